@@ -1,0 +1,1 @@
+//! The wire: messages, services, actions, topics and QoS of Abbe.

@@ -1,0 +1,1 @@
+//! Compensates the axes within limits of size, rate and acceleration.

@@ -1,0 +1,1 @@
+//! A five-axis machine with its own physics that stands in for hardware.

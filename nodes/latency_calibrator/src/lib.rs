@@ -1,0 +1,1 @@
+//! Estimates the transmission latency of a touch probe.

@@ -1,0 +1,1 @@
+//! LinuxCNC behind the same boundary as the fake machine.

@@ -1,0 +1,292 @@
+//! The machine file: a machine as its maker would describe it.
+//!
+//! Keys carry their units; unknown keys are refused by name; physics has no default and nothing is
+//! clamped. Units of the file are those of a data sheet; [`MachineFile`] keeps them as written and
+//! offers inner units (mm, rad, s) through methods.
+
+use std::collections::BTreeMap;
+
+use metrology::{Axis, AxisSet};
+use serde::{Deserialize, Serialize};
+
+/// A whole machine file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MachineFile {
+    /// Name of the machine.
+    pub name: String,
+    /// Kinematic chain from workpiece to tool, ISO 10791-6 style, e.g. `[w C' A' Y' b X Z t]`.
+    pub chain: String,
+    /// Axes by letter.
+    pub axes: BTreeMap<Axis, AxisEntry>,
+    /// Where the rotary axes lie; required with rotary axes.
+    #[serde(default)]
+    pub rotary: Option<RotaryEntry>,
+    /// The control.
+    pub control: ControlEntry,
+    /// The touch probe.
+    pub probe: ProbeEntry,
+    /// Reference blocks on the table.
+    #[serde(default)]
+    pub blocks: Vec<BlockEntry>,
+    /// Other probing artefacts on the table.
+    #[serde(default)]
+    pub artefacts: Vec<ArtefactEntry>,
+    /// Temperature sensors.
+    #[serde(default)]
+    pub temperature_sensors: Vec<SensorEntry>,
+    /// Grid encoder, where one is mounted.
+    #[serde(default)]
+    pub grid_encoder: Option<GridEncoderEntry>,
+    /// The KNOWN effects.
+    #[serde(default)]
+    pub effects: Vec<EffectEntry>,
+}
+
+/// One axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum AxisEntry {
+    /// A linear axis.
+    Linear(LinearAxisEntry),
+    /// A rotary axis.
+    Rotary(RotaryAxisEntry),
+}
+
+/// A linear axis driven by a ball screw.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinearAxisEntry {
+    /// Least and greatest position.
+    pub travel_mm: [f64; 2],
+    /// Feed limit.
+    pub feed_limit_mm_min: f64,
+    /// Acceleration limit.
+    pub acceleration_limit_mm_s2: f64,
+    /// Lead of the screw.
+    pub lead_mm: f64,
+    /// Gain of the position loop.
+    pub position_gain_per_s: f64,
+    /// Share of velocity feed-forward, 0 to 1.
+    pub velocity_feedforward: f64,
+    /// Resolution of the motor encoder, seen at the slide.
+    pub encoder_resolution_um: f64,
+    /// Resolution of the linear scale, where there is one.
+    #[serde(default)]
+    pub scale_resolution_um: Option<f64>,
+}
+
+/// A rotary axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RotaryAxisEntry {
+    /// Least and greatest position.
+    pub travel_deg: [f64; 2],
+    /// Feed limit.
+    pub feed_limit_deg_min: f64,
+    /// Acceleration limit.
+    pub acceleration_limit_deg_s2: f64,
+    /// Gain of the position loop.
+    pub position_gain_per_s: f64,
+    /// Share of velocity feed-forward, 0 to 1.
+    pub velocity_feedforward: f64,
+    /// Resolution of the encoder.
+    pub encoder_resolution_arcsec: f64,
+}
+
+/// Nominal lines of the rotary axes, machine frame, all axes at zero.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RotaryEntry {
+    /// A point on each rotary axis' line.
+    pub origin_mm: BTreeMap<Axis, [f64; 3]>,
+}
+
+/// The control.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ControlEntry {
+    /// Servo period.
+    pub servo_period_ms: f64,
+    /// Pulse equivalent of the linear axes.
+    pub pulse_equivalent_um: f64,
+    /// How a probe trigger is latched.
+    pub latch: Latch,
+}
+
+/// How a control latches positions at a probe trigger.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Latch {
+    /// A hardware latch at the instant the signal arrives.
+    Hardware,
+    /// The input is polled in the servo period.
+    Polled,
+}
+
+/// The touch probe.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeEntry {
+    /// Styli by name.
+    pub styli: BTreeMap<String, StylusEntry>,
+    /// The stylus that is mounted.
+    pub mounted: String,
+    /// Clearance before a touch begins.
+    pub standoff_mm: f64,
+    /// How far behind the nominal surface a touch may go before it has failed.
+    pub overtravel_mm: f64,
+    /// Feed of an ordinary touch.
+    pub feed_mm_min: f64,
+    /// Repeatability of one touch (1 standard deviation), as the maker states it.
+    pub repeatability_um: f64,
+    /// Latency, where it is known; a calibration overrides it.
+    #[serde(default)]
+    pub latency_ms: Option<f64>,
+}
+
+/// A stylus.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StylusEntry {
+    /// Effective radius of the ball.
+    pub radius_mm: f64,
+    /// Distance from the spindle nose to the ball centre.
+    pub length_mm: f64,
+}
+
+/// A reference block: three orthogonal faces that meet in a corner.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BlockEntry {
+    /// Name.
+    pub id: String,
+    /// Nominal corner, machine frame with rotary axes at zero.
+    pub corner_mm: [f64; 3],
+    /// Sign of the tool's motion when the X, Y and Z face is touched: the block's body lies that way.
+    pub approach_sign: [i8; 3],
+    /// Distance from the corner at which each face is touched.
+    pub inset_mm: f64,
+}
+
+/// Another artefact for probing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum ArtefactEntry {
+    /// A sphere.
+    Sphere {
+        /// Name.
+        id: String,
+        /// Nominal centre, machine frame, rotary axes at zero.
+        centre_mm: [f64; 3],
+        /// Radius.
+        radius_mm: f64,
+    },
+    /// A ring gauge whose axis is Z.
+    Bore {
+        /// Name.
+        id: String,
+        /// Nominal centre at probing height.
+        centre_mm: [f64; 3],
+        /// Radius.
+        radius_mm: f64,
+    },
+    /// A boss whose axis is Z.
+    Boss {
+        /// Name.
+        id: String,
+        /// Nominal centre at probing height.
+        centre_mm: [f64; 3],
+        /// Radius.
+        radius_mm: f64,
+    },
+    /// A flat face.
+    Plane {
+        /// Name.
+        id: String,
+        /// A point on it.
+        point_mm: [f64; 3],
+        /// Outward normal, one axis direction such as `[0, 0, 1]`.
+        normal: [f64; 3],
+        /// Half the side of the square that is probed.
+        half_side_mm: f64,
+    },
+}
+
+/// A temperature sensor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorEntry {
+    /// Name; the topic is `temperature/<id>`.
+    pub id: String,
+    /// Where it sits.
+    pub place: SensorPlace,
+    /// Time between readings.
+    pub period_s: f64,
+}
+
+/// Where a temperature sensor sits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "named places")]
+pub enum SensorPlace {
+    SpindleFront,
+    SpindleRear,
+    Column,
+    Bed,
+    NutX,
+    NutY,
+    NutZ,
+    Ambient,
+}
+
+/// A grid encoder's plate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GridEncoderEntry {
+    /// Centre of the plate, machine frame.
+    pub centre_mm: [f64; 3],
+    /// Radius of the usable field.
+    pub radius_mm: f64,
+    /// Resolution.
+    pub resolution_um: f64,
+}
+
+/// One known effect; its own keys are checked by the effect itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EffectEntry {
+    /// Id: the file name of the effect in the catalogue.
+    pub kind: String,
+    /// The axis, or pair of axes, where there is one.
+    #[serde(default)]
+    pub axis: Option<String>,
+    /// Parameters by name, unit in the name.
+    #[serde(flatten)]
+    pub parameters: BTreeMap<String, f64>,
+}
+
+impl MachineFile {
+    /// The axes that the machine has.
+    #[must_use]
+    pub fn axis_set(&self) -> AxisSet {
+        self.axes.keys().copied().collect()
+    }
+
+    /// Entry of a linear axis.
+    #[must_use]
+    pub fn linear(&self, axis: Axis) -> Option<&LinearAxisEntry> {
+        match self.axes.get(&axis) {
+            Some(AxisEntry::Linear(entry)) => Some(entry),
+            _ => None,
+        }
+    }
+
+    /// Entry of a rotary axis.
+    #[must_use]
+    pub fn rotary_axis(&self, axis: Axis) -> Option<&RotaryAxisEntry> {
+        match self.axes.get(&axis) {
+            Some(AxisEntry::Rotary(entry)) => Some(entry),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! Vocabulary of machine-tool metrology that every node shares.
+//!
+//! Lengths are millimetres, angles radians, times integer nanoseconds on a named clock, temperatures
+//! degrees Celsius and their differences kelvin. One sign rule holds everywhere: an *error* is
+//! actual minus commanded, of the tool relative to the workpiece; a *compensation* is what is added
+//! to the command. Axes follow ISO 841.
+
+pub mod axis;
+pub mod sample;
+pub mod stage;
+pub mod stamp;
+
+pub use axis::{Axis, AxisSet, PerAxis};
+pub use stage::Stage;
+pub use stamp::{Clock, Host, Machine, Stamp};

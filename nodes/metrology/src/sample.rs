@@ -1,0 +1,19 @@
+//! What the nodes tell each other, in millimetres: the inner form of each message.
+//!
+//! `abbe_msgs` holds the wire form (SI) of each and the only conversion between the two.
+
+mod block;
+mod compensation;
+mod motion;
+mod segment;
+mod sensor;
+mod thermal;
+mod touch;
+
+pub use block::{BlockMeasurement, FacePosition};
+pub use compensation::{AxisCompensation, CompensationState};
+pub use motion::AxisState;
+pub use segment::{Sense, TestKind, TestPlane, TestSegment};
+pub use sensor::{GridSample, LengthSample, TemperatureSample};
+pub use thermal::{AxisDrift, ThermalModel, UpdateReason, UpdateRequest};
+pub use touch::{LatencyMethod, ProbeLatency, ProbeTrigger, ProbedPoint, Rejection};

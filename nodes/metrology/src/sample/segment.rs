@@ -1,0 +1,86 @@
+//! Marks of where a test begins and ends, from whoever runs the program.
+
+use nalgebra::Vector3;
+
+use crate::stamp::{Host, Stamp};
+
+/// What kind of test a segment is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "named after the trajectory")]
+pub enum TestKind {
+    /// Touches of one surface at several feeds.
+    Latency,
+    /// Three faces of each block.
+    Block,
+    /// One touch.
+    Touch,
+    Plane,
+    /// Bore or boss.
+    Bore,
+    Sphere,
+    Circle,
+    Line,
+    Corner,
+    Positioning,
+    Dwell,
+    /// Ordinary work: nothing is measured.
+    Production,
+    /// Poses visited to check the tool error.
+    Verification,
+}
+
+/// Plane of a planar test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the planes of G17, G19 and G18")]
+pub enum TestPlane {
+    None,
+    Xy,
+    Yz,
+    Zx,
+}
+
+/// Sense of rotation of a circular test, seen against the plane's normal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "self-evident")]
+pub enum Sense {
+    None,
+    Clockwise,
+    CounterClockwise,
+}
+
+/// Begin or end of one test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TestSegment {
+    /// When.
+    pub at: Stamp<Host>,
+    /// Number of the run, unique in the bag.
+    pub run: u32,
+    /// True at the begin, false at the end.
+    pub begin: bool,
+    /// What is tested.
+    pub kind: TestKind,
+    /// Plane.
+    pub plane: TestPlane,
+    /// Centre in the machine frame, mm.
+    pub centre_mm: Vector3<f64>,
+    /// Nominal radius, mm; zero where there is none.
+    pub radius_mm: f64,
+    /// Programmed feed, mm/s.
+    pub feed_mm_s: f64,
+    /// Sense.
+    pub sense: Sense,
+    /// Which repetition of the same test, from 0.
+    pub repeat: u32,
+    /// Stylus name in the machine file; empty: none.
+    pub stylus: String,
+    /// Zero of the grid encoder or length reference.
+    pub zero_id: u32,
+    /// Changes whenever something was set up anew.
+    pub setup_id: u32,
+    /// Whether what is measured becomes the cold reference.
+    pub cold: bool,
+    /// Names of the features (blocks, faces, spheres) that are touched.
+    pub features: Vec<String>,
+    /// Whether the test ran to its end (meaningful at the end).
+    pub completed: bool,
+}

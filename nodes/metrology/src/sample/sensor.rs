@@ -1,0 +1,45 @@
+//! Temperatures and external position references.
+
+use crate::axis::Axis;
+use crate::stamp::{Host, Stamp};
+
+/// One reading of a temperature sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TemperatureSample {
+    /// When it was read.
+    pub at: Stamp<Host>,
+    /// Sensor name in the machine file.
+    pub sensor: String,
+    /// Reading, °C.
+    pub temperature_degc: f64,
+    /// Variance, K²; zero: unknown.
+    pub variance_k2: f64,
+}
+
+/// One reading of a grid encoder: position of the head over the plate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridSample {
+    /// When it was read.
+    pub at: Stamp<Host>,
+    /// Plane of the plate.
+    pub plane: super::TestPlane,
+    /// First coordinate of the plane (X in XY, Y in YZ, Z in ZX), mm.
+    pub u_mm: f64,
+    /// Second coordinate, mm.
+    pub v_mm: f64,
+    /// Changes whenever the encoder is zeroed anew.
+    pub zero_id: u32,
+}
+
+/// One reading of a length reference (interferometer, tracker, step gauge).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LengthSample {
+    /// When it was read.
+    pub at: Stamp<Host>,
+    /// Axis along which it measures.
+    pub axis: Axis,
+    /// Displacement along it, mm.
+    pub displacement_mm: f64,
+    /// Changes whenever the reference is zeroed anew.
+    pub zero_id: u32,
+}

@@ -1,0 +1,1 @@
+//! Runs nodes on ROS 2: the only crate that knows it.

@@ -1,0 +1,1 @@
+//! Corrects touches for latency and stylus radius and evaluates touching cycles.

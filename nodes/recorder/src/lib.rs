@@ -1,0 +1,1 @@
+//! Records topics to MCAP in the layout of rosbag2.

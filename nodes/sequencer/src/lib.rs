@@ -1,0 +1,1 @@
+//! Runs measuring cycles and scenario steps on a controller.

@@ -1,0 +1,1 @@
+//! Models thermal drift from reference blocks on the table.
