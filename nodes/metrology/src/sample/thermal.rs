@@ -28,7 +28,9 @@ pub struct AxisDrift {
     pub slope_identifiable: bool,
     /// Rate of the drift at `p0_mm`, mm/s, used to extrapolate between updates; zero where no time constant is known.
     pub rate_mm_s: f64,
-    /// Time constant with which `rate_mm_s` decays, s; infinite where unknown.
+    /// Rate of the slope, 1/s, used likewise: a screw's growth changes the slope, not the offset.
+    pub slope_rate_per_s: f64,
+    /// Time constant with which both rates decay, s; infinite where unknown.
     pub time_constant_s: f64,
 }
 
