@@ -6,10 +6,12 @@
 //! to the command. Axes follow ISO 841.
 
 pub mod axis;
+pub mod parameter;
 pub mod sample;
 pub mod stage;
 pub mod stamp;
 
 pub use axis::{Axis, AxisSet, PerAxis};
+pub use parameter::ParameterDoc;
 pub use stage::Stage;
 pub use stamp::{Clock, Host, Machine, Stamp};
