@@ -6,6 +6,8 @@
 //! to the command. Axes follow ISO 841.
 
 pub mod axis;
+pub mod drift;
+pub mod least_squares;
 pub mod parameter;
 pub mod sample;
 pub mod stage;

@@ -59,6 +59,9 @@ impl Span {
 }
 
 /// An instant on clock `C`, in nanoseconds since that clock's epoch.
+///
+/// Sums and differences stop at the ends of the 292 years that fit: a senseless stamp from outside
+/// must not end a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Stamp<C: Clock> {
     nanos: i64,
@@ -92,7 +95,7 @@ impl<C: Clock> Sub for Stamp<C> {
     type Output = Span;
 
     fn sub(self, earlier: Self) -> Span {
-        Span(self.nanos - earlier.nanos)
+        Span(self.nanos.saturating_sub(earlier.nanos))
     }
 }
 
@@ -100,7 +103,7 @@ impl<C: Clock> Add<Span> for Stamp<C> {
     type Output = Self;
 
     fn add(self, span: Span) -> Self {
-        Self::from_nanos(self.nanos + span.0)
+        Self::from_nanos(self.nanos.saturating_add(span.0))
     }
 }
 
@@ -108,19 +111,30 @@ impl<C: Clock> Sub<Span> for Stamp<C> {
     type Output = Self;
 
     fn sub(self, span: Span) -> Self {
-        Self::from_nanos(self.nanos - span.0)
+        Self::from_nanos(self.nanos.saturating_sub(span.0))
     }
 }
 
 impl<C: Clock> AddAssign<Span> for Stamp<C> {
     fn add_assign(&mut self, span: Span) {
-        self.nanos += span.0;
+        *self = *self + span;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn senseless_stamps_do_not_panic() {
+        let (first, last) = (
+            Stamp::<Host>::from_nanos(i64::MIN),
+            Stamp::<Host>::from_nanos(i64::MAX),
+        );
+        assert_eq!((last - first).nanos(), i64::MAX);
+        assert_eq!(last + Span::from_secs_f64(1.0), last);
+        assert_eq!(first - Span::from_secs_f64(1.0), first);
+    }
 
     #[test]
     fn spans_add_back_to_the_stamp() {
