@@ -1,0 +1,132 @@
+//! What can be wrong with a plant file, and with the two files together.
+
+use metrology::Axis;
+
+/// A plant that cannot be built.
+#[derive(Debug, thiserror::Error)]
+pub enum PlantError {
+    /// The text is not a plant file; the message names key, line and column.
+    #[error("plant file: {source}")]
+    Syntax {
+        /// What the reader found.
+        #[from]
+        source: serde_saphyr::Error,
+    },
+    /// A value is outside its range.
+    #[error("{place} = {value}: must be {limit}")]
+    OutOfRange {
+        /// Path of the key, unit in its name.
+        place: String,
+        /// The value as written.
+        value: f64,
+        /// The range.
+        limit: &'static str,
+    },
+    /// An axis of the machine file has no entry.
+    #[error("{place}: no entry for axis {axis}, which the machine file has")]
+    AxisMissing {
+        /// The table that lacks it.
+        place: &'static str,
+        /// The axis.
+        axis: Axis,
+    },
+    /// An entry for an axis that the machine file lacks, or has as another kind.
+    #[error("{place}.{axis}: the machine file has no such axis of this kind")]
+    AxisUnknown {
+        /// The table.
+        place: &'static str,
+        /// The axis.
+        axis: Axis,
+    },
+    /// A name that the machine file does not know.
+    #[error("{place}: \"{name}\" is not in the machine file")]
+    NameUnknown {
+        /// Path of the key.
+        place: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// The chain string cannot be read.
+    #[error("chain \"{chain}\", column {column}: \"{found}\": expected {expected}")]
+    Chain {
+        /// The whole string.
+        chain: String,
+        /// Column of the offence, from 1.
+        column: usize,
+        /// What stands there.
+        found: String,
+        /// What should.
+        expected: &'static str,
+    },
+    /// A drive whose elastic mode is too fast for the servo period.
+    #[error(
+        "drive {axis}: natural frequency times inner step = {product}: must be below {limit} \
+         (lower the stiffnesses or the servo period)"
+    )]
+    TooStiff {
+        /// The axis.
+        axis: Axis,
+        /// Angular frequency times inner step.
+        product: f64,
+        /// Greatest allowed.
+        limit: f64,
+    },
+    /// Two heat links between the same places, or a link from a place to itself.
+    #[error(
+        "heat.links[{index}]: {from} to {to}: each pair of different places has one link at most"
+    )]
+    Link {
+        /// Index of the link in the file.
+        index: usize,
+        /// One end.
+        from: String,
+        /// The other end.
+        to: String,
+    },
+    /// An artefact whose normal is no axis direction.
+    #[error("artefact \"{id}\": normal {normal:?}: must be an axis direction such as [0, 0, 1]")]
+    Normal {
+        /// Name of the artefact.
+        id: String,
+        /// The normal as written.
+        normal: [f64; 3],
+    },
+}
+
+/// Refuses a value outside `limit`.
+pub(super) fn require(
+    holds: bool,
+    place: impl Into<String>,
+    value: f64,
+    limit: &'static str,
+) -> Result<(), PlantError> {
+    if holds {
+        Ok(())
+    } else {
+        Err(PlantError::OutOfRange {
+            place: place.into(),
+            value,
+            limit,
+        })
+    }
+}
+
+/// Refuses anything but a finite number above zero.
+pub(super) fn require_positive(place: impl Into<String>, value: f64) -> Result<(), PlantError> {
+    require(
+        value > 0.0 && value.is_finite(),
+        place,
+        value,
+        "finite and above 0",
+    )
+}
+
+/// Refuses anything but a finite number not below zero.
+pub(super) fn require_not_negative(place: impl Into<String>, value: f64) -> Result<(), PlantError> {
+    require(
+        value >= 0.0 && value.is_finite(),
+        place,
+        value,
+        "finite and not below 0",
+    )
+}

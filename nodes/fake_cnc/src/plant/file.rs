@@ -1,0 +1,37 @@
+//! The plant file: the true state of the machine, which reaches no topic, bag or other node.
+//!
+//! Units are those of data sheets and end every key; unknown keys are refused by name; physics has
+//! no default.
+
+mod drives;
+
+pub use drives::{FrictionEntry, LinearDriveEntry, RotaryDriveEntry, RotaryFrictionEntry};
+
+use std::collections::BTreeMap;
+
+use metrology::Axis;
+use serde::{Deserialize, Serialize};
+
+use super::error::PlantError;
+
+/// A whole plant file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlantFile {
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Drives of the linear axes.
+    pub linear_drives: BTreeMap<Axis, LinearDriveEntry>,
+    /// Drives of the rotary axes.
+    pub rotary_drives: BTreeMap<Axis, RotaryDriveEntry>,
+}
+
+impl PlantFile {
+    /// Reads a plant file from its text.
+    ///
+    /// # Errors
+    /// When a key is unknown, missing or of the wrong type; the message has line and column.
+    pub fn from_yaml(text: &str) -> Result<Self, PlantError> {
+        Ok(serde_saphyr::from_str(text)?)
+    }
+}
