@@ -2,7 +2,12 @@
 //!
 //! Keys carry their units; unknown keys are refused by name; physics has no default and nothing is
 //! clamped. Units of the file are those of a data sheet; [`MachineFile`] keeps them as written and
-//! offers inner units (mm, rad, s) through methods.
+//! offers inner units (mm, rad, s) through methods. [`MachineFile::parse`] reads and checks a whole
+//! file; a value made otherwise is checked by [`MachineFile::check`].
+
+mod axes;
+mod check;
+mod read;
 
 use std::collections::BTreeMap;
 
@@ -18,6 +23,7 @@ pub struct MachineFile {
     /// Kinematic chain from workpiece to tool, ISO 10791-6 style, e.g. `[w C' A' Y' b X Z t]`.
     pub chain: String,
     /// Axes by letter.
+    #[serde(deserialize_with = "axes::deserialize")]
     pub axes: BTreeMap<Axis, AxisEntry>,
     /// Where the rotary axes lie; required with rotary axes.
     #[serde(default)]
@@ -288,5 +294,17 @@ impl MachineFile {
             Some(AxisEntry::Rotary(entry)) => Some(entry),
             _ => None,
         }
+    }
+
+    /// The stylus named by `probe.mounted`.
+    #[must_use]
+    pub fn mounted_stylus(&self) -> Option<&StylusEntry> {
+        self.probe.styli.get(&self.probe.mounted)
+    }
+
+    /// Effective radius of the mounted stylus' ball, mm; zero where none is mounted.
+    #[must_use]
+    pub fn ball_radius_mm(&self) -> f64 {
+        self.mounted_stylus().map_or(0.0, |stylus| stylus.radius_mm)
     }
 }

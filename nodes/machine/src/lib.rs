@@ -1,8 +1,17 @@
 //! The forward model of a machine tool, as simulator, compensation and diagnosis share it.
 //!
-//! `file` reads the machine file, which describes a machine as its maker would. The kinematic chain
-//! and the test programs (touch, block, plane, bore, sphere) stand beside it.
+//! `file` reads the machine file, which describes a machine as its maker would. `chain` is the order
+//! of its axes from workpiece to tool; `kinematics` follows from it where ball and workpiece are and
+//! `orientation` which rotary positions point the probe a given way. `cycle` writes the programs
+//! that touch blocks, planes, bores, bosses and spheres.
 
+pub mod chain;
+pub mod cycle;
+pub mod error;
 pub mod file;
+pub mod kinematics;
 
+pub use chain::{Chain, ChainError};
+pub use error::{CycleError, MachineFileError};
 pub use file::MachineFile;
+pub use kinematics::Kinematics;

@@ -1,0 +1,111 @@
+//! Whether a touch reaches its feed before contact and holds it there, equations (3) and (4).
+
+use metrology::Axis;
+use nalgebra::Vector3;
+
+use crate::error::CycleError;
+use crate::file::{LinearAxisEntry, MachineFile};
+
+/// How far a surface may lie from its nominal place, mm.
+const PLACEMENT_MM: f64 = 0.2;
+/// Share of the feed that may still be missing at contact.
+const SETTLED_SHARE: f64 = 0.01;
+/// A direction cosine below this does not move its axis.
+const MOVES: f64 = 1e-9;
+
+/// Entry of a linear axis.
+pub(super) fn linear(file: &MachineFile, axis: Axis) -> Result<&LinearAxisEntry, CycleError> {
+    file.linear(axis).ok_or(CycleError::AxisMissing { axis })
+}
+
+/// Greatest acceleration along `direction` that no axis refuses, mm/s².
+pub(super) fn acceleration_mm_s2(
+    file: &MachineFile,
+    direction: &Vector3<f64>,
+) -> Result<f64, CycleError> {
+    let mut least = f64::INFINITY;
+    for axis in Axis::LINEAR {
+        let cosine = direction[axis.index()].abs();
+        if cosine > MOVES {
+            least = least.min(linear(file, axis)?.acceleration_limit_mm_s2 / cosine);
+        }
+    }
+    Ok(least)
+}
+
+/// Least stand-off at which `feed_mm_min` is reached at contact, mm, equation (3).
+///
+/// # Errors
+/// When the machine lacks a linear axis that `approach` moves.
+pub fn needed_standoff_mm(
+    file: &MachineFile,
+    approach: &Vector3<f64>,
+    feed_mm_min: f64,
+) -> Result<f64, CycleError> {
+    let feed_mm_s = feed_mm_min / 60.0;
+    let mut settling_s = 0.0_f64;
+    for axis in Axis::LINEAR {
+        if approach[axis.index()].abs() > MOVES {
+            let entry = linear(file, axis)?;
+            let missing = (1.0 - entry.velocity_feedforward) / SETTLED_SHARE;
+            settling_s = settling_s.max(missing.max(1.0).ln() / entry.position_gain_per_s);
+        }
+    }
+    let ramp_mm = feed_mm_s.powi(2) / (2.0 * acceleration_mm_s2(file, approach)?);
+    Ok(ramp_mm + feed_mm_s * settling_s + PLACEMENT_MM)
+}
+
+/// Least overtravel at which the control does not brake before contact, mm, equation (4).
+///
+/// # Errors
+/// When the machine lacks a linear axis that `approach` moves.
+pub fn needed_overtravel_mm(
+    file: &MachineFile,
+    approach: &Vector3<f64>,
+    feed_mm_min: f64,
+) -> Result<f64, CycleError> {
+    let feed_mm_s = feed_mm_min / 60.0;
+    Ok(feed_mm_s.powi(2) / (2.0 * acceleration_mm_s2(file, approach)?) + PLACEMENT_MM)
+}
+
+/// Refuses a feed that the axes or the distances of the machine file do not allow.
+pub(super) fn check_feed(
+    file: &MachineFile,
+    feature: &str,
+    approach: &Vector3<f64>,
+    feed_mm_min: f64,
+) -> Result<(), CycleError> {
+    for axis in Axis::LINEAR {
+        let share = approach[axis.index()].abs();
+        let limit_mm_min = linear(file, axis)?.feed_limit_mm_min;
+        if feed_mm_min * share > limit_mm_min {
+            return Err(CycleError::FeedAboveLimit {
+                feed_mm_min,
+                axis,
+                limit_mm_min,
+            });
+        }
+    }
+    let acceleration_mm_s2 = acceleration_mm_s2(file, approach)?;
+    let needed_mm = needed_standoff_mm(file, approach, feed_mm_min)?;
+    if file.probe.standoff_mm < needed_mm {
+        return Err(CycleError::StandoffTooShort {
+            feature: feature.to_owned(),
+            feed_mm_min,
+            standoff_mm: file.probe.standoff_mm,
+            needed_mm,
+            acceleration_mm_s2,
+        });
+    }
+    let needed_mm = needed_overtravel_mm(file, approach, feed_mm_min)?;
+    if file.probe.overtravel_mm < needed_mm {
+        return Err(CycleError::OvertravelTooShort {
+            feature: feature.to_owned(),
+            feed_mm_min,
+            overtravel_mm: file.probe.overtravel_mm,
+            needed_mm,
+            acceleration_mm_s2,
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,234 @@
+//! What can be wrong with a machine file, a chain, an orientation or the plan of a touching cycle.
+
+use metrology::Axis;
+
+use crate::chain::ChainError;
+
+/// A machine file that is not a machine.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MachineFileError {
+    /// The text is not a machine file; the reason names the key.
+    #[error("{source_name}:{line}:{column}: {reason}")]
+    Syntax {
+        /// File name as the caller gave it.
+        source_name: String,
+        /// Line, from 1; 0 where the reader could not tell.
+        line: u64,
+        /// Column, from 1; 0 where the reader could not tell.
+        column: u64,
+        /// What the YAML reader says.
+        reason: String,
+    },
+    /// A number outside its physical range.
+    #[error("{source_name}: {key} = {value}: {rule}")]
+    Number {
+        /// File name.
+        source_name: String,
+        /// Path of the key.
+        key: String,
+        /// Its value, in the unit of the key.
+        value: f64,
+        /// What holds for it.
+        rule: &'static str,
+    },
+    /// A pair of limits in the wrong order.
+    #[error("{source_name}: {key} = [{least}, {greatest}]: the first must be below the second")]
+    Order {
+        /// File name.
+        source_name: String,
+        /// Path of the key.
+        key: String,
+        /// First value.
+        least: f64,
+        /// Second value.
+        greatest: f64,
+    },
+    /// A name that breaks a rule or refers to nothing.
+    #[error("{source_name}: {key} = \"{name}\": {rule}")]
+    Name {
+        /// File name.
+        source_name: String,
+        /// Path of the key.
+        key: String,
+        /// The name.
+        name: String,
+        /// What holds for it.
+        rule: &'static str,
+    },
+    /// The chain cannot be read.
+    #[error("{source_name}: chain: {error}")]
+    Chain {
+        /// File name.
+        source_name: String,
+        /// Where and why.
+        #[source]
+        error: ChainError,
+    },
+    /// Chain and axes disagree.
+    #[error("{source_name}: axes.{axis}: {rule}")]
+    Axis {
+        /// File name.
+        source_name: String,
+        /// The axis.
+        axis: Axis,
+        /// What holds for it.
+        rule: &'static str,
+    },
+}
+
+/// A touching cycle that cannot or must not be run.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CycleError {
+    /// No block or artefact has this id.
+    #[error("feature \"{feature}\": the machine file has no {wanted} of this name")]
+    UnknownFeature {
+        /// The name.
+        feature: String,
+        /// What was looked for.
+        wanted: &'static str,
+    },
+    /// The machine file has nothing of the kind.
+    #[error("the machine file has no {wanted}, so there is nothing to touch")]
+    NothingToTouch {
+        /// What was looked for.
+        wanted: &'static str,
+    },
+    /// A move would leave the travel.
+    #[error(
+        "feature \"{feature}\": axis {axis} would go to {position}, travel is [{least}, {greatest}] (mm, deg)"
+    )]
+    OutsideTravel {
+        /// What was to be touched.
+        feature: String,
+        /// The axis.
+        axis: Axis,
+        /// Where it would go, mm or deg.
+        position: f64,
+        /// Least position.
+        least: f64,
+        /// Greatest position.
+        greatest: f64,
+    },
+    /// The machine lacks a linear axis.
+    #[error("axis {axis} is not in the machine file; touching needs X, Y and Z")]
+    AxisMissing {
+        /// The axis.
+        axis: Axis,
+    },
+    /// The stand-off does not suffice to reach the feed.
+    #[error(
+        "feature \"{feature}\": feed {feed_mm_min} mm/min needs a stand-off of {needed_mm:.3} mm (acceleration {acceleration_mm_s2} mm/s2), probe.standoff_mm is {standoff_mm}"
+    )]
+    StandoffTooShort {
+        /// What was to be touched.
+        feature: String,
+        /// Feed, mm/min.
+        feed_mm_min: f64,
+        /// What there is, mm.
+        standoff_mm: f64,
+        /// What is needed, mm.
+        needed_mm: f64,
+        /// Acceleration along the approach, mm/s².
+        acceleration_mm_s2: f64,
+    },
+    /// The controller would brake for the end of the move before it touches.
+    #[error(
+        "feature \"{feature}\": feed {feed_mm_min} mm/min needs an overtravel of {needed_mm:.3} mm to be held at contact (acceleration {acceleration_mm_s2} mm/s2), probe.overtravel_mm is {overtravel_mm}"
+    )]
+    OvertravelTooShort {
+        /// What was to be touched.
+        feature: String,
+        /// Feed, mm/min.
+        feed_mm_min: f64,
+        /// What there is, mm.
+        overtravel_mm: f64,
+        /// What is needed, mm.
+        needed_mm: f64,
+        /// Acceleration along the approach, mm/s².
+        acceleration_mm_s2: f64,
+    },
+    /// A feed that is no feed.
+    #[error("feeds[{index}] = {feed_mm_min} mm/min: must be a finite number above 0")]
+    FeedNotPositive {
+        /// Place in the list.
+        index: usize,
+        /// Feed, mm/min.
+        feed_mm_min: f64,
+    },
+    /// A feed above an axis' limit.
+    #[error("feed {feed_mm_min} mm/min exceeds the limit of axis {axis}, {limit_mm_min} mm/min")]
+    FeedAboveLimit {
+        /// Feed, mm/min.
+        feed_mm_min: f64,
+        /// The axis.
+        axis: Axis,
+        /// Its limit, mm/min.
+        limit_mm_min: f64,
+    },
+    /// One feed tells nothing about latency.
+    #[error("{n} feeds were given: latency needs at least {least} different feeds")]
+    TooFewFeeds {
+        /// How many.
+        n: usize,
+        /// How many are needed.
+        least: usize,
+    },
+    /// Two feeds are the same.
+    #[error(
+        "feeds[{first}] and feeds[{second}] are both {feed_mm_min} mm/min: latency needs different feeds"
+    )]
+    EqualFeeds {
+        /// Place of the first.
+        first: usize,
+        /// Place of the second.
+        second: usize,
+        /// Feed, mm/min.
+        feed_mm_min: f64,
+    },
+    /// A vertical stylus cannot touch from below.
+    #[error("feature \"{feature}\": it would be touched upwards, a vertical stylus cannot")]
+    ApproachFromBelow {
+        /// What was to be touched.
+        feature: String,
+    },
+    /// The ball does not fit with room to move.
+    #[error(
+        "feature \"{feature}\": radius {radius_mm} mm leaves {room_mm:.3} mm of room to a ball of radius {ball_radius_mm} mm, a stand-off of {standoff_mm} mm needs more than half of that"
+    )]
+    BoreTooSmall {
+        /// The bore.
+        feature: String,
+        /// Its radius, mm.
+        radius_mm: f64,
+        /// Radius of the stylus ball, mm.
+        ball_radius_mm: f64,
+        /// Distance the ball can move from the centre, mm.
+        room_mm: f64,
+        /// Stand-off of the machine file, mm.
+        standoff_mm: f64,
+    },
+    /// Too few points for the shape.
+    #[error("{points} points were asked for: a {shape} needs at least {least}")]
+    TooFewPoints {
+        /// Which shape.
+        shape: &'static str,
+        /// How many were asked for.
+        points: u32,
+        /// How many are needed.
+        least: u32,
+    },
+    /// A plane whose normal is not along an axis.
+    #[error(
+        "feature \"{feature}\": normal [{x}, {y}, {z}] is not along one axis; a plane cycle probes along one axis"
+    )]
+    NormalNotAlongAxis {
+        /// The plane.
+        feature: String,
+        /// Normal, X.
+        x: f64,
+        /// Normal, Y.
+        y: f64,
+        /// Normal, Z.
+        z: f64,
+    },
+}
