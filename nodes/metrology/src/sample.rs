@@ -4,6 +4,7 @@
 
 mod block;
 mod compensation;
+mod feature;
 mod motion;
 mod segment;
 mod sensor;
@@ -12,6 +13,7 @@ mod touch;
 
 pub use block::{BlockMeasurement, FacePosition};
 pub use compensation::{AxisCompensation, CompensationState};
+pub use feature::{FeatureKind, ProbedFeature};
 pub use motion::AxisState;
 pub use segment::{Sense, TestKind, TestPlane, TestSegment};
 pub use sensor::{GridSample, LengthSample, TemperatureSample};
