@@ -1,0 +1,79 @@
+//! What every message, service and action says about itself.
+
+use std::fmt::Debug;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// A ROS 2 message.
+pub trait Message:
+    Clone + Debug + Default + PartialEq + Serialize + DeserializeOwned + Send + Sync + 'static
+{
+    /// `package/kind/Name`, such as `abbe_msgs/msg/AxisState`.
+    const TYPE_NAME: &'static str;
+    /// The RIHS01 hash of the type, as ROS 2 Jazzy computes it.
+    const TYPE_HASH: &'static str;
+    /// The `ros2msg` schema text: the definition and those of all types that it holds.
+    const DEFINITION: &'static str;
+
+    /// The three constants as values.
+    const DESCRIPTION: Description = Description {
+        type_name: Self::TYPE_NAME,
+        type_hash: Self::TYPE_HASH,
+        definition: Self::DEFINITION,
+    };
+}
+
+/// Name, hash and schema text of a message type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Description {
+    /// `package/kind/Name`.
+    pub type_name: &'static str,
+    /// The RIHS01 hash.
+    pub type_hash: &'static str,
+    /// The `ros2msg` schema text.
+    pub definition: &'static str,
+}
+
+/// A ROS 2 service.
+pub trait Service: Send + Sync + 'static {
+    /// What the client sends.
+    type Request: Message;
+    /// What the server answers.
+    type Response: Message;
+    /// `package/kind/Name`, such as `std_srvs/srv/SetBool`.
+    const TYPE_NAME: &'static str;
+    /// The RIHS01 hash of the whole service.
+    const TYPE_HASH: &'static str;
+}
+
+/// A ROS 2 action.
+///
+/// [`crate::SendGoal`], [`crate::GetResult`] and [`crate::FeedbackMessage`] are what ROS 2 derives
+/// from it; cancelling and status use `action_msgs`.
+pub trait Action: Clone + Copy + Debug + Default + PartialEq + Send + Sync + 'static {
+    /// What is wanted.
+    type Goal: Message;
+    /// What came of it.
+    type Result: Message;
+    /// How far it is.
+    type Feedback: Message;
+    /// `package/action/Name`, such as `abbe_msgs/action/RunProgram`.
+    const TYPE_NAME: &'static str;
+    /// The RIHS01 hash of the whole action.
+    const TYPE_HASH: &'static str;
+    /// The service `<action>/_action/send_goal`.
+    const SEND_GOAL: Description;
+    /// Its request.
+    const SEND_GOAL_REQUEST: Description;
+    /// Its response.
+    const SEND_GOAL_RESPONSE: Description;
+    /// The service `<action>/_action/get_result`.
+    const GET_RESULT: Description;
+    /// Its request.
+    const GET_RESULT_REQUEST: Description;
+    /// Its response.
+    const GET_RESULT_RESPONSE: Description;
+    /// The message on `<action>/_action/feedback`.
+    const FEEDBACK_MESSAGE: Description;
+}

@@ -1,0 +1,409 @@
+//! Between the wire (SI) and the inside (millimetres): the only place of that conversion.
+//!
+//! ```text
+//!   length on the wire [m] = length inside [mm] / 1000        (1)
+//!   length inside [mm]     = length on the wire [m] * 1000    (2)
+//! ```
+//!
+//! Angles, ratios, times and temperatures have one unit on both sides. (2) after (1) gives the
+//! length back within one unit in the last place, and every further turn gives the same bits; a
+//! value that must be the same live and in replay is therefore taken through [`Wire::as_received`].
+//!
+//! A NaN or an infinity is refused unless the field's comment in the `.msg` file gives it a meaning.
+//! Stamps are instants from 0 to 2^31 s of their clock. One outside has no wire form: it is written
+//! as (-1 s, 2^32 - 1 ns), DDS's invalid time, which [`Wire::to_inner`] refuses like every stamp out
+//! of range.
+//!
+//! # References
+//! REP 103 for the units of the wire; OMG DDS 1.4, 2.3.2 for the invalid time.
+
+use metrology::stamp::NANOS_PER_S;
+use metrology::{Axis, AxisSet, Clock, PerAxis, Stamp};
+use nalgebra::Vector3;
+
+use crate::builtin_interfaces::msg::Time;
+use crate::geometry_msgs::msg::{Point, Vector3 as WireVector};
+use crate::{Message, Place, WireError};
+
+/// A message with an inner form in millimetres.
+pub trait Wire: Message {
+    /// The inner form.
+    type Inner;
+
+    /// Overwrites this message by the wire form of `inner`, reusing its buffers.
+    fn set_from_inner(&mut self, inner: &Self::Inner);
+
+    /// The inner form.
+    ///
+    /// # Errors
+    /// When a value has no inner form; the error names message, field, value and limit.
+    fn to_inner(&self) -> Result<Self::Inner, WireError>;
+
+    /// The wire form of `inner`.
+    #[must_use]
+    fn from_inner(inner: &Self::Inner) -> Self {
+        let mut message = Self::default();
+        message.set_from_inner(inner);
+        message
+    }
+
+    /// The inner form.
+    ///
+    /// # Errors
+    /// As [`Wire::to_inner`].
+    fn into_inner(self) -> Result<Self::Inner, WireError> {
+        self.to_inner()
+    }
+
+    /// What a reader makes of `inner` once it has been on the wire.
+    ///
+    /// # Errors
+    /// As [`Wire::to_inner`].
+    fn as_received(inner: &Self::Inner) -> Result<Self::Inner, WireError> {
+        Self::from_inner(inner).into_inner()
+    }
+}
+
+const MM_PER_M: f64 = 1000.0;
+
+/// (1)
+pub(crate) fn metres(length_mm: f64) -> f64 {
+    length_mm / MM_PER_M
+}
+
+/// (2)
+pub(crate) fn millimetres(length_m: f64) -> f64 {
+    length_m * MM_PER_M
+}
+
+const INVALID_TIME: Time = Time {
+    sec: -1,
+    nanosec: u32::MAX,
+};
+
+/// The wire form of an instant, or the invalid time where there is none.
+pub(crate) fn time<C: Clock>(stamp: Stamp<C>) -> Time {
+    let sec = i32::try_from(stamp.nanos().div_euclid(NANOS_PER_S));
+    let nanosec = u32::try_from(stamp.nanos().rem_euclid(NANOS_PER_S));
+    match (sec, nanosec) {
+        (Ok(sec @ 0..), Ok(nanosec)) => Time { sec, nanosec },
+        _ => INVALID_TIME,
+    }
+}
+
+pub(crate) fn point(place_mm: &Vector3<f64>) -> Point {
+    Point {
+        x: metres(place_mm.x),
+        y: metres(place_mm.y),
+        z: metres(place_mm.z),
+    }
+}
+
+/// A dimensionless vector.
+pub(crate) fn ratios(vector: &Vector3<f64>) -> WireVector {
+    WireVector {
+        x: vector.x,
+        y: vector.y,
+        z: vector.z,
+    }
+}
+
+pub(crate) fn set_letters(letters: &mut Vec<String>, axes: AxisSet) {
+    letters.resize_with(axes.len(), String::new);
+    for (letter, axis) in letters.iter_mut().zip(axes.iter()) {
+        letter.clear();
+        letter.push_str(axis.letter());
+    }
+}
+
+/// Positions or velocities of the axes: (1) for linear axes.
+pub(crate) fn set_positions(out: &mut Vec<f64>, axes: AxisSet, values: &PerAxis<f64>) {
+    out.clear();
+    out.extend(axes.iter().map(|axis| {
+        if axis.is_linear() {
+            metres(values[axis])
+        } else {
+            values[axis]
+        }
+    }));
+}
+
+/// What a number may be.
+#[derive(Clone, Copy)]
+pub(crate) enum Allowed {
+    /// NaN and the infinities are refused.
+    Finite,
+    /// NaN has a meaning.
+    OrNan,
+    /// Plus infinity has a meaning.
+    OrInfinite,
+    /// Nobody may use the number.
+    Anything,
+}
+
+impl Allowed {
+    fn takes(self, value: f64) -> bool {
+        match self {
+            Self::Finite => value.is_finite(),
+            Self::OrNan => !value.is_infinite(),
+            Self::OrInfinite => value.is_finite() || value == f64::INFINITY,
+            Self::Anything => true,
+        }
+    }
+
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Finite => "a finite number",
+            Self::OrNan => "a finite number or NaN",
+            Self::OrInfinite => "a finite number or +inf",
+            Self::Anything => "anything",
+        }
+    }
+}
+
+/// The axes of a message in the order of its arrays.
+pub(crate) struct Letters {
+    axes: [Axis; 6],
+    len: usize,
+}
+
+impl Letters {
+    pub(crate) fn set(&self) -> AxisSet {
+        self.as_slice().iter().copied().collect()
+    }
+
+    fn as_slice(&self) -> &[Axis] {
+        &self.axes[..self.len]
+    }
+}
+
+/// Reads the fields of one message and names it in every error.
+#[derive(Clone, Copy)]
+pub(crate) struct Reader {
+    message: &'static str,
+}
+
+impl Reader {
+    pub(crate) const fn of<M: Message>() -> Self {
+        Self {
+            message: M::TYPE_NAME,
+        }
+    }
+
+    pub(crate) fn number(
+        self,
+        field: &'static str,
+        place: Place,
+        value: f64,
+        allowed: Allowed,
+    ) -> Result<f64, WireError> {
+        if allowed.takes(value) {
+            return Ok(value);
+        }
+        Err(WireError::NotFinite {
+            message: self.message,
+            field,
+            place,
+            value,
+            allowed: allowed.words(),
+        })
+    }
+
+    pub(crate) fn finite(self, field: &'static str, value: f64) -> Result<f64, WireError> {
+        self.number(field, Place::Whole, value, Allowed::Finite)
+    }
+
+    /// (2) of a finite length.
+    pub(crate) fn length_mm(self, field: &'static str, value_m: f64) -> Result<f64, WireError> {
+        self.finite(field, value_m).map(millimetres)
+    }
+
+    pub(crate) fn point_mm(
+        self,
+        field: &'static str,
+        point: &Point,
+        allowed: Allowed,
+    ) -> Result<Vector3<f64>, WireError> {
+        self.vector(field, [point.x, point.y, point.z], allowed)
+            .map(|place_m| place_m.map(millimetres))
+    }
+
+    pub(crate) fn ratios(
+        self,
+        field: &'static str,
+        vector: &WireVector,
+        allowed: Allowed,
+    ) -> Result<Vector3<f64>, WireError> {
+        self.vector(field, [vector.x, vector.y, vector.z], allowed)
+    }
+
+    fn vector(
+        self,
+        field: &'static str,
+        values: [f64; 3],
+        allowed: Allowed,
+    ) -> Result<Vector3<f64>, WireError> {
+        for (axis, value) in Axis::LINEAR.into_iter().zip(values) {
+            self.number(field, Place::Axis(axis), value, allowed)?;
+        }
+        Ok(Vector3::from(values))
+    }
+
+    pub(crate) fn stamp<C: Clock>(
+        self,
+        field: &'static str,
+        place: Place,
+        time: &Time,
+    ) -> Result<Stamp<C>, WireError> {
+        let nanosec = i64::from(time.nanosec);
+        if time.sec < 0 || nanosec >= NANOS_PER_S {
+            return Err(WireError::StampOutOfRange {
+                message: self.message,
+                field,
+                place,
+                sec: time.sec,
+                nanosec: time.nanosec,
+            });
+        }
+        Ok(Stamp::from_nanos(
+            i64::from(time.sec) * NANOS_PER_S + nanosec,
+        ))
+    }
+
+    pub(crate) fn letters(
+        self,
+        field: &'static str,
+        names: &[String],
+    ) -> Result<Letters, WireError> {
+        let mut letters = Letters {
+            axes: Axis::ALL,
+            len: 0,
+        };
+        for (idx, name) in names.iter().enumerate() {
+            let axis = self.letter(field, idx, name, &Axis::ALL, "X Y Z A B C")?;
+            if letters.as_slice().contains(&axis) {
+                return Err(WireError::DuplicateAxis {
+                    message: self.message,
+                    field,
+                    axis,
+                });
+            }
+            letters.axes[letters.len] = axis;
+            letters.len += 1;
+        }
+        Ok(letters)
+    }
+
+    /// A linear axis.
+    pub(crate) fn linear_axis(
+        self,
+        field: &'static str,
+        idx: usize,
+        name: &str,
+    ) -> Result<Axis, WireError> {
+        self.letter(field, idx, name, &Axis::LINEAR, "X Y Z")
+    }
+
+    fn letter(
+        self,
+        field: &'static str,
+        idx: usize,
+        name: &str,
+        among: &[Axis],
+        allowed: &'static str,
+    ) -> Result<Axis, WireError> {
+        let found = among.iter().find(|axis| axis.letter() == name);
+        found.copied().ok_or_else(|| WireError::UnknownAxis {
+            message: self.message,
+            field,
+            idx,
+            name: name.to_owned(),
+            allowed,
+        })
+    }
+
+    pub(crate) fn duplicate(self, field: &'static str, axis: Axis) -> WireError {
+        WireError::DuplicateAxis {
+            message: self.message,
+            field,
+            axis,
+        }
+    }
+
+    /// Values of the axes; those without an entry keep that of `absent`.
+    pub(crate) fn per_axis<W: Copy, T: Copy>(
+        self,
+        field: &'static str,
+        letters: &Letters,
+        values: &[W],
+        absent: T,
+        read: impl Fn(Axis, W) -> Result<T, WireError>,
+    ) -> Result<PerAxis<T>, WireError> {
+        let axes = letters.as_slice();
+        if values.len() != axes.len() {
+            return Err(WireError::LengthDiffers {
+                message: self.message,
+                field,
+                len: values.len(),
+                axes: axes.len(),
+            });
+        }
+        let mut out = PerAxis([absent; 6]);
+        for (axis, value) in axes.iter().zip(values) {
+            out[*axis] = read(*axis, *value)?;
+        }
+        Ok(out)
+    }
+
+    /// Positions or velocities of the axes: (2) for linear axes; absent ones get `absent`.
+    pub(crate) fn positions(
+        self,
+        field: &'static str,
+        letters: &Letters,
+        values: &[f64],
+        absent: f64,
+        allowed: Allowed,
+    ) -> Result<PerAxis<f64>, WireError> {
+        self.per_axis(field, letters, values, absent, |axis, value| {
+            let value = self.number(field, Place::Axis(axis), value, allowed)?;
+            Ok(if axis.is_linear() {
+                millimetres(value)
+            } else {
+                value
+            })
+        })
+    }
+
+    /// The variant whose code is `value`; codes count from 0.
+    pub(crate) fn variant<T: Copy>(
+        self,
+        field: &'static str,
+        place: Place,
+        value: u8,
+        all: &[T],
+        code: fn(T) -> u8,
+    ) -> Result<T, WireError> {
+        let found = all.iter().find(|variant| code(**variant) == value);
+        found.copied().ok_or_else(|| WireError::UnknownValue {
+            message: self.message,
+            field,
+            place,
+            value,
+            greatest: all.iter().map(|variant| code(*variant)).max().unwrap_or(0),
+        })
+    }
+
+    pub(crate) fn contradiction(
+        self,
+        (field, value): (&'static str, bool),
+        (other, other_value): (&'static str, u8),
+    ) -> WireError {
+        WireError::Contradiction {
+            message: self.message,
+            field,
+            value,
+            other,
+            other_value,
+        }
+    }
+}
