@@ -232,3 +232,49 @@ pub enum CycleError {
         z: f64,
     },
 }
+
+/// A probe axis that cannot be reached.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OrientationError {
+    /// The chain cannot be read.
+    #[error("chain: {error}")]
+    Chain {
+        /// Where and why.
+        #[source]
+        error: ChainError,
+    },
+    /// The rotary axes are not C, then A, from workpiece to tool.
+    #[error("chain {chain}: probe angles are solved for C between the workpiece and A, without B")]
+    OtherForm {
+        /// The chain.
+        chain: String,
+    },
+    /// A rotary axis is not described.
+    #[error("axis {axis} stands in the chain but is not described")]
+    AxisMissing {
+        /// The axis.
+        axis: Axis,
+    },
+    /// A component or a position is not a finite number.
+    #[error("probe axis or present position is not finite")]
+    NotFinite,
+    /// The vector has no direction.
+    #[error("probe axis of length {length} has no direction")]
+    NoDirection {
+        /// Its length.
+        length: f64,
+    },
+    /// Both solutions lie outside the travel.
+    #[error(
+        "no solution inside the travel: A = {a_deg:.3} deg or its opposite, travel of A [{:.3}, {:.3}] deg, of C [{:.3}, {:.3}] deg",
+        .travel_a_deg[0], .travel_a_deg[1], .travel_c_deg[0], .travel_c_deg[1]
+    )]
+    OutsideTravel {
+        /// Position of A in the first solution, deg.
+        a_deg: f64,
+        /// Travel of A, deg.
+        travel_a_deg: [f64; 2],
+        /// Travel of C, deg.
+        travel_c_deg: [f64; 2],
+    },
+}

@@ -10,8 +10,10 @@ pub mod cycle;
 pub mod error;
 pub mod file;
 pub mod kinematics;
+pub mod orientation;
 
 pub use chain::{Chain, ChainError};
-pub use error::{CycleError, MachineFileError};
+pub use error::{CycleError, MachineFileError, OrientationError};
 pub use file::MachineFile;
-pub use kinematics::Kinematics;
+pub use kinematics::{Kinematics, TableSense};
+pub use orientation::Orientation;

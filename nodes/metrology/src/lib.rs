@@ -7,6 +7,7 @@
 
 pub mod axis;
 pub mod drift;
+pub mod fit;
 pub mod least_squares;
 pub mod parameter;
 pub mod sample;
