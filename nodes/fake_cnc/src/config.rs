@@ -1,0 +1,408 @@
+//! Parameters of the control; the machine and its plant are described in their own files.
+
+use machine::MachineFile;
+use machine::file::{AxisEntry, Latch};
+use metrology::stamp::Span;
+use metrology::{Axis, PerAxis};
+use serde::{Deserialize, Serialize};
+
+use crate::error::CncError;
+use crate::path::AxisLimits;
+use crate::rs274::Envelope;
+use crate::servo::Gains;
+
+/// Operational parameters; none of them is physics, so each has a default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Rate of axis states during touches and `(rate: full)` contours, Hz.
+    pub state_rate_hz: f64,
+    /// Rate of axis states otherwise, Hz; 0 means `state_rate_hz`.
+    pub background_rate_hz: f64,
+    /// Rate of program feedback, Hz; 10 at most.
+    pub feedback_rate_hz: f64,
+    /// Time for which the full rate goes on after a touch, and rest before one, s.
+    pub touch_margin_s: f64,
+    /// Rest after every exact stop, s.
+    pub settle_s: f64,
+    /// Gain of the velocity loops, 1/s.
+    pub velocity_gain_per_s: f64,
+    /// Integral time of the velocity loops, s.
+    pub velocity_integral_time_s: f64,
+    /// Greatest acceleration demand over the axis' acceleration limit.
+    pub drive_peak_ratio: f64,
+    /// Following error at which a linear axis stops, mm.
+    pub following_error_limit_mm: f64,
+    /// Following error at which a rotary axis stops, deg.
+    pub following_error_limit_deg: f64,
+    /// Age at which the last compensation is held no longer, s.
+    pub compensation_hold_s: f64,
+    /// Rate at which a stale compensation goes to zero, µm/s.
+    pub compensation_fade_um_s: f64,
+    /// The same of rotary axes, arcsec/s.
+    pub compensation_fade_arcsec_s: f64,
+    /// Rate at which a compensation is followed at most, µm/s.
+    pub compensation_rate_limit_um_s: f64,
+    /// The same of rotary axes, arcsec/s.
+    pub compensation_rate_limit_arcsec_s: f64,
+    /// Greatest compensation that is accepted, µm.
+    pub compensation_limit_um: f64,
+    /// The same of rotary axes, arcsec.
+    pub compensation_limit_arcsec: f64,
+    /// Controller clock minus host clock at the first tick, s.
+    pub clock_offset_s: f64,
+    /// Rate of the controller clock against the host's, minus one, parts per million.
+    pub clock_drift_ppm: f64,
+    /// Jump of the host clock beyond which time is skipped rather than simulated, s.
+    pub longest_catch_up_s: f64,
+    /// Positions of the axes at the start by letter, mm or deg; others start at 0.
+    pub start_position: std::collections::BTreeMap<Axis, f64>,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            state_rate_hz: 1000.0,
+            background_rate_hz: 0.0,
+            feedback_rate_hz: 10.0,
+            touch_margin_s: 0.05,
+            settle_s: 0.02,
+            velocity_gain_per_s: 300.0,
+            velocity_integral_time_s: 0.02,
+            drive_peak_ratio: 3.0,
+            following_error_limit_mm: 1.0,
+            following_error_limit_deg: 0.5,
+            compensation_hold_s: 1.0,
+            compensation_fade_um_s: 5.0,
+            compensation_fade_arcsec_s: 5.0,
+            compensation_rate_limit_um_s: 100.0,
+            compensation_rate_limit_arcsec_s: 100.0,
+            compensation_limit_um: 500.0,
+            compensation_limit_arcsec: 500.0,
+            clock_offset_s: 0.0,
+            clock_drift_ppm: 0.0,
+            longest_catch_up_s: 60.0,
+            start_position: std::collections::BTreeMap::new(),
+        }
+    }
+}
+
+/// Limits of a compensation on one axis, per servo period where it is a rate; mm or rad.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OffsetLimits {
+    /// Greatest size.
+    pub size: f64,
+    /// Greatest step in one period while following.
+    pub step: f64,
+    /// Step in one period while fading.
+    pub fade_step: f64,
+}
+
+/// What the control needs of configuration and machine file, in inner units, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    pub(crate) limits: AxisLimits,
+    pub(crate) envelope: Envelope,
+    pub(crate) gains: PerAxis<Gains>,
+    pub(crate) following_error_limit: PerAxis<f64>,
+    pub(crate) offset: PerAxis<OffsetLimits>,
+    pub(crate) latch: Latch,
+    pub(crate) period: Span,
+    pub(crate) state_every: u64,
+    pub(crate) background_every: u64,
+    pub(crate) feedback_every: u64,
+    pub(crate) touch_margin: u64,
+    pub(crate) settle: u64,
+    pub(crate) compensation_hold: u64,
+    pub(crate) clock_offset: Span,
+    pub(crate) clock_drift: f64,
+    pub(crate) longest_catch_up: Span,
+    pub(crate) start: PerAxis<f64>,
+}
+
+impl Settings {
+    /// Checks `config` and the control's part of `machine`.
+    ///
+    /// # Errors
+    /// The first value that is out of range, by name.
+    pub fn new(config: &Config, machine: &MachineFile) -> Result<Self, CncError> {
+        config.check()?;
+        let period_ms = machine.control.servo_period_ms;
+        if !(0.05..=20.0).contains(&period_ms) {
+            return Err(CncError::Parameter {
+                name: "control.servo_period_ms",
+                value: period_ms,
+                rule: "from 0.05 to 20 ms",
+            });
+        }
+        if machine.axes.is_empty() {
+            return Err(CncError::NoAxes);
+        }
+        let period_s = period_ms / 1e3;
+        let mut settings = config.without_axes(machine, period_s)?;
+        for (&axis, entry) in &machine.axes {
+            settings.axis(axis, &AxisNumbers::read(axis, entry)?, config);
+        }
+        settings.start(config)?;
+        Ok(settings)
+    }
+
+    /// Servo periods in `time_s`, rounded up.
+    pub(crate) fn periods(&self, time_s: f64) -> u64 {
+        periods(time_s, self.limits.period_s)
+    }
+
+    fn axis(&mut self, axis: Axis, numbers: &AxisNumbers, config: &Config) {
+        let period_s = self.limits.period_s;
+        self.limits.axes = self.limits.axes.with(axis);
+        self.envelope.axes = self.limits.axes;
+        self.limits.speed[axis] = numbers.speed;
+        self.limits.acceleration[axis] = numbers.acceleration;
+        self.envelope.travel[axis] = numbers.travel;
+        self.gains[axis] = Gains {
+            position_per_s: numbers.position_gain_per_s,
+            feedforward: numbers.feedforward,
+            velocity_per_s: config.velocity_gain_per_s,
+            integral_time_s: config.velocity_integral_time_s,
+            demand_limit: config.drive_peak_ratio * numbers.acceleration,
+        };
+        let arcsec = (1.0_f64 / 3600.0).to_radians();
+        let (following, unit, size, rate, fade) = if axis.is_linear() {
+            (
+                config.following_error_limit_mm,
+                1e-3,
+                config.compensation_limit_um,
+                config.compensation_rate_limit_um_s,
+                config.compensation_fade_um_s,
+            )
+        } else {
+            (
+                config.following_error_limit_deg.to_radians(),
+                arcsec,
+                config.compensation_limit_arcsec,
+                config.compensation_rate_limit_arcsec_s,
+                config.compensation_fade_arcsec_s,
+            )
+        };
+        self.following_error_limit[axis] = following;
+        self.offset[axis] = OffsetLimits {
+            size: size * unit,
+            step: rate * unit * period_s,
+            fade_step: fade * unit * period_s,
+        };
+    }
+
+    fn start(&mut self, config: &Config) -> Result<(), CncError> {
+        for (&axis, &value) in &config.start_position {
+            let position = if axis.is_linear() {
+                value
+            } else {
+                value.to_radians()
+            };
+            let [least, greatest] = self.envelope.travel[axis];
+            if !self.envelope.axes.contains(axis) || !(least..=greatest).contains(&position) {
+                return Err(CncError::Parameter {
+                    name: "start_position",
+                    value,
+                    rule: "of an axis of the machine and within its travel",
+                });
+            }
+            self.start[axis] = position;
+        }
+        Ok(())
+    }
+}
+
+impl Config {
+    fn check(&self) -> Result<(), CncError> {
+        let positive = [
+            ("state_rate_hz", self.state_rate_hz),
+            ("velocity_gain_per_s", self.velocity_gain_per_s),
+            ("velocity_integral_time_s", self.velocity_integral_time_s),
+            ("drive_peak_ratio", self.drive_peak_ratio),
+            ("following_error_limit_mm", self.following_error_limit_mm),
+            ("following_error_limit_deg", self.following_error_limit_deg),
+            ("compensation_hold_s", self.compensation_hold_s),
+            ("compensation_fade_um_s", self.compensation_fade_um_s),
+            (
+                "compensation_fade_arcsec_s",
+                self.compensation_fade_arcsec_s,
+            ),
+            (
+                "compensation_rate_limit_um_s",
+                self.compensation_rate_limit_um_s,
+            ),
+            (
+                "compensation_rate_limit_arcsec_s",
+                self.compensation_rate_limit_arcsec_s,
+            ),
+            ("compensation_limit_um", self.compensation_limit_um),
+            ("compensation_limit_arcsec", self.compensation_limit_arcsec),
+            ("longest_catch_up_s", self.longest_catch_up_s),
+        ];
+        for (name, value) in positive {
+            require(name, value, value > 0.0, "above 0")?;
+        }
+        let not_negative = [
+            ("background_rate_hz", self.background_rate_hz),
+            ("touch_margin_s", self.touch_margin_s),
+            ("settle_s", self.settle_s),
+        ];
+        for (name, value) in not_negative {
+            require(name, value, value >= 0.0, "0 or above")?;
+        }
+        let rate = self.feedback_rate_hz;
+        require(
+            "feedback_rate_hz",
+            rate,
+            rate > 0.0 && rate <= 10.0,
+            "above 0 and at most 10 Hz",
+        )?;
+        let offset_s = self.clock_offset_s;
+        require(
+            "clock_offset_s",
+            offset_s,
+            offset_s.abs() <= 1e9,
+            "within 1e9 s of 0",
+        )?;
+        let drift_ppm = self.clock_drift_ppm;
+        require(
+            "clock_drift_ppm",
+            drift_ppm,
+            drift_ppm.abs() <= 1000.0,
+            "from -1000 to 1000 ppm",
+        )
+    }
+
+    fn without_axes(&self, machine: &MachineFile, period_s: f64) -> Result<Settings, CncError> {
+        let background_hz = if self.background_rate_hz > 0.0 {
+            self.background_rate_hz
+        } else {
+            self.state_rate_hz
+        };
+        Ok(Settings {
+            limits: AxisLimits {
+                axes: metrology::AxisSet::EMPTY,
+                speed: PerAxis::default(),
+                acceleration: PerAxis::default(),
+                period_s,
+            },
+            envelope: Envelope {
+                axes: metrology::AxisSet::EMPTY,
+                travel: PerAxis::default(),
+            },
+            gains: PerAxis::default(),
+            following_error_limit: PerAxis::default(),
+            offset: PerAxis::default(),
+            latch: machine.control.latch,
+            period: Span::from_secs_f64(period_s),
+            state_every: every("state_rate_hz", self.state_rate_hz, period_s)?,
+            background_every: every("background_rate_hz", background_hz, period_s)?,
+            feedback_every: periods(1.0 / self.feedback_rate_hz, period_s).max(1),
+            touch_margin: periods(self.touch_margin_s, period_s),
+            settle: periods(self.settle_s, period_s),
+            compensation_hold: periods(self.compensation_hold_s, period_s),
+            clock_offset: Span::from_secs_f64(self.clock_offset_s),
+            clock_drift: self.clock_drift_ppm * 1e-6,
+            longest_catch_up: Span::from_secs_f64(self.longest_catch_up_s),
+            start: PerAxis::default(),
+        })
+    }
+}
+
+fn require(
+    name: &'static str,
+    value: f64,
+    holds: bool,
+    rule: &'static str,
+) -> Result<(), CncError> {
+    if holds && value.is_finite() {
+        Ok(())
+    } else {
+        Err(CncError::Parameter { name, value, rule })
+    }
+}
+
+/// Whole servo periods in a time, rounded up.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "times are checked to be finite and not negative; the cast saturates"
+)]
+fn periods(time_s: f64, period_s: f64) -> u64 {
+    (time_s / period_s - 1e-9).ceil() as u64
+}
+
+/// Servo periods from one sample to the next.
+fn every(name: &'static str, rate_hz: f64, period_s: f64) -> Result<u64, CncError> {
+    let ratio = 1.0 / (rate_hz * period_s);
+    let whole = ratio.round();
+    require(
+        name,
+        rate_hz,
+        whole >= 1.0 && (ratio - whole).abs() < 1e-6 * whole,
+        "a whole part of the servo rate",
+    )?;
+    Ok(periods(whole * period_s, period_s).max(1))
+}
+
+/// An axis of the machine file in inner units.
+struct AxisNumbers {
+    travel: [f64; 2],
+    speed: f64,
+    acceleration: f64,
+    position_gain_per_s: f64,
+    feedforward: f64,
+}
+
+impl AxisNumbers {
+    fn read(axis: Axis, entry: &AxisEntry) -> Result<Self, CncError> {
+        let numbers = match entry {
+            AxisEntry::Linear(linear) if axis.is_linear() => Self {
+                travel: linear.travel_mm,
+                speed: linear.feed_limit_mm_min / 60.0,
+                acceleration: linear.acceleration_limit_mm_s2,
+                position_gain_per_s: linear.position_gain_per_s,
+                feedforward: linear.velocity_feedforward,
+            },
+            AxisEntry::Rotary(rotary) if !axis.is_linear() => Self {
+                travel: rotary.travel_deg.map(f64::to_radians),
+                speed: rotary.feed_limit_deg_min.to_radians() / 60.0,
+                acceleration: rotary.acceleration_limit_deg_s2.to_radians(),
+                position_gain_per_s: rotary.position_gain_per_s,
+                feedforward: rotary.velocity_feedforward,
+            },
+            _ => return Err(CncError::AxisKind { axis }),
+        };
+        numbers.check(axis)?;
+        Ok(numbers)
+    }
+
+    fn check(&self, axis: Axis) -> Result<(), CncError> {
+        let positive = [
+            ("feed_limit", self.speed),
+            ("acceleration_limit", self.acceleration),
+            ("position_gain_per_s", self.position_gain_per_s),
+            ("travel", self.travel[1] - self.travel[0]),
+        ];
+        for (name, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(CncError::MachineAxis {
+                    axis,
+                    name,
+                    value,
+                    rule: "above 0",
+                });
+            }
+        }
+        if !(0.0..=1.0).contains(&self.feedforward) {
+            return Err(CncError::MachineAxis {
+                axis,
+                name: "velocity_feedforward",
+                value: self.feedforward,
+                rule: "from 0 to 1",
+            });
+        }
+        Ok(())
+    }
+}

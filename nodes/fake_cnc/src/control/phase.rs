@@ -1,0 +1,248 @@
+//! Phases of a program and what follows each.
+
+use metrology::PerAxis;
+
+use super::{Control, Event, Run};
+use crate::hardware::Hardware;
+use crate::lookahead::Command;
+use crate::outcome::{Ending, ProgramState};
+use crate::path::{Segment, target};
+use crate::rs274::program::{Action, Motion, Touch};
+
+/// Periods for which the velocity loops brake after a following error.
+const BRAKING_PERIODS: u64 = 500;
+
+/// What the control is doing; times in servo periods.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Phase {
+    Idle,
+    /// Along a chain of motions.
+    Following,
+    /// At rest after a motion.
+    Settling {
+        left: u64,
+    },
+    /// At rest before the touch that is the last step taken.
+    Leading {
+        left: u64,
+    },
+    /// Towards a surface; `rest` counts once the way is at its end.
+    Touching {
+        touch: Touch,
+        rest: u64,
+    },
+    /// Slowing down after a trigger.
+    Touched,
+    Dwelling {
+        left: u64,
+    },
+    /// Slowing down along the path before the end.
+    Stopping {
+        ending: Ending,
+    },
+    /// Position loops open, velocity loops braking.
+    Braking {
+        left: u64,
+        ending: Ending,
+    },
+}
+
+impl Phase {
+    pub(super) fn ending(&self) -> bool {
+        matches!(self, Self::Stopping { .. } | Self::Braking { .. })
+    }
+
+    pub(super) fn state(&self, running: bool) -> ProgramState {
+        match self {
+            Self::Idle if running => ProgramState::Running,
+            Self::Idle => ProgramState::Idle,
+            Self::Leading { .. } | Self::Touching { .. } | Self::Touched => ProgramState::Probing,
+            Self::Stopping { ending } | Self::Braking { ending, .. } => match ending {
+                Ending::Fault { .. } => ProgramState::Fault,
+                _ => ProgramState::Holding,
+            },
+            _ => ProgramState::Running,
+        }
+    }
+}
+
+impl<H: Hardware> Control<H> {
+    pub(super) fn brake(&mut self, ending: Ending) {
+        self.chain.clear();
+        self.command.velocity = PerAxis::default();
+        self.phase = Phase::Braking {
+            left: BRAKING_PERIODS,
+            ending,
+        };
+    }
+
+    pub(super) fn next_phase(&mut self, events: &mut Vec<Event>) {
+        let moving = !self.chain.done();
+        let settle = self.settings.settle;
+        match &mut self.phase {
+            Phase::Idle => {}
+            Phase::Following | Phase::Touched | Phase::Stopping { .. } if moving => {}
+            Phase::Following | Phase::Touched => self.phase = Phase::Settling { left: settle },
+            Phase::Settling { left }
+            | Phase::Leading { left }
+            | Phase::Dwelling { left }
+            | Phase::Braking { left, .. }
+                if *left > 0 =>
+            {
+                *left -= 1;
+            }
+            Phase::Settling { .. } | Phase::Dwelling { .. } => self.next_step(events),
+            Phase::Leading { .. } => self.begin_touch(events),
+            Phase::Touching { .. } if moving => {}
+            Phase::Touching { rest, .. } if *rest < settle => *rest += 1,
+            Phase::Touching { touch, .. } => {
+                let touch = *touch;
+                self.missed(touch, events);
+            }
+            Phase::Stopping { ending } => {
+                let ending = ending.clone();
+                self.end(ending, events);
+            }
+            Phase::Braking { ending, .. } => {
+                let ending = ending.clone();
+                let offset = *self.offset.applied();
+                self.command.position = PerAxis::from_fn(|axis| {
+                    if self.settings.limits.axes.contains(axis) {
+                        self.feedback.motor[axis] - offset[axis]
+                    } else {
+                        0.0
+                    }
+                });
+                self.end(ending, events);
+            }
+        }
+    }
+
+    fn end(&mut self, ending: Ending, events: &mut Vec<Event>) {
+        self.spindle_rpm = 0.0;
+        self.phase = Phase::Idle;
+        events.push(Event::Ended(ending));
+    }
+
+    /// Forgets the ended program; gives its goal and the line of its last step taken.
+    pub fn take_ended(&mut self) -> Option<(u64, u32)> {
+        let (line, _) = self.progress();
+        self.run.take().map(|run| (run.goal, line))
+    }
+
+    /// Takes steps until one of them needs time.
+    fn next_step(&mut self, events: &mut Vec<Event>) {
+        while let Some(step) = self
+            .run
+            .as_ref()
+            .and_then(|run| run.program.steps.get(run.next).copied())
+        {
+            match step.action {
+                Action::Move(_) => {
+                    if self.begin_chain() {
+                        self.phase = Phase::Following;
+                        return;
+                    }
+                    continue;
+                }
+                Action::Touch(..) => {
+                    self.phase = Phase::Leading {
+                        left: self.settings.touch_margin,
+                    };
+                }
+                Action::Dwell(time_s) => {
+                    self.phase = Phase::Dwelling {
+                        left: self.settings.periods(time_s),
+                    };
+                }
+                Action::Spindle(rpm) => self.spindle_rpm = rpm,
+                Action::End => {}
+            }
+            if let Some(run) = &mut self.run {
+                run.next += 1;
+            }
+            match step.action {
+                Action::End => return self.end(Ending::Done, events),
+                Action::Spindle(_) => {}
+                _ => return,
+            }
+        }
+    }
+
+    /// Plans every motion up to the next stop; false where none of them has a length.
+    fn begin_chain(&mut self) -> bool {
+        let Some(Run { program, next, .. }) = &mut self.run else {
+            return false;
+        };
+        self.chain.clear();
+        let mut at = self.command.position;
+        while let Some(step) = program.steps.get(*next) {
+            let Action::Move(motion) = &step.action else {
+                break;
+            };
+            if let Some(segment) = Segment::new(motion, &at, &self.settings.limits) {
+                self.chain.push(segment, *next);
+            }
+            at = target(motion, &at);
+            *next += 1;
+        }
+        self.chain.plan(&self.settings.limits);
+        if self.chain.done() {
+            self.command = Command {
+                position: at,
+                velocity: PerAxis::default(),
+            };
+        }
+        !self.chain.done()
+    }
+
+    fn current_touch(&self) -> Option<(usize, u32, Motion, Touch)> {
+        let run = self.run.as_ref()?;
+        let index = run.next.checked_sub(1)?;
+        let step = run.program.steps.get(index)?;
+        match step.action {
+            Action::Touch(motion, touch) => Some((index, step.line, motion, touch)),
+            _ => None,
+        }
+    }
+
+    fn begin_touch(&mut self, events: &mut Vec<Event>) {
+        let Some((step, line, motion, touch)) = self.current_touch() else {
+            return self.next_step(events);
+        };
+        if self.hardware.probe_closed() == touch.until_closed {
+            let ending = Ending::Stuck {
+                line,
+                feature: self.feature(touch.feature),
+                state: signal(touch.until_closed),
+            };
+            return self.end(ending, events);
+        }
+        let at = self.command.position;
+        self.chain.clear();
+        if let Some(segment) = Segment::new(&motion, &at, &self.settings.limits) {
+            self.approach
+                .begin(segment.start(), segment.end(), &self.feedback.motor);
+            self.chain.push(segment, step);
+        }
+        self.chain.plan(&self.settings.limits);
+        self.phase = Phase::Touching { touch, rest: 0 };
+    }
+
+    fn missed(&mut self, touch: Touch, events: &mut Vec<Event>) {
+        if !touch.must_happen {
+            return self.next_step(events);
+        }
+        let line = self.current_touch().map_or(0, |(_, line, ..)| line);
+        let ending = Ending::Missed {
+            line,
+            feature: self.feature(touch.feature),
+            wanted: signal(touch.until_closed),
+        };
+        self.end(ending, events);
+    }
+}
+
+fn signal(closed: bool) -> &'static str {
+    if closed { "closed" } else { "open" }
+}

@@ -1,0 +1,199 @@
+//! The compensation input: offsets added to the position commands, never as a step.
+//!
+//! # Model
+//!
+//! ```text
+//!   o ← o + clamp(o* - o, ±ȯ_max T)          while messages come              (1)
+//!   o ← o - sign(o) min(|o|, ȯ_fade T)       after `compensation_hold_s` without one     (2)
+//! ```
+//!
+//! o* is the last accepted offset. Until it is stale it is held. Because (1) holds for the first
+//! message as for any other, a compensation that starts, stops, restarts or jumps moves the axis at
+//! ȯ_max and no faster.
+
+use metrology::sample::AxisCompensation;
+use metrology::{AxisSet, PerAxis};
+
+use crate::config::OffsetLimits;
+use crate::diagnostic::Diagnostic;
+
+/// State of the compensation input.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OffsetInput {
+    axes: AxisSet,
+    limits: PerAxis<OffsetLimits>,
+    hold: u64,
+    wanted: PerAxis<f64>,
+    applied: PerAxis<f64>,
+    silent: u64,
+    stale: bool,
+    resting: bool,
+}
+
+impl OffsetInput {
+    /// Nothing applied; `hold` is in servo periods.
+    #[must_use]
+    pub fn new(axes: AxisSet, limits: PerAxis<OffsetLimits>, hold: u64) -> Self {
+        Self {
+            axes,
+            limits,
+            hold,
+            wanted: PerAxis::default(),
+            applied: PerAxis::default(),
+            silent: 0,
+            stale: true,
+            resting: true,
+        }
+    }
+
+    /// Offsets in effect, mm or rad.
+    #[must_use]
+    pub const fn applied(&self) -> &PerAxis<f64> {
+        &self.applied
+    }
+
+    /// Takes a message, or refuses it as a whole and says why.
+    ///
+    /// # Errors
+    /// A value that is not finite or larger than its limit; what is in effect stays.
+    pub fn receive(&mut self, message: &AxisCompensation) -> Result<(), Diagnostic> {
+        let mut wanted = PerAxis::default();
+        for axis in self.axes.iter().filter(|axis| message.axes.contains(*axis)) {
+            let value = message.total[axis];
+            let limit = self.limits[axis].size;
+            if !value.is_finite() {
+                return Err(Diagnostic::CompensationNotFinite { axis, value });
+            }
+            if value.abs() > limit {
+                return Err(Diagnostic::CompensationTooLarge { axis, value, limit });
+            }
+            wanted[axis] = value;
+        }
+        self.wanted = wanted;
+        self.silent = 0;
+        self.stale = false;
+        self.resting = false;
+        Ok(())
+    }
+
+    /// One servo period; tells once when the compensation becomes stale.
+    pub fn advance(&mut self) -> Option<Diagnostic> {
+        if self.resting {
+            return None;
+        }
+        let mut became_stale = None;
+        if !self.stale {
+            self.silent += 1;
+            if self.silent > self.hold {
+                self.stale = true;
+                self.wanted = PerAxis::default();
+                became_stale = Some(Diagnostic::CompensationStale {
+                    silent_periods: self.silent,
+                });
+            }
+        }
+        let mut moved = false;
+        for axis in self.axes.iter() {
+            let limits = &self.limits[axis];
+            let step = if self.stale {
+                limits.fade_step
+            } else {
+                limits.step
+            };
+            let gap = self.wanted[axis] - self.applied[axis];
+            if gap.abs() <= step {
+                self.applied[axis] = self.wanted[axis];
+            } else {
+                self.applied[axis] += step.copysign(gap);
+            }
+            moved |= gap.abs() > 0.0;
+        }
+        self.resting = self.stale && !moved;
+        became_stale
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metrology::sample::CompensationState;
+    use metrology::{Axis, Stamp};
+
+    const LIMITS: OffsetLimits = OffsetLimits {
+        size: 0.5,
+        step: 1e-4,
+        fade_step: 5e-6,
+    };
+
+    fn message(x_mm: f64) -> AxisCompensation {
+        let mut total = PerAxis::default();
+        total[Axis::X] = x_mm;
+        AxisCompensation {
+            at: Stamp::default(),
+            axes: AxisSet::XYZ,
+            total,
+            thermal: total,
+            geometric: PerAxis::default(),
+            positioning: PerAxis::default(),
+            pulses: PerAxis::default(),
+            remainder: PerAxis::default(),
+            state: PerAxis::from_fn(|_| CompensationState::Active),
+        }
+    }
+
+    fn input() -> OffsetInput {
+        OffsetInput::new(AxisSet::XYZ, PerAxis::from_fn(|_| LIMITS), 100)
+    }
+
+    #[test]
+    fn eq1_first_message_and_jump_are_followed_at_the_rate_limit() {
+        let mut input = input();
+        let mut last = 0.0;
+        for target in [0.02, -0.02] {
+            assert_eq!(input.receive(&message(target)), Ok(()));
+            for _ in 0..90 {
+                assert_eq!(input.advance(), None);
+                let now = input.applied()[Axis::X];
+                assert!((now - last).abs() <= LIMITS.step + 1e-15);
+                last = now;
+            }
+        }
+        assert!((last - (0.009 - 0.009)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn eq2_stale_offset_is_held_then_fades_to_exactly_zero() {
+        let mut input = input();
+        assert_eq!(input.receive(&message(0.001)), Ok(()));
+        let mut stale_at = None;
+        for period in 1..=400 {
+            if input.advance().is_some() {
+                assert_eq!(stale_at, None, "told once");
+                stale_at = Some(period);
+            }
+            let now = input.applied()[Axis::X];
+            if (11..=100).contains(&period) {
+                assert!((now - 0.001).abs() < 1e-15, "held");
+            }
+        }
+        assert_eq!(stale_at, Some(101));
+        assert!(input.applied()[Axis::X].abs() <= 0.0);
+    }
+
+    #[test]
+    fn refused_messages_change_nothing() {
+        let mut input = input();
+        assert_eq!(input.receive(&message(0.001)), Ok(()));
+        (0..20).for_each(|_| assert_eq!(input.advance(), None));
+        let before = input.clone();
+        let nan = input.receive(&message(f64::NAN)).unwrap_err();
+        assert_eq!(nan.to_string(), "compensation of axis X is NaN: refused");
+        assert!(input.receive(&message(f64::INFINITY)).is_err());
+        let large = input.receive(&message(0.7)).unwrap_err();
+        assert_eq!(
+            large.to_string(),
+            "compensation of axis X is 0.7, limit 0.5: refused"
+        );
+        assert_eq!(input, before);
+    }
+}

@@ -1,0 +1,344 @@
+//! The node's computation: programs, compensation and time in; states, touches and readings out.
+
+use machine::MachineFile;
+use metrology::sample::{
+    AxisCompensation, AxisState, GridSample, ProbeTrigger, TemperatureSample, TestPlane,
+};
+use metrology::{Host, Stage, Stamp};
+
+use crate::clock::Clocks;
+use crate::config::{Config, Settings};
+use crate::control::{Control, Event};
+use crate::diagnostic::Diagnostic;
+use crate::error::CncError;
+use crate::hardware::Hardware;
+use crate::outcome::{Outcome, ProgramState};
+use crate::plant::Plant;
+use crate::touching::Latched;
+
+/// What the control is told.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a box would allocate at every compensation message"
+)]
+#[derive(Clone, Debug, PartialEq)]
+pub enum Input {
+    /// Run a program.
+    RunProgram {
+        /// Number of the request.
+        goal: u64,
+        /// RS-274/NGC.
+        text: String,
+        /// For displays.
+        name: String,
+    },
+    /// End a program.
+    CancelProgram {
+        /// Number of the request that started it.
+        goal: u64,
+    },
+    /// Offsets to add to the commands.
+    Compensation(AxisCompensation),
+    /// Time has come this far: simulate the servo periods that fit.
+    Tick,
+}
+
+/// What the control says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Output {
+    /// Positions at one servo tick.
+    State(AxisState),
+    /// A touch.
+    Trigger(ProbeTrigger),
+    /// A temperature reading.
+    Temperature(TemperatureSample),
+    /// A grid encoder reading.
+    Grid(GridSample),
+    /// The program was found executable and runs.
+    Accepted {
+        /// Its request.
+        goal: u64,
+    },
+    /// The program was not started.
+    Refused {
+        /// Its request.
+        goal: u64,
+        /// Why, with line, column, value and limit.
+        message: String,
+    },
+    /// Where the program is.
+    Feedback {
+        /// Its request.
+        goal: u64,
+        /// Line, from 1.
+        line: u32,
+        /// What the control is doing.
+        state: ProgramState,
+        /// Share of steps that are done.
+        progress: f64,
+    },
+    /// The program ended.
+    Finished {
+        /// Its request.
+        goal: u64,
+        /// How.
+        outcome: Outcome,
+        /// Why; empty when done.
+        message: String,
+        /// Last line that was executed, from 1.
+        line: u32,
+    },
+    /// A condition worth telling.
+    Diagnostic(Diagnostic),
+}
+
+#[derive(Clone, Debug)]
+struct Sensor {
+    id: String,
+    every: u64,
+}
+
+/// A control and the machine it drives, as one stage.
+#[derive(Clone, Debug)]
+pub struct Cnc<H = Plant> {
+    control: Control<H>,
+    clocks: Clocks,
+    sensors: Vec<Sensor>,
+    last_tick: Option<Stamp<Host>>,
+    touches: u32,
+    events: Vec<Event>,
+}
+
+impl<H: Hardware> Cnc<H> {
+    /// A control of `hardware` as `machine` describes it.
+    ///
+    /// # Errors
+    /// A parameter out of its range, by name.
+    pub fn new(config: &Config, machine: &MachineFile, hardware: H) -> Result<Self, CncError> {
+        let settings = Settings::new(config, machine)?;
+        let sensors = machine
+            .temperature_sensors
+            .iter()
+            .map(|sensor| Sensor {
+                id: sensor.id.clone(),
+                every: settings.periods(sensor.period_s).max(1),
+            })
+            .collect();
+        Ok(Self {
+            clocks: Clocks::new(settings.period, settings.clock_offset, settings.clock_drift),
+            control: Control::new(settings, hardware),
+            sensors,
+            last_tick: None,
+            touches: 0,
+            events: Vec::new(),
+        })
+    }
+
+    /// The machine, whose truth a scenario may read and no node may.
+    pub const fn hardware(&self) -> &H {
+        self.control.hardware()
+    }
+
+    /// Whether no program is on its way.
+    pub fn idle(&self) -> bool {
+        self.control.goal().is_none()
+    }
+
+    /// Commanded positions without compensation, mm or rad.
+    pub const fn commanded(&self) -> &metrology::PerAxis<f64> {
+        self.control.commanded()
+    }
+
+    /// Compensation in effect, mm or rad.
+    pub const fn offset(&self) -> &metrology::PerAxis<f64> {
+        self.control.offset()
+    }
+
+    fn run_program(&mut self, goal: u64, text: &str, out: &mut Vec<Output>) {
+        if let Some(other) = self.control.goal() {
+            out.push(Output::Refused {
+                goal,
+                message: format!("program {other} is running"),
+            });
+            return;
+        }
+        out.push(match self.control.start(goal, text) {
+            Ok(()) => Output::Accepted { goal },
+            Err(error) => Output::Refused {
+                goal,
+                message: error.to_string(),
+            },
+        });
+    }
+
+    fn cancel(&mut self, goal: u64, out: &mut Vec<Output>) {
+        if self.control.goal() == Some(goal) {
+            self.control.cancel();
+        } else {
+            out.push(Output::Diagnostic(Diagnostic::NothingToCancel { goal }));
+        }
+    }
+
+    fn pass_time(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        if let Some(last) = self.last_tick.filter(|last| at < *last) {
+            let by_s = (last - at).as_secs_f64();
+            out.push(Output::Diagnostic(Diagnostic::TimeWentBack { by_s }));
+            return;
+        }
+        self.last_tick = Some(at);
+        let Some(now) = self.clocks.host_ahead(0) else {
+            self.clocks.anchor(at);
+            return;
+        };
+        let limit = self.control.settings().longest_catch_up;
+        if at - now > limit {
+            self.clocks.anchor(at);
+            out.push(Output::Diagnostic(Diagnostic::TimeJumped {
+                by_s: (at - now).as_secs_f64(),
+                limit_s: limit.as_secs_f64(),
+            }));
+            return;
+        }
+        while let Some(end) = self.clocks.host_ahead(1).filter(|end| *end <= at) {
+            self.period(end, out);
+        }
+    }
+
+    /// One servo period that ends at host time `end`.
+    fn period(&mut self, end: Stamp<Host>, out: &mut Vec<Output>) {
+        let began = self.clocks.machine_now();
+        self.control.tick(began, &mut self.events);
+        self.clocks.advance();
+        self.report_state(end, out);
+        if !self.events.is_empty() {
+            self.report_events(end, out);
+        }
+        self.report_progress(out);
+        self.report_temperatures(end, out);
+    }
+
+    fn report_state(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        let settings = self.control.settings();
+        let every = if self.control.full_rate() {
+            settings.state_every
+        } else {
+            settings.background_every
+        };
+        if !self.clocks.count().is_multiple_of(every) {
+            return;
+        }
+        let feedback = self.control.feedback();
+        out.push(Output::State(AxisState {
+            received_at: at,
+            controller_at: self.clocks.machine_now(),
+            axes: settings.limits.axes,
+            commanded: *self.control.commanded(),
+            motor: feedback.motor,
+            scale: feedback.scale,
+            velocity: feedback.velocity,
+        }));
+        if let Some((u_mm, v_mm)) = self.control.hardware().grid_position_mm() {
+            out.push(Output::Grid(GridSample {
+                at,
+                plane: TestPlane::Xy,
+                u_mm,
+                v_mm,
+                zero_id: 0,
+            }));
+        }
+    }
+
+    fn report_events(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        let mut events = std::mem::take(&mut self.events);
+        for event in events.drain(..) {
+            match event {
+                Event::Noted(diagnostic) => out.push(Output::Diagnostic(diagnostic)),
+                Event::Touched(latched) => out.push(self.trigger(at, &latched)),
+                Event::Ended(ending) => {
+                    if let Some((goal, line)) = self.control.take_ended() {
+                        out.push(Output::Finished {
+                            goal,
+                            outcome: ending.outcome(),
+                            message: ending.to_string(),
+                            line: ending.line().unwrap_or(line),
+                        });
+                    }
+                }
+            }
+        }
+        self.events = events;
+    }
+
+    fn trigger(&mut self, at: Stamp<Host>, latched: &Latched) -> Output {
+        self.touches += 1;
+        Output::Trigger(ProbeTrigger {
+            received_at: at,
+            controller_at: latched.at,
+            feature_id: self.control.feature(latched.feature),
+            approach: latched.approach,
+            feed_mm_s: latched.feed_mm_s,
+            axes: self.control.settings().limits.axes,
+            latched: latched.positions,
+            sequence: self.touches,
+        })
+    }
+
+    fn report_progress(&self, out: &mut Vec<Output>) {
+        let every = self.control.settings().feedback_every;
+        if !self.clocks.count().is_multiple_of(every) {
+            return;
+        }
+        if let Some(goal) = self.control.goal() {
+            let (line, progress) = self.control.progress();
+            out.push(Output::Feedback {
+                goal,
+                line,
+                state: self.control.state(),
+                progress,
+            });
+        }
+    }
+
+    fn report_temperatures(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        let count = self.clocks.count();
+        for sensor in &self.sensors {
+            if !count.is_multiple_of(sensor.every) {
+                continue;
+            }
+            let reading = self.control.hardware_mut().sensor_reading_degc(&sensor.id);
+            if let Some(temperature_degc) = reading {
+                out.push(Output::Temperature(TemperatureSample {
+                    at,
+                    sensor: sensor.id.clone(),
+                    temperature_degc,
+                    variance_k2: 0.0,
+                }));
+            }
+        }
+    }
+}
+
+impl<H: Hardware> Stage for Cnc<H> {
+    type Input = Input;
+    type Output = Output;
+    type Error = CncError;
+
+    fn step(
+        &mut self,
+        at: Stamp<Host>,
+        input: Input,
+        out: &mut Vec<Output>,
+    ) -> Result<(), CncError> {
+        match input {
+            Input::RunProgram { goal, text, .. } => self.run_program(goal, &text, out),
+            Input::CancelProgram { goal } => self.cancel(goal, out),
+            Input::Compensation(message) => {
+                if let Err(diagnostic) = self.control.offset_mut().receive(&message) {
+                    out.push(Output::Diagnostic(diagnostic));
+                }
+            }
+            Input::Tick => self.pass_time(at, out),
+        }
+        Ok(())
+    }
+}
