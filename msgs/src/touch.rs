@@ -1,7 +1,7 @@
 //! Touches of the probe and the latency that corrects them.
 
 use metrology::sample;
-use metrology::sample::{LatencyMethod, Rejection};
+use metrology::sample::{Correction, LatencyMethod, Rejection};
 
 use crate::msg::{ProbeLatency, ProbeTrigger, ProbedPoint};
 use crate::wire::{
@@ -63,6 +63,17 @@ pub(crate) fn rejection_code(rejection: Rejection) -> u8 {
     }
 }
 
+pub(crate) const CORRECTIONS: [Correction; 3] =
+    [Correction::None, Correction::Queue, Correction::Feed];
+
+pub(crate) fn correction_code(correction: Correction) -> u8 {
+    match correction {
+        Correction::None => ProbedPoint::CORRECTION_NONE,
+        Correction::Queue => ProbedPoint::CORRECTION_QUEUE,
+        Correction::Feed => ProbedPoint::CORRECTION_FEED,
+    }
+}
+
 impl Wire for ProbedPoint {
     type Inner = sample::ProbedPoint;
 
@@ -70,6 +81,7 @@ impl Wire for ProbedPoint {
         self.header.stamp = time(inner.received_at);
         self.feature_id.clone_from(&inner.feature_id);
         self.point = point(&inner.point_in_machine_mm);
+        self.point_in_workpiece = point(&inner.point_in_workpiece_mm);
         set_letters(&mut self.axis, inner.axes);
         set_positions(
             &mut self.axes_at_contact,
@@ -77,6 +89,7 @@ impl Wire for ProbedPoint {
             &inner.axes_at_contact,
         );
         self.applied_latency_s = inner.applied_latency_s;
+        self.correction = correction_code(inner.correction);
         self.standard_uncertainty_m = metres(inner.standard_uncertainty_mm);
         self.approach = ratios(&inner.approach);
         self.feed_m_s = metres(inner.feed_mm_s);
@@ -108,7 +121,19 @@ impl Wire for ProbedPoint {
             axes_at_contact: read.positions("axes_at_contact", &letters, contact, 0.0, allowed)?,
             axes: letters.set(),
             point_in_machine_mm: read.point_mm("point", &self.point, allowed)?,
+            point_in_workpiece_mm: read.point_mm(
+                "point_in_workpiece",
+                &self.point_in_workpiece,
+                allowed,
+            )?,
             applied_latency_s: number("applied_latency_s", self.applied_latency_s)?,
+            correction: read.variant(
+                "correction",
+                Place::Whole,
+                self.correction,
+                &CORRECTIONS,
+                correction_code,
+            )?,
             standard_uncertainty_mm: number("standard_uncertainty_m", self.standard_uncertainty_m)
                 .map(millimetres)?,
             approach: read.ratios("approach", &self.approach, allowed)?,

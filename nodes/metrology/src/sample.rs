@@ -18,4 +18,4 @@ pub use motion::AxisState;
 pub use segment::{Sense, TestKind, TestPlane, TestSegment};
 pub use sensor::{GridSample, LengthSample, TemperatureSample};
 pub use thermal::{AxisDrift, ThermalModel, UpdateReason, UpdateRequest};
-pub use touch::{LatencyMethod, ProbeLatency, ProbeTrigger, ProbedPoint, Rejection};
+pub use touch::{Correction, LatencyMethod, ProbeLatency, ProbeTrigger, ProbedPoint, Rejection};

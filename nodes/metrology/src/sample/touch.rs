@@ -47,6 +47,17 @@ pub enum Rejection {
     NoLatency,
 }
 
+/// How the latency was taken out of a touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Correction {
+    /// It was not.
+    None,
+    /// The queued position at the instant of contact.
+    Queue,
+    /// The latched position less feed times latency.
+    Feed,
+}
+
 /// A touch after correction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbedPoint {
@@ -60,8 +71,13 @@ pub struct ProbedPoint {
     pub axes: AxisSet,
     /// Surface point in the machine frame, stylus radius removed, mm.
     pub point_in_machine_mm: Vector3<f64>,
+    /// The same point in the workpiece frame, which coincides with the machine frame when all axes
+    /// are at zero, mm.
+    pub point_in_workpiece_mm: Vector3<f64>,
     /// Latency that was taken out, s.
     pub applied_latency_s: f64,
+    /// How it was taken out.
+    pub correction: Correction,
     /// Standard uncertainty along the approach, mm.
     pub standard_uncertainty_mm: f64,
     /// Unit vector of the approach.
