@@ -14,6 +14,7 @@ mod action_types;
 mod block;
 mod cdr;
 mod compensation;
+mod cycle;
 mod error;
 mod feature;
 mod interface;

@@ -7,8 +7,9 @@ use std::marker::PhantomData;
 use crate::action::{RunCycle, RunProgram};
 use crate::diagnostic_msgs::msg::DiagnosticArray;
 use crate::msg::{
-    AxisCompensation, AxisState, BlockMeasurement, GridSample, LengthSample, ProbeLatency,
-    ProbeTrigger, ProbedFeature, ProbedPoint, TestSegment, ThermalModel, ThermalUpdateRequest,
+    AxisCompensation, AxisState, BlockMeasurement, GridSample, LengthSample, PlanStatus,
+    ProbeLatency, ProbeTrigger, ProbedFeature, ProbedPoint, TestSegment, ThermalModel,
+    ThermalUpdateRequest,
 };
 use crate::qos::{Durability, Qos, Reliability};
 use crate::rcl_interfaces::msg::{Log, ParameterEvent};
@@ -192,6 +193,8 @@ topics! {
     COMPENSATION: AxisCompensation = "compensation", Qos::RELIABLE_DEEP, Computed;
     /// Begin and end of tests.
     TEST_SEGMENT: TestSegment = "test/segment", Qos::RELIABLE, Raw;
+    /// What the sequencer is doing.
+    PLAN_STATUS: PlanStatus = "sequencer/status", Qos::LATCHED, Housekeeping;
     /// Health of the nodes.
     DIAGNOSTICS: DiagnosticArray = "/diagnostics", Qos::RELIABLE, Housekeeping;
     /// Log lines; ROS 2's own profile without its lifespan.

@@ -4,8 +4,10 @@
 
 mod block;
 mod compensation;
+mod cycle;
 mod feature;
 mod motion;
+mod plan;
 mod segment;
 mod sensor;
 mod thermal;
@@ -13,8 +15,10 @@ mod touch;
 
 pub use block::{BlockMeasurement, FacePosition};
 pub use compensation::{AxisCompensation, CompensationState};
+pub use cycle::{CycleKind, CycleOrder};
 pub use feature::{FeatureKind, ProbedFeature};
 pub use motion::AxisState;
+pub use plan::{PlanState, PlanStatus};
 pub use segment::{Sense, TestKind, TestPlane, TestSegment};
 pub use sensor::{GridSample, LengthSample, TemperatureSample};
 pub use thermal::{AxisDrift, ThermalModel, UpdateReason, UpdateRequest};

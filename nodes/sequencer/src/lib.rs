@@ -1,1 +1,22 @@
-//! Runs measuring cycles and scenario steps on a controller.
+//! Runs measuring cycles and the steps of a plan on a controller.
+//!
+//! A *cycle* is a touching program that this crate takes from `machine::cycle`, sends to the
+//! controller as a goal of `cnc/run_program` and brackets with test segments, so that the nodes
+//! that evaluate touches know what each belongs to. A *plan* strings cycles, part programs and
+//! switching of the compensation together: it is a scenario's script. While a part is being
+//! produced, block cycles are put in between whenever the thermal model asks for one.
+//!
+//! The sequencer is the only publisher of `test/segment`, which keeps run numbers unique in a bag.
+
+pub mod config;
+mod cycle;
+pub mod error;
+mod job;
+pub mod plan;
+pub mod stage;
+mod task;
+
+pub use config::Config;
+pub use error::SequencerError;
+pub use plan::{Plan, Step};
+pub use stage::{CANCELED, CycleGoal, CycleOutcome, Input, Output, ProgramEnd, Sequencer};

@@ -1,0 +1,47 @@
+//! A condition worth reporting, on its way to `/diagnostics`, the log and the bag.
+
+/// Severity, with the values of `diagnostic_msgs/msg/DiagnosticStatus`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// As it should be.
+    Ok = 0,
+    /// It goes on, but not as told.
+    Warn = 1,
+    /// Data is lost or a function has stopped.
+    Error = 2,
+    /// Nothing has been heard.
+    Stale = 3,
+}
+
+/// One condition of a node. It stays on `/diagnostics` until the same `name` is reported `Ok`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Diagnostic {
+    /// Severity.
+    pub level: Level,
+    /// Which condition, snake case, e.g. `model_stale`; the node's name is put in front.
+    pub name: &'static str,
+    /// One line with place, value, unit and limit.
+    pub message: String,
+    /// Values by name, unit in the name.
+    pub values: Vec<(&'static str, String)>,
+}
+
+impl Diagnostic {
+    /// A condition without values.
+    #[must_use]
+    pub fn new(level: Level, name: &'static str, message: String) -> Self {
+        Self {
+            level,
+            name,
+            message,
+            values: Vec::new(),
+        }
+    }
+
+    /// The same with one more value.
+    #[must_use]
+    pub fn with(mut self, name: &'static str, value: impl ToString) -> Self {
+        self.values.push((name, value.to_string()));
+        self
+    }
+}

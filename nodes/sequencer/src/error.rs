@@ -1,0 +1,23 @@
+//! What can be wrong with a plan or an event.
+
+use machine::CycleError;
+
+/// Why a plan cannot be run or an event cannot be taken.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "fields are named in the messages")]
+pub enum SequencerError {
+    #[error("steps[{step}].program = \"{program}\": no such program was given (known: {known})")]
+    UnknownProgram {
+        step: usize,
+        program: String,
+        known: String,
+    },
+    #[error("steps[{step}].minutes = {minutes}: must be above 0 and finite")]
+    Minutes { step: usize, minutes: f64 },
+    #[error("steps[{step}]: {source}")]
+    Cycle { step: usize, source: CycleError },
+    #[error("steps: the plan has none")]
+    NoSteps,
+    #[error("time went back by {back_s} s to {at_s} s: the event was not used")]
+    TimeWentBack { at_s: f64, back_s: f64 },
+}

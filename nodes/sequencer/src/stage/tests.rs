@@ -1,0 +1,317 @@
+use super::*;
+use metrology::sample::{CycleKind, TestKind, UpdateReason};
+
+const MACHINE: &str = include_str!("../../../../launch_configs/first_run/machine.yaml");
+
+fn sequencer(steps: Vec<Step>) -> Sequencer {
+    let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
+    let plan = Plan {
+        title: "test".to_owned(),
+        steps,
+    };
+    let programs = BTreeMap::from([("part.ngc".to_owned(), "G0 X1\nM2\n".to_owned())]);
+    Sequencer::new(Config::default(), machine, Some(plan), programs).unwrap()
+}
+
+fn at(seconds_s: f64) -> Stamp<Host> {
+    Stamp::default() + Span::from_secs_f64(seconds_s)
+}
+
+fn give(sequencer: &mut Sequencer, seconds_s: f64, input: Input) -> Vec<Output> {
+    let mut out = Vec::new();
+    sequencer.step(at(seconds_s), input, &mut out).unwrap();
+    out
+}
+
+fn sent(outputs: &[Output]) -> Option<(u64, String)> {
+    outputs.iter().find_map(|output| match output {
+        Output::SendProgram { id, name, .. } => Some((*id, name.clone())),
+        _ => None,
+    })
+}
+
+fn segments(outputs: &[Output]) -> Vec<(TestKind, bool, bool)> {
+    let pick = |output: &Output| match output {
+        Output::Segment(segment) => Some((segment.kind, segment.begin, segment.completed)),
+        _ => None,
+    };
+    outputs.iter().filter_map(pick).collect()
+}
+
+fn done() -> Option<ProgramEnd> {
+    Some(ProgramEnd {
+        done: true,
+        message: String::new(),
+    })
+}
+
+fn produce(minutes: f64) -> Step {
+    Step::Produce {
+        program: "part.ngc".to_owned(),
+        minutes,
+        serve_updates: true,
+    }
+}
+
+#[test]
+fn steps_run_one_after_the_other_between_marks() {
+    let steps = vec![
+        Step::Blocks {
+            blocks: vec![],
+            cold: true,
+        },
+        produce(0.5),
+    ];
+    let mut sequencer = sequencer(steps);
+    give(&mut sequencer, 0.0, Input::Tick);
+    let started = give(&mut sequencer, 1.0, Input::Tick);
+    let (id, _) = sent(&started).unwrap();
+    assert_eq!(segments(&started), [(TestKind::Block, true, false)]);
+    let next = give(&mut sequencer, 60.0, Input::ProgramEnd { id, end: done() });
+    assert_eq!(
+        segments(&next),
+        [
+            (TestKind::Block, false, true),
+            (TestKind::Production, true, false)
+        ]
+    );
+    let (id, name) = sent(&next).unwrap();
+    assert_eq!(name, "part.ngc");
+    let last = give(&mut sequencer, 100.0, Input::ProgramEnd { id, end: done() });
+    assert!(last.iter().any(|output| matches!(
+        output,
+        Output::Status(PlanStatus {
+            state: PlanState::Done,
+            ..
+        })
+    )));
+}
+
+#[test]
+fn an_update_request_is_served_between_two_parts() {
+    let mut sequencer = sequencer(vec![produce(10.0)]);
+    give(&mut sequencer, 0.0, Input::Tick);
+    let (part, _) = sent(&give(&mut sequencer, 1.0, Input::Tick)).unwrap();
+    let request = UpdateRequest {
+        at: at(2.0),
+        reason: UpdateReason::Period,
+        elapsed_s: 900.0,
+    };
+    assert_eq!(
+        sent(&give(&mut sequencer, 2.0, Input::UpdateRequest(request))),
+        None
+    );
+    let between = give(
+        &mut sequencer,
+        3.0,
+        Input::ProgramEnd {
+            id: part,
+            end: done(),
+        },
+    );
+    assert_eq!(
+        segments(&between).last(),
+        Some(&(TestKind::Block, true, false))
+    );
+    let (blocks, _) = sent(&between).unwrap();
+    let after = give(
+        &mut sequencer,
+        4.0,
+        Input::ProgramEnd {
+            id: blocks,
+            end: done(),
+        },
+    );
+    assert_eq!(
+        segments(&after).last(),
+        Some(&(TestKind::Production, true, false))
+    );
+}
+
+#[test]
+fn a_program_that_nobody_takes_is_proposed_again_and_fails_in_the_end() {
+    let mut sequencer = sequencer(vec![Step::Run {
+        program: "part.ngc".to_owned(),
+    }]);
+    give(&mut sequencer, 0.0, Input::Tick);
+    let mut outputs = give(&mut sequencer, 1.0, Input::Tick);
+    let attempts = Config::default().attempts;
+    for attempt in 0..attempts {
+        let (id, _) = sent(&outputs).unwrap();
+        let now_s = 2.0 + 2.0 * f64::from(attempt);
+        let refused = give(
+            &mut sequencer,
+            now_s,
+            Input::ProgramAnswer {
+                id,
+                accepted: false,
+            },
+        );
+        if attempt + 1 == attempts {
+            outputs = refused;
+        } else {
+            outputs = give(&mut sequencer, now_s + 1.0, Input::Tick);
+        }
+    }
+    let failed = outputs.iter().any(|output| {
+        matches!(output, Output::Status(PlanStatus { state: PlanState::Failed, message, .. })
+            if message.contains("30 attempts"))
+    });
+    assert!(failed, "{outputs:?}");
+}
+
+#[test]
+fn a_failed_update_cycle_leaves_the_production_going() {
+    let mut sequencer = sequencer(vec![produce(10.0)]);
+    give(&mut sequencer, 0.0, Input::Tick);
+    let (part, _) = sent(&give(&mut sequencer, 1.0, Input::Tick)).unwrap();
+    let request = UpdateRequest {
+        at: at(2.0),
+        reason: UpdateReason::Period,
+        elapsed_s: 900.0,
+    };
+    give(&mut sequencer, 2.0, Input::UpdateRequest(request));
+    let (blocks, _) = sent(&give(
+        &mut sequencer,
+        3.0,
+        Input::ProgramEnd {
+            id: part,
+            end: done(),
+        },
+    ))
+    .unwrap();
+    let missed = ProgramEnd {
+        done: false,
+        message: "line 7: block_2.x: no contact".to_owned(),
+    };
+    let after = give(
+        &mut sequencer,
+        4.0,
+        Input::ProgramEnd {
+            id: blocks,
+            end: Some(missed),
+        },
+    );
+    assert!(
+        after
+            .iter()
+            .any(|output| matches!(output, Output::ProgramFailed { .. }))
+    );
+    assert_eq!(segments(&after)[0], (TestKind::Block, false, false));
+    assert_eq!(
+        segments(&after).last(),
+        Some(&(TestKind::Production, true, false))
+    );
+}
+
+#[test]
+fn a_controller_that_vanishes_ends_the_plan_with_the_reason() {
+    let mut sequencer = sequencer(vec![Step::Run {
+        program: "part.ngc".to_owned(),
+    }]);
+    give(&mut sequencer, 0.0, Input::Tick);
+    let (id, _) = sent(&give(&mut sequencer, 1.0, Input::Tick)).unwrap();
+    let outputs = give(&mut sequencer, 2.0, Input::ProgramEnd { id, end: None });
+    assert!(outputs.iter().any(|output| matches!(output,
+        Output::Status(PlanStatus { message, .. }) if message.contains("vanished"))));
+}
+
+#[test]
+fn a_goal_is_run_when_nothing_else_is_and_refused_while_the_plan_runs() {
+    let order = CycleOrder {
+        kind: CycleKind::Blocks,
+        features: vec!["block_1".to_owned()],
+        feeds_mm_min: vec![],
+        points: 0,
+        repeats: 1,
+        cold: false,
+    };
+    let mut busy = sequencer(vec![produce(1.0)]);
+    give(&mut busy, 0.0, Input::Tick);
+    give(&mut busy, 1.0, Input::Tick);
+    let goal = CycleGoal {
+        id: 9,
+        order: order.clone(),
+    };
+    let refused = give(&mut busy, 2.0, Input::Cycle(goal.clone()));
+    assert!(
+        matches!(&refused[0], Output::CycleRejected { id: 9, reason } if reason.contains("busy"))
+    );
+
+    let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
+    let mut idle = Sequencer::new(Config::default(), machine, None, BTreeMap::new()).unwrap();
+    let started = give(&mut idle, 0.0, Input::Cycle(goal));
+    assert_eq!(started[0], Output::CycleAccepted(9));
+    let (program, _) = sent(&started).unwrap();
+    let touched = give(&mut idle, 1.0, Input::Touch);
+    assert_eq!(
+        touched,
+        [Output::CycleProgress {
+            id: 9,
+            touches: 1,
+            planned: 3
+        }]
+    );
+    assert_eq!(
+        give(&mut idle, 2.0, Input::CancelCycle(9)),
+        [Output::CancelProgram(program)]
+    );
+    let end = Some(ProgramEnd {
+        done: false,
+        message: CANCELED.to_owned(),
+    });
+    let ended = give(&mut idle, 3.0, Input::ProgramEnd { id: program, end });
+    assert!(ended.iter().any(|output| matches!(
+        output,
+        Output::CycleEnded(CycleOutcome {
+            canceled: true,
+            success: false,
+            ..
+        })
+    )));
+}
+
+#[test]
+fn a_plan_that_cannot_run_is_refused_before_anything_moves() {
+    let machine = || MachineFile::parse(MACHINE, "machine.yaml").unwrap();
+    let refuse = |steps| {
+        let plan = Plan {
+            title: String::new(),
+            steps,
+        };
+        Sequencer::new(Config::default(), machine(), Some(plan), BTreeMap::new())
+            .err()
+            .unwrap()
+            .to_string()
+    };
+    assert_eq!(refuse(vec![]), "steps: the plan has none");
+    let unknown = refuse(vec![Step::Run {
+        program: "x.ngc".to_owned(),
+    }]);
+    assert!(
+        unknown.starts_with("steps[0].program = \"x.ngc\""),
+        "{unknown}"
+    );
+    let equal = refuse(vec![Step::Latency {
+        feature: "block_1.z".to_owned(),
+        feeds_mm_min: vec![100.0, 100.0],
+        repeats: 2,
+    }]);
+    assert!(
+        equal.starts_with("steps[0]: feeds[0] and feeds[1] are both 100"),
+        "{equal}"
+    );
+    let zero = refuse(vec![produce(0.0)]);
+    assert!(zero.contains("minutes = 0"), "{zero}");
+}
+
+#[test]
+fn time_that_goes_back_is_refused_and_changes_nothing() {
+    let mut sequencer = sequencer(vec![produce(1.0)]);
+    give(&mut sequencer, 5.0, Input::Tick);
+    let error = sequencer
+        .step(at(4.0), Input::Tick, &mut Vec::new())
+        .unwrap_err();
+    assert!(error.to_string().contains("went back by 1 s"), "{error}");
+    give(&mut sequencer, 6.0, Input::Tick);
+}

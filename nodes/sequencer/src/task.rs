@@ -1,0 +1,181 @@
+//! What each step, order and update runs on the controller.
+
+use std::collections::BTreeMap;
+
+use machine::CycleError;
+use machine::MachineFile;
+use machine::file::ArtefactEntry;
+use metrology::sample::{CycleKind, CycleOrder, TestKind};
+
+use crate::cycle;
+use crate::error::SequencerError;
+use crate::job::{Owner, Task};
+use crate::plan::{Plan, Step};
+
+/// Checks that every step of a plan can be run on this machine.
+pub(crate) fn check(
+    plan: &Plan,
+    machine: &MachineFile,
+    programs: &BTreeMap<String, String>,
+) -> Result<(), SequencerError> {
+    if plan.steps.is_empty() {
+        return Err(SequencerError::NoSteps);
+    }
+    for (at, step) in plan.steps.iter().enumerate() {
+        match step {
+            Step::Compensation { .. } => {}
+            Step::Produce {
+                program, minutes, ..
+            } => {
+                if !(minutes.is_finite() && *minutes > 0.0) {
+                    return Err(SequencerError::Minutes {
+                        step: at,
+                        minutes: *minutes,
+                    });
+                }
+                text(at, program, programs)?;
+            }
+            step => {
+                of_step(at, step, machine, programs)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn text<'a>(
+    step: usize,
+    program: &str,
+    programs: &'a BTreeMap<String, String>,
+) -> Result<&'a str, SequencerError> {
+    programs
+        .get(program)
+        .map(String::as_str)
+        .ok_or_else(|| SequencerError::UnknownProgram {
+            step,
+            program: program.to_owned(),
+            known: programs
+                .keys()
+                .map(String::as_str)
+                .collect::<Vec<_>>()
+                .join(", "),
+        })
+}
+
+/// The task of a step that is one program.
+pub(crate) fn of_step(
+    at: usize,
+    step: &Step,
+    machine: &MachineFile,
+    programs: &BTreeMap<String, String>,
+) -> Result<Task, SequencerError> {
+    let order = match step {
+        Step::Blocks { blocks, cold } => order(CycleKind::Blocks, blocks.clone(), *cold),
+        Step::Latency {
+            feature,
+            feeds_mm_min,
+            repeats,
+        } => CycleOrder {
+            feeds_mm_min: feeds_mm_min.clone(),
+            repeats: *repeats,
+            ..order(CycleKind::Latency, vec![feature.clone()], false)
+        },
+        Step::Artefact { id, points } => CycleOrder {
+            points: *points,
+            ..order(kind_of(machine, id), vec![id.clone()], false)
+        },
+        Step::Verify { program, label } => {
+            let text = text(at, program, programs)?;
+            return Ok(plain(
+                program,
+                text,
+                TestKind::Verification,
+                vec![label.clone()],
+            ));
+        }
+        Step::Run { program } | Step::Produce { program, .. } => {
+            let text = text(at, program, programs)?;
+            return Ok(plain(program, text, TestKind::Production, Vec::new()));
+        }
+        Step::Compensation { .. } => return Ok(plain("", "", TestKind::Dwell, Vec::new())),
+    };
+    of_order(&order, machine, Owner::Step)
+        .map_err(|source| SequencerError::Cycle { step: at, source })
+}
+
+/// The task of an ordered cycle.
+pub(crate) fn of_order(
+    order: &CycleOrder,
+    machine: &MachineFile,
+    owner: Owner,
+) -> Result<Task, CycleError> {
+    let cycle = cycle::plan(machine, order)?;
+    Ok(Task {
+        name: format!("{:?} cycle", cycle.kind).to_lowercase(),
+        planned: u32::try_from(cycle.touches.len()).unwrap_or(u32::MAX),
+        feed_mm_s: cycle
+            .touches
+            .first()
+            .map_or(0.0, |touch| touch.feed_mm_min / 60.0),
+        stylus: machine.probe.mounted.clone(),
+        text: cycle.program,
+        kind: cycle.kind,
+        features: cycle.features,
+        cold: order.cold,
+        owner,
+    })
+}
+
+/// The block cycle that the thermal model asked for.
+pub(crate) fn update(machine: &MachineFile) -> Result<Task, CycleError> {
+    of_order(
+        &order(CycleKind::Blocks, Vec::new(), false),
+        machine,
+        Owner::Update,
+    )
+}
+
+/// One part of the production.
+pub(crate) fn part(program: &str, programs: &BTreeMap<String, String>) -> Option<Task> {
+    let text = programs.get(program)?;
+    Some(plain(program, text, TestKind::Production, Vec::new()))
+}
+
+fn order(kind: CycleKind, features: Vec<String>, cold: bool) -> CycleOrder {
+    CycleOrder {
+        kind,
+        features,
+        feeds_mm_min: Vec::new(),
+        points: 0,
+        repeats: 1,
+        cold,
+    }
+}
+
+fn plain(name: &str, text: &str, kind: TestKind, features: Vec<String>) -> Task {
+    Task {
+        name: name.to_owned(),
+        text: text.to_owned(),
+        kind,
+        features,
+        planned: 0,
+        cold: false,
+        feed_mm_s: 0.0,
+        stylus: String::new(),
+        owner: Owner::Step,
+    }
+}
+
+/// The cycle that measures an artefact; an unknown one is left to the cycle to refuse by name.
+fn kind_of(machine: &MachineFile, id: &str) -> CycleKind {
+    let named = machine
+        .artefacts
+        .iter()
+        .find(|entry| machine::cycle::artefact_id(entry) == id);
+    match named {
+        Some(ArtefactEntry::Sphere { .. }) => CycleKind::Sphere,
+        Some(ArtefactEntry::Plane { .. }) => CycleKind::Plane,
+        Some(ArtefactEntry::Bore { .. } | ArtefactEntry::Boss { .. }) => CycleKind::Bore,
+        None => CycleKind::Touch,
+    }
+}
