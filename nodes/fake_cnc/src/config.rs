@@ -1,5 +1,7 @@
 //! Parameters of the control; the machine and its plant are described in their own files.
 
+use std::collections::BTreeMap;
+
 use machine::MachineFile;
 use machine::file::{AxisEntry, Latch};
 use metrology::stamp::Span;
@@ -7,14 +9,20 @@ use metrology::{Axis, PerAxis};
 use serde::{Deserialize, Serialize};
 
 use crate::error::CncError;
+use crate::parameters::PARAMETERS;
 use crate::path::AxisLimits;
 use crate::rs274::Envelope;
 use crate::servo::Gains;
+use crate::stage::JOINT_RATE_HZ;
 
 /// Operational parameters; none of them is physics, so each has a default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
+    /// Machine file, relative to the parameter file.
+    pub machine_file: String,
+    /// Plant file, relative to the parameter file.
+    pub plant_file: String,
     /// Rate of axis states during touches and `(rate: full)` contours, Hz.
     pub state_rate_hz: f64,
     /// Rate of axis states otherwise, Hz; 0 means `state_rate_hz`.
@@ -55,13 +63,17 @@ pub struct Config {
     pub clock_drift_ppm: f64,
     /// Jump of the host clock beyond which time is skipped rather than simulated, s.
     pub longest_catch_up_s: f64,
-    /// Positions of the axes at the start by letter, mm or deg; others start at 0.
-    pub start_position: std::collections::BTreeMap<Axis, f64>,
+    /// Positions of linear axes at the start, by letter; others start at 0.
+    pub start_mm: BTreeMap<Axis, f64>,
+    /// Positions of rotary axes at the start, by letter; others start at 0.
+    pub start_deg: BTreeMap<Axis, f64>,
 }
 
 impl Default for Config {
     fn default() -> Self {
         Self {
+            machine_file: String::new(),
+            plant_file: String::new(),
             state_rate_hz: 1000.0,
             background_rate_hz: 0.0,
             feedback_rate_hz: 10.0,
@@ -82,7 +94,8 @@ impl Default for Config {
             clock_offset_s: 0.0,
             clock_drift_ppm: 0.0,
             longest_catch_up_s: 60.0,
-            start_position: std::collections::BTreeMap::new(),
+            start_mm: BTreeMap::new(),
+            start_deg: BTreeMap::new(),
         }
     }
 }
@@ -111,6 +124,7 @@ pub struct Settings {
     pub(crate) state_every: u64,
     pub(crate) background_every: u64,
     pub(crate) feedback_every: u64,
+    pub(crate) joint_every: u64,
     pub(crate) touch_margin: u64,
     pub(crate) settle: u64,
     pub(crate) compensation_hold: u64,
@@ -193,20 +207,23 @@ impl Settings {
     }
 
     fn start(&mut self, config: &Config) -> Result<(), CncError> {
-        for (&axis, &value) in &config.start_position {
+        let linear = config.start_mm.iter().map(|entry| ("start_mm", entry));
+        let rotary = config.start_deg.iter().map(|entry| ("start_deg", entry));
+        for (name, (&axis, &value)) in linear.chain(rotary) {
             let position = if axis.is_linear() {
                 value
             } else {
                 value.to_radians()
             };
             let [least, greatest] = self.envelope.travel[axis];
-            if !self.envelope.axes.contains(axis) || !(least..=greatest).contains(&position) {
-                return Err(CncError::Parameter {
-                    name: "start_position",
-                    value,
-                    rule: "of an axis of the machine and within its travel",
-                });
-            }
+            require(
+                name,
+                value,
+                axis.is_linear() == (name == "start_mm")
+                    && self.envelope.axes.contains(axis)
+                    && (least..=greatest).contains(&position),
+                "of an axis of this kind that the machine has, and within its travel",
+            )?;
             self.start[axis] = position;
         }
         Ok(())
@@ -214,9 +231,14 @@ impl Settings {
 }
 
 impl Config {
+    /// Checks every number against the range in [`PARAMETERS`].
     fn check(&self) -> Result<(), CncError> {
-        let positive = [
+        let numbers = [
             ("state_rate_hz", self.state_rate_hz),
+            ("background_rate_hz", self.background_rate_hz),
+            ("feedback_rate_hz", self.feedback_rate_hz),
+            ("touch_margin_s", self.touch_margin_s),
+            ("settle_s", self.settle_s),
             ("velocity_gain_per_s", self.velocity_gain_per_s),
             ("velocity_integral_time_s", self.velocity_integral_time_s),
             ("drive_peak_ratio", self.drive_peak_ratio),
@@ -238,40 +260,27 @@ impl Config {
             ),
             ("compensation_limit_um", self.compensation_limit_um),
             ("compensation_limit_arcsec", self.compensation_limit_arcsec),
+            ("clock_offset_s", self.clock_offset_s),
+            ("clock_drift_ppm", self.clock_drift_ppm),
             ("longest_catch_up_s", self.longest_catch_up_s),
         ];
-        for (name, value) in positive {
-            require(name, value, value > 0.0, "above 0")?;
+        for (name, value) in numbers {
+            let range = PARAMETERS
+                .iter()
+                .find(|doc| doc.name == name)
+                .and_then(|doc| doc.range);
+            if let Some((least, greatest)) =
+                range.filter(|(least, greatest)| !(*least..=*greatest).contains(&value))
+            {
+                return Err(CncError::Range {
+                    name,
+                    value,
+                    least,
+                    greatest,
+                });
+            }
         }
-        let not_negative = [
-            ("background_rate_hz", self.background_rate_hz),
-            ("touch_margin_s", self.touch_margin_s),
-            ("settle_s", self.settle_s),
-        ];
-        for (name, value) in not_negative {
-            require(name, value, value >= 0.0, "0 or above")?;
-        }
-        let rate = self.feedback_rate_hz;
-        require(
-            "feedback_rate_hz",
-            rate,
-            rate > 0.0 && rate <= 10.0,
-            "above 0 and at most 10 Hz",
-        )?;
-        let offset_s = self.clock_offset_s;
-        require(
-            "clock_offset_s",
-            offset_s,
-            offset_s.abs() <= 1e9,
-            "within 1e9 s of 0",
-        )?;
-        let drift_ppm = self.clock_drift_ppm;
-        require(
-            "clock_drift_ppm",
-            drift_ppm,
-            drift_ppm.abs() <= 1000.0,
-            "from -1000 to 1000 ppm",
-        )
+        Ok(())
     }
 
     fn without_axes(&self, machine: &MachineFile, period_s: f64) -> Result<Settings, CncError> {
@@ -280,7 +289,9 @@ impl Config {
         } else {
             self.state_rate_hz
         };
+        let joint_hz = background_hz.min(JOINT_RATE_HZ);
         Ok(Settings {
+            joint_every: periods(1.0 / joint_hz, period_s).max(1),
             limits: AxisLimits {
                 axes: metrology::AxisSet::EMPTY,
                 speed: PerAxis::default(),

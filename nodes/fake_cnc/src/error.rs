@@ -6,13 +6,25 @@ use metrology::Axis;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CncError {
     /// A parameter outside its range.
+    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    Range {
+        /// Name of the parameter.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// Least value allowed.
+        least: f64,
+        /// Greatest value allowed.
+        greatest: f64,
+    },
+    /// A parameter that breaks a rule.
     #[error("{name} = {value}: must be {rule}")]
     Parameter {
         /// Name of the parameter.
         name: &'static str,
         /// The value given.
         value: f64,
-        /// The range that is allowed, with its unit.
+        /// The rule, with its unit.
         rule: &'static str,
     },
     /// A value of the machine file that a control cannot work with.
@@ -147,4 +159,35 @@ pub enum ProgramError {
     },
     #[error("line {line}: more than {limit} lines")]
     TooLong { line: u32, limit: u32 },
+}
+
+impl ProgramError {
+    /// Line of the program, from 1.
+    #[must_use]
+    pub const fn line(&self) -> u32 {
+        match self {
+            Self::EndMissing { line } | Self::TooLong { line, .. } => *line,
+            Self::Character { at, .. }
+            | Self::CommentOpen { at }
+            | Self::CommentNested { at }
+            | Self::NumberMissing { at, .. }
+            | Self::NumberMalformed { at, .. }
+            | Self::UnknownWord { at, .. }
+            | Self::NoSuchAxis { at, .. }
+            | Self::DuplicateWord { at, .. }
+            | Self::Conflict { at, .. }
+            | Self::UnusedWord { at, .. }
+            | Self::Value { at, .. }
+            | Self::Needs { at, .. }
+            | Self::Feed { at, .. }
+            | Self::Travel { at, .. }
+            | Self::ArcRadiusMismatch { at, .. }
+            | Self::ArcRadiusTooSmall { at, .. }
+            | Self::ArcAfterTouch { at }
+            | Self::RotaryTouch { at, .. }
+            | Self::TouchWithoutLength { at }
+            | Self::AfterEnd { at, .. }
+            | Self::CommentValue { at, .. } => at.line,
+        }
+    }
 }

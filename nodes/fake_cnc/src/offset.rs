@@ -28,6 +28,7 @@ pub struct OffsetInput {
     silent: u64,
     stale: bool,
     resting: bool,
+    complained: bool,
 }
 
 impl OffsetInput {
@@ -43,6 +44,7 @@ impl OffsetInput {
             silent: 0,
             stale: true,
             resting: true,
+            complained: false,
         }
     }
 
@@ -52,11 +54,24 @@ impl OffsetInput {
         &self.applied
     }
 
-    /// Takes a message, or refuses it as a whole and says why.
-    ///
-    /// # Errors
-    /// A value that is not finite or larger than its limit; what is in effect stays.
-    pub fn receive(&mut self, message: &AxisCompensation) -> Result<(), Diagnostic> {
+    /// Takes a message, or refuses it as a whole; tells what became worse, or well again.
+    pub fn receive(&mut self, message: &AxisCompensation) -> Option<Diagnostic> {
+        match self.wanted_by(message) {
+            Ok(wanted) => {
+                self.wanted = wanted;
+                self.silent = 0;
+                self.stale = false;
+                self.resting = false;
+                std::mem::take(&mut self.complained).then_some(Diagnostic::CompensationFollowed)
+            }
+            Err(refusal) => {
+                self.complained = true;
+                Some(refusal)
+            }
+        }
+    }
+
+    fn wanted_by(&self, message: &AxisCompensation) -> Result<PerAxis<f64>, Diagnostic> {
         let mut wanted = PerAxis::default();
         for axis in self.axes.iter().filter(|axis| message.axes.contains(*axis)) {
             let value = message.total[axis];
@@ -69,11 +84,7 @@ impl OffsetInput {
             }
             wanted[axis] = value;
         }
-        self.wanted = wanted;
-        self.silent = 0;
-        self.stale = false;
-        self.resting = false;
-        Ok(())
+        Ok(wanted)
     }
 
     /// One servo period; tells once when the compensation becomes stale.
@@ -86,6 +97,7 @@ impl OffsetInput {
             self.silent += 1;
             if self.silent > self.hold {
                 self.stale = true;
+                self.complained = true;
                 self.wanted = PerAxis::default();
                 became_stale = Some(Diagnostic::CompensationStale {
                     silent_periods: self.silent,
@@ -150,7 +162,7 @@ mod tests {
         let mut input = input();
         let mut last = 0.0;
         for target in [0.02, -0.02] {
-            assert_eq!(input.receive(&message(target)), Ok(()));
+            assert_eq!(input.receive(&message(target)), None);
             for _ in 0..90 {
                 assert_eq!(input.advance(), None);
                 let now = input.applied()[Axis::X];
@@ -164,7 +176,7 @@ mod tests {
     #[test]
     fn eq2_stale_offset_is_held_then_fades_to_exactly_zero() {
         let mut input = input();
-        assert_eq!(input.receive(&message(0.001)), Ok(()));
+        assert_eq!(input.receive(&message(0.001)), None);
         let mut stale_at = None;
         for period in 1..=400 {
             if input.advance().is_some() {
@@ -178,22 +190,25 @@ mod tests {
         }
         assert_eq!(stale_at, Some(101));
         assert!(input.applied()[Axis::X].abs() <= 0.0);
+        let again = input.receive(&message(0.001));
+        assert_eq!(again, Some(Diagnostic::CompensationFollowed));
+        assert_eq!(input.receive(&message(0.001)), None);
     }
 
     #[test]
     fn refused_messages_change_nothing() {
         let mut input = input();
-        assert_eq!(input.receive(&message(0.001)), Ok(()));
+        assert_eq!(input.receive(&message(0.001)), None);
         (0..20).for_each(|_| assert_eq!(input.advance(), None));
-        let before = input.clone();
-        let nan = input.receive(&message(f64::NAN)).unwrap_err();
+        let before = (input.wanted, input.silent);
+        let nan = input.receive(&message(f64::NAN)).unwrap();
         assert_eq!(nan.to_string(), "compensation of axis X is NaN: refused");
-        assert!(input.receive(&message(f64::INFINITY)).is_err());
-        let large = input.receive(&message(0.7)).unwrap_err();
+        assert!(input.receive(&message(f64::INFINITY)).is_some());
+        let large = input.receive(&message(0.7)).unwrap();
         assert_eq!(
             large.to_string(),
             "compensation of axis X is 0.7, limit 0.5: refused"
         );
-        assert_eq!(input, before);
+        assert_eq!((input.wanted, input.silent), before);
     }
 }

@@ -16,6 +16,9 @@ use crate::outcome::{Outcome, ProgramState};
 use crate::plant::Plant;
 use crate::touching::Latched;
 
+/// Greatest rate of [`Output::Joints`].
+pub const JOINT_RATE_HZ: f64 = 50.0;
+
 /// What the control is told.
 #[expect(
     clippy::large_enum_variant,
@@ -48,22 +51,24 @@ pub enum Input {
 pub enum Output {
     /// Positions at one servo tick.
     State(AxisState),
+    /// The same at [`JOINT_RATE_HZ`] or the background rate, whichever is lower, for everybody's tools.
+    Joints(AxisState),
     /// A touch.
     Trigger(ProbeTrigger),
     /// A temperature reading.
     Temperature(TemperatureSample),
     /// A grid encoder reading.
     Grid(GridSample),
-    /// The program was found executable and runs.
+    /// The request is taken; a program that is not executable ends at once with [`Outcome::Refused`].
     Accepted {
         /// Its request.
         goal: u64,
     },
-    /// The program was not started.
+    /// The request is not taken: another program is on its way.
     Refused {
         /// Its request.
         goal: u64,
-        /// Why, with line, column, value and limit.
+        /// Why.
         message: String,
     },
     /// Where the program is.
@@ -83,7 +88,7 @@ pub enum Output {
         goal: u64,
         /// How.
         outcome: Outcome,
-        /// Why; empty when done.
+        /// Why, with line, column, value and limit where it was refused; empty when done.
         message: String,
         /// Last line that was executed, from 1.
         line: u32,
@@ -106,6 +111,8 @@ pub struct Cnc<H = Plant> {
     sensors: Vec<Sensor>,
     last_tick: Option<Stamp<Host>>,
     touches: u32,
+    faulted: bool,
+    time_disturbed: bool,
     events: Vec<Event>,
 }
 
@@ -130,6 +137,8 @@ impl<H: Hardware> Cnc<H> {
             sensors,
             last_tick: None,
             touches: 0,
+            faulted: false,
+            time_disturbed: false,
             events: Vec::new(),
         })
     }
@@ -162,13 +171,20 @@ impl<H: Hardware> Cnc<H> {
             });
             return;
         }
-        out.push(match self.control.start(goal, text) {
-            Ok(()) => Output::Accepted { goal },
-            Err(error) => Output::Refused {
+        out.push(Output::Accepted { goal });
+        match self.control.start(goal, text) {
+            Ok(()) => {
+                if std::mem::take(&mut self.faulted) {
+                    out.push(Output::Diagnostic(Diagnostic::FaultCleared));
+                }
+            }
+            Err(error) => out.push(Output::Finished {
                 goal,
+                outcome: Outcome::Refused,
+                line: error.line(),
                 message: error.to_string(),
-            },
-        });
+            }),
+        }
     }
 
     fn cancel(&mut self, goal: u64, out: &mut Vec<Output>) {
@@ -182,6 +198,7 @@ impl<H: Hardware> Cnc<H> {
     fn pass_time(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
         if let Some(last) = self.last_tick.filter(|last| at < *last) {
             let by_s = (last - at).as_secs_f64();
+            self.time_disturbed = true;
             out.push(Output::Diagnostic(Diagnostic::TimeWentBack { by_s }));
             return;
         }
@@ -193,11 +210,15 @@ impl<H: Hardware> Cnc<H> {
         let limit = self.control.settings().longest_catch_up;
         if at - now > limit {
             self.clocks.anchor(at);
+            self.time_disturbed = true;
             out.push(Output::Diagnostic(Diagnostic::TimeJumped {
                 by_s: (at - now).as_secs_f64(),
                 limit_s: limit.as_secs_f64(),
             }));
             return;
+        }
+        if std::mem::take(&mut self.time_disturbed) {
+            out.push(Output::Diagnostic(Diagnostic::TimePasses));
         }
         while let Some(end) = self.clocks.host_ahead(1).filter(|end| *end <= at) {
             self.period(end, out);
@@ -219,16 +240,19 @@ impl<H: Hardware> Cnc<H> {
 
     fn report_state(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
         let settings = self.control.settings();
+        let count = self.clocks.count();
         let every = if self.control.full_rate() {
             settings.state_every
         } else {
             settings.background_every
         };
-        if !self.clocks.count().is_multiple_of(every) {
+        let wanted = count.is_multiple_of(every);
+        let joints = count.is_multiple_of(settings.joint_every);
+        if !wanted && !joints {
             return;
         }
         let feedback = self.control.feedback();
-        out.push(Output::State(AxisState {
+        let state = AxisState {
             received_at: at,
             controller_at: self.clocks.machine_now(),
             axes: settings.limits.axes,
@@ -236,7 +260,14 @@ impl<H: Hardware> Cnc<H> {
             motor: feedback.motor,
             scale: feedback.scale,
             velocity: feedback.velocity,
-        }));
+        };
+        if joints {
+            out.push(Output::Joints(state));
+        }
+        if !wanted {
+            return;
+        }
+        out.push(Output::State(state));
         if let Some((u_mm, v_mm)) = self.control.hardware().grid_position_mm() {
             out.push(Output::Grid(GridSample {
                 at,
@@ -255,6 +286,7 @@ impl<H: Hardware> Cnc<H> {
                 Event::Noted(diagnostic) => out.push(Output::Diagnostic(diagnostic)),
                 Event::Touched(latched) => out.push(self.trigger(at, &latched)),
                 Event::Ended(ending) => {
+                    self.faulted |= ending.outcome() == Outcome::Fault;
                     if let Some((goal, line)) = self.control.take_ended() {
                         out.push(Output::Finished {
                             goal,
@@ -333,9 +365,8 @@ impl<H: Hardware> Stage for Cnc<H> {
             Input::RunProgram { goal, text, .. } => self.run_program(goal, &text, out),
             Input::CancelProgram { goal } => self.cancel(goal, out),
             Input::Compensation(message) => {
-                if let Err(diagnostic) = self.control.offset_mut().receive(&message) {
-                    out.push(Output::Diagnostic(diagnostic));
-                }
+                let told = self.control.offset_mut().receive(&message);
+                out.extend(told.map(Output::Diagnostic));
             }
             Input::Tick => self.pass_time(at, out),
         }
