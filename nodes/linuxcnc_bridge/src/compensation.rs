@@ -1,0 +1,181 @@
+//! Compensation on its way into HAL: the bridge's own limits and its heartbeat.
+//!
+//! Offsets go to the signals `abbe-compensation-AXIS` through one lasting `halcmd`, as they come. A
+//! realtime stream (`streamer`) was decided against: it must be fed without a pause and repeats or
+//! starves when its feeder dies, while a signal simply keeps its value. Between two settings, and
+//! whatever arrives, HAL's `limit3` bounds size, rate and acceleration, so that neither a wrong
+//! number nor the death of the bridge steps an axis.
+//!
+//! The signal `abbe-heartbeat` changes as long as fresh compensation comes. When it stands still,
+//! because compensation is stale or the bridge is dead, HAL turns the target to zero and fades the
+//! offsets out at the rate that `limit3` allows.
+
+use std::fmt::Write as _;
+
+use metrology::sample::AxisCompensation;
+use metrology::stamp::{Host, Span, Stamp};
+use metrology::{Axis, PerAxis};
+
+use crate::config::Settings;
+
+/// Least change that is passed on: 10 nm, a tenth of the finest pulse in use; 0.002 arcsec.
+const LEAST_CHANGE: f64 = 1e-5;
+/// Least time between two settings: HAL's limiter interpolates.
+const LEAST_PERIOD: Span = Span::from_nanos(10_000_000);
+/// Time between two beats.
+const BEAT: Span = Span::from_nanos(100_000_000);
+
+/// Why compensation was not passed on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CompensationRefused {
+    /// Not a finite number.
+    NotFinite {
+        /// Axis.
+        axis: Axis,
+    },
+    /// Larger than the bridge's limit; mm or rad.
+    TooLarge {
+        /// Axis.
+        axis: Axis,
+        /// What was asked, mm or rad.
+        offset: f64,
+        /// The limit, mm or rad.
+        limit: f64,
+    },
+}
+
+/// What is to be said once, when it changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Freshness {
+    /// Compensation comes.
+    Fresh,
+    /// Compensation has stopped coming; HAL fades it out.
+    Stale,
+}
+
+/// The way of the offsets into HAL.
+#[derive(Clone, Debug)]
+pub struct CompensationPath {
+    joints: Vec<Axis>,
+    limit: PerAxis<f64>,
+    stale_after: Span,
+    received: Option<Stamp<Host>>,
+    wanted: PerAxis<f64>,
+    passed: PerAxis<Option<f64>>,
+    passed_at: Option<Stamp<Host>>,
+    beat: bool,
+    beat_at: Option<Stamp<Host>>,
+}
+
+impl CompensationPath {
+    /// With the limits of `settings`.
+    #[must_use]
+    pub fn new(settings: &Settings) -> Self {
+        Self {
+            joints: settings.joints.clone(),
+            limit: settings.compensation_limit,
+            stale_after: settings.compensation_stale_after,
+            received: None,
+            wanted: PerAxis::default(),
+            passed: PerAxis::default(),
+            passed_at: None,
+            beat: false,
+            beat_at: None,
+        }
+    }
+
+    /// HAL was started anew and knows nothing.
+    pub fn forget_passed(&mut self) {
+        self.passed = PerAxis::default();
+        self.passed_at = None;
+        self.beat_at = None;
+    }
+
+    /// Takes new offsets; the whole set is refused when one of them is, and the last good one stays.
+    ///
+    /// # Errors
+    /// An offset that is not finite or too large: a condition to report, nothing else changes.
+    pub fn receive(
+        &mut self,
+        at: Stamp<Host>,
+        compensation: &AxisCompensation,
+    ) -> Result<(), CompensationRefused> {
+        for &axis in self
+            .joints
+            .iter()
+            .filter(|axis| compensation.axes.contains(**axis))
+        {
+            let (offset, limit) = (compensation.total[axis], self.limit[axis]);
+            if !offset.is_finite() {
+                return Err(CompensationRefused::NotFinite { axis });
+            }
+            if offset.abs() > limit {
+                return Err(CompensationRefused::TooLarge {
+                    axis,
+                    offset,
+                    limit,
+                });
+            }
+        }
+        for &axis in self
+            .joints
+            .iter()
+            .filter(|axis| compensation.axes.contains(**axis))
+        {
+            self.wanted[axis] = compensation.total[axis];
+        }
+        self.received = Some(at);
+        Ok(())
+    }
+
+    /// Whether compensation is fresh; `None` before the first.
+    #[must_use]
+    pub fn freshness(&self, at: Stamp<Host>) -> Option<Freshness> {
+        let age = at - self.received?;
+        Some(if age > self.stale_after {
+            Freshness::Stale
+        } else {
+            Freshness::Fresh
+        })
+    }
+
+    /// Commands for HAL that are due, one a line; `None` when there are none.
+    pub fn due(&mut self, at: Stamp<Host>) -> Option<String> {
+        if self.freshness(at) != Some(Freshness::Fresh) {
+            return None;
+        }
+        let mut lines = String::new();
+        if self
+            .passed_at
+            .is_none_or(|passed_at| at - passed_at >= LEAST_PERIOD)
+        {
+            for &axis in &self.joints {
+                let wanted = self.wanted[axis];
+                let step = if axis.is_linear() {
+                    LEAST_CHANGE
+                } else {
+                    LEAST_CHANGE * 1e-3
+                };
+                if self.passed[axis].is_none_or(|passed| (wanted - passed).abs() >= step) {
+                    self.passed[axis] = Some(wanted);
+                    self.passed_at = Some(at);
+                    let value = if axis.is_linear() {
+                        wanted
+                    } else {
+                        wanted.to_degrees()
+                    };
+                    let name = axis.letter().to_ascii_lowercase();
+                    writeln!(lines, "sets abbe-compensation-{name} {value:.9}")
+                        .expect("writing to a String cannot fail");
+                }
+            }
+        }
+        if self.beat_at.is_none_or(|beat_at| at - beat_at >= BEAT) {
+            self.beat = !self.beat;
+            self.beat_at = Some(at);
+            writeln!(lines, "sets abbe-heartbeat {}", u8::from(self.beat))
+                .expect("writing to a String cannot fail");
+        }
+        (!lines.is_empty()).then_some(lines)
+    }
+}

@@ -1,0 +1,256 @@
+//! Conditions worth reporting, each with the values that belong to it.
+
+use metrology::Axis;
+
+use crate::compensation::CompensationRefused;
+use crate::fault::FaultKind;
+use crate::latch::NoTouch;
+use crate::protocol::JointLimit;
+
+/// How bad a condition is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// As it should be; clears an earlier condition of the same name.
+    Fine,
+    /// It goes on, but not as told.
+    Warning,
+    /// Data is lost or the machine has stopped.
+    Failure,
+}
+
+/// Why there is no connection.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Lost {
+    /// Nobody listens.
+    #[error("nobody listens: {reason}")]
+    Refused {
+        /// The system's word for it.
+        reason: String,
+    },
+    /// LinuxCNC ended or dropped the connection.
+    #[error("the controller closed the connection: {reason}")]
+    Closed {
+        /// The system's word for it.
+        reason: String,
+    },
+    /// A password was wrong or a step of the greeting was refused.
+    #[error("the greeting was refused at `{step}`")]
+    GreetingRefused {
+        /// Word of the step.
+        step: String,
+    },
+    /// An answer did not come.
+    #[error("no answer to `{request}` within {limit_s} s")]
+    Silent {
+        /// The request.
+        request: String,
+        /// The limit, s.
+        limit_s: f64,
+    },
+    /// What came is not the protocol.
+    #[error("a line of more than {limit_bytes} bytes came")]
+    Nonsense {
+        /// The limit.
+        limit_bytes: usize,
+    },
+}
+
+/// A condition of the bridge or of the controller.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Condition {
+    /// The connection stands.
+    #[error("connected")]
+    Connected,
+    /// The connection does not stand; it is tried again.
+    #[error("not connected: {0}")]
+    Disconnected(Lost),
+    /// The emergency stop was pressed or released.
+    #[error("emergency stop {}", if *.on { "on" } else { "released" })]
+    Estop {
+        /// Whether it is on.
+        on: bool,
+    },
+    /// The drives were switched.
+    #[error("drives {}", if *.on { "on" } else { "off" })]
+    Drives {
+        /// Whether they are on.
+        on: bool,
+    },
+    /// Whether every joint knows where it is.
+    #[error("{}", if *.homed { "all axes homed" } else { "not homed" })]
+    Homed {
+        /// Whether all are homed.
+        homed: bool,
+    },
+    /// Homing took too long.
+    #[error("homing was not over within {limit_s} s")]
+    HomingTimeout {
+        /// The limit, s.
+        limit_s: f64,
+    },
+    /// A joint stands on a limit, or has left it.
+    #[error("axis {axis}: limit {limit:?}")]
+    AxisLimit {
+        /// Axis.
+        axis: Axis,
+        /// Which limit.
+        limit: JointLimit,
+    },
+    /// The controller reported an error.
+    #[error("controller: {message}")]
+    ControllerError {
+        /// What kind.
+        kind: FaultKind,
+        /// Its words.
+        message: String,
+    },
+    /// A line that answers nothing.
+    #[error("unexpected line from the controller: {line:?}")]
+    UnexpectedLine {
+        /// The line.
+        line: String,
+    },
+    /// The controller refused a command.
+    #[error("the controller refused `{request}`")]
+    CommandRefused {
+        /// The command.
+        request: String,
+    },
+    /// Records come (again).
+    #[error("positions come")]
+    Sampling,
+    /// The sampler ended or could not be started.
+    #[error("no positions: {reason}")]
+    SamplerEnded {
+        /// Why.
+        reason: String,
+    },
+    /// Nothing has come from the sampler.
+    #[error("no positions for {silence_s} s")]
+    SamplerSilent {
+        /// For how long, s.
+        silence_s: f64,
+    },
+    /// Records were lost.
+    #[error("{lost} servo periods were not recorded")]
+    SamplerOverrun {
+        /// How many.
+        lost: u32,
+    },
+    /// A line of the sampler is no record.
+    #[error(
+        "a record with {columns} columns came, the joints need {expected}, or a column is no number"
+    )]
+    MalformedSample {
+        /// Columns that came.
+        columns: usize,
+        /// Columns that a record has.
+        expected: usize,
+    },
+    /// The servo thread does not keep its period.
+    #[error("the servo thread runs {:.2} % slow, limit {:.2} %", .slip * 100.0, .limit * 100.0)]
+    ServoSlip {
+        /// Relative slip; 1.
+        slip: f64,
+        /// From where on it is reported; 1.
+        limit: f64,
+    },
+    /// The servo thread keeps its period again.
+    #[error("the servo thread keeps its period")]
+    ServoInTime,
+    /// The probe input changed in a way that gives no touch.
+    #[error("line {line}: probe changed {}", match .reason { NoTouch::AfterGap => "after a gap in the records", NoTouch::AtRest => "while nothing moved" })]
+    TouchUnusable {
+        /// Program line.
+        line: u32,
+        /// Why.
+        reason: NoTouch,
+    },
+    /// Compensation was refused; the last good one stays.
+    #[error("compensation refused: {}", refusal(.0))]
+    CompensationRefused(CompensationRefused),
+    /// Compensation has stopped coming; HAL fades it out.
+    #[error("no compensation for {limit_s} s: fading out")]
+    CompensationStale {
+        /// The limit, s.
+        limit_s: f64,
+    },
+    /// Compensation comes.
+    #[error("compensation is passed on")]
+    CompensationFresh,
+    /// HAL refused a setting.
+    #[error("HAL: {message}")]
+    HalRefused {
+        /// Its words.
+        message: String,
+    },
+}
+
+fn refusal(refused: &CompensationRefused) -> String {
+    match refused {
+        CompensationRefused::NotFinite { axis } => format!("axis {axis}: not a finite number"),
+        CompensationRefused::TooLarge {
+            axis,
+            offset,
+            limit,
+        } => {
+            let unit = if axis.is_linear() { "mm" } else { "rad" };
+            format!("axis {axis}: {offset} {unit}, limit {limit} {unit}")
+        }
+    }
+}
+
+impl Condition {
+    /// Which condition it is, snake case; the same name with [`Severity::Fine`] clears it.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Connected | Self::Disconnected(_) => "connection",
+            Self::Estop { .. } => "emergency_stop",
+            Self::Drives { .. } => "drives",
+            Self::Homed { .. } | Self::HomingTimeout { .. } => "homing",
+            Self::AxisLimit { .. } => "axis_limit",
+            Self::ControllerError { .. } => "controller_error",
+            Self::UnexpectedLine { .. } => "unexpected_line",
+            Self::CommandRefused { .. } => "command_refused",
+            Self::Sampling | Self::SamplerEnded { .. } | Self::SamplerSilent { .. } => "sampler",
+            Self::SamplerOverrun { .. } => "sampler_overrun",
+            Self::MalformedSample { .. } => "malformed_sample",
+            Self::ServoSlip { .. } | Self::ServoInTime => "servo_period",
+            Self::TouchUnusable { .. } => "touch_unusable",
+            Self::CompensationRefused(_) => "compensation_refused",
+            Self::CompensationStale { .. } | Self::CompensationFresh => "compensation",
+            Self::HalRefused { .. } => "hal",
+        }
+    }
+
+    /// How bad it is.
+    #[must_use]
+    pub const fn severity(&self) -> Severity {
+        match self {
+            Self::Connected
+            | Self::Sampling
+            | Self::ServoInTime
+            | Self::CompensationFresh
+            | Self::Estop { on: false }
+            | Self::Drives { on: true }
+            | Self::Homed { homed: true }
+            | Self::AxisLimit {
+                limit: JointLimit::Free,
+                ..
+            } => Severity::Fine,
+            Self::Drives { on: false }
+            | Self::Homed { homed: false }
+            | Self::AxisLimit {
+                limit: JointLimit::MinSoft | JointLimit::MaxSoft,
+                ..
+            }
+            | Self::UnexpectedLine { .. }
+            | Self::ServoSlip { .. }
+            | Self::TouchUnusable { .. }
+            | Self::CompensationRefused(_)
+            | Self::CompensationStale { .. } => Severity::Warning,
+            _ => Severity::Failure,
+        }
+    }
+}

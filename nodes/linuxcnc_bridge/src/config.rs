@@ -1,0 +1,222 @@
+//! Parameters of the bridge, as a person writes them, and the settings that follow from them.
+
+use machine::file::{Latch, MachineFile};
+use metrology::stamp::Span;
+use metrology::{Axis, AxisSet, PerAxis};
+use serde::{Deserialize, Serialize};
+
+use crate::error::BridgeError;
+
+/// The parameter file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BridgeConfig {
+    /// Axis of each joint, from joint 0.
+    pub joints: Vec<Axis>,
+    /// What the bridge does when it finds LinuxCNC freshly started.
+    pub prepare: Prepare,
+    /// INI file to start, relative to the scenario's folder; absent: LinuxCNC is started by others.
+    #[serde(default)]
+    pub start_ini: Option<String>,
+    /// Ordinary user who owns LinuxCNC's processes and memory.
+    #[serde(default = "BridgeConfig::default_user")]
+    pub user: String,
+    /// The TCP interface.
+    #[serde(default)]
+    pub connection: ConnectionConfig,
+    /// Limits of the compensation that is passed on.
+    pub compensation: CompensationConfig,
+}
+
+/// What the bridge does when it finds LinuxCNC freshly started (no joint homed).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Prepare {
+    /// Nothing: a person at the machine releases the emergency stop, powers on and homes.
+    Observe,
+    /// Release the emergency stop, power on and home: for simulated machines only.
+    PowerOnAndHome,
+}
+
+/// The TCP interface and its times.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ConnectionConfig {
+    /// Where `linuxcncrsh` listens.
+    pub host: String,
+    /// Its TCP port.
+    pub port: u16,
+    /// Password of its greeting.
+    pub connect_password: String,
+    /// Password that allows commands.
+    pub enable_password: String,
+    /// Time between looks at the controller's state.
+    pub poll_period_ms: f64,
+    /// An answer later than this ends the connection.
+    pub reply_timeout_ms: f64,
+    /// Time between attempts to connect.
+    pub reconnect_period_ms: f64,
+    /// Homing must be over after this time.
+    pub homing_timeout_s: f64,
+    /// LinuxCNC must listen this long after its start.
+    pub start_timeout_s: f64,
+}
+
+impl Default for ConnectionConfig {
+    fn default() -> Self {
+        Self {
+            host: "127.0.0.1".to_owned(),
+            port: 5007,
+            connect_password: "EMC".to_owned(),
+            enable_password: "EMCTOO".to_owned(),
+            poll_period_ms: 50.0,
+            reply_timeout_ms: 5000.0,
+            reconnect_period_ms: 500.0,
+            homing_timeout_s: 60.0,
+            start_timeout_s: 30.0,
+        }
+    }
+}
+
+/// Limits of the compensation that is passed on; HAL has its own limits behind these.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CompensationConfig {
+    /// Greatest offset of a linear axis.
+    pub limit_um: f64,
+    /// Greatest offset of a rotary axis.
+    pub limit_arcsec: f64,
+    /// Without news for this long the heartbeat stops and HAL fades the offsets out.
+    pub stale_after_ms: f64,
+}
+
+impl BridgeConfig {
+    fn default_user() -> String {
+        "nobody".to_owned()
+    }
+}
+
+/// Checked settings in inner units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Axis of each joint, from joint 0.
+    pub joints: Vec<Axis>,
+    /// The same as a set.
+    pub axes: AxisSet,
+    /// Servo period of the machine file.
+    pub servo_period: Span,
+    /// See [`Prepare`].
+    pub prepare: Prepare,
+    /// Password of the greeting.
+    pub connect_password: String,
+    /// Password that allows commands.
+    pub enable_password: String,
+    /// Time between looks at the controller's state.
+    pub poll_period: Span,
+    /// An answer later than this ends the connection.
+    pub reply_timeout: Span,
+    /// Time between attempts to connect.
+    pub reconnect_period: Span,
+    /// Homing must be over after this time.
+    pub homing_timeout: Span,
+    /// Greatest compensation, mm or rad.
+    pub compensation_limit: PerAxis<f64>,
+    /// Age at which compensation is stale.
+    pub compensation_stale_after: Span,
+}
+
+fn checked(key: &'static str, value: f64, above: f64, at_most: f64) -> Result<f64, BridgeError> {
+    if value > above && value <= at_most {
+        Ok(value)
+    } else {
+        Err(BridgeError::OutOfRange {
+            key,
+            value,
+            above,
+            at_most,
+        })
+    }
+}
+
+fn span(key: &'static str, value: f64, unit_s: f64, at_most: f64) -> Result<Span, BridgeError> {
+    Ok(Span::from_secs_f64(
+        checked(key, value, 0.0, at_most)? * unit_s,
+    ))
+}
+
+fn word(key: &'static str, value: &str) -> Result<String, BridgeError> {
+    if value.is_empty() || value.contains(|c: char| c.is_whitespace() || c.is_control()) {
+        return Err(BridgeError::NotAWord {
+            key,
+            value: value.to_owned(),
+        });
+    }
+    Ok(value.to_owned())
+}
+
+impl Settings {
+    /// Checks a configuration against the machine file.
+    ///
+    /// # Errors
+    /// Values out of range, joints that are not the machine's axes, or a hardware latch.
+    pub fn new(config: &BridgeConfig, machine: &MachineFile) -> Result<Self, BridgeError> {
+        let axes: AxisSet = config.joints.iter().copied().collect();
+        if axes != machine.axis_set() || axes.len() != config.joints.len() {
+            return Err(BridgeError::JointsAndAxesDiffer {
+                joints: config.joints.clone(),
+                axes: machine.axis_set().iter().collect(),
+            });
+        }
+        if machine.control.latch != Latch::Polled {
+            return Err(BridgeError::LatchIsPolled);
+        }
+        let connection = &config.connection;
+        let limit = &config.compensation;
+        let linear_mm = checked("compensation.limit_um", limit.limit_um, 0.0, 5000.0)? / 1000.0;
+        let rotary_rad = (checked("compensation.limit_arcsec", limit.limit_arcsec, 0.0, 3600.0)?
+            / 3600.0)
+            .to_radians();
+        let period_ms = machine.control.servo_period_ms;
+        let poll_ms = connection.poll_period_ms;
+        Ok(Self {
+            joints: config.joints.clone(),
+            axes,
+            servo_period: span("control.servo_period_ms", period_ms, 1e-3, 100.0)?,
+            prepare: config.prepare,
+            connect_password: word("connection.connect_password", &connection.connect_password)?,
+            enable_password: word("connection.enable_password", &connection.enable_password)?,
+            poll_period: span("connection.poll_period_ms", poll_ms, 1e-3, 1000.0)?,
+            reply_timeout: span(
+                "connection.reply_timeout_ms",
+                connection.reply_timeout_ms,
+                1e-3,
+                60_000.0,
+            )?,
+            reconnect_period: span(
+                "connection.reconnect_period_ms",
+                connection.reconnect_period_ms,
+                1e-3,
+                60_000.0,
+            )?,
+            homing_timeout: span(
+                "connection.homing_timeout_s",
+                connection.homing_timeout_s,
+                1.0,
+                3600.0,
+            )?,
+            compensation_limit: PerAxis::from_fn(|axis| {
+                if axis.is_linear() {
+                    linear_mm
+                } else {
+                    rotary_rad
+                }
+            }),
+            compensation_stale_after: span(
+                "compensation.stale_after_ms",
+                limit.stale_after_ms,
+                1e-3,
+                60_000.0,
+            )?,
+        })
+    }
+}
