@@ -9,11 +9,10 @@ use metrology::{Axis, PerAxis};
 use serde::{Deserialize, Serialize};
 
 use crate::error::CncError;
-use crate::parameters::PARAMETERS;
+pub use crate::parameters::PARAMETERS;
 use crate::path::AxisLimits;
 use crate::rs274::Envelope;
 use crate::servo::Gains;
-use crate::stage::JOINT_RATE_HZ;
 
 /// Operational parameters; none of them is physics, so each has a default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -124,7 +123,6 @@ pub struct Settings {
     pub(crate) state_every: u64,
     pub(crate) background_every: u64,
     pub(crate) feedback_every: u64,
-    pub(crate) joint_every: u64,
     pub(crate) touch_margin: u64,
     pub(crate) settle: u64,
     pub(crate) compensation_hold: u64,
@@ -289,9 +287,7 @@ impl Config {
         } else {
             self.state_rate_hz
         };
-        let joint_hz = background_hz.min(JOINT_RATE_HZ);
         Ok(Settings {
-            joint_every: periods(1.0 / joint_hz, period_s).max(1),
             limits: AxisLimits {
                 axes: metrology::AxisSet::EMPTY,
                 speed: PerAxis::default(),

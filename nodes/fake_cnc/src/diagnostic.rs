@@ -2,6 +2,17 @@
 
 use metrology::Axis;
 
+/// How much a condition matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Well, or well again.
+    Ok,
+    /// It goes on, but not as told.
+    Warn,
+    /// A function has stopped.
+    Error,
+}
+
 /// Something worth telling; lengths mm, angles rad.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(
@@ -31,4 +42,63 @@ pub enum Diagnostic {
     TimePasses,
     #[error("there is no program {goal} to cancel")]
     NothingToCancel { goal: u64 },
+}
+
+impl Diagnostic {
+    /// Which condition it is about; a condition is over when told with [`Severity::Ok`].
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::CompensationNotFinite { .. }
+            | Self::CompensationTooLarge { .. }
+            | Self::CompensationStale { .. }
+            | Self::CompensationFollowed => "compensation_input",
+            Self::FollowingError { .. } | Self::ProbeInMotion { .. } | Self::FaultCleared => {
+                "motion_fault"
+            }
+            Self::TimeWentBack { .. } | Self::TimeJumped { .. } | Self::TimePasses => "time",
+            Self::NothingToCancel { .. } => "cancel",
+        }
+    }
+
+    /// How much it matters.
+    #[must_use]
+    pub const fn severity(&self) -> Severity {
+        match self {
+            Self::CompensationFollowed
+            | Self::FaultCleared
+            | Self::TimePasses
+            | Self::NothingToCancel { .. } => Severity::Ok,
+            Self::CompensationStale { .. } | Self::TimeJumped { .. } => Severity::Warn,
+            Self::CompensationNotFinite { .. }
+            | Self::CompensationTooLarge { .. }
+            | Self::FollowingError { .. }
+            | Self::ProbeInMotion { .. }
+            | Self::TimeWentBack { .. } => Severity::Error,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_condition_that_can_go_wrong_can_be_told_well_again() {
+        let wrong = [
+            Diagnostic::CompensationStale { silent_periods: 1 },
+            Diagnostic::ProbeInMotion { line: 1 },
+            Diagnostic::TimeWentBack { by_s: 1.0 },
+        ];
+        let well = [
+            Diagnostic::CompensationFollowed,
+            Diagnostic::FaultCleared,
+            Diagnostic::TimePasses,
+        ];
+        for (wrong, well) in wrong.iter().zip(&well) {
+            assert_eq!(wrong.name(), well.name());
+            assert!(wrong.severity() > Severity::Ok);
+            assert_eq!(well.severity(), Severity::Ok);
+        }
+    }
 }

@@ -28,7 +28,7 @@ pub mod sweep;
 pub mod touching;
 
 pub use config::Config;
-pub use diagnostic::Diagnostic;
+pub use diagnostic::{Diagnostic, Severity};
 pub use error::{CncError, ProgramError};
 pub use hardware::Hardware;
 pub use outcome::{Outcome, ProgramState};

@@ -16,9 +16,6 @@ use crate::outcome::{Outcome, ProgramState};
 use crate::plant::Plant;
 use crate::touching::Latched;
 
-/// Greatest rate of [`Output::Joints`].
-pub const JOINT_RATE_HZ: f64 = 50.0;
-
 /// What the control is told.
 #[expect(
     clippy::large_enum_variant,
@@ -51,8 +48,6 @@ pub enum Input {
 pub enum Output {
     /// Positions at one servo tick.
     State(AxisState),
-    /// The same at [`JOINT_RATE_HZ`] or the background rate, whichever is lower, for everybody's tools.
-    Joints(AxisState),
     /// A touch.
     Trigger(ProbeTrigger),
     /// A temperature reading.
@@ -240,19 +235,16 @@ impl<H: Hardware> Cnc<H> {
 
     fn report_state(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
         let settings = self.control.settings();
-        let count = self.clocks.count();
         let every = if self.control.full_rate() {
             settings.state_every
         } else {
             settings.background_every
         };
-        let wanted = count.is_multiple_of(every);
-        let joints = count.is_multiple_of(settings.joint_every);
-        if !wanted && !joints {
+        if !self.clocks.count().is_multiple_of(every) {
             return;
         }
         let feedback = self.control.feedback();
-        let state = AxisState {
+        out.push(Output::State(AxisState {
             received_at: at,
             controller_at: self.clocks.machine_now(),
             axes: settings.limits.axes,
@@ -260,14 +252,7 @@ impl<H: Hardware> Cnc<H> {
             motor: feedback.motor,
             scale: feedback.scale,
             velocity: feedback.velocity,
-        };
-        if joints {
-            out.push(Output::Joints(state));
-        }
-        if !wanted {
-            return;
-        }
-        out.push(Output::State(state));
+        }));
         if let Some((u_mm, v_mm)) = self.control.hardware().grid_position_mm() {
             out.push(Output::Grid(GridSample {
                 at,
