@@ -43,7 +43,43 @@ pub fn emit(interfaces: &Interfaces, own_package: &str) -> String {
             ),
         );
     }
+    out.push_str(&emit_table(interfaces, own_package));
     out
+}
+
+/// The constants of an action that describe what ROS 2 derives from it, with the names' suffixes.
+const DERIVED: [(&str, &str); 7] = [
+    ("SEND_GOAL", "_SendGoal"),
+    ("SEND_GOAL_REQUEST", "_SendGoal_Request"),
+    ("SEND_GOAL_RESPONSE", "_SendGoal_Response"),
+    ("GET_RESULT", "_GetResult"),
+    ("GET_RESULT_REQUEST", "_GetResult_Request"),
+    ("GET_RESULT_RESPONSE", "_GetResult_Response"),
+    ("FEEDBACK_MESSAGE", "_FeedbackMessage"),
+];
+
+/// Every message that can travel, sorted by full name.
+fn emit_table(interfaces: &Interfaces, own_package: &str) -> String {
+    let mut rows = BTreeMap::new();
+    for name in interfaces.messages.values().filter(|m| m.emitted) {
+        let path = rust_path(&name.full_name, own_package);
+        let row = format!("<{path} as crate::Message>::DESCRIPTION");
+        rows.insert(name.full_name.clone(), row);
+    }
+    for action in &interfaces.actions {
+        let path = rust_path(&action.full_name, own_package);
+        for (constant, suffix) in DERIVED {
+            if !["SEND_GOAL", "GET_RESULT"].contains(&constant) {
+                let row = format!("<{path} as crate::Action>::{constant}");
+                rows.insert(format!("{}{suffix}", action.full_name), row);
+            }
+        }
+    }
+    let rows: Vec<_> = rows.into_values().collect();
+    format!(
+        "/// Every message that can travel on a topic or in a service or action, sorted by type name.\npub const DESCRIPTIONS: &[crate::Description] = &[\n{},\n];\n",
+        rows.join(",\n")
+    )
 }
 
 fn put(out: &mut String, text: std::fmt::Arguments<'_>) {
@@ -203,15 +239,7 @@ fn emit_action(interfaces: &Interfaces, action: &Compound, own_package: &str) ->
             rihs01(interfaces, &interfaces.messages[&action.full_name])
         ),
     );
-    for (constant, suffix) in [
-        ("SEND_GOAL", "_SendGoal"),
-        ("SEND_GOAL_REQUEST", "_SendGoal_Request"),
-        ("SEND_GOAL_RESPONSE", "_SendGoal_Response"),
-        ("GET_RESULT", "_GetResult"),
-        ("GET_RESULT_REQUEST", "_GetResult_Request"),
-        ("GET_RESULT_RESPONSE", "_GetResult_Response"),
-        ("FEEDBACK_MESSAGE", "_FeedbackMessage"),
-    ] {
+    for (constant, suffix) in DERIVED {
         let message = &interfaces.messages[&full(suffix)];
         put(
             &mut out,

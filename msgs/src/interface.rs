@@ -35,6 +35,15 @@ pub struct Description {
     pub definition: &'static str,
 }
 
+/// What is known of the message type `package/kind/Name`; `None`: none of this crate.
+#[must_use]
+pub fn description_of(type_name: &str) -> Option<&'static Description> {
+    crate::DESCRIPTIONS
+        .binary_search_by(|description| description.type_name.cmp(type_name))
+        .ok()
+        .map(|idx| &crate::DESCRIPTIONS[idx])
+}
+
 /// A ROS 2 service.
 pub trait Service: Send + Sync + 'static {
     /// What the client sends.
