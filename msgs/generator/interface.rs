@@ -15,10 +15,8 @@ pub struct Message {
     pub full_name: String,
     /// Fields and constants.
     pub spec: MessageSpecification,
-    /// Its text as written, comments included; for a derived message, written from its fields.
-    pub text: String,
-    /// Whether a Rust type is made of it.
-    pub emitted: bool,
+    /// Its text as written, comments included; `None`: ROS 2 derives it, no Rust type is made of it.
+    pub text: Option<String>,
 }
 
 /// A service or action by the names of its parts.
@@ -44,7 +42,7 @@ impl Interfaces {
     /// Adds a `.msg` file.
     pub fn add_message_file(&mut self, package: &str, name: &str, text: &str) -> Result<()> {
         let spec = parse_message_string(package, name, text)?;
-        self.add("msg", spec, text.to_owned(), true);
+        self.add("msg", spec, Some(text.to_owned()));
         Ok(())
     }
 
@@ -55,9 +53,9 @@ impl Interfaces {
         let parts = split_parts(text);
         let event = create_service_event_message(package, name, &parsed.request, &parsed.response)?;
         for (spec, part) in [parsed.request, parsed.response].into_iter().zip(parts) {
-            self.add("srv", spec, part, true);
+            self.add("srv", spec, Some(part));
         }
-        self.add_derived("srv", event)?;
+        self.add("srv", event, None);
         self.add_service_of(package, "srv", name)?;
         self.services.push(Compound {
             full_name: format!("{package}/srv/{name}"),
@@ -73,18 +71,18 @@ impl Interfaces {
         let feedback_message = create_feedback_message(package, name, &parsed.feedback)?;
         let parts = [parsed.goal, parsed.result, parsed.feedback];
         for (spec, part) in parts.into_iter().zip(split_parts(text)) {
-            self.add("action", spec, part, true);
+            self.add("action", spec, Some(part));
         }
         for service in [parsed.goal_service, parsed.result_service] {
             let service_name = service.srv_name;
             let (request, response) = (service.request, service.response);
             let event = create_service_event_message(package, &service_name, &request, &response)?;
             for spec in [request, response, event] {
-                self.add_derived("action", spec)?;
+                self.add("action", spec, None);
             }
             self.add_service_of(package, "action", &service_name)?;
         }
-        self.add_derived("action", feedback_message)?;
+        self.add("action", feedback_message, None);
         let fields = [
             ("goal", "_Goal"),
             ("result", "_Result"),
@@ -130,7 +128,7 @@ impl Interfaces {
         let package = base.pkg_name.as_ref()?;
         let kind = owner.full_name.split('/').nth(1).unwrap_or("msg");
         let beside = format!("{package}/{kind}/{}", base.type_name);
-        if !owner.emitted && self.messages.contains_key(&beside) {
+        if owner.text.is_none() && self.messages.contains_key(&beside) {
             return Some(beside);
         }
         Some(format!("{package}/msg/{}", base.type_name))
@@ -158,26 +156,16 @@ impl Interfaces {
             let part = Type::new(&format!("{package}/{name}{suffix}"), None)?;
             whole.add_field(Field::new(part, field, None)?);
         }
-        self.add_derived(kind, whole)
-    }
-
-    fn add_derived(&mut self, kind: &str, spec: MessageSpecification) -> Result<()> {
-        let text = spec
-            .fields
-            .iter()
-            .map(|field| format!("{} {}\n", field.field_type, field.name))
-            .collect();
-        self.add(kind, spec, text, false);
+        self.add(kind, whole, None);
         Ok(())
     }
 
-    fn add(&mut self, kind: &str, spec: MessageSpecification, text: String, emitted: bool) {
+    fn add(&mut self, kind: &str, spec: MessageSpecification, text: Option<String>) {
         let full_name = format!("{}/{kind}/{}", spec.pkg_name, spec.msg_name);
         let message = Message {
             full_name: full_name.clone(),
             spec,
             text,
-            emitted,
         };
         self.messages.insert(full_name, message);
     }

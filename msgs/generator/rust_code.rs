@@ -15,7 +15,7 @@ const LONGEST_PLAIN_ARRAY: u32 = 32;
 /// Source text: per package (its own at the root) a module per kind with its types.
 pub fn emit(interfaces: &Interfaces, own_package: &str) -> String {
     let mut modules: BTreeMap<(String, String), String> = BTreeMap::new();
-    for message in interfaces.messages.values().filter(|m| m.emitted) {
+    for message in interfaces.messages.values().filter(|m| m.text.is_some()) {
         let code = emit_message(interfaces, message, own_package);
         module_of(&mut modules, &message.full_name).push_str(&code);
     }
@@ -61,10 +61,10 @@ const DERIVED: [(&str, &str); 7] = [
 /// Every message that can travel, sorted by full name.
 fn emit_table(interfaces: &Interfaces, own_package: &str) -> String {
     let mut rows = BTreeMap::new();
-    for name in interfaces.messages.values().filter(|m| m.emitted) {
-        let path = rust_path(&name.full_name, own_package);
+    for message in interfaces.messages.values().filter(|m| m.text.is_some()) {
+        let path = rust_path(&message.full_name, own_package);
         let row = format!("<{path} as crate::Message>::DESCRIPTION");
-        rows.insert(name.full_name.clone(), row);
+        rows.insert(message.full_name.clone(), row);
     }
     for action in &interfaces.actions {
         let path = rust_path(&action.full_name, own_package);

@@ -111,5 +111,8 @@ fn a_schema_holds_every_nested_definition_once() {
         names.len()
     );
     assert!(text.starts_with(include_str!("../msg/ThermalModel.msg")));
+    let feedback = FeedbackMessage::<LookupTransform>::DEFINITION;
+    assert!(feedback.contains("\ntf2_msgs/action/LookupTransform_Feedback feedback\n"));
+    assert!(feedback.contains("\nMSG: tf2_msgs/action/LookupTransform_Feedback\n"));
     assert!(std_msgs::msg::String::DEFINITION.ends_with("string data\n"));
 }
