@@ -4,7 +4,7 @@ use metrology::sample::{CycleKind, CycleOrder, PlanState, PlanStatus as Status};
 
 use crate::action::RunCycleGoal;
 use crate::msg::PlanStatus;
-use crate::wire::{Reader, metres, millimetres, time};
+use crate::wire::{Allowed, Reader, metres, millimetres, time};
 use crate::{Place, Wire, WireError};
 
 const KINDS: [CycleKind; 6] = [
@@ -51,8 +51,9 @@ impl Wire for RunCycleGoal {
     fn to_inner(&self) -> Result<CycleOrder, WireError> {
         let read = Reader::of::<Self>();
         let mut feeds_mm_min = Vec::with_capacity(self.feeds_m_s.len());
-        for feed_m_s in &self.feeds_m_s {
-            let feed_m_s = read.finite("feeds_m_s", *feed_m_s)?;
+        for (idx, feed_m_s) in self.feeds_m_s.iter().enumerate() {
+            let place = Place::Entry(idx);
+            let feed_m_s = read.number("feeds_m_s", place, *feed_m_s, Allowed::Finite)?;
             feeds_mm_min.push(millimetres(feed_m_s) * S_PER_MIN);
         }
         Ok(CycleOrder {
@@ -145,12 +146,8 @@ mod tests {
             feeds_m_s: vec![f64::NAN],
             ..RunCycleGoal::default()
         };
-        assert!(
-            goal.into_inner()
-                .unwrap_err()
-                .to_string()
-                .contains("feeds_m_s")
-        );
+        let refusal = goal.into_inner().unwrap_err().to_string();
+        assert!(refusal.contains("feeds_m_s[0]: NaN"), "{refusal}");
     }
 
     #[test]

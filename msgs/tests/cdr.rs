@@ -1,5 +1,10 @@
 //! Bytes on the wire: against another implementation, and against anything a network may bring.
 
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test fails by panicking, in its helper functions too"
+)]
+
 use abbe_msgs::builtin_interfaces::msg::Time;
 use abbe_msgs::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use abbe_msgs::geometry_msgs::msg::PoseWithCovariance;

@@ -1,5 +1,10 @@
 //! Type hashes against those of ROS 2 Jazzy's own build.
 
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test fails by panicking, in its helper functions too"
+)]
+
 use std::collections::BTreeMap;
 
 use abbe_msgs::tf2_msgs::action::LookupTransform;
