@@ -78,8 +78,8 @@ impl Default for Config {
             feedback_rate_hz: 10.0,
             touch_margin_s: 0.05,
             settle_s: 0.02,
-            velocity_gain_per_s: 300.0,
-            velocity_integral_time_s: 0.02,
+            velocity_gain_per_s: 500.0,
+            velocity_integral_time_s: 0.01,
             drive_peak_ratio: 3.0,
             following_error_limit_mm: 1.0,
             following_error_limit_deg: 0.5,
@@ -157,6 +157,12 @@ impl Settings {
         }
         settings.start(config)?;
         Ok(settings)
+    }
+
+    /// What programs are checked against.
+    #[must_use]
+    pub const fn envelope(&self) -> &Envelope {
+        &self.envelope
     }
 
     /// Servo periods in `time_s`, rounded up.

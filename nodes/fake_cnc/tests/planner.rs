@@ -209,43 +209,26 @@ fn prop_straight_motions_stay_on_their_path() {
 #[test]
 fn arcs_hit_their_ends_and_keep_their_radius_in_every_plane() {
     let cases = [
-        (
-            "G17 G0 X10 Y0\nF3000 G3 X0 Y10 I-10\nM2",
-            [Axis::X, Axis::Y],
-        ),
-        (
-            "G18 G0 Z10 X0\nF3000 G3 Z0 X10 K-10\nM2",
-            [Axis::Z, Axis::X],
-        ),
-        (
-            "G19 G0 Y10 Z0\nF3000 G3 Y0 Z10 J-10\nM2",
-            [Axis::Y, Axis::Z],
-        ),
-        ("G17 G0 X10 Y0\nF3000 G2 I-10\nM2", [Axis::X, Axis::Y]),
-        (
-            "G17 G0 X10 Y0\nF3000 G2 I-10 Z-6 P3\nM2",
-            [Axis::X, Axis::Y],
-        ),
-        (
-            "G17 G0 X10 Y0\nF3000 G2 X0 Y10 R-10\nM2",
-            [Axis::X, Axis::Y],
-        ),
+        "G17 F3000 G3 X-10 Y10 I-10\nM2",
+        "G18 F3000 G3 Z-10 X10 K-10\nM2",
+        "G19 F3000 G3 Y-10 Z10 J-10\nM2",
+        "G17 F3000 G2 I-10\nM2",
+        "G18 F9000 G2 K-6 I8\nM2",
+        "G17 F3000 G2 I-10 Z-6 P3\nM2",
+        "G17 F3000 G2 X-10 Y10 R10\nM2",
+        "G17 F3000 G2 X-10 Y10 R-10\nM2",
     ];
-    for (text, [first, second]) in cases {
-        let (commands, end, pieces) = commands(text, None);
+    for text in cases {
+        let (commands, end, _) = commands(text, None);
         assert_eq!(commands[commands.len() - 1], end, "{text}");
-        let motion = motions(&program(text))[1];
-        let centre = motion.arc.unwrap().centre_from_start_mm;
-        let from = *pieces[1].start();
-        let begin = commands.iter().position(|c| *c == from).unwrap_or(0);
-        let mut farthest: f64 = 0.0;
-        for command in &commands[begin.max(60)..] {
-            let radius = (command[first] - from[first] - centre[0])
-                .hypot(command[second] - from[second] - centre[1]);
-            if (command[second].abs()) > 1e-6 {
-                farthest = farthest.max((radius - 10.0).abs());
-            }
-        }
+        let arc = motions(&program(text))[0].arc.unwrap();
+        let [first, second, _] = arc.plane.axes();
+        let [a, b] = arc.centre_from_start_mm;
+        assert!((a.hypot(b) - 10.0).abs() < 1e-12, "{text}");
+        let farthest = commands
+            .iter()
+            .map(|c| ((c[first] - a).hypot(c[second] - b) - 10.0).abs())
+            .fold(0.0, f64::max);
         assert!(farthest < 1e-9, "{text}: {farthest}");
     }
 }

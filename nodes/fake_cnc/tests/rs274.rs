@@ -3,13 +3,18 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use fake_cnc::ProgramError;
+use fake_cnc::config::Settings;
 use fake_cnc::path::target;
 use fake_cnc::rs274::program::{Action, Arc, Feed, Motion, Program};
 use fake_cnc::rs274::{Envelope, read, read_line};
+use machine::cycle;
 use metrology::{Axis, AxisSet, PerAxis};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
+const BENCH: &str = include_str!("../../machine/tests/data/bench.yaml");
+const PRODUCTION: &str = include_str!("../../../launch_configs/first_run/production.ngc");
+const VERIFY: &str = include_str!("../../../launch_configs/first_run/verify.ngc");
 const BLOCKS: &str = include_str!("data/linuxcnc_blocks.tsv");
 
 /// What this control refuses and LinuxCNC accepts: outside the subset, or ambiguous.
@@ -414,6 +419,39 @@ fn val_gcode_crate_reads_the_same_words() {
             Ok(())
         })
         .unwrap();
+}
+
+#[test]
+fn measuring_cycles_and_scenario_programs_are_accepted() {
+    let machine = machine::MachineFile::parse(BENCH, "bench.yaml").unwrap();
+    let once = std::num::NonZeroU32::MIN;
+    let cycles = [
+        cycle::blocks(&machine, &[], once).unwrap(),
+        cycle::latency(&machine, "block_1.x", &[60.0, 120.0, 240.0], once).unwrap(),
+        cycle::bores(&machine, &["ring".to_owned()], 8, once).unwrap(),
+        cycle::spheres(&machine, &[], 5, once).unwrap(),
+    ];
+    let settings = Settings::new(&fake_cnc::Config::default(), &machine).unwrap();
+    for cycle in &cycles {
+        let program = read(&cycle.program, settings.envelope(), &PerAxis::default()).unwrap();
+        let touched: Vec<&str> = program
+            .steps
+            .iter()
+            .filter_map(|step| match step.action {
+                Action::Touch(_, touch) => Some(program.features[touch.feature].as_str()),
+                _ => None,
+            })
+            .collect();
+        let planned: Vec<&str> = cycle
+            .touches
+            .iter()
+            .map(|t| t.feature_id.as_str())
+            .collect();
+        assert_eq!(touched, planned);
+    }
+    for text in [PRODUCTION, VERIFY] {
+        read(text, settings.envelope(), &PerAxis::default()).unwrap();
+    }
 }
 
 #[test]
