@@ -2,6 +2,8 @@
 
 use metrology::Axis;
 
+use super::file::Place;
+
 /// A plant that cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum PlantError {
@@ -71,6 +73,12 @@ pub enum PlantError {
         /// Greatest allowed.
         limit: f64,
     },
+    /// A lumped place without an entry.
+    #[error("heat.places: no entry for {place}")]
+    PlaceMissing {
+        /// The place.
+        place: Place,
+    },
     /// Two heat links between the same places, or a link from a place to itself.
     #[error(
         "heat.links[{index}]: {from} to {to}: each pair of different places has one link at most"
@@ -79,9 +87,9 @@ pub enum PlantError {
         /// Index of the link in the file.
         index: usize,
         /// One end.
-        from: String,
+        from: Place,
         /// The other end.
-        to: String,
+        to: Place,
     },
     /// An artefact whose normal is no axis direction.
     #[error("artefact \"{id}\": normal {normal:?}: must be an axis direction such as [0, 0, 1]")]
@@ -129,4 +137,9 @@ pub(super) fn require_not_negative(place: impl Into<String>, value: f64) -> Resu
         value,
         "finite and not below 0",
     )
+}
+
+/// Refuses infinities and NaN.
+pub(super) fn require_finite(place: impl Into<String>, value: f64) -> Result<(), PlantError> {
+    require(value.is_finite(), place, value, "finite")
 }

@@ -3,9 +3,22 @@
 //! Units are those of data sheets and end every key; unknown keys are refused by name; physics has
 //! no default.
 
+mod body;
 mod drives;
+mod heat;
+mod touching;
 
+pub use body::{
+    GeometryEntry, LinearErrorEntry, RotaryErrorEntry, SquarenessEntry, StructureEntry,
+};
 pub use drives::{FrictionEntry, LinearDriveEntry, RotaryDriveEntry, RotaryFrictionEntry};
+pub use heat::{
+    HeatEntry, LinkEntry, Place, PlaceEntry, ScrewEnd, ScrewEntry, ShopAirEntry, SpindleLossEntry,
+};
+pub use touching::{
+    ArtefactsEntry, BumpEntry, FaultsEntry, GridHeadEntry, ProbeFaultEntry, SensorsEntry,
+    TouchProbeEntry,
+};
 
 use std::collections::BTreeMap;
 
@@ -24,6 +37,23 @@ pub struct PlantFile {
     pub linear_drives: BTreeMap<Axis, LinearDriveEntry>,
     /// Drives of the rotary axes.
     pub rotary_drives: BTreeMap<Axis, RotaryDriveEntry>,
+    /// Heat.
+    pub heat: HeatEntry,
+    /// What heat does to the structure.
+    pub structure: StructureEntry,
+    /// Errors of the cold geometry.
+    pub geometry: GeometryEntry,
+    /// The touch probe.
+    pub touch_probe: TouchProbeEntry,
+    /// The artefacts.
+    pub artefacts: ArtefactsEntry,
+    /// Temperature sensors.
+    pub sensors: SensorsEntry,
+    /// The grid encoder's head.
+    pub grid_head: GridHeadEntry,
+    /// What is broken; nothing where absent.
+    #[serde(default)]
+    pub faults: FaultsEntry,
 }
 
 impl PlantFile {

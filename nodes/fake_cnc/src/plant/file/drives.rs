@@ -8,6 +8,8 @@ use crate::plant::drive::DriveConstants;
 use crate::plant::error::{PlantError, require, require_not_negative, require_positive};
 use crate::plant::friction::FrictionConstants;
 
+use super::heat::Place;
+
 const MM_PER_M: f64 = 1e3;
 const UM_PER_MM: f64 = 1e3;
 const RAD_PER_ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
@@ -76,6 +78,8 @@ pub struct RotaryDriveEntry {
     pub motor_friction: RotaryFrictionEntry,
     /// Friction of the table's bearing.
     pub bearing_friction: RotaryFrictionEntry,
+    /// Which place its friction warms.
+    pub heats: Place,
 }
 
 /// Friction of a rotary contact.

@@ -1,0 +1,8 @@
+//! The plant from outside: touches, faults, files, repeatability, and the drift of the first run.
+
+#![expect(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
+mod drift;
+mod file;
+mod rig;
+mod touch;

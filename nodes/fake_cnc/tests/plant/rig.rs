@@ -1,0 +1,45 @@
+//! The first-run machine under a plain servo.
+
+use fake_cnc::{Plant, PlantFile};
+use machine::MachineFile;
+use metrology::PerAxis;
+use metrology::stamp::Span;
+
+pub const PERIOD: Span = Span::from_nanos(1_000_000);
+pub const PERIOD_S: f64 = 1e-3;
+pub const MACHINE_YAML: &str = include_str!("../../../../launch_configs/first_run/machine.yaml");
+pub const PLANT_YAML: &str = include_str!("../../../../launch_configs/first_run/plant.yaml");
+
+pub fn machine() -> MachineFile {
+    serde_saphyr::from_str(MACHINE_YAML).unwrap()
+}
+
+pub fn truth() -> PlantFile {
+    PlantFile::from_yaml(PLANT_YAML).unwrap()
+}
+
+/// Cascade on the motors' encoders with velocity and acceleration fed forward.
+#[derive(Default)]
+pub struct Servo {
+    integral: PerAxis<f64>,
+}
+
+/// Position, velocity and acceleration that are commanded.
+#[derive(Clone, Copy, Default)]
+pub struct Command {
+    pub position: PerAxis<f64>,
+    pub velocity: PerAxis<f64>,
+    pub acceleration: PerAxis<f64>,
+}
+
+impl Servo {
+    pub fn demand(&mut self, plant: &Plant, command: &Command) -> PerAxis<f64> {
+        let feedback = plant.feedback();
+        PerAxis::from_fn(|axis| {
+            let lag = command.position[axis] - feedback.motor[axis];
+            let short = command.velocity[axis] + 50.0 * lag - feedback.velocity[axis];
+            self.integral[axis] += short * PERIOD_S;
+            command.acceleration[axis] + 150.0 * short + 2500.0 * self.integral[axis]
+        })
+    }
+}
