@@ -1,1 +1,35 @@
 //! Compensates the axes within limits of size, rate and acceleration.
+//!
+//! At every servo tick the offset to be added to each axis' command is computed from the position
+//! commanded and the models known. The readings of a warm machine have drifted by d(p), so that
+//! the same place is reached by commanding p + d(p): the thermal part of the offset is +d(p).
+//! `parts` holds the sum; geometric and positioning parts have their place in it.
+//!
+//! Compensation moves a real axis, so nothing else than `limiter` decides what leaves the node: it
+//! follows its target without ever exceeding the axis' size, rate or acceleration, whatever the
+//! target and the spacing of time do. `axis_state` says per axis what the target is: the model, the
+//! last good value (held), or zero by way of a fade. `model_gate` keeps back a model that jumps
+//! faster than heat can. `pulses` splits the offset into whole pulses of the control and the rest.
+//!
+//! A node that is killed and started again begins from zero with nothing added. The control, which
+//! sees the stream break off, is the one that must let go of the old offset gently; the new stream
+//! then rises from zero within its limits.
+//!
+//! # References
+//! SINUMERIK limits the velocity of temperature compensation for the same reason: a step of
+//! compensation is a jerk on the axis.
+
+pub mod axis_state;
+pub mod config;
+pub mod diagnostic;
+pub mod error;
+pub mod limiter;
+pub mod model_gate;
+pub mod parts;
+pub mod pulses;
+pub mod stage;
+
+pub use config::AxisCompensationConfig;
+pub use diagnostic::{Diagnostic, Severity};
+pub use error::AxisCompensationError;
+pub use stage::{AxisCompensationStage, Input, Output};

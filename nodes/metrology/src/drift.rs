@@ -115,9 +115,6 @@ pub fn axis_drift_at(
     at: Stamp<Host>,
     policy: Extrapolate,
 ) -> Result<f64, DriftRefusal> {
-    let (true, Some(drift)) = (axis.is_linear(), &model.axes[axis]) else {
-        return Err(DriftRefusal::NotModelled { axis });
-    };
     if at < model.valid_from {
         let early_s = (model.valid_from - at).as_secs_f64();
         return Err(DriftRefusal::NotYetValid { early_s });
@@ -126,6 +123,23 @@ pub fn axis_drift_at(
         let late_s = (at - model.valid_until).as_secs_f64();
         return Err(DriftRefusal::Expired { late_s });
     }
+    axis_drift_whenever(model, axis, point_mm, at, policy)
+}
+
+/// The same whether the model is valid at that instant or not: for comparing two models.
+///
+/// # Errors
+/// When the model says nothing usable about this axis at this point.
+pub fn axis_drift_whenever(
+    model: &ThermalModel,
+    axis: Axis,
+    point_mm: &Vector3<f64>,
+    at: Stamp<Host>,
+    policy: Extrapolate,
+) -> Result<f64, DriftRefusal> {
+    let (true, Some(drift)) = (axis.is_linear(), &model.axes[axis]) else {
+        return Err(DriftRefusal::NotModelled { axis });
+    };
     let own_mm = placed(axis, point_mm[axis.index()], Some(drift.span_mm), policy)?;
     let lever_mm = own_mm - drift.p0_mm;
     let mut drift_mm = drift.k0_mm + drift.slope_mm_per_mm * lever_mm;

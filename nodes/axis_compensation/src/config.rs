@@ -1,0 +1,308 @@
+//! Parameters of the compensation; keys carry their units, limits are checked once.
+
+use std::collections::BTreeMap;
+
+use machine::MachineFile;
+use metrology::drift::Extrapolate;
+use metrology::{Axis, ParameterDoc};
+use serde::{Deserialize, Serialize};
+
+use crate::error::AxisCompensationError;
+
+/// All parameters. Those that protect the machine have no default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisCompensationConfig {
+    /// The axes to compensate, with their limits.
+    pub axes: BTreeMap<Axis, AxisLimitConfig>,
+    /// What happens outside the blocks' span: `linear`, `hold` or `refuse`.
+    pub extrapolate: Extrapolate,
+    /// Fastest drift that heat can make; a model that changes faster is kept back.
+    pub physical_rate_um_per_min: f64,
+    /// Change between models that is never a jump.
+    pub jump_margin_um: f64,
+    /// How long the last good value is held once the model is refused.
+    pub hold_s: f64,
+    /// Time in which an offset is faded to zero.
+    pub fade_s: f64,
+    /// Silence of the axes' state after which it counts as stale.
+    #[serde(default = "default_gap_s")]
+    pub gap_s: f64,
+    /// Whether compensation is on from the start.
+    #[serde(default = "default_enabled")]
+    pub enabled: bool,
+}
+
+fn default_gap_s() -> f64 {
+    0.5
+}
+
+fn default_enabled() -> bool {
+    true
+}
+
+/// Limits of one axis' offset.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisLimitConfig {
+    /// Greatest size.
+    pub size_limit_um: f64,
+    /// Greatest rate.
+    pub rate_limit_um_per_s: f64,
+    /// Greatest acceleration.
+    pub acceleration_limit_um_per_s2: f64,
+}
+
+const SIZE_UM: (f64, f64) = (0.1, 5000.0);
+const RATE_UM_PER_S: (f64, f64) = (0.001, 10000.0);
+const ACCELERATION_UM_PER_S2: (f64, f64) = (0.001, 1e6);
+
+const fn row(
+    name: &'static str,
+    unit: &'static str,
+    range: (f64, f64),
+    description: &'static str,
+) -> ParameterDoc {
+    ParameterDoc {
+        name,
+        unit,
+        description,
+        range: Some(range),
+    }
+}
+
+const fn word(name: &'static str, description: &'static str) -> ParameterDoc {
+    ParameterDoc {
+        name,
+        unit: "",
+        description,
+        range: None,
+    }
+}
+
+/// Every parameter with its unit, limits and meaning.
+pub const PARAMETERS: &[ParameterDoc] = &[
+    row(
+        "axes.X.size_limit_um",
+        "µm",
+        SIZE_UM,
+        "greatest offset of the axis; the same key exists for Y and Z",
+    ),
+    row(
+        "axes.X.rate_limit_um_per_s",
+        "µm/s",
+        RATE_UM_PER_S,
+        "greatest rate of the offset; the same key exists for Y and Z",
+    ),
+    row(
+        "axes.X.acceleration_limit_um_per_s2",
+        "µm/s²",
+        ACCELERATION_UM_PER_S2,
+        "greatest acceleration of the offset; the same key exists for Y and Z",
+    ),
+    row("axes.Y.size_limit_um", "µm", SIZE_UM, "as for X"),
+    row(
+        "axes.Y.rate_limit_um_per_s",
+        "µm/s",
+        RATE_UM_PER_S,
+        "as for X",
+    ),
+    row(
+        "axes.Y.acceleration_limit_um_per_s2",
+        "µm/s²",
+        ACCELERATION_UM_PER_S2,
+        "as for X",
+    ),
+    row("axes.Z.size_limit_um", "µm", SIZE_UM, "as for X"),
+    row(
+        "axes.Z.rate_limit_um_per_s",
+        "µm/s",
+        RATE_UM_PER_S,
+        "as for X",
+    ),
+    row(
+        "axes.Z.acceleration_limit_um_per_s2",
+        "µm/s²",
+        ACCELERATION_UM_PER_S2,
+        "as for X",
+    ),
+    word(
+        "extrapolate",
+        "linear, hold or refuse: what happens outside the blocks' span",
+    ),
+    row(
+        "physical_rate_um_per_min",
+        "µm/min",
+        (0.01, 1000.0),
+        "fastest drift that heat can make; a model that changes faster is kept back",
+    ),
+    row(
+        "jump_margin_um",
+        "µm",
+        (0.0, 1000.0),
+        "change between models that is never a jump",
+    ),
+    row(
+        "hold_s",
+        "s",
+        (0.0, 3600.0),
+        "how long the last good value is held once the model is refused",
+    ),
+    row(
+        "fade_s",
+        "s",
+        (0.01, 3600.0),
+        "time in which an offset is faded to zero",
+    ),
+    row(
+        "gap_s",
+        "s",
+        (0.001, 60.0),
+        "silence of the axes' state after which it counts as stale",
+    ),
+    word("enabled", "whether compensation is on from the start"),
+];
+
+impl AxisCompensationConfig {
+    /// Checks every number against its limits and the machine.
+    ///
+    /// # Errors
+    /// Names the first parameter that is refused, with value and limits.
+    pub fn check(&self, machine: &MachineFile) -> Result<(), AxisCompensationError> {
+        let given = [
+            ("physical_rate_um_per_min", self.physical_rate_um_per_min),
+            ("jump_margin_um", self.jump_margin_um),
+            ("hold_s", self.hold_s),
+            ("fade_s", self.fade_s),
+            ("gap_s", self.gap_s),
+        ];
+        for (key, value) in given {
+            let doc = PARAMETERS.iter().find(|doc| doc.name == key);
+            let (lower, upper) = doc
+                .and_then(|doc| doc.range)
+                .expect("a test compares the lists");
+            if !(value >= lower && value <= upper) {
+                return Err(AxisCompensationError::ParameterOutOfRange {
+                    key,
+                    value,
+                    lower,
+                    upper,
+                    unit: doc.map_or("", |doc| doc.unit),
+                });
+            }
+        }
+        if self.axes.is_empty() {
+            return Err(AxisCompensationError::NoAxis);
+        }
+        for (&axis, limits) in &self.axes {
+            if machine.linear(axis).is_none() {
+                return Err(AxisCompensationError::NotALinearAxis { axis });
+            }
+            limits.check(axis, self.gap_s)?;
+        }
+        Ok(())
+    }
+}
+
+impl AxisLimitConfig {
+    fn check(&self, axis: Axis, gap_s: f64) -> Result<(), AxisCompensationError> {
+        // A gap freezes the offset: at full rate it must be able to stop within the gap's own time.
+        let least_acceleration = (self.rate_limit_um_per_s / gap_s).max(ACCELERATION_UM_PER_S2.0);
+        let rows = [
+            ("size_limit_um", self.size_limit_um, SIZE_UM, "µm"),
+            (
+                "rate_limit_um_per_s",
+                self.rate_limit_um_per_s,
+                RATE_UM_PER_S,
+                "µm/s",
+            ),
+            (
+                "acceleration_limit_um_per_s2",
+                self.acceleration_limit_um_per_s2,
+                (least_acceleration, ACCELERATION_UM_PER_S2.1),
+                "µm/s²",
+            ),
+        ];
+        for (key, value, (lower, upper), unit) in rows {
+            if !(value >= lower && value <= upper) {
+                return Err(AxisCompensationError::LimitOutOfRange {
+                    axis,
+                    key,
+                    value,
+                    lower,
+                    upper,
+                    unit,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MACHINE: &str = include_str!("../../../launch_configs/first_run/machine.yaml");
+
+    fn check(config: &str) -> Result<(), AxisCompensationError> {
+        let machine: MachineFile = serde_saphyr::from_str(MACHINE).unwrap();
+        serde_saphyr::from_str::<AxisCompensationConfig>(config)
+            .unwrap()
+            .check(&machine)
+    }
+
+    fn config(axes: &str, rest: &str) -> String {
+        format!(
+            "{{axes: {{{axes}}}, extrapolate: hold, physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 10.0, {rest}}}"
+        )
+    }
+
+    const X: &str = "X: {size_limit_um: 200.0, rate_limit_um_per_s: 100.0, acceleration_limit_um_per_s2: 1000.0}";
+
+    #[test]
+    fn values_outside_their_limits_are_refused_by_name_value_and_limit() {
+        assert_eq!(check(&config(X, "fade_s: 5.0")), Ok(()));
+        assert_eq!(
+            check(&config(X, "fade_s: 0.0")).unwrap_err().to_string(),
+            "fade_s = 0 s: must be from 0.01 to 3600 s"
+        );
+        let slow = "Y: {size_limit_um: 200.0, rate_limit_um_per_s: 100.0, acceleration_limit_um_per_s2: 50.0}";
+        assert_eq!(
+            check(&config(slow, "fade_s: 5.0")).unwrap_err().to_string(),
+            "axes.Y.acceleration_limit_um_per_s2 = 50 µm/s²: must be from 200 to 1000000 µm/s²"
+        );
+        assert_eq!(
+            check(&config("", "fade_s: 5.0")),
+            Err(AxisCompensationError::NoAxis)
+        );
+        let rotary = X.replace('X', "C");
+        assert_eq!(
+            check(&config(&rotary, "fade_s: 5.0")),
+            Err(AxisCompensationError::NotALinearAxis { axis: Axis::C })
+        );
+        assert!(check(&config(X, "fade_s: .nan")).is_err());
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_by_name() {
+        let wrong = serde_saphyr::from_str::<AxisCompensationConfig>(&config(X, "fade_ms: 5.0"));
+        assert!(wrong.unwrap_err().to_string().contains("fade_ms"));
+    }
+
+    #[test]
+    fn the_readme_lists_every_parameter_with_unit_and_meaning() {
+        let readme = include_str!("../README.md");
+        for doc in PARAMETERS {
+            let line = readme
+                .lines()
+                .find(|l| l.starts_with(&format!("| `{}` |", doc.name)));
+            let line = line.unwrap_or_else(|| panic!("{} is missing", doc.name));
+            assert!(line.contains(doc.description), "{line}");
+            assert!(
+                line.contains(&format!("| {} |", doc.unit)) || doc.unit.is_empty(),
+                "{line}"
+            );
+        }
+    }
+}

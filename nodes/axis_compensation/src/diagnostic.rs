@@ -1,0 +1,93 @@
+//! What the stage has to say besides its offsets; each is in the bag and on `/diagnostics`.
+
+use metrology::Axis;
+use metrology::drift::DriftRefusal;
+use metrology::sample::CompensationState;
+
+/// How urgent a condition is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// A fact worth recording.
+    Info,
+    /// It goes on, but not as told.
+    Warn,
+    /// Nothing is compensated any more.
+    Error,
+}
+
+/// A condition worth reporting; each is said when it begins, not at every tick.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[expect(
+    missing_docs,
+    reason = "each sentence names its fields with their units"
+)]
+pub enum Diagnostic {
+    #[error("axis {axis}: {from:?} to {to:?} at an offset of {offset_mm:.6} mm{}", .cause.map_or_else(String::new, |c| format!(": {c}")))]
+    StateChanged {
+        axis: Axis,
+        from: CompensationState,
+        to: CompensationState,
+        offset_mm: f64,
+        cause: Option<DriftRefusal>,
+    },
+    #[error(
+        "axis {axis}: wanted offset {wanted_mm:.6} mm exceeds {limit_mm} mm, the last one inside is kept"
+    )]
+    SizeExceeded {
+        axis: Axis,
+        wanted_mm: f64,
+        limit_mm: f64,
+    },
+    #[error("axis {axis}: wanted offset is inside its limit again")]
+    SizeKept { axis: Axis },
+    #[error("axis {axis}: thermal model gives no drift: {cause}")]
+    ModelRefused { axis: Axis, cause: DriftRefusal },
+    #[error(
+        "thermal model {sequence} jumps by {change_mm:.6} mm on axis {axis}, heat allows {limit_mm:.6} mm; kept back"
+    )]
+    ModelQuarantined {
+        sequence: u32,
+        axis: Axis,
+        change_mm: f64,
+        limit_mm: f64,
+    },
+    #[error("thermal model {sequence} confirms the jump and is used")]
+    ModelConfirmed { sequence: u32 },
+    #[error(
+        "thermal model {sequence} has a number on axis {axis} that is not finite or senseless; refused"
+    )]
+    ModelNotFinite { sequence: u32, axis: Axis },
+    #[error("thermal model {sequence} awaits confirmation of a jump at the blocks")]
+    ModelDoubtful { sequence: u32 },
+    #[error("no axis state for {silence_s:.3} s")]
+    StatesStale { silence_s: f64 },
+    #[error("gap of {gap_s:.3} s between axis states, offsets stood meanwhile")]
+    Gap { gap_s: f64 },
+    #[error("controller clock went back by {by_s} s, one servo period is assumed")]
+    ClockWentBack { by_s: f64 },
+    #[error("compensation enabled: {enabled}")]
+    Enabled { enabled: bool },
+    #[error("shutting down, offsets fade to zero")]
+    ShuttingDown,
+}
+
+impl Diagnostic {
+    /// How urgent it is.
+    #[must_use]
+    pub fn severity(&self) -> Severity {
+        match self {
+            Self::Enabled { .. }
+            | Self::ShuttingDown
+            | Self::SizeKept { .. }
+            | Self::ModelConfirmed { .. } => Severity::Info,
+            Self::StateChanged { to, cause, .. } => match to {
+                CompensationState::Active => Severity::Info,
+                CompensationState::Off if cause.is_some() => Severity::Error,
+                CompensationState::Off => Severity::Info,
+                _ => Severity::Warn,
+            },
+            Self::ModelNotFinite { .. } => Severity::Error,
+            _ => Severity::Warn,
+        }
+    }
+}

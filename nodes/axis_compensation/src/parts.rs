@@ -1,0 +1,50 @@
+//! The parts of the offset, before limits.
+//!
+//! ```text
+//!   offset = thermal + geometric + positioning,   thermal = +d(p)                 (1)
+//! ```
+//!
+//! Sign by physics: the control reads p + d where it read p when cold, so p + d has to be commanded
+//! to be at the same place again. The machine's position error is −d(p). p is the position commanded
+//! by the program, compensation not included.
+
+use metrology::drift::{DriftRefusal, Extrapolate, axis_drift_at};
+use metrology::sample::ThermalModel;
+use metrology::{Axis, Host, Stamp};
+use nalgebra::Vector3;
+
+/// The parts for one axis at one pose, mm.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Parts {
+    /// Thermal drift.
+    pub thermal: f64,
+    /// Geometric errors; nothing yet.
+    pub geometric: f64,
+    /// Positioning table; nothing yet.
+    pub positioning: f64,
+}
+
+impl Parts {
+    /// Their sum, mm: (1).
+    #[must_use]
+    pub fn sum(&self) -> f64 {
+        self.thermal + self.geometric + self.positioning
+    }
+}
+
+/// Parts for `axis` at a commanded pose; allocates nothing.
+///
+/// # Errors
+/// When the thermal model gives no drift there.
+pub fn parts_at(
+    model: &ThermalModel,
+    axis: Axis,
+    commanded_mm: &Vector3<f64>,
+    at: Stamp<Host>,
+    policy: Extrapolate,
+) -> Result<Parts, DriftRefusal> {
+    Ok(Parts {
+        thermal: axis_drift_at(model, axis, commanded_mm, at, policy)?,
+        ..Parts::default()
+    })
+}

@@ -1,0 +1,406 @@
+//! The node's computation: axis states and models in, offsets and diagnostics out.
+
+use std::convert::Infallible;
+
+use machine::MachineFile;
+use metrology::drift::{DriftRefusal, Extrapolate};
+use metrology::sample::{AxisCompensation, AxisState, CompensationState, ThermalModel};
+use metrology::stamp::Span;
+use metrology::{Axis, AxisSet, Host, Machine, PerAxis, Stage, Stamp};
+use nalgebra::Vector3;
+
+use crate::axis_state::{AxisState as Compensated, LetGo, Wanted};
+use crate::config::AxisCompensationConfig;
+use crate::diagnostic::Diagnostic;
+use crate::error::AxisCompensationError;
+use crate::limiter::Limits;
+use crate::model_gate::{ModelGate, Passage};
+use crate::parts::{Parts, parts_at};
+use crate::pulses;
+
+/// What the stage is told.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a box would allocate at every servo tick"
+)]
+pub enum Input {
+    /// One servo tick's positions.
+    State(AxisState),
+    /// A new thermal model.
+    Model(Box<ThermalModel>),
+    /// Compensation on or off.
+    Enable(bool),
+    /// Fade to zero and say when it is done.
+    Shutdown,
+    /// Time went on.
+    Tick,
+}
+
+/// What it says.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a box would allocate at every servo tick"
+)]
+pub enum Output {
+    /// Offsets to add to the commands.
+    Compensation(AxisCompensation),
+    /// A condition.
+    Diagnostic(Diagnostic),
+    /// After [`Input::Shutdown`]: nothing is added any more, the node may stop.
+    FadedOut,
+}
+
+/// The compensation of one machine.
+#[derive(Clone, Debug)]
+pub struct AxisCompensationStage {
+    axes: AxisSet,
+    states: PerAxis<Option<Compensated>>,
+    refused: PerAxis<Option<DriftRefusal>>,
+    gate: ModelGate,
+    policy: Extrapolate,
+    pulse_mm: f64,
+    servo_period_s: f64,
+    gap: Span,
+    enabled: bool,
+    shutdown: Shutdown,
+    controller_at: Option<Stamp<Machine>>,
+    heard_at: Option<Stamp<Host>>,
+    driven_at: Option<Stamp<Host>>,
+    is_stale: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shutdown {
+    No,
+    Fading,
+    Done,
+}
+
+/// How long the offsets acted since the last tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Elapsed {
+    /// Nothing to go by, or no time at all: they stay.
+    Nothing,
+    /// This long, s.
+    Step(f64),
+    /// Too long to call it one tick: they stood.
+    Gap,
+}
+
+impl AxisCompensationStage {
+    /// A stage for `machine`, at rest at zero.
+    ///
+    /// # Errors
+    /// When a parameter is outside its limits or an axis is no linear axis of the machine.
+    pub fn new(
+        config: &AxisCompensationConfig,
+        machine: &MachineFile,
+    ) -> Result<Self, AxisCompensationError> {
+        config.check(machine)?;
+        let pulse_mm = positive(
+            "control.pulse_equivalent_um",
+            machine.control.pulse_equivalent_um,
+            "µm",
+        )? * 1e-3;
+        let servo_period_s = positive(
+            "control.servo_period_ms",
+            machine.control.servo_period_ms,
+            "ms",
+        )? * 1e-3;
+        let let_go = LetGo {
+            hold_s: config.hold_s,
+            fade_s: config.fade_s,
+        };
+        let states = PerAxis::from_fn(|axis| {
+            config.axes.get(&axis).map(|limits| {
+                let limits = Limits {
+                    size: limits.size_limit_um * 1e-3,
+                    rate: limits.rate_limit_um_per_s * 1e-3,
+                    acceleration: limits.acceleration_limit_um_per_s2 * 1e-3,
+                };
+                Compensated::new(limits, let_go, pulse_mm)
+            })
+        });
+        Ok(Self {
+            axes: config.axes.keys().copied().collect(),
+            states,
+            refused: PerAxis::default(),
+            gate: ModelGate::new(
+                config.physical_rate_um_per_min * 1e-3 / 60.0,
+                config.jump_margin_um * 1e-3,
+            ),
+            policy: config.extrapolate,
+            pulse_mm,
+            servo_period_s,
+            gap: Span::from_secs_f64(config.gap_s),
+            enabled: config.enabled,
+            shutdown: Shutdown::No,
+            controller_at: None,
+            heard_at: None,
+            driven_at: None,
+            is_stale: false,
+        })
+    }
+
+    fn state(&mut self, at: Stamp<Host>, state: &AxisState, out: &mut Vec<Output>) {
+        let elapsed = self.elapsed(at, state.controller_at, out);
+        self.controller_at = Some(state.controller_at);
+        self.heard_at = Some(at);
+        self.is_stale = false;
+        let commanded_mm = Vector3::from_fn(|row, _| {
+            let axis = Axis::LINEAR[row];
+            if state.axes.contains(axis) {
+                state.commanded[axis]
+            } else {
+                f64::NAN
+            }
+        });
+        self.drive(at, Some(&commanded_mm), elapsed, out);
+    }
+
+    /// Time since the last state by the controller's own clock, which is the one the axes move by.
+    fn elapsed(&self, at: Stamp<Host>, now: Stamp<Machine>, out: &mut Vec<Output>) -> Elapsed {
+        let Some(last) = self.controller_at else {
+            return self.elapsed_on_host(at);
+        };
+        let span = now - last;
+        match span.nanos() {
+            0 => Elapsed::Nothing,
+            i64::MIN..0 => {
+                let by_s = -span.as_secs_f64();
+                out.push(Output::Diagnostic(Diagnostic::ClockWentBack { by_s }));
+                Elapsed::Step(self.servo_period_s)
+            }
+            _ if span > self.gap => {
+                let gap_s = span.as_secs_f64();
+                out.push(Output::Diagnostic(Diagnostic::Gap { gap_s }));
+                Elapsed::Gap
+            }
+            _ => Elapsed::Step(span.as_secs_f64()),
+        }
+    }
+
+    /// Time since the offsets last moved by the host's clock, for when the controller is silent.
+    fn elapsed_on_host(&self, at: Stamp<Host>) -> Elapsed {
+        match self.driven_at.map(|driven_at| at - driven_at) {
+            Some(span) if span > self.gap => Elapsed::Gap,
+            Some(span) if span.nanos() > 0 => Elapsed::Step(span.as_secs_f64()),
+            _ => Elapsed::Nothing,
+        }
+    }
+
+    /// Moves every axis on and publishes.
+    fn drive(
+        &mut self,
+        at: Stamp<Host>,
+        commanded_mm: Option<&Vector3<f64>>,
+        elapsed: Elapsed,
+        out: &mut Vec<Output>,
+    ) {
+        self.driven_at = Some(at);
+        let mut message = AxisCompensation {
+            at,
+            axes: self.axes,
+            total: PerAxis::default(),
+            thermal: PerAxis::default(),
+            geometric: PerAxis::default(),
+            positioning: PerAxis::default(),
+            pulses: PerAxis::default(),
+            remainder: PerAxis::default(),
+            state: PerAxis::default(),
+        };
+        for axis in Axis::ALL {
+            let Some(mut compensated) = self.states[axis] else {
+                continue;
+            };
+            let (parts, wanted) = self.wanted(axis, at, commanded_mm);
+            let before = compensated;
+            match elapsed {
+                Elapsed::Nothing => {}
+                Elapsed::Step(dt_s) => compensated.step(wanted, dt_s),
+                Elapsed::Gap => compensated.freeze(),
+            }
+            self.states[axis] = Some(compensated);
+            self.remark(axis, &before, &compensated, wanted, out);
+            let (pulses, remainder) = pulses::split(compensated.offset(), self.pulse_mm);
+            message.total[axis] = compensated.offset();
+            message.thermal[axis] = parts.thermal;
+            message.geometric[axis] = parts.geometric;
+            message.positioning[axis] = parts.positioning;
+            message.pulses[axis] = pulses;
+            message.remainder[axis] = remainder;
+            message.state[axis] = compensated.state();
+        }
+        out.push(Output::Compensation(message));
+        self.report_faded_out(out);
+    }
+
+    fn wanted(
+        &self,
+        axis: Axis,
+        at: Stamp<Host>,
+        commanded_mm: Option<&Vector3<f64>>,
+    ) -> (Parts, Wanted) {
+        let parts = match (self.gate.current(), commanded_mm) {
+            (Some(model), Some(p_mm)) => parts_at(model, axis, p_mm, at, self.policy),
+            _ => Err(DriftRefusal::NotModelled { axis }),
+        };
+        let is_on = self.enabled && self.shutdown == Shutdown::No;
+        match parts {
+            Ok(parts) if is_on => (parts, Wanted::Offset(parts.sum())),
+            Ok(parts) => (parts, Wanted::Nothing),
+            Err(refusal) if is_on => (Parts::default(), Wanted::Refused(refusal)),
+            Err(_) => (Parts::default(), Wanted::Nothing),
+        }
+    }
+
+    /// Says what changed, once.
+    fn remark(
+        &mut self,
+        axis: Axis,
+        before: &Compensated,
+        after: &Compensated,
+        wanted: Wanted,
+        out: &mut Vec<Output>,
+    ) {
+        let cause = match wanted {
+            Wanted::Refused(cause) => Some(cause),
+            _ => None,
+        };
+        let kind = |c: Option<DriftRefusal>| c.map(|c| std::mem::discriminant(&c));
+        if kind(cause) != kind(self.refused[axis]) {
+            out.extend(
+                cause.map(|cause| Output::Diagnostic(Diagnostic::ModelRefused { axis, cause })),
+            );
+        }
+        self.refused[axis] = cause;
+        match (before.oversize(), after.oversize()) {
+            (None, Some(wanted_mm)) => out.push(Output::Diagnostic(Diagnostic::SizeExceeded {
+                axis,
+                wanted_mm,
+                limit_mm: after.size_limit(),
+            })),
+            (Some(_), None) => out.push(Output::Diagnostic(Diagnostic::SizeKept { axis })),
+            _ => {}
+        }
+        let (from, to): (CompensationState, CompensationState) = (before.state(), after.state());
+        if from != to {
+            out.push(Output::Diagnostic(Diagnostic::StateChanged {
+                axis,
+                from,
+                to,
+                offset_mm: after.offset(),
+                cause,
+            }));
+        }
+    }
+
+    fn model(&mut self, model: ThermalModel, out: &mut Vec<Output>) {
+        let sequence = model.sequence;
+        if model.quarantined {
+            out.push(Output::Diagnostic(Diagnostic::ModelDoubtful { sequence }));
+        }
+        out.extend(match self.gate.offer(model) {
+            Passage::Accepted => None,
+            Passage::Confirmed => Some(Output::Diagnostic(Diagnostic::ModelConfirmed { sequence })),
+            Passage::NotFinite { axis } => Some(Output::Diagnostic(Diagnostic::ModelNotFinite {
+                sequence,
+                axis,
+            })),
+            Passage::Quarantined {
+                axis,
+                change_mm,
+                limit_mm,
+            } => Some(Output::Diagnostic(Diagnostic::ModelQuarantined {
+                sequence,
+                axis,
+                change_mm,
+                limit_mm,
+            })),
+        });
+    }
+
+    /// Without axis states there is no tick: say so, and let ticks of the host drive a last fade.
+    fn tick(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        let silence = self.heard_at.map(|heard_at| at - heard_at);
+        if silence.is_some_and(|silence| silence <= self.gap) {
+            return;
+        }
+        if let (Some(silence), false) = (silence, self.is_stale) {
+            self.is_stale = true;
+            out.push(Output::Diagnostic(Diagnostic::StatesStale {
+                silence_s: silence.as_secs_f64(),
+            }));
+        }
+        if self.shutdown == Shutdown::Fading {
+            let elapsed = self.elapsed_on_host(at);
+            // The next state must not count this time again.
+            self.controller_at = None;
+            self.drive(at, None, elapsed, out);
+        }
+    }
+
+    fn shut_down(&mut self, out: &mut Vec<Output>) {
+        if self.shutdown == Shutdown::No {
+            self.shutdown = Shutdown::Fading;
+            out.push(Output::Diagnostic(Diagnostic::ShuttingDown));
+            self.report_faded_out(out);
+        }
+    }
+
+    fn report_faded_out(&mut self, out: &mut Vec<Output>) {
+        let all_off = self.states.0.iter().flatten().all(Compensated::is_off);
+        if self.shutdown == Shutdown::Fading && all_off {
+            self.shutdown = Shutdown::Done;
+            out.push(Output::FadedOut);
+        }
+    }
+}
+
+fn positive(
+    key: &'static str,
+    value: f64,
+    unit: &'static str,
+) -> Result<f64, AxisCompensationError> {
+    let (lower, upper) = (1e-6, 1e6);
+    if value >= lower && value <= upper {
+        return Ok(value);
+    }
+    Err(AxisCompensationError::ParameterOutOfRange {
+        key,
+        value,
+        lower,
+        upper,
+        unit,
+    })
+}
+
+impl Stage for AxisCompensationStage {
+    type Input = Input;
+    type Output = Output;
+    /// Every input has an answer: what cannot be used is reported as a diagnostic.
+    type Error = Infallible;
+
+    fn step(
+        &mut self,
+        at: Stamp<Host>,
+        input: Input,
+        out: &mut Vec<Output>,
+    ) -> Result<(), Infallible> {
+        match input {
+            Input::State(state) => self.state(at, &state, out),
+            Input::Model(model) => self.model(*model, out),
+            Input::Enable(enabled) => {
+                if enabled != self.enabled {
+                    self.enabled = enabled;
+                    out.push(Output::Diagnostic(Diagnostic::Enabled { enabled }));
+                }
+            }
+            Input::Shutdown => self.shut_down(out),
+            Input::Tick => self.tick(at, out),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,103 @@
+//! The servo tick allocates nothing.
+
+use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input};
+use metrology::drift::{Extrapolate, axis_drift_at};
+use metrology::sample::{AxisDrift, AxisState, ThermalModel};
+use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
+use nalgebra::Vector3;
+
+fn model() -> ThermalModel {
+    let mut axes = PerAxis::default();
+    for axis in Axis::LINEAR {
+        axes[axis] = Some(AxisDrift {
+            k0_mm: 0.01,
+            slope_mm_per_mm: 5e-5,
+            span_mm: (-220.0, 220.0),
+            rate_mm_s: 1e-6,
+            slope_rate_per_s: 1e-9,
+            time_constant_s: 1800.0,
+            ..AxisDrift::default()
+        });
+    }
+    ThermalModel {
+        at: Stamp::from_nanos(0),
+        axes,
+        valid_from: Stamp::from_nanos(0),
+        valid_until: Stamp::from_nanos(i64::MAX),
+        n_blocks: 2,
+        lack_of_fit_p: f64::NAN,
+        quarantined: false,
+        sequence: 1,
+    }
+}
+
+#[test]
+fn a_thousand_ticks_allocate_nothing() {
+    let machine = include_str!("../../../launch_configs/first_run/machine.yaml");
+    let limits =
+        "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
+    let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
+        "{{axes: {{X: {{{limits}}}, Y: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: linear, \
+         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0}}"
+    ))
+    .unwrap();
+    let mut stage =
+        AxisCompensationStage::new(&config, &serde_saphyr::from_str(machine).unwrap()).unwrap();
+    let mut out = Vec::with_capacity(64);
+    stage
+        .step(
+            Stamp::from_nanos(0),
+            Input::Model(Box::new(model())),
+            &mut out,
+        )
+        .unwrap();
+    let measured = allocation_counter::measure(|| {
+        for k in 0..1000_i64 {
+            out.clear();
+            let mut commanded = PerAxis::default();
+            commanded[Axis::X] = k as f64 * 0.3 - 150.0;
+            let state = AxisState {
+                received_at: Stamp::from_nanos(k * 1_000_000),
+                controller_at: Stamp::from_nanos(k * 1_000_000),
+                axes: AxisSet::XYZ,
+                commanded,
+                motor: commanded,
+                scale: commanded,
+                velocity: PerAxis::default(),
+            };
+            stage
+                .step(
+                    Stamp::from_nanos(k * 1_000_000),
+                    Input::State(state),
+                    &mut out,
+                )
+                .unwrap();
+        }
+    });
+    assert_eq!(measured.count_total, 0);
+}
+
+#[test]
+fn evaluating_a_model_allocates_nothing() {
+    let model = model();
+    let mut sum_mm = 0.0;
+    let measured = allocation_counter::measure(|| {
+        for axis in Axis::LINEAR {
+            let p_mm = Vector3::new(1.0, 2.0, 3.0);
+            sum_mm += axis_drift_at(
+                &model,
+                axis,
+                &p_mm,
+                Stamp::from_nanos(1),
+                Extrapolate::Linear,
+            )
+            .unwrap_or(f64::NAN);
+        }
+    });
+    assert_eq!(measured.count_total, 0);
+    assert!(sum_mm.is_finite());
+    // The counter itself is seen counting.
+    assert!(
+        allocation_counter::measure(|| drop(std::hint::black_box(vec![1_u8; 10]))).count_total > 0
+    );
+}

@@ -1,0 +1,311 @@
+//! The safety rules, one scene each.
+
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Diagnostic, Input, Output};
+use metrology::drift::DriftRefusal;
+use metrology::sample::{AxisCompensation, AxisDrift, AxisState, CompensationState, ThermalModel};
+use metrology::stamp::Span;
+use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
+
+const MILLISECOND: i64 = 1_000_000;
+
+struct Scene {
+    stage: AxisCompensationStage,
+    nanos: i64,
+    diagnostics: Vec<Diagnostic>,
+    faded_out: bool,
+    sequence: u32,
+    last: Option<AxisCompensation>,
+}
+
+impl Scene {
+    fn new(extrapolate: &str) -> Self {
+        let machine = include_str!("../../../launch_configs/first_run/machine.yaml");
+        let limits =
+            "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
+        let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
+            "{{axes: {{X: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: {extrapolate}, \
+             physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0}}"
+        ))
+        .unwrap();
+        Self {
+            stage: AxisCompensationStage::new(&config, &serde_saphyr::from_str(machine).unwrap())
+                .unwrap(),
+            nanos: 0,
+            diagnostics: Vec::new(),
+            faded_out: false,
+            sequence: 0,
+            last: None,
+        }
+    }
+
+    fn step(&mut self, input: Input) {
+        let mut out = Vec::new();
+        self.stage
+            .step(Stamp::from_nanos(self.nanos), input, &mut out)
+            .unwrap();
+        for output in out {
+            match output {
+                Output::Compensation(c) => self.last = Some(c),
+                Output::Diagnostic(d) => self.diagnostics.push(d),
+                Output::FadedOut => self.faded_out = true,
+            }
+        }
+    }
+
+    fn state(&mut self, x_mm: f64) {
+        let mut commanded = PerAxis::default();
+        commanded[Axis::X] = x_mm;
+        let state = AxisState {
+            received_at: Stamp::from_nanos(self.nanos),
+            controller_at: Stamp::from_nanos(self.nanos),
+            axes: AxisSet::XYZ,
+            commanded,
+            motor: commanded,
+            scale: commanded,
+            velocity: PerAxis::default(),
+        };
+        self.step(Input::State(state));
+    }
+
+    fn run(&mut self, seconds: f64, x_mm: f64) {
+        for _ in 0..(seconds * 1e3).round() as i64 {
+            self.nanos += MILLISECOND;
+            self.state(x_mm);
+        }
+    }
+
+    fn model(&mut self, k0_mm: f64, slope: f64, life_s: f64) {
+        self.sequence += 1;
+        let drift = AxisDrift {
+            k0_mm,
+            slope_mm_per_mm: slope,
+            span_mm: (-220.0, 220.0),
+            time_constant_s: f64::INFINITY,
+            ..AxisDrift::default()
+        };
+        let mut axes = PerAxis::default();
+        axes[Axis::X] = Some(drift);
+        let at = Stamp::from_nanos(self.nanos);
+        self.step(Input::Model(Box::new(ThermalModel {
+            at,
+            axes,
+            valid_from: at,
+            valid_until: at + Span::from_secs_f64(life_s),
+            n_blocks: 2,
+            lack_of_fit_p: f64::NAN,
+            quarantined: false,
+            sequence: self.sequence,
+        })));
+    }
+
+    fn x(&self) -> (f64, CompensationState) {
+        let last = self.last.as_ref().unwrap();
+        (last.total[Axis::X], last.state[Axis::X])
+    }
+
+    fn assert_x(&self, offset_mm: f64, state: CompensationState) {
+        assert!((self.x().0 - offset_mm).abs() < 1e-9, "{:?}", self.x());
+        assert_eq!(self.x().1, state);
+    }
+}
+
+#[test]
+fn the_thermal_part_is_plus_d_at_the_commanded_position() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.010, 5e-5, 1e6);
+    scene.run(3.0, 200.0);
+    scene.assert_x(0.020, CompensationState::Active);
+    let last = scene.last.unwrap();
+    assert!((last.thermal[Axis::X] - 0.020).abs() < 1e-12);
+    let whole_mm = last.pulses[Axis::X] as f64 * 1e-4;
+    assert!((whole_mm + last.remainder[Axis::X] - last.total[Axis::X]).abs() < 1e-15);
+    assert!((last.pulses[Axis::X] - 200).abs() <= 1);
+    // No block spoke about Z: nothing is added there.
+    assert_eq!(last.state[Axis::Z], CompensationState::Off);
+}
+
+#[test]
+fn a_stale_model_is_held_then_faded() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.010, 0.0, 5.0);
+    scene.run(5.0, 0.0);
+    scene.run(0.5, 0.0);
+    scene.assert_x(0.010, CompensationState::Holding);
+    scene.run(1.5, 0.0);
+    assert_eq!(scene.x().1, CompensationState::Fading);
+    scene.run(2.0, 0.0);
+    scene.assert_x(0.0, CompensationState::Off);
+    let refused = |d: &Diagnostic| {
+        matches!(
+            d,
+            Diagnostic::ModelRefused {
+                axis: Axis::X,
+                cause: DriftRefusal::Expired { .. }
+            }
+        )
+    };
+    assert_eq!(scene.diagnostics.iter().filter(|d| refused(d)).count(), 1);
+}
+
+#[test]
+fn outside_the_span_a_refusing_policy_holds_and_inside_again_it_goes_on() {
+    let mut scene = Scene::new("refuse");
+    scene.model(0.010, 0.0, 1e6);
+    scene.run(2.0, 0.0);
+    scene.run(0.5, 300.0);
+    scene.assert_x(0.010, CompensationState::Holding);
+    scene.run(0.5, 100.0);
+    scene.assert_x(0.010, CompensationState::Active);
+}
+
+#[test]
+fn a_position_that_is_no_number_holds_and_is_reported_once() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.010, 1e-5, 1e6);
+    scene.run(2.0, 100.0);
+    scene.run(0.3, f64::NAN);
+    scene.assert_x(0.011, CompensationState::Holding);
+    let nan = |d: &Diagnostic| {
+        matches!(
+            d,
+            Diagnostic::ModelRefused {
+                cause: DriftRefusal::NotFinite { axis: Axis::X },
+                ..
+            }
+        )
+    };
+    assert_eq!(scene.diagnostics.iter().filter(|d| nan(d)).count(), 1);
+}
+
+#[test]
+fn a_jump_between_models_waits_for_the_second() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.010, 0.0, 1e6);
+    scene.run(2.0, 0.0);
+    scene.model(0.060, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.assert_x(0.010, CompensationState::Active);
+    scene.model(0.0601, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.assert_x(0.0601, CompensationState::Active);
+    assert!(
+        scene
+            .diagnostics
+            .iter()
+            .any(|d| matches!(d, Diagnostic::ModelQuarantined { .. }))
+    );
+    assert!(
+        scene
+            .diagnostics
+            .contains(&Diagnostic::ModelConfirmed { sequence: 3 })
+    );
+}
+
+#[test]
+fn an_oversize_offset_is_not_cut_but_left_at_the_last_one_inside() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.0, 4e-4, 1e6);
+    scene.run(4.0, 200.0);
+    scene.assert_x(0.080, CompensationState::Active);
+    scene.run(1.0, 300.0);
+    scene.assert_x(0.080, CompensationState::Limited);
+    assert!(
+        scene
+            .diagnostics
+            .iter()
+            .any(|d| matches!(d, Diagnostic::SizeExceeded { axis: Axis::X, .. }))
+    );
+    scene.run(1.0, 200.0);
+    assert!(
+        scene
+            .diagnostics
+            .contains(&Diagnostic::SizeKept { axis: Axis::X })
+    );
+}
+
+#[test]
+fn ten_hertz_then_a_kilohertz_gives_the_same_place() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.050, 0.0, 1e6);
+    for _ in 0..50 {
+        scene.nanos += 100 * MILLISECOND;
+        scene.state(0.0);
+    }
+    scene.assert_x(0.050, CompensationState::Active);
+    scene.run(1.0, 0.0);
+    scene.assert_x(0.050, CompensationState::Active);
+}
+
+#[test]
+fn after_a_gap_the_offset_stands_and_then_goes_on_without_a_jump() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.050, 0.0, 1e6);
+    scene.run(0.5, 0.0);
+    let before = scene.x().0;
+    scene.nanos += 10_000 * MILLISECOND;
+    scene.step(Input::Tick);
+    assert!(
+        scene
+            .diagnostics
+            .iter()
+            .any(|d| matches!(d, Diagnostic::StatesStale { .. }))
+    );
+    scene.state(0.0);
+    scene.assert_x(before, CompensationState::Holding);
+    scene.run(0.001, 0.0);
+    assert!((scene.x().0 - before).abs() < 1e-6);
+    scene.run(3.0, 0.0);
+    scene.assert_x(0.050, CompensationState::Active);
+}
+
+#[test]
+fn shutdown_fades_and_says_when_it_is_done() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.050, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.step(Input::Shutdown);
+    assert!(!scene.faded_out);
+    scene.run(1.0, 0.0);
+    assert_eq!(scene.x().1, CompensationState::Fading);
+    scene.run(2.5, 0.0);
+    assert!(scene.faded_out && scene.x() == (0.0, CompensationState::Off));
+}
+
+#[test]
+fn shutdown_without_axis_states_fades_by_ticks() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.050, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.step(Input::Shutdown);
+    for _ in 0..60 {
+        scene.nanos += 100 * MILLISECOND;
+        scene.step(Input::Tick);
+    }
+    assert!(scene.faded_out);
+}
+
+#[test]
+fn a_stage_that_never_added_anything_may_stop_at_once() {
+    let mut scene = Scene::new("linear");
+    scene.step(Input::Shutdown);
+    assert!(scene.faded_out);
+}
+
+#[test]
+fn a_copy_in_mid_run_goes_on_exactly_as_the_original() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.050, 1e-5, 1e6);
+    scene.run(0.7, 30.0);
+    let mut copy = Scene {
+        stage: scene.stage.clone(),
+        ..Scene::new("linear")
+    };
+    copy.nanos = scene.nanos;
+    for x_mm in [40.0, 50.0, f64::NAN, 60.0] {
+        scene.run(0.2, x_mm);
+        copy.run(0.2, x_mm);
+        assert_eq!(scene.x().0.to_bits(), copy.x().0.to_bits());
+    }
+}
