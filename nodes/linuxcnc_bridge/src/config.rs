@@ -6,16 +6,19 @@ use metrology::{Axis, AxisSet, PerAxis};
 use serde::{Deserialize, Serialize};
 
 use crate::error::BridgeError;
+use crate::parameters::PARAMETERS;
 
 /// The parameter file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BridgeConfig {
+    /// Machine file, relative to the parameter file.
+    pub machine_file: String,
     /// Axis of each joint, from joint 0.
     pub joints: Vec<Axis>,
     /// What the bridge does when it finds LinuxCNC freshly started.
     pub prepare: Prepare,
-    /// INI file to start, relative to the scenario's folder; absent: LinuxCNC is started by others.
+    /// INI file to start, relative to the parameter file; absent: LinuxCNC is started by others.
     #[serde(default)]
     pub start_ini: Option<String>,
     /// Ordinary user who owns LinuxCNC's processes and memory.
@@ -125,23 +128,26 @@ pub struct Settings {
     pub compensation_stale_after: Span,
 }
 
-fn checked(key: &'static str, value: f64, above: f64, at_most: f64) -> Result<f64, BridgeError> {
-    if value > above && value <= at_most {
+/// A number within the range that [`PARAMETERS`] states for it.
+fn checked(key: &'static str, value: f64) -> Result<f64, BridgeError> {
+    let doc = PARAMETERS.iter().find(|doc| doc.name == key);
+    let (least, greatest) = doc
+        .and_then(|doc| doc.range)
+        .expect("every number of the configuration has a range in the table");
+    if value >= least && value <= greatest {
         Ok(value)
     } else {
         Err(BridgeError::OutOfRange {
             key,
             value,
-            above,
-            at_most,
+            least,
+            greatest,
         })
     }
 }
 
-fn span(key: &'static str, value: f64, unit_s: f64, at_most: f64) -> Result<Span, BridgeError> {
-    Ok(Span::from_secs_f64(
-        checked(key, value, 0.0, at_most)? * unit_s,
-    ))
+fn span(key: &'static str, value: f64, unit_s: f64) -> Result<Span, BridgeError> {
+    Ok(Span::from_secs_f64(checked(key, value)? * unit_s))
 }
 
 fn word(key: &'static str, value: &str) -> Result<String, BridgeError> {
@@ -152,6 +158,21 @@ fn word(key: &'static str, value: &str) -> Result<String, BridgeError> {
         });
     }
     Ok(value.to_owned())
+}
+
+fn servo_period(machine: &MachineFile) -> Result<Span, BridgeError> {
+    let (key, value) = ("control.servo_period_ms", machine.control.servo_period_ms);
+    let (least, greatest) = (0.01, 100.0);
+    if (least..=greatest).contains(&value) {
+        Ok(Span::from_secs_f64(value * 1e-3))
+    } else {
+        Err(BridgeError::OutOfRange {
+            key,
+            value,
+            least,
+            greatest,
+        })
+    }
 }
 
 impl Settings {
@@ -172,37 +193,32 @@ impl Settings {
         }
         let connection = &config.connection;
         let limit = &config.compensation;
-        let linear_mm = checked("compensation.limit_um", limit.limit_um, 0.0, 5000.0)? / 1000.0;
-        let rotary_rad = (checked("compensation.limit_arcsec", limit.limit_arcsec, 0.0, 3600.0)?
-            / 3600.0)
-            .to_radians();
-        let period_ms = machine.control.servo_period_ms;
-        let poll_ms = connection.poll_period_ms;
+        let linear_mm = checked("compensation.limit_um", limit.limit_um)? / 1000.0;
+        let rotary_rad =
+            (checked("compensation.limit_arcsec", limit.limit_arcsec)? / 3600.0).to_radians();
+        checked("connection.start_timeout_s", connection.start_timeout_s)?;
         Ok(Self {
             joints: config.joints.clone(),
             axes,
-            servo_period: span("control.servo_period_ms", period_ms, 1e-3, 100.0)?,
+            servo_period: servo_period(machine)?,
             prepare: config.prepare,
             connect_password: word("connection.connect_password", &connection.connect_password)?,
             enable_password: word("connection.enable_password", &connection.enable_password)?,
-            poll_period: span("connection.poll_period_ms", poll_ms, 1e-3, 1000.0)?,
+            poll_period: span("connection.poll_period_ms", connection.poll_period_ms, 1e-3)?,
             reply_timeout: span(
                 "connection.reply_timeout_ms",
                 connection.reply_timeout_ms,
                 1e-3,
-                60_000.0,
             )?,
             reconnect_period: span(
                 "connection.reconnect_period_ms",
                 connection.reconnect_period_ms,
                 1e-3,
-                60_000.0,
             )?,
             homing_timeout: span(
                 "connection.homing_timeout_s",
                 connection.homing_timeout_s,
                 1.0,
-                3600.0,
             )?,
             compensation_limit: PerAxis::from_fn(|axis| {
                 if axis.is_linear() {
@@ -215,7 +231,6 @@ impl Settings {
                 "compensation.stale_after_ms",
                 limit.stale_after_ms,
                 1e-3,
-                60_000.0,
             )?,
         })
     }

@@ -8,16 +8,16 @@ use metrology::Axis;
 #[derive(Debug, thiserror::Error)]
 pub enum BridgeError {
     /// A number of the configuration is out of its range.
-    #[error("{key} = {value}: must be above {above} and at most {at_most}")]
+    #[error("{key} = {value}: must be from {least} to {greatest}")]
     OutOfRange {
         /// Key in the parameter file.
         key: &'static str,
         /// What was read, in the key's unit.
         value: f64,
-        /// Limit below.
-        above: f64,
-        /// Limit above.
-        at_most: f64,
+        /// Least value that is allowed.
+        least: f64,
+        /// Greatest value that is allowed.
+        greatest: f64,
     },
     /// A word that goes over the wire would break the line.
     #[error("{key} = {value:?}: must be one word without white space")]

@@ -54,6 +54,7 @@ pub mod fault;
 pub mod io;
 pub mod latch;
 pub mod live;
+pub mod parameters;
 pub mod program;
 pub mod protocol;
 pub mod run;
@@ -63,4 +64,5 @@ pub mod stage;
 
 pub use config::{BridgeConfig, Settings};
 pub use error::BridgeError;
+pub use parameters::PARAMETERS;
 pub use stage::{BridgeStage, Input, Output};

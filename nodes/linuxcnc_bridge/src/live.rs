@@ -4,13 +4,18 @@
 //! over all that has come from outside since the last, with the instants at which it came.
 
 use std::convert::Infallible;
+use std::path::Path;
 
+use machine::MachineFile;
 use metrology::Stage;
 use metrology::sample::AxisCompensation;
 use metrology::stamp::{Host, Stamp};
 
-use crate::io::BridgeIo;
+use crate::config::{BridgeConfig, Settings};
+use crate::error::BridgeError;
+use crate::io::account::Account;
 use crate::io::start::Controller;
+use crate::io::{Address, BridgeIo};
 use crate::stage::{BridgeStage, Input, Output};
 
 /// What the shell tells.
@@ -51,6 +56,29 @@ pub struct LiveBridge {
 }
 
 impl LiveBridge {
+    /// Checks the configuration, starts LinuxCNC where the configuration says so (its INI file lies
+    /// relative to `folder`), and looks for it.
+    ///
+    /// # Errors
+    /// A wrong configuration, or LinuxCNC cannot be started.
+    pub fn open(
+        config: &BridgeConfig,
+        machine: &MachineFile,
+        folder: &Path,
+    ) -> Result<Self, BridgeError> {
+        let stage = BridgeStage::new(&Settings::new(config, machine)?);
+        let controller = match &config.start_ini {
+            Some(ini) => Some(Controller::start(config, &folder.join(ini))?),
+            None => None,
+        };
+        let io = BridgeIo::start(Address {
+            host: config.connection.host.clone(),
+            port: config.connection.port,
+            account: Account::ordinary(&config.user)?,
+        })?;
+        Ok(Self::new(stage, io, controller))
+    }
+
     /// A bridge over `io`; `controller`, where it was started here, ends with it.
     #[must_use]
     pub fn new(stage: BridgeStage, io: BridgeIo, controller: Option<Controller>) -> Self {

@@ -19,6 +19,8 @@ use crate::session::{Session, Want};
 
 /// From where on a slow servo thread is reported.
 const SLIP_LIMIT: f64 = 0.01;
+/// Least time between two [`Output::Joints`].
+const JOINT_PERIOD: Span = Span::from_nanos(20_000_000);
 /// The sampler is started anew after this silence.
 const SILENCE_LIMIT: Span = Span::from_nanos(2_000_000_000);
 
@@ -95,6 +97,8 @@ pub enum IoCommand {
 pub enum Output {
     /// Positions of one servo period.
     State(AxisState),
+    /// The same, at 50 Hz, for everybody's tools.
+    Joints(AxisState),
     /// A latched touch.
     Trigger(ProbeTrigger),
     /// A goal was taken.
@@ -155,6 +159,7 @@ pub struct BridgeStage {
     reader: SampleReader,
     clock: SampleClock,
     touches: TouchDetector,
+    joints_at: Option<Stamp<Machine>>,
     slow: bool,
     sequence: u32,
     motion_type: i32,
@@ -178,6 +183,7 @@ impl BridgeStage {
             reader: SampleReader::new(&settings.joints),
             clock: SampleClock::new(settings.servo_period),
             touches: TouchDetector::new(settings.servo_period, settings.axes),
+            joints_at: None,
             slow: false,
             sequence: 0,
             motion_type: 0,
@@ -430,7 +436,7 @@ impl BridgeStage {
             Succession::First | Succession::Restarted => self.touches.gap(),
         }
         self.watch_slip();
-        out.push(Output::State(AxisState {
+        let state = AxisState {
             received_at: at,
             controller_at,
             axes: self.settings.axes,
@@ -438,7 +444,15 @@ impl BridgeStage {
             motor: record.motor,
             scale: PerAxis([f64::NAN; 6]),
             velocity: self.touches.velocity(record),
-        }));
+        };
+        out.push(Output::State(state));
+        if self
+            .joints_at
+            .is_none_or(|last| controller_at - last >= JOINT_PERIOD)
+        {
+            self.joints_at = Some(controller_at);
+            out.push(Output::Joints(state));
+        }
         self.motion_type = record.motion_type;
         if let Some(run) = &mut self.run
             && record.motion_type != 0

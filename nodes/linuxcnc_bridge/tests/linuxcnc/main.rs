@@ -15,4 +15,5 @@ mod compensation;
 mod faults;
 mod latency;
 mod rig;
+mod start;
 mod tilted;

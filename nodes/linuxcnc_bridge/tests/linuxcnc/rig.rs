@@ -34,7 +34,7 @@ pub struct Rig {
     pub conditions: Vec<Condition>,
     pub endings: Vec<(u64, Ending)>,
     pub lines: Vec<u32>,
-    config: BridgeConfig,
+    pub config: BridgeConfig,
     ini: PathBuf,
     next_goal: u64,
     _turn: MutexGuard<'static, ()>,
@@ -151,7 +151,7 @@ impl Rig {
                 Output::Finished { goal, ending } => self.endings.push((goal, ending)),
                 Output::Feedback { line, .. } => self.lines.push(line),
                 Output::Refused { goal, refusal } => self.endings.push((goal, refusal.ending())),
-                Output::Accepted { .. } | Output::Stopped | Output::Io(_) => {}
+                Output::Accepted { .. } | Output::Joints(_) | Output::Stopped | Output::Io(_) => {}
             }
         }
     }

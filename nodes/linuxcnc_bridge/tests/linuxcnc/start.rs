@@ -1,0 +1,54 @@
+//! LinuxCNC is started once, as told, and leaves nothing behind.
+
+use linuxcnc_bridge::BridgeError;
+use linuxcnc_bridge::io::start::Controller;
+
+use crate::rig::{Rig, scenario};
+
+#[test]
+fn a_second_start_is_refused_and_a_wrong_configuration_says_what_is_wrong() {
+    let Some(mut rig) = Rig::new("linuxcnc_latency") else {
+        return;
+    };
+    let ini = scenario("linuxcnc_latency").join("controller/latency.ini");
+    let second = Controller::start(&rig.config, &ini)
+        .map(|_| ())
+        .unwrap_err();
+    assert!(
+        matches!(second, BridgeError::StartedElsewhere { .. }),
+        "{second}"
+    );
+    assert!(second.to_string().contains("only one can"), "{second}");
+
+    rig.end_controller();
+    let missing = scenario("linuxcnc_latency").join("controller/absent.ini");
+    let absent = Controller::start(&rig.config, &missing)
+        .map(|_| ())
+        .unwrap_err();
+    assert!(absent.to_string().contains("absent.ini"), "{absent}");
+
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["latency.ini", "latency.hal", "tool.tbl"] {
+        std::fs::copy(ini.with_file_name(name), folder.path().join(name)).unwrap();
+    }
+    std::fs::write(
+        folder.path().join("latency.hal"),
+        "loadrt no_such_component\n",
+    )
+    .unwrap();
+    let broken = folder.path().join("latency.ini");
+    let ended = Controller::start(&rig.config, &broken)
+        .map(|_| ())
+        .unwrap_err();
+    println!("{ended}");
+    assert!(matches!(ended, BridgeError::EndedAtStart { .. }), "{ended}");
+    assert!(ended.to_string().contains("no_such_component"), "{ended}");
+
+    let mut nobody = rig.config.clone();
+    nobody.user = "root".to_owned();
+    if nix::unistd::geteuid().is_root() {
+        let root = Controller::start(&nobody, &ini).map(|_| ()).unwrap_err();
+        assert!(matches!(root, BridgeError::NoSuchUser { .. }), "{root}");
+    }
+    rig.start_controller();
+}
