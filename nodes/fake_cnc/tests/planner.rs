@@ -196,6 +196,20 @@ fn prop_commands_never_exceed_the_limits_of_an_axis() {
 }
 
 #[test]
+fn eq2_fine_polygons_are_not_faster_than_the_axes_can_turn() {
+    // Corners 0.01 mm apart on a radius of 1 mm: each alone could be passed at over 60 mm/s.
+    let corners: String = (1..=600)
+        .map(|k| {
+            let angle = f64::from(k) * 0.01;
+            format!("X{:.6} Y{:.6}\n", angle.sin(), 1.0 - angle.cos())
+        })
+        .collect();
+    let text = format!("G1 F20000\n{corners}M2");
+    let (commands, ..) = commands(&text, None);
+    within_limits("polygon", &commands).unwrap();
+}
+
+#[test]
 fn prop_straight_motions_stay_on_their_path() {
     let block = prop_oneof![straight(1.0), straight(0.02)];
     runner(100)
