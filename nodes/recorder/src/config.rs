@@ -1,0 +1,176 @@
+//! Parameters of the recorder.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::RecorderError;
+
+/// Compression of the chunks inside a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ChunkCompression {
+    /// Fastest to write, largest.
+    None,
+    /// Between the two.
+    Lz4,
+    /// Smallest.
+    #[default]
+    Zstd,
+}
+
+impl ChunkCompression {
+    pub(crate) fn of_mcap(self) -> Option<mcap::Compression> {
+        match self {
+            Self::None => None,
+            Self::Lz4 => Some(mcap::Compression::Lz4),
+            Self::Zstd => Some(mcap::Compression::Zstd),
+        }
+    }
+}
+
+/// What a full queue does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WhenFull {
+    /// The sender waits: a composed run in simulated time loses nothing.
+    Wait,
+    /// The message is lost, and counted: a live machine does not wait.
+    #[default]
+    CountLoss,
+}
+
+/// Parameters of the recorder; every one is operational and has a default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecorderConfig {
+    /// Compression of chunks.
+    pub compression: ChunkCompression,
+    /// A chunk is written when its records reach this many bytes, before compression.
+    pub chunk_size_bytes: u64,
+    /// A chunk is written when its messages span this much log time [s].
+    pub flush_period_s: f64,
+    /// `metadata.yaml` is refreshed when this much log time has passed [s].
+    pub metadata_period_s: f64,
+    /// A new file is begun when the current one reaches this many bytes; 0 means one file.
+    pub max_file_bytes: u64,
+    /// Most bytes that wait for the disk.
+    pub queue_limit_bytes: u64,
+    /// What happens to a message that finds the queue full.
+    pub when_full: WhenFull,
+}
+
+impl Default for RecorderConfig {
+    fn default() -> Self {
+        Self {
+            compression: ChunkCompression::Zstd,
+            chunk_size_bytes: 1 << 20,
+            flush_period_s: 1.0,
+            metadata_period_s: 10.0,
+            max_file_bytes: 0,
+            queue_limit_bytes: 256 << 20,
+            when_full: WhenFull::CountLoss,
+        }
+    }
+}
+
+/// Smallest chunk and queue that make sense: one record of a kilobyte must fit.
+const SMALLEST_BYTES: u64 = 1024;
+/// Largest chunk: a reader holds a whole chunk in memory.
+const LARGEST_CHUNK_BYTES: u64 = 64 << 20;
+/// Longest period [s]: an hour of loss is no longer a recording.
+const LONGEST_PERIOD_S: f64 = 3600.0;
+
+impl RecorderConfig {
+    /// Checks every value once.
+    ///
+    /// # Errors
+    /// A value out of its range, with the range.
+    pub fn checked(&self) -> Result<(), RecorderError> {
+        for (key, value_s) in [
+            ("flush_period_s", self.flush_period_s),
+            ("metadata_period_s", self.metadata_period_s),
+        ] {
+            if !(value_s > 0.0 && value_s <= LONGEST_PERIOD_S) {
+                return Err(RecorderError::PeriodOutOfRange {
+                    key,
+                    value_s,
+                    limit_s: LONGEST_PERIOD_S,
+                });
+            }
+        }
+        let sizes = [
+            (
+                "chunk_size_bytes",
+                self.chunk_size_bytes,
+                LARGEST_CHUNK_BYTES,
+            ),
+            ("queue_limit_bytes", self.queue_limit_bytes, u64::MAX),
+        ];
+        for (key, value_bytes, largest_bytes) in sizes {
+            if !(SMALLEST_BYTES..=largest_bytes).contains(&value_bytes) {
+                return Err(RecorderError::SizeOutOfRange {
+                    key,
+                    value_bytes,
+                    smallest_bytes: SMALLEST_BYTES,
+                    largest_bytes,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn flush_period_nanos(&self) -> u64 {
+        nanos_of(self.flush_period_s)
+    }
+
+    pub(crate) fn metadata_period_nanos(&self) -> u64 {
+        nanos_of(self.metadata_period_s)
+    }
+}
+
+fn nanos_of(period_s: f64) -> u64 {
+    // Checked above: between 0 and an hour, so neither sign nor size is lost.
+    (period_s * 1e9).round() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_pass_their_own_check() {
+        RecorderConfig::default().checked().unwrap();
+    }
+
+    #[test]
+    fn a_period_that_is_not_a_time_is_refused_by_name() {
+        for value_s in [0.0, -1.0, f64::NAN, f64::INFINITY, 3601.0] {
+            let config = RecorderConfig {
+                flush_period_s: value_s,
+                ..RecorderConfig::default()
+            };
+            let text = config.checked().unwrap_err().to_string();
+            assert!(text.starts_with("flush_period_s"), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_chunk_larger_than_a_reader_holds_is_refused() {
+        let config = RecorderConfig {
+            chunk_size_bytes: (64 << 20) + 1,
+            ..RecorderConfig::default()
+        };
+        let text = config.checked().unwrap_err().to_string();
+        assert_eq!(
+            text,
+            "chunk_size_bytes = 67108865: must lie between 1024 and 67108864"
+        );
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_by_name() {
+        let text = serde_saphyr::from_str::<RecorderConfig>("chunk_size: 4096\n")
+            .unwrap_err()
+            .to_string();
+        assert!(text.contains("chunk_size"), "{text}");
+    }
+}

@@ -1,0 +1,302 @@
+//! What a bag needs to replay alone: machine file, programs, scenario, parameters, seed, commit.
+//!
+//! Each text is an attachment; the metadata record `abbe.attachments` holds its sha256,
+//! `abbe.run` the seed and the commit, `abbe.parameters.<node>` each resolved parameter by its
+//! dotted name. There is no field for the plant's true state, and a YAML text that carries it
+//! under a key `plant`, `truth` or `plant_truth` is refused.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+use crate::error::RecorderError;
+use crate::read::Bag;
+
+/// Name of the metadata record with seed and commit.
+const RUN_RECORD: &str = "abbe.run";
+/// Name of the metadata record with the hashes.
+const HASHES_RECORD: &str = "abbe.attachments";
+/// Prefix of the metadata records with parameters.
+const PARAMETERS_PREFIX: &str = "abbe.parameters.";
+/// Keys under which a plant's true state would stand.
+const TRUTH_KEYS: [&str; 3] = ["plant", "truth", "plant_truth"];
+
+/// The context of one run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RunContext {
+    /// When the run began, on the clock of the log times [ns].
+    pub start_time_nanos: u64,
+    /// Name of the scenario, empty where there is none.
+    pub scenario_name: String,
+    /// Seed of every random stream.
+    pub seed: Option<u64>,
+    /// Commit of the software.
+    pub commit: String,
+    /// Text of `machine.yaml`.
+    pub machine_file: Option<String>,
+    /// Text of the scenario's file.
+    pub scenario_file: Option<String>,
+    /// Text of each G-code program by file name.
+    pub programs: BTreeMap<String, String>,
+    /// Resolved parameters of each node as YAML text, by node name.
+    pub parameters: BTreeMap<String, String>,
+}
+
+/// One text on its way into the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Attached {
+    /// Name in the bag, e.g. `params/probe.yaml`.
+    pub name: String,
+    /// IANA media type.
+    pub media_type: &'static str,
+    /// Contents.
+    pub text: String,
+}
+
+type MetadataRecords = Vec<(String, BTreeMap<String, String>)>;
+
+impl RunContext {
+    /// The texts, in a fixed order.
+    ///
+    /// # Errors
+    /// A name with a path in it, two texts of one name, YAML that cannot be read, or the plant's
+    /// truth.
+    pub fn attachments(&self) -> Result<Vec<Attached>, RecorderError> {
+        let mut attached = Vec::new();
+        let yaml = |name: String, text: &String| Attached {
+            name,
+            media_type: "application/yaml",
+            text: text.clone(),
+        };
+        attached.extend(
+            self.machine_file
+                .iter()
+                .map(|t| yaml("machine.yaml".into(), t)),
+        );
+        attached.extend(
+            self.scenario_file
+                .iter()
+                .map(|t| yaml("scenario.yaml".into(), t)),
+        );
+        for (node, text) in &self.parameters {
+            plain_name(node)?;
+            attached.push(yaml(format!("params/{node}.yaml"), text));
+        }
+        for item in &attached {
+            refuse_truth(item)?;
+        }
+        for (name, text) in &self.programs {
+            plain_name(name)?;
+            attached.push(Attached {
+                name: name.clone(),
+                media_type: "text/x-gcode",
+                text: text.clone(),
+            });
+        }
+        let mut names = BTreeSet::new();
+        for item in &attached {
+            if !names.insert(&item.name) {
+                return Err(RecorderError::AttachedTwice {
+                    name: item.name.clone(),
+                });
+            }
+        }
+        Ok(attached)
+    }
+
+    pub(crate) fn metadata_records(
+        &self,
+        attached: &[Attached],
+    ) -> Result<MetadataRecords, RecorderError> {
+        let mut run = BTreeMap::from([
+            ("format".to_owned(), "1".to_owned()),
+            (
+                "start_time_ns".to_owned(),
+                self.start_time_nanos.to_string(),
+            ),
+            ("scenario".to_owned(), self.scenario_name.clone()),
+            ("commit".to_owned(), self.commit.clone()),
+        ]);
+        if let Some(seed) = self.seed {
+            run.insert("seed".to_owned(), seed.to_string());
+        }
+        let hashes = attached
+            .iter()
+            .map(|item| (item.name.clone(), sha256_hex(item.text.as_bytes())))
+            .collect();
+        let mut records = vec![
+            (RUN_RECORD.to_owned(), run),
+            (HASHES_RECORD.to_owned(), hashes),
+        ];
+        for (node, text) in &self.parameters {
+            let tree = yaml_tree(&format!("params/{node}.yaml"), text)?;
+            let mut flat = BTreeMap::new();
+            flatten("", &tree, &mut flat);
+            records.push((format!("{PARAMETERS_PREFIX}{node}"), flat));
+        }
+        Ok(records)
+    }
+}
+
+/// Compares every attachment that the bag lists with the hash recorded beside it; returns their
+/// names.
+///
+/// # Errors
+/// An attachment is absent, damaged or different.
+pub fn verify_attachments(bag: &Bag) -> Result<Vec<String>, RecorderError> {
+    let mut names = Vec::new();
+    let Some(hashes) = bag.metadata(HASHES_RECORD) else {
+        return Ok(names);
+    };
+    for (name, recorded) in hashes {
+        let found = match bag.attachment(name)? {
+            Some(attachment) => sha256_hex(&attachment.data),
+            None => "absent".to_owned(),
+        };
+        if found != *recorded {
+            return Err(RecorderError::AttachmentHash {
+                name: name.clone(),
+                found,
+                recorded: recorded.clone(),
+            });
+        }
+        names.push(name.clone());
+    }
+    Ok(names)
+}
+
+fn plain_name(name: &str) -> Result<(), RecorderError> {
+    let plain = !name.is_empty()
+        && !name.starts_with('.')
+        && !name.contains(|c: char| c == '/' || c == '\\' || c.is_control());
+    if plain {
+        return Ok(());
+    }
+    Err(RecorderError::AttachmentName {
+        name: name.to_owned(),
+    })
+}
+
+fn sha256_hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes)
+        .iter()
+        .map(|b| format!("{b:02x}"))
+        .collect()
+}
+
+fn yaml_tree(attachment: &str, text: &str) -> Result<Value, RecorderError> {
+    serde_saphyr::from_str(text).map_err(|source| RecorderError::Yaml {
+        attachment: attachment.to_owned(),
+        source: Box::new(source),
+    })
+}
+
+fn refuse_truth(item: &Attached) -> Result<(), RecorderError> {
+    let tree = yaml_tree(&item.name, &item.text)?;
+    match truth_key(&tree) {
+        None => Ok(()),
+        Some(key) => Err(RecorderError::PlantTruth {
+            attachment: item.name.clone(),
+            key,
+        }),
+    }
+}
+
+/// A key that holds a structure of the plant's; a plain value (the name of its file) is none.
+fn truth_key(tree: &Value) -> Option<String> {
+    match tree {
+        Value::Object(map) => map.iter().find_map(|(key, value)| {
+            let holds =
+                TRUTH_KEYS.contains(&key.as_str()) && (value.is_object() || value.is_array());
+            if holds {
+                Some(key.clone())
+            } else {
+                truth_key(value)
+            }
+        }),
+        Value::Array(items) => items.iter().find_map(truth_key),
+        _ => None,
+    }
+}
+
+fn flatten(prefix: &str, tree: &Value, flat: &mut BTreeMap<String, String>) {
+    let join = |key: &str| match prefix {
+        "" => key.to_owned(),
+        _ => format!("{prefix}.{key}"),
+    };
+    match tree {
+        Value::Object(map) => map
+            .iter()
+            .for_each(|(key, value)| flatten(&join(key), value, flat)),
+        Value::Array(items) => items
+            .iter()
+            .enumerate()
+            .for_each(|(index, value)| flatten(&join(&index.to_string()), value, flat)),
+        Value::String(text) => {
+            flat.insert(prefix.to_owned(), text.clone());
+        }
+        other => {
+            flat.insert(prefix.to_owned(), other.to_string());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_plants_truth_is_refused_wherever_it_stands() {
+        let truths = [
+            "plant:\n  latency_ms: 1.7\n",
+            "scenario:\n  nodes:\n    - fake_cnc: {truth: {backlash_um: 4.0}}\n",
+            "plant_truth: [1.0, 2.0]\n",
+        ];
+        for text in truths {
+            for field in ["machine", "scenario", "parameters"] {
+                let mut context = RunContext::default();
+                match field {
+                    "machine" => context.machine_file = Some(text.into()),
+                    "scenario" => context.scenario_file = Some(text.into()),
+                    _ => drop(context.parameters.insert("fake_cnc".into(), text.into())),
+                }
+                let refused = context.attachments();
+                assert!(
+                    matches!(refused, Err(RecorderError::PlantTruth { .. })),
+                    "{field}: {text}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_name_of_the_plants_file_is_no_truth() {
+        let mut context = RunContext::default();
+        let text = "/**:\n  ros__parameters:\n    plant: plant.yaml\n    seed: 7\n";
+        context.parameters.insert("fake_cnc".into(), text.into());
+        let attached = context.attachments().unwrap();
+        assert_eq!(attached[0].name, "params/fake_cnc.yaml");
+        let records = context.metadata_records(&attached).unwrap();
+        let (name, flat) = &records[2];
+        assert_eq!(name, "abbe.parameters.fake_cnc");
+        assert_eq!(flat["/**.ros__parameters.seed"], "7");
+    }
+
+    #[test]
+    fn names_that_lead_elsewhere_and_names_used_twice_are_refused() {
+        let mut context = RunContext::default();
+        context.programs.insert("../x.ngc".into(), "M2\n".into());
+        let refused = context.attachments().unwrap_err().to_string();
+        assert!(refused.contains("../x.ngc"), "{refused}");
+        let mut context = RunContext {
+            machine_file: Some("name: m\n".into()),
+            ..RunContext::default()
+        };
+        context
+            .programs
+            .insert("machine.yaml".into(), "M2\n".into());
+        let refused = context.attachments().unwrap_err().to_string();
+        assert_eq!(refused, "machine.yaml is attached twice");
+    }
+}

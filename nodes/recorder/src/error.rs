@@ -1,0 +1,258 @@
+//! What can go wrong with a recording.
+
+use std::io;
+use std::path::PathBuf;
+
+/// Errors of writing and of opening a recording. Damage met while reading is no error but a
+/// [`crate::Loss`].
+#[derive(Debug, thiserror::Error)]
+pub enum RecorderError {
+    /// A recording never overwrites.
+    #[error("{path} exists already, a recording overwrites nothing")]
+    Exists {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// A path has no last part to name the files by.
+    #[error("{path} has no name to call a recording by")]
+    NoName {
+        /// The path.
+        path: PathBuf,
+    },
+    /// A directory or file could not be made.
+    #[error("cannot create {path}: {source}")]
+    Create {
+        /// The directory or file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The disk is full; whole chunks before it stay readable.
+    #[error(
+        "no space left for {path}: {bytes_written} bytes with {messages_written} messages are written, {messages_lost} messages are lost"
+    )]
+    StorageFull {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that stay in the file.
+        bytes_written: u64,
+        /// Messages of this recording that stay readable.
+        messages_written: u64,
+        /// Messages taken but not written.
+        messages_lost: u64,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// A write failed for another reason.
+    #[error(
+        "cannot write {path}: {source}; {bytes_written} bytes with {messages_written} messages are written, {messages_lost} messages are lost"
+    )]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that stay in the file.
+        bytes_written: u64,
+        /// Messages of this recording that stay readable.
+        messages_written: u64,
+        /// Messages taken but not written.
+        messages_lost: u64,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The file format has no place for it (65,535 channels or schemas).
+    #[error("{path}: {source}")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// The format's reason.
+        source: mcap::McapError,
+    },
+    /// The recording stopped at an earlier error.
+    #[error("{path} stopped at an earlier error, {messages_lost} messages are lost")]
+    Stopped {
+        /// The recording.
+        path: PathBuf,
+        /// Messages offered since that are not written.
+        messages_lost: u64,
+    },
+    /// A channel id that was never given out.
+    #[error("channel {channel} is not one of the {known} channels of this recording")]
+    UnknownChannel {
+        /// The id.
+        channel: usize,
+        /// Number of channels.
+        known: usize,
+    },
+    /// One topic, two types.
+    #[error("topic {topic} has type {known_type}, so it cannot have type {given_type}")]
+    TypeConflict {
+        /// The topic.
+        topic: String,
+        /// Type of the first channel.
+        known_type: String,
+        /// Type of the refused channel.
+        given_type: String,
+    },
+    /// Not `package/kind/Name`.
+    #[error("topic {topic}: type {type_name:?} is not of the form package/msg/Name")]
+    TypeName {
+        /// The topic.
+        topic: String,
+        /// The name given.
+        type_name: String,
+    },
+    /// Not a RIHS01 hash.
+    #[error("topic {topic}: type hash {type_hash:?} is not RIHS01_ and 64 hexadecimal digits")]
+    TypeHash {
+        /// The topic.
+        topic: String,
+        /// The hash given.
+        type_hash: String,
+    },
+    /// A name that ROS 2 does not take.
+    #[error("topic {topic:?} is not a full topic name")]
+    TopicName {
+        /// The name given.
+        topic: String,
+    },
+    /// QoS text that is not a list of profiles.
+    #[error("topic {topic}: offered QoS: {source}")]
+    Qos {
+        /// The topic.
+        topic: String,
+        /// The reader's reason.
+        source: Box<serde_saphyr::Error>,
+    },
+    /// Before the epoch there is no log time.
+    #[error("topic {topic}: {which} time {time_nanos} ns is before the epoch")]
+    TimeBeforeEpoch {
+        /// The topic.
+        topic: String,
+        /// `log` or `publish`.
+        which: &'static str,
+        /// The time [ns].
+        time_nanos: i64,
+    },
+    /// A period that is not a time.
+    #[error("{key} = {value_s} s: must be above 0 and at most {limit_s} s")]
+    PeriodOutOfRange {
+        /// The parameter.
+        key: &'static str,
+        /// Its value [s].
+        value_s: f64,
+        /// Its limit [s].
+        limit_s: f64,
+    },
+    /// A size out of its range.
+    #[error("{key} = {value_bytes}: must lie between {smallest_bytes} and {largest_bytes}")]
+    SizeOutOfRange {
+        /// The parameter.
+        key: &'static str,
+        /// Its value [byte].
+        value_bytes: u64,
+        /// Smallest value [byte].
+        smallest_bytes: u64,
+        /// Largest value [byte].
+        largest_bytes: u64,
+    },
+    /// The plant's truth never enters a bag.
+    #[error("{attachment}: key {key} holds the plant's truth, which never enters a bag")]
+    PlantTruth {
+        /// The attachment refused.
+        attachment: String,
+        /// The key.
+        key: String,
+    },
+    /// An attachment that cannot be read as YAML.
+    #[error("{attachment}: {source}")]
+    Yaml {
+        /// The attachment refused.
+        attachment: String,
+        /// The reader's reason.
+        source: Box<serde_saphyr::Error>,
+    },
+    /// A name that would leave the bag's own folders.
+    #[error("{name:?} is not a plain file name")]
+    AttachmentName {
+        /// The name given.
+        name: String,
+    },
+    /// Two attachments of one name.
+    #[error("{name} is attached twice")]
+    AttachedTwice {
+        /// The name.
+        name: String,
+    },
+    /// An attachment does not match the hash recorded beside it.
+    #[error("{name}: sha256 is {found}, the bag says {recorded}")]
+    AttachmentHash {
+        /// The attachment.
+        name: String,
+        /// Hash of what is in the bag.
+        found: String,
+        /// Hash that was recorded.
+        recorded: String,
+    },
+    /// The layout could not be written as YAML.
+    #[error("cannot write the layout of {path}: {source}")]
+    Layout {
+        /// The recording.
+        path: PathBuf,
+        /// The writer's reason.
+        source: Box<serde_saphyr::SerializeError>,
+    },
+    /// A path that cannot be opened.
+    #[error("cannot open {path}: {source}")]
+    Open {
+        /// The path.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// A part of a bag that is there and cannot be read.
+    #[error("{loss}")]
+    Damaged {
+        /// Where and why.
+        loss: crate::Loss,
+    },
+    /// A directory without a single file.
+    #[error("{path} holds no .mcap file")]
+    NoFiles {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The worker thread could not be started or did not come back.
+    #[error("the thread that writes {path} is gone")]
+    WorkerGone {
+        /// The recording.
+        path: PathBuf,
+    },
+    /// A dump could not be written.
+    #[error("cannot write the dump: {source}")]
+    Dump {
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// A message that its definition does not describe.
+    #[error("topic {topic}, message {message} at {log_time_nanos} ns: {source}")]
+    Decode {
+        /// The topic.
+        topic: String,
+        /// Number of the message in the bag, from 0.
+        message: u64,
+        /// Its log time [ns].
+        log_time_nanos: u64,
+        /// Why.
+        source: crate::ReflectError,
+    },
+    /// A definition that cannot be read.
+    #[error("topic {topic}, type {type_name}: {source}")]
+    Definition {
+        /// The topic.
+        topic: String,
+        /// Its type.
+        type_name: String,
+        /// Why.
+        source: crate::ReflectError,
+    },
+}

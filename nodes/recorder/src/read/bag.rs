@@ -1,0 +1,291 @@
+//! A bag: its files, topics, texts.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "opening a bag reads files; only recorder, replayer and the command line do"
+)]
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use mcap::records::{Record, op};
+
+use super::file_order::FileOrder;
+use super::index::{FileIndex, parse};
+use super::time_order::TimeOrder;
+use super::walk::Walker;
+use super::{
+    Attachment, Inner, LARGEST_CHUNK_BYTES, Loss, LossReason, Messages, Order, TopicId, TopicInfo,
+};
+use crate::error::RecorderError;
+use crate::layout::{METADATA_FILE, TimeSpan, file_names_of};
+
+/// One file of a bag.
+#[derive(Debug)]
+pub(crate) struct BagFile {
+    pub(crate) path: PathBuf,
+    pub(super) index: FileIndex,
+    /// Topic of each channel number.
+    pub(super) topics: Vec<Option<TopicId>>,
+}
+
+impl BagFile {
+    pub(super) fn open(&self) -> Result<File, LossReason> {
+        File::open(&self.path).map_err(|error| LossReason::Io { kind: error.kind() })
+    }
+
+    pub(super) fn topic(&self, channel: u16) -> Option<TopicId> {
+        self.topics.get(usize::from(channel)).copied().flatten()
+    }
+
+    pub(super) fn loss(&self, at_byte: u64, reason: LossReason, messages_read: u64) -> Loss {
+        Loss {
+            file: self.path.clone(),
+            at_byte,
+            reason,
+            messages_read,
+        }
+    }
+}
+
+/// A recording, open for reading.
+#[derive(Debug)]
+pub struct Bag {
+    path: PathBuf,
+    files: Vec<BagFile>,
+    topics: Vec<TopicInfo>,
+    absent: Vec<PathBuf>,
+}
+
+impl Bag {
+    /// Opens a rosbag2 directory or one `.mcap` file. Damage is no error here: it is told by
+    /// [`Bag::messages`].
+    ///
+    /// # Errors
+    /// The path cannot be opened, or the directory holds no `.mcap` file.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
+        let path = path.as_ref();
+        let failed = |path: &Path, source| RecorderError::Open {
+            path: path.to_owned(),
+            source,
+        };
+        let (names, absent) = if path.is_dir() {
+            files_of(path).map_err(|source| failed(path, source))?
+        } else {
+            (vec![path.to_owned()], Vec::new())
+        };
+        if names.is_empty() && absent.is_empty() {
+            return Err(RecorderError::NoFiles {
+                path: path.to_owned(),
+            });
+        }
+        let mut bag = Self {
+            path: path.to_owned(),
+            files: Vec::new(),
+            topics: Vec::new(),
+            absent,
+        };
+        for name in names {
+            let mut file = File::open(&name).map_err(|source| failed(&name, source))?;
+            bag.add_file(name, FileIndex::read(&mut file));
+        }
+        Ok(bag)
+    }
+
+    fn add_file(&mut self, path: PathBuf, index: FileIndex) {
+        let mut by_channel = Vec::new();
+        for (id, channel) in &index.channels {
+            let schema = index
+                .schemas
+                .get(&channel.schema)
+                .cloned()
+                .unwrap_or_default();
+            let of = |key: &str| channel.metadata.get(key).cloned().unwrap_or_default();
+            let known =
+                |info: &TopicInfo| info.topic == channel.topic && info.type_name == schema.name;
+            let topic = self.topics.iter().position(known).unwrap_or_else(|| {
+                self.topics.push(TopicInfo {
+                    topic: channel.topic.clone(),
+                    type_name: schema.name.clone(),
+                    type_hash: of("topic_type_hash"),
+                    definition_encoding: schema.encoding.clone(),
+                    definition: schema.text.clone(),
+                    message_encoding: channel.encoding.clone(),
+                    qos_yaml: of("offered_qos_profiles"),
+                    message_count: 0,
+                });
+                self.topics.len() - 1
+            });
+            self.topics[topic].message_count += channel.messages;
+            by_channel.resize(usize::from(*id) + 1, None);
+            by_channel[usize::from(*id)] = Some(TopicId(topic));
+        }
+        self.files.push(BagFile {
+            path,
+            index,
+            topics: by_channel,
+        });
+    }
+
+    /// Topics in the order in which they were first recorded.
+    #[must_use]
+    pub fn topics(&self) -> &[TopicInfo] {
+        &self.topics
+    }
+
+    /// One topic.
+    #[must_use]
+    pub fn topic(&self, id: TopicId) -> &TopicInfo {
+        &self.topics[id.0]
+    }
+
+    /// The path that was opened.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Files in order.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.files.iter().map(|file| file.path.as_path())
+    }
+
+    /// Number of messages of all topics.
+    #[must_use]
+    pub fn message_count(&self) -> u64 {
+        self.topics.iter().map(|topic| topic.message_count).sum()
+    }
+
+    /// Earliest and latest log time [ns], `None` without messages.
+    #[must_use]
+    pub fn log_times_nanos(&self) -> Option<(u64, u64)> {
+        let mut span = TimeSpan::default();
+        self.files
+            .iter()
+            .for_each(|file| span.join(file.index.span));
+        span.bounds_nanos()
+    }
+
+    /// Every message, in an order; may be called again and again.
+    #[must_use]
+    pub fn messages(&self, order: Order) -> Messages<'_> {
+        let absent = self.absent.iter().map(|path| Loss {
+            file: path.clone(),
+            at_byte: 0,
+            reason: LossReason::Absent,
+            messages_read: 0,
+        });
+        let inner = match order {
+            Order::File => Inner::File(FileOrder::new(&self.files, absent.collect())),
+            Order::LogTime => Inner::LogTime(TimeOrder::new(&self.files, absent.collect())),
+        };
+        Messages { inner }
+    }
+
+    /// Metadata records by name, of all files; of one name, the first.
+    #[must_use]
+    pub fn metadata(&self, name: &str) -> Option<&BTreeMap<String, String>> {
+        self.metadata_records()
+            .find_map(|(known, metadata)| (known == name).then_some(metadata))
+    }
+
+    /// All metadata records in order.
+    pub fn metadata_records(&self) -> impl Iterator<Item = (&str, &BTreeMap<String, String>)> {
+        let records = self.files.iter().flat_map(|file| &file.index.metadata);
+        records.map(|(name, metadata)| (name.as_str(), metadata))
+    }
+
+    /// Names of the attachments, in order.
+    pub fn attachment_names(&self) -> impl Iterator<Item = &str> {
+        let places = self.files.iter().flat_map(|file| &file.index.attachments);
+        places.map(|place| place.name.as_str())
+    }
+
+    /// An attachment, `None` where there is none of this name.
+    ///
+    /// # Errors
+    /// It is there and cannot be read.
+    pub fn attachment(&self, name: &str) -> Result<Option<Attachment>, RecorderError> {
+        for file in &self.files {
+            if let Some(place) = file.index.attachments.iter().find(|a| a.name == name) {
+                return match read_attachment(file, place.at) {
+                    Ok(attachment) => Ok(Some(attachment)),
+                    Err(reason) => Err(RecorderError::Damaged {
+                        loss: file.loss(place.at, reason, 0),
+                    }),
+                };
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn read_attachment(file: &BagFile, at: u64) -> Result<Attachment, LossReason> {
+    let mut walker = Walker::begin(file.open()?, false)?;
+    walker.seek(at)?;
+    let frame = walker.next_frame()?.ok_or(LossReason::NoEnd)?;
+    if !frame.is_whole() {
+        return Err(frame.cut());
+    }
+    if frame.body_bytes > LARGEST_CHUNK_BYTES {
+        return Err(LossReason::ChunkTooLarge {
+            bytes: frame.body_bytes,
+            limit_bytes: LARGEST_CHUNK_BYTES,
+        });
+    }
+    let mut body = Vec::new();
+    walker.read_body(frame, &mut body)?;
+    match parse(op::ATTACHMENT, &body)? {
+        Record::Attachment { header, data, .. } if frame.opcode == op::ATTACHMENT => {
+            Ok(Attachment {
+                name: header.name,
+                media_type: header.media_type,
+                log_time_nanos: header.log_time,
+                create_time_nanos: header.create_time,
+                data: data.into_owned(),
+            })
+        }
+        _ => Err(LossReason::BadRecord {
+            opcode: frame.opcode,
+        }),
+    }
+}
+
+type Found = (Vec<PathBuf>, Vec<PathBuf>);
+
+/// Files of a directory as its description orders them, then those that it does not know yet.
+fn files_of(directory: &Path) -> std::io::Result<Found> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(directory)? {
+        let path = entry?.path();
+        if path
+            .extension()
+            .is_some_and(|extension| extension == "mcap")
+        {
+            let stem = path
+                .file_stem()
+                .map(|stem| stem.to_string_lossy().into_owned());
+            let stem = stem.unwrap_or_default();
+            let number = stem
+                .rsplit('_')
+                .next()
+                .and_then(|digits| digits.parse::<u64>().ok());
+            found.insert((number, stem), path);
+        }
+    }
+    let text = fs::read_to_string(directory.join(METADATA_FILE)).unwrap_or_default();
+    let listed = file_names_of(&text).unwrap_or_default();
+    let mut files = Vec::new();
+    let mut absent = Vec::new();
+    for name in listed {
+        let path = directory.join(name);
+        if path.is_file() {
+            files.push(path);
+        } else {
+            absent.push(path);
+        }
+    }
+    found.retain(|_, path| !files.contains(path));
+    files.extend(found.into_values());
+    Ok((files, absent))
+}

@@ -1,0 +1,16 @@
+//! Whole bags: written, read, damaged, filled up, and read by others.
+
+#![expect(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "tests write, damage and read files, and stop at the first surprise"
+)]
+
+mod damage;
+#[cfg(feature = "peers")]
+mod peers;
+mod queue;
+mod reflect;
+mod sample;
+mod storage;
+mod write_and_read;
