@@ -237,9 +237,16 @@ fn parse_header(body: &[u8], frame: Frame) -> Result<ChunkHeader, LossReason> {
 }
 
 /// Decompresses until the data or the limit ends; true when the data ended well.
-fn read_what_comes(source: impl Read, limit_bytes: usize, plain: &mut Vec<u8>) -> bool {
-    source
-        .take(limit_bytes as u64 + 1)
-        .read_to_end(plain)
-        .is_ok()
+fn read_what_comes(mut source: impl Read, limit_bytes: usize, plain: &mut Vec<u8>) -> bool {
+    plain.resize(limit_bytes, 0);
+    let mut filled = 0;
+    let well = loop {
+        match source.read(&mut plain[filled..]) {
+            Ok(0) => break true,
+            Ok(count) => filled += count,
+            Err(_) => break false,
+        }
+    };
+    plain.truncate(filled);
+    well
 }

@@ -5,7 +5,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use recorder::{Bag, ChunkCompression, Order, RecorderConfig, dump_json};
+use recorder::{Bag, ChunkCompression, Order, RecorderConfig, dump_json, recover};
 
 use crate::sample::{expect_first, read, record, small_chunks};
 
@@ -93,4 +93,32 @@ fn a_bag_written_by_rosbags_is_read_alike() {
         }
         expect_first(&found, 200);
     }
+}
+
+/// The README's table of readers, checked.
+#[test]
+fn peers_stop_at_a_cut_or_refuse_it_and_read_the_recovered_bag() {
+    let home = tempfile::tempdir().unwrap();
+    let (bag, _) = record(home.path(), 400, small_chunks(ChunkCompression::Zstd));
+    let bytes = std::fs::read(bag.join("run_0.mcap")).unwrap();
+    let cut = home.path().join("cut.mcap");
+    std::fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
+    let (found, _) = read(&Bag::open(&cut).unwrap(), Order::File);
+    let output = run("read_cut_file.py", &[&cut]);
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let theirs = said["messages"].as_u64().unwrap();
+    assert!(theirs > 0 && theirs <= found.len() as u64, "{said}");
+    assert_ne!(said["stream"], "read", "{said}");
+    assert_ne!(said["seeking"], "read", "{said}");
+    assert_eq!(said["rosbags"], "ReaderError: File end magic is invalid.");
+    let whole = home.path().join("recovered");
+    recover(&cut, &whole, &RecorderConfig::default()).unwrap();
+    let dumped = home.path().join("dump.jsonl");
+    dump(&whole, &dumped);
+    let output = run("read_bag.py", &[&whole, &dumped]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        text.starts_with(&format!("{} messages", found.len())),
+        "{text}"
+    );
 }
