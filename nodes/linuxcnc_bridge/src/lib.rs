@@ -38,6 +38,9 @@
 //! `touches_at_five_feeds_give_the_delay_that_only_hal_holds`: on-delay 4.2 ms, 5 feeds of 2 to 30 mm/s,
 //! 8 touches each with spread phases: single waits 4.003 to 4.979 ms, latency 4.504 ms where (3) gives
 //! 4.500 ms, surface within 1 nm; every published position equals LinuxCNC's own probed one to the nm.
+//! `the_latency_cycle_gives_the_delay_that_only_hal_holds`: the suite's own cycle, same feeds and repeats:
+//! 4.511 ms on an X face, 4.572 ms on a Z face, surfaces within 0.3 µm.
+//! Records reach the host later than the fastest one by 5 ms (median), 12 ms (99 %).
 //!
 //! # Which position is `latched`
 //!

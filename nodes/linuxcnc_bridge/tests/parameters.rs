@@ -28,7 +28,7 @@ fn config() -> BridgeConfig {
 }
 
 fn refusal(config: &BridgeConfig) -> String {
-    let machine: MachineFile = serde_saphyr::from_str(MACHINE).unwrap();
+    let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
     Settings::new(config, &machine).unwrap_err().to_string()
 }
 
@@ -97,8 +97,11 @@ fn wrong_values_are_refused_by_name() {
 
 #[test]
 fn a_hardware_latch_is_not_what_linuxcnc_has() {
-    let machine: MachineFile =
-        serde_saphyr::from_str(&MACHINE.replace("latch: polled", "latch: hardware")).unwrap();
+    let machine = MachineFile::parse(
+        &MACHINE.replace("latch: polled", "latch: hardware"),
+        "machine.yaml",
+    )
+    .unwrap();
     let error = Settings::new(&config(), &machine).unwrap_err();
     assert!(matches!(error, BridgeError::LatchIsPolled));
 }

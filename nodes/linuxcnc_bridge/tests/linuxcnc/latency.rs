@@ -29,9 +29,9 @@ fn program(log: &str) -> String {
     text
 }
 
-/// Slope, its standard deviation and intercept of y over x, weighted by 1/x² (the scatter of a
+/// Slope and intercept of y over x, weighted by 1/x² (the scatter of a
 /// polled latch is proportional to feed).
-fn weighted_line(points: &[(f64, f64)]) -> (f64, f64) {
+pub fn weighted_line(points: &[(f64, f64)]) -> (f64, f64) {
     let (mut s, mut sx, mut sy, mut sxx, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (x, y) in points {
         let w = 1.0 / (x * x);
@@ -45,7 +45,7 @@ fn weighted_line(points: &[(f64, f64)]) -> (f64, f64) {
     (slope, (sy - slope * sx) / s)
 }
 
-fn on_delay_s() -> f64 {
+pub fn on_delay_s() -> f64 {
     let hal = read(&scenario("linuxcnc_latency").join("controller/latency.hal"));
     let line = hal
         .lines()
@@ -120,6 +120,19 @@ fn check_stream(rig: &Rig) {
         assert!(step > 0 && step % 1_000_000 == 0, "{step} ns");
         missing += step / 1_000_000 - 1;
     }
+    let mut lags_ms: Vec<f64> = rig
+        .states
+        .iter()
+        .map(|state| (state.received_at.nanos() - state.controller_at.nanos()) as f64 * 1e-6)
+        .collect();
+    lags_ms.sort_by(f64::total_cmp);
+    let at = |share: f64| lags_ms[((lags_ms.len() - 1) as f64 * share) as usize] - lags_ms[0];
+    println!(
+        "records come later than the fastest by: median {:.1} ms, 99 % {:.1} ms, greatest {:.1} ms",
+        at(0.5),
+        at(0.99),
+        at(1.0)
+    );
     println!(
         "{} records, {missing} missing; {:?}",
         rig.states.len(),

@@ -12,6 +12,7 @@
 )]
 
 mod compensation;
+mod cycles;
 mod faults;
 mod latency;
 mod rig;

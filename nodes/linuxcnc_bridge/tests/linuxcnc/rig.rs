@@ -34,6 +34,7 @@ pub struct Rig {
     pub conditions: Vec<Condition>,
     pub endings: Vec<(u64, Ending)>,
     pub lines: Vec<u32>,
+    pub machine: MachineFile,
     pub config: BridgeConfig,
     ini: PathBuf,
     next_goal: u64,
@@ -94,8 +95,8 @@ impl Rig {
         let file: BTreeMap<String, NodeParameters> =
             serde_saphyr::from_str(&read(&folder.join("linuxcnc_bridge.yaml"))).unwrap();
         let config = file.into_values().next().unwrap().parameters;
-        let machine: MachineFile =
-            serde_saphyr::from_str(&read(&folder.join("machine.yaml"))).unwrap();
+        let machine =
+            MachineFile::parse(&read(&folder.join("machine.yaml")), "machine.yaml").unwrap();
         let settings = Settings::new(&config, &machine).unwrap();
         let ini = folder.join(config.start_ini.clone().unwrap());
         let controller = start(&config, &ini);
@@ -117,6 +118,7 @@ impl Rig {
             conditions: Vec::new(),
             endings: Vec::new(),
             lines: Vec::new(),
+            machine,
             config,
             ini,
             next_goal: 0,
