@@ -4,7 +4,7 @@
 //! of the machine's axes and F I J K N P R S, and comments. A word outside it is refused with its
 //! line and column: a control that skips what it does not know moves somewhere unexpected.
 //!
-//! Rules are those of the RS274/NGC interpreter, version 3 [1], as LinuxCNC applies them; each rule
+//! Rules are those of the RS274/NGC interpreter, version 3 \[1\], as LinuxCNC applies them; each rule
 //! is pinned by `val_linuxcnc_accepts_and_refuses_the_same_blocks` against answers of LinuxCNC's own
 //! stand-alone interpreter. Deliberately narrower than LinuxCNC: no expressions, parameters, block
 //! delete, `%`, rotary words in a touch, or text after M2; a touch must not end where it starts.
@@ -20,7 +20,7 @@
 //! a test instead.
 //!
 //! # References
-//! [1] T. Kramer, F. Proctor, E. Messina, The NIST RS274/NGC Interpreter, version 3, NISTIR 6556 (2000),
+//! \[1\] T. Kramer, F. Proctor, E. Messina, The NIST RS274/NGC Interpreter, version 3, NISTIR 6556 (2000),
 //! sections 3.3 (blocks), 3.4 (modal groups), 3.5 (G codes), 3.8 (order of execution).
 
 mod arc;

@@ -13,7 +13,8 @@
 //!
 //! # References
 //! LinuxCNC 2.9 `interp_internal.hh`: CENTER_ARC_RADIUS_TOLERANCE_MM, SPIRAL_RELATIVE_TOLERANCE,
-//! RADIUS_TOLERANCE_MM; the same values in inch mode, where LinuxCNC takes a tenth of an inch less.
+//! RADIUS_TOLERANCE_MM. In inch mode LinuxCNC allows 2 * 0.001 * √2 in = 0.072 mm; here the metric value
+//! holds in both.
 
 use super::block::Block;
 use super::program::Plane;
