@@ -41,6 +41,7 @@ pub(super) struct Body {
     /// How many joints of the tool side stand before column and head.
     before_head: usize,
     head_moves_in_z: bool,
+    table_moves_in_y: bool,
 }
 
 impl Body {
@@ -81,6 +82,10 @@ impl Body {
             workpiece_side: build(&chain.workpiece_side)?,
             tool_side: build(&chain.tool_side)?,
             before_head,
+            table_moves_in_y: chain
+                .workpiece_side
+                .iter()
+                .any(|joint| joint.axis == Axis::Y),
             head_moves_in_z: chain.tool_side.iter().any(|joint| joint.axis == Axis::Z),
         })
     }
@@ -129,10 +134,12 @@ impl Body {
         let (before, after) = self.tool_side.split_at(self.before_head);
         let head = walk(Rigid::identity(), before) * structure.tool_side(head_z_mm);
         let tool = walk(head, after);
-        let table = walk(
-            structure.workpiece_side(slide[Axis::Y]),
-            &self.workpiece_side,
-        );
+        let table_y_mm = if self.table_moves_in_y {
+            slide[Axis::Y]
+        } else {
+            0.0
+        };
+        let table = walk(structure.workpiece_side(table_y_mm), &self.workpiece_side);
         table.inverse() * tool
     }
 }

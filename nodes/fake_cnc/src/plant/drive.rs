@@ -47,6 +47,11 @@ pub(super) struct Drive {
     slide_friction: Friction,
     motor_force: f64,
     slide_force: f64,
+    /// Period for which the gains below were made, s.
+    period_s: f64,
+    step_s: f64,
+    motor_gain_s: f64,
+    slide_gain_s: f64,
     pub(super) motor: f64,
     pub(super) motor_velocity: f64,
     pub(super) slide: f64,
@@ -67,6 +72,10 @@ impl Drive {
             constants,
             motor_force: 0.0,
             slide_force: 0.0,
+            period_s: 0.0,
+            step_s: 0.0,
+            motor_gain_s: 0.0,
+            slide_gain_s: 0.0,
             motor: 0.0,
             motor_velocity: 0.0,
             slide: 0.0,
@@ -96,32 +105,37 @@ impl Drive {
         self.slide_friction.relax();
     }
 
+    /// Divisions that every period would repeat, for periods of `period_s`.
+    fn prepare(&mut self, period_s: f64) {
+        self.period_s = period_s;
+        self.step_s = period_s / f64::from(SUBSTEPS);
+        self.motor_gain_s = self.step_s / self.constants.motor_share;
+        self.slide_gain_s = self.step_s / (1.0 - self.constants.motor_share);
+        self.motor_friction.prepare(self.step_s);
+        self.slide_friction.prepare(self.step_s);
+    }
+
     /// One servo period under a constant acceleration demand.
+    #[expect(clippy::float_cmp, reason = "an unchanged period needs no new gains")]
     pub(super) fn step(&mut self, demand: f64, period_s: f64) {
-        let constants = &self.constants;
-        let limit = constants.demand_limit;
+        if period_s != self.period_s {
+            self.prepare(period_s);
+        }
+        let limit = self.constants.demand_limit;
         let demand = demand.max(-limit).min(limit);
-        let step_s = period_s / f64::from(SUBSTEPS);
-        let motor_gain = step_s / constants.motor_share;
-        let slide_gain = step_s / (1.0 - constants.motor_share);
         for _ in 0..SUBSTEPS {
-            let (spring, engaged) = constants
-                .coupling
-                .force_and_stiffness(self.motor - self.slide);
+            let lead = self.motor - self.slide;
+            let (spring, engaged) = self.constants.coupling.force_and_stiffness(lead);
             let closing = self.motor_velocity - self.slide_velocity;
             let coupling = spring + self.damping_time_s * engaged * closing; // (3)
-            self.motor_velocity += motor_gain * (demand - coupling - self.motor_force); // (1)
-            self.slide_velocity += slide_gain * (coupling - self.slide_force); // (2)
-            let motor_move = self.motor_velocity * step_s;
-            let slide_move = self.slide_velocity * step_s;
+            self.motor_velocity += self.motor_gain_s * (demand - coupling - self.motor_force); // (1)
+            self.slide_velocity += self.slide_gain_s * (coupling - self.slide_force); // (2)
+            let motor_move = self.motor_velocity * self.step_s;
+            let slide_move = self.slide_velocity * self.step_s;
             self.motor += motor_move;
             self.slide += slide_move;
-            self.motor_force = self
-                .motor_friction
-                .step(motor_move, self.motor_velocity, step_s);
-            self.slide_force = self
-                .slide_friction
-                .step(slide_move, self.slide_velocity, step_s);
+            self.motor_force = self.motor_friction.step(motor_move, self.motor_velocity);
+            self.slide_force = self.slide_friction.step(slide_move, self.slide_velocity);
         }
     }
 }

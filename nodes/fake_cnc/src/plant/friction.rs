@@ -50,6 +50,8 @@ pub(super) struct Friction {
     inverse_stribeck_velocity: f64,
     element: [f64; ELEMENTS],
     level: f64,
+    /// Share of (2) that one step closes, by backward Euler.
+    follow: f64,
 }
 
 impl Friction {
@@ -63,6 +65,7 @@ impl Friction {
             inverse_stribeck_velocity: 1.0 / constants.stribeck_velocity,
             element: [0.0; ELEMENTS],
             level: constants.breakaway,
+            follow: 0.0,
         }
     }
 
@@ -77,13 +80,18 @@ impl Friction {
         self.stiffness.iter().sum()
     }
 
+    /// Fixes the length of the steps to come.
+    pub(super) fn prepare(&mut self, step_s: f64) {
+        self.follow = step_s / (self.constants.memory_s + step_s);
+    }
+
     /// Moves the contact by `displacement` at `velocity` and gives the force against the motion.
-    pub(super) fn step(&mut self, displacement: f64, velocity: f64, step_s: f64) -> f64 {
+    pub(super) fn step(&mut self, displacement: f64, velocity: f64) -> f64 {
         let constants = &self.constants;
         let ratio = velocity * self.inverse_stribeck_velocity;
         let target =
             constants.coulomb + (constants.breakaway - constants.coulomb) / (1.0 + ratio * ratio); // (1)
-        self.level += (target - self.level) * step_s / (constants.memory_s + step_s); // (2)
+        self.level += (target - self.level) * self.follow; // (2)
         let mut force = constants.viscous * velocity;
         for ((element, stiffness), share) in
             self.element.iter_mut().zip(&self.stiffness).zip(&SHARE)
@@ -101,19 +109,21 @@ mod tests {
     use super::*;
 
     fn contact() -> Friction {
-        Friction::new(FrictionConstants {
+        let mut contact = Friction::new(FrictionConstants {
             coulomb: 100.0,
             breakaway: 150.0,
             stribeck_velocity: 2.0,
             viscous: 0.5,
             presliding: 0.008,
             memory_s: 0.004,
-        })
+        });
+        contact.prepare(1e-3);
+        contact
     }
 
     /// Slides at constant velocity until everything has settled.
     fn steady(contact: &mut Friction, velocity: f64) -> f64 {
-        (0..4000).fold(0.0, |_, _| contact.step(velocity * 1e-3, velocity, 1e-3))
+        (0..4000).fold(0.0, |_, _| contact.step(velocity * 1e-3, velocity))
     }
 
     #[test]
@@ -133,7 +143,7 @@ mod tests {
     fn eq2_friction_lags_a_velocity_step() {
         let mut contact = contact();
         let slow = steady(&mut contact, 0.1);
-        let at_once = contact.step(0.02, 20.0, 1e-3) - 0.5 * 20.0;
+        let at_once = contact.step(0.02, 20.0) - 0.5 * 20.0;
         assert!(at_once > 0.75 * slow, "{at_once} after {slow}");
         let later = steady(&mut contact, 20.0) - 0.5 * 20.0;
         assert!(later < 0.7 * slow);
@@ -142,12 +152,12 @@ mod tests {
     #[test]
     fn val_virgin_curve_stiffens_as_al_bender_2005() {
         let mut contact = contact();
-        let first = (contact.step(1e-6, 1e-3, 1e-3) - 0.5 * 1e-3) / 1e-6;
+        let first = (contact.step(1e-6, 1e-3) - 0.5 * 1e-3) / 1e-6;
         let expected = 150.0 / 0.008 * (0.3 / 0.125 + 0.3 / 0.25 + 0.2 / 0.5 + 0.2);
         assert!((first / expected - 1.0).abs() < 1e-3);
         let mut force = 0.0;
         for _ in 0..8000 {
-            force = contact.step(1e-6, 1e-3, 1e-3);
+            force = contact.step(1e-6, 1e-3);
         }
         assert!(
             (force - 150.0).abs() < 0.1,
@@ -159,7 +169,7 @@ mod tests {
     fn eq3_presliding_loops_close_with_memory_of_the_reversal_point() {
         let mut contact = contact();
         let mut walk = |steps: i32, sign: f64| {
-            (0..steps).fold(0.0, |_, _| contact.step(sign * 1e-6, sign * 1e-3, 1e-3))
+            (0..steps).fold(0.0, |_, _| contact.step(sign * 1e-6, sign * 1e-3))
         };
         let outer = walk(3000, 1.0);
         walk(800, -1.0);
@@ -173,12 +183,13 @@ mod tests {
     #[test]
     fn a_constant_load_below_breakaway_is_held_without_creep() {
         let mut contact = contact();
+        contact.prepare(5e-4);
         let (mut position, mut velocity, mut friction) = (0.0_f64, 0.0_f64, 0.0_f64);
         let mut after_a_second = 0.0;
         for tick in 0..60_000 {
             velocity += (80.0 - friction - 20.0 * velocity) * 5e-4;
             position += velocity * 5e-4;
-            friction = contact.step(velocity * 5e-4, velocity, 5e-4);
+            friction = contact.step(velocity * 5e-4, velocity);
             if tick == 2000 {
                 after_a_second = position;
             }

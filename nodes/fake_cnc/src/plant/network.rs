@@ -55,6 +55,21 @@ impl Network {
         self.temp_degc[place as usize]
     }
 
+    /// All places at one temperature, for tests of what follows from temperatures.
+    #[cfg(test)]
+    pub(super) fn soaked(temp_degc: f64) -> Self {
+        Self {
+            advance: [[0.0; 2 * N + 1]; N],
+            temp_degc: [temp_degc; N],
+        }
+    }
+
+    /// Sets one temperature, for tests of what follows from temperatures.
+    #[cfg(test)]
+    pub(super) fn set_degc(&mut self, place: Place, temp_degc: f64) {
+        self.temp_degc[place as usize] = temp_degc;
+    }
+
     /// One step under constant heat (W) and air temperature.
     pub(super) fn step(&mut self, heat_w: &[f64; N], air_degc: f64) {
         let before = self.temp_degc;

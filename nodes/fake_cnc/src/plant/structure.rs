@@ -7,7 +7,7 @@
 //!   nose against carriage: d_y = -a dT_head overhang,
 //!     d_z = -a dT_head drop - a_s [(dT_front + dT_rear)/2 l_bearings + dT_front l_nose]   (3)
 //!   bed: d_y = a dT_bed l of the column against the table; k_b = a (T_bed - T_base)/depth;
-//!        table at y:  d_z = k_b y^2/2,  w_x = k_b y                             (4)
+//!        table moved by -y:  d_z = -k_b y^2/2,  w_x = k_b y                     (4)
 //!   table disc, hot at its centre, dT(r) = dT_edge + dT_c (1 - (r/R)^2):
 //!     u(r) = a_t r dT_edge + a_t dT_c [(1+n)(r/2 - r^3/(4 R^2)) + (1-n) r/4]     (5)
 //! ```
@@ -146,11 +146,11 @@ impl Structure {
         shift(carriage_mm + self.nose_mm) * turn_about(&-self.tip_from_carriage_mm, &turn)
     }
 
-    /// Motion of the table by the bed, with the table's slide at `y_mm`.
+    /// Motion of the table by the bed, with the table's slide at `y_mm` (the table itself is at -Y).
     pub(super) fn workpiece_side(&self, y_mm: f64) -> Rigid {
         let tilt = Rotation3::new(Vector3::new(self.bed_curvature_per_mm * y_mm, 0.0, 0.0));
-        let sag_mm = 0.5 * self.bed_curvature_per_mm * y_mm * y_mm; // (4)
-        shift(Vector3::new(0.0, 0.0, sag_mm + self.table_rise_mm))
+        let drop_mm = 0.5 * self.bed_curvature_per_mm * y_mm * y_mm; // (4)
+        shift(Vector3::new(0.0, 0.0, self.table_rise_mm - drop_mm))
             * turn_about(&Vector3::new(0.0, 0.0, self.entry.table_top_mm), &tilt)
     }
 
@@ -224,4 +224,143 @@ fn check(entry: &StructureEntry) -> Result<(), PlantError> {
         require_not_negative(at(key), value)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cold() -> Structure {
+        let entry = StructureEntry {
+            casting_expansion_um_per_m_k: 11.0,
+            carriage_height_mm: 600.0,
+            column_depth_mm: 500.0,
+            column_width_mm: 700.0,
+            overhang_mm: 400.0,
+            head_drop_mm: 100.0,
+            shaft_expansion_um_per_m_k: 12.0,
+            shaft_between_bearings_mm: 200.0,
+            shaft_nose_mm: 50.0,
+            bed_length_mm: 500.0,
+            bed_depth_mm: 400.0,
+            table_height_mm: 300.0,
+            table_radius_mm: 300.0,
+            table_top_mm: 0.0,
+            table_expansion_um_per_m_k: 11.0,
+            workpiece_expansion_um_per_m_k: 23.0,
+            post_expansion_um_per_m_k: 12.0,
+            scale_expansion_um_per_m_k: 8.0,
+        };
+        let network = Network::soaked(20.0);
+        Structure::new(&entry, 20.0, 150.0, &network).unwrap()
+    }
+
+    fn warm(kelvin: &[(Place, f64)]) -> Structure {
+        let mut network = Network::soaked(20.0);
+        for &(place, above_k) in kelvin {
+            network.set_degc(place, 20.0 + above_k);
+        }
+        let mut structure = cold();
+        structure.follow(&network);
+        structure
+    }
+
+    fn tip_mm(structure: &Structure, z_mm: f64) -> Vector3<f64> {
+        structure.tool_side(z_mm).translation.vector
+    }
+
+    #[test]
+    fn a_soaked_machine_is_not_bent() {
+        let structure = cold();
+        assert!(tip_mm(&structure, 200.0).norm() < 1e-15);
+        assert!(structure.workpiece_side(100.0).translation.vector.norm() < 1e-15);
+        let point_mm = Vector3::new(200.0, 100.0, 80.0);
+        assert!(structure.on_table_mm(&point_mm, Standing::Workpiece).norm() < 1e-15);
+    }
+
+    #[test]
+    fn eq3_spindle_growth_pushes_the_nose_down() {
+        let structure = warm(&[(Place::SpindleFront, 12.0), (Place::SpindleRear, 8.0)]);
+        let growth_mm = 12e-6 * (10.0 * 200.0 + 12.0 * 50.0);
+        assert!((tip_mm(&structure, 0.0) - Vector3::new(0.0, 0.0, -growth_mm)).norm() < 1e-12);
+        let structure = warm(&[(Place::Head, 5.0)]);
+        let expected = Vector3::new(0.0, -11e-6 * 5.0 * 400.0, -11e-6 * 5.0 * 100.0);
+        assert!((tip_mm(&structure, 300.0) - expected).norm() < 1e-12);
+    }
+
+    #[test]
+    fn eq2_a_warm_front_tips_the_column_backwards_like_a_bent_beam() {
+        let structure = warm(&[(Place::ColumnFront, 1.0), (Place::ColumnRear, -1.0)]);
+        let curvature = 11e-6 * 2.0 / 500.0;
+        for z_mm in [0.0, 200.0, 400.0] {
+            let height_mm = 600.0 + z_mm;
+            let angle = curvature * height_mm;
+            // Tip from carriage: 400 forward, 100 + 200 + 50 + 150 down.
+            let expected = Vector3::new(
+                0.0,
+                0.5 * curvature * height_mm * height_mm - angle * 500.0,
+                angle * 400.0,
+            );
+            let seen = tip_mm(&structure, z_mm);
+            assert!((seen - expected).norm() < 1e-6, "{seen} {expected}");
+        }
+    }
+
+    #[test]
+    fn eq2_a_uniformly_warm_column_only_grows_taller() {
+        use Place::{ColumnFront, ColumnLeft, ColumnRear, ColumnRight};
+        let structure = warm(&[ColumnFront, ColumnRear, ColumnLeft, ColumnRight].map(|p| (p, 2.0)));
+        let expected = Vector3::new(0.0, 0.0, 11e-6 * 2.0 * 750.0);
+        assert!((tip_mm(&structure, 150.0) - expected).norm() < 1e-12);
+    }
+
+    #[test]
+    fn eq4_a_warm_bed_parts_column_and_table_and_arches_under_it() {
+        let structure = warm(&[(Place::Bed, 1.0), (Place::BedBase, 0.0)]);
+        assert!((tip_mm(&structure, 0.0).y - 11e-6 * 500.0).abs() < 1e-12);
+        let curvature = 11e-6 / 400.0;
+        let table = structure.workpiece_side(200.0);
+        assert!((table.translation.vector.z + 0.5 * curvature * 4e4).abs() < 1e-12);
+        // The slope of the arch where the table is: d(-k s^2/2)/ds at s = -200.
+        assert!((table.rotation.matrix()[(2, 1)] - curvature * 200.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn val_timoshenko_free_disc_with_a_hot_centre() {
+        let structure = warm(&[(Place::TableCentre, 4.0)]);
+        let at = |radius_mm: f64| {
+            structure
+                .on_table_mm(&Vector3::new(radius_mm, 0.0, 0.0), Standing::Artefact)
+                .x
+        };
+        // The rim of a free disc grows by the mean temperature, here half of the centre's.
+        assert!((at(300.0) - 11e-6 * 2.0 * 300.0).abs() < 1e-12);
+        // Quadrature of the plane-stress integrals at half radius.
+        let integral = |to_mm: f64| {
+            let n = 20_000;
+            (0..n)
+                .map(|i| {
+                    let r = (f64::from(i) + 0.5) * to_mm / f64::from(n);
+                    4.0 * (1.0 - (r / 300.0).powi(2)) * r * to_mm / f64::from(n)
+                })
+                .sum::<f64>()
+        };
+        let expected = 11e-6
+            * ((1.0 + POISSON) / 150.0 * integral(150.0)
+                + (1.0 - POISSON) * 150.0 / 9e4 * integral(300.0));
+        assert!(
+            (at(150.0) - expected).abs() < 1e-9,
+            "{} {expected}",
+            at(150.0)
+        );
+    }
+
+    #[test]
+    fn posts_and_workpieces_grow_by_their_own_temperatures() {
+        let structure = warm(&[(Place::Workpiece, 1.0), (Place::Posts, 2.0)]);
+        let point_mm = Vector3::new(0.0, 0.0, 200.0);
+        let height = |standing| structure.on_table_mm(&point_mm, standing).z;
+        assert!((height(Standing::Workpiece) - 23e-6 * 200.0).abs() < 1e-12);
+        assert!((height(Standing::Artefact) - 12e-6 * 2.0 * 200.0).abs() < 1e-12);
+    }
 }

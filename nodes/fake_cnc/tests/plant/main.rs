@@ -4,5 +4,6 @@
 
 mod drift;
 mod file;
+mod pose;
 mod rig;
 mod touch;

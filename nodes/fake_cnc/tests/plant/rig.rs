@@ -11,11 +11,36 @@ pub const MACHINE_YAML: &str = include_str!("../../../../launch_configs/first_ru
 pub const PLANT_YAML: &str = include_str!("../../../../launch_configs/first_run/plant.yaml");
 
 pub fn machine() -> MachineFile {
-    serde_saphyr::from_str(MACHINE_YAML).unwrap()
+    MachineFile::parse(MACHINE_YAML, "machine.yaml").unwrap()
 }
 
 pub fn truth() -> PlantFile {
     PlantFile::from_yaml(PLANT_YAML).unwrap()
+}
+
+/// First-run plant whose artefacts stand where they should on a perfect cold machine.
+pub fn perfect() -> PlantFile {
+    let mut truth = truth();
+    for errors in truth.geometry.linear.values_mut() {
+        (errors.positioning_um, errors.straightness_um) = (0.0, 0.0);
+        (errors.angular_urad, errors.lead_um_per_m) = (0.0, 0.0);
+    }
+    for errors in truth.geometry.rotary.values_mut() {
+        (
+            errors.run_out_um,
+            errors.wobble_urad,
+            errors.positioning_urad,
+        ) = (0.0, 0.0, 0.0);
+        (errors.location_um, errors.tilt_urad) = ([0.0; 3], [0.0; 3]);
+    }
+    let squareness = &mut truth.geometry.squareness_urad;
+    (squareness.y_to_x, squareness.z_to_x, squareness.z_to_y) = (0.0, 0.0, 0.0);
+    truth.artefacts.placement_um = 0.0;
+    truth.touch_probe.repeatability_um = 0.0;
+    truth.touch_probe.ball_radius_deviation_um = 0.0;
+    truth.heat.shop_air.day_amplitude_k = 0.0;
+    truth.heat.shop_air.draught_k = 0.0;
+    truth
 }
 
 /// Cascade on the motors' encoders with velocity and acceleration fed forward.

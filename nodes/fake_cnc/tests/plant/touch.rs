@@ -1,37 +1,12 @@
 //! Touches of the first-run machine's artefacts.
 
 use fake_cnc::plant::{BumpEntry, ProbeFaultEntry, TrueContact};
-use fake_cnc::{Plant, PlantFile, ProbeEdge};
+use fake_cnc::{Plant, ProbeEdge};
 use machine::file::ArtefactEntry;
 use metrology::stamp::Span;
 use metrology::{Axis, PerAxis};
 
-use crate::rig::{Command, PERIOD, PERIOD_S, Servo, machine, truth};
-
-/// First-run plant whose artefacts stand where they should on a perfect cold machine.
-fn perfect() -> PlantFile {
-    let mut truth = truth();
-    for errors in truth.geometry.linear.values_mut() {
-        (errors.positioning_um, errors.straightness_um) = (0.0, 0.0);
-        (errors.angular_urad, errors.lead_um_per_m) = (0.0, 0.0);
-    }
-    for errors in truth.geometry.rotary.values_mut() {
-        (
-            errors.run_out_um,
-            errors.wobble_urad,
-            errors.positioning_urad,
-        ) = (0.0, 0.0, 0.0);
-        (errors.location_um, errors.tilt_urad) = ([0.0; 3], [0.0; 3]);
-    }
-    let squareness = &mut truth.geometry.squareness_urad;
-    (squareness.y_to_x, squareness.z_to_x, squareness.z_to_y) = (0.0, 0.0, 0.0);
-    truth.artefacts.placement_um = 0.0;
-    truth.touch_probe.repeatability_um = 0.0;
-    truth.touch_probe.ball_radius_deviation_um = 0.0;
-    truth.heat.shop_air.day_amplitude_k = 0.0;
-    truth.heat.shop_air.draught_k = 0.0;
-    truth
-}
+use crate::rig::{Command, PERIOD, PERIOD_S, Servo, machine, perfect, truth};
 
 /// What a touch showed.
 struct Touch {
