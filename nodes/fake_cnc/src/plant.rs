@@ -16,7 +16,7 @@
 //!
 //! # Agreement
 //! `val_four_hours_of_work_drift_in_the_proportions_of_a_machining_centre`, tool against workpiece in
-//! the span of the blocks after 4 h of short strokes at 8000 1/min: drift 56 µm (p95); the best line
+//! the span of the blocks after 4 h of short strokes at 8000 1/min: drift 55 µm (p95); the best line
 //! per axis leaves 1.4 µm, the best affine field 1.2 µm; screws grow 33, 24 and 20 µm over X, Y and Z.
 
 mod drive;
