@@ -1,0 +1,133 @@
+//! Why a touch or a whole calibration is not used.
+
+/// Why one touch is not used.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum TouchFault {
+    /// A latched position, the approach or a logged position is no finite number.
+    #[error("a position or the approach is not finite")]
+    NotFinite,
+    /// The log has too few positions before the latch, so that the feed is not known.
+    #[error("{n} logged positions in the {window_s} s before the latch, {least} are needed")]
+    FeedUnknown {
+        /// Positions in the window.
+        n: usize,
+        /// Positions that are needed.
+        least: usize,
+        /// Window, s.
+        window_s: f64,
+    },
+    /// The feed at contact is not above zero.
+    #[error("feed at contact is {feed_mm_s} mm/s, must be above 0")]
+    FeedNotPositive {
+        /// Feed, mm/s.
+        feed_mm_s: f64,
+    },
+    /// The feed still changed: the stand-off was too short, or the control already braked.
+    #[error(
+        "feed changed by {change_mm_s} mm/s over the {window_s} s before the latch at {feed_mm_s} mm/s, limit is {limit_mm_s} mm/s: stand-off or overtravel too short"
+    )]
+    FeedNotSteady {
+        /// Feed, mm/s.
+        feed_mm_s: f64,
+        /// Its change, mm/s.
+        change_mm_s: f64,
+        /// Largest change allowed, mm/s.
+        limit_mm_s: f64,
+        /// Window, s.
+        window_s: f64,
+    },
+    /// The approach differs from that of the feature's first touch.
+    #[error("approach differs from the first touch, cosine {cosine}")]
+    OtherApproach {
+        /// Cosine between the two.
+        cosine: f64,
+    },
+    /// The controller's stamps ran backwards.
+    #[error("controller time went back")]
+    ClockWentBack,
+}
+
+/// Why something is refused; `Display` says it in one line.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// One touch.
+    #[error("touch {sequence} of {feature} not used: {fault}")]
+    Touch {
+        /// Feature.
+        feature: String,
+        /// Number of the touch.
+        sequence: u32,
+        /// Why.
+        fault: TouchFault,
+    },
+    /// All touches came at one feed.
+    #[error(
+        "{feature}: feeds at contact from {least_mm_s:.4} to {greatest_mm_s:.4} mm/s are within {share} of each other: latency needs different feeds"
+    )]
+    EqualFeeds {
+        /// Feature.
+        feature: String,
+        /// Least feed, mm/s.
+        least_mm_s: f64,
+        /// Greatest feed, mm/s.
+        greatest_mm_s: f64,
+        /// Share below which feeds are the same.
+        share: f64,
+    },
+    /// Too few touches are left.
+    #[error("{feature}: {n} usable touches of {made}, at least {least} are needed")]
+    TooFewTouches {
+        /// Feature.
+        feature: String,
+        /// Usable touches.
+        n: usize,
+        /// Touches made.
+        made: usize,
+        /// Touches that are needed.
+        least: usize,
+    },
+    /// Nothing was touched.
+    #[error("run {run}: nothing was touched")]
+    NothingTouched {
+        /// Run.
+        run: u32,
+    },
+    /// The run was broken off.
+    #[error("run {run} was broken off after {made} touches; it is not evaluated")]
+    NotCompleted {
+        /// Run.
+        run: u32,
+        /// Touches made.
+        made: usize,
+    },
+    /// A run began before the last one ended.
+    #[error("run {run} did not end before run {next} began; it is not evaluated")]
+    NotEnded {
+        /// The run that was open.
+        run: u32,
+        /// The run that began.
+        next: u32,
+    },
+    /// The estimate is published, but positions are not linear in feed.
+    #[error(
+        "{feature}: p = {p} for positions linear in feed, limit {limit}; latency depends on feed"
+    )]
+    LackOfFit {
+        /// Feature.
+        feature: String,
+        /// p value.
+        p: f64,
+        /// Limit.
+        limit: f64,
+    },
+    /// The estimate is published, but is below zero.
+    #[error(
+        "{feature}: latency is {latency_s} s, below zero: stamps in the future or approach of the wrong sign"
+    )]
+    Negative {
+        /// Feature.
+        feature: String,
+        /// Signed latency, s.
+        latency_s: f64,
+    },
+}

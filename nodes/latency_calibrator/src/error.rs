@@ -1,0 +1,52 @@
+//! Parameters that cannot work and inputs that break the stage's contract.
+
+use machine::ChainError;
+use metrology::Axis;
+
+/// Why a stage is not built, or an event not taken.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LatencyCalibratorError {
+    /// A parameter outside its range.
+    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    OutOfRange {
+        /// Parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Least value.
+        least: f64,
+        /// Greatest value.
+        greatest: f64,
+    },
+    /// The machine file's chain cannot be read.
+    #[error("chain: {error}")]
+    Chain {
+        /// Where and why.
+        #[source]
+        error: ChainError,
+    },
+    /// Without repeatability there is no uncertainty.
+    #[error(
+        "probe.repeatability_um = {repeatability_um}: the uncertainty of a latency needs a value above 0"
+    )]
+    NoRepeatability {
+        /// Repeatability of the machine file, µm.
+        repeatability_um: f64,
+    },
+    /// The approach of a trigger is no unit vector.
+    #[error("trigger {sequence}: approach has length {length}, must be 1")]
+    ApproachNotUnit {
+        /// Number of the trigger.
+        sequence: u32,
+        /// Length of the vector.
+        length: f64,
+    },
+    /// A sample lacks an axis that the machine file has.
+    #[error("{sample} lacks axis {axis} of the machine file")]
+    AxisMissing {
+        /// Which sample.
+        sample: &'static str,
+        /// The axis.
+        axis: Axis,
+    },
+}

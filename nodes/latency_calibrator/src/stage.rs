@@ -1,0 +1,336 @@
+//! The latency calibrator's whole computation: states, triggers and segments in, latencies out.
+//!
+//! Touches of a latency segment are collected with their feed at contact, as soon as the log reaches
+//! their latch; `hold_ms` after the segment's end they are evaluated, feature by feature.
+
+use machine::file::Latch;
+use machine::{Kinematics, MachineFile};
+use metrology::sample::{AxisState, ProbeLatency, ProbeTrigger, TestKind, TestSegment};
+use metrology::{AxisSet, Host, Machine, Stage, Stamp};
+
+use crate::config::LatencyCalibratorConfig;
+use crate::diagnostic::{Refusal, TouchFault};
+use crate::error::LatencyCalibratorError;
+use crate::evaluation::{FeedTouch, LatencyEvaluation, TouchNoise, evaluate};
+use crate::motion_log::MotionLog;
+
+/// Rounding allowed in the length of an approach.
+const UNIT_ROUNDING: f64 = 1e-6;
+/// Least cosine between the approaches of one feature: 0.1°.
+const SAME_APPROACH: f64 = 0.999_998;
+
+/// What the node is told.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Input {
+    /// Positions at one servo tick.
+    State(AxisState),
+    /// A touch.
+    Trigger(ProbeTrigger),
+    /// Begin or end of a test.
+    Segment(TestSegment),
+    /// Time passes.
+    Tick,
+}
+
+/// What the node says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Output {
+    /// A latency, ready to be used.
+    Latency(ProbeLatency),
+    /// Every value behind it.
+    Evaluation(Box<LatencyEvaluation>),
+    /// What is refused or doubtful.
+    Refused(Refusal),
+    /// The controller's stamps ran backwards; the log was emptied.
+    ClockWentBack {
+        /// Newest stamp before.
+        from: Stamp<Machine>,
+        /// Stamp that came.
+        to: Stamp<Machine>,
+    },
+}
+
+/// The latency calibrator's computation.
+#[derive(Clone, Debug)]
+pub struct LatencyCalibratorStage {
+    config: LatencyCalibratorConfig,
+    axes: AxisSet,
+    kinematics: Kinematics,
+    noise: TouchNoise,
+    log: MotionLog,
+    run: Option<Run>,
+}
+
+/// An open or ending latency run.
+#[derive(Clone, Debug)]
+struct Run {
+    number: u32,
+    touches: Vec<Touch>,
+    /// End and when it was told.
+    end: Option<(Stamp<Host>, TestSegment)>,
+}
+
+#[derive(Clone, Debug)]
+struct Touch {
+    trigger: ProbeTrigger,
+    /// Feed at contact, mm/s; `None`: the log has not reached the latch yet.
+    feed: Option<Result<f64, TouchFault>>,
+}
+
+impl LatencyCalibratorStage {
+    /// From parameters and machine file.
+    ///
+    /// # Errors
+    /// Parameters out of range, a repeatability of zero, a chain that cannot be read.
+    pub fn new(
+        config: &LatencyCalibratorConfig,
+        file: &MachineFile,
+    ) -> Result<Self, LatencyCalibratorError> {
+        config.check()?;
+        let repeatability_um = file.probe.repeatability_um;
+        if repeatability_um.is_nan() || repeatability_um <= 0.0 {
+            return Err(LatencyCalibratorError::NoRepeatability { repeatability_um });
+        }
+        let poll_period_s = match file.control.latch {
+            Latch::Hardware => 0.0,
+            Latch::Polled => file.control.servo_period_ms / 1e3,
+        };
+        Ok(Self {
+            axes: file.axis_set(),
+            kinematics: Kinematics::new(file)
+                .map_err(|error| LatencyCalibratorError::Chain { error })?,
+            noise: TouchNoise {
+                repeatability_mm: repeatability_um / 1e3,
+                poll_period_s,
+                ball_radius_mm: file.ball_radius_mm(),
+            },
+            log: MotionLog::new(config.log_samples),
+            run: None,
+            config: config.clone(),
+        })
+    }
+
+    fn take_state(
+        &mut self,
+        state: &AxisState,
+        out: &mut Vec<Output>,
+    ) -> Result<(), LatencyCalibratorError> {
+        self.check_axes("axis state", state.axes)?;
+        let newest = self.log.newest();
+        if !self.log.push(state)
+            && let Some(from) = newest
+        {
+            out.push(Output::ClockWentBack {
+                from,
+                to: state.controller_at,
+            });
+            let touches = self.run.iter_mut().flat_map(|run| &mut run.touches);
+            for touch in touches.filter(|touch| touch.feed.is_none()) {
+                touch.feed = Some(Err(TouchFault::ClockWentBack));
+            }
+        }
+        self.read_feeds(false);
+        Ok(())
+    }
+
+    /// Reads the feed of every touch whose latch the log has reached, or of all.
+    fn read_feeds(&mut self, all: bool) {
+        let newest = self.log.newest();
+        let touches = self.run.iter_mut().flat_map(|run| &mut run.touches);
+        for touch in touches.filter(|touch| touch.feed.is_none()) {
+            let latch_at = touch.trigger.controller_at;
+            if all || newest.is_some_and(|newest| newest >= latch_at) {
+                touch.feed = Some(self.log.feed_at_contact_mm_s(
+                    latch_at,
+                    &touch.trigger.approach,
+                    self.config.feed_window(),
+                    self.config.steady_share,
+                ));
+            }
+        }
+    }
+
+    fn take_trigger(&mut self, trigger: ProbeTrigger) -> Result<(), LatencyCalibratorError> {
+        self.check_axes("trigger", trigger.axes)?;
+        let length = trigger.approach.norm();
+        if (length - 1.0).abs() > UNIT_ROUNDING {
+            return Err(LatencyCalibratorError::ApproachNotUnit {
+                sequence: trigger.sequence,
+                length,
+            });
+        }
+        if let Some(run) = &mut self.run {
+            let finite = trigger.approach.iter().all(|c| c.is_finite())
+                && self
+                    .axes
+                    .iter()
+                    .all(|axis| trigger.latched[axis].is_finite());
+            let feed = (!finite).then_some(Err(TouchFault::NotFinite));
+            run.touches.push(Touch { trigger, feed });
+            self.read_feeds(false);
+        }
+        Ok(())
+    }
+
+    fn take_segment(&mut self, at: Stamp<Host>, segment: TestSegment, out: &mut Vec<Output>) {
+        if segment.kind != TestKind::Latency {
+            return;
+        }
+        if segment.begin {
+            self.close(at, true, out);
+            if let Some(open) = self.run.take() {
+                out.push(Output::Refused(Refusal::NotEnded {
+                    run: open.number,
+                    next: segment.run,
+                }));
+            }
+            self.run = Some(Run {
+                number: segment.run,
+                touches: Vec::new(),
+                end: None,
+            });
+        } else if let Some(run) = &mut self.run
+            && run.number == segment.run
+        {
+            run.end = Some((at, segment));
+        } else {
+            out.push(Output::Refused(Refusal::NothingTouched {
+                run: segment.run,
+            }));
+        }
+    }
+
+    /// Evaluates a run whose end was told at least `hold_ms` ago, or at once.
+    fn close(&mut self, at: Stamp<Host>, at_once: bool, out: &mut Vec<Output>) {
+        let Some((told_at, _)) = self.run.as_mut().and_then(|run| run.end.as_mut()) else {
+            return;
+        };
+        *told_at = (*told_at).min(at); // host time went back: the wait begins anew
+        if !at_once && at - *told_at < self.config.hold() {
+            return;
+        }
+        self.read_feeds(true);
+        let Some(run) = self.run.take() else {
+            return;
+        };
+        let Some((_, end)) = &run.end else {
+            return;
+        };
+        let made = run.touches.len();
+        if !end.completed {
+            out.push(Output::Refused(Refusal::NotCompleted {
+                run: run.number,
+                made,
+            }));
+        } else if made == 0 {
+            out.push(Output::Refused(Refusal::NothingTouched { run: run.number }));
+        } else {
+            let mut features: Vec<&str> = Vec::new();
+            for touch in &run.touches {
+                if !features.contains(&touch.trigger.feature_id.as_str()) {
+                    features.push(&touch.trigger.feature_id);
+                }
+            }
+            for feature in features {
+                self.evaluate_feature(feature, at, &run, out);
+            }
+        }
+    }
+
+    fn evaluate_feature(&self, feature: &str, at: Stamp<Host>, run: &Run, out: &mut Vec<Output>) {
+        let of_feature = || {
+            let touches = run.touches.iter();
+            touches.filter(|touch| touch.trigger.feature_id == feature)
+        };
+        let mut usable: Vec<FeedTouch> = Vec::new();
+        for touch in of_feature() {
+            match self.usable(touch, usable.first()) {
+                Ok(touch) => usable.push(touch),
+                Err(fault) => out.push(Output::Refused(Refusal::Touch {
+                    feature: feature.to_owned(),
+                    sequence: touch.trigger.sequence,
+                    fault,
+                })),
+            }
+        }
+        let made = of_feature().count();
+        match evaluate(feature, at, &usable, made, &self.noise, &self.config) {
+            Ok(evaluation) => self.publish(evaluation, out),
+            Err(refusal) => out.push(Output::Refused(refusal)),
+        }
+    }
+
+    fn usable(&self, touch: &Touch, first: Option<&FeedTouch>) -> Result<FeedTouch, TouchFault> {
+        let feed_mm_s = touch.feed.unwrap_or(Err(TouchFault::NotFinite))?;
+        let trigger = &touch.trigger;
+        let approach = self
+            .kinematics
+            .direction_in_workpiece(&trigger.latched, &trigger.approach);
+        if let Some(first) = first {
+            let cosine = approach.dot(&first.approach);
+            if cosine < SAME_APPROACH {
+                return Err(TouchFault::OtherApproach { cosine });
+            }
+        }
+        Ok(FeedTouch {
+            feed_mm_s,
+            ball_mm: self.kinematics.ball_in_workpiece_mm(&trigger.latched),
+            approach,
+        })
+    }
+
+    fn publish(&self, evaluation: LatencyEvaluation, out: &mut Vec<Output>) {
+        let (p, limit) = (
+            evaluation.latency.lack_of_fit_p,
+            self.config.lack_of_fit_limit,
+        );
+        if p < limit {
+            out.push(Output::Refused(Refusal::LackOfFit {
+                feature: evaluation.feature.clone(),
+                p,
+                limit,
+            }));
+        }
+        if evaluation.latency.negative {
+            out.push(Output::Refused(Refusal::Negative {
+                feature: evaluation.feature.clone(),
+                latency_s: evaluation.latency.latency_s,
+            }));
+        }
+        out.push(Output::Latency(evaluation.latency.clone()));
+        out.push(Output::Evaluation(Box::new(evaluation)));
+    }
+
+    fn check_axes(
+        &self,
+        sample: &'static str,
+        axes: AxisSet,
+    ) -> Result<(), LatencyCalibratorError> {
+        match self.axes.iter().find(|axis| !axes.contains(*axis)) {
+            Some(axis) => Err(LatencyCalibratorError::AxisMissing { sample, axis }),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Stage for LatencyCalibratorStage {
+    type Input = Input;
+    type Output = Output;
+    type Error = LatencyCalibratorError;
+
+    fn step(
+        &mut self,
+        at: Stamp<Host>,
+        input: Input,
+        out: &mut Vec<Output>,
+    ) -> Result<(), LatencyCalibratorError> {
+        match input {
+            Input::State(state) => self.take_state(&state, out)?,
+            Input::Trigger(trigger) => self.take_trigger(trigger)?,
+            Input::Segment(segment) => self.take_segment(at, segment, out),
+            Input::Tick => {}
+        }
+        self.close(at, false, out);
+        Ok(())
+    }
+}

@@ -1,0 +1,58 @@
+//! Parameters that cannot work and inputs that break the stage's contract.
+
+use machine::ChainError;
+use metrology::Axis;
+
+/// Why a stage is not built, or an event not taken.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ProbeError {
+    /// A parameter outside its range.
+    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    OutOfRange {
+        /// Parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Least value.
+        least: f64,
+        /// Greatest value.
+        greatest: f64,
+    },
+    /// A latency without its uncertainty.
+    #[error(
+        "a latency of {latency_ms} ms is given, but latency_standard_uncertainty_ms is not: a correction needs both"
+    )]
+    UncertaintyMissing {
+        /// The latency, ms.
+        latency_ms: f64,
+    },
+    /// The machine file's chain cannot be read.
+    #[error("chain: {error}")]
+    Chain {
+        /// Where and why.
+        #[source]
+        error: ChainError,
+    },
+    /// No stylus is mounted.
+    #[error("probe.mounted = \"{stylus}\": the machine file has no stylus of this name")]
+    UnknownStylus {
+        /// The name.
+        stylus: String,
+    },
+    /// The approach of a trigger is no unit vector.
+    #[error("trigger {sequence}: approach has length {length}, must be 1")]
+    ApproachNotUnit {
+        /// Number of the trigger.
+        sequence: u32,
+        /// Length of the vector.
+        length: f64,
+    },
+    /// A sample lacks an axis that the machine file has.
+    #[error("{sample} lacks axis {axis} of the machine file")]
+    AxisMissing {
+        /// Which sample.
+        sample: &'static str,
+        /// The axis.
+        axis: Axis,
+    },
+}

@@ -1,0 +1,175 @@
+//! Planes, bores, bosses and spheres from the points of one run.
+//!
+//! # Model
+//!
+//! Circle and sphere are fitted to the ball's centres, which lie on a true circle or sphere even
+//! where the approach misses the normal; the radius of the ball is added for a bore and taken off
+//! for a boss or sphere. A plane is fitted to the surface points.
+//!
+//! ```text
+//!   R = R_ball + r (bore),   R = R_ball − r (boss, sphere)                          (1)
+//!   u²(R) = u²(R_ball) + u_common²,   plane: u² along the normal likewise           (2)
+//! ```
+//!
+//! An error of the latency moves every ball centre of a feature by the same length along its
+//! approach, that is, towards the centre or along the normal: it changes the radius or the place of
+//! the plane, not the centre and not the direction.
+//!
+//! A bore or boss has no height of its own: z is the mean height at which it was touched, and its
+//! variance is given as zero.
+//!
+//! # Holds when
+//! All points of one feature are touched at one pose of the rotary axes; points are in the machine
+//! frame.
+
+use machine::cycle::{FeatureId, artefact_id};
+use machine::file::ArtefactEntry;
+use metrology::fit::{ShapeError, fit_plane, fit_round};
+use metrology::sample::{FeatureKind, ProbedFeature};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::block::count;
+use crate::diagnostic::Diagnostic;
+use crate::run::{Run, RunTouch};
+use crate::stage::Output;
+
+/// Evaluates one artefact at the end of its run.
+pub(crate) fn evaluate(run: &Run, artefact: &ArtefactEntry, radius_mm: f64, out: &mut Vec<Output>) {
+    let id = artefact_id(artefact);
+    let touches: Vec<&RunTouch> = run
+        .touches_of(
+            |feature| matches!(feature, FeatureId::Point { artefact, .. } if artefact == id),
+        )
+        .collect();
+    let usable: Vec<&RunTouch> = touches
+        .iter()
+        .copied()
+        .filter(|touch| touch.is_usable())
+        .collect();
+    let n_rejected = count(touches.iter()) - count(usable.iter());
+    let points = Points::new(&usable, radius_mm);
+    let fitted = match artefact {
+        ArtefactEntry::Plane { normal, .. } => plane(&points, &Vector3::from(*normal)),
+        ArtefactEntry::Bore { .. } => circle(&points, FeatureKind::Bore, radius_mm),
+        ArtefactEntry::Boss { .. } => circle(&points, FeatureKind::Boss, -radius_mm),
+        ArtefactEntry::Sphere { .. } => sphere(&points, -radius_mm),
+    };
+    out.push(match fitted {
+        Ok(shape) => Output::Feature(ProbedFeature {
+            at: usable
+                .last()
+                .map_or(run.segment.at, |touch| touch.point.received_at),
+            feature_id: id.to_owned(),
+            n: count(usable.iter()),
+            n_rejected,
+            run: run.number(),
+            ..shape
+        }),
+        Err(reason) => Output::Diagnostic(Diagnostic::ShapeNotEvaluated {
+            run: run.number(),
+            feature: id.to_owned(),
+            rejected: n_rejected,
+            reason,
+        }),
+    });
+}
+
+/// Points of one feature with their uncertainties.
+struct Points {
+    surface_mm: Vec<Vector3<f64>>,
+    ball_mm: Vec<Vector3<f64>>,
+    independent_mm: Vec<f64>,
+    /// Largest common standard uncertainty, mm.
+    common_mm: f64,
+}
+
+impl Points {
+    fn new(touches: &[&RunTouch], radius_mm: f64) -> Self {
+        let surface = |touch: &&RunTouch| touch.point.point_in_machine_mm;
+        let ball = |touch: &&RunTouch| surface(touch) - touch.point.approach * radius_mm;
+        Self {
+            surface_mm: touches.iter().map(surface).collect(),
+            ball_mm: touches.iter().map(ball).collect(),
+            // A repeatability of zero is legal in a machine file, a weight without end is not.
+            independent_mm: touches
+                .iter()
+                .map(|touch| touch.uncertainty.independent_mm.max(LEAST_UNCERTAINTY_MM))
+                .collect(),
+            common_mm: touches
+                .iter()
+                .map(|touch| touch.uncertainty.common_mm)
+                .fold(0.0, f64::max),
+        }
+    }
+}
+
+/// Weights are not finer than 1 nm.
+const LEAST_UNCERTAINTY_MM: f64 = 1e-6;
+
+fn plane(points: &Points, outward: &Vector3<f64>) -> Result<ProbedFeature, ShapeError> {
+    let fit = fit_plane(&points.surface_mm, &points.independent_mm, outward)?;
+    let u_mm = fit.offset_standard_uncertainty_mm.hypot(points.common_mm); // (2)
+    Ok(ProbedFeature {
+        centre_mm: fit.centroid_mm,
+        centre_covariance_mm2: fit.normal * fit.normal.transpose() * u_mm.powi(2),
+        normal: fit.normal,
+        normal_standard_uncertainty_rad: fit.tilt_standard_uncertainty_rad,
+        form_mm: fit.form_mm,
+        ..unknown(FeatureKind::Plane)
+    })
+}
+
+fn circle(
+    points: &Points,
+    kind: FeatureKind,
+    radius_offset_mm: f64,
+) -> Result<ProbedFeature, ShapeError> {
+    let flat: Vec<_> = points.ball_mm.iter().map(|p| p.xy()).collect();
+    let fit = fit_round(&flat, &points.independent_mm)?;
+    let height_mm = points.ball_mm.iter().map(|p| p.z).sum::<f64>() / flat.len() as f64;
+    let mut centre_covariance_mm2 = Matrix3::zeros();
+    let plane_part = fit.covariance_mm2.view((0, 0), (2, 2));
+    centre_covariance_mm2
+        .view_mut((0, 0), (2, 2))
+        .copy_from(&plane_part);
+    Ok(ProbedFeature {
+        centre_mm: Vector3::new(fit.centre_mm.x, fit.centre_mm.y, height_mm),
+        centre_covariance_mm2,
+        normal: Vector3::z(),
+        radius_mm: fit.radius_mm + radius_offset_mm, // (1)
+        radius_standard_uncertainty_mm: fit.covariance_mm2[(2, 2)].sqrt().hypot(points.common_mm),
+        form_mm: fit.form_mm,
+        ..unknown(kind)
+    })
+}
+
+fn sphere(points: &Points, radius_offset_mm: f64) -> Result<ProbedFeature, ShapeError> {
+    let fit = fit_round(&points.ball_mm, &points.independent_mm)?;
+    Ok(ProbedFeature {
+        centre_mm: fit.centre_mm,
+        centre_covariance_mm2: fit.covariance_mm2.fixed_view::<3, 3>(0, 0).into(),
+        radius_mm: fit.radius_mm + radius_offset_mm, // (1)
+        radius_standard_uncertainty_mm: fit.covariance_mm2[(3, 3)].sqrt().hypot(points.common_mm),
+        form_mm: fit.form_mm,
+        ..unknown(FeatureKind::Sphere)
+    })
+}
+
+/// A feature of which nothing is known yet.
+fn unknown(kind: FeatureKind) -> ProbedFeature {
+    ProbedFeature {
+        at: metrology::Stamp::default(),
+        feature_id: String::new(),
+        kind,
+        centre_mm: Vector3::zeros(),
+        centre_covariance_mm2: Matrix3::zeros(),
+        normal: Vector3::zeros(),
+        normal_standard_uncertainty_rad: f64::NAN,
+        radius_mm: f64::NAN,
+        radius_standard_uncertainty_mm: f64::NAN,
+        form_mm: f64::NAN,
+        n: 0,
+        n_rejected: 0,
+        run: 0,
+    }
+}
