@@ -1,17 +1,30 @@
 //! Runs nodes: the only crate that knows ROS.
 //!
 //! A node is a pure [`metrology::Stage`] put behind a table of topics ([`Wiring`]). The table is
-//! driven by one of two runners. The live runner puts it on the ROS graph, with real clocks. The
-//! [`Harness`] wires many nodes to each other directly, in one total order and simulated time; a
-//! scenario in one process and a replay both use it, so that equal inputs give equal bytes.
+//! driven by one of two runners. The live runner ([`run`], [`run_composed`], [`launch`]) puts it on the
+//! ROS graph, with real clocks. The [`Harness`] wires many nodes to each other directly, in one total
+//! order and simulated time; a scenario in one process and a replay both use it, so that equal inputs
+//! give equal bytes.
 
+pub mod arguments;
+mod clock;
+mod dds;
 pub mod diagnostic;
+pub mod environment;
 pub mod harness;
+pub mod live;
+mod log;
+pub mod names;
 pub mod node;
 pub mod parameter;
+pub mod setup;
+pub mod tap;
 pub mod wiring;
 
 pub use diagnostic::{Diagnostic, Level};
 pub use harness::Harness;
+pub use live::{Composition, Running, launch, run, run_composed};
 pub use node::{Bytes, Emission, Event, GoalId, GoalStatus, Node, NodeFault};
+pub use setup::Setup;
+pub use tap::{RawPublisher, RawTap};
 pub use wiring::{ClientSignal, GoalNews, GoalSignal, Wiring};

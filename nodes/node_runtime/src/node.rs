@@ -128,7 +128,8 @@ pub enum Event<'a> {
         id: GoalId,
         bytes: &'a [u8],
     },
-    /// Our goal ended; `bytes` is the serialised result, absent when the server vanished.
+    /// Our goal ended; `bytes` is the serialised response of `get_result` (status, result), absent when
+    /// the server vanished.
     GoalResult {
         client: usize,
         id: GoalId,
@@ -167,7 +168,8 @@ pub enum Emission {
         id: GoalId,
         bytes: Bytes,
     },
-    /// A goal has ended.
+    /// A goal has ended; `bytes` is the serialised response of `get_result` (status, result), since
+    /// only who knows the type can align a result behind its status.
     FinishGoal {
         server: usize,
         id: GoalId,

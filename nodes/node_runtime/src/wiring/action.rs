@@ -1,7 +1,7 @@
 //! Actions in the table of a node: the server's and the client's side.
 
-use abbe_msgs::Action;
 use abbe_msgs::topics::ActionName;
+use abbe_msgs::{Action, GetResultResponse};
 use metrology::Stage;
 
 use super::{Wiring, decode, encode};
@@ -91,7 +91,10 @@ where
                     server,
                     id,
                     status,
-                    bytes: encode(&result),
+                    bytes: encode(&GetResultResponse::<A> {
+                        status: status as i8,
+                        result,
+                    }),
                 },
             }));
         }));
@@ -129,11 +132,9 @@ where
                 Ok(feedback(GoalNews::Feedback(id, decode(bytes)?)))
             }),
             ended: Box::new(move |id, status, bytes| {
-                Ok(news(GoalNews::Ended(
-                    id,
-                    status,
-                    bytes.map(decode).transpose()?,
-                )))
+                let response = bytes.map(decode::<GetResultResponse<A>>).transpose()?;
+                let result = response.map(|response| response.result);
+                Ok(news(GoalNews::Ended(id, status, result)))
             }),
         });
         self

@@ -1,0 +1,72 @@
+//! What time it is: the computer's clock, or `/clock` where time is simulated.
+#![expect(clippy::disallowed_methods, reason = "the clock that stamps events")]
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use abbe_msgs::builtin_interfaces::msg::Time;
+use metrology::Stamp;
+use metrology::stamp::{Host, NANOS_PER_S};
+
+/// The computer's clock.
+pub(crate) fn host_now() -> Stamp<Host> {
+    let nanos = match SystemTime::now().duration_since(UNIX_EPOCH) {
+        Ok(since) => i64::try_from(since.as_nanos()).unwrap_or(i64::MAX),
+        Err(before) => -i64::try_from(before.duration().as_nanos()).unwrap_or(i64::MAX),
+    };
+    Stamp::from_nanos(nanos)
+}
+
+/// A node's time.
+#[derive(Clone, Debug)]
+pub(crate) enum Clock {
+    /// The computer's.
+    Host,
+    /// The last `/clock`; 0 before the first.
+    Simulated(Arc<AtomicI64>),
+}
+
+impl Clock {
+    pub fn new(use_sim_time: bool) -> Self {
+        if use_sim_time {
+            Self::Simulated(Arc::default())
+        } else {
+            Self::Host
+        }
+    }
+
+    pub fn now(&self) -> Stamp<Host> {
+        match self {
+            Self::Host => host_now(),
+            Self::Simulated(nanos) => Stamp::from_nanos(nanos.load(Ordering::Relaxed)),
+        }
+    }
+
+    /// Takes a `/clock` in; the time before it.
+    pub fn set(&self, now: Stamp<Host>) -> Stamp<Host> {
+        match self {
+            Self::Host => host_now(),
+            Self::Simulated(nanos) => Stamp::from_nanos(nanos.swap(now.nanos(), Ordering::Relaxed)),
+        }
+    }
+
+    pub const fn is_simulated(&self) -> bool {
+        matches!(self, Self::Simulated(_))
+    }
+}
+
+/// A stamp as ROS writes it; times before 1970 or after 2038 come out as zero.
+pub(crate) fn ros_time(at: Stamp<Host>) -> Time {
+    let sec = i32::try_from(at.nanos().div_euclid(NANOS_PER_S));
+    let nanosec = u32::try_from(at.nanos().rem_euclid(NANOS_PER_S));
+    match (sec, nanosec) {
+        (Ok(sec), Ok(nanosec)) => Time { sec, nanosec },
+        _ => Time::default(),
+    }
+}
+
+/// A time of ROS as a stamp.
+pub(crate) fn stamp(time: &Time) -> Stamp<Host> {
+    Stamp::from_nanos(i64::from(time.sec) * NANOS_PER_S + i64::from(time.nanosec))
+}

@@ -1,0 +1,236 @@
+//! The DDS backend: the only modules that know RustDDS and ros2-client.
+//!
+//! One participant per node. Endpoints are RustDDS's own with serialised samples in and out; they
+//! are put into the ROS graph by our own `ros_discovery_info`, since ros2-client registers only
+//! endpoints whose samples it decodes itself. What leaves this module is free of DDS types, so that
+//! a second middleware can stand beside it.
+
+use std::net::Ipv4Addr;
+use std::sync::{Mutex, PoisonError};
+
+use abbe_msgs::Qos;
+use anyhow::{Context as _, anyhow};
+use ros2_client::builtin_topics::ros_discovery;
+use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
+use ros2_client::{Gid, NodeName};
+use rustdds::{
+    CDRDeserializerAdapter, CDRSerializerAdapter, DomainParticipant, DomainParticipantBuilder,
+    RTPSEntity, TopicKind, no_key,
+};
+
+use crate::environment::{self, DiscoveryRange, Environment};
+use crate::names::NodeNames;
+
+mod endpoint;
+mod policies;
+
+pub(crate) use endpoint::{Guid, PublishError, Reader, RequestIdentity, Sample, Writer};
+
+type GraphWriter =
+    no_key::DataWriter<ParticipantEntitiesInfo, CDRSerializerAdapter<ParticipantEntitiesInfo>>;
+type GraphReader = no_key::SimpleDataReader<
+    ParticipantEntitiesInfo,
+    CDRDeserializerAdapter<ParticipantEntitiesInfo>,
+>;
+
+/// Somebody's reader or writer, as discovery describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Remote {
+    pub guid: Guid,
+    pub dds_topic: String,
+    pub dds_type: String,
+    pub reliable: bool,
+    pub latched: bool,
+}
+
+/// A node's place on the network.
+pub(crate) struct Participant {
+    participant: DomainParticipant,
+    publisher: rustdds::Publisher,
+    subscriber: rustdds::Subscriber,
+    graph_writer: GraphWriter,
+    graph_reader: GraphReader,
+    node: NodeName,
+    entities: Mutex<NodeEntitiesInfo>,
+}
+
+impl Participant {
+    /// Joins the network as `names`; nobody sees the node before [`Self::announce`]. A warning comes
+    /// with it where not every node of this computer may be found.
+    pub fn join(
+        environment: &Environment,
+        names: &NodeNames,
+    ) -> anyhow::Result<(Self, Option<String>)> {
+        let interfaces = environment::interfaces();
+        environment.check_interfaces(&interfaces)?;
+        let mut builder = DomainParticipantBuilder::new(environment.domain_id);
+        if environment.range == DiscoveryRange::Localhost {
+            builder = builder.with_only_networks([Ipv4Addr::LOCALHOST]);
+        }
+        let participant = builder.build().map_err(|error| {
+            anyhow!(
+                "DDS participant in domain {}: {error}",
+                environment.domain_id
+            )
+        })?;
+        let warning = environment.multicast_warning(&interfaces, participant.participant_id());
+        let node = NodeName::new(&names.namespace, &names.name)
+            .map_err(|error| anyhow!("node {}: {error:?}", names.fully_qualified()))?;
+        Ok((
+            Self::of(participant, node).context("ROS graph on DDS")?,
+            warning,
+        ))
+    }
+
+    fn of(participant: DomainParticipant, node: NodeName) -> anyhow::Result<Self> {
+        let default = policies::policies(Qos::RELIABLE, policies::Side::Reader);
+        let publisher = participant.create_publisher(&default)?;
+        let subscriber = participant.create_subscriber(&default)?;
+        let topic = participant.create_topic(
+            ros_discovery::TOPIC_NAME.to_owned(),
+            ros_discovery::TYPE_NAME.to_owned(),
+            &ros_discovery::QOS_PUB,
+            TopicKind::NoKey,
+        )?;
+        let graph_writer =
+            publisher.create_datawriter_no_key(&topic, Some(ros_discovery::QOS_PUB.clone()))?;
+        // ros2-client reads it volatile with depth 1: it misses nodes that a Cyclone participant
+        // announced earlier, and all but the last 64 of a large graph.
+        let graph_reader =
+            subscriber.create_simple_datareader_no_key(&topic, Some(policies::graph_reader()))?;
+        let entities = Mutex::new(NodeEntitiesInfo::new(node.clone()));
+        Ok(Self {
+            participant,
+            publisher,
+            subscriber,
+            graph_writer,
+            graph_reader,
+            node,
+            entities,
+        })
+    }
+
+    fn topic(&self, name: &str, type_name: &str, qos: Qos) -> anyhow::Result<rustdds::Topic> {
+        self.participant
+            .create_topic(
+                name.to_owned(),
+                type_name.to_owned(),
+                &policies::policies(qos, policies::Side::Reader),
+                TopicKind::NoKey,
+            )
+            .map_err(|error| anyhow!("DDS topic {name}: {error}"))
+    }
+
+    /// A writer of serialised samples.
+    pub fn writer(&self, dds_topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Writer> {
+        let topic = self.topic(dds_topic, dds_type, qos)?;
+        let policies = policies::policies(qos, policies::Side::Writer);
+        let writer = self
+            .publisher
+            .create_datawriter_no_key(&topic, Some(policies))
+            .map_err(|error| anyhow!("DDS writer of {dds_topic}: {error}"))?;
+        self.entities().add_writer(Gid::from(writer.guid()));
+        Ok(Writer::new(writer))
+    }
+
+    /// A reader of serialised samples.
+    pub fn reader(&self, dds_topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Reader> {
+        let topic = self.topic(dds_topic, dds_type, qos)?;
+        let policies = policies::policies(qos, policies::Side::Reader);
+        let reader = self
+            .subscriber
+            .create_simple_datareader_no_key(&topic, Some(policies))
+            .map_err(|error| anyhow!("DDS reader of {dds_topic}: {error}"))?;
+        self.entities().add_reader(Gid::from(reader.guid()));
+        Ok(Reader::new(reader))
+    }
+
+    fn entities(&self) -> std::sync::MutexGuard<'_, NodeEntitiesInfo> {
+        self.entities.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Shows the node with all its endpoints on the ROS graph.
+    pub fn announce(&self) -> anyhow::Result<()> {
+        let nodes = vec![self.entities().clone()];
+        self.publish_graph(nodes)
+    }
+
+    /// Takes the node off the ROS graph.
+    pub fn withdraw(&self) -> anyhow::Result<()> {
+        self.publish_graph(Vec::new())
+    }
+
+    fn publish_graph(&self, nodes: Vec<NodeEntitiesInfo>) -> anyhow::Result<()> {
+        let info = ParticipantEntitiesInfo::new(Gid::from(self.participant.guid()), nodes);
+        self.graph_writer
+            .write(info, Some(rustdds::Timestamp::now()))
+            .map_err(|error| anyhow!("ros_discovery_info: {error}"))
+    }
+
+    /// Waits until everybody has the last news of the graph.
+    pub async fn graph_acknowledged(&self) {
+        let _ = self.graph_writer.async_wait_for_acknowledgments().await;
+    }
+
+    /// Whether another participant has announced a node of our name since the last call.
+    pub fn namesake(&self) -> bool {
+        let mine = Gid::from(self.participant.guid());
+        let wanted = self.node.fully_qualified_name();
+        let mut found = false;
+        loop {
+            self.graph_reader.drain_read_notifications();
+            match self.graph_reader.try_take_one() {
+                Ok(Some(change)) => {
+                    let info = change.into_value();
+                    found |= info.gid() != mine
+                        && info
+                            .nodes()
+                            .iter()
+                            .any(|node| node.fully_qualified_name() == wanted);
+                }
+                // A node whose name ros2-client refuses is no namesake of ours.
+                Err(_) => {}
+                Ok(None) => return found,
+            }
+        }
+    }
+
+    /// Everybody's writers, ours included.
+    pub fn writers(&self) -> Vec<Remote> {
+        let describe = |found: rustdds::discovery::DiscoveredWriterData| {
+            let data = found.publication_topic_data;
+            Remote {
+                guid: data.key.to_bytes(),
+                reliable: policies::is_reliable(data.reliability),
+                latched: policies::is_latched(data.durability),
+                dds_topic: data.topic_name,
+                dds_type: data.type_name,
+            }
+        };
+        self.participant
+            .discovered_writers()
+            .into_iter()
+            .map(describe)
+            .collect()
+    }
+
+    /// Everybody's readers, ours included.
+    pub fn readers(&self) -> Vec<Remote> {
+        let describe = |found: rustdds::discovery::DiscoveredReaderData| {
+            let data = found.subscription_topic_data;
+            let qos = data.qos();
+            Remote {
+                guid: data.key().to_bytes(),
+                reliable: policies::is_reliable(qos.reliability()),
+                latched: policies::is_latched(qos.durability()),
+                dds_topic: data.topic_name().clone(),
+                dds_type: data.type_name().clone(),
+            }
+        };
+        self.participant
+            .discovered_readers()
+            .into_iter()
+            .map(describe)
+            .collect()
+    }
+}

@@ -1,0 +1,246 @@
+//! Readers and writers of serialised samples: encapsulation header and CDR, in and out.
+
+use std::convert::Infallible;
+use std::pin::pin;
+use std::sync::Arc;
+
+use futures::StreamExt;
+use metrology::Stamp;
+use metrology::stamp::{Host, NANOS_PER_S};
+use rustdds::no_key::{self, Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter};
+use rustdds::rpc::SampleIdentity;
+use rustdds::{GUID, RepresentationIdentifier, SequenceNumber, Timestamp, WriteOptionsBuilder};
+
+use crate::node::Bytes;
+
+/// Names an endpoint: vendor in the first two bytes, participant in the first twelve.
+pub(crate) type Guid = [u8; 16];
+
+/// Names a request: its writer (or what the client calls so) and its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct RequestIdentity {
+    pub writer: Guid,
+    pub sequence: i64,
+}
+
+/// A sample as it came.
+#[derive(Clone, Debug)]
+pub(crate) struct Sample {
+    pub bytes: Bytes,
+    pub writer: Guid,
+    /// Counts the writer's samples from 1; a jump is a loss.
+    pub sequence: i64,
+    pub source: Option<Stamp<Host>>,
+    pub received: Stamp<Host>,
+    pub related: Option<RequestIdentity>,
+}
+
+const HEADER_LEN: usize = 4;
+const CDR_LE_HEADER: [u8; HEADER_LEN] = [0, 1, 0, 0];
+const CDR_BE_HEADER: [u8; HEADER_LEN] = [0, 0, 0, 0];
+
+/// Passes payloads through as they are.
+pub(super) struct Raw;
+
+/// Decoder that only puts the header back in front.
+#[derive(Clone)]
+pub(super) struct Unparsed;
+
+impl<'de> Decode<'de, Bytes> for Unparsed {
+    type Error = Infallible;
+
+    fn decode_bytes(
+        self,
+        payload: &'de [u8],
+        encoding: RepresentationIdentifier,
+    ) -> Result<Bytes, Infallible> {
+        let header = if encoding == RepresentationIdentifier::CDR_BE {
+            CDR_BE_HEADER
+        } else {
+            CDR_LE_HEADER
+        };
+        Ok(header.iter().chain(payload).copied().collect())
+    }
+}
+
+impl DeserializerAdapter<Bytes> for Raw {
+    type Error = Infallible;
+    type Decoded = Bytes;
+
+    fn supported_encodings() -> &'static [RepresentationIdentifier] {
+        &[
+            RepresentationIdentifier::CDR_LE,
+            RepresentationIdentifier::CDR_BE,
+        ]
+    }
+
+    fn transform_decoded(decoded: Bytes) -> Bytes {
+        decoded
+    }
+}
+
+impl DefaultDecoder<Bytes> for Raw {
+    type Decoder = Unparsed;
+    const DECODER: Unparsed = Unparsed;
+}
+
+impl SerializerAdapter<Bytes> for Raw {
+    type Error = Infallible;
+
+    fn output_encoding() -> RepresentationIdentifier {
+        RepresentationIdentifier::CDR_LE
+    }
+
+    fn to_bytes(value: &Bytes) -> Result<rustdds::bytes::Bytes, Infallible> {
+        let whole = rustdds::bytes::Bytes::from_owner(Arc::clone(value));
+        Ok(whole.slice(HEADER_LEN.min(value.len())..))
+    }
+}
+
+fn stamp(time: Timestamp) -> Stamp<Host> {
+    let ticks = time.to_ticks();
+    let nanos = (i128::from(ticks) * i128::from(NANOS_PER_S)) >> 32;
+    Stamp::from_nanos(i64::try_from(nanos).unwrap_or(i64::MAX))
+}
+
+fn timestamp(at: Stamp<Host>) -> Timestamp {
+    let ticks = (i128::from(at.nanos()) << 32) / i128::from(NANOS_PER_S);
+    u64::try_from(ticks).map_or(Timestamp::INVALID, Timestamp::from_ticks)
+}
+
+fn identity(identity: SampleIdentity) -> RequestIdentity {
+    RequestIdentity {
+        writer: identity.writer_guid.to_bytes(),
+        sequence: i64::from(identity.sequence_number),
+    }
+}
+
+/// Reads one topic.
+pub(crate) struct Reader {
+    reader: no_key::SimpleDataReader<Bytes, Raw>,
+}
+
+impl Reader {
+    pub(super) fn new(reader: no_key::SimpleDataReader<Bytes, Raw>) -> Self {
+        Self { reader }
+    }
+
+    /// The next sample; an error is a sample that is no plain CDR.
+    pub async fn next(&self) -> Result<Sample, String> {
+        let mut stream = pin!(self.reader.as_async_stream());
+        match stream.next().await {
+            Some(Ok(change)) => Ok(Sample {
+                writer: change.writer_guid().to_bytes(),
+                sequence: i64::from(change.sequence_number),
+                source: change.source_timestamp().map(stamp),
+                received: stamp(change.receive_instant),
+                related: change.related_sample_identity().map(identity),
+                bytes: change.into_value(),
+            }),
+            Some(Err(error)) => Err(error.to_string()),
+            // The stream of a reader has no end.
+            None => std::future::pending().await,
+        }
+    }
+}
+
+/// Why a sample was not sent.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum PublishError {
+    #[error("encapsulation {found:02x?} is not little-endian plain CDR, 00 01")]
+    Encapsulation { found: Vec<u8> },
+    #[error("too many samples wait for an acknowledgement")]
+    Full,
+    #[error("{0}")]
+    Broken(String),
+}
+
+/// Writes one topic; writing never waits.
+pub(crate) struct Writer {
+    writer: no_key::DataWriter<Bytes, Raw>,
+}
+
+impl Writer {
+    pub(super) fn new(writer: no_key::DataWriter<Bytes, Raw>) -> Self {
+        Self { writer }
+    }
+
+    pub fn guid(&self) -> Guid {
+        use rustdds::RTPSEntity as _;
+        self.writer.guid().to_bytes()
+    }
+
+    /// Sends a sample; `source` is its own time where it has one, else the present.
+    pub fn publish(&self, bytes: &Bytes, source: Option<Stamp<Host>>) -> Result<(), PublishError> {
+        self.send(bytes, source, None).map(drop)
+    }
+
+    /// Sends a reply.
+    pub fn reply(&self, bytes: &Bytes, to: RequestIdentity) -> Result<(), PublishError> {
+        let related = SampleIdentity {
+            writer_guid: GUID::from_bytes(to.writer),
+            sequence_number: SequenceNumber::from(to.sequence),
+        };
+        self.send(bytes, None, Some(related)).map(drop)
+    }
+
+    /// Sends a request and says under which identity the reply will come.
+    pub fn request(&self, bytes: &Bytes) -> Result<RequestIdentity, PublishError> {
+        self.send(bytes, None, None)
+    }
+
+    fn send(
+        &self,
+        bytes: &Bytes,
+        source: Option<Stamp<Host>>,
+        related: Option<SampleIdentity>,
+    ) -> Result<RequestIdentity, PublishError> {
+        if bytes.get(..2) != Some(&CDR_LE_HEADER[..2]) || bytes.len() < HEADER_LEN {
+            let found = bytes.iter().take(2).copied().collect();
+            return Err(PublishError::Encapsulation { found });
+        }
+        let options = WriteOptionsBuilder::new()
+            .source_timestamp(source.map_or_else(Timestamp::now, timestamp))
+            .related_sample_identity_opt(related)
+            .build();
+        match self.writer.write_with_options(Arc::clone(bytes), options) {
+            Ok(sent) => Ok(identity(sent)),
+            Err(rustdds::dds::WriteError::WouldBlock { .. }) => Err(PublishError::Full),
+            Err(error) => Err(PublishError::Broken(error.to_string())),
+        }
+    }
+
+    /// Waits until every reliable reader has everything that was sent.
+    pub async fn acknowledged(&self) {
+        let _ = self.writer.async_wait_for_acknowledgments().await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_survive_the_wire_to_the_nanosecond() {
+        for nanos in [0, 1, 999_999_999, 1_763_000_000_123_456_789] {
+            let there = Stamp::from_nanos(nanos);
+            let back = stamp(timestamp(there));
+            assert!(
+                (back - there).nanos().abs() <= 1,
+                "{nanos} came back as {}",
+                back.nanos()
+            );
+        }
+    }
+
+    #[test]
+    fn payloads_pass_unchanged() {
+        let sent: Bytes = Arc::from([0, 1, 0, 0, 7, 8].as_slice());
+        let payload = Raw::to_bytes(&sent).unwrap();
+        assert_eq!(&payload[..], [7, 8]);
+        let got = Unparsed
+            .decode_bytes(&payload, RepresentationIdentifier::CDR_LE)
+            .unwrap();
+        assert_eq!(got, sent);
+    }
+}

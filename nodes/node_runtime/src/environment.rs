@@ -1,0 +1,290 @@
+//! The environment: ROS's own variables and the network interfaces. It is read here and nowhere else.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the one place that reads ROS's variables"
+)]
+
+use std::net::Ipv4Addr;
+
+/// How far discovery goes (`ROS_AUTOMATIC_DISCOVERY_RANGE`, `ROS_LOCALHOST_ONLY`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DiscoveryRange {
+    /// Every interface.
+    #[default]
+    Subnet,
+    /// This computer only.
+    Localhost,
+}
+
+/// What the environment says about the ROS graph.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Environment {
+    /// `ROS_DOMAIN_ID`.
+    pub domain_id: u16,
+    /// How far discovery goes.
+    pub range: DiscoveryRange,
+    /// `RUST_LOG`.
+    pub log_filter: Option<String>,
+}
+
+/// Why no node can start here.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EnvironmentError {
+    /// A variable with a value that it cannot have.
+    #[error("{variable}={value}: must be {allowed}")]
+    BadVariable {
+        /// Which.
+        variable: &'static str,
+        /// Its value.
+        value: String,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// Nothing to talk through.
+    #[error("no network interface: none of {found} is up with an IPv4 address")]
+    NoInterface {
+        /// What there is.
+        found: String,
+    },
+    /// Loopback was asked for and is down.
+    #[error(
+        "no network interface: discovery is limited to this computer, and `lo` is not up with 127.0.0.1 (found {found})"
+    )]
+    NoLoopback {
+        /// What there is.
+        found: String,
+    },
+}
+
+/// A network interface, as far as it matters here.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Interface {
+    /// E.g. `eth0`.
+    pub name: String,
+    /// Up, with an IPv4 address.
+    pub usable: bool,
+    /// `lo`.
+    pub loopback: bool,
+    /// Has the MULTICAST flag.
+    pub multicast: bool,
+}
+
+/// RustDDS announces itself to this many participants of a computer where there is no multicast.
+pub const PARTICIPANTS_WITHOUT_MULTICAST: u16 = 12;
+
+/// DDS's ports leave room for this many domains.
+const LARGEST_DOMAIN_ID: u16 = 232;
+
+impl Environment {
+    /// Reads the process's environment.
+    ///
+    /// # Errors
+    /// When a variable has a value that it cannot have.
+    pub fn read() -> Result<Self, EnvironmentError> {
+        Self::from_variables(|name| std::env::var(name).ok())
+    }
+
+    /// The same from any source of variables.
+    ///
+    /// # Errors
+    /// When a variable has a value that it cannot have.
+    pub fn from_variables(
+        variable: impl Fn(&'static str) -> Option<String>,
+    ) -> Result<Self, EnvironmentError> {
+        let set = |name| variable(name).filter(|value| !value.is_empty());
+        let domain_id = match set("ROS_DOMAIN_ID") {
+            None => 0,
+            Some(value) => value
+                .parse()
+                .ok()
+                .filter(|id| *id <= LARGEST_DOMAIN_ID)
+                .ok_or(EnvironmentError::BadVariable {
+                    variable: "ROS_DOMAIN_ID",
+                    value,
+                    allowed: "0 to 232",
+                })?,
+        };
+        let automatic = match set("ROS_AUTOMATIC_DISCOVERY_RANGE") {
+            None => DiscoveryRange::Subnet,
+            Some(value) => match value.as_str() {
+                "SUBNET" | "SYSTEM_DEFAULT" => DiscoveryRange::Subnet,
+                "LOCALHOST" => DiscoveryRange::Localhost,
+                _ => {
+                    return Err(EnvironmentError::BadVariable {
+                        variable: "ROS_AUTOMATIC_DISCOVERY_RANGE",
+                        value,
+                        allowed: "SUBNET, LOCALHOST or SYSTEM_DEFAULT",
+                    });
+                }
+            },
+        };
+        let range = match set("ROS_LOCALHOST_ONLY").as_deref() {
+            None | Some("0") => automatic,
+            Some("1") => DiscoveryRange::Localhost,
+            Some(value) => {
+                return Err(EnvironmentError::BadVariable {
+                    variable: "ROS_LOCALHOST_ONLY",
+                    value: value.to_owned(),
+                    allowed: "0 or 1",
+                });
+            }
+        };
+        Ok(Self {
+            domain_id,
+            range,
+            log_filter: set("RUST_LOG"),
+        })
+    }
+
+    /// Whether there is an interface to talk through.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn check_interfaces(&self, interfaces: &[Interface]) -> Result<(), EnvironmentError> {
+        let found = || match interfaces {
+            [] => "none".to_owned(),
+            some => some
+                .iter()
+                .map(|i| i.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", "),
+        };
+        let mut usable = interfaces.iter().filter(|interface| interface.usable);
+        match self.range {
+            DiscoveryRange::Subnet if usable.next().is_none() => {
+                Err(EnvironmentError::NoInterface { found: found() })
+            }
+            DiscoveryRange::Localhost if !usable.any(|interface| interface.loopback) => {
+                Err(EnvironmentError::NoLoopback { found: found() })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What to warn of when this is the `participant`-th participant of the computer, from 0.
+    #[must_use]
+    pub fn multicast_warning(&self, interfaces: &[Interface], participant: u16) -> Option<String> {
+        let relevant = |interface: &&Interface| {
+            interface.usable && (self.range == DiscoveryRange::Subnet || interface.loopback)
+        };
+        if participant < PARTICIPANTS_WITHOUT_MULTICAST
+            || interfaces
+                .iter()
+                .filter(relevant)
+                .any(|interface| interface.multicast)
+        {
+            return None;
+        }
+        Some(format!(
+            "participant {participant} of this computer, and no interface has the MULTICAST flag: only \
+             the first {PARTICIPANTS_WITHOUT_MULTICAST} find each other; `ip link set lo multicast on` cures it"
+        ))
+    }
+}
+
+/// The interfaces of this computer.
+#[must_use]
+pub fn interfaces() -> Vec<Interface> {
+    netdev::get_interfaces()
+        .into_iter()
+        .map(|interface| Interface {
+            usable: interface.is_up() && interface.has_ipv4(),
+            loopback: interface.is_loopback()
+                && interface.ipv4_addrs().contains(&Ipv4Addr::LOCALHOST),
+            multicast: interface.is_multicast(),
+            name: interface.name,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(pairs: &[(&str, &str)]) -> Result<Environment, EnvironmentError> {
+        Environment::from_variables(|name| {
+            pairs
+                .iter()
+                .find(|(n, _)| *n == name)
+                .map(|(_, v)| (*v).to_owned())
+        })
+    }
+
+    fn interface(name: &str, usable: bool, multicast: bool) -> Interface {
+        Interface {
+            name: name.to_owned(),
+            usable,
+            loopback: name == "lo",
+            multicast,
+        }
+    }
+
+    #[test]
+    fn variables_have_the_meaning_of_ros() {
+        assert_eq!(read(&[]).unwrap(), Environment::default());
+        let both = [
+            ("ROS_DOMAIN_ID", "42"),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
+        ];
+        let environment = read(&both).unwrap();
+        assert_eq!(
+            (environment.domain_id, environment.range),
+            (42, DiscoveryRange::Localhost)
+        );
+        let only = read(&[("ROS_LOCALHOST_ONLY", "1")]).unwrap();
+        assert_eq!(only.range, DiscoveryRange::Localhost);
+    }
+
+    #[test]
+    fn bad_variables_are_refused_by_name() {
+        for (name, value) in [
+            ("ROS_DOMAIN_ID", "233"),
+            ("ROS_DOMAIN_ID", "cell"),
+            ("ROS_LOCALHOST_ONLY", "yes"),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"),
+        ] {
+            let error = read(&[(name, value)]).unwrap_err().to_string();
+            assert!(error.contains(name) && error.contains(value), "{error}");
+        }
+    }
+
+    #[test]
+    fn without_an_interface_no_node_starts() {
+        let anywhere = read(&[]).unwrap();
+        let here = read(&[("ROS_LOCALHOST_ONLY", "1")]).unwrap();
+        let down = [
+            interface("lo", false, false),
+            interface("eth0", false, true),
+        ];
+        let error = anywhere.check_interfaces(&down).unwrap_err().to_string();
+        assert!(
+            error.contains("no network interface") && error.contains("eth0"),
+            "{error}"
+        );
+        let no_lo = [interface("lo", false, false), interface("eth0", true, true)];
+        assert!(anywhere.check_interfaces(&no_lo).is_ok());
+        assert!(
+            here.check_interfaces(&no_lo)
+                .unwrap_err()
+                .to_string()
+                .contains("`lo`")
+        );
+        assert!(
+            here.check_interfaces(&[interface("lo", true, false)])
+                .is_ok()
+        );
+    }
+
+    #[test]
+    fn the_thirteenth_participant_without_multicast_is_warned() {
+        let here = read(&[("ROS_LOCALHOST_ONLY", "1")]).unwrap();
+        let plain = [interface("lo", true, false), interface("eth0", true, true)];
+        assert_eq!(here.multicast_warning(&plain, 11), None);
+        assert!(
+            here.multicast_warning(&plain, 12)
+                .unwrap()
+                .contains("multicast on")
+        );
+        assert_eq!(read(&[]).unwrap().multicast_warning(&plain, 12), None);
+    }
+}

@@ -1,0 +1,223 @@
+//! The live runner: nodes on the ROS graph, with real clocks.
+
+use std::collections::BTreeSet;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use anyhow::{Context as _, bail};
+use tokio::runtime::Runtime;
+use tokio::sync::watch;
+use tokio::task::JoinSet;
+use tracing::Instrument as _;
+
+use crate::arguments::Arguments;
+use crate::dds::Participant;
+use crate::environment::Environment;
+use crate::log;
+use crate::node::Node;
+use crate::setup::Setup;
+
+mod action_client;
+mod action_server;
+mod assembly;
+mod board;
+pub(crate) mod incoming;
+mod owner;
+mod parameters;
+mod service;
+mod timers;
+
+/// Exit code for arguments that cannot be understood.
+const USAGE: u8 = 2;
+
+/// How long a node looks for others of its name before it shows itself.
+const LOOKING_AROUND: Duration = Duration::from_millis(800);
+
+/// What makes a node of its setup.
+pub type Build = Box<dyn FnOnce(&Setup) -> anyhow::Result<Box<dyn Node>>>;
+
+/// One node of a composition.
+pub struct Composition {
+    /// What the node calls itself before remapping.
+    pub name: String,
+    /// Arguments as on the command line of its own program, e.g. `--ros-args --params-file …`.
+    pub arguments: Vec<String>,
+    /// Makes the node.
+    pub build: Build,
+}
+
+/// Runs one node until SIGINT or SIGTERM: the whole `main` of a node's program.
+///
+/// `name` is what the node calls itself before remapping. Exit code 0 after a clean stop, 1 when the
+/// node cannot start, 2 when the arguments cannot be understood.
+pub fn run(
+    name: &str,
+    build: impl FnOnce(&Setup) -> anyhow::Result<Box<dyn Node>> + 'static,
+) -> ExitCode {
+    run_composed(vec![Composition {
+        name: name.to_owned(),
+        arguments: std::env::args().skip(1).collect(),
+        build: Box::new(build),
+    }])
+}
+
+/// Runs many nodes in one process, each as its own participant, until SIGINT or SIGTERM.
+///
+/// Exit codes as of [`run`].
+pub fn run_composed(compositions: Vec<Composition>) -> ExitCode {
+    match prepare(compositions).and_then(|(environment, nodes)| launch(&environment, nodes)) {
+        Ok(running) => match running.until_signal() {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => fail(&error),
+        },
+        Err(error) => fail(&error),
+    }
+}
+
+fn fail(error: &anyhow::Error) -> ExitCode {
+    eprintln!("error: {error:#}");
+    if error.is::<crate::arguments::UsageError>() {
+        ExitCode::from(USAGE)
+    } else {
+        ExitCode::FAILURE
+    }
+}
+
+type Prepared = Vec<(Setup, Box<dyn Node>)>;
+
+fn prepare(compositions: Vec<Composition>) -> anyhow::Result<(Environment, Prepared)> {
+    let mut all_arguments = Vec::with_capacity(compositions.len());
+    for composition in &compositions {
+        all_arguments.push(Arguments::parse(composition.arguments.iter().cloned())?);
+    }
+    let environment = Environment::read()?;
+    log::start(
+        &all_arguments.iter().collect::<Vec<_>>(),
+        environment.log_filter.as_deref(),
+    );
+    let mut nodes = Vec::with_capacity(compositions.len());
+    for (composition, arguments) in compositions.into_iter().zip(&all_arguments) {
+        let setup = Setup::new(&composition.name, arguments)
+            .with_context(|| format!("node {}", composition.name))?;
+        let node =
+            (composition.build)(&setup).with_context(|| format!("node {}", composition.name))?;
+        nodes.push((setup, node));
+    }
+    Ok((environment, nodes))
+}
+
+/// Puts nodes on the ROS graph.
+///
+/// # Errors
+/// When there is no network interface, a name is taken, or an endpoint cannot be made.
+pub fn launch(
+    environment: &Environment,
+    nodes: Vec<(Setup, Box<dyn Node>)>,
+) -> anyhow::Result<Running> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .thread_name("node")
+        .enable_all()
+        .build()
+        .context("tokio runtime")?;
+    let (stop, stopped) = watch::channel(false);
+    let mut tasks = JoinSet::new();
+    let mut seen = BTreeSet::new();
+    for (setup, _) in &nodes {
+        let name = setup.names().fully_qualified();
+        if !seen.insert(name.clone()) {
+            bail!("node {name} is there twice in this process: names must be unique");
+        }
+    }
+    let joined = nodes
+        .into_iter()
+        .map(|(setup, node)| {
+            let (participant, warning) = Participant::join(environment, setup.names())
+                .with_context(|| format!("node {}", setup.names().fully_qualified()))?;
+            Ok((setup, node, participant, warning))
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    runtime.block_on(async { tokio::time::sleep(LOOKING_AROUND).await });
+    for (setup, _, participant, _) in &joined {
+        if participant.namesake() {
+            let name = setup.names().fully_qualified();
+            bail!(
+                "node {name} is already running: stop it, or rename this one with -r __node:=NAME"
+            );
+        }
+    }
+    for (setup, node, participant, warning) in joined {
+        let name = setup.names().fully_qualified();
+        let _inside = runtime.enter();
+        let owner = assembly::assemble(&setup, node, participant)
+            .with_context(|| format!("node {name}"))?;
+        let span = tracing::error_span!("node", node = name.as_str());
+        if let Some(warning) = warning {
+            span.in_scope(|| tracing::warn!("{warning}"));
+        }
+        tasks.spawn_on(
+            owner.run(stopped.clone()).instrument(span),
+            runtime.handle(),
+        );
+    }
+    Ok(Running {
+        runtime,
+        stop,
+        tasks,
+    })
+}
+
+/// Nodes that are on the ROS graph.
+pub struct Running {
+    runtime: Runtime,
+    stop: watch::Sender<bool>,
+    tasks: JoinSet<()>,
+}
+
+impl Running {
+    /// Runs until SIGINT or SIGTERM, then stops.
+    ///
+    /// # Errors
+    /// When a node ended by a panic; the others have been stopped then.
+    pub fn until_signal(mut self) -> anyhow::Result<()> {
+        let Self { runtime, tasks, .. } = &mut self;
+        let ended: Option<anyhow::Result<()>> = runtime.block_on(async {
+            tokio::select! {
+                signal = signal() => signal.err().map(Err),
+                ended = tasks.join_next() => ended.map(|outcome| outcome.map_err(Into::into)),
+            }
+        });
+        let stopped = self.stop();
+        ended.unwrap_or(Ok(())).context("a node ended by a panic")?;
+        stopped
+    }
+
+    /// Asks all nodes to stop and waits until they have.
+    ///
+    /// # Errors
+    /// When a node ended by a panic.
+    pub fn stop(mut self) -> anyhow::Result<()> {
+        let _ = self.stop.send(true);
+        let outcome = self.runtime.block_on(async {
+            let mut outcome = Ok(());
+            while let Some(ended) = self.tasks.join_next().await {
+                if let Err(error) = ended {
+                    outcome = Err(error);
+                }
+            }
+            outcome
+        });
+        outcome.context("a node ended by a panic")
+    }
+}
+
+async fn signal() -> anyhow::Result<()> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let mut interrupt = signal(SignalKind::interrupt()).context("SIGINT")?;
+    let mut terminate = signal(SignalKind::terminate()).context("SIGTERM")?;
+    tokio::select! {
+        _ = interrupt.recv() => {}
+        _ = terminate.recv() => {}
+    }
+    Ok(())
+}

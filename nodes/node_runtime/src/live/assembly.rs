@@ -1,0 +1,304 @@
+//! From a node's ports to endpoints on the network.
+
+use std::sync::Arc;
+
+use abbe_msgs::{Message, Qos, topics};
+use anyhow::Context as _;
+use metrology::Stamp;
+use tokio::sync::mpsc;
+use tokio::time::Instant;
+
+use super::action_client::ActionClient;
+use super::action_server::{ActionServer, GoalService};
+use super::board::Board;
+use super::incoming::{QUEUE_LEN, Readers};
+use super::owner::{
+    ActionEnd, ClientUse, Owner, Publication, ServerUse, Subscription, Timers, UsedAction,
+};
+use super::parameters::ParameterService;
+use super::service::{Client, Server};
+use super::timers::{HostTimers, SimulatedTimers};
+use crate::clock::Clock;
+use crate::dds::{Participant, Writer};
+use crate::names::{self, NodeNames};
+use crate::node::{ActionPort, Node, Ports};
+use crate::parameter::Parameter;
+use crate::setup::Setup;
+
+/// Requests and replies: reliable, volatile.
+const SERVICE_QOS: Qos = Qos::RELIABLE;
+const FEEDBACK_QOS: Qos = Qos::RELIABLE;
+const STATUS_QOS: Qos = Qos::LATCHED;
+
+const GOAL_SERVICES: [(GoalService, &str); 3] = [
+    (GoalService::SendGoal, "send_goal"),
+    (GoalService::CancelGoal, "cancel_goal"),
+    (GoalService::GetResult, "get_result"),
+];
+
+struct Assembly {
+    names: NodeNames,
+    participant: Participant,
+    readers: Readers,
+    servers: Vec<(ServerUse, Server)>,
+    clients: Vec<(ClientUse, Client)>,
+}
+
+impl Assembly {
+    fn standard<M: Message>(&self, topic: &topics::Topic<M>) -> anyhow::Result<Writer> {
+        let name = names::dds_topic(&self.names.resolve(topic.name)?);
+        self.participant
+            .writer(&name, &names::dds_type(M::TYPE_NAME), topic.qos)
+    }
+
+    fn server(&mut self, used: ServerUse, service: &str, type_name: &str) -> anyhow::Result<()> {
+        let [request, reply] = service_topics(service, type_name);
+        let reader = self
+            .participant
+            .reader(&request.0, &request.1, SERVICE_QOS)?;
+        let writer = self.participant.writer(&reply.0, &reply.1, SERVICE_QOS)?;
+        self.readers.requests(service, reader, self.servers.len());
+        self.servers.push((
+            used,
+            Server {
+                name: service.to_owned(),
+                writer,
+            },
+        ));
+        Ok(())
+    }
+
+    fn client(&mut self, used: ClientUse, service: &str, type_name: &str) -> anyhow::Result<()> {
+        let [request, reply] = service_topics(service, type_name);
+        let writer = self
+            .participant
+            .writer(&request.0, &request.1, SERVICE_QOS)?;
+        let reader = self.participant.reader(&reply.0, &reply.1, SERVICE_QOS)?;
+        self.readers.replies(service, reader, self.clients.len());
+        let client = Client::new(service.to_owned(), writer, (request.0, reply.0));
+        self.clients.push((used, client));
+        Ok(())
+    }
+
+    fn subscriptions(&mut self, ports: &Ports) -> anyhow::Result<Vec<Subscription>> {
+        let mut subscriptions = Vec::with_capacity(ports.subscriptions.len());
+        for (place, port) in ports.subscriptions.iter().enumerate() {
+            let topic = self.names.resolve(&port.topic)?;
+            let dds_topic = names::dds_topic(&topic);
+            let dds_type = names::dds_type(port.type_name);
+            let reader = self.participant.reader(&dds_topic, &dds_type, port.qos)?;
+            self.readers.messages(&topic, reader, place);
+            let qos = port.qos;
+            subscriptions.push(Subscription {
+                topic,
+                dds_topic,
+                dds_type,
+                qos,
+                received: 0,
+                lost: 0,
+            });
+        }
+        Ok(subscriptions)
+    }
+
+    fn publications(&self, ports: &Ports) -> anyhow::Result<Vec<Publication>> {
+        let open = |port: &crate::node::TopicPort| {
+            let topic = self.names.resolve(&port.topic)?;
+            let dds_topic = names::dds_topic(&topic);
+            let dds_type = names::dds_type(port.type_name);
+            let writer = self.participant.writer(&dds_topic, &dds_type, port.qos)?;
+            let qos = port.qos;
+            Ok(Publication {
+                topic,
+                dds_topic,
+                dds_type,
+                qos,
+                writer,
+                sent: 0,
+                unsent: 0,
+            })
+        };
+        ports.publications.iter().map(open).collect()
+    }
+
+    fn services(&mut self, ports: &Ports) -> anyhow::Result<()> {
+        for (place, port) in ports.services.iter().enumerate() {
+            let name = self.names.resolve(&port.service)?;
+            self.server(ServerUse::Service(place), &name, port.type_name)?;
+        }
+        for (place, port) in ports.clients.iter().enumerate() {
+            let name = self.names.resolve(&port.service)?;
+            self.client(ClientUse::Service(place), &name, port.type_name)?;
+        }
+        for (service, name, type_name) in ParameterService::ALL {
+            let name = self.names.resolve(name)?;
+            self.server(ServerUse::Parameter(service), &name, type_name)?;
+        }
+        Ok(())
+    }
+
+    fn action_servers(&mut self, ports: &[ActionPort]) -> anyhow::Result<Vec<ActionEnd>> {
+        let mut actions = Vec::with_capacity(ports.len());
+        for (place, port) in ports.iter().enumerate() {
+            let name = self.names.resolve(&port.action)?;
+            let first_server = self.servers.len();
+            for (service, suffix) in GOAL_SERVICES {
+                let type_name = goal_service_type(service, port.type_name);
+                let service_name = format!("{name}/_action/{suffix}");
+                self.server(ServerUse::Action(place, service), &service_name, &type_name)?;
+            }
+            let feedback = self.participant.writer(
+                &names::dds_topic(&format!("{name}/_action/feedback")),
+                &names::dds_type(&format!("{}_FeedbackMessage", port.type_name)),
+                FEEDBACK_QOS,
+            )?;
+            let status = self.participant.writer(
+                &names::dds_topic(&format!("{name}/_action/status")),
+                &names::dds_type("action_msgs/msg/GoalStatusArray"),
+                STATUS_QOS,
+            )?;
+            let server = ActionServer::default();
+            actions.push(ActionEnd {
+                name,
+                server,
+                first_server,
+                feedback,
+                status,
+            });
+        }
+        Ok(actions)
+    }
+
+    fn action_clients(&mut self, ports: &[ActionPort]) -> anyhow::Result<Vec<UsedAction>> {
+        let mut actions = Vec::with_capacity(ports.len());
+        for (place, port) in ports.iter().enumerate() {
+            let name = self.names.resolve(&port.action)?;
+            let first_client = self.clients.len();
+            for (service, suffix) in GOAL_SERVICES {
+                let type_name = goal_service_type(service, port.type_name);
+                let service_name = format!("{name}/_action/{suffix}");
+                self.client(ClientUse::Action(place, service), &service_name, &type_name)?;
+            }
+            let topic = format!("{name}/_action/feedback");
+            let feedback = self.participant.reader(
+                &names::dds_topic(&topic),
+                &names::dds_type(&format!("{}_FeedbackMessage", port.type_name)),
+                FEEDBACK_QOS,
+            )?;
+            self.readers.feedback(&topic, feedback, place);
+            actions.push(UsedAction {
+                client: ActionClient::default(),
+                first_client,
+            });
+        }
+        Ok(actions)
+    }
+
+    fn clock(&mut self) -> anyhow::Result<()> {
+        let topic = self.names.resolve(topics::CLOCK.name)?;
+        // ros2-client's own subscription has the type builtin_interfaces/Time, which nobody publishes.
+        let type_name = names::dds_type(abbe_msgs::rosgraph_msgs::msg::Clock::TYPE_NAME);
+        let reader =
+            self.participant
+                .reader(&names::dds_topic(&topic), &type_name, topics::CLOCK.qos)?;
+        self.readers.clock(&topic, reader);
+        Ok(())
+    }
+}
+
+fn goal_service_type(service: GoalService, action_type: &str) -> String {
+    match service {
+        GoalService::SendGoal => format!("{action_type}_SendGoal"),
+        GoalService::CancelGoal => "action_msgs/srv/CancelGoal".to_owned(),
+        GoalService::GetResult => format!("{action_type}_GetResult"),
+    }
+}
+
+/// DDS topic and type of requests and of replies.
+fn service_topics(service: &str, type_name: &str) -> [(String, String); 2] {
+    [
+        (
+            names::dds_request_topic(service),
+            names::dds_type(&format!("{type_name}_Request")),
+        ),
+        (
+            names::dds_reply_topic(service),
+            names::dds_type(&format!("{type_name}_Response")),
+        ),
+    ]
+}
+
+/// Gives a node its endpoints and an owner that drives it.
+pub(super) fn assemble(
+    setup: &Setup,
+    node: Box<dyn Node>,
+    participant: Participant,
+) -> anyhow::Result<Owner> {
+    let ports = node.ports().clone();
+    let (sender, queue) = mpsc::channel(QUEUE_LEN);
+    let mut assembly = Assembly {
+        names: setup.names().clone(),
+        participant,
+        readers: Readers::new(sender.clone()),
+        servers: Vec::new(),
+        clients: Vec::new(),
+    };
+    let publications = assembly.publications(&ports)?;
+    let diagnostics = assembly.standard(&topics::DIAGNOSTICS)?;
+    let rosout = Arc::new(assembly.standard(&topics::ROSOUT)?);
+    let parameter_events = assembly.standard(&topics::PARAMETER_EVENTS)?;
+    assembly.services(&ports)?;
+    let actions = assembly.action_servers(&ports.action_servers)?;
+    let used_actions = assembly.action_clients(&ports.action_clients)?;
+    let subscriptions = assembly.subscriptions(&ports)?;
+    let clock = Clock::new(setup.use_sim_time());
+    let timers = if clock.is_simulated() {
+        assembly.clock()?;
+        Timers::Simulated(SimulatedTimers::new(&ports.timers))
+    } else {
+        Timers::Host(HostTimers::start(&ports.timers, sender).context("thread of the timers")?)
+    };
+    assembly.participant.announce()?;
+    let fully_qualified = setup.names().fully_qualified();
+    let parameters: Vec<Parameter> = with_sim_time(node.parameters(), setup);
+    Ok(Owner {
+        board: Board::new(&fully_qualified),
+        name: fully_qualified,
+        node,
+        parameters,
+        participant: assembly.participant,
+        readers: assembly.readers,
+        queue,
+        clock,
+        timers,
+        subscriptions,
+        publications,
+        servers: assembly.servers,
+        clients: assembly.clients,
+        actions,
+        used_actions,
+        diagnostics,
+        rosout,
+        parameter_events,
+        emissions: Vec::new(),
+        last_event: Stamp::from_nanos(i64::MIN),
+        next_request: 0,
+        requests: std::collections::BTreeMap::new(),
+        stopping_since: None,
+        stopped: false,
+        next_second: Instant::now(),
+        next_service: Instant::now(),
+        last_publication: None,
+    })
+}
+
+/// Every node has `use_sim_time`, whether or not it took its parameters from [`Setup`].
+fn with_sim_time(parameters: &[Parameter], setup: &Setup) -> Vec<Parameter> {
+    let mut all = parameters.to_vec();
+    let own = setup.sim_time_parameter();
+    if !all.iter().any(|parameter| parameter.name == own.name) {
+        all.push(own);
+        all.sort_by(|a, b| a.name.cmp(&b.name));
+    }
+    all
+}

@@ -1,0 +1,255 @@
+//! The node's conditions as `/diagnostics` shows them, and what of them is logged.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use abbe_msgs::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use abbe_msgs::std_msgs::msg::Header;
+use metrology::Stamp;
+use metrology::stamp::Host;
+use tokio::time::Instant;
+
+use crate::clock;
+use crate::diagnostic::{Diagnostic, Level};
+
+/// A condition that goes on is logged again after this time.
+const LOG_AGAIN: Duration = Duration::from_secs(10);
+
+/// A condition that the runtime itself saw is over when it has not come back for this long.
+const OVER_AFTER: Duration = Duration::from_secs(10);
+
+struct Standing {
+    diagnostic: Diagnostic,
+    logged: Instant,
+    /// Since when it has not been seen; only for what the runtime itself reports.
+    expires: Option<Instant>,
+    silenced: u64,
+}
+
+/// All standing conditions and counters of one node.
+pub(super) struct Board {
+    node: String,
+    state: &'static str,
+    standing: BTreeMap<&'static str, Standing>,
+    counters: BTreeMap<String, u64>,
+    /// Reported `Ok` since the last publication, so that the end of a condition is seen.
+    ended: Vec<Diagnostic>,
+    changed: bool,
+}
+
+impl Board {
+    pub fn new(node: &str) -> Self {
+        Self {
+            node: node.to_owned(),
+            state: "running",
+            standing: BTreeMap::new(),
+            counters: BTreeMap::new(),
+            ended: Vec::new(),
+            changed: true,
+        }
+    }
+
+    pub fn stopping(&mut self) {
+        self.state = "stopping";
+        self.changed = true;
+    }
+
+    pub fn count(&mut self, counter: impl Into<String>, by: u64) {
+        *self.counters.entry(counter.into()).or_default() += by;
+    }
+
+    /// Sets a counter that is kept elsewhere.
+    pub fn set(&mut self, counter: String, to: u64) {
+        self.counters.insert(counter, to);
+    }
+
+    /// Takes in what the node reports.
+    pub fn report(&mut self, diagnostic: Diagnostic, now: Instant) {
+        self.put(diagnostic, now, None);
+    }
+
+    /// Takes in what the runtime saw; it is over when it is not seen again.
+    pub fn notice(&mut self, diagnostic: Diagnostic, now: Instant) {
+        self.put(diagnostic, now, Some(now + OVER_AFTER));
+    }
+
+    fn put(&mut self, diagnostic: Diagnostic, now: Instant, expires: Option<Instant>) {
+        let name = diagnostic.name;
+        if diagnostic.level == Level::Ok {
+            if self.standing.remove(name).is_some() {
+                tracing::info!(condition = name, "{}", diagnostic.message);
+                self.ended.push(diagnostic);
+                self.changed = true;
+            }
+            return;
+        }
+        match self.standing.get_mut(name) {
+            Some(standing) if standing.diagnostic.level == diagnostic.level => {
+                standing.diagnostic = diagnostic;
+                standing.expires = expires;
+                standing.silenced += 1;
+                if now.duration_since(standing.logged) >= LOG_AGAIN {
+                    log(&standing.diagnostic, standing.silenced);
+                    standing.logged = now;
+                    standing.silenced = 0;
+                }
+            }
+            _ => {
+                log(&diagnostic, 0);
+                self.changed = true;
+                let standing = Standing {
+                    diagnostic,
+                    logged: now,
+                    expires,
+                    silenced: 0,
+                };
+                self.standing.insert(name, standing);
+            }
+        }
+    }
+
+    /// Lets what the runtime has not seen again come to its end.
+    pub fn expire(&mut self, now: Instant) {
+        let over: Vec<_> = self
+            .standing
+            .iter()
+            .filter(|(_, standing)| standing.expires.is_some_and(|at| at <= now))
+            .map(|(name, _)| *name)
+            .collect();
+        for name in over {
+            let message = format!("not seen for {} s", OVER_AFTER.as_secs());
+            self.put(Diagnostic::new(Level::Ok, name, message), now, None);
+        }
+    }
+
+    /// Whether something began or ended since the last publication.
+    pub const fn has_changed(&self) -> bool {
+        self.changed
+    }
+
+    /// The message for `/diagnostics`.
+    pub fn message(&mut self, at: Stamp<Host>) -> DiagnosticArray {
+        self.changed = false;
+        let worst = self
+            .standing
+            .values()
+            .map(|s| s.diagnostic.level)
+            .max()
+            .unwrap_or(Level::Ok);
+        let values = self
+            .counters
+            .iter()
+            .map(|(key, count)| KeyValue {
+                key: key.clone(),
+                value: count.to_string(),
+            })
+            .collect();
+        let state = DiagnosticStatus {
+            level: worst as u8,
+            name: self.node.clone(),
+            message: self.state.to_owned(),
+            hardware_id: String::new(),
+            values,
+        };
+        let standing = self.standing.values().map(|standing| &standing.diagnostic);
+        let ended = std::mem::take(&mut self.ended);
+        let conditions = standing
+            .chain(&ended)
+            .map(|diagnostic| self.status(diagnostic));
+        DiagnosticArray {
+            status: std::iter::once(state).chain(conditions).collect(),
+            header: Header {
+                stamp: clock::ros_time(at),
+                frame_id: String::new(),
+            },
+        }
+    }
+
+    fn status(&self, diagnostic: &Diagnostic) -> DiagnosticStatus {
+        DiagnosticStatus {
+            level: diagnostic.level as u8,
+            name: format!("{}: {}", self.node, diagnostic.name),
+            message: diagnostic.message.clone(),
+            hardware_id: String::new(),
+            values: diagnostic
+                .values
+                .iter()
+                .map(|(key, value)| KeyValue {
+                    key: (*key).to_owned(),
+                    value: value.clone(),
+                })
+                .collect(),
+        }
+    }
+}
+
+fn log(diagnostic: &Diagnostic, silenced: u64) {
+    let Diagnostic {
+        level,
+        name,
+        message,
+        ..
+    } = diagnostic;
+    match level {
+        Level::Ok => tracing::info!(condition = name, "{message}"),
+        Level::Warn | Level::Stale => tracing::warn!(condition = name, silenced, "{message}"),
+        Level::Error => tracing::error!(condition = name, silenced, "{message}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(board: &mut Board) -> Vec<(String, u8)> {
+        let message = board.message(Stamp::from_nanos(0));
+        message
+            .status
+            .into_iter()
+            .map(|status| (status.name, status.level))
+            .collect()
+    }
+
+    #[test]
+    fn a_condition_stands_until_it_is_reported_ok() {
+        let mut board = Board::new("/probe");
+        let now = Instant::now();
+        board.report(
+            Diagnostic::new(Level::Warn, "model_stale", "old".into()),
+            now,
+        );
+        let stands = [
+            ("/probe".to_owned(), 1),
+            ("/probe: model_stale".to_owned(), 1),
+        ];
+        assert_eq!(names(&mut board), stands);
+        assert!(!board.has_changed());
+        board.report(
+            Diagnostic::new(Level::Warn, "model_stale", "older".into()),
+            now,
+        );
+        assert!(!board.has_changed(), "the same level is no news");
+        board.report(
+            Diagnostic::new(Level::Ok, "model_stale", "fresh".into()),
+            now,
+        );
+        assert!(board.has_changed());
+        assert_eq!(names(&mut board)[1], ("/probe: model_stale".to_owned(), 0));
+        assert_eq!(names(&mut board).len(), 1);
+    }
+
+    #[test]
+    fn what_the_runtime_saw_ends_by_itself() {
+        let mut board = Board::new("/probe");
+        let now = Instant::now();
+        board.notice(
+            Diagnostic::new(Level::Error, "samples_lost", "3".into()),
+            now,
+        );
+        board.expire(now + Duration::from_secs(9));
+        assert_eq!(names(&mut board).len(), 2);
+        board.expire(now + Duration::from_secs(11));
+        assert_eq!(names(&mut board)[1].1, 0);
+        assert_eq!(names(&mut board).len(), 1);
+    }
+}

@@ -1,0 +1,196 @@
+//! What reaches a node's owner through its one queue, and the tasks that put it there.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use abbe_msgs::from_cdr;
+use abbe_msgs::rosgraph_msgs::msg::Clock as ClockMessage;
+use metrology::Stamp;
+use metrology::stamp::Host;
+use tokio::sync::mpsc::Sender;
+use tokio::task::JoinSet;
+
+use crate::clock;
+use crate::dds::{Guid, Reader, RequestIdentity, Sample};
+use crate::node::Bytes;
+
+use super::service::{self, ReplyTo};
+
+/// Room in a node's queue. When it is full, samples wait in the readers' caches, which hold the
+/// topic's depth.
+pub(super) const QUEUE_LEN: usize = 1_024;
+
+/// One thing that happened.
+#[derive(Debug)]
+pub(super) enum Incoming {
+    /// A message for the node; `lost` came never since the one before.
+    Message {
+        subscription: usize,
+        bytes: Bytes,
+        received: Stamp<Host>,
+        lost: u64,
+    },
+    /// A sample that is no plain CDR.
+    Unreadable { topic: Arc<str>, reason: String },
+    /// A request at one of our servers.
+    Request {
+        server: usize,
+        to: ReplyTo,
+        bytes: Bytes,
+    },
+    /// A reply to one of our clients.
+    Reply {
+        client: usize,
+        identity: RequestIdentity,
+        bytes: Bytes,
+    },
+    /// Feedback of an action that we use.
+    Feedback { client: usize, bytes: Bytes },
+    /// A timer of the computer's clock is due; `missed` periods went by unserved.
+    Timer { timer: usize, missed: u64 },
+    /// Simulated time.
+    Clock(Stamp<Host>),
+}
+
+/// Counts what a topic's writers sent and we never got.
+#[derive(Debug, Default)]
+pub(crate) struct GapCounter {
+    last: BTreeMap<Guid, i64>,
+}
+
+impl GapCounter {
+    /// Samples missing between this one and the last of its writer.
+    pub fn count(&mut self, writer: Guid, sequence: i64) -> u64 {
+        match self.last.get_mut(&writer) {
+            Some(last) if sequence > *last => {
+                let lost = sequence - *last - 1;
+                *last = sequence;
+                u64::try_from(lost).unwrap_or(0)
+            }
+            // Out of order: counted as lost before, or a repetition.
+            Some(_) => 0,
+            None => {
+                self.last.insert(writer, sequence);
+                0
+            }
+        }
+    }
+}
+
+/// The reading tasks of a node; they end with it.
+pub(super) struct Readers {
+    tasks: JoinSet<()>,
+    queue: Sender<Incoming>,
+}
+
+impl Readers {
+    pub fn new(queue: Sender<Incoming>) -> Self {
+        Self {
+            tasks: JoinSet::new(),
+            queue,
+        }
+    }
+
+    /// Reads a topic until the node ends.
+    pub fn spawn(
+        &mut self,
+        topic: &str,
+        reader: Reader,
+        mut form: impl FnMut(Sample) -> Option<Incoming> + Send + 'static,
+    ) {
+        let queue = self.queue.clone();
+        let topic: Arc<str> = Arc::from(topic);
+        self.tasks.spawn(async move {
+            loop {
+                let incoming = match reader.next().await {
+                    Ok(sample) => form(sample),
+                    Err(reason) => Some(Incoming::Unreadable {
+                        topic: Arc::clone(&topic),
+                        reason,
+                    }),
+                };
+                if let Some(incoming) = incoming
+                    && queue.send(incoming).await.is_err()
+                {
+                    return;
+                }
+            }
+        });
+    }
+
+    pub fn messages(&mut self, topic: &str, reader: Reader, subscription: usize) {
+        let mut gaps = GapCounter::default();
+        self.spawn(topic, reader, move |sample| {
+            let lost = gaps.count(sample.writer, sample.sequence);
+            let Sample {
+                bytes, received, ..
+            } = sample;
+            Some(Incoming::Message {
+                subscription,
+                bytes,
+                received,
+                lost,
+            })
+        });
+    }
+
+    pub fn requests(&mut self, topic: &str, reader: Reader, server: usize) {
+        self.spawn(topic, reader, move |sample| {
+            let (to, bytes) = service::request(sample)?;
+            Some(Incoming::Request { server, to, bytes })
+        });
+    }
+
+    pub fn replies(&mut self, topic: &str, reader: Reader, client: usize) {
+        self.spawn(topic, reader, move |sample| {
+            let (identity, bytes) = service::reply(sample)?;
+            Some(Incoming::Reply {
+                client,
+                identity,
+                bytes,
+            })
+        });
+    }
+
+    pub fn feedback(&mut self, topic: &str, reader: Reader, client: usize) {
+        self.spawn(topic, reader, move |sample| {
+            Some(Incoming::Feedback {
+                client,
+                bytes: sample.bytes,
+            })
+        });
+    }
+
+    pub fn clock(&mut self, topic: &str, reader: Reader) {
+        let name: Arc<str> = Arc::from(topic);
+        self.spawn(topic, reader, move |sample| {
+            Some(match from_cdr::<ClockMessage>(&sample.bytes) {
+                Ok(message) => Incoming::Clock(clock::stamp(&message.clock)),
+                Err(error) => Incoming::Unreadable {
+                    topic: Arc::clone(&name),
+                    reason: error.to_string(),
+                },
+            })
+        });
+    }
+
+    /// Ends all reading.
+    pub async fn stop(mut self) {
+        self.tasks.shutdown().await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_counted_per_writer() {
+        let (a, b) = ([1; 16], [2; 16]);
+        let mut gaps = GapCounter::default();
+        let lost: Vec<_> = [(a, 5), (a, 6), (b, 1), (a, 9), (a, 8), (b, 2), (a, 10)]
+            .map(|(writer, sequence)| gaps.count(writer, sequence))
+            .into();
+        assert_eq!(lost, [0, 0, 0, 2, 0, 0, 0]);
+    }
+}

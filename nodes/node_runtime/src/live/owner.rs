@@ -1,0 +1,362 @@
+//! The one owner of a node: takes what happens out of one queue, in the order of arrival, hands it to
+//! the node, and carries out what the node says.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use abbe_msgs::{Qos, to_cdr};
+use metrology::Stamp;
+use metrology::stamp::Host;
+use tokio::sync::{mpsc, watch};
+use tokio::time::Instant;
+
+use super::action_client::ActionClient;
+use super::action_server::{ActionServer, GoalService};
+use super::board::Board;
+use super::incoming::{Incoming, Readers};
+use super::parameters::{self, ParameterService};
+use super::service::{Client, ReplyTo, Server, shared};
+use super::timers::{HostTimers, SimulatedTimers};
+use crate::clock::{self, Clock};
+use crate::dds::{Participant, PublishError, Writer};
+use crate::diagnostic::{Diagnostic, Level};
+use crate::log;
+use crate::node::{Bytes, Emission, Event, Node, RequestId};
+use crate::parameter::Parameter;
+
+mod carry;
+mod graph;
+mod take;
+
+/// What a server is there for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum ServerUse {
+    Service(usize),
+    Action(usize, GoalService),
+    Parameter(ParameterService),
+}
+
+/// What a client is there for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum ClientUse {
+    Service(usize),
+    Action(usize, GoalService),
+}
+
+pub(super) struct Subscription {
+    pub topic: String,
+    pub dds_topic: String,
+    pub dds_type: String,
+    pub qos: Qos,
+    pub received: u64,
+    pub lost: u64,
+}
+
+pub(super) struct Publication {
+    pub topic: String,
+    pub dds_topic: String,
+    pub dds_type: String,
+    pub qos: Qos,
+    pub writer: Writer,
+    pub sent: u64,
+    pub unsent: u64,
+}
+
+/// An action that the node offers; its three servers stand together from `first_server` on.
+pub(super) struct ActionEnd {
+    pub name: String,
+    pub server: ActionServer,
+    pub first_server: usize,
+    pub feedback: Writer,
+    pub status: Writer,
+}
+
+/// An action that the node uses; its three clients stand together from `first_client` on.
+pub(super) struct UsedAction {
+    pub client: ActionClient,
+    pub first_client: usize,
+}
+
+pub(super) enum Timers {
+    Host(Option<HostTimers>),
+    Simulated(SimulatedTimers),
+}
+
+pub(super) struct Owner {
+    pub name: String,
+    pub node: Box<dyn Node>,
+    pub parameters: Vec<Parameter>,
+    pub participant: Participant,
+    pub readers: Readers,
+    pub queue: mpsc::Receiver<Incoming>,
+    pub clock: Clock,
+    pub timers: Timers,
+    pub subscriptions: Vec<Subscription>,
+    pub publications: Vec<Publication>,
+    pub servers: Vec<(ServerUse, Server)>,
+    pub clients: Vec<(ClientUse, Client)>,
+    pub actions: Vec<ActionEnd>,
+    pub used_actions: Vec<UsedAction>,
+    pub diagnostics: Writer,
+    pub rosout: Arc<Writer>,
+    pub parameter_events: Writer,
+    pub board: Board,
+    pub emissions: Vec<Emission>,
+    pub last_event: Stamp<Host>,
+    pub next_request: RequestId,
+    pub requests: BTreeMap<(usize, RequestId), (usize, ReplyTo)>,
+    pub stopping_since: Option<Instant>,
+    pub stopped: bool,
+    pub next_second: Instant,
+    pub next_service: Instant,
+    pub last_publication: Option<Instant>,
+}
+
+/// How long a node may take to wind down.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// How long the last samples may take to be acknowledged.
+const ACKNOWLEDGEMENT: Duration = Duration::from_secs(1);
+/// How long the last news of the graph may take; it is a courtesy.
+const FAREWELL: Duration = Duration::from_millis(300);
+/// Between looks for a server while a request waits.
+const SERVER_POLL: Duration = Duration::from_millis(20);
+/// Between looks at the time limits of open requests.
+const LIMIT_POLL: Duration = Duration::from_millis(200);
+/// Between publications of `/diagnostics` when conditions come and go quickly.
+const DIAGNOSTICS_PAUSE: Duration = Duration::from_millis(100);
+/// Events handled before chores are looked at again.
+const BATCH: usize = 256;
+
+fn now() -> Instant {
+    Instant::now()
+}
+
+impl Owner {
+    /// Drives the node until `stop` says so, then winds it down.
+    pub async fn run(mut self, mut stop: watch::Receiver<bool>) {
+        log::open(&self.name, Arc::clone(&self.rosout));
+        let event = parameters::start_event(&self.name, &self.parameters, clock::host_now());
+        let _ = self.parameter_events.publish(&event, None);
+        for action in &self.actions {
+            let _ = action.status.publish(&action.server.status(), None);
+        }
+        tracing::info!(parameters = self.parameters.len(), "started");
+        while !self.is_done() {
+            let wake = self.wake();
+            tokio::select! {
+                Some(incoming) = self.queue.recv() => self.batch(incoming),
+                () = tokio::time::sleep_until(wake) => {}
+                _ = stop.changed(), if self.stopping_since.is_none() => self.begin_to_stop(),
+            }
+            self.chores(now());
+        }
+        self.finish().await;
+    }
+
+    fn batch(&mut self, first: Incoming) {
+        self.take(first);
+        for _ in 1..BATCH {
+            match self.queue.try_recv() {
+                Ok(incoming) => self.take(incoming),
+                Err(_) => return,
+            }
+        }
+    }
+
+    fn is_done(&self) -> bool {
+        let patience_over = |since: Instant| now().duration_since(since) >= PATIENCE;
+        self.stopping_since
+            .is_some_and(|since| self.stopped || patience_over(since))
+    }
+
+    fn wake(&self) -> Instant {
+        let mut wake = self.next_second;
+        let clients = || self.clients.iter().map(|(_, client)| client);
+        if clients().any(Client::is_waiting) {
+            wake = wake.min(self.next_service);
+        } else if clients().any(Client::has_asked) {
+            wake = wake.min(now() + LIMIT_POLL);
+        }
+        if self.board.has_changed() {
+            wake = wake.min(
+                self.last_publication
+                    .map_or(now(), |last| last + DIAGNOSTICS_PAUSE),
+            );
+        }
+        self.stopping_since
+            .map_or(wake, |since| wake.min(since + PATIENCE))
+    }
+
+    fn begin_to_stop(&mut self) {
+        tracing::info!("stopping");
+        self.stopping_since = Some(now());
+        self.board.stopping();
+        let at = self.instant(None);
+        self.hand(at, Event::Shutdown);
+    }
+
+    /// The time of an event; it does not go back unless the clock was set back.
+    fn instant(&mut self, received: Option<Stamp<Host>>) -> Stamp<Host> {
+        /// Samples of several topics overtake each other by less than this.
+        const DISORDER_NANOS: i64 = 100_000_000;
+        if self.clock.is_simulated() {
+            return self.clock.now();
+        }
+        let at = received.unwrap_or_else(clock::host_now);
+        if at >= self.last_event {
+            self.last_event = at;
+        } else if (self.last_event - at).nanos() > DISORDER_NANOS {
+            let back_s = (self.last_event - at).as_secs_f64();
+            self.last_event = at;
+            self.notice(
+                Diagnostic::new(
+                    Level::Warn,
+                    "clock_stepped_back",
+                    format!("clock went back {back_s} s"),
+                )
+                .with("step_s", -back_s),
+            );
+        }
+        self.last_event
+    }
+
+    fn notice(&mut self, diagnostic: Diagnostic) {
+        self.board.notice(diagnostic, now());
+    }
+
+    /// Hands an event to the node and carries out what it says.
+    fn hand(&mut self, at: Stamp<Host>, event: Event<'_>) {
+        let mut emissions = std::mem::take(&mut self.emissions);
+        let outcome = self.node.handle(at, event, &mut emissions);
+        for emission in emissions.drain(..) {
+            self.carry(emission);
+        }
+        self.emissions = emissions;
+        if let Err(fault) = outcome {
+            self.board.count("inputs refused", 1);
+            let diagnostic = Diagnostic::new(Level::Error, "input_refused", fault.to_string());
+            self.notice(diagnostic.with("port", &fault.port));
+        }
+    }
+
+    /// Reports a sample that could not be sent.
+    fn unsent(&mut self, topic: &str, error: &PublishError) {
+        self.board.count("samples not sent", 1);
+        let message = format!("{topic}: not sent: {error}");
+        self.notice(
+            Diagnostic::new(Level::Error, "samples_not_sent", message).with("topic", topic),
+        );
+    }
+
+    fn chores(&mut self, now: Instant) {
+        if self
+            .clients
+            .iter()
+            .any(|(_, client)| client.is_waiting() || client.has_asked())
+            && now >= self.next_service
+        {
+            self.next_service = now + SERVER_POLL;
+            self.serve_clients(now);
+        }
+        if now >= self.next_second {
+            self.next_second = now + Duration::from_secs(1);
+            self.every_second(now);
+        } else if self.board.has_changed()
+            && self
+                .last_publication
+                .is_none_or(|last| now >= last + DIAGNOSTICS_PAUSE)
+        {
+            self.publish_diagnostics(now);
+        }
+    }
+
+    fn every_second(&mut self, now: Instant) {
+        self.board.expire(now);
+        self.check_graph();
+        for place in 0..self.actions.len() {
+            let action = &mut self.actions[place];
+            if action.server.forget(now) {
+                let _ = action.status.publish(&action.server.status(), None);
+            }
+        }
+        self.look_for_servers(now);
+        for place in 0..self.clients.len() {
+            for token in self.clients[place].1.abandoned() {
+                self.replied(place, token, None);
+            }
+        }
+        self.publish_diagnostics(now);
+    }
+
+    fn publish_diagnostics(&mut self, now: Instant) {
+        for subscription in &self.subscriptions {
+            let Subscription {
+                topic,
+                received,
+                lost,
+                ..
+            } = subscription;
+            self.board.set(format!("{topic} received"), *received);
+            self.board.set(format!("{topic} lost"), *lost);
+        }
+        for Publication {
+            topic,
+            sent,
+            unsent,
+            ..
+        } in &self.publications
+        {
+            self.board.set(format!("{topic} sent"), *sent);
+            if *unsent > 0 {
+                self.board.set(format!("{topic} not sent"), *unsent);
+            }
+        }
+        self.last_publication = Some(now);
+        let message = shared(&to_cdr(&self.board.message(clock::host_now())));
+        let _ = self.diagnostics.publish(&message, None);
+    }
+
+    /// Stop reading, say the last things, wait until they have arrived, leave the graph.
+    async fn finish(mut self) {
+        if !self.stopped {
+            let message = format!("not wound down after {} s", PATIENCE.as_secs());
+            self.notice(Diagnostic::new(Level::Error, "stop_forced", message));
+        }
+        if let Timers::Host(Some(timers)) = self.timers {
+            timers.stop();
+            self.timers = Timers::Host(None);
+        }
+        self.publish_diagnostics(now());
+        tracing::info!("stopped");
+        log::close(&self.name);
+        let Self {
+            readers,
+            participant,
+            publications,
+            servers,
+            clients,
+            actions,
+            ..
+        } = self;
+        readers.stop().await;
+        let mut writers: Vec<&Writer> =
+            vec![&self.diagnostics, &self.rosout, &self.parameter_events];
+        writers.extend(publications.iter().map(|publication| &publication.writer));
+        writers.extend(servers.iter().map(|(_, server)| &server.writer));
+        writers.extend(clients.iter().map(|(_, client)| &client.writer));
+        writers.extend(
+            actions
+                .iter()
+                .flat_map(|action| [&action.feedback, &action.status]),
+        );
+        let all = futures::future::join_all(writers.into_iter().map(Writer::acknowledged));
+        let _ = tokio::time::timeout(ACKNOWLEDGEMENT, all).await;
+        if participant.withdraw().is_ok() {
+            let _ = tokio::time::timeout(FAREWELL, participant.graph_acknowledged()).await;
+        }
+    }
+}
+
+/// Bytes of a reply, where one came.
+type Reply<'b> = Option<&'b Bytes>;

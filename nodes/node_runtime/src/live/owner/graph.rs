@@ -1,0 +1,139 @@
+//! Looking at the others on the network: wrong types, impossible QoS, a second node of our name.
+
+use abbe_msgs::{Durability, Qos, Reliability};
+
+use super::Owner;
+use crate::dds::Remote;
+use crate::diagnostic::{Diagnostic, Level};
+use crate::names;
+
+/// Our end of a topic.
+struct End<'o> {
+    topic: &'o str,
+    dds_topic: &'o str,
+    dds_type: &'o str,
+    qos: Qos,
+    is_reader: bool,
+}
+
+impl End<'_> {
+    /// What stands between us and another end of the same topic: its type, its quality of service.
+    fn complaints(&self, other: &Remote) -> (Option<String>, Option<String>) {
+        if other.dds_topic != self.dds_topic {
+            return (None, None);
+        }
+        let topic = self.topic;
+        let shown =
+            |dds_type: &str| names::ros_type(dds_type).unwrap_or_else(|| dds_type.to_owned());
+        // RustDDS matches by topic name alone, so that samples of another type would be decoded.
+        let of_type = (other.dds_type != self.dds_type).then(|| {
+            format!(
+                "{topic}: expected {}, found {}",
+                shown(self.dds_type),
+                shown(&other.dds_type)
+            )
+        });
+        let reliable = self.qos.reliability == Reliability::Reliable;
+        let latched = self.qos.durability == Durability::TransientLocal;
+        let (wants, offers) = if self.is_reader {
+            ((reliable, latched), (other.reliable, other.latched))
+        } else {
+            ((other.reliable, other.latched), (reliable, latched))
+        };
+        let of_qos = match (wants, offers) {
+            ((true, _), (false, _)) => Some("reliable is wanted, best effort offered"),
+            ((_, true), (_, false)) => Some("transient local is wanted, volatile offered"),
+            _ => None,
+        };
+        (
+            of_type,
+            of_qos.map(|complaint| format!("{topic}: {complaint}")),
+        )
+    }
+}
+
+impl Owner {
+    /// Looks once at everybody's endpoints.
+    pub(super) fn check_graph(&mut self) {
+        let (writers, readers) = (self.participant.writers(), self.participant.readers());
+        let subscriptions = self.subscriptions.iter().map(|subscription| End {
+            topic: &subscription.topic,
+            dds_topic: &subscription.dds_topic,
+            dds_type: &subscription.dds_type,
+            qos: subscription.qos,
+            is_reader: true,
+        });
+        let publications = self.publications.iter().map(|publication| End {
+            topic: &publication.topic,
+            dds_topic: &publication.dds_topic,
+            dds_type: &publication.dds_type,
+            qos: publication.qos,
+            is_reader: false,
+        });
+        let (mut of_type, mut of_qos) = (Vec::new(), Vec::new());
+        for end in subscriptions.chain(publications) {
+            for other in if end.is_reader { &writers } else { &readers } {
+                let (wrong_type, wrong_qos) = end.complaints(other);
+                of_type.extend(wrong_type);
+                of_qos.extend(wrong_qos);
+            }
+        }
+        self.complain("type_mismatch", of_type);
+        self.complain("qos_incompatible", of_qos);
+        if self.participant.namesake() {
+            let message = format!("another node is called {}", self.name);
+            self.notice(Diagnostic::new(Level::Error, "second_node", message));
+        }
+    }
+
+    fn complain(&mut self, name: &'static str, mut complaints: Vec<String>) {
+        complaints.sort();
+        complaints.dedup();
+        if !complaints.is_empty() {
+            self.notice(Diagnostic::new(Level::Error, name, complaints.join("; ")));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn complaints_name_topic_expectation_and_finding() {
+        let end = End {
+            topic: "/latency",
+            dds_topic: "rt/latency",
+            dds_type: "abbe_msgs::msg::dds_::ProbeLatency_",
+            qos: Qos::LATCHED,
+            is_reader: true,
+        };
+        let mut other = Remote {
+            guid: [0; 16],
+            dds_topic: "rt/latency".to_owned(),
+            dds_type: end.dds_type.to_owned(),
+            reliable: true,
+            latched: true,
+        };
+        assert_eq!(end.complaints(&other), (None, None));
+        other.latched = false;
+        other.dds_type = "std_msgs::msg::dds_::String_".to_owned();
+        let (of_type, of_qos) = end.complaints(&other);
+        assert_eq!(
+            of_type.unwrap(),
+            "/latency: expected abbe_msgs/msg/ProbeLatency, found std_msgs/msg/String"
+        );
+        assert!(of_qos.unwrap().contains("transient local is wanted"));
+        let offering = End {
+            is_reader: false,
+            ..end
+        };
+        assert_eq!(
+            offering.complaints(&other).1,
+            None,
+            "a volatile reader takes what is latched"
+        );
+        other.dds_topic = "rt/other".to_owned();
+        assert_eq!(offering.complaints(&other), (None, None));
+    }
+}

@@ -1,0 +1,176 @@
+//! Timers: on the computer's clock from a thread of their own, on simulated time from `/clock`.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "a monotonic clock schedules the timers"
+)]
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use metrology::Stamp;
+use metrology::stamp::{Host, Span};
+use tokio::sync::mpsc::Sender;
+
+use super::incoming::Incoming;
+
+/// Timers on the computer's clock. Tokio's own timers are a millisecond coarse, which at a servo's
+/// 1 kHz is a whole period; a thread that parks is some 50 µs late.
+pub(super) struct HostTimers {
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<()>,
+}
+
+impl HostTimers {
+    /// Starts them; `None` when there are none.
+    pub fn start(periods: &[Span], queue: Sender<Incoming>) -> std::io::Result<Option<Self>> {
+        if periods.is_empty() {
+            return Ok(None);
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let periods: Vec<_> = periods.iter().map(|period| duration(*period)).collect();
+        let thread = std::thread::Builder::new()
+            .name("timers".to_owned())
+            .spawn(move || run(&periods, &queue, &stopped))?;
+        Ok(Some(Self { stop, thread }))
+    }
+
+    /// Stops them; the thread ends on its own.
+    pub fn stop(self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.thread().unpark();
+    }
+}
+
+fn duration(period: Span) -> Duration {
+    Duration::from_nanos(u64::try_from(period.nanos()).unwrap_or(0).max(1))
+}
+
+fn run(periods: &[Duration], queue: &Sender<Incoming>, stopped: &AtomicBool) {
+    let start = Instant::now();
+    let mut due: Vec<Instant> = periods.iter().map(|period| start + *period).collect();
+    while !stopped.load(Ordering::Relaxed) {
+        let Some((timer, at)) = due.iter().copied().enumerate().min_by_key(|(_, at)| *at) else {
+            return;
+        };
+        let now = Instant::now();
+        if now < at {
+            std::thread::park_timeout(at - now);
+            continue;
+        }
+        let periods_late = (now - at).as_nanos() / periods[timer].as_nanos();
+        let missed = u32::try_from(periods_late).unwrap_or(u32::MAX);
+        due[timer] = at + periods[timer] * missed.saturating_add(1);
+        if queue
+            .blocking_send(Incoming::Timer {
+                timer,
+                missed: missed.into(),
+            })
+            .is_err()
+        {
+            return;
+        }
+    }
+}
+
+/// Timers on simulated time.
+#[derive(Debug)]
+pub(super) struct SimulatedTimers {
+    periods: Vec<Span>,
+    /// Next instants; `None` before the first `/clock`.
+    due: Option<Vec<Stamp<Host>>>,
+}
+
+/// Ticks that one step of `/clock` may set off; a greater step skips the rest.
+const MOST_TICKS: usize = 100_000;
+
+impl SimulatedTimers {
+    pub fn new(periods: &[Span]) -> Self {
+        Self {
+            periods: periods.to_vec(),
+            due: None,
+        }
+    }
+
+    /// Arms all timers anew from `now`.
+    pub fn arm(&mut self, now: Stamp<Host>) {
+        self.due = Some(self.periods.iter().map(|period| now + *period).collect());
+    }
+
+    /// The next tick up to `now`, in order of time, then of the timers.
+    pub fn next(&mut self, now: Stamp<Host>) -> Option<(Stamp<Host>, usize)> {
+        let due = self.due.as_mut()?;
+        let (timer, at) = due
+            .iter()
+            .copied()
+            .enumerate()
+            .min_by_key(|(timer, at)| (*at, *timer))?;
+        if at > now {
+            return None;
+        }
+        due[timer] = at + self.periods[timer];
+        Some((at, timer))
+    }
+
+    /// Skips what is still due at `now`; the number of ticks skipped.
+    pub fn skip(&mut self, now: Stamp<Host>) -> u64 {
+        let mut skipped = 0;
+        for (due, period) in self.due.iter_mut().flatten().zip(&self.periods) {
+            if *due <= now {
+                let ticks = (now - *due).nanos() / period.nanos().max(1) + 1;
+                *due += Span::from_nanos(ticks * period.nanos());
+                skipped += u64::try_from(ticks).unwrap_or(0);
+            }
+        }
+        skipped
+    }
+
+    pub const fn most_ticks() -> usize {
+        MOST_TICKS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(nanos: i64) -> Stamp<Host> {
+        Stamp::from_nanos(nanos)
+    }
+
+    #[test]
+    fn simulated_ticks_come_in_order_and_only_when_due() {
+        let mut timers = SimulatedTimers::new(&[Span::from_nanos(10), Span::from_nanos(25)]);
+        assert_eq!(timers.next(at(1_000)), None, "not before the first clock");
+        timers.arm(at(100));
+        let ticks: Vec<_> = std::iter::from_fn(|| timers.next(at(130)))
+            .map(|(at, timer)| (at.nanos(), timer))
+            .collect();
+        assert_eq!(ticks, [(110, 0), (120, 0), (125, 1), (130, 0)]);
+        assert_eq!(timers.skip(at(161)), 4);
+        assert_eq!(timers.next(at(170)).unwrap().0, at(170));
+    }
+
+    #[test]
+    fn host_ticks_keep_their_rate() {
+        let (queue, mut ticks) = tokio::sync::mpsc::channel(1_000);
+        let started = Instant::now();
+        let timers = HostTimers::start(&[Span::from_nanos(1_000_000)], queue)
+            .unwrap()
+            .unwrap();
+        let mut periods = 0;
+        while periods < 200 {
+            if let Some(Incoming::Timer { missed, .. }) = ticks.blocking_recv() {
+                periods += 1 + missed;
+            }
+        }
+        let elapsed_ms = started.elapsed().as_secs_f64() * 1e3;
+        timers.stop();
+        assert!(
+            (199.0..260.0).contains(&elapsed_ms),
+            "200 periods of 1 ms took {elapsed_ms} ms"
+        );
+    }
+}

@@ -1,0 +1,143 @@
+//! Log lines to the console and to `/rosout`, from `tracing`.
+//!
+//! A node's owner runs inside a span that carries its name; a line logged there goes out through that
+//! node's `/rosout` writer. Lines of RustDDS and ros2-client reach the console only, and only errors:
+//! at `warn` they flood.
+
+use std::collections::BTreeMap;
+use std::fmt::{self, Write as _};
+use std::io::IsTerminal as _;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use abbe_msgs::rcl_interfaces::msg::Log;
+use abbe_msgs::to_cdr;
+use tracing::field::{Field, Visit};
+use tracing::span::Attributes;
+use tracing::{Event, Id, Level, Subscriber};
+use tracing_subscriber::layer::{Context, SubscriberExt as _};
+use tracing_subscriber::registry::LookupSpan;
+use tracing_subscriber::util::SubscriberInitExt as _;
+use tracing_subscriber::{EnvFilter, Layer};
+
+use crate::arguments::Arguments;
+use crate::clock;
+use crate::dds::Writer;
+
+static ROSOUT: Mutex<BTreeMap<String, Arc<Writer>>> = Mutex::new(BTreeMap::new());
+
+fn writers() -> MutexGuard<'static, BTreeMap<String, Arc<Writer>>> {
+    ROSOUT.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Lets the node of this fully qualified name speak on `/rosout`.
+pub(crate) fn open(node: &str, writer: Arc<Writer>) {
+    writers().insert(node.to_owned(), writer);
+}
+
+/// Ends that.
+pub(crate) fn close(node: &str) {
+    writers().remove(node);
+}
+
+/// Starts logging for the process, unless the program has its own already.
+pub(crate) fn start(arguments: &[&Arguments], log_filter: Option<&str>) {
+    let levels = arguments.iter().flat_map(|arguments| &arguments.log_levels);
+    let level = levels
+        .last()
+        .map_or("info", |(_, level)| match level.as_str() {
+            "fatal" => "error",
+            level => level,
+        });
+    let default = format!("{level},rustdds=error,ros2_client=error");
+    let filter = log_filter
+        .and_then(|directives| EnvFilter::try_new(directives).ok())
+        .unwrap_or_else(|| EnvFilter::new(default));
+    let console = tracing_subscriber::fmt::layer()
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_target(false);
+    // A program that composes nodes may have a subscriber of its own: its lines are its affair then.
+    let _ = tracing_subscriber::registry()
+        .with(filter)
+        .with(console)
+        .with(Rosout)
+        .try_init();
+}
+
+struct Rosout;
+
+/// The node that a span belongs to.
+struct NodeName(String);
+
+#[derive(Default)]
+struct Fields {
+    node: Option<String>,
+    message: String,
+    others: String,
+}
+
+impl Visit for Fields {
+    fn record_str(&mut self, field: &Field, value: &str) {
+        match field.name() {
+            "node" => self.node = Some(value.to_owned()),
+            "message" => value.clone_into(&mut self.message),
+            name => {
+                let _ = write!(self.others, " {name}={value}");
+            }
+        }
+    }
+
+    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+        self.record_str(field, &format!("{value:?}"));
+    }
+}
+
+impl<S> Layer<S> for Rosout
+where
+    S: Subscriber + for<'lookup> LookupSpan<'lookup>,
+{
+    fn on_new_span(&self, attributes: &Attributes<'_>, id: &Id, context: Context<'_, S>) {
+        let mut fields = Fields::default();
+        attributes.record(&mut fields);
+        if let (Some(node), Some(span)) = (fields.node, context.span(id)) {
+            span.extensions_mut().insert(NodeName(node));
+        }
+    }
+
+    fn on_event(&self, event: &Event<'_>, context: Context<'_, S>) {
+        let node = context.event_scope(event).and_then(|scope| {
+            scope.into_iter().find_map(|span| {
+                span.extensions()
+                    .get::<NodeName>()
+                    .map(|name| name.0.clone())
+            })
+        });
+        let Some(node) = node else { return };
+        let Some(writer) = writers().get(&node).cloned() else {
+            return;
+        };
+        let mut fields = Fields::default();
+        event.record(&mut fields);
+        let metadata = event.metadata();
+        let message = Log {
+            stamp: clock::ros_time(clock::host_now()),
+            level: severity(*metadata.level()),
+            name: node.trim_start_matches('/').replace('/', "."),
+            msg: fields.message + &fields.others,
+            file: metadata.file().unwrap_or_default().to_owned(),
+            function: String::new(),
+            line: metadata.line().unwrap_or(0),
+        };
+        // A line that finds no room is on the console all the same.
+        let _ = writer.publish(&Arc::from(to_cdr(&message)), None);
+    }
+}
+
+const fn severity(level: Level) -> u8 {
+    match level {
+        Level::TRACE | Level::DEBUG => Log::DEBUG,
+        Level::INFO => Log::INFO,
+        Level::WARN => Log::WARN,
+        Level::ERROR => Log::ERROR,
+    }
+}

@@ -1,0 +1,136 @@
+use std::fs;
+
+use serde::Deserialize;
+
+use super::*;
+
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    rate_hz: f64,
+    machine_file: String,
+    #[serde(default = "five")]
+    count: u32,
+}
+
+const fn five() -> u32 {
+    5
+}
+
+const DOCS: [ParameterDoc; 2] = [
+    ParameterDoc {
+        name: "rate_hz",
+        unit: "Hz",
+        description: "How often.",
+        range: Some((1.0, 100.0)),
+    },
+    ParameterDoc {
+        name: "count",
+        unit: "",
+        description: "How many.",
+        range: None,
+    },
+];
+
+fn setup(yaml: &str, more: &[&str]) -> (tempfile::TempDir, Result<Setup, SetupError>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("probe.yaml");
+    fs::write(&path, yaml).unwrap();
+    fs::write(folder.path().join("machine.yaml"), "name: m").unwrap();
+    let mut arguments = vec!["--ros-args", "--params-file", path.to_str().unwrap()];
+    arguments.extend(more);
+    let arguments = Arguments::parse(arguments.iter().map(|a| (*a).to_owned())).unwrap();
+    let setup = Setup::new("probe", &arguments);
+    (folder, setup)
+}
+
+const GOOD: &str = "/**:\n  ros__parameters:\n    rate_hz: 10.0\n    machine_file: machine.yaml\n    use_sim_time: true\n";
+
+#[test]
+fn file_and_command_line_make_one_configuration() {
+    let (folder, setup) = setup(GOOD, &["-p", "rate_hz:=20.0", "-r", "__node:=bed"]);
+    let setup = setup.unwrap();
+    let config: Config = setup.config().unwrap();
+    assert_eq!((config.rate_hz, config.count), (20.0, 5));
+    assert!(setup.use_sim_time());
+    assert_eq!(setup.name(), "bed");
+    let (path, text) = setup.file_text("machine_file").unwrap();
+    assert_eq!(
+        (path, text.as_str()),
+        (folder.path().join("machine.yaml"), "name: m")
+    );
+    let served = setup.resolved(&config, &DOCS).unwrap();
+    let names: Vec<_> = served.iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(names, ["count", "machine_file", "rate_hz", "use_sim_time"]);
+    assert_eq!(served[0].value, Value::Integer(5));
+    assert_eq!(served[2].value, Value::Double(20.0));
+    assert_eq!(served[2].description, "How often. [Hz]");
+}
+
+#[test]
+fn a_parameter_that_the_node_does_not_know_is_refused_with_file_and_key() {
+    let (_folder, setup) = setup(
+        "probe:\n  ros__parameters: {rate_hz: 1.0, machine_file: m, rat_hz: 2.0}",
+        &[],
+    );
+    let error = setup.unwrap().config::<Config>().unwrap_err().to_string();
+    assert!(error.contains("probe.yaml"), "{error}");
+    assert!(error.contains("`rat_hz` = 2.0"), "{error}");
+}
+
+#[test]
+fn an_integer_is_no_double_and_the_error_says_who_said_so() {
+    let (_folder, setup) = setup(GOOD, &["-p", "rate_hz:=3"]);
+    let error = setup.unwrap().config::<Config>().unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "command line: parameter `rate_hz` = 3: expected a double, got the integer 3: write 3.0"
+    );
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let (_folder, setup) = setup("/**:\n  ros__parameters: {rate_hz: 1.0}", &[]);
+    let setup = setup.unwrap();
+    assert!(
+        setup
+            .config::<Config>()
+            .unwrap_err()
+            .to_string()
+            .contains("machine_file")
+    );
+    assert!(
+        setup
+            .file_text("machine_file")
+            .unwrap_err()
+            .to_string()
+            .contains("machine_file")
+    );
+}
+
+#[test]
+fn a_value_outside_of_its_range_or_of_a_wrong_kind_is_refused() {
+    let (_folder, setup) = setup(GOOD, &["-p", "rate_hz:=1000.0", "-p", "mixed:=[1, a]"]);
+    let setup = setup.unwrap();
+    let error = setup.parameters(&DOCS).unwrap_err().to_string();
+    assert!(
+        error.contains("`mixed`") && error.contains("one type"),
+        "{error}"
+    );
+    let mut lone = setup.clone();
+    lone.parameters.remove("mixed");
+    let error = lone.parameters(&DOCS).unwrap_err().to_string();
+    assert!(
+        error.contains("`rate_hz` = 1000.0: must be 1 to 100"),
+        "{error}"
+    );
+    let (_folder, bad) = self::setup(GOOD, &["-p", "use_sim_time:=1"]);
+    assert!(bad.unwrap_err().to_string().contains("use_sim_time"));
+}
+
+#[test]
+fn an_absent_parameter_file_is_named() {
+    let arguments = ["--ros-args", "--params-file", "nowhere.yaml"].map(str::to_owned);
+    let error = Setup::new("probe", &Arguments::parse(arguments).unwrap()).unwrap_err();
+    assert!(error.to_string().contains("nowhere.yaml"));
+}

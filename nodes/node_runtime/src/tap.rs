@@ -1,0 +1,471 @@
+//! Every topic of the network, serialised: what a recorder listens to, and what a replay speaks on.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use abbe_msgs::{Durability, Qos, Reliability};
+use anyhow::Context as _;
+use metrology::Stamp;
+use metrology::stamp::Host;
+use tokio::runtime::Runtime;
+use tokio::sync::{mpsc, oneshot};
+use tokio::task::JoinHandle;
+use tokio::time::Instant;
+
+use crate::clock;
+use crate::dds::{Participant, Reader, Remote, Writer};
+use crate::environment::Environment;
+use crate::live::incoming::GapCounter;
+use crate::names::{self, NodeNames};
+use crate::node::{Bytes, TopicPort};
+
+/// A topic that was found on the network.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TappedTopic {
+    /// Absolute name.
+    pub name: String,
+    /// Type, e.g. `abbe_msgs/msg/AxisState`.
+    pub type_name: String,
+    /// What its writers offer; the depth is the tap's own.
+    pub qos: Qos,
+}
+
+/// A sample as the tap saw it.
+#[derive(Clone, Debug)]
+pub struct Tapped {
+    /// Which topic.
+    pub topic: Arc<TappedTopic>,
+    /// When its writer sent it, by the writer's clock.
+    pub source: Option<Stamp<Host>>,
+    /// When it was received.
+    pub received: Stamp<Host>,
+    /// Counts the writer's samples from 1.
+    pub sequence: i64,
+    /// Samples of this writer that never came between this one and the one before.
+    pub lost: u64,
+    /// Encapsulation header and CDR.
+    pub bytes: Bytes,
+}
+
+/// What a tap tells.
+#[derive(Clone, Debug)]
+pub enum TapEvent {
+    /// A topic was found, and is listened to from now on.
+    Found(Arc<TappedTopic>),
+    /// A topic has writers of several types; it is listened to as the first that was found.
+    TypesDiffer {
+        /// Which.
+        topic: Arc<TappedTopic>,
+        /// The other type.
+        found: String,
+    },
+    /// A sample came.
+    Sample(Tapped),
+    /// A sample is no plain CDR.
+    Unreadable {
+        /// Which topic.
+        topic: Arc<TappedTopic>,
+        /// Why.
+        reason: String,
+    },
+}
+
+/// Which topics a tap listens to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Selection {
+    /// All but the tap's own.
+    All,
+    /// Those whose absolute names fit one of the patterns; `*` is any run of characters.
+    Matching(Vec<String>),
+}
+
+impl Selection {
+    /// Whether a topic is selected.
+    #[must_use]
+    pub fn takes(&self, topic: &str) -> bool {
+        match self {
+            Self::All => true,
+            Self::Matching(patterns) => patterns.iter().any(|pattern| fits(pattern, topic)),
+        }
+    }
+}
+
+fn fits(pattern: &str, text: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == text,
+        Some((before, after)) => text.strip_prefix(before).is_some_and(|rest| {
+            rest.char_indices()
+                .map(|(at, _)| at)
+                .chain([rest.len()])
+                .any(|at| fits(after, &rest[at..]))
+        }),
+    }
+}
+
+/// Samples that wait in a reader while the callback is slow: 20 s at 1 kHz.
+const DEPTH: u32 = 20_000;
+/// Samples between the readers and the callback.
+const QUEUE_LEN: usize = 4_096;
+/// Between looks for new topics.
+const LOOK: Duration = Duration::from_millis(100);
+/// Between tries to find room in a full queue.
+const RETRY: Duration = Duration::from_micros(200);
+/// How long what was sent before the end may take to arrive.
+const ACKNOWLEDGEMENT: Duration = Duration::from_secs(1);
+
+fn runtime() -> anyhow::Result<Runtime> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .thread_name("tap")
+        .enable_all()
+        .build()
+        .context("tokio runtime")
+}
+
+/// Listens to the network.
+pub struct RawTap {
+    runtime: Runtime,
+    stop: oneshot::Sender<()>,
+    looking: JoinHandle<Participant>,
+    handing: JoinHandle<()>,
+}
+
+impl RawTap {
+    /// Joins the network as the node `names` and hands everything to `take`, which is called from one
+    /// thread and in the order of arrival.
+    ///
+    /// # Errors
+    /// When there is no network.
+    pub fn start(
+        environment: &Environment,
+        names: &NodeNames,
+        selection: Selection,
+        mut take: impl FnMut(TapEvent) + Send + 'static,
+    ) -> anyhow::Result<Self> {
+        let runtime = runtime()?;
+        let (participant, warning) = Participant::join(environment, names)?;
+        if let Some(warning) = warning {
+            tracing::warn!("{warning}");
+        }
+        participant.announce()?;
+        let (queue, mut events) = mpsc::channel(QUEUE_LEN);
+        let (stop, stopped) = oneshot::channel();
+        let looking = runtime.spawn(look(participant, selection, queue, stopped));
+        // Writing a bag blocks, so it has a thread on which that is allowed.
+        let handing = runtime.spawn_blocking(move || {
+            while let Some(event) = events.blocking_recv() {
+                take(event);
+            }
+        });
+        Ok(Self {
+            runtime,
+            stop,
+            looking,
+            handing,
+        })
+    }
+
+    /// Stops listening, hands over what has arrived, and leaves the network.
+    ///
+    /// # Errors
+    /// When the callback panicked.
+    pub fn stop(self) -> anyhow::Result<()> {
+        let _ = self.stop.send(());
+        self.runtime.block_on(async {
+            let participant = self.looking.await.context("tap")?;
+            self.handing.await.context("callback of the tap")?;
+            let _ = participant.withdraw();
+            let _ = tokio::time::timeout(ACKNOWLEDGEMENT, participant.graph_acknowledged()).await;
+            Ok(())
+        })
+    }
+}
+
+async fn look(
+    participant: Participant,
+    selection: Selection,
+    queue: mpsc::Sender<TapEvent>,
+    mut stopped: oneshot::Receiver<()>,
+) -> Participant {
+    let mut found: BTreeMap<String, (Arc<TappedTopic>, Vec<String>)> = BTreeMap::new();
+    let mut readers = tokio::task::JoinSet::new();
+    loop {
+        for (name, writers) in offered(&participant.writers(), &selection) {
+            let Some(first) = writers.first() else {
+                continue;
+            };
+            if !found.contains_key(&name) {
+                let qos = common_qos(&writers);
+                let Ok(reader) = participant.reader(&first.dds_topic, &first.dds_type, qos) else {
+                    continue;
+                };
+                let type_name =
+                    names::ros_type(&first.dds_type).unwrap_or_else(|| first.dds_type.clone());
+                let topic = Arc::new(TappedTopic {
+                    name: name.clone(),
+                    type_name,
+                    qos,
+                });
+                let _ = participant.announce();
+                if queue
+                    .send(TapEvent::Found(Arc::clone(&topic)))
+                    .await
+                    .is_err()
+                {
+                    return participant;
+                }
+                readers.spawn(read(reader, Arc::clone(&topic), queue.clone()));
+                found.insert(name.clone(), (topic, vec![first.dds_type.clone()]));
+            }
+            let Some((topic, types)) = found.get_mut(&name) else {
+                continue;
+            };
+            for writer in writers {
+                if !types.contains(&writer.dds_type) {
+                    types.push(writer.dds_type.clone());
+                    let (topic, found) = (Arc::clone(topic), writer.dds_type.clone());
+                    let _ = queue.send(TapEvent::TypesDiffer { topic, found }).await;
+                }
+            }
+        }
+        tokio::select! {
+            _ = &mut stopped => break,
+            () = tokio::time::sleep(LOOK) => {}
+        }
+    }
+    readers.shutdown().await;
+    participant
+}
+
+/// Selected topics of messages with their writers.
+fn offered<'w>(writers: &'w [Remote], selection: &Selection) -> BTreeMap<String, Vec<&'w Remote>> {
+    let mut offered: BTreeMap<String, Vec<&Remote>> = BTreeMap::new();
+    for writer in writers {
+        if let Some(name) = names::ros_topic(&writer.dds_topic)
+            && selection.takes(name)
+        {
+            offered.entry(name.to_owned()).or_default().push(writer);
+        }
+    }
+    offered
+}
+
+/// The strongest quality of service that every writer offers.
+fn common_qos(writers: &[&Remote]) -> Qos {
+    let all =
+        |offers: fn(&&&Remote) -> bool| writers.iter().filter(offers).count() == writers.len();
+    Qos {
+        reliability: if all(|writer| writer.reliable) {
+            Reliability::Reliable
+        } else {
+            Reliability::BestEffort
+        },
+        durability: if all(|writer| writer.latched) {
+            Durability::TransientLocal
+        } else {
+            Durability::Volatile
+        },
+        depth: DEPTH,
+    }
+}
+
+async fn read(reader: Reader, topic: Arc<TappedTopic>, queue: mpsc::Sender<TapEvent>) {
+    let mut gaps = GapCounter::default();
+    loop {
+        let topic = Arc::clone(&topic);
+        let event = match reader.next().await {
+            Ok(sample) => TapEvent::Sample(Tapped {
+                topic,
+                source: sample.source,
+                received: sample.received,
+                sequence: sample.sequence,
+                lost: gaps.count(sample.writer, sample.sequence),
+                bytes: sample.bytes,
+            }),
+            Err(reason) => TapEvent::Unreadable { topic, reason },
+        };
+        if queue.send(event).await.is_err() {
+            return;
+        }
+    }
+}
+
+/// A sample on its way out.
+struct Outgoing {
+    place: usize,
+    source: Option<Stamp<Host>>,
+    bytes: Bytes,
+}
+
+/// Speaks on topics from any thread: the mirror of a run in one process, and a replay.
+///
+/// A slow network never holds the caller: what finds no room in the queue within the stated time is
+/// dropped and counted.
+pub struct RawPublisher {
+    runtime: Runtime,
+    queue: mpsc::Sender<Outgoing>,
+    publishing: JoinHandle<(Participant, Vec<Writer>, u64)>,
+    patience: Duration,
+    dropped: u64,
+}
+
+/// What became of the samples given to a [`RawPublisher`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PublishReport {
+    /// Found no room in the queue in time.
+    pub dropped: u64,
+    /// Were refused by the network: too many unacknowledged, or no little-endian CDR.
+    pub refused: u64,
+}
+
+impl RawPublisher {
+    /// Joins the network as the node `names` with one writer for each of `topics`; `patience` is the
+    /// longest that [`Self::publish`] waits.
+    ///
+    /// # Errors
+    /// When there is no network, or a topic's name breaks the rules of ROS.
+    pub fn start(
+        environment: &Environment,
+        names: &NodeNames,
+        topics: &[TopicPort],
+        queue_len: usize,
+        patience: Duration,
+    ) -> anyhow::Result<Self> {
+        let runtime = runtime()?;
+        let (participant, warning) = Participant::join(environment, names)?;
+        if let Some(warning) = warning {
+            tracing::warn!("{warning}");
+        }
+        let mut writers = Vec::with_capacity(topics.len());
+        for port in topics {
+            let dds_topic = names::dds_topic(&names.resolve(&port.topic)?);
+            let dds_type = names::dds_type(port.type_name);
+            writers.push(participant.writer(&dds_topic, &dds_type, port.qos)?);
+        }
+        participant.announce()?;
+        let (queue, mut outgoing) = mpsc::channel::<Outgoing>(queue_len.max(1));
+        let publishing = runtime.spawn(async move {
+            let mut refused = 0;
+            while let Some(Outgoing {
+                place,
+                source,
+                bytes,
+            }) = outgoing.recv().await
+            {
+                let sent = writers
+                    .get(place)
+                    .map(|writer| writer.publish(&bytes, source));
+                refused += u64::from(!matches!(sent, Some(Ok(()))));
+            }
+            (participant, writers, refused)
+        });
+        Ok(Self {
+            runtime,
+            queue,
+            publishing,
+            patience,
+            dropped: 0,
+        })
+    }
+
+    /// Publishes on the topic at `place`; `source` is the sample's own time, else the present. False
+    /// when it was dropped.
+    pub fn publish(&mut self, place: usize, source: Option<Stamp<Host>>, bytes: Bytes) -> bool {
+        let outgoing = Outgoing {
+            place,
+            source,
+            bytes,
+        };
+        let taken = match self.queue.try_send(outgoing) {
+            Ok(()) => true,
+            Err(mpsc::error::TrySendError::Closed(_)) => false,
+            Err(mpsc::error::TrySendError::Full(outgoing)) => {
+                !self.patience.is_zero() && self.wait(outgoing)
+            }
+        };
+        self.dropped += u64::from(!taken);
+        taken
+    }
+
+    /// Waits in the caller's thread, which may be one of another tokio runtime.
+    fn wait(&self, mut outgoing: Outgoing) -> bool {
+        let deadline = Instant::now() + self.patience;
+        while Instant::now() < deadline {
+            std::thread::park_timeout(RETRY);
+            match self.queue.try_send(outgoing) {
+                Ok(()) => return true,
+                Err(mpsc::error::TrySendError::Full(back)) => outgoing = back,
+                Err(mpsc::error::TrySendError::Closed(_)) => return false,
+            }
+        }
+        false
+    }
+
+    /// The time now, as samples are stamped.
+    #[must_use]
+    pub fn now() -> Stamp<Host> {
+        clock::host_now()
+    }
+
+    /// Sends what is left, waits until it has arrived, and leaves the network.
+    ///
+    /// # Errors
+    /// When the publishing thread panicked.
+    pub fn stop(self) -> anyhow::Result<PublishReport> {
+        drop(self.queue);
+        self.runtime.block_on(async {
+            let (participant, writers, refused) = self.publishing.await.context("publisher")?;
+            let all = futures::future::join_all(writers.iter().map(Writer::acknowledged));
+            let _ = tokio::time::timeout(ACKNOWLEDGEMENT, all).await;
+            let _ = participant.withdraw();
+            let _ = tokio::time::timeout(ACKNOWLEDGEMENT, participant.graph_acknowledged()).await;
+            Ok(PublishReport {
+                dropped: self.dropped,
+                refused,
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns_select_by_absolute_name() {
+        let some = Selection::Matching(vec!["/axes/*".to_owned(), "*state".to_owned()]);
+        for (topic, taken) in [
+            ("/axes/state", true),
+            ("/axes/", true),
+            ("/cell/axes/state", true),
+            ("/cell/axes/x", false),
+            ("/latency", false),
+        ] {
+            assert_eq!(some.takes(topic), taken, "{topic}");
+        }
+        assert!(Selection::All.takes("/anything"));
+    }
+
+    #[test]
+    fn a_tap_asks_for_what_every_writer_offers() {
+        let writer = |reliable, latched| Remote {
+            guid: [0; 16],
+            dds_topic: "rt/x".to_owned(),
+            dds_type: "t".to_owned(),
+            reliable,
+            latched,
+        };
+        let (strong, weak) = (writer(true, true), writer(false, false));
+        assert_eq!(
+            common_qos(&[&strong, &strong]),
+            Qos {
+                depth: DEPTH,
+                ..Qos::LATCHED
+            }
+        );
+        let both = common_qos(&[&strong, &weak]);
+        let expected = (Reliability::BestEffort, Durability::Volatile);
+        assert_eq!((both.reliability, both.durability), expected);
+    }
+}

@@ -1,0 +1,217 @@
+//! Nodes as programs: arguments, parameters, signals, exit codes.
+
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use abbe_msgs::std_msgs::msg::Int64;
+use abbe_msgs::{Qos, from_cdr, to_cdr};
+use metrology::stamp::Span;
+use node_runtime::environment::Environment;
+use node_runtime::node::Ports;
+use node_runtime::{Emission, Event, Running};
+
+use super::puppet::{Puppet, environment, start, topic, wait};
+
+fn relay(environment: &Environment, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_relay"));
+    command
+        .args(arguments)
+        .env("ROS_DOMAIN_ID", environment.domain_id.to_string())
+        .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        .env_remove("ROS_LOCALHOST_ONLY")
+        .env_remove("RUST_LOG")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// Ends its process whatever happens to the test.
+struct Process(Option<Child>);
+
+impl Process {
+    fn start(environment: &Environment, arguments: &[&str]) -> Self {
+        Self(Some(relay(environment, arguments).spawn().unwrap()))
+    }
+
+    fn signal(&self, signal: &str) {
+        let id = self.0.as_ref().unwrap().id().to_string();
+        assert!(
+            Command::new("kill")
+                .args([signal, &id])
+                .status()
+                .unwrap()
+                .success()
+        );
+    }
+
+    fn output(mut self) -> Output {
+        self.0.take().unwrap().wait_with_output().unwrap()
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        if let Some(mut child) = self.0.take() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+fn now_nanos() -> i64 {
+    i64::try_from(
+        SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .unwrap()
+            .as_nanos(),
+    )
+    .unwrap()
+}
+
+/// Sends the time on `/in` at `period_us` and hands on what comes back on `/out` with its time.
+fn pinger(environment: &Environment, period_us: i64) -> (Running, Receiver<(i64, i64)>) {
+    let (sender, received) = channel();
+    let ports = Ports {
+        subscriptions: vec![topic::<Int64>("/out", Qos::RELIABLE_DEEP)],
+        publications: vec![topic::<Int64>("/in", Qos::RELIABLE_DEEP)],
+        timers: vec![Span::from_nanos(period_us * 1_000)],
+        ..Ports::default()
+    };
+    let puppet = Puppet::new("pinger", ports, move |_, event, out| {
+        match event {
+            Event::Message { bytes, .. } => {
+                let message: Int64 = from_cdr(bytes).unwrap();
+                let _ = sender.send((message.data, now_nanos()));
+            }
+            Event::Timer { .. } => {
+                let bytes = Arc::from(to_cdr(&Int64 { data: now_nanos() }));
+                out.push(Emission::Publish {
+                    publication: 0,
+                    bytes,
+                });
+            }
+            _ => {}
+        }
+        Ok(())
+    });
+    (start(environment, puppet), received)
+}
+
+#[test]
+fn a_program_relays_between_processes_at_1_khz_and_stops_at_sigint_within_2_s() {
+    let environment = environment(10);
+    let process = Process::start(&environment, &[]);
+    let (pinging, received) = pinger(&environment, 1_000);
+    wait(&received, "the first echo", Some);
+    let mut round_trips_us: Vec<_> = (0..2_000)
+        .map(|_| {
+            wait(&received, "an echo", |(sent, came)| {
+                Some((came - sent) / 1_000)
+            })
+        })
+        .collect();
+    round_trips_us.sort_unstable();
+    let at = |share: usize| round_trips_us[share * round_trips_us.len() / 1_000];
+    eprintln!(
+        "round trip, 1 kHz: p50 {} us, p99 {} us, p99.9 {} us",
+        at(500),
+        at(990),
+        at(999)
+    );
+    process.signal("-INT");
+    let asked = Instant::now();
+    let output = process.output();
+    assert!(
+        asked.elapsed() < Duration::from_secs(2),
+        "stopped after {:?}",
+        asked.elapsed()
+    );
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    pinging.stop().unwrap();
+}
+
+#[test]
+fn arguments_rename_place_and_parametrise_a_program() {
+    let environment = environment(11);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("relay.yaml");
+    std::fs::write(&file, "/cell/adder:\n  ros__parameters:\n    offset: 7\n").unwrap();
+    let arguments = [
+        "--ros-args",
+        "-r",
+        "__node:=adder",
+        "-r",
+        "__ns:=/cell",
+        "-r",
+        "in:=/in",
+        "-r",
+        "/cell/out:=/out",
+        "--params-file",
+        file.to_str().unwrap(),
+        "--log-level",
+        "warn",
+    ];
+    let process = Process::start(&environment, &arguments);
+    let (pinging, received) = pinger(&environment, 20_000);
+    let (first, _) = wait(&received, "an echo", Some);
+    let (second, _) = wait(&received, "an echo", Some);
+    assert!(second > first);
+    pinging.stop().unwrap();
+    process.signal("-TERM");
+    assert_eq!(process.output().status.code(), Some(0));
+}
+
+#[test]
+fn bad_arguments_and_parameters_are_refused_with_their_names() {
+    let environment = environment(12);
+    for (arguments, code, named) in [
+        (&["--fast"][..], 2, "--fast"),
+        (&["--ros-args", "-r", "in"], 2, "`in`"),
+        (&["--ros-args", "-p", "offset:=1.5"], 1, "`offset` = 1.5"),
+        (
+            &["--ros-args", "-p", "ofset:=1"],
+            1,
+            "`ofset` = 1: unknown field",
+        ),
+        (
+            &["--ros-args", "--params-file", "/nowhere.yaml"],
+            1,
+            "/nowhere.yaml",
+        ),
+        (&["--ros-args", "-r", "__node:=1st"], 2, "1st"),
+    ] {
+        let output = relay(&environment, arguments).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
+        assert!(said.contains(named), "{arguments:?}: {said}");
+    }
+    let output = relay(&environment, &[])
+        .env("ROS_DOMAIN_ID", "many")
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("ROS_DOMAIN_ID=many"));
+}
+
+#[test]
+fn a_second_program_of_the_same_name_does_not_start() {
+    let environment = environment(13);
+    let first = Process::start(&environment, &[]);
+    let (pinging, received) = pinger(&environment, 20_000);
+    wait(&received, "the first program", Some);
+    let output = relay(&environment, &[]).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("node /relay is already running"), "{said}");
+    wait(&received, "the first program, still there", Some);
+    pinging.stop().unwrap();
+    first.signal("-INT");
+    assert_eq!(first.output().status.code(), Some(0));
+}

@@ -1,0 +1,126 @@
+//! A node made of a closure, and the network that tests run it on.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+use metrology::Stamp;
+use metrology::stamp::Host;
+use node_runtime::arguments::Arguments;
+use node_runtime::environment::{DiscoveryRange, Environment};
+use node_runtime::node::{Ports, ServicePort, TopicPort};
+use node_runtime::parameter::Parameter;
+use node_runtime::{Emission, Event, Node, NodeFault, Running, Setup, launch};
+
+use abbe_msgs::{Message, Qos};
+
+type Handle = dyn FnMut(Stamp<Host>, Event<'_>, &mut Vec<Emission>) -> Result<(), String> + Send;
+
+/// A node that does what its closure says and stops when asked.
+pub struct Puppet {
+    pub name: String,
+    pub ports: Ports,
+    pub parameters: Vec<Parameter>,
+    pub handle: Box<Handle>,
+}
+
+impl Puppet {
+    pub fn new(
+        name: &str,
+        ports: Ports,
+        handle: impl FnMut(Stamp<Host>, Event<'_>, &mut Vec<Emission>) -> Result<(), String>
+        + Send
+        + 'static,
+    ) -> Self {
+        let handle = Box::new(handle);
+        Self {
+            name: name.to_owned(),
+            ports,
+            parameters: Vec::new(),
+            handle,
+        }
+    }
+}
+
+impl Node for Puppet {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn ports(&self) -> &Ports {
+        &self.ports
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn handle(
+        &mut self,
+        at: Stamp<Host>,
+        event: Event<'_>,
+        out: &mut Vec<Emission>,
+    ) -> Result<(), NodeFault> {
+        if matches!(event, Event::Shutdown) {
+            out.push(Emission::Stopped);
+        }
+        (self.handle)(at, event, out).map_err(|reason| NodeFault {
+            node: self.name.clone(),
+            port: "test".to_owned(),
+            reason,
+        })
+    }
+}
+
+/// A network of its own for one test; other processes of this test program get others.
+pub fn environment(test: u16) -> Environment {
+    let process = u16::try_from(std::process::id() % 7).unwrap();
+    Environment {
+        domain_id: 10 + process * 30 + test,
+        range: DiscoveryRange::Localhost,
+        log_filter: None,
+    }
+}
+
+pub fn start_with(environment: &Environment, puppet: Puppet, arguments: &[&str]) -> Running {
+    let arguments = Arguments::parse(arguments.iter().map(|a| (*a).to_owned())).unwrap();
+    let setup = Setup::new(&puppet.name, &arguments).unwrap();
+    launch(environment, vec![(setup, Box::new(puppet))]).unwrap()
+}
+
+pub fn start(environment: &Environment, puppet: Puppet) -> Running {
+    start_with(environment, puppet, &[])
+}
+
+pub fn topic<M: Message>(name: &str, qos: Qos) -> TopicPort {
+    TopicPort {
+        topic: name.to_owned(),
+        type_name: M::TYPE_NAME,
+        type_hash: M::TYPE_HASH,
+        definition: M::DEFINITION,
+        qos,
+    }
+}
+
+pub fn service(name: &str, type_name: &'static str) -> ServicePort {
+    ServicePort {
+        service: name.to_owned(),
+        type_name,
+    }
+}
+
+/// Waits for something of which the closure makes a value.
+pub fn wait<T, U>(received: &Receiver<T>, what: &str, mut pick: impl FnMut(T) -> Option<U>) -> U {
+    let deadline = Instant::now() + Duration::from_secs(10);
+    loop {
+        let left = deadline.saturating_duration_since(Instant::now());
+        match received.recv_timeout(left) {
+            Ok(item) => {
+                if let Some(picked) = pick(item) {
+                    return picked;
+                }
+            }
+            Err(RecvTimeoutError::Timeout) => panic!("{what} did not come within 10 s"),
+            Err(RecvTimeoutError::Disconnected) => panic!("the node ended before {what} came"),
+        }
+    }
+}
