@@ -25,7 +25,7 @@
 //! lubrication state, dependence on temperature.
 //!
 //! # References
-//! [1] F. Al-Bender, V. Lampaert, J. Swevers, IEEE Trans. Autom. Control 50(11), 2005, doi:10.1109/TAC.2005.858676.
+//! [1] F. Al-Bender, V. Lampaert, J. Swevers, IEEE Trans. Autom. Control 50(11), 2005, doi:10.1109/TAC.2005.858676 (from memory).
 
 const ELEMENTS: usize = 4;
 const SHARE: [f64; ELEMENTS] = [0.3, 0.3, 0.2, 0.2];
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn val_virgin_curve_stiffens_as_al_bender_2005() {
+    fn eq3_virgin_curve_starts_stiff_and_breaks_away_at_the_presliding_distance() {
         let mut contact = contact();
         let first = (contact.step(1e-6, 1e-3) - 0.5 * 1e-3) / 1e-6;
         let expected = 150.0 / 0.008 * (0.3 / 0.125 + 0.3 / 0.25 + 0.2 / 0.5 + 0.2);
