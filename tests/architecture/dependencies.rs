@@ -1,0 +1,155 @@
+//! Who may depend on whom.
+
+use crate::check;
+use crate::packages::{self, Package};
+use crate::tree::{self, PURE};
+
+/// What speaks ROS.
+const ROS: [&str; 2] = ["ros2-client", "rustdds"];
+
+/// What a pure crate never reaches: ROS, its wire, runtimes, logs and clocks.
+const IMPURE: [&str; 11] = [
+    "ros2-client",
+    "rustdds",
+    "abbe_msgs",
+    "node_runtime",
+    "tokio",
+    "tracing",
+    "tracing-subscriber",
+    "log",
+    "nix",
+    "chrono",
+    "mcap",
+];
+
+/// What nodes share.
+const VOCABULARY: [&str; 2] = ["metrology", "machine"];
+
+/// Who composes nodes.
+const COMPOSERS: [&str; 2] = ["abbe", "abbe_tests"];
+
+fn speaks_ros(members: &[Package]) -> Vec<String> {
+    let mut found = Vec::new();
+    for member in members
+        .iter()
+        .filter(|member| member.name != "node_runtime")
+    {
+        for dependency in &member.dependencies {
+            if ROS.contains(&dependency.name.as_str()) {
+                found.push(format!(
+                    "{}: depends on {}: only node_runtime may",
+                    member.folder(),
+                    dependency.name
+                ));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn arch_node_runtime_alone_depends_on_ros() {
+    let members = packages::members();
+    check(&speaks_ros(&members));
+    let bad = [packages::example("nodes/probe/node", &["ros2-client"])];
+    assert_eq!(
+        speaks_ros(&bad),
+        ["nodes/probe/node: depends on ros2-client: only node_runtime may"]
+    );
+}
+
+fn impure(members: &[Package]) -> Vec<String> {
+    let locked = packages::locked();
+    let mut found = Vec::new();
+    for member in members
+        .iter()
+        .filter(|member| PURE.contains(&member.name.as_str()))
+    {
+        let reached = packages::reach(member, members, &locked);
+        for name in IMPURE.iter().filter(|name| reached.contains(**name)) {
+            found.push(format!("{}: reaches {name}", member.folder()));
+        }
+        let product = member
+            .dependencies
+            .iter()
+            .filter(|need| need.kind.is_none());
+        for need in product.filter(|need| need.name == "rand") {
+            let is_entropy = |feature: &String| feature == "os_rng" || feature == "thread_rng";
+            if need.uses_default_features || need.features.iter().any(is_entropy) {
+                found.push(format!("{}: rand with entropy", member.folder()));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn arch_pure_crates_reach_no_ros_runtime_log_or_entropy() {
+    let members = packages::members();
+    for name in PURE {
+        assert!(members.iter().any(|member| member.name == name), "{name}");
+    }
+    check(&impure(&members));
+    let bad = [packages::example(
+        "nodes/probe",
+        &["rand", "serde", "tracing"],
+    )];
+    assert_eq!(
+        impure(&bad),
+        [
+            "nodes/probe: reaches tracing",
+            "nodes/probe: rand with entropy"
+        ]
+    );
+}
+
+/// The node whose library or shell a package is.
+fn node_of(name: &str, nodes: &[String]) -> Option<String> {
+    let node = name.strip_suffix("_node").unwrap_or(name);
+    nodes.iter().find(|known| *known == node).cloned()
+}
+
+fn between_nodes(members: &[Package], nodes: &[String]) -> Vec<String> {
+    let mut found = Vec::new();
+    for member in members {
+        let own = node_of(&member.name, nodes);
+        let composes = COMPOSERS.contains(&member.name.as_str());
+        for need in member.needs() {
+            let is_shell = members
+                .iter()
+                .any(|other| other.name == need && other.is_shell());
+            let other = node_of(need, nodes);
+            let shares = VOCABULARY.contains(&member.name.as_str());
+            if is_shell && !composes {
+                found.push(format!(
+                    "{}: depends on shell {need}: only nodes/abbe composes nodes",
+                    member.folder()
+                ));
+            } else if other.is_some() && own != other && (own.is_some() || shares) {
+                found.push(format!("{}: depends on node {need}", member.folder()));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn arch_no_node_depends_on_another_and_only_abbe_on_shells() {
+    check(&between_nodes(&packages::members(), &tree::nodes()));
+    let nodes = ["probe".to_owned(), "recorder".to_owned()];
+    let bad = [
+        packages::example("nodes/probe", &["recorder", "machine"]),
+        packages::example("nodes/probe/node", &["probe"]),
+        packages::example("nodes/machine", &["probe"]),
+        packages::example("nodes/node_runtime", &["probe_node"]),
+        packages::example("nodes/abbe", &["probe_node"]),
+    ];
+    assert_eq!(
+        between_nodes(&bad, &nodes),
+        [
+            "nodes/probe: depends on node recorder",
+            "nodes/machine: depends on node probe",
+            "nodes/node_runtime: depends on shell probe_node: only nodes/abbe composes nodes",
+        ]
+    );
+}

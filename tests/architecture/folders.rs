@@ -1,0 +1,167 @@
+//! Folder = crate = node; every node has the same files; files are small and named after ideas.
+
+use crate::check;
+use crate::packages::{self, Package, Target};
+use crate::source::sources;
+use crate::tree::{self, File};
+
+/// Longest file, lines.
+const LONGEST_FILE: usize = 600;
+/// Longest table of topics, lines.
+const LONGEST_SHELL: usize = 80;
+
+fn misnamed(member: &Package, targets: &[Target]) -> Vec<String> {
+    let folder = member.folder();
+    let Some(below) = folder.strip_prefix("nodes/") else {
+        return Vec::new();
+    };
+    let mut found = Vec::new();
+    let (node, is_shell) = match below.strip_suffix("/node") {
+        Some(node) => (node, true),
+        None => (below, false),
+    };
+    let name = if is_shell {
+        format!("{node}_node")
+    } else {
+        node.to_owned()
+    };
+    if member.name != name {
+        found.push(format!("{folder}: crate {}: must be {name}", member.name));
+    }
+    let is_bin = |target: &&Target| target.kind.iter().any(|kind| kind == "bin");
+    let bins: Vec<&str> = targets
+        .iter()
+        .filter(is_bin)
+        .map(|target| target.name.as_str())
+        .collect();
+    if is_shell && bins != [node] {
+        found.push(format!("{folder}: programs {bins:?}: must be {node} alone"));
+    }
+    found
+}
+
+#[test]
+fn arch_folder_crate_and_program_have_one_name() {
+    let members = packages::members();
+    let found = members
+        .iter()
+        .flat_map(|member| misnamed(member, &member.targets));
+    check(&found.collect::<Vec<_>>());
+    let mut bad = packages::example("nodes/probe/node", &[]);
+    bad.name = "probe_shell".to_owned();
+    assert_eq!(
+        misnamed(&bad, &[]),
+        [
+            "nodes/probe/node: crate probe_shell: must be probe_node",
+            "nodes/probe/node: programs []: must be probe alone",
+        ]
+    );
+}
+
+fn missing_files(node: &str, has_stage: bool, has: &dyn Fn(&str) -> bool) -> Vec<String> {
+    let stage: &[&str] = if has_stage {
+        &["src/config.rs", "src/stage.rs", "src/error.rs"]
+    } else {
+        &[]
+    };
+    ["README.md", "node/src/lib.rs", "node/src/main.rs"]
+        .iter()
+        .chain(stage)
+        .map(|file| format!("nodes/{node}/{file}"))
+        .filter(|path| !has(path))
+        .map(|path| format!("{path}: is missing"))
+        .collect()
+}
+
+#[test]
+fn arch_every_node_has_the_same_files() {
+    let mut found = Vec::new();
+    for node in tree::nodes() {
+        let sources = sources(&format!("nodes/{node}/src"));
+        let is_stage = |name: &String| name == "Stage";
+        let has_stage = sources
+            .iter()
+            .any(|(_, source)| source.implemented.iter().any(is_stage));
+        found.extend(missing_files(&node, has_stage, &tree::has));
+    }
+    check(&found);
+    assert_eq!(missing_files("probe", true, &|_| false).len(), 6);
+    assert_eq!(
+        missing_files("probe", false, &|path| !path.ends_with(".md")),
+        ["nodes/probe/README.md: is missing"]
+    );
+}
+
+fn too_long(file: &File, limit: usize) -> Option<String> {
+    let lines = file.text.lines().count();
+    (lines > limit).then(|| format!("{}: {lines} lines: at most {limit}", file.path))
+}
+
+#[test]
+fn arch_no_file_is_over_600_lines() {
+    let mut files = tree::files("", ".rs");
+    files.extend(tree::files("", ".py"));
+    check(
+        &files
+            .iter()
+            .filter_map(|file| too_long(file, LONGEST_FILE))
+            .collect::<Vec<_>>(),
+    );
+    let bad = File {
+        path: "a.rs".to_owned(),
+        text: "\n".repeat(601),
+    };
+    assert_eq!(
+        too_long(&bad, LONGEST_FILE).unwrap(),
+        "a.rs: 601 lines: at most 600"
+    );
+}
+
+#[test]
+fn arch_no_shell_is_over_80_lines() {
+    let shells = tree::nodes()
+        .into_iter()
+        .map(|node| format!("nodes/{node}/node/src/lib.rs"));
+    let files = shells.filter_map(|path| {
+        Some(File {
+            text: tree::text(&path)?,
+            path,
+        })
+    });
+    check(
+        &files
+            .filter_map(|file| too_long(&file, LONGEST_SHELL))
+            .collect::<Vec<_>>(),
+    );
+    let bad = File {
+        path: "a.rs".to_owned(),
+        text: "\n".repeat(81),
+    };
+    assert!(too_long(&bad, LONGEST_SHELL).is_some());
+}
+
+/// Names that say nothing of what is in a module.
+const EMPTY_NAMES: [&str; 9] = [
+    "utils", "util", "common", "helpers", "helper", "types", "manager", "misc", "mod",
+];
+
+fn empty_name(path: &str) -> Option<String> {
+    let parts: Vec<&str> = path.trim_end_matches(".rs").split('/').collect();
+    let bad = parts.iter().find(|part| EMPTY_NAMES.contains(part))?;
+    Some(format!("{path}: \"{bad}\" says nothing of what is in it"))
+}
+
+#[test]
+fn arch_modules_are_named_after_ideas() {
+    let rust = tree::paths("")
+        .into_iter()
+        .filter(|path| path.ends_with(".rs"));
+    check(
+        &rust
+            .filter_map(|path| empty_name(&path))
+            .collect::<Vec<_>>(),
+    );
+    assert!(empty_name("nodes/probe/src/utils/a.rs").is_some());
+    assert!(empty_name("nodes/probe/src/queue/mod.rs").is_some());
+    assert!(empty_name("msgs/src/action_types.rs").is_none());
+}

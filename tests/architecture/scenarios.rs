@@ -1,0 +1,183 @@
+//! Scenarios are whole, and the plant's truth is named by the fake machine alone.
+
+use std::collections::BTreeMap;
+
+use crate::check;
+use crate::parameters;
+use crate::tree;
+
+const FOLDER: &str = "launch_configs";
+
+/// A launch file's nodes: executable, and its parameter files below the scenario's folder.
+fn launched(xml: &str) -> Vec<(String, Vec<String>)> {
+    let document = roxmltree::Document::parse(xml).unwrap();
+    let nodes = document
+        .descendants()
+        .filter(|element| element.has_tag_name("node"));
+    nodes
+        .map(|node| {
+            let params = node.children().filter(|child| child.has_tag_name("param"));
+            let files = params.filter_map(|param| param.attribute("from"));
+            let exec = node.attribute("exec").unwrap_or_default().to_owned();
+            let below = |from: &str| from.trim_start_matches("$(dirname)/").to_owned();
+            (exec, files.map(below).collect())
+        })
+        .collect()
+}
+
+fn incomplete(scenario: &str, xml: &[String], has: &dyn Fn(&str) -> bool) -> Vec<String> {
+    let place = format!("{FOLDER}/{scenario}");
+    let mut found = Vec::new();
+    for file in ["scenario.yaml", "machine.yaml"] {
+        if !has(&format!("{place}/{file}")) {
+            found.push(format!("{place}: no {file}"));
+        }
+    }
+    if xml.len() != 1 {
+        found.push(format!("{place}: {} launch files: must be one", xml.len()));
+    }
+    for (exec, files) in xml.iter().flat_map(|xml| launched(xml)) {
+        if !has(&format!("nodes/{exec}/node")) {
+            found.push(format!("{place}: launches {exec}: no such node"));
+        }
+        for file in files.iter().filter(|file| !has(&format!("{place}/{file}"))) {
+            found.push(format!("{place}: {exec}: no {file}"));
+        }
+    }
+    found
+}
+
+#[test]
+fn arch_every_scenario_is_whole() {
+    let scenarios = tree::folders(FOLDER);
+    assert!(!scenarios.is_empty());
+    let mut found = Vec::new();
+    for scenario in scenarios {
+        let files = tree::files(&format!("{FOLDER}/{scenario}"), ".launch.xml");
+        let xml: Vec<String> = files.into_iter().map(|file| file.text).collect();
+        found.extend(incomplete(&scenario, &xml, &tree::has));
+    }
+    check(&found);
+    let xml = "<launch><node pkg='abbe' exec='lathe'><param from='$(dirname)/lathe.yaml'/></node></launch>";
+    assert_eq!(
+        incomplete("bad", &[xml.to_owned()], &|path| path
+            .ends_with("machine.yaml")),
+        [
+            "launch_configs/bad: no scenario.yaml",
+            "launch_configs/bad: launches lathe: no such node",
+            "launch_configs/bad: lathe: no lathe.yaml",
+        ]
+    );
+}
+
+/// Parameters of a ROS parameter file, dotted names; a map stays a map unless `known` has names below it.
+fn set_parameters(yaml: &str) -> Vec<String> {
+    let Ok(file) = serde_saphyr::from_str::<BTreeMap<String, serde_json::Value>>(yaml) else {
+        return Vec::new();
+    };
+    let mut names = Vec::new();
+    for node in file.values() {
+        flatten(&node["ros__parameters"], "", &mut names);
+    }
+    names
+}
+
+fn flatten(value: &serde_json::Value, before: &str, names: &mut Vec<String>) {
+    let Some(map) = value.as_object() else {
+        names.push(before.to_owned());
+        return;
+    };
+    for (key, value) in map {
+        let name = if before.is_empty() {
+            key.clone()
+        } else {
+            format!("{before}.{key}")
+        };
+        flatten(value, &name, names);
+    }
+}
+
+/// Parameters that the runtime gives to every node.
+const OF_EVERY_NODE: [&str; 1] = ["use_sim_time"];
+
+fn unknown_parameters(path: &str, yaml: &str, known: &[String]) -> Vec<String> {
+    let set = set_parameters(yaml).into_iter();
+    let unknown =
+        set.filter(|name| !known.contains(name) && !OF_EVERY_NODE.contains(&name.as_str()));
+    unknown
+        .map(|name| format!("{path}: {name}: the node has no such parameter"))
+        .collect()
+}
+
+#[test]
+fn arch_parameter_files_set_only_what_their_node_has() {
+    let mut found = Vec::new();
+    for scenario in tree::folders(FOLDER) {
+        for node in tree::nodes() {
+            let path = format!("{FOLDER}/{scenario}/{node}.yaml");
+            if let Some(yaml) = tree::text(&path) {
+                let known = parameters::table(&node).into_iter().map(|row| row.name);
+                found.extend(unknown_parameters(&path, &yaml, &known.collect::<Vec<_>>()));
+            }
+        }
+    }
+    check(&found);
+    let yaml = "/**:\n  ros__parameters:\n    axes: {X: {limit_um: 1.0}}\n    rate: 3\n    use_sim_time: true\n";
+    assert_eq!(
+        unknown_parameters("a.yaml", yaml, &["axes.X.limit_um".to_owned()]),
+        ["a.yaml: rate: the node has no such parameter"]
+    );
+}
+
+/// Whether a file beside the fake machine's own names a plant file.
+fn tells_of_the_plant(path: &str, yaml: &str) -> Option<String> {
+    let own = path.ends_with("/fake_cnc.yaml") || path.ends_with("/plant.yaml");
+    let tells = yaml.contains("plant_file") || yaml.contains("plant.yaml");
+    (tells && !own).then(|| format!("{path}: names the plant file: fake_cnc.yaml alone may"))
+}
+
+#[test]
+fn arch_only_the_fake_machine_reads_the_plants_truth() {
+    let mut files = tree::files(FOLDER, ".yaml");
+    files.extend(tree::files(FOLDER, ".xml"));
+    let told = files
+        .iter()
+        .filter_map(|file| tells_of_the_plant(&file.path, &file.text));
+    check(&told.collect::<Vec<_>>());
+    assert!(tells_of_the_plant("launch_configs/a/probe.yaml", "plant_file: p.yaml").is_some());
+    assert!(tells_of_the_plant("launch_configs/a/fake_cnc.yaml", "plant_file: p.yaml").is_none());
+}
+
+/// Largest recorded bag that the tree carries, bytes.
+const LARGEST_BAG_BYTES: usize = 1 << 20;
+
+fn unlisted(readme: &str, files: &[(String, usize)]) -> Vec<String> {
+    let mut found = Vec::new();
+    for (path, bytes) in files {
+        let name = path.trim_start_matches("bags/");
+        if name != "README.md" && !readme.contains(name) {
+            found.push(format!("{path}: bags/README.md does not list it"));
+        }
+        if *bytes > LARGEST_BAG_BYTES {
+            found.push(format!(
+                "{path}: {bytes} bytes: at most {LARGEST_BAG_BYTES}"
+            ));
+        }
+    }
+    found
+}
+
+#[test]
+fn arch_every_bag_is_listed_with_its_making() {
+    let readme = tree::text("bags/README.md");
+    assert!(readme.is_some(), "bags/README.md: is missing");
+    let size = |path: String| {
+        let bytes = std::fs::read(tree::root().join(&path)).unwrap().len();
+        (path, bytes)
+    };
+    let files: Vec<_> = tree::paths("bags").into_iter().map(size).collect();
+    check(&unlisted(&readme.unwrap_or_default(), &files));
+    let bad = [("bags/a/a_0.mcap".to_owned(), 2 << 20)];
+    assert_eq!(unlisted("", &bad).len(), 2);
+    assert_eq!(unlisted("`a/a_0.mcap`", &bad).len(), 1);
+}
