@@ -102,6 +102,7 @@ impl<F: Write> Split<F> {
             .library(concat!("abbe-recorder/", env!("CARGO_PKG_VERSION")))
             .compression(config.compression.of_mcap())
             .compression_threads(0)
+            .compression_level(config.compression.level())
             .chunk_size(None)
             .disable_seeking(true)
             .create(NoSeek::new(BufWriter::with_capacity(1 << 16, counted)));
