@@ -108,6 +108,12 @@ pub enum Refusal {
         /// The run that began.
         next: u32,
     },
+    /// A run ended that had not begun.
+    #[error("run {run} ended, but its begin was not seen; it is not evaluated")]
+    NotBegun {
+        /// The run.
+        run: u32,
+    },
     /// The estimate is published, but positions are not linear in feed.
     #[error(
         "{feature}: p = {p} for positions linear in feed, limit {limit}; latency depends on feed"

@@ -194,9 +194,7 @@ impl LatencyCalibratorStage {
         {
             run.end = Some((at, segment));
         } else {
-            out.push(Output::Refused(Refusal::NothingTouched {
-                run: segment.run,
-            }));
+            out.push(Output::Refused(Refusal::NotBegun { run: segment.run }));
         }
     }
 

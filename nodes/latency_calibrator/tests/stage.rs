@@ -456,6 +456,14 @@ fn time_that_goes_back_is_said_and_its_touches_are_not_used() {
 }
 
 #[test]
+fn an_end_without_a_begin_is_said() {
+    let mut rig = Rig::new(8_370_000);
+    rig.touch(1.0);
+    rig.finish();
+    assert_eq!(rig.refusals(), [Refusal::NotBegun { run: 3 }]);
+}
+
+#[test]
 fn a_machine_without_repeatability_is_refused() {
     let text = BENCH.replace("repeatability_um: 0.3", "repeatability_um: 0.0");
     let file = MachineFile::parse(&text, "bench.yaml").unwrap();
