@@ -52,7 +52,7 @@ fn thermal_part(bencher: Bencher<'_, '_>) {
 }
 
 /// One axis state in, one compensation out.
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn servo_tick(bencher: Bencher<'_, '_>) {
     let machine = include_str!("../../../launch_configs/first_run/machine.yaml");
     let limits =

@@ -59,6 +59,8 @@ pub enum Diagnostic {
     ModelNotFinite { sequence: u32, axis: Axis },
     #[error("thermal model {sequence} awaits confirmation of a jump at the blocks")]
     ModelDoubtful { sequence: u32 },
+    #[error("thermal model {sequence} is used without objection")]
+    ModelAccepted { sequence: u32 },
     #[error("no axis state for {silence_s:.3} s")]
     StatesStale { silence_s: f64 },
     #[error("gap of {gap_s:.3} s between axis states, offsets stood meanwhile")]
@@ -79,6 +81,8 @@ impl Diagnostic {
             Self::Enabled { .. }
             | Self::ShuttingDown
             | Self::SizeKept { .. }
+            | Self::Gap { .. }
+            | Self::ModelAccepted { .. }
             | Self::ModelConfirmed { .. } => Severity::Info,
             Self::StateChanged { to, cause, .. } => match to {
                 CompensationState::Active => Severity::Info,
@@ -88,6 +92,25 @@ impl Diagnostic {
             },
             Self::ModelNotFinite { .. } => Severity::Error,
             _ => Severity::Warn,
+        }
+    }
+
+    /// The lasting condition to which it belongs: one of severity `Info` ends what others began.
+    #[must_use]
+    pub fn condition(&self) -> &'static str {
+        const AXIS: [&str; 6] = ["axis_x", "axis_y", "axis_z", "axis_a", "axis_b", "axis_c"];
+        const SIZE: [&str; 6] = ["size_x", "size_y", "size_z", "size_a", "size_b", "size_c"];
+        match self {
+            Self::StateChanged { axis, .. } | Self::ModelRefused { axis, .. } => AXIS[axis.index()],
+            Self::SizeExceeded { axis, .. } | Self::SizeKept { axis } => SIZE[axis.index()],
+            Self::ModelQuarantined { .. }
+            | Self::ModelConfirmed { .. }
+            | Self::ModelNotFinite { .. }
+            | Self::ModelDoubtful { .. }
+            | Self::ModelAccepted { .. } => "model",
+            Self::StatesStale { .. } | Self::Gap { .. } => "axis_states",
+            Self::ClockWentBack { .. } => "controller_clock",
+            Self::Enabled { .. } | Self::ShuttingDown => "switch",
         }
     }
 }

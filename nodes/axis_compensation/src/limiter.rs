@@ -180,6 +180,18 @@ mod tests {
     }
 
     #[test]
+    fn eq2_a_ramp_that_ends_at_the_size_limit_does_not_cross_it() {
+        let mut limiter = Limiter::new(LIMITS);
+        let mut greatest = 0.0_f64;
+        for k in 0..4000 {
+            let target = (0.09e-3 * f64::from(k)).min(0.2);
+            greatest = greatest.max(limiter.follow(target, 1e-3));
+        }
+        assert!(greatest <= 0.2 * (1.0 + 1e-12), "{greatest}");
+        assert!((limiter.offset() - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
     fn zero_is_reached_exactly() {
         let mut limiter = Limiter::new(LIMITS);
         for _ in 0..500 {

@@ -69,6 +69,7 @@ pub struct AxisCompensationStage {
     heard_at: Option<Stamp<Host>>,
     driven_at: Option<Stamp<Host>>,
     is_stale: bool,
+    model_in_doubt: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,6 +142,7 @@ impl AxisCompensationStage {
             heard_at: None,
             driven_at: None,
             is_stale: false,
+            model_in_doubt: false,
         })
     }
 
@@ -299,11 +301,18 @@ impl AxisCompensationStage {
 
     fn model(&mut self, model: ThermalModel, out: &mut Vec<Output>) {
         let sequence = model.sequence;
+        let was_in_doubt = self.model_in_doubt;
+        self.model_in_doubt = model.quarantined;
         if model.quarantined {
             out.push(Output::Diagnostic(Diagnostic::ModelDoubtful { sequence }));
         }
-        out.extend(match self.gate.offer(model) {
-            Passage::Accepted => None,
+        let passage = self.gate.offer(model);
+        self.model_in_doubt |= !matches!(passage, Passage::Accepted | Passage::Confirmed);
+        let doubt_ends = was_in_doubt && !self.model_in_doubt;
+        out.extend(match passage {
+            Passage::Accepted => {
+                doubt_ends.then_some(Output::Diagnostic(Diagnostic::ModelAccepted { sequence }))
+            }
             Passage::Confirmed => Some(Output::Diagnostic(Diagnostic::ModelConfirmed { sequence })),
             Passage::NotFinite { axis } => Some(Output::Diagnostic(Diagnostic::ModelNotFinite {
                 sequence,
@@ -324,6 +333,9 @@ impl AxisCompensationStage {
 
     /// Without axis states there is no tick: say so, and let ticks of the host drive a last fade.
     fn tick(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        // A host clock that went back must not make a silence look short or a last fade wait.
+        self.heard_at = self.heard_at.map(|heard_at| heard_at.min(at));
+        self.driven_at = self.driven_at.map(|driven_at| driven_at.min(at));
         let silence = self.heard_at.map(|heard_at| at - heard_at);
         if silence.is_some_and(|silence| silence <= self.gap) {
             return;

@@ -69,6 +69,11 @@ fn model(
 
 #[derive(Clone, Debug)]
 enum Event {
+    Sweep {
+        from_mm: f64,
+        to_mm: f64,
+        ticks: u32,
+    },
     State {
         step_nanos: i64,
         position_mm: [f64; 3],
@@ -116,6 +121,8 @@ fn number(range: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
 
 fn event() -> impl Strategy<Value = Event> {
     prop_oneof![
+        3 => (-320.0..320.0_f64, -320.0..320.0_f64, 50..3000_u32)
+            .prop_map(|(from_mm, to_mm, ticks)| Event::Sweep { from_mm, to_mm, ticks }),
         40 => (spacing(), position(), position(), position(), prop::bool::weighted(0.95))
             .prop_map(|(step_nanos, x, y, z, all_axes)| Event::State { step_nanos, position_mm: [x, y, z], all_axes }),
         4 => (number(-0.15..0.15), number(-3e-4..3e-4), number(0.0..2.0), number(-1e-4..1e-4))
@@ -179,7 +186,30 @@ struct Bench {
 
 impl Bench {
     fn run(&mut self, event: &Event) -> Result<(), TestCaseError> {
+        let Event::Sweep {
+            from_mm,
+            to_mm,
+            ticks,
+        } = *event
+        else {
+            return self.run_one(event);
+        };
+        for tick in 0..ticks {
+            let x_mm = from_mm + (to_mm - from_mm) * f64::from(tick) / f64::from(ticks);
+            self.run_one(&Event::State {
+                step_nanos: 1_000_000,
+                position_mm: [x_mm, 0.0, -x_mm],
+                all_axes: true,
+            })?;
+        }
+        Ok(())
+    }
+
+    fn run_one(&mut self, event: &Event) -> Result<(), TestCaseError> {
         let (input, by_state) = self.input(event);
+        if input == Input::Tick {
+            self.last_driven = self.last_driven.map(|last| last.min(self.host_nanos));
+        }
         let mut out = Vec::new();
         let at = Stamp::from_nanos(self.host_nanos);
         self.stage.step(at, input, &mut out).unwrap();
@@ -260,6 +290,7 @@ impl Bench {
                 (Input::Tick, false)
             }
             Event::Shutdown => (Input::Shutdown, false),
+            Event::Sweep { .. } => unreachable!("a sweep is run as its states"),
         }
     }
 }
@@ -281,7 +312,7 @@ fn bench(extrapolate: &str) -> Bench {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 4000,
+        cases: 1500,
         failure_persistence: None,
         rng_seed: proptest::test_runner::RngSeed::Fixed(20231),
         max_shrink_iters: 2000,

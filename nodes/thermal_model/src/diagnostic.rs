@@ -122,6 +122,8 @@ pub enum Diagnostic {
     SensorNotFinite { sensor: String },
     #[error("temperature sensor \"{sensor}\" is silent for {age_s:.0} s")]
     SensorStale { sensor: String, age_s: f64 },
+    #[error("temperature sensor \"{sensor}\" speaks again")]
+    SensorBack { sensor: String },
     #[error("fit refused: {reason}")]
     FitRefused {
         reason: metrology::least_squares::FitError,
@@ -139,6 +141,8 @@ impl Diagnostic {
             | Self::TimeConstant { .. }
             | Self::NoTimeConstant { .. }
             | Self::TemperatureRegression { .. }
+            | Self::SensorBack { .. }
+            | Self::JumpContradicted
             | Self::LoadChanged { .. } => Severity::Info,
             Self::NoReference { .. }
             | Self::NoFace { .. }
@@ -146,6 +150,29 @@ impl Diagnostic {
             | Self::FitRefused { .. }
             | Self::Quarantined { .. } => Severity::Error,
             _ => Severity::Warn,
+        }
+    }
+
+    /// The lasting condition to which it belongs: one of severity `Info` ends what others began.
+    #[must_use]
+    pub fn condition(&self) -> &'static str {
+        match self {
+            Self::SlopeUnidentifiable { .. } | Self::Fitted { .. } | Self::LackOfFit { .. } => {
+                "fit"
+            }
+            Self::Quarantined { .. } | Self::JumpConfirmed { .. } | Self::JumpContradicted => {
+                "block_jump"
+            }
+            Self::ClockWentBack { .. } => "clock",
+            Self::LoadChanged { .. } => "load",
+            Self::TimeConstant { .. }
+            | Self::NoTimeConstant { .. }
+            | Self::TemperatureRegression { .. } => "prediction",
+            Self::UnknownSensor { .. }
+            | Self::SensorNotFinite { .. }
+            | Self::SensorStale { .. }
+            | Self::SensorBack { .. } => "temperature_sensor",
+            _ => "update",
         }
     }
 }

@@ -39,6 +39,6 @@ pub mod update;
 pub mod update_rule;
 
 pub use config::{Method, SingleBlockJump, ThermalModelConfig};
-pub use diagnostic::Diagnostic;
+pub use diagnostic::{Diagnostic, Severity};
 pub use error::ThermalModelError;
 pub use stage::{Input, Output, ThermalModelStage};

@@ -245,7 +245,9 @@ impl ThermalModelStage {
             return;
         }
         self.thermometers.add(index, now, sample.temperature_degc);
-        self.stale_reported[index] = false;
+        if std::mem::take(&mut self.stale_reported[index]) {
+            out.push(Output::Diagnostic(Diagnostic::SensorBack { sensor }));
+        }
     }
 
     fn segment(&mut self, now: Stamp<Host>, segment: &TestSegment, out: &mut Vec<Output>) {
