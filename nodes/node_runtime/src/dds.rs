@@ -44,14 +44,16 @@ pub(crate) struct Remote {
 }
 
 /// A node's place on the network.
+///
+/// The participant comes last, so that it is dropped last: an endpoint that outlives it complains.
 pub(crate) struct Participant {
-    participant: DomainParticipant,
-    publisher: rustdds::Publisher,
-    subscriber: rustdds::Subscriber,
     graph_writer: GraphWriter,
     graph_reader: GraphReader,
+    publisher: rustdds::Publisher,
+    subscriber: rustdds::Subscriber,
     node: NodeName,
     entities: Mutex<NodeEntitiesInfo>,
+    participant: DomainParticipant,
 }
 
 impl Participant {

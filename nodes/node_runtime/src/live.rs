@@ -106,7 +106,8 @@ fn prepare(compositions: Vec<Composition>) -> anyhow::Result<(Environment, Prepa
     Ok((environment, nodes))
 }
 
-/// Puts nodes on the ROS graph.
+/// Puts nodes on the ROS graph, and their log on the console and `/rosout` unless the program has a
+/// `tracing` subscriber of its own.
 ///
 /// # Errors
 /// When there is no network interface, a name is taken, or an endpoint cannot be made.
@@ -120,6 +121,7 @@ pub fn launch(
         .enable_all()
         .build()
         .context("tokio runtime")?;
+    log::start(&[], environment.log_filter.as_deref());
     let (stop, stopped) = watch::channel(false);
     let mut tasks = JoinSet::new();
     let mut seen = BTreeSet::new();

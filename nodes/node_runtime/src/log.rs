@@ -48,7 +48,9 @@ pub(crate) fn start(arguments: &[&Arguments], log_filter: Option<&str>) {
             "fatal" => "error",
             level => level,
         });
-    let default = format!("{level},rustdds=error,ros2_client=error");
+    // RustDDS complains of multicast groups when it leaves a loopback that has none.
+    let quiet = "rustdds=error,rustdds::network::udp_listener=off,ros2_client=error";
+    let default = format!("{level},{quiet}");
     let filter = log_filter
         .and_then(|directives| EnvFilter::try_new(directives).ok())
         .unwrap_or_else(|| EnvFilter::new(default));

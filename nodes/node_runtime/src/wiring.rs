@@ -37,6 +37,10 @@ type Decode<I> = Box<dyn Fn(&[u8]) -> Result<I, String> + Send>;
 type Emit<O> = Box<dyn Fn(&O, &mut Vec<Emission>) + Send>;
 /// Decodes a request and forms the reply from what the stage answered.
 type Reply<O> = Box<dyn Fn(Result<&[O], &str>) -> Bytes + Send>;
+/// A service: how its requests become inputs, and outputs its replies.
+type ServiceTable<I, O> = (Decode<I>, Reply<O>);
+/// Whether an output is the awaited one.
+type Satisfied<O> = Box<dyn Fn(&O) -> bool + Send>;
 /// Decodes the answer to a call of ours.
 type Answer<I> = Box<dyn Fn(u64, Option<&[u8]>) -> Result<I, String> + Send>;
 
@@ -48,13 +52,13 @@ pub struct Wiring<S: Stage> {
     stage: S,
     messages: Vec<Decode<S::Input>>,
     timers: Vec<Box<dyn Fn() -> S::Input + Send>>,
-    services: Vec<(Decode<S::Input>, Reply<S::Output>)>,
+    services: Vec<ServiceTable<S::Input, S::Output>>,
     clients: Vec<Answer<S::Input>>,
     action_servers: Vec<action::ServerTable<S::Input>>,
     action_clients: Vec<action::ClientTable<S::Input>>,
     emitters: Vec<Emit<S::Output>>,
     shutdown: Option<Box<dyn Fn() -> S::Input + Send>>,
-    stopped: Option<Box<dyn Fn(&S::Output) -> bool + Send>>,
+    stopped: Option<Satisfied<S::Output>>,
     outputs: Vec<S::Output>,
 }
 

@@ -3,6 +3,8 @@
     clippy::disallowed_methods,
     reason = "tests wait, look at clocks and write files"
 )]
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(clippy::too_many_lines, reason = "a test tells one story")]
 
 mod live {
     pub mod actions;

@@ -56,54 +56,46 @@ impl Harness {
                     },
                 );
             }
+            Delivery::Shutdown { node } => self.hand(node, Event::Shutdown),
+            of_goal => self.deliver_of_goal(of_goal),
+        }
+    }
+
+    fn deliver_of_goal(&mut self, delivery: Delivery) {
+        let (node, event) = match &delivery {
             Delivery::Goal {
                 server,
                 client,
                 id,
                 bytes,
             } => {
-                let own = self.number(ACTION, server, client, id);
-                self.hand(
-                    server.0,
-                    Event::Goal {
-                        server: server.1,
-                        id: own,
-                        bytes: &bytes,
-                    },
-                );
+                let (server, id) = (*server, self.number(ACTION, *server, *client, *id));
+                let goal = Event::Goal {
+                    server: server.1,
+                    id,
+                    bytes,
+                };
+                (server.0, goal)
             }
-            Delivery::Cancel { server, id } => {
-                self.hand(
-                    server.0,
-                    Event::Cancel {
-                        server: server.1,
-                        id,
-                    },
-                );
-            }
-            Delivery::Answer {
-                client,
+            &Delivery::Cancel {
+                server: (node, server),
+                id,
+            } => (node, Event::Cancel { server, id }),
+            &Delivery::Answer {
+                client: (node, client),
                 id,
                 accepted,
             } => {
-                self.hand(
-                    client.0,
-                    Event::GoalAnswer {
-                        client: client.1,
-                        id,
-                        accepted,
-                    },
-                );
+                let answer = Event::GoalAnswer {
+                    client,
+                    id,
+                    accepted,
+                };
+                (node, answer)
             }
             Delivery::Feedback { client, id, bytes } => {
-                self.hand(
-                    client.0,
-                    Event::GoalFeedback {
-                        client: client.1,
-                        id,
-                        bytes: &bytes,
-                    },
-                );
+                let (node, client, id) = (client.0, client.1, *id);
+                (node, Event::GoalFeedback { client, id, bytes })
             }
             Delivery::Ended {
                 client,
@@ -111,19 +103,17 @@ impl Harness {
                 status,
                 bytes,
             } => {
-                let bytes = bytes.as_deref();
-                self.hand(
-                    client.0,
-                    Event::GoalResult {
-                        client: client.1,
-                        id,
-                        status,
-                        bytes,
-                    },
-                );
+                let ended = Event::GoalResult {
+                    client: client.1,
+                    id: *id,
+                    status: *status,
+                    bytes: bytes.as_deref(),
+                };
+                (client.0, ended)
             }
-            Delivery::Shutdown { node } => self.hand(node, Event::Shutdown),
-        }
+            _ => return,
+        };
+        self.hand(node, event);
     }
 
     /// Gives a request or goal the number under which its server knows it.

@@ -337,24 +337,31 @@ impl Owner {
             servers,
             clients,
             actions,
+            diagnostics,
+            rosout,
+            parameter_events,
             ..
         } = self;
         readers.stop().await;
-        let mut writers: Vec<&Writer> =
-            vec![&self.diagnostics, &self.rosout, &self.parameter_events];
+        let mut writers: Vec<&Writer> = vec![&diagnostics, &rosout, &parameter_events];
         writers.extend(publications.iter().map(|publication| &publication.writer));
         writers.extend(servers.iter().map(|(_, server)| &server.writer));
         writers.extend(clients.iter().map(|(_, client)| &client.writer));
-        writers.extend(
-            actions
-                .iter()
-                .flat_map(|action| [&action.feedback, &action.status]),
-        );
+        for ActionEnd {
+            feedback, status, ..
+        } in &actions
+        {
+            writers.extend([feedback, status]);
+        }
         let all = futures::future::join_all(writers.into_iter().map(Writer::acknowledged));
         let _ = tokio::time::timeout(ACKNOWLEDGEMENT, all).await;
         if participant.withdraw().is_ok() {
             let _ = tokio::time::timeout(FAREWELL, participant.graph_acknowledged()).await;
         }
+        // An endpoint that outlives its participant complains.
+        drop((publications, servers, clients, actions));
+        drop((diagnostics, rosout, parameter_events));
+        drop(participant);
     }
 }
 

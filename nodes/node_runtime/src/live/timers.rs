@@ -16,7 +16,7 @@ use tokio::sync::mpsc::Sender;
 use super::incoming::Incoming;
 
 /// Timers on the computer's clock. Tokio's own timers are a millisecond coarse, which at a servo's
-/// 1 kHz is a whole period; a thread that parks is some 50 µs late.
+/// 1 kHz is a whole period; a parked thread is late by the kernel's timer slack, 50 µs by default.
 pub(super) struct HostTimers {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<()>,

@@ -193,6 +193,14 @@ fn the_start_is_on_parameter_events_and_the_log_on_rosout() {
         },
     );
     assert_eq!(event.new_parameters.len(), 3);
+    let line = wait(&received, "the log of /probe", |(subscription, bytes)| {
+        let line: Log = (subscription == 1).then(|| from_cdr(&bytes).unwrap())?;
+        (line.name == "probe").then_some(line)
+    });
+    assert_eq!(
+        (line.level, line.msg.as_str()),
+        (Log::INFO, "started parameters=3")
+    );
     running.stop().unwrap();
     watching.stop().unwrap();
 }

@@ -215,3 +215,42 @@ fn a_second_program_of_the_same_name_does_not_start() {
     first.signal("-INT");
     assert_eq!(first.output().status.code(), Some(0));
 }
+
+#[test]
+fn a_killed_subscriber_holds_nobody_up() {
+    // Past 8,192 unacknowledged samples RustDDS refuses to write unless told otherwise.
+    const AFTER_THE_KILL: usize = 10_000;
+    let environment = environment(15);
+    let second = ["--ros-args", "-r", "__node:=second", "-r", "out:=/unheard"];
+    let killed = Process::start(&environment, &second);
+    let living = Process::start(&environment, &[]);
+    let (pinging, received) = pinger(&environment, 1_000);
+    wait(&received, "the first echo", Some);
+    std::thread::sleep(Duration::from_secs(1));
+    killed.signal("-KILL");
+    let mut last = wait(&received, "an echo", Some).0;
+    let mut longest_gap_ms = 0;
+    for _ in 0..AFTER_THE_KILL {
+        let (sent, _) = wait(&received, "an echo after the kill", Some);
+        longest_gap_ms = longest_gap_ms.max((sent - last) / 1_000_000);
+        last = sent;
+    }
+    assert!(
+        longest_gap_ms < 500,
+        "nothing was sent for {longest_gap_ms} ms"
+    );
+    let started = Process::start(&environment, &second);
+    std::thread::sleep(Duration::from_secs(2));
+    started.signal("-INT");
+    let output = started.output();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "restarted after the kill: {said}"
+    );
+    assert!(!said.contains("ERROR"), "{said}");
+    pinging.stop().unwrap();
+    living.signal("-INT");
+    assert_eq!(living.output().status.code(), Some(0));
+}

@@ -66,7 +66,7 @@ impl Owner {
             }
             Incoming::Timer { timer, missed } => {
                 if missed > 0 {
-                    self.overrun(missed);
+                    self.missed(timer, missed);
                 }
                 let at = self.instant(None);
                 self.hand(at, Event::Timer { timer });
@@ -87,6 +87,23 @@ impl Owner {
             let message = format!("{topic}: {lost} samples lost, {total} since the start");
             let diagnostic = Diagnostic::new(Level::Error, "samples_lost", message);
             self.notice(diagnostic.with("topic", topic).with("lost", total));
+        }
+    }
+
+    /// Counts missed periods; a stall that a person would notice is a condition too.
+    fn missed(&mut self, timer: usize, missed: u64) {
+        const NOTICED_STALL_NANOS: u64 = 20_000_000;
+        let period = self
+            .node
+            .ports()
+            .timers
+            .get(timer)
+            .map_or(0, |period| period.nanos());
+        let stall_nanos = missed.saturating_mul(u64::try_from(period).unwrap_or(0));
+        if stall_nanos >= NOTICED_STALL_NANOS {
+            self.overrun(missed);
+        } else {
+            self.board.count("timer periods missed", missed);
         }
     }
 
