@@ -34,6 +34,7 @@ pub use action_types::{
 pub use cdr::{ENCAPSULATION, from_cdr, to_cdr, to_cdr_into};
 pub use error::{Place, WireError};
 pub use interface::{Action, Description, Message, Service, description_of};
+pub use motion::joint_state;
 pub use qos::{Durability, Qos, Reliability};
 pub use wire::Wire;
 

@@ -3,6 +3,7 @@
 use metrology::sample::AxisState as Inner;
 
 use crate::msg::AxisState;
+use crate::sensor_msgs::msg::JointState;
 use crate::wire::{Allowed, Reader, set_letters, set_positions, time};
 use crate::{Place, Wire, WireError};
 
@@ -33,4 +34,15 @@ impl Wire for AxisState {
             velocity: finite("velocity", &self.velocity)?,
         })
     }
+}
+
+/// The same positions for everybody's tools: motor positions under the axes' letters, effort unknown.
+#[must_use]
+pub fn joint_state(state: &Inner) -> JointState {
+    let mut message = JointState::default();
+    message.header.stamp = time(state.received_at);
+    set_letters(&mut message.name, state.axes);
+    set_positions(&mut message.position, state.axes, &state.motor);
+    set_positions(&mut message.velocity, state.axes, &state.velocity);
+    message
 }

@@ -1,3 +1,46 @@
-//! The command line of Abbe.
+//! The command line of Abbe: one verb a file.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the command line reads files, clocks and the environment for everybody else"
+)]
+#![expect(clippy::print_stdout, reason = "results go to standard output")]
 
-fn main() {}
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod evidence;
+mod launch;
+mod node;
+mod progress;
+mod report;
+mod run;
+mod scenario;
+mod truth;
+
+/// Measures a CNC machine, models its errors, compensates its axes and records every run.
+#[derive(Parser)]
+#[command(version, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Run a scenario: its nodes, its plan, a bag and a page at the end.
+    Run(run::Run),
+    /// Run one node on the ROS graph, with the arguments of any ROS 2 node.
+    Node(node::NodeVerb),
+}
+
+fn main() -> ExitCode {
+    let outcome = match Arguments::parse().verb {
+        Verb::Run(run) => run.execute(),
+        Verb::Node(node) => return node.execute(),
+    };
+    outcome.unwrap_or_else(|error| {
+        eprintln!("abbe: {error:#}");
+        ExitCode::FAILURE
+    })
+}

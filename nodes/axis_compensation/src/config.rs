@@ -31,6 +31,9 @@ pub struct AxisCompensationConfig {
     /// Whether compensation is on from the start.
     #[serde(default = "default_enabled")]
     pub enabled: bool,
+    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    #[serde(default)]
+    pub machine_file: String,
 }
 
 fn default_gap_s() -> f64 {
@@ -161,6 +164,12 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "silence of the axes' state after which it counts as stale",
     ),
     word("enabled", "whether compensation is on from the start"),
+    ParameterDoc {
+        name: "machine_file",
+        unit: "",
+        description: "Machine file, relative to the parameter file.",
+        range: None,
+    },
 ];
 
 impl AxisCompensationConfig {

@@ -22,6 +22,8 @@ pub struct LatencyCalibratorConfig {
     pub hold_ms: f64,
     /// Lack of fit is reported below this p value.
     pub lack_of_fit_limit: f64,
+    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    pub machine_file: String,
 }
 
 impl Default for LatencyCalibratorConfig {
@@ -33,12 +35,13 @@ impl Default for LatencyCalibratorConfig {
             same_feed_share: 0.02,
             hold_ms: 200.0,
             lack_of_fit_limit: 0.01,
+            machine_file: String::new(),
         }
     }
 }
 
 /// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 6] = [
+pub const PARAMETERS: [ParameterDoc; 7] = [
     ParameterDoc {
         name: "log_samples",
         unit: "",
@@ -74,6 +77,12 @@ pub const PARAMETERS: [ParameterDoc; 6] = [
         unit: "",
         description: "Lack of fit is reported below this p value.",
         range: Some((0.0, 1.0)),
+    },
+    ParameterDoc {
+        name: "machine_file",
+        unit: "",
+        description: "Machine file, relative to the parameter file.",
+        range: None,
     },
 ];
 

@@ -1,5 +1,7 @@
 //! A condition worth reporting, on its way to `/diagnostics`, the log and the bag.
 
+use std::borrow::Cow;
+
 /// Severity, with the values of `diagnostic_msgs/msg/DiagnosticStatus`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
@@ -18,8 +20,9 @@ pub enum Level {
 pub struct Diagnostic {
     /// Severity.
     pub level: Level,
-    /// Which condition, snake case, e.g. `model_stale`; the node's name is put in front.
-    pub name: &'static str,
+    /// Which condition, snake case, with what it is about where there are several, e.g.
+    /// `model_stale` or `limited/X`; the node's name is put in front.
+    pub name: Cow<'static, str>,
     /// One line with place, value, unit and limit.
     pub message: String,
     /// Values by name, unit in the name.
@@ -29,10 +32,10 @@ pub struct Diagnostic {
 impl Diagnostic {
     /// A condition without values.
     #[must_use]
-    pub fn new(level: Level, name: &'static str, message: String) -> Self {
+    pub fn new(level: Level, name: impl Into<Cow<'static, str>>, message: String) -> Self {
         Self {
             level,
-            name,
+            name: name.into(),
             message,
             values: Vec::new(),
         }

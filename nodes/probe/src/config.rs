@@ -25,6 +25,8 @@ pub struct ProbeConfig {
     /// Standard uncertainty of a latency that is given, not calibrated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub latency_standard_uncertainty_ms: Option<f64>,
+    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    pub machine_file: String,
 }
 
 impl Default for ProbeConfig {
@@ -36,12 +38,13 @@ impl Default for ProbeConfig {
             allow_feed_correction: false,
             latency_ms: None,
             latency_standard_uncertainty_ms: None,
+            machine_file: String::new(),
         }
     }
 }
 
 /// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 6] = [
+pub const PARAMETERS: [ParameterDoc; 7] = [
     ParameterDoc {
         name: "queue_samples",
         unit: "",
@@ -77,6 +80,12 @@ pub const PARAMETERS: [ParameterDoc; 6] = [
         unit: "ms",
         description: "Standard uncertainty of a latency that is given, not calibrated.",
         range: Some((0.0, 1e3)),
+    },
+    ParameterDoc {
+        name: "machine_file",
+        unit: "",
+        description: "Machine file, relative to the parameter file.",
+        range: None,
     },
 ];
 

@@ -60,6 +60,9 @@ pub struct ThermalModelConfig {
     /// Detection of load changes.
     #[serde(default)]
     pub load: LoadConfig,
+    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    #[serde(default)]
+    pub machine_file: String,
 }
 
 /// Operation of the block cycles.
@@ -367,6 +370,12 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         (0.1, 240.0),
         "pause of production that is a change of load; longer than a block cycle",
     ),
+    ParameterDoc {
+        name: "machine_file",
+        unit: "",
+        description: "Machine file, relative to the parameter file.",
+        range: None,
+    },
 ];
 
 impl ThermalModelConfig {

@@ -1,66 +1,52 @@
-//! ROS shell of axis_compensation.
+//! ROS shell of the axis compensation.
 
-use abbe_msgs::std_srvs::srv::SetBoolResponse;
+use abbe_msgs::std_srvs::srv::{SetBoolRequest, SetBoolResponse};
 use abbe_msgs::topics;
-use anyhow::Context;
-use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output, Severity};
+use anyhow::Result;
+use axis_compensation::config::PARAMETERS;
+use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output};
 use machine::MachineFile;
 use metrology::stamp::Span;
-use node_runtime::parameter::Parameter;
-use node_runtime::{Diagnostic, Level, Node, Wiring};
+use node_runtime::{Node, Setup, Wiring};
 
-/// Name of the node, its folder, parameter file and log target.
-pub const NAME: &str = "axis_compensation";
+mod conditions;
 
-/// The node for a resolved configuration; `parameters` is what `ros2 param` shows of it.
+/// Time between two looks at what is stale.
+const TICK: Span = Span::from_nanos(10_000_000);
+
+/// Builds the node.
 ///
 /// # Errors
-/// When the configuration or the machine file is refused.
-pub fn node(
-    config: &AxisCompensationConfig,
-    parameters: Vec<Parameter>,
-    machine: &MachineFile,
-) -> anyhow::Result<Box<dyn Node>> {
-    let stage = AxisCompensationStage::new(config, machine).context(NAME)?;
-    Ok(Wiring::new(NAME, parameters, stage)
+/// When a parameter or the machine file is wrong.
+pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
+    let config: AxisCompensationConfig = setup.config()?;
+    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let (path, text) = setup.file_text("machine_file")?;
+    let machine = MachineFile::parse(&text, &path.display().to_string())?;
+    let stage = AxisCompensationStage::new(&config, &machine)?;
+    Ok(Wiring::new(setup.name(), parameters, stage)
         .on(&topics::AXES_STATE, Input::State)
         .on(&topics::THERMAL_MODEL, |model| {
             Input::Model(Box::new(model))
         })
-        // Without axis states the last fade at a shutdown goes on by these ticks.
-        .every(Span::from_secs_f64(0.05), || Input::Tick)
+        .every(TICK, || Input::Tick)
         .service(
             &topics::SET_COMPENSATION,
-            |request| Input::Enable(request.data),
-            |outcome| SetBoolResponse {
-                success: outcome.is_ok(),
-                message: outcome.err().unwrap_or_default().to_owned(),
-            },
+            |request: SetBoolRequest| Input::Enable(request.data),
+            switched,
         )
         .publish(&topics::COMPENSATION, |output| match output {
             Output::Compensation(compensation) => Some(compensation),
             _ => None,
         })
-        .diagnose(condition)
-        .shutdown(
-            || Input::Shutdown,
-            |output| matches!(output, Output::FadedOut),
-        )
+        .diagnose(conditions::condition)
+        .shutdown(|| Input::Shutdown, |output| *output == Output::FadedOut)
         .node())
 }
 
-fn condition(output: &Output) -> Option<Diagnostic> {
-    let Output::Diagnostic(diagnostic) = output else {
-        return None;
-    };
-    let level = match diagnostic.severity() {
-        Severity::Info => Level::Ok,
-        Severity::Warn => Level::Warn,
-        Severity::Error => Level::Error,
-    };
-    Some(Diagnostic::new(
-        level,
-        diagnostic.condition(),
-        diagnostic.to_string(),
-    ))
+fn switched(outcome: Result<&[Output], &str>) -> SetBoolResponse {
+    SetBoolResponse {
+        success: outcome.is_ok(),
+        message: outcome.err().unwrap_or_default().to_owned(),
+    }
 }

@@ -1,1 +1,60 @@
-//! ROS shell of fake_cnc.
+//! ROS shell of the fake machine.
+
+use abbe_msgs::topics;
+use anyhow::{Context, Result};
+use fake_cnc::config::PARAMETERS;
+use fake_cnc::{Cnc, Config, Input, Plant, PlantFile};
+use machine::MachineFile;
+use metrology::stamp::Span;
+use node_runtime::{Node, Setup, Wiring};
+
+mod forms;
+mod witness;
+
+pub use witness::Witness;
+use witness::Witnessed;
+
+/// Builds the node.
+///
+/// # Errors
+/// When a parameter, the machine file or the plant file is wrong.
+pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
+    witnessed(setup, None)
+}
+
+/// Builds the node with somebody who may look at the plant's truth.
+///
+/// # Errors
+/// As [`node`].
+pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node>> {
+    let config: Config = setup.config()?;
+    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let (path, text) = setup.file_text("machine_file")?;
+    let machine = MachineFile::parse(&text, &path.display().to_string())?;
+    let (path, text) = setup.file_text("plant_file")?;
+    let truth =
+        PlantFile::from_yaml(&text).with_context(|| format!("plant file {}", path.display()))?;
+    let cnc = Cnc::new(&config, &machine, Plant::new(&machine, &truth)?)?;
+    let period = Span::from_secs_f64(machine.control.servo_period_ms / 1e3);
+    let mut wiring = Wiring::new(setup.name(), parameters, Witnessed { cnc, witness })
+        .every(period, || Input::Tick)
+        .on(&topics::COMPENSATION, Input::Compensation)
+        .publish(&topics::AXES_STATE, forms::state)
+        .publish_message(&topics::JOINT_STATES, forms::joints())
+        .publish(&topics::PROBE_TRIGGER, forms::trigger)
+        .publish(&topics::GRID_POSITION, forms::grid)
+        .action_server(
+            &topics::RUN_PROGRAM,
+            forms::run,
+            forms::cancel,
+            forms::signals,
+        )
+        .diagnose(forms::condition);
+    for sensor in &machine.temperature_sensors {
+        let id = sensor.id.clone();
+        wiring = wiring.publish_member(&topics::TEMPERATURE, &sensor.id, move |output| {
+            forms::temperature(output, &id)
+        })?;
+    }
+    Ok(wiring.node())
+}

@@ -1,5 +1,6 @@
 //! The node's conditions as `/diagnostics` shows them, and what of them is logged.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -30,7 +31,7 @@ struct Standing {
 pub(super) struct Board {
     node: String,
     state: &'static str,
-    standing: BTreeMap<&'static str, Standing>,
+    standing: BTreeMap<Cow<'static, str>, Standing>,
     counters: BTreeMap<String, u64>,
     /// Reported `Ok` since the last publication, so that the end of a condition is seen.
     ended: Vec<Diagnostic>,
@@ -74,16 +75,16 @@ impl Board {
     }
 
     fn put(&mut self, diagnostic: Diagnostic, now: Instant, expires: Option<Instant>) {
-        let name = diagnostic.name;
+        let name = diagnostic.name.clone();
         if diagnostic.level == Level::Ok {
-            if self.standing.remove(name).is_some() {
-                tracing::info!(condition = name, "{}", diagnostic.message);
+            if self.standing.remove(&name).is_some() {
+                tracing::info!(condition = &*name, "{}", diagnostic.message);
                 self.ended.push(diagnostic);
                 self.changed = true;
             }
             return;
         }
-        match self.standing.get_mut(name) {
+        match self.standing.get_mut(&name) {
             Some(standing) if standing.diagnostic.level == diagnostic.level => {
                 standing.diagnostic = diagnostic;
                 standing.expires = expires;
@@ -114,7 +115,7 @@ impl Board {
             .standing
             .iter()
             .filter(|(_, standing)| standing.expires.is_some_and(|at| at <= now))
-            .map(|(name, _)| *name)
+            .map(|(name, _)| name.clone())
             .collect();
         for name in over {
             let message = format!("not seen for {} s", OVER_AFTER.as_secs());
@@ -191,9 +192,9 @@ fn log(diagnostic: &Diagnostic, silenced: u64) {
         ..
     } = diagnostic;
     match level {
-        Level::Ok => tracing::info!(condition = name, "{message}"),
-        Level::Warn | Level::Stale => tracing::warn!(condition = name, silenced, "{message}"),
-        Level::Error => tracing::error!(condition = name, silenced, "{message}"),
+        Level::Ok => tracing::info!(condition = &**name, "{message}"),
+        Level::Warn | Level::Stale => tracing::warn!(condition = &**name, silenced, "{message}"),
+        Level::Error => tracing::error!(condition = &**name, silenced, "{message}"),
     }
 }
 

@@ -61,12 +61,12 @@ where
 {
     /// Offers an action.
     #[must_use]
-    pub fn action_server<A: Action>(
+    pub fn action_server<A: Action, I: IntoIterator<Item = GoalSignal<A>>>(
         mut self,
         action: &ActionName<A>,
         goal: impl Fn(GoalId, A::Goal) -> S::Input + Send + 'static,
         cancel: impl Fn(GoalId) -> S::Input + Send + 'static,
-        signal: impl Fn(&S::Output) -> Option<GoalSignal<A>> + Send + 'static,
+        signal: impl Fn(&S::Output) -> I + Send + 'static,
     ) -> Self {
         let server = self.ports.action_servers.len();
         let port = ActionPort {
@@ -79,7 +79,7 @@ where
             cancel: Box::new(cancel),
         });
         self.emitters.push(Box::new(move |output, out| {
-            out.extend(signal(output).map(|signal| match signal {
+            out.extend(signal(output).into_iter().map(|signal| match signal {
                 GoalSignal::Accept(id) => Emission::AcceptGoal { server, id },
                 GoalSignal::Reject(id) => Emission::RejectGoal { server, id },
                 GoalSignal::Feedback(id, feedback) => Emission::Feedback {

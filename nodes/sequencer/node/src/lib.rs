@@ -1,1 +1,54 @@
-//! ROS shell of sequencer.
+//! ROS shell of the sequencer.
+
+use std::collections::BTreeMap;
+
+use abbe_msgs::topics;
+use anyhow::{Context, Result};
+use machine::MachineFile;
+use metrology::stamp::Span;
+use node_runtime::{Node, Setup, Wiring};
+use sequencer::config::PARAMETERS;
+use sequencer::{Config, Input, Plan, Sequencer};
+
+mod files;
+mod forms;
+
+/// Time between two looks at the plan.
+const TICK: Span = Span::from_nanos(100_000_000);
+
+/// Builds the node.
+///
+/// # Errors
+/// When a parameter, the machine file, the plan or a program is wrong.
+pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
+    let config: Config = setup.config()?;
+    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let (path, text) = setup.file_text("machine_file")?;
+    let machine = MachineFile::parse(&text, &path.display().to_string())?;
+    let (plan, programs): (Option<Plan>, BTreeMap<_, _>) = if config.plan_file.is_empty() {
+        (None, BTreeMap::new())
+    } else {
+        let (path, text) = setup.file_text("plan_file")?;
+        let plan: Plan =
+            serde_saphyr::from_str(&text).with_context(|| format!("plan {}", path.display()))?;
+        let programs = files::programs(&plan, &path)?;
+        (Some(plan), programs)
+    };
+    let stage = Sequencer::new(config, machine, plan, programs).context("plan")?;
+    Ok(Wiring::new(setup.name(), parameters, stage)
+        .on(&topics::PROBE_TRIGGER, |_| Input::Touch)
+        .on(&topics::THERMAL_UPDATE_REQUEST, Input::UpdateRequest)
+        .every(TICK, || Input::Tick)
+        .publish(&topics::TEST_SEGMENT, forms::segment)
+        .publish(&topics::PLAN_STATUS, forms::status)
+        .client(&topics::SET_COMPENSATION, forms::switch, forms::switched)
+        .action_client(&topics::RUN_PROGRAM, forms::program, forms::program_news)
+        .action_server(
+            &topics::RUN_CYCLE,
+            forms::cycle,
+            Input::CancelCycle,
+            forms::cycle_signal,
+        )
+        .diagnose(forms::condition)
+        .node())
+}

@@ -1,30 +1,32 @@
-//! ROS shell of thermal_model.
+//! ROS shell of the thermal model.
 
 use abbe_msgs::topics;
-use anyhow::Context;
+use anyhow::Result;
 use machine::MachineFile;
 use metrology::stamp::Span;
-use node_runtime::parameter::Parameter;
-use node_runtime::{Diagnostic, Level, Node, Wiring};
-use thermal_model::{Input, Output, Severity, ThermalModelConfig, ThermalModelStage};
+use node_runtime::{Node, Setup, Wiring};
+use thermal_model::config::PARAMETERS;
+use thermal_model::{Input, Output, ThermalModelConfig, ThermalModelStage};
 
-/// Name of the node, its folder, parameter file and log target.
-pub const NAME: &str = "thermal_model";
+mod conditions;
 
-/// The node for a resolved configuration; `parameters` is what `ros2 param` shows of it.
+/// Time between two looks at the update rule.
+const TICK: Span = Span::from_nanos(1_000_000_000);
+
+/// Builds the node.
 ///
 /// # Errors
-/// When the configuration or the machine file is refused, or a sensor's id is no ROS name.
-pub fn node(
-    config: ThermalModelConfig,
-    parameters: Vec<Parameter>,
-    machine: &MachineFile,
-) -> anyhow::Result<Box<dyn Node>> {
-    let stage = ThermalModelStage::new(config, machine).context(NAME)?;
-    let mut wiring = Wiring::new(NAME, parameters, stage)
+/// When a parameter or the machine file is wrong.
+pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
+    let config: ThermalModelConfig = setup.config()?;
+    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let (path, text) = setup.file_text("machine_file")?;
+    let machine = MachineFile::parse(&text, &path.display().to_string())?;
+    let stage = ThermalModelStage::new(config, &machine)?;
+    let mut wiring = Wiring::new(setup.name(), parameters, stage)
         .on(&topics::BLOCKS_MEASUREMENT, Input::Block)
         .on(&topics::TEST_SEGMENT, Input::Segment)
-        .every(Span::from_secs_f64(1.0), || Input::Tick)
+        .every(TICK, || Input::Tick)
         .publish(&topics::THERMAL_MODEL, |output| match output {
             Output::Model(model) => Some(model),
             _ => None,
@@ -33,27 +35,9 @@ pub fn node(
             Output::UpdateRequest(request) => Some(request),
             _ => None,
         })
-        .diagnose(condition);
+        .diagnose(conditions::condition);
     for sensor in &machine.temperature_sensors {
-        wiring = wiring
-            .on_member(&topics::TEMPERATURE, &sensor.id, Input::Temperature)
-            .with_context(|| format!("temperature sensor \"{}\"", sensor.id))?;
+        wiring = wiring.on_member(&topics::TEMPERATURE, &sensor.id, Input::Temperature)?;
     }
     Ok(wiring.node())
-}
-
-fn condition(output: &Output) -> Option<Diagnostic> {
-    let Output::Diagnostic(diagnostic) = output else {
-        return None;
-    };
-    let level = match diagnostic.severity() {
-        Severity::Info => Level::Ok,
-        Severity::Warn => Level::Warn,
-        Severity::Error => Level::Error,
-    };
-    Some(Diagnostic::new(
-        level,
-        diagnostic.condition(),
-        diagnostic.to_string(),
-    ))
 }

@@ -1,0 +1,167 @@
+//! What a run leaves behind for its report: decoded messages of a few topics, and the truth where a scenario may see it.
+
+use abbe_msgs::{Message, Wire, from_cdr, topics};
+use metrology::sample::{
+    AxisCompensation, BlockMeasurement, PlanStatus, ProbeLatency, ProbedPoint, TestKind,
+    TestSegment, ThermalModel,
+};
+use metrology::stamp::{Host, Stamp};
+use nalgebra::Vector3;
+use node_runtime::{Diagnostic, Level};
+
+/// One pose of a verification: the machine stood still there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseError {
+    /// Where the program sent the tool, mm.
+    pub commanded_mm: Vector3<f64>,
+    /// True error of the tool relative to the workpiece, machine frame, mm.
+    pub error_mm: Vector3<f64>,
+}
+
+/// One verification program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verification {
+    /// Its label in the plan.
+    pub label: String,
+    /// When it began.
+    pub at: Stamp<Host>,
+    /// Poses in the order of the program.
+    pub poses: Vec<PoseError>,
+}
+
+/// A condition that a node reported.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Condition {
+    /// When.
+    pub at: Stamp<Host>,
+    /// By whom.
+    pub node: String,
+    /// What.
+    pub diagnostic: Diagnostic,
+}
+
+/// Everything that a report is written from.
+#[derive(Debug, Default)]
+pub struct Evidence {
+    /// Latency estimates in order.
+    pub latencies: Vec<ProbeLatency>,
+    /// Corrected touches in order, each with the run it belongs to.
+    pub points: Vec<(u32, ProbedPoint)>,
+    /// Block measurements in order.
+    pub blocks: Vec<BlockMeasurement>,
+    /// Models in order.
+    pub models: Vec<ThermalModel>,
+    /// Segments in order.
+    pub segments: Vec<TestSegment>,
+    /// Last word of the sequencer.
+    pub status: Option<PlanStatus>,
+    /// Last compensation.
+    pub compensation: Option<AxisCompensation>,
+    /// Conditions above `Ok` in order.
+    pub conditions: Vec<Condition>,
+    /// Verifications with the plant's truth.
+    pub verifications: Vec<Verification>,
+    /// The plant's latency, s.
+    pub true_latency_s: Option<f64>,
+    /// Messages that could not be decoded, by topic.
+    pub undecoded: Vec<String>,
+}
+
+impl Evidence {
+    /// Whether [`Self::message`] looks at `topic`.
+    pub fn wants(topic: &str) -> bool {
+        [
+            topics::LATENCY.name,
+            topics::PROBE_POINT.name,
+            topics::BLOCKS_MEASUREMENT.name,
+            topics::THERMAL_MODEL.name,
+            topics::COMPENSATION.name,
+            topics::PLAN_STATUS.name,
+            topics::TEST_SEGMENT.name,
+        ]
+        .contains(&topic)
+    }
+
+    /// Takes one publication of `topic`.
+    pub fn message(&mut self, topic: &str, bytes: &[u8]) {
+        if topic == topics::LATENCY.name {
+            let taken = self.decode(&topics::LATENCY, bytes);
+            self.latencies.extend(taken);
+        } else if topic == topics::PROBE_POINT.name {
+            let run = self.current_run();
+            let taken = self.decode(&topics::PROBE_POINT, bytes);
+            self.points.extend(taken.map(|point| (run, point)));
+        } else if topic == topics::BLOCKS_MEASUREMENT.name {
+            let taken = self.decode(&topics::BLOCKS_MEASUREMENT, bytes);
+            self.blocks.extend(taken);
+        } else if topic == topics::THERMAL_MODEL.name {
+            let taken = self.decode(&topics::THERMAL_MODEL, bytes);
+            self.models.extend(taken);
+        } else if topic == topics::COMPENSATION.name {
+            self.compensation = self.decode(&topics::COMPENSATION, bytes);
+        } else if topic == topics::PLAN_STATUS.name {
+            self.status = self.decode(&topics::PLAN_STATUS, bytes);
+        } else if topic == topics::TEST_SEGMENT.name {
+            let taken = self.decode(&topics::TEST_SEGMENT, bytes);
+            taken.into_iter().for_each(|segment| self.segment(segment));
+        }
+    }
+
+    /// Takes one condition.
+    pub fn condition(&mut self, at: Stamp<Host>, node: &str, diagnostic: &Diagnostic) {
+        if diagnostic.level != Level::Ok {
+            let (node, diagnostic) = (node.to_owned(), diagnostic.clone());
+            self.conditions.push(Condition {
+                at,
+                node,
+                diagnostic,
+            });
+        }
+    }
+
+    /// The run that is under way; 0: none.
+    fn current_run(&self) -> u32 {
+        self.segments
+            .last()
+            .filter(|segment| segment.begin)
+            .map_or(0, |segment| segment.run)
+    }
+
+    fn segment(&mut self, segment: TestSegment) {
+        if segment.begin && segment.kind == TestKind::Verification {
+            let label = segment.features.first().cloned().unwrap_or_default();
+            self.verifications.push(Verification {
+                label,
+                at: segment.at,
+                poses: Vec::new(),
+            });
+        }
+        self.segments.push(segment);
+    }
+
+    /// Whether a verification is under way.
+    pub fn verifying(&self) -> bool {
+        self.segments
+            .last()
+            .is_some_and(|segment| segment.begin && segment.kind == TestKind::Verification)
+    }
+
+    /// Adds a pose to the verification that is under way.
+    pub fn pose(&mut self, pose: PoseError) {
+        if let Some(verification) = self.verifications.last_mut() {
+            verification.poses.push(pose);
+        }
+    }
+
+    fn decode<M: Message + Wire>(
+        &mut self,
+        topic: &topics::Topic<M>,
+        bytes: &[u8],
+    ) -> Option<M::Inner> {
+        let decoded = from_cdr::<M>(bytes).and_then(M::into_inner);
+        if let Err(error) = &decoded {
+            self.undecoded.push(format!("{}: {error}", topic.name));
+        }
+        decoded.ok()
+    }
+}

@@ -1,0 +1,189 @@
+//! Reads a scenario's launch file: the ROS 2 XML launch format, as far as a scenario needs it.
+//!
+//! `<node pkg exec name namespace><param from="$(dirname)/FILE"/><param name value/></node>` below
+//! `<launch>`. What `ros2 launch` would do and this reader does not is refused by name, never skipped.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+/// One node of a scenario.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LaunchNode {
+    /// Executable, which is the node's folder in `nodes/`.
+    pub exec: String,
+    /// ROS node name.
+    pub name: String,
+    /// Namespace; empty: none.
+    pub namespace: String,
+    /// Parameter files, later ones override.
+    pub parameter_files: Vec<PathBuf>,
+    /// Single parameters, `name:=value` as YAML.
+    pub parameters: Vec<(String, String)>,
+}
+
+impl LaunchNode {
+    /// The node's arguments as `ros2 launch` would give them.
+    pub fn ros_args(&self) -> Vec<String> {
+        let mut args = vec!["--ros-args".to_owned(), "-r".to_owned()];
+        args.push(format!("__node:={}", self.name));
+        if !self.namespace.is_empty() {
+            args.extend(["-r".to_owned(), format!("__ns:={}", self.namespace)]);
+        }
+        for file in &self.parameter_files {
+            args.extend(["--params-file".to_owned(), file.display().to_string()]);
+        }
+        for (name, value) in &self.parameters {
+            args.extend(["-p".to_owned(), format!("{name}:={value}")]);
+        }
+        args
+    }
+}
+
+/// Finds the one `*.launch.xml` in a scenario's folder.
+///
+/// # Errors
+/// When there is none or more than one.
+pub fn find(folder: &Path) -> Result<PathBuf> {
+    let entries =
+        std::fs::read_dir(folder).with_context(|| format!("scenario {}", folder.display()))?;
+    let mut found = Vec::new();
+    for entry in entries {
+        let path = entry?.path();
+        if path.to_string_lossy().ends_with(".launch.xml") {
+            found.push(path);
+        }
+    }
+    match found.as_slice() {
+        [one] => Ok(one.clone()),
+        [] => bail!("scenario {}: it has no *.launch.xml", folder.display()),
+        several => bail!(
+            "scenario {}: it has {} launch files",
+            folder.display(),
+            several.len()
+        ),
+    }
+}
+
+/// Reads a launch file.
+///
+/// # Errors
+/// With line and column, when the file is not a launch file or uses what this reader does not know.
+pub fn read(path: &Path) -> Result<Vec<LaunchNode>> {
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("launch file {}", path.display()))?;
+    let folder = path.parent().unwrap_or_else(|| Path::new("."));
+    parse(&text, folder).with_context(|| format!("launch file {}", path.display()))
+}
+
+fn parse(text: &str, folder: &Path) -> Result<Vec<LaunchNode>> {
+    let document = roxmltree::Document::parse(text)?;
+    let root = document.root_element();
+    if root.tag_name().name() != "launch" {
+        bail!(
+            "the root element is <{}>: must be <launch>",
+            root.tag_name().name()
+        );
+    }
+    let mut nodes = Vec::new();
+    for child in root.children().filter(roxmltree::Node::is_element) {
+        let place = document.text_pos_at(child.range().start);
+        match child.tag_name().name() {
+            "node" => nodes.push(node(child, folder).with_context(|| format!("at {place}"))?),
+            other => bail!("{place}: <{other}> is not supported in a scenario (supported: <node>)"),
+        }
+    }
+    if nodes.is_empty() {
+        bail!("it launches no <node>");
+    }
+    Ok(nodes)
+}
+
+fn node(element: roxmltree::Node<'_, '_>, folder: &Path) -> Result<LaunchNode> {
+    for attribute in element.attributes() {
+        if !["pkg", "exec", "name", "namespace", "output"].contains(&attribute.name()) {
+            bail!(
+                "attribute \"{}\" of <node> is not supported in a scenario",
+                attribute.name()
+            );
+        }
+    }
+    let exec = element
+        .attribute("exec")
+        .context("<node> lacks \"exec\"")?
+        .to_owned();
+    let mut launched = LaunchNode {
+        name: element.attribute("name").unwrap_or(&exec).to_owned(),
+        namespace: element
+            .attribute("namespace")
+            .unwrap_or_default()
+            .to_owned(),
+        exec,
+        parameter_files: Vec::new(),
+        parameters: Vec::new(),
+    };
+    for child in element.children().filter(roxmltree::Node::is_element) {
+        let tag = child.tag_name().name();
+        let (from, name, value) = (
+            child.attribute("from"),
+            child.attribute("name"),
+            child.attribute("value"),
+        );
+        match (tag, from, name, value) {
+            ("param", Some(from), None, None) => {
+                launched
+                    .parameter_files
+                    .push(substitute(from, folder)?.into());
+            }
+            ("param", None, Some(name), Some(value)) => {
+                launched
+                    .parameters
+                    .push((name.to_owned(), substitute(value, folder)?));
+            }
+            ("param", ..) => bail!("<param> needs either \"from\" or \"name\" and \"value\""),
+            (other, ..) => bail!("<{other}> in <node> is not supported in a scenario"),
+        }
+    }
+    Ok(launched)
+}
+
+fn substitute(text: &str, folder: &Path) -> Result<String> {
+    let text = text.replace("$(dirname)", &folder.display().to_string());
+    match text.find("$(") {
+        Some(at) => bail!(
+            "\"{}\": only $(dirname) is supported in a scenario",
+            &text[at..]
+        ),
+        None => Ok(text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_node_with_files_and_parameters_becomes_ros_arguments() {
+        let text = r#"<launch><node pkg="abbe" exec="probe" namespace="/m1">
+            <param from="$(dirname)/probe.yaml"/><param name="queue_s" value="2.0"/>
+        </node></launch>"#;
+        let nodes = parse(text, Path::new("lc")).unwrap();
+        assert_eq!(
+            nodes[0].ros_args().join(" "),
+            "--ros-args -r __node:=probe -r __ns:=/m1 --params-file lc/probe.yaml -p queue_s:=2.0"
+        );
+    }
+
+    #[test]
+    fn what_the_reader_does_not_know_is_refused_with_its_place() {
+        let text = "<launch>\n  <include file=\"x\"/>\n</launch>";
+        let error = format!("{:#}", parse(text, Path::new(".")).unwrap_err());
+        assert!(
+            error.contains("2:3") && error.contains("<include>"),
+            "{error}"
+        );
+        let text = r#"<launch><node exec="a"><param from="$(env HOME)/x"/></node></launch>"#;
+        let error = format!("{:#}", parse(text, Path::new(".")).unwrap_err());
+        assert!(error.contains("$(env HOME)"), "{error}");
+    }
+}

@@ -1,0 +1,66 @@
+//! `abbe node NAME --ros-args …`: one node as a process of its own.
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Args;
+use node_runtime::{Composition, Node, Setup};
+
+/// What builds a node from its setup.
+pub type Builder = fn(&Setup) -> Result<Box<dyn Node>>;
+
+/// Every node that can be launched, by the name of its folder.
+pub const NODES: &[(&str, Builder)] = &[
+    ("axis_compensation", axis_compensation_node::node),
+    ("fake_cnc", fake_cnc_node::node),
+    ("latency_calibrator", latency_calibrator_node::node),
+    ("probe", probe_node::node),
+    ("sequencer", sequencer_node::node),
+    ("thermal_model", thermal_model_node::node),
+];
+
+/// The builder of the node in folder `exec`.
+pub fn builder(exec: &str) -> Option<Builder> {
+    NODES
+        .iter()
+        .find(|(name, _)| *name == exec)
+        .map(|(_, builder)| *builder)
+}
+
+/// Names of all nodes, for messages.
+pub fn names() -> String {
+    NODES
+        .iter()
+        .map(|(name, _)| *name)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// Arguments of `abbe node`.
+#[derive(Args)]
+pub struct NodeVerb {
+    /// Which node.
+    name: String,
+    /// Arguments as of any ROS 2 node: `--ros-args -r … -p … --params-file …`.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+impl NodeVerb {
+    /// Runs the node until it is told to stop.
+    pub fn execute(self) -> ExitCode {
+        let Some(build) = builder(&self.name) else {
+            eprintln!(
+                "abbe: node \"{}\" is unknown (known: {})",
+                self.name,
+                names()
+            );
+            return ExitCode::from(2);
+        };
+        node_runtime::run_composed(vec![Composition {
+            name: self.name,
+            arguments: self.arguments,
+            build: Box::new(build),
+        }])
+    }
+}

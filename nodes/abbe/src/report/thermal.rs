@@ -1,0 +1,224 @@
+//! The page of a warm-up: latency, drift at the blocks, tool error before and after compensation.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use anyhow::Result;
+use maud::{Markup, html};
+use metrology::Axis;
+use metrology::stamp::{Host, Stamp};
+use nalgebra::Vector3;
+
+use super::page::{figure, table};
+use super::plot::{Plot, Trace, svg};
+use super::tool_error::{self, ToolError};
+use super::{Report, conditions, latency};
+use crate::evidence::{Evidence, Verification};
+
+/// Label prefix of the cold verification in a plan.
+const COLD: &str = "cold";
+
+/// Writes the page.
+///
+/// # Errors
+/// When a plot cannot be drawn.
+pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
+    let errors = tool_errors(&evidence.verifications);
+    let mut lines = latency::headline(evidence);
+    lines.extend(headline(&errors));
+    let drift = drift_traces(evidence);
+    let body = html! {
+        h1 { (title) }
+        @for line in &lines { p { (line) } }
+        h2 { "Tool error in the blocks' span, change since cold" }
+        (error_table(&errors))
+        (places_table(&errors))
+        p.note { "Truth of the plant at poses that the machine really went to; no node sees it. Shift: common to all poses. Stretch: along each axis itself, all that two blocks can see besides the shift. Rotation: between axes; two blocks on one diagonal take part of it for stretch. Curved: hot zones and bending, which no linear model follows. A shift that is left is the drift since the last block cycle and the probing error." }
+        h2 { "Drift at the blocks" }
+        @for axis in Axis::LINEAR {
+            (figure(&svg(&Plot {
+                x: "time since start / h".to_owned(),
+                y: format!("drift of the {axis} reading / µm"),
+                traces: drift.get(&axis).cloned().unwrap_or_default(),
+            })?, &format!("{axis} face of each block")))
+        }
+        (latency::section(evidence)?)
+        (conditions::section(evidence))
+    };
+    Ok(Report {
+        title: title.to_owned(),
+        lines,
+        text: text(&errors),
+        body,
+    })
+}
+
+fn tool_errors(verifications: &[Verification]) -> Vec<ToolError> {
+    let Some(cold) = verifications
+        .iter()
+        .find(|check| check.label.starts_with(COLD))
+    else {
+        return Vec::new();
+    };
+    verifications
+        .iter()
+        .filter(|check| !check.label.starts_with(COLD))
+        .filter_map(|check| tool_error::judge(cold, check))
+        .collect()
+}
+
+/// The last verification without and with compensation.
+pub fn last_pair(errors: &[ToolError]) -> Option<(&ToolError, &ToolError)> {
+    let last = |word: &str| errors.iter().rev().find(|error| error.label.contains(word));
+    Some((last("without")?, last("with compensation")?))
+}
+
+fn um(length_mm: f64) -> String {
+    format!("{:.1}", length_mm * 1e3)
+}
+
+fn headline(errors: &[ToolError]) -> Vec<String> {
+    let Some((off, on)) = last_pair(errors) else {
+        return vec![
+            "Tool error: no pair of verifications with and without compensation.".to_owned(),
+        ];
+    };
+    vec![format!(
+        "Tool error at the end of warm-up: p95 {} µm without compensation, {} µm with it ({:.1}-fold less).",
+        um(off.p95_mm),
+        um(on.p95_mm),
+        off.p95_mm / on.p95_mm
+    )]
+}
+
+const HEAD: [&str; 8] = [
+    "verification",
+    "p95 / µm",
+    "max / µm",
+    "shift",
+    "stretch",
+    "rotation",
+    "curved (rms / µm)",
+    "p95 with cold error / µm",
+];
+
+fn error_rows(errors: &[ToolError]) -> Vec<Vec<String>> {
+    errors
+        .iter()
+        .map(|error| {
+            vec![
+                error.label.clone(),
+                um(error.p95_mm),
+                um(error.max_mm),
+                um(error.parts.shift_mm),
+                um(error.parts.stretch_mm),
+                um(error.parts.rotation_mm),
+                um(error.parts.curved_mm),
+                um(error.whole_p95_mm),
+            ]
+        })
+        .collect()
+}
+
+fn error_table(errors: &[ToolError]) -> Markup {
+    table(&HEAD, &error_rows(errors))
+}
+
+/// Corners of the table and its centre, at the lowest height that was visited everywhere.
+fn places() -> [(&'static str, Vector3<f64>); 5] {
+    [
+        ("corner -X -Y", Vector3::new(-1e3, -1e3, 1e3)),
+        ("corner +X -Y", Vector3::new(1e3, -1e3, 1e3)),
+        ("corner -X +Y", Vector3::new(-1e3, 1e3, 1e3)),
+        ("corner +X +Y", Vector3::new(1e3, 1e3, 1e3)),
+        ("centre", Vector3::new(0.0, 0.0, 1e3)),
+    ]
+}
+
+fn place_rows(errors: &[ToolError]) -> Vec<Vec<String>> {
+    places()
+        .iter()
+        .map(|(name, wanted_mm)| {
+            let mut row = vec![(*name).to_owned()];
+            for error in errors {
+                row.push(tool_error::nearest(&error.change, *wanted_mm).map_or_else(
+                    String::new,
+                    |pose| {
+                        let e = pose.error_mm;
+                        let size = um(e.norm());
+                        format!("{size} ({}, {}, {})", um(e.x), um(e.y), um(e.z))
+                    },
+                ));
+            }
+            row
+        })
+        .collect()
+}
+
+fn places_table(errors: &[ToolError]) -> Markup {
+    let mut head = vec!["size (x, y, z) / µm"];
+    head.extend(errors.iter().map(|error| error.label.as_str()));
+    table(&head, &place_rows(errors))
+}
+
+/// Drift of each block's face over time, µm over h.
+fn drift_traces(evidence: &Evidence) -> BTreeMap<Axis, Vec<Trace>> {
+    let mut cold = BTreeMap::new();
+    let mut traces: BTreeMap<Axis, BTreeMap<String, Vec<(f64, f64)>>> = BTreeMap::new();
+    let start = evidence
+        .segments
+        .first()
+        .map_or_else(Stamp::<Host>::default, |first| first.at);
+    for block in &evidence.blocks {
+        for axis in Axis::LINEAR {
+            let Some(face) = block.faces[axis] else {
+                continue;
+            };
+            let key = (block.block_id.clone(), axis);
+            if block.cold {
+                cold.insert(key.clone(), face.position_mm);
+            }
+            if let Some(cold_mm) = cold.get(&key) {
+                let hours = (face.at - start).as_secs_f64() / 3600.0;
+                traces
+                    .entry(axis)
+                    .or_default()
+                    .entry(key.0)
+                    .or_default()
+                    .push((hours, (face.position_mm - cold_mm) * 1e3));
+            }
+        }
+    }
+    let named = |(name, points)| Trace {
+        name,
+        points,
+        marks: false,
+    };
+    traces
+        .into_iter()
+        .map(|(axis, blocks)| (axis, blocks.into_iter().map(named).collect()))
+        .collect()
+}
+
+/// The tables as they stand on a terminal.
+fn text(errors: &[ToolError]) -> String {
+    let mut text = String::new();
+    for row in std::iter::once(HEAD.map(str::to_owned).to_vec()).chain(error_rows(errors)) {
+        let _ = writeln!(
+            text,
+            "  {:<28}{:>9}{:>9}{:>8}{:>9}{:>10}{:>19}{:>26}",
+            row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
+        );
+    }
+    text.push('\n');
+    let mut head = vec!["size (x, y, z) / µm".to_owned()];
+    head.extend(errors.iter().map(|error| error.label.clone()));
+    for row in std::iter::once(head).chain(place_rows(errors)) {
+        let _ = write!(text, "  {:<20}", row[0]);
+        for cell in &row[1..] {
+            let _ = write!(text, "{cell:>30}");
+        }
+        text.push('\n');
+    }
+    text
+}

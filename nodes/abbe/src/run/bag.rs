@@ -1,0 +1,131 @@
+//! The bag of a run: its context and its channels.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use node_runtime::Node;
+use node_runtime::node::TopicPort;
+use node_runtime::parameter::{Parameter, Value};
+use recorder::{
+    Channel, ChunkCompression, Directory, Recorder, RecorderConfig, Recording, RunContext, WhenFull,
+};
+
+use crate::scenario::Scenario;
+
+/// Simulated time passes quickly: a chunk may span this much of it.
+const SIMULATED_FLUSH_S: f64 = 60.0;
+const REAL_FLUSH_S: f64 = 1.0;
+
+/// Begins the bag of `scenario` with everything that a replay needs.
+///
+/// # Errors
+/// When the folder exists or cannot be written, or the context holds what must not be in a bag.
+pub fn begin(
+    path: &Path,
+    scenario: &Scenario,
+    parameters: BTreeMap<String, String>,
+    start_nanos: u64,
+    simulated: bool,
+) -> Result<Recorder> {
+    let config = RecorderConfig {
+        compression: ChunkCompression::Zstd,
+        flush_period_s: if simulated {
+            SIMULATED_FLUSH_S
+        } else {
+            REAL_FLUSH_S
+        },
+        when_full: if simulated {
+            WhenFull::Wait
+        } else {
+            WhenFull::CountLoss
+        },
+        ..RecorderConfig::default()
+    };
+    let name = path
+        .file_name()
+        .context("bag without a name")?
+        .to_string_lossy()
+        .into_owned();
+    let mut recording = Recording::begin(Directory::create(path)?, &name, config.clone())?;
+    recording.add_context(&context(scenario, parameters, start_nanos)?)?;
+    Ok(Recorder::start(recording, &config)?)
+}
+
+fn context(
+    scenario: &Scenario,
+    parameters: BTreeMap<String, String>,
+    start_time_nanos: u64,
+) -> Result<RunContext> {
+    let mut programs = BTreeMap::new();
+    for entry in std::fs::read_dir(&scenario.folder)? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|extension| extension == "ngc") {
+            let name = path
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            let text = std::fs::read_to_string(&path)
+                .with_context(|| format!("program {}", path.display()))?;
+            programs.insert(name, text);
+        }
+    }
+    let read = |name: &str| std::fs::read_to_string(scenario.folder.join(name)).ok();
+    Ok(RunContext {
+        start_time_nanos,
+        scenario_name: scenario.name.clone(),
+        seed: None,
+        commit: env!("ABBE_COMMIT").to_owned(),
+        machine_file: read("machine.yaml"),
+        scenario_file: read("scenario.yaml"),
+        programs,
+        parameters,
+    })
+}
+
+/// Resolved parameters of a node as YAML text.
+///
+/// # Errors
+/// When they cannot be written as YAML.
+pub fn parameters(node: &dyn Node) -> Result<String> {
+    let flat: BTreeMap<&str, serde_json::Value> = node
+        .parameters()
+        .iter()
+        .map(|p| (p.name.as_str(), json(p)))
+        .collect();
+    serde_saphyr::to_string(&flat).with_context(|| format!("parameters of {}", node.name()))
+}
+
+fn json(parameter: &Parameter) -> serde_json::Value {
+    match &parameter.value {
+        Value::Bool(value) => (*value).into(),
+        Value::Integer(value) => (*value).into(),
+        Value::Double(value) => (*value).into(),
+        Value::String(value) => value.as_str().into(),
+        Value::BoolArray(values) => values.clone().into(),
+        Value::IntegerArray(values) => values.clone().into(),
+        Value::DoubleArray(values) => values.clone().into(),
+        Value::StringArray(values) => values.clone().into(),
+    }
+}
+
+/// A topic as the bag holds it; `topic` is its resolved name.
+pub fn channel(topic: String, port: &TopicPort) -> Channel {
+    Channel {
+        topic,
+        type_name: port.type_name.to_owned(),
+        type_hash: port.type_hash.to_owned(),
+        definition: port.definition.to_owned(),
+        qos_yaml: port.qos.offered_qos_profiles(),
+    }
+}
+
+/// `name` as it stands on the graph without a namespace.
+pub fn full_name(name: &str) -> String {
+    if name.starts_with('/') {
+        name.to_owned()
+    } else {
+        format!("/{name}")
+    }
+}

@@ -1,0 +1,196 @@
+//! A scenario in simulated time: every stage wired directly, in one total order.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use metrology::sample::PlanState;
+use metrology::stamp::{Host, Span, Stamp};
+use node_runtime::harness::Published;
+use node_runtime::arguments::Arguments;
+use node_runtime::{Harness, Node, Setup};
+use recorder::{ChannelId, MessageStamp, Recorder, RecorderSink};
+
+use super::mirror::Mirror;
+use super::{Outcome, bag};
+use crate::evidence::Evidence;
+use crate::launch::LaunchNode;
+use crate::node;
+use crate::progress::Progress;
+use crate::scenario::Scenario;
+use crate::truth::Truth;
+
+/// How long nodes may take to wind down, in simulated time.
+const SHUTDOWN_PATIENCE: Span = Span::from_nanos(120_000_000_000);
+
+/// Runs `scenario` from `start_s` on.
+///
+/// # Errors
+/// When a node cannot be built or the bag not written.
+pub fn run(
+    scenario: &Scenario,
+    start_s: i64,
+    bag_path: &Path,
+    pace: f64,
+    on_dds: bool,
+) -> Result<Outcome> {
+    let truth = Arc::new(Truth::default());
+    let nodes = build(scenario, &truth)?;
+    let parameters = nodes
+        .iter()
+        .map(|node| Ok((node.name().to_owned(), bag::parameters(node.as_ref())?)))
+        .collect::<Result<BTreeMap<_, _>>>()?;
+    let start = Stamp::from_nanos(start_s * metrology::stamp::NANOS_PER_S);
+    let start_nanos = u64::try_from(start.nanos()).context("simulated_start_s is below 0")?;
+    let mut harness = Harness::compose(nodes, start)?;
+    let recorder = bag::begin(bag_path, scenario, parameters, start_nanos, true)?;
+    record(&mut harness, &recorder)?;
+    let mirror = if on_dds {
+        Mirror::start(&mut harness)?
+    } else {
+        None
+    };
+    let evidence = gather(&mut harness, &truth);
+    let failure = play(&mut harness, scenario, start, pace, &evidence, &truth);
+    harness.shutdown(SHUTDOWN_PATIENCE);
+    drop(harness);
+    drop(mirror);
+    let summary = recorder.finish()?;
+    let evidence = Rc::try_unwrap(evidence)
+        .map_err(|_| anyhow::anyhow!("an observer outlived its harness"))?
+        .into_inner();
+    Ok(Outcome {
+        evidence,
+        failure,
+        recorded: summary.messages_written,
+        lost: summary.messages_lost,
+    })
+}
+
+/// Builds every node of the launch file; the fake machine with the scenario's look at its truth.
+fn build(scenario: &Scenario, truth: &Arc<Truth>) -> Result<Vec<Box<dyn Node>>> {
+    scenario
+        .nodes
+        .iter()
+        .map(|launched| {
+            build_node(launched, truth).with_context(|| format!("node {}", launched.name))
+        })
+        .collect()
+}
+
+fn build_node(launched: &LaunchNode, truth: &Arc<Truth>) -> Result<Box<dyn Node>> {
+    let setup = Setup::new(&launched.exec, &Arguments::parse(launched.ros_args())?)?;
+    if launched.exec == "fake_cnc" {
+        return fake_cnc_node::witnessed(&setup, Some(truth.witness()));
+    }
+    match node::builder(&launched.exec) {
+        Some(build) => build(&setup),
+        None => bail!(
+            "exec \"{}\" is unknown (known: {})",
+            launched.exec,
+            node::names()
+        ),
+    }
+}
+
+/// Writes every publication into the bag, in total order.
+fn record(harness: &mut Harness, recorder: &Recorder) -> Result<()> {
+    let sink: RecorderSink = recorder.sink();
+    let mut channels: Vec<ChannelId> = Vec::new();
+    for port in harness.topics() {
+        channels.push(sink.add_channel(&bag::channel(bag::full_name(&port.topic), port))?);
+    }
+    harness.observe(Box::new(move |published: Published<'_>| {
+        let nanos = published.at.nanos();
+        let stamp = MessageStamp {
+            log_time_nanos: nanos,
+            publish_time_nanos: nanos,
+            sequence: published.sequence,
+        };
+        sink.push(channels[published.topic], stamp, published.bytes);
+    }));
+    Ok(())
+}
+
+/// Keeps what the report needs.
+fn gather(harness: &mut Harness, truth: &Arc<Truth>) -> Rc<RefCell<Evidence>> {
+    let evidence = Rc::new(RefCell::new(Evidence::default()));
+    let names: Vec<String> = harness.topics().map(|port| port.topic.clone()).collect();
+    let wanted: Vec<bool> = names.iter().map(|name| Evidence::wants(name)).collect();
+    let (seen, truth) = (Rc::clone(&evidence), Arc::clone(truth));
+    harness.observe(Box::new(move |published: Published<'_>| {
+        if wanted[published.topic] {
+            let mut evidence = seen.borrow_mut();
+            settle(&mut evidence, &truth);
+            evidence.message(&names[published.topic], published.bytes);
+            truth
+                .verifying
+                .store(evidence.verifying(), Ordering::Relaxed);
+        }
+    }));
+    let seen = Rc::clone(&evidence);
+    harness.observe_conditions(Box::new(move |at, node, diagnostic| {
+        seen.borrow_mut().condition(at, node, diagnostic);
+    }));
+    evidence
+}
+
+/// Moves what the witness saw to where it belongs, before the next segment begins.
+fn settle(evidence: &mut Evidence, truth: &Truth) {
+    let (poses, latency_s) = truth.take();
+    for pose in poses {
+        evidence.pose(pose);
+    }
+    evidence.true_latency_s = latency_s.or(evidence.true_latency_s);
+}
+
+/// Advances until the plan is over; the reason when it failed.
+fn play(
+    harness: &mut Harness,
+    scenario: &Scenario,
+    start: Stamp<Host>,
+    pace: f64,
+    evidence: &Rc<RefCell<Evidence>>,
+    truth: &Truth,
+) -> Option<String> {
+    let title = format!("{}: {}", scenario.name, scenario.file.title);
+    let mut progress = Progress::new(&title, start);
+    let limit = start + Span::from_secs_f64(scenario.file.limit_min * 60.0);
+    let began = Instant::now();
+    let failure = loop {
+        let Some(now) = harness.advance() else {
+            break Some("no node has a timer: time cannot pass".to_owned());
+        };
+        if progress.due() {
+            settle(&mut evidence.borrow_mut(), truth);
+            progress.show(now, &evidence.borrow());
+        }
+        match evidence
+            .borrow()
+            .status
+            .as_ref()
+            .map(|status| (status.state, &status.message))
+        {
+            Some((PlanState::Done, _)) => break None,
+            Some((PlanState::Failed, message)) => break Some(message.clone()),
+            _ => {}
+        }
+        if now > limit {
+            break Some(format!(
+                "limit_min = {} min have passed",
+                scenario.file.limit_min
+            ));
+        }
+        if pace > 0.0 {
+            let due = Duration::from_secs_f64((now - start).as_secs_f64() / pace);
+            std::thread::sleep(due.saturating_sub(began.elapsed()));
+        }
+    };
+    progress.finish();
+    failure
+}

@@ -1,0 +1,88 @@
+//! A scenario's folder: its launch file, and how the suite runs and reports it.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use serde::Deserialize;
+
+use crate::launch::{self, LaunchNode};
+
+/// `scenario.yaml` beside the launch file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScenarioFile {
+    /// One line for displays and reports.
+    pub title: String,
+    /// Which page is written at the end.
+    pub report: ReportKind,
+    /// First instant of simulated time, seconds since the epoch; `None`: the scenario runs on real time.
+    #[serde(default)]
+    pub simulated_start_s: Option<i64>,
+    /// Longest simulated (or real) time that the plan may take.
+    pub limit_min: f64,
+    /// What must run beside the nodes, on real time only.
+    #[serde(default)]
+    pub hardware: Hardware,
+}
+
+/// Which page a run ends with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReportKind {
+    /// Latency, drift at the blocks, tool error against the truth.
+    Thermal,
+    /// Latency and corrected points per feed.
+    Latency,
+    /// Block cycles.
+    Blocks,
+}
+
+/// Hardware, or what stands for it, that a scenario starts itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hardware {
+    /// None: the machine is a node, or runs already.
+    #[default]
+    None,
+    /// LinuxCNC with this INI file of the scenario's folder.
+    Linuxcnc(String),
+}
+
+/// A scenario, read.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Name: that of the folder.
+    pub name: String,
+    /// `scenario.yaml`.
+    pub file: ScenarioFile,
+    /// Nodes of the launch file.
+    pub nodes: Vec<LaunchNode>,
+}
+
+impl Scenario {
+    /// Reads the scenario in `folder`.
+    ///
+    /// # Errors
+    /// With file, key and value when something is missing or unknown.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let name = folder
+            .file_name()
+            .with_context(|| format!("scenario {}: no folder name", folder.display()))?
+            .to_string_lossy()
+            .into_owned();
+        let path = folder.join("scenario.yaml");
+        let text = std::fs::read_to_string(&path)
+            .with_context(|| format!("scenario file {}", path.display()))?;
+        let file: ScenarioFile = serde_saphyr::from_str(&text)
+            .with_context(|| format!("scenario file {}", path.display()))?;
+        let nodes = launch::read(&launch::find(folder)?)?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            name,
+            file,
+            nodes,
+        })
+    }
+}
