@@ -14,6 +14,8 @@ pub enum SequencerError {
     },
     #[error("steps[{step}].minutes = {minutes}: must be above 0 and finite")]
     Minutes { step: usize, minutes: f64 },
+    #[error("steps[{step}].seconds = {seconds}: must be above 0 and finite")]
+    Seconds { step: usize, seconds: f64 },
     #[error("steps[{step}]: {source}")]
     Cycle { step: usize, source: CycleError },
     #[error("steps: the plan has none")]

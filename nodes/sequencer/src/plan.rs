@@ -62,6 +62,11 @@ pub enum Step {
         /// Which check this is, for reports.
         label: String,
     },
+    /// Lets time pass, e.g. until a compensation has faded.
+    Wait {
+        /// How long.
+        seconds: f64,
+    },
     /// Runs a program once.
     Run {
         /// Name of the program.
@@ -85,6 +90,7 @@ impl Step {
                 program, minutes, ..
             } => format!("{program} for {minutes} min"),
             Self::Verify { label, .. } => format!("verification: {label}"),
+            Self::Wait { seconds } => format!("waiting {seconds} s"),
             Self::Run { program } => format!("running {program}"),
         }
     }

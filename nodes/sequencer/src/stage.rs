@@ -127,6 +127,7 @@ pub struct Sequencer {
     now: Stamp<Host>,
     job: Option<Job>,
     switching: Option<u64>,
+    waiting_until: Option<Stamp<Host>>,
     production: Option<Production>,
     update_wanted: bool,
     next_run: u32,
@@ -161,6 +162,7 @@ impl Sequencer {
             now: Stamp::default(),
             job: None,
             switching: None,
+            waiting_until: None,
             production: None,
             update_wanted: false,
             next_run: 1,
@@ -174,7 +176,7 @@ impl Sequencer {
     }
 
     fn is_idle(&self) -> bool {
-        self.job.is_none() && self.switching.is_none()
+        self.job.is_none() && self.switching.is_none() && self.waiting_until.is_none()
     }
 
     fn say(&self, out: &mut Vec<Output>) {
@@ -277,6 +279,10 @@ impl Sequencer {
                     serve_updates: *serve_updates,
                     parts: 0,
                 });
+                self.say(out);
+            }
+            Step::Wait { seconds } => {
+                self.waiting_until = Some(self.now + Span::from_secs_f64(*seconds));
                 self.say(out);
             }
             step => match task::of_step(self.step - 1, step, &self.machine, &self.programs) {
@@ -387,6 +393,9 @@ impl Sequencer {
             && waited_s >= self.config.start_delay_s
         {
             self.state = PlanState::Running;
+        }
+        if self.waiting_until.is_some_and(|until| until <= self.now) {
+            self.waiting_until = None;
         }
         if self
             .job

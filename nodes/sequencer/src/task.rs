@@ -24,6 +24,14 @@ pub(crate) fn check(
     for (at, step) in plan.steps.iter().enumerate() {
         match step {
             Step::Compensation { .. } => {}
+            Step::Wait { seconds } => {
+                if !(seconds.is_finite() && *seconds > 0.0) {
+                    return Err(SequencerError::Seconds {
+                        step: at,
+                        seconds: *seconds,
+                    });
+                }
+            }
             Step::Produce {
                 program, minutes, ..
             } => {
@@ -97,7 +105,9 @@ pub(crate) fn of_step(
             let text = text(at, program, programs)?;
             return Ok(plain(program, text, TestKind::Production, Vec::new()));
         }
-        Step::Compensation { .. } => return Ok(plain("", "", TestKind::Dwell, Vec::new())),
+        Step::Compensation { .. } | Step::Wait { .. } => {
+            return Ok(plain("", "", TestKind::Dwell, Vec::new()));
+        }
     };
     of_order(&order, machine, Owner::Step)
         .map_err(|source| SequencerError::Cycle { step: at, source })

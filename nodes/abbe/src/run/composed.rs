@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use metrology::sample::PlanState;
 use metrology::stamp::{Host, Span, Stamp};
-use node_runtime::harness::Published;
 use node_runtime::arguments::Arguments;
+use node_runtime::harness::Published;
 use node_runtime::{Harness, Node, Setup};
 use recorder::{ChannelId, MessageStamp, Recorder, RecorderSink};
 

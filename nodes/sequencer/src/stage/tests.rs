@@ -315,3 +315,13 @@ fn time_that_goes_back_is_refused_and_changes_nothing() {
     assert!(error.to_string().contains("went back by 1 s"), "{error}");
     give(&mut sequencer, 6.0, Input::Tick);
 }
+
+#[test]
+fn a_wait_lets_time_pass_and_goes_on() {
+    let wait = Step::Wait { seconds: 5.0 };
+    let mut sequencer = sequencer(vec![wait, produce(1.0)]);
+    give(&mut sequencer, 0.0, Input::Tick);
+    assert_eq!(sent(&give(&mut sequencer, 1.0, Input::Tick)), None);
+    assert_eq!(sent(&give(&mut sequencer, 5.9, Input::Tick)), None);
+    assert!(sent(&give(&mut sequencer, 6.0, Input::Tick)).is_some());
+}
