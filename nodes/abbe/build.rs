@@ -1,4 +1,8 @@
 //! Tells the program which commit it is made from, for its bags.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "a build script is told its commit by the environment"
+)]
 
 use std::process::Command;
 
