@@ -4,16 +4,16 @@
 //! node's `/rosout` writer. Lines of RustDDS and ros2-client reach the console only, and only errors:
 //! at `warn` they flood.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
 use std::io::IsTerminal as _;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use abbe_msgs::rcl_interfaces::msg::Log;
 use abbe_msgs::to_cdr;
 use tracing::field::{Field, Visit};
-use tracing::span::Attributes;
-use tracing::{Event, Id, Level, Subscriber};
+use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::layer::{Context, SubscriberExt as _};
 use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::util::SubscriberInitExt as _;
@@ -23,20 +23,31 @@ use crate::arguments::Arguments;
 use crate::clock;
 use crate::dds::Writer;
 
-static ROSOUT: Mutex<BTreeMap<String, Arc<Writer>>> = Mutex::new(BTreeMap::new());
+/// Speakers by the spans of their nodes; a span is unique where a name need not be.
+static ROSOUT: Mutex<BTreeMap<u64, (String, Weak<Writer>)>> = Mutex::new(BTreeMap::new());
 
-fn writers() -> MutexGuard<'static, BTreeMap<String, Arc<Writer>>> {
+thread_local! {
+    /// Whether this thread is in the middle of a line: what RustDDS logs of it is no line of the node.
+    static IS_SPEAKING: Cell<bool> = const { Cell::new(false) };
+}
+
+fn speakers() -> MutexGuard<'static, BTreeMap<u64, (String, Weak<Writer>)>> {
     ROSOUT.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Lets the node of this fully qualified name speak on `/rosout`.
-pub(crate) fn open(node: &str, writer: Arc<Writer>) {
-    writers().insert(node.to_owned(), writer);
+/// Lets what is logged in the present span out on `/rosout` as node `name`, as long as the writer lives.
+pub(crate) fn open(name: &str, writer: &Arc<Writer>) {
+    if let Some(id) = tracing::Span::current().id() {
+        let name = name.trim_start_matches('/').replace('/', ".");
+        speakers().insert(id.into_u64(), (name, Arc::downgrade(writer)));
+    }
 }
 
 /// Ends that.
-pub(crate) fn close(node: &str) {
-    writers().remove(node);
+pub(crate) fn close() {
+    if let Some(id) = tracing::Span::current().id() {
+        speakers().remove(&id.into_u64());
+    }
 }
 
 /// Starts logging for the process, unless the program has its own already.
@@ -68,12 +79,8 @@ pub(crate) fn start(arguments: &[&Arguments], log_filter: Option<&str>) {
 
 struct Rosout;
 
-/// The node that a span belongs to.
-struct NodeName(String);
-
 #[derive(Default)]
 struct Fields {
-    node: Option<String>,
     message: String,
     others: String,
 }
@@ -81,7 +88,6 @@ struct Fields {
 impl Visit for Fields {
     fn record_str(&mut self, field: &Field, value: &str) {
         match field.name() {
-            "node" => self.node = Some(value.to_owned()),
             "message" => value.clone_into(&mut self.message),
             name => {
                 let _ = write!(self.others, " {name}={value}");
@@ -98,33 +104,29 @@ impl<S> Layer<S> for Rosout
 where
     S: Subscriber + for<'lookup> LookupSpan<'lookup>,
 {
-    fn on_new_span(&self, attributes: &Attributes<'_>, id: &Id, context: Context<'_, S>) {
-        let mut fields = Fields::default();
-        attributes.record(&mut fields);
-        if let (Some(node), Some(span)) = (fields.node, context.span(id)) {
-            span.extensions_mut().insert(NodeName(node));
-        }
-    }
-
     fn on_event(&self, event: &Event<'_>, context: Context<'_, S>) {
-        let node = context.event_scope(event).and_then(|scope| {
-            scope.into_iter().find_map(|span| {
-                span.extensions()
-                    .get::<NodeName>()
-                    .map(|name| name.0.clone())
-            })
+        let speaker = context.event_scope(event).and_then(|scope| {
+            let speakers = speakers();
+            scope
+                .into_iter()
+                .find_map(|span| speakers.get(&span.id().into_u64()).cloned())
         });
-        let Some(node) = node else { return };
-        let Some(writer) = writers().get(&node).cloned() else {
+        let Some((name, writer)) = speaker else {
             return;
         };
+        let Some(writer) = writer.upgrade() else {
+            return;
+        };
+        if IS_SPEAKING.replace(true) {
+            return;
+        }
         let mut fields = Fields::default();
         event.record(&mut fields);
         let metadata = event.metadata();
         let message = Log {
             stamp: clock::ros_time(clock::host_now()),
             level: severity(*metadata.level()),
-            name: node.trim_start_matches('/').replace('/', "."),
+            name,
             msg: fields.message + &fields.others,
             file: metadata.file().unwrap_or_default().to_owned(),
             function: String::new(),
@@ -132,6 +134,7 @@ where
         };
         // A line that finds no room is on the console all the same.
         let _ = writer.publish(&Arc::from(to_cdr(&message)), None);
+        IS_SPEAKING.set(false);
     }
 }
 

@@ -135,7 +135,7 @@ fn now() -> Instant {
 impl Owner {
     /// Drives the node until `stop` says so, then winds it down.
     pub async fn run(mut self, mut stop: watch::Receiver<bool>) {
-        log::open(&self.name, Arc::clone(&self.rosout));
+        log::open(&self.name, &self.rosout);
         let event = parameters::start_event(&self.name, &self.parameters, clock::host_now());
         let _ = self.parameter_events.publish(&event, None);
         for action in &self.actions {
@@ -329,7 +329,7 @@ impl Owner {
         }
         self.publish_diagnostics(now());
         tracing::info!("stopped");
-        log::close(&self.name);
+        log::close();
         let Self {
             readers,
             participant,
