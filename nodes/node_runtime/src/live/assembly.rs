@@ -286,6 +286,7 @@ pub(super) fn assemble(
         requests: std::collections::BTreeMap::new(),
         stopping_since: None,
         stopped: false,
+        has_told_parameters: false,
         next_second: Instant::now(),
         next_service: Instant::now(),
         last_publication: None,

@@ -108,11 +108,15 @@ pub(super) struct Owner {
     pub requests: BTreeMap<(usize, RequestId), (usize, ReplyTo)>,
     pub stopping_since: Option<Instant>,
     pub stopped: bool,
+    pub has_told_parameters: bool,
     pub next_second: Instant,
     pub next_service: Instant,
     pub last_publication: Option<Instant>,
 }
 
+/// How long it takes until everybody has met: `/parameter_events` is volatile, and what is said on it
+/// before is heard by nobody.
+const MEETING: Duration = Duration::from_millis(900);
 /// How long a node may take to wind down.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// How long the last samples may take to be acknowledged.
@@ -136,12 +140,11 @@ impl Owner {
     /// Drives the node until `stop` says so, then winds it down.
     pub async fn run(mut self, mut stop: watch::Receiver<bool>) {
         log::open(&self.name, &self.rosout);
-        let event = parameters::start_event(&self.name, &self.parameters, clock::host_now());
-        let _ = self.parameter_events.publish(&event, None);
         for action in &self.actions {
             let _ = action.status.publish(&action.server.status(), None);
         }
         tracing::info!(parameters = self.parameters.len(), "started");
+        let met_by = now() + MEETING;
         while !self.is_done() {
             let wake = self.wake();
             tokio::select! {
@@ -150,8 +153,19 @@ impl Owner {
                 _ = stop.changed(), if self.stopping_since.is_none() => self.begin_to_stop(),
             }
             self.chores(now());
+            if !self.has_told_parameters && now() >= met_by {
+                self.tell_parameters();
+            }
         }
         self.finish().await;
+    }
+
+    fn tell_parameters(&mut self) {
+        self.has_told_parameters = true;
+        let event = parameters::start_event(&self.name, &self.parameters, clock::host_now());
+        if let Err(error) = self.parameter_events.publish(&event, None) {
+            self.unsent("/parameter_events", &error);
+        }
     }
 
     fn batch(&mut self, first: Incoming) {

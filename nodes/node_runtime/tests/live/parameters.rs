@@ -184,19 +184,23 @@ fn the_start_is_on_parameter_events_and_the_log_on_rosout() {
     });
     let watching = start(&environment, watch);
     let running = start(&environment, puppet());
-    let event = wait(
+    let (mut event, mut line) = (None, None);
+    wait(
         &received,
-        "the parameters of /probe",
+        "parameters and log of /probe",
         |(subscription, bytes)| {
-            let event: ParameterEvent = (subscription == 0).then(|| from_cdr(&bytes).unwrap())?;
-            (event.node == "/probe").then_some(event)
+            if subscription == 0 {
+                let told: ParameterEvent = from_cdr(&bytes).unwrap();
+                event = event.take().or((told.node == "/probe").then_some(told));
+            } else {
+                let logged: Log = from_cdr(&bytes).unwrap();
+                line = line.take().or((logged.name == "probe").then_some(logged));
+            }
+            (event.is_some() && line.is_some()).then_some(())
         },
     );
-    assert_eq!(event.new_parameters.len(), 3);
-    let line = wait(&received, "the log of /probe", |(subscription, bytes)| {
-        let line: Log = (subscription == 1).then(|| from_cdr(&bytes).unwrap())?;
-        (line.name == "probe").then_some(line)
-    });
+    assert_eq!(event.unwrap().new_parameters.len(), 3);
+    let line = line.unwrap();
     assert_eq!(
         (line.level, line.msg.as_str()),
         (Log::INFO, "started parameters=3")
