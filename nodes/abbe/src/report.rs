@@ -27,6 +27,8 @@ pub struct Report {
     pub text: String,
     /// The page's body.
     pub body: Markup,
+    /// The figures of the sentences, for machines; lengths in mm, times in s.
+    pub figures: serde_json::Value,
 }
 
 impl Report {
@@ -53,12 +55,17 @@ impl Report {
         text
     }
 
-    /// Writes the HTML file.
+    /// Writes `report.html` and `report.json` into `folder`.
     ///
     /// # Errors
-    /// When the file cannot be written.
-    pub fn write_html(&self, path: &Path) -> Result<()> {
+    /// When a file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<()> {
         let html = page::page(&self.title, &self.body);
-        std::fs::write(path, html).with_context(|| format!("report {}", path.display()))
+        let figures = serde_json::to_string_pretty(&self.figures)?;
+        for (name, text) in [("report.html", html), ("report.json", figures)] {
+            let path = folder.join(name);
+            std::fs::write(&path, text).with_context(|| format!("report {}", path.display()))?;
+        }
+        Ok(())
     }
 }

@@ -66,8 +66,7 @@ impl Run {
         };
         let title = format!("{}: {}", scenario.name, scenario.file.title);
         let report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
-        let page = folder.join("report.html");
-        report.write_html(&page)?;
+        report.write(&folder)?;
         println!("{}", report.terminal());
         println!(
             "Bag:  {} ({} messages, {} lost)",
@@ -75,7 +74,7 @@ impl Run {
             outcome.recorded,
             outcome.lost
         );
-        println!("Page: {}", page.display());
+        println!("Page: {}", folder.join("report.html").display());
         match outcome.failure {
             None => Ok(ExitCode::SUCCESS),
             Some(reason) => {

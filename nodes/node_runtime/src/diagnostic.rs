@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use abbe_msgs::diagnostic_msgs::msg::{DiagnosticStatus, KeyValue};
+
 /// Severity, with the values of `diagnostic_msgs/msg/DiagnosticStatus`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
@@ -46,5 +48,20 @@ impl Diagnostic {
     pub fn with(mut self, name: &'static str, value: impl ToString) -> Self {
         self.values.push((name, value.to_string()));
         self
+    }
+
+    /// The condition as `node` reports it on `/diagnostics`.
+    pub(crate) fn status(&self, node: &str) -> DiagnosticStatus {
+        let value = |(key, value): &(&'static str, String)| KeyValue {
+            key: (*key).to_owned(),
+            value: value.clone(),
+        };
+        DiagnosticStatus {
+            level: self.level as u8,
+            name: format!("{node}: {}", self.name),
+            message: self.message.clone(),
+            hardware_id: String::new(),
+            values: self.values.iter().map(value).collect(),
+        }
     }
 }

@@ -10,8 +10,12 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 use std::sync::Arc;
 
+use abbe_msgs::diagnostic_msgs::msg::DiagnosticArray;
+use abbe_msgs::std_msgs::msg::Header;
+use abbe_msgs::to_cdr;
 use metrology::stamp::{Host, Span, Stamp};
 
+use crate::clock::ros_time;
 use crate::diagnostic::{Diagnostic, Level};
 use crate::node::{Bytes, Emission, Event, GoalId, GoalStatus, Node, TopicPort};
 
@@ -104,6 +108,8 @@ pub struct Harness {
     now: Stamp<Host>,
     nodes: Vec<Box<dyn Node>>,
     routes: Vec<Route>,
+    /// Place of `/diagnostics` in `routes`.
+    diagnostics: usize,
     /// Per node, publication port to place in `routes`.
     publications: Vec<Vec<usize>>,
     service_servers: BTreeMap<String, End>,
@@ -232,10 +238,20 @@ impl Harness {
         true
     }
 
+    /// Shows a condition to its observers, and to everybody on `/diagnostics` when it is told.
     fn report(&mut self, node: usize, diagnostic: &Diagnostic) {
+        let name = self.nodes[node].name();
         for observer in &mut self.condition_observers {
-            observer(self.now, self.nodes[node].name(), diagnostic);
+            observer(self.now, name, diagnostic);
         }
+        let message = DiagnosticArray {
+            header: Header {
+                stamp: ros_time(self.now),
+                frame_id: String::new(),
+            },
+            status: vec![diagnostic.status(&format!("/{name}"))],
+        };
+        self.publish(self.diagnostics, Arc::from(to_cdr(&message)));
     }
 
     fn hand(&mut self, node: usize, event: Event<'_>) {

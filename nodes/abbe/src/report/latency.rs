@@ -25,6 +25,20 @@ fn method(method: LatencyMethod) -> &'static str {
     }
 }
 
+/// The last estimate for machines.
+pub fn figures(evidence: &Evidence) -> serde_json::Value {
+    let Some(latency) = evidence.latencies.last() else {
+        return serde_json::json!({});
+    };
+    serde_json::json!({
+        "latency_s": latency.latency_s,
+        "latency_standard_uncertainty_s": latency.standard_uncertainty_s,
+        "two_feed_latency_s": latency.two_feed_latency_s,
+        "touches": latency.n,
+        "true_latency_s": evidence.true_latency_s,
+    })
+}
+
 /// One sentence on the latency.
 pub fn headline(evidence: &Evidence) -> Vec<String> {
     let Some(latency) = evidence.latencies.last() else {
@@ -152,5 +166,6 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         lines,
         text,
         body,
+        figures: figures(evidence),
     })
 }

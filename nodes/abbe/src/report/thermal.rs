@@ -26,6 +26,12 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
     let errors = tool_errors(&evidence.verifications);
     let mut lines = latency::headline(evidence);
     lines.extend(headline(&errors));
+    let mut figures = latency::figures(evidence);
+    if let Some((off, on)) = last_pair(&errors) {
+        figures["p95_without_mm"] = off.p95_mm.into();
+        figures["p95_with_mm"] = on.p95_mm.into();
+        figures["max_with_mm"] = on.max_mm.into();
+    }
     let drift = drift_traces(evidence);
     let body = html! {
         h1 { (title) }
@@ -50,6 +56,7 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         lines,
         text: text(&errors),
         body,
+        figures,
     })
 }
 

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 
+use abbe_msgs::diagnostic_msgs::msg::DiagnosticArray;
+use abbe_msgs::{Message, topics};
 use metrology::stamp::{Host, Stamp};
 
 use super::{Harness, Reverse, Route};
@@ -42,6 +44,7 @@ impl Harness {
             now: start,
             nodes: Vec::new(),
             routes: Vec::new(),
+            diagnostics: 0,
             publications: Vec::new(),
             service_servers: BTreeMap::new(),
             action_servers: BTreeMap::new(),
@@ -58,6 +61,14 @@ impl Harness {
         for node in nodes {
             harness.add(node)?;
         }
+        let diagnostics = TopicPort {
+            topic: topics::DIAGNOSTICS.name.to_owned(),
+            type_name: DiagnosticArray::TYPE_NAME,
+            type_hash: DiagnosticArray::TYPE_HASH,
+            definition: DiagnosticArray::DEFINITION,
+            qos: topics::DIAGNOSTICS.qos,
+        };
+        harness.diagnostics = harness.route("the harness", &diagnostics)?;
         Ok(harness)
     }
 

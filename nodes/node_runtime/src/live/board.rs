@@ -156,30 +156,13 @@ impl Board {
         let ended = std::mem::take(&mut self.ended);
         let conditions = standing
             .chain(&ended)
-            .map(|diagnostic| self.status(diagnostic));
+            .map(|diagnostic| diagnostic.status(&self.node));
         DiagnosticArray {
             status: std::iter::once(state).chain(conditions).collect(),
             header: Header {
                 stamp: clock::ros_time(at),
                 frame_id: String::new(),
             },
-        }
-    }
-
-    fn status(&self, diagnostic: &Diagnostic) -> DiagnosticStatus {
-        DiagnosticStatus {
-            level: diagnostic.level as u8,
-            name: format!("{}: {}", self.node, diagnostic.name),
-            message: diagnostic.message.clone(),
-            hardware_id: String::new(),
-            values: diagnostic
-                .values
-                .iter()
-                .map(|(key, value)| KeyValue {
-                    key: (*key).to_owned(),
-                    value: value.clone(),
-                })
-                .collect(),
         }
     }
 }
