@@ -6,7 +6,8 @@
 //! ```
 //!
 //! Each figure is the median of five passes. `rosbags` writes as many messages of the same bytes with its
-//! own writer and reads the bag that we wrote with each compression; raw, without decoding.
+//! own writer and reads the bag that we wrote with each compression; raw, without decoding. Without that
+//! Python its columns are NaN, and it is said.
 #![expect(
     clippy::disallowed_methods,
     clippy::print_stdout,
@@ -137,11 +138,22 @@ fn read(path: &Path, order: Order) {
     assert_eq!(last as i64, stamp(MESSAGES - 1).log_time_nanos);
 }
 
-/// Messages per second of `rosbags`: `write` into, or `read` of, a directory.
-fn rosbags(what: &str, path: &Path) -> f64 {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn python() -> PathBuf {
     let python = std::env::var("ABBE_PYTHON");
-    let python = python.map_or_else(|_| root.join(".venv/bin/python"), PathBuf::from);
+    python.map_or_else(|_| root().join(".venv/bin/python"), PathBuf::from)
+}
+
+/// Messages per second of `rosbags`: `write` into, or `read` of, a directory; NaN where it is not installed.
+fn rosbags(what: &str, path: &Path) -> f64 {
+    let python = python();
+    if !python.exists() {
+        return f64::NAN;
+    }
+    let root = root();
     let output = Command::new(&python)
         .arg(root.join("tests/peers/bench_bag.py"))
         .args([what, &MESSAGES.to_string(), &PASSES.to_string()])
@@ -160,6 +172,10 @@ fn main() {
     let mut messages = vec![[0; MESSAGE_BYTES]; MESSAGES as usize];
     for (n, data) in messages.iter_mut().enumerate() {
         fill(n as u64, data);
+    }
+    if !python().exists() {
+        let python = python();
+        println!("rosbags not run: no {}", python.display());
     }
     println!("{MESSAGES} messages of {MESSAGE_BYTES} B, median of {PASSES} passes [1000/s]");
     println!("chunks   write rosbags  ratio  queued    read by time rosbags  ratio   MiB");
