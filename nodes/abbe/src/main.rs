@@ -13,6 +13,7 @@ mod evidence;
 mod launch;
 mod node;
 mod progress;
+mod record;
 mod report;
 mod run;
 mod scenario;
@@ -30,6 +31,8 @@ struct Arguments {
 enum Verb {
     /// Run a scenario: its nodes, its plan, a bag and a page at the end.
     Run(run::Run),
+    /// Record topics of the ROS graph into a bag.
+    Record(record::Record),
     /// Run one node on the ROS graph, with the arguments of any ROS 2 node.
     Node(node::NodeVerb),
 }
@@ -37,6 +40,7 @@ enum Verb {
 fn main() -> ExitCode {
     let outcome = match Arguments::parse().verb {
         Verb::Run(run) => run.execute(),
+        Verb::Record(record) => record.execute(),
         Verb::Node(node) => return node.execute(),
     };
     outcome.unwrap_or_else(|error| {

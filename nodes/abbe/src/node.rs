@@ -14,7 +14,9 @@ pub const NODES: &[(&str, Builder)] = &[
     ("axis_compensation", axis_compensation_node::node),
     ("fake_cnc", fake_cnc_node::node),
     ("latency_calibrator", latency_calibrator_node::node),
+    ("linuxcnc_bridge", linuxcnc_bridge_node::node),
     ("probe", probe_node::node),
+    ("recorder", recorder_node::node),
     ("sequencer", sequencer_node::node),
     ("thermal_model", thermal_model_node::node),
 ];

@@ -194,6 +194,15 @@ impl Running {
         stopped
     }
 
+    /// Why a node has ended although nobody asked it to; `None`: all are at work.
+    pub fn ended(&mut self) -> Option<anyhow::Error> {
+        let ended = self.tasks.try_join_next()?;
+        Some(match ended {
+            Ok(()) => anyhow::anyhow!("a node ended"),
+            Err(error) => anyhow::Error::new(error).context("a node ended by a panic"),
+        })
+    }
+
     /// Asks all nodes to stop and waits until they have.
     ///
     /// # Errors

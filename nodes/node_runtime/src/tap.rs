@@ -388,6 +388,12 @@ impl RawPublisher {
         taken
     }
 
+    /// How many samples find room in the queue now.
+    #[must_use]
+    pub fn room(&self) -> usize {
+        self.queue.capacity()
+    }
+
     /// Waits in the caller's thread, which may be one of another tokio runtime.
     fn wait(&self, mut outgoing: Outgoing) -> bool {
         let deadline = Instant::now() + self.patience;

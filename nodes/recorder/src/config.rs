@@ -1,5 +1,6 @@
 //! Parameters of the recorder.
 
+use metrology::ParameterDoc;
 use serde::{Deserialize, Serialize};
 
 use crate::error::RecorderError;
@@ -79,6 +80,97 @@ impl Default for RecorderConfig {
         }
     }
 }
+
+/// Parameters of the recorder as a node of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NodeConfig {
+    /// Folder of the bag, relative to where the program was started; it must not exist.
+    pub bag: String,
+    /// Absolute names of topics; `*` stands for any run of characters.
+    #[serde(default = "every_topic")]
+    pub topics: Vec<String>,
+    /// How the bag is written.
+    #[serde(default)]
+    pub writing: RecorderConfig,
+}
+
+fn every_topic() -> Vec<String> {
+    vec!["*".to_owned()]
+}
+
+const fn text(name: &'static str, description: &'static str) -> ParameterDoc {
+    ParameterDoc {
+        name,
+        unit: "",
+        description,
+        range: None,
+    }
+}
+
+const fn number(
+    name: &'static str,
+    unit: &'static str,
+    range: (f64, f64),
+    description: &'static str,
+) -> ParameterDoc {
+    ParameterDoc {
+        name,
+        unit,
+        description,
+        range: Some(range),
+    }
+}
+
+/// What the parameters of the node mean.
+pub const PARAMETERS: &[ParameterDoc] = &[
+    text(
+        "bag",
+        "Folder of the bag, relative to where the program was started; it must not exist.",
+    ),
+    text(
+        "topics",
+        "Absolute names of topics to record; * stands for any run of characters.",
+    ),
+    text(
+        "writing.compression",
+        "Inside the chunks: none, lz4 or zstd (level 1).",
+    ),
+    number(
+        "writing.chunk_size_bytes",
+        "byte",
+        (1024.0, 67_108_864.0),
+        "A chunk is written when its records reach this size, before compression.",
+    ),
+    number(
+        "writing.flush_period_s",
+        "s",
+        (1e-9, 3600.0),
+        "A chunk is written when its messages span this much log time, or when nothing came for so long.",
+    ),
+    number(
+        "writing.metadata_period_s",
+        "s",
+        (1e-9, 3600.0),
+        "metadata.yaml is refreshed when this much log time has passed.",
+    ),
+    number(
+        "writing.max_file_bytes",
+        "byte",
+        (0.0, 9e18),
+        "A new file is begun at this size; 0: one file.",
+    ),
+    number(
+        "writing.queue_limit_bytes",
+        "byte",
+        (1024.0, 9e18),
+        "Most bytes that wait for the disk.",
+    ),
+    text(
+        "writing.when_full",
+        "At the limit: count_loss (a live machine does not wait) or wait.",
+    ),
+];
 
 /// Smallest chunk and queue that make sense: one record of a kilobyte must fit.
 const SMALLEST_BYTES: u64 = 1024;

@@ -32,7 +32,7 @@ mod split;
 
 pub use channel::{Channel, ChannelId, Durability, History, Liveliness, QosProfile, QosTime};
 pub use channel::{Reliability, qos_from_yaml, qos_to_yaml};
-pub use config::{ChunkCompression, RecorderConfig, WhenFull};
+pub use config::{ChunkCompression, NodeConfig, PARAMETERS, RecorderConfig, WhenFull};
 pub use context::{Attached, RunContext, verify_attachments};
 pub use dump::dump_json;
 pub use error::RecorderError;

@@ -112,6 +112,13 @@ fn touches(evidence: &Evidence) -> Vec<(&ProbedPoint, f64)> {
         .collect()
 }
 
+/// What of a latency is the control's own, and what repeated touches do to the rest.
+const TICKS_SHARE: &str = "A control that polls its probe input sees a touch up to one servo period late, half of one on \
+    average. That half is part of the latency above, rightly, since every touch waits so; what is left is between \
+    none and one period for a single touch, with a standard deviation of a period over the square root of 12, and \
+    the mean of n touches in spread phases of the period is better by the square root of n. A control that latches \
+    in hardware has no such share.";
+
 /// Table and plot.
 ///
 /// # Errors
@@ -147,7 +154,10 @@ pub fn section(evidence: &Evidence) -> Result<Markup> {
 /// # Errors
 /// When a plot cannot be drawn.
 pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
-    let lines = headline(evidence);
+    let mut lines = headline(evidence);
+    if !evidence.latencies.is_empty() {
+        lines.push(TICKS_SHARE.to_owned());
+    }
     let body = html! {
         h1 { (title) }
         @for line in &lines { p { (line) } }

@@ -89,12 +89,19 @@ fn context(
 /// # Errors
 /// When they cannot be written as YAML.
 pub fn parameters(node: &dyn Node) -> Result<String> {
-    let flat: BTreeMap<&str, serde_json::Value> = node
-        .parameters()
+    listed(node.name(), node.parameters())
+}
+
+/// Parameters of the node `name` as YAML text.
+///
+/// # Errors
+/// When they cannot be written as YAML.
+pub fn listed(name: &str, parameters: &[Parameter]) -> Result<String> {
+    let flat: BTreeMap<&str, serde_json::Value> = parameters
         .iter()
         .map(|p| (p.name.as_str(), json(p)))
         .collect();
-    serde_saphyr::to_string(&flat).with_context(|| format!("parameters of {}", node.name()))
+    serde_saphyr::to_string(&flat).with_context(|| format!("parameters of {name}"))
 }
 
 fn json(parameter: &Parameter) -> serde_json::Value {

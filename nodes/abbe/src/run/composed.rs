@@ -59,7 +59,9 @@ pub fn run(
     let failure = play(&mut harness, scenario, start, pace, &evidence, &truth);
     harness.shutdown(SHUTDOWN_PATIENCE);
     drop(harness);
-    drop(mirror);
+    if let Some(mirror) = mirror {
+        mirror.finish()?;
+    }
     let summary = recorder.finish()?;
     let evidence = Rc::try_unwrap(evidence)
         .map_err(|_| anyhow::anyhow!("an observer outlived its harness"))?

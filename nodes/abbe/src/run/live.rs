@@ -1,13 +1,270 @@
-//! A scenario in real time.
+//! A scenario in real time: its nodes on the ROS graph, in this process or one process each.
 
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
+use metrology::sample::PlanState;
+use metrology::stamp::{Host, Stamp};
+use node_runtime::arguments::Arguments;
+use node_runtime::environment::Environment;
+use node_runtime::names::NodeNames;
+use node_runtime::tap::{Selection, TapEvent};
+use node_runtime::{Node, Running, Setup};
+use recorder::Recorder;
+use recorder_node::Capture;
+use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::Outcome;
+use super::{Outcome, bag};
+use crate::launch::LaunchNode;
+use crate::node;
+use crate::progress::Progress;
 use crate::scenario::Scenario;
 
-/// Runs it.
-pub fn run(_scenario: &Scenario, _bag: &Path, _separate: bool) -> Result<Outcome> {
-    bail!("not yet");
+mod graph;
+mod processes;
+
+use graph::GraphEvidence;
+use processes::Processes;
+
+/// Between two looks at the plan, the nodes and the signals.
+const LOOK: Duration = Duration::from_millis(50);
+/// What the last program leads to is evaluated and recorded within this.
+const AFTERMATH: Duration = Duration::from_secs(1);
+/// The recorder's own name on the graph.
+const TAP: &str = "abbe_run_tap";
+
+/// Runs `scenario` until its plan is over.
+///
+/// # Errors
+/// When a node cannot be started, there is no network, or the bag cannot be begun.
+pub fn run(scenario: &Scenario, bag_path: &Path, separate: bool) -> Result<Outcome> {
+    let environment = Environment::read()?;
+    let signals = Signals::listen()?;
+    let prepared = prepare(scenario, separate)?;
+    let recorder = begin_bag(scenario, bag_path, &prepared)?;
+    let evidence = Arc::<Mutex<GraphEvidence>>::default();
+    let seen = Arc::clone(&evidence);
+    let capture = Capture::start(
+        &environment,
+        &NodeNames::new(TAP, &[])?,
+        Selection::All,
+        recorder,
+        move |event| {
+            if let TapEvent::Sample(sample) = event {
+                lock(&seen).take(sample);
+            }
+        },
+    )?;
+    let mut cast = match prepared {
+        Prepared::Here(nodes) => Cast::Here(node_runtime::launch(&environment, nodes)?),
+        Prepared::Separate(_) => Cast::Separate(Processes::start(&scenario.nodes)?),
+    };
+    let failure = play(scenario, &evidence, &mut cast, signals);
+    std::thread::sleep(AFTERMATH);
+    let stopped = cast.stop();
+    let captured = capture.finish()?;
+    for word in capture_words(&captured) {
+        eprintln!("abbe: {word}");
+    }
+    let failure = failure
+        .or_else(|| stopped.err().map(|error| format!("{error:#}")))
+        .or_else(|| captured.bag.as_ref().err().map(|error| format!("bag: {error}")));
+    let evidence = std::mem::take(&mut *lock(&evidence)).into_evidence();
+    Ok(Outcome {
+        evidence,
+        failure,
+        recorded: captured.stats.messages_written,
+        lost: captured.stats.messages_lost + captured.lost_on_network,
+    })
+}
+
+fn capture_words(captured: &recorder_node::Captured) -> Vec<String> {
+    let mut words = captured.unrecorded.clone();
+    if captured.lost_on_network > 0 {
+        words.push(format!(
+            "{} messages were lost on their way to the recorder",
+            captured.lost_on_network
+        ));
+    }
+    words
+}
+
+fn lock(evidence: &Mutex<GraphEvidence>) -> MutexGuard<'_, GraphEvidence> {
+    // A panic elsewhere leaves whole messages behind.
+    evidence.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Nodes before the start.
+enum Prepared {
+    Here(Vec<(Setup, Box<dyn Node>)>),
+    /// Parameters as they were given, by node: another process resolves them.
+    Separate(BTreeMap<String, String>),
+}
+
+impl Prepared {
+    fn parameters(&self) -> Result<BTreeMap<String, String>> {
+        match self {
+            Self::Here(nodes) => nodes
+                .iter()
+                .map(|(setup, node)| {
+                    let parameters = bag::parameters(node.as_ref())?;
+                    Ok((setup.name().to_owned(), parameters))
+                })
+                .collect(),
+            Self::Separate(parameters) => Ok(parameters.clone()),
+        }
+    }
+}
+
+fn prepare(scenario: &Scenario, separate: bool) -> Result<Prepared> {
+    let setup = |launched: &LaunchNode| -> Result<Setup> {
+        let arguments = Arguments::parse(launched.ros_args())?;
+        Ok(Setup::new(&launched.exec, &arguments)?)
+    };
+    let known = |launched: &LaunchNode| match node::builder(&launched.exec) {
+        Some(build) => Ok(build),
+        None => bail!(
+            "exec \"{}\" is unknown (known: {})",
+            launched.exec,
+            node::names()
+        ),
+    };
+    let mut given = BTreeMap::new();
+    let mut built = Vec::new();
+    for launched in &scenario.nodes {
+        let context = || format!("node {}", launched.name);
+        let build = known(launched).with_context(context)?;
+        let setup = setup(launched).with_context(context)?;
+        if separate {
+            let parameters = setup.parameters(&[]).with_context(context)?;
+            given.insert(
+                launched.name.clone(),
+                bag::listed(&launched.name, &parameters)?,
+            );
+        } else {
+            let node = build(&setup).with_context(context)?;
+            built.push((setup, node));
+        }
+    }
+    Ok(if separate {
+        Prepared::Separate(given)
+    } else {
+        Prepared::Here(built)
+    })
+}
+
+fn begin_bag(scenario: &Scenario, path: &Path, prepared: &Prepared) -> Result<Recorder> {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH)?;
+    let start_nanos = u64::try_from(now.as_nanos()).context("the computer's clock")?;
+    bag::begin(path, scenario, prepared.parameters()?, start_nanos, false)
+}
+
+/// Nodes at work.
+enum Cast {
+    Here(Running),
+    Separate(Processes),
+}
+
+impl Cast {
+    /// Why the plan cannot go on, where a node that it needs has ended.
+    fn ended(&mut self) -> Option<String> {
+        match self {
+            Self::Here(running) => running.ended().map(|error| format!("{error:#}")),
+            Self::Separate(processes) => processes.look(),
+        }
+    }
+
+    fn stop(self) -> Result<()> {
+        match self {
+            Self::Here(running) => running.stop(),
+            Self::Separate(processes) => {
+                processes.stop();
+                Ok(())
+            }
+        }
+    }
+}
+
+/// SIGINT and SIGTERM, which end the plan instead of the process.
+struct Signals {
+    runtime: tokio::runtime::Runtime,
+    interrupt: Signal,
+    terminate: Signal,
+}
+
+impl Signals {
+    fn listen() -> Result<Self> {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .context("tokio runtime")?;
+        let (interrupt, terminate) = runtime.block_on(async {
+            let interrupt = signal(SignalKind::interrupt()).context("SIGINT")?;
+            let terminate = signal(SignalKind::terminate()).context("SIGTERM")?;
+            anyhow::Ok((interrupt, terminate))
+        })?;
+        Ok(Self {
+            runtime,
+            interrupt,
+            terminate,
+        })
+    }
+
+    /// Waits for [`LOOK`]; true when the program was asked to end.
+    fn wait(&mut self) -> bool {
+        let (interrupt, terminate) = (&mut self.interrupt, &mut self.terminate);
+        self.runtime.block_on(async {
+            tokio::select! {
+                _ = interrupt.recv() => true,
+                _ = terminate.recv() => true,
+                () = tokio::time::sleep(LOOK) => false,
+            }
+        })
+    }
+}
+
+/// Waits until the plan is over; the reason when it failed.
+fn play(
+    scenario: &Scenario,
+    evidence: &Mutex<GraphEvidence>,
+    cast: &mut Cast,
+    mut signals: Signals,
+) -> Option<String> {
+    let title = format!("{}: {}", scenario.name, scenario.file.title);
+    let mut progress = Progress::new(&title, Stamp::<Host>::from_nanos(0));
+    let began = Instant::now();
+    let limit = Duration::from_secs_f64(scenario.file.limit_min * 60.0);
+    let failure = loop {
+        if signals.wait() {
+            break Some("it was interrupted".to_owned());
+        }
+        let elapsed = began.elapsed();
+        {
+            let seen = lock(evidence);
+            if progress.due() {
+                let nanos = i64::try_from(elapsed.as_nanos()).unwrap_or(i64::MAX);
+                progress.show(Stamp::from_nanos(nanos), seen.evidence());
+            }
+            let status = seen.evidence().status.as_ref();
+            match status.map(|status| (status.state, &status.message)) {
+                Some((PlanState::Done, _)) => break None,
+                Some((PlanState::Failed, message)) => break Some(message.clone()),
+                _ => {}
+            }
+        }
+        if let Some(reason) = cast.ended() {
+            break Some(reason);
+        }
+        if elapsed > limit {
+            break Some(format!(
+                "limit_min = {} min have passed",
+                scenario.file.limit_min
+            ));
+        }
+    };
+    progress.finish();
+    failure
 }

@@ -1,1 +1,50 @@
 //! ROS shell of linuxcnc_bridge.
+
+use std::path::PathBuf;
+
+use abbe_msgs::topics;
+use anyhow::Result;
+use linuxcnc_bridge::live::{LiveBridge, LiveInput};
+use linuxcnc_bridge::{BridgeConfig, Output, PARAMETERS};
+use machine::MachineFile;
+use metrology::stamp::Span;
+use node_runtime::{Node, Setup, Wiring};
+
+mod forms;
+
+/// Time between two looks at what has come from LinuxCNC; every look takes all servo periods since the last.
+const TICK: Span = Span::from_nanos(5_000_000);
+
+/// Builds the node; starts LinuxCNC where its parameters name an INI file.
+///
+/// # Errors
+/// When a parameter or the machine file is wrong, or LinuxCNC cannot be started.
+pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
+    let config: BridgeConfig = setup.config()?;
+    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let (path, text) = setup.file_text("machine_file")?;
+    let machine = MachineFile::parse(&text, &path.display().to_string())?;
+    let folder = match &config.start_ini {
+        Some(ini) => forms::folder_of(&setup.file_path("start_ini")?, ini),
+        None => PathBuf::new(),
+    };
+    let bridge = LiveBridge::open(&config, &machine, &folder)?;
+    Ok(Wiring::new(setup.name(), parameters, bridge)
+        .every(TICK, || LiveInput::Tick)
+        .on(&topics::COMPENSATION, LiveInput::Compensation)
+        .publish(&topics::AXES_STATE, forms::state)
+        .publish_message(&topics::JOINT_STATES, forms::joints)
+        .publish(&topics::PROBE_TRIGGER, forms::trigger)
+        .action_server(
+            &topics::RUN_PROGRAM,
+            forms::run,
+            forms::cancel,
+            forms::signals,
+        )
+        .diagnose(forms::condition)
+        .shutdown(
+            || LiveInput::Shutdown,
+            |output| matches!(output, Output::Stopped),
+        )
+        .node())
+}

@@ -1,0 +1,132 @@
+//! Every node of a launch file as a process of its own.
+
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+
+use crate::launch::LaunchNode;
+
+/// A process that was told to stop is killed after this time.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Between two looks at processes that stop.
+const LOOK: Duration = Duration::from_millis(20);
+/// Nodes without which no plan goes on: the sequencer and the controllers.
+const NEEDED: [&str; 3] = ["sequencer", "fake_cnc", "linuxcnc_bridge"];
+
+struct Process {
+    name: String,
+    needed: bool,
+    child: Child,
+    ended: bool,
+}
+
+/// Processes that were started here; they end when this is dropped.
+pub struct Processes(Vec<Process>);
+
+impl Processes {
+    /// Starts this program once for each node.
+    ///
+    /// # Errors
+    /// When a process cannot be started; those that were are stopped.
+    pub fn start(nodes: &[LaunchNode]) -> Result<Self> {
+        let program = std::env::current_exe().context("path of this program")?;
+        let mut processes = Self(Vec::with_capacity(nodes.len()));
+        for node in nodes {
+            let child = Command::new(&program)
+                .args(["node", &node.exec])
+                .args(node.ros_args())
+                // A Ctrl-C at the terminal reaches this program alone, which then stops them in order.
+                .process_group(0)
+                .stdin(Stdio::null())
+                .spawn()
+                .with_context(|| format!("process of node {}", node.name))?;
+            processes.0.push(Process {
+                name: node.name.clone(),
+                needed: NEEDED.contains(&node.exec.as_str()),
+                child,
+                ended: false,
+            });
+        }
+        Ok(processes)
+    }
+
+    /// Says which processes have ended since the last look; the reason when the plan cannot go on.
+    pub fn look(&mut self) -> Option<String> {
+        let mut reason = None;
+        for process in self.0.iter_mut().filter(|process| !process.ended) {
+            if let Ok(Some(status)) = process.child.try_wait() {
+                process.ended = true;
+                let word = format!("node {} ended: {}", process.name, in_words(status));
+                eprintln!("abbe: {word}");
+                if process.needed && reason.is_none() {
+                    reason = Some(word);
+                }
+            }
+        }
+        reason
+    }
+
+    /// Tells all to stop, waits, and kills what does not.
+    pub fn stop(mut self) {
+        self.end();
+    }
+
+    fn end(&mut self) {
+        for process in self.0.iter().filter(|process| !process.ended) {
+            // It is a child that nobody has waited for: its number is still its own.
+            if let Ok(number) = i32::try_from(process.child.id()) {
+                let _ = kill(Pid::from_raw(number), Signal::SIGTERM);
+            }
+        }
+        let deadline = Instant::now() + PATIENCE;
+        while self.0.iter().any(|process| !process.ended) {
+            let late = Instant::now() >= deadline;
+            for process in self.0.iter_mut().filter(|process| !process.ended) {
+                process.settle(late);
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+}
+
+impl Process {
+    fn settle(&mut self, late: bool) {
+        match self.child.try_wait() {
+            Ok(Some(status)) => {
+                self.ended = true;
+                if !status.success() {
+                    eprintln!("abbe: node {} stopped: {}", self.name, in_words(status));
+                }
+            }
+            _ if late => {
+                let limit_s = PATIENCE.as_secs();
+                eprintln!(
+                    "abbe: node {} did not stop within {limit_s} s: killed",
+                    self.name
+                );
+                // It may have ended in this moment.
+                let _ = self.child.kill();
+                let _ = self.child.wait();
+                self.ended = true;
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Drop for Processes {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+fn in_words(status: ExitStatus) -> String {
+    match status.code() {
+        Some(code) => format!("exit code {code}"),
+        None => status.to_string(),
+    }
+}

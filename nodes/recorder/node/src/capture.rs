@@ -1,0 +1,230 @@
+//! From the network into a bag: every topic that is found becomes a channel, every sample a message.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use abbe_msgs::{Qos, description_of, topics};
+use anyhow::Result;
+use node_runtime::environment::Environment;
+use node_runtime::names::NodeNames;
+use node_runtime::tap::{RawTap, Selection, TapEvent, Tapped, TappedTopic};
+use recorder::{
+    Channel, ChannelId, MessageStamp, Recorder, RecorderError, RecorderSink, RecorderStats,
+    RecordingSummary,
+};
+
+/// What the listener counts and cannot put into the bag.
+#[derive(Default)]
+struct Troubles {
+    lost_on_network: AtomicU64,
+    topics: Mutex<Vec<String>>,
+}
+
+impl Troubles {
+    fn topics(&self) -> MutexGuard<'_, Vec<String>> {
+        self.topics.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A recording of the network that goes on.
+pub struct Capture {
+    tap: RawTap,
+    recorder: Recorder,
+    troubles: Arc<Troubles>,
+}
+
+/// What a recording of the network came to.
+#[derive(Debug)]
+pub struct Captured {
+    /// What is in the bag, or why it ended before.
+    pub bag: Result<RecordingSummary, RecorderError>,
+    /// Counts at the end.
+    pub stats: RecorderStats,
+    /// Samples that never arrived here.
+    pub lost_on_network: u64,
+    /// Topics that could not be recorded, a sentence each.
+    pub unrecorded: Vec<String>,
+}
+
+/// The topic's own quality of service, where it is one of ours; what was found has the tap's depth.
+fn offered(topic: &TappedTopic) -> Qos {
+    let known = topics::all().iter().find(|entry| {
+        let name = entry.name.trim_start_matches('/');
+        let end = topic.name.strip_suffix(name);
+        !entry.is_family && end.is_some_and(|before| before.ends_with('/'))
+    });
+    Qos {
+        depth: known.map_or(topic.qos.depth, |entry| entry.qos.depth),
+        ..topic.qos
+    }
+}
+
+/// The topic as a bag holds it; `None`: hidden and of an unknown type, which no reader could decode.
+fn channel(topic: &TappedTopic) -> Option<Channel> {
+    let known = description_of(&topic.type_name);
+    if known.is_none() && topic.name.contains("/_") {
+        return None;
+    }
+    let text = |text: Option<&str>| text.unwrap_or_default().to_owned();
+    Some(Channel {
+        topic: topic.name.clone(),
+        type_name: topic.type_name.clone(),
+        type_hash: text(known.map(|known| known.type_hash)),
+        definition: text(known.map(|known| known.definition)),
+        qos_yaml: offered(topic).offered_qos_profiles(),
+    })
+}
+
+struct Scribe {
+    sink: RecorderSink,
+    channels: BTreeMap<String, ChannelId>,
+    troubles: Arc<Troubles>,
+}
+
+impl Scribe {
+    fn take(&mut self, event: &TapEvent) {
+        match event {
+            TapEvent::Found(topic) => self.found(topic),
+            TapEvent::Sample(sample) => self.sample(sample),
+            TapEvent::TypesDiffer { topic, found } => {
+                let (name, first) = (&topic.name, &topic.type_name);
+                let word = format!("{name}: somebody publishes {found}: only {first} is recorded");
+                self.troubles.topics().push(word);
+            }
+            TapEvent::Unreadable { .. } => self.lose(1),
+        }
+    }
+
+    fn found(&mut self, topic: &TappedTopic) {
+        let Some(channel) = channel(topic) else {
+            return;
+        };
+        match self.sink.add_channel(&channel) {
+            Ok(id) => {
+                self.channels.insert(topic.name.clone(), id);
+            }
+            Err(error) => self.troubles.topics().push(error.to_string()),
+        }
+    }
+
+    fn sample(&self, sample: &Tapped) {
+        let Some(channel) = self.channels.get(&sample.topic.name) else {
+            return;
+        };
+        self.lose(sample.lost);
+        let nanos = |nanos: i64| u64::try_from(nanos).unwrap_or(0);
+        let received = nanos(sample.received.nanos());
+        let stamp = MessageStamp {
+            log_time_nanos: received,
+            publish_time_nanos: sample.source.map_or(received, |at| nanos(at.nanos())),
+            // The low half of the writer's count, as the file has room for it.
+            sequence: (sample.sequence & i64::from(u32::MAX)) as u32,
+        };
+        // What finds the queue full is counted there.
+        let _ = self.sink.push(*channel, stamp, &sample.bytes);
+    }
+
+    fn lose(&self, samples: u64) {
+        self.troubles
+            .lost_on_network
+            .fetch_add(samples, Ordering::Relaxed);
+    }
+}
+
+impl Capture {
+    /// Records into `recorder` what `selection` picks; `look` sees every event first.
+    ///
+    /// # Errors
+    /// When there is no network.
+    pub fn start(
+        environment: &Environment,
+        names: &NodeNames,
+        selection: Selection,
+        recorder: Recorder,
+        mut look: impl FnMut(&TapEvent) + Send + 'static,
+    ) -> Result<Self> {
+        let troubles = Arc::<Troubles>::default();
+        let mut scribe = Scribe {
+            sink: recorder.sink(),
+            channels: BTreeMap::new(),
+            troubles: Arc::clone(&troubles),
+        };
+        let tap = RawTap::start(environment, names, selection, move |event| {
+            look(&event);
+            scribe.take(&event);
+        })?;
+        Ok(Self {
+            tap,
+            recorder,
+            troubles,
+        })
+    }
+
+    /// Counts as of now.
+    #[must_use]
+    pub fn stats(&self) -> RecorderStats {
+        self.recorder.stats()
+    }
+
+    /// Samples that were sent and never arrived here.
+    #[must_use]
+    pub fn lost_on_network(&self) -> u64 {
+        self.troubles.lost_on_network.load(Ordering::Relaxed)
+    }
+
+    /// Topics that cannot be recorded, a sentence each, since the last call.
+    #[must_use]
+    pub fn unrecorded(&self) -> Vec<String> {
+        std::mem::take(&mut *self.troubles.topics())
+    }
+
+    /// Takes what has arrived, leaves the network and closes the bag. Not from within another event loop.
+    ///
+    /// # Errors
+    /// When the listener panicked.
+    pub fn finish(self) -> Result<Captured> {
+        let stopped = self.tap.stop();
+        let sink = self.recorder.sink();
+        let bag = self.recorder.finish();
+        stopped?;
+        Ok(Captured {
+            bag,
+            stats: sink.stats(),
+            lost_on_network: self.troubles.lost_on_network.load(Ordering::Relaxed),
+            unrecorded: std::mem::take(&mut *self.troubles.topics()),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(name: &str, type_name: &str) -> TappedTopic {
+        TappedTopic {
+            name: name.to_owned(),
+            type_name: type_name.to_owned(),
+            qos: Qos {
+                depth: 20_000,
+                ..Qos::RELIABLE
+            },
+        }
+    }
+
+    #[test]
+    fn a_known_topic_has_its_definition_and_its_own_depth() {
+        let channel = channel(&found("/m1/probe/point", "abbe_msgs/msg/ProbedPoint")).unwrap();
+        assert!(channel.type_hash.starts_with("RIHS01_"));
+        assert!(!channel.definition.is_empty());
+        let depth = format!("depth: {}", topics::PROBE_POINT.qos.depth);
+        assert!(channel.qos_yaml.contains(&depth), "{}", channel.qos_yaml);
+    }
+
+    #[test]
+    fn a_foreign_topic_is_recorded_without_definition_unless_it_is_hidden() {
+        let foreign = channel(&found("/camera", "other_msgs/msg/Picture")).unwrap();
+        assert_eq!(foreign.definition, "");
+        assert_eq!(channel(&found("/a/_action/x", "other_msgs/action/X_F")), None);
+    }
+}

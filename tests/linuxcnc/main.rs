@@ -1,0 +1,267 @@
+//! The LinuxCNC scenarios as a person runs them, judged by their bags.
+//!
+//! The only truth is the delay in the scenario's HAL file, which nothing but LinuxCNC and this test
+//! reads. Only one LinuxCNC runs on a computer: the tests wait for each other. Where LinuxCNC is not
+//! installed nothing can be tested: that is a failure where `CI=true`, and is said elsewhere.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![expect(clippy::print_stdout, reason = "the figures seen are worth showing")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "programs are run, files read, and CI is asked"
+)]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use abbe_msgs::topics::{self, Topic};
+use abbe_msgs::{Message, Wire, from_cdr};
+use metrology::Axis;
+use metrology::sample::{ProbedPoint, Rejection, TestKind, TestSegment};
+use recorder::{Bag, Event, Order};
+
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+
+/// Free of everybody else's traffic.
+const DOMAIN: &str = "87";
+const TICK_S: f64 = 1e-3;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn installed() -> bool {
+    let missing = ["linuxcnc", "halcmd", "halsampler"]
+        .into_iter()
+        .find(|program| !Path::new("/usr/bin").join(program).exists());
+    let Some(program) = missing else {
+        return true;
+    };
+    let on_ci = std::env::var("CI").is_ok_and(|value| value == "true");
+    assert!(!on_ci, "{program} is not installed (package linuxcnc-uspace)");
+    eprintln!("NOT TESTED: {program} is not installed (package linuxcnc-uspace)");
+    false
+}
+
+/// A finished run; its folder goes with it.
+struct Finished {
+    bag: Bag,
+    said: String,
+    _folder: tempfile::TempDir,
+    _turn: MutexGuard<'static, ()>,
+}
+
+/// Runs a scenario to its end; `None` where LinuxCNC is not installed.
+fn run(scenario: &str) -> Option<Finished> {
+    if !installed() {
+        return None;
+    }
+    let turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let program = root().join("target/release/abbe");
+    assert!(
+        program.is_file(),
+        "{} is not there: cargo build --release -p abbe",
+        program.display()
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new(&program)
+        .current_dir(root())
+        .args(["run", &format!("launch_configs/{scenario}"), "--out"])
+        .arg(folder.path())
+        .env("ROS_DOMAIN_ID", DOMAIN)
+        .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let complained = String::from_utf8_lossy(&output.stderr).into_owned();
+    println!("{said}");
+    assert!(output.status.success(), "{}\n{complained}", output.status);
+    let run = std::fs::read_dir(folder.path()).unwrap().next().unwrap();
+    let run = run.unwrap().path();
+    assert!(run.join("report.html").is_file());
+    let bag = Bag::open(run.join("bag")).unwrap();
+    Some(Finished {
+        bag,
+        said,
+        _folder: folder,
+        _turn: turn,
+    })
+}
+
+/// Every message of a topic with its place in the bag, which must be whole.
+fn read<M: Message + Wire>(bag: &Bag, topic: &Topic<M>) -> Vec<(usize, M::Inner)> {
+    let mut found = Vec::new();
+    let mut messages = bag.messages(Order::LogTime);
+    let mut place = 0;
+    while let Some(event) = messages.next_event() {
+        match event {
+            Event::Message(message) => {
+                let name = &bag.topic(message.topic).topic;
+                if name.trim_start_matches('/') == topic.name {
+                    let decoded: M = from_cdr(message.data).unwrap();
+                    found.push((place, decoded.into_inner().unwrap()));
+                }
+                place += 1;
+            }
+            Event::Loss(loss) => panic!("{}: {loss:?}", topic.name),
+        }
+    }
+    found
+}
+
+/// The on-delay that the HAL file gives to the probe signal, s.
+fn delay_in_hal_s(scenario: &str, hal: &str) -> f64 {
+    let path = root().join(format!("launch_configs/{scenario}/controller/{hal}"));
+    let text = std::fs::read_to_string(path).unwrap();
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("setp probe-latency.on-delay "))
+        .unwrap();
+    line.split_whitespace().last().unwrap().parse().unwrap()
+}
+
+/// Mean apparent latency of a delay made in the servo thread, s: whole ticks, the first of which
+/// sees the contact, and half a tick until the contact is looked at.
+fn expected_s(delay_s: f64) -> f64 {
+    ((delay_s / TICK_S).ceil() - 1.0) * TICK_S + TICK_S / 2.0
+}
+
+/// Usable touches between the begin and the end of each latency run, in the order of runs.
+fn latency_touches(bag: &Bag) -> Vec<Vec<ProbedPoint>> {
+    let segments: Vec<TestSegment> = read(bag, &topics::TEST_SEGMENT)
+        .into_iter()
+        .map(|(_, segment)| segment)
+        .filter(|segment| segment.kind == TestKind::Latency)
+        .collect();
+    let points: Vec<ProbedPoint> = read(bag, &topics::PROBE_POINT)
+        .into_iter()
+        .map(|(_, point)| point)
+        .filter(|point| point.rejection == Rejection::None)
+        .collect();
+    let begins = segments.iter().filter(|segment| segment.begin);
+    begins
+        .map(|begin| {
+            let end = segments
+                .iter()
+                .find(|segment| !segment.begin && segment.run == begin.run)
+                .unwrap();
+            let within = |point: &&ProbedPoint| (begin.at..=end.at).contains(&point.received_at);
+            points.iter().filter(within).cloned().collect()
+        })
+        .collect()
+}
+
+/// Mean of the corrected surface along the approach, mm, by feed in mm/s.
+fn by_feed(touches: &[ProbedPoint]) -> Vec<(f64, f64, usize)> {
+    let mut groups: BTreeMap<i64, Vec<(f64, f64)>> = BTreeMap::new();
+    for point in touches {
+        let bin = point.feed_mm_s.round() as i64;
+        let along_mm = point.point_in_machine_mm.dot(&point.approach);
+        groups
+            .entry(bin)
+            .or_default()
+            .push((point.feed_mm_s, along_mm));
+    }
+    groups
+        .into_values()
+        .map(|group| {
+            let n = group.len() as f64;
+            let feed_mm_s = group.iter().map(|(feed, _)| feed).sum::<f64>() / n;
+            let along_mm = group.iter().map(|(_, along)| along).sum::<f64>() / n;
+            (feed_mm_s, along_mm, group.len())
+        })
+        .collect()
+}
+
+#[test]
+fn val_linuxcnc_the_latency_is_the_delay_that_only_hal_holds_and_corrected_points_agree() {
+    let Some(finished) = run("linuxcnc_latency") else {
+        return;
+    };
+    let latencies = read(&finished.bag, &topics::LATENCY);
+    let delay_s = delay_in_hal_s("linuxcnc_latency", "latency.hal");
+    let expected_s = expected_s(delay_s);
+    assert_eq!(latencies.len(), 3, "one estimate for each run");
+    for (_, latency) in &latencies {
+        println!(
+            "latency {:.4} ms, u {:.4} ms, in HAL {:.4} ms, with the tick's share {:.4} ms",
+            latency.latency_s * 1e3,
+            latency.standard_uncertainty_s * 1e3,
+            delay_s * 1e3,
+            expected_s * 1e3
+        );
+        assert_eq!(latency.n, 40, "{latency:?}");
+        assert!((latency.latency_s - expected_s).abs() < 0.1e-3, "{latency:?}");
+        assert!(
+            (latency.latency_s - delay_s).abs() < 0.1e-3 + TICK_S / 2.0,
+            "{latency:?}"
+        );
+    }
+    let runs = latency_touches(&finished.bag);
+    assert_eq!(runs.len(), 3);
+    assert!(
+        runs[0].is_empty(),
+        "before the first estimate nothing is corrected"
+    );
+    for touches in &runs[1..] {
+        assert_eq!(touches.len(), 40);
+        let feeds = by_feed(touches);
+        assert_eq!(feeds.len(), 5, "{feeds:?}");
+        let (slow_mm_s, slow_mm, _) = feeds[0];
+        for (feed_mm_s, along_mm, n) in &feeds {
+            let away_mm = along_mm - slow_mm;
+            println!(
+                "{:>6.0} mm/min: {n} touches, {:+.3} um from the slowest, a tick's travel {:.1} um",
+                feed_mm_s * 60.0,
+                away_mm * 1e3,
+                feed_mm_s * TICK_S * 1e3
+            );
+            assert_eq!(*n, 8);
+            assert!(away_mm.abs() <= (feed_mm_s + slow_mm_s) * TICK_S, "{feeds:?}");
+        }
+    }
+    assert!(finished.said.contains("Probe latency"), "{}", finished.said);
+}
+
+#[test]
+fn val_linuxcnc_both_blocks_are_measured_twice_and_every_face_of_them() {
+    let Some(finished) = run("linuxcnc_block_cycle") else {
+        return;
+    };
+    let blocks: Vec<_> = read(&finished.bag, &topics::BLOCKS_MEASUREMENT)
+        .into_iter()
+        .map(|(_, block)| block)
+        .collect();
+    let seen: Vec<(&str, bool)> = blocks
+        .iter()
+        .map(|block| (block.block_id.as_str(), block.cold))
+        .collect();
+    assert_eq!(
+        seen,
+        [
+            ("block_1", true),
+            ("block_2", true),
+            ("block_1", false),
+            ("block_2", false)
+        ]
+    );
+    // Corners of the machine file are those of the HAL file: the simulated blocks stand true.
+    let corners_mm = [[-220.0, -180.0, 20.0], [220.0, 180.0, 200.0]];
+    for (place, block) in blocks.iter().enumerate() {
+        for (axis, corner_mm) in Axis::LINEAR.into_iter().zip(corners_mm[place % 2]) {
+            let face = block.faces[axis].expect("every face is measured");
+            let away_um = (face.position_mm - corner_mm) * 1e3;
+            println!(
+                "{} {axis}: {away_um:+.2} um from nominal, u {:.2} um",
+                block.block_id,
+                face.standard_uncertainty_mm * 1e3
+            );
+            // One touch at 2 mm/s on a control that polls: a tick's travel and the latency's 0.1 ms.
+            assert!(away_um.abs() < 2.5, "{block:?}");
+        }
+    }
+    let models = read(&finished.bag, &topics::THERMAL_MODEL);
+    assert!(!models.is_empty(), "two block cycles make a model");
+}
