@@ -40,7 +40,10 @@ fn installed() -> bool {
         return true;
     };
     let on_ci = std::env::var("CI").is_ok_and(|value| value == "true");
-    assert!(!on_ci, "{program} is not installed (package linuxcnc-uspace)");
+    assert!(
+        !on_ci,
+        "{program} is not installed (package linuxcnc-uspace)"
+    );
     eprintln!("NOT TESTED: {program} is not installed (package linuxcnc-uspace)");
     false
 }
@@ -193,7 +196,10 @@ fn val_linuxcnc_the_latency_is_the_delay_that_only_hal_holds_and_corrected_point
             expected_s * 1e3
         );
         assert_eq!(latency.n, 40, "{latency:?}");
-        assert!((latency.latency_s - expected_s).abs() < 0.1e-3, "{latency:?}");
+        assert!(
+            (latency.latency_s - expected_s).abs() < 0.1e-3,
+            "{latency:?}"
+        );
         assert!(
             (latency.latency_s - delay_s).abs() < 0.1e-3 + TICK_S / 2.0,
             "{latency:?}"
@@ -219,7 +225,10 @@ fn val_linuxcnc_the_latency_is_the_delay_that_only_hal_holds_and_corrected_point
                 feed_mm_s * TICK_S * 1e3
             );
             assert_eq!(*n, 8);
-            assert!(away_mm.abs() <= (feed_mm_s + slow_mm_s) * TICK_S, "{feeds:?}");
+            assert!(
+                away_mm.abs() <= (feed_mm_s + slow_mm_s) * TICK_S,
+                "{feeds:?}"
+            );
         }
     }
     assert!(finished.said.contains("Probe latency"), "{}", finished.said);

@@ -20,9 +20,6 @@ pub struct ScenarioFile {
     pub simulated_start_s: Option<i64>,
     /// Longest simulated (or real) time that the plan may take.
     pub limit_min: f64,
-    /// What must run beside the nodes, on real time only.
-    #[serde(default)]
-    pub hardware: Hardware,
 }
 
 /// Which page a run ends with.
@@ -35,17 +32,6 @@ pub enum ReportKind {
     Latency,
     /// Block cycles.
     Blocks,
-}
-
-/// Hardware, or what stands for it, that a scenario starts itself.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Hardware {
-    /// None: the machine is a node, or runs already.
-    #[default]
-    None,
-    /// LinuxCNC with this INI file of the scenario's folder.
-    Linuxcnc(String),
 }
 
 /// A scenario, read.

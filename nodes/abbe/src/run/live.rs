@@ -71,7 +71,13 @@ pub fn run(scenario: &Scenario, bag_path: &Path, separate: bool) -> Result<Outco
     }
     let failure = failure
         .or_else(|| stopped.err().map(|error| format!("{error:#}")))
-        .or_else(|| captured.bag.as_ref().err().map(|error| format!("bag: {error}")));
+        .or_else(|| {
+            captured
+                .bag
+                .as_ref()
+                .err()
+                .map(|error| format!("bag: {error}"))
+        });
     let evidence = std::mem::take(&mut *lock(&evidence)).into_evidence();
     Ok(Outcome {
         evidence,

@@ -113,11 +113,10 @@ impl Scribe {
             return;
         };
         self.lose(sample.lost);
-        let nanos = |nanos: i64| u64::try_from(nanos).unwrap_or(0);
-        let received = nanos(sample.received.nanos());
+        let received = sample.received.nanos();
         let stamp = MessageStamp {
             log_time_nanos: received,
-            publish_time_nanos: sample.source.map_or(received, |at| nanos(at.nanos())),
+            publish_time_nanos: sample.source.map_or(received, |at| at.nanos()),
             // The low half of the writer's count, as the file has room for it.
             sequence: (sample.sequence & i64::from(u32::MAX)) as u32,
         };
@@ -225,6 +224,9 @@ mod tests {
     fn a_foreign_topic_is_recorded_without_definition_unless_it_is_hidden() {
         let foreign = channel(&found("/camera", "other_msgs/msg/Picture")).unwrap();
         assert_eq!(foreign.definition, "");
-        assert_eq!(channel(&found("/a/_action/x", "other_msgs/action/X_F")), None);
+        assert_eq!(
+            channel(&found("/a/_action/x", "other_msgs/action/X_F")),
+            None
+        );
     }
 }
