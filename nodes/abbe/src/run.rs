@@ -65,7 +65,14 @@ impl Run {
             _ => live::run(&scenario, &bag, self.separate)?,
         };
         let title = format!("{}: {}", scenario.name, scenario.file.title);
-        let report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
+        let mut report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
+        let kept = format!(
+            "Bag: {} ({} messages, {} lost).",
+            bag.display(),
+            outcome.recorded,
+            outcome.lost
+        );
+        report.body = maud::html! { (report.body) h2 { "Recording" } p { (kept) } };
         report.write(&folder)?;
         println!("{}", report.terminal());
         println!(

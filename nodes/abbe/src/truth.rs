@@ -38,7 +38,13 @@ impl Truth {
         let truth = Arc::clone(self);
         let mut at_rest: Option<(PerAxis<f64>, Stamp<Host>)> = None;
         let mut taken = false;
+        let mut told = false;
         Box::new(move |at, cnc| {
+            if !told {
+                told = true;
+                let mut seen = truth.seen.lock().unwrap_or_else(PoisonError::into_inner);
+                seen.latency_s = Some(cnc.hardware().probe_latency_s());
+            }
             if !truth.verifying.load(Ordering::Relaxed) {
                 at_rest = None;
                 return;
@@ -51,7 +57,6 @@ impl Truth {
                         let error_mm = cnc.hardware().tool_error_mm(commanded);
                         let commanded_mm = commanded.xyz();
                         let mut seen = truth.seen.lock().unwrap_or_else(PoisonError::into_inner);
-                        seen.latency_s = Some(cnc.hardware().probe_latency_s());
                         seen.poses.push(PoseError {
                             commanded_mm,
                             error_mm,

@@ -126,11 +126,12 @@ const TICKS_SHARE: &str = "A control that polls its probe input sees a touch up 
 pub fn section(evidence: &Evidence) -> Result<Markup> {
     let touches = touches(evidence);
     let first_mm = touches.first().map_or(0.0, |touch| touch.1);
-    let corrected = touches
+    let corrected: Vec<(f64, f64)> = touches
         .iter()
         .filter(|(point, _)| point.rejection == Rejection::None)
         .map(|(point, along_mm)| (point.feed_mm_s * 60.0, (along_mm - first_mm) * 1e3))
         .collect();
+    let any_corrected = !corrected.is_empty();
     let plot = Plot {
         x: "feed at contact / mm/min".to_owned(),
         y: "corrected surface / µm".to_owned(),
@@ -143,7 +144,7 @@ pub fn section(evidence: &Evidence) -> Result<Markup> {
     Ok(html! {
         h2 { "Probe latency" }
         (table(&HEAD, &rows(&evidence.latencies)))
-        @if !touches.is_empty() {
+        @if any_corrected {
             (figure(&svg(&plot)?, "Touches of the latency run after correction, along the approach: a slope that is left would be latency that was not taken out"))
         }
     })

@@ -39,7 +39,7 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         h2 { "Tool error in the blocks' span, change since cold" }
         (error_table(&errors))
         (places_table(&errors))
-        p.note { "Truth of the plant at poses that the machine really went to; no node sees it. Shift: common to all poses. Stretch: along each axis itself, all that two blocks can see besides the shift. Rotation: between axes; two blocks on one diagonal take part of it for stretch. Curved: hot zones and bending, which no linear model follows. A shift that is left is the drift since the last block cycle and the probing error." }
+        p.note { "All in µm; parts are root mean squares; the whole error includes the geometric error that is there when cold. Truth of the plant at poses that the machine really went to; no node sees it. Shift: common to all poses. Stretch: along each axis itself, all that two blocks can see besides the shift. Rotation: between axes; two blocks on one diagonal take part of it for stretch. Curved: hot zones and bending, which no linear model follows. A shift that is left is the drift since the last block cycle and the probing error." }
         h2 { "Drift at the blocks" }
         @for axis in Axis::LINEAR {
             (figure(&svg(&Plot {
@@ -100,13 +100,13 @@ fn headline(errors: &[ToolError]) -> Vec<String> {
 
 const HEAD: [&str; 8] = [
     "verification",
-    "p95 / µm",
-    "max / µm",
+    "p95",
+    "max",
     "shift",
     "stretch",
     "rotation",
-    "curved (rms / µm)",
-    "p95 with cold error / µm",
+    "curved",
+    "whole p95",
 ];
 
 fn error_rows(errors: &[ToolError]) -> Vec<Vec<String>> {
@@ -209,11 +209,13 @@ fn drift_traces(evidence: &Evidence) -> BTreeMap<Axis, Vec<Trace>> {
 
 /// The tables as they stand on a terminal.
 fn text(errors: &[ToolError]) -> String {
-    let mut text = String::new();
+    let mut text =
+        "Tool error in the blocks' span, change since cold, µm; parts are root mean squares\n"
+            .to_owned();
     for row in std::iter::once(HEAD.map(str::to_owned).to_vec()).chain(error_rows(errors)) {
         let _ = writeln!(
             text,
-            "  {:<28}{:>9}{:>9}{:>8}{:>9}{:>10}{:>19}{:>26}",
+            "  {:<28}{:>8}{:>8}{:>8}{:>9}{:>10}{:>8}{:>11}",
             row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
         );
     }

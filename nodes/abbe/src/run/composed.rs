@@ -28,6 +28,9 @@ use crate::truth::Truth;
 /// How long nodes may take to wind down, in simulated time.
 const SHUTDOWN_PATIENCE: Span = Span::from_nanos(120_000_000_000);
 
+/// Nodes evaluate the last program of a plan after its end: this long the run goes on.
+const EVALUATION: Span = Span::from_nanos(3_000_000_000);
+
 /// Runs `scenario` from `start_s` on.
 ///
 /// # Errors
@@ -164,6 +167,7 @@ fn play(
     let mut progress = Progress::new(&title, start);
     let limit = start + Span::from_secs_f64(scenario.file.limit_min * 60.0);
     let began = Instant::now();
+    let mut done_at = None;
     let failure = loop {
         let Some(now) = harness.advance() else {
             break Some("no node has a timer: time cannot pass".to_owned());
@@ -178,9 +182,14 @@ fn play(
             .as_ref()
             .map(|status| (status.state, &status.message))
         {
-            Some((PlanState::Done, _)) => break None,
+            Some((PlanState::Done, _)) => {
+                done_at.get_or_insert(now);
+            }
             Some((PlanState::Failed, message)) => break Some(message.clone()),
             _ => {}
+        }
+        if done_at.is_some_and(|done| now - done >= EVALUATION) {
+            break None;
         }
         if now > limit {
             break Some(format!(
