@@ -40,6 +40,9 @@ pub struct Condition {
     pub diagnostic: Diagnostic,
 }
 
+/// Value that only the thermal model's score of its predictions has.
+const PREDICTION_KEY: &str = "hold_um";
+
 /// Everything that a report is written from.
 #[derive(Debug, Default)]
 pub struct Evidence {
@@ -57,6 +60,8 @@ pub struct Evidence {
     pub status: Option<PlanStatus>,
     /// Last compensation.
     pub compensation: Option<AxisCompensation>,
+    /// How well each way of predicting the drift did at each update, values in µm by name.
+    pub predictions: Vec<(Stamp<Host>, Vec<(&'static str, String)>)>,
     /// Conditions above `Ok` in order.
     pub conditions: Vec<Condition>,
     /// Verifications with the plant's truth.
@@ -109,7 +114,14 @@ impl Evidence {
 
     /// Takes one condition.
     pub fn condition(&mut self, at: Stamp<Host>, node: &str, diagnostic: &Diagnostic) {
-        if diagnostic.level != Level::Ok {
+        if diagnostic
+            .values
+            .iter()
+            .any(|(name, _)| *name == PREDICTION_KEY)
+        {
+            let diagnostic = diagnostic.clone();
+            self.predictions.push((at, diagnostic.values));
+        } else if diagnostic.level != Level::Ok {
             let (node, diagnostic) = (node.to_owned(), diagnostic.clone());
             self.conditions.push(Condition {
                 at,

@@ -48,6 +48,7 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
                 traces: drift.get(&axis).cloned().unwrap_or_default(),
             })?, &format!("{axis} face of each block")))
         }
+        (predictions(evidence))
         (latency::section(evidence)?)
         (conditions::section(evidence))
     };
@@ -168,14 +169,46 @@ fn places_table(errors: &[ToolError]) -> Markup {
     table(&head, &place_rows(errors))
 }
 
+/// What was left at each update, had the drift been held since the last one or predicted.
+fn predictions(evidence: &Evidence) -> Markup {
+    let rows: Vec<Vec<String>> = evidence
+        .predictions
+        .iter()
+        .map(|(at, values)| {
+            let hours = (*at - start(evidence)).as_secs_f64() / 3600.0;
+            let mut row = vec![format!("{hours:.2}")];
+            row.extend(PREDICTORS.map(|key| {
+                let value = values.iter().find(|(name, _)| *name == key);
+                value
+                    .and_then(|(_, text)| text.parse::<f64>().ok())
+                    .map_or_else(|| "—".to_owned(), |um| format!("{um:.2}"))
+            }));
+            row
+        })
+        .collect();
+    html! {
+        @if !rows.is_empty() {
+            h2 { "Prediction between block cycles" }
+            (table(&["time / h", "held", "time constant", "temperatures"], &rows))
+            p.note { "Residual at the blocks at each update, root mean square in µm, had the last model been held, extrapolated with its time constant, or moved with the temperatures; a dash: that way was not identifiable or not proven yet." }
+        }
+    }
+}
+
+const PREDICTORS: [&str; 3] = ["hold_um", "relaxation_um", "temperature_um"];
+
+fn start(evidence: &Evidence) -> Stamp<Host> {
+    evidence
+        .segments
+        .first()
+        .map_or_else(Stamp::default, |first| first.at)
+}
+
 /// Drift of each block's face over time, µm over h.
 fn drift_traces(evidence: &Evidence) -> BTreeMap<Axis, Vec<Trace>> {
     let mut cold = BTreeMap::new();
     let mut traces: BTreeMap<Axis, BTreeMap<String, Vec<(f64, f64)>>> = BTreeMap::new();
-    let start = evidence
-        .segments
-        .first()
-        .map_or_else(Stamp::<Host>::default, |first| first.at);
+    let start = start(evidence);
     for block in &evidence.blocks {
         for axis in Axis::LINEAR {
             let Some(face) = block.faces[axis] else {
