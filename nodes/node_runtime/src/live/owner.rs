@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use abbe_msgs::{Qos, to_cdr};
+use abbe_msgs::{Qos, to_cdr, topics};
 use metrology::Stamp;
 use metrology::stamp::Host;
 use tokio::sync::{mpsc, watch};
@@ -164,7 +164,7 @@ impl Owner {
         self.has_told_parameters = true;
         let event = parameters::start_event(&self.name, &self.parameters, clock::host_now());
         if let Err(error) = self.parameter_events.publish(&event, None) {
-            self.unsent("/parameter_events", &error);
+            self.unsent(topics::PARAMETER_EVENTS.name, &error);
         }
     }
 
