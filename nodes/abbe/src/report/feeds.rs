@@ -33,10 +33,8 @@ fn feeds(evidence: &Evidence) -> Vec<Feed> {
             .filter(move |(of, point)| *of == run && point.rejection == Rejection::None)
             .map(|(_, point)| point)
     };
-    let Some(run) = latency_runs
-        .filter(|run| corrected(*run).count() > 1)
-        .last()
-    else {
+    let mut of_use = latency_runs.filter(|run| corrected(*run).count() > 1);
+    let Some(run) = of_use.next_back() else {
         return Vec::new();
     };
     let mut by_feed: BTreeMap<i64, Vec<(f64, f64)>> = BTreeMap::new();

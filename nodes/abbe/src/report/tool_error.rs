@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn the_quantile_is_a_value_that_occurred() {
-        assert_eq!(quantile((1..=20).map(f64::from), 0.95), 19.0);
+        assert!((quantile((1..=20).map(f64::from), 0.95) - 19.0).abs() < 1e-12);
         assert!(quantile(std::iter::empty(), 0.95).is_nan());
     }
 }
