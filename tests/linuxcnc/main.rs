@@ -142,7 +142,11 @@ fn delay_in_hal_s(scenario: &str, hal: &str) -> f64 {
         .lines()
         .find(|line| line.starts_with("setp probe-latency.on-delay "))
         .unwrap();
-    line.split_whitespace().next_back().unwrap().parse().unwrap()
+    line.split_whitespace()
+        .next_back()
+        .unwrap()
+        .parse()
+        .unwrap()
 }
 
 /// Mean apparent latency of a delay made in the servo thread, s: whole ticks, the first of which

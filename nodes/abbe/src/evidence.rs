@@ -40,6 +40,15 @@ pub struct Condition {
     pub diagnostic: Diagnostic,
 }
 
+/// How well each way of predicting the drift did at one update.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prediction {
+    /// When.
+    pub at: Stamp<Host>,
+    /// Residual by the way's name, µm; empty: not there.
+    pub residuals_um: Vec<(&'static str, String)>,
+}
+
 /// Value that only the thermal model's score of its predictions has.
 const PREDICTION_KEY: &str = "hold_um";
 
@@ -61,7 +70,7 @@ pub struct Evidence {
     /// Last compensation.
     pub compensation: Option<AxisCompensation>,
     /// How well each way of predicting the drift did at each update, values in µm by name.
-    pub predictions: Vec<(Stamp<Host>, Vec<(&'static str, String)>)>,
+    pub predictions: Vec<Prediction>,
     /// Conditions above `Ok` in order.
     pub conditions: Vec<Condition>,
     /// Verifications with the plant's truth.
@@ -120,7 +129,10 @@ impl Evidence {
             .any(|(name, _)| *name == PREDICTION_KEY)
         {
             let diagnostic = diagnostic.clone();
-            self.predictions.push((at, diagnostic.values));
+            self.predictions.push(Prediction {
+                at,
+                residuals_um: diagnostic.values,
+            });
         } else if diagnostic.level != Level::Ok {
             let (node, diagnostic) = (node.to_owned(), diagnostic.clone());
             self.conditions.push(Condition {

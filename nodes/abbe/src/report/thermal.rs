@@ -174,11 +174,14 @@ fn predictions(evidence: &Evidence) -> Markup {
     let rows: Vec<Vec<String>> = evidence
         .predictions
         .iter()
-        .map(|(at, values)| {
-            let hours = (*at - start(evidence)).as_secs_f64() / 3600.0;
+        .map(|prediction| {
+            let hours = (prediction.at - start(evidence)).as_secs_f64() / 3600.0;
             let mut row = vec![format!("{hours:.2}")];
             row.extend(PREDICTORS.map(|key| {
-                let value = values.iter().find(|(name, _)| *name == key);
+                let value = prediction
+                    .residuals_um
+                    .iter()
+                    .find(|(name, _)| *name == key);
                 value
                     .and_then(|(_, text)| text.parse::<f64>().ok())
                     .map_or_else(|| "—".to_owned(), |um| format!("{um:.2}"))
