@@ -16,7 +16,7 @@
 //! stated repeatability, in 94.6 % with twice its scatter.
 //!
 //! # References
-//! [1] JCGM 100:2008 (GUM), H.3. [2] R. T. Birge, Phys. Rev. 40 (1932) 207, doi:10.1103/PhysRev.40.207.
+//! \[1\] JCGM 100:2008 (GUM), H.3. \[2\] R. T. Birge, Phys. Rev. 40 (1932) 207, doi:10.1103/PhysRev.40.207.
 
 use metrology::fit::{LineFit, ShapeError, chi_square_p, fit_line, lack_of_fit};
 

@@ -5,7 +5,7 @@
 //! may stand directly before `t`, e.g. `(C1)`; it moves nothing.
 //!
 //! # References
-//! [1] ISO 10791-6:2014, structural codes of machining centres.
+//! \[1\] ISO 10791-6:2014, structural codes of machining centres.
 
 use std::fmt;
 use std::str::FromStr;

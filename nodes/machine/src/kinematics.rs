@@ -27,7 +27,7 @@
 //! Nominal geometry: location errors of the rotary axes are not in it. Two rotary axes or fewer.
 //!
 //! # References
-//! [1] ISO 841:2001, axis and motion nomenclature.
+//! \[1\] ISO 841:2001, axis and motion nomenclature.
 
 use metrology::{Axis, PerAxis};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};

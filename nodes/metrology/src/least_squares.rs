@@ -16,7 +16,7 @@
 //! in it, scaled up, would count as rank.
 //!
 //! # References
-//! [1] G. H. Golub, C. F. Van Loan, Matrix Computations, 5.5. [2] JCGM 100:2008 (GUM), H.3.
+//! \[1\] G. H. Golub, C. F. Van Loan, Matrix Computations, 5.5. \[2\] JCGM 100:2008 (GUM), H.3.
 
 use nalgebra::{DMatrix, DVector};
 

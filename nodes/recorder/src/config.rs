@@ -55,9 +55,9 @@ pub struct RecorderConfig {
     pub compression: ChunkCompression,
     /// A chunk is written when its records reach this many bytes, before compression.
     pub chunk_size_bytes: u64,
-    /// A chunk is written when its messages span this much log time [s].
+    /// A chunk is written when its messages span this much log time, s.
     pub flush_period_s: f64,
-    /// `metadata.yaml` is refreshed when this much log time has passed [s].
+    /// `metadata.yaml` is refreshed when this much log time has passed, s.
     pub metadata_period_s: f64,
     /// A new file is begun when the current one reaches this many bytes; 0 means one file.
     pub max_file_bytes: u64,
@@ -176,7 +176,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
 const SMALLEST_BYTES: u64 = 1024;
 /// Largest chunk: a reader holds a whole chunk in memory.
 const LARGEST_CHUNK_BYTES: u64 = 64 << 20;
-/// Longest period [s]: an hour of loss is no longer a recording.
+/// Longest period, s: an hour of loss is no longer a recording.
 const LONGEST_PERIOD_S: f64 = 3600.0;
 
 impl RecorderConfig {

@@ -25,7 +25,7 @@ const TRUTH_KEYS: [&str; 3] = ["plant", "truth", "plant_truth"];
 /// The context of one run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunContext {
-    /// When the run began, on the clock of the log times [ns].
+    /// When the run began, on the clock of the log times, ns.
     pub start_time_nanos: u64,
     /// Name of the scenario, empty where there is none.
     pub scenario_name: String,

@@ -130,7 +130,7 @@ pub enum RecorderError {
         topic: String,
         /// `log` or `publish`.
         which: &'static str,
-        /// The time [ns].
+        /// The time, ns.
         time_nanos: i64,
     },
     /// A period that is not a time.
@@ -138,9 +138,9 @@ pub enum RecorderError {
     PeriodOutOfRange {
         /// The parameter.
         key: &'static str,
-        /// Its value [s].
+        /// Its value, s.
         value_s: f64,
-        /// Its limit [s].
+        /// Its limit, s.
         limit_s: f64,
     },
     /// A size out of its range.
@@ -148,11 +148,11 @@ pub enum RecorderError {
     SizeOutOfRange {
         /// The parameter.
         key: &'static str,
-        /// Its value [byte].
+        /// Its value, byte.
         value_bytes: u64,
-        /// Smallest value [byte].
+        /// Smallest value, byte.
         smallest_bytes: u64,
-        /// Largest value [byte].
+        /// Largest value, byte.
         largest_bytes: u64,
     },
     /// The plant's truth never enters a bag.
@@ -240,7 +240,7 @@ pub enum RecorderError {
         topic: String,
         /// Number of the message in the bag, from 0.
         message: u64,
-        /// Its log time [ns].
+        /// Its log time, ns.
         log_time_nanos: u64,
         /// Why.
         source: crate::ReflectError,

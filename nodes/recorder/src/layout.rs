@@ -24,14 +24,14 @@ pub fn split_file_name(name: &str, index: usize) -> String {
 /// `{ nanoseconds: n }`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Nanoseconds {
-    /// The time [ns].
+    /// The time, ns.
     pub nanoseconds: u64,
 }
 
 /// `{ nanoseconds_since_epoch: n }`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SinceEpoch {
-    /// The instant [ns].
+    /// The instant, ns.
     pub nanoseconds_since_epoch: u64,
 }
 
@@ -108,7 +108,7 @@ pub(crate) struct MetadataFile {
     pub rosbag2_bagfile_information: BagMetadata,
 }
 
-/// Earliest and latest log time [ns].
+/// Earliest and latest log time, ns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct TimeSpan {
     bounds_nanos: Option<(u64, u64)>,

@@ -20,7 +20,7 @@ use std::path::PathBuf;
 
 pub use bag::Bag;
 
-/// Largest chunk that is read, before and after decompression [byte].
+/// Largest chunk that is read, before and after decompression, byte.
 pub(crate) const LARGEST_CHUNK_BYTES: u64 = 256 << 20;
 
 /// Order in which messages are given.
@@ -71,9 +71,9 @@ pub struct TopicInfo {
 pub struct MessageRef<'a> {
     /// Its topic.
     pub topic: TopicId,
-    /// When it was received [ns].
+    /// When it was received, ns.
     pub log_time_nanos: u64,
-    /// When it was published [ns].
+    /// When it was published, ns.
     pub publish_time_nanos: u64,
     /// The publisher's number.
     pub sequence: u32,
@@ -200,9 +200,9 @@ pub struct Attachment {
     pub name: String,
     /// IANA media type.
     pub media_type: String,
-    /// Time it was recorded [ns].
+    /// Time it was recorded, ns.
     pub log_time_nanos: u64,
-    /// Time it was made [ns].
+    /// Time it was made, ns.
     pub create_time_nanos: u64,
     /// Contents.
     pub data: Vec<u8>,

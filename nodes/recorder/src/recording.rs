@@ -21,7 +21,7 @@ use crate::split::{Split, SplitFault};
 pub struct MessageStamp {
     /// When the recorder received it [ns since the epoch of the recording's clock].
     pub log_time_nanos: i64,
-    /// When it was published, the same where unknown [ns].
+    /// When it was published, the same where unknown, ns.
     pub publish_time_nanos: i64,
     /// The publisher's number, 0 where there is none.
     pub sequence: u32,
@@ -40,7 +40,7 @@ pub struct RecordingSummary {
     pub files: Vec<String>,
     /// Messages whose log time is before that of the message before them.
     pub messages_back_in_time: u64,
-    /// The largest such step [ns].
+    /// The largest such step, ns.
     pub largest_step_back_nanos: u64,
 }
 

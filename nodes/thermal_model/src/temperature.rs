@@ -23,7 +23,7 @@
 //! `eq3_is_the_residual_of_fitting_again_without_the_update`: below 1e-9 mm.
 //!
 //! # References
-//! [1] G. H. Golub, M. Heath, G. Wahba, Technometrics 21(2), 1979, doi:10.1080/00401706.1979.10489751.
+//! \[1\] G. H. Golub, M. Heath, G. Wahba, Technometrics 21(2), 1979, doi:10.1080/00401706.1979.10489751.
 
 use std::collections::VecDeque;
 

@@ -10,7 +10,7 @@
 //! Why slip elements and not LuGre: below a micrometre friction is a spring with memory of every
 //! reversal, which LuGre lacks, and LuGre creeps under a load that it should hold, so that a resting
 //! axis would drift during a four-hour run. (3) is a return mapping: whatever the step, no element
-//! carries more than its share. Equation (2) stands for the slip-phase lag of the generalised model [1].
+//! carries more than its share. Equation (2) stands for the slip-phase lag of the generalised model \[1\].
 //!
 //! Four elements break away at 1/8, 1/4, 1/2 and all of the presliding distance.
 //!
@@ -25,7 +25,7 @@
 //! lubrication state, dependence on temperature.
 //!
 //! # References
-//! [1] F. Al-Bender, V. Lampaert, J. Swevers, IEEE Trans. Autom. Control 50(11), 2005, doi:10.1109/TAC.2005.858676 (from memory).
+//! \[1\] F. Al-Bender, V. Lampaert, J. Swevers, IEEE Trans. Autom. Control 50(11), 2005, doi:10.1109/TAC.2005.858676 (from memory).
 
 const ELEMENTS: usize = 4;
 const SHARE: [f64; ELEMENTS] = [0.3, 0.3, 0.2, 0.2];

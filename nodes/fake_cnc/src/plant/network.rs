@@ -15,7 +15,7 @@
 //! Each place is nearly isothermal (Biot number below 0.1). Not modelled: radiation, coolant.
 //!
 //! # References
-//! [1] C. F. Van Loan, IEEE Trans. Autom. Control 23(3), 1978, doi:10.1109/TAC.1978.1101743, for (2).
+//! \[1\] C. F. Van Loan, IEEE Trans. Autom. Control 23(3), 1978, doi:10.1109/TAC.1978.1101743, for (2).
 
 use nalgebra::DMatrix;
 

@@ -23,7 +23,7 @@
 //! Friction between ball and surface is small, deflection small against the stylus.
 //!
 //! # References
-//! [1] F. Shen, S. Moon, on pretravel lobing of kinematic touch probes (mechanism from memory;
+//! \[1\] F. Shen, S. Moon, on pretravel lobing of kinematic touch probes (mechanism from memory;
 //! (1) to (3) derived here).
 
 use std::f64::consts::{FRAC_PI_3, PI, TAU};

@@ -14,7 +14,7 @@
 //!
 //! A beam bends away from its warmer side (1): the column stands behind the table (+Y) and its warm
 //! front tips it backwards. (2) is that of a cantilever with constant curvature. (5) is the free
-//! disc under plane stress, n Poisson's ratio [1]; outside the disc the rim's growth goes on
+//! disc under plane stress, n Poisson's ratio \[1\]; outside the disc the rim's growth goes on
 //! radially. The head's carriage stands at `carriage_height_mm` plus Z where the chain moves the head,
 //! and at `carriage_height_mm` where it moves the table in Z.
 //!
@@ -22,7 +22,7 @@
 //! Gradients are linear through each section. Not modelled: warping of the head, guide-way bearings.
 //!
 //! # References
-//! [1] S. Timoshenko, J. N. Goodier, Theory of Elasticity, 3rd ed., 1970, art. 150 (from memory).
+//! \[1\] S. Timoshenko, J. N. Goodier, Theory of Elasticity, 3rd ed., 1970, art. 150 (from memory).
 
 use nalgebra::{Rotation3, Vector3};
 

@@ -14,7 +14,7 @@
 //! P(χ²_ν > χ²) is left, which is as good as the stated uncertainties.
 //!
 //! # References
-//! [1] NIST/SEMATECH e-Handbook of Statistical Methods, 4.4.4.6.
+//! \[1\] NIST/SEMATECH e-Handbook of Statistical Methods, 4.4.4.6.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 

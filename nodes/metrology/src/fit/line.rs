@@ -14,7 +14,7 @@
 //! `val_nist_strd_norris`: the certified parameters to 12 digits, their standard deviations to 11.
 //!
 //! # References
-//! [1] JCGM 100:2008 (GUM), H.3. [2] NIST StRD, linear regression, dataset Norris (public domain).
+//! \[1\] JCGM 100:2008 (GUM), H.3. \[2\] NIST StRD, linear regression, dataset Norris (public domain).
 
 use nalgebra::Matrix2;
 

@@ -12,7 +12,7 @@
 //! `eq1_finds_a_tilted_plane`: 1e-12. `eq3_tilt_scatter_matches_theory`: within 10 % over 2,000 fits.
 //!
 //! # References
-//! [1] A. B. Forbes, Least-squares best-fit geometric elements, NPL report DITC 140/89, 1991.
+//! \[1\] A. B. Forbes, Least-squares best-fit geometric elements, NPL report DITC 140/89, 1991.
 
 use nalgebra::{Matrix3, Vector3};
 

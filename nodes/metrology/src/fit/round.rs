@@ -18,7 +18,7 @@
 //! `val_gander_golub_strebel_circle`: the published centre and radius to 4 decimals.
 //!
 //! # References
-//! [1] W. Gander, G. H. Golub, R. Strebel, BIT 34 (1994) 558-578, doi:10.1007/BF01934268.
+//! \[1\] W. Gander, G. H. Golub, R. Strebel, BIT 34 (1994) 558-578, doi:10.1007/BF01934268.
 
 use nalgebra::{DMatrix, DVector, SVector};
 

@@ -156,7 +156,7 @@ impl Bag {
         self.topics.iter().map(|topic| topic.message_count).sum()
     }
 
-    /// Earliest and latest log time [ns], `None` without messages.
+    /// Earliest and latest log time, ns, `None` without messages.
     #[must_use]
     pub fn log_times_nanos(&self) -> Option<(u64, u64)> {
         let mut span = TimeSpan::default();

@@ -10,7 +10,7 @@ use super::walk::{Frame, Walker};
 use super::{LARGEST_CHUNK_BYTES, LossReason, MetadataRecord};
 use crate::layout::TimeSpan;
 
-/// Footer record and magic at the end of a file [byte].
+/// Footer record and magic at the end of a file, byte.
 const TAIL_BYTES: u64 = 9 + 20 + 8;
 /// Records outside chunks are read in runs of about this many bytes.
 const RUN_BYTES: u64 = 1 << 20;
