@@ -43,6 +43,10 @@ fi
 wait
 "#;
 /// A clean end takes about 3 s.
+/// LinuxCNC that starts while the last one's real-time part is still being unloaded ends at once: so often,
+/// and after such a pause, it is started again.
+const START_ATTEMPTS: u32 = 3;
+const REALTIME_CLEANUP: Duration = Duration::from_secs(3);
 const END_LIMIT: Duration = Duration::from_secs(20);
 /// Length of the last words in an error.
 const LAST_WORDS_BYTES: u64 = 600;
@@ -135,6 +139,19 @@ impl Controller {
     /// LinuxCNC is not installed, runs already, ends at once, or does not listen in time.
     pub fn start(config: &BridgeConfig, ini: &Path) -> Result<Self, BridgeError> {
         require_installed()?;
+        let mut attempt = 1;
+        loop {
+            match Self::start_once(config, ini) {
+                Err(BridgeError::EndedAtStart { .. }) if attempt < START_ATTEMPTS => {
+                    attempt += 1;
+                    std::thread::sleep(REALTIME_CLEANUP);
+                }
+                outcome => return outcome,
+            }
+        }
+    }
+
+    fn start_once(config: &BridgeConfig, ini: &Path) -> Result<Self, BridgeError> {
         let lock = lock()?;
         if let Some((process, pid)) = running().into_iter().next() {
             return Err(BridgeError::AlreadyRunning { process, pid });
