@@ -42,11 +42,11 @@ if exec 3<>"/dev/tcp/$2/$3"; then
 fi
 wait
 "#;
-/// A clean end takes about 3 s.
 /// LinuxCNC that starts while the last one's real-time part is still being unloaded ends at once: so often,
 /// and after such a pause, it is started again.
 const START_ATTEMPTS: u32 = 3;
 const REALTIME_CLEANUP: Duration = Duration::from_secs(3);
+/// A clean end takes about 3 s.
 const END_LIMIT: Duration = Duration::from_secs(20);
 /// Length of the last words in an error.
 const LAST_WORDS_BYTES: u64 = 600;
