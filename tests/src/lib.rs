@@ -1,1 +1,13 @@
-//! What no crate can test alone.
+//! What no crate can test alone, and what those tests share: the built program, nodes as processes,
+//! Python as the other side, scenarios in a folder of their own.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "tests wait, look at clocks, read the environment and write files"
+)]
+#![expect(clippy::print_stderr, reason = "what is not tested is said")]
+
+pub mod cyclone;
+pub mod program;
+pub mod python;
+pub mod scenario;

@@ -34,7 +34,9 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
     let (path, text) = setup.file_text("plant_file")?;
     let truth =
         PlantFile::from_yaml(&text).with_context(|| format!("plant file {}", path.display()))?;
-    let cnc = Cnc::new(&config, &machine, Plant::new(&machine, &truth)?)?;
+    let plant =
+        Plant::new(&machine, &truth).with_context(|| format!("plant file {}", path.display()))?;
+    let cnc = Cnc::new(&config, &machine, plant)?;
     let period = Span::from_secs_f64(machine.control.servo_period_ms / 1e3);
     let mut wiring = Wiring::new(setup.name(), parameters, Witnessed { cnc, witness })
         .every(period, || Input::Tick)

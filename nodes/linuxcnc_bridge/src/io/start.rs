@@ -137,6 +137,10 @@ impl Controller {
     ///
     /// # Errors
     /// LinuxCNC is not installed, runs already, ends at once, or does not listen in time.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "this is the part that waits for processes"
+    )]
     pub fn start(config: &BridgeConfig, ini: &Path) -> Result<Self, BridgeError> {
         require_installed()?;
         let mut attempt = 1;

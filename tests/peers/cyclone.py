@@ -1,0 +1,124 @@
+"""Cyclone DDS on plain loopback, driven line by line.
+
+    cyclone.py '{"domain": 42, "readers": [...], "writers": [...]}'
+
+A reader or writer is {"topic", "type", "reliable", "latched", "depth"}, with ROS names. Events go to
+standard output, one JSON object a line: `matched` and `sample`, each with its topic and the seconds
+since the participant was made. Commands come on standard input: {"topic", "message"} is written.
+The end of standard input ends the program, after everything written was acknowledged.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import threading
+import time
+
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+from message_types import Types, plain
+
+LOOPBACK = """<CycloneDDS><Domain><General>
+<Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>
+<AllowMulticast>false</AllowMulticast></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex>
+<MaxAutoParticipantIndex>50</MaxAutoParticipantIndex>
+<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
+
+
+def quality(end: dict) -> Qos:
+    depth = end.get("depth", 10)
+    policies = [
+        Policy.History.KeepLast(depth),
+        Policy.Durability.TransientLocal if end["latched"] else Policy.Durability.Volatile,
+        Policy.Reliability.Reliable(duration(seconds=1))
+        if end["reliable"]
+        else Policy.Reliability.BestEffort,
+    ]
+    if end["latched"]:
+        # Without it Cyclone keeps one sample for those who come late.
+        policies.append(
+            Policy.DurabilityService(
+                duration(seconds=0), Policy.History.KeepLast(depth), -1, -1, -1
+            )
+        )
+    return Qos(*policies)
+
+
+def said(value):
+    """JSON has no NaN."""
+    if isinstance(value, dict):
+        return {name: said(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [said(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value
+
+
+def main(plan: dict) -> None:
+    types = Types()
+    domain = Domain(plan["domain"], LOOPBACK)
+    participant = DomainParticipant(plan["domain"])
+    began = time.monotonic()
+    lock = threading.Lock()
+
+    def tell(event: str, topic: str, **more) -> None:
+        after_s = time.monotonic() - began
+        line = {"event": event, "topic": topic, "after_s": after_s, **said(more)}
+        with lock:
+            print(json.dumps(line), flush=True)
+
+    def topic_of(end: dict) -> Topic:
+        return Topic(participant, f"rt{end['topic']}", types.of(end["type"]))
+
+    readers = {
+        end["topic"]: DataReader(participant, topic_of(end), quality(end))
+        for end in plan.get("readers", [])
+    }
+    ends = {end["topic"]: end for end in plan.get("writers", [])}
+    writers = {
+        topic: DataWriter(participant, topic_of(end), quality(end)) for topic, end in ends.items()
+    }
+    ended = threading.Event()
+
+    def obey() -> None:
+        for line in sys.stdin:
+            command = json.loads(line)
+            topic = command["topic"]
+            writers[topic].write(types.build(ends[topic]["type"], command["message"]))
+        ended.set()
+
+    threading.Thread(target=obey, daemon=True).start()
+    unmatched = {**readers, **writers}
+    while not ended.is_set():
+        for topic, end in list(unmatched.items()):
+            matched = (
+                end.get_matched_publications()
+                if isinstance(end, DataReader)
+                else end.get_matched_subscriptions()
+            )
+            if matched:
+                del unmatched[topic]
+                tell("matched", topic)
+        for topic, reader in readers.items():
+            for sample in reader.take(256):
+                if sample.sample_info.valid_data:
+                    tell("sample", topic, message=plain(sample))
+        time.sleep(0.002)
+    for writer in writers.values():
+        writer.wait_for_acks(duration(seconds=2))
+    del domain
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    main(json.loads(sys.argv[1]))

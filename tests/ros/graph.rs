@@ -1,0 +1,211 @@
+//! The graph as a test sees it: every topic, and a voice on some.
+
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use abbe_msgs::diagnostic_msgs::msg::DiagnosticStatus;
+use abbe_msgs::topics::{self, Topic};
+use abbe_msgs::{Message, Wire, from_cdr, to_cdr};
+use node_runtime::environment::{DiscoveryRange, Environment};
+use node_runtime::names::NodeNames;
+use node_runtime::node::TopicPort;
+use node_runtime::tap::{RawPublisher, RawTap, Selection, TapEvent};
+
+/// How long anything may take to be seen on a busy computer.
+const PATIENCE: Duration = Duration::from_secs(15);
+
+#[derive(Default)]
+struct Heard {
+    /// When, absolute topic, bytes; in the order of arrival.
+    samples: Vec<(Instant, String, Arc<[u8]>)>,
+}
+
+/// Everything that is said in a domain.
+pub struct Graph {
+    environment: Environment,
+    tap: Option<RawTap>,
+    heard: Arc<Mutex<Heard>>,
+}
+
+impl Graph {
+    pub fn join(domain: u16) -> Self {
+        let environment = Environment {
+            domain_id: domain,
+            range: DiscoveryRange::Localhost,
+            log_filter: None,
+        };
+        let names = NodeNames::new("witness", &[]).unwrap();
+        let heard = Arc::<Mutex<Heard>>::default();
+        let ear = Arc::clone(&heard);
+        let tap = RawTap::start(&environment, &names, Selection::All, move |event| {
+            if let TapEvent::Sample(sample) = event {
+                let line = (Instant::now(), sample.topic.name.clone(), sample.bytes);
+                ear.lock().unwrap().samples.push(line);
+            }
+        });
+        Self {
+            environment,
+            tap: Some(tap.unwrap()),
+            heard,
+        }
+    }
+
+    /// A node that can speak on `topics`.
+    pub fn voice(&self, topics: &[TopicPort]) -> Voice {
+        let names = NodeNames::new("voice", &[]).unwrap();
+        let patience = Duration::from_millis(100);
+        Voice(RawPublisher::start(&self.environment, &names, topics, 4096, patience).unwrap())
+    }
+
+    /// Messages of a topic since `since`, with the time of their arrival.
+    pub fn since<M: Message>(&self, topic: &Topic<M>, since: Instant) -> Vec<(Instant, M)> {
+        let name = format!("/{}", topic.name.trim_start_matches('/'));
+        let heard = self.heard.lock().unwrap();
+        let of_topic = heard
+            .samples
+            .iter()
+            .rev()
+            .take_while(|(at, ..)| *at >= since);
+        let mut found: Vec<_> = of_topic
+            .filter(|(_, topic, _)| *topic == name)
+            .map(|(at, _, bytes)| (*at, from_cdr(bytes).unwrap()))
+            .collect();
+        found.reverse();
+        found
+    }
+
+    /// The same in inner units.
+    pub fn inner_since<M: Wire>(&self, topic: &Topic<M>, since: Instant) -> Vec<M::Inner> {
+        let messages = self.since(topic, since);
+        messages
+            .into_iter()
+            .map(|(_, message)| message.into_inner().unwrap())
+            .collect()
+    }
+
+    /// Waits until `look` finds what it looks for.
+    pub fn wait<T>(&self, what: &str, look: impl FnMut(&Self) -> Option<T>) -> T {
+        self.wait_longer(PATIENCE, what, look)
+    }
+
+    pub fn wait_longer<T>(
+        &self,
+        patience: Duration,
+        what: &str,
+        mut look: impl FnMut(&Self) -> Option<T>,
+    ) -> T {
+        let deadline = Instant::now() + patience;
+        loop {
+            if let Some(found) = look(self) {
+                return found;
+            }
+            assert!(Instant::now() < deadline, "{what}: not within {patience:?}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Waits for a message of `topic` since `since` that `pick` takes.
+    pub fn next<M: Message>(
+        &self,
+        topic: &Topic<M>,
+        since: Instant,
+        pick: impl Fn(&M) -> bool,
+    ) -> M {
+        self.wait(topic.name, |graph| {
+            let messages = graph.since(topic, since);
+            messages.into_iter().map(|(_, m)| m).find(&pick)
+        })
+    }
+
+    /// Waits until `node` says anything about itself since `since`.
+    pub fn alive(&self, node: &str, since: Instant) {
+        let name = format!("/{node}");
+        self.wait(
+            &format!("{node} on {}", topics::DIAGNOSTICS.name),
+            |graph| {
+                let all = graph.since(&topics::DIAGNOSTICS, since);
+                let statuses = all.into_iter().flat_map(|(_, array)| array.status);
+                statuses.map(|status| status.name).find(|n| *n == name)
+            },
+        );
+    }
+
+    /// Waits for a condition of `node`, above OK, whose message holds all of `words`.
+    pub fn condition(
+        &self,
+        node: &str,
+        condition: &str,
+        words: &[&str],
+        since: Instant,
+    ) -> DiagnosticStatus {
+        self.condition_within(PATIENCE, node, condition, words, since)
+    }
+
+    pub fn condition_within(
+        &self,
+        patience: Duration,
+        node: &str,
+        condition: &str,
+        words: &[&str],
+        since: Instant,
+    ) -> DiagnosticStatus {
+        let name = format!("/{node}: {condition}");
+        let what = format!("{name} with {words:?}");
+        let found = self.wait_longer(patience, &what, |graph| {
+            let all = graph.since(&topics::DIAGNOSTICS, since);
+            let mut statuses = all.into_iter().flat_map(|(_, array)| array.status);
+            statuses.find(|status| {
+                status.name.starts_with(&name)
+                    && status.level > 0
+                    && words.iter().all(|word| status.message.contains(word))
+            })
+        });
+        eprintln!("{}: {}", found.name, found.message);
+        found
+    }
+}
+
+impl Drop for Graph {
+    fn drop(&mut self) {
+        if let Some(tap) = self.tap.take() {
+            let _ = tap.stop();
+        }
+    }
+}
+
+/// Says what it is told, on the topics with which it was made, by their places.
+pub struct Voice(RawPublisher);
+
+impl Voice {
+    pub fn say(&mut self, place: usize, message: &impl Message) {
+        self.bytes(place, &to_cdr(message));
+    }
+
+    pub fn bytes(&mut self, place: usize, bytes: &[u8]) {
+        assert!(self.0.publish(place, None, Arc::from(bytes)));
+    }
+
+    pub fn stop(self) {
+        self.0.stop().unwrap();
+    }
+}
+
+/// A topic of ours as a port.
+pub fn port<M: Message>(topic: &Topic<M>) -> TopicPort {
+    TopicPort {
+        topic: topic.name.to_owned(),
+        type_name: M::TYPE_NAME,
+        type_hash: M::TYPE_HASH,
+        definition: M::DEFINITION,
+        qos: topic.qos,
+    }
+}
+
+/// Now, as the wire has it.
+pub fn now() -> abbe_msgs::builtin_interfaces::msg::Time {
+    let nanos = RawPublisher::now().nanos();
+    abbe_msgs::builtin_interfaces::msg::Time {
+        sec: i32::try_from(nanos / 1_000_000_000).unwrap(),
+        nanosec: u32::try_from(nanos % 1_000_000_000).unwrap(),
+    }
+}

@@ -1,0 +1,210 @@
+//! Starts that cannot go well: an error with place, value and limit, and exit code 1.
+
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use abbe_tests::program::{Ended, Process, abbe, command, domain};
+use abbe_tests::scenario::Scenario;
+
+use crate::graph::Graph;
+
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// A node that must not start.
+fn refused(scenario: &Scenario, node: &str, more: &[&str], words: &[&str]) {
+    let file = scenario.argument(&format!("{node}.yaml"));
+    let mut arguments = vec!["node", node, "--ros-args", "--params-file", &file];
+    arguments.extend(more);
+    let ended = Process::start(command(domain(5), &arguments)).ended_within(PATIENCE);
+    expect(&ended, words);
+}
+
+fn expect(ended: &Ended, words: &[&str]) {
+    eprintln!("{}", ended.said.trim());
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+    for word in words {
+        assert!(
+            ended.said.contains(word),
+            "\"{word}\" is not in: {}",
+            ended.said
+        );
+    }
+}
+
+fn spoiled(file: &str, from: &str, to: &str) -> Scenario {
+    let scenario = Scenario::copy_of("first_run");
+    scenario.replace(file, from, to);
+    scenario
+}
+
+#[test]
+fn bad_parameters_are_refused_with_file_key_and_value() {
+    for (from, to, words) in [
+        (
+            "hold_s:",
+            "hold_time_s:",
+            &["axis_compensation.yaml", "hold_time_s", "60"][..],
+        ),
+        (
+            "    hold_s: 60.0\n",
+            "",
+            &["axis_compensation.yaml", "hold_s"],
+        ),
+        (
+            "hold_s: 60.0",
+            "hold_s: .nan",
+            &["axis_compensation.yaml", "line 11", "hold_s: .nan"],
+        ),
+        (
+            "hold_s: 60.0",
+            "hold_s: soon",
+            &["axis_compensation.yaml", "hold_s", "soon"],
+        ),
+        (
+            "hold_s: 60.0",
+            "hold_s: -1.0",
+            &["hold_s", "-1", "0", "3600"],
+        ),
+        (
+            "machine.yaml",
+            "no_machine.yaml",
+            &["machine_file", "no_machine.yaml"],
+        ),
+        (
+            "Z: {size_limit_um",
+            "W: {size_limit_um",
+            &["axis_compensation.yaml", "W"],
+        ),
+    ] {
+        let scenario = spoiled("axis_compensation.yaml", from, to);
+        refused(&scenario, "axis_compensation", &[], words);
+    }
+    let scenario = Scenario::copy_of("first_run");
+    let more = ["-p", "queue_samples:=many"];
+    refused(
+        &scenario,
+        "probe",
+        &more,
+        &["command line", "queue_samples", "many"],
+    );
+}
+
+#[test]
+fn bad_physics_is_refused_with_file_key_and_value() {
+    for (file, from, to, words) in [
+        (
+            "machine.yaml",
+            "pulse_equivalent_um: 0.1",
+            "pulse_equivalent_mm: 0.0001",
+            &["machine.yaml", "pulse_equivalent_mm"][..],
+        ),
+        (
+            "machine.yaml",
+            "servo_period_ms: 1.0, ",
+            "",
+            &["machine.yaml", "servo_period_ms"],
+        ),
+        (
+            "machine.yaml",
+            "servo_period_ms: 1.0",
+            "servo_period_ms: .nan",
+            &["machine.yaml", "servo_period_ms", "NaN"],
+        ),
+        (
+            "plant.yaml",
+            "  latency_ms: 3.7",
+            "  latency_s: 0.0037",
+            &["plant.yaml", "latency_s"],
+        ),
+        (
+            "plant.yaml",
+            "  latency_ms: 3.7\n",
+            "",
+            &["plant.yaml", "latency_ms"],
+        ),
+        (
+            "plant.yaml",
+            "  latency_ms: 3.7",
+            "  latency_ms: .nan",
+            &["plant.yaml", "latency_ms", "NaN"],
+        ),
+        (
+            "plant.yaml",
+            "slide_mass_kg: 650.0",
+            "slide_mass_kg: -650.0",
+            &["plant.yaml", "slide_mass_kg", "-650"],
+        ),
+    ] {
+        refused(&spoiled(file, from, to), "fake_cnc", &[], words);
+    }
+}
+
+#[test]
+fn a_second_node_of_the_same_name_does_not_start_and_the_first_goes_on() {
+    let (scenario, domain) = (Scenario::copy_of("first_run"), domain(6));
+    let graph = Graph::join(domain);
+    let file = scenario.argument("probe.yaml");
+    let first = Process::node(domain, "probe", &["--params-file", &file]);
+    graph.alive("probe", Instant::now());
+    let second = Process::node(domain, "probe", &["--params-file", &file]);
+    expect(
+        &second.ended_within(PATIENCE),
+        &["node /probe is already running", "__node:=NAME"],
+    );
+    graph.alive("probe", Instant::now());
+    let renamed = ["--params-file", file.as_str(), "-r", "__node:=other_probe"];
+    let other = Process::node(domain, "probe", &renamed);
+    graph.alive("other_probe", Instant::now());
+    other.stop();
+    let asked = Instant::now();
+    first.stop();
+    eprintln!("SIGINT to exit: {:?}", asked.elapsed());
+}
+
+/// In a network namespace of its own, where even `lo` is down. Without the right to make one
+/// (root, or user namespaces) nothing can be tested.
+#[test]
+fn without_a_network_interface_no_node_starts() {
+    let alone = |arguments: &[&str]| {
+        let mut command = Command::new("unshare");
+        command.args(["--map-root-user", "--net"]).args(arguments);
+        command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        command
+    };
+    let possible = alone(&["true"]).output();
+    if !possible
+        .as_ref()
+        .is_ok_and(|output| output.status.success())
+    {
+        let reason = format!("no network namespace can be made here: {possible:?}");
+        assert!(std::env::var("CI").as_deref() != Ok("true"), "{reason}");
+        eprintln!("NOT TESTED: without a network interface no node starts: {reason}");
+        return;
+    }
+    let scenario = Scenario::copy_of("first_run");
+    let (program, file) = (abbe(), scenario.argument("probe.yaml"));
+    let node = [
+        program.to_str().unwrap(),
+        "node",
+        "probe",
+        "--ros-args",
+        "--params-file",
+        &file,
+    ];
+    for (range, words) in [
+        (
+            "LOCALHOST",
+            &["/probe", "no network interface", "`lo` is not up"][..],
+        ),
+        ("SUBNET", &["/probe", "no network interface"]),
+    ] {
+        let mut command = alone(&node);
+        command
+            .env("ROS_AUTOMATIC_DISCOVERY_RANGE", range)
+            .env_remove("ROS_LOCALHOST_ONLY");
+        expect(&Process::start(command).ended_within(PATIENCE), words);
+    }
+}

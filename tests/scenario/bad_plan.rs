@@ -1,0 +1,97 @@
+//! Plans that cannot work are refused whole, with step and values, before anything moves.
+
+use abbe_tests::scenario::Scenario;
+
+use crate::cell::build;
+
+fn refusal(step: &str) -> String {
+    let scenario = Scenario::copy_of("first_run");
+    scenario.write(
+        "plan.yaml",
+        &format!("title: bad\nsteps:\n  - {{do: wait, seconds: 1.0}}\n  - {step}\n"),
+    );
+    let Err(error) = build(&scenario, "sequencer") else {
+        panic!("{step} was not refused");
+    };
+    let error = format!("{error:#}");
+    eprintln!("{error}");
+    error
+}
+
+#[test]
+fn bad_steps_are_refused_with_their_place_and_values() {
+    let latency = |feeds: &str, repeats: u32| {
+        format!("{{do: latency, feature: block_1.z, feeds_mm_min: [{feeds}], repeats: {repeats}}}")
+    };
+    for (step, words) in [
+        (
+            latency("0.0, 240.0", 3),
+            &["steps[1]", "feeds[0] = 0 mm/min"][..],
+        ),
+        (
+            latency("120.0, -60.0", 3),
+            &["steps[1]", "feeds[1] = -60 mm/min"],
+        ),
+        (
+            latency(".nan, 240.0", 3),
+            &["plan.yaml", "line 4 column 54", ".nan"],
+        ),
+        (
+            latency("60.0, 240.0, 60.0", 3),
+            &["steps[1]", "feeds[0] and feeds[2] are both 60 mm/min"],
+        ),
+        (latency("60.0", 3), &["steps[1]", "1 feeds"]),
+        (latency("60.0, 30000.0", 3), &["steps[1]", "30000 mm/min"]),
+        (
+            "{do: artefact, id: bore_9, points: 8}".to_owned(),
+            &["steps[1]", "bore_9"],
+        ),
+        (
+            "{do: blocks, blocks: [block_7]}".to_owned(),
+            &["steps[1]", "block_7"],
+        ),
+        (
+            "{do: produce, program: no.ngc, minutes: 1.0, serve_updates: true}".to_owned(),
+            &["steps[1]", "no.ngc", "plan.yaml"],
+        ),
+        (
+            "{do: produce, program: production.ngc, minutes: 0.0, serve_updates: true}".to_owned(),
+            &["steps[1].minutes = 0"],
+        ),
+        (
+            "{do: wait, seconds: .nan}".to_owned(),
+            &["plan.yaml", "line 4", ".nan"],
+        ),
+        (
+            "{do: wait, minutes: 1.0}".to_owned(),
+            &["plan.yaml", "minutes"],
+        ),
+        ("{do: dance}".to_owned(), &["plan.yaml", "dance"]),
+    ] {
+        let error = refusal(&step);
+        assert!(
+            words.iter().all(|word| error.contains(word)),
+            "{step}: {error}"
+        );
+    }
+}
+
+/// The command line says the same and fails; no bag is begun.
+#[test]
+fn a_run_with_a_bad_plan_ends_at_once_with_exit_code_1() {
+    let scenario = Scenario::copy_of("first_run");
+    scenario.replace(
+        "plan.yaml",
+        "feeds_mm_min: [60.0, 120.0, 240.0, 480.0, 960.0]",
+        "feeds_mm_min: [60.0, 60.0]",
+    );
+    let ended = scenario.run_to_end(&[]);
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+    for word in [
+        "sequencer",
+        "steps[0]",
+        "feeds[0] and feeds[1] are both 60 mm/min",
+    ] {
+        assert!(ended.said.contains(word), "{word}: {}", ended.said);
+    }
+}

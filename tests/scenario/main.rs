@@ -1,0 +1,15 @@
+//! Whole cells in simulated time: what goes wrong with a probe, a block or a plan is said with place,
+//! value and limit and spoils nothing else; the scenarios of launch_configs do what their pages say.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "tests look at clocks and read files"
+)]
+#![expect(clippy::print_stderr, reason = "figures that were seen are said")]
+
+mod bad_plan;
+mod blocks;
+mod cell;
+mod equal_bytes;
+mod probe_faults;
+mod warm_up;

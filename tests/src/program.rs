@@ -1,0 +1,175 @@
+//! The built command line, and nodes as processes of it.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+
+/// The root of the workspace.
+#[must_use]
+pub fn root() -> PathBuf {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    tests.parent().unwrap().to_owned()
+}
+
+/// The command line's program.
+///
+/// # Panics
+/// When it is not built.
+#[must_use]
+pub fn abbe() -> PathBuf {
+    let program = std::env::var("CARGO_TARGET_DIR")
+        .map_or_else(|_| root().join("target"), PathBuf::from)
+        .join("release/abbe");
+    assert!(
+        program.is_file(),
+        "{} is not there: cargo build --release -p abbe makes it (tests/run does)",
+        program.display()
+    );
+    program
+}
+
+/// A domain for one test, `0` to `12`; other processes of these tests get others, and so do the
+/// tests of `node_runtime`.
+#[must_use]
+pub fn domain(test: u16) -> u16 {
+    assert!(test < 13, "a test's number is 0 to 12");
+    let process = u16::try_from(std::process::id() % 7).unwrap();
+    10 + process * 30 + 17 + test
+}
+
+/// `abbe` with `arguments`, on loopback and in a domain.
+#[must_use]
+pub fn command(domain: u16, arguments: &[&str]) -> Command {
+    let mut command = Command::new(abbe());
+    command
+        .args(arguments)
+        .current_dir(root())
+        .env("ROS_DOMAIN_ID", domain.to_string())
+        .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        .env_remove("ROS_LOCALHOST_ONLY")
+        .env_remove("RUST_LOG")
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// A process that ends with its test.
+pub struct Process {
+    child: Option<Child>,
+    said: Vec<JoinHandle<String>>,
+}
+
+/// How a process ended.
+pub struct Ended {
+    /// Exit code or signal.
+    pub status: ExitStatus,
+    /// Standard output, then standard error.
+    pub said: String,
+}
+
+impl Process {
+    /// Starts it.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn start(mut command: Command) -> Self {
+        let mut child = command.spawn().unwrap();
+        let mut said = Vec::new();
+        let pipes: [Option<Box<dyn Read + Send>>; 2] = [
+            child.stdout.take().map(|pipe| Box::new(pipe) as _),
+            child.stderr.take().map(|pipe| Box::new(pipe) as _),
+        ];
+        for mut pipe in pipes.into_iter().flatten() {
+            said.push(std::thread::spawn(move || {
+                let mut bytes = Vec::new();
+                let _ = pipe.read_to_end(&mut bytes);
+                String::from_utf8_lossy(&bytes).into_owned()
+            }));
+        }
+        Self {
+            child: Some(child),
+            said,
+        }
+    }
+
+    /// Starts `abbe node NAME --ros-args …`.
+    #[must_use]
+    pub fn node(domain: u16, name: &str, ros_args: &[&str]) -> Self {
+        let mut arguments = vec!["node", name, "--ros-args"];
+        arguments.extend(ros_args);
+        Self::start(command(domain, &arguments))
+    }
+
+    /// Sends a signal.
+    ///
+    /// # Panics
+    /// When the process is gone.
+    pub fn signal(&self, signal: Signal) {
+        let id = self.child.as_ref().unwrap().id();
+        kill(Pid::from_raw(i32::try_from(id).unwrap()), signal).unwrap();
+    }
+
+    /// Whether it still runs.
+    ///
+    /// # Panics
+    /// When it cannot be asked.
+    pub fn is_running(&mut self) -> bool {
+        self.child.as_mut().unwrap().try_wait().unwrap().is_none()
+    }
+
+    /// Waits for its end.
+    ///
+    /// # Panics
+    /// When it does not end within `patience`; what it said is in the message.
+    pub fn ended_within(mut self, patience: Duration) -> Ended {
+        let deadline = Instant::now() + patience;
+        let mut child = self.child.take().unwrap();
+        let status = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break Some(status);
+            }
+            if Instant::now() > deadline {
+                let _ = child.kill();
+                let _ = child.wait();
+                break None;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        let said: String = self
+            .said
+            .drain(..)
+            .map(|thread| thread.join().unwrap())
+            .collect();
+        let Some(status) = status else {
+            panic!("still running after {patience:?}; it said:\n{said}");
+        };
+        Ended { status, said }
+    }
+
+    /// Asks it to stop with SIGINT and checks that it does so with exit code 0.
+    ///
+    /// # Panics
+    /// When it does not within 10 s, or with another code.
+    pub fn stop(self) -> String {
+        self.signal(Signal::SIGINT);
+        let ended = self.ended_within(Duration::from_secs(10));
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+        ended.said
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
