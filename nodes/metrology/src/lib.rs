@@ -7,6 +7,7 @@
 
 pub mod axis;
 pub mod drift;
+pub mod error_component;
 pub mod fit;
 pub mod least_squares;
 pub mod parameter;
@@ -15,6 +16,7 @@ pub mod stage;
 pub mod stamp;
 
 pub use axis::{Axis, AxisSet, PerAxis};
+pub use error_component::ErrorComponent;
 pub use parameter::ParameterDoc;
 pub use stage::Stage;
 pub use stamp::{Clock, Host, Machine, Stamp};

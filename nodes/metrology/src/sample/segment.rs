@@ -27,6 +27,17 @@ pub enum TestKind {
     Production,
     /// Poses visited to check the tool error.
     Verification,
+    Arc,
+    /// Out and back along one line, the turn being what is looked at.
+    Spike,
+    /// A line that runs on into an arc.
+    ArcWithLine,
+    /// Two arcs that meet tangentially.
+    TwoArcs,
+    /// A line through the working space along its diagonal.
+    Diagonal,
+    /// A sphere touched at several poses of the rotary axes.
+    Rotary,
 }
 
 /// Plane of a planar test.
@@ -73,6 +84,11 @@ pub struct TestSegment {
     pub repeat: u32,
     /// Stylus name in the machine file; empty: none.
     pub stylus: String,
+    /// From the point that the axis positions name to the point that is measured, mm; zero for a
+    /// touch, whose positions name the ball's centre.
+    pub tool_offset_mm: Vector3<f64>,
+    /// Stops at which readings are averaged; zero: recorded while moving.
+    pub stations: u32,
     /// Zero of the grid encoder or length reference.
     pub zero_id: u32,
     /// Changes whenever something was set up anew.
