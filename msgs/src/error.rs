@@ -80,6 +80,38 @@ pub enum WireError {
         /// Entries of `axis`.
         axes: usize,
     },
+    /// An array of another length than its neighbours ask for.
+    #[error("{message}: {field}: {len} entries: must be {needed}")]
+    WrongLength {
+        /// Type name of the message.
+        message: &'static str,
+        /// Field.
+        field: &'static str,
+        /// Entries there are.
+        len: usize,
+        /// Entries there must be.
+        needed: usize,
+    },
+    /// A name that is no error component.
+    #[error("{message}: component \"{name}\": must be an ISO 230-1 name such as EXX or EC0Y")]
+    UnknownComponent {
+        /// Type name of the message.
+        message: &'static str,
+        /// What was there.
+        name: String,
+    },
+    /// A combination of coefficients that the model does not have.
+    #[error("{message}: coefficient{place}: {value}: the model has {len}")]
+    NoSuchCoefficient {
+        /// Type name of the message.
+        message: &'static str,
+        /// Where in the field.
+        place: Place,
+        /// What was there.
+        value: u32,
+        /// Coefficients of the model.
+        len: usize,
+    },
     /// A name that is no axis.
     #[error("{message}: {field}[{idx}]: axis \"{name}\": must be one of {allowed}")]
     UnknownAxis {

@@ -3,10 +3,10 @@
 use metrology::sample::{Sense, TestKind, TestPlane, TestSegment as Inner};
 
 use crate::msg::TestSegment;
-use crate::wire::{Allowed, Reader, metres, point, time};
+use crate::wire::{Allowed, Reader, lengths, metres, point, time};
 use crate::{Place, Wire, WireError};
 
-pub(crate) const KINDS: [TestKind; 13] = [
+pub(crate) const KINDS: [TestKind; 19] = [
     TestKind::Latency,
     TestKind::Block,
     TestKind::Touch,
@@ -20,6 +20,12 @@ pub(crate) const KINDS: [TestKind; 13] = [
     TestKind::Dwell,
     TestKind::Production,
     TestKind::Verification,
+    TestKind::Arc,
+    TestKind::Spike,
+    TestKind::ArcWithLine,
+    TestKind::TwoArcs,
+    TestKind::Diagonal,
+    TestKind::Rotary,
 ];
 
 pub(crate) fn kind_code(kind: TestKind) -> u8 {
@@ -37,6 +43,12 @@ pub(crate) fn kind_code(kind: TestKind) -> u8 {
         TestKind::Dwell => TestSegment::KIND_DWELL,
         TestKind::Production => TestSegment::KIND_PRODUCTION,
         TestKind::Verification => TestSegment::KIND_VERIFICATION,
+        TestKind::Arc => TestSegment::KIND_ARC,
+        TestKind::Spike => TestSegment::KIND_SPIKE,
+        TestKind::ArcWithLine => TestSegment::KIND_ARC_WITH_LINE,
+        TestKind::TwoArcs => TestSegment::KIND_TWO_ARCS,
+        TestKind::Diagonal => TestSegment::KIND_DIAGONAL,
+        TestKind::Rotary => TestSegment::KIND_ROTARY,
     }
 }
 
@@ -78,6 +90,8 @@ impl Wire for TestSegment {
         self.sense = sense_code(inner.sense);
         self.repeat = inner.repeat;
         self.stylus.clone_from(&inner.stylus);
+        self.tool_offset = lengths(&inner.tool_offset_mm);
+        self.stations = inner.stations;
         self.zero_id = inner.zero_id;
         self.setup_id = inner.setup_id;
         self.cold = inner.cold;
@@ -99,6 +113,8 @@ impl Wire for TestSegment {
             sense: read.variant("sense", Place::Whole, self.sense, &SENSES, sense_code)?,
             repeat: self.repeat,
             stylus: self.stylus.clone(),
+            tool_offset_mm: read.lengths_mm("tool_offset", &self.tool_offset)?,
+            stations: self.stations,
             zero_id: self.zero_id,
             setup_id: self.setup_id,
             cold: self.cold,

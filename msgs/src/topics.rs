@@ -7,9 +7,9 @@ use std::marker::PhantomData;
 use crate::action::{RunCycle, RunProgram};
 use crate::diagnostic_msgs::msg::DiagnosticArray;
 use crate::msg::{
-    AxisCompensation, AxisState, BlockMeasurement, GridSample, LengthSample, PlanStatus,
-    ProbeLatency, ProbeTrigger, ProbedFeature, ProbedPoint, TestSegment, ThermalModel,
-    ThermalUpdateRequest,
+    AxisCompensation, AxisState, BlockMeasurement, GeometryModel, GridSample, LengthSample,
+    PlanStatus, PositioningTable, ProbeLatency, ProbeTrigger, ProbedFeature, ProbedPoint,
+    TestSegment, ThermalModel, ThermalUpdateRequest,
 };
 use crate::qos::{Durability, Qos, Reliability};
 use crate::rcl_interfaces::msg::{Log, ParameterEvent};
@@ -189,6 +189,12 @@ topics! {
     GRID_POSITION: GridSample = "grid/position", Qos::RELIABLE_DEEP, Raw;
     /// Readings of the length reference.
     LENGTH_POSITION: LengthSample = "length/position", Qos::RELIABLE_DEEP, Raw;
+    /// Geometric errors of the linear axes.
+    GEOMETRY_MODEL: GeometryModel = "geometry/model", Qos::LATCHED, Computed;
+    /// Geometric errors of the rotary axes.
+    GEOMETRY_ROTARY: GeometryModel = "geometry/rotary", Qos::LATCHED, Computed;
+    /// Positioning deviations, one message per axis.
+    POSITIONING_TABLE: PositioningTable = "positioning/table", POSITIONING_QOS, Computed;
     /// Offsets added to the commands, at every servo tick.
     COMPENSATION: AxisCompensation = "compensation", Qos::RELIABLE_DEEP, Computed;
     /// Begin and end of tests.
@@ -213,6 +219,12 @@ const CLOCK_QOS: Qos = Qos {
     reliability: Reliability::BestEffort,
     durability: Durability::Volatile,
     depth: 10,
+};
+
+/// A late joiner gets the latest of each of six axes.
+const POSITIONING_QOS: Qos = Qos {
+    depth: 6,
+    ..Qos::LATCHED
 };
 
 const PARAMETER_EVENTS_QOS: Qos = Qos {

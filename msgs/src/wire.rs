@@ -103,6 +103,11 @@ pub(crate) fn point(place_mm: &Vector3<f64>) -> Point {
     }
 }
 
+/// A difference of two places.
+pub(crate) fn lengths(vector_mm: &Vector3<f64>) -> WireVector {
+    ratios(&vector_mm.map(metres))
+}
+
 /// A dimensionless vector.
 pub(crate) fn ratios(vector: &Vector3<f64>) -> WireVector {
     WireVector {
@@ -241,6 +246,15 @@ impl Reader {
         self.vector(field, [vector.x, vector.y, vector.z], allowed)
     }
 
+    pub(crate) fn lengths_mm(
+        self,
+        field: &'static str,
+        vector: &WireVector,
+    ) -> Result<Vector3<f64>, WireError> {
+        self.ratios(field, vector, Allowed::Finite)
+            .map(|vector_m| vector_m.map(millimetres))
+    }
+
     fn vector(
         self,
         field: &'static str,
@@ -306,6 +320,34 @@ impl Reader {
         name: &str,
     ) -> Result<Axis, WireError> {
         self.letter(field, idx, name, &Axis::LINEAR, "X Y Z")
+    }
+
+    /// Any axis.
+    pub(crate) fn axis(
+        self,
+        field: &'static str,
+        idx: usize,
+        name: &str,
+    ) -> Result<Axis, WireError> {
+        self.letter(field, idx, name, &Axis::ALL, "X Y Z A B C")
+    }
+
+    /// An array that must have as many entries as another says.
+    pub(crate) fn length(
+        self,
+        field: &'static str,
+        len: usize,
+        needed: usize,
+    ) -> Result<(), WireError> {
+        if len == needed {
+            return Ok(());
+        }
+        Err(WireError::WrongLength {
+            message: self.message,
+            field,
+            len,
+            needed,
+        })
     }
 
     fn letter(

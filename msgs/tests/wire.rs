@@ -417,16 +417,33 @@ fn prop_test_segment_comes_back() {
         TestKind::Dwell,
         TestKind::Production,
         TestKind::Verification,
+        TestKind::Arc,
+        TestKind::Spike,
+        TestKind::ArcWithLine,
+        TestKind::TwoArcs,
+        TestKind::Diagonal,
+        TestKind::Rotary,
     ];
     let senses = [Sense::None, Sense::Clockwise, Sense::CounterClockwise];
     let strategy = (
         (stamp(), one_of(&kinds), one_of(&PLANES), one_of(&senses)),
-        (lengths_mm(), length_mm(), length_mm(), any::<[u32; 4]>()),
+        (
+            lengths_mm(),
+            lengths_mm(),
+            length_mm(),
+            length_mm(),
+            any::<[u32; 5]>(),
+        ),
         (text(), prop::collection::vec(text(), 0..5)),
         any::<[bool; 3]>(),
     )
         .prop_map(
-            |((at, kind, plane, sense), (centre_mm, radius, feed, n), (stylus, features), b)| {
+            |(
+                (at, kind, plane, sense),
+                (centre_mm, tool, radius, feed, n),
+                (stylus, features),
+                b,
+            )| {
                 TestSegment {
                     at,
                     run: n[0],
@@ -439,6 +456,8 @@ fn prop_test_segment_comes_back() {
                     sense,
                     repeat: n[1],
                     stylus,
+                    tool_offset_mm: tool,
+                    stations: n[4],
                     zero_id: n[2],
                     setup_id: n[3],
                     cold: b[1],

@@ -69,6 +69,8 @@ impl Job {
             sense: Sense::None,
             repeat: self.repeat,
             stylus: self.task.stylus.clone(),
+            tool_offset_mm: Vector3::zeros(),
+            stations: 0,
             zero_id: 0,
             setup_id: 0,
             cold: self.task.cold,

@@ -199,6 +199,8 @@ mod tests {
             sense: Sense::None,
             repeat: 0,
             stylus: String::new(),
+            tool_offset_mm: Vector3::zeros(),
+            stations: 0,
             zero_id: 0,
             setup_id: 0,
             cold: false,

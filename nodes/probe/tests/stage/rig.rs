@@ -158,6 +158,8 @@ impl Rig {
             sense: Sense::None,
             repeat: 0,
             stylus: String::from("ruby_6"),
+            tool_offset_mm: Vector3::zeros(),
+            stations: 0,
             zero_id: 0,
             setup_id: 0,
             cold: true,

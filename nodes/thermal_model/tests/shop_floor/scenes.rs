@@ -33,6 +33,8 @@ fn segment(shop: &Shop, kind: TestKind, begin: bool) -> Input {
         sense: Sense::None,
         repeat: 0,
         stylus: String::new(),
+        tool_offset_mm: Vector3::zeros(),
+        stations: 0,
         zero_id: 0,
         setup_id: 0,
         cold: false,
