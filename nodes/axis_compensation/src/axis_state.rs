@@ -12,10 +12,10 @@
 //! a straight line in `fade_s` (Fading). A value beyond the size limit is not followed and not cut:
 //! the target stays at the last one inside (Limited). The limiter turns the target into the offset.
 
-use metrology::drift::DriftRefusal;
 use metrology::sample::CompensationState;
 
 use crate::limiter::{Limiter, Limits};
+use crate::parts::PartRefusal;
 
 /// Times of holding and fading, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,8 +39,8 @@ enum Mode {
 pub enum Wanted {
     /// This offset, mm.
     Offset(f64),
-    /// The model refused.
-    Refused(DriftRefusal),
+    /// A part of it is refused.
+    Refused(PartRefusal),
     /// Nothing may be added: disabled or shutting down.
     Nothing,
 }
@@ -172,8 +172,11 @@ impl AxisState {
 mod tests {
     use super::*;
     use metrology::Axis;
+    use metrology::drift::DriftRefusal;
 
-    const REFUSED: Wanted = Wanted::Refused(DriftRefusal::NotModelled { axis: Axis::X });
+    const REFUSED: Wanted = Wanted::Refused(PartRefusal::Thermal {
+        source: DriftRefusal::NotModelled { axis: Axis::X },
+    });
     const DT_S: f64 = 1e-3;
 
     fn axis() -> AxisState {

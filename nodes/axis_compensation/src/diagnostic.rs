@@ -1,8 +1,9 @@
 //! What the stage has to say besides its offsets; each is in the bag and on `/diagnostics`.
 
 use metrology::Axis;
-use metrology::drift::DriftRefusal;
 use metrology::sample::CompensationState;
+
+use crate::parts::PartRefusal;
 
 /// How urgent a condition is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -28,7 +29,7 @@ pub enum Diagnostic {
         from: CompensationState,
         to: CompensationState,
         offset_mm: f64,
-        cause: Option<DriftRefusal>,
+        cause: Option<PartRefusal>,
     },
     #[error(
         "axis {axis}: wanted offset {wanted_mm:.6} mm exceeds {limit_mm} mm, the last one inside is kept"
@@ -40,8 +41,8 @@ pub enum Diagnostic {
     },
     #[error("axis {axis}: wanted offset is inside its limit again")]
     SizeKept { axis: Axis },
-    #[error("axis {axis}: thermal model gives no drift: {cause}")]
-    ModelRefused { axis: Axis, cause: DriftRefusal },
+    #[error("axis {axis}: {cause}")]
+    ModelRefused { axis: Axis, cause: PartRefusal },
     #[error(
         "thermal model {sequence} jumps by {change_mm:.6} mm on axis {axis}, heat allows {limit_mm:.6} mm; kept back"
     )]

@@ -9,7 +9,8 @@
 //! follows its target without ever exceeding the axis' size, rate or acceleration, whatever the
 //! target and the spacing of time do. `axis_state` says per axis what the target is: the model, the
 //! last good value (held), or zero by way of a fade. `model_gate` keeps back a model that jumps
-//! faster than heat can. `pulses` splits the offset into whole pulses of the control and the rest.
+//! faster than heat can. `pulses` turns the offset
+//! into whole pulses of the control and carries the rest, in the whole femtometres of `femtometre`.
 //!
 //! A node that is killed and started again begins from zero with nothing added. The control, which
 //! sees the stream break off, is the one that must let go of the old offset gently; the new stream
@@ -23,6 +24,7 @@ pub mod axis_state;
 pub mod config;
 pub mod diagnostic;
 pub mod error;
+pub mod femtometre;
 pub mod limiter;
 pub mod model_gate;
 pub mod parts;

@@ -8,6 +8,8 @@
 //! to be at the same place again. The machine's position error is −d(p). p is the position commanded
 //! by the program, compensation not included.
 
+use std::mem::discriminant;
+
 use metrology::drift::{DriftRefusal, Extrapolate, axis_drift_at};
 use metrology::sample::ThermalModel;
 use metrology::{Axis, Host, Stamp};
@@ -29,6 +31,30 @@ impl Parts {
     #[must_use]
     pub fn sum(&self) -> f64 {
         self.thermal + self.geometric + self.positioning
+    }
+}
+
+/// Why a part of the offset is not known.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PartRefusal {
+    /// The thermal part.
+    #[error("thermal model gives no drift: {source}")]
+    Thermal {
+        /// What the model said.
+        #[from]
+        source: DriftRefusal,
+    },
+}
+
+impl PartRefusal {
+    /// Whether both say the same but for their numbers.
+    #[must_use]
+    pub fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Thermal { source: one }, Self::Thermal { source: two }) => {
+                discriminant(one) == discriminant(two)
+            }
+        }
     }
 }
 

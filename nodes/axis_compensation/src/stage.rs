@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use machine::MachineFile;
 use metrology::drift::{DriftRefusal, Extrapolate};
-use metrology::sample::{AxisCompensation, AxisState, CompensationState, ThermalModel};
+use metrology::sample::{AxisCompensation, AxisState, ThermalModel};
 use metrology::stamp::Span;
 use metrology::{Axis, AxisSet, Host, Machine, PerAxis, Stage, Stamp};
 use nalgebra::Vector3;
@@ -14,9 +14,11 @@ use crate::config::AxisCompensationConfig;
 use crate::diagnostic::Diagnostic;
 use crate::error::AxisCompensationError;
 use crate::limiter::Limits;
-use crate::model_gate::{ModelGate, Passage};
-use crate::parts::{Parts, parts_at};
-use crate::pulses;
+use crate::model_gate::ModelGate;
+use crate::parts::{PartRefusal, Parts, parts_at};
+use crate::pulses::PulseTrain;
+
+mod remarks;
 
 /// What the stage is told.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,10 +59,10 @@ pub enum Output {
 pub struct AxisCompensationStage {
     axes: AxisSet,
     states: PerAxis<Option<Compensated>>,
-    refused: PerAxis<Option<DriftRefusal>>,
+    trains: PerAxis<PulseTrain>,
+    refused: PerAxis<Option<PartRefusal>>,
     gate: ModelGate,
     policy: Extrapolate,
-    pulse_mm: f64,
     servo_period_s: f64,
     gap: Span,
     enabled: bool,
@@ -100,11 +102,14 @@ impl AxisCompensationStage {
         machine: &MachineFile,
     ) -> Result<Self, AxisCompensationError> {
         config.check(machine)?;
-        let pulse_mm = positive(
+        let pulse_um = positive(
             "control.pulse_equivalent_um",
             machine.control.pulse_equivalent_um,
             "µm",
-        )? * 1e-3;
+        )?;
+        let pulse_mm = pulse_um * 1e-3;
+        let train =
+            PulseTrain::new(pulse_mm).expect("a pulse from 1e-6 to 1e6 µm was just checked");
         let servo_period_s = positive(
             "control.servo_period_ms",
             machine.control.servo_period_ms,
@@ -133,7 +138,7 @@ impl AxisCompensationStage {
                 config.jump_margin_um * 1e-3,
             ),
             policy: config.extrapolate,
-            pulse_mm,
+            trains: PerAxis::from_fn(|_| train),
             servo_period_s,
             gap: Span::from_secs_f64(config.gap_s),
             enabled: config.enabled,
@@ -226,13 +231,16 @@ impl AxisCompensationStage {
             }
             self.states[axis] = Some(compensated);
             self.remark(axis, &before, &compensated, wanted, out);
-            let (pulses, remainder) = pulses::split(compensated.offset(), self.pulse_mm);
+            let train = &mut self.trains[axis];
+            train
+                .follow(compensated.offset())
+                .expect("an offset inside the size limit is some millimetres at most");
             message.total[axis] = compensated.offset();
             message.thermal[axis] = parts.thermal;
             message.geometric[axis] = parts.geometric;
             message.positioning[axis] = parts.positioning;
-            message.pulses[axis] = pulses;
-            message.remainder[axis] = remainder;
+            message.pulses[axis] = train.pulses();
+            message.remainder[axis] = train.remainder_mm();
             message.state[axis] = compensated.state();
         }
         out.push(Output::Compensation(message));
@@ -253,82 +261,9 @@ impl AxisCompensationStage {
         match parts {
             Ok(parts) if is_on => (parts, Wanted::Offset(parts.sum())),
             Ok(parts) => (parts, Wanted::Nothing),
-            Err(refusal) if is_on => (Parts::default(), Wanted::Refused(refusal)),
+            Err(refusal) if is_on => (Parts::default(), Wanted::Refused(refusal.into())),
             Err(_) => (Parts::default(), Wanted::Nothing),
         }
-    }
-
-    /// Says what changed, once.
-    fn remark(
-        &mut self,
-        axis: Axis,
-        before: &Compensated,
-        after: &Compensated,
-        wanted: Wanted,
-        out: &mut Vec<Output>,
-    ) {
-        let cause = match wanted {
-            Wanted::Refused(cause) => Some(cause),
-            _ => None,
-        };
-        let kind = |c: Option<DriftRefusal>| c.map(|c| std::mem::discriminant(&c));
-        if kind(cause) != kind(self.refused[axis]) {
-            out.extend(
-                cause.map(|cause| Output::Diagnostic(Diagnostic::ModelRefused { axis, cause })),
-            );
-        }
-        self.refused[axis] = cause;
-        match (before.oversize(), after.oversize()) {
-            (None, Some(wanted_mm)) => out.push(Output::Diagnostic(Diagnostic::SizeExceeded {
-                axis,
-                wanted_mm,
-                limit_mm: after.size_limit(),
-            })),
-            (Some(_), None) => out.push(Output::Diagnostic(Diagnostic::SizeKept { axis })),
-            _ => {}
-        }
-        let (from, to): (CompensationState, CompensationState) = (before.state(), after.state());
-        if from != to {
-            out.push(Output::Diagnostic(Diagnostic::StateChanged {
-                axis,
-                from,
-                to,
-                offset_mm: after.offset(),
-                cause,
-            }));
-        }
-    }
-
-    fn model(&mut self, model: ThermalModel, out: &mut Vec<Output>) {
-        let sequence = model.sequence;
-        let was_in_doubt = self.model_in_doubt;
-        self.model_in_doubt = model.quarantined;
-        if model.quarantined {
-            out.push(Output::Diagnostic(Diagnostic::ModelDoubtful { sequence }));
-        }
-        let passage = self.gate.offer(model);
-        self.model_in_doubt |= !matches!(passage, Passage::Accepted | Passage::Confirmed);
-        let doubt_ends = was_in_doubt && !self.model_in_doubt;
-        out.extend(match passage {
-            Passage::Accepted => {
-                doubt_ends.then_some(Output::Diagnostic(Diagnostic::ModelAccepted { sequence }))
-            }
-            Passage::Confirmed => Some(Output::Diagnostic(Diagnostic::ModelConfirmed { sequence })),
-            Passage::NotFinite { axis } => Some(Output::Diagnostic(Diagnostic::ModelNotFinite {
-                sequence,
-                axis,
-            })),
-            Passage::Quarantined {
-                axis,
-                change_mm,
-                limit_mm,
-            } => Some(Output::Diagnostic(Diagnostic::ModelQuarantined {
-                sequence,
-                axis,
-                change_mm,
-                limit_mm,
-            })),
-        });
     }
 
     /// Without axis states there is no tick: say so, and let ticks of the host drive a last fade.
