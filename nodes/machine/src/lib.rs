@@ -3,11 +3,13 @@
 //! `file` reads the machine file, which describes a machine as its maker would. `chain` is the order
 //! of its axes from workpiece to tool; `kinematics` follows from it where ball and workpiece are and
 //! `orientation` which rotary positions point the probe a given way. `cycle` writes the programs
-//! that touch blocks, planes, bores, bosses and spheres.
+//! that touch blocks, planes, bores, bosses and spheres. `export` turns measured errors into the tables that
+//! other controls load.
 
 pub mod chain;
 pub mod cycle;
 pub mod error;
+pub mod export;
 pub mod file;
 pub mod kinematics;
 pub mod orientation;

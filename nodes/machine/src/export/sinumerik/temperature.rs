@@ -1,0 +1,167 @@
+//! Temperature compensation: the line of the drift as setting data 43900, 43910 and 43920.
+//!
+//! ```text
+//!   K(P) = SD43900 + SD43910 (P - SD43920)                                   (1)
+//!   d(p) = k0 + slope (p - p0),   e(p) = -d(p),   K = e                      (2)
+//! ```
+//!
+//! d is the drift of the *reading* of a fixed place: where the control now reads p + d it stands at p, so its error
+//! is -d. By the sign rule of the module above, K = e: absolute value -k0, slope -slope, reference position p0.
+//! (1) is the line of \[4\]; that 43900 is its absolute value, 43910 its slope and 43920 its reference is in the
+//! description of MD32750 (SINUMERIK 808D ADVANCED Parameter Manual, p. 252).
+
+use super::super::error::ExportError;
+use super::super::file::{ExportFile, comments};
+use super::super::number::fixed;
+use super::check_name;
+use metrology::Axis;
+use metrology::sample::ThermalModel;
+
+const CONTROL: &str = "SINUMERIK temperature compensation";
+const SLOPE_DECIMALS: usize = 9;
+const VALUE_DECIMALS: usize = 6;
+
+/// What to do with a drift that changes with other axes too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OtherAxes {
+    /// It is an error: the parameters hold at one place only.
+    Refuse,
+    /// Leave that part out: the line is the drift at the origin of the cross terms.
+    LeaveOut,
+}
+
+/// What the control's set-up says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Temperature {
+    /// Name of the machine axis, such as `X1`.
+    pub machine_axis: String,
+    /// Greatest slope that MD32760 `$MA_COMP_ADD_VELO_FACTOR` leaves, mm/mm.
+    pub max_slope: f64,
+    /// What to do with cross terms.
+    pub other_axes: OtherAxes,
+}
+
+/// A subprogram that sets the parameters of one axis.
+///
+/// # Errors
+/// A model in quarantine, without this axis, or whose offset is not identifiable; a slope that is too great;
+/// cross terms (unless left out); numbers that are none. A slope that is not identifiable is zero in the model
+/// by definition, and only the shift is exported, which the notes say.
+pub fn temperature(
+    model: &ThermalModel,
+    axis: Axis,
+    set_up: &Temperature,
+) -> Result<ExportFile, ExportError> {
+    check_name(CONTROL, &set_up.machine_axis)?;
+    if !axis.is_linear() {
+        return Err(ExportError::NotLinear {
+            control: CONTROL,
+            axis,
+        });
+    }
+    if model.quarantined {
+        return Err(ExportError::Quarantined { axis });
+    }
+    let not = |part| ExportError::DriftNotIdentifiable { axis, part };
+    let drift = model.axes[axis].ok_or_else(|| not("offset"))?;
+    if !drift.offset_identifiable {
+        return Err(not("offset"));
+    }
+    let slope = if drift.slope_identifiable {
+        drift.slope_mm_per_mm
+    } else {
+        0.0
+    };
+    let numbers = [("k0", drift.k0_mm), ("slope", slope), ("p0", drift.p0_mm)];
+    for (quantity, value) in numbers {
+        if !value.is_finite() {
+            return Err(ExportError::NotFinite {
+                axis,
+                quantity,
+                index: 0,
+                value,
+            });
+        }
+    }
+    check_slope(axis, slope, drift.p0_mm, set_up.max_slope)?;
+    for other in Axis::LINEAR {
+        let slope = drift.cross_slope_mm_per_mm[other.index()];
+        let counts = other != axis && slope.abs() > 0.0;
+        if (counts || !slope.is_finite()) && set_up.other_axes == OtherAxes::Refuse {
+            return Err(ExportError::DriftOfOtherAxis {
+                control: CONTROL,
+                axis,
+                other,
+                slope,
+            });
+        }
+    }
+    let error = (-drift.k0_mm, -slope, drift.p0_mm); // (2)
+    Ok(program(
+        model,
+        axis,
+        set_up,
+        error,
+        drift.slope_identifiable,
+    ))
+}
+
+fn check_slope(axis: Axis, slope: f64, position: f64, limit: f64) -> Result<(), ExportError> {
+    if !(limit.is_finite() && limit > 0.0) {
+        let (control, quantity, value) = (CONTROL, "max_slope", limit);
+        let rule = "must be a finite number above 0";
+        return Err(ExportError::Setting {
+            control,
+            quantity,
+            value,
+            rule,
+        });
+    }
+    if slope.abs() > limit {
+        let (control, value, unit) = (CONTROL, slope, "mm/mm");
+        return Err(ExportError::BeyondLimit {
+            control,
+            axis,
+            position,
+            value,
+            limit,
+            unit,
+        });
+    }
+    Ok(())
+}
+
+fn program(
+    model: &ThermalModel,
+    axis: Axis,
+    set_up: &Temperature,
+    (absolute_mm, slope, reference_mm): (f64, f64, f64),
+    slope_identifiable: bool,
+) -> ExportFile {
+    let name = &set_up.machine_axis;
+    let mut notes = vec![
+        format!("SINUMERIK temperature compensation of axis {axis} ({name}), mm and mm/mm"),
+        "value = error with its own sign (minus the drift of the readings); DERIVED from the leadscrew table, where a positive value moves the axis in the negative direction: verify before use".to_owned(),
+        format!("set MD32750[{name}] = 3 once; MD32760 limits how fast a change is travelled"),
+        format!(
+            "fitted at {} ns, may be used until {} ns of the host's clock: a drift is of its hour",
+            model.at.nanos(),
+            model.valid_until.nanos()
+        ),
+    ];
+    if !slope_identifiable {
+        notes.push("the slope was not identifiable and is 0: a pure shift".to_owned());
+    }
+    let mut text = format!("%_N_ABBE_TC_{name}_SPF\n");
+    text.push_str(&comments(";", &notes));
+    let data = [
+        ("ABS_VALUE", fixed(absolute_mm, VALUE_DECIMALS)),
+        ("SLOPE", fixed(slope, SLOPE_DECIMALS)),
+        ("REF_POSITION", fixed(reference_mm, VALUE_DECIMALS)),
+    ];
+    for (datum, value) in data {
+        text.push_str(&format!("$SA_TEMP_COMP_{datum}[{name}]={value}\n"));
+    }
+    text.push_str("M17\n");
+    ExportFile::new(format!("ABBE_TC_{name}.SPF"), text, notes)
+}

@@ -1,0 +1,167 @@
+//! Straightness and squareness as a cross-axis table, and what a model may be asked for.
+
+use machine::export::sinumerik::{CrossTable, cross_table};
+use machine::export::{AxisErrors, CrossErrors, Grid, Unestimable};
+use metrology::sample::{CurveForm, ErrorCurve, GeometryModel};
+use metrology::stamp::Stamp;
+use metrology::{Axis, ErrorComponent};
+use nalgebra::{DMatrix, Rotation3, Vector3};
+
+use crate::sinumerik::{assignments, points};
+use crate::slide::look_up;
+
+pub const EXY: ErrorComponent = ErrorComponent::motion(Axis::X, Axis::Y);
+pub const EC0Y: ErrorComponent = ErrorComponent::location(Axis::C, Axis::Y);
+
+pub fn polynomial(component: ErrorComponent, coefficient: &[f64]) -> ErrorCurve {
+    let n = coefficient.len();
+    ErrorCurve {
+        component,
+        form: CurveForm::Polynomial,
+        origin: 0.0,
+        power: (1..=n as u8).collect(),
+        position: Vec::new(),
+        coefficient: coefficient.to_vec(),
+        standard_uncertainty: vec![0.0; n],
+        estimable: vec![true; n],
+        span: (-250.0, 250.0),
+    }
+}
+
+pub fn constant(component: ErrorComponent, value: f64) -> ErrorCurve {
+    ErrorCurve {
+        form: CurveForm::Constant,
+        power: Vec::new(),
+        ..polynomial(component, &[value])
+    }
+}
+
+pub fn model(curves: Vec<ErrorCurve>) -> GeometryModel {
+    GeometryModel {
+        at: Stamp::from_nanos(1),
+        chain: "[w b Y X Z t]".to_owned(),
+        curves,
+        covariance: DMatrix::zeros(0, 0),
+        combinations: Vec::new(),
+        n_samples: 0,
+        n_unknowns: 0,
+        rank: 0,
+        residual_standard_deviation_mm: 0.0,
+        sequence: 1,
+    }
+}
+
+pub fn set_up() -> CrossTable {
+    CrossTable {
+        table: 3,
+        max_tables: 8,
+        max_points: 200,
+        input_axis: "Y1".to_owned(),
+        output_axis: "X1".to_owned(),
+        max_sum: 1.0,
+    }
+}
+
+pub fn grid() -> Grid {
+    Grid::new(Axis::Y, -250.0, 25.0, 21, (-250.0, 250.0)).unwrap()
+}
+
+const BOW: [f64; 3] = [0.0, 1.5e-7, -2e-10];
+const SQUARENESS_RAD: f64 = 4e-5;
+
+/// X of a tool that Y has carried: Y is turned about Z by the squareness, as a rotation does it, and bowed.
+fn x_mm(y_mm: f64) -> f64 {
+    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), SQUARENESS_RAD);
+    let carried = turn * Vector3::new(0.0, y_mm, 0.0);
+    carried.x + BOW[1] * y_mm.powi(2) + BOW[2] * y_mm.powi(3)
+}
+
+#[test]
+fn eq1_a_cross_axis_table_straightens_and_squares_an_axis_and_doubles_the_error_when_turned_round()
+{
+    for sign in [1.0, -1.0] {
+        let curves = vec![
+            polynomial(EXY, &BOW.map(|c| sign * c)),
+            constant(EC0Y, sign * SQUARENESS_RAD),
+        ];
+        let errors = CrossErrors::sample(
+            &model(curves),
+            &[EXY, EC0Y],
+            Axis::X,
+            &grid(),
+            Unestimable::Refuse,
+        );
+        let file = cross_table(&errors.unwrap(), &set_up()).unwrap();
+        let data = assignments(&file.text);
+        assert_eq!(data["$AN_CEC_INPUT_AXIS[3]"], "(Y1)");
+        assert_eq!(data["$AN_CEC_OUTPUT_AXIS[3]"], "(X1)");
+        let table = points(&data, "$AN_CEC", "3,N", "3");
+        for y_mm in grid().positions() {
+            let left_mm = x_mm(y_mm) - look_up(&table, y_mm);
+            if sign > 0.0 {
+                // Half of 1 nm, and the second order of the turn.
+                assert!(left_mm.abs() < 0.6e-6, "{left_mm}");
+            } else {
+                assert!((left_mm - 2.0 * x_mm(y_mm)).abs() < 0.6e-6, "{left_mm}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_three_squareness_errors_act_as_rotations_do() {
+    for (component, direction) in
+        ErrorComponent::SQUARENESS
+            .into_iter()
+            .zip([Axis::X, Axis::X, Axis::Y])
+    {
+        let base = component.of;
+        let grid = Grid::new(base, -100.0, 100.0, 3, (-100.0, 100.0)).unwrap();
+        let model = model(vec![constant(component, 1e-5)]);
+        let errors =
+            CrossErrors::sample(&model, &[component], direction, &grid, Unestimable::Refuse)
+                .unwrap();
+        let about = Vector3::ith_axis(component.direction.index() - 3);
+        let carried =
+            Rotation3::from_axis_angle(&about, 1e-5) * (Vector3::ith(base.index(), 1.0) * 100.0);
+        let expected_mm: f64 = carried[direction.index()];
+        assert!(expected_mm.abs() > 9e-4);
+        assert!(
+            (errors.error()[2] - expected_mm).abs() < 1e-12,
+            "{component}"
+        );
+    }
+}
+
+#[test]
+fn a_table_of_knots_and_a_polynomial_about_an_origin_are_evaluated_as_they_are_defined() {
+    let exx = ErrorComponent::motion(Axis::X, Axis::X);
+    let grid = Grid::new(Axis::X, -50.0, 50.0, 3, (-50.0, 50.0)).unwrap();
+    let knots = ErrorCurve {
+        form: CurveForm::Table,
+        power: Vec::new(),
+        position: vec![-50.0, 0.0, 100.0],
+        ..polynomial(exx, &[0.001, 0.002, 0.006])
+    };
+    let shifted = ErrorCurve {
+        origin: 50.0,
+        ..polynomial(exx, &[1e-5, 1e-7])
+    };
+    for (curve, expected_mm) in [
+        (knots, [0.001, 0.002, 0.004]),
+        (shifted, [0.0, -0.00025, 0.0]),
+    ] {
+        let errors = CrossErrors::sample(
+            &model(vec![curve]),
+            &[exx],
+            Axis::X,
+            &grid,
+            Unestimable::Refuse,
+        );
+        let own = AxisErrors::from_component(&errors.unwrap()).unwrap();
+        for (e, expected_mm) in own.up().iter().zip(expected_mm) {
+            assert!((e - expected_mm).abs() < 1e-12, "{e} {expected_mm}");
+        }
+        assert_eq!(own.up(), own.down());
+    }
+}
