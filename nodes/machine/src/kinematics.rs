@@ -72,6 +72,17 @@ impl Kinematics {
         })
     }
 
+    /// From a chain and a point on each rotary axis' line (machine frame, all axes at zero); tables
+    /// turn right-handed with a positive command.
+    #[must_use]
+    pub const fn of_chain(chain: Chain, origin_mm: PerAxis<[f64; 3]>) -> Self {
+        Self {
+            chain,
+            origin_mm,
+            table_sense: TableSense::Table,
+        }
+    }
+
     /// The same machine with the other convention for its tables.
     #[must_use]
     pub fn with_table_sense(mut self, table_sense: TableSense) -> Self {
@@ -83,6 +94,18 @@ impl Kinematics {
     #[must_use]
     pub const fn chain(&self) -> &Chain {
         &self.chain
+    }
+
+    /// A point on the line of a rotary axis, machine frame, all axes at zero, mm.
+    #[must_use]
+    pub fn origin_mm(&self, axis: Axis) -> Vector3<f64> {
+        Vector3::from(self.origin_mm[axis])
+    }
+
+    /// Sense in which a positive command of a table's rotary axis turns the table.
+    #[must_use]
+    pub const fn table_sense(&self) -> TableSense {
+        self.table_sense
     }
 
     /// Pose of the probe in the workpiece frame, equation (1); positions in mm and rad.
@@ -176,11 +199,7 @@ impl Kinematics {
 
     /// Motion of one joint, equation (2).
     fn joint(&self, axis: Axis, position: f64) -> Isometry3<f64> {
-        let direction = match axis {
-            Axis::X | Axis::A => Vector3::x(),
-            Axis::Y | Axis::B => Vector3::y(),
-            Axis::Z | Axis::C => Vector3::z(),
-        };
+        let direction = direction_of(axis);
         if axis.is_linear() {
             return Isometry3::from_parts(
                 Translation3::from(direction * position),
@@ -191,5 +210,15 @@ impl Kinematics {
         let origin_mm = Vector3::from(self.origin_mm[axis]);
         let shift_mm = origin_mm - turn.transform_vector(&origin_mm);
         Isometry3::from_parts(Translation3::from(shift_mm), turn)
+    }
+}
+
+/// Direction along or about which an axis moves, machine frame, rotary axes at zero.
+#[must_use]
+pub fn direction_of(axis: Axis) -> Vector3<f64> {
+    match axis {
+        Axis::X | Axis::A => Vector3::x(),
+        Axis::Y | Axis::B => Vector3::y(),
+        Axis::Z | Axis::C => Vector3::z(),
     }
 }

@@ -4,7 +4,8 @@
 //! of its axes from workpiece to tool; `kinematics` follows from it where ball and workpiece are and
 //! `orientation` which rotary positions point the probe a given way. `cycle` writes the programs
 //! that touch blocks, planes, bores, bosses and spheres. `export` turns measured errors into the tables that
-//! other controls load.
+//! other controls load. `volumetric` is the geometric error of the tool tip anywhere in the working
+//! volume, component by component and all together, and what has to be commanded to undo it.
 
 pub mod chain;
 pub mod cycle;
@@ -13,6 +14,7 @@ pub mod export;
 pub mod file;
 pub mod kinematics;
 pub mod orientation;
+pub mod volumetric;
 
 pub use chain::{Chain, ChainError};
 pub use error::{CycleError, MachineFileError, OrientationError};
