@@ -9,6 +9,7 @@ pub mod axis;
 pub mod drift;
 pub mod error_component;
 pub mod fit;
+pub mod iso230;
 pub mod least_squares;
 pub mod parameter;
 pub mod sample;

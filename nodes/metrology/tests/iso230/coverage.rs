@@ -1,0 +1,129 @@
+//! Whether stated intervals hold the truth as often as they say, over simulated tests.
+
+use std::f64::consts::TAU;
+
+use metrology::iso230::budget::{DeviceUncertainty, Expansion};
+use metrology::iso230::positioning::budget::PositioningBudget;
+use metrology::iso230::positioning::{self, PositioningRuns, periodic};
+use rand::{Rng, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
+
+use crate::{EXACT, EXACT_DEVICE, RIGID};
+
+const SEEDS: u64 = 1000;
+
+fn normal(rng: &mut Pcg64Mcg) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// Counts the seeds in which a simulated test holds its truth.
+fn share(holds: impl Fn(&mut Pcg64Mcg) -> bool) -> f64 {
+    let held = (0..SEEDS)
+        .filter(|seed| holds(&mut Pcg64Mcg::seed_from_u64(*seed)))
+        .count();
+    held as f64 / SEEDS as f64
+}
+
+fn within_93_and_97_percent(what: &str, share: f64) {
+    eprintln!("{what}: {:.1} %", 100.0 * share);
+    assert!((0.93..=0.97).contains(&share), "{what}: {share}");
+}
+
+/// True mean deviations of five targets: a lead error and a bow; backlash downwards.
+const TARGETS_MM: [f64; 5] = [11.0, 243.0, 508.0, 749.0, 996.0];
+
+fn true_mm(target_mm: f64, down: bool) -> f64 {
+    let backlash_mm = if down { 0.004 } else { 0.0 };
+    9e-6 * target_mm - 2e-8 * target_mm * target_mm - backlash_mm
+}
+
+/// Readings of one test with a scale error of the whole measurement.
+fn simulated(rng: &mut Pcg64Mcg, scale: f64, scatter_mm: f64) -> PositioningRuns {
+    let mut rows = |down: bool| -> Vec<Vec<f64>> {
+        let mut reading =
+            |t: &f64| true_mm(*t, down) + scale * (t - TARGETS_MM[0]) + scatter_mm * normal(rng);
+        (0..5)
+            .map(|_| TARGETS_MM.iter().map(&mut reading).collect())
+            .collect()
+    };
+    PositioningRuns {
+        targets_mm: TARGETS_MM.to_vec(),
+        up_mm: rows(false),
+        down_mm: rows(true),
+        zero_mm: TARGETS_MM[0],
+        periods_mm: vec![],
+    }
+}
+
+fn holds_far_end(runs: &PositioningRuns, budget: &PositioningBudget) -> bool {
+    let result = positioning::evaluate(runs, budget).unwrap();
+    let interval = result.points[4].down.interval;
+    let truth_mm = true_mm(TARGETS_MM[4], true);
+    interval.lower_mm <= truth_mm && truth_mm <= interval.upper_mm
+}
+
+#[test]
+fn eq8_scatter_of_five_runs_is_covered_by_students_t() {
+    let share = share(|rng| holds_far_end(&simulated(rng, 0.0, 0.002), &EXACT));
+    within_93_and_97_percent("scatter alone", share);
+}
+
+#[test]
+fn eq8_scatter_device_and_temperature_together_are_covered() {
+    let machine = Expansion {
+        temperature_deviation_k: 4.0,
+        temperature_half_width_k: 0.15,
+        expansion_per_k: 11e-6,
+        expansion_half_width_per_k: 0.4e-6,
+    };
+    let budget = PositioningBudget {
+        device: DeviceUncertainty {
+            expanded_uncertainty_per_length: 2.4e-6,
+            ..EXACT_DEVICE
+        },
+        machine,
+        ..EXACT
+    };
+    let share = share(|rng| {
+        let device = 1.2e-6 * normal(rng);
+        let temperature = machine.expansion_per_k * rng.random_range(-0.15..0.15);
+        let coefficient = 4.0 * rng.random_range(-0.4e-6..0.4e-6);
+        let runs = simulated(rng, device + temperature + coefficient, 0.002);
+        holds_far_end(&runs, &budget)
+    });
+    within_93_and_97_percent("scatter, device and temperature", share);
+}
+
+#[test]
+fn eq8_students_factor_is_needed() {
+    // The same intervals with the factor 2 hold far less: t of four degrees of freedom is 2.78.
+    let share = share(|rng| {
+        let result = positioning::evaluate(&simulated(rng, 0.0, 0.002), &EXACT).unwrap();
+        let down = result.points[4].down;
+        let half_mm = 2.0 * down.standard_deviation_mm / 5.0_f64.sqrt();
+        (down.mean_mm - true_mm(TARGETS_MM[4], true)).abs() <= half_mm
+    });
+    assert!((0.86..0.91).contains(&share), "{share}");
+}
+
+#[test]
+fn eq4_the_amplitude_of_a_period_is_covered() {
+    let budget = PositioningBudget {
+        machine: RIGID,
+        ..EXACT
+    };
+    let share = share(|rng| {
+        let positions_mm: Vec<f64> = (0..60).map(|k| 0.47 * f64::from(k)).collect();
+        let reading = |u: &f64| 0.0015 * (TAU * u / 8.0 + 1.0).sin() + 0.0004 * normal(rng);
+        let run = periodic::PeriodicRun {
+            deviations_mm: positions_mm.iter().map(reading).collect(),
+            positions_mm,
+            period_mm: 8.0,
+            n_harmonics: 1,
+        };
+        let amplitude = periodic::evaluate(&run, &budget).unwrap().harmonics[0].amplitude;
+        (amplitude.value_mm - 0.0015).abs() <= amplitude.expanded_uncertainty_mm
+    });
+    within_93_and_97_percent("amplitude", share);
+}
