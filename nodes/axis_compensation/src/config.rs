@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use machine::MachineFile;
+use metrology::Axis;
 use metrology::drift::Extrapolate;
-use metrology::{Axis, ParameterDoc};
 use serde::{Deserialize, Serialize};
 
 use crate::error::AxisCompensationError;
+use crate::parameters::{ACCELERATION_UM_PER_S2, PARAMETERS, RATE_UM_PER_S, SIZE_UM};
+use crate::positioning::config::PositioningConfig;
 
 /// All parameters. Those that protect the machine have no default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,6 +33,9 @@ pub struct AxisCompensationConfig {
     /// Whether compensation is on from the start.
     #[serde(default = "default_enabled")]
     pub enabled: bool,
+    /// Dual loop of the axes that have a scale, or a table of their own.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub positioning: BTreeMap<Axis, PositioningConfig>,
     /// Machine file, relative to the parameter file; read by whoever builds the node.
     #[serde(default)]
     pub machine_file: String,
@@ -55,122 +60,6 @@ pub struct AxisLimitConfig {
     /// Greatest acceleration.
     pub acceleration_limit_um_per_s2: f64,
 }
-
-const SIZE_UM: (f64, f64) = (0.1, 5000.0);
-const RATE_UM_PER_S: (f64, f64) = (0.001, 10000.0);
-const ACCELERATION_UM_PER_S2: (f64, f64) = (0.001, 1e6);
-
-const fn row(
-    name: &'static str,
-    unit: &'static str,
-    range: (f64, f64),
-    description: &'static str,
-) -> ParameterDoc {
-    ParameterDoc {
-        name,
-        unit,
-        description,
-        range: Some(range),
-    }
-}
-
-const fn word(name: &'static str, description: &'static str) -> ParameterDoc {
-    ParameterDoc {
-        name,
-        unit: "",
-        description,
-        range: None,
-    }
-}
-
-/// Every parameter with its unit, limits and meaning.
-pub const PARAMETERS: &[ParameterDoc] = &[
-    row(
-        "axes.X.size_limit_um",
-        "µm",
-        SIZE_UM,
-        "greatest offset of the axis; the same key exists for Y and Z",
-    ),
-    row(
-        "axes.X.rate_limit_um_per_s",
-        "µm/s",
-        RATE_UM_PER_S,
-        "greatest rate of the offset; the same key exists for Y and Z",
-    ),
-    row(
-        "axes.X.acceleration_limit_um_per_s2",
-        "µm/s²",
-        ACCELERATION_UM_PER_S2,
-        "greatest acceleration of the offset; the same key exists for Y and Z",
-    ),
-    row("axes.Y.size_limit_um", "µm", SIZE_UM, "as for X"),
-    row(
-        "axes.Y.rate_limit_um_per_s",
-        "µm/s",
-        RATE_UM_PER_S,
-        "as for X",
-    ),
-    row(
-        "axes.Y.acceleration_limit_um_per_s2",
-        "µm/s²",
-        ACCELERATION_UM_PER_S2,
-        "as for X",
-    ),
-    row("axes.Z.size_limit_um", "µm", SIZE_UM, "as for X"),
-    row(
-        "axes.Z.rate_limit_um_per_s",
-        "µm/s",
-        RATE_UM_PER_S,
-        "as for X",
-    ),
-    row(
-        "axes.Z.acceleration_limit_um_per_s2",
-        "µm/s²",
-        ACCELERATION_UM_PER_S2,
-        "as for X",
-    ),
-    word(
-        "extrapolate",
-        "linear, hold or refuse: what happens outside the blocks' span",
-    ),
-    row(
-        "physical_rate_um_per_min",
-        "µm/min",
-        (0.01, 1000.0),
-        "fastest drift that heat can make; a model that changes faster is kept back",
-    ),
-    row(
-        "jump_margin_um",
-        "µm",
-        (0.0, 1000.0),
-        "change between models that is never a jump",
-    ),
-    row(
-        "hold_s",
-        "s",
-        (0.0, 3600.0),
-        "how long the last good value is held once the model is refused",
-    ),
-    row(
-        "fade_s",
-        "s",
-        (0.01, 3600.0),
-        "time in which an offset is faded to zero",
-    ),
-    row(
-        "gap_s",
-        "s",
-        (0.001, 60.0),
-        "silence of the axes' state after which it counts as stale",
-    ),
-    word("enabled", "whether compensation is on from the start"),
-    ParameterDoc {
-        name: "machine_file",
-        unit: "",
-        description: "Machine file, relative to the parameter file.",
-        range: None,
-    },
-];
 
 impl AxisCompensationConfig {
     /// Checks every number against its limits and the machine.
@@ -208,6 +97,12 @@ impl AxisCompensationConfig {
                 return Err(AxisCompensationError::NotALinearAxis { axis });
             }
             limits.check(axis, self.gap_s)?;
+        }
+        for (&axis, positioning) in &self.positioning {
+            if !self.axes.contains_key(&axis) {
+                return Err(AxisCompensationError::NotCompensated { axis });
+            }
+            positioning.check(axis, machine)?;
         }
         Ok(())
     }

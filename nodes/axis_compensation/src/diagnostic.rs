@@ -4,6 +4,7 @@ use metrology::Axis;
 use metrology::sample::CompensationState;
 
 use crate::parts::PartRefusal;
+use crate::positioning::refusal::PositioningRefusal;
 
 /// How urgent a condition is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -62,6 +63,31 @@ pub enum Diagnostic {
     ModelDoubtful { sequence: u32 },
     #[error("thermal model {sequence} is used without objection")]
     ModelAccepted { sequence: u32 },
+    #[error("{cause}; not learned")]
+    RunRefused { cause: PositioningRefusal },
+    #[error("axis {axis}: {runs} of {needed} runs for a table")]
+    RunsCollected { axis: Axis, runs: u32, needed: u32 },
+    #[error("axis {axis}: table of {points} points learned from {runs} runs")]
+    TableLearned {
+        axis: Axis,
+        points: usize,
+        runs: u32,
+    },
+    #[error("axis {axis}: the scale says nothing")]
+    ScaleMissing { axis: Axis },
+    #[error("axis {axis}: the scale speaks again")]
+    ScaleBack { axis: Axis },
+    #[error(
+        "axis {axis}: {change_mm:.6} mm measured beside what is known at {position_mm:.3} mm, above {limit_mm} mm nothing is believed"
+    )]
+    MeasurementDoubted {
+        axis: Axis,
+        position_mm: f64,
+        change_mm: f64,
+        limit_mm: f64,
+    },
+    #[error("axis {axis}: measurements are believed again")]
+    MeasurementBelieved { axis: Axis },
     #[error("no axis state for {silence_s:.3} s")]
     StatesStale { silence_s: f64 },
     #[error("gap of {gap_s:.3} s between axis states, offsets stood meanwhile")]
@@ -84,6 +110,10 @@ impl Diagnostic {
             | Self::SizeKept { .. }
             | Self::Gap { .. }
             | Self::ModelAccepted { .. }
+            | Self::RunsCollected { .. }
+            | Self::TableLearned { .. }
+            | Self::ScaleBack { .. }
+            | Self::MeasurementBelieved { .. }
             | Self::ModelConfirmed { .. } => Severity::Info,
             Self::StateChanged { to, cause, .. } => match to {
                 CompensationState::Active => Severity::Info,
@@ -101,7 +131,25 @@ impl Diagnostic {
     pub fn condition(&self) -> &'static str {
         const AXIS: [&str; 6] = ["axis_x", "axis_y", "axis_z", "axis_a", "axis_b", "axis_c"];
         const SIZE: [&str; 6] = ["size_x", "size_y", "size_z", "size_a", "size_b", "size_c"];
+        const SCALE: [&str; 6] = [
+            "scale_x", "scale_y", "scale_z", "scale_a", "scale_b", "scale_c",
+        ];
+        const MEASURED: [&str; 6] = [
+            "measured_x",
+            "measured_y",
+            "measured_z",
+            "measured_a",
+            "measured_b",
+            "measured_c",
+        ];
         match self {
+            Self::RunRefused { .. } | Self::RunsCollected { .. } | Self::TableLearned { .. } => {
+                "positioning_test"
+            }
+            Self::ScaleMissing { axis } | Self::ScaleBack { axis } => SCALE[axis.index()],
+            Self::MeasurementDoubted { axis, .. } | Self::MeasurementBelieved { axis } => {
+                MEASURED[axis.index()]
+            }
             Self::StateChanged { axis, .. } | Self::ModelRefused { axis, .. } => AXIS[axis.index()],
             Self::SizeExceeded { axis, .. } | Self::SizeKept { axis } => SIZE[axis.index()],
             Self::ModelQuarantined { .. }

@@ -2,6 +2,8 @@
 
 use metrology::Axis;
 
+use crate::positioning::refusal::PositioningRefusal;
+
 /// A configuration or machine that cannot be compensated safely.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum AxisCompensationError {
@@ -43,5 +45,40 @@ pub enum AxisCompensationError {
     NotALinearAxis {
         /// The axis.
         axis: Axis,
+    },
+    /// A parameter of an axis' positioning part is outside its limits.
+    #[error("positioning.{axis}.{key} = {value} {unit}: must be from {lower} to {upper} {unit}")]
+    PositioningOutOfRange {
+        /// The axis.
+        axis: Axis,
+        /// The key.
+        key: &'static str,
+        /// What was given.
+        value: f64,
+        /// Least value allowed.
+        lower: f64,
+        /// Greatest value allowed.
+        upper: f64,
+        /// Unit of all three.
+        unit: &'static str,
+    },
+    /// A positioning part for an axis that is not compensated.
+    #[error("positioning.{axis}: the axis has no limits under `axes`")]
+    NotCompensated {
+        /// The axis.
+        axis: Axis,
+    },
+    /// What is to be measured has no scale.
+    #[error("positioning.{axis}: the machine file gives the axis no scale_resolution_um")]
+    NoScale {
+        /// The axis.
+        axis: Axis,
+    },
+    /// A start table or loop that is refused.
+    #[error("positioning: {source}")]
+    Positioning {
+        /// Why.
+        #[from]
+        source: PositioningRefusal,
     },
 }

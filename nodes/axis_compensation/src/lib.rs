@@ -3,7 +3,9 @@
 //! At every servo tick the offset to be added to each axis' command is computed from the position
 //! commanded and the models known. The readings of a warm machine have drifted by d(p), so that
 //! the same place is reached by commanding p + d(p): the thermal part of the offset is +d(p).
-//! `parts` holds the sum; geometric and positioning parts have their place in it.
+//! An axis with a linear scale may have a dual loop (`positioning`): what lies between its motor and its
+//! slide is learned point by point, and minus that deviation is the positioning part. `parts` holds the
+//! sum; the geometric part has its place in it.
 //!
 //! Compensation moves a real axis, so nothing else than `limiter` decides what leaves the node: it
 //! follows its target without ever exceeding the axis' size, rate or acceleration, whatever the
@@ -27,7 +29,9 @@ pub mod error;
 pub mod femtometre;
 pub mod limiter;
 pub mod model_gate;
+pub mod parameters;
 pub mod parts;
+pub mod positioning;
 pub mod pulses;
 pub mod stage;
 

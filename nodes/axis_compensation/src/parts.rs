@@ -4,6 +4,8 @@
 //!   offset = thermal + geometric + positioning,   thermal = +d(p)                 (1)
 //! ```
 //!
+//! The positioning part is `positioning`'s own: −Δ, the deviation of the slide from its motor.
+//!
 //! Sign by physics: the control reads p + d where it read p when cold, so p + d has to be commanded
 //! to be at the same place again. The machine's position error is −d(p). p is the position commanded
 //! by the program, compensation not included.
@@ -15,6 +17,8 @@ use metrology::sample::ThermalModel;
 use metrology::{Axis, Host, Stamp};
 use nalgebra::Vector3;
 
+use crate::positioning::refusal::PositioningRefusal;
+
 /// The parts for one axis at one pose, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parts {
@@ -22,7 +26,7 @@ pub struct Parts {
     pub thermal: f64,
     /// Geometric errors; nothing yet.
     pub geometric: f64,
-    /// Positioning table; nothing yet.
+    /// Deviation of the slide from its motor.
     pub positioning: f64,
 }
 
@@ -44,6 +48,12 @@ pub enum PartRefusal {
         #[from]
         source: DriftRefusal,
     },
+    /// The positioning part.
+    #[error("positioning: {source}")]
+    Positioning {
+        /// What the dual loop said.
+        source: PositioningRefusal,
+    },
 }
 
 impl PartRefusal {
@@ -54,6 +64,10 @@ impl PartRefusal {
             (Self::Thermal { source: one }, Self::Thermal { source: two }) => {
                 discriminant(one) == discriminant(two)
             }
+            (Self::Positioning { source: one }, Self::Positioning { source: two }) => {
+                discriminant(one) == discriminant(two)
+            }
+            _ => false,
         }
     }
 }

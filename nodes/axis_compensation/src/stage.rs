@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use machine::MachineFile;
 use metrology::drift::{DriftRefusal, Extrapolate};
-use metrology::sample::{AxisCompensation, AxisState, ThermalModel};
+use metrology::sample::{AxisCompensation, AxisState, PositioningTable, TestSegment, ThermalModel};
 use metrology::stamp::Span;
 use metrology::{Axis, AxisSet, Host, Machine, PerAxis, Stage, Stamp};
 use nalgebra::Vector3;
@@ -16,8 +16,10 @@ use crate::error::AxisCompensationError;
 use crate::limiter::Limits;
 use crate::model_gate::ModelGate;
 use crate::parts::{PartRefusal, Parts, parts_at};
+use crate::positioning::dual_loop::DualLoop;
 use crate::pulses::PulseTrain;
 
+mod dual;
 mod remarks;
 
 /// What the stage is told.
@@ -31,6 +33,8 @@ pub enum Input {
     State(AxisState),
     /// A new thermal model.
     Model(Box<ThermalModel>),
+    /// A test begins or ends.
+    Segment(Box<TestSegment>),
     /// Compensation on or off.
     Enable(bool),
     /// Fade to zero and say when it is done.
@@ -50,6 +54,8 @@ pub enum Output {
     Compensation(AxisCompensation),
     /// A condition.
     Diagnostic(Diagnostic),
+    /// A positioning table that was learned or refreshed.
+    Table(Box<PositioningTable>),
     /// After [`Input::Shutdown`]: nothing is added any more, the node may stop.
     FadedOut,
 }
@@ -60,6 +66,7 @@ pub struct AxisCompensationStage {
     axes: AxisSet,
     states: PerAxis<Option<Compensated>>,
     trains: PerAxis<PulseTrain>,
+    positioning: PerAxis<Option<DualLoop>>,
     refused: PerAxis<Option<PartRefusal>>,
     gate: ModelGate,
     policy: Extrapolate,
@@ -129,6 +136,10 @@ impl AxisCompensationStage {
                 Compensated::new(limits, let_go, pulse_mm)
             })
         });
+        let mut positioning = PerAxis::<Option<DualLoop>>::default();
+        for (&axis, own) in &config.positioning {
+            positioning[axis] = Some(DualLoop::new(axis, own, machine, train.pulse_fm())?);
+        }
         Ok(Self {
             axes: config.axes.keys().copied().collect(),
             states,
@@ -139,6 +150,7 @@ impl AxisCompensationStage {
             ),
             policy: config.extrapolate,
             trains: PerAxis::from_fn(|_| train),
+            positioning,
             servo_period_s,
             gap: Span::from_secs_f64(config.gap_s),
             enabled: config.enabled,
@@ -164,6 +176,7 @@ impl AxisCompensationStage {
                 f64::NAN
             }
         });
+        self.read_axes(at, state, elapsed, out);
         self.drive(at, Some(&commanded_mm), elapsed, out);
     }
 
@@ -247,21 +260,49 @@ impl AxisCompensationStage {
         self.report_faded_out(out);
     }
 
+    /// The parts of one axis' offset. A part of which nothing was ever said is zero beside another.
+    fn parts(
+        &self,
+        axis: Axis,
+        at: Stamp<Host>,
+        commanded_mm: Option<&Vector3<f64>>,
+    ) -> Result<Parts, PartRefusal> {
+        let dual_loop = self.positioning[axis]
+            .as_ref()
+            .filter(|_| commanded_mm.is_some());
+        let positioning = dual_loop.map_or(Ok(None), DualLoop::offset_mm)?;
+        let adds_thermal = dual_loop.is_none_or(DualLoop::adds_thermal);
+        let thermal = match (self.gate.current(), commanded_mm) {
+            (Some(model), Some(p_mm)) if adds_thermal => {
+                parts_at(model, axis, p_mm, at, self.policy)
+            }
+            _ => Err(DriftRefusal::NotModelled { axis }),
+        };
+        match (thermal, positioning) {
+            (Ok(parts), positioning) => Ok(Parts {
+                positioning: positioning.unwrap_or_default(),
+                ..parts
+            }),
+            (Err(DriftRefusal::NotModelled { .. }), Some(positioning)) => Ok(Parts {
+                positioning,
+                ..Parts::default()
+            }),
+            (Err(source), _) => Err(source.into()),
+        }
+    }
+
     fn wanted(
         &self,
         axis: Axis,
         at: Stamp<Host>,
         commanded_mm: Option<&Vector3<f64>>,
     ) -> (Parts, Wanted) {
-        let parts = match (self.gate.current(), commanded_mm) {
-            (Some(model), Some(p_mm)) => parts_at(model, axis, p_mm, at, self.policy),
-            _ => Err(DriftRefusal::NotModelled { axis }),
-        };
+        let parts = self.parts(axis, at, commanded_mm);
         let is_on = self.enabled && self.shutdown == Shutdown::No;
         match parts {
             Ok(parts) if is_on => (parts, Wanted::Offset(parts.sum())),
             Ok(parts) => (parts, Wanted::Nothing),
-            Err(refusal) if is_on => (Parts::default(), Wanted::Refused(refusal.into())),
+            Err(refusal) if is_on => (Parts::default(), Wanted::Refused(refusal)),
             Err(_) => (Parts::default(), Wanted::Nothing),
         }
     }
@@ -271,6 +312,7 @@ impl AxisCompensationStage {
         // A host clock that went back must not make a silence look short or a last fade wait.
         self.heard_at = self.heard_at.map(|heard_at| heard_at.min(at));
         self.driven_at = self.driven_at.map(|driven_at| driven_at.min(at));
+        self.publish_tables(at, out);
         let silence = self.heard_at.map(|heard_at| at - heard_at);
         if silence.is_some_and(|silence| silence <= self.gap) {
             return;
@@ -339,6 +381,7 @@ impl Stage for AxisCompensationStage {
         match input {
             Input::State(state) => self.state(at, &state, out),
             Input::Model(model) => self.model(*model, out),
+            Input::Segment(segment) => self.segment(at, &segment, out),
             Input::Enable(enabled) => {
                 if enabled != self.enabled {
                     self.enabled = enabled;

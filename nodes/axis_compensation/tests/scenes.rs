@@ -51,6 +51,7 @@ impl Scene {
                 Output::Compensation(c) => self.last = Some(c),
                 Output::Diagnostic(d) => self.diagnostics.push(d),
                 Output::FadedOut => self.faded_out = true,
+                Output::Table(_) => {}
             }
         }
     }

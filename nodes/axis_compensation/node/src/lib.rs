@@ -3,7 +3,7 @@
 use abbe_msgs::std_srvs::srv::{SetBoolRequest, SetBoolResponse};
 use abbe_msgs::topics;
 use anyhow::Result;
-use axis_compensation::config::PARAMETERS;
+use axis_compensation::parameters::PARAMETERS;
 use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output};
 use machine::MachineFile;
 use metrology::stamp::Span;
@@ -29,6 +29,9 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         .on(&topics::THERMAL_MODEL, |model| {
             Input::Model(Box::new(model))
         })
+        .on(&topics::TEST_SEGMENT, |segment| {
+            Input::Segment(Box::new(segment))
+        })
         .every(TICK, || Input::Tick)
         .service(
             &topics::SET_COMPENSATION,
@@ -37,6 +40,10 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         )
         .publish(&topics::COMPENSATION, |output| match output {
             Output::Compensation(compensation) => Some(compensation),
+            _ => None,
+        })
+        .publish(&topics::POSITIONING_TABLE, |output| match output {
+            Output::Table(table) => Some(&**table),
             _ => None,
         })
         .diagnose(conditions::condition)

@@ -1,0 +1,191 @@
+//! Parameters of the positioning part of one axis; keys carry their units.
+
+use machine::MachineFile;
+use metrology::Axis;
+use serde::{Deserialize, Serialize};
+
+use super::deviation_table::{DeviationTable, SPACING_MM};
+use super::loop_stability;
+use super::offset::Reading;
+use super::refresh::Directions;
+use super::refusal::PositioningRefusal;
+use crate::error::AxisCompensationError;
+
+/// Parameters of one axis. How it compensates has no default; how it measures has.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PositioningConfig {
+    /// `refreshed_table` or `weighted_increments`.
+    pub reading: Reading,
+    /// ω: of a new measurement in the table, or of the table beside what is measured at once.
+    pub weight: f64,
+    /// `together` or `apart`.
+    pub directions: Directions,
+    /// Whether the thermal part is added too.
+    pub thermal_part: bool,
+    /// Greatest difference between a measurement and what is known that is believed.
+    pub measured_limit_um: f64,
+    /// Runs after which a test gives a table.
+    #[serde(default = "default_runs")]
+    pub runs: u32,
+    /// What is left out of a dwell at its begin.
+    #[serde(default = "default_settle_s")]
+    pub settle_s: f64,
+    /// Least time averaged at a point.
+    #[serde(default = "default_dwell_s")]
+    pub dwell_s: f64,
+    /// Greatest feed at which is measured while the machine works.
+    #[serde(default = "default_measuring_feed_limit_mm_min")]
+    pub measuring_feed_limit_mm_min: f64,
+    /// Cycle of the measured loop of `weighted_increments`.
+    #[serde(default = "default_loop_cycle_s")]
+    pub loop_cycle_s: f64,
+    /// Cycles until the scale shows what the loop asked for.
+    #[serde(default = "default_loop_delay_cycles")]
+    pub loop_delay_cycles: u32,
+    /// Points of a table to begin with; empty: none until a test gives one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub start_points_mm: Vec<f64>,
+    /// Its deviations xs − xm, upwards where directions are apart.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub start_deviations_um: Vec<f64>,
+    /// Its deviations downwards; empty: as upwards.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub start_deviations_down_um: Vec<f64>,
+}
+
+fn default_runs() -> u32 {
+    10
+}
+
+fn default_settle_s() -> f64 {
+    0.3
+}
+
+fn default_dwell_s() -> f64 {
+    0.5
+}
+
+fn default_measuring_feed_limit_mm_min() -> f64 {
+    1000.0
+}
+
+fn default_loop_cycle_s() -> f64 {
+    0.2
+}
+
+fn default_loop_delay_cycles() -> u32 {
+    1
+}
+
+/// Limits of ω: CN 1562563 A, claim 1, step (1).
+pub const WEIGHT: (f64, f64) = (0.0, 0.3);
+/// Limits of the number of runs.
+pub const RUNS: (f64, f64) = (10.0, 20.0);
+/// Limits of what is believed, µm.
+pub const MEASURED_LIMIT_UM: (f64, f64) = (0.1, 5000.0);
+/// Limits of the time left out of a dwell, s.
+pub const SETTLE_S: (f64, f64) = (0.0, 60.0);
+/// Limits of the time averaged, s.
+pub const DWELL_S: (f64, f64) = (0.01, 600.0);
+/// Limits of the feed limit, mm/min.
+pub const FEED_MM_MIN: (f64, f64) = (1.0, 60000.0);
+/// Limits of the measured loop's cycle, s.
+pub const CYCLE_S: (f64, f64) = (0.001, 60.0);
+/// Limits of its delay, cycles.
+pub const DELAY_CYCLES: (f64, f64) = (0.0, 100.0);
+
+impl PositioningConfig {
+    /// Checks every number, the loop and the start table.
+    ///
+    /// # Errors
+    /// Names the first that is refused, with value and limits.
+    pub fn check(&self, axis: Axis, machine: &MachineFile) -> Result<(), AxisCompensationError> {
+        let rows = [
+            ("weight", self.weight, WEIGHT, ""),
+            (
+                "measured_limit_um",
+                self.measured_limit_um,
+                MEASURED_LIMIT_UM,
+                "µm",
+            ),
+            ("runs", f64::from(self.runs), RUNS, ""),
+            ("settle_s", self.settle_s, SETTLE_S, "s"),
+            ("dwell_s", self.dwell_s, DWELL_S, "s"),
+            (
+                "measuring_feed_limit_mm_min",
+                self.measuring_feed_limit_mm_min,
+                FEED_MM_MIN,
+                "mm/min",
+            ),
+            ("loop_cycle_s", self.loop_cycle_s, CYCLE_S, "s"),
+            (
+                "loop_delay_cycles",
+                f64::from(self.loop_delay_cycles),
+                DELAY_CYCLES,
+                "",
+            ),
+        ];
+        for (key, value, (lower, upper), unit) in rows {
+            if !(value >= lower && value <= upper) {
+                return Err(AxisCompensationError::PositioningOutOfRange {
+                    axis,
+                    key,
+                    value,
+                    lower,
+                    upper,
+                    unit,
+                });
+            }
+        }
+        let linear = machine
+            .linear(axis)
+            .ok_or(AxisCompensationError::NotALinearAxis { axis })?;
+        // A table from the parameter file that is never measured again needs no scale.
+        let is_fixed = self.reading == Reading::RefreshedTable
+            && self.weight <= 0.0
+            && !self.start_points_mm.is_empty();
+        if linear.scale_resolution_um.is_none() && !is_fixed {
+            return Err(AxisCompensationError::NoScale { axis });
+        }
+        if self.reading == Reading::WeightedIncrements {
+            loop_stability::check(axis, self.weight, self.loop_delay_cycles)?;
+        }
+        self.start_table(axis)?;
+        Ok(())
+    }
+
+    /// The table to begin with, where there is one.
+    ///
+    /// # Errors
+    /// When it is no table.
+    pub fn start_table(&self, axis: Axis) -> Result<Option<DeviationTable>, PositioningRefusal> {
+        let lengths = [
+            self.start_deviations_um.len(),
+            self.start_deviations_down_um.len(),
+        ];
+        if self.start_points_mm.is_empty() && lengths == [0, 0] {
+            return Ok(None);
+        }
+        let mm = |um: &[f64]| um.iter().map(|um| um * 1e-3).collect::<Vec<_>>();
+        let up_mm = mm(&self.start_deviations_um);
+        let down_mm = match (lengths, self.directions) {
+            ([_, 0], _) => up_mm.clone(),
+            (_, Directions::Apart) => mm(&self.start_deviations_down_um),
+            (_, Directions::Together) => return Err(PositioningRefusal::DownIsTogether { axis }),
+        };
+        DeviationTable::new(axis, &self.start_points_mm, &up_mm, &down_mm).map(Some)
+    }
+
+    /// As many points as a travel has room for.
+    #[must_use]
+    pub fn most_points(travel_mm: [f64; 2]) -> usize {
+        let [lower_mm, upper_mm] = travel_mm;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a cast from f64 stops at the ends, and no axis is 1 km long"
+        )]
+        (((upper_mm - lower_mm) / SPACING_MM.0).clamp(0.0, 1e5) as usize + 2)
+    }
+}
