@@ -2,7 +2,8 @@
 //!
 //! `member` gives the axes in order from the tool to the workpiece and what each does nominally to
 //! the tip. `component` says which ISO 230-1 components a chain has and which of them it needs,
-//! `sensitivity` what one unit of one of them does to the tip.
+//! `sensitivity` what one unit of one of them does to the tip. `curve` evaluates published error
+//! motions, `model` puts all of them together, `inverse` says what has to be commanded to undo them.
 //!
 //! # Conventions
 //!
@@ -63,8 +64,14 @@
 //! \[1\] ISO 230-1:2012, 3.4 and 3.6, annex A. \[2\] ISO 10791-6:2014, chain strings.
 
 pub mod component;
+mod curve;
+pub mod error;
+pub mod inverse;
 mod member;
+pub mod model;
 pub mod sensitivity;
 
 pub use component::{components_of, has_component};
+pub use error::{PoseRefusal, VolumetricError};
+pub use model::VolumetricModel;
 pub use sensitivity::sensitivity;

@@ -18,6 +18,10 @@
 //! ```text
 //!   Cx = EXX + EXY - y (ECX + ECY) - EC0Y y,   Cy = EYX + EYY + x ECX                      (6)
 //! ```
+//!
+//! # Agreement
+//! `prop_sensitivity_is_the_central_difference_of_the_product_of_bodies`: every component of 14 chains, both
+//! senses of the tables, within 4.6e-8 mm per unit, which is what differences of 1e-5 give.
 
 use metrology::{ErrorComponent, PerAxis};
 use nalgebra::Vector3;

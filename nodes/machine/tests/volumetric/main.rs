@@ -3,10 +3,14 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod bodies;
+mod inverse;
+mod model;
 mod sensitivity;
 
 use machine::{Chain, Kinematics};
-use metrology::{Axis, PerAxis};
+use metrology::sample::{ErrorCurve, GeometryModel};
+use metrology::{Axis, PerAxis, Stamp};
+use nalgebra::DMatrix;
 
 /// Chains of every kind: three axes in each order of tables and heads, both rotary axes on tables,
 /// in the head, and one of each.
@@ -38,4 +42,20 @@ fn machine(text: &str) -> Kinematics {
     origin_mm[Axis::B] = [-20.0, 5.0, 35.0];
     origin_mm[Axis::C] = [12.0, 8.0, -4.0];
     Kinematics::of_chain(chain(text), origin_mm)
+}
+
+/// As it is published.
+fn model(chain: &str, curves: Vec<ErrorCurve>) -> GeometryModel {
+    GeometryModel {
+        at: Stamp::from_nanos(0),
+        chain: chain.to_owned(),
+        curves,
+        covariance: DMatrix::zeros(0, 0),
+        combinations: Vec::new(),
+        n_samples: 0,
+        n_unknowns: 0,
+        rank: 0,
+        residual_standard_deviation_mm: 0.0,
+        sequence: 0,
+    }
 }

@@ -1,0 +1,398 @@
+//! The six error motions of one axis as functions of its position.
+//!
+//! ```text
+//!   E(q) = sum_k c_k (q - origin)^k                  inside the recorded span             (1)
+//!   linear: E(end) + E'(end) (q - end)               beyond it                            (2)
+//!   hold:   E(end)                                   beyond it                            (3)
+//! ```
+//!
+//! Polynomials that share origin and span are evaluated together by Horner's rule. A table is straight
+//! between its knots and constant beyond the outer ones, under every policy.
+
+use metrology::drift::Extrapolate;
+use metrology::sample::{CurveForm, ErrorCurve};
+
+use super::error::VolumetricError;
+
+/// Six values in the order EX. EY. EZ. EA. EB. EC., mm and rad.
+pub(super) type Six = [f64; 6];
+
+/// All error motions of one axis.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Motions {
+    /// Where all of them were recorded.
+    span: (f64, f64),
+    together: Polynomials,
+    others: Vec<(usize, Other)>,
+}
+
+/// Polynomials about one origin over one span, one column each.
+#[derive(Clone, Debug, PartialEq)]
+struct Polynomials {
+    origin: f64,
+    span: (f64, f64),
+    /// Highest power first.
+    coefficients: Vec<Six>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Other {
+    Polynomial(Polynomials),
+    Table { knots: Vec<f64>, values: Vec<f64> },
+}
+
+impl Motions {
+    /// An axis without errors.
+    pub(super) const NONE: Self = Self {
+        span: EVERYWHERE,
+        together: Polynomials::NONE,
+        others: Vec::new(),
+    };
+
+    /// Adds one checked error motion.
+    pub(super) fn add(&mut self, curve: &ErrorCurve) {
+        let row = curve.component.direction.index();
+        match curve.form {
+            CurveForm::Constant => self.together.add(row, &[0], &curve.coefficient),
+            CurveForm::Polynomial => {
+                self.narrow(curve.span);
+                if self.together.is_constant() {
+                    self.together.origin = curve.origin;
+                    self.together.span = curve.span;
+                }
+                let same = (self.together.origin, self.together.span) == (curve.origin, curve.span);
+                if same {
+                    self.together.add(row, &curve.power, &curve.coefficient);
+                } else {
+                    let mut alone = Polynomials {
+                        origin: curve.origin,
+                        span: curve.span,
+                        ..Polynomials::NONE
+                    };
+                    alone.add(row, &curve.power, &curve.coefficient);
+                    self.others.push((row, Other::Polynomial(alone)));
+                }
+            }
+            CurveForm::Table => {
+                self.narrow(curve.span);
+                let table = Other::Table {
+                    knots: curve.position.clone(),
+                    values: curve.coefficient.clone(),
+                };
+                self.others.push((row, table));
+            }
+        }
+    }
+
+    fn narrow(&mut self, (lower, upper): (f64, f64)) {
+        self.span = (self.span.0.max(lower), self.span.1.min(upper));
+    }
+
+    /// Where all of them were recorded; infinite without any.
+    pub(super) fn span(&self) -> (f64, f64) {
+        self.span
+    }
+
+    /// Values at a position; the policy `Refuse` is for the caller to have asked about.
+    pub(super) fn at(&self, position: f64, policy: Extrapolate) -> Six {
+        let mut six = self.together.at(position, policy);
+        for (row, other) in &self.others {
+            six[*row] += match other {
+                Other::Polynomial(alone) => alone.at(position, policy)[*row],
+                Other::Table { knots, values } => interpolated(knots, values, position),
+            };
+        }
+        six
+    }
+}
+
+const EVERYWHERE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+
+impl Polynomials {
+    const NONE: Self = Self {
+        origin: 0.0,
+        span: EVERYWHERE,
+        coefficients: Vec::new(),
+    };
+
+    fn is_constant(&self) -> bool {
+        self.coefficients.len() < 2
+    }
+
+    fn add(&mut self, row: usize, powers: &[u8], coefficients: &[f64]) {
+        for (&power, &coefficient) in powers.iter().zip(coefficients) {
+            let power = usize::from(power);
+            while self.coefficients.len() <= power {
+                self.coefficients.insert(0, Six::default());
+            }
+            let place = self.coefficients.len() - 1 - power;
+            self.coefficients[place][row] += coefficient;
+        }
+    }
+
+    fn at(&self, position: f64, policy: Extrapolate) -> Six {
+        let inside = position.max(self.span.0).min(self.span.1);
+        let u = inside - self.origin;
+        let mut six = Six::default();
+        for coefficients in &self.coefficients {
+            for (value, c) in six.iter_mut().zip(coefficients) {
+                *value = *value * u + c; // (1)
+            }
+        }
+        if policy == Extrapolate::Linear && (position - inside).abs() > 0.0 {
+            let slopes = self.slopes(u);
+            for (value, slope) in six.iter_mut().zip(slopes) {
+                *value += slope * (position - inside); // (2)
+            }
+        }
+        six
+    }
+
+    fn slopes(&self, u: f64) -> Six {
+        let mut values = Six::default();
+        let mut slopes = Six::default();
+        for coefficients in &self.coefficients {
+            for ((slope, value), c) in slopes.iter_mut().zip(&mut values).zip(coefficients) {
+                *slope = *slope * u + *value;
+                *value = *value * u + c;
+            }
+        }
+        slopes
+    }
+}
+
+/// Straight between knots, constant beyond them.
+fn interpolated(knots: &[f64], values: &[f64], position: f64) -> f64 {
+    let above = knots.partition_point(|&knot| knot <= position);
+    let (Some(below), true) = (above.checked_sub(1), above < knots.len()) else {
+        let end = if above == 0 {
+            values.first()
+        } else {
+            values.last()
+        };
+        return end.copied().unwrap_or_default();
+    };
+    let share = (position - knots[below]) / (knots[above] - knots[below]);
+    values[below] + share * (values[above] - values[below])
+}
+
+/// Whether the numbers of a curve are what its form needs.
+pub(super) fn check(curve: &ErrorCurve) -> Result<(), VolumetricError> {
+    let component = curve.component;
+    if component.is_location && curve.form != CurveForm::Constant {
+        return Err(VolumetricError::LocationNotConstant { component });
+    }
+    let finite = |what, values: &[f64]| {
+        let at = values.iter().position(|value| !value.is_finite());
+        at.map_or(Ok(()), |index| {
+            Err(VolumetricError::NotFinite {
+                component,
+                what,
+                index,
+                value: values[index],
+            })
+        })
+    };
+    finite("coefficient", &curve.coefficient)?;
+    finite("position", &curve.position)?;
+    finite("origin", &[curve.origin])?;
+    let n_coefficients = curve.coefficient.len();
+    let (n_powers, n_knots, needed) = match curve.form {
+        CurveForm::Constant => (0, 0, 1),
+        CurveForm::Polynomial => (n_coefficients, 0, 1),
+        CurveForm::Table => (0, n_coefficients, 2),
+    };
+    let is_exact = curve.form == CurveForm::Constant;
+    if n_coefficients < needed || is_exact && n_coefficients > needed {
+        return Err(VolumetricError::CoefficientCount {
+            component,
+            found: n_coefficients,
+            needed,
+        });
+    }
+    let lists = [
+        ("powers", n_powers, curve.power.len()),
+        ("knots", n_knots, curve.position.len()),
+    ];
+    for (what, needed, found) in lists {
+        if needed != found {
+            return Err(VolumetricError::LengthsDiffer {
+                component,
+                what,
+                n_coefficients,
+                needed,
+                found,
+            });
+        }
+    }
+    check_arguments(curve)
+}
+
+/// Powers that differ, knots that ascend, a span that is one.
+fn check_arguments(curve: &ErrorCurve) -> Result<(), VolumetricError> {
+    let component = curve.component;
+    for (index, &power) in curve.power.iter().enumerate() {
+        if curve.power[..index].contains(&power) {
+            return Err(VolumetricError::RepeatedPower { component, power });
+        }
+    }
+    let falls = curve
+        .position
+        .windows(2)
+        .position(|pair| pair[0] >= pair[1]);
+    if let Some(index) = falls {
+        return Err(VolumetricError::KnotsNotAscending {
+            component,
+            index: index + 1,
+            before: curve.position[index],
+            position: curve.position[index + 1],
+        });
+    }
+    let (lower, upper) = curve.span;
+    let is_span = lower.is_finite() && upper.is_finite() && lower < upper;
+    if curve.form != CurveForm::Constant && !is_span {
+        return Err(VolumetricError::SpanNotAscending {
+            component,
+            lower,
+            upper,
+        });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "small whole numbers are exact")]
+mod tests {
+    use super::*;
+
+    fn curve(
+        component: &str,
+        form: CurveForm,
+        power: &[u8],
+        position: &[f64],
+        c: &[f64],
+    ) -> ErrorCurve {
+        ErrorCurve {
+            component: component.parse().expect("a component"),
+            form,
+            origin: 10.0,
+            power: power.to_vec(),
+            position: position.to_vec(),
+            coefficient: c.to_vec(),
+            standard_uncertainty: Vec::new(),
+            estimable: Vec::new(),
+            span: (-10.0, 30.0),
+        }
+    }
+
+    fn motions(curves: &[ErrorCurve]) -> Motions {
+        let mut motions = Motions::NONE;
+        for curve in curves {
+            check(curve).expect("a good curve");
+            motions.add(curve);
+        }
+        motions
+    }
+
+    #[test]
+    fn eq1_any_powers_about_the_origin() {
+        let eyx = curve("EYX", CurveForm::Polynomial, &[3, 1], &[], &[2.0, -1.0]);
+        let mut ecx = curve("ECX", CurveForm::Polynomial, &[0, 5], &[], &[7.0, 1.0]);
+        let ezx = curve("EZX", CurveForm::Constant, &[], &[], &[0.5]);
+        let all = motions(&[ezx.clone(), eyx.clone(), ecx.clone()]);
+        assert!(all.others.is_empty());
+        let six = all.at(13.0, Extrapolate::Refuse);
+        assert_eq!(six, [0.0, 51.0, 0.5, 0.0, 0.0, 250.0]);
+        ecx.origin = 11.0;
+        let six = motions(&[ezx, eyx, ecx]).at(13.0, Extrapolate::Refuse);
+        assert_eq!(six, [0.0, 51.0, 0.5, 0.0, 0.0, 39.0]);
+    }
+
+    #[test]
+    fn eq2_and_eq3_beyond_the_span() {
+        let exx = curve("EXX", CurveForm::Polynomial, &[2], &[], &[1.0]);
+        let all = motions(&[exx]);
+        assert_eq!(all.span(), (-10.0, 30.0));
+        assert_eq!(all.at(31.0, Extrapolate::Hold)[0], 400.0);
+        assert_eq!(all.at(31.0, Extrapolate::Linear)[0], 440.0);
+        assert_eq!(all.at(-12.0, Extrapolate::Linear)[0], 480.0);
+    }
+
+    #[test]
+    fn a_table_is_straight_between_knots_and_constant_beyond() {
+        let exx = curve(
+            "EXX",
+            CurveForm::Table,
+            &[],
+            &[0.0, 1.0, 3.0],
+            &[1.0, 2.0, 0.0],
+        );
+        let all = motions(&[exx]);
+        for (at, value) in [
+            (-1.0, 1.0),
+            (0.0, 1.0),
+            (0.5, 1.5),
+            (1.0, 2.0),
+            (2.0, 1.0),
+            (3.0, 0.0),
+            (4.0, 0.0),
+        ] {
+            for policy in [Extrapolate::Linear, Extrapolate::Hold] {
+                assert_eq!(all.at(at, policy)[0], value, "at {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn errors_name_component_and_numbers() {
+        let message = |curve: &ErrorCurve| check(curve).expect_err("a bad curve").to_string();
+        let cubic = curve(
+            "EXX",
+            CurveForm::Polynomial,
+            &[1, 2, 3],
+            &[],
+            &[1.0, 2.0, 3.0],
+        );
+        let with = |change: fn(&mut ErrorCurve)| {
+            let mut changed = cubic.clone();
+            change(&mut changed);
+            message(&changed)
+        };
+        assert_eq!(
+            with(|c| c.coefficient[1] = f64::NAN),
+            "EXX: coefficient[1] = NaN: must be a finite number"
+        );
+        assert_eq!(with(|c| c.power[1] = 3), "EXX: power 3 is given twice");
+        assert_eq!(
+            with(|c| c.power.truncate(2)),
+            "EXX: 3 coefficients need 3 powers, there are 2"
+        );
+        assert_eq!(
+            with(|c| c.span = (1.0, 1.0)),
+            "EXX: recorded span from 1 to 1: must be finite and ascending"
+        );
+        assert!(with(|c| c.origin = f64::INFINITY).contains("origin[0] = inf"));
+        assert_eq!(
+            message(&curve(
+                "EXX",
+                CurveForm::Table,
+                &[],
+                &[0.0, 2.0, 2.0],
+                &[1.0, 2.0, 3.0]
+            )),
+            "EXX: knot 2 at 2 must lie above the one before, at 2"
+        );
+        assert_eq!(
+            message(&curve("EXX", CurveForm::Table, &[], &[0.0], &[1.0])),
+            "EXX: 1 coefficients, its form needs 2"
+        );
+        assert_eq!(
+            message(&curve("EXX", CurveForm::Constant, &[], &[], &[1.0, 2.0])),
+            "EXX: 2 coefficients, its form needs 1"
+        );
+        assert_eq!(
+            message(&curve("EC0Y", CurveForm::Polynomial, &[1], &[], &[1.0])),
+            "EC0Y is a location error and must be a constant"
+        );
+    }
+}
