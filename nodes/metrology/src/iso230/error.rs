@@ -124,7 +124,7 @@ pub enum Iso230Error {
         /// Runs down.
         n_down: usize,
     },
-    /// A value that is known no better than this cannot be used.
+    /// A value is outside the range that has a meaning.
     #[error("{place} = {value}: must be in {lower} to {upper}")]
     OutOfRange {
         /// Which value; its unit ends the name.

@@ -20,10 +20,11 @@
 //! | t, τ | `drift_after_s`, `rate_window_s` | s |
 //! | h | `height_mm` | mm |
 //!
-//! Uncertainties, with u_s of one reading and u_A of the artefact's own growth:
+//! Uncertainties, with u_s of one reading and an artefact of length l and coefficient α whose
+//! temperature stays within a range Δθ, so that it may grow or shrink by up to α l Δθ:
 //!
 //! ```text
-//!   d_t, range:  u² = 2 u_s² + u_A²;   an angle: u² = 4 u_s²/(h₂ − h₁)²                (5)
+//!   d_t, range:  u² = 2 u_s² + (α l Δθ)²/3;   an angle: u² = 4 u_s²/(h₂ − h₁)²         (5)
 //!   rate:        standard deviation of the slope by its residuals                     (6)
 //! ```
 //!
@@ -42,7 +43,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::budget::{DeviceUncertainty, Expansion};
+use super::budget::{DeviceUncertainty, rectangular};
 use super::error::ChannelFault;
 use super::extent::{
     check_ascending, check_finite, check_length, check_not_negative, check_points, check_positive,
@@ -107,8 +108,10 @@ pub struct DriftBudget {
     pub sensor: DeviceUncertainty,
     /// Length of the artefact between its seat and the sensors, mm.
     pub artefact_length_mm: f64,
-    /// Temperature of the artefact: half of its range over the test.
-    pub artefact: Expansion,
+    /// Coefficient of expansion of the artefact, 1/K.
+    pub artefact_expansion_per_k: f64,
+    /// Range of the artefact's temperature over the test, K.
+    pub artefact_temperature_range_k: f64,
 }
 
 /// Drift of one channel.
@@ -167,8 +170,10 @@ pub fn evaluate(test: &DriftTest, budget: &DriftBudget) -> Result<DriftResult, I
     test.check()?;
     budget.check()?;
     let reading_mm = budget.sensor.standard_mm(0.0);
-    let artefact_mm = budget.artefact.standard_mm(budget.artefact_length_mm);
-    let u_mm = (2.0 * reading_mm.powi(2) + artefact_mm.powi(2)).sqrt(); // (5)
+    let growth_mm = budget.artefact_length_mm
+        * budget.artefact_expansion_per_k
+        * budget.artefact_temperature_range_k;
+    let u_mm = (2.0 * reading_mm.powi(2) + rectangular(growth_mm).powi(2)).sqrt(); // (5)
     let displacements = test
         .channels
         .iter()
@@ -285,7 +290,11 @@ impl DriftBudget {
     fn check(&self) -> Result<(), Iso230Error> {
         self.sensor.check()?;
         check_not_negative("artefact_length_mm", self.artefact_length_mm)?;
-        self.artefact.check()
+        check_not_negative("artefact_expansion_per_k", self.artefact_expansion_per_k)?;
+        check_not_negative(
+            "artefact_temperature_range_k",
+            self.artefact_temperature_range_k,
+        )
     }
 }
 

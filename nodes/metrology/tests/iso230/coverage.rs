@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use metrology::iso230::budget::{DeviceUncertainty, Expansion};
+use metrology::iso230::ExpandedLength;
+use metrology::iso230::budget::{DeviceUncertainty, Expansion, drift_mm};
 use metrology::iso230::positioning::budget::PositioningBudget;
-use metrology::iso230::positioning::{self, PositioningRuns, periodic};
+use metrology::iso230::positioning::{self, PositioningResult, PositioningRuns, periodic};
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -126,4 +127,90 @@ fn eq4_the_amplitude_of_a_period_is_covered() {
         (amplitude.value_mm - 0.0015).abs() <= amplitude.expanded_uncertainty_mm
     });
     within_93_and_97_percent("amplitude", share);
+}
+
+/// Errors of the figures of a machine that never scatters, by what its measurement does: the
+/// device's scale and a drift that is new at every reading, both normal.
+fn figure_errors(budget: &PositioningBudget) -> Vec<PositioningResult> {
+    let machine_mm = |t: f64, down: bool| 5e-5 * t - if down { 0.004 } else { 0.0 };
+    let u_drift_mm = drift_mm(budget.environmental_drift_mm);
+    let u_scale = budget.device.standard_mm(1.0);
+    let test = |seed| {
+        let mut rng = Pcg64Mcg::seed_from_u64(seed);
+        let scale = u_scale * normal(&mut rng);
+        let mut rows = |down: bool| -> Vec<Vec<f64>> {
+            let mut reading = |t: &f64| {
+                let drift_mm = u_drift_mm * normal(&mut rng);
+                machine_mm(*t, down) + scale * (t - TARGETS_MM[0]) + drift_mm
+            };
+            (0..5)
+                .map(|_| TARGETS_MM.iter().map(&mut reading).collect())
+                .collect()
+        };
+        let runs = PositioningRuns {
+            targets_mm: TARGETS_MM.to_vec(),
+            up_mm: rows(false),
+            down_mm: rows(true),
+            zero_mm: TARGETS_MM[0],
+            periods_mm: vec![],
+        };
+        positioning::evaluate(&runs, budget).unwrap()
+    };
+    (0..SEEDS).map(test).collect()
+}
+
+#[test]
+fn eq2_eq5_eq6_of_the_budget_are_the_scatter_of_the_figures() {
+    let budget = PositioningBudget {
+        device: DeviceUncertainty {
+            expanded_uncertainty_per_length: 1.2e-6,
+            ..EXACT_DEVICE
+        },
+        environmental_drift_mm: 0.004,
+        ..EXACT
+    };
+    let results = figure_errors(&budget);
+    type Figure = fn(&PositioningResult) -> ExpandedLength;
+    let span_mm = TARGETS_MM[4] - TARGETS_MM[0];
+    let figures: [(&str, Figure, f64); 3] = [
+        ("E up", |r| r.up.systematic_error, 5e-5 * span_mm),
+        ("E", |r| r.systematic_error, 5e-5 * span_mm + 0.004),
+        ("M", |r| r.mean_systematic_error, 5e-5 * span_mm),
+    ];
+    for (name, of, truth_mm) in figures {
+        let held = results.iter().filter(|r| {
+            let figure = of(r);
+            (figure.value_mm - truth_mm).abs() <= figure.expanded_uncertainty_mm
+        });
+        within_93_and_97_percent(name, held.count() as f64 / SEEDS as f64);
+    }
+    // The reversal of every target: the greatest of them is further off than one.
+    let reversals = results.iter().flat_map(|r| {
+        let expanded_mm = r.reversal.expanded_uncertainty_mm;
+        r.points.iter().map(move |p| (p.reversal_mm, expanded_mm))
+    });
+    let held = reversals.filter(|(b, expanded_mm)| (b - 0.004).abs() <= *expanded_mm);
+    within_93_and_97_percent("B_i", held.count() as f64 / (SEEDS * 5) as f64);
+}
+
+#[test]
+fn eq3_eq4_eq7_of_the_budget_bound_what_drift_adds_to_the_scatter() {
+    let budget = PositioningBudget {
+        environmental_drift_mm: 0.004,
+        ..EXACT
+    };
+    let span_mm = TARGETS_MM[4] - TARGETS_MM[0];
+    let held = figure_errors(&budget).into_iter().filter(|r| {
+        let truths_mm = [
+            (r.up.repeatability, 0.0),
+            (r.repeatability, 0.004),
+            (r.accuracy, 5e-5 * span_mm + 0.004),
+        ];
+        truths_mm.iter().all(|(figure, truth_mm)| {
+            (figure.value_mm - truth_mm).abs() <= figure.expanded_uncertainty_mm
+        })
+    });
+    let share = held.count() as f64 / SEEDS as f64;
+    eprintln!("R up, R and A: {:.1} %", 100.0 * share);
+    assert!(share >= 0.95, "{share}");
 }

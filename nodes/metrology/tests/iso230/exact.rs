@@ -106,6 +106,24 @@ fn eq2_eq4_eq5_two_circles_of_different_size_differ_by_their_radii() {
 }
 
 #[test]
+fn recordings_of_twenty_thousand_points_are_evaluated() {
+    let path = |sense: f64| {
+        let angles_rad: Vec<f64> = (0..20_000)
+            .map(|k| sense * TAU * f64::from(k) / 2e4)
+            .collect();
+        let deviation = |a: &f64| 0.005 * (3.0 * a).cos() + sense * 0.001;
+        CircularTrace::Radial {
+            deviations_mm: angles_rad.iter().map(deviation).collect(),
+            angles_rad,
+        }
+    };
+    let result = circular::evaluate(&circle(path(-1.0), path(1.0)), &CERTAIN).unwrap();
+    let both = result.both.unwrap();
+    near("G(b)", both.circular_error.value_mm, 0.012, 1e-8);
+    near("H", both.hysteresis_1996.value_mm, 0.002, 1e-8);
+}
+
+#[test]
 fn eq3_the_centre_is_refitted_for_g_and_not_for_f() {
     let (e, r) = (0.012, 100.004);
     let shifted: Vec<[f64; 2]> = (0..360)
@@ -212,7 +230,8 @@ fn drift_test(displacement_mm: impl Fn(f64) -> f64, hours: f64) -> DriftTest {
 const CERTAIN_DRIFT: DriftBudget = DriftBudget {
     sensor: EXACT_DEVICE,
     artefact_length_mm: 0.0,
-    artefact: RIGID,
+    artefact_expansion_per_k: 0.0,
+    artefact_temperature_range_k: 0.0,
 };
 
 #[test]
@@ -290,11 +309,8 @@ fn eq5_of_a_drift_budget_by_hand() {
             ..EXACT_DEVICE
         },
         artefact_length_mm: 200.0,
-        artefact: Expansion {
-            temperature_half_width_k: 0.2 * 3.0_f64.sqrt(),
-            expansion_per_k: 1e-6,
-            ..RIGID
-        },
+        artefact_expansion_per_k: 1e-6,
+        artefact_temperature_range_k: 0.2 * 3.0_f64.sqrt(),
     };
     let result = thermal::evaluate(&drift_test(|t| t, 1.0), &budget).unwrap();
     let expanded_mm = result.displacements[0].range.expanded_uncertainty_mm;

@@ -195,7 +195,8 @@ fn drift_tests_that_cannot_be_evaluated_are_refused() {
         let budget = DriftBudget {
             sensor: EXACT_DEVICE,
             artefact_length_mm: 0.0,
-            artefact: RIGID,
+            artefact_expansion_per_k: 0.0,
+            artefact_temperature_range_k: 0.0,
         };
         thermal::evaluate(&test, &budget).unwrap_err().to_string()
     };
@@ -369,7 +370,8 @@ proptest! {
         let budget = DriftBudget {
             sensor: EXACT_DEVICE,
             artefact_length_mm: 0.0,
-            artefact: RIGID,
+            artefact_expansion_per_k: 0.0,
+            artefact_temperature_range_k: 0.0,
         };
         let _ = thermal::evaluate(&test, &budget);
     }
