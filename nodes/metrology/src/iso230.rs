@@ -25,4 +25,6 @@ pub mod probing;
 pub mod thermal;
 
 pub use error::{Direction, Iso230Error};
-pub use expanded::{COVERAGE_FACTOR, ExpandedAngle, ExpandedLength, ExpandedRate};
+pub use expanded::{
+    COVERAGE_FACTOR, ExpandedAngle, ExpandedAngularRate, ExpandedLength, ExpandedRate,
+};

@@ -73,3 +73,24 @@ impl ExpandedRate {
         }
     }
 }
+
+/// Speed of a drifting angle with its expanded uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExpandedAngularRate {
+    /// The figure, rad/s.
+    pub value_rad_s: f64,
+    /// Expanded uncertainty with the coverage factor [`COVERAGE_FACTOR`], rad/s.
+    pub expanded_uncertainty_rad_s: f64,
+}
+
+impl ExpandedAngularRate {
+    /// From a value and a standard uncertainty, rad/s.
+    #[must_use]
+    pub const fn new(value_rad_s: f64, standard_uncertainty_rad_s: f64) -> Self {
+        Self {
+            value_rad_s,
+            expanded_uncertainty_rad_s: COVERAGE_FACTOR * standard_uncertainty_rad_s,
+        }
+    }
+}

@@ -49,7 +49,7 @@ use super::extent::{
     check_ascending, check_finite, check_length, check_not_negative, check_points, check_positive,
     range,
 };
-use super::{ExpandedAngle, ExpandedLength, ExpandedRate, Iso230Error};
+use super::{ExpandedAngle, ExpandedAngularRate, ExpandedLength, ExpandedRate, Iso230Error};
 use crate::axis::Axis;
 use crate::fit::fit_line;
 
@@ -140,10 +140,8 @@ pub struct AngularDrift {
     pub drift_after: ExpandedAngle,
     /// (2) of the angle.
     pub range: ExpandedAngle,
-    /// (3) of the angle, rad/s, with its standard uncertainty times two.
-    pub final_rate_rad_s: f64,
-    /// Expanded uncertainty of that rate, rad/s.
-    pub final_rate_expanded_uncertainty_rad_s: f64,
+    /// (3) of the angle.
+    pub final_rate: ExpandedAngularRate,
 }
 
 /// One test, evaluated.
@@ -317,13 +315,12 @@ fn angle(
     let pairs = lower.displacements_mm.iter().zip(&upper.displacements_mm);
     let angles: Vec<f64> = pairs.map(|(l, u)| sign * (u - l) / height_mm).collect(); // (4)
     let u_rad = 2.0 * reading_mm / height_mm; // (5)
-    let (rate, u_rate) = test.rate(&angles)?;
+    let (rate_rad_s, u_rate_rad_s) = test.rate(&angles)?;
     Ok(Some(AngularDrift {
         axis: about,
         heights_mm: [lower.height_mm, upper.height_mm],
         drift_after: ExpandedAngle::new(test.drift(&angles), u_rad),
         range: ExpandedAngle::new(range(angles.iter().copied()), u_rad),
-        final_rate_rad_s: rate,
-        final_rate_expanded_uncertainty_rad_s: super::COVERAGE_FACTOR * u_rate,
+        final_rate: ExpandedAngularRate::new(rate_rad_s, u_rate_rad_s),
     }))
 }

@@ -280,7 +280,7 @@ fn val_iso230_3_an_exponential_drift_has_its_closed_form() {
     );
     near(
         "A rate",
-        angle.final_rate_rad_s,
+        angle.final_rate.value_rad_s,
         -x.final_rate.value_mm_s / 100.0,
         1e-18,
     );
