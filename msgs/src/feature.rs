@@ -4,7 +4,9 @@ use metrology::sample::{FeatureKind, ProbedFeature as Inner};
 use nalgebra::Matrix3;
 
 use crate::msg::ProbedFeature;
-use crate::wire::{Allowed, Reader, metres, millimetres, point, ratios, time};
+use crate::wire::{
+    Allowed, Reader, metres, millimetres, point, ratios, set_letters, set_positions, time,
+};
 use crate::{Place, Wire, WireError};
 
 pub(crate) const KINDS: [FeatureKind; 4] = [
@@ -42,6 +44,8 @@ impl Wire for ProbedFeature {
         self.n = inner.n;
         self.n_rejected = inner.n_rejected;
         self.run = inner.run;
+        set_letters(&mut self.rotary_axis, inner.rotary_axes);
+        set_positions(&mut self.rotary_rad, inner.rotary_axes, &inner.rotary_rad);
     }
 
     fn to_inner(&self) -> Result<Inner, WireError> {
@@ -53,6 +57,14 @@ impl Wire for ProbedFeature {
             let value_m2 = read.number("centre_covariance", place, value_m2, Allowed::Finite)?;
             centre_covariance_mm2[(idx / 3, idx % 3)] = millimetres(millimetres(value_m2));
         }
+        let letters = read.rotary_letters("rotary_axis", &self.rotary_axis)?;
+        let rotary_rad = read.positions(
+            "rotary_rad",
+            &letters,
+            &self.rotary_rad,
+            0.0,
+            Allowed::Finite,
+        )?;
         Ok(Inner {
             at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
             feature_id: self.feature_id.clone(),
@@ -74,6 +86,8 @@ impl Wire for ProbedFeature {
             n: self.n,
             n_rejected: self.n_rejected,
             run: self.run,
+            rotary_axes: letters.set(),
+            rotary_rad,
         })
     }
 }

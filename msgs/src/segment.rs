@@ -6,7 +6,7 @@ use crate::msg::TestSegment;
 use crate::wire::{Allowed, Reader, lengths, metres, point, time};
 use crate::{Place, Wire, WireError};
 
-pub(crate) const KINDS: [TestKind; 19] = [
+pub(crate) const KINDS: [TestKind; 20] = [
     TestKind::Latency,
     TestKind::Block,
     TestKind::Touch,
@@ -26,6 +26,7 @@ pub(crate) const KINDS: [TestKind; 19] = [
     TestKind::TwoArcs,
     TestKind::Diagonal,
     TestKind::Rotary,
+    TestKind::RotaryVerification,
 ];
 
 pub(crate) fn kind_code(kind: TestKind) -> u8 {
@@ -49,6 +50,7 @@ pub(crate) fn kind_code(kind: TestKind) -> u8 {
         TestKind::TwoArcs => TestSegment::KIND_TWO_ARCS,
         TestKind::Diagonal => TestSegment::KIND_DIAGONAL,
         TestKind::Rotary => TestSegment::KIND_ROTARY,
+        TestKind::RotaryVerification => TestSegment::KIND_ROTARY_VERIFICATION,
     }
 }
 

@@ -293,12 +293,31 @@ impl Reader {
         field: &'static str,
         names: &[String],
     ) -> Result<Letters, WireError> {
+        self.letters_among(field, names, &Axis::ALL, "X Y Z A B C")
+    }
+
+    /// Letters of rotary axes.
+    pub(crate) fn rotary_letters(
+        self,
+        field: &'static str,
+        names: &[String],
+    ) -> Result<Letters, WireError> {
+        self.letters_among(field, names, &Axis::ROTARY, "A B C")
+    }
+
+    fn letters_among(
+        self,
+        field: &'static str,
+        names: &[String],
+        among: &[Axis],
+        allowed: &'static str,
+    ) -> Result<Letters, WireError> {
         let mut letters = Letters {
             axes: Axis::ALL,
             len: 0,
         };
         for (idx, name) in names.iter().enumerate() {
-            let axis = self.letter(field, idx, name, &Axis::ALL, "X Y Z A B C")?;
+            let axis = self.letter(field, idx, name, among, allowed)?;
             if letters.as_slice().contains(&axis) {
                 return Err(WireError::DuplicateAxis {
                     message: self.message,

@@ -260,9 +260,18 @@ fn prop_probed_feature_comes_back() {
         (vector(-1.0..1.0), or_nan(number()), length_mm()),
         (or_nan(length_mm()), or_nan(length_mm())),
         (any::<u32>(), any::<u32>(), any::<u32>()),
+        per_axis(number()),
     )
         .prop_map(
-            |((at, feature_id, kind, centre_mm), c, (normal, u_rad, form_mm), (r, u_r), n)| {
+            |(
+                (at, feature_id, kind, centre_mm),
+                c,
+                (normal, u_rad, form_mm),
+                (r, u_r),
+                n,
+                positions,
+            )| {
+                let rotary_axes: AxisSet = [Axis::A, Axis::C].into_iter().collect();
                 ProbedFeature {
                     at,
                     feature_id,
@@ -277,6 +286,8 @@ fn prop_probed_feature_comes_back() {
                     n: n.0,
                     n_rejected: n.1,
                     run: n.2,
+                    rotary_axes,
+                    rotary_rad: only(rotary_axes, &positions, 0.0),
                 }
             },
         );
@@ -423,6 +434,7 @@ fn prop_test_segment_comes_back() {
         TestKind::TwoArcs,
         TestKind::Diagonal,
         TestKind::Rotary,
+        TestKind::RotaryVerification,
     ];
     let senses = [Sense::None, Sense::Clockwise, Sense::CounterClockwise];
     let strategy = (

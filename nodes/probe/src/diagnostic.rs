@@ -100,6 +100,25 @@ pub enum Diagnostic {
         /// Why.
         reason: ShapeError,
     },
+    /// The touches of one feature were made at different poses of the rotary axes.
+    #[error(
+        "run {run}: {feature} was touched with axis {axis} from {:.5} to {:.5} deg, at most {:.5} deg apart is one pose; not evaluated",
+        least_rad.to_degrees(), greatest_rad.to_degrees(), limit_rad.to_degrees()
+    )]
+    MixedPoses {
+        /// Run.
+        run: u32,
+        /// Artefact.
+        feature: String,
+        /// The axis.
+        axis: Axis,
+        /// Its least position, rad.
+        least_rad: f64,
+        /// Its greatest position, rad.
+        greatest_rad: f64,
+        /// Greatest difference that is still one pose, rad.
+        limit_rad: f64,
+    },
     /// A feature that the machine file does not have.
     #[error("run {run}: the machine file has no feature \"{feature}\"")]
     UnknownFeature {

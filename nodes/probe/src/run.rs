@@ -39,6 +39,8 @@ pub(crate) const fn is_probing(kind: TestKind) -> bool {
             | TestKind::Plane
             | TestKind::Bore
             | TestKind::Sphere
+            | TestKind::Rotary
+            | TestKind::RotaryVerification
     )
 }
 

@@ -18,20 +18,27 @@
 //! A bore or boss has no height of its own: z is the mean height at which it was touched, and its
 //! variance is given as zero.
 //!
+//! A feature is touched at one pose of the rotary axes, and the mean of their positions goes with it;
+//! touches at different poses are refused. Where a test visits a sphere at several poses, the numbers
+//! of its points begin anew at each visit, and each visit is a feature of its own.
+//!
 //! # Holds when
-//! All points of one feature are touched at one pose of the rotary axes; points are in the machine
-//! frame.
+//! Points are in the machine frame.
 
 use machine::cycle::{FeatureId, artefact_id};
 use machine::file::ArtefactEntry;
 use metrology::fit::{ShapeError, fit_plane, fit_round};
-use metrology::sample::{FeatureKind, ProbedFeature};
+use metrology::sample::{FeatureKind, ProbedFeature, TestKind};
+use metrology::{Axis, AxisSet, PerAxis};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::block::count;
 use crate::diagnostic::Diagnostic;
 use crate::run::{Run, RunTouch};
 use crate::stage::Output;
+
+/// Rotary positions that differ by no more are one pose, rad: 10", which servo and friction stay within.
+const ONE_POSE_RAD: f64 = 4.85e-5;
 
 /// Evaluates one artefact at the end of its run.
 pub(crate) fn evaluate(run: &Run, artefact: &ArtefactEntry, radius_mm: f64, out: &mut Vec<Output>) {
@@ -41,12 +48,58 @@ pub(crate) fn evaluate(run: &Run, artefact: &ArtefactEntry, radius_mm: f64, out:
             |feature| matches!(feature, FeatureId::Point { artefact, .. } if artefact == id),
         )
         .collect();
+    if matches!(
+        run.segment.kind,
+        TestKind::Rotary | TestKind::RotaryVerification
+    ) {
+        for visit in visits(&touches) {
+            evaluate_visit(run, artefact, visit, radius_mm, out);
+        }
+    } else {
+        evaluate_visit(run, artefact, &touches, radius_mm, out);
+    }
+}
+
+/// Touches from one beginning of the numbering to the next.
+fn visits<'t, 'r>(touches: &'t [&'r RunTouch]) -> impl Iterator<Item = &'t [&'r RunTouch]> {
+    touches.chunk_by(|before, after| point_index(before) <= point_index(after))
+}
+
+fn point_index(touch: &RunTouch) -> u32 {
+    match FeatureId::parse(&touch.point.feature_id) {
+        Some(FeatureId::Point { index, .. }) => index,
+        _ => 0,
+    }
+}
+
+fn evaluate_visit(
+    run: &Run,
+    artefact: &ArtefactEntry,
+    touches: &[&RunTouch],
+    radius_mm: f64,
+    out: &mut Vec<Output>,
+) {
+    let id = artefact_id(artefact);
     let usable: Vec<&RunTouch> = touches
         .iter()
         .copied()
         .filter(|touch| touch.is_usable())
         .collect();
     let n_rejected = count(touches.iter()) - count(usable.iter());
+    let (rotary_axes, rotary_rad) = match rotary_pose(&usable) {
+        Ok(pose) => pose,
+        Err(spread) => {
+            out.push(Output::Diagnostic(Diagnostic::MixedPoses {
+                run: run.number(),
+                feature: id.to_owned(),
+                axis: spread.axis,
+                least_rad: spread.least_rad,
+                greatest_rad: spread.greatest_rad,
+                limit_rad: ONE_POSE_RAD,
+            }));
+            return;
+        }
+    };
     let points = Points::new(&usable, radius_mm);
     let fitted = match artefact {
         ArtefactEntry::Plane { normal, .. } => plane(&points, &Vector3::from(*normal)),
@@ -63,6 +116,8 @@ pub(crate) fn evaluate(run: &Run, artefact: &ArtefactEntry, radius_mm: f64, out:
             n: count(usable.iter()),
             n_rejected,
             run: run.number(),
+            rotary_axes,
+            rotary_rad,
             ..shape
         }),
         Err(reason) => Output::Diagnostic(Diagnostic::ShapeNotEvaluated {
@@ -72,6 +127,40 @@ pub(crate) fn evaluate(run: &Run, artefact: &ArtefactEntry, radius_mm: f64, out:
             reason,
         }),
     });
+}
+
+/// An axis that did not stand still.
+struct Spread {
+    axis: Axis,
+    least_rad: f64,
+    greatest_rad: f64,
+}
+
+/// The machine's rotary axes and their mean positions during the touches, rad.
+fn rotary_pose(touches: &[&RunTouch]) -> Result<(AxisSet, PerAxis<f64>), Spread> {
+    let Some(first) = touches.first() else {
+        return Ok((AxisSet::EMPTY, PerAxis::default()));
+    };
+    let of_machine = first.point.axes.iter().filter(|axis| !axis.is_linear());
+    let axes: AxisSet = of_machine.collect();
+    let mut mean_rad = PerAxis::default();
+    for axis in axes.iter() {
+        let positions = || {
+            let touches = touches.iter();
+            touches.map(|touch| touch.point.axes_at_contact[axis])
+        };
+        let least_rad = positions().fold(f64::INFINITY, f64::min);
+        let greatest_rad = positions().fold(f64::NEG_INFINITY, f64::max);
+        if greatest_rad - least_rad > ONE_POSE_RAD {
+            return Err(Spread {
+                axis,
+                least_rad,
+                greatest_rad,
+            });
+        }
+        mean_rad[axis] = positions().sum::<f64>() / touches.len() as f64;
+    }
+    Ok((axes, mean_rad))
 }
 
 /// Points of one feature with their uncertainties.
@@ -171,5 +260,7 @@ fn unknown(kind: FeatureKind) -> ProbedFeature {
         n: 0,
         n_rejected: 0,
         run: 0,
+        rotary_axes: AxisSet::EMPTY,
+        rotary_rad: PerAxis::default(),
     }
 }

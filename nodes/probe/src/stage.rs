@@ -362,7 +362,15 @@ impl ProbeStage {
                     }));
                 }
                 (TestKind::Block, Some(block), _) => block::evaluate(run, block, radius_mm, out),
-                (TestKind::Plane | TestKind::Bore | TestKind::Sphere, _, Some(artefact)) => {
+                (
+                    TestKind::Plane
+                    | TestKind::Bore
+                    | TestKind::Sphere
+                    | TestKind::Rotary
+                    | TestKind::RotaryVerification,
+                    _,
+                    Some(artefact),
+                ) => {
                     shape::evaluate(run, artefact, radius_mm, out);
                 }
                 _ => {}

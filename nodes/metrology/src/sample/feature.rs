@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::axis::{AxisSet, PerAxis};
 use crate::stamp::{Host, Stamp};
 
 /// Which shape was fitted.
@@ -46,4 +47,8 @@ pub struct ProbedFeature {
     pub n_rejected: u32,
     /// The run (see `TestSegment`) in which it was measured.
     pub run: u32,
+    /// Rotary axes that the machine has.
+    pub rotary_axes: AxisSet,
+    /// Their mean positions while it was touched, rad; zero for every other axis.
+    pub rotary_rad: PerAxis<f64>,
 }

@@ -36,8 +36,10 @@ pub enum TestKind {
     TwoArcs,
     /// A line through the working space along its diagonal.
     Diagonal,
-    /// A sphere touched at several poses of the rotary axes.
+    /// A sphere touched at several poses of the rotary axes, to find their errors.
     Rotary,
+    /// The same at other poses, to judge a model that was found.
+    RotaryVerification,
 }
 
 /// Plane of a planar test.

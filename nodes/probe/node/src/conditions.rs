@@ -25,6 +25,7 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
         Condition::ShapeNotEvaluated { feature, .. } => {
             (Level::Error, format!("shape_not_evaluated/{feature}"))
         }
+        Condition::MixedPoses { feature, .. } => (Level::Error, format!("mixed_poses/{feature}")),
         Condition::UnknownFeature { .. } => (Level::Error, "unknown_feature".to_owned()),
         Condition::UnknownStylus { .. } => (Level::Error, "unknown_stylus".to_owned()),
         Condition::RunNotEnded { .. } => (Level::Warn, "run_not_ended".to_owned()),

@@ -200,6 +200,14 @@ impl Rig {
         features.next().unwrap_or_else(|| panic!("{:?}", self.out))
     }
 
+    pub(crate) fn features(&self) -> Vec<ProbedFeature> {
+        let features = self.out.iter().filter_map(|out| match out {
+            Output::Feature(feature) => Some(feature.clone()),
+            _ => None,
+        });
+        features.collect()
+    }
+
     pub(crate) fn diagnostics(&self) -> Vec<String> {
         let texts = self.out.iter().filter_map(|out| match out {
             Output::Diagnostic(diagnostic) => Some(diagnostic.to_string()),

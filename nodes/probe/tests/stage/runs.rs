@@ -160,6 +160,60 @@ fn a_sphere_a_ring_and_a_pin_have_their_centres_and_radii() {
     }
 }
 
+const POLE_AND_RING: [Vector3<f64>; 5] = [
+    Vector3::new(0.0, 0.0, 1.0),
+    Vector3::new(1.0, 0.0, 0.0),
+    Vector3::new(0.0, 1.0, 0.0),
+    Vector3::new(-1.0, 0.0, 0.0),
+    Vector3::new(0.0, -1.0, 0.0),
+];
+
+fn touch_ball_all_round(rig: &mut Rig, centre: Vector3<f64>) {
+    for (k, normal) in POLE_AND_RING.into_iter().enumerate() {
+        let from = centre + normal * 15.5;
+        rig.touch_ball(&format!("ball.{}", k + 1), from, -normal, 3.0);
+    }
+}
+
+#[test]
+fn a_sphere_is_evaluated_at_every_pose_of_a_rotary_test() {
+    let mut rig = Rig::new(&known_latency());
+    rig.segment(TestKind::Rotary, true, &["ball"]);
+    let poses = [(-0.5, 1.0), (0.2, -2.0), (0.2, -2.0)];
+    for (k, (a, c)) in poses.into_iter().enumerate() {
+        (rig.rotary[Axis::A], rig.rotary[Axis::C]) = (a, c);
+        touch_ball_all_round(&mut rig, Vector3::new(k as f64, 0.0, 90.0));
+    }
+    rig.segment(TestKind::Rotary, false, &["ball"]);
+    rig.settle();
+    let features = rig.features();
+    assert_eq!(features.len(), 3, "{:?}", rig.diagnostics());
+    for (k, (feature, (a, c))) in features.iter().zip(poses).enumerate() {
+        assert!((feature.centre_mm - Vector3::new(k as f64, 0.0, 90.0)).norm() < 1e-8);
+        assert!((feature.rotary_rad[Axis::A] - a).abs() < 1e-12);
+        assert!((feature.rotary_rad[Axis::C] - c).abs() < 1e-12);
+        let axes: Vec<_> = feature.rotary_axes.iter().collect();
+        assert_eq!(axes, [Axis::A, Axis::C]);
+    }
+}
+
+#[test]
+fn touches_at_two_poses_are_no_sphere() {
+    let mut rig = Rig::new(&known_latency());
+    rig.segment(TestKind::Rotary, true, &["ball"]);
+    for (k, normal) in POLE_AND_RING.into_iter().enumerate() {
+        rig.rotary[Axis::C] = if k < 3 { 0.0 } else { 1e-3 };
+        let from = Vector3::new(0.0, 0.0, 90.0) + normal * 15.5;
+        rig.touch_ball(&format!("ball.{}", k + 1), from, -normal, 3.0);
+    }
+    rig.segment(TestKind::Rotary, false, &["ball"]);
+    rig.settle();
+    assert!(rig.features().is_empty());
+    let said = rig.diagnostics();
+    let words = "ball was touched with axis C from 0.00000 to 0.05730 deg";
+    assert!(said.len() == 1 && said[0].contains(words), "{said:?}");
+}
+
 #[test]
 fn a_tilted_plane_has_its_normal_and_too_few_points_have_none() {
     let mut rig = Rig::new(&known_latency());
