@@ -41,6 +41,7 @@ mod latency;
 mod plane;
 mod program;
 mod reach;
+mod rotary;
 mod sphere;
 mod touch;
 
@@ -53,6 +54,7 @@ pub use feature::{FeatureId, artefact_id};
 pub use latency::latency;
 pub use plane::planes;
 pub use reach::{needed_overtravel_mm, needed_standoff_mm};
+pub use rotary::{RotaryOrder, rotary};
 pub use sphere::spheres;
 pub use touch::touches;
 

@@ -3,6 +3,7 @@
 use metrology::Axis;
 
 use crate::chain::ChainError;
+use crate::poses::PoseError;
 
 /// A machine file that is not a machine.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -231,6 +232,43 @@ pub enum CycleError {
         /// Normal, Z.
         z: f64,
     },
+    /// Rotary poses that cannot be used.
+    #[error("{source}")]
+    Pose {
+        /// Which and why.
+        source: PoseError,
+    },
+    /// A sphere that cannot be touched all round at a pose.
+    #[error("poses[{index}] ({} deg): {reason}", in_words(pose))]
+    PoseUnreachable {
+        /// Place in the list.
+        index: usize,
+        /// Positions of the rotary axes, deg.
+        pose: Vec<(Axis, f64)>,
+        /// Why.
+        reason: &'static str,
+    },
+    /// A turn that would swing a feature into the tool.
+    #[error(
+        "feature \"{feature}\": turning would lift it to {highest_mm:.1} mm, the tool waits at {lowest_mm:.1} mm"
+    )]
+    SwingsIntoTool {
+        /// The feature.
+        feature: String,
+        /// Its highest point during the turn, machine frame, mm.
+        highest_mm: f64,
+        /// Where the ball's lowest point is then, less a clearance, mm.
+        lowest_mm: f64,
+    },
+}
+
+/// Rotary positions in degrees, for a message.
+fn in_words(pose: &[(Axis, f64)]) -> String {
+    let words: Vec<String> = pose
+        .iter()
+        .map(|(axis, position_deg)| format!("{axis} {position_deg:.3}"))
+        .collect();
+    words.join(", ")
 }
 
 /// A probe axis that cannot be reached.

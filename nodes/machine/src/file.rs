@@ -38,6 +38,9 @@ pub struct MachineFile {
     /// Other probing artefacts on the table.
     #[serde(default)]
     pub artefacts: Vec<ArtefactEntry>,
+    /// The table, where rotary axes turn it; poses are then planned clear of it.
+    #[serde(default)]
+    pub table: Option<TableEntry>,
     /// Temperature sensors.
     #[serde(default)]
     pub temperature_sensors: Vec<SensorEntry>,
@@ -217,6 +220,18 @@ pub enum ArtefactEntry {
         /// Half the side of the square that is probed.
         half_side_mm: f64,
     },
+}
+
+/// A round table and what may not touch it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableEntry {
+    /// Height of its top, machine frame, rotary axes at zero.
+    pub top_z_mm: f64,
+    /// Its radius.
+    pub radius_mm: f64,
+    /// Radius of the spindle's nose.
+    pub nose_radius_mm: f64,
 }
 
 /// A temperature sensor.

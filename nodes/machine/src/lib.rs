@@ -3,7 +3,8 @@
 //! `file` reads the machine file, which describes a machine as its maker would. `chain` is the order
 //! of its axes from workpiece to tool; `kinematics` follows from it where ball and workpiece are and
 //! `orientation` which rotary positions point the probe a given way. `cycle` writes the programs
-//! that touch blocks, planes, bores, bosses and spheres. `export` turns measured errors into the tables that
+//! that touch blocks, planes, bores, bosses and spheres, `poses` plans at which rotary poses a sphere tells
+//! most. `export` turns measured errors into the tables that
 //! other controls load. `volumetric` is the geometric error of the tool tip anywhere in the working
 //! volume, component by component and all together, and what has to be commanded to undo it.
 
@@ -14,6 +15,7 @@ pub mod export;
 pub mod file;
 pub mod kinematics;
 pub mod orientation;
+pub mod poses;
 pub mod volumetric;
 
 pub use chain::{Chain, ChainError};
@@ -21,3 +23,4 @@ pub use error::{CycleError, MachineFileError, OrientationError};
 pub use file::MachineFile;
 pub use kinematics::{Kinematics, TableSense};
 pub use orientation::Orientation;
+pub use poses::{PoseError, SphereDesign};

@@ -2,14 +2,15 @@
 
 use std::fmt::Write as _;
 
-use metrology::Axis;
 use metrology::sample::TestKind;
+use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
 
 use super::reach::{check_feed, linear};
 use super::{Cycle, PlannedTouch};
 use crate::error::CycleError;
 use crate::file::MachineFile;
+use crate::poses::SphereDesign;
 
 /// Distance kept from the top of Z, so that a compensation can still be added to the command, mm.
 const TRAVEL_MARGIN_MM: f64 = 1.0;
@@ -61,6 +62,8 @@ pub(super) struct Program<'a> {
     features: Vec<String>,
     top_z_mm: f64,
     ball_radius_mm: f64,
+    /// Ball less linear positions, mm: what a turned head adds.
+    ball_from_slides_mm: Vector3<f64>,
 }
 
 impl<'a> Program<'a> {
@@ -77,6 +80,7 @@ impl<'a> Program<'a> {
             features: Vec::new(),
             top_z_mm,
             ball_radius_mm: file.ball_radius_mm(),
+            ball_from_slides_mm: Vector3::zeros(),
         };
         program.line(format_args!("G0 Z{}", Number(top_z_mm)));
         program.rotary_to_zero()?;
@@ -86,6 +90,23 @@ impl<'a> Program<'a> {
     /// Effective radius of the stylus ball, mm.
     pub(super) const fn ball_radius_mm(&self) -> f64 {
         self.ball_radius_mm
+    }
+
+    /// Position of Z at its top, mm.
+    pub(super) const fn top_z_mm(&self) -> f64 {
+        self.top_z_mm
+    }
+
+    /// Turns the rotary axes with the tool at the top of Z.
+    pub(super) fn turn_to(&mut self, design: &SphereDesign, pose_rad: &PerAxis<f64>) {
+        let top_z_mm = self.top_z_mm;
+        self.line(format_args!("G0 Z{}", Number(top_z_mm)));
+        let mut words = String::new();
+        for &axis in design.rotary_axes() {
+            let _ = write!(words, " {axis}{}", Number(pose_rad[axis].to_degrees()));
+        }
+        self.line(format_args!("G0{words}"));
+        self.ball_from_slides_mm = design.ball_from_slides_mm(pose_rad);
     }
 
     fn rotary_to_zero(&mut self) -> Result<(), CycleError> {
@@ -129,10 +150,10 @@ impl<'a> Program<'a> {
         self.line(format_args!("(feature: {})", touch.feature_id));
         self.line(format_args!(
             "G38.2 {} F{}",
-            Words(&target),
+            Words(&self.slides(&target)),
             Number(touch.feed_mm_min)
         ));
-        self.line(format_args!("G0 {}", Words(&start)));
+        self.line(format_args!("G0 {}", Words(&self.slides(&start))));
         self.touches.push(PlannedTouch {
             feature_id: touch.feature_id,
             approach: touch.approach,
@@ -151,17 +172,22 @@ impl<'a> Program<'a> {
         path: Path,
     ) -> Result<(), CycleError> {
         self.check_travel(feature, point)?;
+        let slides = self.slides(point);
         let height_mm = match path {
             Path::Straight => {
-                self.line(format_args!("G0 {}", Words(point)));
+                self.line(format_args!("G0 {}", Words(&slides)));
                 return Ok(());
             }
             Path::Over => self.top_z_mm,
-            Path::LowOver(height_mm) => height_mm.min(self.top_z_mm),
+            Path::LowOver(height_mm) => (height_mm - self.ball_from_slides_mm.z).min(self.top_z_mm),
         };
         self.line(format_args!("G0 Z{}", Number(height_mm)));
-        self.line(format_args!("G0 X{} Y{}", Number(point.x), Number(point.y)));
-        self.line(format_args!("G0 Z{}", Number(point.z)));
+        self.line(format_args!(
+            "G0 X{} Y{}",
+            Number(slides.x),
+            Number(slides.y)
+        ));
+        self.line(format_args!("G0 Z{}", Number(slides.z)));
         Ok(())
     }
 
@@ -185,7 +211,13 @@ impl<'a> Program<'a> {
         }
     }
 
-    fn check_travel(&self, feature: &str, point: &Vector3<f64>) -> Result<(), CycleError> {
+    /// Linear positions that put the ball's centre at a point.
+    fn slides(&self, ball_mm: &Vector3<f64>) -> Vector3<f64> {
+        ball_mm - self.ball_from_slides_mm
+    }
+
+    fn check_travel(&self, feature: &str, ball_mm: &Vector3<f64>) -> Result<(), CycleError> {
+        let point = self.slides(ball_mm);
         for axis in Axis::LINEAR {
             let [least, greatest] = linear(self.file, axis)?.travel_mm;
             let position = point[axis.index()];

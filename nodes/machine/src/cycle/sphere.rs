@@ -12,7 +12,7 @@ use crate::error::CycleError;
 use crate::file::{ArtefactEntry, MachineFile};
 
 /// Least number of points: four determine a sphere, the fifth shows its form.
-const LEAST_POINTS: u32 = 5;
+pub(super) const LEAST_POINTS: u32 = 5;
 /// From this number on, half of the ring's points move to a second ring at 45°.
 const TWO_RINGS: u32 = 9;
 
@@ -67,7 +67,7 @@ pub fn spheres(
 }
 
 /// Outward normals of the points: pole, equator, 45°.
-fn normals(points: u32) -> Vec<Vector3<f64>> {
+pub(super) fn normals(points: u32) -> Vec<Vector3<f64>> {
     let upper = if points < TWO_RINGS {
         0
     } else {

@@ -41,6 +41,7 @@ impl MachineFile {
         )?;
         check.probe(self)?;
         check.features(self)?;
+        check.table(self)?;
         check.sensors(self)?;
         check.grid_and_effects(self)
     }
@@ -315,6 +316,15 @@ impl Check<'_> {
                 self.positive(&format!("{key}.half_side_mm"), *half_side_mm)
             }
         }
+    }
+
+    fn table(&self, file: &MachineFile) -> Result<(), MachineFileError> {
+        let Some(table) = &file.table else {
+            return Ok(());
+        };
+        self.finite("table.top_z_mm", &[table.top_z_mm])?;
+        self.positive("table.radius_mm", table.radius_mm)?;
+        self.positive("table.nose_radius_mm", table.nose_radius_mm)
     }
 
     fn sensors(&self, file: &MachineFile) -> Result<(), MachineFileError> {
