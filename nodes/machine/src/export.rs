@@ -44,6 +44,7 @@ mod grid;
 pub mod heidenhain;
 pub mod linuxcnc;
 mod number;
+pub mod selection;
 pub mod sinumerik;
 
 pub use axis_errors::AxisErrors;

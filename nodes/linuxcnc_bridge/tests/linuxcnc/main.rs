@@ -16,5 +16,6 @@ mod cycles;
 mod faults;
 mod latency;
 mod rig;
+mod screw_error;
 mod start;
 mod tilted;

@@ -85,13 +85,17 @@ fn pause(time: Duration) {
 impl Rig {
     /// LinuxCNC running, homed, and seen by the bridge; `None` where it is not installed.
     pub fn new(scenario_name: &str) -> Option<Self> {
+        Self::of_folder(&scenario(scenario_name))
+    }
+
+    /// The same with the scenario in any folder.
+    pub fn of_folder(folder: &Path) -> Option<Self> {
         if !installed() {
             return None;
         }
         let turn = ONE_AT_A_TIME
             .lock()
             .unwrap_or_else(|poisoned| poisoned.into_inner());
-        let folder = scenario(scenario_name);
         let file: BTreeMap<String, NodeParameters> =
             serde_saphyr::from_str(&read(&folder.join("linuxcnc_bridge.yaml"))).unwrap();
         let config = file.into_values().next().unwrap().parameters;

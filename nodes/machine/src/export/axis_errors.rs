@@ -76,18 +76,7 @@ impl AxisErrors {
     /// A grid of another axis, or a point beyond the first or last own one.
     pub fn on_grid(&self, grid: &Grid) -> Result<Self, ExportError> {
         let position: Vec<f64> = grid.positions().collect();
-        let (least, greatest) = self.span();
-        for &at in &position {
-            if grid.axis() != self.axis || !(least - SAME..=greatest + SAME).contains(&at) {
-                let (axis, position) = (grid.axis(), at);
-                return Err(ExportError::OutsideMeasured {
-                    axis,
-                    position,
-                    least,
-                    greatest,
-                });
-            }
-        }
+        check_inside(self.axis, grid.axis(), &self.position, &position)?;
         let sample = |error: &[f64]| -> Vec<f64> {
             position
                 .iter()
@@ -288,6 +277,26 @@ pub(super) fn equal_spacing(
     }
     let n = position.len() - 1;
     Ok((position[n] - position[0]) / n as f64)
+}
+
+/// Every point of another axis' or the same axis' grid lies between the first and last own point.
+pub(super) fn check_inside(
+    own: Axis,
+    axis: Axis,
+    measured: &[f64],
+    wanted: &[f64],
+) -> Result<(), ExportError> {
+    let (least, greatest) = (measured[0], measured[measured.len() - 1]);
+    let inside = |at: &f64| (least - SAME..=greatest + SAME).contains(at);
+    match wanted.iter().find(|at| own != axis || !inside(at)) {
+        Some(&position) => Err(ExportError::OutsideMeasured {
+            axis,
+            position,
+            least,
+            greatest,
+        }),
+        None => Ok(()),
+    }
 }
 
 /// Value at `at` on straight lines between the points, held beyond the outer ones.

@@ -22,7 +22,7 @@ use metrology::sample::{CurveForm, ErrorCurve, GeometryModel};
 use metrology::{Axis, ErrorComponent};
 use nalgebra::Vector3;
 
-use super::axis_errors::{check_positions, check_values, on_line};
+use super::axis_errors::{check_inside, check_positions, check_values, on_line};
 use super::error::ExportError;
 use super::grid::{Grid, SAME};
 
@@ -102,6 +102,27 @@ impl CrossErrors {
             }
         }
         Self::new(base, direction, position, error, components.to_vec())
+    }
+
+    /// The same errors at the points of `grid`, on straight lines between the own points.
+    ///
+    /// # Errors
+    /// A grid of another axis, or a point beyond the first or last own one.
+    pub fn on_grid(&self, grid: &Grid) -> Result<Self, ExportError> {
+        let position: Vec<f64> = grid.positions().collect();
+        check_inside(self.base, grid.axis(), &self.position, &position)?;
+        let error = position
+            .iter()
+            .map(|at| on_line(&self.position, &self.error, *at))
+            .collect();
+        let (base, direction) = (self.base, self.direction);
+        Self::new(base, direction, position, error, self.parts.clone())
+    }
+
+    /// Whether a component acts in `direction` as a function of `base`.
+    #[must_use]
+    pub fn acts(component: ErrorComponent, base: Axis, direction: Axis) -> bool {
+        share(component, base, direction).is_ok()
     }
 
     /// The axis on whose position it depends.

@@ -91,7 +91,7 @@ impl Grid {
         let first = ((span.0 - SAME) / spacing).ceil();
         let last = ((span.1 + SAME) / spacing).floor();
         // A span that is no number gives no points, which `new` refuses by name.
-        let count = (last - first).max(-1.0) as usize + usize::from(last >= first);
+        let count = ((last - first).max(-1.0) as usize).saturating_add(usize::from(last >= first));
         Self::new(axis, first * spacing, spacing, count, span)
     }
 
@@ -143,6 +143,7 @@ mod tests {
             Grid::inside(Axis::X, 500.0, (1.0, 100.0)),
             Grid::inside(Axis::X, 5.0, (f64::NAN, 100.0)),
             Grid::inside(Axis::X, 1e-5, travel),
+            Grid::inside(Axis::X, 1.0, (f64::NEG_INFINITY, f64::INFINITY)),
         ];
         let names: Vec<String> = refused
             .into_iter()
@@ -159,6 +160,7 @@ mod tests {
                 "axis X: 0 points: at least 2 are needed",
                 "axis X: start[0] = NaN: must be finite",
                 "axis X: 20000001 points: a grid takes at most 100000",
+                "axis X: start[0] = -inf: must be finite",
             ]
         );
     }

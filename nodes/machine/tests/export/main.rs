@@ -12,5 +12,6 @@ mod fanuc;
 mod heidenhain;
 mod linuxcnc;
 mod refusals;
+mod selection;
 mod sinumerik;
 mod slide;
