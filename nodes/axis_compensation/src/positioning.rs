@@ -59,8 +59,14 @@
 //! every distance of points is not even seen. Deviations of the slide that the scale does not see (Abbe,
 //! growth of the scale itself) stay.
 //!
+//! # Agreement
+//! On an axis with physics of its own (`tests/positioning`; lead error up to 6 µm, cyclic error 0.8 µm, lost
+//! motion 5 µm), rms of slide less command over slow strokes: semi-closed 5.16 µm, dual loop 0.59 µm, full closed
+//! 0.11 µm (`the_dual_loop_lies_between_semi_closed_and_full_closed`). After growth by 38 µm/m a fixed table leaves
+//! 7.80 µm, one refreshed with ω = 0.3 0.62 µm (`a_table_that_is_refreshed_follows_a_screw_that_grows`).
+//!
 //! # References
-//! [1] CN 1562563 A, claim 1, steps (1) to (4).
+//! CN 1562563 A, claim 1, steps (1) to (4).
 
 pub mod config;
 pub mod deviation_table;

@@ -1,6 +1,6 @@
 //! The servo tick allocates nothing.
 
-use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input};
+use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output};
 use metrology::drift::{Extrapolate, axis_drift_at};
 use metrology::sample::{AxisDrift, AxisState, ThermalModel};
 use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
@@ -31,6 +31,16 @@ fn model() -> ThermalModel {
     }
 }
 
+/// Both readings; X passes points slowly enough to refresh its table.
+const POSITIONING: &str = "\
+    X: {reading: refreshed_table, weight: 0.3, directions: apart, thermal_part: true, \
+        measured_limit_um: 50.0, measuring_feed_limit_mm_min: 60000.0, \
+        start_points_mm: [-50.0, -40.0, -30.0, -20.0, -10.0, 0.0], \
+        start_deviations_um: [0.0, 1.0, 2.0, 3.0, 3.0, 10.0]}, \
+    Y: {reading: weighted_increments, weight: 0.2, directions: together, thermal_part: true, \
+        measured_limit_um: 50.0, measuring_feed_limit_mm_min: 60000.0, loop_cycle_s: 0.002, \
+        start_points_mm: [-40.0, -20.0, 0.0, 20.0, 40.0], start_deviations_um: [0.0, 5.0, -2.0, 3.0, 3.0]}";
+
 #[test]
 fn a_thousand_ticks_allocate_nothing() {
     let machine = include_str!("../../../launch_configs/first_run/machine.yaml");
@@ -38,7 +48,7 @@ fn a_thousand_ticks_allocate_nothing() {
         "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
     let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
         "{{axes: {{X: {{{limits}}}, Y: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: linear, \
-         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0}}"
+         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0, positioning: {{{POSITIONING}}}}}"
     ))
     .unwrap();
     let mut stage =
@@ -62,7 +72,7 @@ fn a_thousand_ticks_allocate_nothing() {
                 axes: AxisSet::XYZ,
                 commanded,
                 motor: commanded,
-                scale: commanded,
+                scale: PerAxis::from_fn(|axis| commanded[axis] + 2e-3),
                 velocity: PerAxis::default(),
             };
             stage
@@ -75,6 +85,13 @@ fn a_thousand_ticks_allocate_nothing() {
         }
     });
     assert_eq!(measured.count_total, 0);
+    // The table of X was refreshed meanwhile: a tick of the host now publishes it anew.
+    out.clear();
+    stage
+        .step(Stamp::from_nanos(1_000_000_000), Input::Tick, &mut out)
+        .unwrap();
+    let refreshed = |output: &Output| matches!(output, Output::Table(table) if table.axis == Axis::X && table.sequence == 6);
+    assert!(out.iter().any(refreshed), "{out:?}");
 }
 
 #[test]

@@ -3,7 +3,9 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output};
-use metrology::sample::{AxisCompensation, AxisDrift, AxisState, ThermalModel};
+use metrology::sample::{
+    AxisCompensation, AxisDrift, AxisState, Sense, TestKind, TestPlane, TestSegment, ThermalModel,
+};
 use metrology::{Axis, AxisSet, Host, Machine, PerAxis, Stage, Stamp};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -17,13 +19,23 @@ const PULSE_MM: f64 = 1e-4;
 // At full rate an offset can stop within the time that counts as a gap.
 const _: () = assert!(RATE_MM_S / ACCELERATION_MM_S2 <= GAP_S);
 
+const POSITIONING: &str = "\
+    X: {reading: refreshed_table, weight: 0.3, directions: apart, thermal_part: true, \
+        measured_limit_um: 5000.0, measuring_feed_limit_mm_min: 60000.0, settle_s: 0.0, dwell_s: 0.01, \
+        start_points_mm: [-50.0, -40.0, -30.0, -20.0, -10.0, 0.0], \
+        start_deviations_um: [0.0, 50.0, -120.0, 3.0, 3.0, 10.0], \
+        start_deviations_down_um: [0.0, -50.0, 20.0, 3.0, -3.0, 10.0]}, \
+    Y: {reading: weighted_increments, weight: 0.2, directions: together, thermal_part: false, \
+        measured_limit_um: 5000.0, measuring_feed_limit_mm_min: 60000.0, loop_cycle_s: 0.002, \
+        start_points_mm: [-40.0, -20.0, 0.0, 20.0, 40.0], start_deviations_um: [0.0, 50.0, -20.0, 3.0, 3.0]}";
+
 fn stage(extrapolate: &str) -> AxisCompensationStage {
     let machine = include_str!("../../../launch_configs/first_run/machine.yaml");
     let limits =
         "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
     let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
         "{{axes: {{X: {{{limits}}}, Y: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: {extrapolate}, \
-         physical_rate_um_per_min: 3.0, jump_margin_um: 20.0, hold_s: 0.1, fade_s: 0.2, gap_s: 0.2}}"
+         physical_rate_um_per_min: 3.0, jump_margin_um: 20.0, hold_s: 0.1, fade_s: 0.2, gap_s: 0.2, positioning: {{{POSITIONING}}}}}"
     ))
     .unwrap();
     AxisCompensationStage::new(&config, &serde_saphyr::from_str(machine).unwrap()).unwrap()
@@ -78,6 +90,11 @@ enum Event {
         step_nanos: i64,
         position_mm: [f64; 3],
         all_axes: bool,
+        beyond_motor_mm: f64,
+    },
+    Test {
+        begin: bool,
+        completed: bool,
     },
     Model {
         k0_mm: f64,
@@ -123,8 +140,9 @@ fn event() -> impl Strategy<Value = Event> {
     prop_oneof![
         3 => (-320.0..320.0_f64, -320.0..320.0_f64, 50..3000_u32)
             .prop_map(|(from_mm, to_mm, ticks)| Event::Sweep { from_mm, to_mm, ticks }),
-        40 => (spacing(), position(), position(), position(), prop::bool::weighted(0.95))
-            .prop_map(|(step_nanos, x, y, z, all_axes)| Event::State { step_nanos, position_mm: [x, y, z], all_axes }),
+        40 => (spacing(), position(), position(), position(), prop::bool::weighted(0.95), number(-0.05..0.05))
+            .prop_map(|(step_nanos, x, y, z, all_axes, beyond_motor_mm)| Event::State { step_nanos, position_mm: [x, y, z], all_axes, beyond_motor_mm }),
+        2 => (any::<bool>(), any::<bool>()).prop_map(|(begin, completed)| Event::Test { begin, completed }),
         4 => (number(-0.15..0.15), number(-3e-4..3e-4), number(0.0..2.0), number(-1e-4..1e-4))
             .prop_map(|(k0_mm, slope, life_s, rate_mm_s)| Event::Model { k0_mm, slope, life_s, rate_mm_s }),
         2 => any::<bool>().prop_map(Event::Enable),
@@ -132,6 +150,29 @@ fn event() -> impl Strategy<Value = Event> {
         2 => (-1_000_000_000..1_000_000_000_i64).prop_map(|host_nanos| Event::Wait { host_nanos }),
         1 => prop::bool::weighted(0.1).prop_map(|b| if b { Event::Shutdown } else { Event::Tick }),
     ]
+}
+
+fn segment(at: Stamp<Host>, begin: bool, completed: bool) -> TestSegment {
+    TestSegment {
+        at,
+        run: 1,
+        begin,
+        kind: TestKind::Positioning,
+        plane: TestPlane::None,
+        centre_mm: Vector3::zeros(),
+        radius_mm: 0.0,
+        feed_mm_s: 1.0,
+        sense: Sense::None,
+        repeat: 0,
+        stylus: String::new(),
+        zero_id: 0,
+        setup_id: 0,
+        tool_offset_mm: Vector3::zeros(),
+        stations: 0,
+        cold: false,
+        features: Vec::new(),
+        completed,
+    }
 }
 
 /// Follows the outputs and checks each against the one before.
@@ -200,6 +241,7 @@ impl Bench {
                 step_nanos: 1_000_000,
                 position_mm: [x_mm, 0.0, -x_mm],
                 all_axes: true,
+                beyond_motor_mm: 0.03 * (0.05 * x_mm).sin(),
             })?;
         }
         Ok(())
@@ -240,26 +282,21 @@ impl Bench {
                 step_nanos,
                 position_mm,
                 all_axes,
+                beyond_motor_mm,
             } => {
                 self.machine_nanos = self.machine_nanos.saturating_add(step_nanos);
                 self.host_nanos = self
                     .host_nanos
                     .saturating_add(step_nanos.clamp(0, 1_000_000_000));
-                let mut commanded = PerAxis::default();
-                for (axis, p) in Axis::LINEAR.into_iter().zip(position_mm) {
-                    commanded[axis] = p;
-                }
+                let [x_mm, y_mm, z_mm] = position_mm;
+                let commanded = PerAxis([x_mm, y_mm, z_mm, 0.0, 0.0, 0.0]);
                 let state = AxisState {
                     received_at: Stamp::from_nanos(self.host_nanos),
                     controller_at: Stamp::<Machine>::from_nanos(self.machine_nanos),
-                    axes: if all_axes {
-                        AxisSet::XYZ
-                    } else {
-                        AxisSet::EMPTY.with(Axis::Y)
-                    },
+                    axes: [AxisSet::EMPTY.with(Axis::Y), AxisSet::XYZ][usize::from(all_axes)],
                     commanded,
                     motor: commanded,
-                    scale: commanded,
+                    scale: PerAxis::from_fn(|axis| commanded[axis] + beyond_motor_mm),
                     velocity: PerAxis::default(),
                 };
                 (Input::State(state), true)
@@ -283,6 +320,10 @@ impl Bench {
                     false,
                 )
             }
+            Event::Test { begin, completed } => (
+                Input::Segment(Box::new(segment(at, begin, completed))),
+                false,
+            ),
             Event::Enable(on) => (Input::Enable(on), false),
             Event::Tick => (Input::Tick, false),
             Event::Wait { host_nanos } => {
@@ -352,7 +393,7 @@ proptest! {
             let input = if by_ticks {
                 Input::Tick
             } else {
-                let state = Event::State { step_nanos: 0, position_mm: [0.0; 3], all_axes: true };
+                let state = Event::State { step_nanos: 0, position_mm: [0.0; 3], all_axes: true, beyond_motor_mm: 0.0 };
                 bench.input(&state).0
             };
             bench.stage.step(Stamp::from_nanos(bench.host_nanos), input, &mut out).unwrap();
