@@ -8,5 +8,6 @@
 
 mod bad_topics;
 mod graph;
+mod interruptions;
 mod kills;
 mod refusals;

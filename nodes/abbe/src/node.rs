@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Args;
+use nix::sys::signal::{Signal, raise};
 use node_runtime::{Composition, Node, Setup};
 
 /// What builds a node from its setup.
@@ -41,6 +42,9 @@ pub fn names() -> String {
 /// Arguments of `abbe node`.
 #[derive(Args)]
 pub struct NodeVerb {
+    /// Stop when standard input ends: for whoever starts nodes and may be killed.
+    #[arg(long)]
+    while_input_is_open: bool,
     /// Which node.
     name: String,
     /// Arguments as of any ROS 2 node: `--ros-args -r … -p … --params-file …`.
@@ -59,10 +63,20 @@ impl NodeVerb {
             );
             return ExitCode::from(2);
         };
+        if self.while_input_is_open {
+            std::thread::spawn(stop_at_end_of_input);
+        }
         node_runtime::run_composed(vec![Composition {
             name: self.name,
             arguments: self.arguments,
             build: Box::new(build),
         }])
     }
+}
+
+/// Waits for the end of standard input, then asks this process to stop as a terminal would.
+fn stop_at_end_of_input() {
+    // What is written there, and an error, mean nothing: either way it is over.
+    let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+    let _ = raise(Signal::SIGTERM);
 }

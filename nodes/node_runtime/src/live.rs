@@ -122,8 +122,7 @@ pub fn launch(
         .build()
         .context("tokio runtime")?;
     log::start(&[], environment.log_filter.as_deref());
-    let (stop, stopped) = watch::channel(false);
-    let mut tasks = JoinSet::new();
+    let mut shifts = [Shift::new(), Shift::new()];
     let mut seen = BTreeSet::new();
     for (setup, _) in &nodes {
         let name = setup.names().fully_qualified();
@@ -150,6 +149,7 @@ pub fn launch(
     }
     for (setup, node, participant, warning) in joined {
         let name = setup.names().fully_qualified();
+        let shift = &mut shifts[usize::from(node.stops_last())];
         let _inside = runtime.enter();
         let owner = assembly::assemble(&setup, node, participant)
             .with_context(|| format!("node {name}"))?;
@@ -157,23 +157,42 @@ pub fn launch(
         if let Some(warning) = warning {
             span.in_scope(|| tracing::warn!("{warning}"));
         }
-        tasks.spawn_on(
-            owner.run(stopped.clone()).instrument(span),
-            runtime.handle(),
-        );
+        let stopped = shift.stop.subscribe();
+        shift
+            .tasks
+            .spawn_on(owner.run(stopped).instrument(span), runtime.handle());
     }
-    Ok(Running {
-        runtime,
-        stop,
-        tasks,
-    })
+    Ok(Running { runtime, shifts })
+}
+
+/// Nodes that stop together.
+struct Shift {
+    stop: watch::Sender<bool>,
+    tasks: JoinSet<()>,
+}
+
+impl Shift {
+    fn new() -> Self {
+        Self {
+            stop: watch::Sender::new(false),
+            tasks: JoinSet::new(),
+        }
+    }
+
+    /// The next task that ends; never where there is none.
+    async fn next(&mut self) -> Result<(), tokio::task::JoinError> {
+        match self.tasks.join_next().await {
+            Some(ended) => ended,
+            None => std::future::pending().await,
+        }
+    }
 }
 
 /// Nodes that are on the ROS graph.
 pub struct Running {
     runtime: Runtime,
-    stop: watch::Sender<bool>,
-    tasks: JoinSet<()>,
+    /// In the order in which they stop: controllers last.
+    shifts: [Shift; 2],
 }
 
 impl Running {
@@ -182,11 +201,13 @@ impl Running {
     /// # Errors
     /// When a node ended by a panic; the others have been stopped then.
     pub fn until_signal(mut self) -> anyhow::Result<()> {
-        let Self { runtime, tasks, .. } = &mut self;
+        let Self { runtime, shifts } = &mut self;
+        let [first, last] = shifts;
         let ended: Option<anyhow::Result<()>> = runtime.block_on(async {
             tokio::select! {
                 signal = signal() => signal.err().map(Err),
-                ended = tasks.join_next() => ended.map(|outcome| outcome.map_err(Into::into)),
+                ended = first.next() => Some(ended.map_err(Into::into)),
+                ended = last.next() => Some(ended.map_err(Into::into)),
             }
         });
         let stopped = self.stop();
@@ -196,28 +217,30 @@ impl Running {
 
     /// Why a node has ended although nobody asked it to; `None`: all are at work.
     pub fn ended(&mut self) -> Option<anyhow::Error> {
-        let ended = self.tasks.try_join_next()?;
+        let mut shifts = self.shifts.iter_mut();
+        let ended = shifts.find_map(|shift| shift.tasks.try_join_next())?;
         Some(match ended {
             Ok(()) => anyhow::anyhow!("a node ended"),
             Err(error) => anyhow::Error::new(error).context("a node ended by a panic"),
         })
     }
 
-    /// Asks all nodes to stop and waits until they have.
+    /// Asks all nodes to stop and waits until they have, controllers last.
     ///
     /// # Errors
     /// When a node ended by a panic.
     pub fn stop(mut self) -> anyhow::Result<()> {
-        let _ = self.stop.send(true);
-        let outcome = self.runtime.block_on(async {
-            let mut outcome = Ok(());
-            while let Some(ended) = self.tasks.join_next().await {
-                if let Err(error) = ended {
-                    outcome = Err(error);
+        let mut outcome = Ok(());
+        for shift in &mut self.shifts {
+            let _ = shift.stop.send(true);
+            self.runtime.block_on(async {
+                while let Some(ended) = shift.tasks.join_next().await {
+                    if let Err(error) = ended {
+                        outcome = Err(error);
+                    }
                 }
-            }
-            outcome
-        });
+            });
+        }
         outcome.context("a node ended by a panic")
     }
 }

@@ -16,6 +16,9 @@ use crate::parameter::Parameter;
 /// Serialised message: encapsulation header and CDR.
 pub type Bytes = Arc<[u8]>;
 
+/// How long winding down may take unless a node says otherwise.
+pub const PATIENCE: Span = Span::from_nanos(5_000_000_000);
+
 /// Names a goal between a node and its runner; unique per server or client port.
 pub type GoalId = u64;
 
@@ -212,6 +215,16 @@ pub trait Node: Send {
 
     /// Its parameters as resolved at the start; frozen from then on.
     fn parameters(&self) -> &[Parameter];
+
+    /// How long it may take from [`Event::Shutdown`] to [`Emission::Stopped`]; it is stopped by force after that.
+    fn patience(&self) -> Span {
+        PATIENCE
+    }
+
+    /// Whether it stops only when the others have, as a controller that others wind down through.
+    fn stops_last(&self) -> bool {
+        false
+    }
 
     /// Handles one event that happened `at`.
     ///

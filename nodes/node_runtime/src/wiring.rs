@@ -24,7 +24,9 @@ use metrology::Stage;
 use metrology::stamp::{Host, Span, Stamp};
 
 use crate::diagnostic::Diagnostic;
-use crate::node::{Bytes, Emission, Event, Node, NodeFault, Ports, ServicePort, TopicPort};
+use crate::node::{
+    Bytes, Emission, Event, Node, NodeFault, PATIENCE, Ports, ServicePort, TopicPort,
+};
 use crate::parameter::Parameter;
 
 mod action;
@@ -59,6 +61,8 @@ pub struct Wiring<S: Stage> {
     emitters: Vec<Emit<S::Output>>,
     shutdown: Option<Box<dyn Fn() -> S::Input + Send>>,
     stopped: Option<Satisfied<S::Output>>,
+    patience: Span,
+    last: bool,
     outputs: Vec<S::Output>,
 }
 
@@ -104,6 +108,8 @@ where
             emitters: Vec::new(),
             shutdown: None,
             stopped: None,
+            patience: PATIENCE,
+            last: false,
             outputs: Vec::new(),
         }
     }
@@ -280,6 +286,20 @@ where
         self
     }
 
+    /// Lets winding down take as long as this rather than 5 s.
+    #[must_use]
+    pub fn wound_down_within(mut self, patience: Span) -> Self {
+        self.patience = patience;
+        self
+    }
+
+    /// Stops this node only when the others of the process have stopped.
+    #[must_use]
+    pub fn stops_last(mut self) -> Self {
+        self.last = true;
+        self
+    }
+
     /// Closes the table.
     #[must_use]
     pub fn node(self) -> Box<dyn Node> {
@@ -405,6 +425,14 @@ where
 
     fn parameters(&self) -> &[Parameter] {
         &self.parameters
+    }
+
+    fn patience(&self) -> Span {
+        self.patience
+    }
+
+    fn stops_last(&self) -> bool {
+        self.last
     }
 
     fn handle(

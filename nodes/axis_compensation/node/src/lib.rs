@@ -14,6 +14,9 @@ mod conditions;
 /// Time between two looks at what is stale.
 const TICK: Span = Span::from_nanos(10_000_000);
 
+/// What the limits of rate and acceleration add to the time of a last fade, s.
+const FADE_MARGIN_S: f64 = 5.0;
+
 /// Builds the node.
 ///
 /// # Errors
@@ -48,6 +51,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         })
         .diagnose(conditions::condition)
         .shutdown(|| Input::Shutdown, |output| *output == Output::FadedOut)
+        .wound_down_within(Span::from_secs_f64(config.fade_s + FADE_MARGIN_S))
         .node())
 }
 

@@ -58,5 +58,5 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
             forms::temperature(output, &id)
         })?;
     }
-    Ok(wiring.node())
+    Ok(wiring.stops_last().node())
 }

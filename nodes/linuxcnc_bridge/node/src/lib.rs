@@ -46,5 +46,6 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
             || LiveInput::Shutdown,
             |output| matches!(output, Output::Stopped),
         )
+        .stops_last()
         .node())
 }

@@ -1,6 +1,7 @@
 //! From a node's ports to endpoints on the network.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use abbe_msgs::{Message, Qos, topics};
 use anyhow::Context as _;
@@ -260,6 +261,7 @@ pub(super) fn assemble(
     };
     assembly.participant.announce()?;
     let fully_qualified = setup.names().fully_qualified();
+    let patience_s = node.patience().as_secs_f64().max(0.0);
     let parameters: Vec<Parameter> = with_sim_time(node.parameters(), setup);
     Ok(Owner {
         board: Board::new(&fully_qualified),
@@ -284,6 +286,7 @@ pub(super) fn assemble(
         last_event: Stamp::from_nanos(i64::MIN),
         next_request: 0,
         requests: std::collections::BTreeMap::new(),
+        patience: Duration::from_secs_f64(patience_s),
         stopping_since: None,
         stopped: false,
         has_told_parameters: false,

@@ -106,6 +106,7 @@ pub(super) struct Owner {
     pub last_event: Stamp<Host>,
     pub next_request: RequestId,
     pub requests: BTreeMap<(usize, RequestId), (usize, ReplyTo)>,
+    pub patience: Duration,
     pub stopping_since: Option<Instant>,
     pub stopped: bool,
     pub has_told_parameters: bool,
@@ -117,8 +118,6 @@ pub(super) struct Owner {
 /// How long it takes until everybody has met: `/parameter_events` is volatile, and what is said on it
 /// before is heard by nobody.
 const MEETING: Duration = Duration::from_millis(900);
-/// How long a node may take to wind down.
-const PATIENCE: Duration = Duration::from_secs(5);
 /// How long the last samples may take to be acknowledged.
 const ACKNOWLEDGEMENT: Duration = Duration::from_secs(1);
 /// How long the last news of the graph may take; it is a courtesy.
@@ -179,7 +178,7 @@ impl Owner {
     }
 
     fn is_done(&self) -> bool {
-        let patience_over = |since: Instant| now().duration_since(since) >= PATIENCE;
+        let patience_over = |since: Instant| now().duration_since(since) >= self.patience;
         self.stopping_since
             .is_some_and(|since| self.stopped || patience_over(since))
     }
@@ -199,7 +198,7 @@ impl Owner {
             );
         }
         self.stopping_since
-            .map_or(wake, |since| wake.min(since + PATIENCE))
+            .map_or(wake, |since| wake.min(since + self.patience))
     }
 
     fn begin_to_stop(&mut self) {
@@ -334,7 +333,7 @@ impl Owner {
     /// Stop reading, say the last things, wait until they have arrived, leave the graph.
     async fn finish(mut self) {
         if !self.stopped {
-            let message = format!("not wound down after {} s", PATIENCE.as_secs());
+            let message = format!("not wound down after {} s", self.patience.as_secs_f64());
             self.notice(Diagnostic::new(Level::Error, "stop_forced", message));
         }
         if let Timers::Host(Some(timers)) = self.timers {

@@ -10,16 +10,18 @@ use nix::unistd::Pid;
 
 use crate::launch::LaunchNode;
 
-/// A process that was told to stop is killed after this time.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// A process that was told to stop is killed after this time; a node has a limit of its own below it.
+const PATIENCE: Duration = Duration::from_secs(90);
 /// Between two looks at processes that stop.
 const LOOK: Duration = Duration::from_millis(20);
-/// Nodes without which no plan goes on: the sequencer and the controllers.
-const NEEDED: [&str; 3] = ["sequencer", "fake_cnc", "linuxcnc_bridge"];
+/// They stop last, so that compensation fades through them.
+const CONTROLLERS: [&str; 2] = ["fake_cnc", "linuxcnc_bridge"];
+/// With the controllers, the node without which no plan goes on.
+const CONDUCTOR: &str = "sequencer";
 
 struct Process {
     name: String,
-    needed: bool,
+    exec: String,
     child: Child,
     ended: bool,
 }
@@ -37,16 +39,17 @@ impl Processes {
         let mut processes = Self(Vec::with_capacity(nodes.len()));
         for node in nodes {
             let child = Command::new(&program)
-                .args(["node", &node.exec])
+                .args(["node", "--while-input-is-open", &node.exec])
                 .args(node.ros_args())
                 // A Ctrl-C at the terminal reaches this program alone, which then stops them in order.
                 .process_group(0)
-                .stdin(Stdio::null())
+                // It closes with this program, however that ends.
+                .stdin(Stdio::piped())
                 .spawn()
                 .with_context(|| format!("process of node {}", node.name))?;
             processes.0.push(Process {
                 name: node.name.clone(),
-                needed: NEEDED.contains(&node.exec.as_str()),
+                exec: node.exec.clone(),
                 child,
                 ended: false,
             });
@@ -62,7 +65,7 @@ impl Processes {
                 process.ended = true;
                 let word = format!("node {} ended: {}", process.name, in_words(status));
                 eprintln!("abbe: {word}");
-                if process.needed && reason.is_none() {
+                if process.is_needed() && reason.is_none() {
                     reason = Some(word);
                 }
             }
@@ -76,16 +79,22 @@ impl Processes {
     }
 
     fn end(&mut self) {
-        for process in self.0.iter().filter(|process| !process.ended) {
+        self.end_those(|process| !CONTROLLERS.contains(&process.exec.as_str()));
+        self.end_those(|_| true);
+    }
+
+    fn end_those(&mut self, which: fn(&Process) -> bool) {
+        let open = |process: &Process| !process.ended && which(process);
+        for process in self.0.iter().filter(|process| open(process)) {
             // It is a child that nobody has waited for: its number is still its own.
             if let Ok(number) = i32::try_from(process.child.id()) {
                 let _ = kill(Pid::from_raw(number), Signal::SIGTERM);
             }
         }
         let deadline = Instant::now() + PATIENCE;
-        while self.0.iter().any(|process| !process.ended) {
+        while self.0.iter().any(open) {
             let late = Instant::now() >= deadline;
-            for process in self.0.iter_mut().filter(|process| !process.ended) {
+            for process in self.0.iter_mut().filter(|process| open(process)) {
                 process.settle(late);
             }
             std::thread::sleep(LOOK);
@@ -94,6 +103,11 @@ impl Processes {
 }
 
 impl Process {
+    fn is_needed(&self) -> bool {
+        let exec = self.exec.as_str();
+        exec == CONDUCTOR || CONTROLLERS.contains(&exec)
+    }
+
     fn settle(&mut self, late: bool) {
         match self.child.try_wait() {
             Ok(Some(status)) => {

@@ -1,0 +1,158 @@
+//! Runs and recordings that are called off, and a run that is killed over its nodes.
+
+use std::time::{Duration, Instant};
+
+use abbe_msgs::topics;
+use abbe_tests::program::{Process, command, domain};
+use abbe_tests::scenario::Scenario;
+use metrology::sample::CompensationState;
+use nix::sys::signal::Signal;
+use recorder::{Bag, Event, Order};
+
+use crate::graph::Graph;
+
+/// A cell in real time takes this long to its first probed point, with discovery.
+const FIRST_POINT: Duration = Duration::from_secs(60);
+const END: Duration = Duration::from_secs(30);
+
+fn started(scenario: &Scenario, domain: u16, more: &[&str]) -> (Graph, Process) {
+    let graph = Graph::join(domain);
+    let mut command = command(domain, &["run"]);
+    command
+        .arg(scenario.folder())
+        .arg("--out")
+        .arg(scenario.out());
+    command.args(more);
+    let began = Instant::now();
+    let run = Process::start(command);
+    graph.wait_longer(FIRST_POINT, "a probed point", |graph| {
+        (!graph.since(&topics::PROBE_POINT, began).is_empty()).then_some(())
+    });
+    (graph, run)
+}
+
+/// Topics of a closed bag with their number of messages; it must be whole.
+fn whole(bag: &Bag) -> Vec<(String, u64)> {
+    let mut counts = std::collections::BTreeMap::<String, u64>::new();
+    let mut messages = bag.messages(Order::LogTime);
+    while let Some(event) = messages.next_event() {
+        match event {
+            Event::Message(message) => {
+                let name = bag.topic(message.topic).topic.clone();
+                *counts.entry(name).or_default() += 1;
+            }
+            Event::Loss(loss) => panic!("{loss:?}"),
+        }
+    }
+    counts.into_iter().collect()
+}
+
+#[test]
+fn an_interrupted_run_closes_its_bag_and_writes_its_page() {
+    for more in [&[][..], &["--separate"]] {
+        let scenario = Scenario::copy_of("short_cell");
+        let (graph, run) = started(&scenario, domain(9), more);
+        let asked = Instant::now();
+        run.signal(Signal::SIGINT);
+        let ended = run.ended_within(END);
+        eprintln!("{more:?}: SIGINT to exit: {:?}", asked.elapsed());
+        assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+        assert!(ended.said.contains("it was interrupted"), "{}", ended.said);
+        let folder = scenario.new_run(&[]);
+        assert!(folder.join("report.html").is_file());
+        let counts = whole(&Bag::open(folder.join("bag")).unwrap());
+        assert!(
+            counts
+                .iter()
+                .any(|(topic, n)| topic == "/probe/point" && *n > 0),
+            "{counts:?}"
+        );
+        let last = graph.inner_since(&topics::COMPENSATION, asked).pop();
+        if let Some(last) = last {
+            assert!(
+                last.total.0.iter().all(|offset| offset.abs() < 1e-9),
+                "{last:?}"
+            );
+            assert!(
+                last.state
+                    .0
+                    .iter()
+                    .all(|state| *state != CompensationState::Active)
+            );
+        }
+    }
+}
+
+#[test]
+fn nodes_of_a_killed_run_stop_by_themselves() {
+    let scenario = Scenario::copy_of("short_cell");
+    let (graph, run) = started(&scenario, domain(10), &["--separate"]);
+    run.signal(Signal::SIGKILL);
+    let _ = run.ended_within(END);
+    let killed = Instant::now();
+    let silent = Duration::from_secs(3);
+    graph.wait_longer(END, "silence of every node", |graph| {
+        let since = Instant::now().checked_sub(silent)?;
+        let is_over = killed.elapsed() > silent
+            && graph.since(&topics::AXES_STATE, since).is_empty()
+            && graph.since(&topics::DIAGNOSTICS, since).is_empty();
+        is_over.then_some(())
+    });
+    eprintln!("silent {:?} after the kill", killed.elapsed() - silent);
+}
+
+#[test]
+fn a_node_that_dies_in_a_separate_run_is_named_and_the_plan_ends() {
+    let scenario = Scenario::copy_of("short_cell");
+    let (_graph, run) = started(&scenario, domain(11), &["--separate"]);
+    let killed = std::process::Command::new("pkill")
+        .args(["-KILL", "-f"])
+        .arg(format!(
+            "node --while-input-is-open fake_cnc.*{}",
+            scenario.folder().display()
+        ))
+        .status()
+        .unwrap();
+    assert!(killed.success(), "{killed}");
+    let ended = run.ended_within(END);
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+    assert!(
+        ended.said.contains("node fake_cnc ended: signal: 9"),
+        "{}",
+        ended.said
+    );
+    whole(&Bag::open(scenario.new_run(&[]).join("bag")).unwrap());
+}
+
+#[test]
+fn a_recording_ends_with_sigint_and_holds_what_was_said() {
+    let scenario = Scenario::copy_of("short_cell");
+    let domain = domain(12);
+    let bag = scenario.out().join("recorded");
+    std::fs::create_dir_all(scenario.out()).unwrap();
+    let mut command = command(domain, &["record", "-o"]);
+    command.arg(&bag).args(["/probe/*", "/test/segment"]);
+    let recording = Process::start(command);
+    let runs = Scenario::copy_of("short_cell");
+    let (_graph, run) = started(&runs, domain, &[]);
+    run.signal(Signal::SIGTERM);
+    let _ = run.ended_within(END);
+    let said = recording.stop();
+    assert!(said.contains("0 lost"), "{said}");
+    let counts = whole(&Bag::open(&bag).unwrap());
+    eprintln!("{counts:?}");
+    let n = |name: &str| {
+        counts
+            .iter()
+            .find(|(topic, _)| topic == name)
+            .map_or(0, |(_, n)| *n)
+    };
+    assert!(
+        n("/probe/point") > 0 && n("/probe/trigger") >= n("/probe/point"),
+        "{counts:?}"
+    );
+    assert!(
+        n("/test/segment") > 0 && n("/axes/state") == 0,
+        "{counts:?}"
+    );
+}
