@@ -6,7 +6,6 @@
 mod coverage;
 mod exact;
 mod laws;
-mod peer_program;
 mod refusals;
 mod scipy;
 
