@@ -8,6 +8,7 @@ use metrology::drift::Extrapolate;
 use serde::{Deserialize, Serialize};
 
 use crate::error::AxisCompensationError;
+use crate::geometric::GeometricConfig;
 use crate::parameters::{ACCELERATION_UM_PER_S2, PARAMETERS, RATE_UM_PER_S, SIZE_UM};
 use crate::positioning::config::PositioningConfig;
 
@@ -36,6 +37,9 @@ pub struct AxisCompensationConfig {
     /// Dual loop of the axes that have a scale, or a table of their own.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub positioning: BTreeMap<Axis, PositioningConfig>,
+    /// What the geometric part needs; without it geometry models are not used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<GeometricConfig>,
     /// Machine file, relative to the parameter file; read by whoever builds the node.
     #[serde(default)]
     pub machine_file: String,
@@ -104,7 +108,9 @@ impl AxisCompensationConfig {
             }
             positioning.check(axis, machine)?;
         }
-        Ok(())
+        self.geometry
+            .as_ref()
+            .map_or(Ok(()), GeometricConfig::check)
     }
 }
 

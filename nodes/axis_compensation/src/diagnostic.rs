@@ -1,8 +1,10 @@
 //! What the stage has to say besides its offsets; each is in the bag and on `/diagnostics`.
 
+use machine::volumetric::VolumetricError;
 use metrology::Axis;
 use metrology::sample::CompensationState;
 
+use crate::geometric::GeometrySource;
 use crate::parts::PartRefusal;
 use crate::positioning::refusal::PositioningRefusal;
 
@@ -18,7 +20,7 @@ pub enum Severity {
 }
 
 /// A condition worth reporting; each is said when it begins, not at every tick.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(
     missing_docs,
     reason = "each sentence names its fields with their units"
@@ -63,6 +65,36 @@ pub enum Diagnostic {
     ModelDoubtful { sequence: u32 },
     #[error("thermal model {sequence} is used without objection")]
     ModelAccepted { sequence: u32 },
+    #[error("{model} {sequence} is used")]
+    GeometryAccepted {
+        model: GeometrySource,
+        sequence: u32,
+    },
+    #[error("{model} {sequence} confirms the change and is used")]
+    GeometryConfirmed {
+        model: GeometrySource,
+        sequence: u32,
+    },
+    #[error(
+        "{model} {sequence} changes the tip's error by {change_mm:.6} mm, {limit_mm} mm are allowed; kept back"
+    )]
+    GeometryQuarantined {
+        model: GeometrySource,
+        sequence: u32,
+        change_mm: f64,
+        limit_mm: f64,
+    },
+    #[error("{model} {sequence} is refused: {cause}")]
+    GeometryRefused {
+        model: GeometrySource,
+        sequence: u32,
+        cause: Box<VolumetricError>,
+    },
+    #[error("{model} {sequence} is not used: the parameters have no `geometry`")]
+    GeometryUnused {
+        model: GeometrySource,
+        sequence: u32,
+    },
     #[error("{cause}; not learned")]
     RunRefused { cause: PositioningRefusal },
     #[error("axis {axis}: {runs} of {needed} runs for a table")]
@@ -114,6 +146,8 @@ impl Diagnostic {
             | Self::TableLearned { .. }
             | Self::ScaleBack { .. }
             | Self::MeasurementBelieved { .. }
+            | Self::GeometryAccepted { .. }
+            | Self::GeometryConfirmed { .. }
             | Self::ModelConfirmed { .. } => Severity::Info,
             Self::StateChanged { to, cause, .. } => match to {
                 CompensationState::Active => Severity::Info,
@@ -121,7 +155,7 @@ impl Diagnostic {
                 CompensationState::Off => Severity::Info,
                 _ => Severity::Warn,
             },
-            Self::ModelNotFinite { .. } => Severity::Error,
+            Self::ModelNotFinite { .. } | Self::GeometryRefused { .. } => Severity::Error,
             _ => Severity::Warn,
         }
     }
@@ -157,6 +191,14 @@ impl Diagnostic {
             | Self::ModelNotFinite { .. }
             | Self::ModelDoubtful { .. }
             | Self::ModelAccepted { .. } => "model",
+            Self::GeometryAccepted { model, .. }
+            | Self::GeometryConfirmed { model, .. }
+            | Self::GeometryQuarantined { model, .. }
+            | Self::GeometryRefused { model, .. }
+            | Self::GeometryUnused { model, .. } => match model {
+                GeometrySource::Linear => "geometry",
+                GeometrySource::Rotary => "geometry_rotary",
+            },
             Self::StatesStale { .. } | Self::Gap { .. } => "axis_states",
             Self::ClockWentBack { .. } => "controller_clock",
             Self::Enabled { .. } | Self::ShuttingDown => "switch",

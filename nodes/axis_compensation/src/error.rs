@@ -1,5 +1,6 @@
 //! What is refused when the node starts. Bad input while it runs is a [`crate::Diagnostic`].
 
+use machine::ChainError;
 use metrology::Axis;
 
 use crate::positioning::refusal::PositioningRefusal;
@@ -80,5 +81,11 @@ pub enum AxisCompensationError {
         /// Why.
         #[from]
         source: PositioningRefusal,
+    },
+    /// The chain of the machine file cannot be read.
+    #[error("chain of the machine file: {source}")]
+    Chain {
+        /// Where and why.
+        source: ChainError,
     },
 }

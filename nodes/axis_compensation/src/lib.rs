@@ -4,8 +4,9 @@
 //! commanded and the models known. The readings of a warm machine have drifted by d(p), so that
 //! the same place is reached by commanding p + d(p): the thermal part of the offset is +d(p).
 //! An axis with a linear scale may have a dual loop (`positioning`): what lies between its motor and its
-//! slide is learned point by point, and minus that deviation is the positioning part. `parts` holds the
-//! sum; the geometric part has its place in it.
+//! slide is learned point by point, and minus that deviation is the positioning part. The
+//! geometric part (`geometric`) is minus the error of the tip that the published geometry models give.
+//! `parts` holds the sum.
 //!
 //! Compensation moves a real axis, so nothing else than `limiter` decides what leaves the node: it
 //! follows its target without ever exceeding the axis' size, rate or acceleration, whatever the
@@ -27,6 +28,7 @@ pub mod config;
 pub mod diagnostic;
 pub mod error;
 pub mod femtometre;
+pub mod geometric;
 pub mod limiter;
 pub mod model_gate;
 pub mod parameters;

@@ -2,6 +2,7 @@
 
 use metrology::ParameterDoc;
 
+use crate::geometric::JUMP_LIMIT_UM;
 use crate::positioning::config;
 
 pub(crate) const SIZE_UM: (f64, f64) = (0.1, 5000.0);
@@ -264,6 +265,17 @@ pub const PARAMETERS: &[ParameterDoc] = &[
     list("positioning.Z.start_points_mm", "mm", "as for X"),
     list("positioning.Z.start_deviations_um", "µm", "as for X"),
     list("positioning.Z.start_deviations_down_um", "µm", "as for X"),
+    list(
+        "geometry.tool_offset_mm",
+        "mm",
+        "from the machine file's functional point to the tip that works, X Y Z; without geometry no geometry model is used",
+    ),
+    row(
+        "geometry.jump_limit_um",
+        "µm",
+        JUMP_LIMIT_UM,
+        "greatest change of the tip's error between two geometry models that is not a jump",
+    ),
     ParameterDoc {
         name: "machine_file",
         unit: "",

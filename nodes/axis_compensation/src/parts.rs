@@ -4,6 +4,7 @@
 //!   offset = thermal + geometric + positioning,   thermal = +d(p)                 (1)
 //! ```
 //!
+//! The geometric part is `geometric`'s own: minus the tip's error, in machine directions.
 //! The positioning part is `positioning`'s own: −Δ, the deviation of the slide from its motor.
 //!
 //! Sign by physics: the control reads p + d where it read p when cold, so p + d has to be commanded
@@ -12,6 +13,7 @@
 
 use std::mem::discriminant;
 
+use machine::volumetric::PoseRefusal;
 use metrology::drift::{DriftRefusal, Extrapolate, axis_drift_at};
 use metrology::sample::ThermalModel;
 use metrology::{Axis, Host, Stamp};
@@ -24,7 +26,7 @@ use crate::positioning::refusal::PositioningRefusal;
 pub struct Parts {
     /// Thermal drift.
     pub thermal: f64,
-    /// Geometric errors; nothing yet.
+    /// Geometric errors.
     pub geometric: f64,
     /// Deviation of the slide from its motor.
     pub positioning: f64,
@@ -48,6 +50,12 @@ pub enum PartRefusal {
         #[from]
         source: DriftRefusal,
     },
+    /// The geometric part.
+    #[error("geometry model gives no offset: {source}")]
+    Geometric {
+        /// What the model said.
+        source: PoseRefusal,
+    },
     /// The positioning part.
     #[error("positioning: {source}")]
     Positioning {
@@ -65,6 +73,9 @@ impl PartRefusal {
                 discriminant(one) == discriminant(two)
             }
             (Self::Positioning { source: one }, Self::Positioning { source: two }) => {
+                discriminant(one) == discriminant(two)
+            }
+            (Self::Geometric { source: one }, Self::Geometric { source: two }) => {
                 discriminant(one) == discriminant(two)
             }
             _ => false,

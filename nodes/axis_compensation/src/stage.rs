@@ -3,8 +3,10 @@
 use std::convert::Infallible;
 
 use machine::MachineFile;
-use metrology::drift::{DriftRefusal, Extrapolate};
-use metrology::sample::{AxisCompensation, AxisState, PositioningTable, TestSegment, ThermalModel};
+use metrology::drift::{DriftRefusal, Extrapolate, axis_drift_at};
+use metrology::sample::{
+    AxisCompensation, AxisState, GeometryModel, PositioningTable, TestSegment, ThermalModel,
+};
 use metrology::stamp::Span;
 use metrology::{Axis, AxisSet, Host, Machine, PerAxis, Stage, Stamp};
 use nalgebra::Vector3;
@@ -13,13 +15,15 @@ use crate::axis_state::{AxisState as Compensated, LetGo, Wanted};
 use crate::config::AxisCompensationConfig;
 use crate::diagnostic::Diagnostic;
 use crate::error::AxisCompensationError;
+use crate::geometric::{Geometric, GeometrySource};
 use crate::limiter::Limits;
 use crate::model_gate::ModelGate;
-use crate::parts::{PartRefusal, Parts, parts_at};
+use crate::parts::{PartRefusal, Parts};
 use crate::positioning::dual_loop::DualLoop;
 use crate::pulses::PulseTrain;
 
 mod dual;
+mod geometry;
 mod remarks;
 
 /// What the stage is told.
@@ -33,6 +37,8 @@ pub enum Input {
     State(AxisState),
     /// A new thermal model.
     Model(Box<ThermalModel>),
+    /// A new geometry model.
+    Geometry(GeometrySource, Box<GeometryModel>),
     /// A test begins or ends.
     Segment(Box<TestSegment>),
     /// Compensation on or off.
@@ -67,6 +73,7 @@ pub struct AxisCompensationStage {
     states: PerAxis<Option<Compensated>>,
     trains: PerAxis<PulseTrain>,
     positioning: PerAxis<Option<DualLoop>>,
+    geometric: Option<Geometric>,
     refused: PerAxis<Option<PartRefusal>>,
     gate: ModelGate,
     policy: Extrapolate,
@@ -140,6 +147,10 @@ impl AxisCompensationStage {
         for (&axis, own) in &config.positioning {
             positioning[axis] = Some(DualLoop::new(axis, own, machine, train.pulse_fm())?);
         }
+        let geometric = config
+            .geometry
+            .as_ref()
+            .map(|own| Geometric::new(own, machine, config.extrapolate));
         Ok(Self {
             axes: config.axes.keys().copied().collect(),
             states,
@@ -151,6 +162,7 @@ impl AxisCompensationStage {
             policy: config.extrapolate,
             trains: PerAxis::from_fn(|_| train),
             positioning,
+            geometric: geometric.transpose()?,
             servo_period_s,
             gap: Span::from_secs_f64(config.gap_s),
             enabled: config.enabled,
@@ -177,6 +189,16 @@ impl AxisCompensationStage {
             }
         });
         self.read_axes(at, state, elapsed, out);
+        if let Some(geometric) = &mut self.geometric {
+            let known = |axis| {
+                if state.axes.contains(axis) {
+                    state.commanded[axis]
+                } else {
+                    f64::NAN
+                }
+            };
+            geometric.observe(&PerAxis::from_fn(known));
+        }
         self.drive(at, Some(&commanded_mm), elapsed, out);
     }
 
@@ -272,23 +294,28 @@ impl AxisCompensationStage {
             .filter(|_| commanded_mm.is_some());
         let positioning = dual_loop.map_or(Ok(None), DualLoop::offset_mm)?;
         let adds_thermal = dual_loop.is_none_or(DualLoop::adds_thermal);
+        let geometric = self
+            .geometric
+            .as_ref()
+            .filter(|_| commanded_mm.is_some())
+            .map_or(Ok(None), |geometric| geometric.offset_mm(axis))
+            .map_err(|source| PartRefusal::Geometric { source })?;
         let thermal = match (self.gate.current(), commanded_mm) {
             (Some(model), Some(p_mm)) if adds_thermal => {
-                parts_at(model, axis, p_mm, at, self.policy)
+                axis_drift_at(model, axis, p_mm, at, self.policy)
             }
             _ => Err(DriftRefusal::NotModelled { axis }),
         };
-        match (thermal, positioning) {
-            (Ok(parts), positioning) => Ok(Parts {
-                positioning: positioning.unwrap_or_default(),
-                ..parts
-            }),
-            (Err(DriftRefusal::NotModelled { .. }), Some(positioning)) => Ok(Parts {
-                positioning,
-                ..Parts::default()
-            }),
-            (Err(source), _) => Err(source.into()),
-        }
+        let speaks = geometric.is_some() || positioning.is_some();
+        let thermal = match thermal {
+            Err(DriftRefusal::NotModelled { .. }) if speaks => 0.0,
+            thermal => thermal?,
+        };
+        Ok(Parts {
+            thermal,
+            geometric: geometric.unwrap_or_default(),
+            positioning: positioning.unwrap_or_default(),
+        })
     }
 
     fn wanted(
@@ -381,6 +408,7 @@ impl Stage for AxisCompensationStage {
         match input {
             Input::State(state) => self.state(at, &state, out),
             Input::Model(model) => self.model(*model, out),
+            Input::Geometry(source, model) => self.geometry(source, *model, out),
             Input::Segment(segment) => self.segment(at, &segment, out),
             Input::Enable(enabled) => {
                 if enabled != self.enabled {

@@ -3,6 +3,7 @@
 use abbe_msgs::std_srvs::srv::{SetBoolRequest, SetBoolResponse};
 use abbe_msgs::topics;
 use anyhow::Result;
+use axis_compensation::geometric::GeometrySource;
 use axis_compensation::parameters::PARAMETERS;
 use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output};
 use machine::MachineFile;
@@ -31,6 +32,12 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         .on(&topics::AXES_STATE, Input::State)
         .on(&topics::THERMAL_MODEL, |model| {
             Input::Model(Box::new(model))
+        })
+        .on(&topics::GEOMETRY_MODEL, |model| {
+            Input::Geometry(GeometrySource::Linear, Box::new(model))
+        })
+        .on(&topics::GEOMETRY_ROTARY, |model| {
+            Input::Geometry(GeometrySource::Rotary, Box::new(model))
         })
         .on(&topics::TEST_SEGMENT, |segment| {
             Input::Segment(Box::new(segment))

@@ -22,7 +22,7 @@ use metrology::PerAxis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::PoseRefusal;
-use super::model::{Joint, VolumetricModel, turned_about};
+use super::model::{Tips, VolumetricModel, turned_about};
 use crate::kinematics::direction_of;
 
 /// Steps of this size are rounding, mm.
@@ -45,7 +45,7 @@ impl VolumetricModel {
     ) -> Result<PerAxis<f64>, PoseRefusal> {
         self.check_pose(commanded, tool_offset_mm)?;
         let tips = self.tips(commanded, tool_offset_mm);
-        let step_mm = self.in_axes(commanded, &(tips.nominal_mm - tips.actual_mm))?;
+        let step_mm = self.in_axes(&tips, &(tips.nominal_mm - tips.actual_mm))?;
         Ok(self.offsets(&step_mm))
     }
 
@@ -60,12 +60,12 @@ impl VolumetricModel {
         tool_offset_mm: &Vector3<f64>,
     ) -> Result<PerAxis<f64>, PoseRefusal> {
         self.check_pose(commanded, tool_offset_mm)?;
-        let wanted_mm = self.tips(commanded, tool_offset_mm).nominal_mm;
+        let wanted = self.tips(commanded, tool_offset_mm);
         let mut offset = PerAxis::default();
         for _ in 0..MOST_STEPS {
             let moved = PerAxis::from_fn(|axis| commanded[axis] + offset[axis]);
-            let left_mm = wanted_mm - self.tips(&moved, tool_offset_mm).actual_mm;
-            let step = self.offsets(&self.in_axes(commanded, &left_mm)?);
+            let left_mm = wanted.nominal_mm - self.tips(&moved, tool_offset_mm).actual_mm;
+            let step = self.offsets(&self.in_axes(&wanted, &left_mm)?);
             offset = PerAxis::from_fn(|axis| offset[axis] + step[axis]);
             if step.xyz().norm() < SETTLED_MM {
                 break;
@@ -84,38 +84,23 @@ impl VolumetricModel {
     }
 
     /// Motion of the linear axes that moves the tip by a vector of the workpiece frame: J^-1 v.
-    fn in_axes(
-        &self,
-        positions: &PerAxis<f64>,
-        v: &Vector3<f64>,
-    ) -> Result<Vector3<f64>, PoseRefusal> {
-        let tables = || {
-            self.links
-                .iter()
-                .rev()
-                .filter(|l| l.member.carries_workpiece)
-        };
+    fn in_axes(&self, tips: &Tips, v: &Vector3<f64>) -> Result<Vector3<f64>, PoseRefusal> {
         if self.linear_on_bed {
-            return Ok(tables().fold(*v, |v, link| match link.joint {
-                Joint::Linear { .. } => v,
-                Joint::Rotary { sense, .. } => {
-                    let axis = link.member.axis;
-                    let back = (-sense * positions[axis]).sin_cos();
-                    turned_about(axis.index() % 3, back, &v)
-                }
+            let tables = self.links.iter().rev();
+            let tables = tables.filter(|l| l.member.carries_workpiece && l.is_rotary());
+            return Ok(tables.fold(*v, |v, link| {
+                let (sin, cos) = tips.turn[link.member.axis];
+                turned_about(link.member.axis.index() % 3, (-sin, cos), &v)
             }));
         }
         let mut directions = Matrix3::<f64>::zeros();
         for (place, link) in self.links.iter().enumerate() {
             let axis = link.member.axis;
             if axis.is_linear() {
-                let nearer = self.links.iter().skip(place);
-                let direction = nearer.fold(direction_of(axis), |d, link| match link.joint {
-                    Joint::Linear { .. } => d,
-                    Joint::Rotary { sense, .. } => {
-                        let turn = (sense * positions[link.member.axis]).sin_cos();
-                        turned_about(link.member.axis.index() % 3, turn, &d)
-                    }
+                let nearer = self.links.iter().skip(place).filter(|l| l.is_rotary());
+                let direction = nearer.fold(direction_of(axis), |d, link| {
+                    let axis = link.member.axis;
+                    turned_about(axis.index() % 3, tips.turn[axis], &d)
                 });
                 directions.set_column(axis.index(), &direction);
             }

@@ -8,7 +8,7 @@
 //!   R(w) v = v + a w x v + b w x (w x v),   a = sin|w|/|w|,   b = (1 - cos|w|)/|w|^2       (1)
 //! ```
 //!
-//! with the series of a and b where |w| < 0.01, which is exact to the last bit there. The nominal tip is
+//! with the series of a and b where |w| < 0.001, which is exact to the last bit there. The nominal tip is
 //! moved beside it; their difference is the error.
 //!
 //! # Agreement
@@ -71,6 +71,8 @@ pub(super) enum Joint {
 pub(super) struct Tips {
     pub(super) nominal_mm: Vector3<f64>,
     pub(super) actual_mm: Vector3<f64>,
+    /// Sine and cosine of each rotary member's nominal turn of the tip.
+    pub(super) turn: PerAxis<(f64, f64)>,
 }
 
 impl VolumetricModel {
@@ -195,6 +197,7 @@ impl VolumetricModel {
         let mut tips = Tips {
             nominal_mm: *tool_offset_mm,
             actual_mm: *tool_offset_mm,
+            turn: PerAxis::default(),
         };
         for link in &self.links {
             link.move_on(positions[link.member.axis], self.policy, &mut tips);
@@ -234,6 +237,10 @@ impl VolumetricModel {
 }
 
 impl Link {
+    pub(super) const fn is_rotary(&self) -> bool {
+        matches!(self.joint, Joint::Rotary { .. })
+    }
+
     fn shifts_datum(&self) -> bool {
         matches!(self.joint, Joint::Rotary { zero_rad, .. } if zero_rad.abs() > 0.0)
             && self.member.carries_workpiece
@@ -264,6 +271,7 @@ impl Link {
             } => {
                 let angle_rad = sense * position;
                 let nominal = angle_rad.sin_cos();
+                tips.turn[self.member.axis] = nominal;
                 let arm_mm = tips.nominal_mm - nominal_origin_mm;
                 tips.nominal_mm = nominal_origin_mm + turned_about(row, nominal, &arm_mm);
                 let actual = if zero_rad.abs() > 0.0 {
@@ -362,12 +370,16 @@ fn linear_on_bed(chain: &Chain) -> bool {
 
 /// R(w) v, equation (1).
 pub(super) fn turned(w: &Vector3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
-    const SMALL: f64 = 1e-4;
+    // Below 1 mrad the next term of either series is less than 1e-21.
+    const SMALL: f64 = 1e-6;
     let square = w.norm_squared();
     let (a, b) = if square < SMALL {
-        let a = 1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0));
-        let b = 0.5 - square / 24.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0));
-        (a, b)
+        const A: (f64, f64) = (1.0 / 6.0, 1.0 / 120.0);
+        const B: (f64, f64) = (1.0 / 24.0, 1.0 / 720.0);
+        (
+            1.0 - square * (A.0 - square * A.1),
+            0.5 - square * (B.0 - square * B.1),
+        )
     } else {
         let angle = square.sqrt();
         (angle.sin() / angle, (1.0 - angle.cos()) / square)
