@@ -219,19 +219,19 @@ fn combination(
 ) -> Result<sample::EstimableCombination, WireError> {
     let read = Reader::of::<EstimableCombination>();
     read.length("weight", wire.weight.len(), wire.coefficient.len())?;
-    let weight =
-        |(place, (idx, weight)): (usize, (&u32, &f64))| {
-            let factor = factors.get(*idx as usize).copied().ok_or_else(|| {
-                WireError::NoSuchCoefficient {
-                    message: EstimableCombination::TYPE_NAME,
-                    place: Place::Entry(place),
-                    value: *idx,
-                    len: factors.len(),
-                }
+    let weight = |(place, (idx, weight)): (usize, (&u32, &f64))| {
+        let factor = factors
+            .get(*idx as usize)
+            .copied()
+            .ok_or(WireError::NoSuchCoefficient {
+                message: EstimableCombination::TYPE_NAME,
+                place: Place::Entry(place),
+                value: *idx,
+                len: factors.len(),
             })?;
-            let weight = read.number("weight", Place::Entry(place), *weight, Allowed::Finite)?;
-            Ok((*idx, millimetres(weight) * factor))
-        };
+        let weight = read.number("weight", Place::Entry(place), *weight, Allowed::Finite)?;
+        Ok((*idx, millimetres(weight) * factor))
+    };
     let pairs = wire.coefficient.iter().zip(&wire.weight).enumerate();
     Ok(sample::EstimableCombination {
         weights: pairs.map(weight).collect::<Result<_, WireError>>()?,
