@@ -6,6 +6,7 @@
 //! to the command. Axes follow ISO 841.
 
 pub mod axis;
+pub mod breakdown;
 pub mod drift;
 pub mod error_component;
 pub mod fit;

@@ -1,0 +1,268 @@
+//! Which columns the recordings tell apart, and what would tell the others apart.
+//!
+//! # Model
+//!
+//! Columns are taken in order. With Q the orthonormal columns so far:
+//!
+//! ```text
+//!   sine_j = |x_j − Q Qᵀ x_j| / |x_j|                                         (1)
+//!   sine_j ≥ least sine: kept;  else  x_j ≈ Σ a_ij x_i over the kept           (2)
+//!   X β = Σ_kept x_i (β_i + Σ_j a_ij β_j)                                      (3)
+//! ```
+//!
+//! So what is fitted for a kept column is the bracket of (3), whatever the single β are: it is the
+//! estimable combination, and the only one to which the data give a number.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::plane::Input;
+use super::recording::{CircularRecording, CircularSample, CircularSense, ReferenceLength};
+use super::report::Needed;
+use super::scene::Scene;
+use super::term::{RowKey, Term};
+
+/// Shares of a column below this are rounding.
+const NO_SHARE: f64 = 1e-6;
+
+/// A column that is a combination of kept ones, (2).
+#[derive(Clone, Debug)]
+pub(super) struct Dependent {
+    /// Its place among the columns.
+    pub column: usize,
+    /// a of (2), by place of the kept column.
+    pub aliases: Vec<(usize, f64)>,
+}
+
+/// Columns sorted into kept and dependent ones.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Reduction {
+    pub kept: Vec<usize>,
+    pub dependent: Vec<Dependent>,
+    /// Columns that are zero everywhere.
+    pub unseen: Vec<usize>,
+}
+
+/// Orthonormal columns with the triangle that made them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Basis {
+    q: Vec<DVector<f64>>,
+    /// Column k: coordinates of the k-th kept column in q.
+    triangle: Vec<Vec<f64>>,
+}
+
+impl Basis {
+    /// Coordinates of `x` in the basis and what is left of it.
+    pub fn split(&self, x: &DVector<f64>) -> (Vec<f64>, DVector<f64>) {
+        let mut left = x.clone();
+        let mut coordinates = vec![0.0; self.q.len()];
+        // Twice, so that the rest is orthogonal to rounding.
+        for _ in 0..2 {
+            for (q, coordinate) in self.q.iter().zip(&mut coordinates) {
+                let share = q.dot(&left);
+                *coordinate += share;
+                left.axpy(-share, q, 1.0);
+            }
+        }
+        (coordinates, left)
+    }
+
+    /// Takes `x` into the basis unless it is nearly in its span, (1).
+    pub fn take(&mut self, x: &DVector<f64>, least_sine: f64) -> Result<(), Vec<f64>> {
+        let (mut coordinates, left) = self.split(x);
+        let length = left.norm();
+        if length < least_sine * x.norm() {
+            return Err(self.solve(&coordinates));
+        }
+        self.q.push(left / length);
+        coordinates.push(length);
+        self.triangle.push(coordinates);
+        Ok(())
+    }
+
+    /// Coefficients over the kept columns of what has these coordinates.
+    fn solve(&self, coordinates: &[f64]) -> Vec<f64> {
+        let mut rest = coordinates.to_vec();
+        let mut found = vec![0.0; rest.len()];
+        for k in (0..rest.len()).rev() {
+            let column = &self.triangle[k];
+            found[k] = rest[k] / column[k];
+            for (r, c) in rest.iter_mut().zip(column) {
+                *r -= found[k] * c;
+            }
+        }
+        found
+    }
+}
+
+/// The stacked design of some terms.
+pub(super) fn design(scene: &Scene, terms: &[Term]) -> DMatrix<f64> {
+    let mut design = DMatrix::zeros(scene.n_rows, terms.len());
+    for (j, term) in terms.iter().enumerate() {
+        for (row, (trace, point)) in scene.rows().enumerate() {
+            design[(row, j)] = term.at(scene, trace, point);
+        }
+    }
+    design
+}
+
+/// (1) and (2) for all columns.
+pub(super) fn reduce(design: &DMatrix<f64>, least_sine: f64) -> Reduction {
+    let mut basis = Basis::default();
+    let mut reduction = Reduction::default();
+    let norms: Vec<f64> = design.column_iter().map(|column| column.norm()).collect();
+    for column in 0..design.ncols() {
+        if norms[column] == 0.0 {
+            reduction.unseen.push(column);
+            continue;
+        }
+        match basis.take(&design.column(column).into_owned(), least_sine) {
+            Ok(()) => reduction.kept.push(column),
+            Err(shares) => {
+                let counts = |kept: usize, share: f64| {
+                    (share * norms[kept]).abs() > NO_SHARE.max(least_sine) * norms[column]
+                };
+                let aliases = reduction.kept.iter().copied().zip(shares);
+                let aliases = aliases
+                    .filter(|(kept, share)| counts(*kept, *share))
+                    .collect();
+                reduction.dependent.push(Dependent { column, aliases });
+            }
+        }
+    }
+    reduction
+}
+
+/// Additions each of which, or which together, would tell a row apart from the others.
+pub(super) fn needed(input: &Input, key: RowKey) -> Vec<Vec<Needed>> {
+    let helps = |additions: &[Needed]| {
+        let mut recordings: Vec<CircularRecording> = input
+            .recordings
+            .iter()
+            .map(|(_, recording)| (*recording).clone())
+            .collect();
+        for addition in additions {
+            add(&mut recordings, *addition);
+        }
+        is_kept(input, &recordings, key)
+    };
+    let singles: Vec<Vec<Needed>> = Needed::ALL
+        .into_iter()
+        .map(|one| vec![one])
+        .filter(|one| helps(one))
+        .collect();
+    if !singles.is_empty() {
+        return singles;
+    }
+    let pairs = Needed::ALL.into_iter().enumerate().flat_map(|(i, one)| {
+        Needed::ALL
+            .into_iter()
+            .skip(i + 1)
+            .map(move |other| vec![one, other])
+    });
+    pairs.filter(|pair| helps(pair)).collect()
+}
+
+/// Whether a linear row is told apart from all others in some recordings.
+fn is_kept(input: &Input, recordings: &[CircularRecording], key: RowKey) -> bool {
+    let listed: Vec<_> = recordings.iter().enumerate().collect();
+    let scene = Scene::new(input.plane, &listed);
+    let terms = Term::linear(&scene);
+    let reduction = reduce(&design(&scene, &terms), input.config.least_sine);
+    let is_own = |column: usize| terms[column].row(&scene) == key;
+    let is_entangled =
+        |d: &Dependent| is_own(d.column) || d.aliases.iter().any(|(kept, _)| is_own(*kept));
+    !reduction.unseen.iter().any(|column| is_own(*column))
+        && !reduction.dependent.iter().any(is_entangled)
+}
+
+/// Adds a recording like the first one but for one thing, or changes what is known of all.
+fn add(recordings: &mut Vec<CircularRecording>, addition: Needed) {
+    let fresh = recordings
+        .iter()
+        .map(|r| r.zero_id)
+        .max()
+        .map_or(0, |last| last.wrapping_add(1));
+    let Some(first) = recordings.first() else {
+        return;
+    };
+    let mut new = CircularRecording {
+        zero_id: fresh,
+        ..first.clone()
+    };
+    match addition {
+        Needed::OtherSense => {
+            new.sense = first.sense.reversed();
+            for sample in &mut new.samples {
+                sample.angle_rad = -sample.angle_rad;
+            }
+        }
+        Needed::OtherFeed => {
+            new.zero_id = first.zero_id;
+            new.feed_mm_s *= 0.5;
+            for sample in &mut new.samples {
+                sample.time_s *= 2.0;
+            }
+        }
+        Needed::OtherRadius => new.radius_mm *= 0.5,
+        Needed::OtherRadiusSameZero => {
+            new.zero_id = first.zero_id;
+            new.radius_mm *= 0.5;
+        }
+        Needed::FullCircle => new.samples = full_circle(first),
+        Needed::CalibratedReference => {
+            for recording in &mut *recordings {
+                recording.reference = ReferenceLength::Calibrated {
+                    standard_uncertainty_mm: 0.0,
+                };
+            }
+            return;
+        }
+    }
+    recordings.push(new);
+}
+
+fn full_circle(like: &CircularRecording) -> Vec<CircularSample> {
+    let turn_s = std::f64::consts::TAU * like.radius_mm / like.feed_mm_s;
+    let sense = match like.sense {
+        CircularSense::Clockwise => -1.0,
+        CircularSense::CounterClockwise => 1.0,
+    };
+    (0..=720)
+        .map(|i| CircularSample {
+            angle_rad: sense * (f64::from(i) * 0.5).to_radians(),
+            radial_deviation_mm: 0.0,
+            time_s: turn_s * f64::from(i) / 720.0,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eq2_a_dependent_column_names_its_shares() {
+        let design = DMatrix::from_row_slice(
+            4,
+            4,
+            &[
+                1.0, 0.0, 2.0, 0.0, 1.0, 1.0, 5.0, 0.0, 1.0, 2.0, 8.0, 0.0, 1.0, 3.0, 11.0, 0.0,
+            ],
+        );
+        let reduction = reduce(&design, 1e-6);
+        assert_eq!(reduction.kept, [0, 1]);
+        assert_eq!(reduction.unseen, [3]);
+        let aliases = &reduction.dependent[0].aliases;
+        assert_eq!((aliases[0].0, aliases[1].0), (0, 1));
+        assert!((aliases[0].1 - 2.0).abs() < 1e-12 && (aliases[1].1 - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn eq1_the_limit_is_the_sine_of_the_angle() {
+        let sine = 0.01_f64;
+        let design =
+            DMatrix::from_column_slice(2, 2, &[1.0, 0.0, (1.0 - sine * sine).sqrt(), sine]);
+        assert_eq!(reduce(&design, 0.009).kept, [0, 1]);
+        assert_eq!(reduce(&design, 0.011).kept, [0]);
+    }
+}
