@@ -50,10 +50,6 @@ impl Hardware for IdealAxes {
         None
     }
 
-    fn grid_position_mm(&self) -> Option<(f64, f64)> {
-        None
-    }
-
     fn settle_at(&mut self, position: &PerAxis<f64>) {
         self.0.motor = *position;
     }

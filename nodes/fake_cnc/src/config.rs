@@ -62,6 +62,8 @@ pub struct Config {
     pub clock_drift_ppm: f64,
     /// Jump of the host clock beyond which time is skipped rather than simulated, s.
     pub longest_catch_up_s: f64,
+    /// What closes the position loop of each linear axis, by letter; others: the motor.
+    pub feedback: BTreeMap<Axis, FeedbackSource>,
     /// Positions of linear axes at the start, by letter; others start at 0.
     pub start_mm: BTreeMap<Axis, f64>,
     /// Positions of rotary axes at the start, by letter; others start at 0.
@@ -93,10 +95,22 @@ impl Default for Config {
             clock_offset_s: 0.0,
             clock_drift_ppm: 0.0,
             longest_catch_up_s: 60.0,
+            feedback: BTreeMap::new(),
             start_mm: BTreeMap::new(),
             start_deg: BTreeMap::new(),
         }
     }
+}
+
+/// What closes a position loop.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FeedbackSource {
+    /// The motor's encoder: semi-closed.
+    #[default]
+    Motor,
+    /// The linear scale: full-closed.
+    Scale,
 }
 
 /// Limits of a compensation on one axis, per servo period where it is a rate; mm or rad.
@@ -116,6 +130,7 @@ pub struct Settings {
     pub(crate) limits: AxisLimits,
     pub(crate) envelope: Envelope,
     pub(crate) gains: PerAxis<Gains>,
+    pub(crate) feedback: PerAxis<FeedbackSource>,
     pub(crate) following_error_limit: PerAxis<f64>,
     pub(crate) offset: PerAxis<OffsetLimits>,
     pub(crate) latch: Latch,
@@ -156,6 +171,15 @@ impl Settings {
             settings.axis(axis, &AxisNumbers::read(axis, entry)?, config);
         }
         settings.start(config)?;
+        for (&axis, &source) in &config.feedback {
+            let has_scale = machine
+                .linear(axis)
+                .is_some_and(|linear| linear.scale_resolution_um.is_some());
+            if source == FeedbackSource::Scale && !has_scale {
+                return Err(CncError::NoScale { axis });
+            }
+            settings.feedback[axis] = source;
+        }
         Ok(settings)
     }
 
@@ -305,6 +329,7 @@ impl Config {
                 travel: PerAxis::default(),
             },
             gains: PerAxis::default(),
+            feedback: PerAxis::default(),
             following_error_limit: PerAxis::default(),
             offset: PerAxis::default(),
             latch: machine.control.latch,

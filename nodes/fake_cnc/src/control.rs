@@ -18,7 +18,7 @@ mod phase;
 use metrology::stamp::Span;
 use metrology::{Axis, Machine, PerAxis, Stamp};
 
-use crate::config::Settings;
+use crate::config::{FeedbackSource, Settings};
 use crate::diagnostic::Diagnostic;
 use crate::error::ProgramError;
 use crate::hardware::Hardware;
@@ -175,6 +175,16 @@ impl<H: Hardware> Control<H> {
     /// What the program asks that this control could not do; nothing has moved.
     pub fn start(&mut self, goal: u64, text: &str) -> Result<(), ProgramError> {
         let program = rs274::read(text, &self.settings.envelope, &self.command.position)?;
+        for (name, at) in &program.devices {
+            if !self.hardware.has_device(name) {
+                return Err(ProgramError::CommentValue {
+                    at: *at,
+                    what: "mount",
+                    text: name.clone(),
+                    rule: "followed by a placement or beam of the machine file",
+                });
+            }
+        }
         self.chain.reserve(program.longest_chain().max(1));
         self.run = Some(Run {
             goal,
@@ -224,16 +234,25 @@ impl<H: Hardware> Control<H> {
                 continue;
             }
             let velocity = self.feedback.velocity[axis];
+            let measured = self.measured(axis);
             let servo = &mut self.servos[axis];
             demand[axis] = if braking {
                 servo.follow_velocity(0.0, velocity, period_s)
             } else {
                 let wanted = self.command.position[axis] + self.offset.applied()[axis];
-                let error = wanted - self.feedback.motor[axis];
+                let error = wanted - measured;
                 servo.demand(error, self.command.velocity[axis], velocity, period_s)
             };
         }
         demand
+    }
+
+    /// The position that closes this axis' loop, mm or rad.
+    fn measured(&self, axis: Axis) -> f64 {
+        match self.settings.feedback[axis] {
+            FeedbackSource::Motor => self.feedback.motor[axis],
+            FeedbackSource::Scale => self.feedback.scale[axis],
+        }
     }
 
     fn watch_probe(&mut self, began: Stamp<Machine>, period: Span, events: &mut Vec<Event>) {
@@ -273,7 +292,7 @@ impl<H: Hardware> Control<H> {
                 continue;
             }
             let wanted = self.command.position[axis] + self.offset.applied()[axis];
-            let error = wanted - self.feedback.motor[axis];
+            let error = wanted - self.measured(axis);
             let limit = self.settings.following_error_limit[axis];
             // Also true for an error that is not a number.
             if error.abs() <= limit {

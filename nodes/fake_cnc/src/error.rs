@@ -45,6 +45,12 @@ pub enum CncError {
         /// The axis.
         axis: Axis,
     },
+    /// A full-closed loop without a scale.
+    #[error("feedback.{axis} = scale: the machine file has no scale_resolution_um for this axis")]
+    NoScale {
+        /// The axis.
+        axis: Axis,
+    },
     /// A machine without axes.
     #[error("axes: the machine has none")]
     NoAxes,

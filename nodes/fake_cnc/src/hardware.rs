@@ -3,7 +3,7 @@
 use metrology::PerAxis;
 use metrology::stamp::Span;
 
-use crate::plant::{Feedback, Plant, ProbeEdge};
+use crate::plant::{Feedback, GridReading, LengthReading, Plant, ProbeEdge};
 
 /// Drives, encoders, probe and sensors, one servo period at a time.
 pub trait Hardware {
@@ -17,10 +17,26 @@ pub trait Hardware {
     fn probe_closed(&self) -> bool;
     /// Reads the temperature sensor `id`, °C.
     fn sensor_reading_degc(&mut self, id: &str) -> Option<f64>;
-    /// Position of the grid encoder's head over its plate, mm; `None` off the plate.
-    fn grid_position_mm(&self) -> Option<(f64, f64)>;
     /// Puts the axes at rest at `position` (mm, rad) without a motion.
     fn settle_at(&mut self, position: &PerAxis<f64>);
+    /// Whether there is a plate's placement or a beam of this name.
+    fn has_device(&self, _name: &str) -> bool {
+        false
+    }
+    /// Puts a plate or a beam in place.
+    fn mount(&mut self, _name: &str) {}
+    /// Sets the count of the grid encoder to zero.
+    fn zero_grid(&mut self) {}
+    /// Sets the count of the length reference to zero.
+    fn zero_length(&mut self) {}
+    /// Reads the grid encoder; `None` without a count.
+    fn grid_reading(&mut self) -> Option<GridReading> {
+        None
+    }
+    /// Reads the length reference; `None` without a count.
+    fn length_reading(&mut self) -> Option<LengthReading> {
+        None
+    }
 }
 
 impl Hardware for Plant {
@@ -44,11 +60,31 @@ impl Hardware for Plant {
         Self::sensor_reading(self, id)
     }
 
-    fn grid_position_mm(&self) -> Option<(f64, f64)> {
-        Self::grid_position(self)
-    }
-
     fn settle_at(&mut self, position: &PerAxis<f64>) {
         Self::settle_at(self, position);
+    }
+
+    fn has_device(&self, name: &str) -> bool {
+        Self::has_device(self, name)
+    }
+
+    fn mount(&mut self, name: &str) {
+        Self::mount(self, name);
+    }
+
+    fn zero_grid(&mut self) {
+        Self::zero_grid(self);
+    }
+
+    fn zero_length(&mut self) {
+        Self::zero_length(self);
+    }
+
+    fn grid_reading(&mut self) -> Option<GridReading> {
+        Self::grid_reading(self)
+    }
+
+    fn length_reading(&mut self) -> Option<LengthReading> {
+        Self::length_reading(self)
     }
 }

@@ -124,6 +124,9 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "Jump of the host clock beyond which time is skipped rather than simulated.",
         (1e-3, 1e6),
     ),
+    feedback("feedback.X"),
+    feedback("feedback.Y"),
+    feedback("feedback.Z"),
     start("start_mm.X", "mm"),
     start("start_mm.Y", "mm"),
     start("start_mm.Z", "mm"),
@@ -153,6 +156,13 @@ const fn number(
         description,
         range: Some(range),
     }
+}
+
+const fn feedback(name: &'static str) -> ParameterDoc {
+    text(
+        name,
+        "What closes the position loop: motor (semi-closed) or scale (full-closed).",
+    )
 }
 
 const fn start(name: &'static str, unit: &'static str) -> ParameterDoc {

@@ -40,15 +40,22 @@ mod contact;
 mod pretravel;
 mod touch_probe;
 
+mod grid_plate;
+mod laser;
+mod linear_scale;
+mod measuring;
+
 mod error;
 mod file;
 mod noise;
 
 pub use error::PlantError;
 pub use file::*;
+pub use grid_plate::GridReading;
+pub use laser::LengthReading;
 
 use machine::MachineFile;
-use machine::file::{AxisEntry, GridEncoderEntry};
+use machine::file::AxisEntry;
 use metrology::stamp::Span;
 use metrology::{Axis, AxisSet, PerAxis};
 use nalgebra::Vector3;
@@ -56,7 +63,10 @@ use nalgebra::Vector3;
 use body::Body;
 use contact::Contact;
 use drive::Drive;
+use grid_plate::GridPlate;
 use heat::Heat;
+use laser::Laser;
+use linear_scale::LinearScales;
 use structure::{Standing, Structure};
 
 /// Fastest natural frequency times inner step that the drives' integration is trusted with.
@@ -106,8 +116,9 @@ pub struct Plant {
     body: Body,
     structure: Structure,
     contact: Contact,
-    grid: Option<GridEncoderEntry>,
-    grid_gap_mm: f64,
+    scales: LinearScales,
+    plate: Option<GridPlate>,
+    laser: Option<Laser>,
     elapsed: Span,
     edges: Vec<ProbeEdge>,
 }
@@ -125,10 +136,6 @@ impl Plant {
             .styli
             .get(&machine.probe.mounted)
             .map_or(0.0, |stylus| stylus.length_mm);
-        error::require_positive(
-            "grid_head.gap_tolerance_mm",
-            truth.grid_head.gap_tolerance_mm,
-        )?;
         let mut plant = Self {
             axes: machine.axis_set(),
             drives: drives(machine, truth)?,
@@ -143,8 +150,17 @@ impl Plant {
             heat,
             body: Body::new(machine, &truth.geometry, truth.seed)?,
             contact,
-            grid: machine.grid_encoder.clone(),
-            grid_gap_mm: truth.grid_head.gap_tolerance_mm,
+            scales: LinearScales::new(&truth.linear_scales, truth.seed)?,
+            plate: machine
+                .grid_encoder
+                .as_ref()
+                .map(|grid| GridPlate::new(grid, &truth.grid_encoder, truth.seed))
+                .transpose()?,
+            laser: machine
+                .length_reference
+                .as_ref()
+                .map(|length| Laser::new(length, &truth.length_reference, truth.seed))
+                .transpose()?,
             elapsed: Span::default(),
             edges: Vec::with_capacity(EDGES_PER_PERIOD),
         };
@@ -221,7 +237,8 @@ impl Plant {
             if let Some(resolution) = self.scale_resolution[axis] {
                 let carried_mm = drive.slide + self.heat.screw_growth_mm(axis, drive.slide);
                 let true_mm = carried_mm + self.body.along_error_mm(axis, carried_mm);
-                let read_mm = true_mm * (1.0 - self.structure.scale_strain);
+                let strain = self.structure.scale_strain;
+                let read_mm = self.scales.reading_mm(axis, true_mm, strain);
                 feedback.scale[axis] = quantised(read_mm, resolution);
             }
         }
@@ -249,27 +266,6 @@ impl Plant {
     /// Reads the temperature sensor `id` (°C); `None` where the machine file has no such sensor.
     pub fn sensor_reading(&mut self, id: &str) -> Option<f64> {
         self.heat.read_degc(id)
-    }
-
-    /// Grid encoder: position of its head over the plate's centre (mm); `None` outside its field and
-    /// where there is no plate.
-    #[must_use]
-    pub fn grid_position(&self) -> Option<(f64, f64)> {
-        let grid = self.grid.as_ref()?;
-        let tool = self
-            .body
-            .workpiece_from_tool(&self.true_slide(), &self.structure);
-        let centre_mm = Vector3::from(grid.centre_mm);
-        let plate_mm = centre_mm + self.structure.on_table_mm(&centre_mm, Standing::Artefact);
-        let head_mm = tool.translation.vector - plate_mm;
-        let inside = head_mm.xy().norm() <= grid.radius_mm && head_mm.z.abs() <= self.grid_gap_mm;
-        let resolution_mm = grid.resolution_um / 1e3;
-        inside.then(|| {
-            (
-                quantised(head_mm.x, resolution_mm),
-                quantised(head_mm.y, resolution_mm),
-            )
-        })
     }
 
     /// Puts every axis at rest at `position`, free of elastic stress.

@@ -2,7 +2,7 @@
 
 use machine::MachineFile;
 use metrology::sample::{
-    AxisCompensation, AxisState, GridSample, ProbeTrigger, TemperatureSample, TestPlane,
+    AxisCompensation, AxisState, GridSample, LengthSample, ProbeTrigger, TemperatureSample,
 };
 use metrology::{Host, Stage, Stamp};
 
@@ -54,6 +54,8 @@ pub enum Output {
     Temperature(TemperatureSample),
     /// A grid encoder reading.
     Grid(GridSample),
+    /// A reading of the length reference.
+    Length(LengthSample),
     /// The request is taken; a program that is not executable ends at once with [`Outcome::Refused`].
     Accepted {
         /// Its request.
@@ -253,13 +255,22 @@ impl<H: Hardware> Cnc<H> {
             scale: feedback.scale,
             velocity: feedback.velocity,
         }));
-        if let Some((u_mm, v_mm)) = self.control.hardware().grid_position_mm() {
+        let hardware = self.control.hardware_mut();
+        if let Some(reading) = hardware.grid_reading() {
             out.push(Output::Grid(GridSample {
                 at,
-                plane: TestPlane::Xy,
-                u_mm,
-                v_mm,
-                zero_id: 0,
+                plane: reading.plane,
+                u_mm: reading.u_mm,
+                v_mm: reading.v_mm,
+                zero_id: reading.zero_id,
+            }));
+        }
+        if let Some(reading) = hardware.length_reading() {
+            out.push(Output::Length(LengthSample {
+                at,
+                axis: reading.axis,
+                displacement_mm: reading.displacement_mm,
+                zero_id: reading.zero_id,
             }));
         }
     }

@@ -27,6 +27,7 @@ fn readme_and_table_and_defaults_agree() {
         let default = match &defaults[top] {
             serde_json::Value::Number(number) => format!("{}", number.as_f64().unwrap()),
             serde_json::Value::String(text) => format!("{text:?}"),
+            _ if top == "feedback" => "motor".to_owned(),
             _ => "0".to_owned(),
         };
         let row = format!(
@@ -61,6 +62,13 @@ fn values_out_of_range_and_unknown_keys_are_refused_by_name() {
     let mut config = Config::default();
     config.start_mm.insert(metrology::Axis::X, 500.0);
     assert!(refusal(&config).starts_with("start_mm = 500: must be"));
+    let mut config = Config::default();
+    let scale = fake_cnc::config::FeedbackSource::Scale;
+    config.feedback.insert(metrology::Axis::Z, scale);
+    assert_eq!(
+        refusal(&config),
+        "feedback.Z = scale: the machine file has no scale_resolution_um for this axis"
+    );
     let unknown = serde_json::from_str::<Config>("{\"settle_ms\": 3}").unwrap_err();
     assert!(unknown.to_string().contains("unknown field `settle_ms`"));
 }

@@ -39,7 +39,7 @@ mod bore;
 mod feature;
 mod latency;
 mod plane;
-mod program;
+pub(crate) mod program;
 mod reach;
 mod rotary;
 mod sphere;

@@ -8,11 +8,14 @@
 mod axes;
 mod check;
 mod read;
+mod reference;
 
 use std::collections::BTreeMap;
 
 use metrology::{Axis, AxisSet};
 use serde::{Deserialize, Serialize};
+
+pub use reference::{BeamEntry, GridEncoderEntry, GridPlacement, GridPlane, LengthReferenceEntry};
 
 /// A whole machine file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,9 +47,12 @@ pub struct MachineFile {
     /// Temperature sensors.
     #[serde(default)]
     pub temperature_sensors: Vec<SensorEntry>,
-    /// Grid encoder, where one is mounted.
+    /// Grid encoder, where there is one.
     #[serde(default)]
     pub grid_encoder: Option<GridEncoderEntry>,
+    /// Length reference, where there is one.
+    #[serde(default)]
+    pub length_reference: Option<LengthReferenceEntry>,
     /// The KNOWN effects.
     #[serde(default)]
     pub effects: Vec<EffectEntry>,
@@ -261,18 +267,6 @@ pub enum SensorPlace {
     Ambient,
 }
 
-/// A grid encoder's plate.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GridEncoderEntry {
-    /// Centre of the plate, machine frame.
-    pub centre_mm: [f64; 3],
-    /// Radius of the usable field.
-    pub radius_mm: f64,
-    /// Resolution.
-    pub resolution_um: f64,
-}
-
 /// One known effect; its own keys are checked by the effect itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EffectEntry {
@@ -321,5 +315,19 @@ impl MachineFile {
     #[must_use]
     pub fn ball_radius_mm(&self) -> f64 {
         self.mounted_stylus().map_or(0.0, |stylus| stylus.radius_mm)
+    }
+
+    /// The grid encoder's placement `id`.
+    #[must_use]
+    pub fn grid_placement(&self, id: &str) -> Option<&GridPlacement> {
+        let grid = self.grid_encoder.as_ref()?;
+        grid.placements.iter().find(|placement| placement.id == id)
+    }
+
+    /// The length reference's beam `id`.
+    #[must_use]
+    pub fn beam(&self, id: &str) -> Option<&BeamEntry> {
+        let length = self.length_reference.as_ref()?;
+        length.beams.iter().find(|beam| beam.id == id)
     }
 }

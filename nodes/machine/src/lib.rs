@@ -7,6 +7,7 @@
 //! most. `export` turns measured errors into the tables that
 //! other controls load. `volumetric` is the geometric error of the tool tip anywhere in the working
 //! volume, component by component and all together, and what has to be commanded to undo it.
+//! `trajectory` writes the programs that a grid encoder, a laser or a scale measures.
 
 pub mod chain;
 pub mod cycle;
@@ -16,6 +17,7 @@ pub mod file;
 pub mod kinematics;
 pub mod orientation;
 pub mod poses;
+pub mod trajectory;
 pub mod volumetric;
 
 pub use chain::{Chain, ChainError};
@@ -24,3 +26,4 @@ pub use file::MachineFile;
 pub use kinematics::{Kinematics, TableSense};
 pub use orientation::Orientation;
 pub use poses::{PoseError, SphereDesign};
+pub use trajectory::{Trajectory, TrajectoryError};

@@ -171,3 +171,44 @@ fn chain_and_axes_must_agree() {
         "m.yaml: axes.A: needs a point on its line in rotary.origin_mm"
     );
 }
+
+#[test]
+fn placements_and_beams_that_contradict_or_say_too_much_are_refused_by_name() {
+    let cases = [
+        (
+            "id: upright_x",
+            "id: table",
+            "m.yaml: grid_encoder.placements[1].id = \"table\": is used twice",
+        ),
+        (
+            "id: along_x",
+            "id: upright_y",
+            "m.yaml: length_reference.beams[0].id = \"upright_y\": is used twice",
+        ),
+        (
+            "radius_mm: 110.0",
+            "radius_mm: -110.0",
+            "m.yaml: grid_encoder.radius_mm = -110: must be a finite number above 0",
+        ),
+        (
+            "centre_mm: [50.0, 0.0, 150.0]",
+            "centre_mm: [50.0, .nan, 150.0]",
+            "m.yaml: grid_encoder.placements[1].centre_mm[1] = NaN: must be a finite number",
+        ),
+        (
+            "to_mm: [300.0, 20.0, 100.0]",
+            "to_mm: [-300.0, 20.0, 100.0]",
+            "m.yaml: length_reference.beams[0] = 0: is its length, which must be at least 1 mm",
+        ),
+    ];
+    for (from, to, message) in cases {
+        assert_eq!(refusal(from, to), message);
+    }
+    let told = refusal("plane: yz,", "plane: xz,");
+    assert!(told.contains("xz") && told.contains("zx"), "{told}");
+    let told = refusal("plane: yz,", "plane: yz, radius_mm: 3.0,");
+    assert!(
+        told.contains("radius_mm") && told.contains("tool_offset_mm"),
+        "{told}"
+    );
+}

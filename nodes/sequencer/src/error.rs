@@ -1,6 +1,6 @@
 //! What can be wrong with a plan or an event.
 
-use machine::CycleError;
+use machine::{CycleError, TrajectoryError};
 
 /// Why a plan cannot be run or an event cannot be taken.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +18,25 @@ pub enum SequencerError {
     Seconds { step: usize, seconds: f64 },
     #[error("steps[{step}]: {source}")]
     Cycle { step: usize, source: CycleError },
+    #[error("steps[{step}]: {source}")]
+    Trajectory {
+        step: usize,
+        source: TrajectoryError,
+    },
+    #[error("steps[{step}].{key}: missing, {of} needs it")]
+    KeyMissing {
+        step: usize,
+        key: &'static str,
+        of: &'static str,
+    },
+    #[error("steps[{step}].{key}: {of} has none")]
+    KeySuperfluous {
+        step: usize,
+        key: &'static str,
+        of: &'static str,
+    },
+    #[error("steps[{step}]: no beam, run or repetition: there is nothing to run")]
+    NothingToRun { step: usize },
     #[error("steps: the plan has none")]
     NoSteps,
     #[error("time went back by {back_s} s to {at_s} s: the event was not used")]

@@ -25,6 +25,36 @@ pub(crate) struct Task {
     pub stylus: String,
     /// Who ordered it.
     pub owner: Owner,
+    /// What of it is measured by a grid encoder or length reference.
+    pub trace: Trace,
+}
+
+/// Geometry and set-up of a measured trajectory; empty for other programs.
+#[derive(Clone, Debug)]
+pub(crate) struct Trace {
+    pub plane: TestPlane,
+    pub centre_mm: Vector3<f64>,
+    pub radius_mm: f64,
+    pub sense: Sense,
+    pub tool_offset_mm: Vector3<f64>,
+    pub stations: u32,
+    pub zero_id: u32,
+    pub setup_id: u32,
+}
+
+impl Default for Trace {
+    fn default() -> Self {
+        Self {
+            plane: TestPlane::None,
+            centre_mm: Vector3::zeros(),
+            radius_mm: 0.0,
+            sense: Sense::None,
+            tool_offset_mm: Vector3::zeros(),
+            stations: 0,
+            zero_id: 0,
+            setup_id: 0,
+        }
+    }
 }
 
 /// Who ordered a task, and so what its failure means.
@@ -51,28 +81,31 @@ pub(crate) struct Job {
     pub retry_at: Option<Stamp<Host>>,
     /// Touches so far.
     pub touches: u32,
+    /// The program is done, but touches that it made have not arrived: until when they are awaited.
+    pub awaits_touches_until: Option<Stamp<Host>>,
     pub repeat: u32,
 }
 
 impl Job {
     /// The mark of its begin or end.
     pub fn segment(&self, at: Stamp<Host>, begin: bool, completed: bool) -> TestSegment {
+        let trace = &self.task.trace;
         TestSegment {
             at,
             run: self.run,
             begin,
             kind: self.task.kind,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
+            plane: trace.plane,
+            centre_mm: trace.centre_mm,
+            radius_mm: trace.radius_mm,
             feed_mm_s: self.task.feed_mm_s,
-            sense: Sense::None,
+            sense: trace.sense,
             repeat: self.repeat,
             stylus: self.task.stylus.clone(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
-            zero_id: 0,
-            setup_id: 0,
+            tool_offset_mm: trace.tool_offset_mm,
+            stations: trace.stations,
+            zero_id: trace.zero_id,
+            setup_id: trace.setup_id,
             cold: self.task.cold,
             features: self.task.features.clone(),
             completed,

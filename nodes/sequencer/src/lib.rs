@@ -6,17 +6,21 @@
 //! switching of the compensation together: it is a scenario's script. While a part is being
 //! produced, block cycles are put in between whenever the thermal model asks for one.
 //!
+//! A *measuring step* runs trajectories of `machine::trajectory` and keeps account of which plate or beam
+//! is up and when its count was set to zero: every recording's segment says so.
+//!
 //! The sequencer is the only publisher of `test/segment`, which keeps run numbers unique in a bag.
 
 pub mod config;
 mod cycle;
 pub mod error;
 mod job;
+mod measuring;
 pub mod plan;
 pub mod stage;
 mod task;
 
 pub use config::Config;
 pub use error::SequencerError;
-pub use plan::{Plan, Step};
+pub use plan::{DiagonalStep, GridStep, GridTrajectory, Plan, PositioningStep, Senses, Step};
 pub use stage::{CANCELED, CycleGoal, CycleOutcome, Input, Output, ProgramEnd, Sequencer};

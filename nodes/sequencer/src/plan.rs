@@ -1,6 +1,12 @@
 //! The plan: what a scenario does, step by step.
 
+mod grid;
+mod linear;
+
 use serde::{Deserialize, Serialize};
+
+pub use grid::{GridStep, GridTrajectory, Senses};
+pub use linear::{DiagonalStep, PositioningStep};
 
 /// A whole plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,6 +78,26 @@ pub enum Step {
         /// Name of the program.
         program: String,
     },
+    /// Runs a trajectory over the plate of a grid encoder.
+    Grid(GridStep),
+    /// Stops at targets along one axis, up and down.
+    Positioning(PositioningStep),
+    /// Runs through along one axis, up and down.
+    Scan(PositioningStep),
+    /// Stops at targets along beams, up and down.
+    Diagonals(DiagonalStep),
+}
+
+impl Plan {
+    /// Reads a plan from its text.
+    ///
+    /// # Errors
+    /// When a key is unknown, missing or of the wrong type; the message has line and column.
+    pub fn from_yaml(text: &str) -> Result<Self, serde_saphyr::Error> {
+        // `axis: Y` is a letter here, not the truth value that YAML 1.1 takes it for.
+        let options = serde_saphyr::options! { strict_booleans: true };
+        serde_saphyr::from_str_with_options(text, options)
+    }
 }
 
 impl Step {
@@ -92,6 +118,10 @@ impl Step {
             Self::Verify { label, .. } => format!("verification: {label}"),
             Self::Wait { seconds } => format!("waiting {seconds} s"),
             Self::Run { program } => format!("running {program}"),
+            Self::Grid(step) => format!("{:?} over {}", step.trajectory, step.placement),
+            Self::Positioning(step) => format!("positioning of {}", step.axis),
+            Self::Scan(step) => format!("scan along {}", step.axis),
+            Self::Diagonals(step) => format!("diagonals {}", step.beams.join(", ")),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Steps of a plan and cycle goals, one program at a time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use machine::MachineFile;
 use metrology::Stage;
@@ -10,6 +10,7 @@ use metrology::stamp::{Host, Span, Stamp};
 use crate::config::Config;
 use crate::error::SequencerError;
 use crate::job::{Job, Owner, Task};
+use crate::measuring::{self, Measurement, Setups};
 use crate::plan::{Plan, Step};
 use crate::task;
 
@@ -129,6 +130,8 @@ pub struct Sequencer {
     switching: Option<u64>,
     waiting_until: Option<Stamp<Host>>,
     production: Option<Production>,
+    measurements: VecDeque<Measurement>,
+    setups: Setups,
     update_wanted: bool,
     next_run: u32,
     next_id: u64,
@@ -164,6 +167,8 @@ impl Sequencer {
             switching: None,
             waiting_until: None,
             production: None,
+            measurements: VecDeque::new(),
+            setups: Setups::default(),
             update_wanted: false,
             next_run: 1,
             next_id: 1,
@@ -204,6 +209,7 @@ impl Sequencer {
     fn fail(&mut self, message: String, out: &mut Vec<Output>) {
         self.state = PlanState::Failed;
         self.production = None;
+        self.measurements.clear();
         self.message = message;
         self.say(out);
     }
@@ -215,6 +221,10 @@ impl Sequencer {
                 if self.produce(out) {
                     continue;
                 }
+                return;
+            }
+            if let Some(run) = self.measurements.pop_front() {
+                self.measure(&run, out);
                 return;
             }
             let Some(step) = self.steps().get(self.step).cloned() else {
@@ -285,10 +295,20 @@ impl Sequencer {
                 self.waiting_until = Some(self.now + Span::from_secs_f64(*seconds));
                 self.say(out);
             }
+            Step::Grid(_) | Step::Positioning(_) | Step::Scan(_) | Step::Diagonals(_) => {
+                self.measurements = measuring::runs(self.step - 1, step).into();
+            }
             step => match task::of_step(self.step - 1, step, &self.machine, &self.programs) {
                 Ok(task) => self.begin(task, 0, out),
                 Err(error) => self.fail(error.to_string(), out),
             },
+        }
+    }
+
+    fn measure(&mut self, run: &Measurement, out: &mut Vec<Output>) {
+        match self.setups.task(run, &self.machine) {
+            Ok(task) => self.begin(task, run.repeat, out),
+            Err(error) => self.fail(error.to_string(), out),
         }
     }
 
@@ -299,6 +319,9 @@ impl Sequencer {
     }
 
     fn begin(&mut self, task: Task, repeat: u32, out: &mut Vec<Output>) {
+        if task.trace.setup_id == 0 {
+            self.setups.lose_count();
+        }
         let repeat = if task.owner == Owner::Update {
             self.block_cycles += 1;
             self.block_cycles
@@ -311,6 +334,7 @@ impl Sequencer {
             attempts: 0,
             retry_at: None,
             touches: 0,
+            awaits_touches_until: None,
             repeat,
             task,
         };
@@ -330,33 +354,6 @@ impl Sequencer {
             let (name, text) = (job.task.name.clone(), job.task.text.clone());
             out.push(Output::SendProgram { id, name, text });
         }
-    }
-
-    fn end(&mut self, end: &ProgramEnd, canceled: bool, out: &mut Vec<Output>) {
-        let Some(job) = self.job.take() else { return };
-        out.push(Output::Segment(job.segment(self.now, false, end.done)));
-        if !end.done {
-            let (name, message) = (job.task.name.clone(), end.message.clone());
-            out.push(Output::ProgramFailed {
-                name,
-                run: job.run,
-                message,
-            });
-        }
-        match job.task.owner {
-            Owner::Goal(id) => out.push(Output::CycleEnded(CycleOutcome {
-                id,
-                success: end.done,
-                canceled,
-                message: end.message.clone(),
-                run: job.run,
-            })),
-            Owner::Step if !end.done => {
-                self.fail(format!("{}: {}", job.task.name, end.message), out);
-            }
-            Owner::Step | Owner::Update => {}
-        }
-        self.go_on(out);
     }
 
     fn answered(&mut self, id: u64, accepted: bool, out: &mut Vec<Output>) {
@@ -405,6 +402,7 @@ impl Sequencer {
         {
             self.propose(out);
         }
+        self.give_up_touches(out);
         self.go_on(out);
     }
 
@@ -436,19 +434,6 @@ impl Sequencer {
             .filter(|job| job.task.owner == Owner::Goal(id))
         {
             out.push(Output::CancelProgram(job.program));
-        }
-    }
-
-    fn touched(&mut self, out: &mut Vec<Output>) {
-        let Some(job) = &mut self.job else { return };
-        job.touches += 1;
-        if let Owner::Goal(id) = job.task.owner {
-            let (touches, planned) = (job.touches, job.task.planned);
-            out.push(Output::CycleProgress {
-                id,
-                touches,
-                planned,
-            });
         }
     }
 
@@ -495,8 +480,7 @@ impl Stage for Sequencer {
                         done: false,
                         message: "the controller vanished while it ran".to_owned(),
                     };
-                    let canceled = end.as_ref().is_some_and(|end| end.message == CANCELED);
-                    self.end(&end.unwrap_or_else(lost), canceled, out);
+                    self.ended(end.unwrap_or_else(lost), out);
                 }
             }
             Input::Touch => self.touched(out),
@@ -515,5 +499,6 @@ fn count(n: usize) -> u32 {
 /// Message of a program that was stopped because its client called it off.
 pub const CANCELED: &str = "called off";
 
+mod ending;
 #[cfg(test)]
 mod tests;

@@ -9,7 +9,8 @@ use metrology::sample::{CycleKind, CycleOrder, TestKind};
 
 use crate::cycle;
 use crate::error::SequencerError;
-use crate::job::{Owner, Task};
+use crate::job::{Owner, Task, Trace};
+use crate::measuring;
 use crate::plan::{Plan, Step};
 
 /// Checks that every step of a plan can be run on this machine.
@@ -42,6 +43,9 @@ pub(crate) fn check(
                     });
                 }
                 text(at, program, programs)?;
+            }
+            Step::Grid(_) | Step::Positioning(_) | Step::Scan(_) | Step::Diagonals(_) => {
+                measuring::check(at, step, machine)?;
             }
             step => {
                 of_step(at, step, machine, programs)?;
@@ -105,7 +109,12 @@ pub(crate) fn of_step(
             let text = text(at, program, programs)?;
             return Ok(plain(program, text, TestKind::Production, Vec::new()));
         }
-        Step::Compensation { .. } | Step::Wait { .. } => {
+        Step::Compensation { .. }
+        | Step::Wait { .. }
+        | Step::Grid(_)
+        | Step::Positioning(_)
+        | Step::Scan(_)
+        | Step::Diagonals(_) => {
             return Ok(plain("", "", TestKind::Dwell, Vec::new()));
         }
     };
@@ -133,6 +142,7 @@ pub(crate) fn of_order(
         features: cycle.features,
         cold: order.cold,
         owner,
+        trace: Trace::default(),
     })
 }
 
@@ -173,6 +183,7 @@ fn plain(name: &str, text: &str, kind: TestKind, features: Vec<String>) -> Task 
         feed_mm_s: 0.0,
         stylus: String::new(),
         owner: Owner::Step,
+        trace: Trace::default(),
     }
 }
 

@@ -7,7 +7,7 @@ use abbe_msgs::joint_state;
 use abbe_msgs::sensor_msgs::msg::JointState;
 use fake_cnc::diagnostic::Severity;
 use fake_cnc::{Input, Outcome, Output, ProgramState};
-use metrology::sample::{AxisState, GridSample, ProbeTrigger, TemperatureSample};
+use metrology::sample::{AxisState, GridSample, LengthSample, ProbeTrigger, TemperatureSample};
 use metrology::stamp::Span;
 use metrology::{Host, Stamp};
 use node_runtime::{Diagnostic, GoalSignal, GoalStatus, Level};
@@ -48,6 +48,13 @@ pub(crate) fn trigger(output: &Output) -> Option<&ProbeTrigger> {
 pub(crate) fn grid(output: &Output) -> Option<&GridSample> {
     match output {
         Output::Grid(sample) => Some(sample),
+        _ => None,
+    }
+}
+
+pub(crate) fn length(output: &Output) -> Option<&LengthSample> {
+    match output {
+        Output::Length(sample) => Some(sample),
         _ => None,
     }
 }

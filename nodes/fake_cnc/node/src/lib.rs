@@ -45,6 +45,7 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
         .publish_message(&topics::JOINT_STATES, forms::joints())
         .publish(&topics::PROBE_TRIGGER, forms::trigger)
         .publish(&topics::GRID_POSITION, forms::grid)
+        .publish(&topics::LENGTH_POSITION, forms::length)
         .action_server(
             &topics::RUN_PROGRAM,
             forms::run,

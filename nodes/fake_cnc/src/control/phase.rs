@@ -108,7 +108,7 @@ impl<H: Hardware> Control<H> {
                 let offset = *self.offset.applied();
                 self.command.position = PerAxis::from_fn(|axis| {
                     if self.settings.limits.axes.contains(axis) {
-                        self.feedback.motor[axis] - offset[axis]
+                        self.measured(axis) - offset[axis]
                     } else {
                         0.0
                     }
@@ -156,6 +156,9 @@ impl<H: Hardware> Control<H> {
                     };
                 }
                 Action::Spindle(rpm) => self.spindle_rpm = rpm,
+                Action::Mount(device) => self.mount(device),
+                Action::ZeroGrid => self.hardware.zero_grid(),
+                Action::ZeroLength => self.hardware.zero_length(),
                 Action::End => {}
             }
             if let Some(run) = &mut self.run {
@@ -163,9 +166,19 @@ impl<H: Hardware> Control<H> {
             }
             match step.action {
                 Action::End => return self.end(Ending::Done, events),
-                Action::Spindle(_) => {}
+                Action::Spindle(_) | Action::Mount(_) | Action::ZeroGrid | Action::ZeroLength => {}
                 _ => return,
             }
+        }
+    }
+
+    fn mount(&mut self, device: usize) {
+        let device = self
+            .run
+            .as_ref()
+            .and_then(|run| run.program.devices.get(device));
+        if let Some((name, _)) = device {
+            self.hardware.mount(name);
         }
     }
 

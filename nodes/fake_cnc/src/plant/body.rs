@@ -115,7 +115,13 @@ impl Body {
             .chain(&self.workpiece_side)
             .find(|joint| joint.joint.axis == axis)
             .map_or(0.0, |joint| {
-                q_mm * joint.lead_error + joint.errors.component(axis.index(), q_mm)
+                // A table that lags behind its place leaves the tool ahead of the workpiece.
+                let sign = if joint.joint.on_workpiece_side {
+                    -1.0
+                } else {
+                    1.0
+                };
+                q_mm * joint.lead_error + sign * joint.errors.component(axis.index(), q_mm)
             })
     }
 
@@ -258,3 +264,6 @@ impl TrueJoint {
         self.joint.motion(along, &self.direction, &self.origin_mm) * self.errors.rigid(q)
     }
 }
+
+#[cfg(test)]
+mod tests;

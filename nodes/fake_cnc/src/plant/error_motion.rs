@@ -87,6 +87,15 @@ impl ErrorMotion {
         value
     }
 
+    /// Leaves one component and puts the others to zero.
+    #[cfg(test)]
+    pub(super) fn keep(&mut self, kept: Option<usize>) {
+        for component in (0..COMPONENTS).filter(|component| Some(*component) != kept) {
+            self.sine[component] = [0.0; HARMONICS];
+            self.cosine[component] = [0.0; HARMONICS];
+        }
+    }
+
     /// The same as a rigid motion of the carried body.
     pub(super) fn rigid(&self, q: f64) -> Rigid {
         let (shift_mm, turn_rad) = self.at(q);

@@ -6,6 +6,7 @@
 mod body;
 mod drives;
 mod heat;
+mod reference;
 mod touching;
 
 pub use body::{
@@ -15,9 +16,9 @@ pub use drives::{FrictionEntry, LinearDriveEntry, RotaryDriveEntry, RotaryFricti
 pub use heat::{
     HeatEntry, LinkEntry, Place, PlaceEntry, ScrewEnd, ScrewEntry, ShopAirEntry, SpindleLossEntry,
 };
+pub use reference::{GridPlateEntry, LaserEntry, LinearScalesEntry};
 pub use touching::{
-    ArtefactsEntry, BumpEntry, FaultsEntry, GridHeadEntry, ProbeFaultEntry, SensorsEntry,
-    TouchProbeEntry,
+    ArtefactsEntry, BumpEntry, FaultsEntry, ProbeFaultEntry, SensorsEntry, TouchProbeEntry,
 };
 
 use std::collections::BTreeMap;
@@ -49,8 +50,12 @@ pub struct PlantFile {
     pub artefacts: ArtefactsEntry,
     /// Temperature sensors.
     pub sensors: SensorsEntry,
-    /// The grid encoder's head.
-    pub grid_head: GridHeadEntry,
+    /// Linear scales.
+    pub linear_scales: LinearScalesEntry,
+    /// The grid encoder.
+    pub grid_encoder: GridPlateEntry,
+    /// The laser interferometer.
+    pub length_reference: LaserEntry,
     /// What is broken; nothing where absent.
     #[serde(default)]
     pub faults: FaultsEntry,

@@ -14,6 +14,9 @@ pub(super) enum Effect {
     Sensors = 5,
     ShopAir = 6,
     Bounce = 7,
+    Graduation = 8,
+    GridPlate = 9,
+    Laser = 10,
 }
 
 /// Random numbers of one effect.

@@ -167,13 +167,22 @@ impl Reader<'_> {
         });
     }
 
+    fn push_comment(&mut self, line: u32, action: Action) {
+        self.program.steps.push(Step {
+            line,
+            full_rate: self.full_rate,
+            action,
+        });
+    }
+
     fn comment(&mut self, line: u32, comment: &Comment<'_>) -> Result<(), ProgramError> {
+        let at = Place {
+            line,
+            column: comment.column,
+        };
         let refuse = |what, rule| {
             Err(ProgramError::CommentValue {
-                at: Place {
-                    line,
-                    column: comment.column,
-                },
+                at,
                 what,
                 text: comment.text.to_owned(),
                 rule,
@@ -191,6 +200,15 @@ impl Reader<'_> {
             ("rate", "full") => self.full_rate = true,
             ("rate", "background") => self.full_rate = false,
             ("rate", _) => return refuse("rate", "full or background"),
+            ("mount", "") => return refuse("mount", "followed by a placement or beam"),
+            ("mount", name) => {
+                let index = self.program.devices.len();
+                self.program.devices.push((name.to_owned(), at));
+                self.push_comment(line, Action::Mount(index));
+            }
+            ("zero", "grid") => self.push_comment(line, Action::ZeroGrid),
+            ("zero", "length") => self.push_comment(line, Action::ZeroLength),
+            ("zero", _) => return refuse("zero", "grid or length"),
             _ => {}
         }
         Ok(())

@@ -2,6 +2,8 @@
 
 use metrology::PerAxis;
 
+use crate::error::Place;
+
 /// Where one axis goes; mm or rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aim {
@@ -84,6 +86,12 @@ pub enum Action {
     Dwell(f64),
     /// Turns the spindle at this speed, 1/min; 0 stops it.
     Spindle(f64),
+    /// Puts a plate or beam in place; index into [`Program::devices`].
+    Mount(usize),
+    /// Sets the count of the grid encoder to zero.
+    ZeroGrid,
+    /// Sets the count of the length reference to zero.
+    ZeroLength,
     /// Ends the program.
     End,
 }
@@ -106,6 +114,8 @@ pub struct Program {
     pub steps: Vec<Step>,
     /// Names of `(feature: NAME)` comments; the first is empty, for touches before any.
     pub features: Vec<String>,
+    /// Names of `(mount: NAME)` comments and where they stand.
+    pub devices: Vec<(String, Place)>,
     /// Number of lines.
     pub lines: u32,
 }

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod compensation;
+mod feedback;
 mod motion;
 mod time;
 mod touches;
@@ -127,10 +128,6 @@ impl Hardware for Bench {
 
     fn sensor_reading_degc(&mut self, id: &str) -> Option<f64> {
         Some(20.0 + id.len() as f64)
-    }
-
-    fn grid_position_mm(&self) -> Option<(f64, f64)> {
-        None
     }
 
     fn settle_at(&mut self, position: &PerAxis<f64>) {

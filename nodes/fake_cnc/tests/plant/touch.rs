@@ -290,24 +290,6 @@ fn a_bumped_block_is_found_elsewhere_afterwards() {
 }
 
 #[test]
-fn the_grid_encoder_reads_inside_its_field_only() {
-    let mut plant = Plant::new(&machine(), &perfect()).unwrap();
-    plant.settle_at(&PerAxis([60.0, -50.0, 30.0, 0.0, 0.0, 0.0]));
-    let (u_mm, v_mm) = plant.grid_position().unwrap();
-    assert!((u_mm - 60.0).abs() < 1e-4 && (v_mm + 50.0).abs() < 1e-4);
-    let on_grid = (u_mm / 5e-6 - (u_mm / 5e-6).round()).abs();
-    assert!(on_grid < 1e-6, "{on_grid}");
-    plant.settle_at(&PerAxis([100.0, -50.0, 30.0, 0.0, 0.0, 0.0]));
-    assert_eq!(
-        plant.grid_position(),
-        None,
-        "112 mm from the centre of a field of 110 mm"
-    );
-    plant.settle_at(&PerAxis([60.0, -50.0, 33.0, 0.0, 0.0, 0.0]));
-    assert_eq!(plant.grid_position(), None, "lifted off");
-}
-
-#[test]
 fn equal_seeds_give_equal_bits_and_other_seeds_others() {
     let run = |seed: u64| {
         let mut truth = truth();

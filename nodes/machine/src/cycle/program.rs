@@ -13,7 +13,7 @@ use crate::file::MachineFile;
 use crate::poses::SphereDesign;
 
 /// Distance kept from the top of Z, so that a compensation can still be added to the command, mm.
-const TRAVEL_MARGIN_MM: f64 = 1.0;
+pub(crate) const TRAVEL_MARGIN_MM: f64 = 1.0;
 
 /// One wanted touch.
 pub(super) struct Touch {
@@ -240,7 +240,7 @@ impl<'a> Program<'a> {
 }
 
 /// A coordinate or feed, to 10 nm, without a negative zero.
-struct Number(f64);
+pub(crate) struct Number(pub(crate) f64);
 
 impl std::fmt::Display for Number {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -251,7 +251,7 @@ impl std::fmt::Display for Number {
 }
 
 /// X, Y and Z words of a point.
-struct Words<'a>(&'a Vector3<f64>);
+pub(crate) struct Words<'a>(pub(crate) &'a Vector3<f64>);
 
 impl std::fmt::Display for Words<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 
 use metrology::Axis;
 
-use super::{ArtefactEntry, AxisEntry, BlockEntry, LinearAxisEntry, MachineFile, RotaryAxisEntry};
+use super::{
+    ArtefactEntry, AxisEntry, BlockEntry, LinearAxisEntry, MachineFile, RotaryAxisEntry, reference,
+};
 use crate::chain::Chain;
 use crate::cycle::artefact_id;
 use crate::error::MachineFileError;
@@ -43,16 +45,18 @@ impl MachineFile {
         check.features(self)?;
         check.table(self)?;
         check.sensors(self)?;
-        check.grid_and_effects(self)
+        let (grid, length) = (self.grid_encoder.as_ref(), self.length_reference.as_ref());
+        reference::check(&check, grid, length)?;
+        check.effects(self)
     }
 }
 
-struct Check<'a> {
+pub(super) struct Check<'a> {
     source_name: &'a str,
 }
 
 impl Check<'_> {
-    fn number(
+    pub(super) fn number(
         &self,
         key: &str,
         value: f64,
@@ -70,11 +74,11 @@ impl Check<'_> {
         })
     }
 
-    fn positive(&self, key: &str, value: f64) -> Result<(), MachineFileError> {
+    pub(super) fn positive(&self, key: &str, value: f64) -> Result<(), MachineFileError> {
         self.number(key, value, value > 0.0, ABOVE_ZERO)
     }
 
-    fn finite(&self, key: &str, values: &[f64]) -> Result<(), MachineFileError> {
+    pub(super) fn finite(&self, key: &str, values: &[f64]) -> Result<(), MachineFileError> {
         for (index, &value) in values.iter().enumerate() {
             self.number(&format!("{key}[{index}]"), value, true, FINITE)?;
         }
@@ -259,7 +263,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    fn new_id<'a>(
+    pub(super) fn new_id<'a>(
         &self,
         key: &str,
         id: &'a str,
@@ -337,12 +341,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    fn grid_and_effects(&self, file: &MachineFile) -> Result<(), MachineFileError> {
-        if let Some(grid) = &file.grid_encoder {
-            self.finite("grid_encoder.centre_mm", &grid.centre_mm)?;
-            self.positive("grid_encoder.radius_mm", grid.radius_mm)?;
-            self.positive("grid_encoder.resolution_um", grid.resolution_um)?;
-        }
+    fn effects(&self, file: &MachineFile) -> Result<(), MachineFileError> {
         for (index, effect) in file.effects.iter().enumerate() {
             self.ros_name(&format!("effects[{index}].kind"), &effect.kind)?;
             for (name, value) in &effect.parameters {

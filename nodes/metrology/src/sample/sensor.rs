@@ -36,9 +36,9 @@ pub struct GridSample {
 pub struct LengthSample {
     /// When it was read.
     pub at: Stamp<Host>,
-    /// Axis along which it measures.
+    /// Axis along which it measures, or along which a slanting beam advances most.
     pub axis: Axis,
-    /// Displacement along it, mm.
+    /// Displacement along the beam, mm.
     pub displacement_mm: f64,
     /// Changes whenever the reference is zeroed anew.
     pub zero_id: u32,

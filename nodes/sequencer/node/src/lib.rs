@@ -29,8 +29,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         (None, BTreeMap::new())
     } else {
         let (path, text) = setup.file_text("plan_file")?;
-        let plan: Plan =
-            serde_saphyr::from_str(&text).with_context(|| format!("plan {}", path.display()))?;
+        let plan = Plan::from_yaml(&text).with_context(|| format!("plan {}", path.display()))?;
         let programs = files::programs(&plan, &path)?;
         (Some(plan), programs)
     };

@@ -1,6 +1,8 @@
 use super::*;
 use metrology::sample::{CycleKind, TestKind, UpdateReason};
 
+mod measuring;
+
 const MACHINE: &str = include_str!("../../../../launch_configs/first_run/machine.yaml");
 
 fn sequencer(steps: Vec<Step>) -> Sequencer {
@@ -45,6 +47,12 @@ fn done() -> Option<ProgramEnd> {
     })
 }
 
+fn touch(sequencer: &mut Sequencer, seconds_s: f64, touches: u32) {
+    for _ in 0..touches {
+        give(sequencer, seconds_s, Input::Touch);
+    }
+}
+
 fn produce(minutes: f64) -> Step {
     Step::Produce {
         program: "part.ngc".to_owned(),
@@ -67,6 +75,7 @@ fn steps_run_one_after_the_other_between_marks() {
     let started = give(&mut sequencer, 1.0, Input::Tick);
     let (id, _) = sent(&started).unwrap();
     assert_eq!(segments(&started), [(TestKind::Block, true, false)]);
+    touch(&mut sequencer, 30.0, 6);
     let next = give(&mut sequencer, 60.0, Input::ProgramEnd { id, end: done() });
     assert_eq!(
         segments(&next),
@@ -114,6 +123,7 @@ fn an_update_request_is_served_between_two_parts() {
         Some(&(TestKind::Block, true, false))
     );
     let (blocks, _) = sent(&between).unwrap();
+    touch(&mut sequencer, 3.5, 6);
     let after = give(
         &mut sequencer,
         4.0,
@@ -324,4 +334,44 @@ fn a_wait_lets_time_pass_and_goes_on() {
     assert_eq!(sent(&give(&mut sequencer, 1.0, Input::Tick)), None);
     assert_eq!(sent(&give(&mut sequencer, 5.9, Input::Tick)), None);
     assert!(sent(&give(&mut sequencer, 6.0, Input::Tick)).is_some());
+}
+
+fn block_touches() -> (Sequencer, u64) {
+    let blocks = Step::Blocks {
+        blocks: vec![],
+        cold: true,
+    };
+    let mut sequencer = sequencer(vec![blocks, produce(1.0)]);
+    give(&mut sequencer, 0.0, Input::Tick);
+    let (id, _) = sent(&give(&mut sequencer, 1.0, Input::Tick)).unwrap();
+    (sequencer, id)
+}
+
+#[test]
+fn a_program_that_ran_to_its_end_has_failed_when_touches_were_lost() {
+    let (mut sequencer, id) = block_touches();
+    touch(&mut sequencer, 10.0, 5);
+    let ended = give(&mut sequencer, 60.0, Input::ProgramEnd { id, end: done() });
+    assert_eq!(segments(&ended), [], "it waits for stragglers");
+    assert_eq!(segments(&give(&mut sequencer, 60.9, Input::Tick)), []);
+    let judged = give(&mut sequencer, 61.0, Input::Tick);
+    assert_eq!(segments(&judged), [(TestKind::Block, false, false)]);
+    assert!(judged.iter().any(|output| matches!(output,
+        Output::Status(PlanStatus { state: PlanState::Failed, message, .. })
+            if message.contains("5 of 6 touches arrived"))));
+}
+
+#[test]
+fn a_touch_that_comes_after_the_end_still_counts() {
+    let (mut sequencer, id) = block_touches();
+    touch(&mut sequencer, 10.0, 5);
+    give(&mut sequencer, 60.0, Input::ProgramEnd { id, end: done() });
+    let late = give(&mut sequencer, 60.2, Input::Touch);
+    assert_eq!(
+        segments(&late),
+        [
+            (TestKind::Block, false, true),
+            (TestKind::Production, true, false)
+        ]
+    );
 }

@@ -62,14 +62,6 @@ pub struct SensorsEntry {
     pub noise_k: f64,
 }
 
-/// The grid encoder's head.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GridHeadEntry {
-    /// How far the head may be from the plate's nominal height and still read.
-    pub gap_tolerance_mm: f64,
-}
-
 /// What is broken.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
