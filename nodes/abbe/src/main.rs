@@ -10,6 +10,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod evidence;
+mod export;
 mod launch;
 mod node;
 mod progress;
@@ -33,6 +34,8 @@ enum Verb {
     Run(run::Run),
     /// Record topics of the ROS graph into a bag.
     Record(record::Record),
+    /// Make compensation tables for a control from what a bag knows.
+    Export(export::Export),
     /// Run one node on the ROS graph, with the arguments of any ROS 2 node.
     Node(node::NodeVerb),
 }
@@ -41,6 +44,7 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().verb {
         Verb::Run(run) => run.execute(),
         Verb::Record(record) => record.execute(),
+        Verb::Export(export) => export.execute(),
         Verb::Node(node) => return node.execute(),
     };
     outcome.unwrap_or_else(|error| {

@@ -1,0 +1,452 @@
+//! `abbe export BAG --format CONTROL`: what a bag knew last of a machine's errors, as tables for a control.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::str::FromStr;
+
+use abbe_msgs::topics::{self, Topic};
+use abbe_msgs::{Message, Wire, from_cdr};
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+use machine::export::fanuc::Record;
+use machine::export::linuxcnc::FileType;
+use machine::export::selection::{Control, Fanuc, Measured, Selected, Sinumerik, Wanted, select};
+use machine::export::sinumerik::OtherAxes;
+use machine::export::{ExportFile, Unestimable};
+use metrology::{Axis, PerAxis};
+use recorder::{Bag, Event, Order};
+
+/// Controls that tables are made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Linuxcnc,
+    Sinumerik,
+    Heidenhain,
+    Fanuc,
+    Csv,
+}
+
+/// `AXIS=NUMBER`.
+#[derive(Clone, Copy, Debug)]
+struct OfAxis {
+    axis: Axis,
+    value: f64,
+}
+
+impl FromStr for OfAxis {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (axis, value) = text.split_once('=').ok_or("must be AXIS=NUMBER")?;
+        let axis = axis.parse::<Axis>().map_err(|error| error.to_string())?;
+        let value = value
+            .parse()
+            .map_err(|_| format!("{value}: not a number"))?;
+        Ok(Self { axis, value })
+    }
+}
+
+/// Arguments of `abbe export`.
+#[derive(Args)]
+pub struct Export {
+    /// Folder of the bag, or one of its files.
+    bag: PathBuf,
+    /// For whom.
+    #[arg(long, value_enum)]
+    format: Format,
+    /// Axes; none: every axis that the bag knows something of.
+    #[arg(long)]
+    axis: Vec<Axis>,
+    /// Folder of the files; existing files are not overwritten.
+    #[arg(long, default_value = "export")]
+    out: PathBuf,
+    /// Spacing of the points of linear axes, mm.
+    #[arg(long, default_value_t = 20.0)]
+    spacing_mm: f64,
+    /// Spacing of the points of rotary axes, deg.
+    #[arg(long, default_value_t = 15.0)]
+    spacing_deg: f64,
+    /// Reference point of an axis such as X=-300, mm or deg; others: 0.
+    #[arg(long)]
+    reference: Vec<OfAxis>,
+    /// Keep the error at the reference point instead of counting from it.
+    #[arg(long)]
+    absolute: bool,
+    /// Use components although the recordings do not determine them by themselves.
+    #[arg(long)]
+    accept_unestimable: bool,
+    #[command(flatten)]
+    set_up: SetUp,
+}
+
+/// Numbers of the control's set-up.
+#[derive(Args)]
+struct SetUp {
+    /// LinuxCNC: `COMP_FILE_TYPE`.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
+    file_type: u8,
+    /// SINUMERIK: points of a table (MD38000, MD18342).
+    #[arg(long, default_value_t = 200)]
+    max_points: usize,
+    /// SINUMERIK: cross-axis tables.
+    #[arg(long, default_value_t = 8)]
+    max_tables: usize,
+    /// SINUMERIK: greatest sum of cross-axis compensations (MD32720), mm.
+    #[arg(long, default_value_t = 1.0)]
+    max_sum_mm: f64,
+    /// SINUMERIK: greatest slope of the temperature compensation, mm/mm.
+    #[arg(long, default_value_t = 1e-3)]
+    max_slope: f64,
+    /// SINUMERIK: positioning as two cross-axis tables, one for each direction.
+    #[arg(long)]
+    each_direction: bool,
+    /// SINUMERIK: leave out drift that depends on other axes instead of refusing the axis.
+    #[arg(long)]
+    leave_out_other_axes: bool,
+    /// FANUC: number of an axis' reference point such as X=40 (parameter 3620); others: 100 times the axis' place, and 100.
+    #[arg(long)]
+    reference_number: Vec<OfAxis>,
+    /// FANUC: detection unit, um or 0.001 deg.
+    #[arg(long, default_value_t = 1.0)]
+    detection_unit: f64,
+    /// FANUC: magnification (parameter 3623).
+    #[arg(long, default_value_t = 1)]
+    magnification: u32,
+    /// FANUC: greatest size of one value, pulses.
+    #[arg(long, default_value_t = 7)]
+    max_pulses: u32,
+    /// FANUC: greatest number of a point.
+    #[arg(long, default_value_t = 1023)]
+    max_number: u32,
+    /// FANUC: mark pitch data with Q0 as series 30i and later do.
+    #[arg(long)]
+    marked: bool,
+}
+
+/// mm as they are, degrees as rad.
+fn inner(axis: Axis, value: f64) -> f64 {
+    if axis.is_linear() {
+        value
+    } else {
+        value.to_radians()
+    }
+}
+
+/// A fraction of a millimetre or of a degree.
+const THOUSANDTH: f64 = 1e-3;
+
+impl SetUp {
+    fn control(&self, format: Format) -> Control {
+        match format {
+            Format::Linuxcnc if self.file_type == 0 => Control::LinuxCnc(FileType::ActualPosition),
+            Format::Linuxcnc => Control::LinuxCnc(FileType::Offset),
+            Format::Sinumerik => Control::Sinumerik(self.sinumerik()),
+            Format::Heidenhain => Control::Heidenhain,
+            Format::Fanuc => Control::Fanuc(self.fanuc()),
+            Format::Csv => Control::Csv,
+        }
+    }
+
+    fn sinumerik(&self) -> Sinumerik {
+        Sinumerik {
+            names: PerAxis::from_fn(|axis| format!("{axis}1")),
+            max_points: self.max_points,
+            max_tables: self.max_tables,
+            max_cross_points: self.max_points,
+            max_sum: self.max_sum_mm,
+            max_slope: self.max_slope,
+            for_each_direction: self.each_direction,
+            other_axes: if self.leave_out_other_axes {
+                OtherAxes::LeaveOut
+            } else {
+                OtherAxes::Refuse
+            },
+        }
+    }
+
+    fn fanuc(&self) -> Fanuc {
+        let mut reference_number = PerAxis::from_fn(|axis| 100 * axis.index() as u32 + 100);
+        for of in &self.reference_number {
+            // A number that is none becomes one that no control has, which the export refuses by name.
+            reference_number[of.axis] = if of.value >= 0.0 && of.value.fract().abs() < 1e-9 {
+                of.value as u32
+            } else {
+                u32::MAX
+            };
+        }
+        Fanuc {
+            reference_number,
+            detection_unit: PerAxis::from_fn(|axis| inner(axis, self.detection_unit * THOUSANDTH)),
+            magnification: self.magnification,
+            max_pulses: self.max_pulses,
+            max_number: self.max_number,
+            record: if self.marked {
+                Record::Marked
+            } else {
+                Record::Plain
+            },
+        }
+    }
+}
+
+impl Export {
+    /// Exit code 0: every file is written; 1: there was nothing to write, or it failed; 3: written, but the bag has lost something.
+    ///
+    /// # Errors
+    /// The bag cannot be read, or a file cannot be written.
+    pub fn execute(self) -> Result<ExitCode> {
+        let (measured, losses) = read(&self.bag)?;
+        let selected = select(&measured, &self.wanted(), &self.set_up.control(self.format));
+        for left in &selected.left_out {
+            println!("left out: {}: {}", left.what, left.why);
+        }
+        if selected.files.is_empty() {
+            eprintln!("abbe: {}: nothing to export", self.bag.display());
+            return Ok(ExitCode::FAILURE);
+        }
+        self.write(&selected)?;
+        for loss in &losses {
+            eprintln!("abbe: the bag has lost something, a later table may be missing: {loss}");
+        }
+        Ok(if losses.is_empty() {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::from(3)
+        })
+    }
+
+    fn wanted(&self) -> Wanted {
+        let mut reference = PerAxis::default();
+        for of in &self.reference {
+            reference[of.axis] = inner(of.axis, of.value);
+        }
+        Wanted {
+            axes: if self.axis.is_empty() {
+                Axis::ALL.into_iter().collect()
+            } else {
+                self.axis.iter().copied().collect()
+            },
+            spacing_mm: self.spacing_mm,
+            spacing_rad: self.spacing_deg.to_radians(),
+            reference,
+            relative_to_reference: !self.absolute,
+            unestimable: if self.accept_unestimable {
+                Unestimable::Accept
+            } else {
+                Unestimable::Refuse
+            },
+        }
+    }
+
+    fn write(&self, selected: &Selected) -> Result<()> {
+        std::fs::create_dir_all(&self.out).with_context(|| self.out.display().to_string())?;
+        for file in &selected.files {
+            create(&self.out.join(&file.name), &file.text)?;
+            println!("wrote {}", self.out.join(&file.name).display());
+        }
+        let notes = notes(&selected.files);
+        create(&self.out.join(NOTES), &notes)?;
+        println!(
+            "wrote {}: read it before loading anything",
+            self.out.join(NOTES).display()
+        );
+        Ok(())
+    }
+}
+
+/// Beside the files, since not every format has comments.
+const NOTES: &str = "READ_ME_FIRST.txt";
+
+fn notes(files: &[ExportFile]) -> String {
+    let mut text = String::new();
+    for file in files {
+        text.push_str(&format!("{}\n", file.name));
+        for note in &file.notes {
+            text.push_str(&format!("  - {note}\n"));
+        }
+    }
+    text
+}
+
+fn create(path: &Path, text: &str) -> Result<()> {
+    let mut file = File::create_new(path).with_context(|| path.display().to_string())?;
+    file.write_all(text.as_bytes())
+        .with_context(|| path.display().to_string())
+}
+
+fn decode<M: Message + Wire>(topic: &Topic<M>, bytes: &[u8]) -> Result<M::Inner> {
+    let message: M = from_cdr(bytes).with_context(|| topic.name.to_owned())?;
+    message.into_inner().with_context(|| topic.name.to_owned())
+}
+
+/// The last table of each axis and the last models, and what could not be read.
+fn read(path: &Path) -> Result<(Measured, Vec<String>)> {
+    let bag = Bag::open(path).with_context(|| path.display().to_string())?;
+    let mut measured = Measured::default();
+    let mut losses = Vec::new();
+    let mut messages = bag.messages(Order::LogTime);
+    while let Some(event) = messages.next_event() {
+        let message = match event {
+            Event::Message(message) => message,
+            Event::Loss(loss) => {
+                losses.push(loss.to_string());
+                continue;
+            }
+        };
+        let name = bag.topic(message.topic).topic.as_str();
+        // A machine's namespace may stand in front.
+        let is = |topic: &str| name == topic || name.ends_with(&format!("/{topic}"));
+        if is(topics::POSITIONING_TABLE.name) {
+            let table = decode(&topics::POSITIONING_TABLE, message.data)?;
+            let axis = table.axis;
+            measured.tables[axis] = Some(table);
+        } else if is(topics::THERMAL_MODEL.name) {
+            measured.thermal = Some(decode(&topics::THERMAL_MODEL, message.data)?);
+        } else if is(topics::GEOMETRY_MODEL.name) {
+            measured.geometry = Some(decode(&topics::GEOMETRY_MODEL, message.data)?);
+        }
+    }
+    Ok((measured, losses))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use metrology::sample::PositioningTable;
+    use metrology::stamp::Stamp;
+    use recorder::{Channel, Directory, MessageStamp, RecorderConfig, Recording};
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct CommandLine {
+        #[command(flatten)]
+        export: Export,
+    }
+
+    fn table(axis: Axis, slope: f64) -> PositioningTable {
+        let position: Vec<f64> = (0..=10).map(|k| f64::from(k) * 20.0 - 100.0).collect();
+        let deviation: Vec<f64> = position.iter().map(|p| slope * p).collect();
+        PositioningTable {
+            at: Stamp::from_nanos(1),
+            axis,
+            position,
+            deviation_up: deviation.clone(),
+            deviation_down: deviation,
+            n_runs: 10,
+            weight: 0.2,
+            sequence: 1,
+        }
+    }
+
+    /// A bag with these tables in order, and its last chunk cut off where asked for.
+    fn bag(folder: &Path, tables: &[PositioningTable], cut: bool) -> PathBuf {
+        let path = folder.join("bag");
+        let directory = Directory::create(&path).unwrap();
+        let mut recording = Recording::begin(directory, "bag", RecorderConfig::default()).unwrap();
+        let channel = Channel {
+            topic: format!("/mill/{}", topics::POSITIONING_TABLE.name),
+            type_name: "abbe_msgs/msg/PositioningTable".to_owned(),
+            type_hash: String::new(),
+            definition: String::new(),
+            qos_yaml: String::new(),
+        };
+        let id = recording.add_channel(&channel).unwrap();
+        for (k, table) in tables.iter().enumerate() {
+            let message = abbe_msgs::msg::PositioningTable::from_inner(table);
+            let nanos = k as i64 + 1;
+            let stamp = MessageStamp {
+                log_time_nanos: nanos,
+                publish_time_nanos: nanos,
+                sequence: 0,
+            };
+            recording
+                .write(id, stamp, &abbe_msgs::to_cdr(&message))
+                .unwrap();
+            recording.flush().unwrap();
+        }
+        recording.finish().unwrap();
+        if cut {
+            let file = path.join("bag_0.mcap");
+            let bytes = std::fs::read(&file).unwrap();
+            std::fs::write(&file, &bytes[..bytes.len() - 40]).unwrap();
+        }
+        path
+    }
+
+    fn execute(bag: &Path, out: &Path, more: &[&str]) -> Result<ExitCode> {
+        let line = [
+            "export",
+            bag.to_str().unwrap(),
+            "--out",
+            out.to_str().unwrap(),
+        ];
+        CommandLine::parse_from(line.iter().chain(more))
+            .export
+            .execute()
+    }
+
+    fn code(result: Result<ExitCode>) -> String {
+        format!("{:?}", result.unwrap())
+    }
+
+    #[test]
+    fn the_last_table_of_each_axis_is_written_and_nothing_is_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let tables = [
+            table(Axis::X, 1e-4),
+            table(Axis::Y, 2e-4),
+            table(Axis::X, 3e-4),
+        ];
+        let bag = bag(folder.path(), &tables, false);
+        let out = folder.path().join("out");
+        let done = execute(&bag, &out, &["--format", "linuxcnc", "--file-type", "1"]);
+        assert_eq!(code(done), format!("{:?}", ExitCode::SUCCESS));
+        let x = std::fs::read_to_string(out.join("x.comp")).unwrap();
+        assert_eq!(x.lines().next(), Some("-100.000000 0.030000 0.030000"));
+        assert!(out.join("y.comp").is_file() && !out.join("z.comp").exists());
+        let notes = std::fs::read_to_string(out.join(NOTES)).unwrap();
+        assert!(notes.starts_with("x.comp\n  - LinuxCNC screw compensation of axis X"));
+        let again = execute(&bag, &out, &["--format", "linuxcnc"]).unwrap_err();
+        assert!(format!("{again:#}").contains("x.comp"), "{again:#}");
+    }
+
+    #[test]
+    fn a_bag_without_errors_of_the_wanted_axis_is_said_and_fails() {
+        let folder = tempfile::tempdir().unwrap();
+        let bag = bag(folder.path(), &[table(Axis::X, 1e-4)], false);
+        let out = folder.path().join("out");
+        let nothing = execute(&bag, &out, &["--format", "csv", "--axis", "Z"]);
+        assert_eq!(code(nothing), format!("{:?}", ExitCode::FAILURE));
+        assert!(!out.exists());
+        let absent = execute(&folder.path().join("nowhere"), &out, &["--format", "csv"]);
+        assert!(absent.is_err());
+    }
+
+    #[test]
+    fn a_bag_that_was_cut_is_exported_with_a_code_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let bag = bag(folder.path(), &[table(Axis::X, 1e-4)], true);
+        let out = folder.path().join("out");
+        let done = execute(&bag, &out, &["--format", "csv"]);
+        assert_eq!(code(done), format!("{:?}", ExitCode::from(3)));
+        assert!(out.join("errors.csv").is_file());
+    }
+
+    #[test]
+    fn an_argument_that_is_none_is_a_matter_of_usage() {
+        for wrong in [
+            &["--format", "okuma"][..],
+            &["--format", "csv", "--axis", "Q"],
+            &["--format", "csv", "--reference", "X"],
+            &["--format", "csv", "--reference", "X=here"],
+            &["--format", "linuxcnc", "--file-type", "2"],
+        ] {
+            let line = ["export", "bag"].iter().chain(wrong);
+            let refused = CommandLine::try_parse_from(line).err().unwrap();
+            assert_eq!(refused.exit_code(), 2, "{wrong:?}");
+        }
+    }
+}
