@@ -1,10 +1,11 @@
 //! The servo tick allocates nothing.
 
+use axis_compensation::geometric::GeometrySource;
 use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output};
 use metrology::drift::{Extrapolate, axis_drift_at};
-use metrology::sample::{AxisDrift, AxisState, ThermalModel};
-use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
-use nalgebra::Vector3;
+use metrology::sample::{AxisDrift, AxisState, CurveForm, ErrorCurve, GeometryModel, ThermalModel};
+use metrology::{Axis, AxisSet, ErrorComponent, PerAxis, Stage, Stamp};
+use nalgebra::{DMatrix, Vector3};
 
 fn model() -> ThermalModel {
     let mut axes = PerAxis::default();
@@ -31,6 +32,50 @@ fn model() -> ThermalModel {
     }
 }
 
+/// Every component of a table-table machine: cubics, tables, constants.
+fn geometry(source: GeometrySource) -> Input {
+    let chain = "[w C' A' Y' b X Z t]";
+    let wanted =
+        |component: &ErrorComponent| component.of.is_linear() == (source == GeometrySource::Linear);
+    let all = machine::volumetric::components_of(&chain.parse().expect("a chain"));
+    let curves = all.into_iter().filter(wanted).map(|component| {
+        let mut curve = ErrorCurve {
+            component,
+            form: CurveForm::Polynomial,
+            origin: 0.0,
+            power: vec![1, 2, 3],
+            position: Vec::new(),
+            coefficient: vec![3e-8, 1e-10, -3e-13],
+            standard_uncertainty: Vec::new(),
+            estimable: Vec::new(),
+            span: (-400.0, 400.0),
+        };
+        if component.is_location {
+            curve.form = CurveForm::Constant;
+            curve.power = Vec::new();
+            curve.coefficient = vec![1e-5];
+        } else if component.direction == Axis::Z {
+            curve.form = CurveForm::Table;
+            curve.power = Vec::new();
+            curve.position = vec![-400.0, 0.0, 400.0];
+        }
+        curve
+    });
+    let model = GeometryModel {
+        at: Stamp::from_nanos(0),
+        chain: chain.to_owned(),
+        curves: curves.collect(),
+        covariance: DMatrix::zeros(0, 0),
+        combinations: Vec::new(),
+        n_samples: 0,
+        n_unknowns: 0,
+        rank: 0,
+        residual_standard_deviation_mm: 0.0,
+        sequence: 1,
+    };
+    Input::Geometry(source, Box::new(model))
+}
+
 /// Both readings; X passes points slowly enough to refresh its table.
 const POSITIONING: &str = "\
     X: {reading: refreshed_table, weight: 0.3, directions: apart, thermal_part: true, \
@@ -48,12 +93,18 @@ fn a_thousand_ticks_allocate_nothing() {
         "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
     let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
         "{{axes: {{X: {{{limits}}}, Y: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: linear, \
-         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0, positioning: {{{POSITIONING}}}}}"
+         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0, positioning: {{{POSITIONING}}}, \
+         geometry: {{tool_offset_mm: [0.0, 0.0, -100.0], jump_limit_um: 20.0}}}}"
     ))
     .unwrap();
     let mut stage =
         AxisCompensationStage::new(&config, &serde_saphyr::from_str(machine).unwrap()).unwrap();
     let mut out = Vec::with_capacity(64);
+    for source in [GeometrySource::Linear, GeometrySource::Rotary] {
+        stage
+            .step(Stamp::from_nanos(0), geometry(source), &mut out)
+            .unwrap();
+    }
     stage
         .step(
             Stamp::from_nanos(0),
@@ -66,10 +117,12 @@ fn a_thousand_ticks_allocate_nothing() {
             out.clear();
             let mut commanded = PerAxis::default();
             commanded[Axis::X] = k as f64 * 0.3 - 150.0;
+            commanded[Axis::A] = -0.3;
+            commanded[Axis::C] = k as f64 * 1e-3;
             let state = AxisState {
                 received_at: Stamp::from_nanos(k * 1_000_000),
                 controller_at: Stamp::from_nanos(k * 1_000_000),
-                axes: AxisSet::XYZ,
+                axes: AxisSet::XYZ.with(Axis::A).with(Axis::C),
                 commanded,
                 motor: commanded,
                 scale: PerAxis::from_fn(|axis| commanded[axis] + 2e-3),
@@ -85,6 +138,8 @@ fn a_thousand_ticks_allocate_nothing() {
         }
     });
     assert_eq!(measured.count_total, 0);
+    let worked = |output: &Output| matches!(output, Output::Compensation(c) if c.geometric[Axis::Y].abs() > 1e-6);
+    assert!(out.iter().any(worked), "{out:?}");
     // The table of X was refreshed meanwhile: a tick of the host now publishes it anew.
     out.clear();
     stage

@@ -36,12 +36,14 @@ impl Axis {
 
     /// Whether positions along this axis are lengths (mm) rather than angles (rad).
     #[must_use]
+    #[inline]
     pub const fn is_linear(self) -> bool {
         matches!(self, Self::X | Self::Y | Self::Z)
     }
 
     /// Place in [`PerAxis`]; 0, 1, 2 for X, Y, Z.
     #[must_use]
+    #[inline]
     pub const fn index(self) -> usize {
         self as usize
     }

@@ -9,13 +9,24 @@
 //! Polynomials that share origin and span are evaluated together by Horner's rule. A table is straight
 //! between its knots and constant beyond the outer ones, under every policy.
 
+use metrology::Axis;
 use metrology::drift::Extrapolate;
 use metrology::sample::{CurveForm, ErrorCurve};
 
 use super::error::VolumetricError;
 
-/// Six values in the order EX. EY. EZ. EA. EB. EC., mm and rad.
-pub(super) type Six = [f64; 6];
+/// Shifts EX. EY. EZ. (mm), a zero, turns EA. EB. EC. (rad), a zero: each three in a place of four, since a
+/// processor that writes pairs is slow to read one that straddles two of them.
+pub(super) type Lanes = [f64; 8];
+
+/// Place of a direction in [`Lanes`].
+pub(super) const fn lane(direction: Axis) -> usize {
+    if direction.is_linear() {
+        direction.index()
+    } else {
+        direction.index() + 1
+    }
+}
 
 /// All error motions of one axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,13 +42,15 @@ pub(super) struct Motions {
 struct Polynomials {
     origin: f64,
     span: (f64, f64),
-    /// Highest power first.
-    coefficients: Vec<Six>,
+    /// Powers above 3, the highest first.
+    high: Vec<Lanes>,
+    /// Powers 3 to 0: the usual cubic in one piece.
+    low: [Lanes; 4],
 }
 
 #[derive(Clone, Debug, PartialEq)]
 enum Other {
-    Polynomial(Polynomials),
+    Polynomial(Box<Polynomials>),
     Table { knots: Vec<f64>, values: Vec<f64> },
 }
 
@@ -51,7 +64,7 @@ impl Motions {
 
     /// Adds one checked error motion.
     pub(super) fn add(&mut self, curve: &ErrorCurve) {
-        let row = curve.component.direction.index();
+        let row = lane(curve.component.direction);
         match curve.form {
             CurveForm::Constant => self.together.add(row, &[0], &curve.coefficient),
             CurveForm::Polynomial => {
@@ -70,7 +83,7 @@ impl Motions {
                         ..Polynomials::NONE
                     };
                     alone.add(row, &curve.power, &curve.coefficient);
-                    self.others.push((row, Other::Polynomial(alone)));
+                    self.others.push((row, Other::Polynomial(Box::new(alone))));
                 }
             }
             CurveForm::Table => {
@@ -94,15 +107,22 @@ impl Motions {
     }
 
     /// Values at a position; the policy `Refuse` is for the caller to have asked about.
-    pub(super) fn at(&self, position: f64, policy: Extrapolate) -> Six {
+    #[inline]
+    pub(super) fn at(&self, position: f64, policy: Extrapolate) -> Lanes {
         let mut six = self.together.at(position, policy);
+        if !self.others.is_empty() {
+            self.add_others(position, policy, &mut six);
+        }
+        six
+    }
+
+    fn add_others(&self, position: f64, policy: Extrapolate, six: &mut Lanes) {
         for (row, other) in &self.others {
             six[*row] += match other {
                 Other::Polynomial(alone) => alone.at(position, policy)[*row],
                 Other::Table { knots, values } => interpolated(knots, values, position),
             };
         }
-        six
     }
 }
 
@@ -112,52 +132,62 @@ impl Polynomials {
     const NONE: Self = Self {
         origin: 0.0,
         span: EVERYWHERE,
-        coefficients: Vec::new(),
+        high: Vec::new(),
+        low: [[0.0; 8]; 4],
     };
 
+    /// Whether origin and span are still anybody's.
     fn is_constant(&self) -> bool {
-        self.coefficients.len() < 2
+        self.span == EVERYWHERE
     }
 
     fn add(&mut self, row: usize, powers: &[u8], coefficients: &[f64]) {
         for (&power, &coefficient) in powers.iter().zip(coefficients) {
             let power = usize::from(power);
-            while self.coefficients.len() <= power {
-                self.coefficients.insert(0, Six::default());
+            while self.high.len() + 3 < power {
+                self.high.insert(0, Lanes::default());
             }
-            let place = self.coefficients.len() - 1 - power;
-            self.coefficients[place][row] += coefficient;
+            let all = self.low.len() + self.high.len();
+            let place = all - 1 - power;
+            match place.checked_sub(self.high.len()) {
+                Some(place) => self.low[place][row] += coefficient,
+                None => self.high[place][row] += coefficient,
+            }
         }
     }
 
-    fn at(&self, position: f64, policy: Extrapolate) -> Six {
+    #[inline]
+    fn at(&self, position: f64, policy: Extrapolate) -> Lanes {
         let inside = position.max(self.span.0).min(self.span.1);
         let u = inside - self.origin;
-        let mut six = Six::default();
-        for coefficients in &self.coefficients {
+        let mut six = Lanes::default();
+        let mut horner = |coefficients: &Lanes| {
             for (value, c) in six.iter_mut().zip(coefficients) {
                 *value = *value * u + c; // (1)
             }
-        }
+        };
+        self.high.iter().for_each(&mut horner);
+        self.low.iter().for_each(horner);
         if policy == Extrapolate::Linear && (position - inside).abs() > 0.0 {
-            let slopes = self.slopes(u);
-            for (value, slope) in six.iter_mut().zip(slopes) {
-                *value += slope * (position - inside); // (2)
-            }
+            self.continue_by(position - inside, u, &mut six);
         }
         six
     }
 
-    fn slopes(&self, u: f64) -> Six {
-        let mut values = Six::default();
-        let mut slopes = Six::default();
-        for coefficients in &self.coefficients {
+    /// Equation (2).
+    #[cold]
+    fn continue_by(&self, beyond: f64, u: f64, six: &mut Lanes) {
+        let mut values = Lanes::default();
+        let mut slopes = Lanes::default();
+        for coefficients in self.high.iter().chain(&self.low) {
             for ((slope, value), c) in slopes.iter_mut().zip(&mut values).zip(coefficients) {
                 *slope = *slope * u + *value;
                 *value = *value * u + c;
             }
         }
-        slopes
+        for (value, slope) in six.iter_mut().zip(slopes) {
+            *value += slope * beyond;
+        }
     }
 }
 
@@ -302,10 +332,10 @@ mod tests {
         let all = motions(&[ezx.clone(), eyx.clone(), ecx.clone()]);
         assert!(all.others.is_empty());
         let six = all.at(13.0, Extrapolate::Refuse);
-        assert_eq!(six, [0.0, 51.0, 0.5, 0.0, 0.0, 250.0]);
+        assert_eq!(six, [0.0, 51.0, 0.5, 0.0, 0.0, 0.0, 250.0, 0.0]);
         ecx.origin = 11.0;
         let six = motions(&[ezx, eyx, ecx]).at(13.0, Extrapolate::Refuse);
-        assert_eq!(six, [0.0, 51.0, 0.5, 0.0, 0.0, 39.0]);
+        assert_eq!(six, [0.0, 51.0, 0.5, 0.0, 0.0, 0.0, 39.0, 0.0]);
     }
 
     #[test]

@@ -89,8 +89,9 @@ impl VolumetricModel {
             let tables = self.links.iter().rev();
             let tables = tables.filter(|l| l.member.carries_workpiece && l.is_rotary());
             return Ok(tables.fold(*v, |v, link| {
-                let (sin, cos) = tips.turn[link.member.axis];
-                turned_about(link.member.axis.index() % 3, (-sin, cos), &v)
+                let row = link.member.axis.index() % 3;
+                let (sin, cos) = tips.turn[row];
+                turned_about(row, (-sin, cos), &v)
             }));
         }
         let mut directions = Matrix3::<f64>::zeros();
@@ -99,8 +100,8 @@ impl VolumetricModel {
             if axis.is_linear() {
                 let nearer = self.links.iter().skip(place).filter(|l| l.is_rotary());
                 let direction = nearer.fold(direction_of(axis), |d, link| {
-                    let axis = link.member.axis;
-                    turned_about(axis.index() % 3, tips.turn[axis], &d)
+                    let row = link.member.axis.index() % 3;
+                    turned_about(row, tips.turn[row], &d)
                 });
                 directions.set_column(axis.index(), &direction);
             }

@@ -22,7 +22,7 @@ use metrology::{Axis, ErrorComponent, PerAxis};
 use nalgebra::Vector3;
 
 use super::component::has_component;
-use super::curve::{self, Motions};
+use super::curve::{self, Lanes, Motions, lane};
 use super::error::{PoseRefusal, VolumetricError};
 use super::member::{Member, members};
 use crate::chain::Chain;
@@ -51,10 +51,13 @@ pub(super) struct Link {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Joint {
     Linear {
+        nominal_direction: Vector3<f64>,
         /// True direction of motion.
         direction: Vector3<f64>,
     },
     Rotary {
+        /// 0, 1 or 2: about X, Y or Z.
+        row: usize,
         /// Angle of the tip per unit of the position.
         sense: f64,
         nominal_origin_mm: Vector3<f64>,
@@ -71,8 +74,8 @@ pub(super) enum Joint {
 pub(super) struct Tips {
     pub(super) nominal_mm: Vector3<f64>,
     pub(super) actual_mm: Vector3<f64>,
-    /// Sine and cosine of each rotary member's nominal turn of the tip.
-    pub(super) turn: PerAxis<(f64, f64)>,
+    /// Sine and cosine of the nominal turn of the tip about X, Y and Z.
+    pub(super) turn: [(f64, f64); 3],
 }
 
 impl VolumetricModel {
@@ -145,7 +148,7 @@ impl VolumetricModel {
             return found.map(|(_, value)| *value);
         }
         let link = self.links.iter().find(|l| l.member.axis == component.of)?;
-        Some(link.motions.at(position, self.policy)[component.direction.index()])
+        Some(link.motions.at(position, self.policy)[lane(component.direction)])
     }
 
     /// Error of the tip (actual minus nominal, tool relative to workpiece) in the workpiece frame, mm.
@@ -193,14 +196,16 @@ impl VolumetricModel {
     }
 
     /// Both tips at a pose that [`Self::check_pose`] lets pass.
+    #[inline]
     pub(super) fn tips(&self, positions: &PerAxis<f64>, tool_offset_mm: &Vector3<f64>) -> Tips {
         let mut tips = Tips {
             nominal_mm: *tool_offset_mm,
             actual_mm: *tool_offset_mm,
-            turn: PerAxis::default(),
+            turn: [(0.0, 1.0); 3],
         };
         for link in &self.links {
-            link.move_on(positions[link.member.axis], self.policy, &mut tips);
+            let position = positions[link.member.axis];
+            link.move_on(position, &link.motions.at(position, self.policy), &mut tips);
         }
         if self.has_shifted_datum {
             self.take_up_zero_positions(positions, &mut tips);
@@ -247,14 +252,17 @@ impl Link {
     }
 
     /// Moves both tips through this member.
-    fn move_on(&self, position: f64, policy: Extrapolate, tips: &mut Tips) {
-        let [ex, ey, ez, ea, eb, ec] = self.motions.at(position, policy);
+    #[inline]
+    fn move_on(&self, position: f64, motions: &Lanes, tips: &mut Tips) {
+        let [ex, ey, ez, _, ea, eb, ec, _] = *motions;
         let (shift_mm, turn_rad) = (Vector3::new(ex, ey, ez), Vector3::new(ea, eb, ec));
-        let row = self.member.axis.index() % 3;
         let actual_mm = tips.actual_mm;
         match &self.joint {
-            Joint::Linear { direction } => {
-                tips.nominal_mm[row] += position;
+            Joint::Linear {
+                nominal_direction,
+                direction,
+            } => {
+                tips.nominal_mm += nominal_direction * position;
                 let along_mm = direction * position;
                 tips.actual_mm = if self.member.carries_workpiece {
                     shift_mm + turned(&turn_rad, &(actual_mm + along_mm))
@@ -263,6 +271,7 @@ impl Link {
                 };
             }
             Joint::Rotary {
+                row,
                 sense,
                 nominal_origin_mm,
                 origin_mm,
@@ -271,9 +280,9 @@ impl Link {
             } => {
                 let angle_rad = sense * position;
                 let nominal = angle_rad.sin_cos();
-                tips.turn[self.member.axis] = nominal;
+                tips.turn[*row] = nominal;
                 let arm_mm = tips.nominal_mm - nominal_origin_mm;
-                tips.nominal_mm = nominal_origin_mm + turned_about(row, nominal, &arm_mm);
+                tips.nominal_mm = nominal_origin_mm + turned_about(*row, nominal, &arm_mm);
                 let actual = if zero_rad.abs() > 0.0 {
                     (angle_rad + zero_rad).sin_cos()
                 } else {
@@ -309,12 +318,14 @@ fn joint(kinematics: &Kinematics, member: Member, locations: &[(ErrorComponent, 
     let mut tilt_rad = Vector3::from(Axis::ROTARY.map(value));
     if axis.is_linear() {
         return Joint::Linear {
+            nominal_direction: direction_of(axis),
             direction: turned(&tilt_rad, &direction_of(axis)),
         };
     }
     tilt_rad[axis.index() % 3] = 0.0;
     let nominal_origin_mm = kinematics.origin_mm(axis);
     Joint::Rotary {
+        row: axis.index() % 3,
         sense: member.sense(kinematics.table_sense()),
         nominal_origin_mm,
         origin_mm: nominal_origin_mm + shift_mm,
