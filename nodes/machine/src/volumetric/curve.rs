@@ -107,22 +107,24 @@ impl Motions {
     }
 
     /// Values at a position; the policy `Refuse` is for the caller to have asked about.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(&self, position: f64, policy: Extrapolate) -> Lanes {
-        let mut six = self.together.at(position, policy);
-        if !self.others.is_empty() {
-            self.add_others(position, policy, &mut six);
+        let six = self.together.at(position, policy);
+        if self.others.is_empty() {
+            return six;
         }
-        six
+        self.with_others(position, policy, six)
     }
 
-    fn add_others(&self, position: f64, policy: Extrapolate, six: &mut Lanes) {
+    // By value, here and below, so that the usual values need no place in memory.
+    fn with_others(&self, position: f64, policy: Extrapolate, mut six: Lanes) -> Lanes {
         for (row, other) in &self.others {
             six[*row] += match other {
                 Other::Polynomial(alone) => alone.at(position, policy)[*row],
                 Other::Table { knots, values } => interpolated(knots, values, position),
             };
         }
+        six
     }
 }
 
@@ -156,7 +158,7 @@ impl Polynomials {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn at(&self, position: f64, policy: Extrapolate) -> Lanes {
         let inside = position.max(self.span.0).min(self.span.1);
         let u = inside - self.origin;
@@ -169,14 +171,14 @@ impl Polynomials {
         self.high.iter().for_each(&mut horner);
         self.low.iter().for_each(horner);
         if policy == Extrapolate::Linear && (position - inside).abs() > 0.0 {
-            self.continue_by(position - inside, u, &mut six);
+            return self.continued_by(position - inside, u, six);
         }
         six
     }
 
     /// Equation (2).
     #[cold]
-    fn continue_by(&self, beyond: f64, u: f64, six: &mut Lanes) {
+    fn continued_by(&self, beyond: f64, u: f64, mut six: Lanes) -> Lanes {
         let mut values = Lanes::default();
         let mut slopes = Lanes::default();
         for coefficients in self.high.iter().chain(&self.low) {
@@ -188,6 +190,7 @@ impl Polynomials {
         for (value, slope) in six.iter_mut().zip(slopes) {
             *value += slope * beyond;
         }
+        six
     }
 }
 
