@@ -71,6 +71,9 @@ pub use shape::Shape;
 /// A program and what its test segment says of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
+    /// Program that puts the plate or beam up and sets its count to zero; to be run before and not part
+    /// of the recording, since readings of the count before may still come in it.
+    pub setup: Option<String>,
     /// RS-274 text, ends with M2.
     pub program: String,
     /// What a test segment around it is called.

@@ -3,11 +3,12 @@
 //! Which plate or beam is up, and whether its count still stands, decides how each run begins: a new
 //! placement is mounted over the top of Z, a count that was lost (another program ran in between, or
 //! the last one failed) or is wanted anew is set to zero, and otherwise the head goes straight on, so that
-//! recordings share one zero.
+//! recordings share one zero. Mounting and zeroing is a program of its own before the recording's segment
+//! begins: readings of the zero before cannot fall into it.
 
 use machine::MachineFile;
 use machine::trajectory::{Arrival, Trajectory};
-use metrology::sample::Sense;
+use metrology::sample::{Sense, TestKind};
 
 use crate::error::SequencerError;
 use crate::job::{Owner, Task, Trace};
@@ -110,16 +111,16 @@ impl Setups {
         }
     }
 
-    /// The task of `run`, and what is up while it runs.
-    pub(crate) fn task(
+    /// The task of `run`, and the one that sets up what measures it where something has to be.
+    pub(crate) fn tasks(
         &mut self,
         run: &Measurement,
         machine: &MachineFile,
-    ) -> Result<Task, SequencerError> {
+    ) -> Result<(Option<Task>, Task), SequencerError> {
         let Some((device, id, rezero)) = run.device() else {
             self.lose_count();
             let trajectory = run.program(machine, Arrival::Mount)?;
-            return Ok(run.task(trajectory, 0, 0));
+            return Ok((None, run.task(trajectory, 0, 0)));
         };
         let known = self
             .up
@@ -153,7 +154,21 @@ impl Setups {
             up.counts = true;
             up.setup_id
         });
-        Ok(run.task(trajectory, zero_id, setup_id))
+        let setup = trajectory.setup.clone();
+        let task = run.task(trajectory, zero_id, setup_id);
+        let setup = setup.map(|text| Task {
+            name: format!("set-up of {}", task.features.join(" ")),
+            text,
+            kind: TestKind::Production,
+            feed_mm_s: 0.0,
+            trace: Trace {
+                zero_id,
+                setup_id,
+                ..Trace::default()
+            },
+            ..task.clone()
+        });
+        Ok((setup, task))
     }
 }
 

@@ -131,6 +131,8 @@ pub struct Sequencer {
     waiting_until: Option<Stamp<Host>>,
     production: Option<Production>,
     measurements: VecDeque<Measurement>,
+    /// The recording whose set-up is under way, and its repetition.
+    prepared: Option<(Task, u32)>,
     setups: Setups,
     update_wanted: bool,
     next_run: u32,
@@ -168,6 +170,7 @@ impl Sequencer {
             waiting_until: None,
             production: None,
             measurements: VecDeque::new(),
+            prepared: None,
             setups: Setups::default(),
             update_wanted: false,
             next_run: 1,
@@ -210,6 +213,7 @@ impl Sequencer {
         self.state = PlanState::Failed;
         self.production = None;
         self.measurements.clear();
+        self.prepared = None;
         self.message = message;
         self.say(out);
     }
@@ -221,6 +225,10 @@ impl Sequencer {
                 if self.produce(out) {
                     continue;
                 }
+                return;
+            }
+            if let Some((task, repeat)) = self.prepared.take() {
+                self.begin(task, repeat, out);
                 return;
             }
             if let Some(run) = self.measurements.pop_front() {
@@ -306,8 +314,12 @@ impl Sequencer {
     }
 
     fn measure(&mut self, run: &Measurement, out: &mut Vec<Output>) {
-        match self.setups.task(run, &self.machine) {
-            Ok(task) => self.begin(task, run.repeat, out),
+        match self.setups.tasks(run, &self.machine) {
+            Ok((Some(setup), task)) => {
+                self.prepared = Some((task, run.repeat));
+                self.begin(setup, run.repeat, out);
+            }
+            Ok((None, task)) => self.begin(task, run.repeat, out),
             Err(error) => self.fail(error.to_string(), out),
         }
     }

@@ -12,7 +12,7 @@ mod programs;
 use fake_cnc::{Cnc, Config, Input, Outcome, Output, Plant, PlantFile};
 use machine::MachineFile;
 use machine::trajectory::{
-    Arrival, AxisRun, Diagonal, Pace, PlanarOrder, Shape, uneven_targets_mm,
+    Arrival, AxisRun, Diagonal, Pace, PlanarOrder, Shape, Trajectory, uneven_targets_mm,
 };
 use metrology::sample::{GridSample, LengthSample, Sense};
 use metrology::stamp::Span;
@@ -134,6 +134,15 @@ impl Bench {
         let mut out = Vec::new();
         self.cnc.step(self.now, input, &mut out).unwrap();
         out
+    }
+
+    /// Sets up and records.
+    fn measure(&mut self, trajectory: &Trajectory) -> Recorded {
+        if let Some(setup) = &trajectory.setup {
+            let recorded = self.run(setup);
+            assert_eq!(recorded.outcome, Outcome::Done, "{}", recorded.message);
+        }
+        self.run(&trajectory.program)
     }
 
     fn run(&mut self, text: &str) -> Recorded {

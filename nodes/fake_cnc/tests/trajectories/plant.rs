@@ -25,7 +25,7 @@ fn on_a_perfect_machine_the_grid_reads_where_the_axes_are_in_every_plane() {
             from_rad: 0.0,
         };
         let circle = planar(&machine, &order(placement, circle, pace)).unwrap();
-        let recorded = bench.run(&circle.program);
+        let recorded = bench.measure(&circle);
         assert_eq!(recorded.outcome, Outcome::Done, "{}", recorded.message);
         assert!(recorded.grid.len() > 30, "{}", recorded.grid.len());
         let mut worst_mm = 0.0_f64;
@@ -122,7 +122,7 @@ fn the_laser_reads_displacement_along_axis_and_diagonal() {
         },
     )
     .unwrap();
-    let recorded = bench.run(&run.program);
+    let recorded = bench.measure(&run);
     assert_eq!(recorded.outcome, Outcome::Done, "{}", recorded.message);
     assert!(recorded.length.len() > 30);
     for (sample, at) in &recorded.length {
@@ -132,7 +132,7 @@ fn the_laser_reads_displacement_along_axis_and_diagonal() {
         assert!(short_mm.abs() < 0.01, "{at} {short_mm}");
     }
     let run = diagonal(&machine, &corner_to_corner()).unwrap();
-    let recorded = bench.run(&run.program);
+    let recorded = bench.measure(&run);
     let from = Vector3::new(-200.0, -150.0, 50.0);
     assert!(
         recorded

@@ -6,7 +6,7 @@ use std::process::Command;
 use fake_cnc::rs274::program::{Action, Aim, Program};
 use fake_cnc::rs274::{Envelope, read};
 use machine::file::AxisEntry;
-use machine::trajectory::{Trajectory, TrajectoryError, diagonal, planar, positioning, scan};
+use machine::trajectory::{TrajectoryError, diagonal, planar, positioning, scan};
 use metrology::PerAxis;
 use metrology::sample::TestPlane;
 
@@ -93,9 +93,9 @@ fn envelope(machine: &MachineFile) -> Envelope {
     }
 }
 
-fn read_program(trajectory: &Trajectory) -> Program {
+fn read_program(text: &str) -> Program {
     let start = PerAxis([0.0, 0.0, 200.0, 0.0, 0.0, 0.0]);
-    read(&trajectory.program, &envelope(&machine()), &start).unwrap()
+    read(text, &envelope(&machine()), &start).unwrap()
 }
 
 /// Where the program dwells for a station's time.
@@ -121,7 +121,15 @@ fn dwells(program: &Program, dwell_s: f64) -> Vec<Vector3<f64>> {
 #[test]
 fn every_trajectory_is_taken_by_the_control_and_stops_at_its_stations() {
     for trajectory in every_trajectory() {
-        let program = read_program(&trajectory);
+        let program = read_program(&trajectory.program);
+        if let Some(setup) = &trajectory.setup {
+            let steps = read_program(setup).steps;
+            assert!(
+                steps
+                    .iter()
+                    .any(|step| matches!(step.action, Action::Mount(0)))
+            );
+        }
         let stops = dwells(&program, 0.25);
         assert_eq!(stops.len(), trajectory.stations as usize);
         for (stop, wanted) in stops.iter().zip(&trajectory.stops_mm) {

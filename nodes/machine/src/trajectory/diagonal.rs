@@ -66,7 +66,7 @@ pub fn diagonal(file: &MachineFile, order: &Diagonal<'_>) -> Result<Trajectory, 
     let mut writer = Writer::new(file);
     writer.check_travel("beam's beginning", &from)?;
     writer.check_travel("beam's end", &to)?;
-    writer.arrive(order.arrival, &from, &beam.id, "length")?;
+    let setup = Writer::setup(file, order.arrival, &from, &beam.id, "length")?;
     let span_mm = length_mm - 2.0 * order.overrun_mm;
     let step_mm = span_mm / f64::from(order.targets - 1);
     let at = |k: u32| from + direction * (order.overrun_mm + f64::from(k) * step_mm);
@@ -85,6 +85,7 @@ pub fn diagonal(file: &MachineFile, order: &Diagonal<'_>) -> Result<Trajectory, 
         }
     }
     Ok(Trajectory {
+        setup,
         program: writer.finish(),
         kind: TestKind::Diagonal,
         plane: TestPlane::None,

@@ -97,7 +97,7 @@ pub fn positioning(file: &MachineFile, order: &AxisRun<'_>) -> Result<Trajectory
             greatest: MOST_STOPS,
         });
     }
-    let mut writer = line.begin(file, order)?;
+    let mut writer = line.begin(file)?;
     let mut stops_mm = Vec::with_capacity(stops);
     let mut stop = |writer: &mut Writer<'_>, target_mm: f64| {
         let point = line.at(target_mm);
@@ -119,6 +119,7 @@ pub fn positioning(file: &MachineFile, order: &AxisRun<'_>) -> Result<Trajectory
     let stations = u32::try_from(stops).unwrap_or(u32::MAX);
     Ok(line.trajectory(
         order,
+        line.setup(file, order.arrival)?,
         writer.finish(),
         TestKind::Positioning,
         stations,
@@ -140,7 +141,7 @@ pub fn scan(file: &MachineFile, order: &AxisRun<'_>) -> Result<Trajectory, Traje
         });
     }
     let line = Line::new(file, order)?;
-    let mut writer = line.begin(file, order)?;
+    let mut writer = line.begin(file)?;
     let (first, last) = (line.at(line.first_mm), line.at(line.last_mm));
     for _ in 0..order.runs {
         for (from, to, beyond) in [(first, last, line.high()), (last, first, line.low())] {
@@ -152,7 +153,14 @@ pub fn scan(file: &MachineFile, order: &AxisRun<'_>) -> Result<Trajectory, Traje
             writer.dwell(0.1);
         }
     }
-    Ok(line.trajectory(order, writer.finish(), TestKind::Line, 0, vec![first, last]))
+    Ok(line.trajectory(
+        order,
+        line.setup(file, order.arrival)?,
+        writer.finish(),
+        TestKind::Line,
+        0,
+        vec![first, last],
+    ))
 }
 
 /// Where the axis runs.
@@ -219,20 +227,25 @@ impl<'a> Line<'a> {
         self.at(self.last_mm + self.overrun_mm)
     }
 
-    fn begin<'f>(
+    /// The program that puts the beam up and zeroes it, where there is one.
+    fn setup(
         &self,
-        file: &'f MachineFile,
-        order: &AxisRun<'_>,
-    ) -> Result<Writer<'f>, TrajectoryError> {
+        file: &MachineFile,
+        arrival: Arrival,
+    ) -> Result<Option<String>, TrajectoryError> {
+        let Some(beam) = self.beam else {
+            return Ok(None);
+        };
+        let zero_at = Vector3::from(beam.from_mm);
+        Writer::setup(file, arrival, &zero_at, &beam.id, "length")
+    }
+
+    fn begin<'f>(&self, file: &'f MachineFile) -> Result<Writer<'f>, TrajectoryError> {
         let mut writer = Writer::new(file);
         writer.check_travel("overrun", &self.low())?;
         writer.check_travel("overrun", &self.high())?;
-        match self.beam {
-            Some(beam) => {
-                let zero_at = Vector3::from(beam.from_mm);
-                writer.arrive(order.arrival, &zero_at, &beam.id, "length")?;
-            }
-            None => writer.over_the_top(&self.low())?,
+        if self.beam.is_none() {
+            writer.over_the_top(&self.low())?;
         }
         writer.rapid(&self.low());
         Ok(writer)
@@ -241,12 +254,14 @@ impl<'a> Line<'a> {
     fn trajectory(
         &self,
         order: &AxisRun<'_>,
+        setup: Option<String>,
         program: String,
         kind: TestKind,
         stations: u32,
         stops_mm: Vec<Vector3<f64>>,
     ) -> Trajectory {
         Trajectory {
+            setup,
             program,
             kind,
             plane: TestPlane::None,

@@ -68,9 +68,10 @@ pub fn planar(file: &MachineFile, order: &PlanarOrder<'_>) -> Result<Trajectory,
     for point in extremes_mm(&path.whole()) {
         writer.check_travel("trajectory", &place(plane, &centre, &point))?;
     }
-    writer.arrive(order.arrival, &centre, &placement.id, "grid")?;
+    let setup = Writer::setup(file, order.arrival, &centre, &placement.id, "grid")?;
     let stops_mm = path.write(&mut writer, plane, &centre, order);
     Ok(Trajectory {
+        setup,
         program: writer.finish(),
         kind: order.shape.kind(),
         plane: plane.into(),

@@ -31,27 +31,29 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Comes to `zero_at`, mounts and zeroes as `arrival` says; `what` is `grid` or `length`.
-    pub(super) fn arrive(
-        &mut self,
+    /// The program that comes to `zero_at`, mounts and zeroes as `arrival` says; `what` is `grid` or
+    /// `length`.
+    pub(super) fn setup(
+        file: &'a MachineFile,
         arrival: Arrival,
         zero_at: &Vector3<f64>,
         name: &str,
         what: &str,
-    ) -> Result<(), TrajectoryError> {
-        self.check_travel("zero of the count", zero_at)?;
+    ) -> Result<Option<String>, TrajectoryError> {
+        let mut writer = Self::new(file);
+        writer.check_travel("zero of the count", zero_at)?;
         match arrival {
-            Arrival::Straight => return Ok(()),
-            Arrival::Zero => self.rapid(zero_at),
-            Arrival::Return => self.over_the_top(zero_at)?,
+            Arrival::Straight => return Ok(None),
+            Arrival::Zero => writer.rapid(zero_at),
+            Arrival::Return => writer.over_the_top(zero_at)?,
             Arrival::Mount => {
-                self.over_the_top(zero_at)?;
-                self.comment("mount", name);
+                writer.over_the_top(zero_at)?;
+                writer.comment("mount", name);
             }
         }
-        self.dwell(REST_BEFORE_ZERO_S);
-        self.comment("zero", what);
-        Ok(())
+        writer.dwell(REST_BEFORE_ZERO_S);
+        writer.comment("zero", what);
+        Ok(Some(writer.finish()))
     }
 
     /// Up to the top of Z, rotary axes to zero, across, down.
