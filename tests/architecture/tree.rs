@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
 /// Crates without clock, file, environment, entropy, log or ROS.
-pub const PURE: [&str; 8] = [
+pub const PURE: [&str; 9] = [
     "metrology",
     "machine",
     "probe",
     "latency_calibrator",
     "thermal_model",
+    "grid_encoder",
     "axis_compensation",
     "sequencer",
     "fake_cnc",

@@ -1,0 +1,530 @@
+//! Parameters of the grid encoder node; keys carry their units, limits are checked once.
+
+use machine::Chain;
+use metrology::stamp::Span;
+use metrology::{Axis, ErrorComponent, ParameterDoc, PerAxis};
+use serde::{Deserialize, Serialize};
+
+use crate::basis::{Basis, ModelComponent};
+use crate::error::GridEncoderError;
+use crate::identify::{IdentifyOptions, Noise, default_basis};
+use crate::recording::StationRules;
+use crate::unknown::Nuisances;
+
+/// Which positions a reading is paired with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PositionSource {
+    /// Motor encoders: following errors and compensation are not taken for geometry.
+    Motor,
+    /// The command without compensation: what is left with the compensation on.
+    Commanded,
+}
+
+/// Operational parameters; what is physical comes from the machine file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GridEncoderConfig {
+    /// Error components to identify; empty: all of the chain's linear axes.
+    pub components: Vec<String>,
+    /// Greatest power of the polynomials.
+    pub greatest_power: u8,
+    /// Knots of tables over the recorded span instead of polynomials; 0: polynomials.
+    pub table_points: u8,
+    /// Position of X at which its errors are zero.
+    pub origin_x_mm: f64,
+    /// Position of Y at which its errors are zero.
+    pub origin_y_mm: f64,
+    /// Position of Z at which its errors are zero.
+    pub origin_z_mm: f64,
+    /// Positions with which readings are paired: motor or commanded.
+    pub positions: PositionSource,
+    /// Commanded speed below which the machine stands.
+    pub standstill_mm_min: f64,
+    /// Time after a stop that is not used.
+    pub settle_ms: f64,
+    /// Fewest readings of a station, and fewest points of a recording.
+    pub least_readings: usize,
+    /// Greatest distance of the command from its nominal circle.
+    pub on_circle_um: f64,
+    /// Longest time without a reading within a recording.
+    pub gap_limit_ms: f64,
+    /// Points to which a moving trace is reduced; 0: every reading is one.
+    pub bins: usize,
+    /// Readings of one recording that are kept.
+    pub readings_limit: usize,
+    /// Recordings that are fitted together; older ones are dropped.
+    pub recordings_limit: usize,
+    /// Whether lost motion of each axis is unknown.
+    pub lost_motion: bool,
+    /// Whether the time between readings and positions is unknown in moving recordings.
+    pub stamp_offset: bool,
+    /// Whether only the radial part of readings is used, as a ballbar would give it.
+    pub radial_only: bool,
+    /// Whether the radius of each recording is unknown; for `radial_only`.
+    pub radius_free: bool,
+    /// Singular values below this share of the greatest count as zero.
+    pub rank_tolerance: f64,
+    /// Residuals beyond this many standard deviations are weighed down.
+    pub outlier_limit: f64,
+    /// Whether each recording has a noise of its own, at least the stated one.
+    pub recording_noise: bool,
+    /// Lack of fit is reported below this p value.
+    pub lack_of_fit_limit: f64,
+    /// How long the end of a recording waits for its last positions.
+    pub hold_ms: f64,
+    /// Positions that wait for readings.
+    pub log_samples: usize,
+    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    pub machine_file: String,
+}
+
+impl Default for GridEncoderConfig {
+    fn default() -> Self {
+        Self {
+            components: Vec::new(),
+            greatest_power: 3,
+            table_points: 0,
+            origin_x_mm: 0.0,
+            origin_y_mm: 0.0,
+            origin_z_mm: 0.0,
+            positions: PositionSource::Motor,
+            standstill_mm_min: 1.0,
+            settle_ms: 300.0,
+            least_readings: 10,
+            on_circle_um: 100.0,
+            gap_limit_ms: 500.0,
+            bins: 720,
+            readings_limit: 500_000,
+            recordings_limit: 64,
+            lost_motion: true,
+            stamp_offset: true,
+            radial_only: false,
+            radius_free: false,
+            rank_tolerance: 1e-6,
+            outlier_limit: 4.5,
+            recording_noise: true,
+            lack_of_fit_limit: 0.001,
+            hold_ms: 200.0,
+            log_samples: 4096,
+            machine_file: String::new(),
+        }
+    }
+}
+
+const fn doc(name: &'static str, unit: &'static str, description: &'static str) -> ParameterDoc {
+    ParameterDoc {
+        name,
+        unit,
+        description,
+        range: None,
+    }
+}
+
+const fn ranged(
+    name: &'static str,
+    unit: &'static str,
+    description: &'static str,
+    least: f64,
+    greatest: f64,
+) -> ParameterDoc {
+    ParameterDoc {
+        name,
+        unit,
+        description,
+        range: Some((least, greatest)),
+    }
+}
+
+/// What each parameter means.
+pub const PARAMETERS: [ParameterDoc; 26] = [
+    doc(
+        "components",
+        "",
+        "Error components to identify; empty: all of the chain's linear axes.",
+    ),
+    ranged(
+        "greatest_power",
+        "",
+        "Greatest power of the polynomials.",
+        1.0,
+        9.0,
+    ),
+    ranged(
+        "table_points",
+        "",
+        "Knots of tables over the recorded span instead of polynomials, at least 3; 0: polynomials.",
+        0.0,
+        50.0,
+    ),
+    ranged(
+        "origin_x_mm",
+        "mm",
+        "Position of X at which its errors are zero.",
+        -1e5,
+        1e5,
+    ),
+    ranged(
+        "origin_y_mm",
+        "mm",
+        "Position of Y at which its errors are zero.",
+        -1e5,
+        1e5,
+    ),
+    ranged(
+        "origin_z_mm",
+        "mm",
+        "Position of Z at which its errors are zero.",
+        -1e5,
+        1e5,
+    ),
+    doc(
+        "positions",
+        "",
+        "Positions with which readings are paired: motor or commanded.",
+    ),
+    ranged(
+        "standstill_mm_min",
+        "mm/min",
+        "Commanded speed below which the machine stands.",
+        1e-6,
+        1e3,
+    ),
+    ranged(
+        "settle_ms",
+        "ms",
+        "Time after a stop that is not used.",
+        0.0,
+        1e5,
+    ),
+    ranged(
+        "least_readings",
+        "",
+        "Fewest readings of a station, and fewest points of a recording.",
+        2.0,
+        1e5,
+    ),
+    ranged(
+        "on_circle_um",
+        "µm",
+        "Greatest distance of the command from its nominal circle.",
+        0.0,
+        1e5,
+    ),
+    ranged(
+        "gap_limit_ms",
+        "ms",
+        "Longest time without a reading within a recording.",
+        1.0,
+        1e6,
+    ),
+    ranged(
+        "bins",
+        "",
+        "Points to which a moving trace is reduced; 0: every reading is one.",
+        0.0,
+        1e6,
+    ),
+    ranged(
+        "readings_limit",
+        "",
+        "Readings of one recording that are kept.",
+        10.0,
+        1e7,
+    ),
+    ranged(
+        "recordings_limit",
+        "",
+        "Recordings that are fitted together; older ones are dropped.",
+        1.0,
+        1e4,
+    ),
+    doc(
+        "lost_motion",
+        "",
+        "Whether lost motion of each axis is unknown.",
+    ),
+    doc(
+        "stamp_offset",
+        "",
+        "Whether the time between readings and positions is unknown in moving recordings.",
+    ),
+    doc(
+        "radial_only",
+        "",
+        "Whether only the radial part of readings is used, as a ballbar would give it.",
+    ),
+    doc(
+        "radius_free",
+        "",
+        "Whether the radius of each recording is unknown, with radial_only.",
+    ),
+    ranged(
+        "rank_tolerance",
+        "",
+        "Singular values below this share of the greatest count as zero.",
+        1e-12,
+        1e-2,
+    ),
+    ranged(
+        "outlier_limit",
+        "",
+        "Residuals beyond this many standard deviations are weighed down.",
+        2.0,
+        1e6,
+    ),
+    doc(
+        "recording_noise",
+        "",
+        "Whether each recording has a noise of its own, at least the stated one.",
+    ),
+    ranged(
+        "lack_of_fit_limit",
+        "",
+        "Lack of fit is reported below this p value.",
+        0.0,
+        1.0,
+    ),
+    ranged(
+        "hold_ms",
+        "ms",
+        "How long the end of a recording waits for its last positions.",
+        0.0,
+        1e4,
+    ),
+    ranged(
+        "log_samples",
+        "",
+        "Positions that wait for readings.",
+        8.0,
+        1e6,
+    ),
+    doc(
+        "machine_file",
+        "",
+        "Machine file, relative to the parameter file.",
+    ),
+];
+
+impl GridEncoderConfig {
+    fn numbers(&self) -> [(&'static str, f64); 19] {
+        [
+            ("greatest_power", f64::from(self.greatest_power)),
+            ("table_points", f64::from(self.table_points)),
+            ("origin_x_mm", self.origin_x_mm),
+            ("origin_y_mm", self.origin_y_mm),
+            ("origin_z_mm", self.origin_z_mm),
+            ("standstill_mm_min", self.standstill_mm_min),
+            ("settle_ms", self.settle_ms),
+            ("least_readings", self.least_readings as f64),
+            ("on_circle_um", self.on_circle_um),
+            ("gap_limit_ms", self.gap_limit_ms),
+            ("bins", self.bins as f64),
+            ("readings_limit", self.readings_limit as f64),
+            ("recordings_limit", self.recordings_limit as f64),
+            ("rank_tolerance", self.rank_tolerance),
+            ("outlier_limit", self.outlier_limit),
+            ("lack_of_fit_limit", self.lack_of_fit_limit),
+            ("hold_ms", self.hold_ms),
+            ("log_samples", self.log_samples as f64),
+            // One knot or two have nothing between their zeros.
+            (
+                "table_points",
+                if (1..3).contains(&self.table_points) {
+                    -1.0
+                } else {
+                    0.0
+                },
+            ),
+        ]
+    }
+
+    /// Checks every value against its range.
+    pub(crate) fn check(&self) -> Result<(), GridEncoderError> {
+        for (name, value) in self.numbers() {
+            let range = PARAMETERS
+                .iter()
+                .find(|doc| doc.name == name)
+                .and_then(|doc| doc.range);
+            if let Some((least, greatest)) = range
+                && !(least..=greatest).contains(&value)
+            {
+                return Err(GridEncoderError::OutOfRange {
+                    name,
+                    value,
+                    least,
+                    greatest,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The components to identify.
+    pub(crate) fn components_for(
+        &self,
+        chain: &Chain,
+    ) -> Result<Vec<ErrorComponent>, GridEncoderError> {
+        if self.components.is_empty() {
+            let all = machine::volumetric::components_of(chain).into_iter();
+            return Ok(all.filter(|component| component.of.is_linear()).collect());
+        }
+        let read = |name: &String| {
+            let component = name.parse().ok();
+            component
+                .filter(|component| machine::volumetric::has_component(chain, *component))
+                .ok_or_else(|| GridEncoderError::NoComponent {
+                    name: name.clone(),
+                    chain: chain.to_string(),
+                })
+        };
+        self.components.iter().map(read).collect()
+    }
+
+    fn origin_mm(&self, axis: Axis) -> f64 {
+        match axis {
+            Axis::X => self.origin_x_mm,
+            Axis::Y => self.origin_y_mm,
+            Axis::Z => self.origin_z_mm,
+            _ => 0.0,
+        }
+    }
+
+    /// How to identify `components` from recordings over `spans`.
+    #[must_use]
+    pub fn options(
+        &self,
+        components: &[ErrorComponent],
+        spans: &PerAxis<(f64, f64)>,
+    ) -> IdentifyOptions {
+        let basis = |component: ErrorComponent| {
+            let origin = self.origin_mm(component.of);
+            let (least, greatest) = spans[component.of];
+            if self.table_points == 0 || component.is_location || greatest <= least {
+                return default_basis(component, origin, self.greatest_power);
+            }
+            let last = f64::from(self.table_points.max(3) - 1);
+            let share = |k: u8| least + (greatest - least) * f64::from(k) / last;
+            Basis::table(
+                component,
+                origin,
+                (0..self.table_points.max(3)).map(share).collect(),
+            )
+        };
+        let model = |&component: &ErrorComponent| ModelComponent {
+            component,
+            basis: basis(component),
+        };
+        IdentifyOptions {
+            components: components.iter().map(model).collect(),
+            nuisances: Nuisances {
+                zero_offset: true,
+                plate_rotation: !self.radial_only,
+                radius: self.radial_only && self.radius_free,
+                lost_motion: self.lost_motion,
+                stamp_offset: self.stamp_offset,
+            },
+            radial_only: self.radial_only,
+            rank_tolerance: self.rank_tolerance,
+            outlier_limit: self.outlier_limit,
+            recording_noise: self.recording_noise,
+            noise: Noise::FromResiduals,
+        }
+    }
+
+    pub(crate) fn station_rules(&self, resolution_mm: f64) -> StationRules {
+        StationRules {
+            standstill_mm_s: self.standstill_mm_min / 60.0,
+            settle_s: self.settle_ms / 1e3,
+            least_readings: self.least_readings,
+            on_circle_mm: self.on_circle_um / 1e3,
+            resolution_mm,
+        }
+    }
+
+    pub(crate) fn gap_limit(&self) -> Span {
+        Span::from_secs_f64(self.gap_limit_ms / 1e3)
+    }
+
+    pub(crate) fn hold(&self) -> Span {
+        Span::from_secs_f64(self.hold_ms / 1e3)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_with_a_range_is_checked() {
+        let numbers: Vec<_> = GridEncoderConfig::default()
+            .numbers()
+            .map(|(name, _)| name)
+            .to_vec();
+        for row in PARAMETERS.iter().filter(|row| row.range.is_some()) {
+            assert!(numbers.contains(&row.name), "{}", row.name);
+        }
+        assert!(GridEncoderConfig::default().check().is_ok());
+    }
+
+    #[test]
+    fn values_out_of_range_are_refused_by_name() {
+        let config = GridEncoderConfig {
+            greatest_power: 0,
+            ..GridEncoderConfig::default()
+        };
+        assert_eq!(
+            config.check().unwrap_err().to_string(),
+            "greatest_power = 0: must be from 1 to 9"
+        );
+        let two_knots = GridEncoderConfig {
+            table_points: 2,
+            ..GridEncoderConfig::default()
+        };
+        assert!(
+            two_knots
+                .check()
+                .unwrap_err()
+                .to_string()
+                .contains("table_points")
+        );
+        let error = serde_saphyr::from_str::<GridEncoderConfig>("bin: 3").unwrap_err();
+        assert!(error.to_string().contains("bin"));
+    }
+
+    #[test]
+    fn components_that_the_chain_lacks_are_refused_by_name() {
+        let chain: Chain = "[w X' Y' b Z t]".parse().unwrap();
+        let with = |name: &str| GridEncoderConfig {
+            components: vec![name.to_owned()],
+            ..GridEncoderConfig::default()
+        };
+        assert_eq!(with("ECY").components_for(&chain).unwrap().len(), 1);
+        for name in ["ECC", "EX0X", "rubbish", ""] {
+            let message = with(name).components_for(&chain).unwrap_err().to_string();
+            assert!(message.contains(&format!("\"{name}\"")), "{message}");
+        }
+        assert_eq!(
+            GridEncoderConfig::default()
+                .components_for(&chain)
+                .unwrap()
+                .len(),
+            21
+        );
+    }
+
+    #[test]
+    fn the_readme_lists_every_parameter_with_its_sentence() {
+        let readme = include_str!("../README.md");
+        for row in PARAMETERS {
+            let unit = if row.unit.is_empty() { "-" } else { row.unit };
+            let begin = format!("| `{}` | {unit} | ", row.name);
+            let line = readme.lines().find(|line| line.starts_with(&begin));
+            let line = line.unwrap_or_else(|| panic!("{begin}"));
+            assert!(
+                line.ends_with(&format!(" | {} |", row.description)),
+                "{line}"
+            );
+        }
+    }
+}

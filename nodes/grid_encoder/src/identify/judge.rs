@@ -1,0 +1,152 @@
+//! Whether what a fit leaves is noise, by repeats and by the order of the residuals.
+//!
+//! # Model
+//!
+//! ```text
+//!   F = [S_lack/(K − rank)] / [S_pure/(N − K)]   over repeats of equal points             (1)
+//!   r₁ = Σ r_i r_{i+1} / Σ r_i²,   z = r₁ √n                                              (2)
+//! ```
+//!
+//! (1) needs a recording that was repeated. (2) needs nothing: what the model lacks is smooth along the
+//! trajectory, so neighbours resemble each other. z is standard normal for noise, and a little below for few
+//! points for each unknown.
+//!
+//! # References
+//! \[1\] NIST/SEMATECH e-Handbook of Statistical Methods, 4.4.4.6. \[2\] J. Durbin, G. S. Watson, Biometrika 37,
+//! 409 (1950): (2) is 1 − d/2.
+
+use metrology::fit::{chi_square_p, lack_of_fit};
+use metrology::sample::{Sense, TestPlane};
+
+use crate::equations::Equations;
+use crate::recording::{Place, in_plane};
+
+/// Points of repeats nearer than this are one level, mm.
+const SAME_POINT_MM: f64 = 0.1;
+/// Correlation that is too small to mind, however sure it is.
+const MINDED_CORRELATION: f64 = 0.1;
+/// z of (2) that chance exceeds once in 30,000.
+const SURE: f64 = 4.0;
+
+/// Signs that the model lacks something.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judgement {
+    /// p of (1); NaN without repeats.
+    pub lack_of_fit_p: f64,
+    /// Degrees of freedom of the pure error.
+    pub pure_freedom: usize,
+    /// r₁ of (2).
+    pub correlation: f64,
+    /// z of (2).
+    pub correlation_z: f64,
+    /// Probability of a greater χ² if the stated uncertainties are right.
+    pub chi_square_p: f64,
+}
+
+impl Judgement {
+    /// Whether the model lacks something: p of (1) below `p_limit`, or residuals that follow each other.
+    #[must_use]
+    pub fn lacks_something(&self, p_limit: f64) -> bool {
+        self.lack_of_fit_p < p_limit
+            || (self.correlation_z > SURE && self.correlation > MINDED_CORRELATION)
+    }
+
+    pub(super) fn of(
+        equations: &Equations,
+        ratios: &[Vec<[f64; 2]>],
+        weights: &[Vec<[f64; 2]>],
+        rank: usize,
+        chi_square: f64,
+    ) -> Self {
+        let levels = levels(equations);
+        let (mut residuals, mut of_level, mut spread) = (Vec::new(), Vec::new(), Vec::new());
+        for (recording, points) in ratios.iter().enumerate() {
+            for (point, ratios) in points.iter().enumerate() {
+                for (k, ratio) in ratios.iter().enumerate().filter(|(_, r)| r.is_finite()) {
+                    residuals.push(*ratio);
+                    of_level.push(2 * levels[recording][point] + k);
+                    spread.push(1.0 / weights[recording][point][k].sqrt());
+                }
+            }
+        }
+        let pure = lack_of_fit(&residuals, &spread, &of_level, rank);
+        let (correlation, n) = correlation(ratios, weights);
+        Self {
+            lack_of_fit_p: pure.p,
+            pure_freedom: pure.pure_freedom,
+            correlation,
+            correlation_z: correlation * (n as f64).sqrt(),
+            chi_square_p: chi_square_p(chi_square, residuals.len().saturating_sub(rank)),
+        }
+    }
+}
+
+/// (2) over all recordings and both coordinates; outliers are weighed down.
+fn correlation(ratios: &[Vec<[f64; 2]>], weights: &[Vec<[f64; 2]>]) -> (f64, usize) {
+    let (mut products, mut squares, mut n) = (0.0, 0.0, 0);
+    for (ratios, weights) in ratios.iter().zip(weights) {
+        for k in 0..2 {
+            let values = || {
+                let both = ratios.iter().zip(weights).map(|(r, w)| r[k] * w[k].sqrt());
+                both.filter(|r| r.is_finite())
+            };
+            products += values()
+                .zip(values().skip(1))
+                .map(|(a, b)| a * b)
+                .sum::<f64>();
+            squares += values().map(|r| r * r).sum::<f64>();
+            n += values().count();
+        }
+    }
+    (
+        if squares > 0.0 {
+            products / squares
+        } else {
+            0.0
+        },
+        n,
+    )
+}
+
+/// Points of one place, each with the number of its level.
+type Level = Vec<(usize, [f64; 2])>;
+
+/// Number of the level of each point; repeats of a point share one.
+fn levels(equations: &Equations) -> Vec<Vec<usize>> {
+    let mut known: Vec<(usize, Level)> = Vec::new();
+    let mut next = 0;
+    let recordings = equations.recordings;
+    let numbered = recordings.iter().enumerate().map(|(idx, recording)| {
+        let alike =
+            |(first, _): &(usize, Level)| are_repeats(&recordings[*first].place, &recording.place);
+        let group = known.iter().position(alike).unwrap_or_else(|| {
+            known.push((idx, Vec::new()));
+            known.len() - 1
+        });
+        let places = &mut known[group].1;
+        let n_known = places.len();
+        let level = |point: &crate::recording::GridPoint| {
+            let at = in_plane(recording.place.plane, &point.positions.xyz());
+            let near =
+                |(_, q): &&(usize, [f64; 2])| (q[0] - at[0]).hypot(q[1] - at[1]) < SAME_POINT_MM;
+            if let Some((level, _)) = places[..n_known].iter().find(near) {
+                return *level;
+            }
+            places.push((next, at));
+            next += 1;
+            next - 1
+        };
+        recording.points.iter().map(level).collect()
+    });
+    numbered.collect()
+}
+
+fn are_repeats(a: &Place, b: &Place) -> bool {
+    let key = |p: &Place| -> (TestPlane, Sense, bool) { (p.plane, p.sense, p.stations > 0) };
+    key(a) == key(b)
+        && a.kind == b.kind
+        && (a.centre_mm - b.centre_mm).norm() < SAME_POINT_MM
+        && (a.radius_mm - b.radius_mm).abs() < SAME_POINT_MM
+        && (a.feed_mm_s - b.feed_mm_s).abs() <= 1e-3 * a.feed_mm_s
+        && (a.tool_offset_mm - b.tool_offset_mm).norm() < SAME_POINT_MM
+}
