@@ -8,7 +8,7 @@ mod line;
 mod plane;
 mod round;
 
-pub use lack_of_fit::{PureError, chi_square_p, lack_of_fit};
+pub use lack_of_fit::{PureError, chi_square_p, f_test_p, lack_of_fit};
 pub use line::{LineFit, fit_line};
 pub use plane::{PlaneFit, fit_plane};
 pub use round::{CircleFit, RoundFit, SphereFit, fit_round};

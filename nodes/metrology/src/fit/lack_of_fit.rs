@@ -69,11 +69,14 @@ pub fn lack_of_fit(
         pure_freedom,
         lack_sum,
         lack_freedom,
-        p: f_p(lack_sum, lack_freedom, pure_sum, pure_freedom),
+        p: f_test_p(lack_sum, lack_freedom, pure_sum, pure_freedom),
     }
 }
 
-fn f_p(lack_sum: f64, lack_freedom: usize, pure_sum: f64, pure_freedom: usize) -> f64 {
+/// Probability of an F above the ratio of two mean squares, (3); NaN where either has no degree of
+/// freedom or the second is zero.
+#[must_use]
+pub fn f_test_p(lack_sum: f64, lack_freedom: usize, pure_sum: f64, pure_freedom: usize) -> f64 {
     let (lack, pure) = (lack_freedom as f64, pure_freedom as f64);
     match FisherSnedecor::new(lack, pure) {
         Ok(distribution) if pure_sum > 0.0 => {
@@ -97,8 +100,8 @@ mod tests {
     #[test]
     fn val_tables_of_the_f_and_chi_square_distributions() {
         // 5 % points: F(3, 20) = 3.098, F(1, 10) = 4.965, chi-square(5) = 11.070.
-        assert!((f_p(3.0 * 3.098, 3, 20.0, 20) - 0.05).abs() < 1e-4);
-        assert!((f_p(4.965, 1, 10.0, 10) - 0.05).abs() < 1e-4);
+        assert!((f_test_p(3.0 * 3.098, 3, 20.0, 20) - 0.05).abs() < 1e-4);
+        assert!((f_test_p(4.965, 1, 10.0, 10) - 0.05).abs() < 1e-4);
         assert!((chi_square_p(11.070, 5) - 0.05).abs() < 1e-4);
     }
 

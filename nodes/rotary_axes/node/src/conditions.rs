@@ -1,0 +1,46 @@
+//! The conditions of the rotary-axis calibration on `/diagnostics`; lengths in µm.
+
+use node_runtime::{Diagnostic, Level};
+use rotary_axes::diagnostic::Severity;
+use rotary_axes::{Diagnostic as Condition, Output};
+
+pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
+    let Output::Diagnostic(condition) = output else {
+        return None;
+    };
+    let level = match condition.severity() {
+        Severity::Info => Level::Ok,
+        Severity::Warn => Level::Warn,
+        Severity::Error => Level::Error,
+    };
+    let told = Diagnostic::new(level, condition.condition(), condition.to_string());
+    Some(match condition {
+        Condition::Calibrated {
+            merit,
+            before_mm,
+            after_mm,
+            harmonics,
+            lack_of_fit_p,
+            ..
+        } => told
+            .with("merit", merit)
+            .with("spatial_before_um", before_mm * 1e3)
+            .with("spatial_after_um", after_mm * 1e3)
+            .with("harmonics", harmonics)
+            .with("lack_of_fit_p", lack_of_fit_p),
+        Condition::Verified {
+            before_mm,
+            after_mm,
+            greatest_mm,
+            expected_mm,
+            same_places,
+            ..
+        } => told
+            .with("rms_before_um", before_mm * 1e3)
+            .with("rms_after_um", after_mm * 1e3)
+            .with("greatest_after_um", greatest_mm * 1e3)
+            .with("expected_um", expected_mm * 1e3)
+            .with("same_places", same_places),
+        _ => told,
+    })
+}

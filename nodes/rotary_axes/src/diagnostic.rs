@@ -1,0 +1,261 @@
+//! Conditions worth reporting: what was found, and what spoils it.
+
+use metrology::Axis;
+
+use crate::error::EstimateError;
+
+/// How bad a condition is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// For the record.
+    Info,
+    /// It goes on, but not as it should.
+    Warn,
+    /// Something is not done.
+    Error,
+}
+
+/// Something that a person should know; `Display` says it in one line.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Diagnostic {
+    /// Location errors were estimated.
+    #[error(
+        "run {run}: {visits} visits of {spheres} spheres, merit of the poses {merit:.2}; spatial standard deviation {:.2} um, with the model {:.2} um",
+        before_mm * 1e3, after_mm * 1e3
+    )]
+    Calibrated {
+        /// Run.
+        run: u32,
+        /// Visits used.
+        visits: usize,
+        /// Spheres.
+        spheres: usize,
+        /// Merit of the poses.
+        merit: f64,
+        /// Spatial standard deviation of the nominal machine, mm.
+        before_mm: f64,
+        /// The same with the model, mm.
+        after_mm: f64,
+        /// Pairs of harmonics that were needed.
+        harmonics: usize,
+        /// p value of lack of fit.
+        lack_of_fit_p: f64,
+    },
+    /// A model was held against other poses.
+    #[error(
+        "run {run}: {visits} visits, {:.2} um rms without the model, {:.2} um with it ({:.2} um at most), {:.2} um expected from the uncertainties",
+        before_mm * 1e3, after_mm * 1e3, greatest_mm * 1e3, expected_mm * 1e3
+    )]
+    Verified {
+        /// Run.
+        run: u32,
+        /// Visits.
+        visits: usize,
+        /// Root mean square without the model, mm.
+        before_mm: f64,
+        /// Root mean square with it, mm.
+        after_mm: f64,
+        /// Greatest with it, mm.
+        greatest_mm: f64,
+        /// What chance would leave, mm.
+        expected_mm: f64,
+        /// Whether the sphere's place is that of the calibration.
+        same_places: bool,
+    },
+    /// What the poses cannot see.
+    #[error("run {run}: {names} cannot be told apart by these poses")]
+    NotEstimable {
+        /// Run.
+        run: u32,
+        /// Names of the components.
+        names: String,
+    },
+    /// The poses tell too little.
+    #[error("run {run}: merit of the poses is {merit:.3}, at least {least} is wanted")]
+    LowMerit {
+        /// Run.
+        run: u32,
+        /// Merit.
+        merit: f64,
+        /// What is wanted.
+        least: f64,
+    },
+    /// A visit was left out of the fit.
+    #[error("run {run}: sphere {sphere} at {} is {:.1} um off, which chance does not explain; left out", in_words(pose), off_mm * 1e3)]
+    Doubtful {
+        /// Run.
+        run: u32,
+        /// Sphere.
+        sphere: String,
+        /// Rotary positions, deg.
+        pose: Vec<(Axis, f64)>,
+        /// Size of its residual, mm.
+        off_mm: f64,
+    },
+    /// The model does not describe the machine to within the noise.
+    #[error("run {run}: lack of fit, p = {p:.2e}; uncertainties enlarged {enlargement:.2} times")]
+    LackOfFit {
+        /// Run.
+        run: u32,
+        /// p value.
+        p: f64,
+        /// Factor on the standard uncertainties.
+        enlargement: f64,
+    },
+    /// A sphere was found less often at one pose than elsewhere.
+    #[error(
+        "run {run}: sphere {sphere} at {} was found {found} times, {expected} times elsewhere",
+        in_words(pose)
+    )]
+    VisitMissing {
+        /// Run.
+        run: u32,
+        /// Sphere.
+        sphere: String,
+        /// Rotary positions, deg.
+        pose: Vec<(Axis, f64)>,
+        /// How often it was found.
+        found: u32,
+        /// How often it was found at other poses.
+        expected: u32,
+    },
+    /// A sphere that the test does not name.
+    #[error("run {run}: sphere {sphere} is not the one that the test names; not used")]
+    OtherSphere {
+        /// Run.
+        run: u32,
+        /// Sphere.
+        sphere: String,
+    },
+    /// A sphere that the machine file does not have.
+    #[error("run {run}: the machine file has no sphere \"{sphere}\"; not used")]
+    UnknownSphere {
+        /// Run.
+        run: u32,
+        /// Sphere.
+        sphere: String,
+    },
+    /// A centre, covariance or pose that is none.
+    #[error("run {run}: centre, covariance or pose of sphere {sphere} is not usable; not used")]
+    NotFinite {
+        /// Run.
+        run: u32,
+        /// Sphere.
+        sphere: String,
+    },
+    /// A pose that the machine cannot have.
+    #[error("run {run}: sphere {sphere} was found with axis {axis} at {position_deg:.4} deg, travel is [{}, {}] deg; not used", travel_deg[0], travel_deg[1])]
+    OutsideTravel {
+        /// Run.
+        run: u32,
+        /// Sphere.
+        sphere: String,
+        /// Axis.
+        axis: Axis,
+        /// Position, deg.
+        position_deg: f64,
+        /// Travel, deg.
+        travel_deg: [f64; 2],
+    },
+    /// There is no estimate.
+    #[error("run {run}: {reason}")]
+    NotEstimated {
+        /// Run.
+        run: u32,
+        /// Why.
+        reason: EstimateError,
+    },
+    /// A verification without anything to verify.
+    #[error("run {run}: there is no model to verify")]
+    NothingToVerify {
+        /// Run.
+        run: u32,
+    },
+    /// A test that did not run to its end.
+    #[error("run {run} did not run to its end; not evaluated")]
+    NotCompleted {
+        /// Run.
+        run: u32,
+    },
+    /// A test that ended without having begun, or began twice.
+    #[error("run {run}: its begin and end do not belong together")]
+    NotBracketed {
+        /// Run.
+        run: u32,
+    },
+    /// The model of the linear axes has no value at a pose.
+    #[error("run {run}: the model of the linear axes is not used: {reason}")]
+    LinearModelRefused {
+        /// Run; 0: none.
+        run: u32,
+        /// Why.
+        reason: LinearRefusal,
+    },
+}
+
+/// Why a model of the linear axes is not used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LinearRefusal {
+    /// It is not one of this machine.
+    #[error("{0}")]
+    Model(#[from] machine::volumetric::VolumetricError),
+    /// A pose has no value.
+    #[error("{0}")]
+    Pose(#[from] machine::volumetric::PoseRefusal),
+}
+
+/// Rotary positions in degrees.
+fn in_words(pose: &[(Axis, f64)]) -> String {
+    let words: Vec<String> = pose
+        .iter()
+        .map(|(axis, position_deg)| format!("{axis} {position_deg:.2} deg"))
+        .collect();
+    words.join(", ")
+}
+
+impl Diagnostic {
+    /// How bad it is.
+    #[must_use]
+    pub const fn severity(&self) -> Severity {
+        match self {
+            Self::Calibrated { .. } | Self::Verified { .. } => Severity::Info,
+            Self::NotEstimable { .. }
+            | Self::LowMerit { .. }
+            | Self::Doubtful { .. }
+            | Self::LackOfFit { .. }
+            | Self::VisitMissing { .. } => Severity::Warn,
+            Self::OtherSphere { .. }
+            | Self::UnknownSphere { .. }
+            | Self::NotFinite { .. }
+            | Self::OutsideTravel { .. }
+            | Self::NotEstimated { .. }
+            | Self::NothingToVerify { .. }
+            | Self::NotCompleted { .. }
+            | Self::NotBracketed { .. }
+            | Self::LinearModelRefused { .. } => Severity::Error,
+        }
+    }
+
+    /// Its name on `/diagnostics`.
+    #[must_use]
+    pub const fn condition(&self) -> &'static str {
+        match self {
+            Self::Calibrated { .. } => "calibrated",
+            Self::Verified { .. } => "verified",
+            Self::NotEstimable { .. } => "not_estimable",
+            Self::LowMerit { .. } => "low_merit",
+            Self::Doubtful { .. } => "doubtful_visit",
+            Self::LackOfFit { .. } => "lack_of_fit",
+            Self::VisitMissing { .. } => "visit_missing",
+            Self::OtherSphere { .. } => "other_sphere",
+            Self::UnknownSphere { .. } => "unknown_sphere",
+            Self::NotFinite { .. } => "not_finite",
+            Self::OutsideTravel { .. } => "outside_travel",
+            Self::NotEstimated { .. } => "not_estimated",
+            Self::NothingToVerify { .. } => "nothing_to_verify",
+            Self::NotCompleted { .. } => "not_completed",
+            Self::NotBracketed { .. } => "not_bracketed",
+            Self::LinearModelRefused { .. } => "linear_model_refused",
+        }
+    }
+}
