@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
 /// Crates without clock, file, environment, entropy, log or ROS.
-pub const PURE: [&str; 9] = [
+pub const PURE: [&str; 10] = [
     "metrology",
     "machine",
     "probe",
@@ -13,6 +13,7 @@ pub const PURE: [&str; 9] = [
     "thermal_model",
     "grid_encoder",
     "axis_compensation",
+    "rotary_axes",
     "sequencer",
     "fake_cnc",
 ];

@@ -37,6 +37,23 @@ pub enum SequencerError {
     },
     #[error("steps[{step}]: no beam, run or repetition: there is nothing to run")]
     NothingToRun { step: usize },
+    #[error(
+        "steps[{step}]: {poses} poses and planned = {planned}: exactly one of the two must be given"
+    )]
+    PosesOrPlanned {
+        step: usize,
+        poses: usize,
+        planned: u32,
+    },
+    #[error("steps[{step}].poses[{pose}]: {n} positions, the rotary axes are {axes}")]
+    PoseLength {
+        step: usize,
+        pose: usize,
+        n: usize,
+        axes: String,
+    },
+    #[error("steps[{step}].repeats = 0: must be above 0")]
+    NoRepeats { step: usize },
     #[error("steps: the plan has none")]
     NoSteps,
     #[error("time went back by {back_s} s to {at_s} s: the event was not used")]

@@ -17,6 +17,7 @@ pub mod error;
 mod job;
 mod measuring;
 pub mod plan;
+pub mod rotary;
 pub mod stage;
 mod task;
 

@@ -5,6 +5,8 @@ mod linear;
 
 use serde::{Deserialize, Serialize};
 
+use crate::rotary::RotaryStep;
+
 pub use grid::{GridStep, GridTrajectory, Senses};
 pub use linear::{DiagonalStep, PositioningStep};
 
@@ -47,6 +49,8 @@ pub enum Step {
         /// Touches.
         points: u32,
     },
+    /// Touches a sphere at several poses of the rotary axes.
+    Rotary(RotaryStep),
     /// Switches the compensation.
     Compensation {
         /// On or off.
@@ -109,6 +113,7 @@ impl Step {
             Self::Blocks { .. } => "block cycle".to_owned(),
             Self::Latency { feature, .. } => format!("latency calibration on {feature}"),
             Self::Artefact { id, .. } => format!("touching {id}"),
+            Self::Rotary(step) => step.activity(),
             Self::Compensation { enable } => {
                 format!("compensation {}", if *enable { "on" } else { "off" })
             }

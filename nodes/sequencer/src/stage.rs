@@ -12,6 +12,7 @@ use crate::error::SequencerError;
 use crate::job::{Job, Owner, Task};
 use crate::measuring::{self, Measurement, Setups};
 use crate::plan::{Plan, Step};
+use crate::rotary;
 use crate::task;
 
 /// What the sequencer is told.
@@ -298,6 +299,13 @@ impl Sequencer {
                     parts: 0,
                 });
                 self.say(out);
+            }
+            Step::Rotary(rotary) => {
+                let at = self.step - 1;
+                match rotary::task(at, rotary, self.steps(), &self.machine) {
+                    Ok(task) => self.begin(task, 0, out),
+                    Err(error) => self.fail(error.to_string(), out),
+                }
             }
             Step::Wait { seconds } => {
                 self.waiting_until = Some(self.now + Span::from_secs_f64(*seconds));

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use machine::CycleError;
 use machine::MachineFile;
+use machine::cycle::Cycle;
 use machine::file::ArtefactEntry;
 use metrology::sample::{CycleKind, CycleOrder, TestKind};
 
@@ -12,6 +13,7 @@ use crate::error::SequencerError;
 use crate::job::{Owner, Task, Trace};
 use crate::measuring;
 use crate::plan::{Plan, Step};
+use crate::rotary;
 
 /// Checks that every step of a plan can be run on this machine.
 pub(crate) fn check(
@@ -25,6 +27,9 @@ pub(crate) fn check(
     for (at, step) in plan.steps.iter().enumerate() {
         match step {
             Step::Compensation { .. } => {}
+            Step::Rotary(step) => {
+                rotary::task(at, step, &plan.steps, machine)?;
+            }
             Step::Wait { seconds } => {
                 if !(seconds.is_finite() && *seconds > 0.0) {
                     return Err(SequencerError::Seconds {
@@ -114,7 +119,8 @@ pub(crate) fn of_step(
         | Step::Grid(_)
         | Step::Positioning(_)
         | Step::Scan(_)
-        | Step::Diagonals(_) => {
+        | Step::Diagonals(_)
+        | Step::Rotary(_) => {
             return Ok(plain("", "", TestKind::Dwell, Vec::new()));
         }
     };
@@ -129,7 +135,12 @@ pub(crate) fn of_order(
     owner: Owner,
 ) -> Result<Task, CycleError> {
     let cycle = cycle::plan(machine, order)?;
-    Ok(Task {
+    Ok(of_cycle(cycle, order.cold, machine, owner))
+}
+
+/// The task of a cycle's program.
+pub(crate) fn of_cycle(cycle: Cycle, cold: bool, machine: &MachineFile, owner: Owner) -> Task {
+    Task {
         name: format!("{:?} cycle", cycle.kind).to_lowercase(),
         planned: u32::try_from(cycle.touches.len()).unwrap_or(u32::MAX),
         feed_mm_s: cycle
@@ -140,10 +151,10 @@ pub(crate) fn of_order(
         text: cycle.program,
         kind: cycle.kind,
         features: cycle.features,
-        cold: order.cold,
+        cold,
         owner,
         trace: Trace::default(),
-    })
+    }
 }
 
 /// The block cycle that the thermal model asked for.
