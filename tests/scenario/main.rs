@@ -11,5 +11,6 @@ mod bad_plan;
 mod blocks;
 mod cell;
 mod equal_bytes;
+mod five_axis;
 mod probe_faults;
 mod warm_up;

@@ -2,8 +2,8 @@
 
 use abbe_msgs::{Message, Wire, from_cdr, topics};
 use metrology::sample::{
-    AxisCompensation, BlockMeasurement, PlanStatus, ProbeLatency, ProbedPoint, TestKind,
-    TestSegment, ThermalModel,
+    AxisCompensation, BlockMeasurement, GeometryModel, PlanStatus, ProbeLatency, ProbedPoint,
+    TestKind, TestSegment, ThermalModel,
 };
 use metrology::stamp::{Host, Stamp};
 use nalgebra::Vector3;
@@ -52,6 +52,9 @@ pub struct Prediction {
 /// Value that only the thermal model's score of its predictions has.
 const PREDICTION_KEY: &str = "hold_um";
 
+/// What the calibration of the rotary axes says when all is well.
+const JUDGEMENTS: [&str; 2] = ["calibrated", "verified"];
+
 /// Everything that a report is written from.
 #[derive(Debug, Default)]
 pub struct Evidence {
@@ -65,6 +68,10 @@ pub struct Evidence {
     pub models: Vec<ThermalModel>,
     /// Segments in order.
     pub segments: Vec<TestSegment>,
+    /// Models of the rotary axes in order.
+    pub rotary_models: Vec<GeometryModel>,
+    /// What the calibration of the rotary axes said of itself and of its verifications.
+    pub judgements: Vec<Condition>,
     /// Last word of the sequencer.
     pub status: Option<PlanStatus>,
     /// Last compensation.
@@ -89,6 +96,7 @@ impl Evidence {
             topics::PROBE_POINT.name,
             topics::BLOCKS_MEASUREMENT.name,
             topics::THERMAL_MODEL.name,
+            topics::GEOMETRY_ROTARY.name,
             topics::COMPENSATION.name,
             topics::PLAN_STATUS.name,
             topics::TEST_SEGMENT.name,
@@ -111,6 +119,9 @@ impl Evidence {
         } else if topic == topics::THERMAL_MODEL.name {
             let taken = self.decode(&topics::THERMAL_MODEL, bytes);
             self.models.extend(taken);
+        } else if topic == topics::GEOMETRY_ROTARY.name {
+            let taken = self.decode(&topics::GEOMETRY_ROTARY, bytes);
+            self.rotary_models.extend(taken);
         } else if topic == topics::COMPENSATION.name {
             self.compensation = self.decode(&topics::COMPENSATION, bytes);
         } else if topic == topics::PLAN_STATUS.name {
@@ -132,6 +143,13 @@ impl Evidence {
             self.predictions.push(Prediction {
                 at,
                 residuals_um: diagnostic.values,
+            });
+        } else if JUDGEMENTS.contains(&diagnostic.name.as_ref()) {
+            let (node, diagnostic) = (node.to_owned(), diagnostic.clone());
+            self.judgements.push(Condition {
+                at,
+                node,
+                diagnostic,
             });
         } else if diagnostic.level != Level::Ok {
             let (node, diagnostic) = (node.to_owned(), diagnostic.clone());

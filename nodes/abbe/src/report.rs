@@ -14,6 +14,7 @@ mod feeds;
 mod latency;
 mod page;
 mod plot;
+mod rotary;
 mod thermal;
 mod tool_error;
 
@@ -39,6 +40,7 @@ impl Report {
     pub fn of(kind: ReportKind, title: &str, evidence: &Evidence) -> Result<Self> {
         match kind {
             ReportKind::Thermal => thermal::write(title, evidence),
+            ReportKind::Rotary => rotary::write(title, evidence),
             ReportKind::Latency | ReportKind::Blocks => latency::write(title, evidence),
         }
     }

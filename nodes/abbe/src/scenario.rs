@@ -32,6 +32,8 @@ pub enum ReportKind {
     Latency,
     /// Block cycles.
     Blocks,
+    /// Location errors of the rotary axes, tool error before and after their compensation.
+    Rotary,
 }
 
 /// A scenario, read.

@@ -1,0 +1,211 @@
+//! The page of a rotary-axis calibration: location errors, spheres at other poses, tool error before and
+//! after compensation.
+
+use std::fmt::Write as _;
+
+use anyhow::Result;
+use maud::html;
+use metrology::sample::{CurveForm, ErrorCurve, GeometryModel};
+
+use super::page::table;
+use super::tool_error::quantile;
+use super::{Report, conditions, latency};
+use crate::evidence::{Evidence, Verification};
+
+/// Coverage factor of what is printed.
+const COVERAGE: f64 = 2.0;
+
+/// Writes the page.
+///
+/// # Errors
+/// When a plot cannot be drawn.
+pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
+    let model = evidence.rotary_models.last();
+    let mut lines = latency::headline(evidence);
+    lines.extend(judgements(evidence));
+    lines.extend(tool_line(evidence));
+    let locations = model.map_or_else(Vec::new, location_rows);
+    let tools = tool_rows(evidence);
+    let body = html! {
+        h1 { (title) }
+        @for line in &lines { p { (line) } }
+        h2 { "Location errors" }
+        (table(&LOCATION_HEAD, &locations))
+        p.note { "ISO 230-1 components: EX0C is where the line of C lies along X, EA0C how it is tilted about X, with all axes at zero. U is the expanded uncertainty, k = 2. What the poses cannot see has none." }
+        @if let Some(motions) = model.map(motion_names).filter(|names| !names.is_empty()) {
+            p { "Error motions that the readings needed besides: " (motions) "." }
+        }
+        h2 { "Tool error at the verification poses" }
+        (table(&TOOL_HEAD, &tools))
+        p.note { "Truth of the plant at poses that the machine really went to, all five axes' errors included; no node sees it." }
+        (latency::section(evidence)?)
+        (conditions::section(evidence))
+    };
+    let mut text = String::new();
+    for (head, rows) in [(&LOCATION_HEAD[..], &locations), (&TOOL_HEAD[..], &tools)] {
+        for row in std::iter::once(head.iter().map(ToString::to_string).collect())
+            .chain(rows.iter().cloned())
+        {
+            let row: Vec<String> = row;
+            let cells: Vec<String> = row.iter().map(|cell| format!("{cell:>16}")).collect();
+            let _ = writeln!(text, "{}", cells.join("  "));
+        }
+        text.push('\n');
+    }
+    Ok(Report {
+        title: title.to_owned(),
+        lines,
+        text,
+        body,
+        figures: figures(evidence),
+    })
+}
+
+const LOCATION_HEAD: [&str; 4] = ["component", "value", "U", "unit"];
+
+fn locations(model: &GeometryModel) -> impl Iterator<Item = &ErrorCurve> {
+    let curves = model.curves.iter();
+    curves.filter(|curve| curve.form == CurveForm::Constant && !curve.coefficient.is_empty())
+}
+
+fn location_rows(model: &GeometryModel) -> Vec<Vec<String>> {
+    locations(model)
+        .map(|curve| {
+            let (scale, unit) = if curve.component.is_angular() {
+                (1e6, "µrad")
+            } else {
+                (1e3, "µm")
+            };
+            let seen = curve.estimable.first().copied().unwrap_or(false);
+            let u = curve
+                .standard_uncertainty
+                .first()
+                .copied()
+                .unwrap_or(f64::NAN);
+            let (value, expanded) = if seen {
+                (
+                    format!("{:.2}", curve.coefficient[0] * scale),
+                    format!("{:.2}", COVERAGE * u * scale),
+                )
+            } else {
+                ("not estimable".to_owned(), "—".to_owned())
+            };
+            vec![
+                curve.component.to_string(),
+                value,
+                expanded,
+                unit.to_owned(),
+            ]
+        })
+        .collect()
+}
+
+fn motion_names(model: &GeometryModel) -> String {
+    let motions = model
+        .curves
+        .iter()
+        .filter(|curve| curve.form == CurveForm::Table);
+    let names: Vec<String> = motions.map(|curve| curve.component.to_string()).collect();
+    names.join(", ")
+}
+
+/// What the calibration said of itself and of the verifications.
+fn judgements(evidence: &Evidence) -> Vec<String> {
+    let judged = evidence.judgements.iter();
+    judged
+        .map(|condition| {
+            let name = &condition.diagnostic.name;
+            format!("Rotary axes {name}: {}.", condition.diagnostic.message)
+        })
+        .collect()
+}
+
+const TOOL_HEAD: [&str; 4] = ["verification", "rms / µm", "p95 / µm", "max / µm"];
+
+struct Sizes {
+    rms_mm: f64,
+    p95_mm: f64,
+    max_mm: f64,
+}
+
+fn sizes(verification: &Verification) -> Sizes {
+    let sizes = || verification.poses.iter().map(|pose| pose.error_mm.norm());
+    let n = verification.poses.len() as f64;
+    Sizes {
+        rms_mm: (sizes().map(|size| size * size).sum::<f64>() / n).sqrt(),
+        p95_mm: quantile(sizes(), 0.95),
+        max_mm: sizes().fold(0.0, f64::max),
+    }
+}
+
+fn tool_rows(evidence: &Evidence) -> Vec<Vec<String>> {
+    evidence
+        .verifications
+        .iter()
+        .map(|verification| {
+            let sizes = sizes(verification);
+            vec![
+                verification.label.clone(),
+                format!("{:.2}", sizes.rms_mm * 1e3),
+                format!("{:.2}", sizes.p95_mm * 1e3),
+                format!("{:.2}", sizes.max_mm * 1e3),
+            ]
+        })
+        .collect()
+}
+
+/// Verifications without and with compensation, the last of each.
+fn pair(evidence: &Evidence) -> Option<(Sizes, Sizes)> {
+    let last = |word: &str| {
+        let mut all = evidence.verifications.iter().rev();
+        all.find(|verification| verification.label.contains(word))
+    };
+    Some((sizes(last("without")?), sizes(last("with compensation")?)))
+}
+
+fn tool_line(evidence: &Evidence) -> Option<String> {
+    let (off, on) = pair(evidence)?;
+    Some(format!(
+        "Tool error at the verification poses: p95 {:.2} µm without compensation, {:.2} µm with it ({:.1}-fold less).",
+        off.p95_mm * 1e3,
+        on.p95_mm * 1e3,
+        off.p95_mm / on.p95_mm
+    ))
+}
+
+fn figures(evidence: &Evidence) -> serde_json::Value {
+    let mut figures = latency::figures(evidence);
+    if let Some(model) = evidence.rotary_models.last() {
+        for curve in locations(model) {
+            figures["location_errors"][curve.component.to_string()] = serde_json::json!({
+                "value": curve.coefficient[0],
+                "standard_uncertainty": curve.standard_uncertainty.first(),
+                "estimable": curve.estimable.first(),
+            });
+        }
+    }
+    for condition in &evidence.judgements {
+        let name = condition.diagnostic.name.as_ref();
+        let mut values = serde_json::json!({});
+        for (key, value) in &condition.diagnostic.values {
+            values[*key] = value.as_str().into();
+        }
+        if let Some(list) = figures[name].as_array_mut() {
+            list.push(values);
+        } else {
+            figures[name] = serde_json::json!([values]);
+        }
+    }
+    if let Some((off, on)) = pair(evidence) {
+        for (key, value_mm) in [
+            ("rms_without_mm", off.rms_mm),
+            ("rms_with_mm", on.rms_mm),
+            ("p95_without_mm", off.p95_mm),
+            ("p95_with_mm", on.p95_mm),
+            ("max_with_mm", on.max_mm),
+        ] {
+            figures[key] = value_mm.into();
+        }
+    }
+    figures
+}
