@@ -79,8 +79,8 @@ fn scenario_five_axis_tool_error_is_reduced_tenfold() {
     for (before, after) in before_um.iter().zip(&after_um) {
         assert!(before / after >= LEAST_REDUCTION, "{before} {after}");
     }
-    // In the motors' readings the sphere is where it was, compensated or not.
-    assert!((after_um[0] - after_um[1]).abs() < 1.0, "{after_um:?}");
+    // In the motors' readings the sphere is where it was, compensated or not, but for a little heat.
+    assert!((after_um[0] - after_um[1]).abs() < 2.0, "{after_um:?}");
     assert!(
         said(&report, "calibrated", "merit")
             .iter()

@@ -13,7 +13,10 @@
 //! the standard uncertainty of any location error more than three times as great.
 //!
 //! Noise is told from lack of fit by repeated visits where there are any (F test), else by the stated
-//! uncertainties (chi-square test). If lack of fit remains, the covariance is enlarged by chi^2/nu.
+//! uncertainties (chi-square test). If lack of fit remains, the covariance is enlarged by the mean
+//! square of lack of fit: what is the same at each visit of a pose is not averaged out by repeats.
+//! What is the same at every pose, such as a squareness of the linear axes, is in no residual and in
+//! no uncertainty here; a model of the linear axes takes it off.
 //!
 //! The *spatial standard deviation* is what a single centre is off, in all three directions together:
 //! sqrt(sum |r|^2 3/nu), once with the nominal machine (the sphere's place free) and once with the
@@ -110,16 +113,19 @@ pub fn estimate(
     let mut used: Vec<usize> = (0..visits.len()).collect();
     let mut best = settled(design, &of(visits, &used), spheres, &unknowns)?;
     drop_doubtful(design, visits, &mut used, &unknowns, &mut best, rules)?;
-    if is_lacking(design, visits, &used, &best.0).1 < rules.lack_of_fit_p {
+    let first = lacking(design, visits, &used, &best.0);
+    if first.p < rules.lack_of_fit_p {
         add_harmonics(design, &of(visits, &used), &mut unknowns, &mut best, rules)?;
         drop_doubtful(design, visits, &mut used, &unknowns, &mut best, rules)?;
     }
-    let (has_repeats, lack_of_fit_p) = is_lacking(design, visits, &used, &best.0);
+    let Lacking {
+        has_repeats,
+        p: lack_of_fit_p,
+        mean_square,
+    } = lacking(design, visits, &used, &best.0);
     let (mut found, places) = best;
-    let enlargement = if lack_of_fit_p < rules.lack_of_fit_p && found.degrees_of_freedom > 0 {
-        (found.chi_square / found.degrees_of_freedom as f64)
-            .sqrt()
-            .max(1.0)
+    let enlargement = if lack_of_fit_p < rules.lack_of_fit_p {
+        mean_square.sqrt().max(1.0)
     } else {
         1.0
     };
@@ -280,13 +286,22 @@ fn drop_doubtful(
     Ok(())
 }
 
-/// Whether noise is known from repeats, and the p value of lack of fit.
-fn is_lacking(
+/// How much worse the fit is than the noise.
+struct Lacking {
+    /// Whether noise is known from repeats.
+    has_repeats: bool,
+    /// p value; NaN where it cannot be formed.
+    p: f64,
+    /// Mean square of what is not noise, in units of the stated variances.
+    mean_square: f64,
+}
+
+fn lacking(
     design: &SphereDesign,
     visits: &[SphereVisit],
     used: &[usize],
     found: &SphereFit,
-) -> (bool, f64) {
+) -> Lacking {
     let mut firsts: Vec<usize> = Vec::new();
     let mut levels = Vec::new();
     let mut residuals = Vec::new();
@@ -305,11 +320,20 @@ fn is_lacking(
     }
     let parted = lack_of_fit(&residuals, &vec![1.0; residuals.len()], &levels, found.rank);
     if parted.p.is_finite() {
-        (true, parted.p)
-    } else if found.degrees_of_freedom == 0 {
-        (false, f64::NAN)
-    } else {
-        (false, found.p())
+        return Lacking {
+            has_repeats: true,
+            p: parted.p,
+            mean_square: parted.lack_sum / parted.lack_freedom as f64,
+        };
+    }
+    Lacking {
+        has_repeats: false,
+        p: if found.degrees_of_freedom == 0 {
+            f64::NAN
+        } else {
+            found.p()
+        },
+        mean_square: found.chi_square / found.degrees_of_freedom.max(1) as f64,
     }
 }
 
