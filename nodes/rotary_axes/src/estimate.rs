@@ -14,7 +14,7 @@
 //!
 //! Noise is told from lack of fit by repeated visits where there are any (F test), else by the stated
 //! uncertainties (chi-square test). If lack of fit remains, the covariance is enlarged by the mean
-//! square of lack of fit: what is the same at each visit of a pose is not averaged out by repeats.
+//! square of lack of fit, and where repeats scatter more than stated, by chi^2/nu: what is the same at each visit of a pose is not averaged out by repeats.
 //! What is the same at every pose, such as a squareness of the linear axes, is in no residual and in
 //! no uncertainty here; a model of the linear axes takes it off.
 //!
@@ -126,6 +126,9 @@ pub fn estimate(
     let (mut found, places) = best;
     let enlargement = if lack_of_fit_p < rules.lack_of_fit_p {
         mean_square.sqrt().max(1.0)
+    } else if found.p() < rules.lack_of_fit_p {
+        // Repeats scatter more than the stated uncertainties: heat between them, or a servo's rest.
+        (found.chi_square / found.degrees_of_freedom as f64).sqrt()
     } else {
         1.0
     };

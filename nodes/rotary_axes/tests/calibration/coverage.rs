@@ -147,3 +147,21 @@ fn two_spheres_tell_tilts_better_than_one() {
         assert!(v < 0.75 * u, "{unknown}: {u} {v}");
     }
 }
+
+#[test]
+fn a_scatter_of_repeats_beyond_the_stated_one_enlarges_the_uncertainties() {
+    let file = file();
+    let design = SphereDesign::new(&file).unwrap();
+    let poses = calibration_poses(&file, "ball", 12, &ReachLimits::default()).unwrap();
+    let mut seen = visits(&Wrong::drawn(5), &BALL_MM, &poses, 2, (3.0 * NOISE_MM, 6));
+    for visit in &mut seen {
+        visit.covariance_mm2 /= 9.0;
+    }
+    let spheres = [("ball".to_owned(), BALL_MM)];
+    let found = estimate(&design, &seen, &spheres, &RULES).unwrap();
+    assert!(
+        (found.enlargement - 3.0).abs() < 0.6,
+        "{}",
+        found.enlargement
+    );
+}
