@@ -1,7 +1,7 @@
 //! The budget of the suite, each figure beside its peer in the same run; see README.md here.
 //!
 //! ```text
-//! cargo bench -p abbe_tests --bench budget [-- [round_trip|pose|recorder|control]... [--seconds N] [--program ABBE]]
+//! cargo bench -p abbe_tests --bench budget [-- [identification|round_trip|pose|recorder|control]... [--seconds N] [--program ABBE]]
 //! ```
 #![expect(
     clippy::disallowed_methods,
@@ -13,12 +13,20 @@
 use std::path::PathBuf;
 use std::process::Command;
 
+mod identification;
 mod pose;
 mod python;
 mod round_trip;
 
-const PARTS: [&str; 4] = ["round_trip", "pose", "recorder", "control"];
-const USAGE: &str = "budget [round_trip|pose|recorder|control]... [--seconds N] [--program ABBE]";
+const PARTS: [&str; 5] = [
+    "identification",
+    "round_trip",
+    "pose",
+    "recorder",
+    "control",
+];
+const USAGE: &str =
+    "budget [identification|round_trip|pose|recorder|control]... [--seconds N] [--program ABBE]";
 
 struct Wanted {
     parts: Vec<String>,
@@ -67,6 +75,7 @@ fn main() {
         println!("\n== {part}");
         match part.as_str() {
             "round_trip" => round_trip::run(wanted.seconds, wanted.program.clone()),
+            "identification" => identification::run(),
             "pose" => pose::run(),
             "recorder" => bench_of("recorder", "bag"),
             _ => bench_of("fake_cnc", "servo_period"),
