@@ -9,6 +9,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod evaluate;
 mod evidence;
 mod export;
 mod launch;
@@ -16,6 +17,7 @@ mod node;
 mod progress;
 mod record;
 mod report;
+mod report_bag;
 mod run;
 mod scenario;
 mod truth;
@@ -32,6 +34,8 @@ struct Arguments {
 enum Verb {
     /// Run a scenario: its nodes, its plan, a bag and a page at the end.
     Run(run::Run),
+    /// Evaluate the tests that a bag holds.
+    Report(report_bag::ReportBag),
     /// Record topics of the ROS graph into a bag.
     Record(record::Record),
     /// Make compensation tables for a control from what a bag knows.
@@ -43,6 +47,7 @@ enum Verb {
 fn main() -> ExitCode {
     let outcome = match Arguments::parse().verb {
         Verb::Run(run) => run.execute(),
+        Verb::Report(report) => report.execute(),
         Verb::Record(record) => record.execute(),
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => return node.execute(),

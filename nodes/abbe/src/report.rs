@@ -9,14 +9,21 @@ use crate::evidence::Evidence;
 use crate::scenario::ReportKind;
 
 mod blocks;
+pub mod circular;
 mod conditions;
 mod feeds;
+pub mod geometry;
 mod latency;
 mod page;
 mod plot;
+pub mod positioning;
+pub mod probing;
 mod rotary;
+pub mod section;
 mod thermal;
 mod tool_error;
+mod trace;
+pub mod verification;
 
 /// A report before it is laid out.
 pub struct Report {
@@ -42,7 +49,37 @@ impl Report {
             ReportKind::Thermal => thermal::write(title, evidence),
             ReportKind::Rotary => rotary::write(title, evidence),
             ReportKind::Latency | ReportKind::Blocks => latency::write(title, evidence),
+            ReportKind::Tests => Ok(Self::of_verifications(title, evidence)),
         }
+    }
+
+    /// What a witness saw; the tests themselves are evaluated from the bag.
+    fn of_verifications(title: &str, evidence: &Evidence) -> Self {
+        let section = verification::section(&evidence.verifications);
+        let seen = section.as_ref();
+        Self {
+            title: title.to_owned(),
+            lines: Vec::new(),
+            text: seen.map_or_else(String::new, section::Section::terminal),
+            body: maud::html! {
+                h1 { (title) }
+                @if let Some(section) = seen { (section.html()) }
+                (conditions::section(evidence))
+            },
+            figures: serde_json::json!({
+                "title": title,
+                "verification": seen.map(|section| &section.figures),
+            }),
+        }
+    }
+
+    /// This report with the tests of its bag behind it.
+    pub fn join(&mut self, tests: Self) {
+        self.lines.extend(tests.lines);
+        self.text.push('\n');
+        self.text.push_str(&tests.text);
+        self.body = maud::html! { (self.body) (tests.body) };
+        self.figures["tests"] = tests.figures["tests"].clone();
     }
 
     /// The report as it stands on a terminal.

@@ -5,10 +5,13 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use recorder::Bag;
 
+use crate::evaluate::Tests;
 use crate::evidence::Evidence;
 use crate::report::Report;
-use crate::scenario::Scenario;
+use crate::report_bag;
+use crate::scenario::{ReportKind, Scenario};
 
 mod bag;
 mod composed;
@@ -66,6 +69,10 @@ impl Run {
         };
         let title = format!("{}: {}", scenario.name, scenario.file.title);
         let mut report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
+        if scenario.file.report == ReportKind::Tests && outcome.recorded > 0 {
+            let tests = Tests::of(&Bag::open(&bag)?)?;
+            report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
+        }
         let kept = format!(
             "Bag: {} ({} messages, {} lost).",
             bag.display(),

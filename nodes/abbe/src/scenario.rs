@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use serde::Deserialize;
 
+use crate::evaluate::budget::Budget;
 use crate::launch::{self, LaunchNode};
 
 /// `scenario.yaml` beside the launch file.
@@ -34,6 +35,8 @@ pub enum ReportKind {
     Blocks,
     /// Location errors of the rotary axes, tool error before and after their compensation.
     Rotary,
+    /// Every test that the bag holds, and the tool error where it was verified.
+    Tests,
 }
 
 /// A scenario, read.
@@ -50,6 +53,20 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// `budget.yaml` in its folder, where there is one.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn budget(&self) -> Result<Option<Budget>> {
+        let path = self.folder.join("budget.yaml");
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let text = std::fs::read_to_string(&path)
+            .with_context(|| format!("budget file {}", path.display()))?;
+        Budget::read(&text, &path).map(Some)
+    }
+
     /// Reads the scenario in `folder`.
     ///
     /// # Errors
