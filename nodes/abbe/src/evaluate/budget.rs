@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use metrology::iso230::budget::{DeviceUncertainty, Expansion};
 use metrology::iso230::circular::CircularBudget;
-use metrology::iso230::positioning::PositioningBudget;
+use metrology::iso230::positioning::budget::PositioningBudget;
 use serde::Deserialize;
 
 /// Uncertainty of a measuring device, as its certificate states it.

@@ -110,7 +110,7 @@ impl Circles {
             .axes
             .map(|axis| state.commanded[axis] - current.segment.centre_mm[axis.index()]);
         let speed_mm_s = current.tick.map_or(0.0, |before| {
-            let dt_s = (state.at - before.at).as_secs_f64();
+            let dt_s = (state.received_at - before.at).as_secs_f64();
             let way_mm = (place_mm[0] - before.place_mm[0]).hypot(place_mm[1] - before.place_mm[1]);
             if dt_s > 0.0 {
                 way_mm / dt_s
@@ -119,7 +119,7 @@ impl Circles {
             }
         });
         current.tick = Some(Tick {
-            at: state.at,
+            at: state.received_at,
             place_mm,
             speed_mm_s,
         });
@@ -173,5 +173,95 @@ impl Current {
             points: self.pairs.into_iter().map(shifted).collect(),
             compensated: self.compensated,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metrology::{AxisSet, PerAxis};
+    use nalgebra::Vector3;
+
+    fn segment(begin: bool) -> TestSegment {
+        TestSegment {
+            at: Stamp::from_nanos(0),
+            run: 3,
+            begin,
+            kind: TestKind::Circle,
+            plane: TestPlane::Yz,
+            centre_mm: Vector3::new(1.0, 20.0, 30.0),
+            radius_mm: 50.0,
+            feed_mm_s: 50.0,
+            sense: Sense::CounterClockwise,
+            repeat: 0,
+            stylus: String::new(),
+            tool_offset_mm: Vector3::zeros(),
+            stations: 0,
+            zero_id: 7,
+            setup_id: 1,
+            cold: false,
+            features: Vec::new(),
+            completed: !begin,
+        }
+    }
+
+    /// A circle at 50 mm/s in ticks of 10 ms, run in along a radius; the plate lies 3 mm off.
+    fn recorded(zero_id: u32) -> Vec<CircleRecording> {
+        let mut circles = Circles::default();
+        circles.segment(&segment(true));
+        let place = |tick: i64| {
+            if tick < 40 {
+                (f64::from(tick as i32) * 1.25, 0.0)
+            } else {
+                let angle = f64::from((tick - 40) as i32) * 0.01;
+                (50.0 * angle.cos(), 50.0 * angle.sin())
+            }
+        };
+        for tick in 0..(40 + 629) {
+            let (u, v) = place(tick);
+            let mut commanded = PerAxis::default();
+            commanded[Axis::X] = 1.0;
+            commanded[Axis::Y] = 20.0 + u;
+            commanded[Axis::Z] = 30.0 + v;
+            let at = Stamp::from_nanos(tick * 10_000_000);
+            circles.axes(&AxisState {
+                received_at: at,
+                controller_at: Stamp::from_nanos(tick * 10_000_000),
+                axes: AxisSet::XYZ,
+                commanded,
+                motor: commanded,
+                scale: PerAxis([f64::NAN; 6]),
+                velocity: PerAxis::default(),
+            });
+            // An oval of 2 µm, on a plate that was zeroed 3 mm beside the centre.
+            let stretch = 1.0 + 4e-5;
+            circles.grid(&GridSample {
+                at,
+                plane: TestPlane::Yz,
+                u_mm: u * stretch + 3.0,
+                v_mm: v - 1.0,
+                zero_id,
+            });
+        }
+        circles.segment(&segment(false));
+        circles.recordings()
+    }
+
+    #[test]
+    fn readings_on_the_circle_at_feed_are_kept_about_the_nominal_centre() {
+        let recordings = recorded(7);
+        assert_eq!(recordings.len(), 1);
+        let points = &recordings[0].points;
+        assert!((620..=630).contains(&points.len()), "{}", points.len());
+        let radial = points.iter().map(|p| p.at_mm[0].hypot(p.at_mm[1]) - 50.0);
+        let (least, greatest) = radial.fold((1.0_f64, -1.0_f64), |(l, g), r| (l.min(r), g.max(r)));
+        assert!((greatest - 0.002).abs() < 2e-5, "{greatest}");
+        assert!(least.abs() < 2e-5, "{least}");
+        assert!(!recordings[0].compensated);
+    }
+
+    #[test]
+    fn readings_under_another_zero_are_not_of_this_circle() {
+        assert!(recorded(8)[0].points.is_empty());
     }
 }

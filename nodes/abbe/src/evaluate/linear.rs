@@ -53,6 +53,8 @@ pub struct LinearTest {
 #[derive(Clone, Copy, Debug)]
 struct Stop {
     place_mm: Vector3<f64>,
+    /// Where the command was one state before it rested here.
+    from_mm: Vector3<f64>,
     since: Stamp<Host>,
     sum_mm: f64,
     scale_sum_mm: Vector3<f64>,
@@ -60,10 +62,19 @@ struct Stop {
     n_scale: u32,
 }
 
+/// What was read at one rest.
+#[derive(Clone, Copy, Debug)]
+struct Reading {
+    place_mm: Vector3<f64>,
+    from_mm: Vector3<f64>,
+    length_mm: Option<f64>,
+    scale_mm: Vector3<f64>,
+}
+
 /// One run: where the command rested and what was read there.
 #[derive(Clone, Debug, Default)]
 struct Run {
-    stops: Vec<(Vector3<f64>, Option<f64>, Vector3<f64>)>,
+    stops: Vec<Reading>,
 }
 
 /// Collects the runs of a recording.
@@ -103,17 +114,20 @@ impl LinearRuns {
         let place_mm = state.commanded.xyz();
         match stop {
             Some(at) if (at.place_mm - place_mm).amax() < SAME_MM => {
-                if state.at - at.since >= SETTLE && state.scale.xyz().iter().any(|s| s.is_finite())
+                if state.received_at - at.since >= SETTLE
+                    && state.scale.xyz().iter().any(|s| s.is_finite())
                 {
                     at.scale_sum_mm += state.scale.xyz();
                     at.n_scale += 1;
                 }
             }
             _ => {
+                let from_mm = stop.map_or(place_mm, |before| before.place_mm);
                 run.stops.extend(stop.take().and_then(Stop::read));
                 *stop = Some(Stop {
                     place_mm,
-                    since: state.at,
+                    from_mm,
+                    since: state.received_at,
                     sum_mm: 0.0,
                     scale_sum_mm: Vector3::zeros(),
                     n: 0,
@@ -155,16 +169,19 @@ impl LinearRuns {
 }
 
 impl Stop {
-    fn read(self) -> Option<(Vector3<f64>, Option<f64>, Vector3<f64>)> {
+    fn read(self) -> Option<Reading> {
         let length_mm = (self.n > 0).then(|| self.sum_mm / f64::from(self.n));
-        let scale_mm = self.scale_sum_mm / f64::from(self.n_scale.max(1));
-        let has_scale = self.n_scale > 0;
-        let scale_mm = if has_scale {
-            scale_mm
+        let scale_mm = if self.n_scale > 0 {
+            self.scale_sum_mm / f64::from(self.n_scale)
         } else {
             Vector3::repeat(f64::NAN)
         };
-        (length_mm.is_some() || has_scale).then_some((self.place_mm, length_mm, scale_mm))
+        (length_mm.is_some() || self.n_scale > 0).then_some(Reading {
+            place_mm: self.place_mm,
+            from_mm: self.from_mm,
+            length_mm,
+            scale_mm,
+        })
     }
 }
 
@@ -175,12 +192,13 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
     let (first, ..) = group.first()?;
     let axis: Option<Axis> = first.features.first().and_then(|name| name.parse().ok());
     let stops = || group.iter().flat_map(|(_, run, _)| &run.stops);
-    let reference = if stops().all(|(_, length, _)| length.is_some()) {
+    // Where the reference is put up and zeroed it says nothing yet.
+    let reference = if stops().any(|stop| stop.length_mm.is_some()) {
         Reference::Length
     } else {
         Reference::Scale
     };
-    let direction = direction(axis, stops().map(|(place_mm, ..)| place_mm))?;
+    let direction = direction(axis, stops().map(|stop| &stop.place_mm))?;
     let runs: Vec<Visits> = group
         .iter()
         .map(|(_, run, _)| visits(run, axis, &direction, reference))
@@ -224,29 +242,26 @@ fn direction<'a>(
 
 fn visits(run: &Run, axis: Option<Axis>, direction: &Vector3<f64>, reference: Reference) -> Visits {
     let mut visits = Visits::new();
-    let mut before: Option<f64> = None;
     // On a diagonal places count from the first stop; along an axis from the machine's zero.
     let origin = match (axis, run.stops.first()) {
-        (None, Some((place_mm, ..))) => *place_mm,
+        (None, Some(stop)) => stop.place_mm,
         _ => Vector3::zeros(),
     };
-    for (place_mm, length_mm, scale_mm) in &run.stops {
-        let along_mm = direction.dot(&(place_mm - origin));
+    for stop in &run.stops {
+        let along_mm = direction.dot(&(stop.place_mm - origin));
+        let way_mm = direction.dot(&(stop.place_mm - stop.from_mm));
         let read_mm = match (reference, axis) {
-            (Reference::Length, _) => length_mm.unwrap_or(f64::NAN),
-            (Reference::Scale, Some(axis)) => scale_mm[axis.index()],
+            (Reference::Length, _) => stop.length_mm.unwrap_or(f64::NAN),
+            (Reference::Scale, Some(axis)) => stop.scale_mm[axis.index()],
             (Reference::Scale, None) => f64::NAN,
         };
-        if let Some(before_mm) = before
-            && read_mm.is_finite()
-        {
-            let side = usize::from(along_mm < before_mm);
+        if way_mm.abs() > SAME_MM && read_mm.is_finite() {
             let [up, down] = visits
                 .entry((along_mm / SAME_MM).round() as i64)
                 .or_default();
-            [up, down][side].push(read_mm - along_mm);
+            let side = if way_mm > 0.0 { up } else { down };
+            side.push(read_mm - along_mm);
         }
-        before = Some(along_mm);
     }
     visits
 }
@@ -261,5 +276,157 @@ fn level(up_mm: &mut [Vec<f64>], down_mm: &mut [Vec<f64>]) {
     let mean_mm = all().sum::<f64>() / n as f64;
     for value in up_mm.iter_mut().chain(down_mm.iter_mut()).flatten() {
         *value -= mean_mm;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metrology::sample::{Sense, TestPlane};
+    use metrology::{AxisSet, PerAxis};
+
+    const TICK_NANOS: i64 = 10_000_000;
+
+    fn segment(
+        run: u32,
+        repeat: u32,
+        begin: bool,
+        kind: TestKind,
+        features: &[&str],
+    ) -> TestSegment {
+        TestSegment {
+            at: Stamp::from_nanos(0),
+            run,
+            begin,
+            kind,
+            plane: TestPlane::None,
+            centre_mm: Vector3::zeros(),
+            radius_mm: 0.0,
+            feed_mm_s: 10.0,
+            sense: Sense::None,
+            repeat,
+            stylus: String::new(),
+            tool_offset_mm: Vector3::zeros(),
+            stations: 0,
+            zero_id: 1,
+            setup_id: 1,
+            cold: false,
+            features: features.iter().map(|name| (*name).to_owned()).collect(),
+            completed: !begin,
+        }
+    }
+
+    struct Machine {
+        runs: LinearRuns,
+        nanos: i64,
+        place_mm: Vector3<f64>,
+    }
+
+    impl Machine {
+        fn new() -> Self {
+            Self {
+                runs: LinearRuns::default(),
+                nanos: 0,
+                place_mm: Vector3::new(-1.0, 0.0, 0.0),
+            }
+        }
+
+        fn tick(&mut self, place_mm: Vector3<f64>, displacement_mm: Option<f64>) {
+            self.nanos += TICK_NANOS;
+            let at = Stamp::from_nanos(self.nanos);
+            let mut commanded = PerAxis::default();
+            for axis in Axis::LINEAR {
+                commanded[axis] = place_mm[axis.index()];
+            }
+            self.runs.axes(&AxisState {
+                received_at: at,
+                controller_at: Stamp::from_nanos(self.nanos),
+                axes: AxisSet::XYZ,
+                commanded,
+                motor: commanded,
+                scale: PerAxis([f64::NAN; 6]),
+                velocity: PerAxis::default(),
+            });
+            if let Some(displacement_mm) = displacement_mm {
+                self.runs.length(&LengthSample {
+                    at,
+                    axis: Axis::X,
+                    displacement_mm,
+                    zero_id: 1,
+                });
+            }
+        }
+
+        /// Goes there, passing two places on the way, and rests for `rest` ticks.
+        fn go(&mut self, to_mm: Vector3<f64>, rest: usize, error: impl Fn(f64, bool) -> f64) {
+            let from_mm = self.place_mm;
+            for share in [0.3, 0.7] {
+                self.tick(from_mm + (to_mm - from_mm) * share, Some(0.0));
+            }
+            let upwards = to_mm.sum() > from_mm.sum();
+            for tick in 0..rest {
+                // While it settles the reading is far off.
+                let wild_mm = if tick < 25 { 0.5 } else { 0.0 };
+                let along_mm = to_mm.norm() * to_mm.sum().signum();
+                self.tick(to_mm, Some(along_mm + error(along_mm, upwards) + wild_mm));
+            }
+            self.place_mm = to_mm;
+        }
+    }
+
+    #[test]
+    fn targets_are_what_every_run_approached_from_both_sides_and_overruns_are_none() {
+        let error = |x_mm: f64, upwards: bool| 1e-5 * x_mm + if upwards { -0.001 } else { 0.001 };
+        let mut machine = Machine::new();
+        for repeat in 0..3 {
+            let run = 4 + repeat;
+            let features = ["X", "beam_x"];
+            let begin = segment(run, repeat, true, TestKind::Positioning, &features);
+            machine.runs.segment(&begin);
+            let there = [10.0, 20.0, 30.0].map(|x| Vector3::new(x, 0.0, 0.0));
+            machine.go(Vector3::new(5.0, 0.0, 0.0), 2, error);
+            for place in there {
+                machine.go(place, 60, error);
+            }
+            machine.go(Vector3::new(35.0, 0.0, 0.0), 2, error);
+            for place in there.into_iter().rev() {
+                machine.go(place, 60, error);
+            }
+            machine.go(Vector3::new(5.0, 0.0, 0.0), 2, error);
+            let end = segment(run, repeat, false, TestKind::Positioning, &features);
+            machine.runs.segment(&end);
+        }
+        let tests = machine.runs.tests();
+        assert_eq!(tests.len(), 1);
+        let test = &tests[0];
+        assert_eq!(
+            (test.axis, test.first_run, test.reference),
+            (Some(Axis::X), 4, Reference::Length)
+        );
+        assert_eq!(test.targets_mm, [10.0, 20.0, 30.0]);
+        assert_eq!((test.up_mm.len(), test.down_mm.len()), (3, 3));
+        for run in 0..3 {
+            for (place, x_mm) in [10.0, 20.0, 30.0].into_iter().enumerate() {
+                let slope = 1e-5 * (x_mm - 20.0);
+                assert!(
+                    (test.up_mm[run][place] - slope + 0.001).abs() < 1e-9,
+                    "{test:?}"
+                );
+                assert!(
+                    (test.down_mm[run][place] - slope - 0.001).abs() < 1e-9,
+                    "{test:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_broken_off_run_gives_nothing_and_another_axis_begins_another_test() {
+        let mut runs = LinearRuns::default();
+        runs.segment(&segment(1, 0, true, TestKind::Positioning, &["X"]));
+        let mut end = segment(1, 0, false, TestKind::Positioning, &["X"]);
+        end.completed = false;
+        runs.segment(&end);
+        assert!(runs.tests().is_empty());
     }
 }

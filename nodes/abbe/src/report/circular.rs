@@ -24,7 +24,7 @@ pub fn sections(circles: &[CircleRecording], budget: Option<&Budget>) -> Result<
         sections.push(section(&group, budget)?);
     }
     if !circles.is_empty() {
-        sections.extend(breakdowns(circles));
+        sections.extend(breakdowns(circles, budget));
     }
     Ok(sections)
 }
@@ -150,13 +150,13 @@ fn figures(result: &CircularResult, stated: bool) -> Rows {
     }
 }
 
-fn breakdowns(circles: &[CircleRecording]) -> Vec<Section> {
+fn breakdowns(circles: &[CircleRecording], budget: Option<&Budget>) -> Vec<Section> {
     let mut sections = Vec::new();
     for compensated in [false, true] {
         let recordings: Vec<CircularRecording> = circles
             .iter()
             .filter(|circle| circle.compensated == compensated)
-            .filter_map(recording)
+            .filter_map(|circle| recording(circle, budget))
             .collect();
         if recordings.is_empty() {
             continue;
@@ -180,7 +180,7 @@ fn breakdowns(circles: &[CircleRecording]) -> Vec<Section> {
     sections
 }
 
-fn recording(circle: &CircleRecording) -> Option<CircularRecording> {
+fn recording(circle: &CircleRecording, budget: Option<&Budget>) -> Option<CircularRecording> {
     let segment = &circle.segment;
     let plane = match segment.plane {
         TestPlane::Xy => CircularPlane::Xy,
@@ -206,7 +206,12 @@ fn recording(circle: &CircleRecording) -> Option<CircularRecording> {
         sense,
         setup_id: segment.setup_id,
         zero_id: segment.zero_id,
-        reference: ReferenceLength::Calibrated,
+        reference: budget.map_or(ReferenceLength::Free, |budget| {
+            let length = budget.circular().length;
+            ReferenceLength::Calibrated {
+                standard_uncertainty_mm: length.standard_mm(segment.radius_mm),
+            }
+        }),
         samples: samples.collect(),
     })
 }

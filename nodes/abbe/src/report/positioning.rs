@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use metrology::iso230::diagonal::{DiagonalRuns, SpaceDiagonal};
-use metrology::iso230::positioning::{PositioningResult, PositioningRuns};
+use metrology::iso230::positioning::{PositioningRemark, PositioningResult, PositioningRuns};
 use metrology::iso230::{ExpandedLength, diagonal, positioning};
 use metrology::sample::TestKind;
 
@@ -88,12 +88,9 @@ fn fill(
         test.targets_mm.last().copied().unwrap_or(f64::NAN),
         result.n_runs
     ));
-    section.lines.extend(
-        result
-            .remarks
-            .iter()
-            .map(|remark| format!("Remark: {remark}.")),
-    );
+    section
+        .lines
+        .extend(result.remarks.iter().map(|remark| remark_in_words(remark)));
     let (up, down) = (&result.up, &result.down);
     section.tables.push(Rows {
         head: head(&["ISO 230-2 / µm", "up", "down", "both"]),
@@ -165,6 +162,33 @@ fn fill(
     });
     section.figures = serde_json::json!({ "test": section.title, "iso230_2": result });
     Ok(())
+}
+
+fn remark_in_words(remark: &PositioningRemark) -> String {
+    match remark {
+        PositioningRemark::FewRuns { n_runs, required } => {
+            format!("{n_runs} runs in each direction; the standard asks for {required}.")
+        }
+        PositioningRemark::FewTargets {
+            n_targets,
+            required,
+        } => format!("{n_targets} targets; the standard asks for {required} over this length."),
+        PositioningRemark::LongAxis {
+            length_mm,
+            limit_mm,
+        } => format!(
+            "{length_mm:.0} mm are more than {limit_mm:.0} mm, for which the standard has another programme."
+        ),
+        PositioningRemark::EvenSpacing { interval_mm } => format!(
+            "All targets are {interval_mm:.3} mm apart: a periodic error of that length is not seen."
+        ),
+        PositioningRemark::TargetsOnPeriod {
+            period_mm,
+            phase_spread_rad,
+        } => format!(
+            "All targets lie within {phase_spread_rad:.2} rad of one phase of the {period_mm:.3} mm period."
+        ),
+    }
 }
 
 /// ISO 230-6, where the four space diagonals are there.

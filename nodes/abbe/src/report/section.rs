@@ -87,7 +87,7 @@ impl Section {
 
 fn laid_out(rows: &Rows) -> String {
     let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
+    table.load_style(presets::NOTHING);
     table.set_header(&rows.head);
     for row in &rows.rows {
         table.add_row(row);

@@ -117,6 +117,8 @@ pub struct Learning {
     lesson: Lesson,
     dwells: Dwells,
     is_under_way: bool,
+    /// Place of the segment's first dwell.
+    arrival_fm: Option<i64>,
     /// Of the segment under way.
     segment: Vec<Point>,
     /// Of the segments before it.
@@ -133,6 +135,7 @@ impl Learning {
             lesson,
             dwells,
             is_under_way: false,
+            arrival_fm: None,
             segment: Vec::with_capacity(lesson.most_points),
             kept: Vec::with_capacity(lesson.most_points),
             kept_setup: None,
@@ -154,6 +157,7 @@ impl Learning {
     /// Leaves the segment under way and what it said.
     pub fn leave(&mut self) {
         self.is_under_way = false;
+        self.arrival_fm = None;
         self.segment.clear();
         self.dwells.forget();
         self.fault = None;
@@ -207,6 +211,7 @@ impl Learning {
                 position_mm: mm_from_fm(visit.position_fm),
             });
         }
+        self.arrival_fm.get_or_insert(visit.position_fm);
         let place = match find(&self.segment, visit.position_fm) {
             Ok(place) => place,
             Err(_) if self.segment.len() >= self.lesson.most_points => {
@@ -242,7 +247,10 @@ impl Learning {
             self.visit(visit);
         }
         let (fault, axis) = (self.fault, self.lesson.axis);
-        let points = std::mem::take(&mut self.segment);
+        let mut points = std::mem::take(&mut self.segment);
+        if let Some(arrival) = self.arrival_fm {
+            leave_out_arrival(&mut points, arrival);
+        }
         let outcome = match fault {
             _ if !segment.completed => Err(PositioningRefusal::RunBrokenOff {
                 axis,
@@ -336,6 +344,20 @@ impl Learning {
         self.kept = points;
         self.kept.clear();
         table.map(|table| Progress::Learned { table, runs })
+    }
+}
+
+/// Leaves out where the axis rested first, if it came there once while the points were met twice or more: it
+/// stood there when the test began, or a reference was zeroed there.
+fn leave_out_arrival(points: &mut Vec<Point>, arrival_fm: i64) {
+    let met_once = |point: &Point| point.up.n + point.down.n == 1;
+    // The far end of a run without overrun is met once too.
+    let few = points.len() > 2 && points.iter().filter(|point| met_once(point)).count() <= 2;
+    if let Ok(place) = find(points, arrival_fm)
+        && few
+        && points.get(place).is_some_and(met_once)
+    {
+        points.remove(place);
     }
 }
 

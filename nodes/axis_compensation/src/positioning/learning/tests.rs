@@ -280,3 +280,19 @@ fn learning_states_allocates_nothing() {
     assert_eq!(measured.count_total, 0);
     assert_eq!(learning.n_points(), 5);
 }
+
+#[test]
+fn where_the_axis_stood_before_a_test_is_no_point_of_it() {
+    let mut learning = learning(Directions::Together);
+    let mut last = Ok(Progress::Collected { runs: 0 });
+    for repeat in 0..10 {
+        learning.begin(&segment(repeat, true));
+        // It still stands where the last program left it, with the direction of its last motion.
+        dwell(&mut learning, -47.0, Direction::Down, 77.0);
+        run(&mut learning, &POINTS_MM, slide);
+        last = learning.end(&segment(repeat, true));
+    }
+    let (table, runs) = learned(last);
+    assert_eq!(runs, 10);
+    assert_eq!(table.n_points(), POINTS_MM.len());
+}
