@@ -1,19 +1,66 @@
-//! Tool error against the plant's truth at the poses of each verification, as a whole.
+//! Tool error against the plant's truth at the poses of each verification, as a whole and as a part on the machine has it.
+//!
+//! A part is set up on the machine itself: its datum takes out what shifts and turns all poses together.
+//!
+//! ```text
+//!   e_k = s + w x p_k + r_k,   sum |r_k|^2 least over s and w            (1)
+//! ```
+//!
+//! Nor can a plate that is put on the table see s and w, so that it is r that a volumetric compensation must make small.
+
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::section::{Rows, Section, head, um};
 use crate::evidence::Verification;
 
-/// Error that `share` of the poses do not exceed, mm; NaN without poses.
-fn quantile_mm(verification: &Verification, share: f64) -> f64 {
-    let mut sizes: Vec<f64> = verification
-        .poses
-        .iter()
-        .map(|pose| pose.error_mm.norm())
-        .collect();
+/// Sizes of the errors, or of what (1) leaves of them, ascending, mm.
+fn sizes_mm(verification: &Verification, aligned: bool) -> Vec<f64> {
+    let poses = &verification.poses;
+    let mut sizes: Vec<f64> = match aligned.then(|| residuals_mm(verification)).flatten() {
+        Some(residuals) => residuals.iter().map(Vector3::norm).collect(),
+        None if aligned => Vec::new(),
+        None => poses.iter().map(|pose| pose.error_mm.norm()).collect(),
+    };
     sizes.sort_by(f64::total_cmp);
-    let place = (share * sizes.len() as f64).ceil() as usize;
     sizes
-        .get(place.saturating_sub(1).min(sizes.len().saturating_sub(1)))
+}
+
+/// r of (1); `None` with fewer than three poses, or poses on one line.
+fn residuals_mm(verification: &Verification) -> Option<Vec<Vector3<f64>>> {
+    let poses = &verification.poses;
+    let n = poses.len();
+    if n < 3 {
+        return None;
+    }
+    let design = DMatrix::from_fn(3 * n, 6, |row, column| {
+        let (pose, axis) = (&poses[row / 3], row % 3);
+        let unit = Vector3::ith(column % 3, 1.0);
+        if column < 3 {
+            unit[axis]
+        } else {
+            unit.cross(&pose.commanded_mm)[axis]
+        }
+    });
+    let errors = DVector::from_fn(3 * n, |row, _| poses[row / 3].error_mm[row % 3]);
+    let svd = design.clone().svd(true, true);
+    if svd.rank(svd.singular_values.max() * 1e-9) < 6 {
+        return None;
+    }
+    let fit = svd.solve(&errors, 0.0).ok()?;
+    let left = errors - design * fit;
+    Some(
+        (0..n)
+            .map(|k| Vector3::new(left[3 * k], left[3 * k + 1], left[3 * k + 2]))
+            .collect(),
+    )
+}
+
+/// Size that `share` of the poses do not exceed, mm; NaN without poses.
+fn quantile_mm(sizes_mm: &[f64], share: f64) -> f64 {
+    let place = (share * sizes_mm.len() as f64).ceil() as usize;
+    let last = sizes_mm.len().saturating_sub(1);
+    sizes_mm
+        .get(place.saturating_sub(1).min(last))
         .copied()
         .unwrap_or(f64::NAN)
 }
@@ -31,22 +78,30 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
     let mut section = Section::new("Tool error at the poses of each verification");
     let find = |word: &str| seen.iter().rev().find(|v| v.label.contains(word));
     if let (Some(without), Some(with)) = (find("without"), find("with compensation")) {
-        let (before_mm, after_mm) = (quantile_mm(without, 0.95), quantile_mm(with, 0.95));
-        section.lines.push(format!(
-            "p95 {} µm without compensation, {} µm with it ({:.1}-fold less), {} poses.",
-            um(before_mm),
-            um(after_mm),
-            before_mm / after_mm,
-            with.poses.len()
-        ));
+        for (aligned, what) in [
+            (false, "as it stands"),
+            (true, "about a datum set on the machine"),
+        ] {
+            let p95_mm = |verification| quantile_mm(&sizes_mm(verification, aligned), 0.95);
+            let (before_mm, after_mm) = (p95_mm(without), p95_mm(with));
+            section.lines.push(format!(
+                "p95 {what}: {} µm without compensation, {} µm with it ({:.1}-fold less), {} poses.",
+                um(before_mm),
+                um(after_mm),
+                before_mm / after_mm,
+                with.poses.len()
+            ));
+        }
     }
     let rows = seen.iter().map(|verification| {
         vec![
             verification.label.clone(),
             verification.poses.len().to_string(),
-            um(quantile_mm(verification, 0.5)),
-            um(quantile_mm(verification, 0.95)),
-            um(quantile_mm(verification, 1.0)),
+            um(quantile_mm(&sizes_mm(verification, false), 0.95)),
+            um(quantile_mm(&sizes_mm(verification, false), 1.0)),
+            um(quantile_mm(&sizes_mm(verification, true), 0.5)),
+            um(quantile_mm(&sizes_mm(verification, true), 0.95)),
+            um(quantile_mm(&sizes_mm(verification, true), 1.0)),
         ]
     });
     section.tables.push(Rows {
@@ -58,7 +113,7 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
             "max / µm",
         ]),
         rows: rows.collect(),
-        note: "Size of the true error of the tool relative to the workpiece; no node sees it."
+        note: "Size of the true error of the tool relative to the workpiece, which no node sees; about a datum: the shift and turn that all poses share are taken out, as setting a part up does."
             .to_owned(),
     });
     let figures: Vec<serde_json::Value> = seen
@@ -67,9 +122,10 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
             serde_json::json!({
                 "label": verification.label,
                 "poses": verification.poses.len(),
-                "median_mm": quantile_mm(verification, 0.5),
-                "p95_mm": quantile_mm(verification, 0.95),
-                "max_mm": quantile_mm(verification, 1.0),
+                "p95_mm": quantile_mm(&sizes_mm(verification, false), 0.95),
+                "max_mm": quantile_mm(&sizes_mm(verification, false), 1.0),
+                "aligned_p95_mm": quantile_mm(&sizes_mm(verification, true), 0.95),
+                "aligned_max_mm": quantile_mm(&sizes_mm(verification, true), 1.0),
             })
         })
         .collect();
@@ -82,31 +138,47 @@ mod tests {
     use super::*;
     use crate::evidence::PoseError;
     use metrology::Stamp;
-    use nalgebra::Vector3;
 
-    fn verification(label: &str, error_um: f64) -> Verification {
-        let pose = |k: u32| PoseError {
-            commanded_mm: Vector3::zeros(),
-            error_mm: Vector3::new(error_um * 1e-3 * f64::from(k) / 20.0, 0.0, 0.0),
+    fn verification(label: &str, error: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Verification {
+        let place = |k: i32| {
+            let (x, y, z) = (k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+            Vector3::new(f64::from(x), f64::from(y), f64::from(z)) * 100.0
+        };
+        let pose = |k: i32| PoseError {
+            commanded_mm: place(k),
+            error_mm: error(place(k)),
         };
         Verification {
             label: label.to_owned(),
             at: Stamp::from_nanos(0),
-            poses: (1..=20).map(pose).collect(),
+            poses: (0..27).map(pose).collect(),
         }
     }
 
     #[test]
-    fn the_last_verifications_of_either_kind_are_compared() {
-        let seen = [
-            verification("without compensation", 40.0),
-            verification("with compensation", 4.0),
-        ];
-        let section = section(&seen).unwrap();
-        assert_eq!(
-            section.lines,
-            ["p95 38.00 µm without compensation, 3.80 µm with it (10.0-fold less), 20 poses."]
-        );
+    fn eq1_takes_out_what_a_datum_takes_out_and_nothing_else() {
+        let rigid = |p: Vector3<f64>| {
+            Vector3::new(0.01, -0.02, 0.03) + Vector3::new(1e-5, 2e-5, -3e-5).cross(&p)
+        };
+        let moved = verification("without compensation", rigid);
+        assert!(quantile_mm(&sizes_mm(&moved, true), 1.0) < 1e-12);
+        assert!(quantile_mm(&sizes_mm(&moved, false), 1.0) > 0.03);
+        let stretched = verification("with compensation", |p| {
+            rigid(p) + Vector3::new(2e-5 * p.x, 0.0, 0.0)
+        });
+        assert!((quantile_mm(&sizes_mm(&stretched, true), 1.0) - 0.002).abs() < 1e-9);
+        let section = section(&[moved, stretched]).unwrap();
+        assert_eq!(section.lines.len(), 2, "{:?}", section.lines);
         assert!(super::section(&[]).is_none());
+    }
+
+    #[test]
+    fn poses_on_one_line_have_no_datum() {
+        let mut line = verification("line", |_| Vector3::x());
+        for pose in &mut line.poses {
+            pose.commanded_mm.y = 0.0;
+            pose.commanded_mm.z = 0.0;
+        }
+        assert!(residuals_mm(&line).is_none());
     }
 }
