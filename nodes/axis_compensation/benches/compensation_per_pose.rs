@@ -98,6 +98,7 @@ fn dual_loop_state(bencher: Bencher<'_, '_>) {
             commanded_mm,
             motor_mm: commanded_mm,
             scale_mm: commanded_mm + 1e-3,
+            others_mm: 0.0,
             is_on: true,
             follows: true,
         };

@@ -105,6 +105,12 @@ pub enum Diagnostic {
         points: usize,
         runs: u32,
     },
+    #[error(
+        "axis {axis}: the points lie whole leads of {lead_mm} mm apart and cannot see the screw's cyclic error"
+    )]
+    LeadHidden { axis: Axis, lead_mm: f64 },
+    #[error("axis {axis}: the points see the cyclic error of a lead of {lead_mm} mm")]
+    LeadSeen { axis: Axis, lead_mm: f64 },
     #[error("axis {axis}: the scale says nothing")]
     ScaleMissing { axis: Axis },
     #[error("axis {axis}: the scale speaks again")]
@@ -144,6 +150,7 @@ impl Diagnostic {
             | Self::ModelAccepted { .. }
             | Self::RunsCollected { .. }
             | Self::TableLearned { .. }
+            | Self::LeadSeen { .. }
             | Self::ScaleBack { .. }
             | Self::MeasurementBelieved { .. }
             | Self::GeometryAccepted { .. }
@@ -168,6 +175,7 @@ impl Diagnostic {
         const SCALE: [&str; 6] = [
             "scale_x", "scale_y", "scale_z", "scale_a", "scale_b", "scale_c",
         ];
+        const LEAD: [&str; 6] = ["lead_x", "lead_y", "lead_z", "lead_a", "lead_b", "lead_c"];
         const MEASURED: [&str; 6] = [
             "measured_x",
             "measured_y",
@@ -180,6 +188,7 @@ impl Diagnostic {
             Self::RunRefused { .. } | Self::RunsCollected { .. } | Self::TableLearned { .. } => {
                 "positioning_test"
             }
+            Self::LeadHidden { axis, .. } | Self::LeadSeen { axis, .. } => LEAD[axis.index()],
             Self::ScaleMissing { axis } | Self::ScaleBack { axis } => SCALE[axis.index()],
             Self::MeasurementDoubted { axis, .. } | Self::MeasurementBelieved { axis } => {
                 MEASURED[axis.index()]

@@ -34,6 +34,8 @@ pub struct AxisReading {
     pub motor_mm: f64,
     /// Scale, mm; NaN where it says nothing.
     pub scale_mm: f64,
+    /// What the axis is asked for beside the positioning part (thermal, geometric), mm.
+    pub others_mm: f64,
     /// Whether compensation acts at all.
     pub is_on: bool,
     /// Whether the axis does all that it was asked for.
@@ -57,6 +59,7 @@ pub struct DualLoop {
     believed_fm: i64,
     feed_limit_mm_s: f64,
     needed_runs: u32,
+    lead_fm: i64,
     known: Option<Known>,
     motion: DirectionOfMotion,
     learning: Learning,
@@ -82,9 +85,8 @@ impl DualLoop {
         pulse_fm: i64,
     ) -> Result<Self, AxisCompensationError> {
         config.check(axis, machine)?;
-        let travel_mm = machine
+        let linear = machine
             .linear(axis)
-            .map(|linear| linear.travel_mm)
             .ok_or(AxisCompensationError::NotALinearAxis { axis })?;
         let believed_fm =
             fm_from_mm(config.measured_limit_um * 1e-3).expect("5000 µm at most were just checked");
@@ -98,7 +100,7 @@ impl DualLoop {
             axis,
             directions: config.directions,
             runs: config.runs,
-            most_points: PositioningConfig::most_points(travel_mm),
+            most_points: PositioningConfig::most_points(linear.travel_mm),
         };
         let refresh_weight = match config.reading {
             Reading::RefreshedTable => config.weight,
@@ -111,6 +113,7 @@ impl DualLoop {
             believed_fm,
             feed_limit_mm_s,
             needed_runs: config.runs,
+            lead_fm: fm_from_mm(linear.lead_mm).unwrap_or_default(),
             is_changed: known.is_some(),
             known,
             motion: DirectionOfMotion::new(pulse_fm),
@@ -261,7 +264,9 @@ impl DualLoop {
         self.sum.begin(table_fm);
         let is_slow = step_mm <= self.feed_limit_mm_s * dt_s;
         let is_due = self.sum.wait(dt_s, reading.follows && is_slow);
-        let Some(error_fm) = fm_from_mm(reading.commanded_mm - reading.scale_mm) else {
+        // Where the other parts want the slide is where it belongs: the loop must not take them out.
+        let wanted_mm = reading.commanded_mm + reading.others_mm;
+        let Some(error_fm) = fm_from_mm(wanted_mm - reading.scale_mm) else {
             return;
         };
         if !is_due {
@@ -330,18 +335,29 @@ impl DualLoop {
     }
 
     /// The test ends; a new table is in use at once.
-    #[must_use]
-    pub fn end_test(&mut self, at: Stamp<Host>, segment: &TestSegment) -> Diagnostic {
+    pub fn end_test(
+        &mut self,
+        at: Stamp<Host>,
+        segment: &TestSegment,
+        say: &mut impl FnMut(Diagnostic),
+    ) {
         let axis = self.axis;
         match self.learning.end(segment) {
-            Err(cause) => Diagnostic::RunRefused { cause },
-            Ok(Progress::Collected { runs }) => Diagnostic::RunsCollected {
+            Err(cause) => say(Diagnostic::RunRefused { cause }),
+            Ok(Progress::Collected { runs }) => say(Diagnostic::RunsCollected {
                 axis,
                 runs,
                 needed: self.needed_runs,
-            },
+            }),
             Ok(Progress::Learned { table, runs }) => {
                 let points = table.n_points();
+                say(Diagnostic::TableLearned { axis, points, runs });
+                let lead_mm = mm_from_fm(self.lead_fm);
+                say(if table.hides(self.lead_fm) {
+                    Diagnostic::LeadHidden { axis, lead_mm }
+                } else {
+                    Diagnostic::LeadSeen { axis, lead_mm }
+                });
                 self.known = Some(Known {
                     table,
                     runs,
@@ -351,7 +367,6 @@ impl DualLoop {
                 self.sum.let_go();
                 self.is_changed = true;
                 self.sequence = self.sequence.saturating_add(1);
-                Diagnostic::TableLearned { axis, points, runs }
             }
         }
     }

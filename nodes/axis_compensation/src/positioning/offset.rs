@@ -13,7 +13,8 @@
 //! since Σ e = −(D − D(k0)) whatever the way, and both begin at o = ε(k0) = −D(k0), the whole of what the
 //! table says. Rounding of ω D is not carried on: only M sums, in whole femtometres.
 //!
-//! x − xs is what is still wrong with all compensation acting. It holds the servo's lag as well, so it is
+//! x − xs is what is still wrong with all compensation acting; x is where the slide belongs, the command and
+//! what thermal and geometric parts add to it, or the loop would take these out again. It holds the servo's lag as well, so it is
 //! taken below a feed limit only, and not before a whole cycle has passed since the limits of the axis
 //! last held its offset back: what has been asked for but not yet done is not asked for again.
 //!

@@ -24,7 +24,7 @@
 //!
 //! # Agreement
 //! `val_ewma_remembers_2_minus_w_over_w_passes`: 5.667 to 1e-9. `val_ewma_noise_gain`: variance ratio of 4,000
-//! points within its 99.9 % χ² interval about 0.1765. `val_ewma_lags_a_drift_by_its_closed_form`: 1 fm a pass.
+//! points within its 99.9 % χ² interval about 0.1765. `val_ewma_lags_a_drift_by_its_closed_form`: within 4 fm.
 //!
 //! # References
 //! The form of the mean is DERIVED, see `positioning`; its moments are those of S. W. Roberts'

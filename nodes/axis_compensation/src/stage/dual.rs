@@ -37,12 +37,16 @@ impl AxisCompensationStage {
             };
             let follows = self.states[axis]
                 .is_some_and(|compensated| compensated.state() == CompensationState::Active);
+            // Both of the last state.
+            let asked_mm = dual_loop.offset_mm().ok().flatten().unwrap_or_default();
+            let sent_mm = self.states[axis].map_or(0.0, |compensated| compensated.offset());
             let reading = AxisReading {
                 at,
                 dt_s,
                 commanded_mm: known(state.commanded[axis]),
                 motor_mm: known(state.motor[axis]),
                 scale_mm: known(state.scale[axis]),
+                others_mm: sent_mm - asked_mm,
                 is_on,
                 follows,
             };
@@ -85,7 +89,7 @@ impl AxisCompensationStage {
                 continue;
             };
             if Some(axis) == tested && other.is_none() {
-                out.push(Output::Diagnostic(dual_loop.end_test(at, segment)));
+                dual_loop.end_test(at, segment, &mut |said| out.push(Output::Diagnostic(said)));
             } else {
                 dual_loop.leave_test();
             }

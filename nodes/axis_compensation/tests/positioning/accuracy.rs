@@ -22,6 +22,10 @@ fn the_dual_loop_lies_between_semi_closed_and_full_closed() {
             "{:?}",
             machine.diagnostics
         );
+        assert_eq!(
+            machine.said(|said| matches!(said, Diagnostic::LeadSeen { .. })),
+            1
+        );
         machine.errors_mm()
     };
     let [semi, dual, full] = [

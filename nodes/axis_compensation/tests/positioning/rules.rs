@@ -225,6 +225,20 @@ fn the_thermal_part_is_added_only_where_it_is_wanted() {
 }
 
 #[test]
+fn the_measured_loop_leaves_the_other_parts_alone() {
+    let positioning = x("weighted_increments", 0.3, "together", "loop_cycle_s: 0.1")
+        .replace("thermal_part: false", "thermal_part: true");
+    let mut machine = Machine::new(&positioning, Feedback::DualLoop);
+    machine.learn(10);
+    machine.step(thermal(5e-3));
+    machine.go(37.5, 20.0);
+    machine.stand(3.0);
+    // The reading of a warm machine is 5 µm too great: the slide belongs 5 µm beyond the command.
+    let slide_mm = machine.screw.slide_mm;
+    assert!((slide_mm - 37.505).abs() < 0.15e-3, "{slide_mm}");
+}
+
+#[test]
 fn an_offset_beyond_the_size_limit_is_not_followed_and_switching_off_fades() {
     let far = "start_points_mm: [-20.0, -10.0, 0.0, 10.0, 20.0], start_deviations_um: [0.0, 50.0, 99.0, 150.0, 200.0]";
     let mut machine = Machine::new(

@@ -125,6 +125,17 @@ fn a_published_table_says_its_points_in_millimetres() {
     assert_eq!((published.n_runs, published.sequence), (10, 4));
 }
 
+#[test]
+fn points_a_whole_number_of_leads_apart_hide_the_screws_cyclic_error() {
+    let at = |spacing_mm: f64| {
+        let x_mm = points(8, spacing_mm);
+        DeviationTable::new(Axis::X, &x_mm, &[0.0; 8], &[0.0; 8]).unwrap()
+    };
+    assert!(at(10.0).hides(10 * MM) && at(20.0).hides(10 * MM) && at(10.0).hides(5 * MM));
+    assert!(!at(15.0).hides(10 * MM) && !at(10.0).hides(20 * MM) && !at(10.5).hides(10 * MM));
+    assert!(!at(10.0).hides(0));
+}
+
 /// The published (2), walked cell by cell in floating point; µm and mm.
 fn walked_um(up_um: &[f64], spacing_mm: f64, from_mm: f64, to_mm: f64) -> f64 {
     let positions_mm = points(up_um.len(), spacing_mm);
