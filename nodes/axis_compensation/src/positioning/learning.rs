@@ -24,7 +24,7 @@
 use metrology::Axis;
 use metrology::sample::TestSegment;
 
-use super::deviation_table::{DeviationTable, SPACING_TOLERANCE_MM};
+use super::deviation_table::{DeviationTable, SPACING_MM, SPACING_TOLERANCE_MM};
 use super::direction::Direction;
 use super::dwell::{Dwells, Visit};
 use super::refresh::Directions;
@@ -251,6 +251,7 @@ impl Learning {
         if let Some(arrival) = self.arrival_fm {
             leave_out_arrival(&mut points, arrival);
         }
+        leave_out_overruns(&mut points);
         let outcome = match fault {
             _ if !segment.completed => Err(PositioningRefusal::RunBrokenOff {
                 axis,
@@ -344,6 +345,31 @@ impl Learning {
         self.kept = points;
         self.kept.clear();
         table.map(|table| Progress::Learned { table, runs })
+    }
+}
+
+/// Leaves out an outermost place that was met from one side only, and nearer to the next one than points may be,
+/// while all points between were met from both: the axis turned there, or stood there when the test began or ended.
+fn leave_out_overruns(points: &mut Vec<Point>) {
+    let from_one_side = |point: &Point| (point.up.n == 0) != (point.down.n == 0);
+    let near = |a: &Point, b: &Point| {
+        mm_from_fm(a.position_fm) - mm_from_fm(b.position_fm) < SPACING_MM.0 - SPACING_TOLERANCE_MM
+    };
+    let inner = points.get(2..points.len().saturating_sub(2));
+    if !inner.is_some_and(|inner| !inner.is_empty() && !inner.iter().any(from_one_side)) {
+        return;
+    }
+    if let [.., next, last] = points.as_slice()
+        && from_one_side(last)
+        && near(last, next)
+    {
+        points.pop();
+    }
+    if let [first, next, ..] = points.as_slice()
+        && from_one_side(first)
+        && near(next, first)
+    {
+        points.remove(0);
     }
 }
 

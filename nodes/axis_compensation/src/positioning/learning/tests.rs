@@ -296,3 +296,24 @@ fn where_the_axis_stood_before_a_test_is_no_point_of_it() {
     assert_eq!(runs, 10);
     assert_eq!(table.n_points(), POINTS_MM.len());
 }
+
+#[test]
+fn an_overrun_where_the_axis_stood_before_and_after_a_test_is_no_point_of_it() {
+    for directions in [Directions::Together, Directions::Apart] {
+        let mut learning = learning(directions);
+        let mut last = Ok(Progress::Collected { runs: 0 });
+        for repeat in 0..10 {
+            learning.begin(&segment(repeat, true));
+            // The last program left it among the points; then it rests at the overrun, and again at the end.
+            if repeat == 0 {
+                dwell(&mut learning, -21.0, Direction::Down, 55.0);
+            }
+            dwell(&mut learning, -37.0, Direction::Down, 77.0);
+            run(&mut learning, &POINTS_MM, slide);
+            dwell(&mut learning, -37.0, Direction::Down, 77.0);
+            last = learning.end(&segment(repeat, true));
+        }
+        let (table, runs) = learned(last);
+        assert_eq!((runs, table.n_points()), (10, POINTS_MM.len()));
+    }
+}
