@@ -412,33 +412,34 @@ fn prop_axis_compensation_comes_back() {
 
 const PLANES: [TestPlane; 4] = [TestPlane::None, TestPlane::Xy, TestPlane::Yz, TestPlane::Zx];
 
+const KINDS: [TestKind; 20] = [
+    TestKind::Latency,
+    TestKind::Block,
+    TestKind::Touch,
+    TestKind::Plane,
+    TestKind::Bore,
+    TestKind::Sphere,
+    TestKind::Circle,
+    TestKind::Line,
+    TestKind::Corner,
+    TestKind::Positioning,
+    TestKind::Dwell,
+    TestKind::Production,
+    TestKind::Verification,
+    TestKind::Arc,
+    TestKind::Spike,
+    TestKind::ArcWithLine,
+    TestKind::TwoArcs,
+    TestKind::Diagonal,
+    TestKind::Rotary,
+    TestKind::RotaryVerification,
+];
+
 #[test]
 fn prop_test_segment_comes_back() {
-    let kinds = [
-        TestKind::Latency,
-        TestKind::Block,
-        TestKind::Touch,
-        TestKind::Plane,
-        TestKind::Bore,
-        TestKind::Sphere,
-        TestKind::Circle,
-        TestKind::Line,
-        TestKind::Corner,
-        TestKind::Positioning,
-        TestKind::Dwell,
-        TestKind::Production,
-        TestKind::Verification,
-        TestKind::Arc,
-        TestKind::Spike,
-        TestKind::ArcWithLine,
-        TestKind::TwoArcs,
-        TestKind::Diagonal,
-        TestKind::Rotary,
-        TestKind::RotaryVerification,
-    ];
     let senses = [Sense::None, Sense::Clockwise, Sense::CounterClockwise];
     let strategy = (
-        (stamp(), one_of(&kinds), one_of(&PLANES), one_of(&senses)),
+        (stamp(), one_of(&KINDS), one_of(&PLANES), one_of(&senses)),
         (
             lengths_mm(),
             lengths_mm(),

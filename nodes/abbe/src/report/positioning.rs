@@ -2,7 +2,9 @@
 
 use anyhow::Result;
 use metrology::iso230::diagonal::{DiagonalRuns, SpaceDiagonal};
-use metrology::iso230::positioning::{PositioningRemark, PositioningResult, PositioningRuns};
+use metrology::iso230::positioning::{
+    PointResult, PositioningRemark, PositioningResult, PositioningRuns,
+};
 use metrology::iso230::{ExpandedLength, diagonal, positioning};
 use metrology::sample::TestKind;
 
@@ -79,8 +81,6 @@ fn fill(
     result: &PositioningResult,
     stated: bool,
 ) -> Result<()> {
-    let of = |value: &ExpandedLength| figure(value, stated);
-    let dash = || "—".to_owned();
     section.lines.push(format!(
         "{} targets from {:.3} to {:.3} mm, {} runs up and down.",
         test.targets_mm.len(),
@@ -88,67 +88,70 @@ fn fill(
         test.targets_mm.last().copied().unwrap_or(f64::NAN),
         result.n_runs
     ));
-    section
-        .lines
-        .extend(result.remarks.iter().map(|remark| remark_in_words(remark)));
+    let remarks = result.remarks.iter().map(remark_in_words);
+    section.lines.extend(remarks);
+    section.tables.push(figures(result, stated));
+    section.drawings.push(means(result)?);
+    section.figures = serde_json::json!({ "test": section.title, "iso230_2": result });
+    Ok(())
+}
+
+fn figures(result: &PositioningResult, stated: bool) -> Rows {
+    let of = |value: &ExpandedLength| figure(value, stated);
+    let row = |name: &str, up: String, down: String, both: &ExpandedLength| {
+        vec![name.to_owned(), up, down, of(both)]
+    };
+    let dash = || "—".to_owned();
     let (up, down) = (&result.up, &result.down);
-    section.tables.push(Rows {
+    Rows {
         head: head(&["ISO 230-2 / µm", "up", "down", "both"]),
         rows: vec![
-            vec![
-                "accuracy A".to_owned(),
+            row(
+                "accuracy A",
                 of(&up.accuracy),
                 of(&down.accuracy),
-                of(&result.accuracy),
-            ],
-            vec![
-                "systematic deviation E".to_owned(),
+                &result.accuracy,
+            ),
+            row(
+                "systematic deviation E",
                 of(&up.systematic_error),
                 of(&down.systematic_error),
-                of(&result.systematic_error),
-            ],
-            vec![
-                "repeatability R".to_owned(),
+                &result.systematic_error,
+            ),
+            row(
+                "repeatability R",
                 of(&up.repeatability),
                 of(&down.repeatability),
-                of(&result.repeatability),
-            ],
-            vec![
-                "reversal B".to_owned(),
+                &result.repeatability,
+            ),
+            row("reversal B", dash(), dash(), &result.reversal),
+            row("mean reversal", dash(), dash(), &result.mean_reversal),
+            row(
+                "range of means M",
                 dash(),
                 dash(),
-                of(&result.reversal),
-            ],
-            vec![
-                "mean reversal".to_owned(),
-                dash(),
-                dash(),
-                of(&result.mean_reversal),
-            ],
-            vec![
-                "range of means M".to_owned(),
-                dash(),
-                dash(),
-                of(&result.mean_systematic_error),
-            ],
+                &result.mean_systematic_error,
+            ),
         ],
         note: if stated {
             "± expanded uncertainty, k = 2.".to_owned()
         } else {
             "Without --budget no uncertainty is stated.".to_owned()
         },
-    });
-    let trace =
-        |name: &str, value: fn(&metrology::iso230::positioning::PointResult) -> f64| Trace {
-            name: name.to_owned(),
-            points: result
-                .points
-                .iter()
-                .map(|p| (p.target_mm, value(p) * 1e3))
-                .collect(),
-            marks: false,
-        };
-    section.drawings.push(Drawing {
+    }
+}
+
+fn means(result: &PositioningResult) -> Result<Drawing> {
+    let trace = |name: &str, value: fn(&PointResult) -> f64| Trace {
+        name: name.to_owned(),
+        points: result
+            .points
+            .iter()
+            .map(|p| (p.target_mm, value(p) * 1e3))
+            .collect(),
+        marks: false,
+    };
+    Ok(Drawing {
         svg: plot::svg(&Plot {
             x: "target / mm".to_owned(),
             y: "mean deviation / µm".to_owned(),
@@ -159,9 +162,7 @@ fn fill(
         })?,
         caption: "Mean deviation at each target, from either side; the mean of all is taken out."
             .to_owned(),
-    });
-    section.figures = serde_json::json!({ "test": section.title, "iso230_2": result });
-    Ok(())
+    })
 }
 
 fn remark_in_words(remark: &PositioningRemark) -> String {

@@ -112,15 +112,16 @@ fn shapes(features: &[ProbedFeature]) -> Option<Section> {
     })
 }
 
-fn drift(blocks: &[BlockMeasurement]) -> Result<Option<Section>> {
-    let mut series: BTreeMap<(String, Axis), Vec<(f64, f64)>> = BTreeMap::new();
-    let Some(first) = blocks.first() else {
-        return Ok(None);
-    };
+/// Readings of one face: time since the first of all (s), position (mm).
+type Series = BTreeMap<(String, Axis), Vec<(f64, f64)>>;
+
+/// Faces that were read twice or more.
+fn faces(blocks: &[BlockMeasurement]) -> Series {
+    let mut series = Series::new();
     for block in blocks {
         for axis in Axis::LINEAR {
             if let Some(face) = block.faces[axis] {
-                let time_s = (block.at - first.at).as_secs_f64();
+                let time_s = (block.at - blocks[0].at).as_secs_f64();
                 series
                     .entry((block.block_id.clone(), axis))
                     .or_default()
@@ -129,6 +130,11 @@ fn drift(blocks: &[BlockMeasurement]) -> Result<Option<Section>> {
         }
     }
     series.retain(|_, values| values.len() >= 2);
+    series
+}
+
+fn drift(blocks: &[BlockMeasurement]) -> Result<Option<Section>> {
+    let series = faces(blocks);
     if series.is_empty() {
         return Ok(None);
     }

@@ -116,21 +116,20 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
         note: "Size of the true error of the tool relative to the workpiece, which no node sees; about a datum: the shift and turn that all poses share are taken out, as setting a part up does."
             .to_owned(),
     });
-    let figures: Vec<serde_json::Value> = seen
-        .iter()
-        .map(|verification| {
-            serde_json::json!({
-                "label": verification.label,
-                "poses": verification.poses.len(),
-                "p95_mm": quantile_mm(&sizes_mm(verification, false), 0.95),
-                "max_mm": quantile_mm(&sizes_mm(verification, false), 1.0),
-                "aligned_p95_mm": quantile_mm(&sizes_mm(verification, true), 0.95),
-                "aligned_max_mm": quantile_mm(&sizes_mm(verification, true), 1.0),
-            })
-        })
-        .collect();
+    let figures: Vec<serde_json::Value> = seen.iter().map(|one| figures(one)).collect();
     section.figures = serde_json::json!({ "verifications": figures });
     Some(section)
+}
+
+fn figures(verification: &Verification) -> serde_json::Value {
+    serde_json::json!({
+        "label": verification.label,
+        "poses": verification.poses.len(),
+        "p95_mm": quantile_mm(&sizes_mm(verification, false), 0.95),
+        "max_mm": quantile_mm(&sizes_mm(verification, false), 1.0),
+        "aligned_p95_mm": quantile_mm(&sizes_mm(verification, true), 0.95),
+        "aligned_max_mm": quantile_mm(&sizes_mm(verification, true), 1.0),
+    })
 }
 
 #[cfg(test)]
