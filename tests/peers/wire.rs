@@ -138,6 +138,8 @@ fn cyclone_sends_states_and_a_latched_model_and_gets_the_compensation() {
     };
     let (scenario, domain) = (Scenario::copy_of("first_run"), domain(1));
     scenario.replace("axis_compensation.yaml", "enabled: false", "enabled: true");
+    // A node that is told to stop takes its time to fade.
+    scenario.replace("axis_compensation.yaml", "fade_s: 30.0", "fade_s: 1.0");
     let file = scenario.argument("axis_compensation.yaml");
     let writers = [end(&topics::AXES_STATE), end(&topics::THERMAL_MODEL)];
     let readers = [end(&topics::COMPENSATION)];
