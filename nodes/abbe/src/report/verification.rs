@@ -106,11 +106,13 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
     });
     section.tables.push(Rows {
         head: head(&[
-            "verification",
+            "verification / µm",
             "poses",
-            "median / µm",
-            "p95 / µm",
-            "max / µm",
+            "p95",
+            "max",
+            "median about datum",
+            "p95 about datum",
+            "max about datum",
         ]),
         rows: rows.collect(),
         note: "Size of the true error of the tool relative to the workpiece, which no node sees; about a datum: the shift and turn that all poses share are taken out, as setting a part up does."
