@@ -8,9 +8,12 @@
 //! other controls load. `volumetric` is the geometric error of the tool tip anywhere in the working
 //! volume, component by component and all together, and what has to be commanded to undo it.
 //! `trajectory` writes the programs that a grid encoder, a laser or a scale measures.
+//! `effects` is the catalogue of what can be wrong with a machine, one file each, and `twin` simulates a
+//! recorded session with any of them switched on.
 
 pub mod chain;
 pub mod cycle;
+pub mod effects;
 pub mod error;
 pub mod export;
 pub mod file;
@@ -18,6 +21,7 @@ pub mod kinematics;
 pub mod orientation;
 pub mod poses;
 pub mod trajectory;
+pub mod twin;
 pub mod volumetric;
 
 pub use chain::{Chain, ChainError};

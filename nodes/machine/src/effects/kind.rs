@@ -1,0 +1,253 @@
+//! What the catalogue says of an effect: name, targets, parameters, excitation, wider forms.
+
+use std::fmt;
+
+use metrology::{Axis, ErrorComponent};
+
+use super::{Effect, linear_axes};
+use crate::chain::Chain;
+use crate::file::{EffectEntry, MachineFile};
+use crate::twin::TwinError;
+use crate::volumetric::components_of;
+
+/// An entry of the catalogue.
+#[derive(Debug)]
+pub struct Kind {
+    /// Its id, the name of its file.
+    pub id: &'static str,
+    /// What a metrologist calls it.
+    pub title: &'static str,
+    /// What it can act on.
+    pub targets: Targets,
+    /// Parameters of its physics, amplitudes first. All are required in a machine file.
+    pub parameters: &'static [Parameter],
+    /// Amplitudes of the wider form (GAP 1.4), all [`Role::Amplitude`], zero where a file does not give them.
+    pub free: &'static [Parameter],
+    /// Whether it moves the mean of readings or only their scatter.
+    pub moment: Moment,
+    /// What a recording must contain to show it, in words: "a reversal of the axis".
+    pub needs: &'static str,
+    /// Makes it; values in the order of `parameters`, then of `free`, in the units of the file.
+    pub build: fn(Target, &[f64]) -> Box<dyn Effect>,
+}
+
+/// What effects of a kind can act on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Targets {
+    /// Each linear axis.
+    LinearAxes,
+    /// Each rotary axis.
+    RotaryAxes,
+    /// Each pair of linear axes, in the order of the alphabet: XY, XZ, YZ.
+    LinearPairs,
+    /// Each linear axis and each direction across it, e.g. `YX`: straightness in Y of X.
+    Across,
+    /// Each linear axis and each direction of turning, e.g. `CX`: yaw of X.
+    Turning,
+    /// Each component of location of a rotary axis, e.g. `X0C`.
+    RotaryLocations,
+    /// The machine as a whole; the entry names no axis.
+    Machine,
+    /// Each thermometer of the machine file.
+    Thermometers,
+}
+
+/// One thing that an effect acts on.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Target {
+    /// One axis.
+    Axis(Axis),
+    /// Two linear axes.
+    Pair(Axis, Axis),
+    /// A component of ISO 230-1: straightness, angular error, location.
+    Component(ErrorComponent),
+    /// The machine.
+    Machine,
+    /// A thermometer.
+    Thermometer(String),
+}
+
+/// Mean or scatter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// The effect moves readings in a repeatable way.
+    Mean,
+    /// The effect only scatters them (random phase, jitter).
+    Variance,
+}
+
+/// How a parameter enters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Role {
+    /// The response is proportional to it (of [`Moment::Variance`]: to its square).
+    Amplitude,
+    /// It shapes the response; these values are tried before it is refined.
+    Shape {
+        /// Grid, in the parameter's unit, growing.
+        grid: &'static [f64],
+    },
+}
+
+/// One parameter, in the unit of the machine file (its name ends in it).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Key in the machine file.
+    pub name: &'static str,
+    /// How it enters.
+    pub role: Role,
+    /// Least physical value.
+    pub low: f64,
+    /// Greatest physical value.
+    pub high: f64,
+    /// Typical magnitude, the scale of its prior.
+    pub typical: f64,
+}
+
+impl Kind {
+    /// Everything on the machine that the effect can act on.
+    #[must_use]
+    pub fn targets_on(&self, machine: &MachineFile) -> Vec<Target> {
+        let locations = || {
+            machine
+                .chain
+                .parse::<Chain>()
+                .map_or_else(|_| vec![], |chain| components_of(&chain))
+        };
+        let linear = linear_axes(machine);
+        let rotary = || {
+            Axis::ROTARY
+                .into_iter()
+                .filter(|axis| machine.rotary_axis(*axis).is_some())
+        };
+        let named = |components: Vec<ErrorComponent>| {
+            components.into_iter().map(Target::Component).collect()
+        };
+        let motions = |wanted: fn(&ErrorComponent) -> bool| {
+            linear
+                .iter()
+                .flat_map(|of| ErrorComponent::motions_of(*of))
+                .filter(wanted)
+                .collect()
+        };
+        match self.targets {
+            Targets::LinearAxes => linear.into_iter().map(Target::Axis).collect(),
+            Targets::RotaryAxes => rotary().map(Target::Axis).collect(),
+            Targets::LinearPairs => linear
+                .iter()
+                .flat_map(|a| {
+                    linear
+                        .iter()
+                        .filter(move |b| a < b)
+                        .map(|b| Target::Pair(*a, *b))
+                })
+                .collect(),
+            Targets::Across => named(motions(|c| !c.is_angular() && c.direction != c.of)),
+            Targets::Turning => named(motions(|c| c.is_angular())),
+            Targets::RotaryLocations => named(
+                locations()
+                    .into_iter()
+                    .filter(|c| c.is_location && !c.of.is_linear())
+                    .collect(),
+            ),
+            Targets::Machine => vec![Target::Machine],
+            Targets::Thermometers => machine
+                .temperature_sensors
+                .iter()
+                .map(|sensor| Target::Thermometer(sensor.id.clone()))
+                .collect(),
+        }
+    }
+
+    /// Amplitudes among the parameters, then those of the wider form.
+    pub fn amplitudes(&self) -> impl Iterator<Item = &'static Parameter> {
+        self.parameters
+            .iter()
+            .chain(self.free)
+            .filter(|p| p.role == Role::Amplitude)
+    }
+
+    /// Parameters that shape the response.
+    pub fn shapes(&self) -> impl Iterator<Item = &'static Parameter> {
+        self.parameters.iter().filter(|p| p.role != Role::Amplitude)
+    }
+
+    /// The target that an entry names.
+    pub(super) fn target_of(
+        &self,
+        machine: &MachineFile,
+        index: usize,
+        entry: &EffectEntry,
+    ) -> Result<Target, TwinError> {
+        let possible = self.targets_on(machine);
+        let named = entry.axis.as_deref().unwrap_or("");
+        possible
+            .iter()
+            .find(|target| target.to_string() == named)
+            .cloned()
+            .ok_or_else(|| TwinError::Target {
+                index,
+                kind: entry.kind.clone(),
+                target: named.to_owned(),
+                possible: possible
+                    .iter()
+                    .map(|t| format!("`{t}`"))
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            })
+    }
+
+    /// The values that an entry gives, in the order that [`Kind::build`] wants.
+    pub(super) fn values_of(
+        &self,
+        index: usize,
+        entry: &EffectEntry,
+    ) -> Result<Vec<f64>, TwinError> {
+        let kind = || entry.kind.clone();
+        let all = || self.parameters.iter().chain(self.free);
+        if let Some(name) = entry
+            .parameters
+            .keys()
+            .find(|name| all().all(|p| p.name != *name))
+        {
+            return Err(TwinError::UnknownParameter {
+                index,
+                kind: kind(),
+                name: name.clone(),
+                known: all().map(|p| p.name).collect::<Vec<_>>().join(", "),
+            });
+        }
+        let value_of = |p: &Parameter| match entry.parameters.get(p.name) {
+            None if self.free.contains(p) => Ok(0.0),
+            None => Err(TwinError::MissingParameter {
+                index,
+                kind: kind(),
+                name: p.name.to_owned(),
+            }),
+            Some(value) if (p.low..=p.high).contains(value) => Ok(*value),
+            Some(value) => Err(TwinError::Range {
+                index,
+                kind: kind(),
+                name: p.name.to_owned(),
+                value: *value,
+                low: p.low,
+                high: p.high,
+            }),
+        };
+        all().map(value_of).collect()
+    }
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Axis(axis) => write!(f, "{axis}"),
+            Self::Pair(a, b) => write!(f, "{a}{b}"),
+            Self::Component(component) => {
+                let name = component.to_string();
+                f.write_str(name.strip_prefix('E').unwrap_or(&name))
+            }
+            Self::Machine => Ok(()),
+            Self::Thermometer(id) => f.write_str(id),
+        }
+    }
+}

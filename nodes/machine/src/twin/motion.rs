@@ -1,0 +1,180 @@
+//! The commanded motion of one run, with what an effect asks of it.
+
+use metrology::{Axis, AxisSet, PerAxis};
+
+use super::error::TwinError;
+
+/// Commanded motion of all axes during one run, one entry per recorded servo tick.
+///
+/// Every vector has the length of [`Motion::time_s`]. Linear axes in mm, rotary ones in rad. The record
+/// begins before the test itself where the bag has it, so that play and friction know how they stand.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Motion {
+    /// Seconds since the session's start, strictly growing.
+    pub time_s: Vec<f64>,
+    /// The axes that the machine has; vectors of others are empty.
+    pub axes: AxisSet,
+    /// Commanded position, compensation not included.
+    pub position: PerAxis<Vec<f64>>,
+    /// Its derivative, per second.
+    pub velocity: PerAxis<Vec<f64>>,
+    /// Its second derivative, per second squared.
+    pub acceleration: PerAxis<Vec<f64>>,
+    /// Direction of the latest motion: -1, +1, or 0 before the first.
+    pub sense: PerAxis<Vec<i8>>,
+    /// Way since the axis last turned round; infinite before the first turn.
+    pub since_reversal: PerAxis<Vec<f64>>,
+    /// Time since the axis last began to move the other way, s; infinite before the first turn.
+    pub since_reversal_s: PerAxis<Vec<f64>>,
+}
+
+/// A step that is no motion: below a tenth of the finest pulse (mm, rad).
+const STANDSTILL: f64 = 1e-6;
+
+impl Motion {
+    /// Builds the motion from time and commanded positions; velocity and acceleration are central differences
+    /// over the recorded spacing.
+    ///
+    /// # Errors
+    /// [`TwinError::Lengths`] where an axis has another number of entries than time,
+    /// [`TwinError::Time`] where time does not grow, [`TwinError::NotFinite`] for a position that is no number.
+    pub fn new(
+        time_s: Vec<f64>,
+        axes: AxisSet,
+        position: PerAxis<Vec<f64>>,
+    ) -> Result<Self, TwinError> {
+        for (index, pair) in time_s.windows(2).enumerate() {
+            if !matches!(pair, [a, b] if a < b) {
+                return Err(TwinError::Time {
+                    index: index + 1,
+                    time_s: pair[1],
+                });
+            }
+        }
+        for axis in axes.iter() {
+            if position[axis].len() != time_s.len() {
+                return Err(TwinError::Lengths {
+                    axis,
+                    found: position[axis].len(),
+                    wanted: time_s.len(),
+                });
+            }
+            if let Some(index) = position[axis].iter().position(|p| !p.is_finite()) {
+                return Err(TwinError::NotFinite {
+                    axis,
+                    index,
+                    value: position[axis][index],
+                });
+            }
+        }
+        let mut motion = Self {
+            time_s,
+            axes,
+            position,
+            ..Self::default()
+        };
+        for axis in axes.iter() {
+            motion.velocity[axis] = derivative(&motion.time_s, &motion.position[axis]);
+            motion.acceleration[axis] = derivative(&motion.time_s, &motion.velocity[axis]);
+            motion.turns(axis);
+        }
+        Ok(motion)
+    }
+
+    /// Number of ticks.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether nothing was recorded.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    fn turns(&mut self, axis: Axis) {
+        let position = &self.position[axis];
+        let mut sense = 0_i8;
+        let mut has_turned = false;
+        let (mut way, mut since_s) = (0.0, 0.0);
+        let mut last = None;
+        let (mut senses, mut ways, mut times) = (vec![], vec![], vec![]);
+        for (&at_s, &here) in self.time_s.iter().zip(position) {
+            if let Some((before_s, before)) = last {
+                let step: f64 = here - before;
+                since_s += at_s - before_s;
+                if step.abs() > STANDSTILL {
+                    let now = if step > 0.0 { 1 } else { -1 };
+                    if now != sense {
+                        has_turned |= sense != 0;
+                        (sense, way, since_s) = (now, 0.0, at_s - before_s);
+                    }
+                    way += step.abs();
+                    last = Some((at_s, here));
+                } else {
+                    last = Some((at_s, before));
+                }
+            } else {
+                last = Some((at_s, here));
+            }
+            senses.push(sense);
+            ways.push(if has_turned { way } else { f64::INFINITY });
+            times.push(if has_turned { since_s } else { f64::INFINITY });
+        }
+        self.sense[axis] = senses;
+        self.since_reversal[axis] = ways;
+        self.since_reversal_s[axis] = times;
+    }
+}
+
+/// Central differences; one-sided at the ends.
+fn derivative(time_s: &[f64], value: &[f64]) -> Vec<f64> {
+    let n = value.len();
+    (0..n)
+        .map(|k| {
+            let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+            if a == b {
+                0.0
+            } else {
+                (value[b] - value[a]) / (time_s[b] - time_s[a])
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one_axis(position: Vec<f64>) -> Motion {
+        let time_s = (0..position.len())
+            .map(|k| 0.001 * f64::from(u32::try_from(k).expect("few")))
+            .collect();
+        let mut all = PerAxis::<Vec<f64>>::default();
+        all[Axis::X] = position;
+        Motion::new(time_s, AxisSet::EMPTY.with(Axis::X), all).expect("a motion")
+    }
+
+    #[test]
+    fn way_since_reversal_starts_at_the_turn() {
+        let motion = one_axis(vec![0.0, 0.1, 0.2, 0.1, 0.1, 0.0]);
+        assert_eq!(motion.sense[Axis::X], [0, 1, 1, -1, -1, -1]);
+        assert!(motion.since_reversal[Axis::X][2].is_infinite());
+        assert!((motion.since_reversal[Axis::X][3] - 0.1).abs() < 1e-12);
+        assert!((motion.since_reversal[Axis::X][5] - 0.2).abs() < 1e-12);
+        assert!((motion.since_reversal_s[Axis::X][5] - 0.003).abs() < 1e-12);
+    }
+
+    #[test]
+    fn time_that_does_not_grow_is_refused_with_its_place() {
+        let refused = Motion::new(vec![0.0, 1.0, 1.0], AxisSet::EMPTY, PerAxis::default());
+        assert_eq!(
+            refused,
+            Err(TwinError::Time {
+                index: 2,
+                time_s: 1.0
+            })
+        );
+    }
+}

@@ -1,0 +1,98 @@
+//! What was commanded and read during the runs of a recorded session.
+
+use std::fmt;
+
+use metrology::sample::TestSegment;
+use metrology::{Axis, PerAxis};
+use nalgebra::Vector3;
+
+use super::history::History;
+use super::motion::Motion;
+
+/// A recorded session: one bag, or several one after another.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Session {
+    /// What heated the machine.
+    pub history: History,
+    /// The runs, in time.
+    pub runs: Vec<Run>,
+}
+
+/// One run: what was commanded, and what the instruments read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// What it was for: number, kind, plane, feed, sense, repeat, stylus, zero, set-up.
+    pub segment: TestSegment,
+    /// Commanded motion.
+    pub motion: Motion,
+    /// Touches, in time.
+    pub touches: Vec<Touch>,
+    /// Readings of all channels, in time within each channel.
+    pub readings: Vec<Reading>,
+}
+
+/// A touch of the probe.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Touch {
+    /// Seconds since the session's start.
+    pub time_s: f64,
+    /// What was touched.
+    pub feature_id: String,
+    /// Unit vector of the approach, of the tool relative to the workpiece, machine frame.
+    pub approach: Vector3<f64>,
+    /// Feed along it when the latch came, mm/s.
+    pub feed_mm_s: f64,
+    /// Where the axes were (mm, rad).
+    pub position: PerAxis<f64>,
+    /// Nearest tick of the run's motion; none where the motion was not recorded.
+    pub tick: Option<usize>,
+}
+
+/// Which instrument, and which of its coordinates.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Channel {
+    /// Motor encoder minus command.
+    Motor(Axis),
+    /// Linear scale minus command.
+    Scale(Axis),
+    /// First coordinate of the grid encoder.
+    GridU,
+    /// Second coordinate of the grid encoder.
+    GridV,
+    /// Ballbar or other radial instrument.
+    Radial,
+    /// Length reference along (or mostly along) an axis.
+    Length(Axis),
+    /// Touch, along its approach.
+    Touch,
+    /// A thermometer, by its name in the machine file.
+    Thermometer(String),
+}
+
+/// One reading, as a deviation from what the commands say.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// Of what.
+    pub channel: Channel,
+    /// Tick of the motion (of [`Channel::Touch`]: the touch) at or before it.
+    pub at: usize,
+    /// How far towards the next tick it was read, 0 to 1.
+    pub fraction: f64,
+    /// Measured minus nominal, mm (K for a thermometer, rad for a rotary axis).
+    pub deviation: f64,
+}
+
+impl fmt::Display for Channel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Motor(axis) => write!(f, "motor.{axis}"),
+            Self::Scale(axis) => write!(f, "scale.{axis}"),
+            Self::GridU => f.write_str("grid.u"),
+            Self::GridV => f.write_str("grid.v"),
+            Self::Radial => f.write_str("radial"),
+            Self::Length(axis) => write!(f, "length.{axis}"),
+            Self::Touch => f.write_str("touch"),
+            Self::Thermometer(id) => write!(f, "temperature.{id}"),
+        }
+    }
+}
