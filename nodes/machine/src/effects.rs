@@ -6,8 +6,33 @@
 //! losing its name. To add one: write its file, add its line below.
 
 mod kind;
+mod slow;
+mod stale;
 
+pub mod ambient_drift;
 pub mod backlash;
+pub mod clock_drift;
+pub mod clock_offset;
+pub mod column_bend;
+pub mod coolant;
+pub mod latency_drift;
+pub mod latency_jitter;
+pub mod latency_modes;
+pub mod length_misalignment;
+pub mod length_wavelength;
+pub mod plate_error;
+pub mod probe_latency;
+pub mod probe_lobing;
+pub mod probe_pretravel;
+pub mod probe_repeatability;
+pub mod quantisation;
+pub mod screw_elongation;
+pub mod spindle_growth;
+pub mod stylus_jump;
+pub mod thermometer_lag;
+pub mod thermometer_offset;
+pub mod vibration_random;
+pub mod workpiece_expansion;
 
 use metrology::Axis;
 
@@ -18,7 +43,32 @@ use crate::kinematics::Kinematics;
 use crate::twin::{History, Response, Run, TwinError};
 
 /// Every effect that the twin knows.
-pub static CATALOGUE: &[&Kind] = &[&backlash::KIND];
+pub static CATALOGUE: &[&Kind] = &[
+    &ambient_drift::KIND,
+    &backlash::KIND,
+    &clock_drift::KIND,
+    &clock_offset::KIND,
+    &column_bend::KIND,
+    &coolant::KIND,
+    &latency_drift::KIND,
+    &latency_jitter::KIND,
+    &latency_modes::KIND,
+    &length_misalignment::KIND,
+    &length_wavelength::KIND,
+    &plate_error::KIND,
+    &probe_latency::KIND,
+    &probe_lobing::KIND,
+    &probe_pretravel::KIND,
+    &probe_repeatability::KIND,
+    &quantisation::KIND,
+    &screw_elongation::KIND,
+    &spindle_growth::KIND,
+    &stylus_jump::KIND,
+    &thermometer_lag::KIND,
+    &thermometer_offset::KIND,
+    &vibration_random::KIND,
+    &workpiece_expansion::KIND,
+];
 
 /// What an effect may look at: the machine as described, the run, and the past of the session.
 #[derive(Clone, Copy, Debug)]

@@ -25,6 +25,8 @@
 //! | block face | the same, without a feed |
 //! | thermometer | reading minus the temperature, K |
 //!
+//! Every channel adds what its instrument itself does to each reading (`Response::reading`).
+//!
 //! Deviations are small (below a millimetre), so responses of effects add up; positions on a curve are
 //! those commanded.
 //!
@@ -43,5 +45,5 @@ pub use error::TwinError;
 pub use history::History;
 pub use motion::Motion;
 pub use response::Response;
-pub use session::{Channel, Reading, Run, Session, Touch};
+pub use session::{Channel, Instrument, Reading, Run, Session, Touch};
 pub use simulate::Twin;

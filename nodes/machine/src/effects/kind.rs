@@ -7,7 +7,7 @@ use metrology::{Axis, ErrorComponent};
 use super::{Effect, linear_axes};
 use crate::chain::Chain;
 use crate::file::{EffectEntry, MachineFile};
-use crate::twin::TwinError;
+use crate::twin::{Instrument, TwinError};
 use crate::volumetric::components_of;
 
 /// An entry of the catalogue.
@@ -50,6 +50,8 @@ pub enum Targets {
     Machine,
     /// Each thermometer of the machine file.
     Thermometers,
+    /// Each of these instruments.
+    Instruments(&'static [Instrument]),
 }
 
 /// One thing that an effect acts on.
@@ -65,6 +67,8 @@ pub enum Target {
     Machine,
     /// A thermometer.
     Thermometer(String),
+    /// An instrument.
+    Instrument(Instrument),
 }
 
 /// Mean or scatter.
@@ -101,6 +105,75 @@ pub struct Parameter {
     pub high: f64,
     /// Typical magnitude, the scale of its prior.
     pub typical: f64,
+}
+
+impl Parameter {
+    /// An amplitude of either sign, at most `limit` in magnitude.
+    #[must_use]
+    pub const fn amplitude(name: &'static str, limit: f64, typical: f64) -> Self {
+        Self {
+            name,
+            role: Role::Amplitude,
+            low: -limit,
+            high: limit,
+            typical,
+        }
+    }
+
+    /// An amplitude that has a sign.
+    #[must_use]
+    pub const fn size(name: &'static str, high: f64, typical: f64) -> Self {
+        Self {
+            name,
+            role: Role::Amplitude,
+            low: 0.0,
+            high,
+            typical,
+        }
+    }
+
+    /// A parameter of shape between two physical limits, tried at the values of a grid.
+    #[must_use]
+    pub const fn shape(
+        name: &'static str,
+        [low, high]: [f64; 2],
+        typical: f64,
+        grid: &'static [f64],
+    ) -> Self {
+        Self {
+            name,
+            role: Role::Shape { grid },
+            low,
+            high,
+            typical,
+        }
+    }
+}
+
+impl Target {
+    /// The axis, of an effect whose targets are axes.
+    pub(super) fn axis(&self) -> Axis {
+        match self {
+            Self::Axis(axis) => *axis,
+            other => unreachable!("{other:?}: the kind acts on axes only"),
+        }
+    }
+
+    /// The instrument, of an effect whose targets are instruments.
+    pub(super) fn instrument(&self) -> Instrument {
+        match self {
+            Self::Instrument(instrument) => *instrument,
+            other => unreachable!("{other:?}: the kind acts on instruments only"),
+        }
+    }
+
+    /// The thermometer, of an effect whose targets are thermometers.
+    pub(super) fn thermometer(&self) -> String {
+        match self {
+            Self::Thermometer(id) => id.clone(),
+            other => unreachable!("{other:?}: the kind acts on thermometers only"),
+        }
+    }
 }
 
 impl Kind {
@@ -155,6 +228,7 @@ impl Kind {
                 .iter()
                 .map(|sensor| Target::Thermometer(sensor.id.clone()))
                 .collect(),
+            Targets::Instruments(all) => all.iter().copied().map(Target::Instrument).collect(),
         }
     }
 
@@ -248,6 +322,7 @@ impl fmt::Display for Target {
             }
             Self::Machine => Ok(()),
             Self::Thermometer(id) => f.write_str(id),
+            Self::Instrument(instrument) => write!(f, "{instrument}"),
         }
     }
 }

@@ -34,6 +34,50 @@ impl History {
         self.len() == 0
     }
 
+    /// How far a thermometer is above its first reading, K; none where it was never read. Before the first
+    /// reading zero, where readings are missing the last one.
+    #[must_use]
+    pub fn warming_k(&self, sensor: &str) -> Option<Vec<f64>> {
+        let series = self.temperature_degc.get(sensor)?;
+        let first = series.iter().copied().find(|t| t.is_finite())?;
+        let mut last = 0.0;
+        let rise = |t: &f64| {
+            if t.is_finite() {
+                last = t - first;
+            }
+            last
+        };
+        Some(series.iter().map(rise).collect())
+    }
+
+    /// Reading of a thermometer less a reference, K; none where it was never read. Missing readings as in
+    /// [`History::warming_k`].
+    #[must_use]
+    pub fn above_k(&self, sensor: &str, reference_degc: f64) -> Option<Vec<f64>> {
+        let series = self.temperature_degc.get(sensor)?;
+        let first = series.iter().find(|t| t.is_finite())? - reference_degc;
+        let warming = self.warming_k(sensor)?;
+        Some(warming.iter().map(|k| k + first).collect())
+    }
+
+    /// What follows a series of this history with the time constant `lag_s`, from zero, at the middles of the
+    /// entries; exact where the series is constant within each entry.
+    ///
+    /// ```text
+    ///   y' = (u - y) / tau,   y(0) = 0
+    /// ```
+    #[must_use]
+    pub fn lagged(&self, series: &[f64], lag_s: f64) -> Vec<f64> {
+        let half = (-0.5 * self.step_s / lag_s).exp();
+        let mut state = 0.0;
+        let follow = |input: &f64| {
+            let middle = input + (state - input) * half;
+            state = input + (middle - input) * half;
+            middle
+        };
+        series.iter().map(follow).collect()
+    }
+
     /// Value of a series of this history at an instant of the session, linear between the middles of the
     /// entries and constant beyond the first and last; NaN for an empty series.
     #[must_use]
@@ -61,6 +105,30 @@ impl History {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_lags_rises_as_the_exponential_and_ends_at_its_input() {
+        let history = History {
+            step_s: 7.0,
+            ..History::default()
+        };
+        let lagged = history.lagged(&[2.0; 400], 100.0);
+        for (k, value) in lagged.iter().enumerate() {
+            let at_s = 7.0 * (f64::from(u32::try_from(k).expect("few")) + 0.5);
+            assert!((value - 2.0 * (1.0 - (-at_s / 100.0).exp())).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn warming_counts_from_the_first_reading_and_bridges_gaps() {
+        let mut history = History::default();
+        let nan = f64::NAN;
+        let _ = history
+            .temperature_degc
+            .insert("bed".to_owned(), vec![nan, 21.0, nan, 23.5]);
+        assert_eq!(history.warming_k("bed"), Some(vec![0.0, 0.0, 0.0, 2.5]));
+        assert_eq!(history.warming_k("column"), None);
+    }
 
     #[test]
     fn a_series_is_linear_between_middles_and_constant_beyond() {

@@ -93,6 +93,28 @@ impl Motion {
         self.time_s.is_empty()
     }
 
+    /// Commanded position at an instant between ticks: the cubic through position and velocity of the
+    /// ticks about it; where it stood before the first and after the last tick. Zero for an axis that the
+    /// motion lacks.
+    #[must_use]
+    pub fn position_at(&self, axis: Axis, time_s: f64) -> f64 {
+        let (position, velocity) = (&self.position[axis], &self.velocity[axis]);
+        let after = self.time_s.partition_point(|t| *t <= time_s);
+        let before = after.saturating_sub(1);
+        let (Some(a), Some(b)) = (position.get(before), position.get(after)) else {
+            return position.last().copied().unwrap_or(0.0);
+        };
+        if before == after {
+            return *a;
+        }
+        let step_s = self.time_s[after] - self.time_s[before];
+        let share = (time_s - self.time_s[before]) / step_s;
+        let (from, to) = (velocity[before] * step_s, velocity[after] * step_s);
+        let way = b - a;
+        let bend = (3.0 * way - 2.0 * from - to) + share * (from + to - 2.0 * way);
+        a + share * (from + share * bend)
+    }
+
     fn turns(&mut self, axis: Axis) {
         let position = &self.position[axis];
         let mut sense = 0_i8;
@@ -164,6 +186,18 @@ mod tests {
         assert!((motion.since_reversal[Axis::X][3] - 0.1).abs() < 1e-12);
         assert!((motion.since_reversal[Axis::X][5] - 0.2).abs() < 1e-12);
         assert!((motion.since_reversal_s[Axis::X][5] - 0.003).abs() < 1e-12);
+    }
+
+    #[test]
+    fn position_between_ticks_is_that_of_a_parabola_and_holds_beyond() {
+        let motion = one_axis((0..6).map(|k| 0.5 * f64::from(k * k)).collect());
+        let at = |ticks: f64| motion.position_at(Axis::X, 0.001 * ticks);
+        for ticks in [1.0, 1.25, 2.5, 3.9] {
+            assert!((at(ticks) - 0.5 * ticks * ticks).abs() < 1e-9, "{ticks}");
+        }
+        assert!(at(-3.0).abs() < 1e-12);
+        assert!((at(9.0) - 12.5).abs() < 1e-12);
+        assert!(motion.position_at(Axis::Y, 0.002).abs() < 1e-12);
     }
 
     #[test]

@@ -26,8 +26,10 @@ pub struct Response {
     pub length_reading_mm: Vec<f64>,
     /// How far beyond the contact of ball and surface the position is latched, along the approach, per touch.
     pub travel_mm: Vec<f64>,
-    /// Reading minus temperature of each of the run's thermometer readings, K.
-    pub thermometer_k: Vec<f64>,
+    /// What an instrument itself adds to each of the run's readings, of any channel (mm, rad, K).
+    pub reading: Vec<f64>,
+    /// Variance that an instrument itself adds to each of the run's readings, in the square of its unit.
+    pub reading_variance: Vec<f64>,
     /// Variance that an effect of random phase adds to the tip, machine frame X, Y, Z, per tick, mm2.
     pub tip_variance_mm2: [Vec<f64>; 3],
     /// Variance along the approach, per touch, mm2.
@@ -50,7 +52,8 @@ impl Response {
             grid_reading_mm: [ticks(), ticks()],
             length_reading_mm: ticks(),
             travel_mm: vec![0.0; run.touches.len()],
-            thermometer_k: vec![0.0; run.readings.len()],
+            reading: vec![0.0; run.readings.len()],
+            reading_variance: vec![0.0; run.readings.len()],
             tip_variance_mm2: [ticks(), ticks(), ticks()],
             travel_variance_mm2: vec![0.0; run.touches.len()],
         }

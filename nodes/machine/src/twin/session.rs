@@ -69,6 +69,54 @@ pub enum Channel {
     Thermometer(String),
 }
 
+/// What takes readings: the channels of one device together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Instrument {
+    /// The motor encoders.
+    Motor,
+    /// The linear scales.
+    Scale,
+    /// The grid encoder.
+    Grid,
+    /// Ballbar or other radial instrument.
+    Radial,
+    /// The length reference.
+    Length,
+    /// The touch probe.
+    Touch,
+    /// The thermometers.
+    Thermometer,
+}
+
+impl Channel {
+    /// The device that it belongs to.
+    #[must_use]
+    pub const fn instrument(&self) -> Instrument {
+        match self {
+            Self::Motor(_) => Instrument::Motor,
+            Self::Scale(_) => Instrument::Scale,
+            Self::GridU | Self::GridV => Instrument::Grid,
+            Self::Radial => Instrument::Radial,
+            Self::Length(_) => Instrument::Length,
+            Self::Touch => Instrument::Touch,
+            Self::Thermometer(_) => Instrument::Thermometer,
+        }
+    }
+}
+
+impl Run {
+    /// Instant of a reading, s since the session's start; none where it refers to nothing.
+    #[must_use]
+    pub fn time_of(&self, reading: &Reading) -> Option<f64> {
+        if reading.channel == Channel::Touch {
+            return self.touches.get(reading.at).map(|touch| touch.time_s);
+        }
+        let here_s = *self.motion.time_s.get(reading.at)?;
+        let next_s = self.motion.time_s.get(reading.at + 1).unwrap_or(&here_s);
+        Some(here_s + (next_s - here_s) * reading.fraction)
+    }
+}
+
 /// One reading, as a deviation from what the commands say.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
@@ -80,6 +128,20 @@ pub struct Reading {
     pub fraction: f64,
     /// Measured minus nominal, mm (K for a thermometer, rad for a rotary axis).
     pub deviation: f64,
+}
+
+impl fmt::Display for Instrument {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Motor => "motor",
+            Self::Scale => "scale",
+            Self::Grid => "grid",
+            Self::Radial => "radial",
+            Self::Length => "length",
+            Self::Touch => "touch",
+            Self::Thermometer => "thermometer",
+        })
+    }
 }
 
 impl fmt::Display for Channel {

@@ -1,7 +1,7 @@
 //! Sums the responses of a list of effects and reads them off as each instrument would.
 
 use metrology::sample::{TestKind, TestPlane};
-use metrology::{Axis, AxisSet};
+use metrology::{Axis, AxisSet, PerAxis};
 use nalgebra::Vector3;
 
 use super::error::TwinError;
@@ -59,11 +59,7 @@ impl<'a> Twin<'a> {
     #[must_use]
     pub fn predict(&self, session: &Session, run: &Run, effects: &[&dyn Effect]) -> Vec<f64> {
         let response = self.respond(session, run, effects);
-        let reader = Reader {
-            run,
-            response: &response,
-            axes: self.axes,
-        };
+        let reader = Reader::new(run, &response, self.axes);
         run.readings
             .iter()
             .enumerate()
@@ -75,14 +71,14 @@ impl<'a> Twin<'a> {
     #[must_use]
     pub fn variance(&self, session: &Session, run: &Run, effects: &[&dyn Effect]) -> Vec<f64> {
         let response = self.respond(session, run, effects);
-        let reader = Reader {
-            run,
-            response: &response,
-            axes: self.axes,
-        };
+        let reader = Reader::new(run, &response, self.axes);
         run.readings
             .iter()
-            .map(|reading| reader.variance(reading))
+            .enumerate()
+            .map(|(row, reading)| {
+                reader.variance(reading)
+                    + response.reading_variance.get(row).copied().unwrap_or(0.0)
+            })
             .collect()
     }
 }
@@ -126,27 +122,46 @@ struct Reader<'a> {
     run: &'a Run,
     response: &'a Response,
     axes: AxisSet,
+    /// Directions of the length reference's beams, by the axis along which they advance most.
+    beams: PerAxis<Vector3<f64>>,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    fn new(run: &'a Run, response: &'a Response, axes: AxisSet) -> Self {
+        let beam_of = |axis: Axis| {
+            let read = run
+                .readings
+                .iter()
+                .any(|r| r.channel == Channel::Length(axis));
+            if read { beam(run, axis) } else { unit(axis) }
+        };
+        Self {
+            run,
+            response,
+            axes,
+            beams: PerAxis::from_fn(beam_of),
+        }
+    }
+
     fn deviation(&self, row: usize, reading: &Reading) -> f64 {
         let r = self.response;
         let between = |series: &[f64]| interpolate(series, reading);
         let along = |direction: &Vector3<f64>| self.tip_at(reading, true).dot(direction);
-        match &reading.channel {
+        let stands_on = match &reading.channel {
             Channel::Motor(axis) => between(&r.servo[*axis]) + between(&r.motor_reading[*axis]),
             Channel::Scale(axis) => {
                 between(&r.servo[*axis])
                     + between(&r.drive[*axis])
                     + between(&r.scale_reading[*axis])
             }
-            Channel::GridU => along(&self.plate(0)) + between(&r.grid_reading_mm[0]),
-            Channel::GridV => along(&self.plate(1)) + between(&r.grid_reading_mm[1]),
-            Channel::Radial => along(&self.radial(reading)),
-            Channel::Length(axis) => along(&self.beam(*axis)) + between(&r.length_reading_mm),
+            Channel::GridU => along(&plate(self.run, 0)) + between(&r.grid_reading_mm[0]),
+            Channel::GridV => along(&plate(self.run, 1)) + between(&r.grid_reading_mm[1]),
+            Channel::Radial => along(&radial(self.run, reading)),
+            Channel::Length(axis) => along(&self.beams[*axis]) + between(&r.length_reading_mm),
             Channel::Touch => self.touch(reading),
-            Channel::Thermometer(_) => r.thermometer_k.get(row).copied().unwrap_or(0.0),
-        }
+            Channel::Thermometer(_) => 0.0,
+        };
+        stands_on + r.reading.get(row).copied().unwrap_or(0.0)
     }
 
     /// Error of the tip with (or without) what the control loop leaves, machine frame.
@@ -189,10 +204,10 @@ impl Reader<'_> {
                 .sum()
         };
         match reading.channel {
-            Channel::GridU => of_tip(self.plate(0)),
-            Channel::GridV => of_tip(self.plate(1)),
-            Channel::Radial => of_tip(self.radial(reading)),
-            Channel::Length(axis) => of_tip(self.beam(axis)),
+            Channel::GridU => of_tip(plate(self.run, 0)),
+            Channel::GridV => of_tip(plate(self.run, 1)),
+            Channel::Radial => of_tip(radial(self.run, reading)),
+            Channel::Length(axis) => of_tip(self.beams[axis]),
             Channel::Touch => self
                 .response
                 .travel_variance_mm2
@@ -202,50 +217,50 @@ impl Reader<'_> {
             Channel::Motor(_) | Channel::Scale(_) | Channel::Thermometer(_) => 0.0,
         }
     }
+}
 
-    fn plate(&self, coordinate: usize) -> Vector3<f64> {
-        plate_axes(self.run.segment.plane)
-            .map_or_else(Vector3::zeros, |axes| unit(axes[coordinate]))
+/// Direction of a coordinate of the plate, machine frame.
+pub(crate) fn plate(run: &Run, coordinate: usize) -> Vector3<f64> {
+    plate_axes(run.segment.plane).map_or_else(Vector3::zeros, |axes| unit(axes[coordinate]))
+}
+
+/// Outward from the centre, within the plane of the test.
+pub(crate) fn radial(run: &Run, reading: &Reading) -> Vector3<f64> {
+    let Some(axes) = plate_axes(run.segment.plane) else {
+        return Vector3::zeros();
+    };
+    let mut outward = Vector3::zeros();
+    for axis in axes {
+        let here = interpolate(&run.motion.position[axis], reading);
+        outward[axis.index()] = here - run.segment.centre_mm[axis.index()];
     }
+    outward.try_normalize(0.0).unwrap_or_default()
+}
 
-    /// Outward from the centre, within the plane of the test.
-    fn radial(&self, reading: &Reading) -> Vector3<f64> {
-        let Some(axes) = plate_axes(self.run.segment.plane) else {
-            return Vector3::zeros();
-        };
-        let mut outward = Vector3::zeros();
-        for axis in axes {
-            let here = interpolate(&self.run.motion.position[axis], reading);
-            outward[axis.index()] = here - self.run.segment.centre_mm[axis.index()];
-        }
-        outward.try_normalize(0.0).unwrap_or_default()
+/// Along the axis, or along the diagonal that the run goes.
+pub(crate) fn beam(run: &Run, axis: Axis) -> Vector3<f64> {
+    if run.segment.kind != TestKind::Diagonal {
+        return unit(axis);
     }
-
-    /// Along the axis, or along the diagonal that the run goes.
-    fn beam(&self, axis: Axis) -> Vector3<f64> {
-        if self.run.segment.kind != TestKind::Diagonal {
-            return unit(axis);
-        }
-        let position = |tick: usize| {
-            Vector3::from_fn(|k, _| {
-                self.run.motion.position[Axis::LINEAR[k]]
-                    .get(tick)
-                    .copied()
-                    .unwrap_or(0.0)
-            })
-        };
-        let motion = &self.run.motion.position[axis];
-        let order = |a: &usize, b: &usize| motion[*a].total_cmp(&motion[*b]);
-        let (low, high) = (
-            (0..motion.len()).min_by(order),
-            (0..motion.len()).max_by(order),
-        );
-        match (low, high) {
-            (Some(low), Some(high)) => (position(high) - position(low))
-                .try_normalize(0.0)
-                .unwrap_or_else(|| unit(axis)),
-            _ => unit(axis),
-        }
+    let position = |tick: usize| {
+        Vector3::from_fn(|k, _| {
+            run.motion.position[Axis::LINEAR[k]]
+                .get(tick)
+                .copied()
+                .unwrap_or(0.0)
+        })
+    };
+    let motion = &run.motion.position[axis];
+    let order = |a: &usize, b: &usize| motion[*a].total_cmp(&motion[*b]);
+    let (low, high) = (
+        (0..motion.len()).min_by(order),
+        (0..motion.len()).max_by(order),
+    );
+    match (low, high) {
+        (Some(low), Some(high)) => (position(high) - position(low))
+            .try_normalize(0.0)
+            .unwrap_or_else(|| unit(axis)),
+        _ => unit(axis),
     }
 }
 

@@ -1,0 +1,101 @@
+//! Spindle growth: a running spindle warms, and its nose comes down towards the table.
+//!
+//! # Model
+//!
+//! Bearings and shaft warm within minutes, housing and head within an hour. With a thermometer at the spindle
+//! both follow its warming, without one they follow the time since the session began:
+//!
+//! ```text
+//!   tau_i dy_i/dt = w(t) - y_i                                            (1)
+//!   w = warming of the spindle / 10 K, or 1 from the beginning            (2)
+//!   tip_z = -(k_1 y_1 + k_2 y_2),   y_i = 1 - exp(-t/tau_i) where w = 1   (3)
+//! ```
+//!
+//! The wider form lets the nose move sideways too, with the slower of the two.
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | k_1, k_2 | `fast_um`, `slow_um`: for 10 K, or in the end | µm |
+//! | tau_1, tau_2 | `fast_min`, `slow_min` | min |
+//! | `free_x_um`, `free_y_um` | as k_2, along X and Y | µm |
+//!
+//! # Holds when
+//! The spindle's axis is Z. Growth is the same everywhere in the working space. Without a thermometer the
+//! spindle ran evenly from the session's beginning.
+//!
+//! # Agreement
+//! `val_spindle_growth_two_bodies`: two bodies that warm each other and the air, integrated finely, are met by
+//! their two time constants to 1e-3 µm of 40.
+//!
+//! # References
+//! \[1\] ISO 230-3:2020, clause 6 (thermal distortion caused by rotating spindle).
+
+use super::slow::mixture;
+use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
+use crate::file::SensorPlace;
+use crate::twin::Response;
+
+/// Entry of the catalogue.
+pub static KIND: Kind = Kind {
+    id: "spindle_growth",
+    title: "growth of the spindle",
+    targets: Targets::Machine,
+    parameters: &[
+        Parameter::amplitude("fast_um", 200.0, 15.0),
+        Parameter::amplitude("slow_um", 200.0, 25.0),
+        Parameter::shape("fast_min", [0.2, 15.0], 5.0, &[0.5, 2.0, 6.0]),
+        Parameter::shape("slow_min", [10.0, 240.0], 45.0, &[15.0, 40.0, 100.0]),
+    ],
+    free: &[
+        Parameter::amplitude("free_x_um", 200.0, 5.0),
+        Parameter::amplitude("free_y_um", 200.0, 10.0),
+    ],
+    moment: Moment::Mean,
+    needs: "measurements of Z over some minutes while the spindle warms or cools",
+    build: |_, values| {
+        Box::new(SpindleGrowth {
+            fast_mm: values[0] * 1e-3,
+            slow_mm: values[1] * 1e-3,
+            fast_s: values[2] * 60.0,
+            slow_s: values[3] * 60.0,
+            sideways_mm: [values[4] * 1e-3, values[5] * 1e-3],
+        })
+    },
+};
+
+/// Warming for which growth is stated, K.
+const STATED_WARMING_K: f64 = 10.0;
+
+struct SpindleGrowth {
+    fast_mm: f64,
+    slow_mm: f64,
+    fast_s: f64,
+    slow_s: f64,
+    sideways_mm: [f64; 2],
+}
+
+impl Effect for SpindleGrowth {
+    fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        let places = [SensorPlace::SpindleFront, SensorPlace::SpindleRear];
+        let [x, y, z] = &mut response.tip_mm;
+        let [along_x_mm, along_y_mm] = self.sideways_mm;
+        let Some(warming_k) = scene.warming_k(&places) else {
+            let risen = |at_s: f64, lag_s: f64| 1.0 - (-at_s.max(0.0) / lag_s).exp(); // (3)
+            for (tick, at_s) in scene.run.motion.time_s.iter().enumerate() {
+                let (fast, slow) = (risen(*at_s, self.fast_s), risen(*at_s, self.slow_s));
+                x[tick] += along_x_mm * slow;
+                y[tick] += along_y_mm * slow;
+                z[tick] -= self.fast_mm * fast + self.slow_mm * slow;
+            }
+            return;
+        };
+        let fast = || scene.history.lagged(&warming_k, self.fast_s); // (1)
+        let slow = || scene.history.lagged(&warming_k, self.slow_s);
+        let per_k = |mm: f64| mm / STATED_WARMING_K;
+        let growth = mixture(&[(per_k(self.fast_mm), &fast), (per_k(self.slow_mm), &slow)]);
+        scene.add_slow(&growth, z, |_| -1.0);
+        for (sum, mm) in [(x, along_x_mm), (y, along_y_mm)] {
+            scene.add_slow(&mixture(&[(per_k(mm), &slow)]), sum, |_| 1.0);
+        }
+    }
+}

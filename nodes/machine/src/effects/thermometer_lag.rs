@@ -1,0 +1,67 @@
+//! Thermometer lag: a sensor shows the temperature of a while ago.
+//!
+//! # Model
+//!
+//! A sensor that exchanges heat with what it measures reads T_m:
+//!
+//! ```text
+//!   tau dT_m/dt = T - T_m                                                 (1)
+//!   T_m - T = -tau dT_m/dt                                                (2)
+//! ```
+//!
+//! (2) needs only the reading itself, so that the lag is an amplitude.
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | tau | `lag_s` | s |
+//!
+//! # Holds when
+//! The spacing of the history is short against the changes of temperature. Self-heating is `thermometer_offset`.
+//!
+//! # Agreement
+//! `val_thermometer_lag_ramp_and_step`: (1) integrated finely for a ramp and an exponential rise, to 0.01 K of 2.
+
+use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
+use crate::twin::{Channel, Response};
+
+/// Entry of the catalogue.
+pub static KIND: Kind = Kind {
+    id: "thermometer_lag",
+    title: "lag of a thermometer",
+    targets: Targets::Thermometers,
+    parameters: &[Parameter::size("lag_s", 600.0, 60.0)],
+    free: &[],
+    moment: Moment::Mean,
+    needs: "a temperature that changes and another one to compare it with",
+    build: |target, values| {
+        Box::new(ThermometerLag {
+            sensor: target.thermometer(),
+            lag_s: values[0],
+        })
+    },
+};
+
+struct ThermometerLag {
+    sensor: String,
+    lag_s: f64,
+}
+
+impl Effect for ThermometerLag {
+    fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        let Some(reading_k) = scene.history.warming_k(&self.sensor) else {
+            return;
+        };
+        let step_s = scene.history.step_s;
+        let rows = scene.run.readings.iter().zip(&mut response.reading);
+        for (reading, sum) in rows {
+            if !matches!(&reading.channel, Channel::Thermometer(id) if *id == self.sensor) {
+                continue;
+            }
+            if let Some(at_s) = scene.run.time_of(reading) {
+                let at = |t_s: f64| scene.history.at(&reading_k, t_s);
+                let slope = (at(at_s + 0.5 * step_s) - at(at_s - 0.5 * step_s)) / step_s;
+                *sum -= self.lag_s * slope; // (2)
+            }
+        }
+    }
+}
