@@ -1,0 +1,96 @@
+//! How a diagnosis is made: how finely readings are thinned, how hard is searched, how sure is sure.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::GapError;
+
+/// Settings of a diagnosis. The defaults are those that the trials were judged with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GapConfig {
+    /// Stations that a circle, or one pass of a line, is thinned to.
+    pub stations: usize,
+    /// Rows of the whole session above which stations are made longer.
+    pub most_rows: usize,
+    /// Greatest order of the autoregression within a run, 0 to 3.
+    pub most_ar: usize,
+    /// Sets of effects that are followed side by side.
+    pub beam: usize,
+    /// Most effects in one set.
+    pub most_effects: usize,
+    /// Draws of the significance test.
+    pub significance_draws: usize,
+    /// Draws of the bootstrap over held-out runs.
+    pub bootstrap_draws: usize,
+    /// Seed of every draw.
+    pub seed: u64,
+    /// Scatter over that of the repeats, as a ratio of variances, above which the floor is not reproduced.
+    pub most_inflation: f64,
+    /// Standard score at which an effect has two sizes.
+    pub constancy_z: f64,
+    /// Spread of its sizes, as a share of the mean, below which an effect is constant all the same.
+    pub constancy_spread: f64,
+    /// Whether some runs are held out for the shrink.
+    pub hold_out: bool,
+    /// Ids of effects that are not considered.
+    pub left_out: Vec<String>,
+}
+
+impl Default for GapConfig {
+    fn default() -> Self {
+        Self {
+            stations: 240,
+            most_rows: 12_000,
+            most_ar: 3,
+            beam: 5,
+            most_effects: 6,
+            significance_draws: 999,
+            bootstrap_draws: 2000,
+            seed: 20_260_101,
+            most_inflation: 1.2,
+            constancy_z: 4.0,
+            constancy_spread: 0.1,
+            hold_out: true,
+            left_out: vec![],
+        }
+    }
+}
+
+impl GapConfig {
+    /// Refuses settings that mean nothing.
+    ///
+    /// # Errors
+    /// Names the key, the value and what is wanted.
+    pub fn check(&self) -> Result<(), GapError> {
+        let counts = [
+            ("stations", self.stations, 16, 100_000),
+            ("most_rows", self.most_rows, 100, 1_000_000),
+            ("most_ar", self.most_ar, 0, 3),
+            ("beam", self.beam, 1, 50),
+            ("most_effects", self.most_effects, 1, 20),
+            ("significance_draws", self.significance_draws, 99, 100_000),
+            ("bootstrap_draws", self.bootstrap_draws, 100, 1_000_000),
+        ];
+        for (key, value, low, high) in counts {
+            if !(low..=high).contains(&value) {
+                return Err(GapError::Count {
+                    key,
+                    value,
+                    low,
+                    high,
+                });
+            }
+        }
+        let reals = [
+            ("most_inflation", self.most_inflation, 1.0),
+            ("constancy_z", self.constancy_z, 0.0),
+            ("constancy_spread", self.constancy_spread, 0.0),
+        ];
+        for (key, value, low) in reals {
+            if !value.is_finite() || value < low {
+                return Err(GapError::Setting { key, value, low });
+            }
+        }
+        Ok(())
+    }
+}

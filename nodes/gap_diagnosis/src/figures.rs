@@ -1,0 +1,144 @@
+//! What the pages draw beside the numbers of the report.
+//!
+//! Lengths are µm (mK for a thermometer, mrad for a rotary axis), as people read them.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Everything that is drawn.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Where the gap lies: channel against covariate.
+    pub heat: HeatMap,
+    /// Held-out runs (all runs where none were held out) before and after the named effects.
+    pub traces: Vec<Trace>,
+    /// What can be told from what on this recording.
+    pub isolability: Isolability,
+    /// Root mean square of each held-out run.
+    pub held_out: Vec<HeldOut>,
+}
+
+/// Standard score of the residual, channel against covariate.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct HeatMap {
+    /// Channel and direction, one a row.
+    pub rows: Vec<String>,
+    /// Covariates, one a column.
+    pub columns: Vec<String>,
+    /// Standard score; absent where the channel has no such covariate.
+    pub z: Vec<Vec<Option<f64>>>,
+    /// The same once the named effects are simulated.
+    pub z_after: Vec<Vec<Option<f64>>>,
+}
+
+/// What the abscissa of a trace is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Abscissa {
+    /// Angle about the centre of the circle, rad: drawn in polar form.
+    Angle,
+    /// Position along the line, mm.
+    Position,
+    /// Time since the begin of the run, s.
+    Time,
+    /// Number of the touch.
+    Touch,
+}
+
+/// One channel of one run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Trace {
+    /// The run.
+    pub run: u32,
+    /// The channel.
+    pub channel: String,
+    /// E.g. `circle XY R100 F2000 cw`.
+    pub title: String,
+    /// What `at` is.
+    pub abscissa: Abscissa,
+    /// Places.
+    pub at: Vec<f64>,
+    /// Machine minus simulator, as the machine file stands, set-up floated.
+    pub before_um: Vec<f64>,
+    /// Machine minus simulator with the named effects, set-up floated.
+    pub after_um: Vec<f64>,
+    /// Standard deviation that noise alone has.
+    pub floor_um: f64,
+}
+
+/// What can be told from what.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Isolability {
+    /// Effects with what they act on, e.g. `backlash X`.
+    pub names: Vec<String>,
+    /// Cosine between the signatures of two.
+    pub cos: Vec<Vec<f64>>,
+    /// Sine of the angle to everything that all other effects of other kinds can imitate together.
+    pub sin_alone: Vec<f64>,
+    /// Smallest size that would be found in 95 of 100 sessions, in the unit of `unit`.
+    pub detectable: Vec<f64>,
+    /// Amplitude that `detectable` is a value of, e.g. `width_um`.
+    pub unit: Vec<String>,
+}
+
+/// One held-out run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// The run.
+    pub run: u32,
+    /// E.g. `circle XY R100 F2000 cw`.
+    pub title: String,
+    /// Root mean square before.
+    pub before_um: f64,
+    /// Root mean square after.
+    pub after_um: f64,
+    /// What noise alone would give.
+    pub floor_um: f64,
+}
+
+/// Something a reader of the report should know.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "the sentence names each field")]
+pub enum Note {
+    /// A channel was left out.
+    NoRepeats { channel: String },
+    /// Readings were left out.
+    Dropped { channel: String, readings: usize },
+    /// The noise of the repeats is not that of the session.
+    NotReproduced { channel: String, inflation: f64 },
+    /// Too few runs to flip signs.
+    FewRuns { runs: usize },
+    /// Nothing could be held out.
+    NothingHeldOut,
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoRepeats { channel } => write!(
+                f,
+                "{channel}: left out, no test was repeated on it; run one of its tests three times"
+            ),
+            Self::Dropped { channel, readings } => {
+                write!(
+                    f,
+                    "{channel}: {readings} readings left out as outliers or no numbers"
+                )
+            }
+            Self::NotReproduced { channel, inflation } => write!(
+                f,
+                "{channel}: noise floor not reproduced by the session, its variance is {inflation:.2} \
+                 times that of the repeats; nothing is named"
+            ),
+            Self::FewRuns { runs } => write!(
+                f,
+                "{runs} runs are too few to flip signs; significance is from a parametric bootstrap"
+            ),
+            Self::NothingHeldOut => f.write_str(
+                "nothing could be held out: record each test at a second radius, feed or place",
+            ),
+        }
+    }
+}

@@ -1,0 +1,357 @@
+//! Joint refit of all sizes and shapes of a set, through the simulator.
+//!
+//! # Model
+//!
+//! Gauss-Newton on the whitened residual, every step halved until it helps, every value within its physical
+//! range; shapes are first refined between their neighbours on the grid by golden section:
+//!
+//! ```text
+//!   v <- v + (J'J)^-1 J'(z - f(v)),   J by differences of the twin        (1)
+//!   cov = (J'J)^-1 (sum_r J_r' e_r e_r' J_r) (J'J)^-1, clusters r = runs  (2)
+//! ```
+//!
+//! The interval takes the greater of (2) and (J'J)^-1, for few clusters make (2) too small.
+//!
+//! # References
+//! \[1\] H. White, Econometrica 48, 1980; K.-Y. Liang, S. L. Zeger, Biometrika 73, 1986 (the sandwich).
+
+use machine::effects::{Parameter, Role};
+use nalgebra::{DMatrix, DVector};
+
+use crate::normal::Normal;
+use crate::rows::count;
+use crate::signature::{Form, Instance, Library};
+use crate::stack::Stack;
+
+/// Values of one effect with their 95 % intervals.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// All values, parameters then free ones.
+    pub values: Vec<f64>,
+    /// Which of them were estimated.
+    pub active: Vec<usize>,
+    /// Lower ends.
+    pub low: Vec<f64>,
+    /// Upper ends.
+    pub high: Vec<f64>,
+    /// Whether a value stands at its physical bound.
+    pub at_bound: Vec<bool>,
+    /// Norm of the whitened signature.
+    pub d: f64,
+}
+
+struct Member<'f> {
+    instance: &'f Instance,
+    values: Vec<f64>,
+    active: Vec<usize>,
+}
+
+fn parameter(instance: &Instance, place: usize) -> &'static Parameter {
+    let free = place.checked_sub(instance.kind.parameters.len());
+    free.map_or_else(
+        || &instance.kind.parameters[place],
+        |k| &instance.kind.free[k],
+    )
+}
+
+impl Member<'_> {
+    fn signature(&self, stack: &Stack<'_>) -> DVector<f64> {
+        stack.signature(&*self.instance.effect(&self.values))
+    }
+
+    fn moved(&self, place: usize, by: f64) -> Self {
+        let mut values = self.values.clone();
+        values[place] += by;
+        Self {
+            instance: self.instance,
+            values,
+            active: self.active.clone(),
+        }
+    }
+}
+
+/// Refits a set of forms whose sizes, in typical units, are known from the linear fit.
+pub fn joint(
+    stack: &Stack<'_>,
+    library: &Library,
+    forms: &[&Form],
+    sizes: &[f64],
+) -> Vec<Estimate> {
+    if forms.is_empty() {
+        return vec![];
+    }
+    let mut sizes = sizes.iter();
+    let mut members: Vec<Member<'_>> = forms
+        .iter()
+        .map(|form| start(&library.instances[form.instance], form, &mut sizes))
+        .collect();
+    let mut parts: Vec<DVector<f64>> = members.iter().map(|m| m.signature(stack)).collect();
+    for index in 0..members.len() {
+        refine_shapes(stack, &mut members, &mut parts, index);
+    }
+    for _ in 0..5 {
+        if !step(stack, &mut members, &mut parts) {
+            break;
+        }
+    }
+    estimates(stack, &members, &parts)
+}
+
+fn start<'f>(
+    instance: &'f Instance,
+    form: &Form,
+    sizes: &mut std::slice::Iter<'_, f64>,
+) -> Member<'f> {
+    let mut values = form.values.clone();
+    let mut active = form.amplitudes.clone();
+    for (place, size) in form.amplitudes.iter().zip(sizes) {
+        let parameter = parameter(instance, *place);
+        values[*place] = (size * parameter.typical).clamp(parameter.low, parameter.high);
+    }
+    for (place, parameter) in instance.kind.parameters.iter().enumerate() {
+        if matches!(parameter.role, Role::Shape { grid } if grid.len() > 1) {
+            active.push(place);
+        }
+    }
+    active.sort_unstable();
+    Member {
+        instance,
+        values,
+        active,
+    }
+}
+
+/// Golden section of every shape of one member between its neighbours on the grid, its sizes solved anew.
+fn refine_shapes(
+    stack: &Stack<'_>,
+    members: &mut [Member<'_>],
+    parts: &mut [DVector<f64>],
+    index: usize,
+) {
+    let mut rest = stack.z.clone();
+    for (other, part) in parts.iter().enumerate() {
+        if other != index {
+            rest -= part;
+        }
+    }
+    for place in members[index].active.clone() {
+        let Role::Shape { grid } = parameter(members[index].instance, place).role else {
+            continue;
+        };
+        let at = members[index].values[place];
+        let near = grid
+            .iter()
+            .position(|g| *g >= at - 1e-12 * at.abs())
+            .unwrap_or(grid.len() - 1);
+        let low = grid[near.saturating_sub(1)];
+        let high = grid[(near + 1).min(grid.len() - 1)];
+        let best = golden(low, high, |value| {
+            scaled(stack, &members[index], place, value, &rest).1
+        });
+        let (values, _) = scaled(stack, &members[index], place, best, &rest);
+        members[index].values = values;
+    }
+    parts[index] = members[index].signature(stack);
+}
+
+/// Values with one shape set and the sizes solved anew, and the square that is left.
+fn scaled(
+    stack: &Stack<'_>,
+    member: &Member<'_>,
+    place: usize,
+    value: f64,
+    rest: &DVector<f64>,
+) -> (Vec<f64>, f64) {
+    let is_size = |p: &usize| parameter(member.instance, *p).role == Role::Amplitude;
+    let sizes: Vec<usize> = member.active.iter().copied().filter(is_size).collect();
+    let columns: Vec<DVector<f64>> = sizes
+        .iter()
+        .map(|size| {
+            let mut values = member.values.clone();
+            for other in &sizes {
+                values[*other] = 0.0;
+            }
+            values[place] = value;
+            values[*size] = parameter(member.instance, *size).typical;
+            stack.signature(&*member.instance.effect(&values))
+        })
+        .collect();
+    let mut values = member.values.clone();
+    values[place] = value;
+    if columns.is_empty() {
+        return (values, rest.norm_squared());
+    }
+    let normal = Normal::new(&DMatrix::from_columns(&columns), rest);
+    let fit = normal.solve(&(0..columns.len()).collect::<Vec<_>>());
+    for (size, amount) in sizes.iter().zip(&fit.sizes) {
+        let of = parameter(member.instance, *size);
+        values[*size] = (amount * of.typical).clamp(of.low, of.high);
+    }
+    (values, rest.norm_squared() - fit.gain)
+}
+
+/// Least of a function between two points, in their logarithm where both are positive.
+fn golden(low: f64, high: f64, mut left: impl FnMut(f64) -> f64) -> f64 {
+    let log = low > 0.0;
+    let (mut a, mut b) = if log {
+        (low.ln(), high.ln())
+    } else {
+        (low, high)
+    };
+    let back = |x: f64| if log { x.exp() } else { x };
+    let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut c, mut d) = (b - ratio * (b - a), a + ratio * (b - a));
+    let (mut at_c, mut at_d) = (left(back(c)), left(back(d)));
+    for _ in 0..10 {
+        if at_c < at_d {
+            (b, d, at_d) = (d, c, at_c);
+            c = b - ratio * (b - a);
+            at_c = left(back(c));
+        } else {
+            (a, c, at_c) = (c, d, at_d);
+            d = a + ratio * (b - a);
+            at_d = left(back(d));
+        }
+    }
+    back(if at_c < at_d { c } else { d })
+}
+
+/// J of all active values, in the order of members.
+fn jacobian(
+    stack: &Stack<'_>,
+    members: &[Member<'_>],
+    parts: &[DVector<f64>],
+) -> Vec<DVector<f64>> {
+    let mut columns = Vec::new();
+    for (member, part) in members.iter().zip(parts) {
+        for &place in &member.active {
+            let of = parameter(member.instance, place);
+            let mut by = 1e-3 * member.values[place].abs().max(0.1 * of.typical.abs());
+            if member.values[place] + by > of.high {
+                by = -by;
+            }
+            columns.push((member.moved(place, by).signature(stack) - part) / by);
+        }
+    }
+    columns
+}
+
+/// One step (1); false where nothing moved any more.
+fn step(stack: &Stack<'_>, members: &mut [Member<'_>], parts: &mut [DVector<f64>]) -> bool {
+    let mut left = stack.z.clone();
+    for part in parts.iter() {
+        left -= part;
+    }
+    let columns = jacobian(stack, members, parts);
+    if columns.is_empty() {
+        return false;
+    }
+    let normal = Normal::new(&DMatrix::from_columns(&columns), &left);
+    let by = normal.solve(&(0..columns.len()).collect::<Vec<_>>()).sizes;
+    let before = left.norm_squared();
+    let mut share = 1.0;
+    for _ in 0..6 {
+        let moved = moved(members, &by, share);
+        let tried: Vec<DVector<f64>> = moved.iter().map(|m| m.signature(stack)).collect();
+        let mut left = stack.z.clone();
+        for part in &tried {
+            left -= part;
+        }
+        let gain = before - left.norm_squared();
+        if gain > 0.0 {
+            for (member, new) in members.iter_mut().zip(moved) {
+                member.values = new.values;
+            }
+            parts.clone_from_slice(&tried);
+            return gain > 1e-3;
+        }
+        share *= 0.5;
+    }
+    false
+}
+
+fn moved<'f>(members: &[Member<'f>], by: &[f64], share: f64) -> Vec<Member<'f>> {
+    let mut by = by.iter();
+    members
+        .iter()
+        .map(|member| {
+            let mut values = member.values.clone();
+            for (place, by) in member.active.iter().zip(by.by_ref()) {
+                let of = parameter(member.instance, *place);
+                values[*place] = (values[*place] + share * by).clamp(of.low, of.high);
+            }
+            Member {
+                instance: member.instance,
+                values,
+                active: member.active.clone(),
+            }
+        })
+        .collect()
+}
+
+/// (2) and the intervals.
+fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: &[DVector<f64>]) -> Vec<Estimate> {
+    let columns = jacobian(stack, members, parts);
+    let mut left = stack.z.clone();
+    for part in parts {
+        left -= part;
+    }
+    let spread = if columns.is_empty() {
+        vec![]
+    } else {
+        standard_uncertainties(stack, &DMatrix::from_columns(&columns), &left)
+    };
+    let mut spread = spread.into_iter();
+    members
+        .iter()
+        .zip(parts)
+        .map(|(member, part)| {
+            let mut estimate = Estimate {
+                low: member.values.clone(),
+                high: member.values.clone(),
+                at_bound: vec![false; member.values.len()],
+                values: member.values.clone(),
+                active: member.active.clone(),
+                d: part.norm(),
+            };
+            for (&place, u) in member.active.iter().zip(spread.by_ref()) {
+                let of = parameter(member.instance, place);
+                let value = member.values[place];
+                estimate.low[place] = value - 1.96 * u;
+                estimate.high[place] = value + 1.96 * u;
+                let near = 1e-6 * (of.high - of.low);
+                estimate.at_bound[place] = value <= of.low + near || value >= of.high - near;
+            }
+            estimate
+        })
+        .collect()
+}
+
+/// Greater of the sandwich by run and of the model, for each column.
+fn standard_uncertainties(
+    stack: &Stack<'_>,
+    columns: &DMatrix<f64>,
+    left: &DVector<f64>,
+) -> Vec<f64> {
+    let normal = Normal::new(columns, left);
+    let inverse = normal.inverse(&(0..columns.ncols()).collect::<Vec<_>>());
+    let mut scores = vec![DVector::<f64>::zeros(columns.ncols()); stack.runs.len()];
+    for block in &stack.rows.blocks {
+        let Some(cluster) = stack.runs.iter().position(|run| *run == block.run) else {
+            continue;
+        };
+        let range = block.range();
+        let part = columns.rows(range.start, range.len());
+        scores[cluster] += part.tr_mul(&left.rows(range.start, range.len()));
+    }
+    let clusters = count(stack.runs.len());
+    let small = clusters / (clusters - 1.0).max(1.0);
+    let mut meat = DMatrix::zeros(columns.ncols(), columns.ncols());
+    for score in &scores {
+        meat += score * score.transpose() * small;
+    }
+    let sandwich = &inverse * meat * &inverse;
+    (0..columns.ncols())
+        .map(|k| inverse[(k, k)].max(sandwich[(k, k)]).max(0.0).sqrt())
+        .collect()
+}

@@ -1,0 +1,301 @@
+//! Readings of a session, thinned to stations along the path.
+//!
+//! # Model
+//!
+//! A thousand readings a second of a smooth error say no more than a few hundred a circle. A station is a
+//! length of the commanded path (cut where an axis turns round); a row is the mean of the readings of one
+//! channel in it, and the same mean is taken of what the twin predicts:
+//!
+//! ```text
+//!   y_i = 1/m sum_k y_k,   A_i = 1/m sum_k A_k,   k in station i          (1)
+//! ```
+//!
+//! A touch is a row of its own. A single reading that stands off both its neighbours by far more than they
+//! differ elsewhere is an outlier and left out; readings that are no numbers as well; both are counted.
+//!
+//! # Holds when
+//! Within a station an effect changes little, or its mean is all that is wanted of it.
+
+use std::collections::BTreeMap;
+
+use machine::twin::{Channel, Run, Session};
+use metrology::Axis;
+use metrology::sample::TestKind;
+
+/// Station of a run: the same for repeats.
+pub type Station = (u32, u32);
+
+/// One row: the mean of some readings of one channel.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Where on the path.
+    pub station: Station,
+    /// Tick of the middle reading (of a touch: the nearest), where there is one.
+    pub tick: Option<usize>,
+    /// Touch, for the touch channel.
+    pub touch: Option<usize>,
+    /// Readings in it, places in the run's list.
+    pub readings: Vec<usize>,
+}
+
+/// Rows of one channel of one run.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// Place of the run in the session.
+    pub run: usize,
+    /// The channel.
+    pub channel: Channel,
+    /// First row in the stack of all.
+    pub start: usize,
+    /// Its rows, in time.
+    pub rows: Vec<Row>,
+    /// Readings that were left out.
+    pub dropped: usize,
+}
+
+impl Block {
+    /// The rows' places in the stack.
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.start..self.start + self.rows.len()
+    }
+}
+
+/// All rows of some runs.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    /// Blocks, in the order of runs and channels.
+    pub blocks: Vec<Block>,
+    /// Number of rows.
+    pub len: usize,
+}
+
+impl Rows {
+    /// Thins the readings of the runs that are wanted, of the channels that are wanted.
+    pub fn new(
+        session: &Session,
+        wanted: &[usize],
+        stations: usize,
+        keep: impl Fn(&Channel) -> bool,
+    ) -> Self {
+        let mut rows = Self::default();
+        for &run in wanted {
+            for (channel, readings) in channels_of(&session.runs[run]) {
+                if !keep(&channel) {
+                    continue;
+                }
+                let block = thin(
+                    &session.runs[run],
+                    run,
+                    channel,
+                    &readings,
+                    stations,
+                    rows.len,
+                );
+                rows.len += block.rows.len();
+                if !block.rows.is_empty() {
+                    rows.blocks.push(block);
+                }
+            }
+        }
+        rows
+    }
+
+    /// Takes the mean (1) of one value per reading of a run, into the stack.
+    pub fn average(&self, run: usize, per_reading: &[f64], stack: &mut [f64]) {
+        for block in self.blocks.iter().filter(|block| block.run == run) {
+            for (row, sum) in block.rows.iter().zip(&mut stack[block.range()]) {
+                let total: f64 = row.readings.iter().map(|k| per_reading[*k]).sum();
+                *sum = total / count(row.readings.len());
+            }
+        }
+    }
+}
+
+/// A count as a real number.
+#[expect(clippy::cast_precision_loss, reason = "counts are far below 2^52")]
+pub fn count(n: usize) -> f64 {
+    n as f64
+}
+
+fn channels_of(run: &Run) -> BTreeMap<Channel, Vec<usize>> {
+    let mut channels = BTreeMap::<Channel, Vec<usize>>::new();
+    for (k, reading) in run.readings.iter().enumerate() {
+        channels.entry(reading.channel.clone()).or_default().push(k);
+    }
+    channels
+}
+
+fn thin(
+    run: &Run,
+    index: usize,
+    channel: Channel,
+    readings: &[usize],
+    stations: usize,
+    start: usize,
+) -> Block {
+    let good = without_outliers(run, readings, channel == Channel::Touch);
+    let dropped = readings.len() - good.len();
+    let rows = if channel == Channel::Touch {
+        good.iter().map(|k| touch_row(run, *k)).collect()
+    } else {
+        path_rows(run, &good, stations)
+    };
+    Block {
+        run: index,
+        channel,
+        start,
+        rows,
+        dropped,
+    }
+}
+
+fn touch_row(run: &Run, reading: usize) -> Row {
+    let touch = run.readings[reading].at;
+    Row {
+        station: (u32::try_from(touch).unwrap_or(u32::MAX), 0),
+        tick: run.touches[touch].tick,
+        touch: Some(touch),
+        readings: vec![reading],
+    }
+}
+
+fn path_rows(run: &Run, readings: &[usize], stations: usize) -> Vec<Row> {
+    let (Some(first), Some(last)) = (readings.first(), readings.last()) else {
+        return vec![];
+    };
+    let (first, last) = (run.readings[*first].at, run.readings[*last].at);
+    let path = Path::new(run, first, last, stations);
+    let mut rows = Vec::<Row>::new();
+    for &k in readings {
+        let station = path.station(run.readings[k].at);
+        match rows.last_mut() {
+            Some(row) if row.station == station => row.readings.push(k),
+            _ => rows.push(Row {
+                station,
+                tick: None,
+                touch: None,
+                readings: vec![k],
+            }),
+        }
+    }
+    for row in &mut rows {
+        row.tick = Some(run.readings[row.readings[row.readings.len() / 2]].at);
+    }
+    rows
+}
+
+/// Stations along the commanded path of the readings.
+struct Path {
+    first: usize,
+    stations: Vec<Station>,
+}
+
+impl Path {
+    fn new(run: &Run, first: usize, last: usize, stations: usize) -> Self {
+        let motion = &run.motion;
+        let mut way = 0.0;
+        let mut ways = vec![0.0];
+        let mut turns = vec![0_u32];
+        for tick in first + 1..=last {
+            let mut squared = 0.0;
+            let mut turned = 0;
+            for axis in motion.axes.iter() {
+                let weight = if axis.is_linear() { 1.0 } else { ROTARY_ARM_MM };
+                let position = &motion.position[axis];
+                squared += ((position[tick] - position[tick - 1]) * weight).powi(2);
+                turned |= u32::from(motion.sense[axis][tick] != motion.sense[axis][tick - 1]);
+            }
+            way += squared.sqrt();
+            ways.push(way);
+            turns.push(turns[turns.len() - 1] + turned);
+        }
+        let length = if way < STANDING_MM {
+            for (place, tick) in ways.iter_mut().zip(first..) {
+                *place = motion.time_s[tick] - motion.time_s[first];
+            }
+            ways[ways.len() - 1] / count(stations)
+        } else {
+            station_mm(run, way, turns[turns.len() - 1], stations)
+        };
+        let station = |place: f64| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a place is positive and a path has below 2^32 stations"
+            )]
+            let at = (place / length.max(f64::MIN_POSITIVE) + 1e-6) as u32;
+            at
+        };
+        let stations = ways.iter().zip(&turns).map(|(w, t)| (station(*w), *t));
+        Self {
+            first,
+            stations: stations.collect(),
+        }
+    }
+
+    fn station(&self, tick: usize) -> Station {
+        let at = tick.saturating_sub(self.first).min(self.stations.len() - 1);
+        self.stations[at]
+    }
+}
+
+/// Arm at which a turn of a rotary axis counts as way.
+const ROTARY_ARM_MM: f64 = 100.0;
+/// A path shorter than this is standing still.
+const STANDING_MM: f64 = 0.05;
+
+/// Length of a station: a part of the circumference, or of one pass.
+fn station_mm(run: &Run, way_mm: f64, turns: u32, stations: usize) -> f64 {
+    let radius_mm = run.segment.radius_mm;
+    if radius_mm > 0.0 && matches!(run.segment.kind, TestKind::Circle | TestKind::Arc) {
+        return std::f64::consts::TAU * radius_mm / count(stations);
+    }
+    let passes = (f64::from(turns) + 1.0).min(8.0);
+    way_mm / (count(stations) * passes)
+}
+
+/// Readings that are numbers and do not stand alone.
+fn without_outliers(run: &Run, readings: &[usize], is_touch: bool) -> Vec<usize> {
+    let numbers: Vec<usize> = readings
+        .iter()
+        .copied()
+        .filter(|k| run.readings[*k].deviation.is_finite())
+        .collect();
+    if is_touch || numbers.len() < 20 {
+        return numbers;
+    }
+    let value = |k: usize| run.readings[numbers[k]].deviation;
+    let bend = |k: usize| value(k) - 0.5 * (value(k - 1) + value(k + 1));
+    let mut sizes: Vec<f64> = (1..numbers.len() - 1).map(|k| bend(k).abs()).collect();
+    let middle = sizes.len() / 2;
+    sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    let limit = 12.0 * 1.4826 * sizes[middle];
+    let alone = |k: usize| {
+        k > 0
+            && k + 1 < numbers.len()
+            && bend(k).abs() > limit
+            && (value(k - 1) - value(k + 1)).abs() < 0.25 * bend(k).abs()
+    };
+    (0..numbers.len())
+        .filter(|k| limit <= 0.0 || !alone(*k))
+        .map(|k| numbers[k])
+        .collect()
+}
+
+/// Position of the axes at a row (mm, rad).
+pub fn position(run: &Run, row: &Row, axis: Axis) -> f64 {
+    match (row.touch, row.tick) {
+        (Some(touch), _) => run.touches[touch].position[axis],
+        (None, Some(tick)) => run.motion.position[axis].get(tick).copied().unwrap_or(0.0),
+        (None, None) => 0.0,
+    }
+}
+
+/// Time of a row, seconds since the session's start.
+pub fn time_s(run: &Run, row: &Row) -> f64 {
+    match (row.touch, row.tick) {
+        (Some(touch), _) => run.touches[touch].time_s,
+        (None, Some(tick)) => run.motion.time_s.get(tick).copied().unwrap_or(0.0),
+        (None, None) => 0.0,
+    }
+}

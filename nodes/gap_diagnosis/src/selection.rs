@@ -1,0 +1,229 @@
+//! Which set of effects explains the residual best: forward, backward and swapped, several sets at a time.
+//!
+//! # Model
+//!
+//! ```text
+//!   C(S) = |z - A_S beta|^2 + q ln n + 2 |S| ln K                         (1)
+//!   p(S) proportional to exp(-C(S) / 2)                                   (2)
+//! ```
+//!
+//! | symbol | here |
+//! |---|---|
+//! | q | `Form::price` over the set |
+//! | n | rows less floats |
+//! | K | instances that the recording could show |
+//!
+//! # References
+//! \[1\] J. Chen, Z. Chen, Biometrika 95, 2008 (extended BIC).
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::normal::{Fit, Normal};
+use crate::rows::count;
+use crate::signature::{Form, Library};
+
+/// A set of forms, growing places in the library.
+pub type Set = Vec<usize>;
+
+/// The search and everything it visited.
+pub struct Search<'l> {
+    library: &'l Library,
+    normal: &'l Normal,
+    square: f64,
+    log_rows: f64,
+    log_instances: f64,
+    /// C of every set that was visited.
+    pub visited: BTreeMap<Set, f64>,
+}
+
+/// Limits of a search.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Sets that are followed side by side.
+    pub beam: usize,
+    /// Most effects in one set.
+    pub most_effects: usize,
+}
+
+impl<'l> Search<'l> {
+    /// A search over the forms of a library; `square` is |z|^2, `freedom` is n.
+    pub fn new(library: &'l Library, normal: &'l Normal, square: f64, freedom: f64) -> Self {
+        Self {
+            library,
+            normal,
+            square,
+            log_rows: freedom.max(2.0).ln(),
+            log_instances: count(library.seen().max(2)).ln(),
+            visited: BTreeMap::from([(vec![], square)]),
+        }
+    }
+
+    /// Columns of a set.
+    pub fn columns(&self, set: &[usize]) -> Vec<usize> {
+        set.iter()
+            .flat_map(|form| self.library.forms[*form].columns.clone())
+            .collect()
+    }
+
+    /// Amplitudes of a set, in units of their typical sizes.
+    pub fn fit(&self, set: &[usize]) -> Fit {
+        self.normal.solve(&self.columns(set))
+    }
+
+    fn price(&self, set: &[usize]) -> f64 {
+        let parameters: usize = set.iter().map(|form| self.library.forms[*form].price).sum();
+        count(parameters) * self.log_rows + 2.0 * count(set.len()) * self.log_instances
+    }
+
+    /// C of a set, infinite where a size is one that physics does not have.
+    pub fn score(&mut self, set: &Set) -> f64 {
+        if let Some(score) = self.visited.get(set) {
+            return *score;
+        }
+        let fit = self.fit(set);
+        let score = if self.is_physical(set, &fit) {
+            self.square - fit.gain + self.price(set)
+        } else {
+            f64::INFINITY
+        };
+        self.visited.insert(set.clone(), score);
+        score
+    }
+
+    fn is_physical(&self, set: &[usize], fit: &Fit) -> bool {
+        let mut sizes = fit.sizes.iter();
+        set.iter().all(|form| {
+            let Form {
+                instance,
+                amplitudes,
+                ..
+            } = &self.library.forms[*form];
+            let kind = self.library.instances[*instance].kind;
+            let parameter = |place: usize| kind.parameters.iter().chain(kind.free).nth(place);
+            amplitudes.iter().zip(sizes.by_ref()).all(|(place, size)| {
+                parameter(*place).is_some_and(|p| {
+                    let value = size * p.typical;
+                    let most = 1.5 * p.low.abs().max(p.high.abs());
+                    value.abs() <= most && (p.low < 0.0 || value >= 0.0)
+                })
+            })
+        })
+    }
+
+    /// The best form of each instance beside a set, the best first, with its set.
+    fn beside(&mut self, set: &Set, most: usize) -> Vec<(f64, Set)> {
+        let taken: BTreeSet<usize> = set
+            .iter()
+            .map(|form| self.library.forms[*form].instance)
+            .collect();
+        let open: Vec<usize> = (0..self.library.forms.len())
+            .filter(|form| !taken.contains(&self.library.forms[*form].instance))
+            .collect();
+        let columns = self.columns(set);
+        let groups = open
+            .iter()
+            .map(|form| &self.library.forms[*form].columns[..]);
+        let gains = self.normal.gains_beside(&columns, groups);
+        let mut best = BTreeMap::<usize, (f64, usize)>::new();
+        for (form, gain) in open.into_iter().zip(gains) {
+            let entry = &self.library.forms[form];
+            let worth = gain - count(entry.price) * self.log_rows;
+            let known = best.entry(entry.instance).or_insert((worth, form));
+            if worth > known.0 {
+                *known = (worth, form);
+            }
+        }
+        let mut ranked: Vec<(f64, usize)> = best.into_values().collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let sets: Vec<Set> = ranked
+            .iter()
+            .take(most)
+            .map(|(_, form)| with(set, *form))
+            .collect();
+        let mut scored: Vec<(f64, Set)> = sets
+            .into_iter()
+            .map(|set| (self.score(&set), set))
+            .collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        scored
+    }
+
+    /// Improves one set by taking out and by swapping until nothing helps.
+    fn polished(&mut self, mut set: Set) -> Set {
+        loop {
+            let now = self.score(&set);
+            let mut best = (now - 1e-9, set.clone());
+            for &form in &set.clone() {
+                let less = without(&set, form);
+                let score = self.score(&less);
+                if score < best.0 {
+                    best = (score, less.clone());
+                }
+                if let Some((score, swapped)) = self.beside(&less, 4).into_iter().next()
+                    && score < best.0
+                {
+                    best = (score, swapped);
+                }
+            }
+            if best.1 == set {
+                return set;
+            }
+            set = best.1;
+        }
+    }
+
+    /// The best set found.
+    pub fn run(&mut self, limits: Limits) -> Set {
+        let mut beam: Vec<Set> = vec![vec![]];
+        let mut best: Set = vec![];
+        for _ in 0..limits.most_effects {
+            let mut next = Vec::new();
+            for set in &beam {
+                next.extend(self.beside(set, 2 * limits.beam));
+            }
+            next.sort_by(|a, b| a.0.total_cmp(&b.0));
+            next.dedup_by(|a, b| a.1 == b.1);
+            next.truncate(limits.beam);
+            beam = next
+                .into_iter()
+                .enumerate()
+                .map(|(rank, (_, set))| if rank < 2 { self.polished(set) } else { set })
+                .collect();
+            beam.sort();
+            beam.dedup();
+            beam.sort_by(|a, b| self.visited[a].total_cmp(&self.visited[b]));
+            let Some(first) = beam.first() else { break };
+            if self.visited[first] >= self.visited[&best] - 1e-9 {
+                break;
+            }
+            best.clone_from(first);
+        }
+        best
+    }
+
+    /// Visits what could stand in the place of each member: one other effect, or two.
+    pub fn alternatives(&mut self, best: &Set, most: usize) {
+        for &form in best {
+            let less = without(best, form);
+            let own = self.library.forms[form].instance;
+            for (_, other) in self.beside(&less, most) {
+                if other.iter().all(|f| self.library.forms[*f].instance != own) {
+                    self.beside(&other, most);
+                }
+            }
+        }
+    }
+}
+
+/// A set with one form more.
+pub fn with(set: &[usize], form: usize) -> Set {
+    let mut more = set.to_vec();
+    more.push(form);
+    more.sort_unstable();
+    more
+}
+
+/// A set with one form less.
+pub fn without(set: &[usize], form: usize) -> Set {
+    set.iter().copied().filter(|f| *f != form).collect()
+}

@@ -1,0 +1,214 @@
+//! The signatures of every effect of the catalogue on this recording.
+//!
+//! # Model
+//!
+//! An instance is an effect on one target. Its columns are what the twin predicts at the typical size of one
+//! amplitude, all others zero, so that the norm of a column is the instance's D at its typical size:
+//!
+//! ```text
+//!   J_a(theta) = P W sim(a = typical, theta),   D = |J beta|              (1)
+//! ```
+//!
+//! Parameters that shape the response are tried over their grids. The wide form has the free amplitudes of
+//! the catalogue as further columns: it keeps the name and widens the form.
+//!
+//! # Holds when
+//! The response is proportional to each amplitude; the joint refit checks it and corrects where it is not.
+
+use machine::MachineFile;
+use machine::effects::{Effect, Kind, Role, Target};
+use nalgebra::{DMatrix, DVector};
+
+use crate::normal::Normal;
+use crate::stack::Stack;
+
+/// One effect on one target.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Entry of the catalogue.
+    pub kind: &'static Kind,
+    /// What it acts on.
+    pub target: Target,
+}
+
+impl Instance {
+    /// All instances of some kinds on a machine.
+    pub fn all<'k>(
+        machine: &MachineFile,
+        kinds: impl Iterator<Item = &'k &'static Kind>,
+    ) -> Vec<Self> {
+        let of = |kind: &&'static Kind| -> Vec<Self> {
+            let kind = *kind;
+            let targets = kind.targets_on(machine);
+            targets
+                .into_iter()
+                .map(|target| Self { kind, target })
+                .collect()
+        };
+        kinds.flat_map(of).collect()
+    }
+
+    /// E.g. `backlash X`.
+    pub fn name(&self) -> String {
+        format!("{} {}", self.kind.id, self.target)
+            .trim_end()
+            .to_owned()
+    }
+
+    /// The effect with some values.
+    pub fn effect(&self, values: &[f64]) -> Box<dyn Effect> {
+        (self.kind.build)(self.target.clone(), values)
+    }
+}
+
+/// One form of an instance: shapes fixed, wide or not.
+#[derive(Clone, Debug)]
+pub struct Form {
+    /// The instance.
+    pub instance: usize,
+    /// All values (parameters, then free ones) with the amplitudes zero.
+    pub values: Vec<f64>,
+    /// Which of the values are amplitudes with a column here.
+    pub amplitudes: Vec<usize>,
+    /// The columns, in the order of the amplitudes.
+    pub columns: Vec<usize>,
+    /// Parameters that are paid for: amplitudes, and shapes with a choice.
+    pub price: usize,
+    /// Whether the free amplitudes are in it.
+    pub wide: bool,
+}
+
+/// Instances, forms and columns.
+pub struct Library {
+    /// Instances.
+    pub instances: Vec<Instance>,
+    /// Forms.
+    pub forms: Vec<Form>,
+    /// Columns (1).
+    pub columns: Vec<DVector<f64>>,
+    /// Whether an instance could be seen at all.
+    pub excited: Vec<bool>,
+}
+
+/// Most grid points of an instance.
+const MOST_SHAPES: usize = 24;
+/// An effect that would stay below this D at its greatest physical size is not excited.
+pub const LEAST_D: f64 = 6.0;
+
+impl Library {
+    /// Signatures of some instances on a stack.
+    pub fn new(stack: &Stack<'_>, instances: Vec<Instance>) -> Self {
+        let mut library = Self {
+            excited: vec![false; instances.len()],
+            instances,
+            forms: vec![],
+            columns: vec![],
+        };
+        for instance in 0..library.instances.len() {
+            for values in shapes(library.instances[instance].kind) {
+                library.add(stack, instance, values, false);
+            }
+        }
+        library
+    }
+
+    /// Adds one form; a form that stays below [`LEAST_D`] at its greatest size has no columns.
+    pub fn add(&mut self, stack: &Stack<'_>, instance: usize, values: Vec<f64>, wide: bool) {
+        let kind = self.instances[instance].kind;
+        let parameters = || kind.parameters.iter().chain(kind.free).enumerate();
+        let shown = if wide {
+            usize::MAX
+        } else {
+            kind.parameters.len()
+        };
+        let mut amplitudes = vec![];
+        let mut columns = vec![];
+        let mut greatest = 0.0_f64;
+        for (place, parameter) in parameters().take(shown) {
+            if parameter.role != Role::Amplitude {
+                continue;
+            }
+            let mut on = values.clone();
+            on[place] = parameter.typical;
+            let column = stack.signature(&*self.instances[instance].effect(&on));
+            let most = parameter.low.abs().max(parameter.high.abs()) / parameter.typical;
+            let size = column.norm();
+            if !size.is_finite() || size * most < 1e-3 {
+                continue;
+            }
+            greatest = greatest.max(size * most);
+            amplitudes.push(place);
+            columns.push(column);
+        }
+        if greatest < LEAST_D {
+            return;
+        }
+        self.excited[instance] = true;
+        let choices = kind
+            .shapes()
+            .filter(|p| matches!(p.role, Role::Shape { grid } if grid.len() > 1));
+        let first = self.columns.len();
+        self.forms.push(Form {
+            instance,
+            values,
+            price: amplitudes.len() + choices.count(),
+            columns: (first..first + columns.len()).collect(),
+            amplitudes,
+            wide,
+        });
+        self.columns.extend(columns);
+    }
+
+    /// Number of instances that could be seen.
+    pub fn seen(&self) -> usize {
+        self.excited.iter().filter(|seen| **seen).count()
+    }
+
+    /// Gram matrix of all columns.
+    pub fn normal(&self, z: &DVector<f64>) -> Normal {
+        if self.columns.is_empty() {
+            return Normal {
+                gram: DMatrix::zeros(0, 0),
+                along: DVector::zeros(0),
+            };
+        }
+        Normal::new(&DMatrix::from_columns(&self.columns), z)
+    }
+}
+
+/// Values of every point of the shape grids, amplitudes zero.
+fn shapes(kind: &Kind) -> Vec<Vec<f64>> {
+    let grids: Vec<(usize, &[f64])> = kind
+        .parameters
+        .iter()
+        .enumerate()
+        .filter_map(|(place, parameter)| match parameter.role {
+            Role::Shape { grid } => Some((place, grid)),
+            Role::Amplitude => None,
+        })
+        .collect();
+    let mut all = vec![vec![0.0; kind.parameters.len() + kind.free.len()]];
+    let product: usize = grids.iter().map(|(_, grid)| grid.len()).product();
+    let stride = |length: usize| {
+        let share = product.div_ceil(MOST_SHAPES);
+        if grids.len() > 1 && share > 1 && length > 3 {
+            2
+        } else {
+            1
+        }
+    };
+    for (place, grid) in &grids {
+        let chosen: Vec<f64> = grid.iter().copied().step_by(stride(grid.len())).collect();
+        all = all
+            .iter()
+            .flat_map(|values| {
+                chosen.iter().map(|at| {
+                    let mut values = values.clone();
+                    values[*place] = *at;
+                    values
+                })
+            })
+            .collect();
+    }
+    all
+}

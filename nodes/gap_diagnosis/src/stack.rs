@@ -1,0 +1,121 @@
+//! Residuals and signatures of some runs, whitened, with the set-ups' floats projected out.
+//!
+//! # Model
+//!
+//! ```text
+//!   r = y - sim(machine file),   z = P W r                                (1)
+//!   J = P W sim(effect)                                                   (2)
+//! ```
+//!
+//! Responses of effects add up, so the signature of one is what the twin predicts for it alone.
+
+use std::collections::BTreeMap;
+
+use machine::effects::Effect;
+use machine::twin::{Channel, Session, Twin};
+use nalgebra::DVector;
+
+use crate::noise::Noise;
+use crate::nuisance::Nuisance;
+use crate::rows::{Rows, count};
+use crate::whitener::Whitener;
+
+/// The rows of some runs with their noise.
+pub struct Stack<'a> {
+    /// The session.
+    pub session: &'a Session,
+    /// The simulator.
+    pub twin: &'a Twin<'a>,
+    /// The runs, places in the session.
+    pub runs: Vec<usize>,
+    /// Their rows.
+    pub rows: Rows,
+    /// Residual of each row, mm.
+    pub raw: Vec<f64>,
+    /// (1).
+    pub z: DVector<f64>,
+    whitener: Whitener,
+    nuisance: Nuisance,
+    unweighted: Nuisance,
+}
+
+impl<'a> Stack<'a> {
+    /// Stacks some runs; `residual` gives the residual of each reading of each run of the session.
+    pub fn new(
+        session: &'a Session,
+        twin: &'a Twin<'a>,
+        runs: &[usize],
+        stations: usize,
+        noise: &BTreeMap<Channel, Noise>,
+        residual: &[Vec<f64>],
+    ) -> Self {
+        let rows = Rows::new(session, runs, stations, |channel| {
+            noise.contains_key(channel)
+        });
+        let whitener = Whitener::new(session, &rows, |block| {
+            let noise = &noise[&block.channel];
+            (&noise.within, &noise.between)
+        });
+        let nuisance = Nuisance::new(session, &rows, |column| whitener.apply(column));
+        let unweighted = Nuisance::new(session, &rows, |_| {});
+        let mut raw = vec![0.0; rows.len];
+        for &run in runs {
+            rows.average(run, &residual[run], &mut raw);
+        }
+        let mut stack = Self {
+            session,
+            twin,
+            runs: runs.to_vec(),
+            rows,
+            raw: vec![],
+            z: DVector::zeros(0),
+            whitener,
+            nuisance,
+            unweighted,
+        };
+        stack.z = stack.whitened(raw.clone());
+        stack.raw = raw;
+        stack
+    }
+
+    /// What the rows would show of some effects, mm.
+    pub fn simulate(&self, effects: &[&dyn Effect]) -> Vec<f64> {
+        let mut stack = vec![0.0; self.rows.len];
+        for &run in &self.runs {
+            let readings = self
+                .twin
+                .predict(self.session, &self.session.runs[run], effects);
+            self.rows.average(run, &readings, &mut stack);
+        }
+        stack
+    }
+
+    /// Signature (2) of one effect.
+    pub fn signature(&self, effect: &dyn Effect) -> DVector<f64> {
+        self.whitened(self.simulate(&[effect]))
+    }
+
+    /// P W of a stack.
+    pub fn whitened(&self, mut stack: Vec<f64>) -> DVector<f64> {
+        self.whitener.apply(&mut stack);
+        self.nuisance.project(&mut stack);
+        DVector::from_vec(stack)
+    }
+
+    /// P of a stack that is white already.
+    pub fn projected(&self, mut stack: Vec<f64>) -> DVector<f64> {
+        self.nuisance.project(&mut stack);
+        DVector::from_vec(stack)
+    }
+
+    /// A stack with its set-ups floated by plain least squares, mm.
+    pub fn floated(&self, mut stack: Vec<f64>) -> Vec<f64> {
+        self.unweighted.project(&mut stack);
+        stack
+    }
+
+    /// Rows less floats.
+    pub fn freedom(&self) -> f64 {
+        count(self.rows.len.saturating_sub(self.nuisance.count)).max(1.0)
+    }
+}

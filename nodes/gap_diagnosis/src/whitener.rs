@@ -1,0 +1,167 @@
+//! Makes the noise of every row one and independent of the others.
+//!
+//! # Model
+//!
+//! Noise of a block is an autoregression plus the smooth field of `field`, B Lambda B' in covariance:
+//!
+//! ```text
+//!   x_t = (y_t - sum_j phi_j y_(t-j)) / v_p                               (1)
+//!   W = (I + U S^2 U')^(-1/2) = I - U (1 - 1 / sqrt(1 + S^2)) U'          (2)
+//! ```
+//!
+//! with U S the singular vectors and values of the filtered B Lambda^(1/2). The first rows of a block are
+//! predicted with fewer terms (Levinson's recursion), so that (1) is exact from the first row.
+//!
+//! # Holds when
+//! Rows of a block follow each other at one spacing in time.
+//!
+//! # References
+//! \[1\] G. E. P. Box, G. M. Jenkins, G. C. Reinsel, Time Series Analysis, 4th ed., Wiley 2008, 3.2
+//! (autoregression, recursion).
+
+use machine::twin::Session;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use crate::field::{self, Smooth};
+use crate::rows::{Block, Rows};
+
+/// Autoregression of a channel: predictors of order 0 to p with the variance that each leaves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Autoregression {
+    /// Coefficients of order 0, 1, .. p.
+    pub coefficients: Vec<Vec<f64>>,
+    /// Variance that the predictor of each order leaves, mm2.
+    pub variances: Vec<f64>,
+}
+
+impl Autoregression {
+    /// White noise of a variance.
+    pub fn white(variance_mm2: f64) -> Self {
+        Self {
+            coefficients: vec![vec![]],
+            variances: vec![variance_mm2],
+        }
+    }
+
+    /// Levinson's recursion from autocovariances of lag 0 to p; stops where it would not be stationary.
+    pub fn levinson(autocovariance: &[f64]) -> Self {
+        let mut all = Self::white(autocovariance[0]);
+        for order in 1..autocovariance.len() {
+            let before = &all.coefficients[order - 1];
+            let left = all.variances[order - 1];
+            let told: f64 = before
+                .iter()
+                .enumerate()
+                .map(|(j, phi)| phi * autocovariance[order - 1 - j])
+                .sum();
+            let reflection = (autocovariance[order] - told) / left;
+            if !reflection.is_finite() || reflection.abs() >= 0.999 {
+                break;
+            }
+            let mut next: Vec<f64> = (0..before.len())
+                .map(|j| before[j] - reflection * before[before.len() - 1 - j])
+                .collect();
+            next.push(reflection);
+            all.coefficients.push(next);
+            all.variances.push(left * (1.0 - reflection.powi(2)));
+        }
+        all
+    }
+
+    /// Keeps the orders up to one.
+    pub fn up_to(mut self, order: usize) -> Self {
+        self.coefficients.truncate(order + 1);
+        self.variances.truncate(order + 1);
+        self
+    }
+
+    /// Greatest order.
+    pub fn order(&self) -> usize {
+        self.coefficients.len() - 1
+    }
+
+    /// (1), in place.
+    pub fn filter(&self, rows: &mut [f64]) {
+        let order = self.order();
+        for t in (0..rows.len()).rev() {
+            let used = order.min(t);
+            let told: f64 = self.coefficients[used]
+                .iter()
+                .enumerate()
+                .map(|(j, phi)| phi * rows[t - 1 - j])
+                .sum();
+            rows[t] = (rows[t] - told) / self.variances[used].sqrt();
+        }
+    }
+}
+
+/// (2) of every block.
+#[derive(Clone, Debug)]
+pub struct Whitener {
+    blocks: Vec<BlockWhitener>,
+}
+
+#[derive(Clone, Debug)]
+struct BlockWhitener {
+    range: std::ops::Range<usize>,
+    filter: Autoregression,
+    vectors: DMatrix<f64>,
+    shrink: DVector<f64>,
+}
+
+impl Whitener {
+    /// The whitener of a stack; `noise` gives autoregression and field of a block's channel.
+    pub fn new<'n>(
+        session: &Session,
+        rows: &Rows,
+        noise: impl Fn(&Block) -> (&'n Autoregression, &'n Smooth),
+    ) -> Self {
+        let of_block = |block: &Block| {
+            let (filter, smooth) = noise(block);
+            let (kinds, mut columns) = field::modes(&session.runs[block.run], block);
+            for (kind, mut column) in kinds.iter().zip(columns.column_iter_mut()) {
+                filter.filter(column.as_mut_slice());
+                column *= smooth.of(*kind);
+            }
+            let (vectors, singular) = singular(&columns);
+            BlockWhitener {
+                range: block.range(),
+                filter: filter.clone(),
+                vectors,
+                shrink: singular.map(|s| 1.0 - 1.0 / (1.0 + s * s).sqrt()),
+            }
+        };
+        Self {
+            blocks: rows.blocks.iter().map(of_block).collect(),
+        }
+    }
+
+    /// Whitens a stack, in place.
+    pub fn apply(&self, stack: &mut [f64]) {
+        for block in &self.blocks {
+            let part = &mut stack[block.range.clone()];
+            block.filter.filter(part);
+            let mut part = nalgebra::DVectorViewMut::from_slice(part, block.range.len());
+            let mut along = block.vectors.tr_mul(&part);
+            along.component_mul_assign(&block.shrink);
+            part.gemv(-1.0, &block.vectors, &along, 1.0);
+        }
+    }
+}
+
+/// Left singular vectors and singular values of a tall matrix, those of size only.
+fn singular(columns: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let eigen = SymmetricEigen::new(columns.tr_mul(columns));
+    let keep: Vec<usize> = (0..eigen.eigenvalues.len())
+        .filter(|k| eigen.eigenvalues[*k] > 1e-6)
+        .collect();
+    let values = DVector::from_iterator(
+        keep.len(),
+        keep.iter().map(|k| eigen.eigenvalues[*k].sqrt()),
+    );
+    let mut vectors = columns * eigen.eigenvectors.select_columns(&keep);
+    for (mut vector, value) in vectors.column_iter_mut().zip(values.iter()) {
+        vector /= *value;
+    }
+    (vectors, values)
+}
