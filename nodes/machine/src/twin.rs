@@ -38,6 +38,7 @@ pub mod error;
 pub mod history;
 pub mod motion;
 pub mod response;
+pub mod series;
 pub mod session;
 pub mod simulate;
 
@@ -45,5 +46,6 @@ pub use error::TwinError;
 pub use history::History;
 pub use motion::Motion;
 pub use response::Response;
+pub use series::Series;
 pub use session::{Channel, Instrument, Reading, Run, Session, Touch};
 pub use simulate::Twin;

@@ -18,7 +18,7 @@
 //!
 //! # Agreement
 //! `val_clock_offset_circle`: 2 ms on a circle of 50 mm at 3 m/min, the circle's own equation shifted, to
-//! 0.02 µm of 100.
+//! 1e-8 µm of 100.
 //!
 //! # References
 //! \[1\] IEC/IEEE 61588:2021 (offset of a clock: its time less that of its master).

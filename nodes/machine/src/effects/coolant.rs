@@ -20,7 +20,7 @@
 //! The coolant is switched once. A recording that tells when should fix `at_min`.
 //!
 //! # Agreement
-//! `val_coolant_wall`: a wall between coolant and air, its heat balance integrated finely, to 1e-3 µm of 12.
+//! `val_coolant_wall`: a wall between coolant and air, its heat balance integrated finely, to 1e-9 µm of 12.
 //!
 //! # References
 //! \[1\] J. Bryan, International status of thermal error research, CIRP Annals 39(2), 1990, 645-656 (coolants

@@ -17,7 +17,7 @@
 //!
 //! # Agreement
 //! `val_latency_jitter_polled_input`: touches at random instants of a 1 ms servo period, 200 000 drawn, scatter
-//! by (2) to 1 %.
+//! by (2) to 0.2 %.
 
 use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
 use crate::twin::Response;

@@ -19,7 +19,7 @@
 //! clusters themselves tell the two apart.
 //!
 //! # Agreement
-//! `val_latency_modes_drawn`: the variance of 200 000 drawn touches to 1 %.
+//! `val_latency_modes_drawn`: the variance of 200 000 drawn touches to 0.3 %.
 
 use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
 use crate::twin::Response;

@@ -21,7 +21,7 @@
 //! from `length_wavelength` and from a scale error of the axis.
 //!
 //! # Agreement
-//! `val_length_misalignment_projected`: 1, 3 and 10 mrad over 500 mm by the cosine itself, to 1e-6 mm.
+//! `val_length_misalignment_projected`: 1, 3 and 10 mrad over 500 mm by the cosine itself, to 2e-7 mm.
 //!
 //! # References
 //! \[1\] ISO 230-1:2012, 8 (linear positioning measurement: cosine error; from memory).

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //!   d = (n_true / n_assumed - 1) L = k L                                  (1)
-//!   dn/dT = -0.927e-6 per K at 20 degC, 101.325 kPa, 50 % humidity        (2)
+//!   dn/dT = -(n - 1)/T = -0.927e-6 per K at 20 degC and 101.325 kPa       (2)
 //! ```
 //!
 //! The wider form has air whose temperature is not compensated, by (2) with the shop's thermometer, and a k that
@@ -19,16 +19,16 @@
 //! | `free_rate_ppm_per_h` | drift of k | 1e-6/h |
 //!
 //! # Holds when
-//! The dead path is short. In length alone k is a scale error of the axis; another instrument, another axis or
+//! The dead path is short; air is dry, light red (633 nm). In length alone k is a scale error of the axis; another instrument, another axis or
 //! a day of other weather tells them apart.
 //!
 //! # Agreement
-//! `val_length_wavelength_edlen`: (2) against the updated Edlén equation written out in the test, to 1e-9 per K;
-//! that equation against its published table.
+//! `val_length_wavelength_ciddor_standard_air`: (2) against the dispersion formula of standard air brought to
+//! 20 °C by the law of gases, to 1e-9 per K.
 //!
 //! # References
-//! \[1\] K. P. Birch, M. J. Downs, Correction to the updated Edlén equation for the refractive index of air,
-//! Metrologia 31, 1994, 315-316.
+//! \[1\] P. E. Ciddor, Refractive index of air: new equations for the visible and near infrared, Appl. Opt. 35(9),
+//! 1996, 1566-1573, eq. (1).
 
 use metrology::Axis;
 use nalgebra::Vector3;

@@ -20,7 +20,7 @@
 //!
 //! # Agreement
 //! `val_probe_lobing_triangle_of_supports`: the triggering lever of a three-point seat, r/2 over an edge and r
-//! over a support, is met by k = 3 and 6 to 3 % of its mean; k = 2, 4, 5 vanish.
+//! over a support, is met by k = 3 and 6 to 5 % of its mean, of a shape of 21 %; k = 2, 4, 5 vanish.
 //!
 //! # References
 //! \[1\] F. M. Chan, E. J. Davis, T. G. King, K. J. Stout, Some performance characteristics of a multi-axis touch

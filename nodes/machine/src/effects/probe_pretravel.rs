@@ -25,7 +25,7 @@
 //!
 //! # Agreement
 //! `val_probe_pretravel_cantilever`: carbide stems of 50 and 100 mm bent by 0.2 N, the beam's equation
-//! integrated finely, to 1e-6 of the bending.
+//! integrated finely, to 1e-9 of the bending.
 //!
 //! # References
 //! \[1\] ISO 230-10:2022 (probing performance). \[2\] R. Hibbeler, Mechanics of Materials, appendix C (deflection

@@ -3,6 +3,7 @@
 use crate::file::SensorPlace;
 
 use super::Scene;
+use crate::twin::Series;
 
 impl Scene<'_> {
     /// Warming since its first reading of a thermometer at the first of these places that has one and was
@@ -27,7 +28,7 @@ impl Scene<'_> {
     }
 
     /// Adds a series of the session's history to one of the run's ticks, times a factor at each.
-    pub(super) fn add_slow(&self, series: &[f64], sum: &mut [f64], factor: impl Fn(usize) -> f64) {
+    pub(super) fn add_slow(&self, series: &[f64], sum: &mut Series, factor: impl Fn(usize) -> f64) {
         if series.is_empty() {
             return;
         }

@@ -19,7 +19,7 @@
 //! The spacing of the history is short against the changes of temperature. Self-heating is `thermometer_offset`.
 //!
 //! # Agreement
-//! `val_thermometer_lag_ramp_and_step`: (1) integrated finely for a ramp and an exponential rise, to 0.01 K of 2.
+//! `val_thermometer_lag_ramp_and_step`: (1) integrated finely for a ramp and an exponential rise, to 3e-5 K of 0.6.
 
 use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
 use crate::twin::{Channel, Response};

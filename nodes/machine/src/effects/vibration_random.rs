@@ -19,7 +19,7 @@
 //! The phase is random against the run: only the scatter shows it. One that keeps its phase is an effect of the mean.
 //!
 //! # Agreement
-//! `val_vibration_random_phases`: 200 000 sines of drawn phase to 1 %.
+//! `val_vibration_random_phases`: 200 000 sines of drawn phase to 0.1 %.
 
 use metrology::Axis;
 

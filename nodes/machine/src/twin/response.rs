@@ -2,6 +2,7 @@
 
 use metrology::{AxisSet, PerAxis};
 
+use super::series::Series;
 use super::session::Run;
 
 /// Errors along one run; every effect adds its own part.
@@ -11,38 +12,46 @@ use super::session::Run;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Response {
     /// Motor minus command, per tick: the control loop. A motor encoder, a scale and the tip see it.
-    pub servo: PerAxis<Vec<f64>>,
+    pub servo: PerAxis<Series>,
     /// Slide minus motor, per tick: screw, nut, coupling. A scale and the tip see it.
-    pub drive: PerAxis<Vec<f64>>,
+    pub drive: PerAxis<Series>,
     /// Tip relative to the workpiece beyond the slides' positions, machine frame X, Y, Z, per tick.
-    pub tip_mm: [Vec<f64>; 3],
+    pub tip_mm: [Series; 3],
     /// Reading minus position of the motor encoder, per tick.
-    pub motor_reading: PerAxis<Vec<f64>>,
+    pub motor_reading: PerAxis<Series>,
     /// Reading minus position of the linear scale, per tick.
-    pub scale_reading: PerAxis<Vec<f64>>,
+    pub scale_reading: PerAxis<Series>,
     /// Reading minus position of the grid encoder, first and second coordinate, per tick.
-    pub grid_reading_mm: [Vec<f64>; 2],
+    pub grid_reading_mm: [Series; 2],
     /// Reading minus displacement of the length reference, per tick.
-    pub length_reading_mm: Vec<f64>,
+    pub length_reading_mm: Series,
     /// How far beyond the contact of ball and surface the position is latched, along the approach, per touch.
-    pub travel_mm: Vec<f64>,
+    pub travel_mm: Series,
     /// What an instrument itself adds to each of the run's readings, of any channel (mm, rad, K).
-    pub reading: Vec<f64>,
+    pub reading: Series,
     /// Variance that an instrument itself adds to each of the run's readings, in the square of its unit.
-    pub reading_variance: Vec<f64>,
+    pub reading_variance: Series,
     /// Variance that an effect of random phase adds to the tip, machine frame X, Y, Z, per tick, mm2.
-    pub tip_variance_mm2: [Vec<f64>; 3],
+    pub tip_variance_mm2: [Series; 3],
     /// Variance along the approach, per touch, mm2.
-    pub travel_variance_mm2: Vec<f64>,
+    pub travel_variance_mm2: Series,
 }
 
 impl Response {
     /// A response of nothing, sized for a run.
     #[must_use]
     pub fn zero(run: &Run, axes: AxisSet) -> Self {
-        let ticks = || vec![0.0; run.motion.len()];
-        let of_axes =
-            || PerAxis::from_fn(|axis| if axes.contains(axis) { ticks() } else { vec![] });
+        let ticks = || Series::zeros(run.motion.len());
+        let touches = || Series::zeros(run.touches.len());
+        let readings = || Series::zeros(run.readings.len());
+        let of_axis = |axis| {
+            if axes.contains(axis) {
+                ticks()
+            } else {
+                Series::default()
+            }
+        };
+        let of_axes = || PerAxis::from_fn(of_axis);
         Self {
             servo: of_axes(),
             drive: of_axes(),
@@ -51,11 +60,11 @@ impl Response {
             scale_reading: of_axes(),
             grid_reading_mm: [ticks(), ticks()],
             length_reading_mm: ticks(),
-            travel_mm: vec![0.0; run.touches.len()],
-            reading: vec![0.0; run.readings.len()],
-            reading_variance: vec![0.0; run.readings.len()],
+            travel_mm: touches(),
+            reading: readings(),
+            reading_variance: readings(),
             tip_variance_mm2: [ticks(), ticks(), ticks()],
-            travel_variance_mm2: vec![0.0; run.touches.len()],
+            travel_variance_mm2: touches(),
         }
     }
 }
