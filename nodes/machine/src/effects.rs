@@ -5,29 +5,40 @@
 //! parameters it has in the units of the machine file, what excites it, and how to widen its form without
 //! losing its name. To add one: write its file, add its line below.
 
+mod form;
 mod kind;
+mod lever;
 mod slow;
 mod stale;
 
+pub mod acceleration_lag;
 pub mod ambient_drift;
+pub mod angular_error;
 pub mod backlash;
 pub mod clock_drift;
 pub mod clock_offset;
 pub mod column_bend;
 pub mod coolant;
+pub mod cyclic_error;
 pub mod latency_drift;
 pub mod latency_jitter;
 pub mod latency_modes;
 pub mod length_misalignment;
 pub mod length_wavelength;
+pub mod pitch_error;
 pub mod plate_error;
 pub mod probe_latency;
 pub mod probe_lobing;
 pub mod probe_pretravel;
 pub mod probe_repeatability;
 pub mod quantisation;
+pub mod reversal_spike;
+pub mod scale_error;
 pub mod screw_elongation;
+pub mod servo_lag;
 pub mod spindle_growth;
+pub mod squareness;
+pub mod straightness;
 pub mod stylus_jump;
 pub mod thermometer_lag;
 pub mod thermometer_offset;
@@ -40,29 +51,38 @@ pub use kind::{Kind, Moment, Parameter, Role, Target, Targets};
 
 use crate::file::{EffectEntry, MachineFile};
 use crate::kinematics::Kinematics;
-use crate::twin::{History, Response, Run, TwinError};
+use crate::twin::{Following, History, Response, Run, TwinError};
 
 /// Every effect that the twin knows.
 pub static CATALOGUE: &[&Kind] = &[
+    &acceleration_lag::KIND,
     &ambient_drift::KIND,
+    &angular_error::KIND,
     &backlash::KIND,
     &clock_drift::KIND,
     &clock_offset::KIND,
     &column_bend::KIND,
     &coolant::KIND,
+    &cyclic_error::KIND,
     &latency_drift::KIND,
     &latency_jitter::KIND,
     &latency_modes::KIND,
     &length_misalignment::KIND,
     &length_wavelength::KIND,
+    &pitch_error::KIND,
     &plate_error::KIND,
     &probe_latency::KIND,
     &probe_lobing::KIND,
     &probe_pretravel::KIND,
     &probe_repeatability::KIND,
     &quantisation::KIND,
+    &reversal_spike::KIND,
+    &scale_error::KIND,
     &screw_elongation::KIND,
+    &servo_lag::KIND,
     &spindle_growth::KIND,
+    &squareness::KIND,
+    &straightness::KIND,
     &stylus_jump::KIND,
     &thermometer_lag::KIND,
     &thermometer_offset::KIND,
@@ -95,16 +115,16 @@ pub fn kind(id: &str) -> Option<&'static Kind> {
     CATALOGUE.iter().copied().find(|kind| kind.id == id)
 }
 
-/// The known effects of a machine file, checked: kinds, targets, keys, ranges.
+/// The machine as it is described: the nominal following errors of its loops, then the known effects of its
+/// machine file, checked: kinds, targets, keys, ranges. What a measurement is compared with.
 ///
 /// # Errors
 /// Names the entry, the key, the value and what would be possible.
 pub fn known(machine: &MachineFile) -> Result<Vec<Box<dyn Effect>>, TwinError> {
-    machine
-        .effects
-        .iter()
-        .enumerate()
-        .map(|(index, entry)| from_entry(machine, index, entry))
+    let nominal: Box<dyn Effect> = Box::new(Following);
+    let listed = machine.effects.iter().enumerate();
+    std::iter::once(Ok(nominal))
+        .chain(listed.map(|(index, entry)| from_entry(machine, index, entry)))
         .collect()
 }
 

@@ -126,6 +126,18 @@ impl Kinematics {
             .inverse_transform_vector(direction_in_machine)
     }
 
+    /// Turns a direction of the workpiece frame into one of the machine frame.
+    #[must_use]
+    pub fn direction_in_machine(
+        &self,
+        positions: &PerAxis<f64>,
+        direction_in_workpiece: &Vector3<f64>,
+    ) -> Vector3<f64> {
+        self.bed_from_workpiece(positions)
+            .rotation
+            .transform_vector(direction_in_workpiece)
+    }
+
     /// Ball centre in the workpiece frame, mm.
     #[must_use]
     pub fn ball_in_workpiece_mm(&self, positions: &PerAxis<f64>) -> Vector3<f64> {

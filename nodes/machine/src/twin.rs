@@ -27,6 +27,9 @@
 //!
 //! Every channel adds what its instrument itself does to each reading (`Response::reading`).
 //!
+//! The machine as it is described is `effects::known`: the nominal following errors of its control loops
+//! (`following`), and the effects of its machine file. What is predicted with no effect at all is zero.
+//!
 //! Deviations are small (below a millimetre), so responses of effects add up; positions on a curve are
 //! those commanded.
 //!
@@ -35,6 +38,7 @@
 //! or is off. A deviation is measured minus nominal; an error actual minus commanded.
 
 pub mod error;
+pub mod following;
 pub mod history;
 pub mod motion;
 pub mod response;
@@ -43,6 +47,7 @@ pub mod session;
 pub mod simulate;
 
 pub use error::TwinError;
+pub use following::Following;
 pub use history::History;
 pub use motion::Motion;
 pub use response::Response;

@@ -32,7 +32,8 @@
 
 use metrology::Axis;
 
-use super::{Effect, Kind, Moment, Parameter, Role, Scene, Target, Targets};
+use super::form::{WAY_HATS, way_hats};
+use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
 use crate::twin::Response;
 
 /// Entry of the catalogue.
@@ -40,64 +41,39 @@ pub static KIND: Kind = Kind {
     id: "backlash",
     title: "backlash",
     targets: Targets::LinearAxes,
-    parameters: &[Parameter {
-        name: "width_um",
-        role: Role::Amplitude,
-        low: -30.0,
-        high: 30.0,
-        typical: 4.0,
-    }],
+    parameters: &[Parameter::amplitude("width_um", 30.0, 4.0)],
     free: &[
-        hat("free_0p03mm_um"),
-        hat("free_0p1mm_um"),
-        hat("free_0p3mm_um"),
-        hat("free_1mm_um"),
-        hat("free_3mm_um"),
+        Parameter::amplitude("free_0p03mm_um", 30.0, 1.0),
+        Parameter::amplitude("free_0p1mm_um", 30.0, 1.0),
+        Parameter::amplitude("free_0p3mm_um", 30.0, 1.0),
+        Parameter::amplitude("free_1mm_um", 30.0, 1.0),
+        Parameter::amplitude("free_3mm_um", 30.0, 1.0),
     ],
     moment: Moment::Mean,
     needs: "a reversal of the axis",
     build: |target, values| Box::new(Backlash::new(&target, values)),
 };
 
-const fn hat(name: &'static str) -> Parameter {
-    Parameter {
-        name,
-        role: Role::Amplitude,
-        low: -30.0,
-        high: 30.0,
-        typical: 1.0,
-    }
-}
-
-/// Places of the hats, decimal logarithm of mm since the reversal.
-const HATS: [f64; 5] = [-1.5, -1.0, -0.5, 0.0, 0.5];
+/// Nearer to the reversal the wider form stays at its first hat's height, as presliding begins there.
+const FIRST_HAT_MM: f64 = 0.031_622_776_601_683_79;
 
 struct Backlash {
     axis: Axis,
     width_mm: f64,
-    free_mm: [f64; 5],
+    free_mm: [f64; WAY_HATS],
 }
 
 impl Backlash {
     fn new(target: &Target, values: &[f64]) -> Self {
-        let Target::Axis(axis) = target else {
-            unreachable!("the kind acts on axes only")
-        };
-        let mut free_mm = [0.0; 5];
+        let mut free_mm = [0.0; WAY_HATS];
         for (free, value) in free_mm.iter_mut().zip(&values[1..]) {
             *free = value * 1e-3;
         }
         Self {
-            axis: *axis,
+            axis: target.axis(),
             width_mm: values[0] * 1e-3,
             free_mm,
         }
-    }
-
-    fn free_at_mm(&self, way_mm: f64) -> f64 {
-        let place = way_mm.max(1e-9).log10();
-        let hat = |(at, height): (&f64, &f64)| height * (1.0 - (place - at).abs() / 0.5).max(0.0);
-        HATS.iter().zip(&self.free_mm).map(hat).sum()
     }
 }
 
@@ -111,7 +87,8 @@ impl Effect for Backlash {
         for (tick, sum) in response.drive[self.axis].iter_mut().enumerate() {
             lag = (lag - (position[tick] - last)).clamp(-half, half); // (1)
             last = position[tick];
-            let free_mm = self.free_at_mm(motion.since_reversal[self.axis][tick]);
+            let way = motion.since_reversal[self.axis][tick].max(FIRST_HAT_MM);
+            let free_mm = way_hats(&self.free_mm, way);
             *sum += lag * self.width_mm.signum() - f64::from(sense[tick]) * free_mm; // (3)
         }
     }

@@ -174,6 +174,22 @@ impl Target {
             other => unreachable!("{other:?}: the kind acts on thermometers only"),
         }
     }
+
+    /// The component, of an effect whose targets are components.
+    pub(super) fn component(&self) -> ErrorComponent {
+        match self {
+            Self::Component(component) => *component,
+            other => unreachable!("{other:?}: the kind acts on components only"),
+        }
+    }
+
+    /// The two axes, of an effect whose targets are pairs.
+    pub(super) fn pair(&self) -> (Axis, Axis) {
+        match self {
+            Self::Pair(a, b) => (*a, *b),
+            other => unreachable!("{other:?}: the kind acts on pairs only"),
+        }
+    }
 }
 
 impl Kind {
@@ -229,6 +245,30 @@ impl Kind {
                 .map(|sensor| Target::Thermometer(sensor.id.clone()))
                 .collect(),
             Targets::Instruments(all) => all.iter().copied().map(Target::Instrument).collect(),
+        }
+    }
+
+    /// Typical values of its parameters and zeros for the wider form, in the order of [`Kind::build`].
+    #[must_use]
+    pub fn typical(&self) -> Vec<f64> {
+        let physics = self.parameters.iter().map(|p| p.typical);
+        physics.chain(self.free.iter().map(|_| 0.0)).collect()
+    }
+
+    /// The entry of a machine file that names it, its target and its values (in the order of
+    /// [`Kind::build`]); amplitudes of the wider form that are zero are left out.
+    #[must_use]
+    pub fn entry(&self, target: &Target, values: &[f64]) -> EffectEntry {
+        let named = self.parameters.iter().chain(self.free).zip(values);
+        let is_written = |place: usize, value: f64| place < self.parameters.len() || value != 0.0;
+        EffectEntry {
+            kind: self.id.to_owned(),
+            axis: Some(target.to_string()).filter(|name| !name.is_empty()),
+            parameters: named
+                .enumerate()
+                .filter(|(place, (_, value))| is_written(*place, **value))
+                .map(|(_, (p, value))| (p.name.to_owned(), *value))
+                .collect(),
         }
     }
 

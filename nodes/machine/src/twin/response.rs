@@ -38,14 +38,14 @@ pub struct Response {
 }
 
 impl Response {
-    /// A response of nothing, sized for a run.
+    /// A response of nothing, sized for a run; series of axes that the run did not record are empty.
     #[must_use]
     pub fn zero(run: &Run, axes: AxisSet) -> Self {
         let ticks = || Series::zeros(run.motion.len());
         let touches = || Series::zeros(run.touches.len());
         let readings = || Series::zeros(run.readings.len());
         let of_axis = |axis| {
-            if axes.contains(axis) {
+            if axes.contains(axis) && run.motion.axes.contains(axis) {
                 ticks()
             } else {
                 Series::default()

@@ -1,0 +1,70 @@
+//! Angular error: roll, pitch or yaw of an axis, seen at the tip through its arm.
+//!
+//! # Model
+//!
+//! ```text
+//!   w = sum_n p_n P_n(x),   n = 1, 2 and, wider, 3, 4                     (1)
+//!   E = w times the lever of `volumetric::sensitivity` at the pose        (2)
+//! ```
+//!
+//! x is the place within the travel, -1 to 1. The mean angle is left out: it is squareness, or the frame.
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | p_n | `p1_urad`, `p2_urad`, `free_p3_urad`, `free_p4_urad` | µrad |
+//!
+//! # Holds when
+//! Angles are small. The straightness that belongs to an angular error is that at the machine's zero of the
+//! other axes; only another arm (height, tool offset, place of the other axes) tells the two apart.
+//!
+//! # References
+//! \[1\] ISO 230-1:2012, 3.4. \[2\] J. B. Bryan, Precision Engineering 1(3), 1979,
+//! doi:10.1016/0141-6359(79)90037-0 (the Abbe principle).
+
+use metrology::ErrorComponent;
+
+use super::form::{Travel, legendre};
+use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets, lever};
+use crate::twin::Response;
+
+/// Entry of the catalogue.
+pub static KIND: Kind = Kind {
+    id: "angular_error",
+    title: "angular error",
+    targets: Targets::Turning,
+    parameters: &[
+        Parameter::amplitude("p1_urad", 300.0, 10.0),
+        Parameter::amplitude("p2_urad", 300.0, 8.0),
+    ],
+    free: &[
+        Parameter::amplitude("free_p3_urad", 300.0, 4.0),
+        Parameter::amplitude("free_p4_urad", 300.0, 3.0),
+    ],
+    moment: Moment::Mean,
+    needs: "positions over the axis' travel, with two arms",
+    build: |target, values| Box::new(AngularError::new(&target, values)),
+};
+
+struct AngularError {
+    component: ErrorComponent,
+    polynomial_rad: [f64; 4],
+}
+
+impl AngularError {
+    fn new(target: &Target, values: &[f64]) -> Self {
+        Self {
+            component: target.component(),
+            polynomial_rad: std::array::from_fn(|k| values[k] * 1e-6),
+        }
+    }
+}
+
+impl Effect for AngularError {
+    fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        let travel = Travel::of(scene, self.component.of);
+        let position = &scene.run.motion.position[self.component.of];
+        lever::add(scene, self.component, response, |tick| {
+            legendre(1, &self.polynomial_rad, travel.share(position[tick])) // (1)
+        });
+    }
+}

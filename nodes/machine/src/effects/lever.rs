@@ -1,0 +1,104 @@
+//! What a geometric error component does to the tip along a run, machine frame.
+//!
+//! The sensitivities of `volumetric::sensitivity` are affine in the linear positions while the rotary
+//! axes stand, so that they are taken at four poses only:
+//!
+//! ```text
+//!   s(p) = s(0) + sum_i p_i (s(e_i) - s(0))                               (1)
+//! ```
+//!
+//! They are turned from the workpiece frame into the machine frame, in which a response keeps the tip.
+
+use metrology::{Axis, ErrorComponent, PerAxis};
+use nalgebra::{Matrix3, Vector3};
+
+use super::Scene;
+use crate::twin::Response;
+use crate::volumetric::sensitivity;
+
+/// Adds the value of a component (mm or rad) at each tick, times its lever, to the tip; nothing where the run
+/// did not record the component's axis.
+pub(super) fn add(
+    scene: &Scene<'_>,
+    component: ErrorComponent,
+    response: &mut Response,
+    value_at: impl Fn(usize) -> f64,
+) {
+    if !scene.run.motion.axes.contains(component.of) {
+        return;
+    }
+    let mut lever = Lever::new(scene, component);
+    let [x, y, z] = &mut response.tip_mm;
+    for (tick, ((x, y), z)) in x.iter_mut().zip(y).zip(z).enumerate() {
+        let value = value_at(tick);
+        let arm = lever.at(tick);
+        *x += value * arm.x;
+        *y += value * arm.y;
+        *z += value * arm.z;
+    }
+}
+
+struct Lever<'a> {
+    scene: &'a Scene<'a>,
+    component: ErrorComponent,
+    tool_offset_mm: Vector3<f64>,
+    /// Which rotary axes the run has, in the order A B C.
+    turns: [bool; 3],
+    rotary: [f64; 3],
+    affine: Option<(Vector3<f64>, Matrix3<f64>)>,
+}
+
+impl<'a> Lever<'a> {
+    fn new(scene: &'a Scene<'a>, component: ErrorComponent) -> Self {
+        let axes = scene.run.motion.axes;
+        Self {
+            scene,
+            component,
+            tool_offset_mm: scene.run.segment.tool_offset_mm,
+            turns: Axis::ROTARY.map(|axis| axes.contains(axis)),
+            rotary: [0.0; 3],
+            affine: None,
+        }
+    }
+
+    fn at(&mut self, tick: usize) -> Vector3<f64> {
+        let position = &self.scene.run.motion.position;
+        let mut stands = true;
+        for (k, axis) in Axis::ROTARY.into_iter().enumerate() {
+            if self.turns[k] && self.rotary[k].to_bits() != position[axis][tick].to_bits() {
+                self.rotary[k] = position[axis][tick];
+                stands = false;
+            }
+        }
+        let linear = Axis::LINEAR.map(|axis| position[axis].get(tick).copied().unwrap_or(0.0));
+        if !stands {
+            self.affine = None;
+            return self.of(linear);
+        }
+        let (at_zero, per_mm) = match self.affine {
+            Some(affine) => affine,
+            None => *self.affine.insert(self.renewed()),
+        };
+        at_zero + per_mm * Vector3::from(linear) // (1)
+    }
+
+    fn renewed(&self) -> (Vector3<f64>, Matrix3<f64>) {
+        let at_zero = self.of([0.0; 3]);
+        let column = |k: usize| {
+            let mut one = [0.0; 3];
+            one[k] = 1.0;
+            self.of(one) - at_zero
+        };
+        let per_mm = Matrix3::from_columns(&[column(0), column(1), column(2)]);
+        (at_zero, per_mm)
+    }
+
+    fn of(&self, linear: [f64; 3]) -> Vector3<f64> {
+        let [x, y, z] = linear;
+        let [a, b, c] = self.rotary;
+        let pose = PerAxis([x, y, z, a, b, c]);
+        let kinematics = self.scene.kinematics;
+        let in_workpiece = sensitivity(kinematics, &pose, &self.tool_offset_mm, self.component);
+        kinematics.direction_in_machine(&pose, &in_workpiece)
+    }
+}

@@ -1,0 +1,85 @@
+//! Pitch error: the lead of a screw that differs along it.
+//!
+//! # Model
+//!
+//! Legendre polynomials of the place x within the travel, -1 to 1; the linear part is `scale_error`:
+//!
+//! ```text
+//!   E = sum_n p_n P_n(x)                                                  (1)
+//!   E += sum_k f_k h_k(x),   hats at 1/8 .. 7/8 of the travel             (2)
+//! ```
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | p_n | `p2_um`, `p3_um`, wider form `free_p4_um`, `free_p5_um` | µm |
+//! | f_k | `free_1_of_8_um` .. `free_7_of_8_um` | µm |
+//!
+//! # Holds when
+//! The error is of the screw, between motor and slide. Not modelled: a period shorter than a quarter of the
+//! travel (see `cyclic_error`).
+//!
+//! # References
+//! \[1\] ISO 230-2:2014, clause 3 (positioning deviations). \[2\] ISO 3408-3:2006 (travel deviation of
+//! ball screws).
+
+use metrology::Axis;
+
+use super::form::{Travel, hats, legendre};
+use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
+use crate::twin::Response;
+
+/// Entry of the catalogue.
+pub static KIND: Kind = Kind {
+    id: "pitch_error",
+    title: "pitch error",
+    targets: Targets::LinearAxes,
+    parameters: &[
+        Parameter::amplitude("p2_um", 60.0, 4.0),
+        Parameter::amplitude("p3_um", 60.0, 3.0),
+    ],
+    free: &[
+        Parameter::amplitude("free_p4_um", 60.0, 1.0),
+        Parameter::amplitude("free_p5_um", 60.0, 1.0),
+        Parameter::amplitude("free_1_of_8_um", 60.0, 1.0),
+        Parameter::amplitude("free_2_of_8_um", 60.0, 1.0),
+        Parameter::amplitude("free_3_of_8_um", 60.0, 1.0),
+        Parameter::amplitude("free_4_of_8_um", 60.0, 1.0),
+        Parameter::amplitude("free_5_of_8_um", 60.0, 1.0),
+        Parameter::amplitude("free_6_of_8_um", 60.0, 1.0),
+        Parameter::amplitude("free_7_of_8_um", 60.0, 1.0),
+    ],
+    moment: Moment::Mean,
+    needs: "positions over the axis' travel",
+    build: |target, values| Box::new(PitchError::new(&target, values)),
+};
+
+struct PitchError {
+    axis: Axis,
+    polynomial_mm: [f64; 4],
+    local_mm: [f64; 7],
+}
+
+impl PitchError {
+    fn new(target: &Target, values: &[f64]) -> Self {
+        Self {
+            axis: target.axis(),
+            polynomial_mm: std::array::from_fn(|k| values[k] * 1e-3),
+            local_mm: std::array::from_fn(|k| values[4 + k] * 1e-3),
+        }
+    }
+}
+
+impl Effect for PitchError {
+    fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        let travel = Travel::of(scene, self.axis);
+        let is_local = self.local_mm.iter().any(|height| *height != 0.0);
+        let position = &scene.run.motion.position[self.axis];
+        for (sum, here) in response.drive[self.axis].iter_mut().zip(position) {
+            let x = travel.share(*here);
+            *sum += legendre(2, &self.polynomial_mm, x); // (1)
+            if is_local {
+                *sum += hats(-0.75, 0.25, &self.local_mm, x); // (2)
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Servo lag: an axis follows its command by another time than the machine file's gains say.
+//!
+//! # Model
+//!
+//! The nominal following error, (1 - f) v / K, is the twin's own (`twin::following`). This is what comes
+//! on top of it, the first term in v of any loop's answer, and odd powers where the drive is not linear:
+//!
+//! ```text
+//!   E = -T v - c_2 (v / v_0) |v / v_0| - c_3 (v / v_0)^3,   v_0 = 100 mm/s      (1)
+//! ```
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | T | `time_ms` | ms |
+//! | c_2, c_3 | `free_square_um`, `free_cube_um`, at 100 mm/s | µm |
+//!
+//! # Holds when
+//! The velocity changes little within T: the next term is `acceleration_lag`. A circle shows only the
+//! difference of its axes' lags (and their mean as a turn of the start).
+//!
+//! # References
+//! \[1\] ISO 230-4:2022, annex B (following errors on circular paths; from memory).
+
+use metrology::Axis;
+
+use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
+use crate::twin::Response;
+
+/// Entry of the catalogue.
+pub static KIND: Kind = Kind {
+    id: "servo_lag",
+    title: "servo lag",
+    targets: Targets::LinearAxes,
+    parameters: &[Parameter::amplitude("time_ms", 60.0, 0.3)],
+    free: &[
+        Parameter::amplitude("free_square_um", 200.0, 2.0),
+        Parameter::amplitude("free_cube_um", 200.0, 2.0),
+    ],
+    moment: Moment::Mean,
+    needs: "readings while the axis moves, at two speeds or in both senses",
+    build: |target, values| Box::new(ServoLag::new(&target, values)),
+};
+
+struct ServoLag {
+    axis: Axis,
+    time_s: f64,
+    square_mm: f64,
+    cube_mm: f64,
+}
+
+impl ServoLag {
+    fn new(target: &Target, values: &[f64]) -> Self {
+        Self {
+            axis: target.axis(),
+            time_s: values[0] * 1e-3,
+            square_mm: values[1] * 1e-3,
+            cube_mm: values[2] * 1e-3,
+        }
+    }
+}
+
+/// Speed at which the wider form's amplitudes are given, mm/s.
+const REFERENCE_MM_S: f64 = 100.0;
+
+impl Effect for ServoLag {
+    fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        let velocity = &scene.run.motion.velocity[self.axis];
+        for (sum, v) in response.servo[self.axis].iter_mut().zip(velocity) {
+            let share = v / REFERENCE_MM_S;
+            let bent_mm = share * (self.square_mm * share.abs() + self.cube_mm * share * share);
+            *sum -= self.time_s * v + bent_mm; // (1)
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! Straightness: an axis leaves its line in a direction across it.
+//!
+//! # Model
+//!
+//! Legendre polynomials of the place x within the travel, -1 to 1; the linear part is squareness:
+//!
+//! ```text
+//!   E = sum_n p_n P_n(x),   n = 2, 3 and, wider, 4, 5                     (1)
+//! ```
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | p_n | `p2_um`, `p3_um`, `free_p4_um`, `free_p5_um` | µm |
+//!
+//! # Holds when
+//! The line is that of the point whose position the axes name, with the other axes anywhere.
+//!
+//! # References
+//! \[1\] ISO 230-1:2012, 3.4.
+
+use metrology::ErrorComponent;
+
+use super::form::{Travel, legendre};
+use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets, lever};
+use crate::twin::Response;
+
+/// Entry of the catalogue.
+pub static KIND: Kind = Kind {
+    id: "straightness",
+    title: "straightness",
+    targets: Targets::Across,
+    parameters: &[
+        Parameter::amplitude("p2_um", 60.0, 3.0),
+        Parameter::amplitude("p3_um", 60.0, 2.0),
+    ],
+    free: &[
+        Parameter::amplitude("free_p4_um", 60.0, 1.0),
+        Parameter::amplitude("free_p5_um", 60.0, 1.0),
+    ],
+    moment: Moment::Mean,
+    needs: "readings across the axis over its travel",
+    build: |target, values| Box::new(Straightness::new(&target, values)),
+};
+
+struct Straightness {
+    component: ErrorComponent,
+    polynomial_mm: [f64; 4],
+}
+
+impl Straightness {
+    fn new(target: &Target, values: &[f64]) -> Self {
+        Self {
+            component: target.component(),
+            polynomial_mm: std::array::from_fn(|k| values[k] * 1e-3),
+        }
+    }
+}
+
+impl Effect for Straightness {
+    fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        let travel = Travel::of(scene, self.component.of);
+        let position = &scene.run.motion.position[self.component.of];
+        lever::add(scene, self.component, response, |tick| {
+            legendre(2, &self.polynomial_mm, travel.share(position[tick])) // (1)
+        });
+    }
+}
