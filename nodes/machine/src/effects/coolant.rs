@@ -80,7 +80,7 @@ impl Effect for Coolant {
         for (tick, (sum, at_s)) in sum.iter_mut().zip(&motion.time_s).enumerate() {
             if *at_s > self.at_s {
                 let risen = 1.0 - (-(at_s - self.at_s) / self.lag_s).exp();
-                let from_mm = position[tick] - middle_mm;
+                let from_mm = position.get(tick).map_or(0.0, |here| here - middle_mm);
                 *sum += risen * (self.step_mm + self.growth_per_mm * from_mm); // (1), (2)
             }
         }

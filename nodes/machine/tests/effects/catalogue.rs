@@ -88,12 +88,15 @@ fn respond(
 
 /// The largest rms of `a - factor b` over the rms of `b`, over all parts.
 fn mismatch(a: &[(&str, &[f64])], b: &[(&str, &[f64])], factor: f64) -> f64 {
-    let of = |((_, a), (_, b)): (&(&str, &[f64]), &(&str, &[f64]))| {
+    let of = |(a, b): (&[f64], &[f64])| {
         let size = rms(b.iter().copied());
-        let off = rms(a.iter().zip(*b).map(|(a, b)| a - factor * b));
+        let off = rms(a.iter().zip(b).map(|(a, b)| a - factor * b));
         if size > 0.0 { off / size } else { off }
     };
-    a.iter().zip(b).map(of).fold(0.0, f64::max)
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| of((a.1, b.1)))
+        .fold(0.0, f64::max)
 }
 
 #[test]
@@ -103,8 +106,11 @@ fn prop_a_response_is_proportional_to_the_amplitudes() {
         let once = respond(&machine, &session, kind, &target, &values(kind, 1.0));
         let twice = respond(&machine, &session, kind, &target, &values(kind, 2.0));
         // Until the play is taken up, a slide in a wider play stands still for longer; here there are
-        // strokes of 0.1 mm.
-        let limit = if kind.id == "backlash" { 0.1 } else { 1e-9 };
+        // strokes of 0.1 mm. A clock that is late shows where the machine was, which bends with time.
+        let limit = match kind.id {
+            "backlash" | "clock_drift" | "clock_offset" => 0.1,
+            _ => 1e-9,
+        };
         let off = mismatch(&parts(&twice), &parts(&once), 2.0);
         assert!(off < limit, "{} {target}: {off}", kind.id);
         let off = mismatch(&variances(&twice), &variances(&once), 4.0);
@@ -138,10 +144,11 @@ fn prop_amplitudes_add_up() {
             continue;
         }
         let wanted = parts(&together);
+        let alone: Vec<_> = alone.iter().map(parts).collect();
         for (part, (name, series)) in wanted.iter().enumerate() {
             let size = rms(series.iter().copied());
             let off = rms((0..series.len()).map(|k| {
-                let sum: f64 = alone.iter().map(|one| parts(one)[part].1[k]).sum();
+                let sum: f64 = alone.iter().map(|one| one[part].1[k]).sum();
                 sum - series[k]
             }));
             assert!(off <= 1e-9 * size, "{} {target} {name}: {off}", kind.id);
