@@ -28,13 +28,24 @@ pub(super) fn add(
         return;
     }
     let mut lever = Lever::new(scene, component);
-    let [x, y, z] = &mut response.tip_mm;
-    for (tick, ((x, y), z)) in x.iter_mut().zip(y).zip(z).enumerate() {
+    let moves = lever.moves();
+    let mut k = 0;
+    let mut sums = response.tip_mm.each_mut().map(|series| {
+        k += 1;
+        if moves[k - 1] {
+            &mut series[..]
+        } else {
+            &mut []
+        }
+    });
+    for tick in 0..scene.run.motion.len() {
         let value = value_at(tick);
         let arm = lever.at(tick);
-        *x += value * arm.x;
-        *y += value * arm.y;
-        *z += value * arm.z;
+        for (sum, along) in sums.iter_mut().zip(&arm) {
+            if let Some(sum) = sum.get_mut(tick) {
+                *sum += value * along;
+            }
+        }
     }
 }
 
@@ -59,6 +70,21 @@ impl<'a> Lever<'a> {
             rotary: [0.0; 3],
             affine: None,
         }
+    }
+
+    /// Which coordinates of the tip it can move: all while rotary axes turn.
+    fn moves(&mut self) -> [bool; 3] {
+        let position = &self.scene.run.motion.position;
+        let turns = Axis::ROTARY.into_iter().any(|axis| {
+            let first = position[axis].first();
+            position[axis].iter().any(|here| Some(here) != first)
+        });
+        if turns || self.scene.run.motion.is_empty() {
+            return [true; 3];
+        }
+        self.at(0);
+        let (at_zero, per_mm) = self.renewed();
+        std::array::from_fn(|k| at_zero[k] != 0.0 || per_mm.row(k).iter().any(|x| *x != 0.0))
     }
 
     fn at(&mut self, tick: usize) -> Vector3<f64> {

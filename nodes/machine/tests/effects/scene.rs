@@ -258,9 +258,9 @@ pub fn parts(response: &Response) -> Vec<(&'static str, &[f64])> {
         all.push(("motor_reading", &response.motor_reading[axis]));
         all.push(("scale_reading", &response.scale_reading[axis]));
     }
-    all.extend(response.tip_mm.iter().map(|s| ("tip_mm", s.as_slice())));
+    all.extend(response.tip_mm.iter().map(|s| ("tip_mm", &s[..])));
     let grid = response.grid_reading_mm.iter();
-    all.extend(grid.map(|s| ("grid_reading_mm", s.as_slice())));
+    all.extend(grid.map(|s| ("grid_reading_mm", &s[..])));
     all.push(("length_reading_mm", &response.length_reading_mm));
     all.push(("travel_mm", &response.travel_mm));
     all.push(("reading", &response.reading));
@@ -270,13 +270,15 @@ pub fn parts(response: &Response) -> Vec<(&'static str, &[f64])> {
 /// Everything that an effect of random phase can add to.
 pub fn variances(response: &Response) -> Vec<(&'static str, &[f64])> {
     let tip = response.tip_variance_mm2.iter();
-    tip.map(|s| ("tip_variance_mm2", s.as_slice()))
-        .chain([("reading_variance", response.reading_variance.as_slice())])
-        .chain([(
-            "travel_variance_mm2",
-            response.travel_variance_mm2.as_slice(),
-        )])
+    tip.map(|s| ("tip_variance_mm2", &s[..]))
+        .chain([("reading_variance", &response.reading_variance[..])])
+        .chain([("travel_variance_mm2", &response.travel_variance_mm2[..])])
         .collect()
+}
+
+/// Tip at a tick, mm; a series that nothing was written to is zero.
+pub fn tip_mm(response: &Response, tick: usize) -> Vector3<f64> {
+    Vector3::from_fn(|k, _| response.tip_mm[k].get(tick).copied().unwrap_or(0.0))
 }
 
 /// Root mean square.

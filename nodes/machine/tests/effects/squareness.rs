@@ -3,7 +3,7 @@
 use metrology::{Axis, AxisSet};
 use nalgebra::{Rotation3, Vector3};
 
-use crate::scene::{circle, greatest, response_of, run, three_axes};
+use crate::scene::{circle, greatest, response_of, run, three_axes, tip_mm};
 
 #[test]
 fn val_axes_turned_by_rotation_matrices() {
@@ -20,7 +20,7 @@ fn val_axes_turned_by_rotation_matrices() {
         let turn = Rotation3::from_scaled_axis(about * angle);
         let wanted = turn * stretch - stretch;
         for k in 0..3 {
-            let off = response.tip_mm[k][2] - wanted[k];
+            let off = tip_mm(&response, 2)[k] - wanted[k];
             assert!(
                 off.abs() < 1.1 * 90.0 * 0.5 * angle * angle,
                 "{on} {k} {off}"
@@ -39,7 +39,8 @@ fn val_a_circle_becomes_an_ellipse_at_45_degrees() {
         let response = response_of(&machine, &run, "squareness", "XY", &[("angle_urad", 20.0)]);
         let off = (0..run.motion.len()).map(|k| {
             let [x, y] = [Axis::X, Axis::Y].map(|axis| run.motion.position[axis][k]);
-            let radial = (response.tip_mm[0][k] * x + response.tip_mm[1][k] * y) / 150.0;
+            let tip = tip_mm(&response, k);
+            let radial = (tip.x * x + tip.y * y) / 150.0;
             radial + 20e-6 * 150.0 / 2.0 * (2.0 * y.atan2(x)).sin()
         });
         assert!(greatest(off) < 1e-12);
