@@ -20,11 +20,13 @@ pub mod clock_offset;
 pub mod column_bend;
 pub mod coolant;
 pub mod cyclic_error;
+pub mod homing_shift;
 pub mod latency_drift;
 pub mod latency_jitter;
 pub mod latency_modes;
 pub mod length_misalignment;
 pub mod length_wavelength;
+pub mod load_deflection;
 pub mod pitch_error;
 pub mod plate_error;
 pub mod probe_latency;
@@ -64,11 +66,13 @@ pub static CATALOGUE: &[&Kind] = &[
     &column_bend::KIND,
     &coolant::KIND,
     &cyclic_error::KIND,
+    &homing_shift::KIND,
     &latency_drift::KIND,
     &latency_jitter::KIND,
     &latency_modes::KIND,
     &length_misalignment::KIND,
     &length_wavelength::KIND,
+    &load_deflection::KIND,
     &pitch_error::KIND,
     &plate_error::KIND,
     &probe_latency::KIND,

@@ -33,7 +33,7 @@ use crate::twin::Response;
 
 /// Instants that are tried for an event, min since the session began.
 pub(super) const EVENT_GRID_MIN: &[f64] = &[
-    2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 60.0, 90.0, 120.0, 180.0, 240.0,
+    2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 60.0, 90.0, 120.0, 180.0,
 ];
 
 /// Entry of the catalogue.
@@ -44,7 +44,7 @@ pub static KIND: Kind = Kind {
     parameters: &[
         Parameter::amplitude("step_um", 100.0, 8.0),
         Parameter::shape("at_min", [0.0, 1440.0], 20.0, EVENT_GRID_MIN),
-        Parameter::shape("lag_min", [0.1, 30.0], 4.0, &[1.0, 4.0, 12.0]),
+        Parameter::shape("lag_min", [0.1, 30.0], 4.0, &[2.0, 8.0]),
     ],
     free: &[Parameter::amplitude("free_growth_um_per_m", 100.0, 8.0)],
     moment: Moment::Mean,

@@ -32,6 +32,8 @@
 //! # Agreement
 //! `val_screw_elongation_uniform_bar`: a bar of 48 cells with a nut that rubs over the whole of it evenly, to
 //! 0.1 µm of 54 where the heat is switched on or off. `eq1_matches_a_fine_integration`: 1e-4 µm of 18.
+//! `val_screw_elongation_short_stroke`: a nut that rubs over the middle half only leaves 5.5 % of the growth, 2.5 %
+//! in the wider form.
 //!
 //! # References
 //! \[1\] ISO 230-3:2020, clause 7 (thermal distortion caused by moving linear axes).

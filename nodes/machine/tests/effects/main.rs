@@ -7,16 +7,42 @@
 )]
 
 mod catalogue;
+mod past;
 mod scene;
 
 mod acceleration_lag;
+mod ambient_drift;
 mod angular_error;
 mod backlash;
+mod clock_drift;
+mod clock_offset;
+mod column_bend;
+mod coolant;
 mod cyclic_error;
 mod following;
+mod homing_shift;
+mod latency_drift;
+mod latency_jitter;
+mod latency_modes;
+mod length_misalignment;
+mod length_wavelength;
+mod load_deflection;
 mod pitch_error;
+mod plate_error;
+mod probe_latency;
+mod probe_lobing;
+mod probe_pretravel;
+mod probe_repeatability;
+mod quantisation;
 mod reversal_spike;
 mod scale_error;
+mod screw_elongation;
 mod servo_lag;
+mod spindle_growth;
 mod squareness;
 mod straightness;
+mod stylus_jump;
+mod thermometer_lag;
+mod thermometer_offset;
+mod vibration_random;
+mod workpiece_expansion;

@@ -1,0 +1,34 @@
+//! Vibration of random phase against drawn sines.
+
+use machine::twin::Channel;
+use metrology::Axis;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use crate::past::{read, scatter};
+use crate::scene::{bench, run};
+
+#[test]
+fn val_vibration_random_phases() {
+    let machine = bench();
+    let mut rng = Pcg64Mcg::seed_from_u64(14);
+    let n = 200_000;
+    let drawn = (0..n)
+        .map(|_| (0.6e-3 * (std::f64::consts::TAU * rng.random::<f64>()).sin()).powi(2))
+        .sum::<f64>()
+        / f64::from(n);
+    let mut line = run(100, machine.axis_set(), |t| {
+        [0.0, 50.0 * t, 0.0, 0.0, 0.0, 0.0]
+    });
+    read(&mut line, &Channel::GridU);
+    read(&mut line, &Channel::GridV);
+    let seen = |given: &[(&str, f64)]| scatter(&machine, &line, ("vibration_random", "Y"), given);
+    let plain = seen(&[("amplitude_um", 0.6)]);
+    println!("phases: {:.2} % off", 100.0 * (plain[150] / drawn - 1.0));
+    assert!((plain[150] / drawn - 1.0).abs() < 0.01);
+    assert!(plain[50].abs() < 1e-18, "across it nothing shakes");
+    // At 50 mm/s half the amplitude that is stated at 100 mm/s.
+    let with_speed = seen(&[("amplitude_um", 0.0), ("free_with_speed_um", 1.2)]);
+    assert!((with_speed[150] / drawn - 1.0).abs() < 0.01);
+    let _ = Axis::Y;
+}
