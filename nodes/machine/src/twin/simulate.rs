@@ -192,7 +192,8 @@ impl<'a> Reader<'a> {
             };
             self.tip_at(&there, false)
         });
-        self.response.travel_mm[reading.at] - at_contact.dot(&touch.approach)
+        let travel = self.response.travel_mm.get(reading.at);
+        travel.copied().unwrap_or(0.0) - at_contact.dot(&touch.approach)
     }
 
     fn variance(&self, reading: &Reading) -> f64 {
