@@ -20,10 +20,17 @@ pub mod clock_offset;
 pub mod column_bend;
 pub mod coolant;
 pub mod cyclic_error;
+pub mod drive_windup;
+pub mod feed_lost_motion;
+pub mod friction_windup;
+pub mod gravity_sag;
+pub mod guide_bow;
 pub mod homing_shift;
+pub mod interpolation_error;
 pub mod latency_drift;
 pub mod latency_jitter;
 pub mod latency_modes;
+pub mod lateral_play;
 pub mod length_misalignment;
 pub mod length_wavelength;
 pub mod load_deflection;
@@ -35,12 +42,16 @@ pub mod probe_pretravel;
 pub mod probe_repeatability;
 pub mod quantisation;
 pub mod reversal_spike;
+pub mod rotary_location;
+pub mod rotary_motion;
 pub mod scale_error;
 pub mod screw_elongation;
 pub mod servo_lag;
 pub mod spindle_growth;
 pub mod squareness;
+pub mod stick_slip;
 pub mod straightness;
+pub mod structural_ringing;
 pub mod stylus_jump;
 pub mod thermometer_lag;
 pub mod thermometer_offset;
@@ -66,10 +77,17 @@ pub static CATALOGUE: &[&Kind] = &[
     &column_bend::KIND,
     &coolant::KIND,
     &cyclic_error::KIND,
+    &drive_windup::KIND,
+    &feed_lost_motion::KIND,
+    &friction_windup::KIND,
+    &gravity_sag::KIND,
+    &guide_bow::KIND,
     &homing_shift::KIND,
+    &interpolation_error::KIND,
     &latency_drift::KIND,
     &latency_jitter::KIND,
     &latency_modes::KIND,
+    &lateral_play::KIND,
     &length_misalignment::KIND,
     &length_wavelength::KIND,
     &load_deflection::KIND,
@@ -81,12 +99,16 @@ pub static CATALOGUE: &[&Kind] = &[
     &probe_repeatability::KIND,
     &quantisation::KIND,
     &reversal_spike::KIND,
+    &rotary_location::KIND,
+    &rotary_motion::KIND,
     &scale_error::KIND,
     &screw_elongation::KIND,
     &servo_lag::KIND,
     &spindle_growth::KIND,
     &squareness::KIND,
+    &stick_slip::KIND,
     &straightness::KIND,
+    &structural_ringing::KIND,
     &stylus_jump::KIND,
     &thermometer_lag::KIND,
     &thermometer_offset::KIND,

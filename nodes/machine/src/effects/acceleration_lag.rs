@@ -9,8 +9,8 @@
 //! ```
 //!
 //! On a circle a = -(v/R)^2 r, so that its radius grows by c (v/R)^2 R. A loop of first order,
-//! 1/(1 + T s), has c = -T^2: its radius shrinks by R (1 - 1/sqrt(1 + (T v/R)^2)), half of which is this
-//! term's doing and half, with the other sign, that of T s across the path (Agreement).
+//! 1/(1 + T s), has c = -T^2: its radius shrinks by R (1 - 1/sqrt(1 + (T v/R)^2)), which is twice that by this
+//! term and once back by T s, whose lag is across the radius.
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
@@ -21,6 +21,9 @@
 //!
 //! # Holds when
 //! The motion changes little within the loop's time.
+//!
+//! # Agreement
+//! `val_a_first_order_loop_shrinks_circles_as_its_frequency_response_says`: below 0.001 µm of 4 µm.
 //!
 //! # References
 //! \[1\] Y. Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 5 (contour errors of feed

@@ -11,7 +11,8 @@
 //!
 //! Where the run begins before the axis has moved by b the slide stands in the middle of its play. A
 //! negative width is a backlash that the control over-compensates: (1) with |b|, its sign turned.
-//! The wider form adds steps that fade with the way since the reversal, hats in its logarithm:
+//! The wider form adds steps that fade with the way since the reversal, hats in its logarithm of which the first
+//! reaches back to the reversal:
 //!
 //! ```text
 //!   q - m += -sgn(last motion) sum_k f_k h_k(log10 s)                     (3)
@@ -26,7 +27,11 @@
 //! # Holds when
 //! The slide stays where it is left. Not modelled: elasticity within the play (presliding).
 //!
-//! # References
+//! # Agreement
+//! `val_a_slide_dragged_through_a_gap`: 2.2 µm, which is how far the contact of that slide yields.
+//! `val_the_wider_form_takes_presliding_friction`: of 4.7 µm a step leaves 2.2, with hats 0.43.
+//!
+//! # References (from memory)
 //! \[1\] ISO 230-2:2014, 2.10 (reversal error). \[2\] A. Visintin, Differential Models of Hysteresis,
 //! Springer 1994, ch. III (play operator).
 

@@ -74,6 +74,11 @@ impl Travel {
         }
     }
 
+    /// One over the half travel.
+    pub(super) const fn per_half(self) -> f64 {
+        self.per_half
+    }
+
     /// Share of the half travel, (2).
     pub(super) fn share(self, position: f64) -> f64 {
         (position - self.middle) * self.per_half

@@ -44,8 +44,12 @@ pub enum Targets {
     Across,
     /// Each linear axis and each direction of turning, e.g. `CX`: yaw of X.
     Turning,
+    /// Each linear axis in the direction of gravity, e.g. `ZY`.
+    Sagging,
     /// Each component of location of a rotary axis, e.g. `X0C`.
     RotaryLocations,
+    /// Each error motion of a rotary axis, e.g. `XC`.
+    RotaryMotions,
     /// The machine as a whole; the entry names no axis.
     Machine,
     /// Each thermometer of the machine file.
@@ -231,6 +235,11 @@ impl Kind {
                 })
                 .collect(),
             Targets::Across => named(motions(|c| !c.is_angular() && c.direction != c.of)),
+            Targets::Sagging => named(motions(|c| c.direction == Axis::Z && c.of != Axis::Z)),
+            Targets::RotaryMotions => {
+                let of_axes = rotary().flat_map(ErrorComponent::motions_of);
+                of_axes.map(Target::Component).collect()
+            }
             Targets::Turning => named(motions(|c| c.is_angular())),
             Targets::RotaryLocations => named(
                 locations()

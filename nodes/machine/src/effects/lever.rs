@@ -49,6 +49,11 @@ pub(super) fn add(
     }
 }
 
+/// mm per µm of a displacement, rad per µrad of a turn.
+pub(super) const fn per_micro(component: ErrorComponent) -> f64 {
+    if component.is_angular() { 1e-6 } else { 1e-3 }
+}
+
 struct Lever<'a> {
     scene: &'a Scene<'a>,
     component: ErrorComponent,

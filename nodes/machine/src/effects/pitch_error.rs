@@ -18,7 +18,10 @@
 //! The error is of the screw, between motor and slide. Not modelled: a period shorter than a quarter of the
 //! travel (see `cyclic_error`).
 //!
-//! # References
+//! # Agreement
+//! `val_a_screw_of_drifting_lead`: of 1.44 µm with a bump 0.1 m long, (1) leaves 0.44, (2) 0.094.
+//!
+//! # References (from memory)
 //! \[1\] ISO 230-2:2014, clause 3 (positioning deviations). \[2\] ISO 3408-3:2006 (travel deviation of
 //! ball screws).
 

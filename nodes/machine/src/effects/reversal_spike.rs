@@ -30,7 +30,12 @@
 //! # Holds when
 //! The axis had left its earlier reversal behind. Seen by the motor's encoder, as a servo error.
 //!
-//! # References
+//! # Agreement
+//! `eq1_a_step_into_a_loop_of_two_equal_poles`: 0.1 % of the height.
+//! `val_lugre_friction_under_a_cascaded_loop`: of a LuGre drive under position and velocity loops, at two feeds
+//! and radii with one height, (2) leaves 39 % of the rms, (3) 33 %.
+//!
+//! # References (from memory)
 //! \[1\] C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, IEEE Trans. Autom. Control 40(3),
 //! 1995, doi:10.1109/9.376053 (the friction of the test).
 

@@ -18,7 +18,10 @@
 //! # Holds when
 //! The error is between motor and slide. Expansion with a time constant of its own is another effect.
 //!
-//! # References
+//! # Agreement
+//! `val_steel_off_the_reference_temperature_of_iso_1`: 34.5 µm for 300 mm of steel at 30 degC.
+//!
+//! # References (from memory)
 //! \[1\] ISO 230-2:2014, clause 3; ISO 1:2016 (20 degC).
 
 use metrology::Axis;

@@ -18,6 +18,10 @@
 //! The velocity changes little within T: the next term is `acceleration_lag`. A circle shows only the
 //! difference of its axes' lags (and their mean as a turn of the start).
 //!
+//! # Agreement
+//! `val_a_loop_of_first_order_integrated_finely`: 0.1 µm of 100 µm, the next order.
+//! `val_mismatch_is_an_ellipse_at_45_degrees`: 3.33 µm for 0.2 ms at 2 m/min.
+//!
 //! # References
 //! \[1\] ISO 230-4:2022, annex B (following errors on circular paths; from memory).
 

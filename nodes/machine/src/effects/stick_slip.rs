@@ -1,0 +1,70 @@
+//! Stick-slip: below a critical feed an axis stands and jumps instead of creeping.
+//!
+//! # Model
+//!
+//! A saw-tooth of height h, whose phase does not repeat, has a variance of h2/12; the height goes to zero at
+//! the critical feed:
+//!
+//! ```text
+//!   variance = (h2 / 12) (1 - |v|/v_c)^2   for 0 < |v| < v_c              (1)
+//! ```
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | h | `height_um` | µm |
+//! | v_c | `critical_mm_s` | mm/s |
+//!
+//! # Holds when
+//! Each jump begins somewhere else, so that only the scatter shows it.
+//!
+//! # Agreement
+//! `val_a_block_dragged_by_a_spring`: 2.1 % of the variance of a block with static and sliding friction.
+//!
+//! # References (from memory)
+//! \[1\] B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30(7), 1994,
+//! doi:10.1016/0005-1098(94)90209-7 (stick-slip and the critical velocity).
+
+use metrology::Axis;
+
+use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
+use crate::twin::Response;
+
+/// Entry of the catalogue.
+pub static KIND: Kind = Kind {
+    id: "stick_slip",
+    title: "stick-slip at slow feeds",
+    targets: Targets::LinearAxes,
+    parameters: &[
+        Parameter::size("height_um", 50.0, 2.0),
+        Parameter::shape("critical_mm_s", [0.05, 50.0], 2.0, &[0.5, 2.0, 8.0]),
+    ],
+    free: &[],
+    moment: Moment::Variance,
+    needs: "motion of the axis below a few mm/s",
+    build: |target, values| {
+        Box::new(StickSlip {
+            axis: target.axis(),
+            variance_mm2: (values[0] * 1e-3).powi(2) / 12.0,
+            critical_mm_s: values[1],
+        })
+    },
+};
+
+struct StickSlip {
+    axis: Axis,
+    variance_mm2: f64,
+    critical_mm_s: f64,
+}
+
+impl Effect for StickSlip {
+    fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        let velocity = &scene.run.motion.velocity[self.axis];
+        let sums = &mut response.tip_variance_mm2[self.axis.index()];
+        for (sum, v) in sums.iter_mut().zip(velocity) {
+            let share = v.abs() / self.critical_mm_s;
+            if share > 0.0 && share < 1.0 {
+                *sum += self.variance_mm2 * (1.0 - share).powi(2); // (1)
+            }
+        }
+    }
+}

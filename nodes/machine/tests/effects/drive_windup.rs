@@ -1,0 +1,48 @@
+//! Wind-up of a drive against a mass on a spring.
+
+use metrology::{Axis, AxisSet};
+
+use crate::scene::{TICK_S, greatest, integrate, response_of, run, three_axes};
+
+#[test]
+fn val_a_mass_on_a_spring() {
+    let machine = three_axes("[w X' Y' b Z t]");
+    let (radius_mm, rate, natural) = (20.0, 10.0, 150.0_f64);
+    let run = run(2000, AxisSet::XYZ, |t| {
+        [radius_mm * (rate * t).cos(), 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+    let ratio = (rate / natural).powi(2);
+    let spring = |t: f64, y: &[f64; 2]| {
+        [
+            y[1],
+            natural * natural * (radius_mm * (rate * t).cos() - y[0]),
+        ]
+    };
+    let slide = integrate(
+        [radius_mm / (1.0 - ratio), 0.0],
+        TICK_S / 10.0,
+        19_990,
+        10,
+        spring,
+    );
+    let given = [("windup_um", 1000.0 / (natural * natural) * 1e3)];
+    let response = response_of(&machine, &run, "drive_windup", "X", &given);
+    let off = (2..1998)
+        .map(|k| slide[k][0] - run.motion.position[Axis::X][k] - response.drive[Axis::X][k]);
+    let most_um = greatest(response.drive[Axis::X].iter().copied()) * 1e3;
+    let off_um = greatest(off) * 1e3;
+    println!("wind-up {most_um:.2} um, off by {off_um:.3} um");
+    assert!(off_um < 1.2 * ratio * most_um, "{off_um}");
+}
+
+#[test]
+fn eq1_a_screw_is_softer_at_its_free_end() {
+    let machine = three_axes("[w X' Y' b Z t]");
+    let run = run(101, AxisSet::XYZ, |t| {
+        [160.0 + 500.0 * (t - 0.05).powi(2), 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+    let given = [("windup_um", 2.0), ("free_by_place_um", 1.0)];
+    let response = response_of(&machine, &run, "drive_windup", "X", &given);
+    // 1000 mm/s2 at half of the half travel.
+    assert!((response.drive[Axis::X][50] + 2.5e-3).abs() < 1e-6);
+}
