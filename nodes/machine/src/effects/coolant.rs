@@ -33,7 +33,7 @@ use crate::twin::Response;
 
 /// Instants that are tried for an event, min since the session began.
 pub(super) const EVENT_GRID_MIN: &[f64] = &[
-    2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 60.0, 90.0, 120.0, 180.0,
+    1.0, 2.0, 3.5, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 120.0,
 ];
 
 /// Entry of the catalogue.

@@ -23,6 +23,27 @@ fn ids_are_the_names_of_the_files_and_unique() {
 }
 
 #[test]
+fn the_readme_lists_every_effect_and_no_other() {
+    let readme = include_str!("../../README.md");
+    let rows = |line: &&str| line.starts_with("| `") && line.split('|').count() == 6;
+    let section = readme
+        .split("## ")
+        .find(|part| part.starts_with("Twin and effects"));
+    let listed: Vec<_> = section.unwrap().lines().filter(rows).collect();
+    assert_eq!(listed.len(), CATALOGUE.len());
+    for (row, kind) in listed.iter().zip(CATALOGUE) {
+        let cells: Vec<_> = row.split('|').map(str::trim).collect();
+        assert_eq!(cells[1], format!("`{}`", kind.id));
+        assert_eq!(
+            (cells[2], cells[4]),
+            (kind.title, kind.needs),
+            "{}",
+            kind.id
+        );
+    }
+}
+
+#[test]
 fn every_effect_is_described() {
     for kind in CATALOGUE {
         let id = kind.id;
