@@ -17,6 +17,7 @@ mod compensation;
 mod cycle;
 mod error;
 mod feature;
+mod gap;
 mod geometry;
 mod interface;
 mod motion;

@@ -7,9 +7,9 @@ use std::marker::PhantomData;
 use crate::action::{RunCycle, RunProgram};
 use crate::diagnostic_msgs::msg::DiagnosticArray;
 use crate::msg::{
-    AxisCompensation, AxisState, BlockMeasurement, GeometryModel, GridSample, LengthSample,
-    PlanStatus, PositioningTable, ProbeLatency, ProbeTrigger, ProbedFeature, ProbedPoint,
-    TestSegment, ThermalModel, ThermalUpdateRequest,
+    AxisCompensation, AxisState, BlockMeasurement, GapReport, GeometryModel, GridSample,
+    LengthSample, PlanStatus, PositioningTable, ProbeLatency, ProbeTrigger, ProbedFeature,
+    ProbedPoint, TestSegment, ThermalModel, ThermalUpdateRequest,
 };
 use crate::qos::{Durability, Qos, Reliability};
 use crate::rcl_interfaces::msg::{Log, ParameterEvent};
@@ -197,6 +197,8 @@ topics! {
     POSITIONING_TABLE: PositioningTable = "positioning/table", POSITIONING_QOS, Computed;
     /// Offsets added to the commands, at every servo tick.
     COMPENSATION: AxisCompensation = "compensation", Qos::RELIABLE_DEEP, Computed;
+    /// Where simulator and machine differ.
+    GAP_REPORT: GapReport = "gap/report", Qos::LATCHED, Housekeeping;
     /// Begin and end of tests.
     TEST_SEGMENT: TestSegment = "test/segment", Qos::RELIABLE, Raw;
     /// What the sequencer is doing.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
 /// Crates without clock, file, environment, entropy, log or ROS.
-pub const PURE: [&str; 10] = [
+pub const PURE: [&str; 11] = [
     "metrology",
     "machine",
     "probe",
@@ -15,6 +15,7 @@ pub const PURE: [&str; 10] = [
     "axis_compensation",
     "rotary_axes",
     "sequencer",
+    "gap_diagnosis",
     "fake_cnc",
 ];
 

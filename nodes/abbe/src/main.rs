@@ -9,9 +9,11 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod diagnose;
 mod evaluate;
 mod evidence;
 mod export;
+mod import;
 mod launch;
 mod node;
 mod progress;
@@ -36,8 +38,12 @@ enum Verb {
     Run(run::Run),
     /// Evaluate the tests that a bag holds.
     Report(report_bag::ReportBag),
+    /// Say where simulator and machine differ, which effect causes it, and how far it shrinks.
+    Diagnose(diagnose::Diagnose),
     /// Record topics of the ROS graph into a bag.
     Record(record::Record),
+    /// Make a bag of a table that a laser, a ballbar or a logger wrote.
+    Import(import::Import),
     /// Make compensation tables for a control from what a bag knows.
     Export(export::Export),
     /// Run one node on the ROS graph, with the arguments of any ROS 2 node.
@@ -48,7 +54,9 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().verb {
         Verb::Run(run) => run.execute(),
         Verb::Report(report) => report.execute(),
+        Verb::Diagnose(diagnose) => diagnose.execute(),
         Verb::Record(record) => record.execute(),
+        Verb::Import(import) => import.execute(),
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => return node.execute(),
     };

@@ -14,6 +14,7 @@ pub type Builder = fn(&Setup) -> Result<Box<dyn Node>>;
 pub const NODES: &[(&str, Builder)] = &[
     ("axis_compensation", axis_compensation_node::node),
     ("fake_cnc", fake_cnc_node::node),
+    ("gap_diagnosis", gap_diagnosis_node::node),
     ("grid_encoder", grid_encoder_node::node),
     ("latency_calibrator", latency_calibrator_node::node),
     ("linuxcnc_bridge", linuxcnc_bridge_node::node),

@@ -12,6 +12,7 @@ mod blocks;
 pub mod circular;
 mod conditions;
 mod feeds;
+pub mod gap;
 pub mod geometry;
 mod latency;
 mod page;
@@ -49,7 +50,7 @@ impl Report {
             ReportKind::Thermal => thermal::write(title, evidence),
             ReportKind::Rotary => rotary::write(title, evidence),
             ReportKind::Latency | ReportKind::Blocks => latency::write(title, evidence),
-            ReportKind::Tests => Ok(Self::of_verifications(title, evidence)),
+            ReportKind::Tests | ReportKind::Gap => Ok(Self::of_verifications(title, evidence)),
         }
     }
 
@@ -94,12 +95,25 @@ impl Report {
         text
     }
 
+    /// This report with the diagnosis of its bag behind it.
+    pub fn join_gap(&mut self, gap: &Self) {
+        self.text.push_str("\n\n");
+        self.text.push_str(&gap.terminal());
+        self.body = maud::html! { (self.body) (gap.body) };
+        self.figures["gap"] = gap.figures.clone();
+    }
+
+    /// The page as one HTML text.
+    pub fn html(&self) -> String {
+        page::page(&self.title, &self.body)
+    }
+
     /// Writes `report.html` and `report.json` into `folder`.
     ///
     /// # Errors
     /// When a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        let html = page::page(&self.title, &self.body);
+        let html = self.html();
         let figures = serde_json::to_string_pretty(&self.figures)?;
         for (name, text) in [("report.html", html), ("report.json", figures)] {
             let path = folder.join(name);

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use recorder::Bag;
 
+use crate::diagnose;
 use crate::evaluate::Tests;
 use crate::evidence::Evidence;
 use crate::report::Report;
@@ -72,6 +73,10 @@ impl Run {
         if scenario.file.report == ReportKind::Tests && outcome.recorded > 0 {
             let tests = Tests::of(&Bag::open(&bag)?)?;
             report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
+        }
+        if scenario.file.diagnose && outcome.recorded > 0 {
+            let machine = scenario.folder.join("machine.yaml");
+            report.join_gap(&diagnose::of_run(&bag, &folder, &machine)?);
         }
         let kept = format!(
             "Bag: {} ({} messages, {} lost).",

@@ -16,6 +16,9 @@ pub struct ScenarioFile {
     pub title: String,
     /// Which page is written at the end.
     pub report: ReportKind,
+    /// Whether the run ends with the diagnosis of its own bag.
+    #[serde(default)]
+    pub diagnose: bool,
     /// First instant of simulated time, seconds since the epoch; `None`: the scenario runs on real time.
     #[serde(default)]
     pub simulated_start_s: Option<i64>,
@@ -35,6 +38,8 @@ pub enum ReportKind {
     Blocks,
     /// Location errors of the rotary axes, tool error before and after their compensation.
     Rotary,
+    /// The diagnosis of simulator against machine alone (with `diagnose`).
+    Gap,
     /// Every test that the bag holds, and the tool error where it was verified.
     Tests,
 }

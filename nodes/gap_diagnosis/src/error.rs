@@ -28,6 +28,17 @@ pub enum GapError {
         value: f64,
         low: f64,
     },
+    /// A parameter of the node outside its range.
+    #[error("{name} = {value}: must be within {low} and {high}")]
+    Parameter {
+        name: &'static str,
+        value: f64,
+        low: f64,
+        high: f64,
+    },
+    /// The samples are no session of this machine.
+    #[error(transparent)]
+    Session(#[from] crate::session::SessionError),
     /// An id that the catalogue does not have.
     #[error("left_out: `{id}` is not in the catalogue")]
     LeftOut { id: String },

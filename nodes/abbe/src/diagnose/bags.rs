@@ -1,0 +1,152 @@
+//! Reads bags into one session.
+
+use std::path::{Path, PathBuf};
+
+use abbe_msgs::topics::{self, Topic};
+use abbe_msgs::{Message, Wire, from_cdr};
+use anyhow::{Context, Result, bail};
+use gap_diagnosis::report;
+use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
+use machine::MachineFile;
+use machine::twin::Session;
+use recorder::{Bag, Event, Order};
+use sha2::{Digest, Sha256};
+
+/// What bags hold, as one session.
+pub struct Recorded {
+    /// The session.
+    pub session: Session,
+    /// Each bag with its hash and counts.
+    pub bags: Vec<report::Bag>,
+    /// What was left out, in words.
+    pub remarks: Vec<String>,
+    /// What could not be read, in words.
+    pub losses: Vec<String>,
+}
+
+impl Recorded {
+    /// Reads bags one after another.
+    ///
+    /// # Errors
+    /// When one cannot be read, holds a message that is none, or is another machine's.
+    pub fn read(paths: &[PathBuf], machine: &MachineFile) -> Result<Self> {
+        let mut builder = SessionBuilder::new(machine, SessionConfig::default())?;
+        let (mut losses, mut hashes, mut ends) = (vec![], vec![], vec![]);
+        for path in paths {
+            let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
+            builder.next_bag();
+            losses.extend(
+                messages(&bag, &mut builder).with_context(|| format!("bag {}", path.display()))?,
+            );
+            hashes.push(hash(&bag)?);
+            builder.end_bag();
+            ends.push(builder.runs().len());
+        }
+        let (session, account) = builder.finish()?;
+        let mut from = 0;
+        let bags = paths
+            .iter()
+            .zip(hashes)
+            .zip(ends)
+            .map(|((path, sha256), end)| {
+                let runs = session.runs.get(from..end).unwrap_or(&[]);
+                from = end;
+                report::Bag {
+                    path: path.display().to_string(),
+                    sha256,
+                    runs: runs.len(),
+                    samples: runs.iter().map(|run| run.readings.len()).sum(),
+                }
+            });
+        let bags = bags.collect();
+        Ok(Self {
+            session,
+            bags,
+            remarks: account.remarks().collect(),
+            losses,
+        })
+    }
+}
+
+/// The machine file that a bag was recorded with.
+///
+/// # Errors
+/// When the bag has none.
+pub fn machine_text(path: &Path) -> Result<(String, String)> {
+    let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
+    let Some(attachment) = bag.attachment("machine.yaml")? else {
+        bail!(
+            "bag {}: holds no machine file: name it with --machine",
+            path.display()
+        );
+    };
+    let name = format!("machine.yaml of {}", path.display());
+    let text = String::from_utf8(attachment.data).with_context(|| name.clone())?;
+    Ok((name, text))
+}
+
+fn hash(bag: &Bag) -> Result<String> {
+    let mut hash = Sha256::new();
+    for path in bag.files() {
+        let mut file = std::fs::File::open(path).with_context(|| format!("{}", path.display()))?;
+        std::io::copy(&mut file, &mut hash).with_context(|| format!("{}", path.display()))?;
+    }
+    Ok(format!("{:x}", hash.finalize()))
+}
+
+fn messages(bag: &Bag, builder: &mut SessionBuilder) -> Result<Vec<String>> {
+    let names: Vec<String> = bag
+        .topics()
+        .iter()
+        .map(|info| info.topic.trim_start_matches('/').to_owned())
+        .collect();
+    let mut losses = vec![];
+    let mut messages = bag.messages(Order::LogTime);
+    while let Some(event) = messages.next_event() {
+        match event {
+            Event::Message(message) => {
+                let name = names.get(message.topic.index()).map_or("", String::as_str);
+                if let Some(input) = input(name, message.data)? {
+                    builder.take(input);
+                }
+            }
+            Event::Loss(loss) => losses.push(format!("{loss}")),
+        }
+    }
+    Ok(losses)
+}
+
+/// Whether `name` is `topic`, in whatever namespace.
+fn is<M: Message>(name: &str, topic: &Topic<M>) -> bool {
+    name.strip_suffix(topic.name)
+        .is_some_and(|space| space.is_empty() || space.ends_with('/'))
+}
+
+fn read<M: Message + Wire>(_: &Topic<M>, bytes: &[u8]) -> Result<M::Inner> {
+    Ok(from_cdr::<M>(bytes)?.into_inner()?)
+}
+
+fn input(name: &str, bytes: &[u8]) -> Result<Option<Input>> {
+    Ok(Some(if is(name, &topics::AXES_STATE) {
+        Input::State(read(&topics::AXES_STATE, bytes)?)
+    } else if is(name, &topics::GRID_POSITION) {
+        Input::Grid(read(&topics::GRID_POSITION, bytes)?)
+    } else if is(name, &topics::LENGTH_POSITION) {
+        Input::Length(read(&topics::LENGTH_POSITION, bytes)?)
+    } else if is(name, &topics::COMPENSATION) {
+        Input::Compensation(read(&topics::COMPENSATION, bytes)?)
+    } else if is(name, &topics::PROBE_TRIGGER) {
+        Input::Trigger(read(&topics::PROBE_TRIGGER, bytes)?)
+    } else if is(name, &topics::BLOCKS_MEASUREMENT) {
+        Input::Block(read(&topics::BLOCKS_MEASUREMENT, bytes)?)
+    } else if is(name, &topics::TEST_SEGMENT) {
+        Input::Segment(read(&topics::TEST_SEGMENT, bytes)?)
+    } else if let Some(sensor) = topics::TEMPERATURE.member_of(name) {
+        let mut sample =
+            from_cdr::<abbe_msgs::sensor_msgs::msg::Temperature>(bytes)?.into_inner()?;
+        sensor.clone_into(&mut sample.sensor);
+        Input::Temperature(sample)
+    } else {
+        return Ok(None);
+    }))
+}

@@ -1,0 +1,97 @@
+//! The numbers of the columns that a map names.
+
+use anyhow::{Context, Result, bail};
+
+use super::map::Map;
+
+/// Rows of numbers, in the order of the map's columns.
+#[derive(Debug)]
+pub struct Table {
+    /// Rows.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// Reads a CSV text; lines that begin with `#` are comments.
+    ///
+    /// # Errors
+    /// Names the column that is missing, or line, column and text of a cell that is no number.
+    pub fn read(text: &str, map: &Map) -> Result<Self> {
+        let separator = u8::try_from(map.separator).context("separator: must be one byte")?;
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(separator)
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let head = reader.headers()?.clone();
+        let columns = map.test.columns();
+        let place = |name: &&str| {
+            head.iter().position(|cell| cell == *name).with_context(|| {
+                let there: Vec<&str> = head.iter().collect();
+                format!("no column \"{name}\"; there are {}", there.join(", "))
+            })
+        };
+        let places: Vec<usize> = columns.iter().map(place).collect::<Result<_>>()?;
+        let mut rows = vec![];
+        for record in reader.records() {
+            let record = record?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let mut row = vec![];
+            for (place, name) in places.iter().zip(&columns) {
+                let cell = record.get(*place).unwrap_or("");
+                let number = cell.replace(map.decimal, ".").parse::<f64>();
+                match number {
+                    Ok(number) if number.is_finite() => row.push(number),
+                    _ => bail!("line {line}, column \"{name}\": \"{cell}\": must be a number"),
+                }
+            }
+            rows.push(row);
+        }
+        if rows.is_empty() {
+            bail!("no rows");
+        }
+        Ok(Self { rows })
+    }
+
+    /// Rows that follow one another with one value in the first column.
+    pub fn runs(&self) -> impl Iterator<Item = &[Vec<f64>]> {
+        let number = |row: &Vec<f64>| row.first().map_or(0, |run| run.to_bits());
+        self.rows.chunk_by(move |a, b| number(a) == number(b))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MAP: &str = "
+separator: ';'
+decimal: ','
+start_s: 1767600000
+test:
+  circle: {plane: XY, centre_mm: [0.0, 0.0, 0.0], radius_mm: 100.0, feed_mm_min: 1000.0, run: n, angle_deg: w, radial_um: r}
+";
+
+    fn map() -> Map {
+        serde_saphyr::from_str(MAP).expect("a map")
+    }
+
+    #[test]
+    fn columns_are_found_by_name_with_the_decimals_of_the_map() {
+        let table =
+            Table::read("# made by hand\nn;x;r;w\n1;9;0,5;10\n2;9;-1;20\n", &map()).expect("rows");
+        assert_eq!(table.rows, [vec![1.0, 10.0, 0.5], vec![2.0, 20.0, -1.0]]);
+        assert_eq!(table.runs().count(), 2);
+    }
+
+    #[test]
+    fn a_missing_column_and_a_broken_cell_are_named() {
+        let missing = Table::read("n;r\n1;2\n", &map()).expect_err("no angle");
+        assert!(format!("{missing:#}").contains("no column \"w\"; there are n, r"));
+        let broken = Table::read("n;w;r\n1;2;abc\n", &map()).expect_err("no number");
+        assert_eq!(
+            format!("{broken:#}"),
+            "line 2, column \"r\": \"abc\": must be a number"
+        );
+    }
+}

@@ -1,0 +1,386 @@
+//! The diagnosis of simulator against machine, as a page: three answers first, tables and drawings after.
+
+use anyhow::Result;
+use gap_diagnosis::report::{Cause, GapReport, Status};
+use machine::effects;
+use maud::html;
+
+use super::Report;
+use super::section::{Rows, Section, head};
+use crate::diagnose::Diagnosed;
+
+mod drawings;
+mod matrix;
+mod sentences;
+
+/// Most rows of a table on the page.
+const MOST_ROWS: usize = 24;
+
+/// The page of a diagnosis.
+///
+/// # Errors
+/// When a drawing cannot be made.
+pub fn page(title: &str, diagnosed: &Diagnosed) -> Result<Report> {
+    let report = &diagnosed.diagnosis.report;
+    let figures = &diagnosed.diagnosis.figures;
+    let lines = sentences::answers(report);
+    let sections = sections(diagnosed);
+    let notes: Vec<String> = notes(diagnosed);
+    let traces = drawings::traces(&figures.traces)?;
+    let text = sections
+        .iter()
+        .map(Section::terminal)
+        .chain(matrix::terminal(&figures.isolability))
+        .chain((!notes.is_empty()).then(|| format!("Remarks\n{}\n", notes.join("\n"))))
+        .collect::<Vec<_>>()
+        .join("\n");
+    Ok(Report {
+        title: title.to_owned(),
+        text,
+        body: html! {
+            h1 { (title) }
+            (matrix::style())
+            @for line in &lines { p { (line) } }
+            (matrix::heat(&figures.heat))
+            @for trace in &traces { (trace) }
+            @for section in &sections { (section.html()) }
+            (matrix::isolability(&figures.isolability))
+            @if !notes.is_empty() {
+                h2 { "Remarks" }
+                @for note in &notes { p.note { (note) } }
+            }
+            p.note { (read(report)) }
+        },
+        figures: serde_json::to_value(report)?,
+        lines,
+    })
+}
+
+/// The page of a recording that cannot be diagnosed.
+pub fn without(title: &str, reason: &str) -> Report {
+    let line = format!("No diagnosis: {reason}.");
+    Report {
+        title: title.to_owned(),
+        text: String::new(),
+        body: html! { h2 { (title) } p { (line) } },
+        figures: serde_json::json!({ "refused": reason }),
+        lines: vec![line],
+    }
+}
+
+fn read(report: &GapReport) -> String {
+    let bags = report.inputs.bags.iter().map(|bag| {
+        let hash = bag.sha256.get(..12).unwrap_or("");
+        format!(
+            "{} ({} runs, {} readings, sha256 {hash})",
+            bag.path, bag.runs, bag.samples
+        )
+    });
+    let bags: Vec<String> = bags.collect();
+    format!(
+        "Read: {}. Diagnosed in {:.1} s. Intervals are 95 %.",
+        bags.join("; "),
+        report.runtime_s
+    )
+}
+
+fn notes(diagnosed: &Diagnosed) -> Vec<String> {
+    let notes = diagnosed.diagnosis.notes.iter().map(ToString::to_string);
+    notes
+        .chain(diagnosed.losses.iter().cloned())
+        .chain(diagnosed.remarks.iter().cloned())
+        .collect()
+}
+
+/// A number with three significant digits.
+fn three(value: f64) -> String {
+    let size = value.abs();
+    match () {
+        () if !value.is_finite() => "—".to_owned(),
+        () if size >= 100.0 => format!("{value:.0}"),
+        () if size >= 10.0 => format!("{value:.1}"),
+        () if size >= 1.0 || size == 0.0 => format!("{value:.2}"),
+        () => format!("{value:.3}"),
+    }
+}
+
+fn maybe(value: Option<f64>) -> String {
+    value.map_or_else(|| "—".to_owned(), three)
+}
+
+/// Name of an effect as a metrologist says it, with what it acts on.
+fn name(effect: &str, axis: &str) -> String {
+    let title = effects::kind(effect).map_or(effect, |kind| kind.title);
+    format!("{title} {axis}").trim_end().to_owned()
+}
+
+fn sections(diagnosed: &Diagnosed) -> Vec<Section> {
+    let report = &diagnosed.diagnosis.report;
+    let all = [
+        causes(report),
+        places(report),
+        gap(report),
+        held_out(diagnosed),
+        next(report),
+        not_excited(report),
+    ];
+    all.into_iter()
+        .filter(|section| section.tables.iter().any(|table| !table.rows.is_empty()))
+        .collect()
+}
+
+fn section(title: &str, names: &[&str], rows: Vec<Vec<String>>, note: &str) -> Section {
+    Section {
+        tables: vec![Rows {
+            head: head(names),
+            rows,
+            note: note.to_owned(),
+        }],
+        ..Section::new(title)
+    }
+}
+
+fn causes(report: &GapReport) -> Section {
+    let rows = report.causes.iter().map(|cause| {
+        vec![
+            name(&cause.effect, &cause.axis),
+            status(cause.status).to_owned(),
+            format!("{:.2}", cause.confidence),
+            three(cause.d),
+            constancy(cause),
+            alike(cause),
+        ]
+    });
+    let names = [
+        "effect",
+        "status",
+        "confidence",
+        "D",
+        "one size under all conditions",
+        "looks like",
+    ];
+    let mut section = section(
+        "Causes",
+        &names,
+        rows.collect(),
+        "D: size over noise, whitened; effects are found reliably from about 8.",
+    );
+    section.tables.push(sizes(report));
+    section
+}
+
+/// Parameters, one a row.
+fn sizes(report: &GapReport) -> Rows {
+    let of_cause = |cause: &Cause| -> Vec<Vec<String>> {
+        let title = name(&cause.effect, &cause.axis);
+        let row = |p: &gap_diagnosis::report::ParameterValue| {
+            vec![
+                title.clone(),
+                p.name.clone(),
+                three(p.value),
+                three(p.low),
+                three(p.high),
+                if p.at_bound { "at its bound" } else { "" }.to_owned(),
+            ]
+        };
+        cause.parameters.iter().map(row).collect()
+    };
+    Rows {
+        head: head(&[
+            "effect",
+            "key of the machine file",
+            "value",
+            "from",
+            "to",
+            "",
+        ]),
+        rows: report.causes.iter().flat_map(of_cause).collect(),
+        note: "From and to: 95 % interval.".to_owned(),
+    }
+}
+
+fn status(status: Status) -> &'static str {
+    match status {
+        Status::Named => "named",
+        Status::Surrogate => "looks like it",
+        Status::Set => "one of a set",
+    }
+}
+
+fn values(cause: &Cause) -> String {
+    let value = |p: &gap_diagnosis::report::ParameterValue| {
+        let bound = if p.at_bound { ", at its bound" } else { "" };
+        format!(
+            "{} = {} ({} to {}{bound})",
+            p.name,
+            three(p.value),
+            three(p.low),
+            three(p.high)
+        )
+    };
+    let all: Vec<String> = cause.parameters.iter().map(value).collect();
+    all.join(", ")
+}
+
+fn constancy(cause: &Cause) -> String {
+    let constancy = &cause.constancy;
+    if constancy.split_by.is_empty() {
+        return "one condition only".to_owned();
+    }
+    let word = if constancy.passed { "yes" } else { "no" };
+    format!(
+        "{word}, z {} by {}",
+        three(constancy.worst_z),
+        constancy.split_by
+    )
+}
+
+fn alike(cause: &Cause) -> String {
+    let open = cause.confusable_with.iter().filter(|other| !other.excluded);
+    let names: Vec<String> = open
+        .map(|other| {
+            format!(
+                "{} (cos {:.2})",
+                name(&other.effect, &other.axis),
+                other.cos
+            )
+        })
+        .collect();
+    if names.is_empty() {
+        "nothing else".to_owned()
+    } else {
+        names.join(", ")
+    }
+}
+
+fn places(report: &GapReport) -> Section {
+    let rows = report.r#where.iter().take(MOST_ROWS).map(|place| {
+        vec![
+            place.channel.clone(),
+            place.direction.clone(),
+            place.covariate.clone(),
+            format!("{:.0} %", 100.0 * place.share_unique),
+            format!("{:.0} %", 100.0 * place.share_shared),
+            format!("{:.3}", place.p_value),
+            three(place.z),
+        ]
+    });
+    let names = [
+        "channel",
+        "direction",
+        "goes with",
+        "alone",
+        "shared",
+        "p",
+        "z",
+    ];
+    section(
+        "Where the gap lies",
+        &names,
+        rows.collect(),
+        "Alone: share of the structured gap that only this explains; p: chance of so much in noise, over all places that were looked at.",
+    )
+}
+
+fn gap(report: &GapReport) -> Section {
+    let rows = report.gap.per_channel.iter().map(|channel| {
+        let noise = report
+            .noise_floor
+            .iter()
+            .find(|n| n.channel == channel.channel);
+        let of = |value: fn(&gap_diagnosis::report::NoiseFloor) -> String| {
+            noise.map_or_else(|| "—".to_owned(), value)
+        };
+        vec![
+            channel.channel.clone(),
+            three(channel.rms_um),
+            three(channel.p95_um),
+            three(channel.floor_um),
+            if channel.above_floor { "yes" } else { "no" }.to_owned(),
+            of(|n| three(n.sigma_um)),
+            of(|n| three(n.between_runs_um)),
+            of(|n| n.repeats.to_string()),
+            of(|n| if n.reproduced { "yes" } else { "no" }.to_owned()),
+        ]
+    });
+    let names = [
+        "channel",
+        "gap rms µm",
+        "95 % µm",
+        "floor µm",
+        "above it",
+        "noise of a reading µm",
+        "between runs µm",
+        "repeats",
+        "reproduced",
+    ];
+    section(
+        "Gap and noise floor",
+        &names,
+        rows.collect(),
+        "Rotary axes in mrad, thermometers in mK.",
+    )
+}
+
+fn held_out(diagnosed: &Diagnosed) -> Section {
+    let report = &diagnosed.diagnosis.report;
+    let runs = diagnosed.diagnosis.figures.held_out.iter().map(|run| {
+        vec![
+            format!("run {}: {}", run.run, run.title),
+            three(run.before_um),
+            three(run.after_um),
+            three(run.floor_um),
+        ]
+    });
+    let names = ["run", "before µm", "after µm", "floor µm"];
+    let mut section = section(
+        "Runs before and after",
+        &names,
+        runs.collect(),
+        "Root mean square of machine minus simulator, set-up floated.",
+    );
+    let without = report
+        .shrink
+        .leave_one_out
+        .iter()
+        .map(|out| vec![name(&out.effect, &out.axis), three(out.rms_um_without)]);
+    let without: Vec<Vec<String>> = without.collect();
+    if !without.is_empty() {
+        section.tables.push(Rows {
+            head: head(&["effect taken out again", "rms without it µm"]),
+            rows: without,
+            note: String::new(),
+        });
+    }
+    section
+}
+
+fn next(report: &GapReport) -> Section {
+    let rows = report.next_experiments.iter().map(|next| {
+        vec![
+            next.run.clone(),
+            next.separates.join(" / "),
+            three(next.delta),
+            three(next.minutes),
+        ]
+    });
+    section(
+        "What to measure next",
+        &["run", "tells apart", "squared distance", "minutes"],
+        rows.collect(),
+        "A squared distance of 9 or more is a decision.",
+    )
+}
+
+fn not_excited(report: &GapReport) -> Section {
+    let rows = report.not_excited.iter().map(|effect| {
+        let kind = name(&effect.effect, "");
+        vec![kind, effect.needs.clone()]
+    });
+    section(
+        "Effects that this recording could not show",
+        &["effect", "needs"],
+        rows.collect(),
+        "",
+    )
+}

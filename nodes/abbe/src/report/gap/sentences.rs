@@ -1,0 +1,144 @@
+//! One sentence for each question: where, which, how far.
+
+use gap_diagnosis::report::{Cause, GapReport, Status};
+
+use super::{maybe, name, three, values};
+
+/// The three answers.
+pub(super) fn answers(report: &GapReport) -> Vec<String> {
+    vec![place(report), cause(report), shrink(report)]
+}
+
+fn place(report: &GapReport) -> String {
+    let gap = &report.gap;
+    if !gap.above_floor {
+        return format!(
+            "Where: no gap above the noise floor; machine and simulator differ by {} µm rms, noise alone gives {} µm.",
+            three(gap.rms_um),
+            three(gap.floor_um)
+        );
+    }
+    let size = format!(
+        "machine and simulator differ by {} µm rms (95 % within {} µm; noise alone gives {} µm)",
+        three(gap.rms_um),
+        three(gap.p95_um),
+        three(gap.floor_um)
+    );
+    match report.r#where.first() {
+        Some(place) => format!(
+            "Where: {size}; most of it is in {} {}, going with {} ({:.0} % of the structured gap lies there alone).",
+            place.channel,
+            place.direction,
+            place.covariate,
+            100.0 * place.share_unique
+        ),
+        None => {
+            let most = report.gap.per_channel.iter();
+            let most = most.max_by(|a, b| a.rms_um.total_cmp(&b.rms_um));
+            let channel = most.map_or("", |channel| channel.channel.as_str());
+            format!("Where: {size}; most of it is in {channel}.")
+        }
+    }
+}
+
+fn cause(report: &GapReport) -> String {
+    let of = |status: Status| report.causes.iter().filter(move |c| c.status == status);
+    let with_size = |cause: &Cause| {
+        let title = name(&cause.effect, &cause.axis);
+        format!(
+            "{title} ({}; confidence {:.2})",
+            values(cause),
+            cause.confidence
+        )
+    };
+    let mut parts = vec![];
+    let named: Vec<String> = of(Status::Named).map(with_size).collect();
+    if !named.is_empty() {
+        parts.push(named.join("; "));
+    }
+    for cause in of(Status::Set) {
+        let others = cause.confusable_with.iter().filter(|other| !other.excluded);
+        let others: Vec<String> = others.map(|o| name(&o.effect, &o.axis)).collect();
+        parts.push(format!(
+            "{} or one that this recording cannot tell from it ({})",
+            with_size(cause),
+            others.join(", ")
+        ));
+    }
+    let alike: Vec<String> = of(Status::Surrogate)
+        .map(|cause| name(&cause.effect, &cause.axis))
+        .collect();
+    if !alike.is_empty() {
+        parts.push(format!(
+            "something that looks like {} but fails a check of it",
+            alike.join(", ")
+        ));
+    }
+    if report.unknown.flagged {
+        parts.push(unknown(report));
+    }
+    if parts.is_empty() {
+        return "Which: no effect of the catalogue is named.".to_owned();
+    }
+    format!("Which: {}.", parts.join(". And "))
+}
+
+fn unknown(report: &GapReport) -> String {
+    let found = &report.unknown.description;
+    let mut words = vec![];
+    if !found.covariate.is_empty() {
+        words.push(format!("it goes with {}", found.covariate));
+    }
+    if !found.parity.is_empty() {
+        words.push(format!("is {} in the direction of motion", found.parity));
+    }
+    if !found.period.is_empty() {
+        words.push(format!("has a period of {}", found.period));
+    }
+    if let Some(exponent) = found.feed_exponent {
+        words.push(format!("grows with feed to the power {exponent:.1}"));
+    }
+    if let Some(time_s) = found.time_constant_s {
+        words.push(format!("has a time constant of {} s", three(time_s)));
+    }
+    format!(
+        "a rest that no known effect explains (score {} over {}): {}",
+        three(report.unknown.score),
+        three(report.unknown.threshold),
+        if words.is_empty() {
+            "without a clear shape".to_owned()
+        } else {
+            words.join(", ")
+        }
+    )
+}
+
+fn shrink(report: &GapReport) -> String {
+    let shrink = &report.shrink;
+    if shrink.held_out_runs.is_empty() {
+        return "How far: no run was held out, so nothing is said of how far the gap shrinks."
+            .to_owned();
+    }
+    let runs: Vec<String> = shrink
+        .held_out_runs
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    let closed = shrink.gap_closed.map_or_else(
+        || "there was no gap above the floor on them".to_owned(),
+        |closed| {
+            format!(
+                "{:.1} % of the gap is closed ({:.1} to {:.1} %)",
+                100.0 * closed.value,
+                100.0 * closed.low,
+                100.0 * closed.high
+            )
+        },
+    );
+    format!(
+        "How far: with the named effects in the simulator, the held-out runs ({}) go from {} to {} µm rms; {closed}.",
+        runs.join(", "),
+        maybe(shrink.rms_um.before),
+        maybe(shrink.rms_um.after),
+    )
+}

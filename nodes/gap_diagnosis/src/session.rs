@@ -1,0 +1,69 @@
+//! A recorded session as the simulator wants it: runs, commands, and what each instrument read beyond them.
+//!
+//! [`SessionBuilder`] takes the samples of one bag, or of several one after another, in the order in which
+//! they were recorded, and gives a [`machine::twin::Session`] with an [`Account`] of everything that could
+//! not be used. The live node and the command line use the same builder.
+//!
+//! # What a deviation is
+//!
+//! Measured minus nominal, mm (rad for rotary axes). Nominal is what the command says, and an applied
+//! compensation c (topic `compensation`, zero-order hold) is part of what was commanded:
+//!
+//! ```text
+//!   motor, scale     d = reading - (command + c)                          (1)
+//!   grid             d = reading - (command + c) along u or v - zero      (2)
+//!   ballbar          d = reading - distance of (command + c) from the centre
+//!   length           d = reading - (command + c) along the beam - zero    (3)
+//!   touch            d = surface latched along the approach - surface of the machine file   (4)
+//! ```
+//!
+//! (4) needs no c: a latched position is where the motor was, compensation included, and so is the
+//! command that an uncompensated machine would have needed. A circle that was measured with the compensation
+//! on therefore shows the same deviations as without it. The zero of (2) and (3) is the mean of the first
+//! run under that count; between runs of one count differences stay.
+//!
+//! # What is read when
+//!
+//! | run | readings |
+//! |---|---|
+//! | circle in motion | on the nominal circle at 98 % of the feed or more |
+//! | other contours in motion | from the first motion to the last, while the record is at its full rate |
+//! | with stations, positioning, diagonals | the mean of each stop after [`SessionConfig::settle_s`] |
+//! | touches | each touch of a feature that the machine file has |
+//!
+//! A contour has at most [`SessionConfig::readings_per_run`] readings per channel: means of an odd number of
+//! neighbours, the same number in every repeat. The commanded motion is kept at each of them, at reversals,
+//! starts and stops tick by tick, and at least every 50 ms or 0.5 mm.
+//!
+//! # When the record is not whole
+//!
+//! | what | answer |
+//! |---|---|
+//! | hole in the axis states | readings inside are left out, unless they bear the stamp of a state |
+//! | value that is no number, count of another zero, sensor that stands while the axes move | left out, counted |
+//! | time that goes back by less than a second | the sample is left out, counted |
+//! | a clock that jumps back by more | the session's time goes on, the open run is cut, counted |
+//! | segment that the end of the bag cuts | kept up to there, counted |
+//! | segment that failed | left out, counted |
+//! | topics that are not there | the session holds the other channels |
+//! | another machine's axes, positions outside its travel | [`SessionError`] |
+//!
+//! # Holds when
+//! Rotary axes rest at zero during grid and length runs. Positions on a curve are those commanded.
+
+mod account;
+mod builder;
+mod channels;
+mod config;
+mod error;
+mod motion;
+mod nominal;
+mod past;
+mod record;
+mod select;
+mod time;
+
+pub use account::{Account, Reason};
+pub use builder::{Input, SessionBuilder};
+pub use config::SessionConfig;
+pub use error::SessionError;

@@ -1,0 +1,96 @@
+//! What of a recording could not be used, counted.
+
+use std::collections::BTreeMap;
+
+/// Counts of what was read and of what was left out.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Account {
+    /// Runs with readings.
+    pub runs: usize,
+    /// Readings that the diagnosis gets.
+    pub readings: usize,
+    /// Segments that began.
+    pub segments: usize,
+    /// Samples that were left out, by reason.
+    pub left_out: BTreeMap<Reason, usize>,
+}
+
+/// Why something was left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Reason {
+    /// A sample with a value that is no number.
+    NotFinite,
+    /// A sample older than one before it.
+    WentBack,
+    /// The recording's clock jumped back by more than a second.
+    ClockJump,
+    /// A reading between two axis states that lie too far apart.
+    InGap,
+    /// A reading under another zero than its segment's.
+    OtherZero,
+    /// A reading that stood while the axes moved.
+    Stuck,
+    /// A grid or length reading with a turned rotary axis.
+    RotaryTurned,
+    /// A touch of something that the machine file does not have.
+    UnknownFeature,
+    /// A segment that did not run to its end.
+    Failed,
+    /// A segment that the end of the recording, a jump of the clock or the next segment cut.
+    Cut,
+    /// An end without a begin.
+    NotBegun,
+    /// Ticks beyond what a run may hold.
+    TooLong,
+    /// A run during which the compensation's messages broke off; its last value was held.
+    CompensationHeld,
+}
+
+impl Reason {
+    /// What a person is told, after a number.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::NotFinite => "samples were no numbers",
+            Self::WentBack => "samples were older than one before them",
+            Self::ClockJump => "times the clock jumped back",
+            Self::InGap => "readings lie in holes of the axis states",
+            Self::OtherZero => "readings belong to another zero",
+            Self::Stuck => "readings stood while the axes moved",
+            Self::RotaryTurned => "readings were taken with a turned rotary axis",
+            Self::UnknownFeature => "touches are of features that the machine file does not have",
+            Self::Failed => "segments did not run to their end and are left out",
+            Self::Cut => "segments were cut; they are used up to there",
+            Self::NotBegun => "segments ended whose begin was not recorded",
+            Self::TooLong => "ticks were beyond what one run may hold",
+            Self::CompensationHeld => {
+                "runs had a hole in the compensation; its last value was held"
+            }
+        }
+    }
+}
+
+impl Account {
+    pub(super) fn note(&mut self, reason: Reason) {
+        self.note_many(reason, 1);
+    }
+
+    pub(super) fn note_many(&mut self, reason: Reason, n: usize) {
+        if n > 0 {
+            *self.left_out.entry(reason).or_default() += n;
+        }
+    }
+
+    /// How often a reason came up.
+    #[must_use]
+    pub fn count(&self, reason: Reason) -> usize {
+        self.left_out.get(&reason).copied().unwrap_or(0)
+    }
+
+    /// What was left out, in words.
+    pub fn remarks(&self) -> impl Iterator<Item = String> {
+        self.left_out
+            .iter()
+            .map(|(reason, n)| format!("{n} {}", reason.text()))
+    }
+}

@@ -1,0 +1,112 @@
+//! What was recorded of one run while it is open.
+
+use metrology::PerAxis;
+use metrology::sample::{AxisState, GridSample, LengthSample, ProbeTrigger, TestSegment};
+use metrology::stamp::{Host, Machine, Stamp};
+
+/// Positions at one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tick {
+    /// Host's stamp.
+    pub at: Stamp<Host>,
+    /// Controller's stamp.
+    pub controller_at: Stamp<Machine>,
+    /// Session time of the host's stamp, s.
+    pub time_s: f64,
+    /// Command without compensation.
+    pub commanded: PerAxis<f64>,
+    /// Motors, compensation included.
+    pub motor: PerAxis<f64>,
+    /// Scales, NaN where there are none.
+    pub scale: PerAxis<f64>,
+}
+
+impl Tick {
+    pub(super) fn new(time_s: f64, state: &AxisState) -> Self {
+        Self {
+            at: state.received_at,
+            controller_at: state.controller_at,
+            time_s,
+            commanded: state.commanded,
+            motor: state.motor,
+            scale: state.scale,
+        }
+    }
+}
+
+/// Offsets from one instant on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Offset {
+    /// From when.
+    pub at: Stamp<Host>,
+    /// Added to the command.
+    pub total: PerAxis<f64>,
+}
+
+/// One run as it comes.
+#[derive(Clone, Debug)]
+pub(super) struct Record {
+    /// Its begin.
+    pub segment: TestSegment,
+    /// The lead-in and the run.
+    pub ticks: Vec<Tick>,
+    /// How many of the ticks are lead-in.
+    pub lead_in: usize,
+    /// Compensation in effect, in time.
+    pub offsets: Vec<Offset>,
+    /// Readings of the grid encoder.
+    pub grid: Vec<GridSample>,
+    /// Readings of the length reference.
+    pub length: Vec<LengthSample>,
+    /// Touches with their session time.
+    pub triggers: Vec<(f64, ProbeTrigger)>,
+    /// Faces of blocks that a node computed, for records without touches: feature, approach, positions, time.
+    pub faces: Vec<(f64, String, nalgebra::Vector3<f64>, PerAxis<f64>)>,
+    /// Ticks that were not held.
+    pub beyond_limit: usize,
+}
+
+/// Silence of the compensation beyond which its last value is only held, s.
+const COMPENSATION_SILENCE_S: f64 = 1.0;
+
+impl Record {
+    pub(super) fn new(segment: TestSegment, lead_in: Vec<Tick>, offset: Option<Offset>) -> Self {
+        Self {
+            segment,
+            lead_in: lead_in.len(),
+            ticks: lead_in,
+            offsets: offset.into_iter().collect(),
+            grid: vec![],
+            length: vec![],
+            triggers: vec![],
+            faces: vec![],
+            beyond_limit: 0,
+        }
+    }
+
+    /// Offsets that were added to the command at an instant: the last message at or before it.
+    pub(super) fn offset(&self, at: Stamp<Host>) -> PerAxis<f64> {
+        let next = self.offsets.partition_point(|offset| offset.at <= at);
+        next.checked_sub(1)
+            .and_then(|k| self.offsets.get(k))
+            .map_or_else(PerAxis::default, |offset| offset.total)
+    }
+
+    /// Whether the compensation acted and its messages broke off during the run.
+    pub(super) fn compensation_broke_off(&self) -> bool {
+        let acts = |offset: &Offset| offset.total.0.iter().any(|v| v.abs() > 0.0);
+        let end = self.ticks.last().map(|tick| tick.at);
+        let begin = self.ticks.get(self.lead_in).map(|tick| tick.at);
+        let (Some(begin), Some(end)) = (begin, end) else {
+            return false;
+        };
+        let times = self.offsets.iter().map(|o| o.at).filter(|at| *at >= begin);
+        let mut before = begin;
+        let mut longest_s = 0.0_f64;
+        for at in times.chain([end]) {
+            longest_s = longest_s.max((at - before).as_secs_f64());
+            before = at;
+        }
+        self.offsets.iter().any(acts) && longest_s > COMPENSATION_SILENCE_S
+    }
+}

@@ -1,0 +1,74 @@
+//! The session's time: host stamps made to go on where a clock jumps or another bag begins.
+
+use metrology::stamp::{Host, Span, Stamp};
+
+/// A sample this much older than the newest one is late; an older one means that the clock jumped.
+const LATE: Span = Span::from_nanos(1_000_000_000);
+/// Between a jump back, or a bag that is older than the one before it, and what came before.
+const PAUSE: Span = Span::from_nanos(60_000_000_000);
+
+/// Maps stamps to seconds since the session's start.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SessionTime {
+    start: Option<Stamp<Host>>,
+    newest: Stamp<Host>,
+    shift: Span,
+}
+
+/// What a stamp means.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum At {
+    /// Seconds since the session's start.
+    Time(f64),
+    /// The clock jumped back; the seconds go on after a pause.
+    Jumped(f64),
+}
+
+impl SessionTime {
+    /// The time of a sample that drives the clock.
+    pub(super) fn take(&mut self, at: Stamp<Host>) -> At {
+        let start = *self.start.get_or_insert_with(|| {
+            self.newest = at;
+            at
+        });
+        let mut shifted = at + self.shift;
+        let jumped = self.newest - shifted > LATE;
+        if jumped {
+            self.shift = self.newest + PAUSE - at;
+            shifted = at + self.shift;
+        }
+        self.newest = self.newest.max(shifted);
+        let time_s = (shifted - start).as_secs_f64();
+        if jumped {
+            At::Jumped(time_s)
+        } else {
+            At::Time(time_s)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn at(seconds: i64) -> Stamp<Host> {
+        Stamp::from_nanos(seconds * 1_000_000_000)
+    }
+
+    #[test]
+    fn a_jump_back_goes_on_after_a_pause() {
+        let mut time = SessionTime::default();
+        assert_eq!(time.take(at(100)), At::Time(0.0));
+        assert_eq!(time.take(at(110)), At::Time(10.0));
+        assert_eq!(time.take(at(50)), At::Jumped(70.0));
+        assert_eq!(time.take(at(55)), At::Time(75.0));
+    }
+
+    #[test]
+    fn a_sample_that_is_a_little_late_keeps_its_time() {
+        let mut time = SessionTime::default();
+        let _ = time.take(at(100));
+        let _ = time.take(at(101));
+        assert_eq!(time.take(Stamp::from_nanos(100_500_000_000)), At::Time(0.5));
+    }
+}

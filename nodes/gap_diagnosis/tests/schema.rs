@@ -1,0 +1,91 @@
+//! The JSON Schema and the report name the same keys, all of them required and no others allowed.
+
+use gap_diagnosis::GapReport;
+use serde_json::Value;
+
+const TEXT: &str = include_str!("../schema/abbe.gap.1.schema.json");
+
+/// A report in which every list has an entry and every option a value.
+const FULL: &str = r#"{
+"schema": "abbe.gap/1",
+"inputs": {"bags": [{"path": "", "sha256": "", "runs": 0, "samples": 0}], "machine_sha256": ""},
+"noise_floor": [{"channel": "grid.u", "sigma_um": 0.2, "ar": [0.6], "between_runs_um": 0.1, "repeats": 3, "reproduced": true}],
+"gap": {"rms_um": 8.1, "p95_um": 14.0, "floor_um": 0.3, "above_floor": true,
+  "per_channel": [{"channel": "grid.u", "rms_um": 8.1, "p95_um": 14.0, "floor_um": 0.3, "above_floor": true}]},
+"where": [{"channel": "grid.u", "direction": "X", "covariate": "", "share_unique": 0.6, "share_shared": 0.1, "p_value": 0.001,
+  "z": 19.0, "per_condition": [{"condition": "", "rms_um": 1.0}]}],
+"causes": [{"effect": "backlash", "axis": "X", "status": "set", "confidence": 0.97,
+  "parameters": [{"name": "width_um", "value": 5.9, "low": 5.6, "high": 6.2, "at_bound": false}], "D": 88.0,
+  "confusable_with": [{"effect": "", "axis": "", "cos": 0.6, "excluded": true}],
+  "constancy": {"passed": true, "worst_z": 1.2, "split_by": "feed"}}],
+"unknown": {"flagged": false, "score": 1.4, "threshold": 3.1,
+  "description": {"covariate": "", "parity": "", "period": "", "feed_exponent": null, "time_constant_s": null}},
+"shrink": {"fit_runs": [1], "held_out_runs": [7], "rms_um": {"before": 8.1, "after": 0.5}, "p95_um": {"before": null, "after": null},
+  "gap_closed": {"value": 0.995, "low": 0.99, "high": 0.998},
+  "leave_one_out": [{"effect": "backlash", "axis": "X", "rms_um_without": 7.9}]},
+"not_excited": [{"effect": "probe_latency", "needs": ""}],
+"next_experiments": [{"run": "", "separates": [""], "delta": 31.0, "minutes": 1.5}],
+"runtime_s": 1.3 }"#;
+
+/// Where value and schema name other things.
+fn differences(at: &str, schema: &Value, value: &Value, found: &mut Vec<String>) {
+    let schema = schema["anyOf"]
+        .as_array()
+        .and_then(|all| all.iter().find(|one| one["type"] == "object"))
+        .unwrap_or(schema);
+    match value {
+        Value::Object(fields) => {
+            let properties = schema["properties"].as_object();
+            let keys = |map: Option<&serde_json::Map<String, Value>>| {
+                let mut keys: Vec<String> =
+                    map.into_iter().flat_map(|m| m.keys().cloned()).collect();
+                keys.sort();
+                keys
+            };
+            let mut required: Vec<String> = schema["required"]
+                .as_array()
+                .into_iter()
+                .flatten()
+                .filter_map(|key| key.as_str().map(str::to_owned))
+                .collect();
+            required.sort();
+            let there = keys(Some(fields));
+            if keys(properties) != there || required != there {
+                found.push(format!("{at}: {there:?}"));
+            }
+            if schema["additionalProperties"] != Value::Bool(false) {
+                found.push(format!("{at}: takes other keys"));
+            }
+            for (key, value) in fields {
+                differences(
+                    &format!("{at}.{key}"),
+                    &schema["properties"][key],
+                    value,
+                    found,
+                );
+            }
+        }
+        Value::Array(items) => {
+            if schema["type"] != "array" || items.is_empty() {
+                found.push(format!("{at}: no array"));
+            }
+            for item in items {
+                differences(&format!("{at}[]"), &schema["items"], item, found);
+            }
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn the_schema_names_every_key_of_the_report_and_no_other() {
+    let mut schema: Value = serde_json::from_str(TEXT).expect("JSON");
+    let report: GapReport = serde_json::from_str(FULL).expect("a report");
+    let report = serde_json::to_value(report).expect("JSON");
+    let mut found = vec![];
+    differences("report", &schema, &report, &mut found);
+    assert_eq!(found, Vec::<String>::new());
+    schema["properties"]["unknown"]["properties"]["score2"] = Value::Null;
+    differences("report", &schema, &report, &mut found);
+    assert_eq!(found.len(), 1, "a key too many is found");
+}

@@ -1,0 +1,298 @@
+//! Sessions built from recorded samples whose errors are known.
+
+use std::f64::consts::TAU;
+
+use gap_diagnosis::session::{Input, Reason, SessionBuilder, SessionConfig, SessionError};
+use machine::MachineFile;
+use machine::twin::{Channel, Session, Twin};
+use metrology::sample::{
+    AxisCompensation, AxisState, CompensationState, GridSample, ProbeTrigger, Sense, TestKind,
+    TestPlane, TestSegment,
+};
+use metrology::{Axis, AxisSet, PerAxis, Stamp};
+use nalgebra::Vector3;
+
+const MACHINE: &str = include_str!("../../../launch_configs/gap_first/machine.yaml");
+
+fn machine() -> MachineFile {
+    MachineFile::parse(MACHINE, "machine.yaml").expect("the scenario's machine file")
+}
+
+fn segment(run: u32, begin: bool, kind: TestKind) -> TestSegment {
+    TestSegment {
+        at: Stamp::from_nanos(0),
+        run,
+        begin,
+        kind,
+        plane: TestPlane::Xy,
+        centre_mm: Vector3::new(0.0, 0.0, 30.0),
+        radius_mm: 50.0,
+        feed_mm_s: 25.0,
+        sense: Sense::CounterClockwise,
+        repeat: run - 1,
+        stylus: String::new(),
+        tool_offset_mm: Vector3::zeros(),
+        stations: 0,
+        zero_id: 1,
+        setup_id: 1,
+        cold: false,
+        features: vec!["middle".to_owned()],
+        completed: true,
+    }
+}
+
+/// A recording in ticks of a millisecond, on a controller whose clock is 7 s ahead.
+struct Rig {
+    builder: SessionBuilder,
+    millis: i64,
+    /// Added to commands and motors alike.
+    compensation_mm: f64,
+    /// What the plate reads beyond the command and its compensation along X, by the angle.
+    error_mm: fn(f64) -> f64,
+}
+
+impl Rig {
+    fn new(error_mm: fn(f64) -> f64) -> Self {
+        Self {
+            builder: SessionBuilder::new(&machine(), SessionConfig::default()).expect("a machine"),
+            millis: 0,
+            compensation_mm: 0.0,
+            error_mm,
+        }
+    }
+
+    fn tick(&mut self, x: f64, y: f64) {
+        let at = Stamp::from_nanos(self.millis * 1_000_000);
+        let mut commanded = PerAxis::default();
+        (commanded[Axis::X], commanded[Axis::Y], commanded[Axis::Z]) = (x, y, 30.0);
+        let mut motor = commanded;
+        motor[Axis::X] += self.compensation_mm + 1e-3;
+        self.builder.take(Input::State(AxisState {
+            received_at: at,
+            controller_at: Stamp::from_nanos((self.millis + 7000) * 1_000_000),
+            axes: AxisSet::XYZ,
+            commanded,
+            motor,
+            scale: PerAxis([f64::NAN; 6]),
+            velocity: PerAxis::default(),
+        }));
+        let error_mm = (self.error_mm)(y.atan2(x));
+        self.builder.take(Input::Grid(GridSample {
+            at,
+            plane: TestPlane::Xy,
+            u_mm: x + self.compensation_mm + error_mm - 3.0,
+            v_mm: y + 2.0,
+            zero_id: 1,
+        }));
+        self.millis += 1;
+    }
+
+    fn compensate(&mut self, x_mm: f64) {
+        self.compensation_mm = x_mm;
+        let mut total = PerAxis::default();
+        total[Axis::X] = x_mm;
+        self.builder.take(Input::Compensation(AxisCompensation {
+            at: Stamp::from_nanos(self.millis * 1_000_000),
+            axes: AxisSet::XYZ,
+            total,
+            thermal: total,
+            geometric: PerAxis::default(),
+            positioning: PerAxis::default(),
+            pulses: PerAxis::default(),
+            remainder: PerAxis::default(),
+            state: PerAxis([CompensationState::Active; 6]),
+        }));
+    }
+
+    /// A rest of 6 s at the start of the circle, then once round.
+    fn circle(&mut self, run: u32, share: f64) {
+        for _ in 0..6000 {
+            self.tick(50.0, 0.0);
+        }
+        self.builder
+            .take(Input::Segment(segment(run, true, TestKind::Circle)));
+        let ticks = TAU * 50.0 / 0.025 * share;
+        let mut k = 0.0;
+        while k < ticks {
+            let angle: f64 = k * 0.025 / 50.0;
+            self.tick(50.0 * angle.cos(), 50.0 * angle.sin());
+            k += 1.0;
+        }
+    }
+
+    fn end(&mut self, run: u32) {
+        self.builder
+            .take(Input::Segment(segment(run, false, TestKind::Circle)));
+    }
+}
+
+fn of(session: &Session, run: usize, channel: &Channel) -> Vec<(f64, f64)> {
+    let run = &session.runs[run];
+    let readings = run.readings.iter().filter(|r| r.channel == *channel);
+    readings
+        .map(|r| {
+            let position = |axis: Axis| {
+                let p = &run.motion.position[axis];
+                p[r.at] + (p.get(r.at + 1).unwrap_or(&p[r.at]) - p[r.at]) * r.fraction
+            };
+            (position(Axis::Y).atan2(position(Axis::X)), r.deviation)
+        })
+        .collect()
+}
+
+#[test]
+fn a_circle_gives_deviations_at_their_places_with_the_lead_in_before_it() {
+    let mut rig = Rig::new(|angle| 2e-3 * (2.0 * angle).cos());
+    rig.circle(1, 1.0);
+    rig.end(1);
+    let (session, account) = rig.builder.finish().expect("a session");
+    assert_eq!((account.runs, account.segments), (1, 1));
+    let grid = of(&session, 0, &Channel::GridU);
+    assert!((1700..=2000).contains(&grid.len()), "{}", grid.len());
+    for (angle, deviation) in &grid {
+        let wanted = 2e-3 * (2.0 * angle).cos();
+        assert!((deviation - wanted).abs() < 4e-6, "{angle} {deviation}");
+    }
+    let motor = of(&session, 0, &Channel::Motor(Axis::X));
+    assert!(motor.iter().all(|(_, d)| (d - 1e-3).abs() < 1e-9));
+    let motion = &session.runs[0].motion;
+    assert!(
+        (motion.time_s[0] - 1.0).abs() < 0.01,
+        "{}",
+        motion.time_s[0]
+    );
+    let reading = &session.runs[0].readings[900];
+    let speed = motion.velocity[Axis::X][reading.at].hypot(motion.velocity[Axis::Y][reading.at]);
+    assert!((speed - 25.0).abs() < 1e-3, "{speed}");
+}
+
+#[test]
+fn a_compensation_is_part_of_what_was_commanded() {
+    let mut rig = Rig::new(|angle| 2e-3 * (2.0 * angle).cos());
+    rig.circle(1, 1.0);
+    rig.end(1);
+    rig.compensate(0.03);
+    rig.circle(2, 1.0);
+    rig.end(2);
+    let (session, account) = rig.builder.finish().expect("a session");
+    for channel in [Channel::GridU, Channel::Motor(Axis::X)] {
+        let (without, with) = (of(&session, 0, &channel), of(&session, 1, &channel));
+        assert_eq!(without.len(), with.len());
+        for (a, b) in without.iter().zip(&with) {
+            assert!((a.1 - b.1).abs() < 1e-9, "{channel} {a:?} {b:?}");
+        }
+    }
+    assert_eq!(account.count(Reason::CompensationHeld), 1);
+}
+
+#[test]
+fn a_bag_that_ends_within_a_run_keeps_the_run_up_to_there() {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.circle(1, 0.4);
+    let (session, account) = rig.builder.finish().expect("a session");
+    assert_eq!(account.count(Reason::Cut), 1);
+    let readings = of(&session, 0, &Channel::GridU).len();
+    assert!((650..=2000).contains(&readings), "{readings}");
+}
+
+#[test]
+fn a_clock_that_jumps_back_cuts_the_run_and_time_goes_on() {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.circle(1, 0.5);
+    rig.millis -= 10_000;
+    rig.circle(2, 1.0);
+    rig.end(2);
+    let (session, account) = rig.builder.finish().expect("a session");
+    assert_eq!(account.count(Reason::ClockJump), 1);
+    assert_eq!(account.count(Reason::Cut), 1);
+    assert_eq!(session.runs.len(), 2);
+    let last = |run: usize| *session.runs[run].motion.time_s.last().expect("ticks");
+    assert!(last(1) > last(0));
+}
+
+#[test]
+fn readings_in_a_hole_of_the_states_and_broken_values_are_counted_and_left_out() {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.circle(1, 0.5);
+    // Readings go on while states are missing for half a second.
+    for k in 0..500 {
+        let at = Stamp::from_nanos((rig.millis + k) * 1_000_000);
+        for u_mm in [1.0, f64::NAN] {
+            rig.builder.take(Input::Grid(GridSample {
+                at,
+                plane: TestPlane::Xy,
+                u_mm,
+                v_mm: 0.0,
+                zero_id: 1,
+            }));
+        }
+    }
+    rig.millis += 500;
+    rig.tick(-50.0, 0.0);
+    rig.end(1);
+    let (_, account) = rig.builder.finish().expect("a session");
+    assert_eq!(account.count(Reason::NotFinite), 500);
+    assert_eq!(account.count(Reason::InGap), 500);
+}
+
+#[test]
+fn a_bag_of_another_machine_is_refused_by_what_differs() {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.tick(900.0, 0.0);
+    assert!(matches!(
+        rig.builder.finish(),
+        Err(SessionError::OutsideTravel { axis: Axis::X, .. })
+    ));
+    let builder = SessionBuilder::new(&machine(), SessionConfig::default()).expect("a machine");
+    assert_eq!(
+        builder.finish().map(|_| ()),
+        Err(SessionError::NothingCommanded)
+    );
+}
+
+#[test]
+fn a_touch_is_measured_from_the_surface_of_the_machine_file() {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.builder
+        .take(Input::Segment(segment(1, true, TestKind::Latency)));
+    // block_1's X face lies at -220 and is touched towards +X with a ball of 3 mm; 5 um too deep.
+    let mut latched = PerAxis::default();
+    (latched[Axis::X], latched[Axis::Y], latched[Axis::Z]) = (-222.995, -174.0, 14.0);
+    for feature in ["block_1.x", "nothing.x"] {
+        rig.builder.take(Input::Trigger(ProbeTrigger {
+            received_at: Stamp::from_nanos(5_000_000),
+            controller_at: Stamp::from_nanos(5_000_000),
+            feature_id: feature.to_owned(),
+            approach: Vector3::x(),
+            feed_mm_s: 2.0,
+            axes: AxisSet::XYZ,
+            latched,
+            sequence: 0,
+        }));
+    }
+    rig.builder
+        .take(Input::Segment(segment(1, false, TestKind::Latency)));
+    let (session, account) = rig.builder.finish().expect("a session without axis states");
+    let run = &session.runs[0];
+    assert_eq!((run.touches.len(), run.touches[0].tick), (1, None));
+    assert!((run.readings[0].deviation - 5e-3).abs() < 1e-9);
+    assert_eq!(account.count(Reason::UnknownFeature), 1);
+    let machine = machine();
+    let twin = Twin::new(&machine).expect("a twin");
+    assert_eq!(twin.predict(&session, run, &[]), [0.0]);
+}
+
+#[test]
+fn a_second_bag_has_runs_of_its_own() {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.circle(1, 1.0);
+    rig.end(1);
+    rig.builder.next_bag();
+    rig.millis = 0;
+    rig.circle(1, 1.0);
+    rig.end(1);
+    let (session, _) = rig.builder.finish().expect("a session");
+    let numbers: Vec<u32> = session.runs.iter().map(|run| run.segment.run).collect();
+    assert_eq!(numbers, [1, 2]);
+    assert!(session.history.len() >= 2);
+}
