@@ -1,23 +1,46 @@
 //! From signatures to named causes.
+//!
+//! The catalogue's own forms are tried first. Only where they leave more than noise would are the wide forms of
+//! the effects found (and of their rivals) tried as well, so that a form that is not quite the catalogue's does
+//! not call for a second cause. A member is named where it holds on runs left out, has one size under all conditions,
+//! stands off its physical bounds, is not a small part of a gap that stays unexplained, and the noise is the repeats';
+//! otherwise it is a surrogate, shown and not added. A named member with rivals is a set.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use machine::effects::{Kind, Moment};
 use machine::file::EffectEntry;
+use machine::twin::Channel;
+use nalgebra::{DMatrix, DVector};
 
+use crate::confidence::{Rivals, adequacy};
 use crate::config::GapConfig;
-use crate::refit::{self, Estimate};
-use crate::report::{Cause, Constancy, ParameterValue, Status};
-use crate::selection::{Limits, Search};
+use crate::confirm;
+use crate::families::Slot;
+use crate::isolability;
+use crate::noise::Noise;
+use crate::normal::Normal;
+use crate::refit::{self, Estimate, Refit};
+use crate::report::{Cause, Confusable, Constancy, ParameterValue, Status};
+use crate::selection::{Limits, Search, Set};
 use crate::signature::{Form, Instance, Library};
 use crate::stack::Stack;
+use crate::unknown::{self, Leftover};
 
 /// Everything that the search found.
 pub struct Found {
     /// Signatures.
     pub library: Library,
+    /// Their Gram matrix.
+    pub normal: Normal,
     /// Members of the best set with their values.
     pub members: Vec<Member>,
+    /// What the set leaves.
+    pub left: DVector<f64>,
+    /// Its scores.
+    pub leftover: Leftover,
+    /// One form of each instance, the best set's where it has one.
+    pub forms: Vec<usize>,
 }
 
 /// One effect of the best set.
@@ -31,48 +54,276 @@ pub struct Member {
     pub status: Status,
     /// Probability.
     pub confidence: f64,
+    /// What looks like it.
+    pub confusable: Vec<Confusable>,
     /// Whether it has one size.
     pub constancy: Constancy,
-    /// Whitened size.
-    pub d: f64,
 }
 
+/// What a search is made with.
+pub struct Scope<'s, 'a> {
+    /// The runs that are fitted.
+    pub stack: &'s Stack<'a>,
+    /// Families of those runs.
+    pub slots: &'s [Slot],
+    /// The noise floor.
+    pub noise: &'s BTreeMap<Channel, Noise>,
+    /// Settings.
+    pub config: &'s GapConfig,
+}
+
+struct Best {
+    set: Set,
+    visited: BTreeMap<Set, f64>,
+    refit: Refit,
+    left: DVector<f64>,
+    leftover: Leftover,
+}
+
+/// A member of an insufficient set must gain this many times what is left unexplained. A share of the whole gain
+/// instead would withdraw the smaller of two true causes (plays of 5 and 3 µm).
+const LEAST_RATIO: f64 = 2.0;
+
 /// Searches the catalogue.
-pub fn find(stack: &Stack<'_>, kinds: &[&'static Kind], config: &GapConfig) -> Found {
+pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
+    let stack = scope.stack;
     let means = kinds.iter().filter(|kind| kind.moment == Moment::Mean);
     let instances = Instance::all(stack.twin.machine(), means);
-    let library = Library::new(stack, instances);
-    let normal = library.normal(&stack.z);
-    let mut search = Search::new(&library, &normal, stack.z.norm_squared(), stack.freedom());
-    let limits = Limits {
-        beam: config.beam,
-        most_effects: config.most_effects,
-    };
-    let best = search.run(limits);
-    search.alternatives(&best, 6);
-    let sizes = search.fit(&best).sizes;
-    let forms: Vec<&Form> = best.iter().map(|form| &library.forms[*form]).collect();
-    let estimates = refit::joint(stack, &library, &forms, &sizes);
-    let members = best
+    let mut library = Library::new(stack, instances);
+    let mut normal = library.normal(&stack.z);
+    let mut best = search(scope, &library, &normal);
+    let is_closed = !best.leftover.flagged();
+    if !is_closed && !best.set.is_empty() {
+        widen(scope, &mut library, &best);
+        normal = library.normal(&stack.z);
+        let wide = search(scope, &library, &normal);
+        if wide.leftover.score < best.leftover.score {
+            best = wide;
+        }
+    }
+    let forms = isolability::forms(&library, &normal, &best.set);
+    let mut members = judged(scope, &library, &normal, &best, &forms, is_closed);
+    resize(stack, &library, &normal, &mut members);
+    Found {
+        library,
+        normal,
+        members,
+        left: best.left,
+        leftover: best.leftover,
+        forms,
+    }
+}
+
+/// Sizes what is named without the surrogates, as it will be simulated.
+fn resize(stack: &Stack<'_>, library: &Library, normal: &Normal, members: &mut [Member]) {
+    if members
         .iter()
-        .zip(estimates)
-        .map(|(form, estimate)| Member {
-            form: *form,
-            d: estimate.d,
-            estimate,
-            status: Status::Named,
-            confidence: 1.0,
-            constancy: Constancy {
-                passed: true,
-                worst_z: 0.0,
-                split_by: String::new(),
-            },
-        })
+        .all(|member| member.status != Status::Surrogate)
+    {
+        return;
+    }
+    let named = || {
+        members
+            .iter()
+            .filter(|member| member.status != Status::Surrogate)
+    };
+    let forms: Vec<&Form> = named().map(|member| &library.forms[member.form]).collect();
+    let columns: Vec<usize> = forms.iter().flat_map(|form| form.columns.clone()).collect();
+    let refit = refit::joint(stack, library, &forms, &normal.solve(&columns).sizes);
+    let kept = members
+        .iter_mut()
+        .filter(|member| member.status != Status::Surrogate);
+    for (member, estimate) in kept.zip(refit.estimates) {
+        member.estimate = estimate;
+    }
+}
+
+/// A member whose own signature is this many times what the whole set explains (in squares) only cancels another.
+const MOST_CANCELLING: f64 = 2.0;
+
+fn search(scope: &Scope<'_, '_>, library: &Library, normal: &Normal) -> Best {
+    let stack = scope.stack;
+    let mut search = Search::new(library, normal, stack.z.norm_squared(), stack.freedom());
+    let set = search.run(Limits {
+        beam: scope.config.beam,
+        most_effects: scope.config.most_effects,
+    });
+    search.alternatives(&set, 8);
+    let sizes = search.fit(&set).sizes;
+    let forms: Vec<&Form> = set.iter().map(|form| &library.forms[*form]).collect();
+    let refit = refit::joint(stack, library, &forms, &sizes);
+    let left = refit.left(stack);
+    let leftover = unknown::leftover(
+        stack,
+        scope.slots,
+        scope.noise,
+        &left,
+        &refit.jacobian,
+        scope.config,
+    );
+    Best {
+        set,
+        visited: search.visited,
+        refit,
+        left,
+        leftover,
+    }
+}
+
+/// Adds the wide forms of the members and of what stood nearly as well in their place.
+fn widen(scope: &Scope<'_, '_>, library: &mut Library, best: &Best) {
+    let least = best.visited[&best.set];
+    let reach = 0.1 * (scope.stack.z.norm_squared() - least).max(0.0);
+    let near = best
+        .visited
+        .iter()
+        .filter(|(_, score)| **score <= least + reach);
+    let forms: BTreeSet<usize> = near.flat_map(|(set, _)| set.iter().copied()).collect();
+    let mut done = BTreeSet::new();
+    for form in best.set.iter().copied().chain(forms) {
+        let (instance, values) = (
+            library.forms[form].instance,
+            library.forms[form].values.clone(),
+        );
+        let has_free = !library.instances[instance].kind.free.is_empty();
+        if has_free && done.len() < 12 && done.insert(instance) {
+            library.add(scope.stack, instance, values, true);
+        }
+    }
+}
+
+fn judged(
+    scope: &Scope<'_, '_>,
+    library: &Library,
+    normal: &Normal,
+    best: &Best,
+    forms: &[usize],
+    is_closed: bool,
+) -> Vec<Member> {
+    let rivals = Rivals::new(library, &best.visited);
+    let steady = steady(scope, library, best);
+    let kept: Vec<usize> = (0..steady.len()).filter(|place| steady[*place].1).collect();
+    let parts: Vec<DVector<f64>> = kept
+        .iter()
+        .map(|place| best.refit.parts[*place].clone())
         .collect();
-    Found { library, members }
+    let confirmed = confirm::held_out_gains(scope.stack, &parts);
+    let gains = drop_one_gains(scope.stack, &parts);
+    let [before, after] = [scope.stack.z.norm_squared(), best.left.norm_squared()];
+    let freedom = scope.stack.freedom();
+    let adequacy = adequacy(best.leftover.flagged(), before, after, freedom);
+    let unexplained = (after - freedom).max(0.0);
+    let member = |(place, form): (usize, &usize)| {
+        let instance = library.forms[*form].instance;
+        let estimate = best.refit.estimates[place].clone();
+        let constancy = steady[place].0.clone();
+        let among = kept.iter().position(|other| *other == place);
+        let cancels = estimate.d.powi(2) > MOST_CANCELLING * (before - after);
+        let holds = !cancels
+            && among.is_some_and(|k| {
+                confirmed[k] && (is_closed || gains[k] >= LEAST_RATIO * unexplained)
+            });
+        Member {
+            form: *form,
+            status: match (holds, rivals.is_alone(instance)) {
+                (false, _) => Status::Surrogate,
+                (true, true) => Status::Named,
+                (true, false) => Status::Set,
+            },
+            confidence: rivals.probability(instance) * adequacy * if holds { 1.0 } else { 0.5 },
+            confusable: confusable(library, normal, &rivals, *form, forms),
+            constancy,
+            estimate,
+        }
+    };
+    let mut members: Vec<Member> = best.set.iter().enumerate().map(member).collect();
+    let rank = |member: &Member| (member.status == Status::Surrogate, -member.estimate.d);
+    members.sort_by(|a, b| rank(a).partial_cmp(&rank(b)).expect("D is a number"));
+    members
+}
+
+/// Constancy of each member, and whether it has one size and stands off its bounds. What does not is set aside
+/// before the others are judged, so that a look-alike in the set does not take a cause's gain from it.
+fn steady(scope: &Scope<'_, '_>, library: &Library, best: &Best) -> Vec<(Constancy, bool)> {
+    let of = |(form, estimate): (&usize, &Estimate)| {
+        let instance = &library.instances[library.forms[*form].instance];
+        let raw = scope.stack.simulate(&[&*instance.effect(&estimate.values)]);
+        let (jacobian, left) = (&best.refit.jacobian, &best.left);
+        let constancy = confirm::constancy(scope.stack, &raw, jacobian, left, scope.config);
+        let holds = constancy.passed && !railed(library, *form, estimate);
+        (constancy, holds)
+    };
+    best.set.iter().zip(&best.refit.estimates).map(of).collect()
+}
+
+/// Whether an amplitude stands at a bound that is not zero.
+fn railed(library: &Library, form: usize, estimate: &Estimate) -> bool {
+    library.forms[form]
+        .amplitudes
+        .iter()
+        .any(|place| estimate.at_bound[*place] && estimate.values[*place] != 0.0)
+}
+
+/// What is lost when each member alone is left out, the others refitted.
+fn drop_one_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<f64> {
+    if parts.is_empty() {
+        return vec![];
+    }
+    let normal = Normal::new(&DMatrix::from_columns(parts), &stack.z);
+    let all: Vec<usize> = (0..parts.len()).collect();
+    let whole = normal.solve(&all).gain;
+    let without = |out: &usize| -> f64 {
+        let others: Vec<usize> = all.iter().copied().filter(|k| k != out).collect();
+        normal.solve(&others).gain
+    };
+    all.iter().map(|out| whole - without(out)).collect()
+}
+
+fn confusable(
+    library: &Library,
+    normal: &Normal,
+    rivals: &Rivals,
+    form: usize,
+    forms: &[usize],
+) -> Vec<Confusable> {
+    let instance = library.forms[form].instance;
+    let instead = rivals.instead_of(instance);
+    let mut all: Vec<Confusable> = forms
+        .iter()
+        .filter(|other| library.forms[**other].instance != instance)
+        .map(|other| {
+            let own = library.forms[*other].instance;
+            Confusable {
+                effect: library.instances[own].kind.id.to_owned(),
+                axis: library.instances[own].target.to_string(),
+                cos: isolability::cos(library, normal, form, *other),
+                excluded: !instead.contains(&own),
+            }
+        })
+        .filter(|other| other.cos > 0.4 || !other.excluded)
+        .collect();
+    all.sort_by(|a, b| a.excluded.cmp(&b.excluded).then(b.cos.total_cmp(&a.cos)));
+    all.truncate(6);
+    all
 }
 
 impl Found {
+    /// Takes the names away where the noise is not that of the repeats.
+    pub fn withdraw(&mut self) {
+        for member in &mut self.members {
+            member.status = Status::Surrogate;
+        }
+    }
+
+    /// Whether something is left that no named effect explains.
+    pub fn is_unexplained(&self) -> bool {
+        self.leftover.flagged()
+            || self
+                .members
+                .iter()
+                .any(|member| member.status == Status::Surrogate)
+    }
+
     /// The causes of the report.
     pub fn causes(&self) -> Vec<Cause> {
         self.members
@@ -104,8 +355,8 @@ impl Found {
                     at_bound: member.estimate.at_bound[place],
                 })
                 .collect(),
-            d: member.d,
-            confusable_with: vec![],
+            d: member.estimate.d,
+            confusable_with: member.confusable.clone(),
             constancy: member.constancy.clone(),
         }
     }
@@ -115,32 +366,38 @@ impl Found {
         &self.library.instances[self.library.forms[member.form].instance]
     }
 
-    /// The named members as entries of a machine file.
-    pub fn entries(&self) -> Vec<EffectEntry> {
-        let named = self
-            .members
+    /// Members that are no surrogates.
+    pub fn named(&self) -> impl Iterator<Item = &Member> {
+        self.members
             .iter()
-            .filter(|member| member.status != Status::Surrogate);
-        named.map(|member| self.entry(member)).collect()
+            .filter(|member| member.status != Status::Surrogate)
     }
 
-    fn entry(&self, member: &Member) -> EffectEntry {
-        let instance = self.instance(member);
-        let target = instance.target.to_string();
-        let parameters: BTreeMap<String, f64> = instance
-            .kind
-            .parameters
-            .iter()
-            .chain(instance.kind.free)
-            .zip(&member.estimate.values)
-            .enumerate()
-            .filter(|(place, (_, value))| *place < instance.kind.parameters.len() || **value != 0.0)
-            .map(|(_, (parameter, value))| (parameter.name.to_owned(), *value))
-            .collect();
-        EffectEntry {
-            kind: instance.kind.id.to_owned(),
-            axis: (!target.is_empty()).then_some(target),
-            parameters,
-        }
+    /// The named members as entries of a machine file.
+    pub fn entries(&self) -> Vec<EffectEntry> {
+        self.named()
+            .map(|member| entry(self.instance(member), &member.estimate.values))
+            .collect()
+    }
+}
+
+/// An effect as a machine file lists it.
+pub fn entry(instance: &Instance, values: &[f64]) -> EffectEntry {
+    let target = instance.target.to_string();
+    let own = instance.kind.parameters.len();
+    let parameters: BTreeMap<String, f64> = instance
+        .kind
+        .parameters
+        .iter()
+        .chain(instance.kind.free)
+        .zip(values)
+        .enumerate()
+        .filter(|(place, (_, value))| *place < own || **value != 0.0)
+        .map(|(_, (parameter, value))| (parameter.name.to_owned(), *value))
+        .collect();
+    EffectEntry {
+        kind: instance.kind.id.to_owned(),
+        axis: (!target.is_empty()).then_some(target),
+        parameters,
     }
 }

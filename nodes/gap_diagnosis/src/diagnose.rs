@@ -7,17 +7,20 @@ use machine::effects::{self, CATALOGUE, Effect, Kind, Moment};
 use machine::file::EffectEntry;
 use machine::twin::{Channel, Session, Twin, simulate};
 
-use crate::cause::{self, Found};
+use crate::cause::{self, Found, Scope};
 use crate::config::GapConfig;
 use crate::error::GapError;
+use crate::families::Slot;
 use crate::figures::{Figures, Note};
 use crate::gap::{self, Size};
 use crate::noise::{self, Noise};
-use crate::report::{
-    ChannelGap, Gap, GapReport, Inputs, NoiseFloor, NotExcited, SCHEMA, Shrink, Unknown,
-};
+use crate::report::{ChannelGap, Gap, GapReport, Inputs, NoiseFloor, NotExcited, SCHEMA};
 use crate::rows::Rows;
+use crate::shrink::{self, Named, Shrunk};
+use crate::split::{self, Split};
 use crate::stack::Stack;
+use crate::unknown::Leftover;
+use crate::{families, isolability, localise, places, unknown};
 
 /// A diagnosis: the report, what is drawn beside it, and what `--write-machine` adds.
 #[derive(Clone, Debug)]
@@ -60,41 +63,172 @@ pub fn diagnose(
     if noise.is_empty() {
         return Err(no_repeats(session, &rows));
     }
-    let stack = Stack::new(session, &twin, &all, stations, &noise, &residual);
-    let notes = notes(&rows, &noise);
-    let found = cause::find(&stack, &kinds, config);
-    let sizes = gap::by_block(&stack, &noise, &stack.floated(stack.raw.clone()));
-    let report = GapReport {
-        schema: SCHEMA.to_owned(),
-        inputs: Inputs::default(),
-        noise_floor: noise_floor(&noise),
-        gap: gap_of(&stack, &sizes, true),
-        r#where: vec![],
-        causes: found.causes(),
-        unknown: Unknown {
-            flagged: false,
-            score: 0.0,
-            threshold: 0.0,
-            description: crate::report::Description::default(),
-        },
-        shrink: Shrink {
-            fit_runs: vec![],
-            held_out_runs: vec![],
-            rms_um: crate::report::BeforeAfter::default(),
-            p95_um: crate::report::BeforeAfter::default(),
-            gap_closed: None,
-            leave_one_out: vec![],
-        },
-        not_excited: not_excited(&found, &kinds),
-        next_experiments: vec![],
-        runtime_s: 0.0,
+    let base = Base {
+        session,
+        twin: &twin,
+        stations,
+        noise: &noise,
+        residual: &residual,
     };
-    Ok(Diagnosis {
-        report,
-        figures: Figures::default(),
-        notes,
-        effects: found.entries(),
-    })
+    Ok(base.diagnosis(&kinds, config, notes(&rows, &noise)))
+}
+
+/// What every stack is made of.
+struct Base<'a> {
+    session: &'a Session,
+    twin: &'a Twin<'a>,
+    stations: usize,
+    noise: &'a BTreeMap<Channel, Noise>,
+    residual: &'a [Vec<f64>],
+}
+
+impl<'a> Base<'a> {
+    fn stack(&self, runs: &[usize]) -> Stack<'a> {
+        Stack::new(
+            self.session,
+            self.twin,
+            runs,
+            self.stations,
+            self.noise,
+            self.residual,
+        )
+    }
+
+    fn diagnosis(
+        &self,
+        kinds: &[&'static Kind],
+        config: &GapConfig,
+        mut notes: Vec<Note>,
+    ) -> Diagnosis {
+        let split = split::split(self.session, config.hold_out);
+        let stack = self.stack(&split.fit);
+        let slots = families::families(&stack);
+        let scope = Scope {
+            stack: &stack,
+            slots: &slots,
+            noise: self.noise,
+            config,
+        };
+        let before = unknown::leftover(&stack, &slots, self.noise, &stack.z, &[], config);
+        let mut found = cause::find(&scope, kinds);
+        let inflation = unknown::inflation(&stack, &slots, &found.left);
+        let reproduced = judge_noise(&inflation, config, &mut notes);
+        if !reproduced {
+            found.withdraw();
+        }
+        if split.held_out.is_empty() {
+            notes.push(Note::NothingHeldOut);
+        }
+        if stack.runs.len() < localise::FEWEST_RUNS {
+            notes.push(Note::FewRuns {
+                runs: stack.runs.len(),
+            });
+        }
+        let shrunk = self.shrunk(&split, &found, before.flagged(), config);
+        let all = self.stack(&[&split.fit[..], &split.held_out].concat());
+        let sizes = gap::by_block(&all, self.noise, &all.floated(all.raw.clone()));
+        let floated = stack.floated(stack.raw.clone());
+        let (rest, beside) = self.beside_named(&stack, &slots, &found, config);
+        let flagged = reproduced && before.flagged() && found.is_unexplained();
+        let report = GapReport {
+            schema: SCHEMA.to_owned(),
+            inputs: Inputs::default(),
+            noise_floor: noise_floor(self.noise, &inflation, config),
+            gap: gap_of(&all, &sizes, before.flagged()),
+            r#where: places::places(&stack, &slots, &before.families, &floated),
+            causes: found.causes(),
+            unknown: unknown::unknown(&stack, &slots, &beside, flagged, &rest),
+            shrink: shrunk.shrink,
+            not_excited: not_excited(&found, kinds),
+            next_experiments: vec![],
+            runtime_s: 0.0,
+        };
+        let figures = Figures {
+            heat: places::heat_map(&slots, &before.families, &beside.families),
+            traces: shrunk.traces,
+            isolability: isolability::isolability(
+                &found.library,
+                &found.normal,
+                &found.forms,
+                stack.freedom(),
+            ),
+            held_out: shrunk.held_out,
+        };
+        Diagnosis {
+            report,
+            figures,
+            notes,
+            effects: found.entries(),
+        }
+    }
+
+    /// What the named effects leave, before whitening, and its scores.
+    fn beside_named(
+        &self,
+        stack: &Stack<'_>,
+        slots: &[Slot],
+        found: &Found,
+        config: &GapConfig,
+    ) -> (Vec<f64>, Leftover) {
+        let effects: Vec<Box<dyn Effect>> = found
+            .named()
+            .map(|member| found.instance(member).effect(&member.estimate.values))
+            .collect();
+        let effects: Vec<&dyn Effect> = effects.iter().map(|effect| &**effect).collect();
+        let told = stack.simulate(&effects);
+        let rest: Vec<f64> = stack
+            .raw
+            .iter()
+            .zip(told)
+            .map(|(raw, told)| raw - told)
+            .collect();
+        let white = stack.whitened(rest.clone());
+        let leftover = unknown::leftover(stack, slots, self.noise, &white, &[], config);
+        (rest, leftover)
+    }
+
+    fn shrunk(&self, split: &Split, found: &Found, has_gap: bool, config: &GapConfig) -> Shrunk {
+        let judged = if split.held_out.is_empty() {
+            &split.fit
+        } else {
+            &split.held_out
+        };
+        let stack = self.stack(judged);
+        let effects: Vec<Box<dyn Effect>> = found
+            .named()
+            .map(|member| found.instance(member).effect(&member.estimate.values))
+            .collect();
+        let named: Vec<Named<'_>> = found
+            .named()
+            .zip(&effects)
+            .map(|(member, effect)| Named {
+                effect: found.instance(member).kind.id.to_owned(),
+                axis: found.instance(member).target.to_string(),
+                simulated: &**effect,
+            })
+            .collect();
+        shrink::shrink(&stack, self.noise, split, &named, has_gap, config)
+    }
+}
+
+/// Whether every channel has the noise of its repeats; says so where not.
+fn judge_noise(
+    inflation: &BTreeMap<Channel, f64>,
+    config: &GapConfig,
+    notes: &mut Vec<Note>,
+) -> bool {
+    let worse = inflation
+        .iter()
+        .filter(|(_, ratio)| **ratio > config.most_inflation);
+    let said: Vec<Note> = worse
+        .map(|(channel, ratio)| Note::NotReproduced {
+            channel: channel.to_string(),
+            inflation: *ratio,
+        })
+        .collect();
+    let reproduced = said.is_empty();
+    notes.extend(said);
+    reproduced
 }
 
 fn no_repeats(session: &Session, rows: &Rows) -> GapError {
@@ -171,14 +305,20 @@ fn notes(rows: &Rows, noise: &BTreeMap<Channel, Noise>) -> Vec<Note> {
     notes
 }
 
-fn noise_floor(noise: &BTreeMap<Channel, Noise>) -> Vec<NoiseFloor> {
+fn noise_floor(
+    noise: &BTreeMap<Channel, Noise>,
+    inflation: &BTreeMap<Channel, f64>,
+    config: &GapConfig,
+) -> Vec<NoiseFloor> {
     let of = |(channel, noise): (&Channel, &Noise)| NoiseFloor {
         channel: channel.to_string(),
         sigma_um: 1e3 * noise.reading_sigma_mm,
         ar: noise.within.coefficients[noise.within.order()].clone(),
         between_runs_um: 1e3 * noise.between.total_mm(),
         repeats: noise.repeats,
-        reproduced: true,
+        reproduced: inflation
+            .get(channel)
+            .is_none_or(|ratio| *ratio <= config.most_inflation),
     };
     noise.iter().map(of).collect()
 }

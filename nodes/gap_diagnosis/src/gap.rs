@@ -47,6 +47,11 @@ impl Size {
         1e3 * (self.floor_squares / count(self.magnitudes.len().max(1))).sqrt()
     }
 
+    /// Number of rows.
+    pub fn rows(&self) -> f64 {
+        count(self.magnitudes.len())
+    }
+
     /// Adds the rows of another.
     pub fn join(&mut self, other: &Self) {
         self.squares += other.squares;

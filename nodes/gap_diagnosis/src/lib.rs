@@ -5,37 +5,44 @@
 //! left is looked at against the noise that repeats show, and every question is answered with its doubt.
 //! `report` is the answer, in the form that people's programs read; `figures` is what pages draw beside it.
 //!
-//! `session` makes a session of recorded samples. `rows` thins readings to stations; `repeats` finds what was measured twice, `field` and `noise` make the
-//! noise floor of it; `whitener` makes every row's noise one, `nuisance` takes out what set-ups leave open,
+//! `session` makes a session of recorded samples. `rows` thins readings to stations; `repeats` finds what was
+//! measured twice, `field` and `noise` make the noise floor of it; `whitener` makes every row's noise one, `nuisance` takes out what set-ups leave open,
 //! `stack` keeps both. `signature` asks the twin what each effect of the catalogue would look like, `normal`
-//! and `selection` find the set that explains the residual, `refit` sizes it, `cause` judges it. `gap` is how
-//! much there was to explain. `diagnose` puts the questions in their order. `stage` is the node's whole computation, `following` its parameters.
-
-#![expect(
-    dead_code,
-    reason = "held-out runs and isolability use the rest of the normal equations"
-)]
+//! and `selection` find the set that explains the residual, `refit` sizes it, `confirm` tries it on runs left out
+//! and under every condition, `confidence` weighs its rivals, `cause` judges it. `families`, `localise` and `places`
+//! say where the gap lies, `unknown` what no effect explains, `isolability` what could be told from what. `gap` is
+//! how much there was to explain, `split` and `shrink` how much of it goes on runs held out. `diagnose` puts the
+//! questions in their order. `stage` is the node's whole computation, `following` its parameters.
 
 mod cause;
+mod confidence;
 pub mod config;
+mod confirm;
 mod diagnose;
 pub mod error;
+mod families;
 mod field;
 pub mod figures;
 pub mod following;
 mod gap;
+mod isolability;
+mod localise;
 mod noise;
 mod normal;
 mod nuisance;
+mod places;
 mod refit;
 mod repeats;
 pub mod report;
 mod rows;
 mod selection;
 pub mod session;
+mod shrink;
 mod signature;
+mod split;
 mod stack;
 pub mod stage;
+mod unknown;
 mod whitener;
 
 pub use config::GapConfig;

@@ -49,6 +49,8 @@ pub struct Noise {
     pub repeats: usize,
     /// Independent rows that the variance is known from.
     pub freedom: f64,
+    /// Independent coefficients that the field between runs is known from.
+    pub field_freedom: f64,
 }
 
 impl Noise {
@@ -60,6 +62,8 @@ impl Noise {
 
 /// Share of the posterior that an amplitude is taken at.
 const CAUTION: f64 = 0.7;
+/// Coefficients of the field between runs that one difference tells about.
+const FIELD_MODES: usize = 6;
 /// Fewest rows of differences that say what noise is.
 const FEWEST_ROWS: usize = 6;
 
@@ -97,6 +101,8 @@ fn of_channel(
         .iter()
         .flat_map(|group| differences(session, rows, group))
         .collect();
+    let modes = |d: &Difference| d.values.len().min(FIELD_MODES);
+    let field_freedom = count(differences.iter().map(modes).sum());
     let total: usize = differences.iter().map(|d| d.values.len()).sum();
     if total < FEWEST_ROWS {
         return None;
@@ -126,6 +132,7 @@ fn of_channel(
         between,
         repeats,
         freedom,
+        field_freedom,
     })
 }
 
@@ -170,7 +177,10 @@ impl Difference {
         for mut column in self.open.column_iter_mut() {
             within.filter(column.as_mut_slice());
         }
-        let basis = crate::nuisance::orthonormal(self.open.column_iter().map(|c| c.into_owned()));
+        let basis = crate::nuisance::orthonormal(
+            self.values.len(),
+            self.open.column_iter().map(|c| c.into_owned()),
+        );
         self.values -= &basis * basis.tr_mul(&self.values);
         self.modes -= &basis * basis.tr_mul(&self.modes);
         self
@@ -181,7 +191,10 @@ impl Difference {
         if self.values.len() < 3 * self.modes.ncols() {
             return (self.values.clone(), 0);
         }
-        let basis = crate::nuisance::orthonormal(self.modes.column_iter().map(|c| c.into_owned()));
+        let basis = crate::nuisance::orthonormal(
+            self.values.len(),
+            self.modes.column_iter().map(|c| c.into_owned()),
+        );
         let rough = &self.values - &basis * basis.tr_mul(&self.values);
         (rough, basis.ncols())
     }

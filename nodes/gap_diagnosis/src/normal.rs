@@ -92,25 +92,6 @@ impl Normal {
         inverse
     }
 
-    /// (2): what is left of all columns once some are fitted.
-    pub fn without(&self, columns: &[usize]) -> Self {
-        if columns.is_empty() {
-            return self.clone();
-        }
-        let factor = self.factor(columns);
-        let m = self.gram.ncols();
-        let mut half = DMatrix::zeros(columns.len(), m);
-        for column in 0..m {
-            let solved = factor.forward(|i| self.gram[(columns[i], column)]);
-            half.set_column(column, &DVector::from_vec(solved));
-        }
-        let along = DVector::from_vec(factor.forward(|i| self.along[columns[i]]));
-        Self {
-            gram: &self.gram - half.tr_mul(&half),
-            along: &self.along - half.tr_mul(&along),
-        }
-    }
-
     /// Gain of a few columns beside others whose half solution is known: (2) without the whole matrix.
     pub fn gains_beside<'f>(
         &self,
@@ -193,6 +174,5 @@ mod tests {
         let first = normal.solve(&[0]).gain;
         let second = normal.gains_beside(&[0], [&[1_usize][..]].into_iter())[0];
         assert!((first + second - 84.0).abs() < 1e-9);
-        assert!((normal.without(&[0]).solve(&[1]).gain - second).abs() < 1e-9);
     }
 }

@@ -102,23 +102,22 @@ impl Group {
                     .any(|column| column[range.clone()].iter().any(|v| *v != 0.0))
             })
             .collect();
+        let count = blocks.iter().map(ExactSizeIterator::len).sum();
         let gathered = columns.iter().map(|column| {
             let rows = blocks
                 .iter()
                 .flat_map(|r| column[r.clone()].iter().copied());
-            DVector::from_iterator(blocks.iter().map(ExactSizeIterator::len).sum(), rows)
+            DVector::from_iterator(count, rows)
         });
-        let basis = orthonormal(gathered);
+        let basis = orthonormal(count, gathered);
         Self { blocks, basis }
     }
 }
 
 /// Orthonormal basis of some columns, those that add nothing left out (Gram-Schmidt, twice).
-pub fn orthonormal(columns: impl Iterator<Item = DVector<f64>>) -> DMatrix<f64> {
+pub fn orthonormal(rows: usize, columns: impl Iterator<Item = DVector<f64>>) -> DMatrix<f64> {
     let mut basis = Vec::<DVector<f64>>::new();
-    let mut rows = 0;
     for mut column in columns {
-        rows = column.len();
         let size = column.norm();
         for _ in 0..2 {
             for other in &basis {

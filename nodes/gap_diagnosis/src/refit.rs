@@ -40,6 +40,25 @@ pub struct Estimate {
     pub d: f64,
 }
 
+/// A set with its values, whitened signatures and derivatives.
+pub struct Refit {
+    /// One a form.
+    pub estimates: Vec<Estimate>,
+    /// Whitened signature of each form at its values.
+    pub parts: Vec<DVector<f64>>,
+    /// Derivatives by all active values, in the order of forms.
+    pub jacobian: Vec<DVector<f64>>,
+}
+
+impl Refit {
+    /// What the set leaves of the stack.
+    pub fn left(&self, stack: &Stack<'_>) -> DVector<f64> {
+        self.parts
+            .iter()
+            .fold(stack.z.clone(), |left, part| left - part)
+    }
+}
+
 struct Member<'f> {
     instance: &'f Instance,
     values: Vec<f64>,
@@ -71,15 +90,7 @@ impl Member<'_> {
 }
 
 /// Refits a set of forms whose sizes, in typical units, are known from the linear fit.
-pub fn joint(
-    stack: &Stack<'_>,
-    library: &Library,
-    forms: &[&Form],
-    sizes: &[f64],
-) -> Vec<Estimate> {
-    if forms.is_empty() {
-        return vec![];
-    }
+pub fn joint(stack: &Stack<'_>, library: &Library, forms: &[&Form], sizes: &[f64]) -> Refit {
     let mut sizes = sizes.iter();
     let mut members: Vec<Member<'_>> = forms
         .iter()
@@ -94,7 +105,7 @@ pub fn joint(
             break;
         }
     }
-    estimates(stack, &members, &parts)
+    estimates(stack, &members, parts)
 }
 
 fn start<'f>(
@@ -290,10 +301,10 @@ fn moved<'f>(members: &[Member<'f>], by: &[f64], share: f64) -> Vec<Member<'f>> 
 }
 
 /// (2) and the intervals.
-fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: &[DVector<f64>]) -> Vec<Estimate> {
-    let columns = jacobian(stack, members, parts);
+fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: Vec<DVector<f64>>) -> Refit {
+    let columns = jacobian(stack, members, &parts);
     let mut left = stack.z.clone();
-    for part in parts {
+    for part in &parts {
         left -= part;
     }
     let spread = if columns.is_empty() {
@@ -302,9 +313,9 @@ fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: &[DVector<f64>]) 
         standard_uncertainties(stack, &DMatrix::from_columns(&columns), &left)
     };
     let mut spread = spread.into_iter();
-    members
+    let estimates = members
         .iter()
-        .zip(parts)
+        .zip(&parts)
         .map(|(member, part)| {
             let mut estimate = Estimate {
                 low: member.values.clone(),
@@ -324,7 +335,12 @@ fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: &[DVector<f64>]) 
             }
             estimate
         })
-        .collect()
+        .collect();
+    Refit {
+        estimates,
+        parts,
+        jacobian: columns,
+    }
 }
 
 /// Greater of the sandwich by run and of the model, for each column.

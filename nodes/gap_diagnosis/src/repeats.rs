@@ -181,7 +181,7 @@ fn weights(times: &[f64]) -> Vec<DVector<f64>> {
         DVector::from_iterator(n, times.iter().map(|t| scaled(*t).powi(power)))
     });
     let unit = (0..n).map(|i| DVector::from_fn(n, |row, _| if row == i { 1.0 } else { 0.0 }));
-    let basis = orthonormal(smooth.chain(unit));
+    let basis = orthonormal(n, smooth.chain(unit));
     (powers + 1..basis.ncols())
         .map(|k| basis.column(k).into_owned())
         .collect()

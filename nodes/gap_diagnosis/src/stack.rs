@@ -102,12 +102,6 @@ impl<'a> Stack<'a> {
         DVector::from_vec(stack)
     }
 
-    /// P of a stack that is white already.
-    pub fn projected(&self, mut stack: Vec<f64>) -> DVector<f64> {
-        self.nuisance.project(&mut stack);
-        DVector::from_vec(stack)
-    }
-
     /// A stack with its set-ups floated by plain least squares, mm.
     pub fn floated(&self, mut stack: Vec<f64>) -> Vec<f64> {
         self.unweighted.project(&mut stack);

@@ -1,0 +1,80 @@
+//! How likely each effect is, and what it cannot be told from.
+//!
+//! # Model
+//!
+//! Over all sets S that the search visited, C of `selection`, each set of instances once with its best form:
+//!
+//! ```text
+//!   p(g) = sum_(S has g) exp(-C(S)/2) / sum_S exp(-C(S)/2)  times  p(adequate)   (1)
+//!   g alone is named where every S with C <= C* + 2 ln 20 has g                  (2)
+//! ```
+//!
+//! p(adequate) is one where the leftover is within noise and falls with the share of the gap that is left. (1) is a probability only as far as the catalogue holds the truth. A table of recalibration from trials
+//! on other physics than the catalogue's belongs behind it; until those trials exist it is the identity, so that
+//! a confidence above 0.9 is to be read as "no rival in the catalogue", not as one error in ten.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::selection::Set;
+use crate::signature::Library;
+
+/// Best C of every set of instances that was visited.
+pub struct Rivals {
+    sets: BTreeMap<BTreeSet<usize>, f64>,
+    best: f64,
+}
+
+/// Odds beyond which a rival is excluded.
+const ODDS: f64 = 20.0;
+
+impl Rivals {
+    /// Of a search's visits.
+    pub fn new(library: &Library, visited: &BTreeMap<Set, f64>) -> Self {
+        let mut sets = BTreeMap::<BTreeSet<usize>, f64>::new();
+        for (set, score) in visited {
+            let instances = set
+                .iter()
+                .map(|form| library.forms[*form].instance)
+                .collect();
+            let entry = sets.entry(instances).or_insert(*score);
+            *entry = entry.min(*score);
+        }
+        let best = sets.values().copied().fold(f64::INFINITY, f64::min);
+        Self { sets, best }
+    }
+
+    /// (1) without p(adequate).
+    pub fn probability(&self, instance: usize) -> f64 {
+        let weight = |score: &f64| (-0.5 * (score - self.best)).exp();
+        let all: f64 = self.sets.values().map(weight).sum();
+        let own = self.sets.iter().filter(|(set, _)| set.contains(&instance));
+        own.map(|(_, score)| weight(score)).sum::<f64>() / all
+    }
+
+    /// Instances that stand in sets nearly as good that do without this one.
+    pub fn instead_of(&self, instance: usize) -> BTreeSet<usize> {
+        let near = |score: &f64| *score <= self.best + 2.0 * ODDS.ln();
+        self.sets
+            .iter()
+            .filter(|(set, score)| near(score) && !set.contains(&instance))
+            .flat_map(|(set, _)| set.iter().copied())
+            .collect()
+    }
+
+    /// Whether (2) holds.
+    pub fn is_alone(&self, instance: usize) -> bool {
+        let near = |score: &f64| *score <= self.best + 2.0 * ODDS.ln();
+        self.sets
+            .iter()
+            .all(|(set, score)| !near(score) || set.contains(&instance))
+    }
+}
+
+/// p(adequate): one less the share of what is beyond noise that stays unexplained, where the leftover is flagged.
+pub fn adequacy(flagged: bool, before: f64, after: f64, freedom: f64) -> f64 {
+    if !flagged {
+        return 1.0;
+    }
+    let left = (after - freedom).max(0.0) / (before - freedom).max(1.0);
+    (1.0 - left.sqrt()).clamp(0.2, 0.95)
+}

@@ -1,0 +1,241 @@
+//! Whether an effect that was found holds in every part of the recording.
+//!
+//! # Model
+//!
+//! Each member has its whitened signature f_g at the values found. A run is left out, the sizes of all
+//! members are fitted on the others, and the gain of g on the run that was left out is
+//!
+//! ```text
+//!   gain_g = |z - sum_(h != g) a_h f_h|^2 - |z - sum_h a_h f_h|^2         (1)
+//! ```
+//!
+//! It must be above its standard error in all, and above zero in four of five runs that g shows in. A cause has
+//! one size under all conditions, a surrogate does not: g is split by condition and the gain of separate
+//! sizes is a score of Wilson and Hilferty's (`localise`):
+//!
+//! ```text
+//!   z - sum_h J_h d_h - sum_level e_level f_g 1[level],   e_level = 0?    (2)
+//! ```
+//!
+//! An effect passes where the score stays below `constancy_z` or its sizes differ by less than
+//! `constancy_spread` of the mean.
+
+use std::collections::BTreeMap;
+
+use machine::twin::Run;
+use metrology::sample::Sense;
+use nalgebra::{DMatrix, DVector};
+
+use crate::config::GapConfig;
+use crate::field;
+use crate::localise::wilson_hilferty;
+use crate::normal::Normal;
+use crate::nuisance::plane_name;
+use crate::report::Constancy;
+use crate::rows::{Block, Row, count, position, time_s};
+use crate::stack::Stack;
+
+/// A level of a condition needs this D of the effect to say something of its size.
+const LEAST_D: f64 = 3.0;
+
+/// Whether (1) confirms each signature.
+pub fn held_out_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<bool> {
+    let Some(columns) = (!parts.is_empty()).then(|| DMatrix::from_columns(parts)) else {
+        return vec![];
+    };
+    let folds: Vec<Vec<std::ops::Range<usize>>> = stack
+        .runs
+        .iter()
+        .map(|run| {
+            let own = stack.rows.blocks.iter().filter(|block| block.run == *run);
+            own.map(Block::range).collect()
+        })
+        .collect();
+    let whole = Normal::new(&columns, &stack.z);
+    let normals: Vec<Normal> = folds
+        .iter()
+        .map(|fold| within(&columns, &stack.z, fold))
+        .collect();
+    (0..parts.len())
+        .map(|member| {
+            let gains: Vec<f64> = normals
+                .iter()
+                .filter(|fold| fold.gram[(member, member)] > LEAST_D * LEAST_D)
+                .map(|fold| gain(&whole, fold, member))
+                .collect();
+            is_confirmed(&gains)
+        })
+        .collect()
+}
+
+fn within(columns: &DMatrix<f64>, z: &DVector<f64>, ranges: &[std::ops::Range<usize>]) -> Normal {
+    let n = columns.ncols();
+    let mut sum = Normal {
+        gram: DMatrix::zeros(n, n),
+        along: DVector::zeros(n),
+    };
+    for range in ranges {
+        let part = columns.rows(range.start, range.len());
+        sum.gram += part.tr_mul(&part);
+        sum.along += part.tr_mul(&z.rows(range.start, range.len()));
+    }
+    sum
+}
+
+/// (1) of one run.
+fn gain(whole: &Normal, fold: &Normal, member: usize) -> f64 {
+    let rest = Normal {
+        gram: &whole.gram - &fold.gram,
+        along: &whole.along - &fold.along,
+    };
+    let all: Vec<usize> = (0..whole.gram.ncols()).collect();
+    let others: Vec<usize> = all.iter().copied().filter(|k| *k != member).collect();
+    let told = |chosen: &[usize]| {
+        let sizes = rest.solve(chosen).sizes;
+        let mut told = 0.0;
+        for (a, i) in sizes.iter().zip(chosen) {
+            told += 2.0 * a * fold.along[*i];
+            for (b, j) in sizes.iter().zip(chosen) {
+                told -= a * b * fold.gram[(*i, *j)];
+            }
+        }
+        told
+    };
+    told(&all) - told(&others)
+}
+
+fn is_confirmed(gains: &[f64]) -> bool {
+    if gains.len() < 2 {
+        return true;
+    }
+    let n = count(gains.len());
+    let mean = gains.iter().sum::<f64>() / n;
+    let variance = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let positive = count(gains.iter().filter(|gain| **gain > 0.0).count());
+    mean > (variance / n).sqrt() && positive >= 0.8 * n
+}
+
+type Level = fn(&Run, &Block, &Row) -> String;
+
+/// What an effect is split by.
+const SPLITS: [(&str, Level); 7] = [
+    ("channel", |_, block, _| block.channel.to_string()),
+    ("feed", |run, _, row| {
+        let touch = row.touch.and_then(|touch| run.touches.get(touch));
+        format!(
+            "{:.2}",
+            touch.map_or(run.segment.feed_mm_s, |t| t.feed_mm_s)
+        )
+    }),
+    ("sense", |run, _, _| match run.segment.sense {
+        Sense::None => String::new(),
+        Sense::Clockwise => "clockwise".to_owned(),
+        Sense::CounterClockwise => "counterclockwise".to_owned(),
+    }),
+    ("plane", |run, _, _| {
+        plane_name(run.segment.plane).to_owned()
+    }),
+    ("radius", |run, _, _| {
+        format!("{:.1}", run.segment.radius_mm)
+    }),
+    ("stylus", |run, _, _| run.segment.stylus.clone()),
+    ("side of the travel", |run, block, row| {
+        field::leading_axis(run, block).map_or_else(String::new, |(axis, low, high)| {
+            (position(run, row, axis) > 0.5 * (low + high)).to_string()
+        })
+    }),
+];
+
+/// (2) of one member whose signature before whitening is `raw`; `jacobian` holds what all members may change.
+pub fn constancy(
+    stack: &Stack<'_>,
+    raw: &[f64],
+    jacobian: &[DVector<f64>],
+    left: &DVector<f64>,
+    config: &GapConfig,
+) -> Constancy {
+    let mut worst = Constancy {
+        passed: true,
+        worst_z: 0.0,
+        split_by: String::new(),
+    };
+    let halves =
+        |run: &Run, _: &Block, row: &Row| (time_s(run, row) > middle_time(stack)).to_string();
+    let times = ("time", split(stack, raw, halves));
+    let by_condition = SPLITS
+        .iter()
+        .map(|(name, level)| (*name, split(stack, raw, level)));
+    for (name, levels) in by_condition.chain([times]) {
+        let levels: Vec<DVector<f64>> = levels
+            .into_iter()
+            .filter(|level| level.norm() > LEAST_D)
+            .collect();
+        if levels.len() < 2 {
+            continue;
+        }
+        let (z, spread) = split_score(&levels, jacobian, left);
+        if z > worst.worst_z || worst.split_by.is_empty() {
+            worst.worst_z = z;
+            worst.split_by = name.to_owned();
+        }
+        worst.passed &= z < config.constancy_z || spread < config.constancy_spread;
+    }
+    worst
+}
+
+fn middle_time(stack: &Stack<'_>) -> f64 {
+    let starts = stack.runs.iter().map(|run| {
+        let motion = &stack.session.runs[*run].motion;
+        motion.time_s.first().copied().unwrap_or(0.0)
+    });
+    let mut starts: Vec<f64> = starts.collect();
+    starts.sort_by(f64::total_cmp);
+    starts.get(starts.len() / 2).map_or(0.0, |t| t - 1e-9)
+}
+
+/// The signature in each level of a condition.
+fn split(
+    stack: &Stack<'_>,
+    raw: &[f64],
+    level: impl Fn(&Run, &Block, &Row) -> String,
+) -> Vec<DVector<f64>> {
+    let mut levels = BTreeMap::<String, Vec<f64>>::new();
+    for block in &stack.rows.blocks {
+        let run = &stack.session.runs[block.run];
+        for (place, row) in block.range().zip(&block.rows) {
+            let part = levels
+                .entry(level(run, block, row))
+                .or_insert_with(|| vec![0.0; stack.rows.len]);
+            part[place] = raw[place];
+        }
+    }
+    if levels.len() < 2 || levels.len() > 8 {
+        return vec![];
+    }
+    levels
+        .into_values()
+        .map(|part| stack.whitened(part))
+        .collect()
+}
+
+/// Score and spread of separate sizes.
+fn split_score(
+    levels: &[DVector<f64>],
+    jacobian: &[DVector<f64>],
+    left: &DVector<f64>,
+) -> (f64, f64) {
+    let columns: Vec<DVector<f64>> = jacobian.iter().chain(levels).cloned().collect();
+    let normal = Normal::new(&DMatrix::from_columns(&columns), left);
+    let common: Vec<usize> = (0..jacobian.len()).collect();
+    let more: Vec<usize> = (0..columns.len()).collect();
+    let gain = normal.solve(&more).gain - normal.solve(&common).gain;
+    let freedom = count(levels.len() - 1);
+    let alone: Vec<usize> = (jacobian.len()..columns.len()).collect();
+    let apart = normal.solve(&alone).sizes;
+    let mean = apart.iter().sum::<f64>() / count(apart.len());
+    let spread = apart.iter().map(|e| (e - mean).abs()).fold(0.0, f64::max);
+    (
+        wilson_hilferty(gain, freedom),
+        spread / (1.0 + mean).abs().max(0.1),
+    )
+}

@@ -1,0 +1,264 @@
+//! How far the gap shrinks on runs that were held out, once the named effects are simulated.
+//!
+//! # Model
+//!
+//! The held-out runs are simulated anew with and without the named effects; only set-ups float:
+//!
+//! ```text
+//!   G2 = rms2 - floor2,   closed = 1 - G2_after / G2_before               (1)
+//! ```
+//!
+//! The interval draws whole runs with replacement, the same before and after, and takes the 2.5 % and 97.5 %
+//! points. It is absent where the gap before cannot be told from none.
+//!
+//! # References
+//! \[1\] B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, Chapman & Hall 1993, 13 (percentiles).
+
+use std::collections::BTreeMap;
+
+use machine::effects::Effect;
+use machine::twin::Channel;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use crate::config::GapConfig;
+use crate::field::{self, Place};
+use crate::figures::{Abscissa, HeldOut, Trace};
+use crate::gap::{self, Size};
+use crate::noise::Noise;
+use crate::report::{BeforeAfter, Interval, LeftOut, Shrink};
+use crate::rows::{Block, count, position, time_s};
+use crate::split::{Split, title};
+use crate::stack::Stack;
+
+/// One named effect.
+pub struct Named<'e> {
+    /// Its id.
+    pub effect: String,
+    /// What it acts on.
+    pub axis: String,
+    /// The effect with the values found.
+    pub simulated: &'e dyn Effect,
+}
+
+/// The report's part and the figures.
+pub struct Shrunk {
+    /// Report.
+    pub shrink: Shrink,
+    /// One entry a held-out run.
+    pub held_out: Vec<HeldOut>,
+    /// Traces of the runs that were judged.
+    pub traces: Vec<Trace>,
+}
+
+/// Most traces that are drawn.
+const MOST_TRACES: usize = 40;
+
+/// Judges a stack of held-out runs.
+pub fn shrink(
+    stack: &Stack<'_>,
+    noise: &BTreeMap<Channel, Noise>,
+    split: &Split,
+    named: &[Named<'_>],
+    has_gap: bool,
+    config: &GapConfig,
+) -> Shrunk {
+    let before = stack.floated(stack.raw.clone());
+    let after = with_effects(stack, named.iter());
+    let sizes = [&before, &after].map(|floated| gap::by_block(stack, noise, floated));
+    let [whole, left] = [0, 1].map(|k| gap::together(sizes[k].iter()));
+    let is_judged = !split.held_out.is_empty();
+    let value = |number: f64| is_judged.then_some(number);
+    let leave_one_out = (0..named.len()).filter(|_| is_judged).map(|out| {
+        let others = named
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| *k != out)
+            .map(|(_, n)| n);
+        let floated = with_effects(stack, others);
+        LeftOut {
+            effect: named[out].effect.clone(),
+            axis: named[out].axis.clone(),
+            rms_um_without: gap::together(gap::by_block(stack, noise, &floated).iter()).rms_um(),
+        }
+    });
+    let number = |run: &usize| stack.session.runs[*run].segment.run;
+    let shrink = Shrink {
+        fit_runs: split.fit.iter().map(number).collect(),
+        held_out_runs: split.held_out.iter().map(number).collect(),
+        rms_um: BeforeAfter {
+            before: value(whole.rms_um()),
+            after: value(left.rms_um()),
+        },
+        p95_um: BeforeAfter {
+            before: value(whole.p95_um()),
+            after: value(left.p95_um()),
+        },
+        gap_closed: (is_judged && has_gap)
+            .then(|| closed(stack, &sizes, config))
+            .flatten(),
+        leave_one_out: leave_one_out.collect(),
+    };
+    Shrunk {
+        shrink,
+        held_out: if is_judged {
+            by_run(stack, &sizes)
+        } else {
+            vec![]
+        },
+        traces: traces(stack, noise, &before, &after),
+    }
+}
+
+fn with_effects<'n, 'e: 'n>(
+    stack: &Stack<'_>,
+    named: impl Iterator<Item = &'n Named<'e>>,
+) -> Vec<f64> {
+    let effects: Vec<&dyn Effect> = named.map(|named| named.simulated).collect();
+    let told = stack.simulate(&effects);
+    stack.floated(
+        stack
+            .raw
+            .iter()
+            .zip(told)
+            .map(|(raw, told)| raw - told)
+            .collect(),
+    )
+}
+
+/// (1) of sums before and after, each of squares, floor and rows.
+fn share(sums: &[[f64; 2]; 2]) -> Option<f64> {
+    let gap = |sum: [f64; 2]| (sum[0] - sum[1]).max(0.0);
+    (gap(sums[0]) > 0.0).then(|| 1.0 - gap(sums[1]) / gap(sums[0]))
+}
+
+fn squares(size: &Size) -> [f64; 2] {
+    [
+        size.rms_um().powi(2) * size.rows(),
+        size.floor_um().powi(2) * size.rows(),
+    ]
+}
+
+fn closed(stack: &Stack<'_>, sizes: &[Vec<Size>; 2], config: &GapConfig) -> Option<Interval> {
+    let of_run = |run: usize| -> [[f64; 2]; 2] {
+        let of = |sizes: &[Size]| {
+            let own = stack
+                .rows
+                .blocks
+                .iter()
+                .zip(sizes)
+                .filter(|(block, _)| block.run == run);
+            own.map(|(_, size)| squares(size)).fold([0.0; 2], add)
+        };
+        [of(&sizes[0]), of(&sizes[1])]
+    };
+    let runs: Vec<[[f64; 2]; 2]> = stack.runs.iter().map(|run| of_run(*run)).collect();
+    let total = |chosen: &mut dyn Iterator<Item = &[[f64; 2]; 2]>| {
+        chosen.fold([[0.0; 2]; 2], |sum, run| {
+            [add(sum[0], run[0]), add(sum[1], run[1])]
+        })
+    };
+    let value = share(&total(&mut runs.iter()))?;
+    let mut random = Pcg64Mcg::seed_from_u64(config.seed ^ 0x7);
+    let mut draws: Vec<f64> = (0..config.bootstrap_draws)
+        .filter_map(|_| {
+            let drawn: Vec<[[f64; 2]; 2]> = runs
+                .iter()
+                .map(|_| runs[random.random_range(0..runs.len())])
+                .collect();
+            share(&total(&mut drawn.iter()))
+        })
+        .collect();
+    if draws.len() * 40 < config.bootstrap_draws * 39 {
+        return None;
+    }
+    draws.sort_by(f64::total_cmp);
+    let at = |permille: usize| draws[(draws.len() - 1) * permille / 1000];
+    Some(Interval {
+        value,
+        low: at(25).min(value),
+        high: at(975).max(value),
+    })
+}
+
+fn add(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+fn by_run(stack: &Stack<'_>, sizes: &[Vec<Size>; 2]) -> Vec<HeldOut> {
+    let of_run = |run: &usize| {
+        let of = |sizes: &[Size]| {
+            let own = stack
+                .rows
+                .blocks
+                .iter()
+                .zip(sizes)
+                .filter(|(block, _)| block.run == *run);
+            gap::together(own.map(|(_, size)| size))
+        };
+        let (before, after) = (of(&sizes[0]), of(&sizes[1]));
+        let segment = &stack.session.runs[*run].segment;
+        HeldOut {
+            run: segment.run,
+            title: title(segment),
+            before_um: before.rms_um(),
+            after_um: after.rms_um(),
+            floor_um: before.floor_um(),
+        }
+    };
+    stack.runs.iter().map(of_run).collect()
+}
+
+fn traces(
+    stack: &Stack<'_>,
+    noise: &BTreeMap<Channel, Noise>,
+    before: &[f64],
+    after: &[f64],
+) -> Vec<Trace> {
+    let um = |rows: &[f64]| rows.iter().map(|mm| mm * 1e3).collect();
+    let trace = |block: &Block| {
+        let segment = &stack.session.runs[block.run].segment;
+        let (abscissa, at) = abscissa(stack, block);
+        Trace {
+            run: segment.run,
+            channel: block.channel.to_string(),
+            title: title(segment),
+            abscissa,
+            at,
+            before_um: um(&before[block.range()]),
+            after_um: um(&after[block.range()]),
+            floor_um: 1e3 * noise[&block.channel].total_mm(),
+        }
+    };
+    stack
+        .rows
+        .blocks
+        .iter()
+        .take(MOST_TRACES)
+        .map(trace)
+        .collect()
+}
+
+fn abscissa(stack: &Stack<'_>, block: &Block) -> (Abscissa, Vec<f64>) {
+    let run = &stack.session.runs[block.run];
+    let places = field::places(run, block);
+    if block.channel == Channel::Touch {
+        return (Abscissa::Touch, (0..block.rows.len()).map(count).collect());
+    }
+    let angle = |place: &Place| match place {
+        Place::Circle(angle) | Place::Line(angle) => *angle,
+        Place::None => 0.0,
+    };
+    match (places.first(), field::leading_axis(run, block)) {
+        (Some(Place::Circle(_)), _) => (Abscissa::Angle, places.iter().map(angle).collect()),
+        (Some(Place::Line(_)), Some((axis, ..))) => {
+            let at = block.rows.iter().map(|row| position(run, row, axis));
+            (Abscissa::Position, at.collect())
+        }
+        _ => {
+            let first = block.rows.first().map_or(0.0, |row| time_s(run, row));
+            let at = block.rows.iter().map(|row| time_s(run, row) - first);
+            (Abscissa::Time, at.collect())
+        }
+    }
+}

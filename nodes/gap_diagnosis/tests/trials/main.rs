@@ -1,0 +1,7 @@
+//! Blind trials on sessions of a small plant with its own formulas: no effect, one, two, an unknown one, and
+//! noise that the repeats do not show.
+
+mod named;
+mod nulls;
+mod plant;
+mod unnamed;

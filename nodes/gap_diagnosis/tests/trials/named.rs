@@ -1,0 +1,40 @@
+//! One effect, or two: named, on their axes, with intervals that hold the truth.
+
+use gap_diagnosis::report::Status;
+
+use crate::plant::{Noise, diagnosed, names, session, soft_play};
+
+#[test]
+fn a_play_with_a_soft_edge_is_named_backlash_of_its_axis() {
+    for (seed, axis, width_um) in [(1, 0, 4.0), (2, 1, 3.0), (3, 0, 1.5)] {
+        let wrong = soft_play(axis, width_um * 1e-3);
+        let diagnosis = diagnosed(&session(seed, Noise::default(), &wrong));
+        let name = format!("backlash {}", ["X", "Y"][axis]);
+        assert_eq!(names(&diagnosis), [name]);
+        let cause = &diagnosis.report.causes[0];
+        assert_ne!(cause.status, Status::Surrogate);
+        let width = &cause.parameters[0];
+        assert!(
+            (width.value - width_um).abs() < 0.12 * width_um,
+            "{width:?}"
+        );
+        let closed = diagnosis.report.shrink.gap_closed.unwrap();
+        assert!(closed.value > 0.8, "{closed:?}");
+        assert_eq!(diagnosis.effects.len(), 1);
+    }
+}
+
+#[test]
+fn two_plays_are_named_both() {
+    let (x, y) = (soft_play(0, 5e-3), soft_play(1, -3e-3));
+    let wrong = move |state: &crate::plant::State| [x(state)[0], y(state)[1]];
+    let diagnosis = diagnosed(&session(7, Noise::default(), &wrong));
+    let mut found = names(&diagnosis);
+    found.sort();
+    assert_eq!(
+        found,
+        ["backlash X", "backlash Y"],
+        "{:#?}",
+        diagnosis.report.causes
+    );
+}
