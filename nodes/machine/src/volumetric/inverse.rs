@@ -22,7 +22,8 @@ use metrology::PerAxis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::PoseRefusal;
-use super::model::{Tips, VolumetricModel, turned_about};
+use super::model::{Tips, VolumetricModel};
+use super::turn::turned_about;
 use crate::kinematics::direction_of;
 
 /// Steps of this size are rounding, mm.

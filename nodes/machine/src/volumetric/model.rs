@@ -1,14 +1,7 @@
 //! All geometric errors of a machine together: the exact position of the tip at a pose.
 //!
 //! The product of the module's equation (1) is applied to the tip from the tool's end, member by
-//! member, so that no matrix is multiplied: each member moves one point. A turn by a rotation vector
-//! w is
-//!
-//! ```text
-//!   R(w) v = v + a w x v + b w x (w x v),   a = sin|w|/|w|,   b = (1 - cos|w|)/|w|^2       (1)
-//! ```
-//!
-//! with the series of a and b where |w| < 0.001, which is exact to the last bit there. The nominal tip is
+//! member, so that no matrix is multiplied: each member moves one point (`turn`). The nominal tip is
 //! moved beside it; their difference is the error.
 //!
 //! # Agreement
@@ -25,6 +18,7 @@ use super::component::has_component;
 use super::curve::{self, Lanes, Motions, lane};
 use super::error::{PoseRefusal, VolumetricError};
 use super::member::{Member, members};
+use super::turn::{SinCos, sin_cos, turned, turned_about, turned_by};
 use crate::chain::Chain;
 use crate::kinematics::{Kinematics, direction_of};
 
@@ -75,7 +69,7 @@ pub(super) struct Tips {
     pub(super) nominal_mm: Vector3<f64>,
     pub(super) actual_mm: Vector3<f64>,
     /// Sine and cosine of the nominal turn of the tip about X, Y and Z.
-    pub(super) turn: [(f64, f64); 3],
+    pub(super) turn: [SinCos; 3],
 }
 
 impl VolumetricModel {
@@ -252,7 +246,7 @@ impl Link {
     }
 
     /// Moves both tips through this member.
-    #[inline]
+    #[inline(always)]
     fn move_on(&self, position: f64, motions: &Lanes, tips: &mut Tips) {
         let [ex, ey, ez, _, ea, eb, ec, _] = *motions;
         let (shift_mm, turn_rad) = (Vector3::new(ex, ey, ez), Vector3::new(ea, eb, ec));
@@ -279,12 +273,12 @@ impl Link {
                 zero_rad,
             } => {
                 let angle_rad = sense * position;
-                let nominal = angle_rad.sin_cos();
+                let nominal = sin_cos(angle_rad);
                 tips.turn[*row] = nominal;
                 let arm_mm = tips.nominal_mm - nominal_origin_mm;
                 tips.nominal_mm = nominal_origin_mm + turned_about(*row, nominal, &arm_mm);
                 let actual = if zero_rad.abs() > 0.0 {
-                    (angle_rad + zero_rad).sin_cos()
+                    sin_cos(angle_rad + zero_rad)
                 } else {
                     nominal
                 };
@@ -377,38 +371,4 @@ fn linear_on_bed(chain: &Chain) -> bool {
         let rest = side.iter().skip_while(|axis| axis.is_linear());
         rest.into_iter().all(|axis| !axis.is_linear())
     })
-}
-
-/// R(w) v, equation (1).
-pub(super) fn turned(w: &Vector3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
-    // Below 1 mrad the next term of either series is less than 1e-21.
-    const SMALL: f64 = 1e-6;
-    let square = w.norm_squared();
-    let (a, b) = if square < SMALL {
-        const A: (f64, f64) = (1.0 / 6.0, 1.0 / 120.0);
-        const B: (f64, f64) = (1.0 / 24.0, 1.0 / 720.0);
-        (
-            1.0 - square * (A.0 - square * A.1),
-            0.5 - square * (B.0 - square * B.1),
-        )
-    } else {
-        let angle = square.sqrt();
-        (angle.sin() / angle, (1.0 - angle.cos()) / square)
-    };
-    let once = w.cross(v);
-    v + once * a + w.cross(&once) * b
-}
-
-/// Turn about a unit vector by an angle given as its sine and cosine.
-fn turned_by(n: &Vector3<f64>, (sin, cos): (f64, f64), v: &Vector3<f64>) -> Vector3<f64> {
-    v * cos + n.cross(v) * sin + n * (n.dot(v) * (1.0 - cos))
-}
-
-/// Turn about a coordinate direction.
-pub(super) fn turned_about(row: usize, (sin, cos): (f64, f64), v: &Vector3<f64>) -> Vector3<f64> {
-    match row {
-        0 => Vector3::new(v.x, cos * v.y - sin * v.z, sin * v.y + cos * v.z),
-        1 => Vector3::new(cos * v.x + sin * v.z, v.y, cos * v.z - sin * v.x),
-        _ => Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z),
-    }
 }
