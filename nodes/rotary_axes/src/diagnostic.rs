@@ -70,6 +70,14 @@ pub enum Diagnostic {
         /// Names of the components.
         names: String,
     },
+    /// Nothing is stated of what is alike in all visits.
+    #[error(
+        "run {run}: no allowance is stated for set-up, linear axes and error motions: uncertainties are those of the noise alone"
+    )]
+    NoAllowance {
+        /// Run.
+        run: u32,
+    },
     /// The poses tell too little.
     #[error("run {run}: merit of the poses is {merit:.3}, at least {least} is wanted")]
     LowMerit {
@@ -220,6 +228,7 @@ impl Diagnostic {
         match self {
             Self::Calibrated { .. } | Self::Verified { .. } => Severity::Info,
             Self::NotEstimable { .. }
+            | Self::NoAllowance { .. }
             | Self::LowMerit { .. }
             | Self::Doubtful { .. }
             | Self::LackOfFit { .. }
@@ -243,6 +252,7 @@ impl Diagnostic {
             Self::Calibrated { .. } => "calibrated",
             Self::Verified { .. } => "verified",
             Self::NotEstimable { .. } => "not_estimable",
+            Self::NoAllowance { .. } => "no_allowance",
             Self::LowMerit { .. } => "low_merit",
             Self::Doubtful { .. } => "doubtful_visit",
             Self::LackOfFit { .. } => "lack_of_fit",
