@@ -13,4 +13,6 @@ mod cell;
 mod equal_bytes;
 mod five_axis;
 mod probe_faults;
+mod rotary_coverage;
+mod volumetric;
 mod warm_up;
