@@ -3,6 +3,16 @@
 //! The scenario is run as a person runs it, with drives, friction, lost motion and heat. Beside it the same
 //! programme is measured on the plant at rest and cold, so that what the programme itself can and cannot see
 //! stands apart from what heat does between measurement and use.
+//!
+//! What is left of 17.5 µm (p95 about a datum), from one run of each:
+//!
+//! | with | µm |
+//! |---|---|
+//! | plate (0.2 µm) and tables alone, at rest and cold | 0.97 |
+//! | drives, friction and lost motion besides, no heat | 1.03 |
+//! | heat of cabinet, hydraulics and screws besides: the scenario | 1.31 |
+//! | 18 W in the middle of the table besides, whose growth no plate of glass ceramic shows | 2.28 |
+//! | poses in random order and approached from any side, at the end of the measurement, and those 18 W | 7.5 |
 
 use std::time::{Duration, Instant};
 

@@ -29,7 +29,8 @@
 //! The allowances are standard uncertainties of their causes, independent of each other.
 //!
 //! # Agreement
-//! `coverage_of_95_percent_intervals_over_machines_of_the_plant` in tests/scenario/five_axis.rs.
+//! `coverage_of_95_percent_intervals_over_machines_of_the_plant` in tests/scenario/rotary_coverage.rs: 95.5 % of 1,200
+//! intervals hold the truth, 47.8 % with the noise alone.
 //!
 //! # References
 //! \[1\] JCGM 100:2008, F.1.2 (correlation by common causes). \[2\] JCGM 102:2011, 6.2 (propagation to several

@@ -5,7 +5,7 @@
 //! moved beside it; their difference is the error.
 //!
 //! # Agreement
-//! `prop_the_walk_is_the_product_of_bodies`, 14 chains, errors up to 2 mm and 0.05 rad: 5e-13 mm.
+//! `prop_the_walk_is_the_product_of_bodies`, 14 chains, errors from 10 µm and 10 µrad up to 2 mm and 0.05 rad: 5e-13 mm.
 //! `prop_the_first_order_is_off_by_the_second_order`: the sum of sensitivities times values is off by
 //! 7.3e-9 mm for errors of 1 µm and 1 µrad, by a hundred times that for ten times those.
 
@@ -30,6 +30,8 @@ pub struct VolumetricModel {
     locations: Vec<(ErrorComponent, f64)>,
     policy: Extrapolate,
     has_shifted_datum: bool,
+    /// Whether there is an axis X, Y, Z.
+    pub(super) has_linear: [bool; 3],
     /// Whether no rotary axis stands between the bed and a linear axis.
     pub(super) linear_on_bed: bool,
 }
@@ -119,6 +121,7 @@ impl VolumetricModel {
             })
             .collect();
         Ok(Self {
+            has_linear: Axis::LINEAR.map(|axis| chain.axes().contains(axis)),
             has_shifted_datum: links.iter().any(Link::shifts_datum),
             links,
             locations,
@@ -160,7 +163,24 @@ impl VolumetricModel {
     }
 
     /// Whether a pose has an answer.
+    #[inline]
     pub(super) fn check_pose(
+        &self,
+        positions: &PerAxis<f64>,
+        tool_offset_mm: &Vector3<f64>,
+    ) -> Result<(), PoseRefusal> {
+        // A sum that is finite has no summand that is not.
+        let sum = self.links.iter().fold(tool_offset_mm.sum(), |sum, link| {
+            sum + positions[link.member.axis]
+        });
+        if self.policy != Extrapolate::Refuse && sum.is_finite() {
+            return Ok(());
+        }
+        self.look_at_pose(positions, tool_offset_mm)
+    }
+
+    /// [`Self::check_pose`], number by number.
+    fn look_at_pose(
         &self,
         positions: &PerAxis<f64>,
         tool_offset_mm: &Vector3<f64>,
