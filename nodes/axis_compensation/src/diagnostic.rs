@@ -8,16 +8,7 @@ use crate::geometric::GeometrySource;
 use crate::parts::PartRefusal;
 use crate::positioning::refusal::PositioningRefusal;
 
-/// How urgent a condition is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// A fact worth recording.
-    Info,
-    /// It goes on, but not as told.
-    Warn,
-    /// Nothing is compensated any more.
-    Error,
-}
+pub use metrology::Severity;
 
 /// A condition worth reporting; each is said when it begins, not at every tick.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

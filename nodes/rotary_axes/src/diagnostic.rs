@@ -4,16 +4,7 @@ use metrology::Axis;
 
 use crate::error::EstimateError;
 
-/// How bad a condition is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
-    /// For the record.
-    Info,
-    /// It goes on, but not as it should.
-    Warn,
-    /// Something is not done.
-    Error,
-}
+pub use metrology::Severity;
 
 /// Something that a person should know; `Display` says it in one line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,18 +1,13 @@
 //! The conditions of the rotary-axis calibration on `/diagnostics`; lengths in µm.
 
 use node_runtime::{Diagnostic, Level};
-use rotary_axes::diagnostic::Severity;
 use rotary_axes::{Diagnostic as Condition, Output};
 
 pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
     let Output::Diagnostic(condition) = output else {
         return None;
     };
-    let level = match condition.severity() {
-        Severity::Info => Level::Ok,
-        Severity::Warn => Level::Warn,
-        Severity::Error => Level::Error,
-    };
+    let level = Level::from(condition.severity());
     let told = Diagnostic::new(level, condition.condition(), condition.to_string());
     Some(match condition {
         Condition::Calibrated {
