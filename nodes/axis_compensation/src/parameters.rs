@@ -116,6 +116,12 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "time in which an offset is faded to zero",
     ),
     row(
+        "shutdown_fade_s",
+        "s",
+        (0.01, 60.0),
+        "the same when the node is told to end, where that is shorter; the axes' limits of rate and acceleration hold all the same",
+    ),
+    row(
         "gap_s",
         "s",
         (0.001, 60.0),

@@ -132,6 +132,7 @@ impl AxisCompensationStage {
         let let_go = LetGo {
             hold_s: config.hold_s,
             fade_s: config.fade_s,
+            shutdown_fade_s: config.shutdown_fade_s,
         };
         let states = PerAxis::from_fn(|axis| {
             config.axes.get(&axis).map(|limits| {
@@ -361,6 +362,9 @@ impl AxisCompensationStage {
     fn shut_down(&mut self, out: &mut Vec<Output>) {
         if self.shutdown == Shutdown::No {
             self.shutdown = Shutdown::Fading;
+            for state in self.states.0.iter_mut().flatten() {
+                state.hasten();
+            }
             out.push(Output::Diagnostic(Diagnostic::ShuttingDown));
             self.report_faded_out(out);
         }

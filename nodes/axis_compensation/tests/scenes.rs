@@ -22,12 +22,16 @@ struct Scene {
 
 impl Scene {
     fn new(extrapolate: &str) -> Self {
+        Self::with(extrapolate, "fade_s: 2.0")
+    }
+
+    fn with(extrapolate: &str, rest: &str) -> Self {
         let machine = include_str!("../../../launch_configs/first_run/machine.yaml");
         let limits =
             "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
         let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
             "{{axes: {{X: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: {extrapolate}, \
-             physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0}}"
+             physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, {rest}}}"
         ))
         .unwrap();
         Self {
@@ -277,6 +281,50 @@ fn shutdown_fades_and_says_when_it_is_done() {
     assert_eq!(scene.x().1, CompensationState::Fading);
     scene.run(2.5, 0.0);
     assert!(scene.faded_out && scene.x() == (0.0, CompensationState::Off));
+}
+
+#[test]
+fn shutdown_is_quicker_than_a_long_fade_and_keeps_the_rate_limit() {
+    let mut scene = Scene::with("linear", "fade_s: 30.0, shutdown_fade_s: 0.5");
+    scene.model(0.050, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.step(Input::Shutdown);
+    let (mut before, mut fastest) = (scene.x().0, 0.0_f64);
+    for _ in 0..1500 {
+        scene.run(0.001, 0.0);
+        fastest = fastest.max((scene.x().0 - before).abs() / 0.001);
+        before = scene.x().0;
+    }
+    // 50 µm at 50 µm/s and a start and a stop at 500 µm/s²: 1.1 s.
+    assert!(scene.faded_out, "{before} mm is left");
+    assert!((0.049..0.050 + 1e-9).contains(&fastest), "{fastest} mm/s");
+}
+
+#[test]
+fn the_longest_wind_down_holds_for_the_greatest_offset_and_states_that_end() {
+    let config = "fade_s: 30.0, shutdown_fade_s: 0.5";
+    for states_end in [false, true] {
+        let mut scene = Scene::with("linear", config);
+        scene.model(0.0999, 0.0, 1e6);
+        scene.run(4.0, 0.0);
+        scene.step(Input::Shutdown);
+        let began = scene.nanos;
+        scene.run(0.5, 0.0);
+        while !scene.faded_out && scene.nanos - began < 60_000 * MILLISECOND {
+            if states_end {
+                scene.nanos += 10 * MILLISECOND;
+                scene.step(Input::Tick);
+            } else {
+                scene.run(0.01, 0.0);
+            }
+        }
+        let took_s = (scene.nanos - began) as f64 * 1e-9;
+        // 100 µm at 50 µm/s, four starts and stops of 0.1 s, and gap_s.
+        assert!(
+            took_s <= 2.0 + 0.4 + 0.5,
+            "states end: {states_end}: {took_s} s"
+        );
+    }
 }
 
 #[test]
