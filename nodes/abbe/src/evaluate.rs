@@ -9,7 +9,7 @@ use metrology::sample::{
     AxisCompensation, BlockMeasurement, GeometryModel, PositioningTable, ProbedFeature,
     ProbedPoint, TestSegment,
 };
-use recorder::{Bag, Event, Order};
+use recorder::{Bag, Event, Loss, Order};
 
 pub mod budget;
 pub mod circles;
@@ -40,8 +40,8 @@ pub struct Tests {
     pub rotary: Option<GeometryModel>,
     /// The last positioning table of each axis.
     pub tables: Vec<PositioningTable>,
-    /// What could not be read, in words.
-    pub remarks: Vec<String>,
+    /// What of the bag could not be read.
+    pub losses: Vec<Loss>,
 }
 
 /// Everything that collects while a bag is read.
@@ -72,7 +72,7 @@ impl Tests {
                     let name = names.get(message.topic.index()).map_or("", String::as_str);
                     collected.message(name, message.data)?;
                 }
-                Event::Loss(loss) => collected.tests.remarks.push(format!("{loss}")),
+                Event::Loss(loss) => collected.tests.losses.push(loss),
             }
         }
         let mut tests = collected.tests;

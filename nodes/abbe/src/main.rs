@@ -8,6 +8,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use node_runtime::complaint;
 
 mod evaluate;
 mod evidence;
@@ -53,7 +54,7 @@ fn main() -> ExitCode {
         Verb::Node(node) => return node.execute(),
     };
     outcome.unwrap_or_else(|error| {
-        eprintln!("abbe: {error:#}");
+        eprintln!("abbe: {}", complaint::in_words(&error));
         ExitCode::FAILURE
     })
 }

@@ -79,7 +79,9 @@ impl Report {
         self.text.push('\n');
         self.text.push_str(&tests.text);
         self.body = maud::html! { (self.body) (tests.body) };
-        self.figures["tests"] = tests.figures["tests"].clone();
+        for key in ["tests", "loss", "uncertainty"] {
+            self.figures[key] = tests.figures[key].clone();
+        }
     }
 
     /// The report as it stands on a terminal.

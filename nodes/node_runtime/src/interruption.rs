@@ -145,10 +145,7 @@ mod tests {
         let interruption = Interruption::never();
         assert!(!interruption.wait(Duration::from_millis(5)));
         let asking = interruption.clone();
-        let asked = std::thread::spawn(move || {
-            std::thread::sleep(Duration::from_millis(20));
-            asking.ask(Asked::ToEnd);
-        });
+        let asked = std::thread::spawn(move || asking.ask(Asked::ToEnd));
         assert!(interruption.wait(Duration::from_secs(10)));
         asked.join().unwrap();
         assert!(interruption.is_asked() && !interruption.is_forced());

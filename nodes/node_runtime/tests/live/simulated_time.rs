@@ -148,7 +148,7 @@ fn diagnostics_and_log_carry_the_nodes_time_and_not_the_computers() {
             let mut own = of_timed.iter();
             own.any(|(name, stamp_s)| name.starts_with(start) && *stamp_s == 3)
         };
-        (any("/timed: clock_stepped_back") && any("timed says clock went back")).then_some(())
+        (any("/timed: clock_stepped_back") && any("timed says /clock went back")).then_some(())
     };
     wait(&seen, "the step back on both", &mut is_all);
     let late = of_timed.iter().find(|(_, stamp_s)| *stamp_s > 7);
