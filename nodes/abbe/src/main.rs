@@ -15,6 +15,7 @@ mod evidence;
 mod export;
 mod launch;
 mod node;
+mod preflight;
 mod progress;
 mod record;
 mod report;
@@ -37,6 +38,8 @@ enum Verb {
     Run(run::Run),
     /// Evaluate the tests that a bag holds.
     Report(report_bag::ReportBag),
+    /// Tell what a plan's recordings will determine, before they are made, and what to add.
+    Preflight(preflight::Preflight),
     /// Record topics of the ROS graph into a bag.
     Record(record::Record),
     /// Make compensation tables for a control from what a bag knows.
@@ -49,6 +52,7 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().verb {
         Verb::Run(run) => run.execute(),
         Verb::Report(report) => report.execute(),
+        Verb::Preflight(preflight) => preflight.execute(),
         Verb::Record(record) => record.execute(),
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => return node.execute(),

@@ -39,6 +39,7 @@ impl ReportBag {
     /// When bag or budget cannot be read, or the page not written.
     pub fn execute(self) -> Result<ExitCode> {
         let budget = self.budget.as_deref().map(read_budget).transpose()?;
+        eprintln!("Evaluating the tests of {}", self.bag.display());
         let bag = Bag::open(&self.bag)?;
         let tests = Tests::of(&bag).with_context(|| format!("bag {}", self.bag.display()))?;
         for loss in &tests.losses {
@@ -172,8 +173,12 @@ fn unstate(figures: &mut serde_json::Value) {
 
 fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> {
     let mut sections = report::positioning::sections(&tests.linear, budget)?;
+    sections.extend(report::stops::section(&tests.stops));
     sections.extend(report::geometry::tables(&tests.tables));
     sections.extend(report::circular::sections(&tests.circles, budget)?);
+    if let Some(circle) = &tests.station_circle {
+        sections.extend(report::published::sections(circle, tests.geometry.as_ref()));
+    }
     for (name, model) in [
         ("Geometric errors of the linear axes", &tests.geometry),
         ("Geometric errors of the rotary axes", &tests.rotary),

@@ -95,6 +95,7 @@ impl Run {
         let title = format!("{}: {}", scenario.name, scenario.file.title);
         let mut report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
         if scenario.file.report == ReportKind::Tests && outcome.recorded > 0 {
+            eprintln!("Evaluating the tests of {}", bag.display());
             let tests = Tests::of(&Bag::open(&bag)?)?;
             report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
         }

@@ -11,8 +11,8 @@ pub use metrology::Severity;
 pub enum Diagnostic {
     /// Location errors were estimated.
     #[error(
-        "run {run}: {visits} visits of {spheres} spheres, merit of the poses {merit:.2}; spatial standard deviation {:.2} um, with the model {:.2} um",
-        before_mm * 1e3, after_mm * 1e3
+        "run {run}: {visits} visits of {}, merit of the poses {merit:.2}; spatial standard deviation {:.2} µm, with the model {:.2} µm",
+        counted(*spheres), before_mm * 1e3, after_mm * 1e3
     )]
     Calibrated {
         /// Run.
@@ -34,7 +34,7 @@ pub enum Diagnostic {
     },
     /// A model was held against other poses.
     #[error(
-        "run {run}: {visits} visits, {:.2} um rms without the model, {:.2} um with it ({:.2} um at most), {:.2} um expected from the uncertainties",
+        "run {run}: {visits} visits, {:.2} µm rms without the model, {:.2} µm with it ({:.2} µm at most); noise and the model's uncertainty alone would leave {:.2} µm",
         before_mm * 1e3, after_mm * 1e3, greatest_mm * 1e3, expected_mm * 1e3
     )]
     Verified {
@@ -80,7 +80,7 @@ pub enum Diagnostic {
         least: f64,
     },
     /// A visit was left out of the fit.
-    #[error("run {run}: sphere {sphere} at {} is {:.1} um off, which chance does not explain; left out", in_words(pose), off_mm * 1e3)]
+    #[error("run {run}: sphere {sphere} at {} is {:.1} µm off, which chance does not explain; left out", in_words(pose), off_mm * 1e3)]
     Doubtful {
         /// Run.
         run: u32,
@@ -201,6 +201,13 @@ pub enum LinearRefusal {
     /// A pose has no value.
     #[error("{0}")]
     Pose(#[from] machine::volumetric::PoseRefusal),
+}
+
+fn counted(spheres: usize) -> String {
+    match spheres {
+        1 => "1 sphere".to_owned(),
+        n => format!("{n} spheres"),
+    }
 }
 
 /// Rotary positions in degrees.

@@ -34,7 +34,7 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
             .with("rms_before_um", before_mm * 1e3)
             .with("rms_after_um", after_mm * 1e3)
             .with("greatest_after_um", greatest_mm * 1e3)
-            .with("expected_um", expected_mm * 1e3)
+            .with("noise_alone_um", expected_mm * 1e3)
             .with("same_places", same_places),
         _ => told,
     })

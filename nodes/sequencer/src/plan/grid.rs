@@ -144,13 +144,28 @@ impl GridStep {
         sense: Sense,
         arrival: Arrival,
     ) -> Result<Trajectory, SequencerError> {
+        self.paced(step, machine, sense, arrival, self.pace(step)?)
+    }
+
+    /// The program of one run at another pace.
+    ///
+    /// # Errors
+    /// As [`planar`].
+    pub(crate) fn paced(
+        &self,
+        step: usize,
+        machine: &MachineFile,
+        sense: Sense,
+        arrival: Arrival,
+        pace: Pace,
+    ) -> Result<Trajectory, SequencerError> {
         let order = PlanarOrder {
             placement: &self.placement,
             shape: self.shape(step)?,
             offset_mm: self.offset_mm,
             feed_mm_min: self.feed_mm_min,
             sense,
-            pace: self.pace(step)?,
+            pace,
             arrival,
         };
         planar(machine, &order).map_err(|source| in_step(step, source))
