@@ -132,16 +132,22 @@ impl StopRuns {
 impl Current {
     /// The stops, where one axis moved and no other.
     fn finished(self) -> Option<Stops> {
+        // The first rest is where the machine happened to stand.
+        let entered = || self.done.iter().skip(1);
+        let is_stop = |rest: &&Rest| rest.n >= LEAST_READINGS;
         let span = |axis: usize| {
-            let all = || self.done.iter().map(|rest| rest.commanded_mm[axis]);
+            let all = || {
+                entered()
+                    .filter(is_stop)
+                    .map(|rest| rest.commanded_mm[axis])
+            };
             all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
         };
         let moved: Vec<usize> = (0..3).filter(|axis| span(*axis) > SAME_MM).collect();
         let [axis] = moved[..] else {
             return None;
         };
-        let is_stop = |rest: &&Rest| rest.n >= LEAST_READINGS;
-        let mut rests = self.done.iter().filter(is_stop);
+        let mut rests = entered().filter(is_stop);
         let by_scale = rests.all(|rest| rest.sums_mm[axis][1].is_finite());
         let pairs = self.done.windows(2).filter_map(|pair| match pair {
             [before, rest] if rest.n >= LEAST_READINGS => Some(Stop {

@@ -7,7 +7,7 @@ use grid_encoder::preflight::{
 use grid_encoder::recording::{Fixture, Place};
 use grid_encoder::spectrum::Visibility;
 use grid_encoder::unknown::Unknown;
-use machine::file::AxisEntry;
+use machine::file::{AxisEntry, GridEncoderEntry};
 use metrology::sample::TestPlane;
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
@@ -181,24 +181,7 @@ fn places(programme: &Programme, offsets: &[Vector3<f64>]) -> Vec<Place> {
         Some(AxisEntry::Linear(entry)) => entry.travel_mm.into(),
         _ => (0.0, 0.0),
     });
-    let mut planes: Vec<TestPlane> = Vec::new();
-    let mut head: Vec<Vector3<f64>> = Vec::new();
-    let known = plate.placements.iter();
-    for (plane, offset) in known.map(|p| (p.plane.into(), Vector3::from(p.tool_offset_mm))) {
-        if !planes.contains(&plane) {
-            planes.push(plane);
-        }
-        if !head.contains(&offset) {
-            head.push(offset);
-        }
-    }
-    head.extend(
-        offsets
-            .iter()
-            .filter(|o| !head.contains(o))
-            .copied()
-            .collect::<Vec<_>>(),
-    );
+    let (planes, head) = mountings(plate, offsets);
     let largest_mm = programme
         .recordings
         .iter()
@@ -234,4 +217,30 @@ fn places(programme: &Programme, offsets: &[Vector3<f64>]) -> Vec<Place> {
         place.fixture.setup_id += last.setup_id;
     }
     found
+}
+
+/// Planes in which the plate is mounted, and offsets of the head: those of the machine file and `offsets`.
+fn mountings(
+    plate: &GridEncoderEntry,
+    offsets: &[Vector3<f64>],
+) -> (Vec<TestPlane>, Vec<Vector3<f64>>) {
+    let mut planes: Vec<TestPlane> = Vec::new();
+    let mut head: Vec<Vector3<f64>> = Vec::new();
+    let known = plate.placements.iter();
+    for (plane, offset) in known.map(|p| (p.plane.into(), Vector3::from(p.tool_offset_mm))) {
+        if !planes.contains(&plane) {
+            planes.push(plane);
+        }
+        if !head.contains(&offset) {
+            head.push(offset);
+        }
+    }
+    head.extend(
+        offsets
+            .iter()
+            .filter(|o| !head.contains(o))
+            .copied()
+            .collect::<Vec<_>>(),
+    );
+    (planes, head)
 }

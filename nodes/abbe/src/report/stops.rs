@@ -15,6 +15,8 @@ use crate::evaluate::stops::{Stop, Stops};
 
 /// Stops of one direction that a prediction needs.
 const LEAST_STOPS: usize = 5;
+/// Deviations below which there is nothing to take out, µm.
+const WORTH_UM: f64 = 0.5;
 
 /// One part for all verifications along one axis; none without any.
 #[must_use]
@@ -40,7 +42,9 @@ pub fn section(all: &[Stops]) -> Option<Section> {
     });
     let predicted: Vec<_> = all
         .iter()
+        .filter(|stops| !stops.compensated)
         .filter_map(|stops| Some((stops, predicted_um(&stops.stops)?)))
+        .filter(|(_, [before_um, ..])| *before_um > WORTH_UM)
         .collect();
     if !predicted.is_empty() {
         section.tables.push(Rows {
