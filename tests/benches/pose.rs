@@ -12,7 +12,9 @@ use axis_compensation::positioning::direction::Direction;
 use machine::volumetric::{VolumetricModel, components_of};
 use machine::{Chain, Kinematics};
 use metrology::drift::Extrapolate;
-use metrology::sample::{AxisDrift, CurveForm, ErrorCurve, GeometryModel, ThermalModel};
+use metrology::sample::{
+    AxisDrift, CurveForm, DriftGrowth, ErrorCurve, GeometryModel, ThermalModel,
+};
 use metrology::{Axis, ErrorComponent, PerAxis, Stamp};
 use nalgebra::{DMatrix, Vector3};
 use serde::Deserialize;
@@ -55,11 +57,25 @@ fn drift(axis: Axis) -> AxisDrift {
         slope_mm_per_mm: 5e-5,
         cross_slope_mm_per_mm,
         span_mm: (-220.0, 220.0),
-        rate_mm_s: 1e-6,
-        slope_rate_per_s: 1e-9,
-        time_constant_s: 1800.0,
+        growth: Axis::LINEAR.map(|source| {
+            (source == axis).then_some(DriftGrowth {
+                rate_mm_s: 1e-6,
+                gradient_rate_per_s: Vector3::from_fn(
+                    |row, _| {
+                        if row == axis.index() { 1e-9 } else { 0.0 }
+                    },
+                ),
+                time_constant_s: 1800.0,
+            })
+        }),
         ..AxisDrift::default()
     }
+}
+
+/// The own growth of a drift.
+fn growth(drift: &AxisDrift) -> DriftGrowth {
+    let mut own = drift.growth.iter().flatten();
+    *own.next().expect("every drift above has one")
 }
 
 fn model() -> ThermalModel {
@@ -226,9 +242,9 @@ fn as_json(model: &ThermalModel) -> String {
         "p0": of(|d| d.p0_mm),
         "k0": of(|d| d.k0_mm),
         "slope": of(|d| d.slope_mm_per_mm),
-        "rate": of(|d| d.rate_mm_s),
-        "slope_rate": of(|d| d.slope_rate_per_s),
-        "tau": of(|d| d.time_constant_s),
+        "rate": of(|d| growth(d).rate_mm_s),
+        "slope_rate": of(|d| growth(d).gradient_rate_per_s.sum()),
+        "tau": of(|d| growth(d).time_constant_s),
         "lower": of(|d| d.span_mm.0),
         "upper": of(|d| d.span_mm.1),
         "cross": vectors(|d| d.cross_slope_mm_per_mm),

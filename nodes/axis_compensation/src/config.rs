@@ -24,6 +24,9 @@ pub struct AxisCompensationConfig {
     pub physical_rate_um_per_min: f64,
     /// Change between models that is never a jump.
     pub jump_margin_um: f64,
+    /// Greatest expanded uncertainty (k = 2) of a drift at the travel's corners; beyond it the axis is
+    /// refused.
+    pub expanded_uncertainty_limit_um: f64,
     /// How long the last good value is held once the model is refused.
     pub hold_s: f64,
     /// Time in which an offset is faded to zero.
@@ -81,6 +84,10 @@ impl AxisCompensationConfig {
         let given = [
             ("physical_rate_um_per_min", self.physical_rate_um_per_min),
             ("jump_margin_um", self.jump_margin_um),
+            (
+                "expanded_uncertainty_limit_um",
+                self.expanded_uncertainty_limit_um,
+            ),
             ("hold_s", self.hold_s),
             ("fade_s", self.fade_s),
             ("shutdown_fade_s", self.shutdown_fade_s),
@@ -188,7 +195,7 @@ mod tests {
 
     fn config(axes: &str, rest: &str) -> String {
         format!(
-            "{{axes: {{{axes}}}, extrapolate: hold, physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 10.0, {rest}}}"
+            "{{axes: {{{axes}}}, extrapolate: hold, physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, expanded_uncertainty_limit_um: 20.0, hold_s: 10.0, {rest}}}"
         )
     }
 
