@@ -26,6 +26,7 @@ use crate::update_rule::UpdateRule;
 
 /// What the stage is told.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "a few messages a second")]
 pub enum Input {
     /// A block was measured.
     Block(BlockMeasurement),
