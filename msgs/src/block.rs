@@ -1,6 +1,6 @@
 //! Reference blocks.
 
-use metrology::sample::{BlockMeasurement as Inner, FacePosition};
+use metrology::sample::{BlockMeasurement as Inner, FacePosition, LatencyShare};
 use metrology::{Axis, PerAxis};
 
 use crate::builtin_interfaces::msg::Time;
@@ -19,6 +19,12 @@ impl Wire for BlockMeasurement {
             self.position_m[idx] = face.map_or(f64::NAN, |face| metres(face.position_mm));
             self.standard_uncertainty_m[idx] =
                 face.map_or(f64::NAN, |face| metres(face.standard_uncertainty_mm));
+            let latency = face.map(|face| face.latency);
+            self.latency_s[idx] = latency.map_or(f64::NAN, |share| share.latency_s);
+            self.latency_standard_uncertainty_s[idx] =
+                latency.map_or(f64::NAN, |share| share.standard_uncertainty_s);
+            self.latency_sensitivity_m_s[idx] =
+                latency.map_or(f64::NAN, |share| metres(share.sensitivity_mm_s));
             self.touched[idx] = face.map_or_else(Time::default, |face| time(face.at));
         }
         self.cold = inner.cold;
@@ -41,10 +47,22 @@ impl Wire for BlockMeasurement {
                 self.standard_uncertainty_m[idx],
                 Allowed::Finite,
             )?;
+            let finite =
+                |field, values: &[f64; 3]| read.number(field, place, values[idx], Allowed::Finite);
+            let uncertainty_s = finite(
+                "latency_standard_uncertainty_s",
+                &self.latency_standard_uncertainty_s,
+            )?;
+            let sensitivity_m_s = finite("latency_sensitivity_m_s", &self.latency_sensitivity_m_s)?;
             faces[axis] = Some(FacePosition {
                 position_mm: millimetres(position_m),
                 standard_uncertainty_mm: millimetres(uncertainty_m),
                 at: read.stamp("touched", place, &self.touched[idx])?,
+                latency: LatencyShare {
+                    latency_s: finite("latency_s", &self.latency_s)?,
+                    standard_uncertainty_s: uncertainty_s,
+                    sensitivity_mm_s: millimetres(sensitivity_m_s),
+                },
             });
         }
         Ok(Inner {

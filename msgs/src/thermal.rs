@@ -3,9 +3,9 @@
 use metrology::sample;
 use metrology::sample::UpdateReason;
 use metrology::{Axis, PerAxis};
-use nalgebra::Matrix2;
+use nalgebra::Matrix4;
 
-use crate::msg::{AxisDrift, ThermalModel, ThermalUpdateRequest};
+use crate::msg::{AxisDrift, DriftGrowth, ThermalModel, ThermalUpdateRequest};
 use crate::wire::{Allowed, Reader, metres, millimetres, point, ratios, time};
 use crate::{Place, Wire, WireError};
 
@@ -18,34 +18,49 @@ impl Wire for AxisDrift {
         self.p0_m = metres(drift.p0_mm);
         self.k0_m = metres(drift.k0_mm);
         self.slope = drift.slope_mm_per_mm;
-        let covariance = &drift.covariance;
-        self.covariance = [
-            metres(metres(covariance[(0, 0)])),
-            metres(covariance[(0, 1)]),
-            metres(covariance[(1, 0)]),
-            covariance[(1, 1)],
-        ];
+        for (idx, value) in self.covariance.iter_mut().enumerate() {
+            let (row, column) = (idx / 4, idx % 4);
+            let lengths = u32::from(row == 0) + u32::from(column == 0);
+            *value = (0..lengths).fold(drift.covariance[(row, column)], |v, _| metres(v));
+        }
         self.cross_slope = ratios(&drift.cross_slope_mm_per_mm);
         self.cross_origin = point(&drift.cross_origin_mm);
         self.span_m = [metres(drift.span_mm.0), metres(drift.span_mm.1)];
         self.offset_identifiable = drift.offset_identifiable;
         self.slope_identifiable = drift.slope_identifiable;
-        self.rate_m_s = metres(drift.rate_mm_s);
-        self.slope_rate_per_s = drift.slope_rate_per_s;
-        self.time_constant_s = drift.time_constant_s;
+        self.growth.clear();
+        let sources = Axis::LINEAR.into_iter().zip(drift.growth);
+        self.growth.extend(sources.filter_map(|(source, growth)| {
+            growth.map(|growth| DriftGrowth::from_inner(&(source, growth)))
+        }));
+        self.measured = time(drift.measured_at);
     }
 
     fn to_inner(&self) -> Result<Self::Inner, WireError> {
         let read = Reader::of::<Self>();
         let entry =
             |field, idx, value| read.number(field, Place::Entry(idx), value, Allowed::Finite);
-        let [var_k0_m2, cov_m, cov_transposed_m, var_slope] = self.covariance;
-        let covariance = Matrix2::new(
-            millimetres(millimetres(entry("covariance", 0, var_k0_m2)?)),
-            millimetres(entry("covariance", 1, cov_m)?),
-            millimetres(entry("covariance", 2, cov_transposed_m)?),
-            entry("covariance", 3, var_slope)?,
-        );
+        let axis = read.linear_axis("axis", 0, &self.axis)?;
+        let mut covariance = Matrix4::zeros();
+        for (idx, value) in self.covariance.iter().enumerate() {
+            let (row, column) = (idx / 4, idx % 4);
+            let own = row == column && row == axis.index() + 1;
+            let allowed = if own && !self.slope_identifiable {
+                Allowed::OrInfinite
+            } else {
+                Allowed::Finite
+            };
+            let value = read.number("covariance", Place::Entry(idx), *value, allowed)?;
+            let lengths = u32::from(row == 0) + u32::from(column == 0);
+            covariance[(row, column)] = (0..lengths).fold(value, |v, _| millimetres(v));
+        }
+        let mut growth = [None; 3];
+        for entry in &self.growth {
+            let (source, entry) = entry.to_inner()?;
+            if growth[source.index()].replace(entry).is_some() {
+                return Err(read.duplicate("growth", source));
+            }
+        }
         let span_mm = (
             millimetres(entry("span_m", 0, self.span_m[0])?),
             millimetres(entry("span_m", 1, self.span_m[1])?),
@@ -64,8 +79,33 @@ impl Wire for AxisDrift {
             span_mm,
             offset_identifiable: self.offset_identifiable,
             slope_identifiable: self.slope_identifiable,
+            growth,
+            measured_at: read.stamp("measured", Place::Whole, &self.measured)?,
+        };
+        Ok((axis, drift))
+    }
+}
+
+impl Wire for DriftGrowth {
+    type Inner = (Axis, sample::DriftGrowth);
+
+    fn set_from_inner(&mut self, (source, growth): &Self::Inner) {
+        self.axis.clear();
+        self.axis.push_str(source.letter());
+        self.rate_m_s = metres(growth.rate_mm_s);
+        self.gradient_rate_per_s = ratios(&growth.gradient_rate_per_s);
+        self.time_constant_s = growth.time_constant_s;
+    }
+
+    fn to_inner(&self) -> Result<Self::Inner, WireError> {
+        let read = Reader::of::<Self>();
+        let growth = sample::DriftGrowth {
             rate_mm_s: read.length_mm("rate_m_s", self.rate_m_s)?,
-            slope_rate_per_s: read.finite("slope_rate_per_s", self.slope_rate_per_s)?,
+            gradient_rate_per_s: read.ratios(
+                "gradient_rate_per_s",
+                &self.gradient_rate_per_s,
+                Allowed::Finite,
+            )?,
             time_constant_s: read.number(
                 "time_constant_s",
                 Place::Whole,
@@ -73,7 +113,7 @@ impl Wire for AxisDrift {
                 Allowed::OrInfinite,
             )?,
         };
-        Ok((read.linear_axis("axis", 0, &self.axis)?, drift))
+        Ok((read.linear_axis("axis", 0, &self.axis)?, growth))
     }
 }
 

@@ -105,9 +105,13 @@ fn numbers_that_are_none_are_refused_except_where_they_mean_something() {
     );
     let drift = (Axis::X, AxisDrift::default());
     let good = msg::AxisDrift::from_inner(&drift);
+    let growth = msg::DriftGrowth {
+        axis: String::from("X"),
+        ..msg::DriftGrowth::default()
+    };
     assert_eq!(
-        complaint(&good, |m| m.time_constant_s = f64::NAN),
-        "abbe_msgs/msg/AxisDrift: time_constant_s: NaN: must be a finite number or +inf"
+        complaint(&growth, |m| m.time_constant_s = f64::NAN),
+        "abbe_msgs/msg/DriftGrowth: time_constant_s: NaN: must be a finite number or +inf"
     );
     assert_eq!(
         complaint(&good, |m| m.cross_slope.y = f64::NAN),
@@ -116,6 +120,14 @@ fn numbers_that_are_none_are_refused_except_where_they_mean_something() {
     assert_eq!(
         complaint(&good, |m| m.covariance[3] = f64::INFINITY),
         "abbe_msgs/msg/AxisDrift: covariance[3]: inf: must be a finite number"
+    );
+    // Nothing may be known of an unidentifiable slope; of another entry something must be.
+    let mut unknown = good.clone();
+    unknown.covariance[5] = f64::INFINITY;
+    assert!(unknown.to_inner().is_ok());
+    assert_eq!(
+        complaint(&unknown, |m| m.slope_identifiable = true),
+        "abbe_msgs/msg/AxisDrift: covariance[5]: inf: must be a finite number"
     );
 }
 

@@ -104,6 +104,7 @@ fn a_schema_holds_every_nested_definition_once() {
         names,
         [
             "abbe_msgs/AxisDrift",
+            "abbe_msgs/DriftGrowth",
             "builtin_interfaces/Time",
             "geometry_msgs/Point",
             "geometry_msgs/Vector3",

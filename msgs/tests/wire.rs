@@ -8,12 +8,12 @@
 use abbe_msgs::{Wire, from_cdr, msg, sensor_msgs, to_cdr};
 use metrology::sample::{
     AxisCompensation, AxisDrift, AxisState, BlockMeasurement, CompensationState, Correction,
-    FacePosition, FeatureKind, GridSample, LatencyMethod, LengthSample, ProbeLatency, ProbeTrigger,
-    ProbedFeature, ProbedPoint, Rejection, Sense, TemperatureSample, TestKind, TestPlane,
-    TestSegment, ThermalModel, UpdateReason, UpdateRequest,
+    DriftGrowth, FacePosition, FeatureKind, GridSample, LatencyMethod, LatencyShare, LengthSample,
+    ProbeLatency, ProbeTrigger, ProbedFeature, ProbedPoint, Rejection, Sense, TemperatureSample,
+    TestKind, TestPlane, TestSegment, ThermalModel, UpdateReason, UpdateRequest,
 };
 use metrology::{Axis, AxisSet, Clock, PerAxis, Stamp};
-use nalgebra::{Matrix2, Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
@@ -296,11 +296,19 @@ fn prop_probed_feature_comes_back() {
 
 #[test]
 fn prop_block_measurement_comes_back() {
-    let face = prop::option::of((length_mm(), length_mm(), stamp()).prop_map(
-        |(position_mm, standard_uncertainty_mm, at)| FacePosition {
+    let latency = (number(), number(), length_mm()).prop_map(
+        |(latency_s, standard_uncertainty_s, sensitivity_mm_s)| LatencyShare {
+            latency_s,
+            standard_uncertainty_s,
+            sensitivity_mm_s,
+        },
+    );
+    let face = prop::option::of((length_mm(), length_mm(), stamp(), latency).prop_map(
+        |(position_mm, standard_uncertainty_mm, at, latency)| FacePosition {
             position_mm,
             standard_uncertainty_mm,
             at,
+            latency,
         },
     ));
     let linear: AxisSet = Axis::LINEAR.into_iter().collect();
@@ -316,27 +324,42 @@ fn prop_block_measurement_comes_back() {
     check::<msg::BlockMeasurement>(&strategy);
 }
 
+fn growth() -> impl Strategy<Value = DriftGrowth> {
+    (length_mm(), vector(-1.0..1.0), number(), any::<bool>()).prop_map(
+        |(rate_mm_s, gradient_rate_per_s, tau_s, lasting)| DriftGrowth {
+            rate_mm_s,
+            gradient_rate_per_s,
+            time_constant_s: if lasting { f64::INFINITY } else { tau_s },
+        },
+    )
+}
+
 fn drift() -> impl Strategy<Value = AxisDrift> {
     (
-        (length_mm(), length_mm(), number(), length_mm()),
+        (length_mm(), length_mm(), number(), stamp()),
         (square_mm2(), length_mm(), length_mm(), number()),
         (vector(-1.0..1.0), lengths_mm(), length_mm(), length_mm()),
-        (any::<bool>(), any::<bool>(), number(), any::<bool>()),
+        (any::<bool>(), any::<bool>()),
+        prop::array::uniform3(prop::option::of(growth())),
     )
         .prop_map(
-            |((p0, k0, slope, rate), c, (cross, origin, low, high), flags)| AxisDrift {
+            |((p0, k0, slope, at), c, (cross, origin, low, high), flags, growth)| AxisDrift {
                 p0_mm: p0,
                 k0_mm: k0,
                 slope_mm_per_mm: slope,
-                covariance: Matrix2::new(c.0, c.1, c.2, c.3),
+                covariance: Matrix4::from_fn(|i, j| match (i, j) {
+                    (0, 0) => c.0,
+                    (0, _) => c.1,
+                    (_, 0) => c.2,
+                    _ => c.3,
+                }),
                 cross_slope_mm_per_mm: cross,
                 cross_origin_mm: origin,
                 span_mm: (low, high),
                 offset_identifiable: flags.0,
                 slope_identifiable: flags.1,
-                rate_mm_s: rate,
-                slope_rate_per_s: flags.2,
-                time_constant_s: if flags.3 { f64::INFINITY } else { flags.2 },
+                growth,
+                measured_at: at,
             },
         )
 }

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use axis_compensation::AxisCompensationConfig;
+
 use crate::check;
 use crate::parameters;
 use crate::tree;
@@ -127,6 +129,81 @@ fn arch_parameter_files_set_only_what_their_node_has() {
         unknown_parameters("a.yaml", yaml, &["axes.X.limit_um".to_owned()]),
         ["a.yaml: rate: the node has no such parameter"]
     );
+}
+
+/// What a node's last words and its farewell on the graph take at most, s.
+const FAREWELL_S: f64 = 2.5;
+/// How long a node that has something to wind down may take where it does not say otherwise, s.
+const USUAL_WIND_DOWN_S: f64 = 5.0;
+
+/// How long the nodes of a launch file need to end, where that is said by `of` them, against what
+/// `ros2 launch` waits before it does worse than SIGINT.
+fn cut_short(path: &str, xml: &str, of: &dyn Fn(&str) -> Option<f64>) -> Vec<String> {
+    let document = roxmltree::Document::parse(xml).unwrap();
+    let nodes = document
+        .descendants()
+        .filter(|element| element.has_tag_name("node"));
+    let mut found = Vec::new();
+    for node in nodes {
+        let exec = node.attribute("exec").unwrap_or_default();
+        let Some(wind_down_s) = of(exec) else {
+            continue;
+        };
+        let least_s = wind_down_s + FAREWELL_S;
+        let said = node.attribute("sigterm_timeout").map(str::parse::<f64>);
+        if !matches!(said, Some(Ok(said_s)) if said_s >= least_s) {
+            found.push(format!(
+                "{path}: {exec}: sigterm_timeout must be at least {least_s:.1} s"
+            ));
+        }
+        if !matches!(node.attribute("sigkill_timeout").map(str::parse::<f64>), Some(Ok(more_s)) if more_s >= FAREWELL_S)
+        {
+            found.push(format!(
+                "{path}: {exec}: sigkill_timeout must be at least {FAREWELL_S} s"
+            ));
+        }
+    }
+    found
+}
+
+/// Time that a node of `scenario` may need to wind down by its parameters; `None`: it ends at once.
+fn wind_down_s(scenario: &str, exec: &str) -> Option<f64> {
+    let shell = tree::text(&format!("nodes/{exec}/node/src/lib.rs")).unwrap_or_default();
+    if !shell.contains(".shutdown(") {
+        return None;
+    }
+    if exec != "axis_compensation" {
+        return Some(USUAL_WIND_DOWN_S);
+    }
+    let path = format!("{FOLDER}/{scenario}/{exec}.yaml");
+    let yaml = tree::text(&path).unwrap();
+    let mut file: BTreeMap<String, serde_json::Value> = serde_saphyr::from_str(&yaml).unwrap();
+    let parameters = file.remove("/**").unwrap()["ros__parameters"].take();
+    let config: AxisCompensationConfig = serde_json::from_value(parameters).unwrap();
+    // A busy computer adds to it: axis_compensation's shell counts a second.
+    Some(config.wind_down_s() + 1.0)
+}
+
+#[test]
+fn arch_launch_files_let_every_node_wind_down() {
+    let mut found = Vec::new();
+    for scenario in tree::folders(FOLDER) {
+        for file in tree::files(&format!("{FOLDER}/{scenario}"), ".launch.xml") {
+            let of = |exec: &str| wind_down_s(&scenario, exec);
+            found.extend(cut_short(&file.path, &file.text, &of));
+        }
+    }
+    check(&found);
+    let bad = |attributes: &str| {
+        let xml = format!(
+            "<launch><node pkg='abbe' exec='probe'/><node pkg='abbe' exec='lathe' {attributes}/></launch>"
+        );
+        cut_short("a.xml", &xml, &|exec| (exec == "lathe").then_some(9.4)).len()
+    };
+    assert_eq!(bad(""), 2);
+    assert_eq!(bad("sigterm_timeout='5' sigkill_timeout='5'"), 1);
+    assert_eq!(bad("sigterm_timeout='12' sigkill_timeout='5'"), 0);
+    assert!(wind_down_s("first_run", "axis_compensation").unwrap() > 9.0);
 }
 
 /// Whether a file beside the fake machine's own names a plant file.

@@ -141,7 +141,6 @@ fn model(at: Stamp<Host>) -> ThermalModel {
     axes[Axis::X] = Some(AxisDrift {
         slope_mm_per_mm: SLOPE_MM_PER_MM,
         span_mm: (0.0, NUMBERS as f64 * STEP_MM),
-        time_constant_s: f64::INFINITY,
         ..AxisDrift::default()
     });
     ThermalModel {

@@ -65,7 +65,7 @@ const QUEUE_FAULT: &str = "Queue is not empty after probing";
 fn attempted(program: &Path, scenario: &str, out: &Path) -> Option<String> {
     let output = Command::new(program)
         .current_dir(root())
-        .args(["run", &format!("launch_configs/{scenario}"), "--out"])
+        .args(["run", &format!("launch_configs/{scenario}"), "--runs"])
         .arg(out)
         .env("ROS_DOMAIN_ID", DOMAIN)
         .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")

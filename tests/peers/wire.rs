@@ -190,15 +190,16 @@ const POSITION_M: [f64; 3] = [0.1, -0.05, 0.2];
 const DRIFT: [(f64, f64); 3] = [(5e-6, 2e-5), (-3e-6, 4e-5), (8e-6, -1e-5)];
 
 fn model(at: Duration) -> Value {
+    let mut covariance = [0.0; 16];
+    covariance[0] = 1e-14;
     let axes: Vec<Value> = ["X", "Y", "Z"]
         .iter()
         .zip(DRIFT)
         .map(|(axis, (k0, slope))| {
             json!({
                 "axis": axis, "p0_m": 0.0, "k0_m": k0, "slope": slope,
-                "covariance": [1e-14, 0.0, 0.0, 1e-12], "span_m": [-0.25, 0.25],
+                "covariance": covariance, "span_m": [-0.25, 0.25],
                 "offset_identifiable": true, "slope_identifiable": true,
-                "time_constant_s": "inf",
             })
         })
         .collect();

@@ -20,7 +20,7 @@ fn started(scenario: &Scenario, domain: u16, more: &[&str]) -> (Graph, Process) 
     let mut command = command(domain, &["run"]);
     command
         .arg(scenario.folder())
-        .arg("--out")
+        .arg("--runs")
         .arg(scenario.out());
     command.args(more);
     let began = Instant::now();
@@ -60,7 +60,14 @@ fn an_interrupted_run_closes_its_bag_and_writes_its_page() {
         assert!(ended.said.contains("it was interrupted"), "{}", ended.said);
         let folder = scenario.new_run(&[]);
         assert!(folder.join("report.html").is_file());
-        let counts = whole(&Bag::open(folder.join("bag")).unwrap());
+        let bag = Bag::open(folder.join("bag")).unwrap();
+        let parameters = bag.attachment("params/axis_compensation.yaml").unwrap();
+        let parameters = String::from_utf8(parameters.unwrap().data).unwrap();
+        assert!(
+            parameters.contains("gap_s: 0.5") && parameters.contains("hold_s: "),
+            "{more:?}: a default is not among what is recorded:\n{parameters}"
+        );
+        let counts = whole(&bag);
         assert!(
             counts
                 .iter()
@@ -155,4 +162,27 @@ fn a_recording_ends_with_sigint_and_holds_what_was_said() {
         n("/test/segment") > 0 && n("/axes/state") == 0,
         "{counts:?}"
     );
+}
+
+#[test]
+fn a_simulated_run_that_is_interrupted_closes_its_bag_and_names_the_steps_that_were_skipped() {
+    let scenario = Scenario::copy_of("short_cell");
+    // As the scenario, but in simulated time and no faster than real time.
+    scenario.append("scenario.yaml", "simulated_start_s: 1767600000\n");
+    let mut command = command(0, &["run", "--no-dds", "--pace", "1"]);
+    command
+        .arg(scenario.folder())
+        .arg("--runs")
+        .arg(scenario.out());
+    let run = Process::start(command);
+    std::thread::sleep(Duration::from_secs(6));
+    run.signal(Signal::SIGINT);
+    let ended = run.ended_within(END);
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+    assert!(ended.said.contains("it was interrupted"), "{}", ended.said);
+    let skipped = "were skipped: the run ended in step";
+    assert!(ended.said.contains(skipped), "{}", ended.said);
+    let folder = scenario.new_run(&[]);
+    assert!(folder.join("report.html").is_file());
+    assert!(!whole(&Bag::open(folder.join("bag")).unwrap()).is_empty());
 }

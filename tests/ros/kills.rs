@@ -136,11 +136,10 @@ fn tell_drift(voice: &mut Voice) {
         .map(|axis| AxisDrift {
             axis: axis.to_owned(),
             k0_m: DRIFT_M,
-            covariance: [1e-14, 0.0, 0.0, 1e-12],
+            covariance: std::array::from_fn(|entry| if entry == 0 { 1e-14 } else { 0.0 }),
             span_m: [-0.3, 0.3],
             offset_identifiable: true,
             slope_identifiable: true,
-            time_constant_s: f64::INFINITY,
             ..AxisDrift::default()
         })
         .into();

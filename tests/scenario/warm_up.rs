@@ -19,9 +19,13 @@ fn warm_up(scenario: &str, least_reduction: f64) {
     let took = began.elapsed();
     let error_s = number(&report, "latency_s") - number(&report, "true_latency_s");
     let uncertainty_s = number(&report, "latency_standard_uncertainty_s");
+    let span = &report["tool_error_in_blocks_span"];
+    let of_tool = |which: &str| number(&span[which], "change_since_cold_p95_mm");
+    // Three layers of 24 poses; the five above the blocks are no part of the judgement.
+    assert_eq!(span["with_compensation"]["poses"], 72);
     let (without_mm, with_mm) = (
-        number(&report, "p95_without_mm"),
-        number(&report, "p95_with_mm"),
+        of_tool("without_compensation"),
+        of_tool("with_compensation"),
     );
     eprintln!(
         "{scenario}: {:.1} s; latency off by {:.4} ms = {:.2} u; p95 {:.2} um without, {:.2} um with, {:.1}-fold",

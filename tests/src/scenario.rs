@@ -107,7 +107,7 @@ impl Scenario {
     pub fn run_to_end(&self, more: &[&str]) -> Ended {
         let (folder, out) = (self.folder(), self.out());
         let mut command = command(0, &["run", "--no-dds"]);
-        command.arg(folder).arg("--out").arg(out).args(more);
+        command.arg(folder).arg("--runs").arg(out).args(more);
         Process::start(command).ended_within(Duration::from_secs(120))
     }
 

@@ -5,18 +5,23 @@
 use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Wire, from_cdr};
 use anyhow::Result;
+use machine::MachineFile;
 use metrology::sample::{
     AxisCompensation, BlockMeasurement, GeometryModel, PositioningTable, ProbedFeature,
     ProbedPoint, TestSegment,
 };
-use recorder::{Bag, Event, Order};
+use recorder::{Bag, Event, Loss, Order};
 
 pub mod budget;
 pub mod circles;
 pub mod linear;
+pub mod stationwise;
+pub mod stops;
 
 use circles::{CircleRecording, Circles};
 use linear::{LinearRuns, LinearTest};
+use stationwise::{StationCircle, Stationwise};
+use stops::{StopRuns, Stops};
 
 /// Offsets below this are none, mm.
 const NOTHING_MM: f64 = 1e-7;
@@ -26,8 +31,12 @@ const NOTHING_MM: f64 = 1e-7;
 pub struct Tests {
     /// Circles over a grid encoder.
     pub circles: Vec<CircleRecording>,
+    /// The first circle with stops, for the published separation.
+    pub station_circle: Option<StationCircle>,
     /// Positioning runs and diagonals.
     pub linear: Vec<LinearTest>,
+    /// Stops of verifications along one axis.
+    pub stops: Vec<Stops>,
     /// Touches that were used, each with the test it belongs to.
     pub touches: Vec<(TestSegment, ProbedPoint)>,
     /// Fitted shapes.
@@ -40,8 +49,8 @@ pub struct Tests {
     pub rotary: Option<GeometryModel>,
     /// The last positioning table of each axis.
     pub tables: Vec<PositioningTable>,
-    /// What could not be read, in words.
-    pub remarks: Vec<String>,
+    /// What of the bag could not be read.
+    pub losses: Vec<Loss>,
 }
 
 /// Everything that collects while a bag is read.
@@ -49,7 +58,9 @@ pub struct Tests {
 struct Collected {
     tests: Tests,
     circles: Circles,
+    stationwise: Stationwise,
     linear: LinearRuns,
+    stops: StopRuns,
     segment: Option<TestSegment>,
 }
 
@@ -59,7 +70,11 @@ impl Tests {
     /// # Errors
     /// When a message of a known topic cannot be decoded.
     pub fn of(bag: &Bag) -> Result<Self> {
-        let mut collected = Collected::default();
+        let machine = machine_file(bag);
+        let mut collected = Collected {
+            stationwise: Stationwise::new(machine.as_ref()),
+            ..Collected::default()
+        };
         let mut messages = bag.messages(Order::LogTime);
         let names: Vec<String> = bag
             .topics()
@@ -72,14 +87,23 @@ impl Tests {
                     let name = names.get(message.topic.index()).map_or("", String::as_str);
                     collected.message(name, message.data)?;
                 }
-                Event::Loss(loss) => collected.tests.remarks.push(format!("{loss}")),
+                Event::Loss(loss) => collected.tests.losses.push(loss),
             }
         }
         let mut tests = collected.tests;
         tests.circles = collected.circles.recordings();
+        tests.station_circle = collected.stationwise.circle();
         tests.linear = collected.linear.tests();
+        tests.stops = collected.stops.stops();
         Ok(tests)
     }
+}
+
+/// The machine file that a bag holds, where it can be read.
+fn machine_file(bag: &Bag) -> Option<MachineFile> {
+    let attached = bag.attachment("machine.yaml").ok().flatten()?;
+    let text = String::from_utf8(attached.data).ok()?;
+    MachineFile::parse(&text, "machine.yaml of the bag").ok()
 }
 
 /// Whether `name` is `topic`, in whatever namespace.
@@ -95,14 +119,18 @@ fn read<M: Message + Wire>(_: &Topic<M>, bytes: &[u8]) -> Result<M::Inner> {
 impl Collected {
     fn message(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
         if is(name, &topics::AXES_STATE) {
-            if self.segment.is_some() {
+            if self.segment.is_some() || self.stationwise.listens() {
                 let state = read(&topics::AXES_STATE, bytes)?;
                 self.circles.axes(&state);
                 self.linear.axes(&state);
+                self.stops.axes(&state);
+                self.stationwise.axes(state);
             }
         } else if is(name, &topics::GRID_POSITION) {
             if self.segment.is_some() {
-                self.circles.grid(&read(&topics::GRID_POSITION, bytes)?);
+                let sample = read(&topics::GRID_POSITION, bytes)?;
+                self.circles.grid(&sample);
+                self.stationwise.grid(sample);
             }
         } else if is(name, &topics::LENGTH_POSITION) {
             if self.segment.is_some() {
@@ -122,7 +150,9 @@ impl Collected {
 
     fn test(&mut self, segment: TestSegment) {
         self.circles.segment(&segment);
+        self.stationwise.segment(&segment);
         self.linear.segment(&segment);
+        self.stops.segment(&segment);
         self.segment = segment.begin.then_some(segment);
     }
 
@@ -134,6 +164,7 @@ impl Collected {
             .any(|offset| offset.abs() > NOTHING_MM);
         self.circles.compensation(acts);
         self.linear.compensation(acts);
+        self.stops.compensation(acts);
     }
 
     fn result(&mut self, name: &str, bytes: &[u8]) -> Result<()> {

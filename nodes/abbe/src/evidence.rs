@@ -1,5 +1,7 @@
 //! What a run leaves behind for its report: decoded messages of a few topics, and the truth where a scenario may see it.
 
+use std::collections::BTreeSet;
+
 use abbe_msgs::{Message, Wire, from_cdr, topics};
 use metrology::sample::{
     AxisCompensation, BlockMeasurement, GeometryModel, PlanStatus, ProbeLatency, ProbedPoint,
@@ -74,12 +76,16 @@ pub struct Evidence {
     pub judgements: Vec<Condition>,
     /// Last word of the sequencer.
     pub status: Option<PlanStatus>,
+    /// Its first word on each step, in order.
+    pub begun: Vec<PlanStatus>,
     /// Last compensation.
     pub compensation: Option<AxisCompensation>,
     /// How well each way of predicting the drift did at each update, values in µm by name.
     pub predictions: Vec<Prediction>,
     /// Conditions above `Ok` in order.
     pub conditions: Vec<Condition>,
+    /// Node and name of conditions that were `Ok` again when last heard of.
+    pub over: BTreeSet<(String, String)>,
     /// Verifications with the plant's truth.
     pub verifications: Vec<Verification>,
     /// The plant's latency, s.
@@ -125,7 +131,8 @@ impl Evidence {
         } else if topic == topics::COMPENSATION.name {
             self.compensation = self.decode(&topics::COMPENSATION, bytes);
         } else if topic == topics::PLAN_STATUS.name {
-            self.status = self.decode(&topics::PLAN_STATUS, bytes);
+            let status = self.decode(&topics::PLAN_STATUS, bytes);
+            self.plan(status);
         } else if topic == topics::TEST_SEGMENT.name {
             let taken = self.decode(&topics::TEST_SEGMENT, bytes);
             taken.into_iter().for_each(|segment| self.segment(segment));
@@ -134,6 +141,12 @@ impl Evidence {
 
     /// Takes one condition.
     pub fn condition(&mut self, at: Stamp<Host>, node: &str, diagnostic: &Diagnostic) {
+        let key = (node.to_owned(), diagnostic.name.to_string());
+        if diagnostic.level == Level::Ok {
+            self.over.insert(key);
+        } else {
+            self.over.remove(&key);
+        }
         if diagnostic
             .values
             .iter()
@@ -159,6 +172,19 @@ impl Evidence {
                 diagnostic,
             });
         }
+    }
+
+    fn plan(&mut self, status: Option<PlanStatus>) {
+        if let Some(status) = &status
+            && !status.activity.is_empty()
+            && self
+                .begun
+                .last()
+                .is_none_or(|last| last.step != status.step)
+        {
+            self.begun.push(status.clone());
+        }
+        self.status = status;
     }
 
     /// The run that is under way; 0: none.

@@ -6,26 +6,50 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
 
-use abbe_msgs::topics::{self, Topic};
-use abbe_msgs::{Message, Wire, from_cdr};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use machine::export::fanuc::Record;
 use machine::export::linuxcnc::FileType;
-use machine::export::selection::{Control, Fanuc, Measured, Selected, Sinumerik, Wanted, select};
+use machine::export::selection::{Control, Fanuc, Selected, Sinumerik, Wanted, select};
 use machine::export::sinumerik::OtherAxes;
 use machine::export::{ExportFile, Unestimable};
-use metrology::{Axis, PerAxis};
-use recorder::{Bag, Event, Order};
+use metrology::{Axis, AxisSet, PerAxis};
+
+mod found;
+
+use found::{Found, looked_for, read};
 
 /// Controls that tables are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Format {
+    /// LinuxCNC: screw compensation files, one for each axis.
     Linuxcnc,
+    /// SINUMERIK 840D sl / 828D: leadscrew, cross-axis and temperature compensation.
     Sinumerik,
+    /// HEIDENHAIN: compensation-value tables (.COM), one for each axis.
     Heidenhain,
+    /// FANUC: stored pitch error compensation, whole pulses.
     Fanuc,
+    /// A plain table of errors and compensations, for other programs and for people.
     Csv,
+}
+
+/// Exit code for arguments that cannot be understood.
+const USAGE: u8 = 2;
+
+/// Every format with what it is, a line each.
+fn formats() -> String {
+    let line = |format: &Format| {
+        let value = format.to_possible_value()?;
+        let help = value.get_help().map(ToString::to_string);
+        Some(format!(
+            "  {:<12}{}",
+            value.get_name(),
+            help.unwrap_or_default()
+        ))
+    };
+    let lines: Vec<String> = Format::value_variants().iter().filter_map(line).collect();
+    lines.join("\n")
 }
 
 /// `AXIS=NUMBER`.
@@ -53,13 +77,13 @@ impl FromStr for OfAxis {
 pub struct Export {
     /// Folder of the bag, or one of its files.
     bag: PathBuf,
-    /// For whom.
+    /// The control that the tables are for; must be given.
     #[arg(long, value_enum)]
-    format: Format,
+    format: Option<Format>,
     /// Axes; none: every axis that the bag knows something of.
     #[arg(long)]
     axis: Vec<Axis>,
-    /// Folder of the files; existing files are not overwritten.
+    /// Folder to write the files into; existing files are not overwritten.
     #[arg(long, default_value = "export")]
     out: PathBuf,
     /// Spacing of the points of linear axes, mm.
@@ -197,13 +221,28 @@ impl Export {
     /// # Errors
     /// The bag cannot be read, or a file cannot be written.
     pub fn execute(self) -> Result<ExitCode> {
-        let (measured, losses) = read(&self.bag)?;
-        let selected = select(&measured, &self.wanted(), &self.set_up.control(self.format));
+        let Some(format) = self.format else {
+            eprintln!("abbe: --format is missing; the formats are:\n{}", formats());
+            return Ok(ExitCode::from(USAGE));
+        };
+        let Found {
+            measured,
+            losses,
+            topics,
+        } = read(&self.bag)?;
+        let selected = select(&measured, &self.wanted(), &self.set_up.control(format));
         for left in &selected.left_out {
             println!("left out: {}: {}", left.what, left.why);
         }
         if selected.files.is_empty() {
-            eprintln!("abbe: {}: nothing to export", self.bag.display());
+            let bag = self.bag.display();
+            eprintln!("abbe: {bag}: nothing to export; looked for");
+            for line in looked_for(&measured, topics, self.axes()) {
+                eprintln!("  {line}");
+            }
+            for loss in &losses {
+                eprintln!("abbe: what was looked for may have been in what was lost: {loss}");
+            }
             return Ok(ExitCode::FAILURE);
         }
         self.write(&selected)?;
@@ -217,17 +256,21 @@ impl Export {
         })
     }
 
+    fn axes(&self) -> AxisSet {
+        if self.axis.is_empty() {
+            Axis::ALL.into_iter().collect()
+        } else {
+            self.axis.iter().copied().collect()
+        }
+    }
+
     fn wanted(&self) -> Wanted {
         let mut reference = PerAxis::default();
         for of in &self.reference {
             reference[of.axis] = inner(of.axis, of.value);
         }
         Wanted {
-            axes: if self.axis.is_empty() {
-                Axis::ALL.into_iter().collect()
-            } else {
-                self.axis.iter().copied().collect()
-            },
+            axes: self.axes(),
             spacing_mm: self.spacing_mm,
             spacing_rad: self.spacing_deg.to_radians(),
             reference,
@@ -276,43 +319,9 @@ fn create(path: &Path, text: &str) -> Result<()> {
         .with_context(|| path.display().to_string())
 }
 
-fn decode<M: Message + Wire>(topic: &Topic<M>, bytes: &[u8]) -> Result<M::Inner> {
-    let message: M = from_cdr(bytes).with_context(|| topic.name.to_owned())?;
-    message.into_inner().with_context(|| topic.name.to_owned())
-}
-
-/// The last table of each axis and the last models, and what could not be read.
-fn read(path: &Path) -> Result<(Measured, Vec<String>)> {
-    let bag = Bag::open(path).with_context(|| path.display().to_string())?;
-    let mut measured = Measured::default();
-    let mut losses = Vec::new();
-    let mut messages = bag.messages(Order::LogTime);
-    while let Some(event) = messages.next_event() {
-        let message = match event {
-            Event::Message(message) => message,
-            Event::Loss(loss) => {
-                losses.push(loss.to_string());
-                continue;
-            }
-        };
-        let name = bag.topic(message.topic).topic.as_str();
-        // A machine's namespace may stand in front.
-        let is = |topic: &str| name == topic || name.ends_with(&format!("/{topic}"));
-        if is(topics::POSITIONING_TABLE.name) {
-            let table = decode(&topics::POSITIONING_TABLE, message.data)?;
-            let axis = table.axis;
-            measured.tables[axis] = Some(table);
-        } else if is(topics::THERMAL_MODEL.name) {
-            measured.thermal = Some(decode(&topics::THERMAL_MODEL, message.data)?);
-        } else if is(topics::GEOMETRY_MODEL.name) {
-            measured.geometry = Some(decode(&topics::GEOMETRY_MODEL, message.data)?);
-        }
-    }
-    Ok((measured, losses))
-}
-
 #[cfg(test)]
 mod tests {
+    use abbe_msgs::{Wire, topics};
     use clap::Parser;
     use metrology::sample::PositioningTable;
     use metrology::stamp::Stamp;
@@ -423,6 +432,32 @@ mod tests {
         assert!(!out.exists());
         let absent = execute(&folder.path().join("nowhere"), &out, &["--format", "csv"]);
         assert!(absent.is_err());
+    }
+
+    #[test]
+    fn nothing_to_export_names_each_source_and_why_it_gave_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let bag = bag(folder.path(), &[table(Axis::X, 1e-4)], false);
+        let found = read(&bag).unwrap();
+        assert_eq!(found.topics, [Some(1), None, None]);
+        let lines = looked_for(&found.measured, found.topics, AxisSet::EMPTY.with(Axis::Z));
+        assert!(lines[0].contains("positioning/table"), "{lines:?}");
+        assert!(lines[0].contains("it is about X"), "{lines:?}");
+        for line in &lines[1..3] {
+            assert!(line.contains("the bag has no such topic"), "{lines:?}");
+        }
+        assert_eq!(lines[3], "for axes Z");
+    }
+
+    #[test]
+    fn without_a_format_all_of_them_are_named_and_nothing_is_read() {
+        let line = ["export", "no_such_bag"];
+        let done = CommandLine::parse_from(line).export.execute();
+        assert_eq!(code(done), format!("{:?}", ExitCode::from(USAGE)));
+        let said = formats();
+        for name in ["linuxcnc", "sinumerik", "heidenhain", "fanuc", "csv"] {
+            assert!(said.contains(&format!("  {name} ")), "{said}");
+        }
     }
 
     #[test]

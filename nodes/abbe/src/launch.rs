@@ -4,6 +4,7 @@
 //! `<launch>`. What `ros2 launch` would do and this reader does not is refused by name, never skipped.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 
@@ -20,7 +21,26 @@ pub struct LaunchNode {
     pub parameter_files: Vec<PathBuf>,
     /// Single parameters, `name:=value` as YAML.
     pub parameters: Vec<(String, String)>,
+    /// How long it may take to end before it is killed: `sigterm_timeout` and `sigkill_timeout`
+    /// together, as `ros2 launch` counts them; `None`: neither is said.
+    pub ends_within: Option<Duration>,
 }
+
+/// What `ros2 launch` takes for a `sigterm_timeout` or `sigkill_timeout` that is not said, s.
+const ROS_TIMEOUT_S: f64 = 5.0;
+/// Longest of either that makes sense, s.
+const LONGEST_TIMEOUT_S: f64 = 3600.0;
+
+/// Attributes of `<node>` that are read; `output` means nothing here: every node says all.
+const ATTRIBUTES: [&str; 7] = [
+    "pkg",
+    "exec",
+    "name",
+    "namespace",
+    "output",
+    "sigterm_timeout",
+    "sigkill_timeout",
+];
 
 impl LaunchNode {
     /// The node's arguments as `ros2 launch` would give them.
@@ -101,7 +121,7 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<LaunchNode>> {
 
 fn node(element: roxmltree::Node<'_, '_>, folder: &Path) -> Result<LaunchNode> {
     for attribute in element.attributes() {
-        if !["pkg", "exec", "name", "namespace", "output"].contains(&attribute.name()) {
+        if !ATTRIBUTES.contains(&attribute.name()) {
             bail!(
                 "attribute \"{}\" of <node> is not supported in a scenario",
                 attribute.name()
@@ -121,6 +141,7 @@ fn node(element: roxmltree::Node<'_, '_>, folder: &Path) -> Result<LaunchNode> {
         exec,
         parameter_files: Vec::new(),
         parameters: Vec::new(),
+        ends_within: ends_within(element)?,
     };
     for child in element.children().filter(roxmltree::Node::is_element) {
         let tag = child.tag_name().name();
@@ -145,6 +166,23 @@ fn node(element: roxmltree::Node<'_, '_>, folder: &Path) -> Result<LaunchNode> {
         }
     }
     Ok(launched)
+}
+
+fn ends_within(element: roxmltree::Node<'_, '_>) -> Result<Option<Duration>> {
+    let timeout_s = |name: &str| -> Result<Option<f64>> {
+        let Some(text) = element.attribute(name) else {
+            return Ok(None);
+        };
+        match text.parse::<f64>() {
+            Ok(seconds) if (0.0..=LONGEST_TIMEOUT_S).contains(&seconds) => Ok(Some(seconds)),
+            _ => bail!("{name}=\"{text}\": must be 0 to {LONGEST_TIMEOUT_S} s"),
+        }
+    };
+    let (term_s, kill_s) = (timeout_s("sigterm_timeout")?, timeout_s("sigkill_timeout")?);
+    Ok((term_s.is_some() || kill_s.is_some()).then(|| {
+        let whole_s = term_s.unwrap_or(ROS_TIMEOUT_S) + kill_s.unwrap_or(ROS_TIMEOUT_S);
+        Duration::from_secs_f64(whole_s)
+    }))
 }
 
 fn substitute(text: &str, folder: &Path) -> Result<String> {
@@ -172,6 +210,26 @@ mod tests {
             nodes[0].ros_args().join(" "),
             "--ros-args -r __node:=probe -r __ns:=/m1 --params-file lc/probe.yaml -p queue_s:=2.0"
         );
+    }
+
+    #[test]
+    fn the_time_to_end_is_what_ros_launch_would_give() {
+        let of = |attributes: &str| {
+            let text = format!("<launch><node pkg='abbe' exec='probe' {attributes}/></launch>");
+            parse(&text, Path::new("lc")).map(|nodes| nodes[0].ends_within)
+        };
+        let seconds = |seconds| Some(Duration::from_secs(seconds));
+        assert_eq!(of("").unwrap(), None);
+        assert_eq!(of("sigterm_timeout='12'").unwrap(), seconds(17));
+        assert_eq!(
+            of("sigterm_timeout='12' sigkill_timeout='3'").unwrap(),
+            seconds(15)
+        );
+        for wrong in ["-1", "NaN", "3601", "soon"] {
+            let error = of(&format!("sigkill_timeout='{wrong}'")).unwrap_err();
+            let limit = format!("sigkill_timeout=\"{wrong}\": must be 0 to 3600 s");
+            assert!(format!("{error:#}").contains(&limit), "{error:#}");
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use node_runtime::complaint;
 
 mod diagnose;
 mod evaluate;
@@ -16,6 +17,7 @@ mod export;
 mod import;
 mod launch;
 mod node;
+mod preflight;
 mod progress;
 mod record;
 mod report;
@@ -40,6 +42,8 @@ enum Verb {
     Report(report_bag::ReportBag),
     /// Say where simulator and machine differ, which effect causes it, and how far it shrinks.
     Diagnose(diagnose::Diagnose),
+    /// Tell what a plan's recordings will determine, before they are made, and what to add.
+    Preflight(preflight::Preflight),
     /// Record topics of the ROS graph into a bag.
     Record(record::Record),
     /// Make a bag of a table that a laser, a ballbar or a logger wrote.
@@ -55,13 +59,14 @@ fn main() -> ExitCode {
         Verb::Run(run) => run.execute(),
         Verb::Report(report) => report.execute(),
         Verb::Diagnose(diagnose) => diagnose.execute(),
+        Verb::Preflight(preflight) => preflight.execute(),
         Verb::Record(record) => record.execute(),
         Verb::Import(import) => import.execute(),
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => return node.execute(),
     };
     outcome.unwrap_or_else(|error| {
-        eprintln!("abbe: {error:#}");
+        eprintln!("abbe: {}", complaint::in_words(&error));
         ExitCode::FAILURE
     })
 }

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 use nix::sys::signal::{Signal, raise};
 use node_runtime::{Composition, Node, Setup};
 
@@ -49,6 +50,7 @@ pub struct NodeVerb {
     #[arg(long)]
     while_input_is_open: bool,
     /// Which node.
+    #[arg(value_parser = PossibleValuesParser::new(NODES.iter().map(|(name, _)| *name)))]
     name: String,
     /// Arguments as of any ROS 2 node: `--ros-args -r … -p … --params-file …`.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -58,14 +60,7 @@ pub struct NodeVerb {
 impl NodeVerb {
     /// Runs the node until it is told to stop.
     pub fn execute(self) -> ExitCode {
-        let Some(build) = builder(&self.name) else {
-            eprintln!(
-                "abbe: node \"{}\" is unknown (known: {})",
-                self.name,
-                names()
-            );
-            return ExitCode::from(2);
-        };
+        let build = builder(&self.name).expect("the argument is one of NODES");
         if self.while_input_is_open {
             std::thread::spawn(stop_at_end_of_input);
         }
@@ -82,4 +77,50 @@ fn stop_at_end_of_input() {
     // What is written there, and an error, mean nothing: either way it is over.
     let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
     let _ = raise(Signal::SIGTERM);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use node_runtime::arguments::Arguments;
+
+    use super::*;
+    use crate::launch;
+
+    /// Every node of every scenario: executable and setup.
+    fn launched() -> Vec<(String, Setup)> {
+        let home = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../launch_configs");
+        let folders = std::fs::read_dir(home)
+            .unwrap()
+            .map(|entry| entry.unwrap().path());
+        let nodes = folders
+            .filter(|folder| folder.is_dir())
+            .flat_map(|folder| launch::read(&launch::find(&folder).unwrap()).unwrap());
+        nodes
+            .map(|node| {
+                let arguments = Arguments::parse(node.ros_args()).unwrap();
+                let setup = Setup::new(&node.exec, &arguments).unwrap();
+                (node.exec, setup)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn what_a_node_resolves_is_known_without_the_node_and_has_its_defaults() {
+        let all = launched();
+        assert!(all.iter().any(|(exec, _)| exec == "linuxcnc_bridge"));
+        for (exec, setup) in all {
+            let build = builder(&exec).unwrap();
+            let resolved = setup.resolved_by(build).unwrap();
+            let given = setup.parameters(&[]).unwrap();
+            assert!(
+                resolved.len() > given.len(),
+                "{exec}: no default among {resolved:?}"
+            );
+            if exec != "linuxcnc_bridge" {
+                assert_eq!(build(&setup).unwrap().parameters(), resolved, "{exec}");
+            }
+        }
+    }
 }

@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use node_runtime::Interruption;
 use recorder::{ChunkCompression, NodeConfig, RecorderConfig};
-use tokio::signal::unix::{SignalKind, signal};
 
 /// Compression inside the bag's chunks.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -34,22 +35,18 @@ pub struct Record {
 
 /// The recorder's own name on the graph.
 const NAME: &str = "abbe_record";
+/// Between two looks at whether it is over; a signal wakes it at once.
+const A_WHILE: Duration = Duration::from_secs(60);
+/// Exit code for a bag that has not all that was said.
+const DONE_WITH_LOSS: u8 = 3;
 
 impl Record {
-    /// Records until SIGINT or SIGTERM; exit code 1 when the bag lost something.
+    /// Records until SIGINT or SIGTERM; exit code 3 when the bag lost something.
     ///
     /// # Errors
     /// When the bag cannot be begun, or there is no network.
     pub fn execute(self) -> Result<ExitCode> {
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .context("tokio runtime")?;
-        let (mut interrupt, mut terminate) = runtime.block_on(async {
-            let interrupt = signal(SignalKind::interrupt()).context("SIGINT")?;
-            let terminate = signal(SignalKind::terminate()).context("SIGTERM")?;
-            anyhow::Ok((interrupt, terminate))
-        })?;
+        let interruption = Interruption::listen("the bag is being closed")?;
         let bag = self.output.to_str().context("--output: must be UTF-8")?;
         let config = NodeConfig {
             bag: bag.to_owned(),
@@ -70,12 +67,7 @@ impl Record {
         };
         let capture = recorder_node::record(&config, NAME)?;
         eprintln!("Recording into {bag}; Ctrl-C ends it.");
-        runtime.block_on(async {
-            tokio::select! {
-                _ = interrupt.recv() => {}
-                _ = terminate.recv() => {}
-            }
-        });
+        while !interruption.wait(A_WHILE) {}
         let captured = capture.finish()?;
         for word in &captured.unrecorded {
             eprintln!("abbe: {word}");
@@ -89,7 +81,7 @@ impl Record {
         Ok(if lost == 0 {
             ExitCode::SUCCESS
         } else {
-            ExitCode::FAILURE
+            ExitCode::from(DONE_WITH_LOSS)
         })
     }
 }

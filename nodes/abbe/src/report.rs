@@ -19,8 +19,10 @@ mod page;
 mod plot;
 pub mod positioning;
 pub mod probing;
+pub mod published;
 mod rotary;
 pub mod section;
+pub mod stops;
 mod thermal;
 mod tool_error;
 mod trace;
@@ -80,7 +82,9 @@ impl Report {
         self.text.push('\n');
         self.text.push_str(&tests.text);
         self.body = maud::html! { (self.body) (tests.body) };
-        self.figures["tests"] = tests.figures["tests"].clone();
+        for key in ["tests", "loss", "uncertainty"] {
+            self.figures[key] = tests.figures[key].clone();
+        }
     }
 
     /// The report as it stands on a terminal.

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use node_runtime::Interruption;
 use recorder::Bag;
 
 use crate::diagnose;
@@ -18,15 +19,19 @@ mod bag;
 mod composed;
 mod live;
 mod mirror;
+mod shortcomings;
 
 /// Arguments of `abbe run`.
 #[derive(Args)]
 pub struct Run {
     /// Folder of the scenario, e.g. `launch_configs/first_run`.
     scenario: PathBuf,
-    /// Where runs are kept.
+    /// Folder in which runs are kept, each in a new one of its own.
     #[arg(long, default_value = "runs")]
-    out: PathBuf,
+    runs: PathBuf,
+    /// Was the name of `--runs`.
+    #[arg(long, hide = true, value_parser = renamed)]
+    out: Option<String>,
     /// Stay off the network: nothing is published on DDS.
     #[arg(long)]
     no_dds: bool,
@@ -37,6 +42,15 @@ pub struct Run {
     #[arg(long)]
     separate: bool,
 }
+
+fn renamed(_: &str) -> Result<String, &'static str> {
+    Err(
+        "for `run` it is called --runs: the folder in which runs are kept; --out is where `report` and `export` write",
+    )
+}
+
+/// Why a plan that was called off did not run to its end.
+const INTERRUPTED: &str = "it was interrupted";
 
 /// What a runner leaves behind.
 pub struct Outcome {
@@ -60,17 +74,29 @@ impl Run {
             bail!("--pace {}: must be 0 or a finite number above", self.pace);
         }
         let scenario = Scenario::read(&self.scenario)?;
-        let folder = new_folder(&self.out, &scenario.name)?;
+        let interruption = Interruption::listen("the bag is closed, no page is written")?;
+        let folder = new_folder(&self.runs, &scenario.name)?;
         let bag = folder.join("bag");
         let outcome = match scenario.file.simulated_start_s {
             Some(start_s) if !self.separate => {
-                composed::run(&scenario, start_s, &bag, self.pace, !self.no_dds)?
+                let how = composed::How {
+                    pace: self.pace,
+                    on_dds: !self.no_dds,
+                    interruption: &interruption,
+                };
+                composed::run(&scenario, start_s, &bag, how)?
             }
-            _ => live::run(&scenario, &bag, self.separate)?,
+            _ => live::run(&scenario, &bag, self.separate, &interruption)?,
         };
+        if interruption.is_forced() {
+            println!("Bag:  {}", outcome.kept(&bag));
+            eprintln!("abbe: the end was forced: no page was written");
+            return Ok(ExitCode::FAILURE);
+        }
         let title = format!("{}: {}", scenario.name, scenario.file.title);
         let mut report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
         if scenario.file.report == ReportKind::Tests && outcome.recorded > 0 {
+            eprintln!("Evaluating the tests of {}", bag.display());
             let tests = Tests::of(&Bag::open(&bag)?)?;
             report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
         }
@@ -78,27 +104,37 @@ impl Run {
             let machine = scenario.folder.join("machine.yaml");
             report.join_gap(&diagnose::of_run(&bag, &folder, &machine)?);
         }
-        let kept = format!(
-            "Bag: {} ({} messages, {} lost).",
-            bag.display(),
-            outcome.recorded,
-            outcome.lost
-        );
+        let kept = format!("Bag: {}.", outcome.kept(&bag));
         report.body = maud::html! { (report.body) h2 { "Recording" } p { (kept) } };
         report.write(&folder)?;
         println!("{}", report.terminal());
-        println!(
-            "Bag:  {} ({} messages, {} lost)",
-            bag.display(),
-            outcome.recorded,
-            outcome.lost
-        );
+        println!("Bag:  {}", outcome.kept(&bag));
         println!("Page: {}", folder.join("report.html").display());
-        match outcome.failure {
-            None => Ok(ExitCode::SUCCESS),
+        Ok(outcome.end())
+    }
+}
+
+impl Outcome {
+    /// The bag in a few words.
+    fn kept(&self, bag: &Path) -> String {
+        let (recorded, lost) = (self.recorded, self.lost);
+        format!("{} ({recorded} messages, {lost} lost)", bag.display())
+    }
+
+    /// Says what did not work; the exit code.
+    fn end(self) -> ExitCode {
+        let shortcomings = shortcomings::of(&self.evidence, self.lost);
+        if !shortcomings.is_empty() {
+            eprintln!("abbe: what did not go as told:");
+        }
+        for line in &shortcomings {
+            eprintln!("abbe:   {line}");
+        }
+        match self.failure {
+            None => ExitCode::SUCCESS,
             Some(reason) => {
                 eprintln!("abbe: the plan failed: {reason}");
-                Ok(ExitCode::FAILURE)
+                ExitCode::FAILURE
             }
         }
     }

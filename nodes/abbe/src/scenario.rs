@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow, bail};
+use node_runtime::complaint;
 use serde::Deserialize;
 
 use crate::evaluate::budget::Budget;
@@ -82,11 +83,16 @@ impl Scenario {
             .with_context(|| format!("scenario {}: no folder name", folder.display()))?
             .to_string_lossy()
             .into_owned();
-        let path = folder.join("scenario.yaml");
+        let path = folder.join(SCENARIO_FILE);
+        if !path.is_file() {
+            bail!("{}", no_scenario(folder));
+        }
         let text = std::fs::read_to_string(&path)
             .with_context(|| format!("scenario file {}", path.display()))?;
-        let file: ScenarioFile = serde_saphyr::from_str(&text)
-            .with_context(|| format!("scenario file {}", path.display()))?;
+        let file: ScenarioFile = serde_saphyr::from_str(&text).map_err(|error| {
+            let reason = complaint::of_yaml(&error, &text);
+            anyhow!("scenario file {}: {reason}", path.display())
+        })?;
         let nodes = launch::read(&launch::find(folder)?)?;
         Ok(Self {
             folder: folder.to_owned(),
@@ -94,5 +100,84 @@ impl Scenario {
             file,
             nodes,
         })
+    }
+}
+
+const SCENARIO_FILE: &str = "scenario.yaml";
+/// Where a clone of the tree has its scenarios.
+const USUAL_HOME: &str = "launch_configs";
+
+/// What was looked for in vain, and what is near it.
+fn no_scenario(folder: &Path) -> String {
+    let shown = folder.display();
+    let what = if folder.is_dir() {
+        format!("scenario {shown}: the folder has no {SCENARIO_FILE}")
+    } else if folder.exists() {
+        format!("scenario {shown}: it is a file; must be the folder that has {SCENARIO_FILE}")
+    } else {
+        format!(
+            "scenario {shown}: there is no such folder (a folder with {SCENARIO_FILE} is looked for)"
+        )
+    };
+    let parent = folder
+        .parent()
+        .filter(|parent| !parent.as_os_str().is_empty());
+    let beside = parent.unwrap_or(Path::new(".")).to_owned();
+    let homes = [
+        folder.to_owned(),
+        beside.clone(),
+        beside.join(USUAL_HOME),
+        PathBuf::from(USUAL_HOME),
+    ];
+    let near = homes.iter().find_map(|home| {
+        let found = scenarios_in(home);
+        (!found.is_empty()).then(|| format!("in {} are: {}", home.display(), found.join(", ")))
+    });
+    match near {
+        Some(near) => format!("{what}; {near}"),
+        None => format!("{what}; none is near it"),
+    }
+}
+
+/// Names of the folders in `home` that are scenarios, in order.
+fn scenarios_in(home: &Path) -> Vec<String> {
+    let Ok(entries) = std::fs::read_dir(home) else {
+        return Vec::new();
+    };
+    let mut found: Vec<String> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.join(SCENARIO_FILE).is_file())
+        .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
+        .collect();
+    found.sort();
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_path_says_what_was_looked_for_and_what_is_near() {
+        let home = tempfile::tempdir().unwrap();
+        for name in ["a", "b"] {
+            let folder = home.path().join("launch_configs").join(name);
+            std::fs::create_dir_all(&folder).unwrap();
+            std::fs::write(folder.join(SCENARIO_FILE), "").unwrap();
+        }
+        let configs = home.path().join("launch_configs");
+        let near = format!("in {} are: a, b", configs.display());
+        for (wrong, word) in [
+            (configs.join("c"), "no such folder"),
+            (configs.clone(), "has no scenario.yaml"),
+            (configs.join("a").join(SCENARIO_FILE), "it is a file"),
+            (home.path().join("c"), "no such folder"),
+        ] {
+            let error = Scenario::read(&wrong).unwrap_err().to_string();
+            assert!(error.contains(&wrong.display().to_string()), "{error}");
+            assert!(error.contains(word), "{error}");
+            let is_file = wrong.ends_with(SCENARIO_FILE);
+            assert!(error.ends_with(&near) || is_file, "{error}");
+        }
     }
 }

@@ -10,7 +10,7 @@ use axis_compensation::positioning::offset::{OffsetSum, Reading};
 use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input};
 use divan::{Bencher, black_box};
 use metrology::drift::Extrapolate;
-use metrology::sample::{AxisDrift, AxisState, ThermalModel};
+use metrology::sample::{AxisDrift, AxisState, DriftGrowth, ThermalModel};
 use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
 use nalgebra::Vector3;
 
@@ -28,9 +28,15 @@ fn model() -> ThermalModel {
             slope_mm_per_mm: 5e-5,
             cross_slope_mm_per_mm: cross,
             span_mm: (-220.0, 220.0),
-            rate_mm_s: 1e-6,
-            slope_rate_per_s: 1e-9,
-            time_constant_s: 1800.0,
+            growth: Axis::LINEAR.map(|source| {
+                (source == axis).then_some(DriftGrowth {
+                    rate_mm_s: 1e-6,
+                    gradient_rate_per_s: Vector3::from_fn(|row, _| {
+                        if row == axis.index() { 1e-9 } else { 0.0 }
+                    }),
+                    time_constant_s: 1800.0,
+                })
+            }),
             ..AxisDrift::default()
         });
     }
@@ -123,7 +129,7 @@ fn servo_tick(bencher: Bencher<'_, '_>, dual_loops: &str) {
         "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
     let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
         "{{axes: {{X: {{{limits}}}, Y: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: hold, \
-         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0, positioning: {{{positioning}}}}}"
+         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, expanded_uncertainty_limit_um: 1000.0, hold_s: 1.0, fade_s: 2.0, positioning: {{{positioning}}}}}"
     ))
     .expect("the configuration above is complete");
     let machine = serde_saphyr::from_str(MACHINE)

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! The target follows the model (Active), stays where it last was (Holding), or goes to zero along
-//! a straight line in `fade_s` (Fading). A value beyond the size limit is not followed and not cut:
+//! a straight line in `fade_s` (Fading), or in `shutdown_fade_s` when the node is told to end. A value beyond the size limit is not followed and not cut:
 //! the target stays at the last one inside (Limited). The limiter turns the target into the offset.
 
 use metrology::sample::CompensationState;
@@ -24,6 +24,8 @@ pub struct LetGo {
     pub hold_s: f64,
     /// How long the way to zero takes.
     pub fade_s: f64,
+    /// How long it takes at most when the node is told to end.
+    pub shutdown_fade_s: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,6 +119,22 @@ impl AxisState {
         }
     }
 
+    /// The node is told to end: what is left goes to zero in `shutdown_fade_s`, as far as the limits allow.
+    pub fn hasten(&mut self) {
+        let fade_s = self.let_go.shutdown_fade_s;
+        match self.mode {
+            Mode::Fading { for_s, .. } if self.let_go.fade_s - for_s <= fade_s => {}
+            Mode::Fading { .. } => {
+                self.let_go.fade_s = fade_s;
+                self.mode = Mode::Fading {
+                    from: self.target,
+                    for_s: 0.0,
+                };
+            }
+            _ => self.let_go.fade_s = self.let_go.fade_s.min(fade_s),
+        }
+    }
+
     /// One tick of `dt_s` > 0; the offset follows.
     pub fn step(&mut self, wanted: Wanted, dt_s: f64) {
         self.mode = self.next_mode(wanted, dt_s);
@@ -190,6 +208,7 @@ mod tests {
             LetGo {
                 hold_s: 1.0,
                 fade_s: 2.0,
+                shutdown_fade_s: 0.5,
             },
             1e-4,
         )
@@ -250,6 +269,30 @@ mod tests {
         run(&mut axis, Wanted::Nothing, 0.1);
         assert_eq!(axis.state(), CompensationState::Fading);
         run(&mut axis, Wanted::Nothing, 2.5);
+        assert!(axis.is_off());
+    }
+
+    #[test]
+    fn hastened_the_fade_is_short_whether_or_not_one_is_under_way() {
+        for fading in [false, true] {
+            let mut axis = axis();
+            run(&mut axis, Wanted::Offset(0.02), 2.0);
+            if fading {
+                run(&mut axis, Wanted::Nothing, 0.1);
+            }
+            axis.hasten();
+            run(&mut axis, Wanted::Nothing, 0.7);
+            assert!(axis.is_off(), "fading before: {fading}");
+        }
+    }
+
+    #[test]
+    fn hastening_does_not_lengthen_a_fade_that_is_nearly_over() {
+        let mut axis = axis();
+        run(&mut axis, Wanted::Offset(0.05), 2.0);
+        run(&mut axis, Wanted::Nothing, 1.8);
+        axis.hasten();
+        run(&mut axis, Wanted::Nothing, 0.4);
         assert!(axis.is_off());
     }
 

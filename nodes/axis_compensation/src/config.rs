@@ -24,10 +24,16 @@ pub struct AxisCompensationConfig {
     pub physical_rate_um_per_min: f64,
     /// Change between models that is never a jump.
     pub jump_margin_um: f64,
+    /// Greatest expanded uncertainty (k = 2) of a drift at the travel's corners; beyond it the axis is
+    /// refused.
+    pub expanded_uncertainty_limit_um: f64,
     /// How long the last good value is held once the model is refused.
     pub hold_s: f64,
     /// Time in which an offset is faded to zero.
     pub fade_s: f64,
+    /// The same when the node is told to end; the limits of rate and acceleration hold all the same.
+    #[serde(default = "default_shutdown_fade_s")]
+    pub shutdown_fade_s: f64,
     /// Silence of the axes' state after which it counts as stale.
     #[serde(default = "default_gap_s")]
     pub gap_s: f64,
@@ -43,6 +49,10 @@ pub struct AxisCompensationConfig {
     /// Machine file, relative to the parameter file; read by whoever builds the node.
     #[serde(default)]
     pub machine_file: String,
+}
+
+fn default_shutdown_fade_s() -> f64 {
+    2.0
 }
 
 fn default_gap_s() -> f64 {
@@ -74,8 +84,13 @@ impl AxisCompensationConfig {
         let given = [
             ("physical_rate_um_per_min", self.physical_rate_um_per_min),
             ("jump_margin_um", self.jump_margin_um),
+            (
+                "expanded_uncertainty_limit_um",
+                self.expanded_uncertainty_limit_um,
+            ),
             ("hold_s", self.hold_s),
             ("fade_s", self.fade_s),
+            ("shutdown_fade_s", self.shutdown_fade_s),
             ("gap_s", self.gap_s),
         ];
         for (key, value) in given {
@@ -111,6 +126,22 @@ impl AxisCompensationConfig {
         self.geometry
             .as_ref()
             .map_or(Ok(()), GeometricConfig::check)
+    }
+
+    /// Longest time from the call to end until every offset is zero, s.
+    ///
+    /// The greatest offset S goes to zero in `shutdown_fade_s`, or at the rate limit R where that is
+    /// slower. Each start and stop at the acceleration limit A costs R/A at most, and there are four:
+    /// out of a motion, into the fade, out of it, and once more when the axes' states end meanwhile,
+    /// which takes `gap_s` to be seen.
+    #[must_use]
+    pub fn wind_down_s(&self) -> f64 {
+        let of_axis = |limits: &AxisLimitConfig| {
+            let at_full_rate_s = limits.size_limit_um / limits.rate_limit_um_per_s;
+            let start_s = limits.rate_limit_um_per_s / limits.acceleration_limit_um_per_s2;
+            self.shutdown_fade_s.max(at_full_rate_s) + 4.0 * start_s
+        };
+        self.axes.values().map(of_axis).fold(0.0, f64::max) + self.gap_s
     }
 }
 
@@ -164,11 +195,24 @@ mod tests {
 
     fn config(axes: &str, rest: &str) -> String {
         format!(
-            "{{axes: {{{axes}}}, extrapolate: hold, physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 10.0, {rest}}}"
+            "{{axes: {{{axes}}}, extrapolate: hold, physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, expanded_uncertainty_limit_um: 20.0, hold_s: 10.0, {rest}}}"
         )
     }
 
     const X: &str = "X: {size_limit_um: 200.0, rate_limit_um_per_s: 100.0, acceleration_limit_um_per_s2: 1000.0}";
+
+    #[test]
+    fn the_wind_down_is_the_slowest_axis_and_no_shorter_than_its_fade() {
+        let of = |text: &str| {
+            let config: AxisCompensationConfig = serde_saphyr::from_str(text).unwrap();
+            config.wind_down_s()
+        };
+        let slow = "X: {size_limit_um: 150.0, rate_limit_um_per_s: 20.0, acceleration_limit_um_per_s2: 200.0}";
+        assert!((of(&config(slow, "fade_s: 30.0")) - (7.5 + 0.4 + 0.5)).abs() < 1e-12);
+        let quick = "X: {size_limit_um: 150.0, rate_limit_um_per_s: 400.0, acceleration_limit_um_per_s2: 4000.0}";
+        let long = "fade_s: 30.0, shutdown_fade_s: 5.0, gap_s: 0.2";
+        assert!((of(&config(quick, long)) - (5.0 + 0.4 + 0.2)).abs() < 1e-12);
+    }
 
     #[test]
     fn values_outside_their_limits_are_refused_by_name_value_and_limit() {

@@ -8,16 +8,7 @@ use crate::geometric::GeometrySource;
 use crate::parts::PartRefusal;
 use crate::positioning::refusal::PositioningRefusal;
 
-/// How urgent a condition is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// A fact worth recording.
-    Info,
-    /// It goes on, but not as told.
-    Warn,
-    /// Nothing is compensated any more.
-    Error,
-}
+pub use metrology::Severity;
 
 /// A condition worth reporting; each is said when it begins, not at every tick.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -65,6 +56,23 @@ pub enum Diagnostic {
     ModelDoubtful { sequence: u32 },
     #[error("thermal model {sequence} is used without objection")]
     ModelAccepted { sequence: u32 },
+    #[error("thermal model {sequence} expired {late_s} s ago and is not taken")]
+    ModelExpired { sequence: u32, late_s: f64 },
+    #[error("thermal model {sequence} is {by_s} s older than the one in use and is not taken")]
+    ModelOlder { sequence: u32, by_s: f64 },
+    #[error(
+        "axis {axis}: drift used at {position_mm:.3} mm, outside the blocks' span {lower_mm:.3} to {upper_mm:.3} mm, with an expanded uncertainty of {expanded_uncertainty_mm:.6} mm, up to {greatest_mm:.6} mm at the travel's corners"
+    )]
+    BeyondSpan {
+        axis: Axis,
+        position_mm: f64,
+        lower_mm: f64,
+        upper_mm: f64,
+        expanded_uncertainty_mm: f64,
+        greatest_mm: f64,
+    },
+    #[error("axis {axis}: positions stayed inside the blocks' span")]
+    WithinSpan { axis: Axis },
     #[error("{model} {sequence} is used")]
     GeometryAccepted {
         model: GeometrySource,
@@ -148,6 +156,7 @@ impl Diagnostic {
             | Self::SizeKept { .. }
             | Self::Gap { .. }
             | Self::ModelAccepted { .. }
+            | Self::WithinSpan { .. }
             | Self::RunsCollected { .. }
             | Self::TableLearned { .. }
             | Self::LeadSeen { .. }
@@ -176,6 +185,7 @@ impl Diagnostic {
             "scale_x", "scale_y", "scale_z", "scale_a", "scale_b", "scale_c",
         ];
         const LEAD: [&str; 6] = ["lead_x", "lead_y", "lead_z", "lead_a", "lead_b", "lead_c"];
+        const SPAN: [&str; 6] = ["span_x", "span_y", "span_z", "span_a", "span_b", "span_c"];
         const MEASURED: [&str; 6] = [
             "measured_x",
             "measured_y",
@@ -195,7 +205,10 @@ impl Diagnostic {
             }
             Self::StateChanged { axis, .. } | Self::ModelRefused { axis, .. } => AXIS[axis.index()],
             Self::SizeExceeded { axis, .. } | Self::SizeKept { axis } => SIZE[axis.index()],
+            Self::BeyondSpan { axis, .. } | Self::WithinSpan { axis } => SPAN[axis.index()],
             Self::ModelQuarantined { .. }
+            | Self::ModelExpired { .. }
+            | Self::ModelOlder { .. }
             | Self::ModelConfirmed { .. }
             | Self::ModelNotFinite { .. }
             | Self::ModelDoubtful { .. }

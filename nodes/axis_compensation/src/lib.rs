@@ -12,7 +12,8 @@
 //! follows its target without ever exceeding the axis' size, rate or acceleration, whatever the
 //! target and the spacing of time do. `axis_state` says per axis what the target is: the model, the
 //! last good value (held), or zero by way of a fade. `model_gate` keeps back a model that jumps
-//! faster than heat can. `pulses` turns the offset
+//! faster than heat can, and refuses an axis whose drift is too uncertain where it may go; `span_watch`
+//! sees where a drift is used beyond the blocks. `pulses` turns the offset
 //! into whole pulses of the control and carries the rest, in the whole femtometres of `femtometre`.
 //!
 //! A node that is killed and started again begins from zero with nothing added. The control, which
@@ -35,6 +36,7 @@ pub mod parameters;
 pub mod parts;
 pub mod positioning;
 pub mod pulses;
+pub mod span_watch;
 pub mod stage;
 
 pub use config::AxisCompensationConfig;

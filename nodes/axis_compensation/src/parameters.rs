@@ -104,6 +104,12 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "change between models that is never a jump",
     ),
     row(
+        "expanded_uncertainty_limit_um",
+        "µm",
+        (0.1, 1000.0),
+        "greatest expanded uncertainty (k = 2) of a drift at the travel's corners; beyond it the axis is refused",
+    ),
+    row(
         "hold_s",
         "s",
         (0.0, 3600.0),
@@ -114,6 +120,12 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "s",
         (0.01, 3600.0),
         "time in which an offset is faded to zero",
+    ),
+    row(
+        "shutdown_fade_s",
+        "s",
+        (0.01, 60.0),
+        "the same when the node is told to end, where that is shorter; the axes' limits of rate and acceleration hold all the same",
     ),
     row(
         "gap_s",

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 
 use machine::MachineFile;
-use metrology::drift::{DriftRefusal, Extrapolate, axis_drift_at};
+use metrology::drift::DriftRefusal;
 use metrology::sample::{
     AxisCompensation, AxisState, GeometryModel, PositioningTable, TestSegment, ThermalModel,
 };
@@ -17,10 +17,11 @@ use crate::diagnostic::Diagnostic;
 use crate::error::AxisCompensationError;
 use crate::geometric::{Geometric, GeometrySource};
 use crate::limiter::Limits;
-use crate::model_gate::ModelGate;
+use crate::model_gate::{GateLimits, ModelGate};
 use crate::parts::{PartRefusal, Parts};
 use crate::positioning::dual_loop::DualLoop;
 use crate::pulses::PulseTrain;
+use crate::span_watch::SpanWatch;
 
 mod dual;
 mod geometry;
@@ -76,7 +77,7 @@ pub struct AxisCompensationStage {
     geometric: Option<Geometric>,
     refused: PerAxis<Option<PartRefusal>>,
     gate: ModelGate,
-    policy: Extrapolate,
+    spans: PerAxis<SpanWatch>,
     servo_period_s: f64,
     gap: Span,
     enabled: bool,
@@ -132,6 +133,7 @@ impl AxisCompensationStage {
         let let_go = LetGo {
             hold_s: config.hold_s,
             fade_s: config.fade_s,
+            shutdown_fade_s: config.shutdown_fade_s,
         };
         let states = PerAxis::from_fn(|axis| {
             config.axes.get(&axis).map(|limits| {
@@ -155,11 +157,8 @@ impl AxisCompensationStage {
             axes: config.axes.keys().copied().collect(),
             states,
             refused: PerAxis::default(),
-            gate: ModelGate::new(
-                config.physical_rate_um_per_min * 1e-3 / 60.0,
-                config.jump_margin_um * 1e-3,
-            ),
-            policy: config.extrapolate,
+            gate: ModelGate::new(gate_limits(config, machine)),
+            spans: PerAxis::default(),
             trains: PerAxis::from_fn(|_| train),
             positioning,
             geometric: geometric.transpose()?,
@@ -258,6 +257,9 @@ impl AxisCompensationStage {
                 continue;
             };
             let (parts, wanted) = self.wanted(axis, at, commanded_mm);
+            if let (Wanted::Offset(_), Some(p_mm)) = (wanted, commanded_mm) {
+                self.watch_span(axis, p_mm, out);
+            }
             let before = compensated;
             match elapsed {
                 Elapsed::Nothing => {}
@@ -300,10 +302,8 @@ impl AxisCompensationStage {
             .filter(|_| commanded_mm.is_some())
             .map_or(Ok(None), |geometric| geometric.offset_mm(axis))
             .map_err(|source| PartRefusal::Geometric { source })?;
-        let thermal = match (self.gate.current(), commanded_mm) {
-            (Some(model), Some(p_mm)) if adds_thermal => {
-                axis_drift_at(model, axis, p_mm, at, self.policy)
-            }
+        let thermal = match commanded_mm {
+            Some(p_mm) if adds_thermal => self.gate.drift_mm(axis, p_mm, at),
             _ => Err(DriftRefusal::NotModelled { axis }),
         };
         let speaks = geometric.is_some() || positioning.is_some();
@@ -361,6 +361,9 @@ impl AxisCompensationStage {
     fn shut_down(&mut self, out: &mut Vec<Output>) {
         if self.shutdown == Shutdown::No {
             self.shutdown = Shutdown::Fading;
+            for state in self.states.0.iter_mut().flatten() {
+                state.hasten();
+            }
             out.push(Output::Diagnostic(Diagnostic::ShuttingDown));
             self.report_faded_out(out);
         }
@@ -372,6 +375,20 @@ impl AxisCompensationStage {
             self.shutdown = Shutdown::Done;
             out.push(Output::FadedOut);
         }
+    }
+}
+
+fn gate_limits(config: &AxisCompensationConfig, machine: &MachineFile) -> GateLimits {
+    GateLimits {
+        physical_rate_mm_s: config.physical_rate_um_per_min * 1e-3 / 60.0,
+        margin_mm: config.jump_margin_um * 1e-3,
+        expanded_uncertainty_mm: config.expanded_uncertainty_limit_um * 1e-3,
+        policy: config.extrapolate,
+        // An axis that the machine does not have goes nowhere.
+        travel_mm: Axis::LINEAR.map(|axis| {
+            let travel_mm = machine.linear(axis).map(|entry| entry.travel_mm);
+            travel_mm.map_or((0.0, 0.0), |[lower_mm, upper_mm]| (lower_mm, upper_mm))
+        }),
     }
 }
 
@@ -407,7 +424,7 @@ impl Stage for AxisCompensationStage {
     ) -> Result<(), Infallible> {
         match input {
             Input::State(state) => self.state(at, &state, out),
-            Input::Model(model) => self.model(*model, out),
+            Input::Model(model) => self.model(at, *model, out),
             Input::Geometry(source, model) => self.geometry(source, *model, out),
             Input::Segment(segment) => self.segment(at, &segment, out),
             Input::Enable(enabled) => {

@@ -3,7 +3,9 @@
 use axis_compensation::geometric::GeometrySource;
 use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output};
 use metrology::drift::{Extrapolate, axis_drift_at};
-use metrology::sample::{AxisDrift, AxisState, CurveForm, ErrorCurve, GeometryModel, ThermalModel};
+use metrology::sample::{
+    AxisDrift, AxisState, CurveForm, DriftGrowth, ErrorCurve, GeometryModel, ThermalModel,
+};
 use metrology::{Axis, AxisSet, ErrorComponent, PerAxis, Stage, Stamp};
 use nalgebra::{DMatrix, Vector3};
 
@@ -14,9 +16,15 @@ fn model() -> ThermalModel {
             k0_mm: 0.01,
             slope_mm_per_mm: 5e-5,
             span_mm: (-220.0, 220.0),
-            rate_mm_s: 1e-6,
-            slope_rate_per_s: 1e-9,
-            time_constant_s: 1800.0,
+            growth: Axis::LINEAR.map(|source| {
+                (source == axis).then_some(DriftGrowth {
+                    rate_mm_s: 1e-6,
+                    gradient_rate_per_s: Vector3::from_fn(|row, _| {
+                        if row == axis.index() { 1e-9 } else { 0.0 }
+                    }),
+                    time_constant_s: 1800.0,
+                })
+            }),
             ..AxisDrift::default()
         });
     }
@@ -93,7 +101,7 @@ fn a_thousand_ticks_allocate_nothing() {
         "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
     let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
         "{{axes: {{X: {{{limits}}}, Y: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: linear, \
-         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0, positioning: {{{POSITIONING}}}, \
+         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, expanded_uncertainty_limit_um: 1000.0, hold_s: 1.0, fade_s: 2.0, positioning: {{{POSITIONING}}}, \
          geometry: {{tool_offset_mm: [0.0, 0.0, -100.0], jump_limit_um: 20.0}}}}"
     ))
     .unwrap();

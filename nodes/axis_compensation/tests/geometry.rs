@@ -32,7 +32,7 @@ fn config(rest: &str) -> AxisCompensationConfig {
         "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
     serde_saphyr::from_str(&format!(
         "{{axes: {{X: {{{limits}}}, Y: {{{limits}}}, Z: {{{limits}}}}}, \
-         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0, {rest}}}"
+         physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, expanded_uncertainty_limit_um: 1000.0, hold_s: 1.0, fade_s: 2.0, {rest}}}"
     ))
     .unwrap()
 }
@@ -142,7 +142,6 @@ fn thermal(scene: &mut Scene, k0_mm: f64) {
     let drift = AxisDrift {
         k0_mm,
         span_mm: (-220.0, 220.0),
-        time_constant_s: f64::INFINITY,
         ..AxisDrift::default()
     };
     let mut axes = PerAxis::default();

@@ -4,7 +4,8 @@
 
 use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output};
 use metrology::sample::{
-    AxisCompensation, AxisDrift, AxisState, Sense, TestKind, TestPlane, TestSegment, ThermalModel,
+    AxisCompensation, AxisDrift, AxisState, DriftGrowth, Sense, TestKind, TestPlane, TestSegment,
+    ThermalModel,
 };
 use metrology::{Axis, AxisSet, Host, Machine, PerAxis, Stage, Stamp};
 use nalgebra::Vector3;
@@ -35,7 +36,7 @@ fn stage(extrapolate: &str) -> AxisCompensationStage {
         "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
     let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
         "{{axes: {{X: {{{limits}}}, Y: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: {extrapolate}, \
-         physical_rate_um_per_min: 3.0, jump_margin_um: 20.0, hold_s: 0.1, fade_s: 0.2, gap_s: 0.2, positioning: {{{POSITIONING}}}}}"
+         physical_rate_um_per_min: 3.0, jump_margin_um: 20.0, expanded_uncertainty_limit_um: 1000.0, hold_s: 0.1, fade_s: 0.2, gap_s: 0.2, positioning: {{{POSITIONING}}}}}"
     ))
     .unwrap();
     AxisCompensationStage::new(&config, &serde_saphyr::from_str(machine).unwrap()).unwrap()
@@ -57,8 +58,16 @@ fn model(
         span_mm: (-220.0, 220.0),
         offset_identifiable: true,
         slope_identifiable: true,
-        rate_mm_s,
-        time_constant_s: 1800.0,
+        growth: [
+            Some(DriftGrowth {
+                rate_mm_s,
+                gradient_rate_per_s: Vector3::zeros(),
+                time_constant_s: 1800.0,
+            }),
+            None,
+            None,
+        ],
+        measured_at: at,
         ..AxisDrift::default()
     };
     let mut axes = PerAxis::default();

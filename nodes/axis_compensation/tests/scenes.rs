@@ -8,6 +8,7 @@ use metrology::drift::DriftRefusal;
 use metrology::sample::{AxisCompensation, AxisDrift, AxisState, CompensationState, ThermalModel};
 use metrology::stamp::Span;
 use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
+use nalgebra::Matrix4;
 
 const MILLISECOND: i64 = 1_000_000;
 
@@ -17,17 +18,26 @@ struct Scene {
     diagnostics: Vec<Diagnostic>,
     faded_out: bool,
     sequence: u32,
+    /// Of the model's offset, mm².
+    variance_mm2: f64,
+    /// The last model told.
+    told: Option<Input>,
     last: Option<AxisCompensation>,
 }
 
 impl Scene {
     fn new(extrapolate: &str) -> Self {
+        Self::with(extrapolate, "fade_s: 2.0")
+    }
+
+    fn with(extrapolate: &str, rest: &str) -> Self {
         let machine = include_str!("../../../launch_configs/first_run/machine.yaml");
         let limits =
             "size_limit_um: 100.0, rate_limit_um_per_s: 50.0, acceleration_limit_um_per_s2: 500.0";
         let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
             "{{axes: {{X: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: {extrapolate}, \
-             physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0}}"
+             physical_rate_um_per_min: 3.0, jump_margin_um: 2.0, expanded_uncertainty_limit_um: 1000.0, \
+             hold_s: 1.0, {rest}}}"
         ))
         .unwrap();
         Self {
@@ -37,6 +47,8 @@ impl Scene {
             diagnostics: Vec::new(),
             faded_out: false,
             sequence: 0,
+            variance_mm2: 0.0,
+            told: None,
             last: None,
         }
     }
@@ -80,17 +92,20 @@ impl Scene {
 
     fn model(&mut self, k0_mm: f64, slope: f64, life_s: f64) {
         self.sequence += 1;
+        let mut covariance = Matrix4::zeros();
+        covariance[(0, 0)] = self.variance_mm2;
         let drift = AxisDrift {
             k0_mm,
+            covariance,
             slope_mm_per_mm: slope,
             span_mm: (-220.0, 220.0),
-            time_constant_s: f64::INFINITY,
+            measured_at: Stamp::from_nanos(self.nanos),
             ..AxisDrift::default()
         };
         let mut axes = PerAxis::default();
         axes[Axis::X] = Some(drift);
         let at = Stamp::from_nanos(self.nanos);
-        self.step(Input::Model(Box::new(ThermalModel {
+        let model = Input::Model(Box::new(ThermalModel {
             at,
             axes,
             valid_from: at,
@@ -99,7 +114,9 @@ impl Scene {
             lack_of_fit_p: f64::NAN,
             quarantined: false,
             sequence: self.sequence,
-        })));
+        }));
+        self.told = Some(model.clone());
+        self.step(model);
     }
 
     fn x(&self) -> (f64, CompensationState) {
@@ -162,6 +179,95 @@ fn outside_the_span_a_refusing_policy_holds_and_inside_again_it_goes_on() {
     scene.assert_x(0.010, CompensationState::Holding);
     scene.run(0.5, 100.0);
     scene.assert_x(0.010, CompensationState::Active);
+}
+
+#[test]
+fn a_drift_used_beyond_the_blocks_is_said_once_with_its_uncertainty() {
+    let mut scene = Scene::new("linear");
+    scene.variance_mm2 = 4e-6;
+    scene.model(0.010, 5e-5, 1e6);
+    scene.run(0.5, 220.0);
+    assert!(!scene.diagnostics.iter().any(|d| d.condition() == "span_x"));
+    for x_mm in [300.0, 0.0, 310.0, 0.0] {
+        scene.run(0.1, x_mm);
+    }
+    let told: Vec<_> = scene
+        .diagnostics
+        .iter()
+        .filter(|d| d.condition() == "span_x")
+        .collect();
+    assert_eq!(
+        told,
+        [&Diagnostic::BeyondSpan {
+            axis: Axis::X,
+            position_mm: 300.0,
+            lower_mm: -220.0,
+            upper_mm: 220.0,
+            expanded_uncertainty_mm: 0.004,
+            greatest_mm: 0.004,
+        }]
+    );
+    // A whole cycle inside takes it back.
+    for _ in 0..2 {
+        scene.model(0.010, 5e-5, 1e6);
+        scene.run(0.1, 0.0);
+    }
+    let within = Diagnostic::WithinSpan { axis: Axis::X };
+    assert!(scene.diagnostics.contains(&within));
+}
+
+#[test]
+fn an_axis_too_uncertain_at_the_travels_corners_holds_and_fades_with_value_and_limit() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.010, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.assert_x(0.010, CompensationState::Active);
+    scene.variance_mm2 = 0.36;
+    scene.model(0.010, 0.0, 1e6);
+    scene.run(0.5, 0.0);
+    scene.assert_x(0.010, CompensationState::Holding);
+    let refused = DriftRefusal::TooUncertain {
+        axis: Axis::X,
+        expanded_uncertainty_mm: 1.2,
+        limit_mm: 1.0,
+    };
+    assert!(scene.diagnostics.iter().any(|d| matches!(
+        d,
+        Diagnostic::ModelRefused { axis: Axis::X, cause: PartRefusal::Thermal { source } } if *source == refused
+    )));
+    scene.run(4.0, 0.0);
+    scene.assert_x(0.0, CompensationState::Off);
+    scene.variance_mm2 = 0.0;
+    scene.model(0.010, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.assert_x(0.010, CompensationState::Active);
+}
+
+#[test]
+fn a_model_that_expired_or_is_older_than_the_one_in_use_is_history() {
+    let mut scene = Scene::new("linear");
+    scene.model(0.010, 0.0, 0.5);
+    let latched = scene.told.clone();
+    scene.run(1.0, 0.0);
+    scene.step(latched.clone().unwrap());
+    let expired = Diagnostic::ModelExpired {
+        sequence: 1,
+        late_s: 0.5,
+    };
+    assert_eq!(scene.diagnostics.last(), Some(&expired));
+    scene.model(0.011, 0.0, 1e6);
+    let Some(Input::Model(mut older)) = latched else {
+        panic!("no model was told")
+    };
+    older.valid_until = Stamp::from_nanos(i64::MAX);
+    scene.step(Input::Model(older));
+    let older = Diagnostic::ModelOlder {
+        sequence: 1,
+        by_s: 1.0,
+    };
+    assert_eq!(scene.diagnostics.last(), Some(&older));
+    scene.run(3.0, 0.0);
+    scene.assert_x(0.011, CompensationState::Active);
 }
 
 #[test]
@@ -277,6 +383,50 @@ fn shutdown_fades_and_says_when_it_is_done() {
     assert_eq!(scene.x().1, CompensationState::Fading);
     scene.run(2.5, 0.0);
     assert!(scene.faded_out && scene.x() == (0.0, CompensationState::Off));
+}
+
+#[test]
+fn shutdown_is_quicker_than_a_long_fade_and_keeps_the_rate_limit() {
+    let mut scene = Scene::with("linear", "fade_s: 30.0, shutdown_fade_s: 0.5");
+    scene.model(0.050, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.step(Input::Shutdown);
+    let (mut before, mut fastest) = (scene.x().0, 0.0_f64);
+    for _ in 0..1500 {
+        scene.run(0.001, 0.0);
+        fastest = fastest.max((scene.x().0 - before).abs() / 0.001);
+        before = scene.x().0;
+    }
+    // 50 µm at 50 µm/s and a start and a stop at 500 µm/s²: 1.1 s.
+    assert!(scene.faded_out, "{before} mm is left");
+    assert!((0.049..0.050 + 1e-9).contains(&fastest), "{fastest} mm/s");
+}
+
+#[test]
+fn the_longest_wind_down_holds_for_the_greatest_offset_and_states_that_end() {
+    let config = "fade_s: 30.0, shutdown_fade_s: 0.5";
+    for states_end in [false, true] {
+        let mut scene = Scene::with("linear", config);
+        scene.model(0.0999, 0.0, 1e6);
+        scene.run(4.0, 0.0);
+        scene.step(Input::Shutdown);
+        let began = scene.nanos;
+        scene.run(0.5, 0.0);
+        while !scene.faded_out && scene.nanos - began < 60_000 * MILLISECOND {
+            if states_end {
+                scene.nanos += 10 * MILLISECOND;
+                scene.step(Input::Tick);
+            } else {
+                scene.run(0.01, 0.0);
+            }
+        }
+        let took_s = (scene.nanos - began) as f64 * 1e-9;
+        // 100 µm at 50 µm/s, four starts and stops of 0.1 s, and gap_s.
+        assert!(
+            took_s <= 2.0 + 0.4 + 0.5,
+            "states end: {states_end}: {took_s} s"
+        );
+    }
 }
 
 #[test]

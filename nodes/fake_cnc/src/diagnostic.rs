@@ -2,16 +2,7 @@
 
 use metrology::Axis;
 
-/// How much a condition matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// Well, or well again.
-    Ok,
-    /// It goes on, but not as told.
-    Warn,
-    /// A function has stopped.
-    Error,
-}
+pub use metrology::Severity;
 
 /// Something worth telling; lengths mm, angles rad.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -45,7 +36,7 @@ pub enum Diagnostic {
 }
 
 impl Diagnostic {
-    /// Which condition it is about; a condition is over when told with [`Severity::Ok`].
+    /// Which condition it is about; a condition is over when told with [`Severity::Info`].
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -68,7 +59,7 @@ impl Diagnostic {
             Self::CompensationFollowed
             | Self::FaultCleared
             | Self::TimePasses
-            | Self::NothingToCancel { .. } => Severity::Ok,
+            | Self::NothingToCancel { .. } => Severity::Info,
             Self::CompensationStale { .. } | Self::TimeJumped { .. } => Severity::Warn,
             Self::CompensationNotFinite { .. }
             | Self::CompensationTooLarge { .. }
@@ -97,8 +88,8 @@ mod tests {
         ];
         for (wrong, well) in wrong.iter().zip(&well) {
             assert_eq!(wrong.name(), well.name());
-            assert!(wrong.severity() > Severity::Ok);
-            assert_eq!(well.severity(), Severity::Ok);
+            assert!(wrong.severity() > Severity::Info);
+            assert_eq!(well.severity(), Severity::Info);
         }
     }
 }

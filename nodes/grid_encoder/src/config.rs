@@ -390,6 +390,20 @@ impl GridEncoderConfig {
         }
     }
 
+    /// How to identify from these recordings, planned or made.
+    ///
+    /// # Errors
+    /// Parameters out of range, components that the chain does not have.
+    pub fn options_for(
+        &self,
+        chain: &Chain,
+        recordings: &[crate::recording::Recording],
+    ) -> Result<IdentifyOptions, GridEncoderError> {
+        self.check()?;
+        let components = self.components_for(chain)?;
+        Ok(self.options(&components, &crate::equations::spans(recordings)))
+    }
+
     /// How to identify `components` from recordings over `spans`.
     #[must_use]
     pub fn options(

@@ -4,6 +4,8 @@ use metrology::sample::TestPlane;
 
 use crate::error::IdentifyError;
 
+pub use metrology::Severity;
+
 /// Why a recording is not used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(
@@ -104,17 +106,6 @@ pub enum Diagnostic {
     ClockWentBack { by_s: f64 },
     #[error("{n} grid readings waited for positions in vain")]
     Unpaired { n: usize },
-}
-
-/// How urgent a condition is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// A fact worth recording.
-    Info,
-    /// It goes on, but not as told.
-    Warn,
-    /// The model cannot be trusted.
-    Error,
 }
 
 impl Diagnostic {

@@ -14,11 +14,12 @@
 mod choose;
 mod placement;
 
-pub use choose::{Choice, Search, choose};
+pub use choose::{Choice, Search, choose, choose_beside};
 pub use placement::{PlateRules, candidates};
 
 use machine::Kinematics;
 use metrology::sample::Sense;
+use metrology::{Axis, PerAxis};
 use nalgebra::{DMatrix, Vector3};
 
 use crate::equations::{Equations, PointRows};
@@ -45,24 +46,65 @@ pub fn planned(number: u32, place: &Place, station_uncertainty_mm: f64) -> Recor
             - place.centre_mm;
         let clockwise = place.sense == Sense::Clockwise;
         let along = if clockwise { -tangent } else { tangent };
-        let moving = place.stations == 0 && place.radius_mm > 0.0;
-        GridPoint {
-            positions,
-            sense: along.map(|c| if c.abs() > 1e-9 { c.signum() } else { 0.0 }),
-            velocity_mm_s: if moving {
-                along * (place.feed_mm_s / place.radius_mm)
-            } else {
-                Vector3::zeros()
-            },
-            reading_mm: in_plane(place.plane, &positions.xyz()),
-            standard_uncertainty_mm: [station_uncertainty_mm; 2],
-            n_readings: 1,
-        }
+        point(place, positions, &along, station_uncertainty_mm)
     });
     Recording {
         run: number,
         place: *place,
         points: points.collect(),
+    }
+}
+
+/// A planned trajectory through `places_mm`, as a recording whose readings are what a perfect machine gives.
+#[must_use]
+pub fn planned_through(
+    number: u32,
+    place: &Place,
+    places_mm: &[Vector3<f64>],
+    station_uncertainty_mm: f64,
+) -> Recording {
+    let every = places_mm.len().div_ceil(PLANNED_STATIONS as usize).max(1);
+    let points = (0..places_mm.len()).step_by(every).map(|k| {
+        let ends = [
+            k.checked_sub(1).unwrap_or(k),
+            (k + 1).min(places_mm.len() - 1),
+        ];
+        // A place is approached in the direction of motion, the first one too.
+        let along = if k == 0 {
+            places_mm[ends[1]] - places_mm[k]
+        } else {
+            places_mm[k] - places_mm[ends[0]]
+        };
+        let mut positions = PerAxis::default();
+        for axis in Axis::LINEAR {
+            positions[axis] = places_mm[k][axis.index()];
+        }
+        point(place, positions, &along, station_uncertainty_mm)
+    });
+    Recording {
+        run: number,
+        place: *place,
+        points: points.collect(),
+    }
+}
+
+fn point(
+    place: &Place,
+    positions: PerAxis<f64>,
+    along: &Vector3<f64>,
+    station_uncertainty_mm: f64,
+) -> GridPoint {
+    let moving = place.stations == 0;
+    GridPoint {
+        positions,
+        sense: along.map(|c| if c.abs() > 1e-9 { c.signum() } else { 0.0 }),
+        velocity_mm_s: match along.try_normalize(1e-9) {
+            Some(direction) if moving => direction * place.feed_mm_s,
+            _ => Vector3::zeros(),
+        },
+        reading_mm: in_plane(place.plane, &positions.xyz()),
+        standard_uncertainty_mm: [station_uncertainty_mm; 2],
+        n_readings: 1,
     }
 }
 
@@ -80,13 +122,25 @@ pub fn preflight(
     let recordings: Vec<Recording> = numbered
         .map(|(number, place)| planned(number, place, station_uncertainty_mm))
         .collect();
+    preflight_of(kinematics, &recordings, options)
+}
+
+/// What planned recordings will see, as [`preflight`].
+///
+/// # Errors
+/// As [`identify`].
+pub fn preflight_of(
+    kinematics: &Kinematics,
+    recordings: &[Recording],
+    options: &IdentifyOptions,
+) -> Result<Identification, IdentifyError> {
     let options = IdentifyOptions {
         outlier_limit: f64::INFINITY,
         recording_noise: false,
         noise: Noise::AsStated,
         ..options.clone()
     };
-    identify(kinematics, &recordings, &options)
+    identify(kinematics, recordings, &options)
 }
 
 /// Sum of the outer products of the scaled rows of one planned recording, by column.

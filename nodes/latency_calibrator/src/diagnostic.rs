@@ -16,6 +16,18 @@ pub enum TouchFault {
         /// Window, s.
         window_s: f64,
     },
+    /// The log leaves a part of the window out.
+    #[error(
+        "{gap_s} s of the {window_s} s before the latch are not logged, at most {limit_s} s may be between positions"
+    )]
+    LogGap {
+        /// Longest time without a position, s.
+        gap_s: f64,
+        /// Longest one allowed, s.
+        limit_s: f64,
+        /// Window, s.
+        window_s: f64,
+    },
     /// The feed at contact is not above zero.
     #[error("feed at contact is {feed_mm_s} mm/s, must be above 0")]
     FeedNotPositive {
@@ -85,6 +97,20 @@ pub enum Refusal {
         made: usize,
         /// Touches that are needed.
         least: usize,
+    },
+    /// The contact lies before the window in which the feed was taken.
+    #[error(
+        "{feature}: latency {latency_s} s with a standard uncertainty of {standard_uncertainty_s} s does not fit into the window of {window_s} s before the latch in which the feed was taken; not published"
+    )]
+    WindowTooShort {
+        /// Feature.
+        feature: String,
+        /// Latency, s.
+        latency_s: f64,
+        /// Its standard uncertainty, s.
+        standard_uncertainty_s: f64,
+        /// Window, s.
+        window_s: f64,
     },
     /// Nothing was touched.
     #[error("run {run}: nothing was touched")]

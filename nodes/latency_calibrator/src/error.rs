@@ -18,6 +18,20 @@ pub enum LatencyCalibratorError {
         /// Greatest value.
         greatest: f64,
     },
+    /// The log forgets what a touch needs before it comes.
+    #[error(
+        "log_samples = {log_samples} at control.servo_period_ms = {servo_period_ms}: covers {covered_ms} ms, feed_window_ms + hold_ms need {needed_ms} ms"
+    )]
+    LogTooShort {
+        /// Positions that the log holds.
+        log_samples: usize,
+        /// Time between them, ms.
+        servo_period_ms: f64,
+        /// Time that they cover, ms.
+        covered_ms: f64,
+        /// Time that is needed, ms.
+        needed_ms: f64,
+    },
     /// The machine file's chain cannot be read.
     #[error("chain: {error}")]
     Chain {

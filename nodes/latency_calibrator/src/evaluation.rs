@@ -15,6 +15,8 @@ use crate::two_feed::{self, AtFeed};
 
 /// Least number of different feeds for the line.
 const LINE_FEEDS: usize = 3;
+/// Of the uncertainty of a latency that must fit into the window.
+const COVERAGE_FACTOR: f64 = 2.0;
 /// Least number of touches.
 const LEAST_TOUCHES: usize = 2;
 
@@ -38,6 +40,8 @@ pub struct TouchNoise {
     pub poll_period_s: f64,
     /// Effective radius of the stylus ball, mm.
     pub ball_radius_mm: f64,
+    /// Coarsest resolution of the latched positions, mm.
+    pub resolution_mm: f64,
 }
 
 impl TouchNoise {
@@ -92,13 +96,7 @@ pub fn evaluate(
     }
     let (level_of, levels) = levels(touches, config.same_feed_share);
     let [slow, .., fast] = &levels[..] else {
-        let feeds = || touches.iter().map(|touch| touch.feed_mm_s);
-        return Err(Refusal::EqualFeeds {
-            feature: feature.to_owned(),
-            least_mm_s: feeds().fold(f64::INFINITY, f64::min),
-            greatest_mm_s: feeds().fold(f64::NEG_INFINITY, f64::max),
-            share: config.same_feed_share,
-        });
+        return Err(equal_feeds(feature, touches, config.same_feed_share));
     };
     let line = line::estimate(&line_touches(touches, &level_of, noise)).map_err(|_| too_few())?;
     let two = TwoFeeds::new(slow, fast, &first.approach, noise);
@@ -110,6 +108,7 @@ pub fn evaluate(
         let latency_s = two.published_s.copysign(two.signed_s);
         (two.method, latency_s, two.standard_uncertainty_s)
     };
+    check_window(feature, latency_s, standard_uncertainty_s, config)?;
     Ok(LatencyEvaluation {
         feature: feature.to_owned(),
         latency: ProbeLatency {
@@ -134,6 +133,35 @@ pub fn evaluate(
     })
 }
 
+fn equal_feeds(feature: &str, touches: &[FeedTouch], share: f64) -> Refusal {
+    let feeds = || touches.iter().map(|touch| touch.feed_mm_s);
+    Refusal::EqualFeeds {
+        feature: feature.to_owned(),
+        least_mm_s: feeds().fold(f64::INFINITY, f64::min),
+        greatest_mm_s: feeds().fold(f64::NEG_INFINITY, f64::max),
+        share,
+    }
+}
+
+/// The feed is that of the contact only if the contact lies inside the window before the latch.
+fn check_window(
+    feature: &str,
+    latency_s: f64,
+    standard_uncertainty_s: f64,
+    config: &LatencyCalibratorConfig,
+) -> Result<(), Refusal> {
+    let window_s = config.feed_window().as_secs_f64();
+    if latency_s + COVERAGE_FACTOR * standard_uncertainty_s <= window_s {
+        return Ok(());
+    }
+    Err(Refusal::WindowTooShort {
+        feature: feature.to_owned(),
+        latency_s,
+        standard_uncertainty_s,
+        window_s,
+    })
+}
+
 /// Two-feed values from the least and the greatest feed.
 struct TwoFeeds {
     method: LatencyMethod,
@@ -155,16 +183,15 @@ impl TwoFeeds {
         } else {
             (LatencyMethod::TwoFeedSingle, single_s)
         };
-        let u_mm = |feed_mm_s| noise.standard_uncertainty_mm(feed_mm_s);
+        let u_mm = [fa_mm_s, fb_mm_s].map(|feed_mm_s| noise.standard_uncertainty_mm(feed_mm_s));
+        let seen = two_feed::scatter_factor(slow, fast, approach, (u_mm[0], u_mm[1]));
+        let resolution_s = two_feed::resolution_s(slow, fast, noise.resolution_mm);
         Self {
             method,
             published_s,
-            standard_uncertainty_s: two_feed::standard_uncertainty_s(
-                slow,
-                fast,
-                u_mm(fa_mm_s),
-                u_mm(fb_mm_s),
-            ),
+            standard_uncertainty_s: (seen
+                * two_feed::standard_uncertainty_s(slow, fast, u_mm[0], u_mm[1]))
+            .hypot(resolution_s),
             single_s,
             of_means_s,
             signed_s: two_feed::signed_s(slow, fast, approach),

@@ -5,6 +5,7 @@
 //! ```text
 //!   n·p(t) = s + f t + a t²/2,   t from the middle of the window before the latch      (1)
 //!   steady  ⇔  |a| w ≤ max(share · f, 3 u(a) w)                                       (2)
+//!   covered  ⇔  no time in [latch − w, latch] longer than w/5 without a position      (3)
 //! ```
 //!
 //! f is the feed at contact, w the window. After a short stand-off the ball is still accelerating at
@@ -12,9 +13,12 @@
 //! the latency acted, and (2) refuses the touch. Noise of the encoder does not, whatever the feed.
 //!
 //! # Holds when
-//! The window is at least as long as the latency, and the control does not react before the latch.
+//! The window is at least as long as the latency, which is known only once all touches are evaluated and
+//! is checked there; the control does not react before the latch. (3) is checked here: positions at
+//! one end of the window alone say nothing of the other, where the contact was.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
 use metrology::sample::AxisState;
 use metrology::stamp::Span;
@@ -94,6 +98,7 @@ impl MotionLog {
                 window_s,
             });
         }
+        self.check_covered(first..behind, from, latch_at)?;
         let middle = from + Span::from_nanos(window.nanos() / 2);
         // Times in units of half a window keep the columns of one size.
         let half_s = window_s / 2.0;
@@ -129,6 +134,35 @@ impl MotionLog {
             });
         }
         Ok(feed_mm_s)
+    }
+}
+
+impl MotionLog {
+    /// (3) for the positions `places`, all between `from` and `to`.
+    fn check_covered(
+        &self,
+        places: Range<usize>,
+        from: Stamp<Machine>,
+        to: Stamp<Machine>,
+    ) -> Result<(), TouchFault> {
+        let window_s = (to - from).as_secs_f64();
+        let stamps = self.positions.range(places).map(|(at, _)| *at);
+        let ends = stamps.clone().chain([to]);
+        let gap_s = [from]
+            .into_iter()
+            .chain(stamps)
+            .zip(ends)
+            .map(|(before, after)| (after - before).as_secs_f64())
+            .fold(0.0, f64::max);
+        let limit_s = window_s / (LEAST_POSITIONS - 1) as f64;
+        if gap_s > limit_s {
+            return Err(TouchFault::LogGap {
+                gap_s,
+                limit_s,
+                window_s,
+            });
+        }
+        Ok(())
     }
 }
 
@@ -190,6 +224,41 @@ mod tests {
         let log = log_of(|t| (t / 6.0 / 5e-4).round() * 5e-4, 200);
         let found = feed(&log, 190.0).unwrap();
         assert!((found - 1.0 / 6.0).abs() < 0.01, "{found}");
+    }
+
+    #[test]
+    fn eq3_positions_at_one_end_of_the_window_do_not_speak_for_the_other() {
+        // The log begins 12 ms before the latch: 18 of 30 ms are missing.
+        let mut late = MotionLog::new(64);
+        let mut holed = MotionLog::new(64);
+        for k in 0..60_i64 {
+            let mut motor = PerAxis::default();
+            motor.0[2] = -8.5 * k as f64 / 1e3;
+            let state = AxisState {
+                received_at: Stamp::from_nanos(0),
+                controller_at: Stamp::from_nanos(k * 1_000_000),
+                axes: AxisSet::XYZ,
+                commanded: motor,
+                motor,
+                scale: motor,
+                velocity: PerAxis::default(),
+            };
+            if k >= 47 {
+                late.push(&state);
+            }
+            if !(36..44).contains(&k) {
+                holed.push(&state);
+            }
+        }
+        for (log, gap_ms) in [(late, 18.0), (holed, 9.0)] {
+            match feed(&log, 59.0) {
+                Err(TouchFault::LogGap { gap_s, limit_s, .. }) => {
+                    assert!((gap_s * 1e3 - gap_ms).abs() < 1e-9, "{gap_s}");
+                    assert!((limit_s - 0.006).abs() < 1e-12);
+                }
+                other => panic!("{other:?}"),
+            }
+        }
     }
 
     #[test]

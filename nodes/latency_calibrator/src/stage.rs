@@ -6,7 +6,7 @@
 use machine::file::Latch;
 use machine::{Kinematics, MachineFile};
 use metrology::sample::{AxisState, ProbeLatency, ProbeTrigger, TestKind, TestSegment};
-use metrology::{AxisSet, Host, Machine, Stage, Stamp};
+use metrology::{Axis, AxisSet, Host, Machine, Stage, Stamp};
 
 use crate::config::LatencyCalibratorConfig;
 use crate::diagnostic::{Refusal, TouchFault};
@@ -91,6 +91,7 @@ impl LatencyCalibratorStage {
         if repeatability_um.is_nan() || repeatability_um <= 0.0 {
             return Err(LatencyCalibratorError::NoRepeatability { repeatability_um });
         }
+        check_log(config, file.control.servo_period_ms)?;
         let poll_period_s = match file.control.latch {
             Latch::Hardware => 0.0,
             Latch::Polled => file.control.servo_period_ms / 1e3,
@@ -103,6 +104,11 @@ impl LatencyCalibratorStage {
                 repeatability_mm: repeatability_um / 1e3,
                 poll_period_s,
                 ball_radius_mm: file.ball_radius_mm(),
+                resolution_mm: Axis::LINEAR
+                    .into_iter()
+                    .filter_map(|axis| file.linear(axis))
+                    .map(|entry| entry.encoder_resolution_um / 1e3)
+                    .fold(0.0, f64::max),
             },
             log: MotionLog::new(config.log_samples),
             run: None,
@@ -309,6 +315,24 @@ impl LatencyCalibratorStage {
             None => Ok(()),
         }
     }
+}
+
+/// Whether the log reaches from the latest moment at which a touch may be read back over its window.
+fn check_log(
+    config: &LatencyCalibratorConfig,
+    servo_period_ms: f64,
+) -> Result<(), LatencyCalibratorError> {
+    let covered_ms = config.log_samples as f64 * servo_period_ms;
+    let needed_ms = config.feed_window_ms + config.hold_ms;
+    if covered_ms >= needed_ms {
+        return Ok(());
+    }
+    Err(LatencyCalibratorError::LogTooShort {
+        log_samples: config.log_samples,
+        servo_period_ms,
+        covered_ms,
+        needed_ms,
+    })
 }
 
 impl Stage for LatencyCalibratorStage {

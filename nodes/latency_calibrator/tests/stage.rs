@@ -238,7 +238,14 @@ fn two_feeds_use_the_published_method_in_its_single_and_multi_sample_form() {
         assert_eq!(latency.method, method);
         assert!((latency.latency_s - 0.008_37).abs() < 1e-8);
         assert!(latency.least_squares_latency_s.is_nan() && latency.lack_of_fit_p.is_nan());
-        let u_s = (2.0 / repeats as f64).sqrt() * 0.0003 / 9.0;
+        // One touch a feed has the stated repeatability; four that are equal have no scatter and are
+        // as good as the encoder's 0.05 µm.
+        let u_mm = if repeats == 1 {
+            0.0003
+        } else {
+            0.00005 / 12_f64.sqrt()
+        };
+        let u_s = 2_f64.sqrt() * u_mm / 9.0;
         assert!((latency.standard_uncertainty_s - u_s).abs() < 1e-8);
         let evaluation = rig.evaluation();
         assert!((evaluation.single_s - 0.008_37).abs() < 1e-8);
@@ -262,6 +269,56 @@ fn the_interval_of_the_whole_stage_holds_the_truth() {
     }
     // 95 % of 200 within three standard deviations of a binomial.
     assert!((181..=199).contains(&held), "{held} of 200");
+}
+
+#[test]
+fn the_interval_of_two_feeds_holds_the_truth_with_twice_the_stated_scatter() {
+    let mut held = 0;
+    for seed in 0..400 {
+        let mut rig = Rig::new(8_370_000);
+        rig.scatter_mm = 0.0006;
+        rig.rng = Pcg64Mcg::seed_from_u64(seed);
+        rig.run(&[2.0, 10.0], 3);
+        let latency = rig.latency();
+        assert_eq!(latency.method, LatencyMethod::TwoFeedMulti);
+        let error_s = latency.latency_s - 0.008_37;
+        held += u32::from(error_s.abs() <= 1.96 * latency.standard_uncertainty_s);
+    }
+    // 95 % of 400 within three standard deviations of a binomial.
+    assert!((367..=393).contains(&held), "{held} of 400");
+}
+
+#[test]
+fn a_latency_that_the_window_does_not_hold_is_not_published() {
+    let mut rig = Rig::new(40_000_000);
+    rig.run(&FEEDS_MM_S, 2);
+    assert!(!rig.out.iter().any(|o| matches!(o, Output::Latency(_))));
+    match &rig.refusals()[..] {
+        [
+            Refusal::WindowTooShort {
+                latency_s,
+                window_s,
+                ..
+            },
+        ] => {
+            assert!((latency_s - 0.040).abs() < 1e-6 && (window_s - 0.030).abs() < 1e-12);
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_log_that_forgets_before_a_touch_is_read_is_refused_at_the_start() {
+    let file = MachineFile::parse(BENCH, "bench.yaml").unwrap();
+    let config = LatencyCalibratorConfig {
+        log_samples: 200,
+        ..LatencyCalibratorConfig::default()
+    };
+    let error = LatencyCalibratorStage::new(&config, &file).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "log_samples = 200 at control.servo_period_ms = 1: covers 200 ms, feed_window_ms + hold_ms need 230 ms"
+    );
 }
 
 #[test]

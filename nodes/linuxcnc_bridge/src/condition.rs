@@ -7,16 +7,7 @@ use crate::fault::FaultKind;
 use crate::latch::NoTouch;
 use crate::protocol::JointLimit;
 
-/// How bad a condition is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// As it should be; clears an earlier condition of the same name.
-    Fine,
-    /// It goes on, but not as told.
-    Warning,
-    /// Data is lost or the machine has stopped.
-    Failure,
-}
+pub use metrology::Severity;
 
 /// Why there is no connection.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -201,7 +192,7 @@ fn refusal(refused: &CompensationRefused) -> String {
 }
 
 impl Condition {
-    /// Which condition it is, snake case; the same name with [`Severity::Fine`] clears it.
+    /// Which condition it is, snake case; the same name with [`Severity::Info`] clears it.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -238,7 +229,7 @@ impl Condition {
             | Self::AxisLimit {
                 limit: JointLimit::Free,
                 ..
-            } => Severity::Fine,
+            } => Severity::Info,
             Self::Drives { on: false }
             | Self::Homed { homed: false }
             | Self::AxisLimit {
@@ -249,8 +240,8 @@ impl Condition {
             | Self::ServoSlip { .. }
             | Self::TouchUnusable { .. }
             | Self::CompensationRefused(_)
-            | Self::CompensationStale { .. } => Severity::Warning,
-            _ => Severity::Failure,
+            | Self::CompensationStale { .. } => Severity::Warn,
+            _ => Severity::Error,
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! `member` gives the axes in order from the tool to the workpiece and what each does nominally to
 //! the tip. `component` says which ISO 230-1 components a chain has and which of them it needs,
-//! `sensitivity` what one unit of one of them does to the tip. `curve` evaluates published error
+//! `sensitivity` what one unit of one of them does to the tip. `turn` turns points exactly and fast. `curve` evaluates published error
 //! motions, `model` puts all of them together, `inverse` says what has to be commanded to undo them.
 //!
 //! # Conventions
@@ -70,8 +70,11 @@ pub mod inverse;
 mod member;
 pub mod model;
 pub mod sensitivity;
+mod turn;
 
+pub(crate) use component::lean;
 pub use component::{components_of, has_component};
+pub(crate) use curve::{Alone, check as check_curve, on_line};
 pub use error::{PoseRefusal, VolumetricError};
 pub use model::VolumetricModel;
 pub use sensitivity::sensitivity;

@@ -50,6 +50,8 @@
 //! noise on six circles of both senses, two feeds and two radii: each cause alone is the first row;
 //! linear rows within 1 to 2 %, a LuGre friction pulse within 40 % of its height, a vibration within
 //! 0.005 Hz. 95 % intervals of the linear rows hold the truth in 93 to 97 % of 1,000 noises.
+//! A search in a tenth of the rows gives the rows of all samples to a quarter of their uncertainties
+//! (`samples_taken_together_give_the_rows_of_all_samples`).
 //! `val_first_order_lag_contraction_is_the_closed_form`: 0.1 %.
 //! `val_unequal_lags_make_half_the_feed_times_their_difference`: 0.2 %.
 //!
@@ -60,6 +62,7 @@
 mod backlash;
 mod cause;
 mod centre;
+mod columns;
 mod config;
 mod contribution;
 mod cross_check;
@@ -68,9 +71,11 @@ mod distinguish;
 mod drift;
 mod error;
 mod lateral;
+mod maximum;
 mod noise;
 mod periodogram;
 mod plane;
+mod projector;
 mod recording;
 mod report;
 mod robust;
@@ -78,10 +83,12 @@ mod scale;
 mod scene;
 mod search;
 mod servo;
+mod spectrum;
 mod spike;
 mod squareness;
 mod straightness;
 mod term;
+mod thin;
 mod tone;
 
 pub use config::{AxisPitch, BreakdownConfig, Pitch};

@@ -5,26 +5,32 @@
 //!
 //! # Model
 //!
+//! With the levers l_i = r_i − p0_i along the own axis and l_j = r_j − o_ij along the others:
+//!
 //! ```text
-//!   d_i(r, t) = k0_i + s_i (r_i − p0_i) + Σ_{j≠i} c_ij (r_j − o_ij)
-//!               + [k0'_i + s'_i (r_i − p0_i)] g(t − t0)                       (1)
-//!   g(e) = τ (1 − exp(−e/τ)),   g(e) = e for τ = ∞                            (2)
-//!   u²(d_i) = var(k0) + 2 cov(k0, s) (r_i − p0_i) + var(s) (r_i − p0_i)²      (3)
+//!   d_i(r, t) = k0_i + g_i·l + Σ_a [k0'_ia + g'_ia·l] h(t − t0; τ_a)              (1)
+//!   h(e; τ) = τ (1 − exp(−e/τ)),   h = e for τ = ∞                                (2)
+//!   u²(d_i) = bᵀ C_i b,   b = (1, l)                                              (3)
+//!   held beyond the span by v:   u² = (3) at its end + Σ_j (g_ij² + var g_ij) v_j²   (4)
 //! ```
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
-//! | k0, s | `k0_mm`, `slope_mm_per_mm` | mm, mm/mm |
-//! | c | `cross_slope_mm_per_mm` | mm/mm |
-//! | k0', s' | `rate_mm_s`, `slope_rate_per_s` | mm/s, 1/s |
-//! | τ | `time_constant_s` | s |
+//! | k0, g | `k0_mm`; `slope_mm_per_mm` and `cross_slope_mm_per_mm` | mm, mm/mm |
+//! | C | `covariance` of (k0, g) | mm², mm, 1 |
+//! | k0'_a, g'_a, τ_a | `growth` by the faces of axis a | mm/s, 1/s, s |
+//!
+//! Rotations and shears make a face of one axis move the drift of another, and each axis' faces have
+//! their own time constant: hence the sum over a in (1).
 //!
 //! Sign: d is the drift of the *reading* of a fixed physical place, hot minus cold. To reach that
 //! place again the axis must be commanded to p + d(p); the machine's position error is −d(p).
 //!
 //! # Holds when
-//! The readings' drift is affine inside the blocks' span. (3) holds for the line along the own axis;
-//! the cross terms' share is known to the fit only. p may be the commanded or the drifted position:
+//! The readings' drift is affine, inside the blocks' span and, for a line that is continued, outside.
+//! (3) is for the model's instant; what a time constant or a hold adds until later is not in it, nor a
+//! gradient that the fit supposes to be zero. Outside the span (3) grows with the distance as METROLOGY
+//! says: 1.58 times u of a block at λ = 1.5, 2.24 at 2. p may be the commanded or the drifted position:
 //! the difference changes d by s·d, some 1e-4 of d.
 //!
 //! # Agreement
@@ -35,7 +41,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::axis::{Axis, PerAxis};
-use crate::sample::{AxisDrift, ThermalModel};
+use crate::sample::{AxisDrift, DriftGrowth, ThermalModel};
 use crate::stamp::{Host, Stamp};
 
 /// What to do with a position outside the blocks' span.
@@ -91,6 +97,18 @@ pub enum DriftRefusal {
         /// Greatest block position, mm.
         upper_mm: f64,
     },
+    /// Where the axis may go, the drift is not known well enough.
+    #[error(
+        "axis {axis}: expanded uncertainty of the drift reaches {expanded_uncertainty_mm} mm at the travel's corners, limit is {limit_mm} mm"
+    )]
+    TooUncertain {
+        /// The axis.
+        axis: Axis,
+        /// Expanded uncertainty there (k = 2), mm.
+        expanded_uncertainty_mm: f64,
+        /// Greatest one allowed, mm.
+        limit_mm: f64,
+    },
 }
 
 /// Drift of all linear axes at a point of the machine frame (mm): (1) for each. Rotary axes are not modelled.
@@ -137,31 +155,113 @@ pub fn axis_drift_whenever(
     at: Stamp<Host>,
     policy: Extrapolate,
 ) -> Result<f64, DriftRefusal> {
-    let (true, Some(drift)) = (axis.is_linear(), &model.axes[axis]) else {
-        return Err(DriftRefusal::NotModelled { axis });
-    };
-    let own_mm = placed(axis, point_mm[axis.index()], Some(drift.span_mm), policy)?;
-    let lever_mm = own_mm - drift.p0_mm;
-    let mut drift_mm = drift.k0_mm + drift.slope_mm_per_mm * lever_mm;
-    for other in Axis::LINEAR {
-        let slope = drift.cross_slope_mm_per_mm[other.index()];
-        if other == axis || slope == 0.0 {
-            continue;
-        }
-        let span_mm = model.axes[other].as_ref().map(|d| d.span_mm);
-        let origin_mm = drift.cross_origin_mm[other.index()];
-        let position_mm = match (span_mm, policy) {
-            (None, Extrapolate::Hold) => origin_mm,
-            _ => placed(other, point_mm[other.index()], span_mm, policy)?,
-        };
-        drift_mm += slope * (position_mm - origin_mm);
-    }
-    drift_mm += growth_mm(drift, lever_mm, (at - model.at).as_secs_f64());
+    let (drift, levers) = levers(model, axis, point_mm, policy)?;
+    let lever_mm = levers.inside_mm;
+    let mut gradient = drift.cross_slope_mm_per_mm;
+    gradient[axis.index()] = drift.slope_mm_per_mm;
+    let elapsed_s = (at - model.at).as_secs_f64();
+    let growth_mm: f64 = drift
+        .growth
+        .iter()
+        .flatten()
+        .map(|growth| growth_mm(growth, &lever_mm, elapsed_s))
+        .sum();
+    let drift_mm = drift.k0_mm + gradient.dot(&lever_mm) + growth_mm;
     if drift_mm.is_finite() {
         Ok(drift_mm)
     } else {
         Err(DriftRefusal::NotFinite { axis })
     }
+}
+
+/// Standard uncertainty of the drift of one axis at a point and the model's instant, mm: (3), with
+/// (4) where it is held. Infinite away from the blocks where their slope is not known at all.
+///
+/// # Errors
+/// As [`axis_drift_whenever`].
+pub fn drift_standard_uncertainty_mm(
+    model: &ThermalModel,
+    axis: Axis,
+    point_mm: &Vector3<f64>,
+    policy: Extrapolate,
+) -> Result<f64, DriftRefusal> {
+    let (drift, levers) = levers(model, axis, point_mm, policy)?;
+    let (inside, beyond) = (levers.inside_mm, levers.beyond_mm);
+    let c = &drift.covariance;
+    let mut variance_mm2 = c[(0, 0)];
+    for j in 0..3 {
+        // An infinite variance says nothing where its lever is zero.
+        if inside[j] != 0.0 {
+            variance_mm2 += (c[(0, j + 1)] + c[(j + 1, 0)]) * inside[j];
+            variance_mm2 += (0..3)
+                .filter(|k| inside[*k] != 0.0)
+                .map(|k| c[(j + 1, k + 1)] * inside[j] * inside[k])
+                .sum::<f64>();
+        }
+        if beyond[j] != 0.0 {
+            let slope = if j == axis.index() {
+                drift.slope_mm_per_mm
+            } else {
+                drift.cross_slope_mm_per_mm[j]
+            };
+            variance_mm2 += (slope * slope + c[(j + 1, j + 1)]) * beyond[j] * beyond[j]; // (4)
+        }
+    }
+    if variance_mm2.is_nan() {
+        return Err(DriftRefusal::NotFinite { axis });
+    }
+    Ok(variance_mm2.max(0.0).sqrt())
+}
+
+/// Where a drift is evaluated.
+struct Levers {
+    /// From the reference to the place of evaluation, mm.
+    inside_mm: Vector3<f64>,
+    /// From there to the point itself where the span's end is held, mm.
+    beyond_mm: Vector3<f64>,
+}
+
+/// The drift of `axis` and its levers to a point; a coordinate of which nothing depends has none.
+fn levers<'a>(
+    model: &'a ThermalModel,
+    axis: Axis,
+    point_mm: &Vector3<f64>,
+    policy: Extrapolate,
+) -> Result<(&'a AxisDrift, Levers), DriftRefusal> {
+    let (true, Some(drift)) = (axis.is_linear(), &model.axes[axis]) else {
+        return Err(DriftRefusal::NotModelled { axis });
+    };
+    let mut levers = Levers {
+        inside_mm: Vector3::zeros(),
+        beyond_mm: Vector3::zeros(),
+    };
+    for other in Axis::LINEAR {
+        let idx = other.index();
+        if other != axis && !depends_on(drift, idx) {
+            continue;
+        }
+        let origin_mm = if other == axis {
+            drift.p0_mm
+        } else {
+            drift.cross_origin_mm[idx]
+        };
+        let span_mm = model.axes[other].as_ref().map(|d| d.span_mm);
+        let position_mm = match (span_mm, policy) {
+            (None, Extrapolate::Hold) if point_mm[idx].is_finite() => origin_mm,
+            _ => placed(other, point_mm[idx], span_mm, policy)?,
+        };
+        levers.inside_mm[idx] = position_mm - origin_mm;
+        levers.beyond_mm[idx] = point_mm[idx] - position_mm;
+    }
+    Ok((drift, levers))
+}
+
+/// Whether a drift depends on another coordinate, by value, by growth or by what is not known of it.
+fn depends_on(drift: &AxisDrift, idx: usize) -> bool {
+    let grows = |growth: &DriftGrowth| growth.gradient_rate_per_s[idx] != 0.0;
+    drift.cross_slope_mm_per_mm[idx] != 0.0
+        || drift.covariance[(idx + 1, idx + 1)] != 0.0
+        || drift.growth.iter().flatten().any(grows)
 }
 
 /// Where the model is evaluated for a coordinate at `position_mm`.
@@ -193,13 +293,13 @@ fn placed(
     }
 }
 
-/// What has been added to the drift since the model was fitted, mm: the second line of (1).
-fn growth_mm(drift: &AxisDrift, lever_mm: f64, elapsed_s: f64) -> f64 {
-    let rate_mm_s = drift.rate_mm_s + drift.slope_rate_per_s * lever_mm;
+/// What one growth has added to the drift since the model was fitted, mm: the sum's term of (1).
+fn growth_mm(growth: &DriftGrowth, lever_mm: &Vector3<f64>, elapsed_s: f64) -> f64 {
+    let rate_mm_s = growth.rate_mm_s + growth.gradient_rate_per_s.dot(lever_mm);
     if rate_mm_s == 0.0 {
         return 0.0;
     }
-    rate_mm_s * relaxed_s(elapsed_s, drift.time_constant_s)
+    rate_mm_s * relaxed_s(elapsed_s, growth.time_constant_s)
 }
 
 /// Effective time for which an initial rate has acted after `elapsed_s`, s: (2).
@@ -212,35 +312,24 @@ pub fn relaxed_s(elapsed_s: f64, time_constant_s: f64) -> f64 {
     -time_constant_s * (-elapsed_s / time_constant_s).exp_m1()
 }
 
-/// Standard uncertainty of the drift at a position along the axis itself, mm: (3).
-#[must_use]
-pub fn drift_standard_uncertainty_mm(drift: &AxisDrift, position_mm: f64) -> f64 {
-    let lever_mm = position_mm - drift.p0_mm;
-    let c = &drift.covariance;
-    let variance_mm2 =
-        c[(0, 0)] + (c[(0, 1)] + c[(1, 0)]) * lever_mm + c[(1, 1)] * lever_mm * lever_mm;
-    variance_mm2.max(0.0).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Matrix2;
+    use nalgebra::Matrix4;
 
     fn line() -> AxisDrift {
         let (u2, length_mm) = (1.0, 400.0);
+        let mut covariance = Matrix4::zeros();
+        covariance[(0, 0)] = u2;
+        covariance[(0, 1)] = -u2 / length_mm;
+        covariance[(1, 0)] = -u2 / length_mm;
+        covariance[(1, 1)] = 2.0 * u2 / (length_mm * length_mm);
         AxisDrift {
             p0_mm: -200.0,
             k0_mm: 0.010,
             slope_mm_per_mm: 5e-5,
-            covariance: Matrix2::new(
-                u2,
-                -u2 / length_mm,
-                -u2 / length_mm,
-                2.0 * u2 / (length_mm * length_mm),
-            ),
+            covariance,
             span_mm: (-200.0, 200.0),
-            time_constant_s: f64::INFINITY,
             offset_identifiable: true,
             slope_identifiable: true,
             ..AxisDrift::default()
@@ -306,9 +395,15 @@ mod tests {
     #[test]
     fn eq2_relaxes_from_the_rate_towards_rate_times_time_constant() {
         let drift = AxisDrift {
-            rate_mm_s: 1e-5,
-            slope_rate_per_s: 1e-8,
-            time_constant_s: 100.0,
+            growth: [
+                Some(DriftGrowth {
+                    rate_mm_s: 1e-5,
+                    gradient_rate_per_s: Vector3::new(1e-8, 0.0, 0.0),
+                    time_constant_s: 100.0,
+                }),
+                None,
+                None,
+            ],
             ..line()
         };
         let early = at_x(drift, -200.0, 1, Extrapolate::Linear).unwrap() - 0.010;
@@ -329,9 +424,58 @@ mod tests {
             (2.0, 2.24),
             (3.0, 3.61),
         ] {
-            let u = drift_standard_uncertainty_mm(&line(), -200.0 + 400.0 * lambda);
+            let u = u_at_x(line(), -200.0 + 400.0 * lambda, Extrapolate::Linear);
             assert!((u - factor).abs() < 0.005, "{lambda} {u}");
         }
+    }
+
+    fn u_at_x(drift: AxisDrift, x_mm: f64, policy: Extrapolate) -> f64 {
+        let point_mm = Vector3::new(x_mm, 7.0, 9.0);
+        drift_standard_uncertainty_mm(&model(drift), Axis::X, &point_mm, policy).unwrap()
+    }
+
+    #[test]
+    fn eq4_what_is_held_beyond_the_span_may_be_wrong_by_the_slope_times_the_distance() {
+        let end = u_at_x(line(), 200.0, Extrapolate::Hold);
+        let held = u_at_x(line(), 300.0, Extrapolate::Hold);
+        let slope2 = 5e-5_f64.powi(2) + 2.0 / (400.0 * 400.0);
+        assert!((held - (end * end + slope2 * 1e4).sqrt()).abs() < 1e-12);
+        let point_mm = Vector3::new(300.0, 0.0, 0.0);
+        let refused =
+            drift_standard_uncertainty_mm(&model(line()), Axis::X, &point_mm, Extrapolate::Refuse);
+        assert!(matches!(refused, Err(DriftRefusal::OutOfSpan { .. })));
+    }
+
+    #[test]
+    fn eq3_an_unknown_slope_leaves_nothing_known_away_from_the_block() {
+        let mut shift = AxisDrift {
+            slope_mm_per_mm: 0.0,
+            slope_identifiable: false,
+            ..line()
+        };
+        shift.covariance = Matrix4::zeros();
+        shift.covariance[(0, 0)] = 4.0;
+        shift.covariance[(1, 1)] = f64::INFINITY;
+        assert!((u_at_x(shift, -200.0, Extrapolate::Linear) - 2.0).abs() < 1e-12);
+        assert!(u_at_x(shift, -199.0, Extrapolate::Linear).is_infinite());
+    }
+
+    #[test]
+    fn eq1_faces_of_another_axis_make_a_drift_grow_by_their_own_time_constant() {
+        let grow = |rate_per_s, time_constant_s| {
+            Some(DriftGrowth {
+                rate_mm_s: 0.0,
+                gradient_rate_per_s: Vector3::new(0.0, rate_per_s, 0.0),
+                time_constant_s,
+            })
+        };
+        let drift = AxisDrift {
+            growth: [grow(1e-9, 100.0), grow(-4e-9, 900.0), None],
+            ..line()
+        };
+        let grown = at_x(drift, 0.0, 300, Extrapolate::Linear).unwrap() - 0.020;
+        let expected = 7.0 * (1e-9 * relaxed_s(300.0, 100.0) - 4e-9 * relaxed_s(300.0, 900.0));
+        assert!((grown - expected).abs() < 1e-15, "{grown} {expected}");
     }
 
     #[test]

@@ -14,11 +14,13 @@ pub mod iso230;
 pub mod least_squares;
 pub mod parameter;
 pub mod sample;
+pub mod severity;
 pub mod stage;
 pub mod stamp;
 
 pub use axis::{Axis, AxisSet, PerAxis};
 pub use error_component::ErrorComponent;
 pub use parameter::ParameterDoc;
+pub use severity::Severity;
 pub use stage::Stage;
 pub use stamp::{Clock, Host, Machine, Stamp};

@@ -16,7 +16,7 @@ mod sensor;
 mod thermal;
 mod touch;
 
-pub use block::{BlockMeasurement, FacePosition};
+pub use block::{BlockMeasurement, FacePosition, LatencyShare};
 pub use compensation::{AxisCompensation, CompensationState};
 pub use cycle::{CycleKind, CycleOrder};
 pub use feature::{FeatureKind, ProbedFeature};
@@ -27,5 +27,5 @@ pub use plan::{PlanState, PlanStatus};
 pub use positioning::PositioningTable;
 pub use segment::{Sense, TestKind, TestPlane, TestSegment};
 pub use sensor::{GridSample, LengthSample, TemperatureSample};
-pub use thermal::{AxisDrift, ThermalModel, UpdateReason, UpdateRequest};
+pub use thermal::{AxisDrift, DriftGrowth, ThermalModel, UpdateReason, UpdateRequest};
 pub use touch::{Correction, LatencyMethod, ProbeLatency, ProbeTrigger, ProbedPoint, Rejection};

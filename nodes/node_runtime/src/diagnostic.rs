@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use abbe_msgs::diagnostic_msgs::msg::{DiagnosticStatus, KeyValue};
+use metrology::Severity;
 
 /// Severity, with the values of `diagnostic_msgs/msg/DiagnosticStatus`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -15,6 +16,16 @@ pub enum Level {
     Error = 2,
     /// Nothing has been heard.
     Stale = 3,
+}
+
+impl From<Severity> for Level {
+    fn from(severity: Severity) -> Self {
+        match severity {
+            Severity::Info => Self::Ok,
+            Severity::Warn => Self::Warn,
+            Severity::Error => Self::Error,
+        }
+    }
 }
 
 /// One condition of a node. It stays on `/diagnostics` until the same `name` is reported `Ok`.

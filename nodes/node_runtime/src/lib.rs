@@ -8,10 +8,12 @@
 
 pub mod arguments;
 mod clock;
+pub mod complaint;
 mod dds;
 pub mod diagnostic;
 pub mod environment;
 pub mod harness;
+pub mod interruption;
 pub mod live;
 mod log;
 pub mod names;
@@ -23,6 +25,7 @@ pub mod wiring;
 
 pub use diagnostic::{Diagnostic, Level};
 pub use harness::Harness;
+pub use interruption::Interruption;
 pub use live::{Composition, Running, launch, run, run_composed};
 pub use node::{Bytes, Emission, Event, GoalId, GoalStatus, Node, NodeFault};
 pub use setup::Setup;

@@ -11,8 +11,10 @@ use tokio::task::JoinSet;
 use tracing::Instrument as _;
 
 use crate::arguments::Arguments;
+use crate::complaint;
 use crate::dds::Participant;
 use crate::environment::Environment;
+use crate::interruption::Interruption;
 use crate::log;
 use crate::node::Node;
 use crate::setup::Setup;
@@ -65,17 +67,18 @@ pub fn run(
 ///
 /// Exit codes as of [`run`].
 pub fn run_composed(compositions: Vec<Composition>) -> ExitCode {
-    match prepare(compositions).and_then(|(environment, nodes)| launch(&environment, nodes)) {
-        Ok(running) => match running.until_signal() {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(error) => fail(&error),
-        },
+    let outcome = prepare(compositions).and_then(|(environment, nodes)| {
+        let interruption = Interruption::listen("what was being wound down is cut off")?;
+        launch(&environment, nodes)?.until(&interruption)
+    });
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&error),
     }
 }
 
 fn fail(error: &anyhow::Error) -> ExitCode {
-    eprintln!("error: {error:#}");
+    eprintln!("error: {}", complaint::in_words(error));
     if error.is::<crate::arguments::UsageError>() {
         ExitCode::from(USAGE)
     } else {
@@ -165,28 +168,34 @@ pub fn launch(
     Ok(Running { runtime, shifts })
 }
 
+/// How a node is told to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stop {
+    /// Not at all.
+    No,
+    /// In good order: it may take its patience to wind down.
+    InOrder,
+    /// At once: it closes what is open and leaves.
+    AtOnce,
+}
+
 /// Nodes that stop together.
 struct Shift {
-    stop: watch::Sender<bool>,
+    stop: watch::Sender<Stop>,
     tasks: JoinSet<()>,
 }
 
 impl Shift {
     fn new() -> Self {
         Self {
-            stop: watch::Sender::new(false),
+            stop: watch::Sender::new(Stop::No),
             tasks: JoinSet::new(),
         }
     }
-
-    /// The next task that ends; never where there is none.
-    async fn next(&mut self) -> Result<(), tokio::task::JoinError> {
-        match self.tasks.join_next().await {
-            Some(ended) => ended,
-            None => std::future::pending().await,
-        }
-    }
 }
+
+/// Between two looks at nodes and signals.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Nodes that are on the ROS graph.
 pub struct Running {
@@ -196,23 +205,20 @@ pub struct Running {
 }
 
 impl Running {
-    /// Runs until SIGINT or SIGTERM, then stops.
+    /// Runs until an end is asked for, then stops; at once when that is asked for.
     ///
     /// # Errors
-    /// When a node ended by a panic; the others have been stopped then.
-    pub fn until_signal(mut self) -> anyhow::Result<()> {
-        let Self { runtime, shifts } = &mut self;
-        let [first, last] = shifts;
-        let ended: Option<anyhow::Result<()>> = runtime.block_on(async {
-            tokio::select! {
-                signal = signal() => signal.err().map(Err),
-                ended = first.next() => Some(ended.map_err(Into::into)),
-                ended = last.next() => Some(ended.map_err(Into::into)),
+    /// When a node ended by a panic, and the others have been stopped then; when the end was forced.
+    pub fn until(mut self, interruption: &Interruption) -> anyhow::Result<()> {
+        let mut ended = None;
+        while !interruption.wait(LOOK) {
+            ended = self.ended();
+            if ended.is_some() {
+                break;
             }
-        });
-        let stopped = self.stop();
-        ended.unwrap_or(Ok(())).context("a node ended by a panic")?;
-        stopped
+        }
+        let stopped = self.stop_unless_forced(interruption);
+        ended.map_or(stopped, Err)
     }
 
     /// Why a node has ended although nobody asked it to; `None`: all are at work.
@@ -229,29 +235,38 @@ impl Running {
     ///
     /// # Errors
     /// When a node ended by a panic.
-    pub fn stop(mut self) -> anyhow::Result<()> {
-        let mut outcome = Ok(());
-        for shift in &mut self.shifts {
-            let _ = shift.stop.send(true);
-            self.runtime.block_on(async {
-                while let Some(ended) = shift.tasks.join_next().await {
-                    if let Err(error) = ended {
-                        outcome = Err(error);
-                    }
-                }
-            });
-        }
-        outcome.context("a node ended by a panic")
+    pub fn stop(self) -> anyhow::Result<()> {
+        self.stop_unless_forced(&Interruption::never())
     }
-}
 
-async fn signal() -> anyhow::Result<()> {
-    use tokio::signal::unix::{SignalKind, signal};
-    let mut interrupt = signal(SignalKind::interrupt()).context("SIGINT")?;
-    let mut terminate = signal(SignalKind::terminate()).context("SIGTERM")?;
-    tokio::select! {
-        _ = interrupt.recv() => {}
-        _ = terminate.recv() => {}
+    /// The same; nodes that still wind down when an end at once is asked for leave without it.
+    ///
+    /// # Errors
+    /// When a node ended by a panic, or the end was forced.
+    pub fn stop_unless_forced(mut self, interruption: &Interruption) -> anyhow::Result<()> {
+        let mut outcome = Ok(());
+        let mut forced = false;
+        for shift in &mut self.shifts {
+            let mut told = Stop::InOrder;
+            let _ = shift.stop.send(told);
+            while !shift.tasks.is_empty() {
+                if told == Stop::InOrder && interruption.is_forced() {
+                    (told, forced) = (Stop::AtOnce, true);
+                    let _ = shift.stop.send(told);
+                }
+                let next = shift.tasks.join_next();
+                let ended = self
+                    .runtime
+                    .block_on(async { tokio::time::timeout(LOOK, next).await });
+                if let Ok(Some(Err(error))) = ended {
+                    outcome = Err(error);
+                }
+            }
+        }
+        outcome.context("a node ended by a panic")?;
+        if forced {
+            bail!("the end was forced: nodes did not wind down");
+        }
+        Ok(())
     }
-    Ok(())
 }

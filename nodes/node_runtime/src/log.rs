@@ -20,26 +20,41 @@ use tracing_subscriber::util::SubscriberInitExt as _;
 use tracing_subscriber::{EnvFilter, Layer};
 
 use crate::arguments::Arguments;
-use crate::clock;
+use crate::clock::{self, Clock};
 use crate::dds::Writer;
 
+/// A node as the speaker of its log lines.
+#[derive(Clone)]
+struct Speaker {
+    name: String,
+    writer: Weak<Writer>,
+    /// The node's time, as `rclcpp` stamps its lines with.
+    clock: Clock,
+}
+
 /// Speakers by the spans of their nodes; a span is unique where a name need not be.
-static ROSOUT: Mutex<BTreeMap<u64, (String, Weak<Writer>)>> = Mutex::new(BTreeMap::new());
+static ROSOUT: Mutex<BTreeMap<u64, Speaker>> = Mutex::new(BTreeMap::new());
 
 thread_local! {
     /// Whether this thread is in the middle of a line: what RustDDS logs of it is no line of the node.
     static IS_SPEAKING: Cell<bool> = const { Cell::new(false) };
 }
 
-fn speakers() -> MutexGuard<'static, BTreeMap<u64, (String, Weak<Writer>)>> {
+fn speakers() -> MutexGuard<'static, BTreeMap<u64, Speaker>> {
     ROSOUT.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Lets what is logged in the present span out on `/rosout` as node `name`, as long as the writer lives.
-pub(crate) fn open(name: &str, writer: &Arc<Writer>) {
+/// Lets what is logged in the present span out on `/rosout` as node `name`, as long as the writer lives,
+/// with stamps of the node's own `clock`.
+pub(crate) fn open(name: &str, writer: &Arc<Writer>, clock: &Clock) {
     if let Some(id) = tracing::Span::current().id() {
         let name = name.trim_start_matches('/').replace('/', ".");
-        speakers().insert(id.into_u64(), (name, Arc::downgrade(writer)));
+        let speaker = Speaker {
+            name,
+            writer: Arc::downgrade(writer),
+            clock: clock.clone(),
+        };
+        speakers().insert(id.into_u64(), speaker);
     }
 }
 
@@ -111,10 +126,10 @@ where
                 .into_iter()
                 .find_map(|span| speakers.get(&span.id().into_u64()).cloned())
         });
-        let Some((name, writer)) = speaker else {
+        let Some(speaker) = speaker else {
             return;
         };
-        let Some(writer) = writer.upgrade() else {
+        let Some(writer) = speaker.writer.upgrade() else {
             return;
         };
         if IS_SPEAKING.replace(true) {
@@ -124,9 +139,9 @@ where
         event.record(&mut fields);
         let metadata = event.metadata();
         let message = Log {
-            stamp: clock::ros_time(clock::host_now()),
+            stamp: clock::ros_time(speaker.clock.now()),
             level: severity(*metadata.level()),
-            name,
+            name: speaker.name,
             msg: fields.message + &fields.others,
             file: metadata.file().unwrap_or_default().to_owned(),
             function: String::new(),

@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use anyhow::Context;
 use metrology::ParameterDoc;
@@ -14,6 +15,7 @@ use serde::de::DeserializeOwned;
 
 use crate::arguments::{Arguments, ParameterSource};
 use crate::names::{NameError, NodeNames};
+use crate::node::Node;
 use crate::parameter::{Parameter, Value};
 
 mod file;
@@ -79,7 +81,14 @@ pub struct Setup {
     parameters: Tree,
     origins: BTreeMap<String, Origin>,
     use_sim_time: bool,
+    /// Where the parameters go when nothing but these is asked for.
+    asked: Option<Arc<OnceLock<Vec<Parameter>>>>,
 }
+
+/// How building a node ends when nothing but its parameters was asked for.
+#[derive(Debug, thiserror::Error)]
+#[error("only the parameters were asked for")]
+struct ParametersOnly;
 
 /// The one parameter that every node has.
 const USE_SIM_TIME: &str = "use_sim_time";
@@ -96,6 +105,7 @@ impl Setup {
             parameters: Tree::empty(),
             origins: BTreeMap::new(),
             use_sim_time: false,
+            asked: None,
         };
         for source in &arguments.parameters {
             match source {
@@ -281,7 +291,36 @@ impl Setup {
             serde_json::to_value(config).context("parameters of the configuration")?,
         )
         .context("parameters of the configuration")?;
-        self.served(&resolved, docs)
+        let parameters = self.served(&resolved, docs)?;
+        match &self.asked {
+            None => Ok(parameters),
+            Some(told) => {
+                // The first answer counts: a node resolves its parameters once.
+                let _ = told.set(parameters);
+                Err(ParametersOnly.into())
+            }
+        }
+    }
+
+    /// The parameters that `build` would give its node, defaults included, without the node: building ends
+    /// where they are resolved, which is before a node reads, starts or opens anything else.
+    ///
+    /// # Errors
+    /// When the node could not be built that far.
+    pub fn resolved_by(
+        &self,
+        build: impl FnOnce(&Self) -> anyhow::Result<Box<dyn Node>>,
+    ) -> anyhow::Result<Vec<Parameter>> {
+        let told = Arc::<OnceLock<Vec<Parameter>>>::default();
+        let asking = Self {
+            asked: Some(Arc::clone(&told)),
+            ..self.clone()
+        };
+        let built = build(&asking);
+        if let Some(parameters) = told.get() {
+            return Ok(parameters.clone());
+        }
+        Ok(built?.parameters().to_vec())
     }
 
     /// The one parameter that every node has.

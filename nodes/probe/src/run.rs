@@ -6,6 +6,7 @@ use machine::cycle::FeatureId;
 use metrology::sample::{ProbedPoint, Rejection, TestKind, TestSegment};
 
 use crate::correction::TouchUncertainty;
+use crate::latency_in_use::LatencyInUse;
 
 /// One open test segment and what it has touched so far.
 #[derive(Clone, Debug)]
@@ -21,6 +22,8 @@ pub(crate) struct Run {
 pub(crate) struct RunTouch {
     pub(crate) point: ProbedPoint,
     pub(crate) uncertainty: TouchUncertainty,
+    /// The latency that corrected it; `None` where none did.
+    pub(crate) latency: Option<LatencyInUse>,
 }
 
 impl RunTouch {

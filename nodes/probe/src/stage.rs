@@ -257,6 +257,7 @@ impl ProbeStage {
                     independent_mm: f64::NAN,
                     common_mm: f64::NAN,
                 },
+                latency: None,
             })
         };
         if clock_went_back {
@@ -294,6 +295,7 @@ impl ProbeStage {
                 .model
                 .point(trigger, (&axes, correction), latency, radius_mm),
             uncertainty: self.model.uncertainty(trigger.feed_mm_s, latency),
+            latency: Some(*latency),
         })
     }
 

@@ -108,7 +108,7 @@ impl fmt::Display for Loss {
         let (file, at, read) = (self.file.display(), self.at_byte, self.messages_read);
         write!(
             f,
-            "{file}, byte {at}: {}, {read} messages read",
+            "{file}, byte {at}: {}; {read} messages were read before",
             self.reason
         )
     }
@@ -125,16 +125,18 @@ pub enum LossReason {
     Absent,
     /// The file ends inside a record.
     #[error(
-        "the file ends inside a record of kind {opcode:#04x}, {missing_bytes} bytes are missing"
+        "the file was read up to its end at byte {end_byte}, which cuts a record of kind {opcode:#04x}: what followed is unknown"
     )]
     Cut {
         /// Kind of the record.
         opcode: u8,
-        /// Bytes that should follow.
-        missing_bytes: u64,
+        /// Where the file ends, bytes from its begin.
+        end_byte: u64,
     },
     /// The file ends behind a whole record, without its end.
-    #[error("the file ends without its index")]
+    #[error(
+        "the file was read up to its end, but has no index: what followed, if anything, is unknown"
+    )]
     NoEnd,
     /// A chunk's contents are not what was written.
     #[error("chunk of {chunk_bytes} bytes: CRC is {calculated:08x}, was {saved:08x}")]

@@ -4,6 +4,7 @@ use metrology::ParameterDoc;
 use metrology::stamp::Span;
 use serde::{Deserialize, Serialize};
 
+use crate::allowance::Allowance;
 use crate::error::RotaryAxesError;
 use crate::estimate::EstimateRules;
 
@@ -25,6 +26,9 @@ pub struct RotaryAxesConfig {
     pub doubtful_limit: f64,
     /// Least merit of the poses; below it a warning is given.
     pub least_merit: f64,
+    /// What is alike in all visits and so in no residual; without it uncertainties are those of the noise alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub allowance: Option<Allowance>,
 }
 
 impl Default for RotaryAxesConfig {
@@ -37,12 +41,13 @@ impl Default for RotaryAxesConfig {
             lack_of_fit_limit: 0.01,
             doubtful_limit: 0.001,
             least_merit: 1.0,
+            allowance: None,
         }
     }
 }
 
 /// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 7] = [
+pub const PARAMETERS: [ParameterDoc; 14] = [
     ParameterDoc {
         name: "machine_file",
         unit: "",
@@ -85,6 +90,48 @@ pub const PARAMETERS: [ParameterDoc; 7] = [
         description: "Merit of the poses below which a warning is given.",
         range: Some((0.0, 100.0)),
     },
+    ParameterDoc {
+        name: "allowance.setup_um",
+        unit: "µm",
+        description: "Place of the probe's ball against the point that works, standard uncertainty in each direction.",
+        range: Some((0.0, 1000.0)),
+    },
+    ParameterDoc {
+        name: "allowance.linear_scale_um_per_m",
+        unit: "µm/m",
+        description: "Scale of each linear axis, standard uncertainty; where no model of them is known.",
+        range: Some((0.0, 1000.0)),
+    },
+    ParameterDoc {
+        name: "allowance.linear_squareness_urad",
+        unit: "µrad",
+        description: "Each squareness of the linear axes, standard uncertainty; where no model of them is known.",
+        range: Some((0.0, 1000.0)),
+    },
+    ParameterDoc {
+        name: "allowance.linear_error_um",
+        unit: "µm",
+        description: "Any other error of the linear axes, standard uncertainty in each direction; where no model of them is known.",
+        range: Some((0.0, 1000.0)),
+    },
+    ParameterDoc {
+        name: "allowance.linear_error_length_mm",
+        unit: "mm",
+        description: "Distance over which that error changes.",
+        range: Some((1.0, 100_000.0)),
+    },
+    ParameterDoc {
+        name: "allowance.motion_um",
+        unit: "µm",
+        description: "Each error motion of a rotary axis, standard deviation over a turn.",
+        range: Some((0.0, 1000.0)),
+    },
+    ParameterDoc {
+        name: "allowance.motion_urad",
+        unit: "µrad",
+        description: "Each turning error motion of a rotary axis, standard deviation over a turn.",
+        range: Some((0.0, 1000.0)),
+    },
 ];
 
 impl RotaryAxesConfig {
@@ -99,6 +146,18 @@ impl RotaryAxesConfig {
             self.doubtful_limit,
             self.least_merit,
         ];
+        let allowed = self.allowance.map(|allowance| {
+            [
+                allowance.setup_um,
+                allowance.linear_scale_um_per_m,
+                allowance.linear_squareness_urad,
+                allowance.linear_error_um,
+                allowance.linear_error_length_mm,
+                allowance.motion_um,
+                allowance.motion_urad,
+            ]
+        });
+        let values = values.into_iter().chain(allowed.into_iter().flatten());
         for (doc, value) in PARAMETERS.iter().zip(values) {
             if let Some((least, greatest)) = doc.range
                 && !(least..=greatest).contains(&value)
@@ -135,6 +194,7 @@ mod tests {
     fn the_readme_lists_every_parameter_with_its_default() {
         let readme = include_str!("../README.md");
         let defaults = ["\"\"", "1000.0", "0.0", "2", "0.01", "0.001", "1.0"];
+        let defaults = defaults.into_iter().chain(["none"; 7]);
         for (doc, default) in PARAMETERS.iter().zip(defaults) {
             let unit = if doc.unit.is_empty() { "-" } else { doc.unit };
             let row = format!(

@@ -4,24 +4,15 @@ use metrology::Axis;
 
 use crate::error::EstimateError;
 
-/// How bad a condition is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
-    /// For the record.
-    Info,
-    /// It goes on, but not as it should.
-    Warn,
-    /// Something is not done.
-    Error,
-}
+pub use metrology::Severity;
 
 /// Something that a person should know; `Display` says it in one line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Diagnostic {
     /// Location errors were estimated.
     #[error(
-        "run {run}: {visits} visits of {spheres} spheres, merit of the poses {merit:.2}; spatial standard deviation {:.2} um, with the model {:.2} um",
-        before_mm * 1e3, after_mm * 1e3
+        "run {run}: {visits} visits of {}, merit of the poses {merit:.2}; spatial standard deviation {:.2} µm, with the model {:.2} µm",
+        counted(*spheres), before_mm * 1e3, after_mm * 1e3
     )]
     Calibrated {
         /// Run.
@@ -43,7 +34,7 @@ pub enum Diagnostic {
     },
     /// A model was held against other poses.
     #[error(
-        "run {run}: {visits} visits, {:.2} um rms without the model, {:.2} um with it ({:.2} um at most), {:.2} um expected from the uncertainties",
+        "run {run}: {visits} visits, {:.2} µm rms without the model, {:.2} µm with it ({:.2} µm at most); noise and the model's uncertainty alone would leave {:.2} µm",
         before_mm * 1e3, after_mm * 1e3, greatest_mm * 1e3, expected_mm * 1e3
     )]
     Verified {
@@ -70,6 +61,14 @@ pub enum Diagnostic {
         /// Names of the components.
         names: String,
     },
+    /// Nothing is stated of what is alike in all visits.
+    #[error(
+        "run {run}: no allowance is stated for set-up, linear axes and error motions: uncertainties are those of the noise alone"
+    )]
+    NoAllowance {
+        /// Run.
+        run: u32,
+    },
     /// The poses tell too little.
     #[error("run {run}: merit of the poses is {merit:.3}, at least {least} is wanted")]
     LowMerit {
@@ -81,7 +80,7 @@ pub enum Diagnostic {
         least: f64,
     },
     /// A visit was left out of the fit.
-    #[error("run {run}: sphere {sphere} at {} is {:.1} um off, which chance does not explain; left out", in_words(pose), off_mm * 1e3)]
+    #[error("run {run}: sphere {sphere} at {} is {:.1} µm off, which chance does not explain; left out", in_words(pose), off_mm * 1e3)]
     Doubtful {
         /// Run.
         run: u32,
@@ -204,6 +203,13 @@ pub enum LinearRefusal {
     Pose(#[from] machine::volumetric::PoseRefusal),
 }
 
+fn counted(spheres: usize) -> String {
+    match spheres {
+        1 => "1 sphere".to_owned(),
+        n => format!("{n} spheres"),
+    }
+}
+
 /// Rotary positions in degrees.
 fn in_words(pose: &[(Axis, f64)]) -> String {
     let words: Vec<String> = pose
@@ -220,6 +226,7 @@ impl Diagnostic {
         match self {
             Self::Calibrated { .. } | Self::Verified { .. } => Severity::Info,
             Self::NotEstimable { .. }
+            | Self::NoAllowance { .. }
             | Self::LowMerit { .. }
             | Self::Doubtful { .. }
             | Self::LackOfFit { .. }
@@ -243,6 +250,7 @@ impl Diagnostic {
             Self::Calibrated { .. } => "calibrated",
             Self::Verified { .. } => "verified",
             Self::NotEstimable { .. } => "not_estimable",
+            Self::NoAllowance { .. } => "no_allowance",
             Self::LowMerit { .. } => "low_merit",
             Self::Doubtful { .. } => "doubtful_visit",
             Self::LackOfFit { .. } => "lack_of_fit",

@@ -15,8 +15,8 @@
 //! Noise is told from lack of fit by repeated visits where there are any (F test), else by the stated
 //! uncertainties (chi-square test). If lack of fit remains, the covariance is enlarged by the mean
 //! square of lack of fit, and where repeats scatter more than stated, by chi^2/nu: what is the same at each visit of a pose is not averaged out by repeats.
-//! What is the same at every pose, such as a squareness of the linear axes, is in no residual and in
-//! no uncertainty here; a model of the linear axes takes it off.
+//! What is alike at every pose, such as a squareness of the linear axes, is in no residual: `allowance` says what
+//! it adds to the uncertainties.
 //!
 //! The *spatial standard deviation* is what a single centre is off, in all three directions together:
 //! sqrt(sum |r|^2 3/nu), once with the nominal machine (the sphere's place free) and once with the
@@ -30,6 +30,7 @@ use machine::poses::{Merit, merit};
 use metrology::fit::lack_of_fit;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
+use crate::allowance::{Known, common_covariance};
 use crate::error::EstimateError;
 use crate::fit::{SphereFit, fit};
 use crate::unknown::Unknown;
@@ -90,6 +91,8 @@ pub struct RotaryEstimate {
     pub has_repeats: bool,
     /// Factor on the stated standard uncertainties; 1 where the fit is as good as they say.
     pub enlargement: f64,
+    /// What is alike in all visits adds to the covariance of the fit; zero until it is asked for.
+    pub common_covariance: DMatrix<f64>,
     /// Spatial standard deviation of the nominal machine, mm.
     pub spatial_before_mm: f64,
     /// The same with the estimate, mm.
@@ -139,6 +142,7 @@ pub fn estimate(
         spatial_after_mm: spatial_mm(&found),
         merit: merit(design, &poses_by_sphere(visits, &used, &places)),
         residuals: residuals(design, visits, &used, (&found, &unknowns), &places),
+        common_covariance: DMatrix::zeros(unknowns.len(), unknowns.len()),
         fit: found,
         unknowns,
         spheres: places,
@@ -149,6 +153,19 @@ pub fn estimate(
 }
 
 impl RotaryEstimate {
+    /// The same with what is alike in all visits.
+    #[must_use]
+    pub fn with_common(mut self, design: &SphereDesign, known: Known<'_>) -> Self {
+        self.common_covariance = common_covariance(design, &self, known);
+        self
+    }
+
+    /// Covariance of the unknowns: noise and what is alike in all visits.
+    #[must_use]
+    pub fn covariance(&self) -> DMatrix<f64> {
+        &self.fit.covariance + &self.common_covariance
+    }
+
     /// Where a sphere at `place_mm` is read at a pose according to the estimate, machine frame, mm.
     #[must_use]
     pub fn predicted_mm(

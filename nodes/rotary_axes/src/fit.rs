@@ -56,6 +56,8 @@ pub struct SphereFit {
     pub covariance: DMatrix<f64>,
     /// (5).
     pub estimable: Vec<bool>,
+    /// Change of each unknown per mm of each reading, machine frame: b = G y of (3).
+    pub gain: DMatrix<f64>,
     /// What is seen of the unknowns that are not estimable alone.
     pub combinations: Vec<Combination>,
     /// Step of each sphere's place, workpiece frame, mm.
@@ -95,6 +97,8 @@ struct Row {
     reading: Vector3<f64>,
     /// L.
     deviation: Matrix3<f64>,
+    /// Its inverse.
+    whitener: Matrix3<f64>,
 }
 
 /// Solves (1) for `spheres` (name and place, workpiece frame, mm).
@@ -181,6 +185,7 @@ fn whiten(
             .collect(),
         reading,
         deviation,
+        whitener,
     })
 }
 
@@ -311,6 +316,7 @@ fn assemble(
             scaled_covariance[(i, j)] * scale[i] * scale[j]
         }),
         estimable,
+        gain: gain(rows, weights, seen, scale),
         place_per_unknown: place_per_unknown(rows, weights, scale),
         place_steps_mm,
         place_covariances_mm2: weights.to_vec(),
@@ -325,6 +331,32 @@ fn assemble(
         rank,
         singular_values: seen.singular_values.clone(),
     }
+}
+
+/// S V diag(1/sigma) U^T (1 - N N+) L^-1: what (3) does to a reading.
+fn gain(
+    rows: &[Row],
+    weights: &[Matrix3<f64>],
+    seen: &Decomposition,
+    scale: &[f64],
+) -> DMatrix<f64> {
+    let whole = seen.seen.transpose() * seen.left.transpose();
+    let mut gain = DMatrix::zeros(scale.len(), 3 * rows.len());
+    for (j, s) in scale.iter().enumerate() {
+        let own = |k: usize| Vector3::from_fn(|i, _| whole[(j, 3 * k + i)]);
+        let mut of_places = vec![Vector3::zeros(); weights.len()];
+        for (k, row) in rows.iter().enumerate() {
+            of_places[row.sphere] += row.turn.transpose() * own(k);
+        }
+        for (k, row) in rows.iter().enumerate() {
+            let free = own(k) - row.turn * (weights[row.sphere] * of_places[row.sphere]);
+            let per_mm = row.whitener.transpose() * free * *s;
+            for i in 0..3 {
+                gain[(j, 3 * k + i)] = per_mm[i];
+            }
+        }
+    }
+    gain
 }
 
 fn place_per_unknown(

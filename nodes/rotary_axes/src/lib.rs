@@ -5,7 +5,7 @@
 //! centre at one pose. `unknown` lists what may be asked: location errors, and low harmonics of the
 //! rotary axes' error motions. `fit` is the weighted least-squares solution that says what it cannot
 //! see; `estimate` puts it to use: the sphere's place, doubtful visits, lack of fit, harmonics where
-//! they are needed. `verification` holds a model against other poses, `published` turns it into the
+//! they are needed; `allowance` adds to its uncertainty what no visit shows. `verification` holds a model against other poses, `published` turns it into the
 //! message. `stage` is the node's whole computation. The poses themselves are planned, and what they
 //! would tell is predicted, in `machine::poses`.
 //!
@@ -13,6 +13,7 @@
 //! place; two spheres at different heights or distances can. Spheres measured one after the other in
 //! one set-up are put together.
 
+pub mod allowance;
 pub mod config;
 pub mod diagnostic;
 pub mod error;
@@ -25,6 +26,7 @@ pub mod unknown;
 pub mod verification;
 pub mod visit;
 
+pub use allowance::{Allowance, Known};
 pub use config::{PARAMETERS, RotaryAxesConfig};
 pub use diagnostic::Diagnostic;
 pub use error::RotaryAxesError;

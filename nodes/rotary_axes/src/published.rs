@@ -37,6 +37,7 @@ pub fn published(
     design: &SphereDesign,
     found: &RotaryEstimate,
 ) -> GeometryModel {
+    let covariance = found.covariance();
     let mut curves = Vec::new();
     let mut coefficients: Vec<Weights> = Vec::new();
     let mut place_of: Vec<Option<usize>> = vec![None; found.unknowns.len()];
@@ -45,7 +46,7 @@ pub fn published(
             place_of[j] = Some(coefficients.len());
             let weights = vec![vec![(j, 1.0)]];
             curves.push(curve(
-                found,
+                (found, &covariance),
                 component,
                 &weights,
                 visited(found, component.of),
@@ -60,7 +61,7 @@ pub fn published(
             .iter()
             .map(|&q| at_knot(found, motion, q))
             .collect();
-        let mut table = curve(found, motion, &weights, span);
+        let mut table = curve((found, &covariance), motion, &weights, span);
         table.form = CurveForm::Table;
         table.position = position;
         curves.push(table);
@@ -76,7 +77,7 @@ pub fn published(
         at,
         chain: design.kinematics().chain().to_string(),
         curves,
-        covariance: &spread * &found.fit.covariance * spread.transpose(), // (1)
+        covariance: &spread * &covariance * spread.transpose(), // (1)
         combinations: combinations(found, &place_of),
         n_samples: count(found.residuals.iter().filter(|left| !left.doubtful).count()),
         n_unknowns: count(found.unknowns.len() + 3 * found.spheres.len()),
@@ -87,7 +88,7 @@ pub fn published(
 }
 
 fn curve(
-    found: &RotaryEstimate,
+    (found, covariance): (&RotaryEstimate, &DMatrix<f64>),
     component: ErrorComponent,
     weights: &[Weights],
     span: (f64, f64),
@@ -97,7 +98,7 @@ fn curve(
         let mut variance = 0.0;
         for (i, a) in weights {
             for (j, b) in weights {
-                variance += a * b * found.fit.covariance[(*i, *j)];
+                variance += a * b * covariance[(*i, *j)];
             }
         }
         f64::max(variance, 0.0).sqrt()
@@ -186,10 +187,17 @@ fn combinations(found: &RotaryEstimate, place_of: &[Option<usize>]) -> Vec<Estim
             .weights
             .iter()
             .map(|&(j, weight)| place_of[j].map(|place| (count(place), weight)));
+        let members = combination.weights.iter();
+        let common = members.clone().flat_map(|&(i, a)| {
+            members
+                .clone()
+                .map(move |&(j, b)| a * b * found.common_covariance[(i, j)])
+        });
+        let variance = combination.standard_uncertainty_mm.powi(2) + common.sum::<f64>();
         Some(EstimableCombination {
             weights: weights.collect::<Option<Vec<_>>>()?,
             value_mm: combination.value_mm,
-            standard_uncertainty_mm: combination.standard_uncertainty_mm,
+            standard_uncertainty_mm: variance.max(0.0).sqrt(),
         })
     });
     published.flatten().collect()

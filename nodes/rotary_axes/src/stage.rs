@@ -15,6 +15,7 @@ use metrology::stamp::Span;
 use metrology::{Host, Stage, Stamp};
 use nalgebra::Vector3;
 
+use crate::allowance::{Allowance, Known};
 use crate::config::RotaryAxesConfig;
 use crate::diagnostic::{Diagnostic, LinearRefusal};
 use crate::error::{EstimateError, RotaryAxesError};
@@ -64,7 +65,8 @@ pub struct RotaryAxesStage {
     setup_id: u32,
     visits: Vec<SphereVisit>,
     found: Option<RotaryEstimate>,
-    linear: Option<VolumetricModel>,
+    linear: Option<(VolumetricModel, GeometryModel)>,
+    allowance: Option<Allowance>,
     sequence: u32,
 }
 
@@ -87,6 +89,7 @@ impl RotaryAxesStage {
             visits: Vec::new(),
             found: None,
             linear: None,
+            allowance: config.allowance,
             sequence: 0,
         })
     }
@@ -194,7 +197,7 @@ impl RotaryAxesStage {
         &self,
         visits: &mut [SphereVisit],
     ) -> Result<(), machine::volumetric::PoseRefusal> {
-        let Some(linear) = &self.linear else {
+        let Some((linear, _)) = &self.linear else {
             return Ok(());
         };
         for visit in visits {
@@ -220,6 +223,13 @@ impl RotaryAxesStage {
         let spheres = self.spheres(&visits);
         match estimate(&self.design, &visits, &spheres, &self.rules) {
             Ok(found) => {
+                let found = found.with_common(
+                    &self.design,
+                    Known {
+                        allowance: self.allowance.as_ref(),
+                        linear: self.linear.as_ref().map(|(_, model)| model),
+                    },
+                );
                 self.visits = visits;
                 self.report(number, &found, out);
                 self.sequence += 1;
@@ -267,6 +277,9 @@ impl RotaryAxesStage {
         if !names.is_empty() {
             let names = names.join(", ");
             out.push(say(Diagnostic::NotEstimable { run, names }));
+        }
+        if self.allowance.is_none() {
+            out.push(say(Diagnostic::NoAllowance { run }));
         }
         if found.merit.merit < self.least_merit {
             out.push(say(Diagnostic::LowMerit {
@@ -338,7 +351,18 @@ impl RotaryAxesStage {
 
     fn take_linear(&mut self, model: &GeometryModel, out: &mut Vec<Output>) {
         match VolumetricModel::new(self.design.kinematics(), model) {
-            Ok(linear) => self.linear = Some(linear),
+            Ok(linear) => {
+                self.linear = Some((linear, model.clone()));
+                // What was visited before it came is put together with what comes.
+                let mut visits = std::mem::take(&mut self.visits);
+                if let Err(reason) = self.take_off_linear(&mut visits) {
+                    out.push(say(Diagnostic::LinearModelRefused {
+                        run: 0,
+                        reason: LinearRefusal::Pose(reason),
+                    }));
+                }
+                self.visits = visits;
+            }
             Err(error) => out.push(say(Diagnostic::LinearModelRefused {
                 run: 0,
                 reason: LinearRefusal::Model(error),

@@ -173,6 +173,14 @@ impl Setups {
 }
 
 impl Measurement {
+    /// The step over a plate and its sense, where it is one.
+    pub(crate) const fn grid(&self) -> Option<(&GridStep, Sense)> {
+        match &self.what {
+            What::Grid(step, sense) => Some((step, *sense)),
+            _ => None,
+        }
+    }
+
     /// What measures it, where, and whether its count is wanted anew; `None`: scales alone.
     fn device(&self) -> Option<(Device, &str, bool)> {
         match &self.what {

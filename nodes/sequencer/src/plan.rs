@@ -109,24 +109,31 @@ impl Step {
     #[must_use]
     pub fn activity(&self) -> String {
         match self {
-            Self::Blocks { cold: true, .. } => "cold reference of the blocks".to_owned(),
-            Self::Blocks { .. } => "block cycle".to_owned(),
-            Self::Latency { feature, .. } => format!("latency calibration on {feature}"),
+            Self::Blocks { cold: true, .. } => {
+                "measuring the blocks as the cold reference".to_owned()
+            }
+            Self::Blocks { .. } => "measuring the blocks".to_owned(),
+            Self::Latency { feature, .. } => {
+                format!("calibrating the probe's latency on {feature}")
+            }
             Self::Artefact { id, .. } => format!("touching {id}"),
             Self::Rotary(step) => step.activity(),
             Self::Compensation { enable } => {
-                format!("compensation {}", if *enable { "on" } else { "off" })
+                format!(
+                    "switching compensation {}",
+                    if *enable { "on" } else { "off" }
+                )
             }
             Self::Produce {
                 program, minutes, ..
-            } => format!("{program} for {minutes} min"),
-            Self::Verify { label, .. } => format!("verification: {label}"),
-            Self::Wait { seconds } => format!("waiting {seconds} s"),
-            Self::Run { program } => format!("running {program}"),
-            Self::Grid(step) => format!("{:?} over {}", step.trajectory, step.placement),
-            Self::Positioning(step) => format!("positioning of {}", step.axis),
-            Self::Scan(step) => format!("scan along {}", step.axis),
-            Self::Diagonals(step) => format!("diagonals {}", step.beams.join(", ")),
+            } => format!("production with {program} for {minutes} min"),
+            Self::Verify { label, .. } => format!("verification of the tool error, {label}"),
+            Self::Wait { seconds } => format!("waiting for {seconds} s"),
+            Self::Run { program } => format!("running {program} once"),
+            Self::Grid(step) => step.activity(),
+            Self::Positioning(step) => format!("positioning test of axis {}", step.axis),
+            Self::Scan(step) => format!("scan along axis {}", step.axis),
+            Self::Diagonals(step) => format!("diagonal test along {}", step.beams.join(", ")),
         }
     }
 }

@@ -43,11 +43,11 @@ impl RotaryStep {
     /// In words, for displays.
     pub(crate) fn activity(&self) -> String {
         let what = if self.verification {
-            "verification"
+            "verifying"
         } else {
-            "calibration"
+            "calibrating"
         };
-        format!("{what} of the rotary axes on {}", self.sphere)
+        format!("{what} the rotary axes on {}", self.sphere)
     }
 }
 

@@ -5,12 +5,12 @@
 //!
 //! ```text
 //!   d(t_c) = d + f (d − d_prev),   f = (t_c − t) / (t − t_prev)                  (1)
-//!   u²(d(t_c)) = u_cold² + ((1 + f)² + f²) u_hot²                                (2)
+//!   u²(d(t_c)) = u_cold² + (1 + f)² u_hot² + f² u_hot,prev²                      (2)
 //! ```
 //!
 //! # Holds when
 //! f is well below 1, that is the cycle is short against the update period; above [`SHARE_LIMIT`]
-//! the face is left as touched. The cold touch is common to both values and cancels in their
+//! the face is left as touched, with the instant at which it was. The cold touch is common to both values and cancels in their
 //! difference, hence its plain share in (2).
 
 use crate::reference::FaceDrift;
@@ -35,18 +35,23 @@ pub fn to_latest(faces: &mut [FaceDrift], previous: &[FaceDrift]) {
         });
         if let (Some(before), true) = (before, share <= SHARE_LIMIT) {
             let cold2 = face.standard_uncertainty_mm.powi(2) - face.hot_uncertainty_mm.powi(2);
+            let (latency, left_mm2) = face.latency.moved_on(&before.latency, share);
+            let hot2 = ((1.0 + share) * face.hot_uncertainty_mm).powi(2)
+                + (share * before.hot_uncertainty_mm).powi(2)
+                + left_mm2;
             face.drift_mm += share * (face.drift_mm - before.drift_mm);
-            face.hot_uncertainty_mm *= (1.0 + share).hypot(share);
-            face.standard_uncertainty_mm =
-                (cold2.max(0.0) + face.hot_uncertainty_mm.powi(2)).sqrt();
+            face.hot_uncertainty_mm = hot2.sqrt();
+            face.standard_uncertainty_mm = (cold2.max(0.0) + hot2).sqrt();
+            face.latency = latency;
+            face.at = common_at;
         }
-        face.at = common_at;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::latency_share::LatencyShares;
     use metrology::{Axis, Stamp};
     use nalgebra::Vector3;
 
@@ -58,6 +63,7 @@ mod tests {
             drift_mm,
             standard_uncertainty_mm: 5e-4,
             hot_uncertainty_mm: 3e-4,
+            latency: LatencyShares::default(),
             at: Stamp::from_nanos((at_s * 1e9) as i64),
         }
     }
@@ -85,5 +91,7 @@ mod tests {
         let mut now = [face(0, 600.0, 0.006), face(1, 1200.0, 0.012)];
         to_latest(&mut now, &previous);
         assert!((now[0].drift_mm - 0.006).abs() < 1e-15);
+        // Nor does it claim to be of a later instant than it is.
+        assert_eq!(now[0].at, face(0, 600.0, 0.0).at);
     }
 }

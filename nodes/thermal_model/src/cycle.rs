@@ -5,11 +5,15 @@
 //! ```text
 //!   x = Σ x_k/u_k² / Σ 1/u_k²,   u²(x) = 1 / Σ 1/u_k²,   t = Σ t_k/u_k² / Σ 1/u_k²       (1)
 //! ```
+//!
+//! u_k is what is independent from touch to touch. The latency is common to all touches and does not
+//! average; its share is the weighted mean of theirs.
 
-use metrology::sample::{BlockMeasurement, FacePosition};
+use metrology::sample::{BlockMeasurement, FacePosition, LatencyShare};
 use metrology::stamp::Span;
 use metrology::{Axis, Host, PerAxis, Stamp};
 
+use crate::latency_share::is_same;
 use crate::reference::FaceReading;
 
 /// Why a face is not used.
@@ -49,14 +53,22 @@ struct Sum {
     weight: f64,
     offset: f64,
     delay_s: f64,
+    /// Sensitivity to the first touch's latency.
+    sensitivity: f64,
+    /// Squares of what other latencies make of it.
+    foreign: f64,
 }
 
 impl Sum {
     fn reading(self) -> FaceReading {
         FaceReading {
             position_mm: self.first.position_mm + self.offset / self.weight,
-            standard_uncertainty_mm: self.weight.sqrt().recip(),
+            standard_uncertainty_mm: (self.weight + self.foreign).sqrt() / self.weight,
             at: self.first.at + Span::from_secs_f64(self.delay_s / self.weight),
+            latency: LatencyShare {
+                sensitivity_mm_s: self.sensitivity / self.weight,
+                ..self.first.latency
+            },
         }
     }
 }
@@ -122,9 +134,19 @@ fn usable(
     not_before: Option<Stamp<Host>>,
     not_after: Stamp<Host>,
 ) -> Result<(), FaceRefusal> {
-    let uncertainty_mm = face.standard_uncertainty_mm;
+    let uncertainty_mm = face.independent_uncertainty_mm();
+    let latency = &face.latency;
+    let shared_mm = latency.latency_s + latency.standard_uncertainty_mm();
     // The weight 1/u² must stay a finite number above zero too.
-    if !face.position_mm.is_finite() || !uncertainty_mm.is_finite() || uncertainty_mm > 1e100 {
+    let is_finite = [
+        face.position_mm,
+        face.standard_uncertainty_mm,
+        uncertainty_mm,
+        shared_mm,
+    ]
+    .iter()
+    .all(|x| x.is_finite());
+    if !is_finite || uncertainty_mm > 1e100 {
         Err(FaceRefusal::NotFinite)
     } else if uncertainty_mm <= 1e-100 {
         Err(FaceRefusal::NoUncertainty)
@@ -138,16 +160,23 @@ fn usable(
 }
 
 fn accumulate(sum: &mut Option<Sum>, face: FacePosition) {
-    let weight = face.standard_uncertainty_mm.powi(-2);
+    let weight = face.independent_uncertainty_mm().powi(-2);
     let sum = sum.get_or_insert(Sum {
         first: face,
         weight: 0.0,
         offset: 0.0,
         delay_s: 0.0,
+        sensitivity: 0.0,
+        foreign: 0.0,
     });
     sum.weight += weight;
     sum.offset += weight * (face.position_mm - sum.first.position_mm);
     sum.delay_s += weight * (face.at - sum.first.at).as_secs_f64();
+    if is_same(&face.latency, &sum.first.latency) {
+        sum.sensitivity += weight * face.latency.sensitivity_mm_s;
+    } else {
+        sum.foreign += (weight * face.latency.standard_uncertainty_mm()).powi(2);
+    }
 }
 
 #[cfg(test)]
@@ -159,6 +188,7 @@ mod tests {
             position_mm,
             standard_uncertainty_mm: 4e-4,
             at: Stamp::from_nanos(at_s * 1_000_000_000),
+            latency: LatencyShare::default(),
         }
     }
 
@@ -191,6 +221,28 @@ mod tests {
         assert!((mean.standard_uncertainty_mm - 4e-4 / 2_f64.sqrt()).abs() < 1e-12);
         assert_eq!(mean.at, Stamp::from_nanos(5_000_000_000));
         assert!(cycle.is_complete());
+    }
+
+    #[test]
+    fn what_the_latency_makes_common_does_not_average_away() {
+        let late = Stamp::from_nanos(100_000_000_000);
+        let mut cycle = Cycle::new(1, 1, false, late);
+        let latency = LatencyShare {
+            latency_s: 0.008,
+            standard_uncertainty_s: 25e-6,
+            sensitivity_mm_s: -12.0,
+        };
+        for at_s in 1..=4 {
+            let touched = FacePosition {
+                standard_uncertainty_mm: 4e-4_f64.hypot(3e-4),
+                latency,
+                ..face(10.0, at_s)
+            };
+            cycle.add(0, &measurement(touched), None, late);
+        }
+        let mean = cycle.readings()[0][Axis::X].unwrap();
+        assert!((mean.standard_uncertainty_mm - 2e-4).abs() < 1e-12);
+        assert!((mean.latency.standard_uncertainty_mm() - 3e-4).abs() < 1e-12);
     }
 
     #[test]

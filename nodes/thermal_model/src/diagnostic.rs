@@ -8,16 +8,7 @@ use crate::n_block::Term;
 use crate::prediction::{Predictor, Score};
 use crate::relaxation::Unidentifiable;
 
-/// How urgent a condition is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// A fact worth recording.
-    Info,
-    /// It goes on, but not as told.
-    Warn,
-    /// The model cannot be trusted.
-    Error,
-}
+pub use metrology::Severity;
 
 /// A condition worth reporting.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use metrology::drift::relaxed_s;
 use metrology::least_squares::FitError;
-use metrology::sample::AxisDrift;
+use metrology::sample::{AxisDrift, DriftGrowth};
 use metrology::{Axis, PerAxis};
 
 use crate::config::Method;
@@ -99,45 +99,55 @@ fn affine(
     })
 }
 
-/// Gives `axes` the rates that `rates` (faces whose drift is a rate, mm/s) have, axis by axis with
-/// its time constant. The fit is linear in the drifts, so rates go through it as drifts do.
-pub fn with_rates(
+/// Lets `axes` grow by `rates`, the fit of faces whose drift is a rate (mm/s) for the faces of
+/// `source` and zero for the others, with the time constant of `source`. The fit is linear in the
+/// drifts, so rates go through it as drifts do; done for every axis in turn, the sum is the field
+/// fitted to all faces as they will be.
+pub fn add_growth(
     axes: &mut PerAxis<Option<AxisDrift>>,
-    rates: &Field,
-    time_constants_s: &PerAxis<Option<f64>>,
+    source: Axis,
+    rates: &PerAxis<Option<AxisDrift>>,
+    time_constant_s: f64,
 ) {
     for axis in Axis::LINEAR {
-        if let (Some(drift), Some(rate), Some(tau_s)) =
-            (&mut axes[axis], &rates.axes[axis], time_constants_s[axis])
-        {
-            drift.rate_mm_s = rate.k0_mm;
-            drift.slope_rate_per_s = rate.slope_mm_per_mm;
-            drift.time_constant_s = tau_s;
+        let (Some(drift), Some(rate)) = (&mut axes[axis], &rates[axis]) else {
+            continue;
+        };
+        let mut gradient_rate_per_s = rate.cross_slope_mm_per_mm;
+        gradient_rate_per_s[axis.index()] = rate.slope_mm_per_mm;
+        if rate.k0_mm != 0.0 || gradient_rate_per_s.iter().any(|g| *g != 0.0) {
+            drift.growth[source.index()] = Some(DriftGrowth {
+                rate_mm_s: rate.k0_mm,
+                gradient_rate_per_s,
+                time_constant_s,
+            });
         }
     }
 }
 
-/// The same drift seen from `elapsed_s` later; its rates have decayed meanwhile.
+/// The same drift of `axis` seen from `elapsed_s` later; its rates have decayed meanwhile.
 #[must_use]
-pub fn advanced(drift: &AxisDrift, elapsed_s: f64) -> AxisDrift {
-    let acted_s = relaxed_s(elapsed_s, drift.time_constant_s);
-    let left = (-elapsed_s / drift.time_constant_s).exp();
-    AxisDrift {
-        k0_mm: drift.k0_mm + drift.rate_mm_s * acted_s,
-        slope_mm_per_mm: drift.slope_mm_per_mm + drift.slope_rate_per_s * acted_s,
-        rate_mm_s: drift.rate_mm_s * left,
-        slope_rate_per_s: drift.slope_rate_per_s * left,
-        ..*drift
+pub fn advanced(axis: Axis, drift: &AxisDrift, elapsed_s: f64) -> AxisDrift {
+    let mut later = *drift;
+    for growth in later.growth.iter_mut().flatten() {
+        let acted_s = relaxed_s(elapsed_s, growth.time_constant_s);
+        let left = (-elapsed_s / growth.time_constant_s).exp();
+        let mut change = growth.gradient_rate_per_s * acted_s;
+        later.k0_mm += growth.rate_mm_s * acted_s;
+        later.slope_mm_per_mm += change[axis.index()];
+        change[axis.index()] = 0.0;
+        later.cross_slope_mm_per_mm += change;
+        growth.rate_mm_s *= left;
+        growth.gradient_rate_per_s *= left;
     }
+    later
 }
 
 /// The same drift, standing still.
 #[must_use]
 pub fn halted(drift: &AxisDrift) -> AxisDrift {
     AxisDrift {
-        rate_mm_s: 0.0,
-        slope_rate_per_s: 0.0,
-        time_constant_s: f64::INFINITY,
+        growth: [None; 3],
         ..*drift
     }
 }
@@ -145,20 +155,35 @@ pub fn halted(drift: &AxisDrift) -> AxisDrift {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     #[test]
     fn advancing_in_two_steps_is_advancing_once() {
         let drift = AxisDrift {
             k0_mm: 0.01,
-            rate_mm_s: 1e-5,
-            slope_rate_per_s: 2e-8,
-            time_constant_s: 1800.0,
+            growth: [
+                Some(DriftGrowth {
+                    rate_mm_s: 1e-5,
+                    gradient_rate_per_s: Vector3::new(2e-8, 1e-8, 0.0),
+                    time_constant_s: 1800.0,
+                }),
+                None,
+                Some(DriftGrowth {
+                    rate_mm_s: -2e-6,
+                    gradient_rate_per_s: Vector3::zeros(),
+                    time_constant_s: 600.0,
+                }),
+            ],
             ..AxisDrift::default()
         };
-        let once = advanced(&drift, 900.0);
-        let twice = advanced(&advanced(&drift, 400.0), 500.0);
+        let later = |drift: &AxisDrift, s| advanced(Axis::X, drift, s);
+        let once = later(&drift, 900.0);
+        let twice = later(&later(&drift, 400.0), 500.0);
         assert!((once.k0_mm - twice.k0_mm).abs() < 1e-15);
-        assert!((once.slope_rate_per_s - twice.slope_rate_per_s).abs() < 1e-20);
-        assert!(halted(&once).rate_mm_s == 0.0);
+        assert!((once.slope_mm_per_mm - twice.slope_mm_per_mm).abs() < 1e-18);
+        assert!((once.cross_slope_mm_per_mm - twice.cross_slope_mm_per_mm).norm() < 1e-18);
+        let rates = |drift: &AxisDrift| drift.growth[0].unwrap().gradient_rate_per_s;
+        assert!((rates(&once) - rates(&twice)).norm() < 1e-20);
+        assert!(halted(&once).growth == [None; 3]);
     }
 }

@@ -9,7 +9,8 @@
 //! `two_block` is the published method: a line per axis through two blocks at the ends of the
 //! table's diagonal, renewed when `tt >= ct`. `n_block` carries it to any number of blocks, fits
 //! what their geometry allows (offsets, scales, rotations, shears) and tests the fit. `alignment`
-//! brings faces touched one after another to one instant. `quarantine` keeps back a jump that heat
+//! brings faces touched one after another to one instant, `latency_share` is what their errors have in
+//! common. `quarantine` keeps back a jump that heat
 //! cannot make. `update_rule` asks for the next cycle, `load` sees that the heat sources changed.
 //! Between cycles `relaxation` extrapolates with a time constant where the data show one, and
 //! `temperature` by the sensors where they have earned it; `prediction` keeps the score of both
@@ -26,6 +27,7 @@ pub mod cycle;
 pub mod diagnostic;
 pub mod drift_field;
 pub mod error;
+pub mod latency_share;
 pub mod load;
 pub mod n_block;
 pub mod prediction;

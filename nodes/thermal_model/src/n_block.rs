@@ -23,6 +23,19 @@
 //! on a sloping plane add all rotations; three at one height give up the vertical scale instead; four
 //! that span a volume make (1) complete.
 //!
+//! The drifts share what an error of the latency makes of all of them ([`crate::latency_share`]), so
+//! that the fit is generalised least squares:
+//!
+//! ```text
+//!   V = diag(u²) + Σ_T u²(T) s_T s_Tᵀ = R Rᵀ,   R⁻¹ d = R⁻¹ X β + ε               (3)
+//!   cov(k0, ∂d_i/∂r) = M cov(β) Mᵀ                                                (4)
+//! ```
+//!
+//! (4) is what is published for each axis: with it u(d_i) is that of the whole fit at every point. What
+//! the drifts of two axes have in common is not published. A scale that is left out is not known to be
+//! zero: its published variance is its mean square, β² + u²(β), and infinite where the geometry says
+//! nothing. Rotations and shears that are left out are supposed to be zero, as by the published method.
+//!
 //! Lack of fit: χ² of the residuals on n − rank degrees of freedom, where there are any.
 //!
 //! # Holds when
@@ -31,102 +44,23 @@
 //!
 //! # Agreement
 //! `eq1_two_blocks_give_the_published_line`, `eq1_four_blocks_reproduce_any_affine_drift`: below
-//! 1e-12 mm. `lack_of_fit_is_uniform_for_true_models`: 5 % level rejects 3 to 7 % of 1,000 seeds.
+//! 1e-12 mm. `eq4_covers_the_truth_in_every_direction`: 1.96 u held the truth in 93.9 to 96.0 % of 2,000
+//! runs, with one latency and with two. `lack_of_fit_is_uniform_for_true_models`: 5 % level rejects 3 to 7 % of 1,000 seeds.
 
-use metrology::least_squares::{WeightedFit, solve};
+use metrology::least_squares::{FitError, WeightedFit, solve};
 use metrology::sample::AxisDrift;
 use metrology::{Axis, PerAxis};
-use nalgebra::{DMatrix, DVector, Matrix2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::error::ThermalModelError;
+use crate::latency_share::latencies;
 use crate::reference::FaceDrift;
 use crate::two_block::SlopeLimit;
 
-/// One unknown of (1).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Term {
-    /// t of one axis.
-    Offset(Axis),
-    /// s of one axis.
-    Scale(Axis),
-    /// ω about one axis.
-    Rotation(Axis),
-    /// Shear in the plane whose normal is the axis.
-    Shear(Axis),
-}
+mod term;
 
-impl Term {
-    /// All terms in the order in which they are tried.
-    pub const ALL: [Self; 12] = [
-        Self::Offset(Axis::X),
-        Self::Offset(Axis::Y),
-        Self::Offset(Axis::Z),
-        Self::Scale(Axis::X),
-        Self::Scale(Axis::Y),
-        Self::Scale(Axis::Z),
-        Self::Rotation(Axis::Z),
-        Self::Rotation(Axis::X),
-        Self::Rotation(Axis::Y),
-        Self::Shear(Axis::Z),
-        Self::Shear(Axis::X),
-        Self::Shear(Axis::Y),
-    ];
-
-    /// Contribution of a unit of this term to the drift of `axis` at `r`.
-    fn column(self, axis: Axis, r: &Vector3<f64>) -> f64 {
-        match self {
-            Self::Offset(own) => f64::from(own == axis),
-            _ => self.gradient(axis).dot(r),
-        }
-    }
-
-    /// ∂d_axis/∂r for a unit of this term.
-    fn gradient(self, axis: Axis) -> Vector3<f64> {
-        let mut gradient = Vector3::zeros();
-        let row = self.axis().index();
-        let (next, previous) = ((row + 1) % 3, (row + 2) % 3);
-        match self {
-            Self::Offset(_) => {}
-            Self::Scale(own) if own == axis => gradient[row] = 1.0,
-            Self::Scale(_) => {}
-            // ω × r about axis k: the next axis receives ω times the previous one's coordinate with
-            // a minus, the previous receives ω times the next one's.
-            Self::Rotation(_) | Self::Shear(_) => {
-                let sign = if matches!(self, Self::Rotation(_)) {
-                    -1.0
-                } else {
-                    1.0
-                };
-                if axis.index() == next {
-                    gradient[previous] = sign;
-                } else if axis.index() == previous {
-                    gradient[next] = 1.0;
-                }
-            }
-        }
-        gradient
-    }
-
-    fn axis(self) -> Axis {
-        match self {
-            Self::Offset(a) | Self::Scale(a) | Self::Rotation(a) | Self::Shear(a) => a,
-        }
-    }
-
-    /// The travel over which an error of this term acts.
-    fn limit(self, limits: &PerAxis<SlopeLimit>) -> SlopeLimit {
-        match self {
-            Self::Offset(a) | Self::Scale(a) => limits[a],
-            Self::Rotation(a) | Self::Shear(a) => Axis::LINEAR
-                .into_iter()
-                .filter(|other| *other != a)
-                .map(|other| limits[other])
-                .max_by(|a, b| a.travel_mm.total_cmp(&b.travel_mm))
-                .unwrap_or(limits[a]),
-        }
-    }
-}
+pub use term::Term;
 
 /// The fitted model.
 #[derive(Clone, Debug)]
@@ -145,20 +79,49 @@ pub struct NBlockFit {
     pub lack_of_fit_p: f64,
     /// Root mean square of the residuals at the faces, mm.
     pub residual_rms_mm: f64,
-    origin_mm: Vector3<f64>,
-    covariance: DMatrix<f64>,
 }
 
-impl NBlockFit {
-    /// Standard uncertainty of the drift of `axis` at a point, mm, every term included.
-    #[must_use]
-    pub fn standard_uncertainty_mm(&self, axis: Axis, point_mm: &Vector3<f64>) -> f64 {
-        let r = point_mm - self.origin_mm;
-        let row = DVector::from_iterator(
-            self.terms.len(),
-            self.terms.iter().map(|term| term.column(axis, &r)),
-        );
-        (&self.covariance * &row).dot(&row).max(0.0).sqrt()
+/// Rows of (1) made independent and of unit variance: (3).
+struct Whitened {
+    roots: Option<DMatrix<f64>>,
+    uncertainties_mm: DVector<f64>,
+}
+
+impl Whitened {
+    fn new(faces: &[FaceDrift]) -> Result<Self, FitError> {
+        let uncertainties_mm =
+            DVector::from_iterator(faces.len(), faces.iter().map(|f| f.standard_uncertainty_mm));
+        let shared = latencies(faces);
+        if shared.is_empty() {
+            return Ok(Self {
+                roots: None,
+                uncertainties_mm,
+            });
+        }
+        let mut covariance = DMatrix::from_diagonal(&uncertainties_mm.map(|u| u * u));
+        for latency in shared {
+            let sensitivities = faces.iter().map(|f| f.latency.sensitivity_mm_s(&latency));
+            let s = DVector::from_iterator(faces.len(), sensitivities);
+            covariance += &s * s.transpose() * latency.standard_uncertainty_s.powi(2);
+        }
+        let roots = covariance.cholesky().ok_or(FitError::NoDecomposition)?;
+        Ok(Self {
+            roots: Some(roots.l()),
+            uncertainties_mm: DVector::from_element(faces.len(), 1.0),
+        })
+    }
+
+    fn solve(&self, design: &DMatrix<f64>, y: &DVector<f64>) -> Result<WeightedFit, FitError> {
+        let Some(roots) = &self.roots else {
+            return solve(design, y, &self.uncertainties_mm);
+        };
+        let no_inverse = FitError::NoDecomposition;
+        let design_white = roots.solve_lower_triangular(design).ok_or(no_inverse)?;
+        let no_inverse = FitError::NoDecomposition;
+        let y_white = roots.solve_lower_triangular(y).ok_or(no_inverse)?;
+        let mut fit = solve(&design_white, &y_white, &self.uncertainties_mm)?;
+        fit.residuals = y - design * &fit.parameters;
+        Ok(fit)
     }
 }
 
@@ -172,9 +135,9 @@ pub fn fit(
     limits: &PerAxis<SlopeLimit>,
 ) -> Result<NBlockFit, ThermalModelError> {
     let y = DVector::from_iterator(faces.len(), faces.iter().map(|f| f.drift_mm));
-    let u = DVector::from_iterator(faces.len(), faces.iter().map(|f| f.standard_uncertainty_mm));
+    let white = Whitened::new(faces)?;
     let mut terms: Vec<Term> = Vec::new();
-    let mut left_out = Vec::new();
+    let mut left_out: Vec<LeftOut> = Vec::new();
     let mut kept: Option<WeightedFit> = None;
     for term in Term::ALL {
         if !faces.iter().any(|f| f.axis == term.axis()) && matches!(term, Term::Offset(_)) {
@@ -184,27 +147,38 @@ pub fn fit(
         let design = DMatrix::from_fn(faces.len(), terms.len(), |i, j| {
             terms[j].column(faces[i].axis, &(faces[i].point_mm - origin_mm))
         });
-        let trial = solve(&design, &y, &u)?;
-        if trial.rank == terms.len() && certain(&terms, &trial, limits) {
+        let trial = white.solve(&design, &y)?;
+        let is_of_full_rank = trial.rank == terms.len();
+        if is_of_full_rank && certain(&terms, &trial, limits) {
             kept = Some(trial);
         } else {
+            let last = terms.len() - 1;
+            left_out.push(LeftOut {
+                term,
+                mean_square: if is_of_full_rank {
+                    trial.parameters[last].powi(2) + trial.covariance[(last, last)]
+                } else {
+                    f64::INFINITY
+                },
+            });
             terms.pop();
-            left_out.push(term);
         }
     }
     match kept {
-        Some(solution) => Ok(assemble(faces, origin_mm, terms, left_out, solution)),
-        // Without a face there is no offset; the fit of nothing names the reason.
-        None => Err(
-            solve(&DMatrix::zeros(0, 0), &y, &u).map_or_else(Into::into, |_| {
-                metrology::least_squares::FitError::Empty {
-                    n_rows: faces.len(),
-                    n_columns: 0,
-                }
-                .into()
-            }),
-        ),
+        Some(solution) => Ok(assemble(faces, origin_mm, terms, &left_out, solution)),
+        None => Err(FitError::Empty {
+            n_rows: faces.len(),
+            n_columns: 0,
+        }
+        .into()),
     }
+}
+
+/// A term that is not estimated, and the mean square that the faces allow it.
+#[derive(Clone, Copy, Debug)]
+struct LeftOut {
+    term: Term,
+    mean_square: f64,
 }
 
 /// Whether every slope-like term fulfils (2).
@@ -220,23 +194,38 @@ fn assemble(
     faces: &[FaceDrift],
     origin_mm: Vector3<f64>,
     terms: Vec<Term>,
-    left_out: Vec<Term>,
+    left_out: &[LeftOut],
     solution: WeightedFit,
 ) -> NBlockFit {
-    let axes = PerAxis::from_fn(|axis| axis_drift(axis, faces, origin_mm, &terms, &solution));
+    let axes = PerAxis::from_fn(|axis| {
+        let unknown = left_out.iter().find(|l| l.term == Term::Scale(axis));
+        let drift = axis_drift(axis, faces, origin_mm, &terms, &solution)?;
+        Some(unknown.map_or(drift, |left| without_slope(drift, axis, faces, left)))
+    });
     let degrees_of_freedom = solution.degrees_of_freedom;
     let lack_of_fit_p = ChiSquared::new(degrees_of_freedom as f64)
         .map_or(f64::NAN, |chi_squared| chi_squared.sf(solution.chi_square));
     NBlockFit {
         axes,
         terms,
-        left_out,
+        left_out: left_out.iter().map(|l| l.term).collect(),
         n_faces: faces.len(),
         degrees_of_freedom,
         lack_of_fit_p,
         residual_rms_mm: (solution.residuals.norm_squared() / faces.len() as f64).sqrt(),
-        origin_mm,
-        covariance: solution.covariance,
+    }
+}
+
+/// A drift whose own slope is not known: it acts from the middle of the axis' faces.
+fn without_slope(drift: AxisDrift, axis: Axis, faces: &[FaceDrift], left: &LeftOut) -> AxisDrift {
+    let own = || faces.iter().filter(|f| f.axis == axis);
+    let sum_mm: f64 = own().map(|f| f.point_mm[axis.index()]).sum();
+    let mut covariance = drift.covariance;
+    covariance[(axis.index() + 1, axis.index() + 1)] = left.mean_square;
+    AxisDrift {
+        p0_mm: sum_mm / own().count() as f64,
+        covariance,
+        ..drift
     }
 }
 
@@ -248,7 +237,6 @@ fn axis_drift(
     solution: &WeightedFit,
 ) -> Option<AxisDrift> {
     let offset = terms.iter().position(|t| *t == Term::Offset(axis))?;
-    let scale = terms.iter().position(|t| *t == Term::Scale(axis));
     let own = faces
         .iter()
         .filter(|f| f.axis == axis)
@@ -256,37 +244,34 @@ fn axis_drift(
     let span_mm = own.fold((f64::INFINITY, f64::NEG_INFINITY), |(lower, upper), p| {
         (lower.min(p), upper.max(p))
     });
-    let mut gradient = Vector3::zeros();
-    for (term, value) in terms.iter().zip(solution.parameters.iter()) {
-        gradient += term.gradient(axis) * *value;
+    // Rows of M in (4): the offset, then the change with X, Y and Z.
+    let mut rows = DMatrix::zeros(4, terms.len());
+    rows[(0, offset)] = 1.0;
+    for (j, term) in terms.iter().enumerate() {
+        rows.fixed_view_mut::<3, 1>(1, j)
+            .copy_from(&term.gradient(axis));
     }
-    let mut cross = gradient;
+    let gradient = rows.fixed_rows::<3>(1) * &solution.parameters;
+    let covariance = &rows * &solution.covariance * rows.transpose();
+    let mut cross = Vector3::from_fn(|row, _| gradient[row]);
     cross[axis.index()] = 0.0;
-    let c = &solution.covariance;
-    let covariance = scale.map_or_else(
-        || Matrix2::new(c[(offset, offset)], 0.0, 0.0, 0.0),
-        |s| {
-            Matrix2::new(
-                c[(offset, offset)],
-                c[(offset, s)],
-                c[(s, offset)],
-                c[(s, s)],
-            )
-        },
-    );
     Some(AxisDrift {
         p0_mm: origin_mm[axis.index()],
         k0_mm: solution.parameters[offset],
         slope_mm_per_mm: gradient[axis.index()],
-        covariance,
+        covariance: Matrix4::from_fn(|i, j| covariance[(i, j)]),
         cross_slope_mm_per_mm: cross,
         cross_origin_mm: origin_mm,
         span_mm,
         offset_identifiable: true,
-        slope_identifiable: scale.is_some(),
-        rate_mm_s: 0.0,
-        slope_rate_per_s: 0.0,
-        time_constant_s: f64::INFINITY,
+        slope_identifiable: terms.contains(&Term::Scale(axis)),
+        growth: [None; 3],
+        measured_at: faces
+            .iter()
+            .filter(|f| f.axis == axis)
+            .map(|f| f.at)
+            .max()
+            .unwrap_or_default(),
     })
 }
 
@@ -294,10 +279,13 @@ fn axis_drift(
 #[expect(clippy::print_stdout, reason = "figures that the header quotes")]
 mod tests {
     use super::*;
+    use crate::latency_share::LatencyShares;
     use metrology::Stamp;
+    use metrology::drift::{Extrapolate, drift_standard_uncertainty_mm};
+    use metrology::sample::{LatencyShare, ThermalModel};
     use nalgebra::Matrix3;
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, Normal};
+    use rand::{Rng, SeedableRng};
+    use rand_distr::{Distribution, Normal, StandardNormal};
     use rand_pcg::Pcg64Mcg;
 
     const U_MM: f64 = 3e-4;
@@ -320,6 +308,7 @@ mod tests {
                 drift_mm: d[axis.index()],
                 standard_uncertainty_mm: U_MM,
                 hot_uncertainty_mm: U_MM,
+                latency: LatencyShares::default(),
                 at: Stamp::from_nanos(0),
             })
         };
@@ -340,6 +329,23 @@ mod tests {
             + drift
                 .cross_slope_mm_per_mm
                 .dot(&(r - drift.cross_origin_mm))
+    }
+
+    fn u_mm(drift: &AxisDrift, axis: Axis, r: &Vector3<f64>) -> f64 {
+        let at = Stamp::from_nanos(0);
+        let mut axes = PerAxis::default();
+        axes[axis] = Some(*drift);
+        let model = ThermalModel {
+            at,
+            axes,
+            valid_from: at,
+            valid_until: at,
+            n_blocks: 2,
+            lack_of_fit_p: f64::NAN,
+            quarantined: false,
+            sequence: 0,
+        };
+        drift_standard_uncertainty_mm(&model, axis, r, Extrapolate::Linear).unwrap()
     }
 
     const TWO: [[f64; 3]; 2] = [[-220.0, -180.0, 20.0], [220.0, 180.0, 200.0]];
@@ -374,8 +380,7 @@ mod tests {
                 r[i] = p;
                 let (a, b) = (fit.axes[axis].unwrap(), line);
                 assert!((value_mm(&a, axis, &r) - value_mm(&b, axis, &r)).abs() < 1e-12);
-                let u = |d| metrology::drift::drift_standard_uncertainty_mm(d, p);
-                assert!((u(&a) - u(&b)).abs() < 1e-12);
+                assert!((u_mm(&a, axis, &r) - u_mm(&b, axis, &r)).abs() < 1e-12);
             }
         }
     }
@@ -493,32 +498,78 @@ mod tests {
     }
 
     #[test]
-    fn the_stated_uncertainty_covers_the_truth_in_95_percent_of_seeds() {
-        let noise = Normal::new(0.0, U_MM).unwrap();
+    fn eq4_covers_the_truth_in_every_direction() {
         let mut rng = Pcg64Mcg::seed_from_u64(21);
         let points = [
             Vector3::new(0.0, 0.0, 110.0),
             Vector3::new(300.0, -200.0, 350.0),
+            Vector3::new(-220.0, 260.0, 0.0),
         ];
-        let mut covered = [0; 2];
-        for _ in 0..1000 {
-            let mut noisy = faces(&FOUR, affine);
-            noisy
-                .iter_mut()
-                .for_each(|f| f.drift_mm += noise.sample(&mut rng));
-            let fit = fit(&noisy, origin(&FOUR), &limits()).unwrap();
-            for (point, count) in points.iter().zip(&mut covered) {
-                let error_mm =
-                    value_mm(&fit.axes[Axis::X].unwrap(), Axis::X, point) - affine(*point).x;
-                *count += usize::from(
-                    error_mm.abs() < 1.96 * fit.standard_uncertainty_mm(Axis::X, point),
-                );
+        let (feed_mm_s, u_s) = (20.0, 60e-6);
+        for hot_s in [0.008, 0.0081] {
+            let mut covered = [[0; 3]; 3];
+            for _ in 0..2000 {
+                let mut normal = || rng.sample::<f64, _>(StandardNormal);
+                let cold_error_s = u_s * normal();
+                let hot_error_s = if hot_s > 0.008 {
+                    u_s * normal()
+                } else {
+                    cold_error_s
+                };
+                let mut noisy = faces(&FOUR, affine);
+                for face in &mut noisy {
+                    let sign = if face.block % 2 == 0 { 1.0 } else { -1.0 };
+                    let share = |latency_s| LatencyShare {
+                        latency_s,
+                        standard_uncertainty_s: u_s,
+                        sensitivity_mm_s: -sign * feed_mm_s,
+                    };
+                    face.latency = LatencyShares::of_difference(&share(hot_s), &share(0.008));
+                    face.drift_mm += U_MM * normal();
+                    face.drift_mm -= sign * feed_mm_s * (hot_error_s - cold_error_s);
+                }
+                let fit = fit(&noisy, origin(&FOUR), &wide()).unwrap();
+                assert_eq!(fit.terms.len(), 12);
+                for (point, counts) in points.iter().zip(&mut covered) {
+                    for axis in Axis::LINEAR {
+                        let drift = fit.axes[axis].unwrap();
+                        let truth_mm = affine(*point)[axis.index()];
+                        let error_mm = value_mm(&drift, axis, point) - truth_mm;
+                        let within = error_mm.abs() < 1.96 * u_mm(&drift, axis, point);
+                        counts[axis.index()] += usize::from(within);
+                    }
+                }
             }
+            println!("hot latency {hot_s} s: covered {covered:?} of 2000");
+            let mut all = covered.iter().flatten();
+            assert!(all.all(|c| (1860..=1940).contains(c)), "{covered:?}");
         }
-        println!("covered {covered:?} of 1000");
-        assert!(
-            covered.iter().all(|c| (930..=970).contains(c)),
-            "{covered:?}"
-        );
+    }
+
+    #[test]
+    fn a_scale_that_is_left_out_is_not_known_to_be_zero() {
+        let flat = fit(&faces(&FLAT, affine), origin(&FLAT), &limits()).unwrap();
+        let z = flat.axes[Axis::Z].unwrap();
+        assert!(z.covariance[(3, 3)].is_infinite());
+        let high = Vector3::new(0.0, 0.0, 300.0);
+        assert!(u_mm(&z, Axis::Z, &high).is_infinite());
+        // 30 mm apart in Z: the slope is bounded by what the blocks say, not known.
+        let near = [[0.0, 0.0, 0.0], [200.0, 200.0, 30.0]];
+        let low = fit(&faces(&near, affine), origin(&near), &limits()).unwrap();
+        let z = low.axes[Axis::Z].unwrap();
+        assert!(!z.slope_identifiable && (z.p0_mm - 15.0).abs() < 1e-12);
+        // No more than what both blocks differ by, over the 30 mm between them.
+        let apart_mm = affine(Vector3::from(near[1])).z - affine(Vector3::zeros()).z;
+        let mean_square = (apart_mm * apart_mm + 2.0 * U_MM * U_MM) / 900.0;
+        assert!((z.covariance[(3, 3)] / mean_square - 1.0).abs() < 1e-9);
+        let mean_alone_mm2 = mean_square * 285.0_f64.powi(2);
+        assert!(u_mm(&z, Axis::Z, &high).powi(2) > mean_alone_mm2);
+    }
+
+    fn wide() -> PerAxis<SlopeLimit> {
+        PerAxis::from_fn(|_| SlopeLimit {
+            travel_mm: 600.0,
+            error_mm: 1.0,
+        })
     }
 }

@@ -1,15 +1,17 @@
 //! Keeps back a jump of the drift that heat cannot make until a second measurement confirms it.
 //!
 //! ```text
-//!   |d − d_prev| > r Δt + 3 √(u_hot² + u_hot,prev²)   ⇒   a jump                  (1)
+//!   |d − d_prev| > r Δt + 3 √(u_hot² + u_hot,prev² + u_latency²)   ⇒   a jump     (1)
 //! ```
 //!
-//! with r the fastest physical drift. A jump that the next cycle repeats (no jump between the two)
-//! is confirmed; if the next cycle agrees with the state before, the first one was wrong. A jump of
+//! with r the fastest physical drift and u_latency what different latencies leave in the difference. A
+//! jump that the next cycle repeats (no jump between the two) is confirmed, if that cycle's touches are
+//! later ones: the same touches told twice confirm nothing; if the next cycle agrees with the state before, the first one was wrong. A jump of
 //! one block alone, when others stay, is the block that moved (pushed, chip under it), not heat.
 
 use metrology::Axis;
 
+use crate::latency_share::difference_variance_mm2;
 use crate::reference::FaceDrift;
 
 /// One face beyond (1).
@@ -88,7 +90,9 @@ impl Quarantine {
         match kept {
             _ if jumps.is_empty() && kept.is_some() => Verdict::Contradicted,
             _ if jumps.is_empty() => Verdict::Plausible,
-            Some((first, first_jumps)) if self.jumps(&first, cycle).is_empty() => {
+            Some((first, first_jumps))
+                if self.jumps(&first, cycle).is_empty() && is_later(&jumps, &first, cycle) =>
+            {
                 Verdict::Confirmed {
                     first,
                     jumps: first_jumps,
@@ -109,8 +113,9 @@ impl Quarantine {
                 let last = before.iter().find(|b| b.same_face(face))?;
                 let change_mm = face.drift_mm - last.drift_mm;
                 let elapsed_s = (face.at - last.at).as_secs_f64().abs();
-                let limit_mm = self.physical_rate_mm_s * elapsed_s
-                    + 3.0 * face.hot_uncertainty_mm.hypot(last.hot_uncertainty_mm);
+                let touches_mm = face.hot_uncertainty_mm.hypot(last.hot_uncertainty_mm);
+                let u_mm = (touches_mm.powi(2) + difference_variance_mm2(face, last)).sqrt();
+                let limit_mm = self.physical_rate_mm_s * elapsed_s + 3.0 * u_mm;
                 (change_mm.abs() > limit_mm).then_some(Jump {
                     block: face.block,
                     axis: face.axis,
@@ -120,6 +125,19 @@ impl Quarantine {
             })
             .collect()
     }
+}
+
+/// Whether every face that jumps was touched after `first`.
+fn is_later(jumps: &[Jump], first: &[FaceDrift], cycle: &[FaceDrift]) -> bool {
+    jumps.iter().all(|jump| {
+        let of = |faces: &[FaceDrift]| {
+            let mut own = faces
+                .iter()
+                .filter(|f| f.block == jump.block && f.axis == jump.axis);
+            own.next().map(|f| f.at)
+        };
+        matches!((of(first), of(cycle)), (Some(before), Some(after)) if after > before)
+    })
 }
 
 /// The only block among `jumps`, if it is only one.
@@ -132,6 +150,7 @@ pub fn single_block(jumps: &[Jump]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::latency_share::LatencyShares;
     use metrology::Stamp;
     use nalgebra::Vector3;
 
@@ -143,6 +162,7 @@ mod tests {
             drift_mm,
             standard_uncertainty_mm: 4e-4,
             hot_uncertainty_mm: 3e-4,
+            latency: LatencyShares::default(),
             at: Stamp::from_nanos(at_s * 1_000_000_000),
         };
         drifts_mm.into_iter().enumerate().map(face).collect()
@@ -168,6 +188,20 @@ mod tests {
         };
         assert!((first[1].drift_mm - 0.066).abs() < 1e-12);
         assert!(!gate.is_occupied());
+    }
+
+    #[test]
+    fn the_same_touches_told_twice_confirm_nothing() {
+        let mut gate = Quarantine::new(3e-3 / 60.0);
+        let accepted = cycle(0, [0.0, 0.0]);
+        gate.judge(&accepted, &cycle(600, [0.1, 0.1]));
+        let again = gate.judge(&accepted, &cycle(600, [0.1, 0.1]));
+        assert!(matches!(again, Verdict::Quarantined { .. }), "{again:?}");
+        let measured = gate.judge(&accepted, &cycle(660, [0.1, 0.1]));
+        assert!(
+            matches!(measured, Verdict::Confirmed { .. }),
+            "{measured:?}"
+        );
     }
 
     #[test]

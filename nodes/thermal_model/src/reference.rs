@@ -5,22 +5,36 @@
 //!   u²(d) = u²(x') + u²(x)                                                       (2)
 //! ```
 //!
+//! (2) is what is independent of every other face; what the latency makes common to them is in
+//! [`crate::latency_share`].
+//!
+//! A block that was pushed gets a new reference, such that its drift goes on from d_prev:
+//!
+//! ```text
+//!   x_new = x' − d_prev,   u²(x_new) = u²(x') + u²(d_prev)                       (3)
+//! ```
+//!
 //! The face of axis i is touched at the corner, set in by the block's inset along the two other
 //! directions, on the block's side; that point is where d_i is known.
 
 use machine::file::BlockEntry;
+use metrology::sample::LatencyShare;
 use metrology::{Axis, Host, PerAxis, Stamp};
 use nalgebra::Vector3;
+
+use crate::latency_share::{LatencyShares, difference_variance_mm2};
 
 /// A face's position, the mean of its touches in one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaceReading {
     /// Position along the face's axis, mm.
     pub position_mm: f64,
-    /// Standard uncertainty, mm.
+    /// Standard uncertainty without the latency's share, mm.
     pub standard_uncertainty_mm: f64,
     /// Mean instant of the touches.
     pub at: Stamp<Host>,
+    /// The latency taken out of them.
+    pub latency: LatencyShare,
 }
 
 /// How far the reading of one face has moved since the cold reference.
@@ -38,7 +52,9 @@ pub struct FaceDrift {
     pub standard_uncertainty_mm: f64,
     /// Share of the hot touch alone, mm; the cold one is common to all updates.
     pub hot_uncertainty_mm: f64,
-    /// Instant of the hot touch.
+    /// What the drift shares with others by the latency.
+    pub latency: LatencyShares,
+    /// Mean instant of the hot touches.
     pub at: Stamp<Host>,
 }
 
@@ -100,15 +116,26 @@ impl Reference {
         self.taken_at = self.taken_at.map(|at| at + by);
     }
 
-    /// Moves one face's cold position: its block was pushed by `by_mm`.
-    pub fn rebase(&mut self, block: usize, axis: Axis, by_mm: f64) {
-        if let Some(face) = self
-            .blocks
-            .get_mut(block)
-            .and_then(|b| b.faces[axis].as_mut())
-        {
-            face.position_mm += by_mm;
+    /// Moves one face's cold position, its block was pushed: (3). `previous` is its drift before,
+    /// `pushed` the first one after.
+    pub fn rebase(&mut self, previous: &FaceDrift, pushed: &FaceDrift) {
+        let face = self.blocks.get_mut(pushed.block);
+        if let Some(face) = face.and_then(|b| b.faces[pushed.axis].as_mut()) {
+            face.position_mm += pushed.drift_mm - previous.drift_mm;
+            // The cold reading cancels in x' − x, what the latency leaves between the two does not.
+            let latency_mm2 = difference_variance_mm2(previous, pushed);
+            face.standard_uncertainty_mm = (previous.standard_uncertainty_mm.powi(2)
+                + pushed.hot_uncertainty_mm.powi(2)
+                + latency_mm2)
+                .sqrt();
         }
+    }
+
+    /// Standard uncertainty of a face's cold position, mm; `None` where there is none.
+    #[must_use]
+    pub fn standard_uncertainty_mm(&self, block: usize, axis: Axis) -> Option<f64> {
+        let face = self.blocks.get(block)?.faces[axis]?;
+        Some(face.standard_uncertainty_mm)
     }
 
     /// Number of blocks in the machine file.
@@ -189,6 +216,7 @@ impl Reference {
                         .standard_uncertainty_mm
                         .hypot(cold.standard_uncertainty_mm),
                     hot_uncertainty_mm: hot.standard_uncertainty_mm,
+                    latency: LatencyShares::of_difference(&hot.latency, &cold.latency),
                     at: hot.at,
                 })
             })
@@ -205,6 +233,7 @@ mod tests {
             position_mm,
             standard_uncertainty_mm: 3e-4,
             at: Stamp::from_nanos(0),
+            latency: LatencyShare::default(),
         })
     }
 
@@ -231,6 +260,23 @@ mod tests {
         let point = reference().touch_point_mm(0, Axis::X).unwrap();
         assert_eq!(point, Vector3::new(-200.5, -144.0, 14.25));
         assert_eq!(reference().touch_point_mm(0, Axis::Y), None);
+    }
+
+    #[test]
+    fn eq3_a_pushed_block_goes_on_from_its_drift_with_the_uncertainty_of_the_new_reading() {
+        let mut reference = reference();
+        let drift = |reference: &Reference, x_mm| {
+            reference.drifts(&[PerAxis([reading(x_mm), None, None, None, None, None])])[0]
+        };
+        let previous = drift(&reference, -200.49);
+        let pushed = drift(&reference, -200.40);
+        reference.rebase(&previous, &pushed);
+        let after = drift(&reference, -200.40);
+        assert!((after.drift_mm - previous.drift_mm).abs() < 1e-12);
+        // Cold, the hot reading before the push, the one after it: three readings instead of one.
+        let reference_mm = reference.standard_uncertainty_mm(0, Axis::X).unwrap();
+        assert!((reference_mm - 3e-4 * 3_f64.sqrt()).abs() < 1e-12);
+        assert!((after.standard_uncertainty_mm - 3e-4 * 2.0).abs() < 1e-12);
     }
 
     #[test]

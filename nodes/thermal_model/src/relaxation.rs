@@ -10,27 +10,35 @@
 //!   χ²(τ) = min over a, b of Σ ((d − d(t))/u_hot)²                                (3)
 //! ```
 //!
-//! τ runs over a logarithmic grid. The 95 % interval is where χ²(τ) − χ²_min ≤ 3.84 max(1, χ²_min/ν):
-//! a misfit widens it. τ is identifiable only if the interval lies inside the grid, not touching
-//! either end (the long end is the straight line, the short end the step that is over), and if the
-//! ratio of its ends is below a limit. Otherwise there is no rate, and the caller holds.
+//! τ runs over a logarithmic grid, and over finer ones where that leaves it. Its 95 % interval is
+//!
+//! ```text
+//!   χ²(τ) − χ²_min ≤ t²(0.975, ν) χ²_min/ν,   ν = n − 2 faces − 1                 (4)
+//! ```
+//!
+//! with Student's t, since the scatter is taken from the residuals and these are few: with five updates
+//! of two blocks ν = 5, t² = 6.6 instead of 3.84, with three ν = 1 and t² = 161. τ is identifiable only
+//! if the interval lies inside the range, not touching either end (the long end is the straight line,
+//! the short end the step that is over), and if the ratio of its ends is below a limit. Otherwise there is no rate, and the caller holds.
 //!
 //! # Holds when
 //! One time constant dominates and the heat sources did not change between the updates used.
 //!
 //! # Agreement
 //! `eq1_a_clean_decay_gives_its_time_constant_back`: within 3 %.
-//! `pure_noise_and_straight_lines_are_hardly_ever_identified`: at most 5 % of 500 seeds each.
+//! `eq4_covers_the_time_constant_with_few_updates`: held the truth in 94.5 to 95.8 % of 1,000 runs, for
+//! ν = 1, 3 and 5 and for a twentieth to twice the stated scatter. `pure_noise_and_straight_lines_are_hardly_ever_identified`: at most 5 % of 500 seeds each.
 
 use metrology::Axis;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::config::RelaxationConfig;
 use crate::reference::FaceDrift;
 
 /// Grid points over the range of time constants.
 const GRID: usize = 240;
-/// 95 % quantile of χ² with one degree of freedom.
-const CHI2_95: f64 = 3.84;
+/// Times that a grid is laid anew; each is a hundredfold finer.
+const REFINEMENTS: usize = 4;
 
 /// An identified time constant.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +60,9 @@ pub enum Unidentifiable {
         /// Updates there are.
         n_updates: usize,
     },
+    /// As many unknowns as drifts: nothing is left to tell the scatter from.
+    #[error("as many unknowns as drifts, no residual is left")]
+    NoScatter,
     /// A time constant as short as the shortest fits as well.
     #[error("a time constant below {shortest_s:.0} s fits as well")]
     OpenBelow {
@@ -94,43 +105,15 @@ pub fn identify(
         return Err(Unidentifiable::TooFew { n_updates });
     }
     let (shortest_s, longest_s) = (config.shortest_min * 60.0, config.longest_min * 60.0);
-    let step = (longest_s / shortest_s).ln() / (GRID - 1) as f64;
-    let grid: Vec<f64> = (0..GRID)
-        .map(|k| shortest_s * (step * k as f64).exp())
-        .collect();
-    let profile: Vec<f64> = grid
-        .iter()
-        .map(|tau_s| series.iter().map(|s| curve(s, *tau_s).chi_square).sum())
-        .collect();
-    let (best, least) = profile
-        .iter()
-        .enumerate()
-        .fold((0, f64::INFINITY), |best, (k, &value)| {
-            if value < best.1 { (k, value) } else { best }
-        });
-    let n: usize = series.iter().map(Vec::len).sum();
-    let freedom = n.saturating_sub(2 * series.len() + 1);
-    let misfit = if freedom > 0 {
-        (least / freedom as f64).max(1.0)
-    } else {
-        1.0
-    };
-    let inside = |k: &usize| profile[*k] - least <= CHI2_95 * misfit;
-    let (lower, upper) = (
-        (0..GRID).find(inside).unwrap_or(best),
-        (0..GRID).rev().find(inside).unwrap_or(best),
-    );
-    let (lower_s, upper_s) = (grid[lower], grid[upper]);
-    if upper == GRID - 1 {
-        return Err(Unidentifiable::OpenAbove);
-    }
-    if lower == 0 {
-        return Err(Unidentifiable::OpenBelow { shortest_s });
-    }
+    let found = search(&series, shortest_s, longest_s)?;
+    let upper_s = found.upper_s.ok_or(Unidentifiable::OpenAbove)?;
+    let lower_s = found
+        .lower_s
+        .ok_or(Unidentifiable::OpenBelow { shortest_s })?;
     if upper_s > lower_s * config.interval_ratio_limit {
         return Err(Unidentifiable::TooWide { lower_s, upper_s });
     }
-    let tau_s = grid[best];
+    let tau_s = found.tau_s;
     Ok(Relaxation {
         time_constant_s: tau_s,
         interval_s: (lower_s, upper_s),
@@ -139,6 +122,90 @@ pub fn identify(
             .map(|s| -curve(s, tau_s).amplitude_mm / tau_s)
             .collect(),
     })
+}
+
+/// The best τ and the ends of (4); `None` where the range searched ends first.
+struct Found {
+    tau_s: f64,
+    lower_s: Option<f64>,
+    upper_s: Option<f64>,
+}
+
+/// Searches the whole range, then again and again what (4) leaves of it, until a step is small against
+/// the interval: with little scatter it is first less than a step.
+fn search(
+    series: &[Vec<[f64; 3]>],
+    shortest_s: f64,
+    longest_s: f64,
+) -> Result<Found, Unidentifiable> {
+    let mut grid_s = grid(shortest_s, longest_s);
+    let whole = profile(series, &grid_s)?;
+    let mut inner = whole;
+    for _ in 0..REFINEMENTS {
+        let outside = (
+            inner.lower.saturating_sub(1),
+            (inner.upper + 1).min(GRID - 1),
+        );
+        if inner.upper - inner.lower > GRID / 2 {
+            break;
+        }
+        grid_s = grid(grid_s[outside.0], grid_s[outside.1]);
+        inner = profile(series, &grid_s)?;
+    }
+    let (below, above) = (
+        inner.lower.saturating_sub(1),
+        (inner.upper + 1).min(GRID - 1),
+    );
+    Ok(Found {
+        tau_s: grid_s[inner.best],
+        lower_s: (whole.lower > 0).then(|| grid_s[below]),
+        upper_s: (whole.upper < GRID - 1).then(|| grid_s[above]),
+    })
+}
+
+/// Time constants in equal ratios.
+fn grid(from_s: f64, to_s: f64) -> Vec<f64> {
+    let step = (to_s / from_s).ln() / (GRID - 1) as f64;
+    (0..GRID)
+        .map(|k| from_s * (step * k as f64).exp())
+        .collect()
+}
+
+/// Places on a grid: of the least χ² and of the ends of (4).
+#[derive(Clone, Copy, Debug)]
+struct Profile {
+    best: usize,
+    lower: usize,
+    upper: usize,
+}
+
+fn profile(series: &[Vec<[f64; 3]>], grid: &[f64]) -> Result<Profile, Unidentifiable> {
+    let chi_square: Vec<f64> = grid
+        .iter()
+        .map(|tau_s| series.iter().map(|s| curve(s, *tau_s).chi_square).sum())
+        .collect();
+    let (best, least) =
+        chi_square
+            .iter()
+            .enumerate()
+            .fold((0, f64::INFINITY), |best, (k, &value)| {
+                if value < best.1 { (k, value) } else { best }
+            });
+    let n: usize = series.iter().map(Vec::len).sum();
+    let allowed = scatter_allowed(least, n.saturating_sub(2 * series.len() + 1))?;
+    let inside = |k: &usize| chi_square[*k] - least <= allowed; // (4)
+    Ok(Profile {
+        best,
+        lower: (0..grid.len()).find(inside).unwrap_or(best),
+        upper: (0..grid.len()).rev().find(inside).unwrap_or(best),
+    })
+}
+
+/// Right-hand side of (4).
+fn scatter_allowed(least: f64, freedom: usize) -> Result<f64, Unidentifiable> {
+    let student =
+        StudentsT::new(0.0, 1.0, freedom as f64).map_err(|_| Unidentifiable::NoScatter)?;
+    Ok(student.inverse_cdf(0.975).powi(2) * least / freedom as f64)
 }
 
 /// (t − t_n, d, u) of one face.
@@ -195,6 +262,7 @@ fn curve(series: &[[f64; 3]], tau_s: f64) -> Curve {
 #[expect(clippy::print_stdout, reason = "figures that the header quotes")]
 mod tests {
     use super::*;
+    use crate::latency_share::LatencyShares;
     use metrology::Stamp;
     use nalgebra::Vector3;
     use rand::SeedableRng;
@@ -215,6 +283,7 @@ mod tests {
             drift_mm,
             standard_uncertainty_mm: U_MM,
             hot_uncertainty_mm: U_MM,
+            latency: LatencyShares::default(),
             at: Stamp::from_nanos((t_s * 1e9) as i64),
         };
         (0..n)
@@ -264,6 +333,32 @@ mod tests {
                 .count();
             println!("slope {slope_mm_s}: identified {n} of 500");
             assert!(n <= 25, "{slope_mm_s} {n}");
+        }
+    }
+
+    #[test]
+    fn eq4_covers_the_time_constant_with_few_updates() {
+        let tau_s = 2400.0;
+        // With three updates and a scatter of 0.3 µm the interval is mostly open and holds more.
+        for (n, scatter, seed) in [(3, 0.05, 31), (4, 1.0, 32), (5, 1.0, 33), (5, 2.0, 34)] {
+            let noise = Normal::new(0.0, scatter * U_MM).unwrap();
+            let mut rng = Pcg64Mcg::seed_from_u64(seed);
+            let mut covered = 0;
+            for _ in 0..1000 {
+                let updates = updates(n, &mut || noise.sample(&mut rng), |t| {
+                    0.06 * (1.0 - (-t / tau_s).exp())
+                });
+                let borrowed: Vec<&[FaceDrift]> = updates.iter().map(Vec::as_slice).collect();
+                let last = updates.last().unwrap();
+                let series: Vec<_> = last.iter().map(|f| series_of(f, &borrowed)).collect();
+                let found = search(&series, 60.0, 80_000.0).unwrap();
+                // An interval that reaches an end of the range is open there.
+                let above = found.lower_s.is_none_or(|lower_s| lower_s <= tau_s);
+                let below = found.upper_s.is_none_or(|upper_s| tau_s <= upper_s);
+                covered += i32::from(above && below);
+            }
+            println!("{n} updates, scatter {scatter}: covered {covered} of 1000");
+            assert!((930..=970).contains(&covered), "{n} {scatter} {covered}");
         }
     }
 

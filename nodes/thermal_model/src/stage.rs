@@ -26,6 +26,7 @@ use crate::update_rule::UpdateRule;
 
 /// What the stage is told.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "a few messages a second")]
 pub enum Input {
     /// A block was measured.
     Block(BlockMeasurement),
@@ -191,6 +192,9 @@ impl ThermalModelStage {
             model.at += by;
             model.valid_from += by;
             model.valid_until += by;
+            for drift in model.axes.0.iter_mut().flatten() {
+                drift.measured_at += by;
+            }
             self.publish(model, out);
         }
     }
@@ -283,8 +287,10 @@ impl ThermalModelStage {
         self.predictor = Predictor::Hold;
         if let Some(mut model) = self.model.take() {
             let elapsed_s = (now - model.at).as_secs_f64();
-            for drift in model.axes.0.iter_mut().flatten() {
-                *drift = drift_field::halted(&drift_field::advanced(drift, elapsed_s));
+            for axis in Axis::LINEAR {
+                model.axes[axis] = model.axes[axis].map(|drift| {
+                    drift_field::halted(&drift_field::advanced(axis, &drift, elapsed_s))
+                });
             }
             model.at = now;
             self.publish(model, out);

@@ -128,11 +128,7 @@ impl ThermalModelStage {
         }));
         if rebased {
             for jump in jumps {
-                self.reference.rebase(jump.block, jump.axis, jump.change_mm);
-                let moved = |f: &&mut FaceDrift| f.block == jump.block && f.axis == jump.axis;
-                for face in first.iter_mut().chain(&mut second).filter(moved) {
-                    face.drift_mm -= jump.change_mm;
-                }
+                self.rebase(jump, &mut first, &mut second);
             }
         } else {
             self.forget();
@@ -141,6 +137,27 @@ impl ThermalModelStage {
         alignment::to_latest(&mut second, &[]);
         self.accept(now, first, rebased, out);
         self.accept(now, second, rebased, out);
+    }
+
+    /// Gives the face that jumped a new reference and takes the jump out of both measurements.
+    fn rebase(&mut self, jump: &Jump, first: &mut [FaceDrift], second: &mut [FaceDrift]) {
+        let is_moved = |f: &FaceDrift| f.block == jump.block && f.axis == jump.axis;
+        let previous = self.history.back();
+        let previous = previous.and_then(|u| u.faces.iter().copied().find(is_moved));
+        let pushed = first.iter().copied().find(is_moved);
+        let (Some(previous), Some(pushed)) = (previous, pushed) else {
+            return;
+        };
+        self.reference.rebase(&previous, &pushed);
+        let cold_mm = self
+            .reference
+            .standard_uncertainty_mm(jump.block, jump.axis)
+            .expect("a face with a drift has a cold position");
+        let both = first.iter_mut().chain(second);
+        for face in both.filter(|f| is_moved(f)) {
+            face.drift_mm -= jump.change_mm;
+            face.standard_uncertainty_mm = face.hot_uncertainty_mm.hypot(cold_mm);
+        }
     }
 
     /// Takes the faces as the machine's drift at their instant.
@@ -297,12 +314,8 @@ impl ThermalModelStage {
         out.extend(field.remarks.drain(..).map(Output::Diagnostic));
         if self.predictor == Predictor::Relaxation
             && let Some(rates) = self.rates()
-            && let Ok(rates) =
-                drift_field::fit(self.config.method, &self.reference, &rates, &self.limits)
         {
-            let taus_s =
-                PerAxis::from_fn(|axis| self.relaxations[axis].as_ref().map(|r| r.time_constant_s));
-            drift_field::with_rates(&mut field.axes, &rates, &taus_s);
+            self.let_grow(&mut field, &rates, out);
         }
         let axes = self.merge_with_previous(at, field.axes, out);
         let measured = self.history.back().map_or(&[][..], |u| &u.faces);
@@ -320,6 +333,27 @@ impl ThermalModelStage {
             sequence: 0,
         };
         self.publish(model, out);
+    }
+
+    /// Extrapolates the field by the faces of every axis that shows a time constant; those of the
+    /// others are held.
+    fn let_grow(&self, field: &mut Field, rates: &[FaceDrift], out: &mut Vec<Output>) {
+        for source in Axis::LINEAR {
+            let Some(relaxation) = &self.relaxations[source] else {
+                continue;
+            };
+            let mut own = rates.to_vec();
+            for face in own.iter_mut().filter(|f| f.axis != source) {
+                face.drift_mm = 0.0;
+            }
+            match drift_field::fit(self.config.method, &self.reference, &own, &self.limits) {
+                Ok(rates) => {
+                    let tau_s = relaxation.time_constant_s;
+                    drift_field::add_growth(&mut field.axes, source, &rates.axes, tau_s);
+                }
+                Err(reason) => out.push(Output::Diagnostic(Diagnostic::FitRefused { reason })),
+            }
+        }
     }
 
     fn validity(&self) -> Span {
@@ -345,7 +379,8 @@ impl ThermalModelStage {
                 .and_then(|m| Some((m.at, m.axes[axis]?)));
             match (previous, self.axis_updated_at[axis]) {
                 (Some((from, drift)), Some(updated_at)) if at - updated_at <= self.validity() => {
-                    axes[axis] = Some(drift_field::advanced(&drift, (at - from).as_secs_f64()));
+                    let elapsed_s = (at - from).as_secs_f64();
+                    axes[axis] = Some(drift_field::advanced(axis, &drift, elapsed_s));
                     out.push(Output::Diagnostic(Diagnostic::AxisKept { axis }));
                 }
                 (Some(_), Some(_)) => {
@@ -403,16 +438,27 @@ impl ThermalModelStage {
                 face.drift_mm = moved.drift_mm;
             }
         }
-        let Ok(field) = drift_field::fit(self.config.method, &self.reference, &faces, &self.limits)
-        else {
-            return;
-        };
+        let field =
+            match drift_field::fit(self.config.method, &self.reference, &faces, &self.limits) {
+                Ok(field) => field,
+                Err(reason) => {
+                    out.push(Output::Diagnostic(Diagnostic::FitRefused { reason }));
+                    return;
+                }
+            };
         let Some(mut model) = self.model.clone() else {
             return;
         };
+        // What is predicted is less certain than what was touched, by what left-out updates missed.
+        let left_out_mm = self.regression.as_ref().map_or(0.0, |r| r.left_out_rms_mm);
         for axis in Axis::LINEAR {
-            if self.is_whole(axis) && model.axes[axis].is_some() {
-                model.axes[axis] = field.axes[axis];
+            let (Some(held), Some(mut predicted)) = (model.axes[axis], field.axes[axis]) else {
+                continue;
+            };
+            if self.is_whole(axis) {
+                predicted.measured_at = held.measured_at;
+                predicted.covariance[(0, 0)] += left_out_mm * left_out_mm;
+                model.axes[axis] = Some(predicted);
             }
         }
         model.at = now;

@@ -39,6 +39,8 @@ pub struct LinearTest {
     pub first_run: u32,
     /// What measured.
     pub reference: Reference,
+    /// Where the line leads, from its smaller positions to its greater ones; of length 1.
+    pub direction: Vector3<f64>,
     /// Targets by ascending position along the line, mm.
     pub targets_mm: Vec<f64>,
     /// Deviations per run and target towards greater positions, mm.
@@ -220,6 +222,7 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
         name: first.features.join(" "),
         first_run: first.run,
         reference,
+        direction,
         targets_mm: places.iter().map(|place| *place as f64 * SAME_MM).collect(),
         up_mm,
         down_mm,
@@ -404,6 +407,7 @@ mod tests {
             (Some(Axis::X), 4, Reference::Length)
         );
         assert_eq!(test.targets_mm, [10.0, 20.0, 30.0]);
+        assert_eq!(test.direction, Vector3::x());
         assert_eq!((test.up_mm.len(), test.down_mm.len()), (3, 3));
         for run in 0..3 {
             for (place, x_mm) in [10.0, 20.0, 30.0].into_iter().enumerate() {

@@ -9,10 +9,15 @@ use metrology::iso230::circular::{CircularResult, CircularTest, CircularTrace, e
 use metrology::sample::{Sense, TestPlane};
 
 use super::positioning::figure;
-use super::section::{Drawing, Rows, Section, head, um};
+use super::section::{Drawing, Rows, Section, head, rounded, um};
 use super::trace;
 use crate::evaluate::budget::Budget;
 use crate::evaluate::circles::{CircleRecording, plane_axes};
+
+/// Coverage factor of what is printed.
+const COVERAGE: f64 = 2.0;
+/// Probability above which a row may be chance.
+const BY_CHANCE: f64 = 0.01;
 
 /// One part for each circle (both senses together), then one for the breakdown.
 ///
@@ -59,8 +64,13 @@ fn section(group: &[&CircleRecording], budget: Option<&Budget>) -> Result<Sectio
         "not compensated"
     };
     let letters = plane_axes(segment.plane).map_or_else(String::new, |[u, v]| format!("{u}{v}"));
+    let runs: Vec<String> = group.iter().map(|c| c.segment.run.to_string()).collect();
+    let runs = match runs.as_slice() {
+        [one] => format!("run {one}"),
+        several => format!("runs {}", several.join(" and ")),
+    };
     let mut section = Section::new(format!(
-        "Circle {letters}, R {:.3} mm, {:.0} mm/min about ({:.1}, {:.1}, {:.1}): {state}",
+        "Circle {letters}, R {:.3} mm, {:.0} mm/min about ({:.1}, {:.1}, {:.1}), {runs}: {state}",
         segment.radius_mm,
         segment.feed_mm_s * 60.0,
         segment.centre_mm.x,
@@ -226,34 +236,54 @@ fn plane_section(plane: &PlaneBreakdown, state: &str) -> Section {
         plane.noise.residual_mm * 1e3
     ));
     let rows = plane.rows.iter().map(|row| {
-        let name = row.aliases.iter().fold(row.name.clone(), |name, alias| {
-            format!("{name} with {}", alias.name)
-        });
         vec![
-            name,
+            row.name.clone(),
             with_unit(row.value, row.standard_uncertainty, row.unit),
             um(row.peak_to_peak_mm),
             format!("{:.1}", row.share_percent),
             format!("{:.1}", row.variance_share_percent),
             um(row.worst_circularity_without_mm),
-            row.cause.clone(),
         ]
     });
     section.tables.push(Rows {
         head: head(&[
-            "row",
-            "value ± u",
+            "cause",
+            "value ± U (k = 2)",
             "span / µm",
             "share / %",
             "of variance / %",
-            "circularity without / µm",
-            "look at",
+            "G without / µm",
         ]),
         rows: rows.collect(),
-        note: needed(plane),
+        note: format!(
+            "Span: greatest minus least deviation that the cause alone makes on one circle. G without: the greatest circular error that would be left. {}",
+            needed(plane)
+        ),
     });
+    section.tables.extend(where_to_look(plane));
     section.figures = serde_json::json!({ "test": section.title, "breakdown": plane });
     section
+}
+
+/// Where to look, for the causes that chance does not explain.
+fn where_to_look(plane: &PlaneBreakdown) -> Option<Rows> {
+    let (seen, not_seen): (Vec<_>, Vec<_>) =
+        plane.rows.iter().partition(|row| row.chance < BY_CHANCE);
+    let note = match not_seen.as_slice() {
+        [] => String::new(),
+        rows => {
+            let names: Vec<&str> = rows.iter().map(|row| row.name.as_str()).collect();
+            format!("Not beyond chance: {}.", names.join(", "))
+        }
+    };
+    (!seen.is_empty()).then(|| Rows {
+        head: head(&["cause", "look at"]),
+        rows: seen
+            .iter()
+            .map(|row| vec![row.name.clone(), row.cause.clone()])
+            .collect(),
+        note,
+    })
 }
 
 fn needed(plane: &PlaneBreakdown) -> String {
@@ -302,9 +332,6 @@ fn with_unit(value: f64, standard_uncertainty: f64, unit: Unit) -> String {
         Unit::Hz => (1.0, "Hz"),
         Unit::LobesPerTurn => (1.0, "per turn"),
     };
-    format!(
-        "{:.3} ± {:.3} {name}",
-        value * factor,
-        standard_uncertainty * factor
-    )
+    let (value, u) = rounded(value * factor, COVERAGE * standard_uncertainty * factor);
+    format!("{value} ± {u} {name}")
 }

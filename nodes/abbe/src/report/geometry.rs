@@ -1,13 +1,34 @@
 //! Geometric errors as they were identified: what is known, how well, and what is not known.
 
 use metrology::ErrorComponent;
-use metrology::sample::{CurveForm, ErrorCurve, GeometryModel, PositioningTable};
+use metrology::sample::{
+    CurveForm, ErrorCurve, EstimableCombination, GeometryModel, PositioningTable,
+};
 
-use super::section::{Rows, Section, head, um};
+use super::section::{Rows, Section, head, rounded, um};
+
+/// Coverage factor of what is printed.
+pub const COVERAGE: f64 = 2.0;
+/// Coefficients that can be listed in a sentence.
+const FEW: usize = 16;
+/// Lever of turns in sums without a linear axis, mm.
+const LEVER_MM: f64 = 100.0;
+/// Members that a person can read in one sum.
+pub const READABLE: usize = 4;
+
+/// One coefficient with its place in the model.
+pub struct Coefficient<'a> {
+    /// Its component.
+    pub curve: &'a ErrorCurve,
+    /// Place in the curve.
+    pub place: usize,
+}
 
 /// One part for a model.
 #[must_use]
 pub fn section(title: &str, model: &GeometryModel) -> Section {
+    let all = coefficients(model);
+    let known: Vec<&Coefficient> = all.iter().filter(|c| c.is_known()).collect();
     let mut section = Section::new(title);
     section.lines.push(format!(
         "Chain {}; {} unknowns, rank {}, {} readings; standard deviation of the residuals {} µm.",
@@ -17,95 +38,275 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
         model.n_samples,
         um(model.residual_standard_deviation_mm)
     ));
-    let mut rows = Vec::new();
-    for curve in &model.curves {
-        for place in 0..curve.coefficient.len() {
-            rows.push(row(curve, place));
-        }
-    }
+    section.lines.push(count(&all, known.len()));
     section.tables.push(Rows {
-        head: head(&["coefficient", "at the end of the span", "u", "known"]),
-        rows,
-        note: "A coefficient times the greatest recorded position to its power: µm for shifts, µrad for turns. A dash: the recordings do not determine it by itself.".to_owned(),
+        head: head(&["coefficient", "at the end of the span", "± U (k = 2)", "span"]),
+        rows: known.iter().map(|coefficient| coefficient.row()).collect(),
+        note: "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns. U: expanded uncertainty.".to_owned(),
     });
+    let (short, long): (Vec<_>, Vec<_>) = model
+        .combinations
+        .iter()
+        .partition(|combination| combination.weights.len() <= READABLE);
     if !model.combinations.is_empty() {
-        let names: Vec<String> = model.curves.iter().flat_map(names).collect();
-        let rows = model.combinations.iter().map(|combination| {
-            let mut terms: Vec<(f64, String)> = combination
-                .weights
-                .iter()
-                .filter_map(|(idx, weight)| Some((*weight, names.get(*idx as usize)?.clone())))
-                .collect();
-            terms.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
-            let words: Vec<String> = terms
-                .iter()
-                .map(|(weight, name)| format!("{weight:+.4e} {name}"))
-                .collect();
-            vec![
-                words.join(" "),
-                um(combination.value_mm),
-                um(combination.standard_uncertainty_mm),
-            ]
-        });
         section.tables.push(Rows {
-            head: head(&["known together (mm)", "value / µm", "u / µm"]),
-            rows: rows.collect(),
-            note: "Sums that the recordings determine although their members are not known."
-                .to_owned(),
+            head: head(&["known only together", "± U (k = 2)", "at"]),
+            rows: short
+                .iter()
+                .filter_map(|combination| sum(&all, combination))
+                .map(|sum| sum.row())
+                .collect(),
+            note: together(long.len()),
         });
     }
+    section.figures = figures(title, model, &all);
     section
 }
 
-fn names(curve: &ErrorCurve) -> Vec<String> {
-    (0..curve.coefficient.len())
-        .map(|place| name(curve, place))
+fn count(all: &[Coefficient], n_known: usize) -> String {
+    let unknown: Vec<String> = all
+        .iter()
+        .filter(|c| !c.is_known())
+        .map(Coefficient::name)
+        .collect();
+    if unknown.is_empty() {
+        return format!("All {n_known} coefficients are known by themselves.");
+    }
+    let names = if unknown.len() <= FEW {
+        format!(": {}", unknown.join(", "))
+    } else {
+        String::new()
+    };
+    format!(
+        "{n_known} of {} coefficients are known by themselves; {} are not{names}.",
+        all.len(),
+        unknown.len()
+    )
+}
+
+fn together(n_long: usize) -> String {
+    let more = match n_long {
+        0 => String::new(),
+        1 => format!(" One sum of more than {READABLE} members is in report.json."),
+        n => format!(" {n} sums of more than {READABLE} members each are in report.json."),
+    };
+    format!(
+        "What the recordings determine although its members are not known: each name stands for that error's value at the stated distance from its origin, a turn for its lever of the same length.{more}"
+    )
+}
+
+/// A sum of errors at one distance.
+pub struct Sum {
+    /// (factor, name); the first factor is 1.
+    pub members: Vec<(f64, String)>,
+    /// Its value, mm.
+    pub value_mm: f64,
+    /// Of the value, mm.
+    pub standard_uncertainty_mm: f64,
+    /// Distance from the origin at which each member is meant, mm.
+    pub at_mm: f64,
+}
+
+/// The sums that a model determines.
+#[must_use]
+pub fn sums(model: &GeometryModel) -> Vec<Sum> {
+    let all = coefficients(model);
+    let sums = model.combinations.iter();
+    sums.filter_map(|combination| sum(&all, combination))
         .collect()
 }
 
-fn name(curve: &ErrorCurve, place: usize) -> String {
-    let component = curve.component;
-    match curve.form {
-        CurveForm::Constant => component.to_string(),
-        CurveForm::Polynomial => {
-            let power = curve.power.get(place).copied().unwrap_or(0);
-            format!("{component}{power}")
+/// A combination with every member as its error at one distance, so that factors are plain numbers.
+fn sum(all: &[Coefficient], combination: &EstimableCombination) -> Option<Sum> {
+    let member = |(idx, weight): &(u32, f64)| Some((all.get(*idx as usize)?, *weight));
+    let members: Vec<(&Coefficient, f64)> = combination
+        .weights
+        .iter()
+        .map(member)
+        .collect::<Option<_>>()?;
+    let linear = members
+        .iter()
+        .filter(|(c, _)| c.curve.component.of.is_linear());
+    let reaches = linear.map(|(c, _)| c.reach()).filter(|reach| *reach > 0.0);
+    let at_mm = reaches.reduce(f64::max).unwrap_or(LEVER_MM);
+    let factor = |(coefficient, weight): &(&Coefficient, f64)| weight / coefficient.lever(at_mm);
+    let first = factor(members.first()?);
+    Some(Sum {
+        members: members
+            .iter()
+            .map(|member| (factor(member) / first, member.0.name()))
+            .collect(),
+        value_mm: combination.value_mm / first,
+        standard_uncertainty_mm: combination.standard_uncertainty_mm / first.abs(),
+        at_mm,
+    })
+}
+
+impl Sum {
+    /// Such as `EXY2 + 0.98 ECY1`.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let mut words = String::new();
+        for (factor, name) in &self.members {
+            let sign = match (words.is_empty(), *factor < 0.0) {
+                (true, _) => "",
+                (false, true) => " − ",
+                (false, false) => " + ",
+            };
+            let size = format!("{:.2}", factor.abs());
+            let size = if size == "1.00" {
+                String::new()
+            } else {
+                size + " "
+            };
+            words.push_str(&format!("{sign}{size}{name}"));
         }
-        CurveForm::Table => {
-            let at = curve.position.get(place).copied().unwrap_or(f64::NAN);
-            format!("{component} at {at:.1}")
-        }
+        words
+    }
+
+    fn row(&self) -> Vec<String> {
+        let expanded = COVERAGE * self.standard_uncertainty_mm;
+        let (value, u) = rounded(self.value_mm * 1e3, expanded * 1e3);
+        vec![
+            format!("{} = {value} µm", self.in_words()),
+            format!("{u} µm"),
+            format!("{:.0} mm", self.at_mm),
+        ]
     }
 }
 
-fn row(curve: &ErrorCurve, place: usize) -> Vec<String> {
-    let reach = (curve.span.0 - curve.origin)
-        .abs()
-        .max((curve.span.1 - curve.origin).abs());
-    let factor = match curve.form {
-        CurveForm::Polynomial => {
-            let power = curve.power.get(place).copied().unwrap_or(0);
-            reach.powi(i32::from(power))
-        }
-        _ => 1.0,
+fn figures(title: &str, model: &GeometryModel, all: &[Coefficient]) -> serde_json::Value {
+    let coefficient = |c: &Coefficient| {
+        let known = c.is_known();
+        serde_json::json!({
+            "name": c.name(),
+            "estimable": known,
+            "value": known.then(|| c.curve.coefficient.get(c.place)),
+            "standard_uncertainty": known.then(|| c.curve.standard_uncertainty.get(c.place)),
+            "reach": c.reach(),
+        })
     };
-    let estimable = curve.estimable.get(place).copied().unwrap_or(false);
-    let shown = |value: Option<&f64>| match value {
-        Some(value) if estimable && value.is_finite() => {
-            format!(
-                "{:.2} {}",
-                value * factor * scale(curve.component),
-                unit(curve.component)
-            )
-        }
-        _ => "—".to_owned(),
+    let combination = |sum: Sum| {
+        serde_json::json!({
+            "sum": sum.in_words(),
+            "members": sum.members,
+            "value_mm": sum.value_mm,
+            "standard_uncertainty_mm": sum.standard_uncertainty_mm,
+            "at_mm": sum.at_mm,
+        })
     };
-    vec![
-        name(curve, place),
-        shown(curve.coefficient.get(place)),
-        shown(curve.standard_uncertainty.get(place)),
-        if estimable { "yes" } else { "no" }.to_owned(),
-    ]
+    let sums = sums(model).into_iter();
+    serde_json::json!({
+        "test": title,
+        "geometry": {
+            "chain": model.chain,
+            "unknowns": model.n_unknowns,
+            "rank": model.rank,
+            "readings": model.n_samples,
+            "residual_standard_deviation_mm": model.residual_standard_deviation_mm,
+            "coefficients": all.iter().map(coefficient).collect::<Vec<_>>(),
+            "combinations": sums.map(combination).collect::<Vec<_>>(),
+        },
+    })
+}
+
+/// Every coefficient of a model, in the order in which its combinations count them.
+#[must_use]
+pub fn coefficients(model: &GeometryModel) -> Vec<Coefficient<'_>> {
+    let of = |curve| places(curve).map(move |place| Coefficient { curve, place });
+    model.curves.iter().flat_map(of).collect()
+}
+
+fn places(curve: &ErrorCurve) -> std::ops::Range<usize> {
+    0..curve.coefficient.len()
+}
+
+impl Coefficient<'_> {
+    fn name(&self) -> String {
+        let component = self.curve.component;
+        match self.curve.form {
+            CurveForm::Constant => component.to_string(),
+            CurveForm::Polynomial => format!("{component}{}", self.power()),
+            CurveForm::Table => {
+                let at = self.curve.position.get(self.place);
+                format!("{component} at {:.1}", at.copied().unwrap_or(f64::NAN))
+            }
+        }
+    }
+
+    /// Whether the recordings determine it by itself.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        let value = self.curve.coefficient.get(self.place);
+        let said = self.curve.estimable.get(self.place).copied();
+        said.unwrap_or(false) && value.is_some_and(|value| value.is_finite())
+    }
+
+    /// Name, expanded uncertainty at the end of the span and span, before there is a value.
+    #[must_use]
+    pub fn planned_row(&self) -> Vec<String> {
+        let component = self.curve.component;
+        let factor = self.reach().powi(i32::from(self.power())) * scale(component);
+        let u = self.curve.standard_uncertainty.get(self.place);
+        let (_, u) = rounded(0.0, COVERAGE * factor * u.copied().unwrap_or(f64::NAN));
+        vec![self.name(), format!("{u} {}", unit(component)), self.span()]
+    }
+
+    fn span(&self) -> String {
+        let (least, greatest) = self.curve.span;
+        let axis = self.curve.component.of;
+        match self.curve.form {
+            CurveForm::Constant => "—".to_owned(),
+            _ if axis.is_linear() => format!("{axis} {least:.0} to {greatest:.0} mm"),
+            _ => format!(
+                "{axis} {:.0} to {:.0}°",
+                least.to_degrees(),
+                greatest.to_degrees()
+            ),
+        }
+    }
+
+    /// Power of the position; 0 for constants and knots.
+    #[must_use]
+    pub fn power(&self) -> u8 {
+        match self.curve.form {
+            CurveForm::Polynomial => self.curve.power.get(self.place).copied().unwrap_or(0),
+            _ => 0,
+        }
+    }
+
+    /// Greatest recorded distance from the origin, in the unit of the axis; 0 where nothing was recorded.
+    fn reach(&self) -> f64 {
+        let (least, greatest) = self.curve.span;
+        let origin = self.curve.origin;
+        (least - origin).abs().max((greatest - origin).abs())
+    }
+
+    /// Unit of its own to mm at a distance: the distance to its power, and once more for a turn.
+    fn lever(&self, at_mm: f64) -> f64 {
+        let component = self.curve.component;
+        let arm = if component.is_angular() { at_mm } else { 1.0 };
+        let way = if component.of.is_linear() {
+            at_mm
+        } else {
+            self.reach()
+        };
+        arm * way.powi(i32::from(self.power()))
+    }
+
+    fn row(&self) -> Vec<String> {
+        let component = self.curve.component;
+        let factor = self.reach().powi(i32::from(self.power())) * scale(component);
+        let of = |values: &[f64]| values.get(self.place).copied().unwrap_or(f64::NAN) * factor;
+        let u = COVERAGE * of(&self.curve.standard_uncertainty);
+        let (value, u) = rounded(of(&self.curve.coefficient), u);
+        vec![
+            self.name(),
+            format!("{value} {}", unit(component)),
+            u,
+            self.span(),
+        ]
+    }
 }
 
 fn scale(component: ErrorComponent) -> f64 {

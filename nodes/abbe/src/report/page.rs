@@ -10,6 +10,7 @@ h1 { font-size: 1.5rem; margin: .5rem 0; } h2 { font-size: 1.15rem; margin: 1.8r
 table { border-collapse: collapse; margin: .6rem 0; font-variant-numeric: tabular-nums; display: block; overflow-x: auto; }
 th, td { padding: .25rem .8rem .25rem 0; border-bottom: 1px solid var(--rule); text-align: right; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; } th { color: var(--soft); font-weight: 600; }
+th.prose, td.prose { text-align: left; white-space: normal; min-width: 10rem; }
 .plot { width: 100%; height: auto; } .note { color: var(--soft); font-size: .9rem; } .good { color: var(--good); } .bad { color: var(--bad); }
 code { font-size: .9em; } @media print { body { max-width: none; } h2 { break-after: avoid; } .plot, table { break-inside: avoid; } }
 ";
@@ -31,12 +32,26 @@ pub fn page(title: &str, body: &Markup) -> String {
     .into_string()
 }
 
-/// A table from texts; the first column is left aligned.
+/// Characters beyond which a cell is a sentence.
+const SENTENCE: usize = 36;
+
+/// Whether a column holds sentences, which are read from the left and may take several lines.
+pub fn is_prose(rows: &[Vec<String>], column: usize) -> bool {
+    let cells = rows.iter().filter_map(|row| row.get(column));
+    cells
+        .into_iter()
+        .any(|cell| cell.chars().count() > SENTENCE)
+}
+
+/// A table from texts; the first column and sentences are left aligned.
 pub fn table(head: &[&str], rows: &[Vec<String>]) -> Markup {
+    let class = |column: usize| is_prose(rows, column).then_some("prose");
+    let classes: Vec<Option<&str>> = (0..head.len()).map(class).collect();
+    let of = |column: usize| classes.get(column).copied().flatten();
     html! {
         table {
-            thead { tr { @for cell in head { th { (cell) } } } }
-            tbody { @for row in rows { tr { @for cell in row { td { (cell) } } } } }
+            thead { tr { @for (column, cell) in head.iter().enumerate() { th class=[of(column)] { (cell) } } } }
+            tbody { @for row in rows { tr { @for (column, cell) in row.iter().enumerate() { td class=[of(column)] { (cell) } } } } }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! ISO 230-2 and 230-6 of a bag.
 
 use anyhow::Result;
-use metrology::iso230::diagonal::{DiagonalRuns, SpaceDiagonal};
+use metrology::iso230::diagonal::{DiagonalResult, DiagonalRuns, DiagonalsResult, SpaceDiagonal};
 use metrology::iso230::positioning::{
     PointResult, PositioningRemark, PositioningResult, PositioningRuns,
 };
@@ -192,27 +192,91 @@ fn remark_in_words(remark: &PositioningRemark) -> String {
     }
 }
 
-/// ISO 230-6, where the four space diagonals are there.
-fn diagonals(tests: &[LinearTest], budget: Option<&Budget>) -> Option<Section> {
-    let of_kind: Vec<&LinearTest> = tests
-        .iter()
-        .filter(|test| test.kind == TestKind::Diagonal)
-        .collect();
-    let names = SpaceDiagonal::ALL;
-    if of_kind.len() < names.len() {
+/// Least share of every axis in a space diagonal.
+const LEAST_SHARE: f64 = 0.1;
+
+/// The space diagonal along which a test ran, and whether it ran it upwards.
+fn space_diagonal(test: &LinearTest) -> Option<(SpaceDiagonal, bool)> {
+    let along = test.direction;
+    if test.kind != TestKind::Diagonal || along.iter().any(|share| share.abs() < LEAST_SHARE) {
         return None;
     }
-    let first: Vec<DiagonalRuns> = names
-        .into_iter()
-        .zip(&of_kind)
-        .map(|(diagonal, test)| DiagonalRuns {
-            diagonal,
-            runs: runs(test),
-        })
+    let positive = along.map(|share| share > 0.0);
+    // A diagonal and its reverse are one: the one with at most one negative axis names it.
+    let upwards = positive.iter().filter(|p| **p).count() >= 2;
+    let [x, y, z] = [positive.x, positive.y, positive.z].map(|p| p == upwards);
+    let diagonal = match (x, y, z) {
+        (false, _, _) => SpaceDiagonal::Npp,
+        (_, false, _) => SpaceDiagonal::Pnp,
+        (_, _, false) => SpaceDiagonal::Ppn,
+        _ => SpaceDiagonal::Ppp,
+    };
+    Some((diagonal, upwards))
+}
+
+/// The runs as they are upwards along the diagonal, positions counted from its lower end.
+fn upwards(test: &LinearTest, is_upwards: bool) -> PositioningRuns {
+    let mut runs = runs(test);
+    if is_upwards {
+        return runs;
+    }
+    let last_mm = test.targets_mm.last().copied().unwrap_or(0.0);
+    runs.targets_mm = test
+        .targets_mm
+        .iter()
+        .rev()
+        .map(|at| last_mm - at)
         .collect();
-    let mut section = Section::new("Space diagonals, ISO 230-6");
+    // Seen from the other end a deviation along the line is of the other sign, and up is down.
+    let turned = |all: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let turn = |run: &Vec<f64>| run.iter().rev().map(|deviation| -deviation).collect();
+        all.iter().map(turn).collect()
+    };
+    (runs.up_mm, runs.down_mm) = (turned(&test.down_mm), turned(&test.up_mm));
+    runs.zero_mm = runs.targets_mm.first().copied().unwrap_or(0.0);
+    runs
+}
+
+/// Deviations from the mean at the lower end, so that diagonals of one corner can be compared.
+fn from_lower_end(runs: &mut PositioningRuns) {
+    let all = || runs.up_mm.iter().chain(&runs.down_mm);
+    let first: Vec<f64> = all().filter_map(|run| run.first().copied()).collect();
+    let mean_mm = first.iter().sum::<f64>() / first.len().max(1) as f64;
+    for deviation in runs.up_mm.iter_mut().chain(&mut runs.down_mm).flatten() {
+        *deviation -= mean_mm;
+    }
+}
+
+/// ISO 230-6, for each state in which the four space diagonals are there.
+fn diagonals(tests: &[LinearTest], budget: Option<&Budget>) -> Vec<Section> {
+    let mut sections = Vec::new();
+    for compensated in [false, true] {
+        let mut first: Vec<DiagonalRuns> = Vec::new();
+        for test in tests.iter().filter(|test| test.compensated == compensated) {
+            if let Some((diagonal, is_upwards)) = space_diagonal(test)
+                && first.iter().all(|known| known.diagonal != diagonal)
+            {
+                let mut runs = upwards(test, is_upwards);
+                from_lower_end(&mut runs);
+                first.push(DiagonalRuns { diagonal, runs });
+            }
+        }
+        if first.len() == SpaceDiagonal::ALL.len() {
+            sections.push(diagonals_section(&first, compensated, budget));
+        }
+    }
+    sections
+}
+
+fn diagonals_section(runs: &[DiagonalRuns], compensated: bool, budget: Option<&Budget>) -> Section {
+    let state = if compensated {
+        "compensated"
+    } else {
+        "not compensated"
+    };
+    let mut section = Section::new(format!("Space diagonals, ISO 230-6: {state}"));
     let used = budget.copied().unwrap_or(Budget::nothing()).positioning();
-    match diagonal::evaluate(&first, &used) {
+    match diagonal::evaluate(runs, &used) {
         Ok(result) => {
             let stated = budget.is_some();
             section.lines.push(format!(
@@ -221,9 +285,89 @@ fn diagonals(tests: &[LinearTest], budget: Option<&Budget>) -> Option<Section> {
                 figure(&result.reversal, stated),
                 figure(&result.spread, stated)
             ));
-            section.figures = serde_json::json!({ "iso230_6": result });
+            section.tables.push(of_diagonals(&result, stated));
+            section.figures = serde_json::json!({ "test": section.title, "iso230_6": result });
         }
         Err(error) => section.lines.push(format!("Not evaluated: {error}.")),
     }
-    Some(section)
+    section
+}
+
+fn of_diagonals(result: &DiagonalsResult, stated: bool) -> Rows {
+    let row = |one: &DiagonalResult| {
+        let (points, found) = (&one.positioning.points, &one.positioning);
+        let mean = |point: Option<&PointResult>| {
+            point.map_or(f64::NAN, |p| f64::midpoint(p.up.mean_mm, p.down.mean_mm))
+        };
+        vec![
+            one.diagonal.name().to_owned(),
+            um(mean(points.last()) - mean(points.first())),
+            figure(&found.systematic_error, stated),
+            figure(&found.reversal, stated),
+            figure(&found.repeatability, stated),
+            figure(&found.accuracy, stated),
+        ]
+    };
+    Rows {
+        head: head(&["diagonal / µm", "too long by", "E", "B", "R", "A"]),
+        rows: result.diagonals.iter().map(row).collect(),
+        note: if stated {
+            "± expanded uncertainty, k = 2. All too long alike: a scale error; unlike: squareness."
+        } else {
+            "Without --budget no uncertainty is stated. All too long alike: a scale error; unlike: squareness."
+        }
+        .to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    fn test(direction: [f64; 3]) -> LinearTest {
+        LinearTest {
+            kind: TestKind::Diagonal,
+            axis: None,
+            name: String::new(),
+            first_run: 1,
+            reference: Reference::Length,
+            direction: Vector3::from(direction).normalize(),
+            targets_mm: vec![0.0, 100.0, 300.0],
+            up_mm: vec![vec![0.0, 0.001, 0.003]],
+            down_mm: vec![vec![0.002, 0.003, 0.005]],
+            compensated: false,
+        }
+    }
+
+    #[test]
+    fn a_diagonal_is_known_by_its_direction_and_not_by_its_place_in_the_plan() {
+        for (direction, wanted) in [
+            ([2.0, 1.0, 1.5], (SpaceDiagonal::Ppp, true)),
+            ([-2.0, 1.0, 1.5], (SpaceDiagonal::Npp, true)),
+            ([2.0, -1.0, 1.5], (SpaceDiagonal::Pnp, true)),
+            ([2.0, 1.0, -1.5], (SpaceDiagonal::Ppn, true)),
+            ([-2.0, -1.0, 1.5], (SpaceDiagonal::Ppn, false)),
+            ([-2.0, -1.0, -1.5], (SpaceDiagonal::Ppp, false)),
+        ] {
+            assert_eq!(
+                space_diagonal(&test(direction)),
+                Some(wanted),
+                "{direction:?}"
+            );
+        }
+        assert_eq!(space_diagonal(&test([1.0, 1.0, 0.0])), None);
+    }
+
+    #[test]
+    fn a_diagonal_that_is_run_from_its_upper_end_is_as_long_and_has_the_same_reversal() {
+        let turned = upwards(&test([-1.0, -1.0, 1.0]), false);
+        assert_eq!(turned.targets_mm, [0.0, 200.0, 300.0]);
+        assert_eq!(turned.up_mm, [vec![-0.005, -0.003, -0.002]]);
+        assert_eq!(turned.down_mm, [vec![-0.003, -0.001, -0.0]]);
+        let mut levelled = turned;
+        from_lower_end(&mut levelled);
+        assert!((levelled.up_mm[0][0] + 0.001).abs() < 1e-12);
+        assert!((levelled.down_mm[0][0] - 0.001).abs() < 1e-12);
+    }
 }

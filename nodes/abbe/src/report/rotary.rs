@@ -61,7 +61,7 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
     })
 }
 
-const LOCATION_HEAD: [&str; 4] = ["component", "value", "U", "unit"];
+const LOCATION_HEAD: [&str; 4] = ["component", "value", "± U (k = 2)", "unit"];
 
 fn locations(model: &GeometryModel) -> impl Iterator<Item = &ErrorCurve> {
     let curves = model.curves.iter();

@@ -1,9 +1,14 @@
 //! A part of a page: sentences, tables and plots, laid out for a terminal and for HTML alike.
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Width, presets};
 use maud::{Markup, html};
 
 use super::page;
+
+/// Columns of a terminal that tables may take.
+const TERMINAL_WIDTH: u16 = 160;
+/// Columns of it for sentences.
+const PROSE_WIDTH: u16 = 56;
 
 /// A table.
 #[derive(Clone, Debug, Default)]
@@ -88,18 +93,39 @@ impl Section {
 fn laid_out(rows: &Rows) -> String {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
+    table.set_content_arrangement(ContentArrangement::Dynamic);
+    table.set_width(TERMINAL_WIDTH);
     table.set_header(&rows.head);
     for row in &rows.rows {
         table.add_row(row);
     }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
+    for (place, column) in table.column_iter_mut().enumerate() {
+        let sentences = page::is_prose(&rows.rows, place);
+        if sentences {
+            column.set_constraint(ColumnConstraint::UpperBoundary(Width::Fixed(PROSE_WIDTH)));
+        } else if place > 0 {
+            column.set_cell_alignment(CellAlignment::Right);
+            column.set_constraint(ColumnConstraint::ContentWidth);
+        }
     }
     table
         .lines()
         .map(|line| line.trim_end().to_owned())
         .collect::<Vec<_>>()
         .join("\n")
+}
+
+/// A value and its uncertainty with as many decimals as two digits of the uncertainty need.
+#[must_use]
+pub fn rounded(value: f64, uncertainty: f64) -> (String, String) {
+    if !(value.is_finite() && uncertainty.is_finite() && uncertainty > 0.0) {
+        return (format!("{value:.2}"), "—".to_owned());
+    }
+    let decimals = (1.0 - uncertainty.log10().floor()).clamp(0.0, 9.0) as usize;
+    (
+        format!("{value:.decimals$}"),
+        format!("{uncertainty:.decimals$}"),
+    )
 }
 
 /// A length in µm with as many decimals as matter.
@@ -115,4 +141,41 @@ pub fn um(length_mm: f64) -> String {
 #[must_use]
 pub fn head(names: &[&str]) -> Vec<String> {
     names.iter().map(|name| (*name).to_owned()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sentences_are_laid_out_from_the_left_and_wrapped() {
+        let cause = "X+ and Y+ enclose less than 90°: guideway alignment, worn guides, foundation";
+        let rows = Rows {
+            head: head(&["row", "span / µm", "look at"]),
+            rows: vec![vec![
+                "squareness".to_owned(),
+                "6.38".to_owned(),
+                cause.to_owned(),
+            ]],
+            note: String::new(),
+        };
+        let text = laid_out(&rows);
+        assert!(text.lines().count() > 2, "{text}");
+        assert!(
+            text.lines().all(|line| line.chars().count() < 100),
+            "{text}"
+        );
+        let html = page::table(&["row", "span", "look at"], &rows.rows).into_string();
+        assert!(html.contains("<td class=\"prose\">X+ and Y+"), "{html}");
+    }
+
+    #[test]
+    fn two_digits_of_the_uncertainty_decide_the_decimals() {
+        assert_eq!(
+            rounded(12.3456, 0.123),
+            ("12.35".to_owned(), "0.12".to_owned())
+        );
+        assert_eq!(rounded(12.3456, 23.4), ("12".to_owned(), "23".to_owned()));
+        assert_eq!(rounded(1.0, f64::NAN), ("1.00".to_owned(), "—".to_owned()));
+    }
 }

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 
 use super::page::{figure, table};
 use super::plot::{Plot, Trace, svg};
-use super::tool_error::{self, ToolError};
+use super::tool_error::{self, BlocksSpan, Places, ToolError};
 use super::{Report, conditions, latency};
 use crate::evidence::{Evidence, Verification};
 
@@ -23,23 +23,24 @@ const COLD: &str = "cold";
 /// # Errors
 /// When a plot cannot be drawn.
 pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
-    let errors = tool_errors(&evidence.verifications);
+    let span = BlocksSpan::of(&evidence.blocks);
+    let errors = span.map_or_else(Vec::new, |span| tool_errors(&evidence.verifications, &span));
     let mut lines = latency::headline(evidence);
-    lines.extend(headline(&errors));
+    lines.extend(headline(&errors, span.as_ref()));
     let mut figures = latency::figures(evidence);
-    if let Some((off, on)) = last_pair(&errors) {
-        figures["p95_without_mm"] = off.p95_mm.into();
-        figures["p95_with_mm"] = on.p95_mm.into();
-        figures["max_with_mm"] = on.max_mm.into();
-    }
+    figures["tool_error_in_blocks_span"] = figures_of(&errors, span.as_ref());
     let drift = drift_traces(evidence);
     let body = html! {
         h1 { (title) }
         @for line in &lines { p { (line) } }
-        h2 { "Tool error in the blocks' span, change since cold" }
+        h2 { "Change of the tool error since cold, in the blocks' span" }
         (error_table(&errors))
-        (places_table(&errors))
-        p.note { "All in µm; parts are root mean squares; the whole error includes the geometric error that is there when cold. Truth of the plant at poses that the machine really went to; no node sees it. Shift: common to all poses. Stretch: along each axis itself, all that two blocks can see besides the shift. Rotation: between axes; two blocks on one diagonal take part of it for stretch. Curved: hot zones and bending, which no linear model follows. A shift that is left is the drift since the last block cycle and the probing error." }
+        p.note { "All in µm. Truth of the plant at poses that the machine really went to; no node sees it." @for line in EXPLAINED { " " (line) } }
+        @if let Some(places) = places(&errors) {
+            h2 { "Change of the tool error since cold, at Z " (places.z_mm) " mm" }
+            (places_table(&errors, &places))
+            p.note { (of_places(&places, span.as_ref())) }
+        }
         h2 { "Drift at the blocks" }
         @for axis in Axis::LINEAR {
             (figure(&svg(&Plot {
@@ -55,13 +56,13 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
     Ok(Report {
         title: title.to_owned(),
         lines,
-        text: text(&errors),
+        text: text(&errors, span.as_ref()),
         body,
         figures,
     })
 }
 
-fn tool_errors(verifications: &[Verification]) -> Vec<ToolError> {
+fn tool_errors(verifications: &[Verification], span: &BlocksSpan) -> Vec<ToolError> {
     let Some(cold) = verifications
         .iter()
         .find(|check| check.label.starts_with(COLD))
@@ -71,7 +72,7 @@ fn tool_errors(verifications: &[Verification]) -> Vec<ToolError> {
     verifications
         .iter()
         .filter(|check| !check.label.starts_with(COLD))
-        .filter_map(|check| tool_error::judge(cold, check))
+        .filter_map(|check| tool_error::judge(cold, check, span))
         .collect()
 }
 
@@ -85,18 +86,53 @@ fn um(length_mm: f64) -> String {
     format!("{:.1}", length_mm * 1e3)
 }
 
-fn headline(errors: &[ToolError]) -> Vec<String> {
+fn headline(errors: &[ToolError], span: Option<&BlocksSpan>) -> Vec<String> {
+    if span.is_none() {
+        return vec!["Tool error: not judged, since no two blocks were measured.".to_owned()];
+    }
     let Some((off, on)) = last_pair(errors) else {
         return vec![
             "Tool error: no pair of verifications with and without compensation.".to_owned(),
         ];
     };
     vec![format!(
-        "Tool error at the end of warm-up: p95 {} µm without compensation, {} µm with it ({:.1}-fold less).",
-        um(off.p95_mm),
-        um(on.p95_mm),
-        off.p95_mm / on.p95_mm
+        "Tool error at the end of warm-up, change since cold, at {} poses in the blocks' span: p95 {} µm without compensation, {} µm with it ({:.1}-fold less).",
+        on.n_inside,
+        um(off.change_p95_mm),
+        um(on.change_p95_mm),
+        off.change_p95_mm / on.change_p95_mm
     )]
+}
+
+/// The same for machines, mm.
+fn figures_of(errors: &[ToolError], span: Option<&BlocksSpan>) -> serde_json::Value {
+    let Some(span) = span else {
+        return serde_json::Value::Null;
+    };
+    let row = |error: &ToolError| {
+        serde_json::json!({
+            "label": error.label,
+            "poses": error.n_inside,
+            "change_since_cold_p95_mm": error.change_p95_mm,
+            "change_since_cold_max_mm": error.change_max_mm,
+            "change_since_cold_shift_mm": error.parts.shift_mm,
+            "change_since_cold_stretch_rms_mm": error.parts.stretch_mm,
+            "change_since_cold_rotation_rms_mm": error.parts.rotation_mm,
+            "change_since_cold_curved_rms_mm": error.parts.curved_mm,
+            "whole_error_cold_included_p95_mm": error.whole_p95_mm,
+        })
+    };
+    let (off, on) = match last_pair(errors) {
+        Some((off, on)) => (row(off), row(on)),
+        None => Default::default(),
+    };
+    serde_json::json!({
+        "span_low_mm": [span.low_mm.x, span.low_mm.y, span.low_mm.z],
+        "span_high_mm": [span.high_mm.x, span.high_mm.y, span.high_mm.z],
+        "without_compensation": off,
+        "with_compensation": on,
+        "verifications": errors.iter().map(row).collect::<Vec<_>>(),
+    })
 }
 
 const HEAD: [&str; 8] = [
@@ -110,14 +146,25 @@ const HEAD: [&str; 8] = [
     "whole p95",
 ];
 
+/// What each column says, a line each.
+const EXPLAINED: [&str; 7] = [
+    "p95, max: size of the change since cold that 95 % of the poses do not exceed, and the greatest.",
+    "shift: what all poses share; what compensation leaves of it is drift since the last block cycle, and probing.",
+    "stretch: growth along each axis itself (rms), all that two blocks can see besides the shift.",
+    "rotation: turns and shears between axes (rms); two blocks on one diagonal take a part of them for stretch.",
+    "curved: the rest (rms), from hot zones and bending, which no linear model follows.",
+    "whole p95: 95 % of the whole error, with the geometric error that is there when cold and that thermal compensation leaves alone.",
+    "in the blocks' span: at poses between the outermost faces of the blocks in X, Y and Z.",
+];
+
 fn error_rows(errors: &[ToolError]) -> Vec<Vec<String>> {
     errors
         .iter()
         .map(|error| {
             vec![
                 error.label.clone(),
-                um(error.p95_mm),
-                um(error.max_mm),
+                um(error.change_p95_mm),
+                um(error.change_max_mm),
                 um(error.parts.shift_mm),
                 um(error.parts.stretch_mm),
                 um(error.parts.rotation_mm),
@@ -132,41 +179,46 @@ fn error_table(errors: &[ToolError]) -> Markup {
     table(&HEAD, &error_rows(errors))
 }
 
-/// Corners of the table and its centre, at the lowest height that was visited everywhere.
-fn places() -> [(&'static str, Vector3<f64>); 5] {
-    [
-        ("corner -X -Y", Vector3::new(-1e3, -1e3, 1e3)),
-        ("corner +X -Y", Vector3::new(1e3, -1e3, 1e3)),
-        ("corner -X +Y", Vector3::new(-1e3, 1e3, 1e3)),
-        ("corner +X +Y", Vector3::new(1e3, 1e3, 1e3)),
-        ("centre", Vector3::new(0.0, 0.0, 1e3)),
-    ]
+/// Corners and centre of what every verification visited.
+fn places(errors: &[ToolError]) -> Option<Places> {
+    Places::of(&errors.first()?.change)
 }
 
-fn place_rows(errors: &[ToolError]) -> Vec<Vec<String>> {
-    places()
+fn of_places(places: &Places, span: Option<&BlocksSpan>) -> String {
+    let z_mm = places.z_mm;
+    let inside = span.is_some_and(|span| places.at_mm.iter().all(|place| span.holds(place)));
+    let span = if inside {
+        "inside the blocks' span"
+    } else {
+        "outside of the blocks' span, where drift is extrapolated"
+    };
+    format!(
+        "Corners and centre of the visited area at Z {z_mm} mm, the lowest height at which all five were visited; {span}."
+    )
+}
+
+fn place_rows(errors: &[ToolError], places: &Places) -> Vec<Vec<String>> {
+    let row = |(name, place_mm): (&&str, &Vector3<f64>)| {
+        let mut row = vec![(*name).to_owned()];
+        for error in errors {
+            let e = tool_error::at(&error.change, place_mm);
+            row.push(e.map_or_else(String::new, |e| {
+                format!("{} ({}, {}, {})", um(e.norm()), um(e.x), um(e.y), um(e.z))
+            }));
+        }
+        row
+    };
+    tool_error::PLACES
         .iter()
-        .map(|(name, wanted_mm)| {
-            let mut row = vec![(*name).to_owned()];
-            for error in errors {
-                row.push(tool_error::nearest(&error.change, *wanted_mm).map_or_else(
-                    String::new,
-                    |pose| {
-                        let e = pose.error_mm;
-                        let size = um(e.norm());
-                        format!("{size} ({}, {}, {})", um(e.x), um(e.y), um(e.z))
-                    },
-                ));
-            }
-            row
-        })
+        .zip(&places.at_mm)
+        .map(row)
         .collect()
 }
 
-fn places_table(errors: &[ToolError]) -> Markup {
+fn places_table(errors: &[ToolError], places: &Places) -> Markup {
     let mut head = vec!["size (x, y, z) / µm"];
     head.extend(errors.iter().map(|error| error.label.as_str()));
-    table(&head, &place_rows(errors))
+    table(&head, &place_rows(errors, places))
 }
 
 /// What was left at each update, had the drift been held since the last one or predicted.
@@ -244,10 +296,12 @@ fn drift_traces(evidence: &Evidence) -> BTreeMap<Axis, Vec<Trace>> {
 }
 
 /// The tables as they stand on a terminal.
-fn text(errors: &[ToolError]) -> String {
-    let mut text =
-        "Tool error in the blocks' span, change since cold, µm; parts are root mean squares\n"
-            .to_owned();
+fn text(errors: &[ToolError], span: Option<&BlocksSpan>) -> String {
+    let mut text = String::new();
+    if errors.is_empty() {
+        return text;
+    }
+    text.push_str("Change of the tool error since cold, in the blocks' span, µm\n");
     for row in std::iter::once(HEAD.map(str::to_owned).to_vec()).chain(error_rows(errors)) {
         let _ = writeln!(
             text,
@@ -255,15 +309,25 @@ fn text(errors: &[ToolError]) -> String {
             row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
         );
     }
-    text.push('\n');
-    let mut head = vec!["size (x, y, z) / µm".to_owned()];
+    for line in EXPLAINED {
+        let _ = writeln!(text, "  {line}");
+    }
+    let Some(places) = places(errors) else {
+        return text;
+    };
+    let _ = writeln!(
+        text,
+        "\nChange of the tool error since cold at five places, µm"
+    );
+    let mut head = vec!["size (x, y, z)".to_owned()];
     head.extend(errors.iter().map(|error| error.label.clone()));
-    for row in std::iter::once(head).chain(place_rows(errors)) {
+    for row in std::iter::once(head).chain(place_rows(errors, &places)) {
         let _ = write!(text, "  {:<20}", row[0]);
         for cell in &row[1..] {
             let _ = write!(text, "{cell:>30}");
         }
         text.push('\n');
     }
+    let _ = writeln!(text, "  {}", of_places(&places, span));
     text
 }

@@ -13,11 +13,11 @@ use metrology::sample::PlanState;
 use metrology::stamp::{Host, Span, Stamp};
 use node_runtime::arguments::Arguments;
 use node_runtime::harness::Published;
-use node_runtime::{Harness, Node, Setup};
+use node_runtime::{Harness, Interruption, Node, Setup};
 use recorder::{ChannelId, MessageStamp, Recorder, RecorderSink};
 
 use super::mirror::Mirror;
-use super::{Outcome, bag};
+use super::{INTERRUPTED, Outcome, bag};
 use crate::evidence::Evidence;
 use crate::launch::LaunchNode;
 use crate::node;
@@ -31,17 +31,22 @@ const SHUTDOWN_PATIENCE: Span = Span::from_nanos(120_000_000_000);
 /// Nodes evaluate the last program of a plan after its end: this long the run goes on.
 const EVALUATION: Span = Span::from_nanos(3_000_000_000);
 
+/// How a scenario is run.
+#[derive(Clone, Copy)]
+pub struct How<'a> {
+    /// No faster than this many times real time; 0: as fast as it can.
+    pub pace: f64,
+    /// Whether its topics are shown on DDS.
+    pub on_dds: bool,
+    /// Whether it is to end before its plan does.
+    pub interruption: &'a Interruption,
+}
+
 /// Runs `scenario` from `start_s` on.
 ///
 /// # Errors
 /// When a node cannot be built or the bag not written.
-pub fn run(
-    scenario: &Scenario,
-    start_s: i64,
-    bag_path: &Path,
-    pace: f64,
-    on_dds: bool,
-) -> Result<Outcome> {
+pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> Result<Outcome> {
     let truth = Arc::new(Truth::default());
     let nodes = build(scenario, &truth)?;
     let parameters = nodes
@@ -53,14 +58,16 @@ pub fn run(
     let mut harness = Harness::compose(nodes, start)?;
     let recorder = bag::begin(bag_path, scenario, parameters, start_nanos, true)?;
     record(&mut harness, &recorder)?;
-    let mirror = if on_dds {
+    let mirror = if how.on_dds {
         Mirror::start(&mut harness)?
     } else {
         None
     };
     let evidence = gather(&mut harness, &truth);
-    let failure = play(&mut harness, scenario, start, pace, &evidence, &truth);
-    harness.shutdown(SHUTDOWN_PATIENCE);
+    let failure = play(&mut harness, scenario, start, how, &evidence, &truth);
+    if !how.interruption.is_forced() {
+        harness.shutdown(SHUTDOWN_PATIENCE);
+    }
     drop(harness);
     if let Some(mirror) = mirror {
         mirror.finish()?;
@@ -159,7 +166,7 @@ fn play(
     harness: &mut Harness,
     scenario: &Scenario,
     start: Stamp<Host>,
-    pace: f64,
+    how: How<'_>,
     evidence: &Rc<RefCell<Evidence>>,
     truth: &Truth,
 ) -> Option<String> {
@@ -175,6 +182,9 @@ fn play(
         if progress.due() {
             settle(&mut evidence.borrow_mut(), truth);
             progress.show(now, &evidence.borrow());
+            if how.interruption.is_asked() {
+                break Some(INTERRUPTED.to_owned());
+            }
         }
         match evidence
             .borrow()
@@ -197,11 +207,11 @@ fn play(
                 scenario.file.limit_min
             ));
         }
-        if pace > 0.0 {
-            let due = Duration::from_secs_f64((now - start).as_secs_f64() / pace);
+        if how.pace > 0.0 {
+            let due = Duration::from_secs_f64((now - start).as_secs_f64() / how.pace);
             std::thread::sleep(due.saturating_sub(began.elapsed()));
         }
     };
-    progress.finish();
+    progress.finish(&evidence.borrow());
     failure
 }

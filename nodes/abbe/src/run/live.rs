@@ -12,12 +12,11 @@ use node_runtime::arguments::Arguments;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::{Selection, TapEvent};
-use node_runtime::{Node, Running, Setup};
+use node_runtime::{Interruption, Node, Running, Setup};
 use recorder::Recorder;
 use recorder_node::Capture;
-use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::{Outcome, bag};
+use super::{INTERRUPTED, Outcome, bag};
 use crate::launch::LaunchNode;
 use crate::node;
 use crate::progress::Progress;
@@ -40,9 +39,13 @@ const TAP: &str = "abbe_run_tap";
 ///
 /// # Errors
 /// When a node cannot be started, there is no network, or the bag cannot be begun.
-pub fn run(scenario: &Scenario, bag_path: &Path, separate: bool) -> Result<Outcome> {
+pub fn run(
+    scenario: &Scenario,
+    bag_path: &Path,
+    separate: bool,
+    interruption: &Interruption,
+) -> Result<Outcome> {
     let environment = Environment::read()?;
-    let signals = Signals::listen()?;
     let prepared = prepare(scenario, separate)?;
     let recorder = begin_bag(scenario, bag_path, &prepared)?;
     let evidence = Arc::<Mutex<GraphEvidence>>::default();
@@ -62,9 +65,9 @@ pub fn run(scenario: &Scenario, bag_path: &Path, separate: bool) -> Result<Outco
         Prepared::Here(nodes) => Cast::Here(node_runtime::launch(&environment, nodes)?),
         Prepared::Separate(_) => Cast::Separate(Processes::start(&scenario.nodes)?),
     };
-    let failure = play(scenario, &evidence, &mut cast, signals);
-    std::thread::sleep(AFTERMATH);
-    let stopped = cast.stop();
+    let failure = play(scenario, &evidence, &mut cast, interruption);
+    let _ = interruption.wait_until_forced(AFTERMATH);
+    let stopped = cast.stop(interruption);
     let captured = capture.finish()?;
     for word in capture_words(&captured) {
         eprintln!("abbe: {word}");
@@ -106,7 +109,7 @@ fn lock(evidence: &Mutex<GraphEvidence>) -> MutexGuard<'_, GraphEvidence> {
 /// Nodes before the start.
 enum Prepared {
     Here(Vec<(Setup, Box<dyn Node>)>),
-    /// Parameters as they were given, by node: another process resolves them.
+    /// Parameters by node, as the node's own process will resolve them.
     Separate(BTreeMap<String, String>),
 }
 
@@ -145,7 +148,7 @@ fn prepare(scenario: &Scenario, separate: bool) -> Result<Prepared> {
         let build = known(launched).with_context(context)?;
         let setup = setup(launched).with_context(context)?;
         if separate {
-            let parameters = setup.parameters(&[]).with_context(context)?;
+            let parameters = setup.resolved_by(build).with_context(context)?;
             given.insert(
                 launched.name.clone(),
                 bag::listed(&launched.name, &parameters)?,
@@ -183,52 +186,14 @@ impl Cast {
         }
     }
 
-    fn stop(self) -> Result<()> {
+    fn stop(self, interruption: &Interruption) -> Result<()> {
         match self {
-            Self::Here(running) => running.stop(),
+            Self::Here(running) => running.stop_unless_forced(interruption),
             Self::Separate(processes) => {
-                processes.stop();
+                processes.stop(interruption);
                 Ok(())
             }
         }
-    }
-}
-
-/// SIGINT and SIGTERM, which end the plan instead of the process.
-struct Signals {
-    runtime: tokio::runtime::Runtime,
-    interrupt: Signal,
-    terminate: Signal,
-}
-
-impl Signals {
-    fn listen() -> Result<Self> {
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .context("tokio runtime")?;
-        let (interrupt, terminate) = runtime.block_on(async {
-            let interrupt = signal(SignalKind::interrupt()).context("SIGINT")?;
-            let terminate = signal(SignalKind::terminate()).context("SIGTERM")?;
-            anyhow::Ok((interrupt, terminate))
-        })?;
-        Ok(Self {
-            runtime,
-            interrupt,
-            terminate,
-        })
-    }
-
-    /// Waits for [`LOOK`]; true when the program was asked to end.
-    fn wait(&mut self) -> bool {
-        let (interrupt, terminate) = (&mut self.interrupt, &mut self.terminate);
-        self.runtime.block_on(async {
-            tokio::select! {
-                _ = interrupt.recv() => true,
-                _ = terminate.recv() => true,
-                () = tokio::time::sleep(LOOK) => false,
-            }
-        })
     }
 }
 
@@ -237,15 +202,16 @@ fn play(
     scenario: &Scenario,
     evidence: &Mutex<GraphEvidence>,
     cast: &mut Cast,
-    mut signals: Signals,
+    interruption: &Interruption,
 ) -> Option<String> {
     let title = format!("{}: {}", scenario.name, scenario.file.title);
     let mut progress = Progress::new(&title, Stamp::<Host>::from_nanos(0));
     let began = Instant::now();
     let limit = Duration::from_secs_f64(scenario.file.limit_min * 60.0);
     let failure = loop {
-        if signals.wait() {
-            break Some("it was interrupted".to_owned());
+        if interruption.wait(LOOK) {
+            eprintln!("abbe: interrupted: the nodes wind down; a second Ctrl-C ends at once");
+            break Some(INTERRUPTED.to_owned());
         }
         let elapsed = began.elapsed();
         {
@@ -271,6 +237,6 @@ fn play(
             ));
         }
     };
-    progress.finish();
+    progress.finish(lock(evidence).evidence());
     failure
 }

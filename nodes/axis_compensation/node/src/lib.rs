@@ -15,8 +15,8 @@ mod conditions;
 /// Time between two looks at what is stale.
 const TICK: Span = Span::from_nanos(10_000_000);
 
-/// What the limits of rate and acceleration add to the time of a last fade, s.
-const FADE_MARGIN_S: f64 = 5.0;
+/// What a busy computer adds to the time of a last fade, s.
+const BUSY_S: f64 = 1.0;
 
 /// Builds the node.
 ///
@@ -58,7 +58,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         })
         .diagnose(conditions::condition)
         .shutdown(|| Input::Shutdown, |output| *output == Output::FadedOut)
-        .wound_down_within(Span::from_secs_f64(config.fade_s + FADE_MARGIN_S))
+        .wound_down_within(Span::from_secs_f64(config.wind_down_s() + BUSY_S))
         .node())
 }
 

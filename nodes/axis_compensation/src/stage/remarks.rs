@@ -1,12 +1,16 @@
 //! What the stage has to say of an axis that changed and of a model that came.
 
-use metrology::Axis;
+use metrology::drift::drift_standard_uncertainty_mm;
 use metrology::sample::{CompensationState, ThermalModel};
+use metrology::{Axis, Host, Stamp};
+use nalgebra::Vector3;
 
 use super::{AxisCompensationStage, Output};
 use crate::axis_state::{AxisState as Compensated, Wanted};
 use crate::diagnostic::Diagnostic;
-use crate::model_gate::Passage;
+use crate::model_gate::{COVERAGE_FACTOR, Passage};
+use crate::positioning::dual_loop::DualLoop;
+use crate::span_watch::SpanChange;
 
 impl AxisCompensationStage {
     /// Says what changed, once.
@@ -53,17 +57,66 @@ impl AxisCompensationStage {
         }
     }
 
-    pub(super) fn model(&mut self, model: ThermalModel, out: &mut Vec<Output>) {
+    /// Says where a drift is used beyond the blocks.
+    pub(super) fn watch_span(
+        &mut self,
+        axis: Axis,
+        point_mm: &Vector3<f64>,
+        out: &mut Vec<Output>,
+    ) {
+        let dual_loop = self.positioning[axis].as_ref();
+        let adds_thermal = dual_loop.is_none_or(DualLoop::adds_thermal);
+        let Some(model) = self.gate.current().filter(|_| adds_thermal) else {
+            return;
+        };
+        let Some(drift) = &model.axes[axis] else {
+            return;
+        };
+        let position_mm = point_mm[axis.index()];
+        let change = self.spans[axis].look(drift, position_mm);
+        out.extend(change.map(|change| {
+            Output::Diagnostic(match change {
+                SpanChange::KeptWithin => Diagnostic::WithinSpan { axis },
+                SpanChange::Left => Diagnostic::BeyondSpan {
+                    axis,
+                    position_mm,
+                    lower_mm: drift.span_mm.0,
+                    upper_mm: drift.span_mm.1,
+                    expanded_uncertainty_mm: COVERAGE_FACTOR
+                        * drift_standard_uncertainty_mm(model, axis, point_mm, self.gate.policy())
+                            .unwrap_or(f64::NAN),
+                    greatest_mm: self.gate.expanded_uncertainty_mm(axis),
+                },
+            })
+        }));
+    }
+
+    pub(super) fn model(&mut self, at: Stamp<Host>, model: ThermalModel, out: &mut Vec<Output>) {
         let sequence = model.sequence;
         let was_in_doubt = self.model_in_doubt;
-        self.model_in_doubt = model.quarantined;
-        if model.quarantined {
+        let is_doubtful = model.quarantined;
+        let passage = self.gate.offer(at, model);
+        // History of a latched topic changes nothing.
+        if let Passage::Expired { late_s } = passage {
+            let expired = Diagnostic::ModelExpired { sequence, late_s };
+            out.push(Output::Diagnostic(expired));
+            return;
+        }
+        if let Passage::Older { by_s } = passage {
+            out.push(Output::Diagnostic(Diagnostic::ModelOlder {
+                sequence,
+                by_s,
+            }));
+            return;
+        }
+        if is_doubtful {
             out.push(Output::Diagnostic(Diagnostic::ModelDoubtful { sequence }));
         }
-        let passage = self.gate.offer(model);
+        self.model_in_doubt = is_doubtful;
         self.model_in_doubt |= !matches!(passage, Passage::Accepted | Passage::Confirmed);
         let doubt_ends = was_in_doubt && !self.model_in_doubt;
         out.extend(match passage {
+            Passage::Expired { .. } | Passage::Older { .. } => None,
             Passage::Accepted => {
                 doubt_ends.then_some(Output::Diagnostic(Diagnostic::ModelAccepted { sequence }))
             }

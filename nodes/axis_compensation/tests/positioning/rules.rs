@@ -15,7 +15,6 @@ fn thermal(k0_mm: f64) -> Input {
     axes[Axis::X] = Some(AxisDrift {
         k0_mm,
         span_mm: (-220.0, 220.0),
-        time_constant_s: f64::INFINITY,
         ..AxisDrift::default()
     });
     let at = Stamp::from_nanos(0);

@@ -112,7 +112,7 @@ pub fn configured(positioning: &str) -> Result<AxisCompensationStage, String> {
         "size_limit_um: 100.0, rate_limit_um_per_s: 2000.0, acceleration_limit_um_per_s2: 100000.0";
     let config: AxisCompensationConfig = serde_saphyr::from_str(&format!(
         "{{axes: {{X: {{{limits}}}, Z: {{{limits}}}}}, extrapolate: hold, physical_rate_um_per_min: 3.0, \
-         jump_margin_um: 2.0, hold_s: 1.0, fade_s: 2.0, positioning: {{{positioning}}}}}"
+         jump_margin_um: 2.0, expanded_uncertainty_limit_um: 1000.0, hold_s: 1.0, fade_s: 2.0, positioning: {{{positioning}}}}}"
     ))
     .map_err(|error| error.to_string())?;
     AxisCompensationStage::new(&config, &serde_saphyr::from_str(MACHINE).unwrap())

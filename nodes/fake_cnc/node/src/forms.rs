@@ -5,7 +5,6 @@ use std::cell::Cell;
 use abbe_msgs::action::{RunProgram, RunProgramFeedback, RunProgramGoal, RunProgramResult};
 use abbe_msgs::joint_state;
 use abbe_msgs::sensor_msgs::msg::JointState;
-use fake_cnc::diagnostic::Severity;
 use fake_cnc::{Input, Outcome, Output, ProgramState};
 use metrology::sample::{AxisState, GridSample, LengthSample, ProbeTrigger, TemperatureSample};
 use metrology::stamp::Span;
@@ -154,11 +153,7 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
     let Output::Diagnostic(condition) = output else {
         return None;
     };
-    let level = match condition.severity() {
-        Severity::Ok => Level::Ok,
-        Severity::Warn => Level::Warn,
-        Severity::Error => Level::Error,
-    };
+    let level = Level::from(condition.severity());
     Some(Diagnostic::new(
         level,
         condition.name(),

@@ -8,7 +8,7 @@ use super::file::Place;
 #[derive(Debug, thiserror::Error)]
 pub enum PlantError {
     /// The text is not a plant file; the message names key, line and column.
-    #[error("plant file: {source}")]
+    #[error("{source}")]
     Syntax {
         /// What the reader found.
         #[from]

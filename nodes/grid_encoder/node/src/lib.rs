@@ -2,7 +2,6 @@
 
 use abbe_msgs::topics;
 use anyhow::Result;
-use grid_encoder::diagnostic::Severity;
 use grid_encoder::{GridEncoderConfig, GridEncoderStage, Input, Output, PARAMETERS};
 use machine::MachineFile;
 use metrology::stamp::Span;
@@ -38,11 +37,7 @@ fn condition(output: &Output) -> Option<Diagnostic> {
     let Output::Diagnostic(diagnostic) = output else {
         return None;
     };
-    let level = match diagnostic.severity() {
-        Severity::Info => Level::Ok,
-        Severity::Warn => Level::Warn,
-        Severity::Error => Level::Error,
-    };
+    let level = Level::from(diagnostic.severity());
     Some(Diagnostic::new(
         level,
         diagnostic.condition(),

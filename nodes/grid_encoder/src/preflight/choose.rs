@@ -18,7 +18,7 @@
 use machine::Kinematics;
 use nalgebra::DMatrix;
 
-use super::{information, planned, preflight};
+use super::{information, planned, preflight_of};
 use crate::equations::Equations;
 use crate::error::IdentifyError;
 use crate::identify::{Identification, IdentifyOptions};
@@ -65,7 +65,7 @@ pub struct Choice {
 /// Looks for the fewest of `places` with which every coefficient that `wanted` accepts is estimable.
 ///
 /// # Errors
-/// As [`preflight`].
+/// As [`preflight`](super::preflight).
 pub fn choose(
     kinematics: &Kinematics,
     places: &[Place],
@@ -73,29 +73,58 @@ pub fn choose(
     wanted: impl Fn(&Unknown) -> bool,
     search: &Search,
 ) -> Result<Choice, IdentifyError> {
-    let whole = preflight(kinematics, places, options, search.station_uncertainty_mm)?;
+    choose_beside(kinematics, &[], places, options, wanted, search)
+}
+
+/// The same, for what `already` planned recordings do not see; they belong to every programme.
+///
+/// # Errors
+/// As [`preflight`](super::preflight).
+pub fn choose_beside(
+    kinematics: &Kinematics,
+    already: &[Recording],
+    places: &[Place],
+    options: &IdentifyOptions,
+    wanted: impl Fn(&Unknown) -> bool,
+    search: &Search,
+) -> Result<Choice, IdentifyError> {
+    let with = |idx: &[usize]| -> Vec<Recording> {
+        let first = already.iter().map(|r| r.run).max().unwrap_or(0) + 1;
+        let added = idx.iter().map(|idx| &places[*idx]).zip(first..);
+        let added = added.map(|(place, run)| planned(run, place, search.station_uncertainty_mm));
+        already.iter().cloned().chain(added).collect()
+    };
+    let all: Vec<usize> = (0..places.len()).collect();
+    let whole = preflight_of(kinematics, &with(&all), options)?;
+    let before = if already.is_empty() {
+        None
+    } else {
+        Some(preflight_of(kinematics, already, options)?)
+    };
+    let is_seen = |seen: &Identification, j: usize| seen.visibility[j] == Visibility::Estimable;
     let asked: Vec<usize> = (0..whole.n_coefficients)
         .filter(|j| wanted(&whole.unknowns[*j]))
         .collect();
-    let (goal, beyond): (Vec<usize>, Vec<usize>) = asked
-        .into_iter()
-        .partition(|j| whole.visibility[*j] == Visibility::Estimable);
+    let (goal, beyond): (Vec<usize>, Vec<usize>) =
+        asked.into_iter().partition(|j| is_seen(&whole, *j));
     let beyond_the_list = beyond.iter().map(|j| whole.unknowns[*j].clone()).collect();
-    if goal.is_empty() {
+    let is_done = before
+        .as_ref()
+        .is_some_and(|before| goal.iter().all(|j| is_seen(before, *j)));
+    if goal.is_empty() || is_done {
         return Ok(Choice {
             recordings: Vec::new(),
             is_least: true,
             beyond_the_list,
-            seen: None,
+            seen: before,
         });
     }
-    let list = List::new(kinematics, places, options, goal);
+    let list = List::new(kinematics, already, places, options, goal);
     let (recordings, is_least) = match list.smallest(search.programmes) {
         Ok(found) => (found, true),
         Err(next_size) => (list.one_by_one(), next_size == 0),
     };
-    let chosen: Vec<Place> = recordings.iter().map(|idx| places[*idx]).collect();
-    let seen = preflight(kinematics, &chosen, options, search.station_uncertainty_mm)?;
+    let seen = preflight_of(kinematics, &with(&recordings), options)?;
     Ok(Choice {
         recordings,
         is_least,
@@ -106,6 +135,8 @@ pub fn choose(
 
 /// The information of every recording of a list.
 struct List {
+    /// Of the recordings that belong to every programme.
+    already: DMatrix<f64>,
     grams: Vec<DMatrix<f64>>,
     goal: Vec<usize>,
 }
@@ -123,14 +154,14 @@ struct Score {
 impl List {
     fn new(
         kinematics: &Kinematics,
+        already: &[Recording],
         places: &[Place],
         options: &IdentifyOptions,
         goal: Vec<usize>,
     ) -> Self {
         let numbered = (1..).zip(places);
-        let recordings: Vec<Recording> = numbered
-            .map(|(number, place)| planned(number, place, 1.0))
-            .collect();
+        let added = numbered.map(|(number, place)| planned(number, place, 1.0));
+        let recordings: Vec<Recording> = already.iter().cloned().chain(added).collect();
         let unknowns = Unknowns::of(&options.components, &recordings, &options.nuisances);
         let equations = Equations::new(
             kinematics,
@@ -139,8 +170,14 @@ impl List {
             unknowns,
             options.radial_only,
         );
+        let p = equations.unknowns.len();
+        let mut before = DMatrix::zeros(p, p);
+        for idx in 0..already.len() {
+            before += information(&equations, idx);
+        }
         Self {
-            grams: (0..places.len())
+            already: before,
+            grams: (already.len()..recordings.len())
                 .map(|idx| information(&equations, idx))
                 .collect(),
             goal,
@@ -149,8 +186,8 @@ impl List {
 
     /// (1); the columns that the programme does not touch are left out.
     fn score(&self, programme: &[usize]) -> Score {
-        let p = self.grams.first().map_or(0, DMatrix::ncols);
-        let mut sum = DMatrix::zeros(p, p);
+        let p = self.already.ncols();
+        let mut sum = self.already.clone();
         for idx in programme {
             sum += &self.grams[*idx];
         }

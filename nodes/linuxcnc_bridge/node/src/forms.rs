@@ -6,7 +6,6 @@ use abbe_msgs::action::{RunProgram, RunProgramFeedback, RunProgramGoal, RunProgr
 use abbe_msgs::joint_state;
 use abbe_msgs::sensor_msgs::msg::JointState;
 use linuxcnc_bridge::Output;
-use linuxcnc_bridge::condition::Severity;
 use linuxcnc_bridge::live::LiveInput;
 use linuxcnc_bridge::run::{Ending, Outcome};
 use metrology::sample::{AxisState, ProbeTrigger};
@@ -95,11 +94,7 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
     let Output::Condition(condition) = output else {
         return None;
     };
-    let level = match condition.severity() {
-        Severity::Fine => Level::Ok,
-        Severity::Warning => Level::Warn,
-        Severity::Failure => Level::Error,
-    };
+    let level = Level::from(condition.severity());
     Some(Diagnostic::new(
         level,
         condition.name(),

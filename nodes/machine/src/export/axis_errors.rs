@@ -6,6 +6,7 @@ use metrology::{Axis, ErrorComponent};
 use super::cross_errors::CrossErrors;
 use super::error::ExportError;
 use super::grid::{Grid, SAME};
+use crate::volumetric::on_line;
 
 /// Positioning errors of an axis: actual minus commanded, checked and at ascending points.
 #[derive(Clone, Debug, PartialEq)]
@@ -297,17 +298,4 @@ pub(super) fn check_inside(
         }),
         None => Ok(()),
     }
-}
-
-/// Value at `at` on straight lines between the points, held beyond the outer ones.
-pub(super) fn on_line(position: &[f64], value: &[f64], at: f64) -> f64 {
-    let above = position.partition_point(|p| *p <= at);
-    if above == 0 {
-        return value[0];
-    }
-    if above == position.len() {
-        return value[above - 1];
-    }
-    let share = (at - position[above - 1]) / (position[above] - position[above - 1]);
-    value[above - 1] + share * (value[above] - value[above - 1])
 }

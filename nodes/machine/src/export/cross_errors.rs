@@ -20,11 +20,12 @@
 
 use metrology::sample::{CurveForm, ErrorCurve, GeometryModel};
 use metrology::{Axis, ErrorComponent};
-use nalgebra::Vector3;
 
-use super::axis_errors::{check_inside, check_positions, check_values, on_line};
+use super::axis_errors::{check_inside, check_positions, check_values};
 use super::error::ExportError;
 use super::grid::{Grid, SAME};
+use crate::kinematics::direction_of;
+use crate::volumetric::{Alone, check_curve, lean, on_line};
 
 /// What to do with a component that the recordings do not determine by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,12 +94,19 @@ impl CrossErrors {
                 .iter()
                 .find(|curve| curve.component == component)
                 .ok_or(ExportError::MissingComponent { component })?;
-            check_curve(curve)?;
+            check(curve)?;
             if unestimable == Unestimable::Refuse {
                 check_estimable(curve)?;
             }
+            let alone = Alone::new(curve);
             for (at, error) in position.iter().zip(&mut error) {
-                *error += share.of(curve, *at)?;
+                *error += match share {
+                    Share::Motion => {
+                        check_recorded(curve, *at)?;
+                        alone.at(*at)
+                    }
+                    Share::Turn(sign) => sign * alone.at(*at) * at, // (1)
+                };
             }
         }
         Self::new(base, direction, position, error, components.to_vec())
@@ -163,25 +171,12 @@ impl CrossErrors {
 }
 
 /// How a component acts in a direction.
+#[derive(Clone, Copy)]
 enum Share {
     /// As its curve says.
     Motion,
     /// As an angle times position, with this sign.
     Turn(f64),
-}
-
-impl Share {
-    fn of(&self, curve: &ErrorCurve, at: f64) -> Result<f64, ExportError> {
-        match self {
-            Self::Motion => value_at(curve, at),
-            // (1)
-            Self::Turn(sign) => Ok(sign * curve.coefficient[0] * at),
-        }
-    }
-}
-
-fn unit_vector(axis: Axis) -> Vector3<f64> {
-    Vector3::ith(axis.index() % 3, 1.0)
 }
 
 fn share(component: ErrorComponent, base: Axis, direction: Axis) -> Result<Share, ExportError> {
@@ -203,8 +198,7 @@ fn share(component: ErrorComponent, base: Axis, direction: Axis) -> Result<Share
     if component.direction.is_linear() || !base.is_linear() || !direction.is_linear() {
         return Err(none);
     }
-    let turned = unit_vector(component.direction).cross(&unit_vector(base));
-    let sign = turned.dot(&unit_vector(direction));
+    let sign = lean(component).dot(&direction_of(direction));
     if sign.abs() < 0.5 {
         Err(none)
     } else {
@@ -212,33 +206,18 @@ fn share(component: ErrorComponent, base: Axis, direction: Axis) -> Result<Share
     }
 }
 
-fn check_curve(curve: &ErrorCurve) -> Result<(), ExportError> {
+/// What a curve must be beyond what the machine model asks of it.
+fn check(curve: &ErrorCurve) -> Result<(), ExportError> {
+    check_curve(curve)?;
     let component = curve.component;
-    let n = curve.coefficient.len();
-    let fits = match curve.form {
-        CurveForm::Constant => n == 1,
-        CurveForm::Polynomial => curve.power.len() == n,
-        CurveForm::Table => curve.position.len() == n && n >= 2,
-    };
-    let rule = if !fits {
-        Some("the number of coefficients does not fit the form of the curve")
-    } else if component.is_location != (curve.form == CurveForm::Constant) {
-        Some("a location error is one number and an error motion is not")
-    } else if curve.estimable.len() != n {
-        Some("each coefficient needs its mark of estimability")
-    } else if !curve.origin.is_finite() {
-        Some("the origin must be finite")
+    let rule = if component.is_location != (curve.form == CurveForm::Constant) {
+        "a location error is one number and an error motion is not"
+    } else if curve.estimable.len() != curve.coefficient.len() {
+        "each coefficient needs its mark of estimability"
     } else {
-        None
+        return Ok(());
     };
-    if let Some(rule) = rule {
-        return Err(ExportError::Malformed { component, rule });
-    }
-    check_values(component.of, "coefficient", &curve.coefficient, n)?;
-    if curve.form == CurveForm::Table {
-        check_positions(component.of, &curve.position)?;
-    }
-    Ok(())
+    Err(ExportError::Malformed { component, rule })
 }
 
 fn check_estimable(curve: &ErrorCurve) -> Result<(), ExportError> {
@@ -251,26 +230,17 @@ fn check_estimable(curve: &ErrorCurve) -> Result<(), ExportError> {
     }
 }
 
-/// Value of a curve inside its recorded span.
-fn value_at(curve: &ErrorCurve, at: f64) -> Result<f64, ExportError> {
+/// Whether a curve was recorded at a position.
+fn check_recorded(curve: &ErrorCurve, at: f64) -> Result<(), ExportError> {
     let (least, greatest) = curve.span;
-    // A span that is no number contains nothing.
-    if !(least - SAME..=greatest + SAME).contains(&at) {
-        let (axis, position) = (curve.component.of, at);
-        return Err(ExportError::OutsideMeasured {
-            axis,
-            position,
-            least,
-            greatest,
-        });
+    if (least - SAME..=greatest + SAME).contains(&at) {
+        return Ok(());
     }
-    Ok(match curve.form {
-        CurveForm::Constant => curve.coefficient[0],
-        CurveForm::Polynomial => {
-            let q = at - curve.origin;
-            let terms = curve.power.iter().zip(&curve.coefficient);
-            terms.map(|(power, c)| c * q.powi(i32::from(*power))).sum()
-        }
-        CurveForm::Table => on_line(&curve.position, &curve.coefficient, at),
+    let (axis, position) = (curve.component.of, at);
+    Err(ExportError::OutsideMeasured {
+        axis,
+        position,
+        least,
+        greatest,
     })
 }

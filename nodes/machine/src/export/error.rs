@@ -2,6 +2,8 @@
 
 use metrology::{Axis, ErrorComponent};
 
+use crate::volumetric::VolumetricError;
+
 /// Errors that a control cannot be given.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExportError {
@@ -217,7 +219,14 @@ pub enum ExportError {
         /// Direction of the error.
         direction: Axis,
     },
-    /// A curve whose lists do not fit its form.
+    /// A curve that is none.
+    #[error("{source}")]
+    Curve {
+        /// What is wrong with it.
+        #[from]
+        source: VolumetricError,
+    },
+    /// A curve that no table can take.
     #[error("{component}: {rule}")]
     Malformed {
         /// The component.

@@ -47,11 +47,12 @@
 //! machine error compensation, 9.2 (2) incremental system. \[3\] FANUC Series 15i/150i Parameter Manual, B-63330EN/03, p. 25.
 //! \[4\] FANUC Series 30i Parameter Manual, B-63950EN/02, 3.3, p. 8 to 12. \[5\] FANUC Technical Report A-77810E (2000), table (a): parameters 3620 to 3624.
 
-use super::axis_errors::{AxisErrors, equal_spacing, on_line};
+use super::axis_errors::{AxisErrors, equal_spacing};
 use super::error::ExportError;
 use super::file::ExportFile;
 use super::grid::SAME;
 use super::number::{fixed, mm_or_deg, unit};
+use crate::volumetric::on_line;
 
 const CONTROL: &str = "FANUC pitch error table";
 /// `N` of a point is its number and this.

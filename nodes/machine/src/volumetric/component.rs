@@ -11,6 +11,7 @@
 //! alike (for `[w X' Y' b Z t]`: EXY and the yaw ECY at one height), which recordings must show.
 
 use metrology::{Axis, ErrorComponent};
+use nalgebra::Vector3;
 
 use super::member::members;
 use crate::chain::Chain;
@@ -53,6 +54,12 @@ pub fn has_component(chain: &Chain, component: ErrorComponent) -> bool {
         _ => return false,
     };
     axes.contains(against)
+}
+
+/// Way of the tip per rad of a squareness and mm of the axis' position, first order: the axis is turned
+/// about the direction of its first letter.
+pub(crate) fn lean(squareness: ErrorComponent) -> Vector3<f64> {
+    direction_of(squareness.direction).cross(&direction_of(squareness.of))
 }
 
 /// Whether it displaces or tilts the line of a rotary axis.

@@ -6,7 +6,8 @@
 //!   hold:   E(end)                                   beyond it                            (3)
 //! ```
 //!
-//! Polynomials that share origin and span are evaluated together by Horner's rule. A table is straight
+//! Polynomials that share origin and span are evaluated together by Horner's rule, tables that share their knots
+//! by one look-up, which needs no search where the knots are equally far apart. A table is straight
 //! between its knots and constant beyond the outer ones, under every policy.
 
 use metrology::Axis;
@@ -34,7 +35,10 @@ pub(super) struct Motions {
     /// Where all of them were recorded.
     span: (f64, f64),
     together: Polynomials,
-    others: Vec<(usize, Other)>,
+    /// Whether `together` is more than constants.
+    has_powers: bool,
+    tables: Vec<Tables>,
+    others: Vec<(usize, Polynomials)>,
 }
 
 /// Polynomials about one origin over one span, one column each.
@@ -48,10 +52,15 @@ struct Polynomials {
     low: [Lanes; 4],
 }
 
+/// Tables over the same knots, one column each.
 #[derive(Clone, Debug, PartialEq)]
-enum Other {
-    Polynomial(Box<Polynomials>),
-    Table { knots: Vec<f64>, values: Vec<f64> },
+struct Tables {
+    knots: Vec<f64>,
+    values: Vec<Lanes>,
+    /// Knots per unit of position where they are equally far apart.
+    density: Option<f64>,
+    /// One by the length of each cell.
+    inverse_lengths: Vec<f64>,
 }
 
 impl Motions {
@@ -59,6 +68,8 @@ impl Motions {
     pub(super) const NONE: Self = Self {
         span: EVERYWHERE,
         together: Polynomials::NONE,
+        has_powers: false,
+        tables: Vec::new(),
         others: Vec::new(),
     };
 
@@ -75,6 +86,7 @@ impl Motions {
                 }
                 let same = (self.together.origin, self.together.span) == (curve.origin, curve.span);
                 if same {
+                    self.has_powers = true;
                     self.together.add(row, &curve.power, &curve.coefficient);
                 } else {
                     let mut alone = Polynomials {
@@ -83,16 +95,19 @@ impl Motions {
                         ..Polynomials::NONE
                     };
                     alone.add(row, &curve.power, &curve.coefficient);
-                    self.others.push((row, Other::Polynomial(Box::new(alone))));
+                    self.others.push((row, alone));
                 }
             }
             CurveForm::Table => {
                 self.narrow(curve.span);
-                let table = Other::Table {
-                    knots: curve.position.clone(),
-                    values: curve.coefficient.clone(),
-                };
-                self.others.push((row, table));
+                let same = |tables: &&mut Tables| tables.knots == curve.position;
+                if let Some(tables) = self.tables.iter_mut().find(same) {
+                    tables.add(row, &curve.coefficient);
+                } else {
+                    let mut tables = Tables::over(&curve.position);
+                    tables.add(row, &curve.coefficient);
+                    self.tables.push(tables);
+                }
             }
         }
     }
@@ -109,7 +124,14 @@ impl Motions {
     /// Values at a position; the policy `Refuse` is for the caller to have asked about.
     #[inline(always)]
     pub(super) fn at(&self, position: f64, policy: Extrapolate) -> Lanes {
-        let six = self.together.at(position, policy);
+        let mut six = if self.has_powers {
+            self.together.at(position, policy)
+        } else {
+            self.together.low[3]
+        };
+        for tables in &self.tables {
+            six = tables.add_at(position, six);
+        }
         if self.others.is_empty() {
             return six;
         }
@@ -118,11 +140,8 @@ impl Motions {
 
     // By value, here and below, so that the usual values need no place in memory.
     fn with_others(&self, position: f64, policy: Extrapolate, mut six: Lanes) -> Lanes {
-        for (row, other) in &self.others {
-            six[*row] += match other {
-                Other::Polynomial(alone) => alone.at(position, policy)[*row],
-                Other::Table { knots, values } => interpolated(knots, values, position),
-            };
+        for (row, alone) in &self.others {
+            six[*row] += alone.at(position, policy)[*row];
         }
         six
     }
@@ -162,14 +181,18 @@ impl Polynomials {
     fn at(&self, position: f64, policy: Extrapolate) -> Lanes {
         let inside = position.max(self.span.0).min(self.span.1);
         let u = inside - self.origin;
-        let mut six = Lanes::default();
+        let (mut six, low) = if self.high.is_empty() {
+            (self.low[0], &self.low[1..])
+        } else {
+            (Lanes::default(), &self.low[..])
+        };
         let mut horner = |coefficients: &Lanes| {
             for (value, c) in six.iter_mut().zip(coefficients) {
                 *value = *value * u + c; // (1)
             }
         };
         self.high.iter().for_each(&mut horner);
-        self.low.iter().for_each(horner);
+        low.iter().for_each(horner);
         if policy == Extrapolate::Linear && (position - inside).abs() > 0.0 {
             return self.continued_by(position - inside, u, six);
         }
@@ -194,23 +217,98 @@ impl Polynomials {
     }
 }
 
-/// Straight between knots, constant beyond them.
-fn interpolated(knots: &[f64], values: &[f64], position: f64) -> f64 {
-    let above = knots.partition_point(|&knot| knot <= position);
-    let (Some(below), true) = (above.checked_sub(1), above < knots.len()) else {
+impl Tables {
+    /// Without columns yet; the knots ascend and are two or more.
+    fn over(knots: &[f64]) -> Self {
+        /// Of a cell: how far a knot may be from where equal cells would put it.
+        const EVEN: f64 = 1e-6;
+        let cells = knots.len() - 1;
+        let length = (knots[cells] - knots[0]) / cells as f64;
+        let is_even =
+            |(k, knot): (usize, &f64)| (knot - knots[0] - k as f64 * length).abs() <= EVEN * length;
+        let lengths = knots.windows(2).map(|pair| pair[1] - pair[0]);
+        Self {
+            values: vec![Lanes::default(); knots.len()],
+            density: knots.iter().enumerate().all(is_even).then(|| 1.0 / length),
+            inverse_lengths: lengths.map(|length| 1.0 / length).collect(),
+            knots: knots.to_vec(),
+        }
+    }
+
+    fn add(&mut self, row: usize, values: &[f64]) {
+        for (lanes, value) in self.values.iter_mut().zip(values) {
+            lanes[row] += value;
+        }
+    }
+
+    #[inline]
+    fn add_at(&self, position: f64, mut six: Lanes) -> Lanes {
+        let last = self.inverse_lengths.len() - 1;
+        let inside = position.max(self.knots[0]).min(self.knots[last + 1]);
+        let cell = match self.density {
+            Some(density) => {
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a cell inside the table"
+                )]
+                let cell = ((inside - self.knots[0]) * density) as usize;
+                cell.min(last)
+            }
+            None => {
+                let above = self.knots.partition_point(|&knot| knot <= inside);
+                above.saturating_sub(1).min(last)
+            }
+        };
+        let share = (inside - self.knots[cell]) * self.inverse_lengths[cell];
+        let (from, to) = (&self.values[cell], &self.values[cell + 1]);
+        for ((value, from), to) in six.iter_mut().zip(from).zip(to) {
+            *value += from + share * (to - from);
+        }
+        six
+    }
+}
+
+/// Straight between ascending points, constant beyond the outer ones; zero without a point.
+pub(crate) fn on_line(position: &[f64], value: &[f64], at: f64) -> f64 {
+    let above = position.partition_point(|&point| point <= at);
+    let (Some(below), true) = (above.checked_sub(1), above < position.len()) else {
         let end = if above == 0 {
-            values.first()
+            value.first()
         } else {
-            values.last()
+            value.last()
         };
         return end.copied().unwrap_or_default();
     };
-    let share = (position - knots[below]) / (knots[above] - knots[below]);
-    values[below] + share * (values[above] - values[below])
+    let share = (at - position[below]) / (position[above] - position[below]);
+    value[below] + share * (value[above] - value[below])
+}
+
+/// One checked curve, ready to be evaluated alone.
+pub(crate) struct Alone {
+    motions: Motions,
+    lane: usize,
+}
+
+impl Alone {
+    /// Of a curve that [`check`] lets pass.
+    pub(crate) fn new(curve: &ErrorCurve) -> Self {
+        let mut motions = Motions::NONE;
+        motions.add(curve);
+        Self {
+            motions,
+            lane: lane(curve.component.direction),
+        }
+    }
+
+    /// Its value at a position, mm or rad; beyond the recorded span that at its end.
+    pub(crate) fn at(&self, position: f64) -> f64 {
+        self.motions.at(position, Extrapolate::Hold)[self.lane]
+    }
 }
 
 /// Whether the numbers of a curve are what its form needs.
-pub(super) fn check(curve: &ErrorCurve) -> Result<(), VolumetricError> {
+pub(crate) fn check(curve: &ErrorCurve) -> Result<(), VolumetricError> {
     let component = curve.component;
     if component.is_location && curve.form != CurveForm::Constant {
         return Err(VolumetricError::LocationNotConstant { component });

@@ -18,11 +18,12 @@
 //! between knots 75 mm apart: of at most 0.257 mm, one step leaves at most 0.18 µm (the slope of the steepest
 //! table), iterating at most 5e-12 mm.
 
-use metrology::PerAxis;
+use metrology::{Axis, PerAxis};
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::PoseRefusal;
-use super::model::{Tips, VolumetricModel, turned_about};
+use super::model::{Tips, VolumetricModel};
+use super::turn::turned_about;
 use crate::kinematics::direction_of;
 
 /// Steps of this size are rounding, mm.
@@ -77,8 +78,10 @@ impl VolumetricModel {
     /// Of the axes that the chain has.
     fn offsets(&self, step_mm: &Vector3<f64>) -> PerAxis<f64> {
         let mut offset = PerAxis::default();
-        for link in self.links.iter().filter(|l| l.member.axis.is_linear()) {
-            offset[link.member.axis] = step_mm[link.member.axis.index()];
+        for (axis, has) in Axis::LINEAR.into_iter().zip(self.has_linear) {
+            if has {
+                offset[axis] = step_mm[axis.index()];
+            }
         }
         offset
     }

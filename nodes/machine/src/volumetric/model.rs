@@ -1,18 +1,11 @@
 //! All geometric errors of a machine together: the exact position of the tip at a pose.
 //!
 //! The product of the module's equation (1) is applied to the tip from the tool's end, member by
-//! member, so that no matrix is multiplied: each member moves one point. A turn by a rotation vector
-//! w is
-//!
-//! ```text
-//!   R(w) v = v + a w x v + b w x (w x v),   a = sin|w|/|w|,   b = (1 - cos|w|)/|w|^2       (1)
-//! ```
-//!
-//! with the series of a and b where |w| < 0.001, which is exact to the last bit there. The nominal tip is
+//! member, so that no matrix is multiplied: each member moves one point (`turn`). The nominal tip is
 //! moved beside it; their difference is the error.
 //!
 //! # Agreement
-//! `prop_the_walk_is_the_product_of_bodies`, 14 chains, errors up to 2 mm and 0.05 rad: 5e-13 mm.
+//! `prop_the_walk_is_the_product_of_bodies`, 14 chains, errors from 10 µm and 10 µrad up to 2 mm and 0.05 rad: 3.1e-12 mm.
 //! `prop_the_first_order_is_off_by_the_second_order`: the sum of sensitivities times values is off by
 //! 7.3e-9 mm for errors of 1 µm and 1 µrad, by a hundred times that for ten times those.
 
@@ -25,6 +18,7 @@ use super::component::has_component;
 use super::curve::{self, Lanes, Motions, lane};
 use super::error::{PoseRefusal, VolumetricError};
 use super::member::{Member, members};
+use super::turn::{SinCos, sin_cos, turned, turned_about, turned_by};
 use crate::chain::Chain;
 use crate::kinematics::{Kinematics, direction_of};
 
@@ -36,6 +30,8 @@ pub struct VolumetricModel {
     locations: Vec<(ErrorComponent, f64)>,
     policy: Extrapolate,
     has_shifted_datum: bool,
+    /// Whether there is an axis X, Y, Z.
+    pub(super) has_linear: [bool; 3],
     /// Whether no rotary axis stands between the bed and a linear axis.
     pub(super) linear_on_bed: bool,
 }
@@ -75,7 +71,7 @@ pub(super) struct Tips {
     pub(super) nominal_mm: Vector3<f64>,
     pub(super) actual_mm: Vector3<f64>,
     /// Sine and cosine of the nominal turn of the tip about X, Y and Z.
-    pub(super) turn: [(f64, f64); 3],
+    pub(super) turn: [SinCos; 3],
 }
 
 impl VolumetricModel {
@@ -125,6 +121,7 @@ impl VolumetricModel {
             })
             .collect();
         Ok(Self {
+            has_linear: Axis::LINEAR.map(|axis| chain.axes().contains(axis)),
             has_shifted_datum: links.iter().any(Link::shifts_datum),
             links,
             locations,
@@ -166,7 +163,24 @@ impl VolumetricModel {
     }
 
     /// Whether a pose has an answer.
+    #[inline]
     pub(super) fn check_pose(
+        &self,
+        positions: &PerAxis<f64>,
+        tool_offset_mm: &Vector3<f64>,
+    ) -> Result<(), PoseRefusal> {
+        // A sum that is finite has no summand that is not.
+        let sum = self.links.iter().fold(tool_offset_mm.sum(), |sum, link| {
+            sum + positions[link.member.axis]
+        });
+        if self.policy != Extrapolate::Refuse && sum.is_finite() {
+            return Ok(());
+        }
+        self.look_at_pose(positions, tool_offset_mm)
+    }
+
+    /// [`Self::check_pose`], number by number.
+    fn look_at_pose(
         &self,
         positions: &PerAxis<f64>,
         tool_offset_mm: &Vector3<f64>,
@@ -252,7 +266,7 @@ impl Link {
     }
 
     /// Moves both tips through this member.
-    #[inline]
+    #[inline(always)]
     fn move_on(&self, position: f64, motions: &Lanes, tips: &mut Tips) {
         let [ex, ey, ez, _, ea, eb, ec, _] = *motions;
         let (shift_mm, turn_rad) = (Vector3::new(ex, ey, ez), Vector3::new(ea, eb, ec));
@@ -279,12 +293,12 @@ impl Link {
                 zero_rad,
             } => {
                 let angle_rad = sense * position;
-                let nominal = angle_rad.sin_cos();
+                let nominal = sin_cos(angle_rad);
                 tips.turn[*row] = nominal;
                 let arm_mm = tips.nominal_mm - nominal_origin_mm;
                 tips.nominal_mm = nominal_origin_mm + turned_about(*row, nominal, &arm_mm);
                 let actual = if zero_rad.abs() > 0.0 {
-                    (angle_rad + zero_rad).sin_cos()
+                    sin_cos(angle_rad + zero_rad)
                 } else {
                     nominal
                 };
@@ -377,38 +391,4 @@ fn linear_on_bed(chain: &Chain) -> bool {
         let rest = side.iter().skip_while(|axis| axis.is_linear());
         rest.into_iter().all(|axis| !axis.is_linear())
     })
-}
-
-/// R(w) v, equation (1).
-pub(super) fn turned(w: &Vector3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
-    // Below 1 mrad the next term of either series is less than 1e-21.
-    const SMALL: f64 = 1e-6;
-    let square = w.norm_squared();
-    let (a, b) = if square < SMALL {
-        const A: (f64, f64) = (1.0 / 6.0, 1.0 / 120.0);
-        const B: (f64, f64) = (1.0 / 24.0, 1.0 / 720.0);
-        (
-            1.0 - square * (A.0 - square * A.1),
-            0.5 - square * (B.0 - square * B.1),
-        )
-    } else {
-        let angle = square.sqrt();
-        (angle.sin() / angle, (1.0 - angle.cos()) / square)
-    };
-    let once = w.cross(v);
-    v + once * a + w.cross(&once) * b
-}
-
-/// Turn about a unit vector by an angle given as its sine and cosine.
-fn turned_by(n: &Vector3<f64>, (sin, cos): (f64, f64), v: &Vector3<f64>) -> Vector3<f64> {
-    v * cos + n.cross(v) * sin + n * (n.dot(v) * (1.0 - cos))
-}
-
-/// Turn about a coordinate direction.
-pub(super) fn turned_about(row: usize, (sin, cos): (f64, f64), v: &Vector3<f64>) -> Vector3<f64> {
-    match row {
-        0 => Vector3::new(v.x, cos * v.y - sin * v.z, sin * v.y + cos * v.z),
-        1 => Vector3::new(cos * v.x + sin * v.z, v.y, cos * v.z - sin * v.x),
-        _ => Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z),
-    }
 }

@@ -26,6 +26,7 @@
 use metrology::{ErrorComponent, PerAxis};
 use nalgebra::Vector3;
 
+use super::component::lean;
 use super::member::{Member, members};
 use crate::kinematics::{Kinematics, direction_of};
 
@@ -87,7 +88,10 @@ fn own_shift(
     match (is_linear, component.is_location, member.carries_workpiece) {
         (true, false, true) => rigid(by.to_mm),    // (1)
         (true, false, false) => rigid(by.from_mm), // (1)
-        (true, true, _) if component.is_angular() => rigid(by.to_mm - by.from_mm), // (2)
+        (true, true, _) if component.is_angular() => {
+            let way_mm = (by.to_mm - by.from_mm).dot(&direction_of(component.of));
+            lean(component) * way_mm // (2)
+        }
         // A displacement of a whole linear axis is taken up by the machine's origin.
         (true, true, _) => Vector3::zeros(),
         (false, false, true) => turned(rigid(by.from_mm - by.about_mm)), // (3)

@@ -2,9 +2,11 @@
 
 use machine::export::sinumerik::{CrossTable, cross_table};
 use machine::export::{AxisErrors, CrossErrors, Grid, Unestimable};
+use machine::volumetric::{VolumetricModel, components_of};
+use machine::{Chain, Kinematics};
 use metrology::sample::{CurveForm, ErrorCurve, GeometryModel};
 use metrology::stamp::Stamp;
-use metrology::{Axis, ErrorComponent};
+use metrology::{Axis, ErrorComponent, PerAxis};
 use nalgebra::{DMatrix, Rotation3, Vector3};
 
 use crate::sinumerik::{assignments, points};
@@ -164,4 +166,49 @@ fn a_table_of_knots_and_a_polynomial_about_an_origin_are_evaluated_as_they_are_d
         }
         assert_eq!(own.up(), own.down());
     }
+}
+
+#[test]
+fn eq1_a_table_and_the_machine_model_say_the_same_of_every_component_that_moves_the_tool() {
+    const SMALL_RAD: f64 = 3e-5;
+    let mut n = 0;
+    for text in ["[w b Y X Z t]", "[w X' Y' b Z t]", "[w Y' b X Z t]"] {
+        let chain: Chain = text.parse().unwrap();
+        let kinematics = Kinematics::of_chain(chain.clone(), PerAxis::default());
+        for component in components_of(&chain) {
+            let base = component.of;
+            let curve = if component.is_location {
+                constant(component, SMALL_RAD)
+            } else {
+                polynomial(component, &[2e-6, -4e-9, 3e-11])
+            };
+            let mut published = model(vec![curve]);
+            published.chain = text.to_owned();
+            let machine = VolumetricModel::new(&kinematics, &published).unwrap();
+            let grid = Grid::new(base, -250.0, 50.0, 11, (-250.0, 250.0)).unwrap();
+            for direction in Axis::LINEAR {
+                if !CrossErrors::acts(component, base, direction) {
+                    continue;
+                }
+                let what = Unestimable::Refuse;
+                let table =
+                    CrossErrors::sample(&published, &[component], direction, &grid, what).unwrap();
+                for (at, error) in table.position().iter().zip(table.error()) {
+                    let mut pose = PerAxis::default();
+                    pose[base] = *at;
+                    let tip = machine.tip_error_mm(&pose, &Vector3::zeros()).unwrap();
+                    let apart_mm = (tip[direction.index()] - error).abs();
+                    // A squareness turns the whole way: less than its square times the way is between both.
+                    let second_order_mm = SMALL_RAD * SMALL_RAD * at.abs();
+                    assert!(
+                        apart_mm <= second_order_mm + 1e-15,
+                        "{text} {component} at {at}: {error} {tip}"
+                    );
+                }
+                n += 1;
+            }
+        }
+    }
+    // Nine shifts and one effect of each squareness.
+    assert_eq!(n, 3 * (9 + 3));
 }

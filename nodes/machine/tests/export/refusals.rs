@@ -151,17 +151,28 @@ fn a_model_is_not_read_beyond_what_it_says() {
 #[test]
 fn a_curve_that_does_not_fit_its_form_is_refused() {
     let good = || polynomial(EXY, &[1e-6]);
+    assert_says(
+        sampled(
+            vec![ErrorCurve {
+                power: Vec::new(),
+                ..good()
+            }],
+            &[EXY],
+            Axis::X,
+        ),
+        "EXY: 1 coefficients need 1 powers, there are 0",
+    );
+    let no_origin = ErrorCurve {
+        origin: f64::NAN,
+        ..good()
+    };
+    assert_says(
+        sampled(vec![no_origin], &[EXY], Axis::X),
+        "EXY: origin[0] = NaN",
+    );
     let malformed = [
         ErrorCurve {
-            power: Vec::new(),
-            ..good()
-        },
-        ErrorCurve {
             estimable: Vec::new(),
-            ..good()
-        },
-        ErrorCurve {
-            origin: f64::NAN,
             ..good()
         },
         constant(EXY, 1.0),
@@ -182,7 +193,7 @@ fn a_curve_that_does_not_fit_its_form_is_refused() {
     };
     assert_says(
         sampled(vec![nowhere], &[EXY], Axis::X),
-        "measured is [NaN, NaN]",
+        "EXY: recorded span from NaN to NaN: must be finite and ascending",
     );
 }
 

@@ -164,7 +164,6 @@ pub fn drift(sign: f64) -> AxisDrift {
         slope_mm_per_mm: sign * 4.1e-5,
         offset_identifiable: true,
         slope_identifiable: true,
-        time_constant_s: f64::INFINITY,
         ..AxisDrift::default()
     }
 }

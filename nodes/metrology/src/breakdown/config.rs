@@ -59,6 +59,9 @@ pub struct BreakdownConfig {
     pub least_lobes: f64,
     /// Most tones to look for.
     pub most_tones: usize,
+    /// Samples a turn that spikes, cyclic errors and slow tones are searched in; more are taken together.
+    /// The fit itself has all.
+    pub search_samples: usize,
 }
 
 impl Default for BreakdownConfig {
@@ -78,6 +81,7 @@ impl Default for BreakdownConfig {
             outlier_limit: 6.0,
             least_lobes: 12.0,
             most_tones: 3,
+            search_samples: 1440,
         }
     }
 }
@@ -86,10 +90,17 @@ impl BreakdownConfig {
     pub(super) fn check(&self) -> Result<(), BreakdownError> {
         let limits = [
             ("false_alarm", self.false_alarm, 0.0, 0.5),
-            ("least_sine", self.least_sine, 1e-9, 0.5),
+            // Products of columns have half of the digits of an angle.
+            ("least_sine", self.least_sine, 1e-6, 0.5),
             ("huber_limit", self.huber_limit, 1.0, 100.0),
             ("outlier_limit", self.outlier_limit, 3.0, 1000.0),
             ("least_lobes", self.least_lobes, 3.0, 1e6),
+            (
+                "search_samples",
+                self.search_samples as f64,
+                300.0,
+                f64::INFINITY,
+            ),
         ];
         for (key, value, above, below) in limits {
             within(key, value, above, below)?;

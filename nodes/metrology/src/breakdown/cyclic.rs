@@ -26,7 +26,7 @@ pub(super) fn cyclic(axis: usize, pitch_mm: f64, part: Quadrature, point: &Point
 
 /// Whether all recordings are sampled densely enough for a period.
 pub(super) fn is_resolved(pitch_mm: f64, scene: &Scene) -> bool {
-    let step_mm = |trace: &super::scene::Trace| trace.radius_mm * trace.spacing_rad();
+    let step_mm = |trace: &super::scene::Trace| trace.radius_mm * trace.spacing_rad;
     scene
         .traces
         .iter()

@@ -2,10 +2,10 @@
 //!
 //! # Model
 //!
-//! Columns are taken in order. With Q the orthonormal columns so far:
+//! Columns are taken in order. With G = L Lᵀ the products of those so far:
 //!
 //! ```text
-//!   sine_j = |x_j − Q Qᵀ x_j| / |x_j|                                         (1)
+//!   sine_j² = 1 − |L⁻¹ Xᵀ x_j|² / |x_j|²                                      (1)
 //!   sine_j ≥ least sine: kept;  else  x_j ≈ Σ a_ij x_i over the kept           (2)
 //!   X β = Σ_kept x_i (β_i + Σ_j a_ij β_j)                                      (3)
 //! ```
@@ -13,8 +13,9 @@
 //! So what is fitted for a kept column is the bracket of (3), whatever the single β are: it is the
 //! estimable combination, and the only one to which the data give a number.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
+use super::columns::Columns;
 use super::plane::Input;
 use super::recording::{CircularRecording, CircularSample, CircularSense, ReferenceLength};
 use super::report::Needed;
@@ -23,6 +24,8 @@ use super::term::{RowKey, Term};
 
 /// Shares of a column below this are rounding.
 const NO_SHARE: f64 = 1e-6;
+/// Samples of a recording that show which columns it tells apart.
+const ENOUGH_SAMPLES: usize = 720;
 
 /// A column that is a combination of kept ones, (2).
 #[derive(Clone, Debug)]
@@ -42,80 +45,63 @@ pub(super) struct Reduction {
     pub unseen: Vec<usize>,
 }
 
-/// Orthonormal columns with the triangle that made them.
+/// The triangle L of columns whose products are G = L Lᵀ, taken one by one.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Basis {
-    q: Vec<DVector<f64>>,
-    /// Column k: coordinates of the k-th kept column in q.
-    triangle: Vec<Vec<f64>>,
+pub(super) struct Triangle {
+    /// Row k: products of the k-th column with the orthonormal ones, its own length last.
+    rows: Vec<Vec<f64>>,
 }
 
-impl Basis {
-    /// Coordinates of `x` in the basis and what is left of it.
-    pub fn split(&self, x: &DVector<f64>) -> (Vec<f64>, DVector<f64>) {
-        let mut left = x.clone();
-        let mut coordinates = vec![0.0; self.q.len()];
-        // Twice, so that the rest is orthogonal to rounding.
-        for _ in 0..2 {
-            for (q, coordinate) in self.q.iter().zip(&mut coordinates) {
-                let share = q.dot(&left);
-                *coordinate += share;
-                left.axpy(-share, q, 1.0);
-            }
+impl Triangle {
+    /// L⁻¹ times the products of something with the columns so far.
+    pub fn coordinates(&self, products: &[f64]) -> Vec<f64> {
+        let mut found: Vec<f64> = Vec::with_capacity(products.len());
+        for (row, product) in self.rows.iter().zip(products) {
+            let known: f64 = row.iter().zip(&found).map(|(l, u)| l * u).sum();
+            found.push((product - known) / row[found.len()]);
         }
-        (coordinates, left)
+        found
     }
 
-    /// Takes `x` into the basis unless it is nearly in its span, (1).
-    pub fn take(&mut self, x: &DVector<f64>, least_sine: f64) -> Result<(), Vec<f64>> {
-        let (mut coordinates, left) = self.split(x);
-        let length = left.norm();
-        if length < least_sine * x.norm() {
-            return Err(self.solve(&coordinates));
+    /// Takes a column by its products with those before and with itself, unless it is nearly in their
+    /// span, (1): then its coefficients over them, (2).
+    pub fn take(&mut self, products: &[f64], square: f64, least_sine: f64) -> Result<(), Vec<f64>> {
+        let mut row = self.coordinates(products);
+        let left = square - row.iter().map(|u| u * u).sum::<f64>();
+        if left < least_sine * least_sine * square || left <= 0.0 {
+            return Err(self.solve(&row));
         }
-        self.q.push(left / length);
-        coordinates.push(length);
-        self.triangle.push(coordinates);
+        row.push(left.sqrt());
+        self.rows.push(row);
         Ok(())
     }
 
-    /// Coefficients over the kept columns of what has these coordinates.
+    /// Lᵀ⁻¹ times coordinates.
     fn solve(&self, coordinates: &[f64]) -> Vec<f64> {
-        let mut rest = coordinates.to_vec();
-        let mut found = vec![0.0; rest.len()];
-        for k in (0..rest.len()).rev() {
-            let column = &self.triangle[k];
-            found[k] = rest[k] / column[k];
-            for (r, c) in rest.iter_mut().zip(column) {
-                *r -= found[k] * c;
+        let mut found = coordinates.to_vec();
+        for k in (0..found.len()).rev() {
+            found[k] /= self.rows[k][k];
+            for j in 0..k {
+                found[j] -= self.rows[k][j] * found[k];
             }
         }
         found
     }
 }
 
-/// The stacked design of some terms.
-pub(super) fn design(scene: &Scene, terms: &[Term]) -> DMatrix<f64> {
-    let mut design = DMatrix::zeros(scene.n_rows, terms.len());
-    for (j, term) in terms.iter().enumerate() {
-        for (row, (trace, point)) in scene.rows().enumerate() {
-            design[(row, j)] = term.at(scene, trace, point);
-        }
-    }
-    design
-}
-
-/// (1) and (2) for all columns.
-pub(super) fn reduce(design: &DMatrix<f64>, least_sine: f64) -> Reduction {
-    let mut basis = Basis::default();
+/// (1) and (2) for columns with these products.
+pub(super) fn reduce(gram: &DMatrix<f64>, least_sine: f64) -> Reduction {
+    let mut triangle = Triangle::default();
     let mut reduction = Reduction::default();
-    let norms: Vec<f64> = design.column_iter().map(|column| column.norm()).collect();
-    for column in 0..design.ncols() {
-        if norms[column] == 0.0 {
+    let norms: Vec<f64> = gram.diagonal().iter().map(|square| square.sqrt()).collect();
+    for column in 0..gram.ncols() {
+        if norms[column] <= 0.0 {
             reduction.unseen.push(column);
             continue;
         }
-        match basis.take(&design.column(column).into_owned(), least_sine) {
+        let kept = reduction.kept.iter();
+        let products: Vec<f64> = kept.map(|kept| gram[(column, *kept)]).collect();
+        match triangle.take(&products, gram[(column, column)], least_sine) {
             Ok(()) => reduction.kept.push(column),
             Err(shares) => {
                 let counts = |kept: usize, share: f64| {
@@ -134,12 +120,13 @@ pub(super) fn reduce(design: &DMatrix<f64>, least_sine: f64) -> Reduction {
 
 /// Additions each of which, or which together, would tell a row apart from the others.
 pub(super) fn needed(input: &Input, key: RowKey) -> Vec<Vec<Needed>> {
+    let few: Vec<CircularRecording> = input
+        .recordings
+        .iter()
+        .map(|(_, recording)| few_samples(recording))
+        .collect();
     let helps = |additions: &[Needed]| {
-        let mut recordings: Vec<CircularRecording> = input
-            .recordings
-            .iter()
-            .map(|(_, recording)| (*recording).clone())
-            .collect();
+        let mut recordings = few.clone();
         for addition in additions {
             add(&mut recordings, *addition);
         }
@@ -167,12 +154,22 @@ fn is_kept(input: &Input, recordings: &[CircularRecording], key: RowKey) -> bool
     let listed: Vec<_> = recordings.iter().enumerate().collect();
     let scene = Scene::new(input.plane, &listed);
     let terms = Term::linear(&scene);
-    let reduction = reduce(&design(&scene, &terms), input.config.least_sine);
+    let (_, gram) = Columns::new(&scene).gram(&terms);
+    let reduction = reduce(&gram, input.config.least_sine);
     let is_own = |column: usize| terms[column].row(&scene) == key;
     let is_entangled =
         |d: &Dependent| is_own(d.column) || d.aliases.iter().any(|(kept, _)| is_own(*kept));
     !reduction.unseen.iter().any(|column| is_own(*column))
         && !reduction.dependent.iter().any(is_entangled)
+}
+
+/// A recording with no more samples than the angles between columns need.
+fn few_samples(recording: &CircularRecording) -> CircularRecording {
+    let every = recording.samples.len().div_ceil(ENOUGH_SAMPLES).max(1);
+    CircularRecording {
+        samples: recording.samples.iter().step_by(every).copied().collect(),
+        ..recording.clone()
+    }
 }
 
 /// Adds a recording like the first one but for one thing, or changes what is known of all.
@@ -249,7 +246,7 @@ mod tests {
                 1.0, 0.0, 2.0, 0.0, 1.0, 1.0, 5.0, 0.0, 1.0, 2.0, 8.0, 0.0, 1.0, 3.0, 11.0, 0.0,
             ],
         );
-        let reduction = reduce(&design, 1e-6);
+        let reduction = reduce(&design.tr_mul(&design), 1e-6);
         assert_eq!(reduction.kept, [0, 1]);
         assert_eq!(reduction.unseen, [3]);
         let aliases = &reduction.dependent[0].aliases;
@@ -262,7 +259,8 @@ mod tests {
         let sine = 0.01_f64;
         let design =
             DMatrix::from_column_slice(2, 2, &[1.0, 0.0, (1.0 - sine * sine).sqrt(), sine]);
-        assert_eq!(reduce(&design, 0.009).kept, [0, 1]);
-        assert_eq!(reduce(&design, 0.011).kept, [0]);
+        let gram = design.tr_mul(&design);
+        assert_eq!(reduce(&gram, 0.009).kept, [0, 1]);
+        assert_eq!(reduce(&gram, 0.011).kept, [0]);
     }
 }

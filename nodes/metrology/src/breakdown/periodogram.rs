@@ -29,13 +29,16 @@
 
 use std::f64::consts::TAU;
 
+use rustfft::num_complex::Complex;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::config::BreakdownConfig;
+use super::maximum::{by_curvature, greatest};
 use super::noise::median;
+use super::projector::Projector;
 use super::robust::Fit;
 use super::scene::{Scene, Trace};
-use super::search::{Projector, by_curvature, golden};
+use super::spectrum::{Frequencies, sums};
 use super::term::{Quadrature, RowKey, Term};
 use super::tone::{hz_of_lobes, lobes_of_hz};
 
@@ -76,9 +79,10 @@ impl Series {
         let (mut time_s, mut weighted_mm, mut weight) = (Vec::new(), Vec::new(), Vec::new());
         let mut direction = Vec::new();
         for row in rows {
+            let root = trace.root(row - trace.first_row);
             time_s.push(trace.points[row - trace.first_row].time_s);
-            weighted_mm.push(fit.weights[row] * fit.residuals_mm[row]);
-            weight.push(fit.weights[row]);
+            weighted_mm.push(fit.weights[row] * root * fit.residuals_mm[row]);
+            weight.push(fit.weights[row] * root * root);
             direction.push(trace.points[row - trace.first_row].direction);
         }
         Self {
@@ -104,10 +108,6 @@ impl Series {
                 let seen = along.map_or(1.0, |axis| direction[axis]);
                 (sin * seen, cos * seen)
             });
-        self.gain_of(phasors)
-    }
-
-    fn gain_of(&self, phasors: impl Iterator<Item = (f64, f64)>) -> f64 {
         let (mut rs, mut rc, mut ss, mut cc, mut sc) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for ((sin, cos), (r, w)) in phasors.zip(self.weighted_mm.iter().zip(&self.weight)) {
             rs += r * sin;
@@ -116,35 +116,19 @@ impl Series {
             cc += w * cos * cos;
             sc += w * sin * cos;
         }
-        let determinant = ss * cc - sc * sc;
-        if determinant <= 1e-9 * (ss + cc).powi(2) {
-            return 0.0;
-        }
-        (cc * rs * rs - 2.0 * sc * rs * rc + ss * rc * rc) / determinant
+        gain_of(rs, rc, ss, cc, sc)
     }
 
-    /// Δ_k on a grid, phasors turned on from point to point.
-    fn gains(&self, first_hz: f64, step_hz: f64, n: usize) -> Vec<f64> {
-        let turn: Vec<_> = self
-            .time_s
-            .iter()
-            .map(|t| (TAU * step_hz * t).sin_cos())
-            .collect();
-        let mut now: Vec<_> = self
-            .time_s
-            .iter()
-            .map(|t| (TAU * first_hz * t).sin_cos())
-            .collect();
-        let mut gains = Vec::with_capacity(n);
-        for _ in 0..n {
-            gains.push(self.gain_of(now.iter().copied()));
-            for ((sin, cos), (turn_sin, turn_cos)) in now.iter_mut().zip(&turn) {
-                let old = *sin;
-                *sin = old * turn_cos + *cos * turn_sin;
-                *cos = *cos * turn_cos - old * turn_sin;
-            }
-        }
-        gains
+    /// Δ_k of the radius at many frequencies: Σ w sin² and the like are those of twice the frequency.
+    fn gains(&self, at: &Frequencies) -> Vec<f64> {
+        let total: f64 = self.weight.iter().sum();
+        let once = sums(&self.time_s, &self.weighted_mm, at);
+        let twice = sums(&self.time_s, &self.weight, &at.doubled());
+        let gain = |(r, w): (&Complex<f64>, &Complex<f64>)| {
+            let (ss, cc, sc) = (0.5 * (total - w.re), 0.5 * (total + w.re), 0.5 * w.im);
+            gain_of(r.im, r.re, ss, cc, sc)
+        };
+        once.iter().zip(&twice).map(gain).collect()
     }
 
     /// Greatest Δ_k within 1/T of a frequency.
@@ -155,8 +139,17 @@ impl Series {
     }
 }
 
-/// The frequencies to search, (first, step, number); none where the samples are too far apart.
-fn grid(scene: &Scene, series: &[Series], config: &BreakdownConfig) -> Option<(f64, f64, usize)> {
+/// Fall of the sum of squares, from Σ r sin, Σ r cos, Σ sin², Σ cos² and Σ sin cos.
+fn gain_of(rs: f64, rc: f64, ss: f64, cc: f64, sc: f64) -> f64 {
+    let determinant = ss * cc - sc * sc;
+    if determinant <= 1e-9 * (ss + cc).powi(2) {
+        return 0.0;
+    }
+    (cc * rs * rs - 2.0 * sc * rs * rc + ss * rc * rc) / determinant
+}
+
+/// The frequencies to search; none where the samples are too far apart.
+fn grid(scene: &Scene, series: &[Series], config: &BreakdownConfig) -> Option<Frequencies> {
     let fastest = scene
         .traces
         .iter()
@@ -167,27 +160,26 @@ fn grid(scene: &Scene, series: &[Series], config: &BreakdownConfig) -> Option<(f
     let longest_s = series.iter().map(Series::duration_s).fold(0.0, f64::max);
     let points = (last_hz - first_hz) * longest_s * OVERSAMPLING;
     let usable = (1.0..MOST_POINTS).contains(&points);
-    usable.then(|| {
-        (
-            first_hz,
-            1.0 / (longest_s * OVERSAMPLING),
-            points as usize + 1,
-        )
+    usable.then(|| Frequencies {
+        first_hz,
+        step_hz: 1.0 / (longest_s * OVERSAMPLING),
+        n: points as usize + 1,
     })
 }
 
 /// The strongest tone in the residuals of a fit, whether it is believable or not.
 pub(super) fn strongest(projector: &Projector, config: &BreakdownConfig) -> Option<Tone> {
-    let scene = projector.scene;
+    let scene = projector.scene();
     let series: Vec<Series> = scene
         .traces
         .iter()
         .map(|t| Series::new(t, projector.fit))
         .collect();
-    let (first_hz, step_hz, n) = grid(scene, &series, config)?;
-    let mut sums = vec![0.0; n];
+    let frequencies = grid(scene, &series, config)?;
+    let step_hz = frequencies.step_hz;
+    let mut sums = vec![0.0; frequencies.n];
     for one in &series {
-        for (sum, gain) in sums.iter_mut().zip(one.gains(first_hz, step_hz, n)) {
+        for (sum, gain) in sums.iter_mut().zip(one.gains(&frequencies)) {
             *sum += gain;
         }
     }
@@ -195,19 +187,19 @@ pub(super) fn strongest(projector: &Projector, config: &BreakdownConfig) -> Opti
     let floors = floors(&sums, projector.fit.variance_mm2, &chi);
     let ratios = sums.iter().zip(&floors).map(|(sum, floor)| sum / floor);
     let (at, _) = ratios.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let line_hz = first_hz + step_hz * at as f64;
+    let line_hz = frequencies.at_hz(at);
     let (hz, along) = shape(scene, &series, line_hz, step_hz);
     let total = |hz: f64| series.iter().map(|s| s.gain(hz, along)).sum::<f64>();
-    let trials = 3.0 * n as f64 / OVERSAMPLING;
+    let trials = 3.0 * frequencies.n as f64 / OVERSAMPLING;
     let needed = chi.inverse_cdf(1.0 - config.false_alarm / trials) * floors[at];
     let terms = terms(scene, &series, hz, along, floors[at], config);
-    let gain_mm2 = projector.gain(&terms)?.0;
+    let gain_mm2 = projector.gain_of(&terms)?.0;
     Some(Tone {
         terms,
         gain_mm2,
         chance: (trials * chi.sf(sums[at] / floors[at])).min(1.0),
         uncertainty_hz: by_curvature(hz, 0.1 * step_hz, projector.fit.variance_mm2, total),
-        detectable_mm: (2.0 * needed / scene.n_rows as f64).sqrt(),
+        detectable_mm: (2.0 * needed / scene.n_samples as f64).sqrt(),
     })
 }
 
@@ -235,7 +227,7 @@ fn shape(scene: &Scene, series: &[Series], line_hz: f64, step_hz: f64) -> (f64, 
             .map(|hz| (total(hz), hz))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let near_hz = best.map_or(line_hz, |(_, hz)| hz);
-        let hz = golden(near_hz - 0.5 * step_hz, near_hz + 0.5 * step_hz, total);
+        let hz = greatest(near_hz - 0.5 * step_hz, near_hz + 0.5 * step_hz, total);
         (total(hz), hz, along)
     });
     let best = refined.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
@@ -317,7 +309,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn eq1_the_grid_by_turned_phasors_is_the_fit_at_each_frequency() {
+    fn eq1_the_gains_at_many_frequencies_are_the_fit_at_each() {
         let time_s: Vec<f64> = (0..500)
             .map(|i| 0.01 * f64::from(i) + 0.003 * f64::from(i % 7))
             .collect();
@@ -329,9 +321,14 @@ mod tests {
             time_s,
             weighted_mm,
         };
-        let gains = series.gains(5.0, 0.05, 100);
+        let at = Frequencies {
+            first_hz: 5.0,
+            step_hz: 0.05,
+            n: 100,
+        };
+        let gains = series.gains(&at);
         for i in [0, 46, 99] {
-            let direct = series.gain(5.0 + 0.05 * i as f64, None);
+            let direct = series.gain(at.at_hz(i), None);
             assert!((gains[i] - direct).abs() < 1e-8 * (1.0 + direct), "{i}");
         }
         assert!((series.gain(7.3, None) - square).abs() < 1e-8 * square);

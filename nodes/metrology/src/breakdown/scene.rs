@@ -36,6 +36,7 @@ pub(super) struct Point {
 pub(super) struct Trace {
     /// Its place in the caller's list.
     pub recording: usize,
+    pub circle: Circle,
     /// +1 counter-clockwise.
     pub sense: f64,
     pub radius_mm: f64,
@@ -50,7 +51,19 @@ pub(super) struct Trace {
     pub condition: usize,
     /// Row of its first sample in the stacked design.
     pub first_row: usize,
+    /// Typical angle between samples, rad: the median.
+    pub spacing_rad: f64,
     pub points: Vec<Point>,
+    /// What each point stands for, where it stands for several samples.
+    pub blocks: Vec<Block>,
+}
+
+/// Several samples in a row, by two places that have their mean and their spread.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
+    pub nodes: [Point; 2],
+    /// √ of the number of samples: what their mean counts for.
+    pub root: f64,
 }
 
 /// All recordings of a plane.
@@ -67,6 +80,8 @@ pub(super) struct Scene {
     pub conditions: Vec<(f64, f64)>,
     pub largest_radius_mm: f64,
     pub n_rows: usize,
+    /// Samples behind the rows.
+    pub n_samples: usize,
 }
 
 /// Place of `item` in `seen`, where it is put if it is new.
@@ -101,8 +116,16 @@ impl Scene {
                 ReferenceLength::Calibrated { .. } => {}
             }
             let condition = (recording.feed_mm_s, recording.radius_mm);
+            let circle = Circle {
+                sense: recording.sense.sign(),
+                radius_mm: recording.radius_mm,
+                centre_mm: recording.centre_mm,
+                origin_mm,
+            };
+            let points = points(recording, &circle);
             traces.push(Trace {
                 recording: *index,
+                circle,
                 sense: recording.sense.sign(),
                 radius_mm: recording.radius_mm,
                 feed_mm_s: recording.feed_mm_s,
@@ -111,7 +134,9 @@ impl Scene {
                 certificate,
                 condition: place(&mut conditions, condition),
                 first_row: n_rows,
-                points: points(recording, origin_mm),
+                spacing_rad: spacing_rad(&points),
+                points,
+                blocks: Vec::new(),
             });
             n_rows += recording.samples.len();
         }
@@ -125,6 +150,7 @@ impl Scene {
             conditions,
             largest_radius_mm,
             n_rows,
+            n_samples: n_rows,
         }
     }
 
@@ -152,43 +178,75 @@ impl Trace {
         self.feed_mm_s / self.radius_mm
     }
 
-    /// Typical angle between samples, rad: the median.
-    pub fn spacing_rad(&self) -> f64 {
-        let gaps = self.points.windows(2).map(|pair| match pair {
-            [a, b] => (b.angle_rad - a.angle_rad).abs(),
-            _ => 0.0,
-        });
-        let mut gaps: Vec<f64> = gaps.filter(|gap| *gap > 0.0).collect();
-        gaps.sort_by(f64::total_cmp);
-        gaps.get(gaps.len() / 2).copied().unwrap_or(TAU)
+    /// √ of the number of samples behind a point.
+    pub fn root(&self, place: usize) -> f64 {
+        self.blocks.get(place).map_or(1.0, |block| block.root)
+    }
+
+    /// Mean of a quantity over the samples behind a point, times [`Self::root`].
+    pub fn mean(&self, place: usize, of: impl Fn(&Point) -> f64) -> f64 {
+        match self.blocks.get(place) {
+            Some(block) => 0.5 * block.root * block.nodes.iter().map(of).sum::<f64>(),
+            None => of(&self.points[place]),
+        }
     }
 }
 
-fn points(recording: &CircularRecording, origin_mm: [f64; 2]) -> Vec<Point> {
-    let sense = recording.sense.sign();
+/// Typical angle between points, rad: the median.
+pub(super) fn spacing_rad(points: &[Point]) -> f64 {
+    let gaps = points.windows(2).map(|pair| match pair {
+        [a, b] => (b.angle_rad - a.angle_rad).abs(),
+        _ => 0.0,
+    });
+    let mut gaps: Vec<f64> = gaps.filter(|gap| *gap > 0.0).collect();
+    let middle = gaps.len() / 2;
+    if gaps.is_empty() {
+        return TAU;
+    }
+    *gaps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+impl Point {
+    /// At an angle of a circle.
+    pub fn new(circle: &Circle, angle_rad: f64, time_s: f64, observed_mm: f64) -> Self {
+        let (sin, cos) = angle_rad.sin_cos();
+        let direction = [cos, sin];
+        let position_mm = [0, 1].map(|a| circle.centre_mm[a] + circle.radius_mm * direction[a]);
+        // (1): the positive ends are at 0 and π/2, half a turn of σθ after the negative ones.
+        let since_positive =
+            [0.0, FRAC_PI_2].map(|end| (circle.sense * (angle_rad - end)).rem_euclid(TAU));
+        Self {
+            direction,
+            angle_rad,
+            position_mm,
+            offset_mm: [0, 1].map(|a| position_mm[a] - circle.origin_mm[a]),
+            arc_rad: since_positive.map(|arc| arc % PI), // (2)
+            end: since_positive.map(|arc| if arc < PI { 1.0 } else { -1.0 }),
+            time_s,
+            observed_mm,
+        }
+    }
+}
+
+/// Where a trace runs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Circle {
+    pub sense: f64,
+    pub radius_mm: f64,
+    pub centre_mm: [f64; 2],
+    /// Centre of the first recording, mm.
+    pub origin_mm: [f64; 2],
+}
+
+fn points(recording: &CircularRecording, circle: &Circle) -> Vec<Point> {
     let time = |sample: Option<&super::CircularSample>| sample.map_or(0.0, |s| s.time_s);
     let middle_s = 0.5 * (time(recording.samples.first()) + time(recording.samples.last()));
     let angles = recording.unwrapped_rad();
     let samples = recording.samples.iter().zip(angles);
     samples
         .map(|(sample, angle_rad)| {
-            let (sin, cos) = angle_rad.sin_cos();
-            let direction = [cos, sin];
-            let position_mm =
-                [0, 1].map(|a| recording.centre_mm[a] + recording.radius_mm * direction[a]);
-            // (1): the positive ends are at 0 and π/2, half a turn of σθ after the negative ones.
-            let since_positive =
-                [0.0, FRAC_PI_2].map(|end| (sense * (angle_rad - end)).rem_euclid(TAU));
-            Point {
-                direction,
-                angle_rad,
-                position_mm,
-                offset_mm: [0, 1].map(|a| position_mm[a] - origin_mm[a]),
-                arc_rad: since_positive.map(|arc| arc % PI), // (2)
-                end: since_positive.map(|arc| if arc < PI { 1.0 } else { -1.0 }),
-                time_s: sample.time_s - middle_s,
-                observed_mm: sample.radial_deviation_mm,
-            }
+            let time_s = sample.time_s - middle_s;
+            Point::new(circle, angle_rad, time_s, sample.radial_deviation_mm)
         })
         .collect()
 }

@@ -2,40 +2,37 @@
 //!
 //! # Model
 //!
-//! What a candidate of m columns would take off the weighted sum of squares S, all other rows refitted:
-//!
-//! ```text
-//!   Δ = |Q_cᵀ r|²,  Q_c: its columns, orthogonal to the design                   (1)
-//!   F = (Δ/m) / ((S − Δ)/(ν − m)),   chance = trials · P(F_{m, ν−m} > F)          (2)
-//! ```
+//! A candidate is judged by what it would take off the sum of squares, Δ, and by the chance that noise alone
+//! makes as much: `projector`, (3) and (4).
 //!
 //! The candidate of greatest Δ that is believed joins; then all are searched again. At the end each
-//! found one must stand the test (2) beside all others, its variance inflated if residuals drag on.
+//! found one must stand the test beside all others, its variance inflated if residuals drag on.
 //! Decay times and frequencies maximise Δ; their uncertainty is that of its curvature. That of
 //! amplitudes holds for the decay, pitch or frequency found.
+//!
+//! Where samples stand close together the search takes their means (`thin`). The fit that is reported has all
+//! samples, and vibration is looked for in its residuals.
 
-use nalgebra::DVector;
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::distinguish::Basis;
+use super::columns::Columns;
 use super::error::BreakdownError;
+use super::maximum::{by_curvature, greatest};
 use super::periodogram::{self, Tone};
 use super::plane::Input;
+use super::projector::{LONGEST_DECAY_RAD, Projector};
 use super::report::NotFound;
 use super::robust::{Fit, fit};
 use super::scene::Scene;
 use super::spike::SLOWEST_RISE;
 use super::term::{Quadrature, RowKey, Term};
+use super::thin::{thinned, would_do};
 use super::{cause, cyclic};
 
 /// Decay times that are tried, evenly in the logarithm.
 const DECAYS: usize = 25;
 /// Shapes of pulses that are tried.
 const PULSES: f64 = (DECAYS * (SLOWEST_RISE as usize + 1)) as f64;
-/// Longest decay, as an arc of the slowest circle, rad (20°).
-const LONGEST_DECAY_RAD: f64 = 0.35;
-/// Steps of a search by golden section.
-const GOLDEN_STEPS: usize = 40;
 /// Most times that the play is fitted anew with its own width.
 const PLAY_STEPS: usize = 6;
 /// Play whose width changes less is settled, mm.
@@ -56,9 +53,9 @@ pub(super) enum Kind {
 pub(super) struct Candidate {
     pub kind: Kind,
     pub terms: Vec<Term>,
-    /// Δ of (1), mm².
+    /// Δ, mm².
     pub gain_mm2: f64,
-    /// Chance of (2).
+    /// Chance that noise makes it.
     pub chance: f64,
     /// Standard uncertainty of decay or frequency; 0 where there is none.
     pub nonlinear_uncertainty: f64,
@@ -74,92 +71,6 @@ pub(super) struct Found {
     pub not_found: Vec<NotFound>,
 }
 
-/// Residuals and design of a fit, ready for (1).
-pub(super) struct Projector<'a> {
-    pub scene: &'a Scene,
-    pub fit: &'a Fit,
-    basis: Basis,
-    roots: DVector<f64>,
-    residual: DVector<f64>,
-    sum: f64,
-    least_sine: f64,
-}
-
-impl<'a> Projector<'a> {
-    pub fn new(scene: &'a Scene, fit: &'a Fit, least_sine: f64) -> Self {
-        let weights = scene.rows().zip(&fit.weights).map(|((_, point), weight)| {
-            let just_reversed = point.arc_rad.iter().any(|arc| *arc < LONGEST_DECAY_RAD);
-            // Where a spike may be, its height is no reason to weigh less.
-            if just_reversed && *weight > 0.0 {
-                1.0
-            } else {
-                weight.sqrt()
-            }
-        });
-        let roots = DVector::from_iterator(scene.n_rows, weights);
-        let mut basis = Basis::default();
-        for column in fit.design.column_iter() {
-            // A column that the weights put into the span of the others takes nothing off (1).
-            let _ = basis.take(&column.component_mul(&roots), 1e-9);
-        }
-        let residual = DVector::from_column_slice(&fit.residuals_mm).component_mul(&roots);
-        let residual = basis.split(&residual).1;
-        let sum = residual.norm_squared();
-        Self {
-            scene,
-            fit,
-            basis,
-            roots,
-            residual,
-            sum,
-            least_sine,
-        }
-    }
-
-    /// Δ of (1) and the mean square of a column beside the design; none where a column is in its span.
-    pub fn gain(&self, terms: &[Term]) -> Option<(f64, f64)> {
-        let mut own = Basis::default();
-        let (mut gain, mut square) = (0.0, 0.0_f64);
-        for term in terms {
-            let values = self
-                .scene
-                .rows()
-                .map(|(trace, point)| term.at(self.scene, trace, point));
-            let column =
-                DVector::from_iterator(self.scene.n_rows, values).component_mul(&self.roots);
-            let left = self.basis.split(&column).1;
-            if left.norm() < self.least_sine * column.norm() || column.norm() == 0.0 {
-                return None;
-            }
-            let beside = own.split(&left).1;
-            if own.take(&left, self.least_sine).is_err() {
-                return None;
-            }
-            gain += (beside.dot(&self.residual) / beside.norm()).powi(2);
-            square = square.max(left.norm_squared());
-        }
-        Some((gain, square))
-    }
-
-    /// (2)
-    fn chance(&self, gain: f64, n_columns: usize, trials: f64) -> f64 {
-        let (m, freedom) = (
-            n_columns as f64,
-            self.fit.degrees_of_freedom as f64 - n_columns as f64,
-        );
-        let left = (self.sum - gain).max(self.sum * f64::EPSILON);
-        let ratio = (gain / m) / (left / freedom);
-        FisherSnedecor::new(m, freedom).map_or(1.0, |f| (trials * f.sf(ratio)).min(1.0))
-    }
-
-    /// Amplitude of a column of this square that (2) would believe, mm.
-    fn detectable_mm(&self, square: f64, n_columns: usize, trials: f64, false_alarm: f64) -> f64 {
-        let needed = ChiSquared::new(n_columns as f64)
-            .map_or(f64::NAN, |c| c.inverse_cdf(1.0 - false_alarm / trials));
-        (needed * self.fit.variance_mm2 / square).sqrt()
-    }
-}
-
 /// Everything that can be found in a plane.
 pub(super) fn search(input: &Input, scene: &Scene) -> Result<Found, BreakdownError> {
     let mut base = Term::linear(scene);
@@ -168,19 +79,32 @@ pub(super) fn search(input: &Input, scene: &Scene) -> Result<Found, BreakdownErr
             base.extend(cyclic_terms(axis, pitch_mm));
         }
     }
-    let mut chosen: Vec<Candidate> = Vec::new();
-    let mut last = add_believed(input, scene, &base, &mut chosen)?;
-    // Tones that were found before the rest was known are found anew.
-    let n_chosen = chosen.len();
-    chosen.retain(|c| c.kind != Kind::Tone);
-    if chosen.len() < n_chosen {
-        last = add_believed(input, scene, &base, &mut chosen)?;
+    let columns = Columns::new(scene);
+    let fewer = if would_do(scene, input.config) {
+        thinned(
+            scene,
+            &fit(&columns, base.clone(), input.config)?,
+            input.config,
+        )
+    } else {
+        None
+    };
+    let (mut chosen, mut last) = match &fewer {
+        Some(fewer) => effects(input, &Columns::new(fewer), &base)?,
+        None => effects(input, &columns, &base)?,
+    };
+    if fewer.is_some() {
+        // In the means a fast vibration may stand at a frequency that it does not have.
+        chosen.retain(|c| c.kind != Kind::Tone);
+        last.retain(|c| c.kind != Kind::Tone);
     }
-    chosen = polished(input, scene, &base, chosen)?;
-    let mut fit = fit_with_play(input, scene, &base, &chosen)?;
+    let mut fit = fit_with_play(input, &columns, &base, &chosen)?;
+    if fewer.is_some() {
+        fit = add_tones(input, &columns, &base, &mut chosen, &mut last, fit)?;
+    }
     while let Some(weakest) = weakest(input, scene, &fit, &chosen) {
         last.push(chosen.remove(weakest));
-        fit = fit_with_play(input, scene, &base, &chosen)?;
+        fit = fit_with_play(input, &columns, &base, &chosen)?;
     }
     let not_found = not_found(input, scene, &chosen, &last);
     Ok(Found {
@@ -190,18 +114,64 @@ pub(super) fn search(input: &Input, scene: &Scene) -> Result<Found, BreakdownErr
     })
 }
 
+/// The effects that are believed, and those that were tried last.
+fn effects(
+    input: &Input,
+    columns: &Columns,
+    base: &[Term],
+) -> Result<(Vec<Candidate>, Vec<Candidate>), BreakdownError> {
+    let mut chosen: Vec<Candidate> = Vec::new();
+    let mut last = add_believed(input, columns, base, &mut chosen)?;
+    // Tones that were found before the rest was known are found anew.
+    let n_chosen = chosen.len();
+    chosen.retain(|c| c.kind != Kind::Tone);
+    if chosen.len() < n_chosen {
+        last = add_believed(input, columns, base, &mut chosen)?;
+    }
+    Ok((polished(input, columns, base, chosen)?, last))
+}
+
+/// Adds believed tones beside what is chosen, until there is none.
+fn add_tones(
+    input: &Input,
+    columns: &Columns,
+    base: &[Term],
+    chosen: &mut Vec<Candidate>,
+    last: &mut Vec<Candidate>,
+    mut fit: Fit,
+) -> Result<Fit, BreakdownError> {
+    while n_tones(chosen) < input.config.most_tones {
+        let projector = Projector::new(columns, &fit, input.config.least_sine);
+        let Some(tone) = periodogram::strongest(&projector, input.config) else {
+            break;
+        };
+        let candidate = tone_candidate(&tone);
+        if candidate.chance >= input.config.false_alarm {
+            last.push(candidate);
+            break;
+        }
+        chosen.push(candidate);
+        fit = fit_with_play(input, columns, base, chosen)?;
+    }
+    Ok(fit)
+}
+
+fn n_tones(chosen: &[Candidate]) -> usize {
+    chosen.iter().filter(|c| c.kind == Kind::Tone).count()
+}
+
 /// Adds the greatest believed candidate until there is none; gives the last ones that were tried.
 fn add_believed(
     input: &Input,
-    scene: &Scene,
+    columns: &Columns,
     base: &[Term],
     chosen: &mut Vec<Candidate>,
 ) -> Result<Vec<Candidate>, BreakdownError> {
     loop {
-        let fit = fit_with_play(input, scene, base, chosen)?;
+        let fit = fit_with_play(input, columns, base, chosen)?;
         let tried = candidates(
             input,
-            &Projector::new(scene, &fit, input.config.least_sine),
+            &Projector::new(columns, &fit, input.config.least_sine),
             chosen,
         );
         let believed = tried.iter().filter(|c| c.chance < input.config.false_alarm);
@@ -215,7 +185,7 @@ fn add_believed(
 /// Fits base and chosen terms, the play of each backlash taken up as far as it is wide.
 fn fit_with_play(
     input: &Input,
-    scene: &Scene,
+    columns: &Columns,
     base: &[Term],
     chosen: &[Candidate],
 ) -> Result<Fit, BreakdownError> {
@@ -225,7 +195,7 @@ fn fit_with_play(
             .iter()
             .flat_map(|candidate| candidate.terms.iter().copied()),
     );
-    let mut best = fit(scene, terms, input.config)?;
+    let mut best = fit(columns, terms, input.config)?;
     for _ in 0..PLAY_STEPS {
         let mut terms = best.terms.clone();
         let mut change = 0.0_f64;
@@ -240,7 +210,7 @@ fn fit_with_play(
         if change < PLAY_SETTLED_MM {
             break;
         }
-        let next = fit(scene, terms, input.config)?;
+        let next = fit(columns, terms, input.config)?;
         if next.variance_mm2 >= best.variance_mm2 {
             break;
         }
@@ -271,14 +241,13 @@ fn candidates(input: &Input, projector: &Projector, chosen: &[Candidate]) -> Vec
         if is_new(Kind::Cyclic(axis))
             && input
                 .config
-                .given_pitch_mm(projector.scene.axes[axis])
+                .given_pitch_mm(projector.scene().axes[axis])
                 .is_none()
         {
             found.extend(cyclic(input, projector, axis));
         }
     }
-    let n_tones = chosen.iter().filter(|c| c.kind == Kind::Tone).count();
-    if n_tones < input.config.most_tones {
+    if n_tones(chosen) < input.config.most_tones {
         found.extend(
             periodogram::strongest(projector, input.config).map(|tone| tone_candidate(&tone)),
         );
@@ -311,7 +280,7 @@ fn spike_terms(scene: &Scene, axis: usize, rise: u8, decay_s: f64) -> Vec<Term> 
 
 /// Logarithms of the shortest and longest decay that the samples can show, s.
 fn decay_range(scene: &Scene) -> (f64, f64) {
-    let shortest = |t: &super::scene::Trace| t.spacing_rad() / t.speed_rad_s();
+    let shortest = |t: &super::scene::Trace| t.spacing_rad / t.speed_rad_s();
     let longest = |t: &super::scene::Trace| LONGEST_DECAY_RAD / t.speed_rad_s();
     let low = scene
         .traces
@@ -323,26 +292,26 @@ fn decay_range(scene: &Scene) -> (f64, f64) {
 }
 
 fn spike(input: &Input, projector: &Projector, axis: usize) -> Option<Candidate> {
-    let (low, high) = decay_range(projector.scene);
+    let (low, high) = decay_range(projector.scene());
     let step = (high - low) / (DECAYS - 1) as f64;
-    let terms = |rise: u8, log: f64| spike_terms(projector.scene, axis, rise, log.exp());
-    let gain = |rise: u8, log: f64| projector.gain(&terms(rise, log)).map_or(0.0, |g| g.0);
+    let terms = |rise: u8, log: f64| spike_terms(projector.scene(), axis, rise, log.exp());
     let tried =
         (0..=SLOWEST_RISE).flat_map(|rise| (0..DECAYS).map(move |i| (rise, low + step * i as f64)));
-    let gains = tried.map(|(rise, log)| (gain(rise, log), rise, log));
-    let (_, rise, coarse) = gains.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let log = golden((coarse - step).max(low), (coarse + step).min(high), |log| {
-        gain(rise, log)
+    let gains = tried.map(|(rise, log)| {
+        let gain = projector.gain_of_known(&terms(rise, log));
+        (gain.map_or(0.0, |g| g.0), rise, log)
     });
+    let (_, rise, coarse) = gains.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let gain = |log: f64| projector.gain_of(&terms(rise, log)).map_or(0.0, |g| g.0);
+    let log = greatest((coarse - step).max(low), (coarse + step).min(high), gain);
     let terms = terms(rise, log);
-    let (gain_mm2, square) = projector.gain(&terms)?;
+    let (gain_mm2, square) = projector.gain_of(&terms)?;
     let variance = projector.fit.variance_mm2;
     Some(Candidate {
         kind: Kind::Spike(axis),
         gain_mm2,
         chance: projector.chance(gain_mm2, terms.len(), PULSES),
-        nonlinear_uncertainty: log.exp()
-            * by_curvature(log, 0.1 * step, variance, |log| gain(rise, log)),
+        nonlinear_uncertainty: log.exp() * by_curvature(log, 0.1 * step, variance, gain),
         detectable_mm: projector.detectable_mm(
             square,
             terms.len(),
@@ -354,12 +323,14 @@ fn spike(input: &Input, projector: &Projector, axis: usize) -> Option<Candidate>
 }
 
 fn cyclic(input: &Input, projector: &Projector, axis: usize) -> Option<Candidate> {
-    let candidates_mm = input.config.candidates_mm(projector.scene.axes[axis]);
+    let scene = projector.scene();
+    let candidates_mm = input.config.candidates_mm(scene.axes[axis]);
     let resolved = candidates_mm
         .iter()
         .copied()
-        .filter(|p| cyclic::is_resolved(*p, projector.scene));
-    let gains = resolved.filter_map(|p| Some((p, projector.gain(&cyclic_terms(axis, p))?)));
+        .filter(|p| cyclic::is_resolved(*p, scene));
+    let gains =
+        resolved.filter_map(|p| Some((p, projector.gain_of_known(&cyclic_terms(axis, p))?)));
     let (pitch_mm, (gain_mm2, square)) = gains.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     let trials = candidates_mm.len() as f64;
     Some(Candidate {
@@ -375,7 +346,7 @@ fn cyclic(input: &Input, projector: &Projector, axis: usize) -> Option<Candidate
 /// Searches each decay and pitch again beside all others.
 fn polished(
     input: &Input,
-    scene: &Scene,
+    columns: &Columns,
     base: &[Term],
     mut chosen: Vec<Candidate>,
 ) -> Result<Vec<Candidate>, BreakdownError> {
@@ -385,8 +356,8 @@ fn polished(
     for at in 0..chosen.len() {
         let mut others = chosen.clone();
         let own = others.remove(at);
-        let fit = fit_with_play(input, scene, base, &others)?;
-        let projector = Projector::new(scene, &fit, input.config.least_sine);
+        let fit = fit_with_play(input, columns, base, &others)?;
+        let projector = Projector::new(columns, &fit, input.config.least_sine);
         let again = match own.kind {
             Kind::Spike(axis) => spike(input, &projector, axis),
             Kind::Cyclic(axis) => cyclic(input, &projector, axis),
@@ -468,35 +439,6 @@ fn not_found(
                 .filter(|d| d.is_finite()),
         })
         .collect()
-}
-
-/// Where `f` is greatest between two bounds, by golden section.
-pub(super) fn golden(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let share = 0.5 * (5_f64.sqrt() - 1.0);
-    let (mut a, mut b) = (high - share * (high - low), low + share * (high - low));
-    let (mut at_a, mut at_b) = (f(a), f(b));
-    for _ in 0..GOLDEN_STEPS {
-        if at_a >= at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - share * (high - low);
-            at_a = f(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + share * (high - low);
-            at_b = f(b);
-        }
-    }
-    0.5 * (low + high)
-}
-
-/// Standard uncertainty of the place of a maximum of Δ: √(2 variance/−Δ'').
-pub(super) fn by_curvature(at: f64, step: f64, variance: f64, gain: impl Fn(f64) -> f64) -> f64 {
-    let second = (gain(at + step) - 2.0 * gain(at) + gain(at - step)) / (step * step);
-    if second < 0.0 {
-        (2.0 * variance / -second).sqrt()
-    } else {
-        f64::INFINITY
-    }
 }
 
 /// Whether a row was searched for, with the uncertainty of its decay or frequency.

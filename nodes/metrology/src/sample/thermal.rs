@@ -2,9 +2,9 @@
 
 use crate::axis::PerAxis;
 use crate::stamp::{Host, Stamp};
-use nalgebra::{Matrix2, Vector3};
+use nalgebra::{Matrix4, Vector3};
 
-/// Drift of one axis: `d(p) = k0 + slope (p - p0)`, plus the cross terms of more than two blocks.
+/// Drift of one axis: `d(r) = k0 + slope (p - p0)`, plus the cross terms of more than two blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisDrift {
     /// Reference position, mm.
@@ -13,8 +13,10 @@ pub struct AxisDrift {
     pub k0_mm: f64,
     /// Change of drift with position along the axis itself, mm/mm.
     pub slope_mm_per_mm: f64,
-    /// Covariance of (k0, slope): mm², mm, 1.
-    pub covariance: Matrix2<f64>,
+    /// Covariance of (k0, change with X, with Y, with Z): mm², mm, 1. The own coordinate's entry is the
+    /// slope's. Zero rows: supposed to be zero, not estimated. Where the slope is not identifiable its
+    /// variance is the mean square of what the blocks allow, infinite where they allow anything.
+    pub covariance: Matrix4<f64>,
     /// Change of this axis' drift with the *other* coordinates (mm/mm), about `cross_origin_mm`;
     /// the own coordinate's entry is zero. All zero for two blocks.
     pub cross_slope_mm_per_mm: Vector3<f64>,
@@ -26,11 +28,22 @@ pub struct AxisDrift {
     pub offset_identifiable: bool,
     /// Whether the slope could be estimated.
     pub slope_identifiable: bool,
-    /// Rate of the drift at `p0_mm`, mm/s, used to extrapolate between updates; zero where no time constant is known.
+    /// How the drift goes on between updates, by the faces of X, Y and Z: rotations and shears couple
+    /// the axes. `None`: those faces show no time constant.
+    pub growth: [Option<DriftGrowth>; 3],
+    /// When the last of the axis' faces behind it was touched; a model renewed without new touches
+    /// keeps it.
+    pub measured_at: Stamp<Host>,
+}
+
+/// How a drift grows after the model's instant with one time constant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriftGrowth {
+    /// Rate at the model's instant where all levers are zero, mm/s.
     pub rate_mm_s: f64,
-    /// Rate of the slope, 1/s, used likewise: a screw's growth changes the slope, not the offset.
-    pub slope_rate_per_s: f64,
-    /// Time constant with which both rates decay, s; infinite where unknown.
+    /// Rate of the change with X, Y and Z, 1/s; levers as for the drift itself.
+    pub gradient_rate_per_s: Vector3<f64>,
+    /// Time constant with which both rates decay, s; infinite: they do not.
     pub time_constant_s: f64,
 }
 
@@ -53,6 +66,14 @@ pub struct ThermalModel {
     pub quarantined: bool,
     /// Counts models since the node started.
     pub sequence: u32,
+}
+
+impl ThermalModel {
+    /// When the last face behind it was touched; `None` without an axis.
+    #[must_use]
+    pub fn measured_at(&self) -> Option<Stamp<Host>> {
+        self.axes.0.iter().flatten().map(|d| d.measured_at).max()
+    }
 }
 
 /// Why new block measurements are wanted.

@@ -17,7 +17,7 @@ use rand_pcg::Pcg64Mcg;
 /// Step of the simulation, s.
 const STEP_S: f64 = 1e-4;
 /// Samples a turn.
-const SAMPLES: usize = 1200;
+pub const SAMPLES: usize = 1200;
 /// Turns before the recording begins, and beyond the full one.
 const LEAD_TURNS: f64 = 0.4;
 const OVERSHOOT_TURNS: f64 = 0.05;
@@ -173,6 +173,11 @@ impl State {
 impl Machine {
     /// Drives and measures one circle.
     pub fn measure(&self, drive: &Drive) -> CircularRecording {
+        self.measure_densely(drive, SAMPLES)
+    }
+
+    /// Drives and measures one circle with so many samples a turn.
+    pub fn measure_densely(&self, drive: &Drive, samples: usize) -> CircularRecording {
         let sense = drive.sense.sign();
         let omega = sense * drive.feed_mm_s / drive.radius_mm;
         let turn_s = TAU / omega.abs();
@@ -187,7 +192,7 @@ impl Machine {
         let mut states = [0, 1].map(|a| State::at(at[a], speed[a]));
         let steps = (turn_s * (LEAD_TURNS + 1.0 + OVERSHOOT_TURNS) / STEP_S) as usize;
         let lead = (turn_s * LEAD_TURNS / STEP_S) as usize;
-        let every = ((turn_s / STEP_S) as usize / SAMPLES).max(1);
+        let every = ((turn_s / STEP_S) as usize / samples).max(1);
         let mut rng = Pcg64Mcg::seed_from_u64(drive.seed);
         let mut samples = Vec::new();
         for step in 1..steps {

@@ -7,6 +7,7 @@ mod coverage;
 mod machine;
 mod props;
 mod robust;
+mod thinned;
 mod told_apart;
 mod val;
 

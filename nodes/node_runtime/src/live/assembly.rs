@@ -289,6 +289,7 @@ pub(super) fn assemble(
         patience: Duration::from_secs_f64(patience_s),
         stopping_since: None,
         stopped: false,
+        forced: false,
         has_told_parameters: false,
         next_second: Instant::now(),
         next_service: Instant::now(),

@@ -11,6 +11,7 @@ use metrology::stamp::Host;
 use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
 
+use super::Stop;
 use super::action_client::ActionClient;
 use super::action_server::{ActionServer, GoalService};
 use super::board::Board;
@@ -109,6 +110,7 @@ pub(super) struct Owner {
     pub patience: Duration,
     pub stopping_since: Option<Instant>,
     pub stopped: bool,
+    pub forced: bool,
     pub has_told_parameters: bool,
     pub next_second: Instant,
     pub next_service: Instant,
@@ -137,8 +139,8 @@ fn now() -> Instant {
 
 impl Owner {
     /// Drives the node until `stop` says so, then winds it down.
-    pub async fn run(mut self, mut stop: watch::Receiver<bool>) {
-        log::open(&self.name, &self.rosout);
+    pub async fn run(mut self, mut stop: watch::Receiver<Stop>) {
+        log::open(&self.name, &self.rosout, &self.clock);
         for action in &self.actions {
             let _ = action.status.publish(&action.server.status(), None);
         }
@@ -149,7 +151,7 @@ impl Owner {
             tokio::select! {
                 Some(incoming) = self.queue.recv() => self.batch(incoming),
                 () = tokio::time::sleep_until(wake) => {}
-                _ = stop.changed(), if self.stopping_since.is_none() => self.begin_to_stop(),
+                Ok(()) = stop.changed() => self.told(*stop.borrow_and_update()),
             }
             self.chores(now());
             if !self.has_told_parameters && now() >= met_by {
@@ -161,7 +163,7 @@ impl Owner {
 
     fn tell_parameters(&mut self) {
         self.has_told_parameters = true;
-        let event = parameters::start_event(&self.name, &self.parameters, clock::host_now());
+        let event = parameters::start_event(&self.name, &self.parameters, self.clock.now());
         if let Err(error) = self.parameter_events.publish(&event, None) {
             self.unsent(topics::PARAMETER_EVENTS.name, &error);
         }
@@ -180,7 +182,7 @@ impl Owner {
     fn is_done(&self) -> bool {
         let patience_over = |since: Instant| now().duration_since(since) >= self.patience;
         self.stopping_since
-            .is_some_and(|since| self.stopped || patience_over(since))
+            .is_some_and(|since| self.stopped || self.forced || patience_over(since))
     }
 
     fn wake(&self) -> Instant {
@@ -199,6 +201,13 @@ impl Owner {
         }
         self.stopping_since
             .map_or(wake, |since| wake.min(since + self.patience))
+    }
+
+    fn told(&mut self, stop: Stop) {
+        if stop != Stop::No && self.stopping_since.is_none() {
+            self.begin_to_stop();
+        }
+        self.forced |= stop == Stop::AtOnce;
     }
 
     fn begin_to_stop(&mut self) {
@@ -326,14 +335,18 @@ impl Owner {
             }
         }
         self.last_publication = Some(now);
-        let message = shared(&to_cdr(&self.board.message(clock::host_now())));
+        let message = shared(&to_cdr(&self.board.message(self.clock.now())));
         let _ = self.diagnostics.publish(&message, None);
     }
 
     /// Stop reading, say the last things, wait until they have arrived, leave the graph.
     async fn finish(mut self) {
         if !self.stopped {
-            let message = format!("not wound down after {} s", self.patience.as_secs_f64());
+            let message = if self.forced {
+                "not wound down: the end was forced".to_owned()
+            } else {
+                format!("not wound down after {} s", self.patience.as_secs_f64())
+            };
             self.notice(Diagnostic::new(Level::Error, "stop_forced", message));
         }
         if let Timers::Host(Some(timers)) = self.timers {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::tree::Tree;
 use super::{Origin, SetupError};
+use crate::complaint;
 
 const PARAMETERS_KEY: &str = "ros__parameters";
 
@@ -39,7 +40,8 @@ pub(super) fn sections(
         path: path.to_owned(),
         reason,
     };
-    let tree: Tree = Tree::from_yaml(text).map_err(|error| bad(error.to_string()))?;
+    let tree: Tree =
+        Tree::from_yaml(text).map_err(|error| bad(complaint::of_yaml(&error, text)))?;
     let mut found = Vec::new();
     if tree != Tree::Null {
         walk(&tree, "", &tokens(fully_qualified), &mut found).map_err(bad)?;

@@ -138,6 +138,38 @@ fn a_program_relays_between_processes_at_1_khz_and_stops_at_sigint_within_2_s() 
 }
 
 #[test]
+fn a_second_sigint_ends_a_node_that_winds_down_and_is_said() {
+    let environment = environment(16);
+    let mut process = Process::start(&environment, &["--ros-args", "-p", "stubborn:=true"]);
+    let (pinging, received) = pinger(&environment, 10_000);
+    wait(&received, "the first echo", Some);
+    process.signal("-INT");
+    std::thread::sleep(Duration::from_millis(100));
+    // A terminal and a launcher pass the same Ctrl-C on.
+    process.signal("-INT");
+    std::thread::sleep(Duration::from_millis(1_000));
+    process.signal("-TERM");
+    std::thread::sleep(Duration::from_millis(200));
+    assert!(
+        process.0.as_mut().unwrap().try_wait().unwrap().is_none(),
+        "one Ctrl-C and a SIGTERM leave it its patience"
+    );
+    process.signal("-INT");
+    let asked = Instant::now();
+    let output = process.output();
+    let took = asked.elapsed();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(took < Duration::from_secs(4), "{took:?}: {said}");
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("second SIGINT: ending at once"), "{said}");
+    assert!(
+        said.contains("not wound down: the end was forced"),
+        "{said}"
+    );
+    pinging.stop().unwrap();
+}
+
+#[test]
 fn arguments_rename_place_and_parametrise_a_program() {
     let environment = environment(11);
     let folder = tempfile::tempdir().unwrap();

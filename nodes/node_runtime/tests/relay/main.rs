@@ -1,13 +1,13 @@
 //! The smallest node: repeats the numbers of `in` on `out` with an offset added.
 //!
-//! It stands for every node's program in the tests of processes.
+//! With `stubborn` it does not wind down when it is told to end. It stands for every node's program in the tests of processes.
 
 use std::process::ExitCode;
 
 use abbe_msgs::std_msgs::msg::Int64;
 use abbe_msgs::{Message, Qos, from_cdr, to_cdr};
 use metrology::Stamp;
-use metrology::stamp::Host;
+use metrology::stamp::{Host, Span};
 use node_runtime::node::{Ports, TopicPort};
 use node_runtime::parameter::Parameter;
 use node_runtime::{Emission, Event, Node, NodeFault, Setup};
@@ -18,11 +18,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Default)]
 struct Config {
     offset: i64,
+    stubborn: bool,
 }
 
 struct Relay {
     name: String,
     offset: i64,
+    stubborn: bool,
     ports: Ports,
     parameters: Vec<Parameter>,
 }
@@ -50,6 +52,7 @@ impl Relay {
         Ok(Box::new(Self {
             name,
             offset: config.offset,
+            stubborn: config.stubborn,
             ports,
             parameters,
         }))
@@ -67,6 +70,10 @@ impl Node for Relay {
 
     fn parameters(&self) -> &[Parameter] {
         &self.parameters
+    }
+
+    fn patience(&self) -> Span {
+        Span::from_nanos(60_000_000_000)
     }
 
     fn handle(
@@ -90,7 +97,7 @@ impl Node for Relay {
                     bytes,
                 });
             }
-            Event::Shutdown => out.push(Emission::Stopped),
+            Event::Shutdown if !self.stubborn => out.push(Emission::Stopped),
             _ => {}
         }
         Ok(())

@@ -36,6 +36,16 @@ fn three_faces_make_a_block_with_repeats_averaged() {
         );
         let u_mm = (0.0003 / 2_f64.sqrt()).hypot(2.0 * 25e-6);
         assert!((face.standard_uncertainty_mm - u_mm).abs() < 1e-12);
+        // All faces share what the latency's error makes of them, with the sign of their approach.
+        let (latency, approach) = (face.latency, faces[axis.index()].1[axis.index()]);
+        assert!((latency.sensitivity_mm_s + 2.0 * approach).abs() < 1e-12);
+        assert!((latency.standard_uncertainty_s - 25e-6).abs() < 1e-15);
+        let alone_mm = 0.0003 / 2_f64.sqrt();
+        assert!((face.independent_uncertainty_mm() - alone_mm).abs() < 1e-12);
+        // The position is of the mean instant of its touches.
+        let points = rig.points();
+        let touched = |k: usize| points[2 * axis.index() + k].received_at.nanos();
+        assert!((face.at.nanos() - touched(0).midpoint(touched(1))).abs() <= 1);
     }
     assert_eq!(block.at, rig.points()[5].received_at);
     assert!(rig.diagnostics().is_empty());

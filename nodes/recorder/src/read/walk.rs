@@ -33,7 +33,7 @@ impl Frame {
     pub(super) fn cut(self) -> LossReason {
         LossReason::Cut {
             opcode: self.opcode,
-            missing_bytes: self.body_bytes - self.present_bytes,
+            end_byte: self.at + FRAME_BYTES + self.present_bytes,
         }
     }
 }
@@ -94,7 +94,7 @@ impl<R: Read + Seek> Walker<R> {
             self.fill(&mut bytes[..part])?;
             return Err(LossReason::Cut {
                 opcode: bytes[0],
-                missing_bytes: FRAME_BYTES - left,
+                end_byte: self.length,
             });
         }
         self.fill(&mut bytes)?;

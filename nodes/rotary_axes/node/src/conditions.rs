@@ -1,18 +1,13 @@
 //! The conditions of the rotary-axis calibration on `/diagnostics`; lengths in µm.
 
 use node_runtime::{Diagnostic, Level};
-use rotary_axes::diagnostic::Severity;
 use rotary_axes::{Diagnostic as Condition, Output};
 
 pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
     let Output::Diagnostic(condition) = output else {
         return None;
     };
-    let level = match condition.severity() {
-        Severity::Info => Level::Ok,
-        Severity::Warn => Level::Warn,
-        Severity::Error => Level::Error,
-    };
+    let level = Level::from(condition.severity());
     let told = Diagnostic::new(level, condition.condition(), condition.to_string());
     Some(match condition {
         Condition::Calibrated {
@@ -39,7 +34,7 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
             .with("rms_before_um", before_mm * 1e3)
             .with("rms_after_um", after_mm * 1e3)
             .with("greatest_after_um", greatest_mm * 1e3)
-            .with("expected_um", expected_mm * 1e3)
+            .with("noise_alone_um", expected_mm * 1e3)
             .with("same_places", same_places),
         _ => told,
     })

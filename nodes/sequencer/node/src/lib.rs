@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use abbe_msgs::topics;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use machine::MachineFile;
 use metrology::stamp::Span;
-use node_runtime::{Node, Setup, Wiring};
+use node_runtime::{Node, Setup, Wiring, complaint};
 use sequencer::config::PARAMETERS;
 use sequencer::{Config, Input, Plan, Sequencer};
 
@@ -29,7 +29,10 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         (None, BTreeMap::new())
     } else {
         let (path, text) = setup.file_text("plan_file")?;
-        let plan = Plan::from_yaml(&text).with_context(|| format!("plan {}", path.display()))?;
+        let plan = Plan::from_yaml(&text).map_err(|error| {
+            let reason = complaint::of_yaml(&error, &text);
+            anyhow!("plan {}: {reason}", path.display())
+        })?;
         let programs = files::programs(&plan, &path)?;
         (Some(plan), programs)
     };

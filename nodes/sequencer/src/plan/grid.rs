@@ -104,7 +104,35 @@ impl Senses {
     }
 }
 
+impl GridTrajectory {
+    /// In words, for displays.
+    const fn in_words(self) -> &'static str {
+        match self {
+            Self::Circle => "circle",
+            Self::Arc => "arc",
+            Self::Line => "line",
+            Self::Spike => "line there and back",
+            Self::Corner => "corner of two lines",
+            Self::ArcWithLine => "arc that runs into a line",
+            Self::TwoArcs => "two arcs in a row",
+        }
+    }
+}
+
 impl GridStep {
+    /// In words, for displays.
+    pub(crate) fn activity(&self) -> String {
+        let stops = match (self.on_the_fly, self.stations) {
+            (false, Some(stations)) => format!(" with {stations} stops"),
+            _ => String::new(),
+        };
+        let (shape, plate) = (self.trajectory.in_words(), &self.placement);
+        format!(
+            "grid encoder {plate}: {shape}{stops} at {} mm/min",
+            self.feed_mm_min
+        )
+    }
+
     /// The program of one run.
     ///
     /// # Errors
@@ -116,13 +144,28 @@ impl GridStep {
         sense: Sense,
         arrival: Arrival,
     ) -> Result<Trajectory, SequencerError> {
+        self.paced(step, machine, sense, arrival, self.pace(step)?)
+    }
+
+    /// The program of one run at another pace.
+    ///
+    /// # Errors
+    /// As [`planar`].
+    pub(crate) fn paced(
+        &self,
+        step: usize,
+        machine: &MachineFile,
+        sense: Sense,
+        arrival: Arrival,
+        pace: Pace,
+    ) -> Result<Trajectory, SequencerError> {
         let order = PlanarOrder {
             placement: &self.placement,
             shape: self.shape(step)?,
             offset_mm: self.offset_mm,
             feed_mm_min: self.feed_mm_min,
             sense,
-            pace: self.pace(step)?,
+            pace,
             arrival,
         };
         planar(machine, &order).map_err(|source| in_step(step, source))

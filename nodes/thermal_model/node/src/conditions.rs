@@ -1,18 +1,13 @@
 //! The conditions of the thermal model on `/diagnostics`.
 
 use node_runtime::{Diagnostic, Level};
-use thermal_model::diagnostic::Severity;
 use thermal_model::{Diagnostic as Condition, Output};
 
 pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
     let Output::Diagnostic(condition) = output else {
         return None;
     };
-    let level = match condition.severity() {
-        Severity::Info => Level::Ok,
-        Severity::Warn => Level::Warn,
-        Severity::Error => Level::Error,
-    };
+    let level = Level::from(condition.severity());
     let told = Diagnostic::new(level, condition.condition(), condition.to_string());
     let Condition::Scored { score, .. } = condition else {
         return Some(told);

@@ -7,8 +7,9 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
-use thermal_model::Diagnostic;
+use thermal_model::config::Method;
 use thermal_model::prediction::Predictor;
+use thermal_model::{Diagnostic, ThermalModelConfig};
 
 const A_MM: f64 = 0.060;
 
@@ -59,7 +60,7 @@ fn an_identified_time_constant_takes_most_of_the_saw_tooth_away() {
     println!("residual with relaxation {:.2} %", 100.0 * share);
     assert!(share.abs() < 0.02, "{share}");
     let x = shop.model().axes[Axis::X].unwrap();
-    assert!((x.time_constant_s / 3600.0 - 1.0).abs() < 0.05);
+    assert!((x.growth[0].unwrap().time_constant_s / 3600.0 - 1.0).abs() < 0.05);
     assert!(shop.diagnostics.iter().any(|d| matches!(
         d,
         Diagnostic::Scored {
@@ -80,7 +81,7 @@ fn a_drift_with_constant_rate_leaves_the_rate_times_the_period() {
         });
     }
     // No time constant can be seen in a straight line, so the drift is held.
-    assert!(shop.model().axes[Axis::X].unwrap().rate_mm_s == 0.0);
+    assert!(shop.model().axes[Axis::X].unwrap().growth == [None; 3]);
     let scores: Vec<_> = shop
         .diagnostics
         .iter()
@@ -94,6 +95,67 @@ fn a_drift_with_constant_rate_leaves_the_rate_times_the_period() {
         scores.iter().all(|um| (um - 4.0).abs() < 1e-6),
         "{scores:?}"
     );
+}
+
+#[test]
+fn faces_with_a_time_constant_move_the_axes_they_are_coupled_to_and_no_others_are_invented() {
+    // X is sheared along Y with one time constant; Y and Z only wander.
+    let tau_s = 2400.0;
+    let shear = |t_s: f64| 5e-4 * (1.0 - (-t_s / tau_s).exp());
+    let noise = Normal::new(0.0, U_MM).unwrap();
+    let mut rng = Pcg64Mcg::seed_from_u64(5);
+    let machine = serde_saphyr::from_str(include_str!(
+        "../../../../launch_configs/four_blocks/machine.yaml"
+    ));
+    let config = config(", temperature: {enabled: false}");
+    let config = ThermalModelConfig {
+        method: Method::NBlock,
+        slope_error_limit_um: 30.0,
+        ..config
+    };
+    let mut shop = Shop::on(config, machine.unwrap());
+    shop.cold();
+    for _ in 0..5 {
+        shop.wait_s(900.0);
+        let angle = shear(shop.now().as_secs_f64());
+        shop.cycle(false, |axis, corner| match axis {
+            // The X faces are touched 6 mm inside of the corners.
+            Axis::X => {
+                let y_mm = corner.y - 6.0 * corner.y.signum();
+                corner.x + angle * y_mm + U_MM * 0.3 * noise.sample(&mut rng)
+            }
+            _ => corner[axis.index()] + U_MM * 0.3 * noise.sample(&mut rng),
+        });
+    }
+    let identified: Vec<bool> = Axis::LINEAR
+        .iter()
+        .map(|axis| {
+            shop.diagnostics.iter().rev().find_map(|d| match d {
+                Diagnostic::TimeConstant { axis: of, .. } if of == axis => Some(true),
+                Diagnostic::NoTimeConstant { axis: of, .. } if of == axis => Some(false),
+                _ => None,
+            }) == Some(true)
+        })
+        .collect();
+    assert_eq!(identified, [true, false, false]);
+    let updated_s = shop.now().as_secs_f64();
+    shop.wait_s(900.0);
+    let now_s = shop.now().as_secs_f64();
+    for p_mm in [
+        Vector3::new(50.0, 150.0, 60.0),
+        Vector3::new(-80.0, -170.0, 200.0),
+    ] {
+        let at = |axis| {
+            let now = shop.now();
+            axis_drift_at(shop.model(), axis, &p_mm, now, Extrapolate::Linear).unwrap()
+        };
+        let held_mm = (shear(now_s) - shear(updated_s)) * p_mm.y;
+        let missed_mm = shear(now_s) * p_mm.y - at(Axis::X);
+        let (held_um, missed_um) = (1e3 * held_mm, 1e3 * missed_mm);
+        println!("at {p_mm:?}: holding misses {held_um:.2} µm, growth {missed_um:.2} µm");
+        assert!(missed_um.abs() < 0.3 * held_um.abs());
+        assert!(at(Axis::Y).abs() < 2e-3 && at(Axis::Z).abs() < 2e-3);
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Days in the shop: what goes wrong between a block and a model, one scene each.
 
-use crate::shop::{Shop, config};
+use crate::shop::{Shop, U_MM, config};
 use metrology::sample::{Sense, TestKind, TestPlane, TestSegment, UpdateReason};
 use metrology::{Axis, Stamp};
 use nalgebra::Vector3;
@@ -198,6 +198,38 @@ fn a_bumped_block_may_be_rebased_instead() {
     });
     assert!(!shop.model().quarantined);
     assert!((k0_um(&shop, Axis::X) - 14.0).abs() < 1e-9);
+    // The pushed face rests on three readings, the cold one, the last before and the first after.
+    let x = shop.model().axes[Axis::X].unwrap();
+    let slope_u = (2.0 + 4.0_f64).sqrt() * U_MM / 440.0;
+    assert!((x.covariance[(1, 1)].sqrt() - slope_u).abs() < 0.03 * slope_u);
+}
+
+#[test]
+fn a_model_renewed_without_touches_keeps_the_instant_of_the_last_ones() {
+    let mut shop = Shop::new(config(""));
+    shop.cold();
+    shop.wait_s(900.0);
+    drifted(&mut shop, 0.010);
+    let measured_at = shop.model().measured_at();
+    assert_eq!(measured_at, Some(shop.now()));
+    shop.wait_s(300.0);
+    drifted(&mut shop, 0.500);
+    // The marked copy of the old model is new, its measurement is not.
+    assert!(shop.model().quarantined && shop.model().sequence == 3);
+    assert_eq!(shop.model().measured_at(), measured_at);
+    // Nor is that of an axis with a face missing, beside others that were measured again.
+    shop.wait_s(600.0);
+    shop.run += 1;
+    for block in 0..2 {
+        let mut measured = shop.measurement(block, false, |axis, c| c[axis.index()] + 0.011);
+        if block == 1 {
+            measured.faces[Axis::Y] = None;
+        }
+        shop.step(Input::Block(measured));
+    }
+    let at = |axis| shop.model().axes[axis].map(|d| d.measured_at);
+    assert_eq!(at(Axis::Y), measured_at);
+    assert_eq!(at(Axis::X), Some(shop.now()));
 }
 
 #[test]
@@ -297,7 +329,12 @@ fn a_change_of_load_asks_and_stops_extrapolating() {
         drifted(&mut shop, 0.040 * (1.0 - left));
         shop.wait_s(900.0);
     }
-    assert!(shop.model().axes[Axis::X].unwrap().rate_mm_s > 0.0);
+    assert!(
+        shop.model().axes[Axis::X].unwrap().growth[0]
+            .unwrap()
+            .rate_mm_s
+            > 0.0
+    );
     shop.requests.clear();
     let before_um = {
         let p_mm = Vector3::zeros();
@@ -316,7 +353,7 @@ fn a_change_of_load_asks_and_stops_extrapolating() {
     }
     shop.step(faster);
     let x = shop.model().axes[Axis::X].unwrap();
-    assert!(x.rate_mm_s == 0.0);
+    assert!(x.growth == [None; 3]);
     assert!((k0_um(&shop, Axis::X) + x.slope_mm_per_mm * 220.0 * 1e3 - before_um).abs() < 1e-6);
 }
 

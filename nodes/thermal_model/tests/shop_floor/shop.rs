@@ -2,7 +2,7 @@
 
 use machine::MachineFile;
 use metrology::sample::{
-    BlockMeasurement, FacePosition, TemperatureSample, ThermalModel, UpdateRequest,
+    BlockMeasurement, FacePosition, LatencyShare, TemperatureSample, ThermalModel, UpdateRequest,
 };
 use metrology::stamp::Span;
 use metrology::{Axis, Host, PerAxis, Stage, Stamp};
@@ -38,7 +38,10 @@ pub struct Shop {
 
 impl Shop {
     pub fn new(config: ThermalModelConfig) -> Self {
-        let machine = machine();
+        Self::on(config, machine())
+    }
+
+    pub fn on(config: ThermalModelConfig, machine: MachineFile) -> Self {
         Self {
             stage: ThermalModelStage::new(config, &machine).unwrap(),
             machine,
@@ -88,6 +91,7 @@ impl Shop {
                 position_mm: reading(axis, Vector3::from(entry.corner_mm)),
                 standard_uncertainty_mm: U_MM,
                 at: self.now(),
+                latency: LatencyShare::default(),
             });
         }
         BlockMeasurement {

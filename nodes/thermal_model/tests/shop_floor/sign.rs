@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
+use thermal_model::latency_share::LatencyShares;
 use thermal_model::reference::FaceDrift;
 use thermal_model::two_block::{SlopeLimit, line};
 
@@ -73,6 +74,9 @@ fn the_stated_uncertainty_covers_the_truth_in_95_percent_of_seeds() {
     let truth_mm = |p_mm: f64| 0.012 + 4e-5 * p_mm;
     let points_mm = [-220.0, 0.0, 220.0, 320.0];
     let mut covered = [0; 4];
+    let mut shop = Shop::new(config(""));
+    shop.cold();
+    let mut model = shop.model().clone();
     for _ in 0..1000 {
         let mut face = |x_mm: f64| {
             let (cold, hot) = (noise.sample(&mut rng), noise.sample(&mut rng));
@@ -83,13 +87,18 @@ fn the_stated_uncertainty_covers_the_truth_in_95_percent_of_seeds() {
                 drift_mm: truth_mm(x_mm) + hot - cold,
                 standard_uncertainty_mm: U_MM * 2_f64.sqrt(),
                 hot_uncertainty_mm: U_MM,
+                latency: LatencyShares::default(),
                 at: Stamp::from_nanos(0),
             }
         };
         let drift = line(Axis::X, &face(-220.0), &face(220.0), limit).drift;
         for (p_mm, count) in points_mm.iter().zip(&mut covered) {
             let d_mm = drift.k0_mm + drift.slope_mm_per_mm * (p_mm - drift.p0_mm);
-            let expanded_mm = 1.96 * drift_standard_uncertainty_mm(&drift, *p_mm);
+            model.axes[Axis::X] = Some(drift);
+            let point_mm = Vector3::new(*p_mm, 0.0, 0.0);
+            let u_mm =
+                drift_standard_uncertainty_mm(&model, Axis::X, &point_mm, Extrapolate::Linear);
+            let expanded_mm = 1.96 * u_mm.unwrap();
             *count += usize::from((d_mm - truth_mm(*p_mm)).abs() < expanded_mm);
         }
     }

@@ -7,11 +7,17 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use node_runtime::Interruption;
 
 use crate::launch::LaunchNode;
 
-/// A process that was told to stop is killed after this time; a node has a limit of its own below it.
-const PATIENCE: Duration = Duration::from_secs(90);
+/// A process that was told to stop is killed after this time where its launch file says nothing; a
+/// node has a limit of its own below it.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// A node takes a second signal within this for the same Ctrl-C.
+const SAME: Duration = Duration::from_millis(600);
+/// A process that was forced to end is killed after this time.
+const LAST_PATIENCE: Duration = Duration::from_secs(3);
 /// Between two looks at processes that stop.
 const LOOK: Duration = Duration::from_millis(20);
 /// They stop last, so that compensation fades through them.
@@ -23,6 +29,7 @@ struct Process {
     name: String,
     exec: String,
     child: Child,
+    patience: Duration,
     ended: bool,
 }
 
@@ -51,6 +58,7 @@ impl Processes {
                 name: node.name.clone(),
                 exec: node.exec.clone(),
                 child,
+                patience: node.ends_within.unwrap_or(PATIENCE),
                 ended: false,
             });
         }
@@ -74,27 +82,39 @@ impl Processes {
     }
 
     /// Tells all to stop, waits, and kills what does not.
-    pub fn stop(mut self) {
-        self.end();
+    pub fn stop(mut self, interruption: &Interruption) {
+        self.end(interruption);
     }
 
-    fn end(&mut self) {
-        self.end_those(|process| !CONTROLLERS.contains(&process.exec.as_str()));
-        self.end_those(|_| true);
+    fn end(&mut self, interruption: &Interruption) {
+        let others = |process: &Process| !CONTROLLERS.contains(&process.exec.as_str());
+        self.end_those(others, interruption);
+        self.end_those(|_| true, interruption);
     }
 
-    fn end_those(&mut self, which: fn(&Process) -> bool) {
+    /// Tells `which` to stop; once the end is forced, at once, and kills what does not even so.
+    fn end_those(&mut self, which: fn(&Process) -> bool, interruption: &Interruption) {
         let open = |process: &Process| !process.ended && which(process);
-        for process in self.0.iter().filter(|process| open(process)) {
-            // It is a child that nobody has waited for: its number is still its own.
-            if let Ok(number) = i32::try_from(process.child.id()) {
-                let _ = kill(Pid::from_raw(number), Signal::SIGTERM);
+        let tell = |processes: &[Process], signal: Signal| {
+            for process in processes.iter().filter(|process| open(process)) {
+                // It is a child that nobody has waited for: its number is still its own.
+                if let Ok(number) = i32::try_from(process.child.id()) {
+                    let _ = kill(Pid::from_raw(number), signal);
+                }
             }
-        }
-        let deadline = Instant::now() + PATIENCE;
+        };
+        tell(&self.0, Signal::SIGTERM);
+        let asked = Instant::now();
+        let mut forced = None;
         while self.0.iter().any(open) {
-            let late = Instant::now() >= deadline;
+            if forced.is_none() && asked.elapsed() >= SAME && interruption.is_forced() {
+                // For a node that was told to stop it is the second signal.
+                tell(&self.0, Signal::SIGINT);
+                forced = Some(Instant::now());
+            }
+            let forced_for = forced.map_or(Duration::ZERO, |at| at.elapsed());
             for process in self.0.iter_mut().filter(|process| open(process)) {
+                let late = asked.elapsed() >= process.patience || forced_for >= LAST_PATIENCE;
                 process.settle(late);
             }
             std::thread::sleep(LOOK);
@@ -117,11 +137,7 @@ impl Process {
                 }
             }
             _ if late => {
-                let limit_s = PATIENCE.as_secs();
-                eprintln!(
-                    "abbe: node {} did not stop within {limit_s} s: killed",
-                    self.name
-                );
+                eprintln!("abbe: node {} did not stop in time: killed", self.name);
                 // It may have ended in this moment.
                 let _ = self.child.kill();
                 let _ = self.child.wait();
@@ -134,7 +150,7 @@ impl Process {
 
 impl Drop for Processes {
     fn drop(&mut self) {
-        self.end();
+        self.end(&Interruption::never());
     }
 }
 

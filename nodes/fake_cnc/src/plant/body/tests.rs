@@ -3,7 +3,9 @@
 //! What is expected is written down per chain from small displacements, without rigid motions: a body
 //! that is shifted by d and turned by w about its carriage c moves its point p by d + w x (p - c). A
 //! body on the tool side moves the tool so; one on the workpiece side moves the workpiece, and the tool
-//! against it the other way.
+//! against it the other way. `compensated` takes each away again by its published component.
+
+mod compensated;
 
 use machine::MachineFile;
 use metrology::{Axis, PerAxis};

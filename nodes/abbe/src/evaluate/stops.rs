@@ -1,0 +1,169 @@
+//! Where an axis stood at the stops of a verification program that moves this axis alone.
+//!
+//! The position is that of the linear scale where the axis has one, otherwise the one that the control reports.
+//! A stop counts when the command rests long enough; the mean of its last part is taken.
+
+use metrology::Axis;
+use metrology::sample::{AxisState, TestKind, TestSegment};
+use metrology::stamp::{Host, Span, Stamp};
+
+/// Rest after which readings count.
+const SETTLE: Span = Span::from_nanos(200_000_000);
+/// Commands closer than this are one place, mm.
+const SAME_MM: f64 = 1e-6;
+/// Readings that a stop needs.
+const LEAST_READINGS: u32 = 10;
+
+/// One stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    /// Where the program sent the axis, mm.
+    pub commanded_mm: f64,
+    /// Position minus command, mm.
+    pub deviation_mm: f64,
+    /// Whether it was entered from smaller positions.
+    pub up: bool,
+}
+
+/// The stops of one verification.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stops {
+    /// Its run.
+    pub run: u32,
+    /// The axis that moved.
+    pub axis: Axis,
+    /// Whether its linear scale was read.
+    pub by_scale: bool,
+    /// Whether anything was added to the commands.
+    pub compensated: bool,
+    /// In the order of the program.
+    pub stops: Vec<Stop>,
+}
+
+/// A rest of the command.
+#[derive(Clone, Copy, Debug)]
+struct Rest {
+    commanded_mm: [f64; 3],
+    since: Stamp<Host>,
+    /// Sums of position minus command, by axis: reported, scale.
+    sums_mm: [[f64; 2]; 3],
+    n: u32,
+}
+
+#[derive(Debug)]
+struct Current {
+    run: u32,
+    compensated: bool,
+    rest: Option<Rest>,
+    done: Vec<Rest>,
+}
+
+/// Collects the stops of a recording.
+#[derive(Debug, Default)]
+pub struct StopRuns {
+    current: Option<Current>,
+    found: Vec<Stops>,
+}
+
+impl StopRuns {
+    /// Begin or end of a test.
+    pub fn segment(&mut self, segment: &TestSegment) {
+        if segment.begin {
+            self.current = (segment.kind == TestKind::Verification).then(|| Current {
+                run: segment.run,
+                compensated: false,
+                rest: None,
+                done: Vec::new(),
+            });
+        } else if let Some(mut current) = self.current.take()
+            && segment.completed
+            && segment.run == current.run
+        {
+            current.done.extend(current.rest);
+            self.found.extend(current.finished());
+        }
+    }
+
+    /// Something is added to the commands, or nothing.
+    pub fn compensation(&mut self, acts: bool) {
+        if let Some(current) = &mut self.current {
+            current.compensated |= acts;
+        }
+    }
+
+    /// Positions at one tick.
+    pub fn axes(&mut self, state: &AxisState) {
+        let Some(current) = &mut self.current else {
+            return;
+        };
+        let commanded_mm = Axis::LINEAR.map(|axis| state.commanded[axis]);
+        let same = |rest: &Rest| {
+            let pairs = rest.commanded_mm.iter().zip(&commanded_mm);
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < SAME_MM
+        };
+        match &mut current.rest {
+            Some(rest) if same(rest) => {
+                if state.received_at - rest.since >= SETTLE {
+                    for (sums, axis) in rest.sums_mm.iter_mut().zip(Axis::LINEAR) {
+                        sums[0] += state.motor[axis] - state.commanded[axis];
+                        sums[1] += state.scale[axis] - state.commanded[axis];
+                    }
+                    rest.n += 1;
+                }
+            }
+            rest => {
+                current.done.extend(rest.replace(Rest {
+                    commanded_mm,
+                    since: state.received_at,
+                    sums_mm: [[0.0; 2]; 3],
+                    n: 0,
+                }));
+            }
+        }
+    }
+
+    /// The verifications with stops, in the order of the recording.
+    #[must_use]
+    pub fn stops(self) -> Vec<Stops> {
+        self.found
+    }
+}
+
+impl Current {
+    /// The stops, where one axis moved and no other.
+    fn finished(self) -> Option<Stops> {
+        // The first rest is where the machine happened to stand.
+        let entered = || self.done.iter().skip(1);
+        let is_stop = |rest: &&Rest| rest.n >= LEAST_READINGS;
+        let span = |axis: usize| {
+            let all = || {
+                entered()
+                    .filter(is_stop)
+                    .map(|rest| rest.commanded_mm[axis])
+            };
+            all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
+        };
+        let moved: Vec<usize> = (0..3).filter(|axis| span(*axis) > SAME_MM).collect();
+        let [axis] = moved[..] else {
+            return None;
+        };
+        let mut rests = entered().filter(is_stop);
+        let by_scale = rests.all(|rest| rest.sums_mm[axis][1].is_finite());
+        let pairs = self.done.windows(2).filter_map(|pair| match pair {
+            [before, rest] if rest.n >= LEAST_READINGS => Some(Stop {
+                commanded_mm: rest.commanded_mm[axis],
+                deviation_mm: rest.sums_mm[axis][usize::from(by_scale)] / f64::from(rest.n),
+                up: rest.commanded_mm[axis] > before.commanded_mm[axis],
+            }),
+            _ => None,
+        });
+        let stops: Vec<Stop> = pairs.collect();
+        (!stops.is_empty()).then_some(Stops {
+            run: self.run,
+            axis: Axis::LINEAR[axis],
+            by_scale,
+            compensated: self.compensated,
+            stops,
+        })
+    }
+}

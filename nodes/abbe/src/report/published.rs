@@ -1,0 +1,197 @@
+//! The published separation of one circle, as it prints single errors, beside what the circle determines.
+
+use grid_encoder::comparison::{Compared, Comparison, compare};
+use grid_encoder::geometry::geometry_model;
+use grid_encoder::spectrum::Visibility;
+use grid_encoder::unknown::Unknown;
+use metrology::Axis;
+use metrology::sample::{GeometryModel, TestPlane};
+use metrology::stamp::Stamp;
+
+use super::geometry::{self, coefficients};
+use super::section::{Rows, Section, head, rounded, um};
+use crate::evaluate::circles::plane_axes;
+use crate::evaluate::stationwise::StationCircle;
+
+/// Every element of the other U, mm at the radius.
+const OTHER_MM: f64 = 0.005;
+/// Coverage factor of what is printed.
+const COVERAGE: f64 = 2.0;
+
+/// What all recordings together say of one unknown, mm at the circle's radius.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+struct Together {
+    value_mm: f64,
+    standard_uncertainty_mm: f64,
+}
+
+/// Two parts, the comparison and what the circle determines; none where the circle cannot be compared.
+#[must_use]
+pub fn sections(circle: &StationCircle, all: Option<&GeometryModel>) -> Vec<Section> {
+    let place = &circle.recording.place;
+    let letters = plane_axes(place.plane).map_or_else(String::new, |[u, v]| format!("{u}{v}"));
+    let title = format!(
+        "One circle {letters}, R {:.0} mm, run {}: the published separation and what it determines",
+        place.radius_mm, circle.recording.run
+    );
+    let of_all = |compared: &Compared| together(all?, compared, normal(place.plane)?);
+    match compare(&circle.kinematics, &circle.recording, OTHER_MM) {
+        Ok(None) => Vec::new(),
+        Ok(Some(found)) => {
+            let chain = circle.kinematics.chain().to_string();
+            let model = geometry_model(&found.determined, &chain, Stamp::from_nanos(0), 1);
+            vec![
+                comparison(title, &found, &of_all),
+                geometry::section("What this circle alone determines", &model),
+            ]
+        }
+        Err(error) => {
+            let mut section = Section::new(title);
+            section.lines.push(format!("Not evaluated: {error}."));
+            vec![section]
+        }
+    }
+}
+
+fn comparison(
+    title: String,
+    found: &Comparison,
+    of_all: &dyn Fn(&Compared) -> Option<Together>,
+) -> Section {
+    let mut section = Section::new(title);
+    let n = found.unknowns.len();
+    let seen = found.unknowns.iter().filter(|c| is_seen(c)).count();
+    section.lines.push(format!(
+        "{} stations give the published equations rank {} for {n} unknowns: their solution has {} arbitrary numbers U.",
+        found.n_stations,
+        found.rank,
+        n - found.rank
+    ));
+    section.lines.push(format!(
+        "U = 0 and U = {:.0} µm draw one and the same trace ({:.0e} µm apart, {} µm rms from the readings) with different errors. Of the {n} the circle determines {seen}; the others, marked ×, are numbers of the method and not of the machine.",
+        OTHER_MM * 1e3,
+        found.apart_mm * 1e3,
+        um(found.left_mm)
+    ));
+    let rows = found.unknowns.iter().map(|compared| {
+        vec![
+            compared.unknown.to_string(),
+            format!("{}{}", um(compared.published_mm), mark(compared)),
+            format!("{}{}", um(compared.other_mm), mark(compared)),
+            verdict(compared).to_owned(),
+            of_all(compared).map_or_else(|| "—".to_owned(), in_words),
+        ]
+    });
+    section.tables.push(Rows {
+        head: head(&[
+            "µm at the radius",
+            "published, U = 0",
+            "published, other U",
+            "this circle",
+            "all recordings, ± U (k = 2)",
+        ]),
+        rows: rows.collect(),
+        note: "Each number is the error at the radius from the machine's origin, a turn times the radius. The last column is what all recordings of the bag determine, at the height of the plate; a dash: not even they.".to_owned(),
+    });
+    section.figures = figures(&section.title, found, of_all);
+    section
+}
+
+fn is_seen(compared: &Compared) -> bool {
+    compared.visibility == Visibility::Estimable
+}
+
+fn mark(compared: &Compared) -> &'static str {
+    if is_seen(compared) { "  " } else { " ×" }
+}
+
+fn verdict(compared: &Compared) -> &'static str {
+    match compared.visibility {
+        Visibility::Estimable => "determined",
+        Visibility::Mixed => "only in sums",
+        Visibility::Unseen => "not at all",
+    }
+}
+
+fn in_words(together: Together) -> String {
+    let (value, u) = rounded(
+        together.value_mm * 1e3,
+        COVERAGE * together.standard_uncertainty_mm * 1e3,
+    );
+    format!("{value} ± {u}")
+}
+
+/// The turn about the normal of a plane.
+fn normal(plane: TestPlane) -> Option<Axis> {
+    match plane {
+        TestPlane::Xy => Some(Axis::C),
+        TestPlane::Yz => Some(Axis::A),
+        TestPlane::Zx => Some(Axis::B),
+        TestPlane::None => None,
+    }
+}
+
+/// The unknown in a model of all recordings about the same origin: by itself, or as it acts at the height of
+/// the plate, where the tilts of the same motions are in it.
+fn together(model: &GeometryModel, compared: &Compared, normal: Axis) -> Option<Together> {
+    let Unknown::Power { component, power } = compared.unknown else {
+        return None;
+    };
+    let all = coefficients(model);
+    let wanted = all.iter().position(|c| {
+        c.curve.component == component && c.power() == power && c.curve.origin.abs() < 1e-9
+    })?;
+    if all[wanted].is_known() {
+        let (curve, place) = (all[wanted].curve, all[wanted].place);
+        return Some(Together {
+            value_mm: curve.coefficient.get(place)? / compared.scale,
+            standard_uncertainty_mm: curve.standard_uncertainty.get(place)? / compared.scale,
+        });
+    }
+    let is_tilt = |idx: u32| {
+        let other = all.get(idx as usize).map(|c| c.curve.component);
+        other.is_some_and(|other| other.is_angular() && other.direction != normal)
+    };
+    model.combinations.iter().find_map(|sum| {
+        let own = sum
+            .weights
+            .iter()
+            .find(|(idx, _)| *idx as usize == wanted)?;
+        let mut others = sum
+            .weights
+            .iter()
+            .filter(|(idx, _)| *idx as usize != wanted);
+        let factor = own.1 * compared.scale;
+        others.all(|(idx, _)| is_tilt(*idx)).then(|| Together {
+            value_mm: sum.value_mm / factor,
+            standard_uncertainty_mm: sum.standard_uncertainty_mm / factor.abs(),
+        })
+    })
+}
+
+fn figures(
+    title: &str,
+    found: &Comparison,
+    of_all: &dyn Fn(&Compared) -> Option<Together>,
+) -> serde_json::Value {
+    let unknown = |compared: &Compared| {
+        serde_json::json!({
+            "name": compared.unknown.to_string(),
+            "published_mm": compared.published_mm,
+            "published_other_mm": compared.other_mm,
+            "determined_by_the_circle": is_seen(compared),
+            "all_recordings": of_all(compared),
+        })
+    };
+    serde_json::json!({
+        "test": title,
+        "published": {
+            "stations": found.n_stations,
+            "rank": found.rank,
+            "other_u_mm": OTHER_MM,
+            "traces_apart_mm": found.apart_mm,
+            "left_mm": found.left_mm,
+            "unknowns": found.unknowns.iter().map(unknown).collect::<Vec<_>>(),
+        },
+    })
+}
