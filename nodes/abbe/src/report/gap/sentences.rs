@@ -135,10 +135,19 @@ fn shrink(report: &GapReport) -> String {
             )
         },
     );
+    let runs = runs.join(", ");
+    let before = maybe(shrink.rms_um.before);
+    if report
+        .causes
+        .iter()
+        .all(|cause| cause.status == Status::Surrogate)
+    {
+        return format!(
+            "How far: no effect was named, so nothing was added to the simulator; the held-out runs ({runs}) stay at {before} µm rms."
+        );
+    }
     format!(
-        "How far: with the named effects in the simulator, the held-out runs ({}) go from {} to {} µm rms; {closed}.",
-        runs.join(", "),
-        maybe(shrink.rms_um.before),
+        "How far: with the effects found in the simulator, the held-out runs ({runs}) go from {before} to {} µm rms; {closed}.",
         maybe(shrink.rms_um.after),
     )
 }
