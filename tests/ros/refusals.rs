@@ -53,7 +53,7 @@ fn bad_parameters_are_refused_with_file_key_and_value() {
         (
             "hold_s: 60.0",
             "hold_s: .nan",
-            &["axis_compensation.yaml", "line 11", "hold_s: .nan"],
+            &["axis_compensation.yaml", "line 12", "hold_s: .nan"],
         ),
         (
             "hold_s: 60.0",

@@ -34,7 +34,7 @@ fn bad_steps_are_refused_with_their_place_and_values() {
         ),
         (
             latency(".nan, 240.0", 3),
-            &["plan.yaml", "line 4 column 54", ".nan"],
+            &["plan.yaml", "line 4, column 54", ".nan"],
         ),
         (
             latency("60.0, 240.0, 60.0", 3),

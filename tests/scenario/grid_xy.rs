@@ -36,7 +36,8 @@ fn check_readings(segments: &[TestSegment], samples: &[GridSample]) {
 #[test]
 fn every_reading_of_grid_xy_is_of_its_segment_and_its_page_marks_what_one_circle_cannot_tell() {
     let began = Instant::now();
-    let run = Scenario::copy_of("grid_xy").run();
+    let scenario = Scenario::copy_of("grid_xy");
+    let run = scenario.run();
     let took = began.elapsed();
     let bag = Bag::open(run.join("bag")).unwrap();
     let segments = all(&bag, &topics::TEST_SEGMENT);

@@ -19,16 +19,19 @@ const REST_S: f64 = 0.4;
 struct Run {
     report: Value,
     bag: Bag,
+    /// Keeps the folder that the bag is in.
+    _scenario: Scenario,
 }
 
 fn run(name: &str) -> Run {
     let began = Instant::now();
-    let folder = Scenario::copy_of(name);
-    let run = folder.run();
+    let scenario = Scenario::copy_of(name);
+    let run = scenario.run();
     let text = std::fs::read_to_string(run.join("report.json")).unwrap();
     let found = Run {
         report: serde_json::from_str(&text).unwrap(),
         bag: Bag::open(run.join("bag")).unwrap(),
+        _scenario: scenario,
     };
     let took = began.elapsed();
     eprintln!("{name}: {:.1} s", took.as_secs_f64());

@@ -67,10 +67,12 @@ fn five_places_of_one_head_leave_straightness_and_yaw_together_and_another_head_
     assert_eq!(wanted["beyond_what_was_tried"], serde_json::json!([]));
     assert_eq!(wanted["is_least"], true);
     let add = wanted["add"].as_array().unwrap();
-    assert_eq!(add.len(), 1, "{wanted}");
-    assert_eq!(
-        add[0]["head_offset_mm"],
-        serde_json::json!([60.0, 0.0, 0.0])
+    assert_eq!(add.len(), 2, "{wanted}");
+    let other_head = serde_json::json!([60.0, 0.0, 0.0]);
+    assert!(
+        add.iter()
+            .any(|circle| circle["head_offset_mm"] == other_head),
+        "{wanted}"
     );
     let known = told(&[grid_xy, "--want", "EXX1"]);
     assert_eq!(known["wanted"][0]["open"], serde_json::json!([]));

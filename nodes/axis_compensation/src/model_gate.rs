@@ -13,7 +13,9 @@
 //! published again, or extrapolated anew, rests on the same touches and confirms nothing.
 //!
 //! The corners are those of the travel where lines are continued. Otherwise drifts act within the spans
-//! only: (1) holds at their ends, and (2) for what is held beyond them. Coverage factor 2. Where a
+//! only: (1) holds at their ends, and (2) for what is held beyond them. An axis whose slope the blocks
+//! do not show moves by their mean drift alone, and of what is far from them nothing is known: (2) asks at
+//! the blocks there, and the thermal model says that there is no slope. Coverage factor 2. Where a
 //! model fell away (an axis is missing) there is nothing to compare.
 //!
 //! A model that has expired, or that is older than the one in use, is history of a latched topic. If the
@@ -231,9 +233,10 @@ impl ModelGate {
 
     /// Expanded uncertainty at the worst corner of (2), mm; zero for an axis without drift.
     fn greatest_expanded_mm(&self, model: &ThermalModel, axis: Axis) -> f64 {
+        let has_slope = model.axes[axis].is_some_and(|drift| drift.slope_identifiable);
         let corners_mm = match self.limits.policy {
-            Extrapolate::Linear | Extrapolate::Hold => corners(&self.limits.travel_mm),
-            Extrapolate::Refuse => self.corners_in_use(model, model),
+            Extrapolate::Linear | Extrapolate::Hold if has_slope => corners(&self.limits.travel_mm),
+            _ => corners_of_spans(model, model),
         };
         let expanded_mm = corners_mm.iter().filter_map(|corner_mm| {
             let u_mm = drift_standard_uncertainty_mm(model, axis, corner_mm, self.limits.policy);
@@ -247,14 +250,7 @@ impl ModelGate {
         if self.limits.policy == Extrapolate::Linear {
             return corners(&self.limits.travel_mm);
         }
-        corners(&Axis::LINEAR.map(|axis| {
-            let span = |m: &ThermalModel| m.axes[axis].map(|d| d.span_mm);
-            match (span(old), span(new)) {
-                (Some(a), Some(b)) => (a.0.min(b.0), a.1.max(b.1)),
-                (Some(one), None) | (None, Some(one)) => one,
-                (None, None) => (0.0, 0.0),
-            }
-        }))
+        corners_of_spans(old, new)
     }
 }
 
@@ -275,6 +271,18 @@ fn older_by_s(model: &ThermalModel, current: &ThermalModel) -> Option<f64> {
         used.0 - own.0
     };
     (own < used).then(|| by.as_secs_f64())
+}
+
+/// Corners of the box of the spans of two models.
+fn corners_of_spans(old: &ThermalModel, new: &ThermalModel) -> [Vector3<f64>; 8] {
+    corners(&Axis::LINEAR.map(|axis| {
+        let span = |m: &ThermalModel| m.axes[axis].map(|d| d.span_mm);
+        match (span(old), span(new)) {
+            (Some(a), Some(b)) => (a.0.min(b.0), a.1.max(b.1)),
+            (Some(one), None) | (None, Some(one)) => one,
+            (None, None) => (0.0, 0.0),
+        }
+    }))
 }
 
 fn corners(ends_mm: &[(f64, f64); 3]) -> [Vector3<f64>; 8] {
