@@ -157,7 +157,7 @@ fn a_test_gives_a_model_and_a_verification_judges_it() {
     let mut rig = Rig::new();
     rig.test(TestKind::Rotary, &wrong, &poses, |_, _| true);
     assert_eq!(rig.models().len(), 1);
-    rig.expect(&["calibrated: run 1: 12 visits of 1 spheres"]);
+    rig.expect(&["calibrated: run 1: 12 visits of 1 sphere,"]);
     rig.test(TestKind::RotaryVerification, &wrong, &others, |_, _| true);
     let [verified] = &rig.verifications()[..] else {
         panic!("{:?}", rig.said());
@@ -242,7 +242,7 @@ fn a_visit_that_is_off_is_left_out_and_named() {
         }
         true
     });
-    rig.expect(&["doubtful_visit", "um off, which chance does not explain"]);
+    rig.expect(&["doubtful_visit", "µm off, which chance does not explain"]);
     let doubtful = rig
         .said()
         .iter()
