@@ -74,7 +74,7 @@ fn five_places_of_one_head_leave_straightness_and_yaw_together_and_another_head_
             .any(|circle| circle["head_offset_mm"] == other_head),
         "{wanted}"
     );
-    let known = told(&[grid_xy, "--want", "EXX1"]);
+    let known = told(&[grid_xy, "--want", "ECX1"]);
     assert_eq!(known["wanted"][0]["open"], serde_json::json!([]));
 }
 
