@@ -30,7 +30,7 @@ use crate::unknown::{self, Leftover};
 /// Everything that the search found.
 pub struct Found {
     /// Signatures.
-    pub library: Library,
+    pub signatures: Library,
     /// Their Gram matrix.
     pub normal: Normal,
     /// Members of the best set with their values.
@@ -46,7 +46,7 @@ pub struct Found {
 /// One effect of the best set.
 #[derive(Clone, Debug)]
 pub struct Member {
-    /// Its form in the library.
+    /// Its form in the signatures.
     pub form: usize,
     /// Its values.
     pub estimate: Estimate,
@@ -89,23 +89,23 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let stack = scope.stack;
     let means = kinds.iter().filter(|kind| kind.moment == Moment::Mean);
     let instances = Instance::all(stack.twin.machine(), means);
-    let mut library = Library::new(stack, instances);
-    let mut normal = library.normal(&stack.z);
-    let mut best = search(scope, &library, &normal);
+    let mut signatures = Library::new(stack, instances);
+    let mut normal = signatures.normal(&stack.z);
+    let mut best = search(scope, &signatures, &normal);
     let is_closed = !best.leftover.flagged();
     if !is_closed && !best.set.is_empty() {
-        widen(scope, &mut library, &best);
-        normal = library.normal(&stack.z);
-        let wide = search(scope, &library, &normal);
+        widen(scope, &mut signatures, &best);
+        normal = signatures.normal(&stack.z);
+        let wide = search(scope, &signatures, &normal);
         if wide.leftover.score < best.leftover.score {
             best = wide;
         }
     }
-    let forms = isolability::forms(&library, &normal, &best.set);
-    let mut members = judged(scope, &library, &normal, &best, &forms, is_closed);
-    resize(stack, &library, &normal, &mut members);
+    let forms = isolability::forms(&signatures, &normal, &best.set);
+    let mut members = judged(scope, &signatures, &normal, &best, &forms, is_closed);
+    resize(stack, &signatures, &normal, &mut members);
     Found {
-        library,
+        signatures,
         normal,
         members,
         left: best.left,
@@ -115,7 +115,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
 }
 
 /// Sizes what is named without the surrogates, as it will be simulated.
-fn resize(stack: &Stack<'_>, library: &Library, normal: &Normal, members: &mut [Member]) {
+fn resize(stack: &Stack<'_>, signatures: &Library, normal: &Normal, members: &mut [Member]) {
     if members
         .iter()
         .all(|member| member.status != Status::Surrogate)
@@ -127,9 +127,11 @@ fn resize(stack: &Stack<'_>, library: &Library, normal: &Normal, members: &mut [
             .iter()
             .filter(|member| member.status != Status::Surrogate)
     };
-    let forms: Vec<&Form> = named().map(|member| &library.forms[member.form]).collect();
+    let forms: Vec<&Form> = named()
+        .map(|member| &signatures.forms[member.form])
+        .collect();
     let columns: Vec<usize> = forms.iter().flat_map(|form| form.columns.clone()).collect();
-    let refit = refit::joint(stack, library, &forms, &normal.solve(&columns).sizes);
+    let refit = refit::joint(stack, signatures, &forms, &normal.solve(&columns).sizes);
     let kept = members
         .iter_mut()
         .filter(|member| member.status != Status::Surrogate);
@@ -141,17 +143,17 @@ fn resize(stack: &Stack<'_>, library: &Library, normal: &Normal, members: &mut [
 /// A member whose own signature is this many times what the whole set explains (in squares) only cancels another.
 const MOST_CANCELLING: f64 = 2.0;
 
-fn search(scope: &Scope<'_, '_>, library: &Library, normal: &Normal) -> Best {
+fn search(scope: &Scope<'_, '_>, signatures: &Library, normal: &Normal) -> Best {
     let stack = scope.stack;
-    let mut search = Search::new(library, normal, stack.z.norm_squared(), stack.freedom());
+    let mut search = Search::new(signatures, normal, stack.z.norm_squared(), stack.freedom());
     let set = search.run(Limits {
         beam: scope.config.beam,
         most_effects: scope.config.most_effects,
     });
     search.alternatives(&set, 8);
     let sizes = search.fit(&set).sizes;
-    let forms: Vec<&Form> = set.iter().map(|form| &library.forms[*form]).collect();
-    let refit = refit::joint(stack, library, &forms, &sizes);
+    let forms: Vec<&Form> = set.iter().map(|form| &signatures.forms[*form]).collect();
+    let refit = refit::joint(stack, signatures, &forms, &sizes);
     let left = refit.left(stack);
     let leftover = unknown::leftover(
         stack,
@@ -171,7 +173,7 @@ fn search(scope: &Scope<'_, '_>, library: &Library, normal: &Normal) -> Best {
 }
 
 /// Adds the wide forms of the members and of what stood nearly as well in their place.
-fn widen(scope: &Scope<'_, '_>, library: &mut Library, best: &Best) {
+fn widen(scope: &Scope<'_, '_>, signatures: &mut Library, best: &Best) {
     let least = best.visited[&best.set];
     let reach = 0.1 * (scope.stack.z.norm_squared() - least).max(0.0);
     let near = best
@@ -182,26 +184,26 @@ fn widen(scope: &Scope<'_, '_>, library: &mut Library, best: &Best) {
     let mut done = BTreeSet::new();
     for form in best.set.iter().copied().chain(forms) {
         let (instance, values) = (
-            library.forms[form].instance,
-            library.forms[form].values.clone(),
+            signatures.forms[form].instance,
+            signatures.forms[form].values.clone(),
         );
-        let has_free = !library.instances[instance].kind.free.is_empty();
+        let has_free = !signatures.instances[instance].kind.free.is_empty();
         if has_free && done.len() < 12 && done.insert(instance) {
-            library.add(scope.stack, instance, values, true);
+            signatures.add(scope.stack, instance, values, true);
         }
     }
 }
 
 fn judged(
     scope: &Scope<'_, '_>,
-    library: &Library,
+    signatures: &Library,
     normal: &Normal,
     best: &Best,
     forms: &[usize],
     is_closed: bool,
 ) -> Vec<Member> {
-    let rivals = Rivals::new(library, &best.visited);
-    let steady = steady(scope, library, best);
+    let rivals = Rivals::new(signatures, &best.visited);
+    let steady = steady(scope, signatures, best);
     let kept: Vec<usize> = (0..steady.len()).filter(|place| steady[*place].1).collect();
     let parts: Vec<DVector<f64>> = kept
         .iter()
@@ -214,7 +216,7 @@ fn judged(
     let adequacy = adequacy(best.leftover.flagged(), before, after, freedom);
     let unexplained = (after - freedom).max(0.0);
     let member = |(place, form): (usize, &usize)| {
-        let instance = library.forms[*form].instance;
+        let instance = signatures.forms[*form].instance;
         let estimate = best.refit.estimates[place].clone();
         let constancy = steady[place].0.clone();
         let among = kept.iter().position(|other| *other == place);
@@ -231,7 +233,7 @@ fn judged(
                 (true, false) => Status::Set,
             },
             confidence: rivals.probability(instance) * adequacy * if holds { 1.0 } else { 0.5 },
-            confusable: confusable(library, normal, &rivals, *form, forms),
+            confusable: confusable(signatures, normal, &rivals, *form, forms),
             constancy,
             estimate,
         }
@@ -244,21 +246,21 @@ fn judged(
 
 /// Constancy of each member, and whether it has one size and stands off its bounds. What does not is set aside
 /// before the others are judged, so that a look-alike in the set does not take a cause's gain from it.
-fn steady(scope: &Scope<'_, '_>, library: &Library, best: &Best) -> Vec<(Constancy, bool)> {
+fn steady(scope: &Scope<'_, '_>, signatures: &Library, best: &Best) -> Vec<(Constancy, bool)> {
     let of = |(form, estimate): (&usize, &Estimate)| {
-        let instance = &library.instances[library.forms[*form].instance];
+        let instance = &signatures.instances[signatures.forms[*form].instance];
         let raw = scope.stack.simulate(&[&*instance.effect(&estimate.values)]);
         let (jacobian, left) = (&best.refit.jacobian, &best.left);
         let constancy = confirm::constancy(scope.stack, &raw, jacobian, left, scope.config);
-        let holds = constancy.passed && !railed(library, *form, estimate);
+        let holds = constancy.passed && !railed(signatures, *form, estimate);
         (constancy, holds)
     };
     best.set.iter().zip(&best.refit.estimates).map(of).collect()
 }
 
 /// Whether an amplitude stands at a bound that is not zero.
-fn railed(library: &Library, form: usize, estimate: &Estimate) -> bool {
-    library.forms[form]
+fn railed(signatures: &Library, form: usize, estimate: &Estimate) -> bool {
+    signatures.forms[form]
         .amplitudes
         .iter()
         .any(|place| estimate.at_bound[*place] && estimate.values[*place] != 0.0)
@@ -280,23 +282,23 @@ fn drop_one_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<f64> {
 }
 
 fn confusable(
-    library: &Library,
+    signatures: &Library,
     normal: &Normal,
     rivals: &Rivals,
     form: usize,
     forms: &[usize],
 ) -> Vec<Confusable> {
-    let instance = library.forms[form].instance;
+    let instance = signatures.forms[form].instance;
     let instead = rivals.instead_of(instance);
     let mut all: Vec<Confusable> = forms
         .iter()
-        .filter(|other| library.forms[**other].instance != instance)
+        .filter(|other| signatures.forms[**other].instance != instance)
         .map(|other| {
-            let own = library.forms[*other].instance;
+            let own = signatures.forms[*other].instance;
             Confusable {
-                effect: library.instances[own].kind.id.to_owned(),
-                axis: library.instances[own].target.to_string(),
-                cos: isolability::cos(library, normal, form, *other),
+                effect: signatures.instances[own].kind.id.to_owned(),
+                axis: signatures.instances[own].target.to_string(),
+                cos: isolability::cos(signatures, normal, form, *other),
                 excluded: !instead.contains(&own),
             }
         })
@@ -363,7 +365,7 @@ impl Found {
 
     /// Instance of a member.
     pub fn instance(&self, member: &Member) -> &Instance {
-        &self.library.instances[self.library.forms[member.form].instance]
+        &self.signatures.instances[self.signatures.forms[member.form].instance]
     }
 
     /// Members that are no surrogates.

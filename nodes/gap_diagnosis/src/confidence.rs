@@ -29,12 +29,12 @@ const ODDS: f64 = 20.0;
 
 impl Rivals {
     /// Of a search's visits.
-    pub fn new(library: &Library, visited: &BTreeMap<Set, f64>) -> Self {
+    pub fn new(signatures: &Library, visited: &BTreeMap<Set, f64>) -> Self {
         let mut sets = BTreeMap::<BTreeSet<usize>, f64>::new();
         for (set, score) in visited {
             let instances = set
                 .iter()
-                .map(|form| library.forms[*form].instance)
+                .map(|form| signatures.forms[*form].instance)
                 .collect();
             let entry = sets.entry(instances).or_insert(*score);
             *entry = entry.min(*score);

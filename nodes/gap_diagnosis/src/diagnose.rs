@@ -147,7 +147,7 @@ impl<'a> Base<'a> {
             heat: places::heat_map(&slots, &before.families, &beside.families),
             traces: shrunk.traces,
             isolability: isolability::isolability(
-                &found.library,
+                &found.signatures,
                 &found.normal,
                 &found.forms,
                 stack.freedom(),
@@ -357,7 +357,11 @@ fn gap_of(stack: &Stack<'_>, sizes: &[Size], above_floor: bool) -> Gap {
 /// Kinds of which no instance could be seen.
 fn not_excited(found: &Found, kinds: &[&'static Kind]) -> Vec<NotExcited> {
     let seen = |kind: &&&'static Kind| {
-        let all = found.library.instances.iter().zip(&found.library.excited);
+        let all = found
+            .signatures
+            .instances
+            .iter()
+            .zip(&found.signatures.excited);
         !all.into_iter()
             .any(|(instance, seen)| *seen && instance.kind.id == kind.id)
     };

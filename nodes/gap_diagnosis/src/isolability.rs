@@ -21,15 +21,17 @@ use crate::rows::count;
 use crate::signature::{Form, Library};
 
 /// One form for each instance: those given, and the form that shows best of the others.
-pub fn forms(library: &Library, normal: &Normal, chosen: &[usize]) -> Vec<usize> {
+pub fn forms(signatures: &Library, normal: &Normal, chosen: &[usize]) -> Vec<usize> {
     let size = |form: &Form| -> f64 { form.columns.iter().map(|c| normal.gram[(*c, *c)]).sum() };
-    (0..library.instances.len())
+    (0..signatures.instances.len())
         .filter_map(|instance| {
-            let own = |form: &usize| library.forms[*form].instance == instance;
+            let own = |form: &usize| signatures.forms[*form].instance == instance;
             chosen.iter().copied().find(own).or_else(|| {
-                let all = (0..library.forms.len()).filter(own);
-                let plain = all.filter(|form| !library.forms[*form].wide);
-                plain.max_by(|a, b| size(&library.forms[*a]).total_cmp(&size(&library.forms[*b])))
+                let all = (0..signatures.forms.len()).filter(own);
+                let plain = all.filter(|form| !signatures.forms[*form].wide);
+                plain.max_by(|a, b| {
+                    size(&signatures.forms[*a]).total_cmp(&size(&signatures.forms[*b]))
+                })
             })
         })
         .collect()
@@ -37,26 +39,26 @@ pub fn forms(library: &Library, normal: &Normal, chosen: &[usize]) -> Vec<usize>
 
 /// The whole matrix.
 pub fn isolability(
-    library: &Library,
+    signatures: &Library,
     normal: &Normal,
     forms: &[usize],
     freedom: f64,
 ) -> Isolability {
-    let log_instances = 2.0 * count(library.seen().max(2)).ln();
+    let log_instances = 2.0 * count(signatures.seen().max(2)).ln();
     let mut matrix = Isolability::default();
     for &form in forms {
-        let entry = &library.forms[form];
-        let instance = &library.instances[entry.instance];
+        let entry = &signatures.forms[form];
+        let instance = &signatures.instances[entry.instance];
         matrix.names.push(instance.name());
         matrix.cos.push(
             forms
                 .iter()
-                .map(|other| cos(library, normal, form, *other))
+                .map(|other| cos(signatures, normal, form, *other))
                 .collect(),
         );
         matrix
             .sin_alone
-            .push(sin_alone(library, normal, forms, form));
+            .push(sin_alone(signatures, normal, forms, form));
         let d95 = (count(entry.price) * freedom.ln() + log_instances).sqrt() + 1.64;
         let first = entry.amplitudes[0];
         let parameter = instance
@@ -77,8 +79,8 @@ pub fn isolability(
 }
 
 /// (1).
-pub fn cos(library: &Library, normal: &Normal, a: usize, b: usize) -> f64 {
-    let (a, b) = (&library.forms[a].columns, &library.forms[b].columns);
+pub fn cos(signatures: &Library, normal: &Normal, a: usize, b: usize) -> f64 {
+    let (a, b) = (&signatures.forms[a].columns, &signatures.forms[b].columns);
     let half = |own: &[usize]| root_inverse(&normal.gram.select_rows(own).select_columns(own));
     let between = normal.gram.select_rows(a).select_columns(b);
     let cosines = half(a) * between * half(b);
@@ -106,14 +108,18 @@ fn root_inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// (2).
-fn sin_alone(library: &Library, normal: &Normal, forms: &[usize], form: usize) -> f64 {
-    let kind = |form: usize| library.instances[library.forms[form].instance].kind.id;
+fn sin_alone(signatures: &Library, normal: &Normal, forms: &[usize], form: usize) -> f64 {
+    let kind = |form: usize| {
+        signatures.instances[signatures.forms[form].instance]
+            .kind
+            .id
+    };
     let others: Vec<usize> = forms
         .iter()
         .filter(|other| kind(**other) != kind(form))
-        .flat_map(|other| library.forms[*other].columns.clone())
+        .flat_map(|other| signatures.forms[*other].columns.clone())
         .collect();
-    let own = library.forms[form].columns[0];
+    let own = signatures.forms[form].columns[0];
     let square = normal.gram[(own, own)];
     let along = Normal {
         gram: normal.gram.clone(),

@@ -90,11 +90,11 @@ impl Member<'_> {
 }
 
 /// Refits a set of forms whose sizes, in typical units, are known from the linear fit.
-pub fn joint(stack: &Stack<'_>, library: &Library, forms: &[&Form], sizes: &[f64]) -> Refit {
+pub fn joint(stack: &Stack<'_>, signatures: &Library, forms: &[&Form], sizes: &[f64]) -> Refit {
     let mut sizes = sizes.iter();
     let mut members: Vec<Member<'_>> = forms
         .iter()
-        .map(|form| start(&library.instances[form.instance], form, &mut sizes))
+        .map(|form| start(&signatures.instances[form.instance], form, &mut sizes))
         .collect();
     let mut parts: Vec<DVector<f64>> = members.iter().map(|m| m.signature(stack)).collect();
     for index in 0..members.len() {

@@ -22,12 +22,12 @@ use crate::normal::{Fit, Normal};
 use crate::rows::count;
 use crate::signature::{Form, Library};
 
-/// A set of forms, growing places in the library.
+/// A set of forms, growing places in the signatures.
 pub type Set = Vec<usize>;
 
 /// The search and everything it visited.
 pub struct Search<'l> {
-    library: &'l Library,
+    signatures: &'l Library,
     normal: &'l Normal,
     square: f64,
     log_rows: f64,
@@ -46,14 +46,14 @@ pub struct Limits {
 }
 
 impl<'l> Search<'l> {
-    /// A search over the forms of a library; `square` is |z|^2, `freedom` is n.
-    pub fn new(library: &'l Library, normal: &'l Normal, square: f64, freedom: f64) -> Self {
+    /// A search over the forms of a signatures; `square` is |z|^2, `freedom` is n.
+    pub fn new(signatures: &'l Library, normal: &'l Normal, square: f64, freedom: f64) -> Self {
         Self {
-            library,
+            signatures,
             normal,
             square,
             log_rows: freedom.max(2.0).ln(),
-            log_instances: count(library.seen().max(2)).ln(),
+            log_instances: count(signatures.seen().max(2)).ln(),
             visited: BTreeMap::from([(vec![], square)]),
         }
     }
@@ -61,7 +61,7 @@ impl<'l> Search<'l> {
     /// Columns of a set.
     pub fn columns(&self, set: &[usize]) -> Vec<usize> {
         set.iter()
-            .flat_map(|form| self.library.forms[*form].columns.clone())
+            .flat_map(|form| self.signatures.forms[*form].columns.clone())
             .collect()
     }
 
@@ -71,7 +71,10 @@ impl<'l> Search<'l> {
     }
 
     fn price(&self, set: &[usize]) -> f64 {
-        let parameters: usize = set.iter().map(|form| self.library.forms[*form].price).sum();
+        let parameters: usize = set
+            .iter()
+            .map(|form| self.signatures.forms[*form].price)
+            .sum();
         count(parameters) * self.log_rows + 2.0 * count(set.len()) * self.log_instances
     }
 
@@ -97,8 +100,8 @@ impl<'l> Search<'l> {
                 instance,
                 amplitudes,
                 ..
-            } = &self.library.forms[*form];
-            let kind = self.library.instances[*instance].kind;
+            } = &self.signatures.forms[*form];
+            let kind = self.signatures.instances[*instance].kind;
             let parameter = |place: usize| kind.parameters.iter().chain(kind.free).nth(place);
             amplitudes.iter().zip(sizes.by_ref()).all(|(place, size)| {
                 parameter(*place).is_some_and(|p| {
@@ -114,19 +117,19 @@ impl<'l> Search<'l> {
     fn beside(&mut self, set: &Set, most: usize) -> Vec<(f64, Set)> {
         let taken: BTreeSet<usize> = set
             .iter()
-            .map(|form| self.library.forms[*form].instance)
+            .map(|form| self.signatures.forms[*form].instance)
             .collect();
-        let open: Vec<usize> = (0..self.library.forms.len())
-            .filter(|form| !taken.contains(&self.library.forms[*form].instance))
+        let open: Vec<usize> = (0..self.signatures.forms.len())
+            .filter(|form| !taken.contains(&self.signatures.forms[*form].instance))
             .collect();
         let columns = self.columns(set);
         let groups = open
             .iter()
-            .map(|form| &self.library.forms[*form].columns[..]);
+            .map(|form| &self.signatures.forms[*form].columns[..]);
         let gains = self.normal.gains_beside(&columns, groups);
         let mut best = BTreeMap::<usize, (f64, usize)>::new();
         for (form, gain) in open.into_iter().zip(gains) {
-            let entry = &self.library.forms[form];
+            let entry = &self.signatures.forms[form];
             let worth = gain - count(entry.price) * self.log_rows;
             let known = best.entry(entry.instance).or_insert((worth, form));
             if worth > known.0 {
@@ -205,9 +208,12 @@ impl<'l> Search<'l> {
     pub fn alternatives(&mut self, best: &Set, most: usize) {
         for &form in best {
             let less = without(best, form);
-            let own = self.library.forms[form].instance;
+            let own = self.signatures.forms[form].instance;
             for (_, other) in self.beside(&less, most) {
-                if other.iter().all(|f| self.library.forms[*f].instance != own) {
+                if other
+                    .iter()
+                    .all(|f| self.signatures.forms[*f].instance != own)
+                {
                     self.beside(&other, most);
                 }
             }

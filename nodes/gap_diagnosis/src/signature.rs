@@ -98,18 +98,18 @@ pub const LEAST_D: f64 = 6.0;
 impl Library {
     /// Signatures of some instances on a stack.
     pub fn new(stack: &Stack<'_>, instances: Vec<Instance>) -> Self {
-        let mut library = Self {
+        let mut signatures = Self {
             excited: vec![false; instances.len()],
             instances,
             forms: vec![],
             columns: vec![],
         };
-        for instance in 0..library.instances.len() {
-            for values in shapes(library.instances[instance].kind) {
-                library.add(stack, instance, values, false);
+        for instance in 0..signatures.instances.len() {
+            for values in shapes(signatures.instances[instance].kind) {
+                signatures.add(stack, instance, values, false);
             }
         }
-        library
+        signatures
     }
 
     /// Adds one form; a form that stays below [`LEAST_D`] at its greatest size has no columns.
