@@ -46,7 +46,7 @@ pub struct Found {
 /// One effect of the best set.
 #[derive(Clone, Debug)]
 pub struct Member {
-    /// Its form in the signatures.
+    /// Its form among the signatures.
     pub form: usize,
     /// Its values.
     pub estimate: Estimate,

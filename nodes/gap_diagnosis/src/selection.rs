@@ -22,7 +22,7 @@ use crate::normal::{Fit, Normal};
 use crate::rows::count;
 use crate::signature::{Form, Library};
 
-/// A set of forms, growing places in the signatures.
+/// A set of forms, growing places among the signatures.
 pub type Set = Vec<usize>;
 
 /// The search and everything it visited.
@@ -46,7 +46,7 @@ pub struct Limits {
 }
 
 impl<'l> Search<'l> {
-    /// A search over the forms of a signatures; `square` is |z|^2, `freedom` is n.
+    /// A search over the forms of all signatures; `square` is |z|^2, `freedom` is n.
     pub fn new(signatures: &'l Library, normal: &'l Normal, square: f64, freedom: f64) -> Self {
         Self {
             signatures,
