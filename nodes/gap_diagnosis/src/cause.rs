@@ -13,15 +13,20 @@ use machine::file::EffectEntry;
 use machine::twin::Channel;
 use nalgebra::{DMatrix, DVector};
 
+use crate::challenge::{self, Cost};
 use crate::confidence::{Rivals, adequacy};
 use crate::config::GapConfig;
 use crate::confirm;
 use crate::families::Slot;
+use crate::figures::Note;
+use crate::form_doubt;
 use crate::isolability;
 use crate::noise::Noise;
 use crate::normal::Normal;
+use crate::recalibration::recalibrated;
 use crate::refit::{self, Estimate, Refit};
 use crate::report::{Cause, Confusable, Constancy, ParameterValue, Status};
+use crate::rows::count;
 use crate::selection::{Limits, Search, Set};
 use crate::signature::{Form, Instance, Library};
 use crate::stack::Stack;
@@ -41,6 +46,8 @@ pub struct Found {
     pub leftover: Leftover,
     /// One form of each instance, the best set's where it has one.
     pub forms: Vec<usize>,
+    /// The best set, places among the forms.
+    pub set: Set,
 }
 
 /// One effect of the best set.
@@ -58,6 +65,8 @@ pub struct Member {
     pub confusable: Vec<Confusable>,
     /// Whether it has one size.
     pub constancy: Constancy,
+    /// The best sets that do without it, and by how much worse each is.
+    pub rivals: Vec<(Set, f64)>,
 }
 
 /// What a search is made with.
@@ -104,6 +113,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let forms = isolability::forms(&signatures, &normal, &best.set);
     let mut members = judged(scope, &signatures, &normal, &best, &forms, is_closed);
     resize(stack, &signatures, &normal, &mut members);
+    doubt_forms(stack, &signatures, &mut members);
     Found {
         signatures,
         normal,
@@ -111,6 +121,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
         left: best.left,
         leftover: best.leftover,
         forms,
+        set: best.set,
     }
 }
 
@@ -137,6 +148,24 @@ fn resize(stack: &Stack<'_>, signatures: &Library, normal: &Normal, members: &mu
         .filter(|member| member.status != Status::Surrogate);
     for (member, estimate) in kept.zip(refit.estimates) {
         member.estimate = estimate;
+    }
+}
+
+/// Widens the intervals of what is named by what the sizes owe to their forms.
+fn doubt_forms(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) {
+    let kept = || (0..members.len()).filter(|place| members[*place].status != Status::Surrogate);
+    let places: Vec<usize> = kept().collect();
+    let forms: Vec<&Form> = places
+        .iter()
+        .map(|place| &signatures.forms[members[*place].form])
+        .collect();
+    let mut estimates: Vec<Estimate> = places
+        .iter()
+        .map(|place| members[*place].estimate.clone())
+        .collect();
+    form_doubt::widen(stack, signatures, &forms, &mut estimates);
+    for (place, estimate) in places.into_iter().zip(estimates) {
+        members[place].estimate = estimate;
     }
 }
 
@@ -214,6 +243,9 @@ fn judged(
     let [before, after] = [scope.stack.z.norm_squared(), best.left.norm_squared()];
     let freedom = scope.stack.freedom();
     let adequacy = adequacy(best.leftover.flagged(), before, after, freedom);
+    let beaten: Vec<bool> = (0..best.set.len())
+        .map(|place| !is_closed && is_beaten(scope, signatures, best, place))
+        .collect();
     let unexplained = (after - freedom).max(0.0);
     let member = |(place, form): (usize, &usize)| {
         let instance = signatures.forms[*form].instance;
@@ -222,6 +254,7 @@ fn judged(
         let among = kept.iter().position(|other| *other == place);
         let cancels = estimate.d.powi(2) > MOST_CANCELLING * (before - after);
         let holds = !cancels
+            && !beaten[place]
             && among.is_some_and(|k| {
                 confirmed[k] && (is_closed || gains[k] >= LEAST_RATIO * unexplained)
             });
@@ -232,9 +265,12 @@ fn judged(
                 (true, true) => Status::Named,
                 (true, false) => Status::Set,
             },
-            confidence: rivals.probability(instance) * adequacy * if holds { 1.0 } else { 0.5 },
+            confidence: recalibrated(
+                rivals.probability(instance) * adequacy * if holds { 1.0 } else { 0.5 },
+            ),
             confusable: confusable(signatures, normal, &rivals, *form, forms),
             constancy,
+            rivals: without(signatures, best, instance),
             estimate,
         }
     };
@@ -242,6 +278,63 @@ fn judged(
     let rank = |member: &Member| (member.status == Status::Surrogate, -member.estimate.d);
     members.sort_by(|a, b| rank(a).partial_cmp(&rank(b)).expect("D is a number"));
     members
+}
+
+/// Whether a shape without a physics does better in the place of a member.
+fn is_beaten(scope: &Scope<'_, '_>, signatures: &Library, best: &Best, place: usize) -> bool {
+    let widths = || {
+        best.refit
+            .estimates
+            .iter()
+            .map(|estimate| estimate.active.len())
+    };
+    let first: usize = widths().take(place).sum();
+    let own = first..first + best.refit.estimates[place].active.len();
+    let columns = best.refit.jacobian.iter().enumerate();
+    let others: Vec<DVector<f64>> = columns
+        .filter(|(column, _)| !own.contains(column))
+        .map(|(_, column)| column.clone())
+        .collect();
+    let cost = Cost {
+        price: signatures.forms[best.set[place]].price,
+        log_rows: scope.stack.freedom().ln(),
+        log_instances: count(signatures.seen().max(2)).ln(),
+    };
+    challenge::is_beaten(
+        scope.slots,
+        &best.left,
+        &best.refit.parts[place],
+        &others,
+        cost,
+    )
+}
+
+/// Sets that are kept for each member.
+const RIVALS: usize = 4;
+
+/// The best sets that were visited without an instance, one for each set of instances.
+fn without(signatures: &Library, best: &Best, instance: usize) -> Vec<(Set, f64)> {
+    let least = best.visited[&best.set];
+    let instances = |set: &Set| -> BTreeSet<usize> {
+        set.iter()
+            .map(|form| signatures.forms[*form].instance)
+            .collect()
+    };
+    let mut found = BTreeMap::<BTreeSet<usize>, (Set, f64)>::new();
+    for (set, score) in best.visited.iter().filter(|(_, score)| score.is_finite()) {
+        let own = instances(set);
+        let is_better = found.get(&own).is_none_or(|(_, known)| score < known);
+        if !own.contains(&instance) && is_better {
+            found.insert(own, (set.clone(), *score));
+        }
+    }
+    let mut rivals: Vec<(Set, f64)> = found
+        .into_values()
+        .map(|(set, score)| (set, score - least))
+        .collect();
+    rivals.sort_by(|a, b| a.1.total_cmp(&b.1));
+    rivals.truncate(RIVALS);
+    rivals
 }
 
 /// Constancy of each member, and whether it has one size and stands off its bounds. What does not is set aside
@@ -281,7 +374,8 @@ fn drop_one_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<f64> {
     all.iter().map(|out| whole - without(out)).collect()
 }
 
-fn confusable(
+/// What looks like a form, among one form of each instance.
+pub fn confusable(
     signatures: &Library,
     normal: &Normal,
     rivals: &Rivals,
@@ -375,11 +469,33 @@ impl Found {
             .filter(|member| member.status != Status::Surrogate)
     }
 
-    /// The named members as entries of a machine file.
+    /// The members that stand alone as entries of a machine file.
     pub fn entries(&self) -> Vec<EffectEntry> {
-        self.named()
+        let alone = self
+            .members
+            .iter()
+            .filter(|member| member.status == Status::Named);
+        alone
             .map(|member| entry(self.instance(member), &member.estimate.values))
             .collect()
+    }
+
+    /// The members that others could stand for: they are reported, and not written to a machine file.
+    pub fn not_written(&self) -> Vec<Note> {
+        let of_sets = self
+            .members
+            .iter()
+            .filter(|member| member.status == Status::Set);
+        let note = |member: &Member| {
+            let open = member.confusable.iter().filter(|other| !other.excluded);
+            Note::NotWritten {
+                effect: self.instance(member).name(),
+                others: open
+                    .map(|o| format!("{} {}", o.effect, o.axis).trim_end().to_owned())
+                    .collect(),
+            }
+        };
+        of_sets.map(note).collect()
     }
 }
 

@@ -9,9 +9,8 @@
 //!   g alone is named where every S with C <= C* + 2 ln 20 has g                  (2)
 //! ```
 //!
-//! p(adequate) is one where the leftover is within noise and falls with the share of the gap that is left. (1) is a probability only as far as the catalogue holds the truth. A table of recalibration from trials
-//! on other physics than the catalogue's belongs behind it; until those trials exist it is the identity, so that
-//! a confidence above 0.9 is to be read as "no rival in the catalogue", not as one error in ten.
+//! p(adequate) is one where the leftover is within noise and falls with the share of the gap that is left. (1) is a
+//! probability only as far as the catalogue holds the truth; `recalibration` is behind it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,7 +24,7 @@ pub struct Rivals {
 }
 
 /// Odds beyond which a rival is excluded.
-const ODDS: f64 = 20.0;
+pub const ODDS: f64 = 20.0;
 
 impl Rivals {
     /// Of a search's visits.

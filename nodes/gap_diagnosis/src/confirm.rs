@@ -40,6 +40,11 @@ const LEAST_D: f64 = 3.0;
 
 /// Whether (1) confirms each signature.
 pub fn held_out_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<bool> {
+    held_out_gains_of(stack, &stack.z, parts)
+}
+
+/// The same on other numbers of the stack's rows.
+pub fn held_out_gains_of(stack: &Stack<'_>, z: &DVector<f64>, parts: &[DVector<f64>]) -> Vec<bool> {
     let Some(columns) = (!parts.is_empty()).then(|| DMatrix::from_columns(parts)) else {
         return vec![];
     };
@@ -51,11 +56,8 @@ pub fn held_out_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<bool> {
             own.map(Block::range).collect()
         })
         .collect();
-    let whole = Normal::new(&columns, &stack.z);
-    let normals: Vec<Normal> = folds
-        .iter()
-        .map(|fold| within(&columns, &stack.z, fold))
-        .collect();
+    let whole = Normal::new(&columns, z);
+    let normals: Vec<Normal> = folds.iter().map(|fold| within(&columns, z, fold)).collect();
     (0..parts.len())
         .map(|member| {
             let gains: Vec<f64> = normals
@@ -154,6 +156,25 @@ pub fn constancy(
     left: &DVector<f64>,
     config: &GapConfig,
 ) -> Constancy {
+    constancy_of(
+        stack,
+        raw,
+        &|part| stack.whitened(part),
+        jacobian,
+        left,
+        config,
+    )
+}
+
+/// The same with another way from a part of a signature to its column.
+pub fn constancy_of(
+    stack: &Stack<'_>,
+    raw: &[f64],
+    column: &dyn Fn(Vec<f64>) -> DVector<f64>,
+    jacobian: &[DVector<f64>],
+    left: &DVector<f64>,
+    config: &GapConfig,
+) -> Constancy {
     let mut worst = Constancy {
         passed: true,
         worst_z: 0.0,
@@ -161,10 +182,10 @@ pub fn constancy(
     };
     let halves =
         |run: &Run, _: &Block, row: &Row| (time_s(run, row) > middle_time(stack)).to_string();
-    let times = ("time", split(stack, raw, halves));
+    let times = ("time", split(stack, raw, column, halves));
     let by_condition = SPLITS
         .iter()
-        .map(|(name, level)| (*name, split(stack, raw, level)));
+        .map(|(name, level)| (*name, split(stack, raw, column, level)));
     for (name, levels) in by_condition.chain([times]) {
         let levels: Vec<DVector<f64>> = levels
             .into_iter()
@@ -197,6 +218,7 @@ fn middle_time(stack: &Stack<'_>) -> f64 {
 fn split(
     stack: &Stack<'_>,
     raw: &[f64],
+    column: &dyn Fn(Vec<f64>) -> DVector<f64>,
     level: impl Fn(&Run, &Block, &Row) -> String,
 ) -> Vec<DVector<f64>> {
     let mut levels = BTreeMap::<String, Vec<f64>>::new();
@@ -212,10 +234,7 @@ fn split(
     if levels.len() < 2 || levels.len() > 8 {
         return vec![];
     }
-    levels
-        .into_values()
-        .map(|part| stack.whitened(part))
-        .collect()
+    levels.into_values().map(column).collect()
 }
 
 /// Score and spread of separate sizes.

@@ -3,24 +3,30 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
-use machine::effects::{self, CATALOGUE, Effect, Kind, Moment};
+use machine::effects::{self, CATALOGUE, Effect, Kind};
 use machine::file::EffectEntry;
 use machine::twin::{Channel, Session, Twin, simulate};
 
 use crate::cause::{self, Found, Scope};
 use crate::config::GapConfig;
 use crate::error::GapError;
+use crate::experiment::Experiment;
 use crate::families::Slot;
 use crate::figures::{Figures, Note};
 use crate::gap::{self, Size};
+use crate::next::{self, Bench};
 use crate::noise::{self, Noise};
 use crate::report::{ChannelGap, Gap, GapReport, Inputs, NoiseFloor, NotExcited, SCHEMA};
 use crate::rows::Rows;
+use crate::scatter::{self, Scattered};
 use crate::shrink::{self, Named, Shrunk};
 use crate::split::{self, Split};
 use crate::stack::Stack;
 use crate::unknown::Leftover;
-use crate::{families, isolability, localise, places, unknown};
+use crate::{families, isolability, localise, places, recalibration, unknown, whiteness};
+
+/// Fewer held-out runs than this are to be looked at one by one.
+const FEW_HELD_OUT: usize = 6;
 
 /// A diagnosis: the report, what is drawn beside it, and what `--write-machine` adds.
 #[derive(Clone, Debug)]
@@ -31,8 +37,10 @@ pub struct Diagnosis {
     pub figures: Figures,
     /// What a reader should know besides.
     pub notes: Vec<Note>,
-    /// The named effects, as the machine file lists effects.
+    /// The effects that stand alone, as the machine file lists effects; what others could stand for is not in it.
     pub effects: Vec<EffectEntry>,
+    /// The report's next experiments, as they would be run.
+    pub experiments: Vec<Experiment>,
 }
 
 /// Diagnoses a session.
@@ -64,6 +72,7 @@ pub fn diagnose(
         return Err(no_repeats(session, &rows));
     }
     let base = Base {
+        machine,
         session,
         twin: &twin,
         stations,
@@ -75,6 +84,7 @@ pub fn diagnose(
 
 /// What every stack is made of.
 struct Base<'a> {
+    machine: &'a MachineFile,
     session: &'a Session,
     twin: &'a Twin<'a>,
     stations: usize,
@@ -94,6 +104,48 @@ impl<'a> Base<'a> {
         )
     }
 
+    /// The search for effects of the mean, then of scatter; where these are found the first once more, each row
+    /// with the scatter that it is now known to have.
+    fn explained(
+        &self,
+        split: &Split,
+        kinds: &[&'static Kind],
+        config: &GapConfig,
+    ) -> (Stack<'a>, Vec<Slot>, Found, Scattered) {
+        let stack = self.stack(&split.fit);
+        let slots = families::families(&stack);
+        let scope = |stack, slots| Scope {
+            stack,
+            slots,
+            noise: self.noise,
+            config,
+        };
+        let found = cause::find(&scope(&stack, &slots), kinds);
+        let scattered = scatter::find(&scope(&stack, &slots), kinds, &found.left);
+        if !scattered.is_named() {
+            return (stack, slots, found, scattered);
+        }
+        let weighed = stack.weighed(&scattered.spread);
+        let slots_weighed = families::families(&weighed);
+        let again = cause::find(&scope(&weighed, &slots_weighed), kinds);
+        let left = again.left.component_mul(&scattered.spread);
+        let scattered = scatter::find(&scope(&stack, &slots), kinds, &left);
+        if scattered.is_named() {
+            (weighed, slots_weighed, again, scattered)
+        } else {
+            (stack, slots, found, scattered)
+        }
+    }
+
+    fn bench(&self) -> Bench<'_> {
+        Bench {
+            machine: self.machine,
+            session: self.session,
+            twin: self.twin,
+            noise: self.noise,
+        }
+    }
+
     fn diagnosis(
         &self,
         kinds: &[&'static Kind],
@@ -101,46 +153,37 @@ impl<'a> Base<'a> {
         mut notes: Vec<Note>,
     ) -> Diagnosis {
         let split = split::split(self.session, config.hold_out);
-        let stack = self.stack(&split.fit);
-        let slots = families::families(&stack);
-        let scope = Scope {
-            stack: &stack,
-            slots: &slots,
-            noise: self.noise,
-            config,
-        };
+        let (stack, slots, mut found, mut scattered) = self.explained(&split, kinds, config);
         let before = unknown::leftover(&stack, &slots, self.noise, &stack.z, &[], config);
-        let mut found = cause::find(&scope, kinds);
         let inflation = unknown::inflation(&stack, &slots, &found.left);
         let reproduced = judge_noise(&inflation, config, &mut notes);
         if !reproduced {
             found.withdraw();
         }
-        if split.held_out.is_empty() {
-            notes.push(Note::NothingHeldOut);
+        if !reproduced || found.leftover.flagged() {
+            scattered.withdraw();
         }
-        if stack.runs.len() < localise::FEWEST_RUNS {
-            notes.push(Note::FewRuns {
-                runs: stack.runs.len(),
-            });
-        }
+        notes.extend(remarks(&stack, &split, &found));
+        let next = next::propose(&self.bench(), &found);
+        notes.extend(next.notes);
         let shrunk = self.shrunk(&split, &found, before.flagged(), config);
         let all = self.stack(&[&split.fit[..], &split.held_out].concat());
         let sizes = gap::by_block(&all, self.noise, &all.floated(all.raw.clone()));
         let floated = stack.floated(stack.raw.clone());
         let (rest, beside) = self.beside_named(&stack, &slots, &found, config);
-        let flagged = reproduced && before.flagged() && found.is_unexplained();
+        let is_open = found.is_unexplained() || scattered.is_unexplained();
+        let flagged = reproduced && before.flagged() && is_open;
         let report = GapReport {
             schema: SCHEMA.to_owned(),
             inputs: Inputs::default(),
             noise_floor: noise_floor(self.noise, &inflation, config),
             gap: gap_of(&all, &sizes, before.flagged()),
             r#where: places::places(&stack, &slots, &before.families, &floated),
-            causes: found.causes(),
+            causes: [found.causes(), scattered.causes].concat(),
             unknown: unknown::unknown(&stack, &slots, &beside, flagged, &rest),
             shrink: shrunk.shrink,
-            not_excited: not_excited(&found, kinds),
-            next_experiments: vec![],
+            not_excited: not_excited(&found, &scattered.seen, kinds),
+            next_experiments: next.entries,
             runtime_s: 0.0,
         };
         let figures = Figures {
@@ -158,7 +201,8 @@ impl<'a> Base<'a> {
             report,
             figures,
             notes,
-            effects: found.entries(),
+            effects: [found.entries(), scattered.entries].concat(),
+            experiments: next.experiments,
         }
     }
 
@@ -209,6 +253,32 @@ impl<'a> Base<'a> {
             .collect();
         shrink::shrink(&stack, self.noise, split, &named, has_gap, config)
     }
+}
+
+/// What a reader should know of the runs and of what is left of them.
+fn remarks(stack: &Stack<'_>, split: &Split, found: &Found) -> Vec<Note> {
+    let mut notes = Vec::new();
+    match split.held_out.len() {
+        0 => notes.push(Note::NothingHeldOut),
+        runs if runs < FEW_HELD_OUT => notes.push(Note::FewHeldOut { runs }),
+        _ => {}
+    }
+    if stack.runs.len() < localise::FEWEST_RUNS {
+        notes.push(Note::FewRuns {
+            runs: stack.runs.len(),
+        });
+    }
+    let coloured = whiteness::coloured(stack, &found.left);
+    notes.extend(coloured.into_iter().map(|found| Note::NotWhite {
+        channel: found.channel,
+        blocks: found.blocks,
+        of: found.of,
+    }));
+    notes.extend(found.not_written());
+    if !found.members.is_empty() && recalibration::PROVENANCE.is_none() {
+        notes.push(Note::NotRecalibrated);
+    }
+    notes
 }
 
 /// Whether every channel has the noise of its repeats; says so where not.
@@ -355,20 +425,21 @@ fn gap_of(stack: &Stack<'_>, sizes: &[Size], above_floor: bool) -> Gap {
 }
 
 /// Kinds of which no instance could be seen.
-fn not_excited(found: &Found, kinds: &[&'static Kind]) -> Vec<NotExcited> {
+fn not_excited(found: &Found, scattering: &[&str], kinds: &[&'static Kind]) -> Vec<NotExcited> {
     let seen = |kind: &&&'static Kind| {
         let all = found
             .signatures
             .instances
             .iter()
             .zip(&found.signatures.excited);
-        !all.into_iter()
-            .any(|(instance, seen)| *seen && instance.kind.id == kind.id)
+        scattering.contains(&kind.id)
+            || all
+                .into_iter()
+                .any(|(instance, seen)| *seen && instance.kind.id == kind.id)
     };
     let entry = |kind: &&'static Kind| NotExcited {
         effect: kind.id.to_owned(),
         needs: kind.needs.to_owned(),
     };
-    let means = kinds.iter().filter(|kind| kind.moment == Moment::Mean);
-    means.filter(seen).map(entry).collect()
+    kinds.iter().filter(|kind| !seen(kind)).map(entry).collect()
 }

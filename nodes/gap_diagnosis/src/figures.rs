@@ -112,6 +112,24 @@ pub enum Note {
     FewRuns { runs: usize },
     /// Nothing could be held out.
     NothingHeldOut,
+    /// So few runs were held out that each is to be looked at.
+    FewHeldOut { runs: usize },
+    /// No trials stand behind the confidences yet.
+    NotRecalibrated,
+    /// What is left is not white.
+    NotWhite {
+        channel: String,
+        blocks: usize,
+        of: usize,
+    },
+    /// An effect was found and is not written to a machine file.
+    NotWritten { effect: String, others: Vec<String> },
+    /// No run that can be proposed tells these apart.
+    NoRunSeparates {
+        effects: Vec<String>,
+        delta: f64,
+        lever: String,
+    },
 }
 
 impl fmt::Display for Note {
@@ -138,6 +156,35 @@ impl fmt::Display for Note {
             ),
             Self::NothingHeldOut => f.write_str(
                 "nothing could be held out: record each test at a second radius, feed or place",
+            ),
+            Self::FewHeldOut { runs } => write!(
+                f,
+                "{runs} runs were held out: an interval of so few is rough, look at each"
+            ),
+            Self::NotRecalibrated => f.write_str(
+                "confidences are not recalibrated by trials: read one above 0.9 as \"no rival in the catalogue\"",
+            ),
+            Self::NotWhite {
+                channel,
+                blocks,
+                of,
+            } => write!(
+                f,
+                "{channel}: what is left is not white in {blocks} of {of} runs"
+            ),
+            Self::NotWritten { effect, others } => write!(
+                f,
+                "{effect} is not written to a machine file: {} would do as well on this recording",
+                others.join(", ")
+            ),
+            Self::NoRunSeparates {
+                effects,
+                delta,
+                lever,
+            } => write!(
+                f,
+                "no run in the library separates {} (squared distance {delta:.1} at most, 9 decides); the lever is {lever}",
+                effects.join(" and ")
             ),
         }
     }

@@ -191,13 +191,10 @@ fn touch_floats(session: &Session, block: &Block) -> Vec<(Key, Vec<f64>)> {
             continue;
         };
         let a = touch.approach.map(|c| (c * 100.0).round() + 0.0);
-        let group = format!(
-            "touch {} {} {} {} {}",
-            run.segment.setup_id, touch.feature_id, a.x, a.y, a.z
-        );
+        // One group for the whole set-up: whitening mixes the touches of a run, so that they float together.
         let key = Key {
-            group,
-            float: String::new(),
+            group: format!("touch {}", run.segment.setup_id),
+            float: format!("{} {} {} {}", touch.feature_id, a.x, a.y, a.z),
         };
         all.entry(key)
             .or_insert_with(|| vec![0.0; block.rows.len()])[place] = 1.0;

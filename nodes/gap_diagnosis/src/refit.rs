@@ -344,7 +344,7 @@ fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: Vec<DVector<f64>>
 }
 
 /// Greater of the sandwich by run and of the model, for each column.
-fn standard_uncertainties(
+pub fn standard_uncertainties(
     stack: &Stack<'_>,
     columns: &DMatrix<f64>,
     left: &DVector<f64>,

@@ -8,11 +8,8 @@
 //!   G2 = rms2 - floor2,   closed = 1 - G2_after / G2_before               (1)
 //! ```
 //!
-//! The interval draws whole runs with replacement, the same before and after, and takes the 2.5 % and 97.5 %
-//! points. It is absent where the gap before cannot be told from none.
-//!
-//! # References
-//! \[1\] B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, Chapman & Hall 1993, 13 (percentiles).
+//! The interval draws whole runs with replacement, the same before and after (`bootstrap`). It is absent where
+//! the gap before cannot be told from none.
 
 use std::collections::BTreeMap;
 
@@ -21,6 +18,7 @@ use machine::twin::Channel;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use crate::bootstrap;
 use crate::config::GapConfig;
 use crate::field::{self, Place};
 use crate::figures::{Abscissa, HeldOut, Trace};
@@ -160,7 +158,7 @@ fn closed(stack: &Stack<'_>, sizes: &[Vec<Size>; 2], config: &GapConfig) -> Opti
     };
     let value = share(&total(&mut runs.iter()))?;
     let mut random = Pcg64Mcg::seed_from_u64(config.seed ^ 0x7);
-    let mut draws: Vec<f64> = (0..config.bootstrap_draws)
+    let draws: Vec<f64> = (0..config.bootstrap_draws)
         .filter_map(|_| {
             let drawn: Vec<[[f64; 2]; 2]> = runs
                 .iter()
@@ -172,12 +170,21 @@ fn closed(stack: &Stack<'_>, sizes: &[Vec<Size>; 2], config: &GapConfig) -> Opti
     if draws.len() * 40 < config.bootstrap_draws * 39 {
         return None;
     }
-    draws.sort_by(f64::total_cmp);
-    let at = |permille: usize| draws[(draws.len() - 1) * permille / 1000];
+    let without_each: Vec<f64> = (0..runs.len())
+        .filter_map(|out| {
+            let mut others = runs
+                .iter()
+                .enumerate()
+                .filter(|(run, _)| *run != out)
+                .map(|(_, run)| run);
+            share(&total(&mut others))
+        })
+        .collect();
+    let [low, high] = bootstrap::bca(value, draws, &without_each);
     Some(Interval {
         value,
-        low: at(25).min(value),
-        high: at(975).max(value),
+        low: low.min(value),
+        high: high.max(value),
     })
 }
 

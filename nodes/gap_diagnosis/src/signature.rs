@@ -177,7 +177,7 @@ impl Library {
 }
 
 /// Values of every point of the shape grids, amplitudes zero.
-fn shapes(kind: &Kind) -> Vec<Vec<f64>> {
+pub fn shapes(kind: &Kind) -> Vec<Vec<f64>> {
     let grids: Vec<(usize, &[f64])> = kind
         .parameters
         .iter()

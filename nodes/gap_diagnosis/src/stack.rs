@@ -35,6 +35,7 @@ pub struct Stack<'a> {
     /// (1).
     pub z: DVector<f64>,
     whitener: Whitener,
+    weight: Option<DVector<f64>>,
     nuisance: Nuisance,
     unweighted: Nuisance,
 }
@@ -70,12 +71,35 @@ impl<'a> Stack<'a> {
             raw: vec![],
             z: DVector::zeros(0),
             whitener,
+            weight: None,
             nuisance,
             unweighted,
         };
         stack.z = stack.whitened(raw.clone());
         stack.raw = raw;
         stack
+    }
+
+    /// The same stack where each row is known to scatter by this many times its noise.
+    pub fn weighed(&self, spread: &DVector<f64>) -> Self {
+        let weight = spread.map(|spread| 1.0 / spread);
+        let nuisance = Nuisance::new(self.session, &self.rows, |column| {
+            self.whitener.apply(column);
+            scale(column, &weight);
+        });
+        let mut weighed = Self {
+            runs: self.runs.clone(),
+            rows: self.rows.clone(),
+            raw: self.raw.clone(),
+            z: DVector::zeros(0),
+            whitener: self.whitener.clone(),
+            weight: Some(weight),
+            nuisance,
+            unweighted: self.unweighted.clone(),
+            ..*self
+        };
+        weighed.z = weighed.whitened(weighed.raw.clone());
+        weighed
     }
 
     /// What the rows would show of some effects, mm.
@@ -98,6 +122,9 @@ impl<'a> Stack<'a> {
     /// P W of a stack.
     pub fn whitened(&self, mut stack: Vec<f64>) -> DVector<f64> {
         self.whitener.apply(&mut stack);
+        if let Some(weight) = &self.weight {
+            scale(&mut stack, weight);
+        }
         self.nuisance.project(&mut stack);
         DVector::from_vec(stack)
     }
@@ -111,5 +138,11 @@ impl<'a> Stack<'a> {
     /// Rows less floats.
     pub fn freedom(&self) -> f64 {
         count(self.rows.len.saturating_sub(self.nuisance.count)).max(1.0)
+    }
+}
+
+fn scale(column: &mut [f64], weight: &DVector<f64>) {
+    for (value, weight) in column.iter_mut().zip(weight.iter()) {
+        *value *= weight;
     }
 }

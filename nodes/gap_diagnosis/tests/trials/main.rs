@@ -2,6 +2,8 @@
 //! noise that the repeats do not show.
 
 mod named;
+mod next;
 mod nulls;
 mod plant;
+mod scatter;
 mod unnamed;

@@ -57,7 +57,9 @@ pub fn machine() -> MachineFile {
 }
 
 /// Radius mm, feed mm/min, counterclockwise, repeat.
-pub const PROGRAM: [(f64, f64, bool, u32); 14] = [
+pub type Circle = (f64, f64, bool, u32);
+
+pub const PROGRAM: [Circle; 14] = [
     (50.0, 2000.0, true, 0),
     (50.0, 2000.0, false, 0),
     (80.0, 4000.0, true, 0),
@@ -75,28 +77,57 @@ pub const PROGRAM: [(f64, f64, bool, u32); 14] = [
 ];
 
 pub fn session(seed: u64, noise: Noise, wrong: &Wrong) -> Session {
-    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    session_of(&PROGRAM, seed, noise, wrong)
+}
+
+/// A session of another program.
+pub fn session_of(program: &[Circle], seed: u64, noise: Noise, wrong: &Wrong) -> Session {
     let mut session = Session::default();
-    let mut start_s = 10.0;
-    for (run, entry) in PROGRAM.iter().enumerate() {
-        let run = circle(
-            u32::try_from(run).expect("the plant is sound"),
+    go_on(&mut session, program, 1, seed, noise, wrong);
+    session
+}
+
+/// Measures more circles after a session, in a set-up of their own.
+pub fn go_on(
+    session: &mut Session,
+    program: &[Circle],
+    setup: u32,
+    seed: u64,
+    noise: Noise,
+    wrong: &Wrong,
+) {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let mut start_s = session
+        .runs
+        .last()
+        .map_or(10.0, |run| run.motion.time_s[run.motion.len() - 1] + 60.0);
+    for entry in program {
+        let number = u32::try_from(session.runs.len()).expect("the plant is sound");
+        let is_repeated = program.iter().filter(|other| same(entry, other)).count() > 1;
+        let mut run = circle(
+            number,
             start_s,
             *entry,
+            is_repeated,
             noise,
             wrong,
             &mut random,
         );
+        (run.segment.setup_id, run.segment.zero_id) = (setup, setup);
         start_s = run.motion.time_s[run.motion.len() - 1] + 30.0;
         session.runs.push(run);
     }
-    session
+}
+
+fn same(a: &Circle, b: &Circle) -> bool {
+    (a.0 - b.0).abs() + (a.1 - b.1).abs() < 1e-9 && a.2 == b.2
 }
 
 fn circle(
     run: u32,
     start_s: f64,
-    (radius, feed, ccw, repeat): (f64, f64, bool, u32),
+    (radius, feed, ccw, repeat): Circle,
+    is_repeat: bool,
     noise: Noise,
     wrong: &Wrong,
     random: &mut Pcg64Mcg,
@@ -111,10 +142,6 @@ fn circle(
     position[Axis::Z] = vec![30.0; count];
     let time_s = (0..count).map(|t| start_s + t as f64 * TICK_S).collect();
     let motion = Motion::new(time_s, AxisSet::XYZ, position).expect("the plant is sound");
-    let is_repeat = PROGRAM.iter().any(|(r, f, c, n)| {
-        let same = (r - radius).abs() + (f - feed).abs() < 1e-9;
-        same && *c == ccw && *n == 1
-    });
     let white = noise.white_mm * if is_repeat { 1.0 } else { noise.other_runs };
     let fields = [
         field(noise.between_mm, random),
@@ -233,4 +260,37 @@ pub fn names(diagnosis: &Diagnosis) -> Vec<String> {
     let causes = diagnosis.report.causes.iter();
     let kept = causes.filter(|c| c.status != gap_diagnosis::report::Status::Surrogate);
     kept.map(|c| format!("{} {}", c.effect, c.axis)).collect()
+}
+
+/// Causes and notes in a few words, for messages of tests.
+pub fn told(diagnosis: &Diagnosis) -> String {
+    let causes = diagnosis.report.causes.iter().map(|c| {
+        let values: Vec<String> = c
+            .parameters
+            .iter()
+            .map(|p| format!("{} {:.3} ({:.3} to {:.3})", p.name, p.value, p.low, p.high))
+            .collect();
+        format!(
+            "{} {} {:?} {:.2} D {:.1} {} z {:.1} {}",
+            c.effect,
+            c.axis,
+            c.status,
+            c.confidence,
+            c.d,
+            values.join(", "),
+            c.constancy.worst_z,
+            c.constancy.split_by
+        )
+    });
+    let notes = diagnosis.notes.iter().map(ToString::to_string);
+    let unknown = &diagnosis.report.unknown;
+    let rest = format!(
+        "rest {} {:.1} of {:.1}",
+        unknown.flagged, unknown.score, unknown.threshold
+    );
+    causes
+        .chain(notes)
+        .chain([rest])
+        .collect::<Vec<_>>()
+        .join("\n")
 }
