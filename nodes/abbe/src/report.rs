@@ -28,6 +28,11 @@ mod tool_error;
 mod trace;
 pub mod verification;
 
+/// A body as one self-contained HTML text.
+pub fn html(title: &str, body: &Markup) -> String {
+    page::page(title, body)
+}
+
 /// A report before it is laid out.
 pub struct Report {
     /// Title.
