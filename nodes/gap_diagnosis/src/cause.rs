@@ -113,6 +113,9 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let forms = isolability::forms(&signatures, &normal, &best.set);
     let mut members = judged(scope, &signatures, &normal, &best, &forms, is_closed);
     resize(stack, &signatures, &normal, &mut members);
+    while leave_out_small(stack, &signatures, &mut members) {
+        resize(stack, &signatures, &normal, &mut members);
+    }
     doubt_forms(stack, &signatures, &mut members);
     Found {
         signatures,
@@ -167,6 +170,19 @@ fn doubt_forms(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) 
     for (place, estimate) in places.into_iter().zip(estimates) {
         members[place].estimate = estimate;
     }
+}
+
+/// Leaves out members that, sized without the surrogates, are below what they cost the search: they were found for
+/// what the surrogates left. Whether there were any.
+fn leave_out_small(stack: &Stack<'_>, signatures: &Library, members: &mut Vec<Member>) -> bool {
+    let log_rows = stack.freedom().max(2.0).ln();
+    let log_instances = count(signatures.seen().max(2)).ln();
+    let before = members.len();
+    members.retain(|member| {
+        let price = count(signatures.forms[member.form].price) * log_rows + 2.0 * log_instances;
+        member.status == Status::Surrogate || member.estimate.d.powi(2) >= price
+    });
+    members.len() < before
 }
 
 /// A member whose own signature is this many times what the whole set explains (in squares) only cancels another.

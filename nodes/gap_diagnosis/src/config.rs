@@ -26,6 +26,10 @@ pub struct GapConfig {
     pub seed: u64,
     /// Scatter over that of the repeats, as a ratio of variances, above which the floor is not reproduced.
     pub most_inflation: f64,
+    /// Error of form that every simulator has, below which nothing is named, µm.
+    pub form_error_um: f64,
+    /// What is added to it where effects were found, as a share of their signatures.
+    pub form_error_share: f64,
     /// Standard score at which an effect has two sizes.
     pub constancy_z: f64,
     /// Spread of its sizes, as a share of the mean, below which an effect is constant all the same.
@@ -48,6 +52,8 @@ impl Default for GapConfig {
             bootstrap_draws: 2000,
             seed: 20_260_101,
             most_inflation: 1.2,
+            form_error_um: 0.2,
+            form_error_share: 0.05,
             constancy_z: 4.0,
             constancy_spread: 0.1,
             hold_out: true,
@@ -83,6 +89,8 @@ impl GapConfig {
         }
         let reals = [
             ("most_inflation", self.most_inflation, 1.0),
+            ("form_error_um", self.form_error_um, 0.0),
+            ("form_error_share", self.form_error_share, 0.0),
             ("constancy_z", self.constancy_z, 0.0),
             ("constancy_spread", self.constancy_spread, 0.0),
         ];

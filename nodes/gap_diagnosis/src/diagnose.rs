@@ -6,14 +6,17 @@ use machine::MachineFile;
 use machine::effects::{self, CATALOGUE, Effect, Kind};
 use machine::file::EffectEntry;
 use machine::twin::{Channel, Session, Twin, simulate};
+use nalgebra::DVector;
 
-use crate::cause::{self, Found, Scope};
+use crate::cause::{self, Found, Member, Scope};
 use crate::config::GapConfig;
 use crate::error::GapError;
 use crate::experiment::Experiment;
 use crate::families::Slot;
 use crate::figures::{Figures, Note};
+use crate::form_error::FormError;
 use crate::gap::{self, Size};
+use crate::guard;
 use crate::next::{self, Bench};
 use crate::noise::{self, Noise};
 use crate::report::{ChannelGap, Gap, GapReport, Inputs, NoiseFloor, NotExcited, SCHEMA};
@@ -124,15 +127,59 @@ struct Base<'a> {
 }
 
 impl<'a> Base<'a> {
-    fn stack(&self, runs: &[usize]) -> Stack<'a> {
+    fn stack(
+        &self,
+        runs: &[usize],
+        noise: &BTreeMap<Channel, Noise>,
+        form: &FormError,
+    ) -> Stack<'a> {
         Stack::new(
             self.session,
             self.twin,
             runs,
             self.stations,
-            self.noise,
+            noise,
+            form,
             self.residual,
         )
+    }
+
+    /// Searches some runs twice: once with the form error that every simulator has, then with what the effects
+    /// found add to it, and with the noise of channels whose repeats show too little of it.
+    fn searched(
+        &self,
+        runs: &[usize],
+        kinds: &[&'static Kind],
+        config: &GapConfig,
+    ) -> Searched<'a> {
+        let base = FormError::base(config);
+        let first = self.search(runs, self.noise, &base, kinds, config);
+        let told = told(&first.stack, first.found.members.iter(), &first.found);
+        let rest = less(&first.stack.raw, &told);
+        let inflation = guard::inflation(&first.stack, &first.slots, self.noise, rest, &base);
+        let worse = |channel: &Channel| {
+            let ratio = inflation.get(channel).copied().unwrap_or(1.0);
+            ratio > config.most_inflation
+        };
+        if first.found.members.is_empty() && !inflation.keys().any(worse) {
+            return Searched { inflation, ..first };
+        }
+        let scaled = |(channel, noise): (&Channel, &Noise)| {
+            let ratio = if worse(channel) {
+                inflation[channel]
+            } else {
+                1.0
+            };
+            (channel.clone(), noise.scaled(ratio))
+        };
+        let noise: BTreeMap<Channel, Noise> = self.noise.iter().map(scaled).collect();
+        let form = FormError::beside(&first.stack, &told, config);
+        let second = self.search(runs, &noise, &form, kinds, config);
+        Searched {
+            before: first.before,
+            inflation,
+            ..second
+        }
     }
 
     /// The search for effects of the mean, then of scatter; where these are found the first once more, each row
@@ -142,30 +189,36 @@ impl<'a> Base<'a> {
         split: &Split,
         kinds: &[&'static Kind],
         config: &GapConfig,
-    ) -> (Stack<'a>, Vec<Slot>, Found, Scattered) {
-        let stack = self.stack(&split.fit);
-        let slots = families::families(&stack);
+    ) -> (Searched<'a>, Scattered) {
+        let searched = self.searched(&split.fit, kinds, config);
         let scope = |stack, slots| Scope {
             stack,
             slots,
-            noise: self.noise,
+            noise: &searched.noise,
             config,
         };
-        let found = cause::find(&scope(&stack, &slots), kinds);
-        let scattered = scatter::find(&scope(&stack, &slots), kinds, &found.left);
+        let of_scatter = |left: &DVector<f64>| {
+            let scope = scope(&searched.stack, &searched.slots);
+            scatter::find(&scope, kinds, left)
+        };
+        let scattered = of_scatter(&searched.found.left);
         if !scattered.is_named() {
-            return (stack, slots, found, scattered);
+            return (searched, scattered);
         }
-        let weighed = stack.weighed(&scattered.spread);
-        let slots_weighed = families::families(&weighed);
-        let again = cause::find(&scope(&weighed, &slots_weighed), kinds);
-        let left = again.left.component_mul(&scattered.spread);
-        let scattered = scatter::find(&scope(&stack, &slots), kinds, &left);
-        if scattered.is_named() {
-            (weighed, slots_weighed, again, scattered)
-        } else {
-            (stack, slots, found, scattered)
+        let stack = searched.stack.weighed(&scattered.spread);
+        let slots = families::families(&stack);
+        let found = cause::find(&scope(&stack, &slots), kinds);
+        let scattered = of_scatter(&found.left.component_mul(&scattered.spread));
+        if !scattered.is_named() {
+            return (searched, scattered);
         }
+        let again = Searched {
+            stack,
+            slots,
+            found,
+            ..searched
+        };
+        (again, scattered)
     }
 
     fn bench(&self) -> Bench<'_> {
@@ -177,6 +230,34 @@ impl<'a> Base<'a> {
         }
     }
 
+    fn search(
+        &self,
+        runs: &[usize],
+        noise: &BTreeMap<Channel, Noise>,
+        form: &FormError,
+        kinds: &[&'static Kind],
+        config: &GapConfig,
+    ) -> Searched<'a> {
+        let stack = self.stack(runs, noise, form);
+        let slots = families::families(&stack);
+        let scope = Scope {
+            stack: &stack,
+            slots: &slots,
+            noise,
+            config,
+        };
+        let before = unknown::leftover(&stack, &slots, noise, &stack.z, &[], config);
+        let found = cause::find(&scope, kinds);
+        Searched {
+            stack,
+            slots,
+            before,
+            found,
+            noise: noise.clone(),
+            inflation: BTreeMap::new(),
+        }
+    }
+
     fn diagnosis(
         &self,
         kinds: &[&'static Kind],
@@ -184,9 +265,15 @@ impl<'a> Base<'a> {
         mut notes: Vec<Note>,
     ) -> Diagnosis {
         let split = split::split(self.session, config.hold_out);
-        let (stack, slots, mut found, mut scattered) = self.explained(&split, kinds, config);
-        let before = unknown::leftover(&stack, &slots, self.noise, &stack.z, &[], config);
-        let inflation = unknown::inflation(&stack, &slots, &found.left);
+        let (searched, mut scattered) = self.explained(&split, kinds, config);
+        let Searched {
+            stack,
+            slots,
+            before,
+            mut found,
+            inflation,
+            ..
+        } = searched;
         let reproduced = judge_noise(&inflation, config, &mut notes);
         if !reproduced {
             found.withdraw();
@@ -198,7 +285,8 @@ impl<'a> Base<'a> {
         let next = next::propose(&self.bench(), &found);
         notes.extend(next.notes);
         let shrunk = self.shrunk(&split, &found, before.flagged(), config);
-        let all = self.stack(&[&split.fit[..], &split.held_out].concat());
+        let both = [&split.fit[..], &split.held_out].concat();
+        let all = self.stack(&both, self.noise, &FormError::base(config));
         let sizes = gap::by_block(&all, self.noise, &all.floated(all.raw.clone()));
         let floated = stack.floated(stack.raw.clone());
         let (rest, beside) = self.beside_named(&stack, &slots, &found, config);
@@ -245,18 +333,7 @@ impl<'a> Base<'a> {
         found: &Found,
         config: &GapConfig,
     ) -> (Vec<f64>, Leftover) {
-        let effects: Vec<Box<dyn Effect>> = found
-            .named()
-            .map(|member| found.instance(member).effect(&member.estimate.values))
-            .collect();
-        let effects: Vec<&dyn Effect> = effects.iter().map(|effect| &**effect).collect();
-        let told = stack.simulate(&effects);
-        let rest: Vec<f64> = stack
-            .raw
-            .iter()
-            .zip(told)
-            .map(|(raw, told)| raw - told)
-            .collect();
+        let rest = less(&stack.raw, &told(stack, found.named(), found));
         let white = stack.whitened(rest.clone());
         let leftover = unknown::leftover(stack, slots, self.noise, &white, &[], config);
         (rest, leftover)
@@ -268,7 +345,7 @@ impl<'a> Base<'a> {
         } else {
             &split.held_out
         };
-        let stack = self.stack(judged);
+        let stack = self.stack(judged, self.noise, &FormError::base(config));
         let effects: Vec<Box<dyn Effect>> = found
             .named()
             .map(|member| found.instance(member).effect(&member.estimate.values))
@@ -312,7 +389,36 @@ fn remarks(stack: &Stack<'_>, split: &Split, found: &Found) -> Vec<Note> {
     notes
 }
 
-/// Whether every channel has the noise of its repeats; says so where not.
+/// What a search was made of and what it found.
+struct Searched<'a> {
+    stack: Stack<'a>,
+    slots: Vec<Slot>,
+    /// Scores before any effect.
+    before: Leftover,
+    found: Found,
+    /// The noise that it was made with.
+    noise: BTreeMap<Channel, Noise>,
+    inflation: BTreeMap<Channel, f64>,
+}
+
+/// What the rows would show of some members, mm.
+fn told<'m>(
+    stack: &Stack<'_>,
+    members: impl Iterator<Item = &'m Member>,
+    found: &Found,
+) -> Vec<f64> {
+    let effects: Vec<Box<dyn Effect>> = members
+        .map(|member| found.instance(member).effect(&member.estimate.values))
+        .collect();
+    let effects: Vec<&dyn Effect> = effects.iter().map(|effect| &**effect).collect();
+    stack.simulate(&effects)
+}
+
+fn less(raw: &[f64], told: &[f64]) -> Vec<f64> {
+    raw.iter().zip(told).map(|(raw, told)| raw - told).collect()
+}
+
+/// Whether the noise of the repeats is the session's: the middle channel's. A channel whose noise is worse is said.
 fn judge_noise(
     inflation: &BTreeMap<Channel, f64>,
     config: &GapConfig,
@@ -327,9 +433,11 @@ fn judge_noise(
             inflation: *ratio,
         })
         .collect();
-    let reproduced = said.is_empty();
     notes.extend(said);
-    reproduced
+    let mut all: Vec<f64> = inflation.values().copied().collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2)
+        .is_none_or(|middle| *middle <= config.most_inflation)
 }
 
 fn no_repeats(session: &Session, rows: &Rows) -> GapError {

@@ -6,14 +6,15 @@
 //! `report` is the answer, in the form that people's programs read; `figures` is what pages draw beside it.
 //!
 //! `session` makes a session of recorded samples. `rows` thins readings to stations; `repeats` finds what was
-//! measured twice, `field` and `noise` make the noise floor of it; `whitener` makes every row's noise one,
+//! measured twice, `field` and `noise` make the noise floor of it, `form_error`
+//! adds what every simulator is off by; `whitener` makes every row's noise one,
 //! `nuisance` takes out what set-ups leave open, `stack` keeps both. `signature` asks the twin what each effect of
 //! the catalogue would look like, `normal` and `selection` find the set that explains the residual, `refit` sizes
 //! it, `form_doubt` says what a size owes to its form, `confirm` tries it on runs left out and under every
 //! condition, `challenge` against shapes without a physics; `confidence` weighs its rivals, `recalibration` what a
 //! confidence is worth, `cause` judges it. `scatter` looks for effects that move no mean, `whiteness` says whether
-//! the search may stop. `families`, `localise` and `places` say where the gap lies, `unknown` what no effect
-//! explains, `isolability` what could be told from what. `gap` is how much there was to explain, `split` and
+//! the search may stop. `families`, `localise` and `places` say where the gap lies, `guard` whether the
+//! noise is that of the repeats, `unknown` what no effect explains, `isolability` what could be told from what. `gap` is how much there was to explain, `split` and
 //! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`. `experiment` knows what could
 //! be measured next and `next` which of it would decide. `diagnose` puts the questions in their order,
 //! `preflight` some of them before anything is measured. `stage` is the node's whole computation, `following` its
@@ -33,7 +34,9 @@ mod field;
 pub mod figures;
 pub mod following;
 mod form_doubt;
+mod form_error;
 mod gap;
+mod guard;
 mod isolability;
 mod localise;
 mod next;

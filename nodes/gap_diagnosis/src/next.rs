@@ -36,6 +36,7 @@ use crate::cause::{Found, Member};
 use crate::confidence::ODDS;
 use crate::experiment::{Experiment, library};
 use crate::figures::Note;
+use crate::form_error::FormError;
 use crate::noise::Noise;
 use crate::normal::Normal;
 use crate::report::{NextExperiment, Status};
@@ -408,7 +409,8 @@ fn information(
         .iter()
         .map(|run| vec![0.0; run.readings.len()])
         .collect();
-    let stack = Stack::new(future, bench.twin, &runs, STATIONS, noise, &nothing);
+    let form = FormError::default();
+    let stack = Stack::new(future, bench.twin, &runs, STATIONS, noise, &form, &nothing);
     let mut columns = Vec::new();
     for form in forms {
         let instance = &signatures.instances[form.instance];

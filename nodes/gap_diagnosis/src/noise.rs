@@ -54,6 +54,18 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// The same with another variance.
+    pub fn scaled(&self, ratio: f64) -> Self {
+        let mut scaled = self.clone();
+        let size = ratio.sqrt();
+        for variance in &mut scaled.within.variances {
+            *variance *= ratio;
+        }
+        scaled.row_sigma_mm *= size;
+        scaled.reading_sigma_mm *= size;
+        scaled
+    }
+
     /// Standard deviation of a row about the truth, mm.
     pub fn total_mm(&self) -> f64 {
         self.row_sigma_mm.hypot(self.between.total_mm())

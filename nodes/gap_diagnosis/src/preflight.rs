@@ -37,6 +37,7 @@ use crate::diagnose::{considered, stations};
 use crate::error::GapError;
 use crate::field::Smooth;
 use crate::figures::Isolability;
+use crate::form_error::FormError;
 use crate::isolability::{self, isolability};
 use crate::noise::Noise;
 use crate::repeats;
@@ -155,7 +156,10 @@ pub fn preflight(
         .map(|run| vec![0.0; run.readings.len()])
         .collect();
     let split = split::split(session, config.hold_out);
-    let stack = Stack::new(session, &twin, &split.fit, stations, &noise, &residual);
+    let form = FormError::base(config);
+    let stack = Stack::new(
+        session, &twin, &split.fit, stations, &noise, &form, &residual,
+    );
     let means = kinds.iter().filter(|kind| kind.moment == Moment::Mean);
     let library = Library::new(&stack, Instance::all(machine, means));
     let normal = library.normal(&stack.z);
@@ -411,7 +415,8 @@ mod tests {
             .map(|r| vec![0.0; r.readings.len()])
             .collect();
         let split = split::split(&session, config.hold_out);
-        let stack = Stack::new(&session, &twin, &split.fit, stations, &noise, &zero);
+        let form = FormError::base(&config);
+        let stack = Stack::new(&session, &twin, &split.fit, stations, &noise, &form, &zero);
         let kind = machine::effects::kind("backlash").expect("in the catalogue");
         let mut values = kind.typical();
         values[0] = play.found_from;

@@ -18,7 +18,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::twin::{Channel, Run, Session};
+use machine::twin::{Channel, Run, Session, Touch};
 use metrology::PerAxis;
 use nalgebra::DVector;
 
@@ -38,12 +38,8 @@ pub struct Contrasts {
     pub one_zero: bool,
 }
 
-/// Groups of repeats with their differences, by channel.
-pub fn contrasts(
-    session: &Session,
-    rows: &Rows,
-    residual: &[f64],
-) -> BTreeMap<Channel, Vec<Contrasts>> {
+/// Places of the blocks that repeat each other; a block without a repeat is a group of its own.
+pub fn groups(session: &Session, rows: &Rows) -> Vec<Vec<usize>> {
     let mut groups = Vec::<Vec<usize>>::new();
     for (index, block) in rows.blocks.iter().enumerate() {
         let same = |group: &&mut Vec<usize>| is_repeat(session, &rows.blocks[group[0]], block);
@@ -52,8 +48,17 @@ pub fn contrasts(
             None => groups.push(vec![index]),
         }
     }
+    groups
+}
+
+/// Groups of repeats with their differences, by channel.
+pub fn contrasts(
+    session: &Session,
+    rows: &Rows,
+    residual: &[f64],
+) -> BTreeMap<Channel, Vec<Contrasts>> {
     let mut all = BTreeMap::<Channel, Vec<Contrasts>>::new();
-    for group in groups {
+    for group in groups(session, rows) {
         let channel = rows.blocks[group[0]].channel.clone();
         let found = between(session, rows, &group, residual);
         all.entry(channel).or_default().extend(found);
@@ -187,18 +192,21 @@ fn weights(times: &[f64]) -> Vec<DVector<f64>> {
         .collect()
 }
 
+/// Feature, approach and feed of a touch.
+pub fn label(touch: &Touch) -> (String, [i64; 4]) {
+    #[expect(clippy::cast_possible_truncation, reason = "a label, rounded")]
+    let rounded = |value: f64| (value * 100.0).round() as i64;
+    let a = touch.approach;
+    let at = [a.x, a.y, a.z, touch.feed_mm_s].map(rounded);
+    (touch.feature_id.clone(), at)
+}
+
 /// Touches of one feature, approach and feed within a run.
 fn touches_between(run: &Run, place: usize, block: &Block, residual: &[f64]) -> Vec<Contrasts> {
     let mut same = BTreeMap::<(String, [i64; 4]), Vec<usize>>::new();
     for (index, row) in block.rows.iter().enumerate() {
         if let Some(touch) = row.touch.and_then(|touch| run.touches.get(touch)) {
-            #[expect(clippy::cast_possible_truncation, reason = "a label, rounded")]
-            let label = |value: f64| (value * 100.0).round() as i64;
-            let a = touch.approach;
-            let at = [label(a.x), label(a.y), label(a.z), label(touch.feed_mm_s)];
-            same.entry((touch.feature_id.clone(), at))
-                .or_default()
-                .push(index);
+            same.entry(label(touch)).or_default().push(index);
         }
     }
     let contrast = |rows: Vec<usize>| {

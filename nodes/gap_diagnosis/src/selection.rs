@@ -22,6 +22,9 @@ use crate::normal::{Fit, Normal};
 use crate::rows::count;
 use crate::signature::{Form, Library};
 
+/// The free part of a wide form is at most this share of the rest of its signature.
+const MOST_FREE: f64 = 0.5;
+
 /// A set of forms, growing places among the signatures.
 pub type Set = Vec<usize>;
 
@@ -84,13 +87,40 @@ impl<'l> Search<'l> {
             return *score;
         }
         let fit = self.fit(set);
-        let score = if self.is_physical(set, &fit) {
+        let score = if self.is_physical(set, &fit) && self.keeps_form(set, &fit) {
             self.square - fit.gain + self.price(set)
         } else {
             f64::INFINITY
         };
         self.visited.insert(set.clone(), score);
         score
+    }
+
+    /// Whether the free part of every wide form only widens the form: one that is as large as the rest of its
+    /// signature would be another effect under this one's name.
+    fn keeps_form(&self, set: &[usize], fit: &Fit) -> bool {
+        let mut first = 0;
+        set.iter().all(|form| {
+            let entry = &self.signatures.forms[*form];
+            let sizes = &fit.sizes[first..first + entry.columns.len()];
+            first += entry.columns.len();
+            let own = self.signatures.instances[entry.instance]
+                .kind
+                .parameters
+                .len();
+            let square = |is_free: bool| -> f64 {
+                let wanted = |k: &usize| (entry.amplitudes[*k] >= own) == is_free;
+                let part: Vec<usize> = (0..sizes.len()).filter(wanted).collect();
+                let of = |i: &usize, j: &usize| {
+                    let gram = self.normal.gram[(entry.columns[*i], entry.columns[*j])];
+                    sizes[*i] * sizes[*j] * gram
+                };
+                part.iter()
+                    .flat_map(|i| part.iter().map(move |j| of(i, j)))
+                    .sum()
+            };
+            !entry.wide || square(true) <= MOST_FREE.powi(2) * square(false)
+        })
     }
 
     fn is_physical(&self, set: &[usize], fit: &Fit) -> bool {

@@ -15,9 +15,10 @@ use machine::effects::Effect;
 use machine::twin::{Channel, Session, Twin};
 use nalgebra::DVector;
 
+use crate::form_error::FormError;
 use crate::noise::Noise;
 use crate::nuisance::Nuisance;
-use crate::rows::{Rows, count};
+use crate::rows::{Block, Rows, count};
 use crate::whitener::Whitener;
 
 /// The rows of some runs with their noise.
@@ -48,15 +49,17 @@ impl<'a> Stack<'a> {
         runs: &[usize],
         stations: usize,
         noise: &BTreeMap<Channel, Noise>,
+        form: &FormError,
         residual: &[Vec<f64>],
     ) -> Self {
         let rows = Rows::new(session, runs, stations, |channel| {
             noise.contains_key(channel)
         });
-        let whitener = Whitener::new(session, &rows, |block| {
+        let of = |block: &Block| {
             let noise = &noise[&block.channel];
             (&noise.within, &noise.between)
-        });
+        };
+        let whitener = Whitener::new(session, &rows, of, form);
         let nuisance = Nuisance::new(session, &rows, |column| whitener.apply(column));
         let unweighted = Nuisance::new(session, &rows, |_| {});
         let mut raw = vec![0.0; rows.len];

@@ -11,15 +11,6 @@
 //!
 //! over families F (`families`) and channels c, with n_c rows less floats and nu_c rows that the noise is known
 //! from. Draws of (1) take the fitted effects out of the families' covariance as the fit does.
-//!
-//! Whether the repeats' noise is the session's is seen from what is left beside the families:
-//!
-//! ```text
-//!   s2 = |z_c - fit|^2 / n,  times (1 + rho) / (1 - rho)                  (3)
-//! ```
-//!
-//! with rho the autocorrelation at lag one where it is above a quarter. What repeats leave alike at the same
-//! stations is structure, not noise: where their mean product says so, (3) is taken over the repeats, less it.
 
 use std::collections::BTreeMap;
 
@@ -34,7 +25,6 @@ use crate::families::{Family, Parity, Slot};
 use crate::localise::{self, Score, noise_maxima};
 use crate::noise::Noise;
 use crate::normal::Normal;
-use crate::repeats;
 use crate::report::{Description, Unknown};
 use crate::rows::{count, position, time_s};
 use crate::stack::Stack;
@@ -56,8 +46,6 @@ impl Leftover {
     }
 }
 
-/// Mean product of repeats above which what is left is structure rather than noise.
-const STRUCTURE: f64 = 0.15;
 /// Draws of the threshold.
 const DRAWS: usize = 999;
 
@@ -122,83 +110,6 @@ fn left_grams(slots: &[Slot], fitted: &[DVector<f64>]) -> Vec<DMatrix<f64>> {
         plain(slot) - &part * part.transpose()
     };
     slots.iter().map(of).collect()
-}
-
-/// (3) of every channel.
-pub fn inflation(stack: &Stack<'_>, slots: &[Slot], left: &DVector<f64>) -> BTreeMap<Channel, f64> {
-    let mut rest = left.clone();
-    let mut sums = BTreeMap::<Channel, [f64; 4]>::new();
-    let share = stack.freedom() / count(stack.rows.len);
-    for slot in slots {
-        let along =
-            DVector::from_iterator(slot.rows.len(), slot.rows.iter().map(|place| left[*place]));
-        let normal = Normal::new(&slot.basis, &along);
-        let all: Vec<usize> = (0..slot.basis.ncols()).collect();
-        let fit = &slot.basis * DVector::from_vec(normal.solve(&all).sizes);
-        for (place, told) in slot.rows.iter().zip(fit.iter()) {
-            rest[*place] -= told;
-        }
-        let channel = stack.rows.blocks[slot.blocks[0]].channel.clone();
-        sums.entry(channel).or_default()[1] -= count(all.len());
-    }
-    for block in &stack.rows.blocks {
-        let sum = sums.entry(block.channel.clone()).or_default();
-        let part = rest.rows(block.start, block.rows.len());
-        sum[0] += part.norm_squared();
-        sum[1] += share * count(block.rows.len());
-        sum[2] += (1..part.len()).map(|k| part[k] * part[k - 1]).sum::<f64>();
-        sum[3] += count(part.len().saturating_sub(1));
-    }
-    let shared = shared_by_repeats(stack, &rest);
-    sums.into_iter()
-        .filter(|(_, [_, n, ..])| *n > 20.0)
-        .map(|(channel, [square, n, product, pairs])| {
-            let s2 = square / n;
-            let rho = product / pairs.max(1.0) / s2.max(f64::MIN_POSITIVE);
-            match shared.get(&channel) {
-                Some([common, own]) if *common > STRUCTURE.min(0.3 * (s2 - 1.0)).max(0.05) => {
-                    (channel, own - common)
-                }
-                _ if rho > 0.25 => (channel, s2 * (1.0 + rho) / (1.0 - rho).max(0.05)),
-                _ => (channel, s2),
-            }
-        })
-        .collect()
-}
-
-/// Mean product of the same station in two repeats, and mean square there.
-fn shared_by_repeats(stack: &Stack<'_>, rest: &DVector<f64>) -> BTreeMap<Channel, [f64; 2]> {
-    let mut sums = BTreeMap::<Channel, [f64; 3]>::new();
-    let blocks = &stack.rows.blocks;
-    for (place, one) in blocks.iter().enumerate() {
-        let repeat = |other: &&crate::rows::Block| repeats::is_repeat(stack.session, one, other);
-        let Some(other) = blocks[place + 1..].iter().find(repeat) else {
-            continue;
-        };
-        let sum = sums.entry(one.channel.clone()).or_default();
-        let mut at = other.rows.iter().zip(other.range()).peekable();
-        for (row, here) in one.rows.iter().zip(one.range()) {
-            while at
-                .peek()
-                .is_some_and(|(next, _)| next.station < row.station)
-            {
-                at.next();
-            }
-            if let Some((next, there)) = at.peek()
-                && next.station == row.station
-            {
-                sum[0] += rest[here] * rest[*there];
-                sum[1] += 0.5 * (rest[here].powi(2) + rest[*there].powi(2));
-                sum[2] += 1.0;
-            }
-        }
-    }
-    let mean =
-        |(channel, [product, square, n]): (Channel, [f64; 3])| (channel, [product / n, square / n]);
-    sums.into_iter()
-        .filter(|(_, [.., n])| *n > 0.0)
-        .map(mean)
-        .collect()
 }
 
 /// The report's part on what the named effects leave (`rest`, mm).

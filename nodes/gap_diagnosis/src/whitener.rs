@@ -2,7 +2,8 @@
 //!
 //! # Model
 //!
-//! Noise of a block is an autoregression plus the smooth field of `field`, B Lambda B' in covariance:
+//! Noise of a block is an autoregression (of which the white part of `form_error` is one more term) plus the
+//! smooth fields of `field` and `form_error`, B Lambda B' in covariance:
 //!
 //! ```text
 //!   x_t = (y_t - sum_j phi_j y_(t-j)) / v_p                               (1)
@@ -19,10 +20,11 @@
 //! \[1\] G. E. P. Box, G. M. Jenkins, G. C. Reinsel, Time Series Analysis, 4th ed., Wiley 2008, 3.2
 //! (autoregression, recursion).
 
-use machine::twin::Session;
+use machine::twin::{Channel, Session};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::field::{self, Smooth};
+use crate::form_error::{self, FormError};
 use crate::rows::{Block, Rows};
 
 /// Autoregression of a channel: predictors of order 0 to p with the variance that each leaves.
@@ -68,6 +70,23 @@ impl Autoregression {
         all
     }
 
+    /// The same noise with white noise beside it, to the order that is wanted.
+    ///
+    /// Where the noise is no white one itself the sum is an autoregression of no finite order; three terms leave
+    /// less than the repeats tell of it.
+    pub fn with_white(&self, variance_mm2: f64, order: usize) -> Self {
+        if variance_mm2 <= 0.0 {
+            return self.clone();
+        }
+        let mut all = vec![self.variances[0]];
+        for lag in 1..=order.max(self.order()) {
+            let told = self.coefficients[lag.min(self.order())].iter().enumerate();
+            all.push(told.map(|(j, phi)| phi * all[lag - 1 - j]).sum());
+        }
+        all[0] += variance_mm2;
+        Self::levinson(&all)
+    }
+
     /// Keeps the orders up to one.
     pub fn up_to(mut self, order: usize) -> Self {
         self.coefficients.truncate(order + 1);
@@ -95,6 +114,9 @@ impl Autoregression {
     }
 }
 
+/// Order of an autoregression with white noise beside it.
+const WHITE_ORDER: usize = 3;
+
 /// (2) of every block.
 #[derive(Clone, Debug)]
 pub struct Whitener {
@@ -115,24 +137,53 @@ impl Whitener {
         session: &Session,
         rows: &Rows,
         noise: impl Fn(&Block) -> (&'n Autoregression, &'n Smooth),
+        form: &FormError,
     ) -> Self {
-        let of_block = |block: &Block| {
-            let (filter, smooth) = noise(block);
-            let (kinds, mut columns) = field::modes(&session.runs[block.run], block);
+        let sharing = form_error::sharing(session, rows);
+        let touched = form_error::touched(session, rows);
+        let of_block = |(block, sharing): (&Block, &f64)| {
+            let run = &session.runs[block.run];
+            let (within, between) = noise(block);
+            let size = form.of(block) * sharing.sqrt();
+            let (kinds, mut columns) = field::modes(run, block);
+            let is_touch = block.channel == Channel::Touch;
+            let (filter, form_field) = if is_touch {
+                (within.clone(), Smooth::default())
+            } else {
+                (
+                    within.with_white((form_error::ROUGH * size).powi(2), WHITE_ORDER),
+                    form_error::smooth(size),
+                )
+            };
             for (kind, mut column) in kinds.iter().zip(columns.column_iter_mut()) {
+                column *= form_error::joined(between, &form_field, *kind);
+            }
+            let of_touches = form_error::touch_columns(run, block, &touched)
+                .into_iter()
+                .map(|(column, repeats)| {
+                    let size = form.of(block) * repeats.sqrt();
+                    column.into_iter().map(|v| v * size).collect::<Vec<f64>>()
+                });
+            let of_edges = form.edges(block).iter().map(|(row, height)| {
+                let mut column = vec![0.0; block.rows.len()];
+                column[*row] = height * sharing.sqrt();
+                column
+            });
+            let more: Vec<Vec<f64>> = of_touches.into_iter().chain(of_edges).collect();
+            let mut columns = form_error::beside(columns, &more);
+            for mut column in columns.column_iter_mut() {
                 filter.filter(column.as_mut_slice());
-                column *= smooth.of(*kind);
             }
             let (vectors, singular) = singular(&columns);
             BlockWhitener {
                 range: block.range(),
-                filter: filter.clone(),
+                filter,
                 vectors,
                 shrink: singular.map(|s| 1.0 - 1.0 / (1.0 + s * s).sqrt()),
             }
         };
         Self {
-            blocks: rows.blocks.iter().map(of_block).collect(),
+            blocks: rows.blocks.iter().zip(&sharing).map(of_block).collect(),
         }
     }
 
@@ -164,4 +215,36 @@ fn singular(columns: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
         vector /= *value;
     }
     (vectors, values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_noise_beside_white_noise_adds_up() {
+        let both = Autoregression::white(3.0).with_white(1.0, 3);
+        assert!((both.variances[3] - 4.0).abs() < 1e-12);
+        assert!(both.coefficients[3].iter().all(|phi| phi.abs() < 1e-12));
+    }
+
+    #[test]
+    fn eq1_white_noise_beside_an_autoregression_keeps_its_autocovariances() {
+        // An autoregression of first order with phi 0.6 and variance 1: 0.6^lag.
+        let one = Autoregression::levinson(&[1.0, 0.6]);
+        let both = one.with_white(0.5, 3);
+        // Yule and Walker's equations of the sum, solved by hand for order one: 0.6 / 1.5.
+        assert!((both.coefficients[1][0] - 0.4).abs() < 1e-12);
+        assert!((both.variances[0] - 1.5).abs() < 1e-12);
+        for row in 0..3_usize {
+            let lag = |a: usize| {
+                let far = a.abs_diff(row);
+                0.6_f64.powi(i32::try_from(far).expect("small")) + if far == 0 { 0.5 } else { 0.0 }
+            };
+            let told: f64 = (0..3).map(|j| both.coefficients[3][j] * lag(j)).sum();
+            let expected = 0.6_f64.powi(i32::try_from(row + 1).expect("small"));
+            assert!((told - expected).abs() < 1e-12, "{row}");
+        }
+        assert_eq!(one.with_white(0.0, 3), one);
+    }
 }

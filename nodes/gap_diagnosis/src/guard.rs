@@ -1,0 +1,228 @@
+//! Whether the session has the noise that its repeats show.
+//!
+//! # Model
+//!
+//! What the effects found leave, as white as the noise within a run makes it, less the biggest model without a
+//! physics: every family of `families` and every smooth mode of every block, each with a size of its own.
+//!
+//! ```text
+//!   s2 = median z_i^2 / 0.4549  n / (n - k),   times (1 + rho) / (1 - rho)       (1)
+//!   inflation = 1 + (s2 - 1)+ s_w^2 / (s_w^2 + s_0^2 / 16)                       (2)
+//! ```
+//!
+//! with rho the autocorrelation at lag one where it is above a quarter, s_w the noise of a row within a run and
+//! s_0 the simulator's own error of form, of which a quarter may stay beside such a model. What repeats leave alike at the same stations is structure, not noise: where
+//! their mean product says so, it is taken from (1). The median keeps a few sharp places (reversals) from
+//! passing for noise; products are clipped at three standard deviations.
+//!
+//! # Holds when
+//! A channel has twenty rows more than its models have terms; others are not judged.
+//!
+//! # References
+//! \[1\] P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., Wiley 2009, 5.1 (scale by the median).
+
+use std::collections::BTreeMap;
+
+use machine::twin::Channel;
+use nalgebra::DVector;
+
+use crate::families::Slot;
+use crate::field::{self, Smooth};
+use crate::form_error::{self, FormError};
+use crate::noise::Noise;
+use crate::nuisance::orthonormal;
+use crate::repeats;
+use crate::rows::{Block, count};
+use crate::stack::Stack;
+use crate::whitener::Whitener;
+
+/// Mean product of repeats above which what is left is structure rather than noise.
+const STRUCTURE: f64 = 0.15;
+/// Median of the square of a normal number.
+const MEDIAN_SQUARE: f64 = 0.454_936;
+/// Share of the error of form that stays beside the biggest model.
+const ROUGH: f64 = 0.25;
+/// Rows beyond the terms of the models below which a channel is not judged.
+const FEWEST: f64 = 20.0;
+
+/// (2) of every channel; `rest` is what the effects found leave of the stack, mm.
+pub fn inflation(
+    stack: &Stack<'_>,
+    slots: &[Slot],
+    noise: &BTreeMap<Channel, Noise>,
+    rest: Vec<f64>,
+    form: &FormError,
+) -> BTreeMap<Channel, f64> {
+    let (rest, terms) = rough(stack, slots, noise, rest);
+    let mut sums = BTreeMap::<Channel, Vec<&[f64]>>::new();
+    for block in &stack.rows.blocks {
+        let part = &rest[block.range()];
+        sums.entry(block.channel.clone()).or_default().push(part);
+    }
+    let scale = |(channel, parts): (Channel, Vec<&[f64]>)| {
+        let n = count(parts.iter().map(|part| part.len()).sum());
+        let left = n - terms.get(&channel).copied().unwrap_or(0.0);
+        (left > FEWEST).then(|| {
+            let s2 = median_square(&parts) / MEDIAN_SQUARE * n / left;
+            (channel, s2)
+        })
+    };
+    let scales: BTreeMap<Channel, f64> = sums.into_iter().filter_map(scale).collect();
+    let shared = shared_by_repeats(stack, &rest, &scales);
+    let judged = |(channel, s2): (&Channel, &f64)| {
+        let worse = match shared.get(channel) {
+            Some(common) if *common > STRUCTURE.min(0.3 * (s2 - 1.0)).max(0.05) => s2 - common,
+            _ => s2 * of_neighbours(stack, &rest, channel, *s2),
+        };
+        let beyond = (worse - 1.0).max(0.0) * allowed(stack, noise, channel, form);
+        (channel.clone(), 1.0 + beyond) // (2)
+    };
+    scales.iter().map(judged).collect()
+}
+
+/// Share of the variance of a row that is noise, where the error of form is added.
+fn allowed(
+    stack: &Stack<'_>,
+    noise: &BTreeMap<Channel, Noise>,
+    channel: &Channel,
+    form: &FormError,
+) -> f64 {
+    let own = |block: &&Block| block.channel == *channel;
+    let found = stack.rows.blocks.iter().find(own);
+    let form = ROUGH * found.map_or(0.0, |block| form.of(block));
+    let within = noise[channel].row_sigma_mm.powi(2);
+    within / (within + form * form)
+}
+
+/// What is left beside the biggest model, and its terms by channel.
+fn rough(
+    stack: &Stack<'_>,
+    slots: &[Slot],
+    noise: &BTreeMap<Channel, Noise>,
+    mut rest: Vec<f64>,
+) -> (Vec<f64>, BTreeMap<Channel, f64>) {
+    let still = Smooth::default();
+    let within = Whitener::new(
+        stack.session,
+        &stack.rows,
+        |block| (&noise[&block.channel].within, &still),
+        &FormError::default(),
+    );
+    within.apply(&mut rest);
+    let mut terms = BTreeMap::<Channel, f64>::new();
+    for block in &stack.rows.blocks {
+        let run = &stack.session.runs[block.run];
+        let (_, modes) = field::modes(run, block);
+        let touches = form_error::touch_columns(run, block, &BTreeMap::new());
+        let touches: Vec<Vec<f64>> = touches.into_iter().map(|(column, _)| column).collect();
+        let modes = form_error::beside(modes, &touches);
+        let rows: Vec<usize> = block.range().collect();
+        let columns = modes.column_iter().map(|column| {
+            let mut column = column.into_owned();
+            noise[&block.channel].within.filter(column.as_mut_slice());
+            column
+        });
+        let used = take_out(&mut rest, &rows, columns);
+        *terms.entry(block.channel.clone()).or_default() += used;
+    }
+    for slot in slots {
+        let plain = slot.families.iter().flat_map(|family| {
+            let columns = family.plain.column_iter();
+            columns
+                .map(|column| column.into_owned())
+                .collect::<Vec<_>>()
+        });
+        let columns = plain.map(|column| {
+            let mut whole = vec![0.0; stack.rows.len];
+            for (place, value) in slot.rows.iter().zip(column.iter()) {
+                whole[*place] = *value;
+            }
+            within.apply(&mut whole);
+            DVector::from_iterator(slot.rows.len(), slot.rows.iter().map(|place| whole[*place]))
+        });
+        let used = take_out(&mut rest, &slot.rows, columns);
+        *terms.entry(slot.key.clone()).or_default() += used;
+    }
+    (rest, terms)
+}
+
+/// Takes some columns over some rows out of the rest; how many there were.
+fn take_out(rest: &mut [f64], rows: &[usize], columns: impl Iterator<Item = DVector<f64>>) -> f64 {
+    let basis = orthonormal(rows.len(), columns);
+    let part = DVector::from_iterator(rows.len(), rows.iter().map(|place| rest[*place]));
+    let told = &basis * basis.tr_mul(&part);
+    for (place, told) in rows.iter().zip(told.iter()) {
+        rest[*place] -= told;
+    }
+    count(basis.ncols())
+}
+
+fn median_square(parts: &[&[f64]]) -> f64 {
+    let mut squares: Vec<f64> = parts.concat().iter().map(|v| v * v).collect();
+    let middle = squares.len() / 2;
+    *squares.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+fn clipped(value: f64, s2: f64) -> f64 {
+    let most = 3.0 * s2.sqrt();
+    value.clamp(-most, most)
+}
+
+/// What correlation of neighbours adds to the variance of their means.
+fn of_neighbours(stack: &Stack<'_>, rest: &[f64], channel: &Channel, s2: f64) -> f64 {
+    let (mut product, mut pairs) = (0.0, 0.0);
+    for block in stack.rows.blocks.iter().filter(|b| b.channel == *channel) {
+        for pair in rest[block.range()].windows(2) {
+            product += clipped(pair[0], s2) * clipped(pair[1], s2);
+            pairs += 1.0;
+        }
+    }
+    let rho = product / f64::max(pairs, 1.0) / s2.max(f64::MIN_POSITIVE);
+    if rho > 0.25 {
+        (1.0 + rho) / (1.0 - rho).max(0.05)
+    } else {
+        1.0
+    }
+}
+
+/// Mean product of the same station in two repeats.
+fn shared_by_repeats(
+    stack: &Stack<'_>,
+    rest: &[f64],
+    scales: &BTreeMap<Channel, f64>,
+) -> BTreeMap<Channel, f64> {
+    let mut sums = BTreeMap::<Channel, [f64; 2]>::new();
+    let blocks = &stack.rows.blocks;
+    for group in repeats::groups(stack.session, &stack.rows) {
+        for pair in group.windows(2) {
+            let (one, other) = (&blocks[pair[0]], &blocks[pair[1]]);
+            let Some(s2) = scales.get(&one.channel) else {
+                continue;
+            };
+            let sum = sums.entry(one.channel.clone()).or_default();
+            for (here, there) in same_stations(one, other) {
+                sum[0] += clipped(rest[here], *s2) * clipped(rest[there], *s2);
+                sum[1] += 1.0;
+            }
+        }
+    }
+    sums.into_iter()
+        .filter(|(_, [_, n])| *n > 0.0)
+        .map(|(channel, [product, n])| (channel, product / n))
+        .collect()
+}
+
+/// Places in the stack of the stations that two blocks both have.
+fn same_stations(one: &Block, other: &Block) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    let mut at = other.rows.iter().zip(other.range()).peekable();
+    for (row, here) in one.rows.iter().zip(one.range()) {
+        while at.next_if(|(next, _)| next.station < row.station).is_some() {}
+        if let Some((next, there)) = at.peek()
+            && next.station == row.station
+        {
+            pairs.push((here, *there));
+        }
+    }
+    pairs
+}

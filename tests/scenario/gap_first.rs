@@ -1,0 +1,67 @@
+//! What a machine file lacks is named from a run's own bag; written into the file, nothing is left to name.
+
+use std::path::Path;
+use std::time::Duration;
+
+use abbe_tests::program::{Process, command};
+use abbe_tests::scenario::Scenario;
+use serde_json::Value;
+
+/// Of the plant's parameter file.
+const PLAY_UM: f64 = 6.0;
+
+fn read(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// Causes that are named, alone or as a set.
+fn named(report: &Value) -> Vec<&Value> {
+    let causes = report["causes"].as_array().unwrap().iter();
+    causes.filter(|c| c["status"] != "surrogate").collect()
+}
+
+#[test]
+fn scenario_gap_first_names_the_backlash_and_a_run_on_the_new_file_ends_at_the_floor() {
+    let scenario = Scenario::copy_of("gap_first");
+    let run = scenario.run();
+    let better = scenario.path("better.yaml");
+    let mut diagnose = command(0, &["diagnose"]);
+    diagnose.arg(run.join("bag"));
+    diagnose.args(["--machine", &scenario.argument("machine.yaml")]);
+    diagnose.args(["--write-machine", &scenario.argument("better.yaml")]);
+    let ended = Process::start(diagnose).ended_within(Duration::from_secs(60));
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+
+    let report = read(&run.join("gap.json"));
+    let play = named(&report)
+        .into_iter()
+        .find(|c| c["effect"] == "backlash" && c["axis"] == "X")
+        .unwrap_or_else(|| panic!("no backlash X in {:#}", report["causes"]));
+    assert_eq!(play["status"], "named");
+    let width = &play["parameters"][0];
+    let (low, high) = (number(&width["low"]), number(&width["high"]));
+    assert!(low <= PLAY_UM && PLAY_UM <= high, "{width}");
+    assert!(high - low < 0.4 * PLAY_UM, "{width}");
+    let shrink = &report["shrink"];
+    let (before, after) = (
+        number(&shrink["rms_um"]["before"]),
+        number(&shrink["rms_um"]["after"]),
+    );
+    assert!(after < 0.4 * before, "{shrink}");
+    assert!(number(&shrink["gap_closed"]["low"]) > 0.8, "{shrink}");
+
+    std::fs::copy(&better, scenario.path("machine.yaml")).unwrap();
+    let again = read(&scenario.run().join("gap.json"));
+    assert!(named(&again).is_empty(), "{:#}", again["causes"]);
+    let gap = &again["gap"];
+    eprintln!(
+        "gap_first: backlash X {low:.2} to {high:.2} um; held out {before:.2} to {after:.2} um; then {gap}"
+    );
+    assert!(number(&gap["rms_um"]) < 1.5 * number(&gap["floor_um"]), "{gap}");
+}
