@@ -10,7 +10,6 @@
 mod bad_plan;
 mod blocks;
 mod cell;
-mod equal_bytes;
 mod five_axis;
 mod grid_xy;
 mod positioning;
