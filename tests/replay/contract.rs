@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use abbe_msgs::msg::ProbeTrigger;
 use abbe_msgs::{from_cdr, to_cdr};
-use abbe_tests::program::{Process, command};
+use abbe_tests::program::{Process, command, root};
 use abbe_tests::scenario::{SHORT_PLAN, Scenario, mcap_file};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -232,4 +232,10 @@ fn a_bag_without_a_run_says_what_it_lacks() {
     recording.finish().unwrap();
     assert!(said(&bag).contains("abbe.run"), "{}", said(&bag));
     assert_eq!(check(&bag).0, 1);
+}
+
+#[test]
+fn compat_format_v1_replays() {
+    let (code, outcome) = check(&root().join("bags/cold_reference"));
+    assert_eq!(code, 0, "{outcome:#}");
 }
