@@ -33,6 +33,7 @@ mod thermometer;
 mod body;
 mod chain;
 mod error_motion;
+mod oil_film;
 mod structure;
 
 mod artefact;
@@ -148,7 +149,11 @@ impl Plant {
                 &heat.network,
             )?,
             heat,
-            body: Body::new(machine, &truth.geometry, truth.seed)?,
+            body: Body::new(machine, &truth.geometry, truth.seed)?.floating(
+                machine,
+                &truth.oil_film,
+                truth.seed,
+            )?,
             contact,
             scales: LinearScales::new(&truth.linear_scales, truth.seed)?,
             plate: machine
@@ -205,6 +210,7 @@ impl Plant {
                 .rub(axis, drive.slide, path, demand[axis], period_s);
         }
         self.heat.spin(spindle_rpm, period_s);
+        self.body.pass(period_s);
         self.elapsed = Span::from_nanos(start.nanos() + period.nanos());
         if self.heat.pass(period) {
             self.structure.follow(&self.heat.network);

@@ -84,11 +84,26 @@ pub struct LinearAxisEntry {
     pub position_gain_per_s: f64,
     /// Share of velocity feed-forward, 0 to 1.
     pub velocity_feedforward: f64,
+    /// The velocity loop inside the position loop; ideal where absent.
+    #[serde(default)]
+    pub velocity_loop: Option<VelocityLoopEntry>,
     /// Resolution of the motor encoder, seen at the slide.
     pub encoder_resolution_um: f64,
     /// Resolution of the linear scale, where there is one.
     #[serde(default)]
     pub scale_resolution_um: Option<f64>,
+}
+
+/// A velocity loop with proportional and integral action, as it is tuned.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VelocityLoopEntry {
+    /// Natural frequency of the closed loop: root of its gain over its integral time, over 2 pi.
+    pub frequency_hz: f64,
+    /// Damping ratio of the closed loop: half the root of its gain times its integral time.
+    pub damping: f64,
+    /// Time constant of the filter of the measured velocity; 0: none.
+    pub filter_ms: f64,
 }
 
 /// A rotary axis.
@@ -105,6 +120,9 @@ pub struct RotaryAxisEntry {
     pub position_gain_per_s: f64,
     /// Share of velocity feed-forward, 0 to 1.
     pub velocity_feedforward: f64,
+    /// The velocity loop inside the position loop; ideal where absent.
+    #[serde(default)]
+    pub velocity_loop: Option<VelocityLoopEntry>,
     /// Resolution of the encoder.
     pub encoder_resolution_arcsec: f64,
 }

@@ -83,6 +83,16 @@ fn numbers_outside_their_range_are_named_with_value_and_rule() {
             "m.yaml: axes.X.velocity_feedforward = 1.2: must be from 0 to 1",
         ),
         (
+            "velocity_feedforward: 0.98",
+            "velocity_feedforward: 0.98, velocity_loop: {frequency_hz: 0.0, damping: 1.1, filter_ms: 0.0}",
+            "m.yaml: axes.X.velocity_loop.frequency_hz = 0: must be a finite number above 0",
+        ),
+        (
+            "velocity_feedforward: 0.98",
+            "velocity_feedforward: 0.98, velocity_loop: {frequency_hz: 35.0, damping: 1.1, filter_ms: -0.1}",
+            "m.yaml: axes.X.velocity_loop.filter_ms = -0.1: must be a finite number, 0 or above",
+        ),
+        (
             "feed_mm_min: 120.0",
             "feed_mm_min: 0.0",
             "m.yaml: probe.feed_mm_min = 0: must be a finite number above 0",

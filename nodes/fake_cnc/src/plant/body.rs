@@ -1,7 +1,7 @@
 //! Where the tool really is against the workpiece: chain, error motions and warm structure together.
 //!
 //! ```text
-//!   joint j:  M_j(q_j) = nominal motion along its true line, then its error motion E_j(q_j)      (1)
+//!   joint j:  M_j(q_j) = nominal motion along its true line, float F_j(q_j, t), error motion E_j(q_j)  (1)
 //!   workpiece_from_tool = (B M_w1 .. M_wm)^-1 (M_t1 .. H .. M_tn)                              (2)
 //! ```
 //!
@@ -9,6 +9,7 @@
 //! there is none); `B` is the warm bed. The heat of the screws is already in the slides' positions
 //! that come in.
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use machine::MachineFile;
@@ -16,10 +17,11 @@ use machine::file::AxisEntry;
 use metrology::{Axis, PerAxis};
 use nalgebra::{Rotation3, Vector3};
 
-use super::chain::{Chain, Joint, Rigid, nominal_direction};
+use super::chain::{Chain, Joint, Rigid, nominal_direction, shift};
 use super::error::{PlantError, require_finite, require_not_negative};
 use super::error_motion::ErrorMotion;
-use super::file::{GeometryEntry, LinearErrorEntry, RotaryErrorEntry};
+use super::file::{GeometryEntry, LinearErrorEntry, OilFilmEntry, RotaryErrorEntry};
+use super::oil_film::OilFilm;
 use super::structure::Structure;
 
 /// One joint with its true line.
@@ -31,6 +33,7 @@ struct TrueJoint {
     direction: Vector3<f64>,
     lead_error: f64,
     errors: ErrorMotion,
+    film: Option<OilFilm>,
 }
 
 /// The chain with its true geometry.
@@ -90,6 +93,41 @@ impl Body {
         })
     }
 
+    /// Puts oil under the slides.
+    pub(super) fn floating(
+        mut self,
+        machine: &MachineFile,
+        films: &BTreeMap<Axis, OilFilmEntry>,
+        seed: u64,
+    ) -> Result<Self, PlantError> {
+        for (&axis, entry) in films {
+            let (Some(linear), Some(joint)) = (machine.linear(axis), self.joint_mut(axis)) else {
+                return Err(PlantError::AxisUnknown {
+                    place: "oil_film",
+                    axis,
+                });
+            };
+            let travel_mm = linear.travel_mm[1] - linear.travel_mm[0];
+            joint.film = Some(OilFilm::draw(seed, axis, travel_mm, entry)?);
+        }
+        Ok(self)
+    }
+
+    fn joint_mut(&mut self, axis: Axis) -> Option<&mut TrueJoint> {
+        self.joints_mut().find(|joint| joint.joint.axis == axis)
+    }
+
+    fn joints_mut(&mut self) -> impl Iterator<Item = &mut TrueJoint> {
+        self.tool_side.iter_mut().chain(&mut self.workpiece_side)
+    }
+
+    /// Lets time pass under the slides.
+    pub(super) fn pass(&mut self, period_s: f64) {
+        for film in self.joints_mut().filter_map(|joint| joint.film.as_mut()) {
+            film.pass(period_s);
+        }
+    }
+
     /// Tool tip in the workpiece frame of a perfect cold machine, mm.
     pub(super) fn nominal_tip_mm(&self, position: &PerAxis<f64>) -> Vector3<f64> {
         let walk = |joints: &[TrueJoint]| {
@@ -121,7 +159,12 @@ impl Body {
                 } else {
                     1.0
                 };
-                q_mm * joint.lead_error + sign * joint.errors.component(axis.index(), q_mm)
+                let floats_mm = joint
+                    .film
+                    .as_ref()
+                    .map_or(0.0, |film| film.component_mm(axis.index(), q_mm));
+                let own_mm = joint.errors.component(axis.index(), q_mm) + floats_mm;
+                q_mm * joint.lead_error + sign * own_mm
             })
     }
 
@@ -221,6 +264,7 @@ impl TrueJoint {
             direction: nominal_direction(axis) + lean / 1e6,
             lead_error: entry.lead_um_per_m / 1e6,
             errors: ErrorMotion::draw(seed, axis, PI / travel_mm, &deviation, centre_mm),
+            film: None,
         })
     }
 
@@ -255,13 +299,18 @@ impl TrueJoint {
             direction: tilt * nominal_direction(axis),
             lead_error: 0.0,
             errors: ErrorMotion::draw(seed, axis, 1.0, &deviation, origin_mm),
+            film: None,
         })
     }
 
     /// (1).
     fn motion(&self, q: f64) -> Rigid {
         let along = q * (1.0 + self.lead_error);
-        self.joint.motion(along, &self.direction, &self.origin_mm) * self.errors.rigid(q)
+        let guided = self.joint.motion(along, &self.direction, &self.origin_mm);
+        match &self.film {
+            Some(film) => guided * shift(film.shift_mm(q)) * self.errors.rigid(q),
+            None => guided * self.errors.rigid(q),
+        }
     }
 }
 

@@ -10,7 +10,8 @@ mod reference;
 mod touching;
 
 pub use body::{
-    GeometryEntry, LinearErrorEntry, RotaryErrorEntry, SquarenessEntry, StructureEntry,
+    GeometryEntry, LinearErrorEntry, OilFilmEntry, RotaryErrorEntry, SquarenessEntry,
+    StructureEntry,
 };
 pub use drives::{FrictionEntry, LinearDriveEntry, RotaryDriveEntry, RotaryFrictionEntry};
 pub use heat::{
@@ -44,6 +45,9 @@ pub struct PlantFile {
     pub structure: StructureEntry,
     /// Errors of the cold geometry.
     pub geometry: GeometryEntry,
+    /// The oil under the slides; where absent, a slide comes back to where it was.
+    #[serde(default)]
+    pub oil_film: BTreeMap<Axis, OilFilmEntry>,
     /// The touch probe.
     pub touch_probe: TouchProbeEntry,
     /// The artefacts.

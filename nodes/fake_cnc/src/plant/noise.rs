@@ -17,6 +17,7 @@ pub(super) enum Effect {
     Graduation = 8,
     GridPlate = 9,
     Laser = 10,
+    OilFilm = 11,
 }
 
 /// Random numbers of one effect.

@@ -1,10 +1,11 @@
 //! Where the tool is against the workpiece on machines of several chains.
 
+use fake_cnc::plant::OilFilmEntry;
 use fake_cnc::{Plant, PlantFile};
-use metrology::PerAxis;
+use metrology::{Axis, PerAxis};
 use nalgebra::{Rotation3, Vector3};
 
-use crate::rig::{machine, perfect};
+use crate::rig::{PERIOD, machine, perfect};
 
 fn pose(x: f64, y: f64, z: f64, a_deg: f64, c_deg: f64) -> PerAxis<f64> {
     PerAxis([x, y, z, a_deg.to_radians(), 0.0, c_deg.to_radians()])
@@ -91,4 +92,53 @@ fn squareness_leans_an_axis_and_lead_stretches_it() {
     plant.settle_at(&at);
     let expected = Vector3::new(100.0 * 30e-6 + 200.0 * 20e-6, 0.0, 0.0);
     assert!((plant.tool_error_mm(&at) - expected).norm() < 1e-9);
+}
+
+#[test]
+fn a_slide_on_oil_comes_back_to_another_place_after_a_while_and_at_once_to_the_same() {
+    let at = pose(120.0, -80.0, 60.0, 0.0, 0.0);
+    let mut truth = perfect();
+    let film = OilFilmEntry {
+        along_um: 0.2,
+        across_um: 0.0,
+        length_mm: 100.0,
+        time_s: 20.0,
+    };
+    let mut dry = plant("[w C' A' Y' b X Z t]", &truth);
+    truth.oil_film.insert(Axis::X, film);
+    let mut oiled = plant("[w C' A' Y' b X Z t]", &truth);
+    dry.settle_at(&at);
+    oiled.settle_at(&at);
+    let mut seen_um = Vec::new();
+    for _ in 0..40 {
+        let error_mm = oiled.tool_error_mm(&at) - dry.tool_error_mm(&at);
+        assert_eq!(oiled.tool_error_mm(&at), oiled.tool_error_mm(&at));
+        assert!(error_mm.yz().norm() < 1e-9, "across there is no float");
+        seen_um.push(error_mm.x * 1e3);
+        for plant in [&mut dry, &mut oiled] {
+            for _ in 0..2000 {
+                plant.step(&PerAxis::default(), 0.0, PERIOD);
+            }
+        }
+    }
+    let size_um = (seen_um.iter().map(|e| e * e).sum::<f64>() / 40.0).sqrt();
+    // 80 s hold four correlation times: about four independent values.
+    assert!((0.06..0.5).contains(&size_um), "{size_um}");
+}
+
+#[test]
+fn oil_under_an_axis_that_is_not_there_is_refused() {
+    let mut truth = perfect();
+    let film = OilFilmEntry {
+        along_um: 0.2,
+        across_um: 0.2,
+        length_mm: 100.0,
+        time_s: 20.0,
+    };
+    truth.oil_film.insert(Axis::C, film);
+    let told = Plant::new(&machine(), &truth).unwrap_err().to_string();
+    assert_eq!(
+        told,
+        "oil_film.C: the machine file has no such axis of this kind"
+    );
 }

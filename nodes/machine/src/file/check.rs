@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use metrology::Axis;
 
 use super::{
-    ArtefactEntry, AxisEntry, BlockEntry, LinearAxisEntry, MachineFile, RotaryAxisEntry, reference,
+    ArtefactEntry, AxisEntry, BlockEntry, LinearAxisEntry, MachineFile, RotaryAxisEntry,
+    VelocityLoopEntry, reference,
 };
 use crate::chain::Chain;
 use crate::cycle::artefact_id;
@@ -129,6 +130,19 @@ impl Check<'_> {
         self.number(&format!("{key}.velocity_feedforward"), share, holds, SHARE)
     }
 
+    fn velocity_loop(
+        &self,
+        key: &str,
+        entry: Option<&VelocityLoopEntry>,
+    ) -> Result<(), MachineFileError> {
+        let Some(entry) = entry else { return Ok(()) };
+        let at = |field: &str| format!("{key}.velocity_loop.{field}");
+        self.positive(&at("frequency_hz"), entry.frequency_hz)?;
+        self.positive(&at("damping"), entry.damping)?;
+        let holds = entry.filter_ms >= 0.0 && entry.filter_ms.is_finite();
+        self.number(&at("filter_ms"), entry.filter_ms, holds, NOT_NEGATIVE)
+    }
+
     fn linear(&self, key: &str, entry: &LinearAxisEntry) -> Result<(), MachineFileError> {
         self.travel(&format!("{key}.travel_mm"), entry.travel_mm)?;
         let fields = [
@@ -143,6 +157,7 @@ impl Check<'_> {
         if let Some(value) = entry.scale_resolution_um {
             self.positive(&format!("{key}.scale_resolution_um"), value)?;
         }
+        self.velocity_loop(key, entry.velocity_loop.as_ref())?;
         self.loop_of(key, entry.position_gain_per_s, entry.velocity_feedforward)
     }
 
@@ -156,6 +171,7 @@ impl Check<'_> {
         for (field, value) in fields {
             self.positive(&format!("{key}.{field}"), value)?;
         }
+        self.velocity_loop(key, entry.velocity_loop.as_ref())?;
         self.loop_of(key, entry.position_gain_per_s, entry.velocity_feedforward)
     }
 

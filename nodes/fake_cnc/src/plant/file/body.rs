@@ -1,4 +1,4 @@
-//! Shape of the machine in the plant file: structure that heat bends, and errors of geometry.
+//! Shape of the machine in the plant file: structure that heat bends, errors of geometry, and the oil under the slides.
 
 use std::collections::BTreeMap;
 
@@ -85,6 +85,20 @@ pub struct LinearErrorEntry {
     pub lead_um_per_m: f64,
     /// Where the carriage is guided, machine frame, axes at zero: the centre of its rotations.
     pub carriage_mm: [f64; 3],
+}
+
+/// How a slide floats on the oil of its guides, differently from minute to minute.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OilFilmEntry {
+    /// Standard deviation along the axis.
+    pub along_um: f64,
+    /// Standard deviation in each direction across it.
+    pub across_um: f64,
+    /// Distance along the axis over which it changes (correlation falls to exp(-1/2)).
+    pub length_mm: f64,
+    /// Time over which it changes (correlation falls to exp(-1)).
+    pub time_s: f64,
 }
 
 /// Error motions and location of a rotary axis.
