@@ -12,6 +12,7 @@ mod blocks;
 mod cell;
 mod equal_bytes;
 mod five_axis;
+mod grid_truth;
 mod grid_xy;
 mod positioning;
 mod preflight;
