@@ -88,7 +88,7 @@ fn a_question_that_cannot_be_answered_is_refused_with_its_place_and_value() {
             &["--station-uncertainty-um -1", "above 0"],
         ),
         (
-            &["launch_configs/first_run"],
+            &["launch_configs/first_run", "--want", "EXX1"],
             &["launch_configs/first_run", "no grid step"],
         ),
         (

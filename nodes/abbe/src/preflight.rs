@@ -1,19 +1,32 @@
 //! `abbe preflight PLAN|SCENARIO`: what the recordings of a plan will determine, before anything is measured.
+//!
+//! Two questions are asked of it: which errors of geometry its recordings over a plate determine, and which effects
+//! of the catalogue a diagnosis of everything that it records would find, from what size, and tell apart.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::Args;
+use gap_diagnosis::GapConfig;
+use gap_diagnosis::preflight::preflight;
 use nalgebra::Vector3;
 
+mod dry_run;
+mod floors;
+mod ideal;
 mod outcome;
 mod programme;
 mod wanted;
 
+use floors::FloorArgument;
 use outcome::Seen;
-use programme::Programme;
+use programme::{Planned, Programme};
 use wanted::Proposal;
+
+use crate::report::gap::planned;
+use crate::report::section::Section;
+use crate::report::{self, Report};
 
 /// Arguments of `abbe preflight`.
 #[derive(Args)]
@@ -37,13 +50,20 @@ pub struct Preflight {
         allow_negative_numbers = true
     )]
     station_uncertainty_um: f64,
+    /// Noise to assume of an instrument (motor, scale, grid, radial, length, touch): of a reading and between
+    /// runs, in µm; may be repeated.
+    #[arg(long, value_name = "INSTRUMENT=READING/BETWEEN", value_parser = floors::argument)]
+    floor: Vec<FloorArgument>,
+    /// Write the page as one HTML file.
+    #[arg(long)]
+    html: Option<PathBuf>,
     /// The figures as JSON instead of text.
     #[arg(long)]
     json: bool,
 }
 
 impl Preflight {
-    /// Tells rank, what is determined and what to add.
+    /// Tells rank, what is determined and what to add, and what a diagnosis would find.
     ///
     /// # Errors
     /// When plan, machine or a wanted name cannot be used.
@@ -52,29 +72,90 @@ impl Preflight {
         if !(u_um.is_finite() && u_um > 0.0) {
             bail!("--station-uncertainty-um {u_um}: must be finite and above 0");
         }
-        let programme = Programme::read(&self.what, self.machine.as_deref(), u_um * 1e-3)?;
+        let plan = Planned::read(&self.what, self.machine.as_deref())?;
+        let geometry = self.geometry(&plan, u_um * 1e-3)?;
+        let run = dry_run::dry_run(
+            &plan.plan,
+            plan.programs.clone(),
+            &plan.machine,
+            &plan.control,
+        )?;
+        let floors = floors::floors(&plan.machine, &self.floor);
+        let forecast = preflight(&plan.machine, &run.session, &floors, &GapConfig::default())?;
+        let page = planned::page("What a diagnosis would find", &forecast, run.minutes);
+        let title = format!("Preflight of: {}", plan.plan.title);
+        if let Some(path) = &self.html {
+            let sections = geometry.sections();
+            let body = maud::html! {
+                h1 { (title) }
+                (page.body)
+                @for section in &sections { (section.html()) }
+            };
+            let html = report::html(&title, &body);
+            std::fs::write(path, html).with_context(|| format!("{}", path.display()))?;
+        }
+        self.tell(&plan, &geometry, &page)
+    }
+
+    /// Text or JSON on standard output.
+    fn tell(&self, plan: &Planned, geometry: &Geometry, page: &Report) -> Result<ExitCode> {
+        if self.json {
+            let mut figures = geometry.figures();
+            figures["plan"] = plan.plan.title.clone().into();
+            figures["gap"] = page.figures.clone();
+            println!("{}", serde_json::to_string_pretty(&figures)?);
+        } else {
+            for section in geometry.sections() {
+                println!("{}", section.terminal());
+            }
+            println!("{}", page.terminal());
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn geometry(&self, plan: &Planned, station_uncertainty_mm: f64) -> Result<Geometry> {
+        let Some(programme) = Programme::of(plan, station_uncertainty_mm)? else {
+            if let Some(name) = self.want.first() {
+                bail!(
+                    "--want {name}: the plan of {} has no grid step, so no error of geometry is looked at",
+                    self.what.display()
+                );
+            }
+            return Ok(Geometry(None));
+        };
         let seen = Seen::of(&programme)?;
         let proposals = self
             .want
             .iter()
             .map(|name| Proposal::find(&programme, name, &self.head_offset))
             .collect::<Result<Vec<_>>>()?;
-        if self.json {
-            let figures = serde_json::json!({
-                "plan": programme.title,
-                "chain": programme.kinematics.chain().to_string(),
-                "station_uncertainty_mm": programme.station_uncertainty_mm,
-                "seen": seen.figures(),
-                "wanted": proposals.iter().map(Proposal::figures).collect::<Vec<_>>(),
-            });
-            println!("{}", serde_json::to_string_pretty(&figures)?);
-        } else {
-            println!("{}", seen.section(&programme).terminal());
-            for proposal in &proposals {
-                println!("{}", proposal.section().terminal());
-            }
-        }
-        Ok(ExitCode::SUCCESS)
+        Ok(Geometry(Some((programme, seen, proposals))))
+    }
+}
+
+/// What the recordings over a plate will determine, where there are any.
+struct Geometry(Option<(Programme, Seen, Vec<Proposal>)>);
+
+impl Geometry {
+    fn sections(&self) -> Vec<Section> {
+        let Some((programme, seen, proposals)) = &self.0 else {
+            return vec![];
+        };
+        let mut sections = vec![seen.section(programme)];
+        sections.extend(proposals.iter().map(Proposal::section));
+        sections
+    }
+
+    fn figures(&self) -> serde_json::Value {
+        let Some((programme, seen, proposals)) = &self.0 else {
+            return serde_json::json!({ "seen": null, "wanted": [] });
+        };
+        serde_json::json!({
+            "chain": programme.kinematics.chain().to_string(),
+            "station_uncertainty_mm": programme.station_uncertainty_mm,
+            "seen": seen.figures(),
+            "wanted": proposals.iter().map(Proposal::figures).collect::<Vec<_>>(),
+        })
     }
 }
 

@@ -28,6 +28,11 @@ mod tool_error;
 mod trace;
 pub mod verification;
 
+/// A body as one self-contained HTML text.
+pub fn html(title: &str, body: &Markup) -> String {
+    page::page(title, body)
+}
+
 /// A report before it is laid out.
 pub struct Report {
     /// Title.
@@ -97,6 +102,14 @@ impl Report {
         text.push('\n');
         text.push_str(&self.text);
         text
+    }
+
+    /// This report with another section behind it; its figures as `key`.
+    pub fn add(&mut self, key: &str, section: &section::Section) {
+        self.text.push('\n');
+        self.text.push_str(&section.terminal());
+        self.body = maud::html! { (self.body) (section.html()) };
+        self.figures[key] = section.figures.clone();
     }
 
     /// This report with the diagnosis of its bag behind it.

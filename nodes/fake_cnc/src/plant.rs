@@ -214,7 +214,11 @@ impl Plant {
         self.elapsed = Span::from_nanos(start.nanos() + period.nanos());
         if self.heat.pass(period) {
             self.structure.follow(&self.heat.network);
-            self.contact.age(self.elapsed.as_secs_f64());
+            let elapsed_s = self.elapsed.as_secs_f64();
+            self.contact.age(elapsed_s);
+            for drive in self.drives.0.iter_mut().flatten() {
+                drive.age(elapsed_s);
+            }
         }
         if self.contact.travel(linear_mm, rotary_rad) {
             let tool = self
@@ -439,6 +443,10 @@ fn drives(machine: &MachineFile, truth: &PlantFile) -> Result<PerAxis<Option<Dri
             )
         };
         let drive = Drive::new(constants.ok_or(PlantError::AxisMissing { place, axis })??);
+        let drive = match truth.linear_drives.get(&axis) {
+            Some(entry) => drive.that_wears(entry.wear(axis)?),
+            None => drive,
+        };
         let product = drive.natural_step_product(period_s);
         if product >= STIFFNESS_LIMIT {
             return Err(PlantError::TooStiff {

@@ -52,6 +52,19 @@ pub fn diagnose(
     session: &Session,
     config: &GapConfig,
 ) -> Result<Diagnosis, GapError> {
+    diagnose_against(machine, session, session, config)
+}
+
+/// Diagnoses a session whose noise is what the repeats of another one of the same machine show.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_against(
+    machine: &MachineFile,
+    session: &Session,
+    quiet: &Session,
+    config: &GapConfig,
+) -> Result<Diagnosis, GapError> {
     config.check()?;
     simulate::check(session)?;
     let kinds = considered(config)?;
@@ -63,11 +76,13 @@ pub fn diagnose(
     if rows.len == 0 {
         return Err(GapError::NoReadings);
     }
-    let mut raw = vec![0.0; rows.len];
-    for &run in &all {
-        rows.average(run, &residual[run], &mut raw);
-    }
-    let noise = noise::noise(session, &rows, &raw, config);
+    let noise = if std::ptr::eq(session, quiet) {
+        noise_of(session, stations, &residual, config)
+    } else {
+        simulate::check(quiet)?;
+        let residual = residuals(machine, &twin, quiet)?;
+        noise_of(quiet, stations, &residual, config)
+    };
     if noise.is_empty() {
         return Err(no_repeats(session, &rows));
     }
@@ -80,6 +95,22 @@ pub fn diagnose(
         residual: &residual,
     };
     Ok(base.diagnosis(&kinds, config, notes(&rows, &noise)))
+}
+
+/// Noise of the repeats of a session.
+fn noise_of(
+    session: &Session,
+    stations: usize,
+    residual: &[Vec<f64>],
+    config: &GapConfig,
+) -> BTreeMap<Channel, Noise> {
+    let all: Vec<usize> = (0..session.runs.len()).collect();
+    let rows = Rows::new(session, &all, stations, |_| true);
+    let mut raw = vec![0.0; rows.len];
+    for &run in &all {
+        rows.average(run, &residual[run], &mut raw);
+    }
+    noise::noise(session, &rows, &raw, config)
 }
 
 /// What every stack is made of.
@@ -314,7 +345,7 @@ fn no_repeats(session: &Session, rows: &Rows) -> GapError {
 }
 
 /// The kinds of the catalogue that are considered.
-fn considered(config: &GapConfig) -> Result<Vec<&'static Kind>, GapError> {
+pub(crate) fn considered(config: &GapConfig) -> Result<Vec<&'static Kind>, GapError> {
     if let Some(id) = config
         .left_out
         .iter()
@@ -345,7 +376,7 @@ fn residuals(
 }
 
 /// Stations a circle or pass, fewer where the session would have too many rows.
-fn stations(session: &Session, runs: &[usize], config: &GapConfig) -> usize {
+pub(crate) fn stations(session: &Session, runs: &[usize], config: &GapConfig) -> usize {
     let mut stations = config.stations;
     while stations > 32 && Rows::new(session, runs, stations, |_| true).len > config.most_rows {
         stations = stations * 3 / 4;

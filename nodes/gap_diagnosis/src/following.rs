@@ -14,6 +14,8 @@ pub struct GapDiagnosisConfig {
     pub last_runs: usize,
     /// Runs before the first diagnosis.
     pub least_runs: usize,
+    /// Runs of one test cycle: the last so many are diagnosed, those before say what noise is.
+    pub cycle_runs: usize,
     /// Least time between two diagnoses.
     pub least_period_s: f64,
     /// Confidence from which a new effect is warned of.
@@ -33,6 +35,7 @@ impl Default for GapDiagnosisConfig {
         Self {
             last_runs: 40,
             least_runs: 6,
+            cycle_runs: 12,
             least_period_s: 5.0,
             least_confidence: 0.9,
             stations_per_pass: 120,
@@ -44,7 +47,7 @@ impl Default for GapDiagnosisConfig {
 }
 
 /// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 8] = [
+pub const PARAMETERS: [ParameterDoc; 9] = [
     ParameterDoc {
         name: "last_runs",
         unit: "",
@@ -56,6 +59,12 @@ pub const PARAMETERS: [ParameterDoc; 8] = [
         unit: "",
         description: "Runs before the first diagnosis.",
         range: Some((2.0, 1e4)),
+    },
+    ParameterDoc {
+        name: "cycle_runs",
+        unit: "",
+        description: "Runs of one test cycle: the last so many are diagnosed, those before say what noise is.",
+        range: Some((1.0, 1e4)),
     },
     ParameterDoc {
         name: "least_period_s",
@@ -101,6 +110,7 @@ impl GapDiagnosisConfig {
         let values = [
             self.last_runs as f64,
             self.least_runs as f64,
+            self.cycle_runs as f64,
             self.least_period_s,
             self.least_confidence,
             self.stations_per_pass as f64,
@@ -135,7 +145,7 @@ mod tests {
     #[test]
     fn the_readme_lists_every_parameter_with_its_default() {
         let readme = include_str!("../README.md");
-        let defaults = ["40", "6", "5.0", "0.9", "120", "199", "500", "\"\""];
+        let defaults = ["40", "6", "12", "5.0", "0.9", "120", "199", "500", "\"\""];
         for (doc, default) in PARAMETERS.iter().zip(defaults) {
             let unit = if doc.unit.is_empty() { "-" } else { doc.unit };
             let name = doc.name;

@@ -15,8 +15,9 @@
 //! the search may stop. `families`, `localise` and `places` say where the gap lies, `unknown` what no effect
 //! explains, `isolability` what could be told from what. `gap` is how much there was to explain, `split` and
 //! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`. `experiment` knows what could
-//! be measured next and `next` which of it would decide. `diagnose` puts the questions in their order. `stage` is
-//! the node's whole computation, `following` its parameters.
+//! be measured next and `next` which of it would decide. `diagnose` puts the questions in their order,
+//! `preflight` some of them before anything is measured. `stage` is the node's whole computation, `following` its
+//! parameters.
 
 mod bootstrap;
 mod cause;
@@ -40,6 +41,7 @@ mod noise;
 mod normal;
 mod nuisance;
 mod places;
+pub mod preflight;
 mod recalibration;
 mod refit;
 mod repeats;

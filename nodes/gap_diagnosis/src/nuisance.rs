@@ -8,7 +8,10 @@
 //! | grid u and v | turn of the plate about its normal | set-up and plane |
 //! | radial | centre and radius | run |
 //! | length | offset | zero |
-//! | touch | offset | set-up, feature and approach |
+//! | touch of a sphere | centre and radius | set-up and sphere |
+//! | touch of a bore or boss | centre and radius | set-up and bore |
+//! | touch of a plane | offset and two tilts | set-up and plane |
+//! | other touches | offset | set-up, feature and approach |
 //! | motor, scale, thermometer | offset | set-up |
 //!
 //! They are no errors of the machine, and always projected out: P = I - Q Q', Q = orth(W N).
@@ -18,9 +21,11 @@
 
 use std::collections::BTreeMap;
 
+use machine::cycle::FeatureId;
 use machine::twin::simulate::plate_axes;
-use machine::twin::{Channel, Session};
-use metrology::sample::TestPlane;
+use machine::twin::{Channel, Run, Session, Touch};
+use metrology::Axis;
+use metrology::sample::{TestKind, TestPlane};
 use nalgebra::{DMatrix, DVector};
 
 use crate::field::{self, Place};
@@ -190,16 +195,49 @@ fn touch_floats(session: &Session, block: &Block) -> Vec<(Key, Vec<f64>)> {
         let Some(touch) = row.touch.and_then(|touch| run.touches.get(touch)) else {
             continue;
         };
-        let a = touch.approach.map(|c| (c * 100.0).round() + 0.0);
-        // One group for the whole set-up: whitening mixes the touches of a run, so that they float together.
-        let key = Key {
-            group: format!("touch {}", run.segment.setup_id),
-            float: format!("{} {} {} {}", touch.feature_id, a.x, a.y, a.z),
-        };
-        all.entry(key)
-            .or_insert_with(|| vec![0.0; block.rows.len()])[place] = 1.0;
+        let (owner, floats) = surface_floats(run, touch);
+        for (float, value) in floats {
+            // One group for the whole set-up: whitening mixes the touches of a run, so that they float together.
+            let key = Key {
+                group: format!("touch {}", run.segment.setup_id),
+                float: format!("{owner} {float}"),
+            };
+            all.entry(key)
+                .or_insert_with(|| vec![0.0; block.rows.len()])[place] = value;
+        }
     }
     all.into_iter().collect()
+}
+
+/// What the place of a touched surface leaves open, by name, and what shares it.
+fn surface_floats(run: &Run, touch: &Touch) -> (String, Vec<(&'static str, f64)>) {
+    let a = touch.approach;
+    let owner = match FeatureId::parse(&touch.feature_id) {
+        Some(FeatureId::Point { artefact, .. }) => artefact.to_owned(),
+        _ => touch.feature_id.clone(),
+    };
+    let across = |axis: Axis| touch.position[axis] * (1.0 - a[axis.index()].abs());
+    match run.segment.kind {
+        TestKind::Sphere => (
+            owner,
+            vec![("radius", 1.0), ("x", a.x), ("y", a.y), ("z", a.z)],
+        ),
+        TestKind::Bore => (owner, vec![("radius", 1.0), ("x", a.x), ("y", a.y)]),
+        TestKind::Plane => {
+            let tilts = [
+                ("tilt x", Axis::X),
+                ("tilt y", Axis::Y),
+                ("tilt z", Axis::Z),
+            ];
+            let tilts = tilts.map(|(name, axis)| (name, across(axis)));
+            (owner, [[("offset", 1.0)].as_slice(), &tilts].concat())
+        }
+        _ => {
+            let a = a.map(|c| (c * 100.0).round() + 0.0);
+            let whose = format!("{} {} {} {}", touch.feature_id, a.x, a.y, a.z);
+            (whose, vec![("", 1.0)])
+        }
+    }
 }
 
 /// What a turn of the plate by one radian reads: -v in u, +u in v.

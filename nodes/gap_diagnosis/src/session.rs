@@ -15,6 +15,7 @@
 //!   ballbar          d = reading - distance of (command + c) from the centre
 //!   length           d = reading - (command + c) along the beam - zero    (3)
 //!   touch            d = surface latched along the approach - surface of the machine file   (4)
+//!   thermometer      d = reading - reading of the first thermometer at its place            (5)
 //! ```
 //!
 //! (4) needs no c: a latched position is where the motor was, compensation included, and so is the
@@ -29,11 +30,12 @@
 //! | circle in motion | on the nominal circle at 98 % of the feed or more |
 //! | other contours in motion | from the first motion to the last, while the record is at its full rate |
 //! | with stations, positioning, diagonals | the mean of each stop after [`SessionConfig::settle_s`] |
-//! | touches | each touch of a feature that the machine file has |
+//! | touches | each touch of a feature that the machine file has, up to 2 s after the end of its segment |
 //!
 //! A contour has at most [`SessionConfig::readings_per_run`] readings per channel: means of an odd number of
 //! neighbours, the same number in every repeat. The commanded motion is kept at each of them, at reversals,
-//! starts and stops tick by tick, and at least every 50 ms or 0.5 mm.
+//! starts and stops tick by tick, and at least every 50 ms or 0.5 mm. While a run is open, ticks of axes that stand are
+//! held every 20 ms only.
 //!
 //! # When the record is not whole
 //!
@@ -46,6 +48,7 @@
 //! | segment that the end of the bag cuts | kept up to there, counted |
 //! | segment that failed | left out, counted |
 //! | topics that are not there | the session holds the other channels |
+//! | touches without axis states, block measurements without touches | the motion that touches have by themselves (`touching`) |
 //! | another machine's axes, positions outside its travel | [`SessionError`] |
 //!
 //! # Holds when
@@ -54,6 +57,7 @@
 mod account;
 mod builder;
 mod channels;
+mod close;
 mod config;
 mod error;
 mod motion;
@@ -61,7 +65,9 @@ mod nominal;
 mod past;
 mod record;
 mod select;
+mod thermometers;
 mod time;
+mod touching;
 
 pub use account::{Account, Reason};
 pub use builder::{Input, SessionBuilder};

@@ -2,18 +2,33 @@
 //!
 //! After each segment that was recorded whole, and at most every `least_period_s`, the last runs are diagnosed as a
 //! bag of them would be. An effect that was not named in the diagnosis before is told of by itself.
+//!
+//! Once the runs before the last test cycle have repeated its tests three times, the last cycle is what is diagnosed,
+//! and the runs before it say what noise is: a machine that changes between two cycles would else have its change taken
+//! for noise. When what is named changes, the runs before the change no longer say what noise is; until the runs since
+//! then are repeats enough, the noise from before is kept. Until there are enough of any, all runs are diagnosed by
+//! their own repeats.
+//!
+//! An effect is told of when it is named. A rest that no effect explains is vaguer: it is told of when a whole cycle
+//! later it is still there.
+//!
+//! A diagnosis takes a second or two. In simulated time it is made at once, so that equal samples give equal reports.
+//! On a live machine it is made beside ([`GapDiagnosisStage::go_beside`]): the stage gives a [`Task`] out, takes samples
+//! while somebody runs it, and is told its [`Finding`]; a new one begins only when the one before is back.
 
 use std::collections::BTreeSet;
 
 use machine::MachineFile;
+use machine::twin::{Run, Session};
 use metrology::sample::{GapCause, GapParameter, GapStatus, GapSummary};
 use metrology::stamp::Span;
 use metrology::{Host, Stage, Stamp};
 
 use crate::config::GapConfig;
-use crate::diagnose::{Diagnosis, diagnose};
+use crate::diagnose::diagnose_against;
 use crate::error::GapError;
 use crate::following::GapDiagnosisConfig;
+use crate::repeats::same_condition;
 use crate::report::{Cause, GapReport, Status};
 use crate::session::{self, SessionBuilder, SessionConfig};
 
@@ -26,13 +41,69 @@ use crate::session::{self, SessionBuilder, SessionConfig};
 pub enum Input {
     /// A recorded sample.
     Sample(session::Input),
+    /// A diagnosis that was given out is made.
+    Found(Box<Finding>),
     /// Time passes.
     Tick,
+}
+
+/// A diagnosis to be made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Task {
+    machine: MachineFile,
+    session: Session,
+    /// The session whose repeats say what noise is, where it is another one.
+    quiet: Option<Session>,
+    gap: GapConfig,
+    /// Runs that were closed up to the last that is diagnosed.
+    closed: usize,
+}
+
+/// A diagnosis that was made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// The runs that it looked at.
+    runs: Vec<u32>,
+    outcome: Result<GapReport, GapError>,
+    quiet: Option<Session>,
+    closed: usize,
+}
+
+impl Task {
+    /// Makes the diagnosis.
+    #[must_use]
+    pub fn run(self) -> Finding {
+        let runs = self.session.runs.iter().map(|run| run.segment.run);
+        let quiet = self.quiet.as_ref().unwrap_or(&self.session);
+        let found = diagnose_against(&self.machine, &self.session, quiet, &self.gap);
+        Finding {
+            runs: runs.collect(),
+            outcome: found.map(|found| found.report),
+            closed: self.closed,
+            quiet: self.quiet,
+        }
+    }
+}
+
+/// Repeats of a test that say what its noise is.
+const REPEATS: usize = 3;
+
+/// Whether earlier runs repeat the tests of a cycle often enough; touches are repeated within their runs.
+fn is_repeated(cycle: &[Run], earlier: &[Run]) -> bool {
+    let is_known = |run: &Run| {
+        let same = earlier.iter().filter(|one| same_condition(one, run));
+        same.count() >= REPEATS
+    };
+    let paths = || cycle.iter().filter(|run| run.touches.is_empty());
+    let known = paths().filter(|run| is_known(run)).count();
+    !earlier.is_empty() && 2 * known >= paths().count()
 }
 
 /// What the node says.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Output {
+    /// A diagnosis is to be made beside.
+    Due(Box<Task>),
     /// A diagnosis.
     Report(Box<GapSummary>),
     /// An effect that was not named before: its id, what it acts on, its size in words.
@@ -44,7 +115,7 @@ pub enum Output {
         /// Probability.
         confidence: f64,
     },
-    /// A rest that no effect explains, where there was none before.
+    /// A rest that no effect explains and that stays, where there was none before.
     NewRest {
         /// What it goes with.
         covariate: String,
@@ -64,7 +135,16 @@ pub struct GapDiagnosisStage {
     builder: SessionBuilder,
     last: Option<Stamp<Host>>,
     is_due: bool,
+    /// Whether diagnoses are given out, and whether one is on its way.
+    beside: bool,
+    is_out: bool,
+    /// Runs that were closed before the machine became what it is now.
+    steady_from: usize,
+    /// The last session whose repeats said what noise is.
+    quiet: Option<Session>,
     named: BTreeSet<String>,
+    /// Runs that were closed when the rest that is there was first seen.
+    rest_since: Option<usize>,
     had_rest: bool,
     remarks: Vec<String>,
 }
@@ -83,16 +163,26 @@ impl GapDiagnosisStage {
             machine: machine.clone(),
             last: None,
             is_due: false,
+            beside: false,
+            is_out: false,
+            steady_from: 0,
+            quiet: None,
             named: BTreeSet::new(),
+            rest_since: None,
             had_rest: false,
             remarks: vec![],
         })
     }
 
+    /// From now on diagnoses are given out rather than made at once.
+    pub fn go_beside(&mut self) {
+        self.beside = true;
+    }
+
     fn sample(&mut self, sample: session::Input) {
-        let ends = matches!(&sample, session::Input::Segment(segment) if !segment.begin);
+        let closed = self.builder.closed();
         self.builder.take(sample);
-        if ends {
+        if self.builder.closed() > closed {
             self.builder.keep_last(self.config.last_runs);
             self.is_due |= self.builder.runs().len() >= self.config.least_runs;
         }
@@ -103,13 +193,62 @@ impl GapDiagnosisStage {
         let rested = self
             .last
             .is_none_or(|last| at - last >= period || at < last);
-        if !(self.is_due && rested) {
+        if !(self.is_due && rested) || self.is_out {
             return;
         }
         self.is_due = false;
         self.last = Some(at);
-        match diagnose(&self.machine, &self.builder.so_far(), &self.gap) {
-            Ok(diagnosis) => self.tell(at, &diagnosis, out),
+        let task = self.task();
+        if self.beside {
+            self.is_out = true;
+            out.push(Output::Due(Box::new(task)));
+        } else {
+            self.found(at, task.run(), out);
+        }
+    }
+
+    /// The last cycle, and what says its noise; all runs where nothing does.
+    fn task(&self) -> Task {
+        let mut session = self.builder.so_far();
+        let earlier = session.runs.len().saturating_sub(self.config.cycle_runs);
+        let held = self.builder.closed() - session.runs.len();
+        let steady = self.steady_from.saturating_sub(held).min(earlier);
+        let (before, cycle) = session.runs.split_at(earlier);
+        let steadily = before.get(steady..).unwrap_or(&[]);
+        let quiet = if is_repeated(cycle, steadily) {
+            let history = session.history.clone();
+            let runs = steadily.to_vec();
+            Some(Session { history, runs })
+        } else {
+            self.quiet.clone()
+        };
+        if quiet.is_some() {
+            session.runs.drain(..earlier);
+        }
+        Task {
+            machine: self.machine.clone(),
+            session,
+            quiet,
+            gap: self.gap.clone(),
+            closed: self.builder.closed(),
+        }
+    }
+
+    fn found(&mut self, at: Stamp<Host>, finding: Finding, out: &mut Vec<Output>) {
+        self.is_out = false;
+        match finding.outcome {
+            Ok(report) => {
+                let named = self.named.clone();
+                self.tell(at, finding.runs, &report, out);
+                self.look_at_rest(finding.closed, &report, out);
+                if named != self.named {
+                    // Those that were looked at may be of before and after.
+                    self.steady_from = finding.closed;
+                }
+                if let Some(quiet) = finding.quiet {
+                    self.quiet = Some(quiet);
+                }
+            }
             Err(error) => out.push(Output::NotYet(error)),
         }
         let remarks: Vec<String> = self.builder.account().remarks().collect();
@@ -119,14 +258,8 @@ impl GapDiagnosisStage {
         }
     }
 
-    fn tell(&mut self, at: Stamp<Host>, diagnosis: &Diagnosis, out: &mut Vec<Output>) {
-        let report = &diagnosis.report;
-        let runs = self.builder.runs().iter().map(|run| run.segment.run);
-        out.push(Output::Report(Box::new(summary(
-            at,
-            runs.collect(),
-            report,
-        ))));
+    fn tell(&mut self, at: Stamp<Host>, runs: Vec<u32>, report: &GapReport, out: &mut Vec<Output>) {
+        out.push(Output::Report(Box::new(summary(at, runs, report))));
         let mut named = BTreeSet::new();
         let sure = report.causes.iter().filter(|cause| {
             cause.status == Status::Named && cause.confidence >= self.config.least_confidence
@@ -144,12 +277,22 @@ impl GapDiagnosisStage {
             named.insert(effect);
         }
         self.named = named;
-        if report.unknown.flagged && !self.had_rest {
+    }
+
+    /// A rest is told of once, when it is there in diagnoses of a whole cycle of new runs.
+    fn look_at_rest(&mut self, closed: usize, report: &GapReport, out: &mut Vec<Output>) {
+        if !report.unknown.flagged {
+            self.rest_since = None;
+            self.had_rest = false;
+            return;
+        }
+        let since = *self.rest_since.get_or_insert(closed);
+        if closed >= since + self.config.cycle_runs && !self.had_rest {
+            self.had_rest = true;
             out.push(Output::NewRest {
                 covariate: report.unknown.description.covariate.clone(),
             });
         }
-        self.had_rest = report.unknown.flagged;
     }
 }
 
@@ -229,6 +372,7 @@ impl Stage for GapDiagnosisStage {
     ) -> Result<(), GapError> {
         match input {
             Input::Sample(sample) => self.sample(sample),
+            Input::Found(finding) => self.found(at, *finding, out),
             Input::Tick => self.look(at, out),
         }
         Ok(())

@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use gap_diagnosis::session::{Input, Reason, SessionBuilder, SessionConfig, SessionError};
-use machine::MachineFile;
 use machine::twin::{Channel, Session, Twin};
+use machine::{MachineFile, effects};
 use metrology::sample::{
-    AxisCompensation, AxisState, CompensationState, GridSample, ProbeTrigger, Sense, TestKind,
-    TestPlane, TestSegment,
+    AxisCompensation, AxisState, BlockMeasurement, CompensationState, FacePosition, GridSample,
+    LatencyShare, ProbeTrigger, Sense, TemperatureSample, TestKind, TestPlane, TestSegment,
 };
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
 use nalgebra::Vector3;
@@ -140,6 +140,22 @@ fn of(session: &Session, run: usize, channel: &Channel) -> Vec<(f64, f64)> {
         .collect()
 }
 
+fn touch(millis: i64, feature: &str) -> ProbeTrigger {
+    let mut latched = PerAxis::default();
+    // block_1's X face lies at -220 and is touched towards +X with a ball of 3 mm; 5 um too deep.
+    (latched[Axis::X], latched[Axis::Y], latched[Axis::Z]) = (-222.995, -174.0, 14.0);
+    ProbeTrigger {
+        received_at: Stamp::from_nanos(millis * 1_000_000),
+        controller_at: Stamp::from_nanos((millis + 7000) * 1_000_000),
+        feature_id: feature.to_owned(),
+        approach: Vector3::x(),
+        feed_mm_s: 2.0,
+        axes: AxisSet::XYZ,
+        latched,
+        sequence: 0,
+    }
+}
+
 #[test]
 fn a_circle_gives_deviations_at_their_places_with_the_lead_in_before_it() {
     let mut rig = Rig::new(|angle| 2e-3 * (2.0 * angle).cos());
@@ -255,31 +271,155 @@ fn a_touch_is_measured_from_the_surface_of_the_machine_file() {
     let mut rig = Rig::new(|_| 0.0);
     rig.builder
         .take(Input::Segment(segment(1, true, TestKind::Latency)));
-    // block_1's X face lies at -220 and is touched towards +X with a ball of 3 mm; 5 um too deep.
-    let mut latched = PerAxis::default();
-    (latched[Axis::X], latched[Axis::Y], latched[Axis::Z]) = (-222.995, -174.0, 14.0);
     for feature in ["block_1.x", "nothing.x"] {
-        rig.builder.take(Input::Trigger(ProbeTrigger {
-            received_at: Stamp::from_nanos(5_000_000),
-            controller_at: Stamp::from_nanos(5_000_000),
-            feature_id: feature.to_owned(),
-            approach: Vector3::x(),
-            feed_mm_s: 2.0,
-            axes: AxisSet::XYZ,
-            latched,
-            sequence: 0,
-        }));
+        rig.builder.take(Input::Trigger(touch(5, feature)));
     }
     rig.builder
         .take(Input::Segment(segment(1, false, TestKind::Latency)));
     let (session, account) = rig.builder.finish().expect("a session without axis states");
     let run = &session.runs[0];
-    assert_eq!((run.touches.len(), run.touches[0].tick), (1, None));
+    assert_eq!((run.touches.len(), run.touches[0].tick), (1, Some(1)));
     assert!((run.readings[0].deviation - 5e-3).abs() < 1e-9);
     assert_eq!(account.count(Reason::UnknownFeature), 1);
     let machine = machine();
     let twin = Twin::new(&machine).expect("a twin");
     assert_eq!(twin.predict(&session, run, &[]), [0.0]);
+    // It is told what the place and the way of a touch tell, though no axis state was recorded.
+    let squareness = effects::kind("squareness").expect("in the catalogue");
+    let square = (squareness.build)(squareness.targets_on(&machine).remove(0), &[30.0]);
+    let told = twin.predict(&session, run, &[&*square])[0];
+    assert!(told.abs() > 1e-3, "{told}");
+    assert_eq!(run.motion.sense[Axis::X], [0, 1]);
+    assert_eq!(run.motion.velocity[Axis::X], [0.0, 0.0]);
+    assert!((run.motion.position[Axis::X][0] - (-224.995)).abs() < 1e-9);
+}
+
+#[test]
+fn a_touch_that_comes_after_the_end_of_its_run_is_kept_and_one_much_later_is_not() {
+    for (late_millis, touches) in [(500, 1), (4000, 0)] {
+        let mut rig = Rig::new(|_| 0.0);
+        rig.tick(0.0, 0.0);
+        for begin in [true, false] {
+            rig.builder
+                .take(Input::Segment(segment(1, begin, TestKind::Latency)));
+        }
+        for _ in 0..late_millis {
+            rig.tick(0.0, 0.0);
+        }
+        rig.builder
+            .take(Input::Trigger(touch(rig.millis, "block_1.x")));
+        let found = rig.builder.finish();
+        let found = found.map_or(0, |(session, _)| session.runs[0].touches.len());
+        assert_eq!(found, touches);
+    }
+}
+
+#[test]
+fn blocks_that_were_measured_without_touches_are_runs_of_touches() {
+    let mut builder = SessionBuilder::new(&machine(), SessionConfig::default()).expect("a machine");
+    let face = |position_mm: f64, seconds: i64| {
+        Some(FacePosition {
+            position_mm,
+            at: Stamp::from_nanos(seconds * 1_000_000_000),
+            standard_uncertainty_mm: 1e-4,
+            latency: LatencyShare::default(),
+        })
+    };
+    for run in 1..=3 {
+        let began = i64::from(run) * 100;
+        for begin in [true, false] {
+            builder.take(Input::Segment(segment(run, begin, TestKind::Block)));
+        }
+        let mut faces = PerAxis::from_fn(|_| None);
+        faces[Axis::X] = face(-220.0 + 1e-3 * f64::from(run), began);
+        faces[Axis::Z] = face(20.0, began + 10);
+        builder.take(Input::Block(BlockMeasurement {
+            at: Stamp::from_nanos((began + 10) * 1_000_000_000),
+            block_id: "block_1".to_owned(),
+            faces,
+            cold: run == 1,
+            run,
+        }));
+    }
+    let (session, account) = builder.finish().expect("a session");
+    assert_eq!((account.runs, account.readings), (3, 6));
+    for (run, wanted_mm) in session.runs.iter().zip([1e-3, 2e-3, 3e-3]) {
+        assert_eq!(run.motion.len(), 4);
+        let x = &run.readings[0];
+        assert!((x.deviation - wanted_mm).abs() < 1e-12, "{x:?}");
+        assert!(run.readings[1].deviation.abs() < 1e-12);
+        assert_eq!(run.touches[0].tick, Some(1));
+    }
+    let apart_s = session.runs[1].touches[0].time_s - session.runs[0].touches[0].time_s;
+    assert!((apart_s - 100.0).abs() < 1e-9, "{apart_s}");
+}
+
+#[test]
+fn a_thermometer_is_compared_with_the_first_at_its_place_and_no_other() {
+    let text = MACHINE.replace(
+        "  - {id: bed, place: bed, period_s: 10.0}",
+        "  - {id: bed, place: bed, period_s: 10.0}\n  - {id: bed_2, place: bed, period_s: 10.0}",
+    );
+    let machine = MachineFile::parse(&text, "machine.yaml").expect("a machine file");
+    let mut rig = Rig::new(|_| 0.0);
+    rig.builder = SessionBuilder::new(&machine, SessionConfig::default()).expect("a machine");
+    rig.builder
+        .take(Input::Segment(segment(1, true, TestKind::Dwell)));
+    for k in 0..60_000 {
+        if k % 10_000 == 0 {
+            let second = f64::from(k) * 1e-3;
+            for (sensor, degc) in [
+                ("bed", 20.0 + 0.01 * second),
+                ("bed_2", 20.3 + 0.01 * second),
+                ("ambient", 19.0),
+            ] {
+                rig.builder.take(Input::Temperature(TemperatureSample {
+                    at: Stamp::from_nanos(rig.millis * 1_000_000),
+                    sensor: sensor.to_owned(),
+                    temperature_degc: degc,
+                    variance_k2: 0.0,
+                }));
+            }
+        }
+        rig.tick(0.0, 0.0);
+    }
+    rig.end(1);
+    let (session, _) = rig.builder.finish().expect("a session");
+    let thermometers = session.runs[0].readings.iter();
+    let thermometers: Vec<_> = thermometers
+        .filter(|r| matches!(r.channel, Channel::Thermometer(_)))
+        .collect();
+    assert!(thermometers.len() >= 4, "{}", thermometers.len());
+    for reading in thermometers {
+        assert_eq!(reading.channel, Channel::Thermometer("bed_2".to_owned()));
+        assert!((reading.deviation - 0.3).abs() < 1e-9, "{reading:?}");
+    }
+}
+
+#[test]
+fn a_minute_of_standing_axes_is_held_in_few_ticks_and_a_turn_after_it_in_all() {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.builder
+        .take(Input::Segment(segment(1, true, TestKind::Circle)));
+    for _ in 0..60_000 {
+        rig.tick(50.0, 0.0);
+    }
+    let mut k = 0.0;
+    while k < TAU * 50.0 / 0.025 {
+        let angle: f64 = k * 0.025 / 50.0;
+        rig.tick(50.0 * angle.cos(), 50.0 * angle.sin());
+        k += 1.0;
+    }
+    rig.end(1);
+    let (session, _) = rig.builder.finish().expect("a session");
+    let run = &session.runs[0];
+    assert!(run.motion.len() < 6000, "{}", run.motion.len());
+    let grid = of(&session, 0, &Channel::GridU);
+    assert!((1700..=2000).contains(&grid.len()), "{}", grid.len());
+    let reading = &run.readings[900];
+    let speed =
+        run.motion.velocity[Axis::X][reading.at].hypot(run.motion.velocity[Axis::Y][reading.at]);
+    assert!((speed - 25.0).abs() < 1e-3, "{speed}");
 }
 
 #[test]

@@ -135,7 +135,8 @@ pub fn launch(
     }
     let joined = nodes
         .into_iter()
-        .map(|(setup, node)| {
+        .map(|(setup, mut node)| {
+            node.goes_live();
             let (participant, warning) = Participant::join(environment, setup.names())
                 .with_context(|| format!("node {}", setup.names().fully_qualified()))?;
             Ok((setup, node, participant, warning))

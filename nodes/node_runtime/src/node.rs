@@ -271,6 +271,10 @@ pub trait Node: Send {
         false
     }
 
+    /// The node is put on a live graph: real time passes while it computes. Told once, before any event; a node in the
+    /// harness is never told.
+    fn goes_live(&mut self) {}
+
     /// Handles one event that happened `at`.
     ///
     /// # Errors

@@ -46,6 +46,9 @@ type Satisfied<O> = Box<dyn Fn(&O) -> bool + Send>;
 /// Decodes the answer to a call of ours.
 type Answer<I> = Box<dyn Fn(u64, Option<&[u8]>) -> Result<I, String> + Send>;
 
+/// Tells a stage of what its runner does.
+type Told<S> = Box<dyn Fn(&mut S) + Send>;
+
 /// The table of one node: a stage and what its inputs and outputs are called outside.
 pub struct Wiring<S: Stage> {
     name: String,
@@ -63,6 +66,7 @@ pub struct Wiring<S: Stage> {
     stopped: Option<Satisfied<S::Output>>,
     patience: Span,
     last: bool,
+    live: Option<Told<S>>,
     outputs: Vec<S::Output>,
 }
 
@@ -110,6 +114,7 @@ where
             stopped: None,
             patience: PATIENCE,
             last: false,
+            live: None,
             outputs: Vec::new(),
         }
     }
@@ -302,6 +307,13 @@ where
         self
     }
 
+    /// Tells the stage when it is put on a live graph, where real time passes while it computes.
+    #[must_use]
+    pub fn live(mut self, told: impl Fn(&mut S) + Send + 'static) -> Self {
+        self.live = Some(Box::new(told));
+        self
+    }
+
     /// Closes the table.
     #[must_use]
     pub fn node(self) -> Box<dyn Node> {
@@ -435,6 +447,12 @@ where
 
     fn stops_last(&self) -> bool {
         self.last
+    }
+
+    fn goes_live(&mut self) {
+        if let Some(told) = &self.live {
+            told(&mut self.stage);
+        }
     }
 
     fn handle(

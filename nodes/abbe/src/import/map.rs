@@ -74,6 +74,9 @@ pub enum Test {
     Log {
         /// The axis along which the displacement is measured.
         axis: Axis,
+        /// Column of the run's number, where the log was made several times; times go on from run to run.
+        #[serde(default)]
+        run: Option<String>,
         /// Column of the time, s.
         time_s: String,
         /// Column of the displacement, µm.
@@ -112,14 +115,16 @@ impl Test {
                 ..
             } => vec![run.as_str(), angle_deg, radial_um],
             Self::Log {
+                run,
                 time_s,
                 displacement_um,
                 temperature_degc,
                 ..
             } => {
+                let run = run.iter().map(String::as_str);
                 let fixed = [time_s.as_str(), displacement_um.as_str()];
                 let sensors = temperature_degc.values().map(String::as_str);
-                fixed.into_iter().chain(sensors).collect()
+                run.chain(fixed).chain(sensors).collect()
             }
         }
     }

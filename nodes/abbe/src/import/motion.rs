@@ -32,13 +32,23 @@ pub fn write(map: &Map, table: &Table, writer: &mut Writer) -> Result<u32> {
     let mut n = 0;
     if let Test::Log {
         axis,
+        run,
         temperature_degc,
         ..
     } = &map.test
     {
         let sensors: Vec<&str> = temperature_degc.keys().map(String::as_str).collect();
-        log(*axis, &sensors, table, &position, writer)?;
-        return Ok(1);
+        let begin_s = table.rows[0][usize::from(run.is_some())];
+        let runs: Vec<&[Vec<f64>]> = match run {
+            Some(_) => table.runs().collect(),
+            None => vec![&table.rows],
+        };
+        for rows in runs {
+            n += 1;
+            let rows = rows.iter().map(|row| &row[usize::from(run.is_some())..]);
+            log((*axis, n, begin_s), &sensors, rows, &position, writer)?;
+        }
+        return Ok(n);
     }
     for rows in table.runs() {
         n += 1;
@@ -254,18 +264,21 @@ fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
     all
 }
 
-fn log(
-    axis: Axis,
+fn log<'a>(
+    (axis, run, begin_s): (Axis, u32, f64),
     sensors: &[&str],
-    table: &Table,
+    rows: impl Iterator<Item = &'a [f64]>,
     position: &PerAxis<f64>,
     writer: &mut Writer,
 ) -> Result<()> {
-    let test = segment(TestKind::Dwell, 1, 0.0);
-    writer.segment(&test, true)?;
-    let first_s = table.rows[0][0];
-    for row in &table.rows {
-        writer.wait_until(row[0] - first_s)?;
+    let test = segment(TestKind::Dwell, run, 0.0);
+    let mut has_begun = false;
+    for row in rows {
+        writer.wait_until(row[0] - begin_s)?;
+        if !has_begun {
+            writer.segment(&test, true)?;
+            has_begun = true;
+        }
         writer.tick(position)?;
         writer.length(axis, position[axis] + row[1] * 1e-3)?;
         for (sensor, degc) in sensors.iter().zip(&row[2..]) {

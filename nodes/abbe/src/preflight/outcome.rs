@@ -49,7 +49,7 @@ impl Seen {
     /// For a terminal.
     pub fn section(&self, programme: &Programme) -> Section {
         let found = &self.identification;
-        let mut section = Section::new(format!("Preflight of: {}", programme.title));
+        let mut section = Section::new("What the recordings over the plate determine");
         section.lines.push(format!(
             "Chain {}: {} recordings, {} unknowns of which {} are set-up, rank {}.",
             self.model.chain,

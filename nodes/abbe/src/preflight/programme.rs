@@ -1,24 +1,76 @@
-//! What is planned: the machine, the recordings over its plate, and how they will be fitted.
+//! What is planned: the plan, the machine and its control; the recordings over its plate, and how they will be fitted.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use grid_encoder::GridEncoderConfig;
 use grid_encoder::identify::IdentifyOptions;
 use grid_encoder::preflight::planned_through;
 use grid_encoder::recording::{Place, Recording};
+use machine::file::AxisEntry;
 use machine::{Kinematics, MachineFile};
+use metrology::Axis;
 use node_runtime::Setup;
 use node_runtime::arguments::Arguments;
-use sequencer::{Plan, recordings};
+use sequencer::{Plan, Step, recordings};
 
 use crate::launch::LaunchNode;
 use crate::scenario::Scenario;
 
-/// A plan's recordings, ready to be judged.
+/// Where an axis stands at the begin of a plan without a scenario, as a share of its travel: the head up,
+/// the others in the middle.
+const START: [f64; 3] = [0.5, 0.5, 0.9];
+
+/// A plan with everything that it is run with.
+pub struct Planned {
+    /// The plan.
+    pub plan: Plan,
+    /// Texts of the programs that it names.
+    pub programs: BTreeMap<String, String>,
+    /// The machine file.
+    pub machine: MachineFile,
+    /// Parameters of the control.
+    pub control: fake_cnc::Config,
+    /// Parameters of the fit.
+    pub fit: GridEncoderConfig,
+    /// As the user gave it.
+    what: String,
+}
+
+impl Planned {
+    /// Reads a scenario's folder, or a plan file beside a machine file.
+    ///
+    /// # Errors
+    /// With file and place when something is missing or wrong.
+    pub fn read(what: &Path, machine: Option<&Path>) -> Result<Self> {
+        let mut planned = if what.is_dir() {
+            of_scenario(what, machine)?
+        } else {
+            let plan = plan_file(what)?;
+            let Some(machine) = machine else {
+                bail!("plan {}: --machine FILE is needed", what.display());
+            };
+            let machine = machine_file(machine)?;
+            Self {
+                programs: programs(&plan, what)?,
+                plan,
+                control: fake_cnc::Config {
+                    start_mm: start_mm(&machine),
+                    ..fake_cnc::Config::default()
+                },
+                machine,
+                fit: GridEncoderConfig::default(),
+                what: String::new(),
+            }
+        };
+        planned.what = what.display().to_string();
+        Ok(planned)
+    }
+}
+
+/// A plan's recordings over a plate, ready to be judged.
 pub struct Programme {
-    /// Title of the plan.
-    pub title: String,
     /// The machine file.
     pub machine: MachineFile,
     /// Its chain.
@@ -32,31 +84,19 @@ pub struct Programme {
 }
 
 impl Programme {
-    /// Reads a scenario's folder, or a plan file beside a machine file.
+    /// The recordings of a plan; none where it has no step over a plate.
     ///
     /// # Errors
-    /// With file and place when something is missing or wrong, or no recording is planned.
-    pub fn read(what: &Path, machine: Option<&Path>, station_uncertainty_mm: f64) -> Result<Self> {
-        let (plan, own_machine, config) = if what.is_dir() {
-            of_scenario(what)?
-        } else {
-            (plan_file(what)?, None, GridEncoderConfig::default())
-        };
-        let machine = match (machine, own_machine) {
-            (Some(path), _) => machine_file(path)?,
-            (None, Some(own)) => own,
-            (None, None) => bail!("plan {}: --machine FILE is needed", what.display()),
-        };
+    /// When one cannot be made on this machine, or a parameter of the fit is wrong.
+    pub fn of(planned: &Planned, station_uncertainty_mm: f64) -> Result<Option<Self>> {
+        let machine = planned.machine.clone();
         let kinematics = Kinematics::new(&machine).context("machine file: chain")?;
-        let planned =
-            recordings(&plan, &machine).with_context(|| format!("plan of {}", what.display()))?;
-        if planned.is_empty() {
-            bail!(
-                "plan of {}: it has no grid step, so nothing to look at",
-                what.display()
-            );
+        let of_plan = recordings(&planned.plan, &machine);
+        let of_plan = of_plan.with_context(|| format!("plan of {}", planned.what))?;
+        if of_plan.is_empty() {
+            return Ok(None);
         }
-        let recordings: Vec<Recording> = planned
+        let recordings: Vec<Recording> = of_plan
             .iter()
             .map(|one| {
                 let place = Place::from(&one.segment);
@@ -68,22 +108,19 @@ impl Programme {
                 )
             })
             .collect();
-        let options = config.options_for(kinematics.chain(), &recordings)?;
-        Ok(Self {
-            title: plan.title,
+        let options = planned.fit.options_for(kinematics.chain(), &recordings)?;
+        Ok(Some(Self {
             machine,
             kinematics,
             recordings,
             options,
             station_uncertainty_mm,
-        })
+        }))
     }
 }
 
-type Parts = (Plan, Option<MachineFile>, GridEncoderConfig);
-
-/// Plan and machine of the sequencer, parameters of the grid encoder.
-fn of_scenario(folder: &Path) -> Result<Parts> {
+/// Plan and machine of the sequencer, parameters of the control and of the grid encoder.
+fn of_scenario(folder: &Path, machine: Option<&Path>) -> Result<Planned> {
     let scenario = Scenario::read(folder)?;
     let find = |exec: &str| scenario.nodes.iter().find(|node| node.exec == exec);
     let Some(sequencer) = find("sequencer") else {
@@ -95,12 +132,53 @@ fn of_scenario(folder: &Path) -> Result<Parts> {
     let setup = setup(sequencer)?;
     let (path, text) = setup.file_text("plan_file")?;
     let plan = Plan::from_yaml(&text).with_context(|| format!("plan {}", path.display()))?;
-    let machine = machine_file(&setup.file_path("machine_file")?)?;
-    let config = match find("grid_encoder") {
-        Some(node) => self::setup(node)?.config()?,
-        None => GridEncoderConfig::default(),
+    let own = setup.file_path("machine_file")?;
+    let machine = machine_file(machine.unwrap_or(&own))?;
+    Ok(Planned {
+        programs: programs(&plan, &path)?,
+        plan,
+        control: match find("fake_cnc") {
+            Some(node) => self::setup(node)?.config()?,
+            None => fake_cnc::Config {
+                start_mm: start_mm(&machine),
+                ..fake_cnc::Config::default()
+            },
+        },
+        machine,
+        fit: match find("grid_encoder") {
+            Some(node) => self::setup(node)?.config()?,
+            None => GridEncoderConfig::default(),
+        },
+        what: String::new(),
+    })
+}
+
+fn start_mm(machine: &MachineFile) -> BTreeMap<Axis, f64> {
+    let linear = machine.axes.iter().filter_map(|(axis, entry)| match entry {
+        AxisEntry::Linear(linear) => Some((*axis, linear.travel_mm)),
+        AxisEntry::Rotary(_) => None,
+    });
+    let start =
+        |(axis, [low, high]): (Axis, [f64; 2])| (axis, low + (high - low) * START[axis.index()]);
+    linear.map(start).collect()
+}
+
+/// Texts of the programs that a plan names; paths are relative to the plan's file.
+fn programs(plan: &Plan, plan_path: &Path) -> Result<BTreeMap<String, String>> {
+    let folder = plan_path.parent().unwrap_or_else(|| Path::new(""));
+    let named = plan.steps.iter().filter_map(|step| match step {
+        Step::Produce { program, .. } | Step::Verify { program, .. } | Step::Run { program } => {
+            Some(program)
+        }
+        _ => None,
+    });
+    let read = |program: &String| {
+        let path: PathBuf = folder.join(program);
+        let text = std::fs::read_to_string(&path)
+            .with_context(|| format!("plan {}: {}", plan_path.display(), path.display()))?;
+        Ok((program.clone(), text))
     };
-    Ok((plan, Some(machine), config))
+    named.map(read).collect()
 }
 
 fn setup(node: &LaunchNode) -> Result<Setup> {

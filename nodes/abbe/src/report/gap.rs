@@ -11,8 +11,11 @@ use crate::diagnose::Diagnosed;
 
 mod drawings;
 mod matrix;
+pub mod planned;
 mod sentences;
 
+/// Begin of the names of amplitudes that only widen an effect's form.
+const FREE_FORM: &str = "free_";
 /// Most rows of a table on the page.
 const MOST_ROWS: usize = 24;
 
@@ -42,7 +45,7 @@ pub fn page(title: &str, diagnosed: &Diagnosed) -> Result<Report> {
             (matrix::style())
             @for line in &lines { p { (line) } }
             (matrix::heat(&figures.heat))
-            @for trace in &traces { (trace) }
+            div.traces { @for trace in &traces { (trace) } }
             @for section in &sections { (section.html()) }
             (matrix::isolability(&figures.isolability))
             @if !notes.is_empty() {
@@ -92,7 +95,7 @@ fn notes(diagnosed: &Diagnosed) -> Vec<String> {
         .collect()
 }
 
-/// A number with three significant digits.
+/// A number with three significant digits, a small one with two.
 fn three(value: f64) -> String {
     let size = value.abs();
     match () {
@@ -100,7 +103,12 @@ fn three(value: f64) -> String {
         () if size >= 100.0 => format!("{value:.0}"),
         () if size >= 10.0 => format!("{value:.1}"),
         () if size >= 1.0 || size == 0.0 => format!("{value:.2}"),
-        () => format!("{value:.3}"),
+        () if size >= 0.1 => format!("{value:.3}"),
+        () if size >= 1e-6 => {
+            let decimals = (1.0 - size.log10().floor()) as usize;
+            format!("{value:.decimals$}")
+        }
+        () => "0".to_owned(),
     }
 }
 
@@ -183,7 +191,9 @@ fn sizes(report: &GapReport) -> Rows {
                 if p.at_bound { "at its bound" } else { "" }.to_owned(),
             ]
         };
-        cause.parameters.iter().map(row).collect()
+        let shown = cause.parameters.iter();
+        let shown = shown.filter(|p| !p.name.starts_with(FREE_FORM));
+        shown.map(row).collect()
     };
     Rows {
         head: head(&[
@@ -195,7 +205,8 @@ fn sizes(report: &GapReport) -> Rows {
             "",
         ]),
         rows: report.causes.iter().flat_map(of_cause).collect(),
-        note: "From and to: 95 % interval.".to_owned(),
+        note: "From and to: 95 % interval. Amplitudes of an effect's free form are in the JSON."
+            .to_owned(),
     }
 }
 
@@ -218,7 +229,9 @@ fn values(cause: &Cause) -> String {
             three(p.high)
         )
     };
-    let all: Vec<String> = cause.parameters.iter().map(value).collect();
+    let shown = cause.parameters.iter();
+    let shown = shown.filter(|p| !p.name.starts_with(FREE_FORM));
+    let all: Vec<String> = shown.map(value).collect();
     all.join(", ")
 }
 

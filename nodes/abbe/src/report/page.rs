@@ -12,7 +12,9 @@ th, td { padding: .25rem .8rem .25rem 0; border-bottom: 1px solid var(--rule); t
 th:first-child, td:first-child { text-align: left; } th { color: var(--soft); font-weight: 600; }
 th.prose, td.prose { text-align: left; white-space: normal; min-width: 10rem; }
 .plot { width: 100%; height: auto; } .note { color: var(--soft); font-size: .9rem; } .good { color: var(--good); } .bad { color: var(--bad); }
-code { font-size: .9em; } @media print { body { max-width: none; } h2 { break-after: avoid; } .plot, table { break-inside: avoid; } }
+@media (max-width: 40rem) { h1 { font-size: 1.25rem; } table { font-size: .85rem; } th, td { padding-right: .6rem; }
+  th:first-child, td:first-child { position: sticky; left: 0; background: var(--paper); max-width: 9rem; white-space: normal; } }
+th, td { vertical-align: top; } code { font-size: .9em; } @media print { body { max-width: none; font-size: 11px; } table { font-size: 9px; overflow: visible; } th, td { white-space: normal; } h2 { break-after: avoid; } .plot, table { break-inside: avoid; } }
 ";
 
 /// Puts `body` on a page.

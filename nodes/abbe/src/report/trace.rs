@@ -4,7 +4,8 @@
 //!   drawn radius = 10 divisions + deviation / division            (1)
 //! ```
 //!
-//! A division is 5 µm, and more by steps of 1, 2 and 5 where deviations would not fit on the drawing.
+//! A division is 5 µm, or less where the drawing says so, and more by steps of 1, 2 and 5 where deviations would not
+//! fit on the drawing.
 
 use anyhow::{Result, anyhow};
 use metrology::sample::TestPlane;
@@ -33,14 +34,31 @@ pub struct Drawn {
     pub scale: String,
 }
 
+/// Least division of a circular test, µm.
+const USUAL_UM: f64 = 5.0;
+/// Least division that a drawing may have, µm.
+const FINEST_UM: f64 = 0.1;
+
 /// Draws named traces of (angle in rad, radial deviation in mm).
 ///
 /// # Errors
 /// When the drawing library fails.
 pub fn svg(traces: &[(String, Vec<(f64, f64)>)], plane: TestPlane) -> Result<Drawn> {
+    drawn(traces, plane, USUAL_UM)
+}
+
+/// The same with divisions as fine as the traces want.
+///
+/// # Errors
+/// When the drawing library fails.
+pub fn fine_svg(traces: &[(String, Vec<(f64, f64)>)], plane: TestPlane) -> Result<Drawn> {
+    drawn(traces, plane, FINEST_UM)
+}
+
+fn drawn(traces: &[(String, Vec<(f64, f64)>)], plane: TestPlane, least_um: f64) -> Result<Drawn> {
     let deviations = traces.iter().flat_map(|(_, points)| points);
     let greatest_um = deviations.map(|(_, d)| d.abs() * 1e3).fold(0.0, f64::max);
-    let division_um = division_um(greatest_um);
+    let division_um = division_um(greatest_um, least_um);
     let mut text = String::new();
     draw(traces, plane, division_um, &mut text)
         .map_err(|error| anyhow!("circular trace: {error}"))?;
@@ -50,14 +68,14 @@ pub fn svg(traces: &[(String, Vec<(f64, f64)>)], plane: TestPlane) -> Result<Dra
             "<svg class=\"plot\" style=\"max-width:34rem\" role=\"img\" ",
             1,
         ),
-        scale: format!("{division_um} µm a division"),
+        scale: format!("{} µm a division", (division_um * 1e3).round() / 1e3),
     })
 }
 
-fn division_um(greatest_um: f64) -> f64 {
-    let steps = (0..6).flat_map(|decade| [5.0, 10.0, 20.0].map(|step| step * 10_f64.powi(decade)));
-    let mut last = 5.0;
-    for step in steps {
+fn division_um(greatest_um: f64, least_um: f64) -> f64 {
+    let steps = (-1..8).flat_map(|decade| [1.0, 2.0, 5.0].map(|step| step * 10_f64.powi(decade)));
+    let mut last = least_um;
+    for step in steps.filter(|step| *step >= 0.999 * least_um) {
         last = step;
         if greatest_um <= MOST * step {
             break;
@@ -143,10 +161,11 @@ mod tests {
             (161.0, 50.0),
         ] {
             assert!(
-                (division_um(greatest_um) - wanted_um).abs() < 1e-9,
+                (division_um(greatest_um, USUAL_UM) - wanted_um).abs() < 1e-9,
                 "{greatest_um}"
             );
         }
+        assert!((division_um(1.5, FINEST_UM) - 0.2).abs() < 1e-9);
     }
 
     #[test]

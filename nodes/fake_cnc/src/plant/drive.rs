@@ -41,6 +41,9 @@ pub(super) struct DriveConstants {
 #[derive(Clone, Debug)]
 pub(super) struct Drive {
     constants: DriveConstants,
+    /// Half the width of the gap from an instant (s since the start) on.
+    wear: Vec<(f64, f64)>,
+    has_worn: usize,
     /// Damping over engaged stiffness, s.
     damping_time_s: f64,
     motor_friction: Friction,
@@ -70,6 +73,8 @@ impl Drive {
             motor_friction: Friction::new(constants.motor_friction),
             slide_friction: Friction::new(constants.slide_friction),
             constants,
+            wear: Vec::new(),
+            has_worn: 0,
             motor_force: 0.0,
             slide_force: 0.0,
             period_s: 0.0,
@@ -80,6 +85,23 @@ impl Drive {
             motor_velocity: 0.0,
             slide: 0.0,
             slide_velocity: 0.0,
+        }
+    }
+
+    /// The drive with a gap that widens: instants in s since the start, half widths.
+    pub(super) fn that_wears(mut self, wear: Vec<(f64, f64)>) -> Self {
+        self.wear = wear;
+        self
+    }
+
+    /// Lets the gap have the width that it has at `elapsed_s`.
+    pub(super) fn age(&mut self, elapsed_s: f64) {
+        while let Some((after_s, half_width)) = self.wear.get(self.has_worn) {
+            if *after_s > elapsed_s {
+                break;
+            }
+            self.constants.coupling.half_width = *half_width;
+            self.has_worn += 1;
         }
     }
 
@@ -234,6 +256,16 @@ mod tests {
             (seen - expected).abs() < 5e-5,
             "seen {seen}, expected {expected}"
         );
+    }
+
+    #[test]
+    fn a_gap_widens_at_its_time_and_not_before() {
+        let mut drive = Drive::new(constants()).that_wears(vec![(60.0, 4e-3)]);
+        let half_width = |drive: &Drive| drive.constants.coupling.half_width;
+        drive.age(59.0);
+        assert!((half_width(&drive) - 1.5e-3).abs() < 1e-12);
+        drive.age(60.0);
+        assert!((half_width(&drive) - 4e-3).abs() < 1e-12);
     }
 
     #[test]

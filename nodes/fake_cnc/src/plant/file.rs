@@ -13,7 +13,9 @@ pub use body::{
     GeometryEntry, LinearErrorEntry, OilFilmEntry, RotaryErrorEntry, SquarenessEntry,
     StructureEntry,
 };
-pub use drives::{FrictionEntry, LinearDriveEntry, RotaryDriveEntry, RotaryFrictionEntry};
+pub use drives::{
+    FrictionEntry, LinearDriveEntry, RotaryDriveEntry, RotaryFrictionEntry, WearEntry,
+};
 pub use heat::{
     HeatEntry, LinkEntry, Place, PlaceEntry, ScrewEnd, ScrewEntry, ShopAirEntry, SpindleLossEntry,
 };

@@ -10,6 +10,10 @@ use machine::MachineFile;
 use metrology::stamp::Span;
 use node_runtime::{Diagnostic, Level, Node, Setup, Wiring};
 
+mod beside;
+
+use beside::Beside;
+
 /// Time between two looks at whether a diagnosis is due.
 const TICK: Span = Span::from_nanos(500_000_000);
 
@@ -23,7 +27,8 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = GapDiagnosisStage::new(&config, &machine)?;
-    let mut wiring = Wiring::new(setup.name(), parameters, stage)
+    let mut wiring = Wiring::new(setup.name(), parameters, Beside::new(stage))
+        .live(Beside::begin)
         .on(&topics::AXES_STATE, |s| Input::Sample(State(s)))
         .on(&topics::GRID_POSITION, |s| Input::Sample(Grid(s)))
         .on(&topics::LENGTH_POSITION, |s| Input::Sample(Length(s)))
@@ -61,7 +66,7 @@ fn condition(output: &Output) -> Option<Diagnostic> {
         }
         Output::NotYet(error) => (Level::Ok, "no_diagnosis", error.to_string()),
         Output::LeftOut(remarks) => (Level::Ok, "left_out", remarks.join("; ")),
-        Output::Report(_) => return None,
+        Output::Report(_) | Output::Due(_) => return None,
     };
     Some(Diagnostic::new(level, name, message))
 }

@@ -3,24 +3,22 @@
 use std::collections::VecDeque;
 
 use machine::file::AxisEntry;
-use machine::twin::{Channel, Motion, Reading, Run, Session, Touch, simulate};
+use machine::twin::{Run, Session, simulate};
 use machine::{Kinematics, MachineFile};
 use metrology::sample::{
     AxisCompensation, AxisState, BlockMeasurement, GridSample, LengthSample, ProbeTrigger,
     TemperatureSample, TestSegment,
 };
 use metrology::stamp::{Host, Stamp};
-use metrology::{Axis, AxisSet, PerAxis};
+use metrology::{Axis, AxisSet};
 
 use super::account::{Account, Reason};
-use super::channels::{Scope, Series, Zero, is_test, take_zero};
+use super::channels::{Zero, is_test, touches_only};
 use super::config::SessionConfig;
 use super::error::SessionError;
-use super::motion::{of, thin, times_s, wanted};
 use super::nominal;
 use super::past::Past;
 use super::record::{Offset, Record, Tick};
-use super::select::{Selection, index};
 use super::time::{At, SessionTime};
 
 /// One recorded sample.
@@ -47,25 +45,31 @@ pub enum Input {
 /// How far beyond the travel of the machine file a command may go, share of the travel.
 const BEYOND_TRAVEL: f64 = 0.01;
 
+/// How long touches and measured blocks may come after the end of their run, s.
+const LATE_S: f64 = 2.0;
+
 /// Number of readings that makes one mean, by what repeats have in common.
 type Blocks = Vec<(TestSegment, usize)>;
 
 /// Builds a session from recorded samples.
 #[derive(Clone, Debug)]
 pub struct SessionBuilder {
-    config: SessionConfig,
-    machine: MachineFile,
-    kinematics: Kinematics,
-    axes: AxisSet,
+    pub(super) config: SessionConfig,
+    pub(super) machine: MachineFile,
+    pub(super) kinematics: Kinematics,
+    pub(super) axes: AxisSet,
     time: SessionTime,
     past: Past,
     recent: VecDeque<Tick>,
     offset: Option<Offset>,
     open: Option<Record>,
-    runs: Vec<Run>,
-    zeros: Vec<Zero>,
-    blocks: Blocks,
-    account: Account,
+    /// A run of touches that has ended, with the time of its end: its last touches may still come.
+    ended: Option<(f64, Record)>,
+    pub(super) runs: Vec<Run>,
+    pub(super) closed: usize,
+    pub(super) zeros: Vec<Zero>,
+    pub(super) blocks: Blocks,
+    pub(super) account: Account,
     /// Greatest run, set-up and zero of the bags before this one, and of all.
     base: [u32; 3],
     greatest: [u32; 3],
@@ -89,7 +93,9 @@ impl SessionBuilder {
             recent: VecDeque::new(),
             offset: None,
             open: None,
+            ended: None,
             runs: vec![],
+            closed: 0,
             zeros: vec![],
             blocks: vec![],
             account: Account::default(),
@@ -103,6 +109,7 @@ impl SessionBuilder {
     /// A bag ends: what is open is cut there.
     pub fn end_bag(&mut self) {
         self.cut();
+        self.close_ended();
     }
 
     /// Another bag begins: its runs, set-ups and zeros are others than those before.
@@ -141,6 +148,12 @@ impl SessionBuilder {
         &self.runs
     }
 
+    /// Number of runs with readings that were closed since the start.
+    #[must_use]
+    pub fn closed(&self) -> usize {
+        self.closed
+    }
+
     /// Keeps the last `most` runs only.
     pub fn keep_last(&mut self, most: usize) {
         let beyond = self.runs.len().saturating_sub(most);
@@ -167,7 +180,7 @@ impl SessionBuilder {
     /// # Errors
     /// When it is another machine's, or holds nothing that could be diagnosed.
     pub fn finish(mut self) -> Result<(Session, Account), SessionError> {
-        self.cut();
+        self.end_bag();
         if let Some(error) = self.other_machine {
             return Err(error);
         }
@@ -190,10 +203,17 @@ impl SessionBuilder {
 
     fn session_time(&mut self, at: Stamp<Host>) -> f64 {
         match self.time.take(at) {
-            At::Time(time_s) => time_s,
+            At::Time(time_s) => {
+                let is_over = |(ended_s, _): &(f64, Record)| time_s - ended_s > LATE_S;
+                if self.ended.as_ref().is_some_and(is_over) {
+                    self.close_ended();
+                }
+                time_s
+            }
             At::Jumped(time_s) => {
                 self.account.note(Reason::ClockJump);
                 self.cut();
+                self.close_ended();
                 self.recent.clear();
                 self.offset = None;
                 time_s
@@ -224,7 +244,7 @@ impl SessionBuilder {
         self.past.axes(time_s, &state.commanded);
         let tick = Tick::new(time_s, state);
         match &mut self.open {
-            Some(open) if open.ticks.len() < self.config.ticks_per_run => open.ticks.push(tick),
+            Some(open) if open.ticks.len() < self.config.ticks_per_run => open.push(tick),
             Some(open) => open.beyond_limit += 1,
             None => {
                 self.recent.push_back(tick);
@@ -268,6 +288,9 @@ impl SessionBuilder {
             let time_s = self.session_time(sample.at);
             self.past
                 .temperature(time_s, &sample.sensor, sample.temperature_degc);
+            self.open
+                .iter_mut()
+                .for_each(|open| open.temperatures.push(sample.clone()));
         } else {
             self.account.note(Reason::NotFinite);
         }
@@ -281,28 +304,33 @@ impl SessionBuilder {
             .all(f64::is_finite)
         {
             let time_s = self.session_time(trigger.received_at);
-            self.open
-                .iter_mut()
-                .for_each(|open| open.triggers.push((time_s, trigger.clone())));
+            let ended = self.ended.as_mut().map(|(_, ended)| ended);
+            if let Some(run) = self.open.as_mut().or(ended) {
+                run.triggers.push((time_s, trigger));
+            }
         } else {
             self.account.note(Reason::NotFinite);
         }
     }
 
+    /// A block is measured when its touches are corrected, which may be after the end of its run.
     fn block(&mut self, measurement: &BlockMeasurement) {
         self.has_commands = true;
+        let number = measurement.run.saturating_add(self.base[0]);
         for axis in Axis::LINEAR {
             let Some(face) = &measurement.faces[axis] else {
                 continue;
             };
-            let time_s = self.session_time(face.at);
             let known = nominal::face(&self.machine, &measurement.block_id, axis, face.position_mm);
-            match known {
-                Some((feature, approach, positions)) => self.open.iter_mut().for_each(|open| {
-                    open.faces
-                        .push((time_s, feature.clone(), approach, positions));
-                }),
-                None => self.account.note(Reason::UnknownFeature),
+            let Some((feature, approach, positions)) = known else {
+                self.account.note(Reason::UnknownFeature);
+                continue;
+            };
+            let time_s = self.time.of(face.at);
+            let ended = self.ended.as_mut().map(|(_, ended)| ended);
+            let mut all = self.open.iter_mut().chain(ended);
+            if let Some(run) = all.find(|run| run.segment.run == number) {
+                run.faces.push((time_s, feature, approach, positions));
             }
         }
     }
@@ -320,6 +348,7 @@ impl SessionBuilder {
         }
         if segment.begin {
             self.cut();
+            self.close_ended();
             self.account.segments += 1;
             if is_test(segment.kind) {
                 let lead_in = self.recent.iter().copied().collect();
@@ -330,7 +359,12 @@ impl SessionBuilder {
                 self.account.note(Reason::NotBegun);
                 self.open = Some(open);
             } else if segment.completed {
-                self.close(open);
+                self.go_on(&open);
+                if touches_only(segment.kind) {
+                    self.ended = Some((self.time.newest_s(), open));
+                } else {
+                    self.close(open);
+                }
             } else {
                 self.account.note(Reason::Failed);
                 self.go_on(&open);
@@ -344,7 +378,15 @@ impl SessionBuilder {
     fn cut(&mut self) {
         if let Some(open) = self.open.take() {
             self.account.note(Reason::Cut);
+            self.go_on(&open);
             self.close(open);
+        }
+    }
+
+    /// Closes a run of touches that has ended.
+    fn close_ended(&mut self) {
+        if let Some((_, ended)) = self.ended.take() {
+            self.close(ended);
         }
     }
 
@@ -355,191 +397,6 @@ impl SessionBuilder {
         let recent = |tick: &&Tick| tick.time_s >= newest_s - self.config.lead_in_s;
         self.recent.extend(open.ticks.iter().filter(recent));
     }
-
-    fn close(&mut self, open: Record) {
-        self.go_on(&open);
-        self.account.note_many(Reason::TooLong, open.beyond_limit);
-        if open.compensation_broke_off() {
-            self.account.note(Reason::CompensationHeld);
-        }
-        // What is no motion was refused sample by sample before.
-        if let Ok(Some(run)) = self.run(open) {
-            self.runs.push(run);
-        }
-    }
-
-    fn run(&mut self, open: Record) -> Result<Option<Run>, SessionError> {
-        let times = times_s(&open.ticks);
-        let motion = of(&open.ticks, times, self.axes)?;
-        let selection = Selection::of(&open.segment, &motion, open.lead_in, self.config.settle_s);
-        let block = self.block_of(&open.segment, selection.len());
-        let scope = Scope {
-            machine: &self.machine,
-            record: &open,
-            motion: &motion,
-        };
-        let mut series = scope.channels(&mut self.account);
-        for (_, readings) in &mut series {
-            *readings = selection.apply(readings, block);
-        }
-        take_zero(&mut self.zeros, &open, &mut series);
-        let touches = self.touches(&open, &motion);
-        let mut marks = vec![false; motion.len()];
-        wanted(&motion, &mut marks);
-        let places = series.iter().flat_map(|(_, readings)| readings);
-        for place in places.map(|raw| raw.place) {
-            marks[index(place)] = true;
-            if place.fract() > 0.0 && index(place) + 1 < marks.len() {
-                marks[index(place) + 1] = true;
-            }
-        }
-        for tick in touches.iter().filter_map(|(touch, _)| touch.tick) {
-            marks[tick] = true;
-        }
-        Ok(assemble(open.segment, &motion, &marks, series, touches))
-    }
-
-    /// How many neighbours make one reading: the same odd number in every repeat.
-    fn block_of(&mut self, segment: &TestSegment, n: usize) -> usize {
-        if let Some((_, block)) = self.blocks.iter().find(|(known, _)| alike(known, segment)) {
-            return *block;
-        }
-        let block = n.div_ceil(self.config.readings_per_run.max(1)).max(1) | 1;
-        self.blocks.push((segment.clone(), block));
-        block
-    }
-
-    /// Touches with their deviation (4); faces of blocks where there are none.
-    fn touches(&mut self, open: &Record, motion: &Motion) -> Vec<(Touch, f64)> {
-        let mut touches = vec![];
-        for (time_s, trigger) in &open.triggers {
-            let beyond = self.beyond(&trigger.feature_id, &trigger.latched, &trigger.approach);
-            let Some(deviation) = beyond else {
-                self.account.note(Reason::UnknownFeature);
-                continue;
-            };
-            let after = open
-                .ticks
-                .partition_point(|tick| tick.controller_at <= trigger.controller_at);
-            let tick = after
-                .checked_sub(1)
-                .map(|before| nearest(open, before, trigger));
-            touches.push((
-                Touch {
-                    time_s: tick.map_or(*time_s, |tick| motion.time_s[tick]),
-                    feature_id: trigger.feature_id.clone(),
-                    approach: trigger.approach,
-                    feed_mm_s: trigger.feed_mm_s,
-                    position: trigger.latched,
-                    tick,
-                },
-                deviation,
-            ));
-        }
-        if touches.is_empty() && open.triggers.is_empty() {
-            for (time_s, feature, approach, positions) in &open.faces {
-                let touch = Touch {
-                    time_s: *time_s,
-                    feature_id: feature.clone(),
-                    approach: *approach,
-                    feed_mm_s: 0.0,
-                    position: *positions,
-                    tick: None,
-                };
-                let beyond = self.beyond(feature, positions, approach);
-                touches.extend(beyond.map(|deviation| (touch, deviation)));
-            }
-        }
-        touches
-    }
-
-    fn beyond(
-        &self,
-        feature: &str,
-        latched: &PerAxis<f64>,
-        approach: &nalgebra::Vector3<f64>,
-    ) -> Option<f64> {
-        nominal::beyond_surface_mm(&self.machine, &self.kinematics, feature, latched, approach)
-    }
-}
-
-/// The run with the marked ticks of its motion; none without a reading.
-fn assemble(
-    segment: TestSegment,
-    motion: &Motion,
-    marks: &[bool],
-    series: Vec<Series>,
-    touches: Vec<(Touch, f64)>,
-) -> Option<Run> {
-    let (thinned, kept) = thin(motion, marks);
-    let mut readings: Vec<Reading> = vec![];
-    for (channel, raws) in series {
-        readings.extend(raws.into_iter().map(|raw| {
-            let (at, fraction) = place_in(motion, &thinned, &kept, raw.place);
-            Reading {
-                channel: channel.clone(),
-                at,
-                fraction,
-                deviation: raw.deviation,
-            }
-        }));
-    }
-    let mut kept_touches = vec![];
-    for (mut touch, deviation) in touches {
-        touch.tick = touch.tick.map(|tick| kept[tick]);
-        readings.push(Reading {
-            channel: Channel::Touch,
-            at: kept_touches.len(),
-            fraction: 0.0,
-            deviation,
-        });
-        kept_touches.push(touch);
-    }
-    if readings.is_empty() {
-        return None;
-    }
-    Some(Run {
-        segment,
-        motion: thinned,
-        touches: kept_touches,
-        readings,
-    })
-}
-
-fn nearest(open: &Record, before: usize, trigger: &ProbeTrigger) -> usize {
-    let off = |k: usize| {
-        let tick = open.ticks.get(k)?;
-        Some((tick.controller_at - trigger.controller_at).nanos().abs())
-    };
-    match (off(before), off(before + 1)) {
-        (Some(a), Some(b)) if b < a => before + 1,
-        _ => before,
-    }
-}
-
-/// Index and fraction in the thinned motion of a place in the full one.
-fn place_in(full: &Motion, thinned: &Motion, kept: &[usize], place: f64) -> (usize, f64) {
-    let k = index(place);
-    let time = |k: usize| full.time_s.get(k).copied();
-    let here = full.time_s[k];
-    let at_s = here + (time(k + 1).unwrap_or(here) - here) * place.fract();
-    let at = kept[k];
-    let before_s = thinned.time_s[at];
-    let fraction = thinned
-        .time_s
-        .get(at + 1)
-        .map_or(0.0, |after_s| (at_s - before_s) / (after_s - before_s));
-    (at, fraction.clamp(0.0, 1.0))
-}
-
-/// Whether two runs are repeats of one test.
-fn alike(a: &TestSegment, b: &TestSegment) -> bool {
-    a.kind == b.kind
-        && a.plane == b.plane
-        && a.stations == b.stations
-        && a.features == b.features
-        && (a.radius_mm - b.radius_mm).abs() < 1e-9
-        && (a.feed_mm_s - b.feed_mm_s).abs() < 1e-9
 }
 
 fn other_machine(machine: &MachineFile, axes: AxisSet, state: &AxisState) -> Option<SessionError> {

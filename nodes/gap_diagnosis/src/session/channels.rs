@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 
 use super::account::{Account, Reason};
 use super::record::Record;
+use super::thermometers;
 
 /// Greatest distance between ticks on either side of a reading, s.
 const GAP_S: f64 = 0.25;
@@ -66,6 +67,7 @@ impl Scope<'_> {
             }
             all.push((Channel::Scale(axis), self.encoder(axis, |tick| tick.scale)));
         }
+        all.extend(thermometers::compared(self));
         all.retain(|(_, series)| !series.is_empty());
         all
     }
@@ -222,7 +224,7 @@ impl Scope<'_> {
     }
 
     /// Place of an instant among the ticks.
-    fn place(&self, at: Stamp<Host>, fixed: bool) -> Result<f64, Reason> {
+    pub(super) fn place(&self, at: Stamp<Host>, fixed: bool) -> Result<f64, Reason> {
         let ticks = &self.record.ticks;
         let next = ticks.partition_point(|tick| tick.at <= at);
         let (Some(k), true) = (next.checked_sub(1), next > self.record.lead_in) else {

@@ -83,13 +83,13 @@ impl Past {
         }
     }
 
-    /// The history so far. Where nothing was recorded the axes rest where they were last seen.
+    /// The history so far, at least one entry. Where nothing was recorded the axes rest where they were last seen.
     pub(super) fn history(&self, axes: AxisSet) -> History {
         let n = self
             .temperatures
             .values()
             .map(Vec::len)
-            .fold(self.cells.len(), usize::max);
+            .fold(self.cells.len().max(1), usize::max);
         let mut history = History {
             step_s: self.step_s,
             ..History::default()

@@ -1,7 +1,9 @@
 //! What was recorded of one run while it is open.
 
 use metrology::PerAxis;
-use metrology::sample::{AxisState, GridSample, LengthSample, ProbeTrigger, TestSegment};
+use metrology::sample::{
+    AxisState, GridSample, LengthSample, ProbeTrigger, TemperatureSample, TestSegment,
+};
 use metrology::stamp::{Host, Machine, Stamp};
 
 /// Positions at one tick.
@@ -62,9 +64,16 @@ pub(super) struct Record {
     pub triggers: Vec<(f64, ProbeTrigger)>,
     /// Faces of blocks that a node computed, for records without touches: feature, approach, positions, time.
     pub faces: Vec<(f64, String, nalgebra::Vector3<f64>, PerAxis<f64>)>,
+    /// Temperatures.
+    pub temperatures: Vec<TemperatureSample>,
     /// Ticks that were not held.
     pub beyond_limit: usize,
 }
+
+/// Ticks of axes that stand are kept this far apart, s: nothing happens between them.
+const STANDING_S: f64 = 0.02;
+/// A command that changes by less stands, mm or rad.
+const STANDSTILL: f64 = 1e-6;
 
 /// Silence of the compensation beyond which its last value is only held, s.
 const COMPENSATION_SILENCE_S: f64 = 1.0;
@@ -80,7 +89,21 @@ impl Record {
             length: vec![],
             triggers: vec![],
             faces: vec![],
+            temperatures: vec![],
             beyond_limit: 0,
+        }
+    }
+
+    /// Takes a tick; of axes that stand only some are kept, the first and the last always.
+    pub(super) fn push(&mut self, tick: Tick) {
+        if let [.., before, last] = &mut self.ticks[self.lead_in..]
+            && stands(before, last)
+            && stands(last, &tick)
+            && tick.time_s - before.time_s < STANDING_S
+        {
+            *last = tick;
+        } else {
+            self.ticks.push(tick);
         }
     }
 
@@ -109,4 +132,9 @@ impl Record {
         }
         self.offsets.iter().any(acts) && longest_s > COMPENSATION_SILENCE_S
     }
+}
+
+fn stands(a: &Tick, b: &Tick) -> bool {
+    let pairs = a.commanded.0.iter().zip(&b.commanded.0);
+    pairs.into_iter().all(|(a, b)| (a - b).abs() < STANDSTILL)
 }

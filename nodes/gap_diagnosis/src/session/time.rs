@@ -25,6 +25,21 @@ pub(super) enum At {
 }
 
 impl SessionTime {
+    /// The time of the newest sample.
+    pub(super) fn newest_s(&self) -> f64 {
+        self.start
+            .map_or(0.0, |start| (self.newest - start).as_secs_f64())
+    }
+
+    /// The time of something that may be told long after it was.
+    pub(super) fn of(&mut self, at: Stamp<Host>) -> f64 {
+        let start = *self.start.get_or_insert_with(|| {
+            self.newest = at;
+            at
+        });
+        (at + self.shift - start).as_secs_f64().max(0.0)
+    }
+
     /// The time of a sample that drives the clock.
     pub(super) fn take(&mut self, at: Stamp<Host>) -> At {
         let start = *self.start.get_or_insert_with(|| {

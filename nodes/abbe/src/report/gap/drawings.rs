@@ -22,7 +22,7 @@ pub(super) fn traces(traces: &[Trace]) -> Result<Vec<Markup>> {
             ("before".to_owned(), pair(&circle.before_um)),
             ("after".to_owned(), pair(&circle.after_um)),
         ];
-        let drawing = trace::svg(&lines, plane(&circle.title))?;
+        let drawing = trace::fine_svg(&lines, plane(&circle.title))?;
         let caption = format!(
             "Run {}, {}, {}: machine minus simulator, {}; noise {:.2} µm",
             circle.run, circle.title, circle.channel, drawing.scale, circle.floor_um
@@ -80,6 +80,7 @@ fn plane(title: &str) -> TestPlane {
     .map_or(TestPlane::None, |(_, plane)| plane)
 }
 
+/// One run of each test and channel, those with the largest gap.
 fn largest(mut traces: Vec<Trace>) -> Vec<Trace> {
     let size = |t: &Trace| {
         t.before_um
@@ -87,9 +88,15 @@ fn largest(mut traces: Vec<Trace>) -> Vec<Trace> {
             .fold(0.0_f64, |most, v| most.max(v.abs()))
     };
     traces.sort_by(|a, b| size(b).total_cmp(&size(a)));
-    traces.truncate(MOST_DRAWN);
-    traces.sort_by_key(|t| t.run);
-    traces
+    let mut drawn: Vec<Trace> = vec![];
+    for trace in traces {
+        let is_same = |one: &Trace| one.title == trace.title && one.channel == trace.channel;
+        if drawn.len() < MOST_DRAWN && !drawn.iter().any(is_same) {
+            drawn.push(trace);
+        }
+    }
+    drawn.sort_by_key(|t| t.run);
+    drawn
 }
 
 /// Circles as a ballbar shows them: the radial part of both coordinates of the plate where both are there,

@@ -6,8 +6,9 @@ use maud::{Markup, PreEscaped, html};
 use super::three;
 use crate::report::section::{Rows, Section, head};
 
-/// Standard score at which a cell is fully shaded.
-const FULL_Z: f64 = 20.0;
+/// Standard score at which a cell begins to be shaded, and how many times that it is fully: scores run over decades.
+const FIRST_Z: f64 = 4.0;
+const FULL_RATIO: f64 = 100.0;
 /// Most effects that the matrix on the page shows: those that others imitate best.
 const MOST_EFFECTS: usize = 24;
 /// Pairs below this cosine are not listed on a terminal.
@@ -19,9 +20,10 @@ pub(super) fn style() -> Markup {
         style { (PreEscaped("
 .shaded td, .shaded th { padding: .15rem .4rem; font-size: .8rem; text-align: center; }
 .shaded td:first-child { text-align: left; }
-.shaded th { white-space: normal; overflow-wrap: anywhere; min-width: 3.2rem; vertical-align: bottom; }
+.shaded th { white-space: normal; min-width: 4.4rem; vertical-align: bottom; }
 .shaded td { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
-figure { margin: .8rem 0; }
+.traces { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 22rem), 1fr)); gap: 0 1rem; }
+figure { margin: .8rem 0; break-inside: avoid; }
 ")) }
     }
 }
@@ -44,7 +46,7 @@ pub(super) fn heat(map: &HeatMap) -> Markup {
                             td { (row) }
                             @for z in cells {
                                 @match z {
-                                    Some(z) => { (cell(&three(*z), z / FULL_Z)) }
+                                    Some(z) => { (cell(&three(*z), (z / FIRST_Z).max(1.0).ln() / FULL_RATIO.ln())) }
                                     None => { td { "" } }
                                 }
                             }
@@ -59,7 +61,7 @@ pub(super) fn heat(map: &HeatMap) -> Markup {
             h2 { "Residual by channel and what it goes with" }
             (one("before", &map.z))
             @if !map.z_after.is_empty() { (one("after", &map.z_after)) }
-            p.note { "Standard score; noise alone stays below about 4." }
+            p.note { "Standard score; noise alone stays below about 4. Shaded by its logarithm." }
         }
     }
 }

@@ -32,10 +32,23 @@ pub struct LinearDriveEntry {
     pub backlash_um: f64,
     /// Rounding of the gap's corners.
     pub backlash_softness_um: f64,
+    /// How the gap widens: what it is from some instants on.
+    #[serde(default)]
+    pub wear: Vec<WearEntry>,
     /// Friction of bearings, seals and motor, at the nut.
     pub motor_friction: FrictionEntry,
     /// Friction of the guides.
     pub guide_friction: FrictionEntry,
+}
+
+/// The gap from an instant on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WearEntry {
+    /// Since the start.
+    pub after_s: f64,
+    /// Width of the gap.
+    pub backlash_um: f64,
 }
 
 /// Friction of a linear contact.
@@ -203,6 +216,27 @@ impl LinearDriveEntry {
                 .guide_friction
                 .constants(&at("guide_friction"), per_force)?,
         })
+    }
+}
+
+impl LinearDriveEntry {
+    /// Instants, s since the start, with half the width that the gap has from then on, mm.
+    pub(in crate::plant) fn wear(&self, axis: Axis) -> Result<Vec<(f64, f64)>, PlantError> {
+        let at = |k: usize, key: &str| format!("linear_drives.{axis}.wear[{k}].{key}");
+        let mut before_s = 0.0;
+        let mut all = Vec::new();
+        for (k, entry) in self.wear.iter().enumerate() {
+            require(
+                entry.after_s.is_finite() && entry.after_s >= before_s,
+                at(k, "after_s"),
+                entry.after_s,
+                "finite and not below the one before",
+            )?;
+            require_not_negative(at(k, "backlash_um"), entry.backlash_um)?;
+            before_s = entry.after_s;
+            all.push((entry.after_s, 0.5 * entry.backlash_um / UM_PER_MM));
+        }
+        Ok(all)
     }
 }
 

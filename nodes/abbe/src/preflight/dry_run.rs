@@ -1,0 +1,177 @@
+//! A plan run on a machine without errors: its sequencer, its control, and what would be recorded.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use anyhow::{Context, Result, bail};
+use fake_cnc::{Cnc, Outcome};
+use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
+use machine::MachineFile;
+use machine::twin::Session;
+use metrology::Stage;
+use metrology::sample::PlanState;
+use metrology::stamp::{Host, Span, Stamp};
+use sequencer::{Plan, ProgramEnd, Sequencer};
+
+use super::ideal::IdealMachine;
+
+/// Time between two looks of the sequencer at its plan.
+const LOOK: Span = Span::from_nanos(100_000_000);
+/// Longest programme, s.
+const LIMIT_S: f64 = 24.0 * 3600.0;
+
+/// What a plan would record.
+pub struct DryRun {
+    /// The session of an ideal machine.
+    pub session: Session,
+    /// How long the plan takes.
+    pub minutes: f64,
+}
+
+/// Control, sequencer and what is recorded of them.
+struct Rehearsal {
+    now: Stamp<Host>,
+    cnc: Cnc<IdealMachine>,
+    sequencer: Sequencer,
+    orders: VecDeque<fake_cnc::Input>,
+    news: VecDeque<sequencer::Input>,
+    recorded: SessionBuilder,
+    state: PlanState,
+    message: String,
+}
+
+/// Runs a plan; `programs` are those that it names.
+///
+/// # Errors
+/// When the plan cannot be run on this machine, or no session comes of it.
+pub fn dry_run(
+    plan: &Plan,
+    programs: BTreeMap<String, String>,
+    machine: &MachineFile,
+    control: &fake_cnc::Config,
+) -> Result<DryRun> {
+    let settings = sequencer::Config::default();
+    let mut rehearsal = Rehearsal {
+        now: Stamp::from_nanos(0),
+        cnc: Cnc::new(control, machine, IdealMachine::new(machine)?)?,
+        sequencer: Sequencer::new(settings, machine.clone(), Some(plan.clone()), programs)
+            .context("plan")?,
+        orders: VecDeque::new(),
+        news: VecDeque::new(),
+        recorded: SessionBuilder::new(machine, SessionConfig::default())?,
+        state: PlanState::Waiting,
+        message: String::new(),
+    };
+    let period = Span::from_secs_f64(machine.control.servo_period_ms / 1e3);
+    let mut look_at = rehearsal.now;
+    while rehearsal.state != PlanState::Done {
+        if rehearsal.now >= look_at {
+            look_at += LOOK;
+            rehearsal.news.push_back(sequencer::Input::Tick);
+        }
+        rehearsal.orders.push_back(fake_cnc::Input::Tick);
+        rehearsal.settle()?;
+        if rehearsal.state == PlanState::Failed {
+            bail!("plan: it would fail: {}", rehearsal.message);
+        }
+        let passed_s = rehearsal.now.as_secs_f64();
+        if passed_s > LIMIT_S {
+            bail!("plan: it would take more than {} h", LIMIT_S / 3600.0);
+        }
+        rehearsal.now += period;
+    }
+    let minutes = rehearsal.now.as_secs_f64() / 60.0;
+    let (session, _) = rehearsal.recorded.finish()?;
+    Ok(DryRun { session, minutes })
+}
+
+impl Rehearsal {
+    /// Hands on what control and sequencer tell each other until both are silent.
+    fn settle(&mut self) -> Result<()> {
+        let (mut said, mut told) = (vec![], vec![]);
+        loop {
+            if let Some(order) = self.orders.pop_front() {
+                self.cnc.step(self.now, order, &mut said)?;
+                for output in said.drain(..) {
+                    self.of_control(output);
+                }
+            } else if let Some(news) = self.news.pop_front() {
+                self.sequencer.step(self.now, news, &mut told)?;
+                for output in told.drain(..) {
+                    self.of_sequencer(output);
+                }
+            } else {
+                return Ok(());
+            }
+        }
+    }
+
+    fn of_control(&mut self, output: fake_cnc::Output) {
+        use fake_cnc::Output as Said;
+        let news = match output {
+            Said::State(state) => return self.recorded.take(Input::State(state)),
+            Said::Grid(sample) => return self.recorded.take(Input::Grid(sample)),
+            Said::Length(sample) => return self.recorded.take(Input::Length(sample)),
+            Said::Temperature(sample) => return self.recorded.take(Input::Temperature(sample)),
+            Said::Trigger(trigger) => {
+                self.recorded.take(Input::Trigger(trigger));
+                sequencer::Input::Touch
+            }
+            Said::Accepted { goal } => sequencer::Input::ProgramAnswer {
+                id: goal,
+                accepted: true,
+            },
+            Said::Refused { goal, .. } => sequencer::Input::ProgramAnswer {
+                id: goal,
+                accepted: false,
+            },
+            Said::Finished {
+                goal,
+                outcome,
+                message,
+                ..
+            } => sequencer::Input::ProgramEnd {
+                id: goal,
+                end: Some(ProgramEnd {
+                    done: outcome == Outcome::Done,
+                    message,
+                }),
+            },
+            Said::Feedback { .. } | Said::Diagnostic(_) => return,
+        };
+        self.news.push_back(news);
+    }
+
+    fn of_sequencer(&mut self, output: sequencer::Output) {
+        use sequencer::Output as Told;
+        match output {
+            Told::SendProgram { id, name, text } => {
+                self.orders.push_back(fake_cnc::Input::RunProgram {
+                    goal: id,
+                    text,
+                    name,
+                });
+            }
+            Told::CancelProgram(goal) => {
+                self.orders
+                    .push_back(fake_cnc::Input::CancelProgram { goal });
+            }
+            Told::Segment(segment) => self.recorded.take(Input::Segment(segment)),
+            // An ideal machine has nothing to compensate.
+            Told::SwitchCompensation { id, .. } => {
+                self.news.push_back(sequencer::Input::CompensationAnswer {
+                    id,
+                    answer: Some((true, String::new())),
+                });
+            }
+            Told::Status(status) => {
+                self.state = status.state;
+                self.message = status.message;
+            }
+            Told::CycleAccepted(_)
+            | Told::CycleRejected { .. }
+            | Told::CycleProgress { .. }
+            | Told::CycleEnded(_)
+            | Told::ProgramFailed { .. } => {}
+        }
+    }
+}

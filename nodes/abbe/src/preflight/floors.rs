@@ -1,0 +1,110 @@
+//! The noise that a forecast assumes, until repeats have shown what it is.
+
+use anyhow::Result;
+use gap_diagnosis::preflight::{AssumedFloor, Floors};
+use machine::MachineFile;
+use machine::twin::Instrument;
+
+/// Instruments with the noise of a reading that is assumed unless something else is said, µm.
+const READING_UM: [(Instrument, f64); 6] = [
+    (Instrument::Motor, 0.1),
+    (Instrument::Scale, 0.1),
+    (Instrument::Grid, 0.1),
+    (Instrument::Radial, 0.1),
+    (Instrument::Length, 0.1),
+    (Instrument::Touch, 0.5),
+];
+/// Smooth deviation between runs that is assumed unless something else is said, µm: what machining centres
+/// in good repair show from run to run lies between a tenth and a half.
+const BETWEEN_RUNS_UM: f64 = 0.3;
+
+/// A floor as the command line has it: `grid=0.1/0.3`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FloorArgument {
+    instrument: Instrument,
+    floor: AssumedFloor,
+}
+
+/// Reads `INSTRUMENT=READING/BETWEEN` in µm.
+///
+/// # Errors
+/// Says what of it cannot be read.
+pub fn argument(text: &str) -> Result<FloorArgument, String> {
+    let form =
+        || format!("\"{text}\": INSTRUMENT=READING/BETWEEN in µm is needed, e.g. grid=0.1/0.3");
+    let (name, values) = text.split_once('=').ok_or_else(form)?;
+    let (reading, between) = values.split_once('/').ok_or_else(form)?;
+    let known = READING_UM.map(|(instrument, _)| instrument);
+    let instrument = known
+        .into_iter()
+        .find(|instrument| instrument.to_string() == name)
+        .ok_or_else(|| {
+            let names = known.map(|instrument| instrument.to_string());
+            format!("\"{name}\" is no instrument (known: {})", names.join(", "))
+        })?;
+    let number = |part: &str| match part.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err(format!("\"{part}\": must be a number above 0")),
+    };
+    Ok(FloorArgument {
+        instrument,
+        floor: AssumedFloor {
+            reading_um: number(reading)?,
+            between_runs_um: number(between)?,
+        },
+    })
+}
+
+/// Floors of all instruments: those said, else the probe's repeatability of the machine file and the usual.
+pub fn floors(machine: &MachineFile, said: &[FloorArgument]) -> Floors {
+    let usual = READING_UM.into_iter().map(|(instrument, reading_um)| {
+        let of_file = machine.probe.repeatability_um;
+        let is_probe = instrument == Instrument::Touch && of_file > 0.0;
+        let floor = AssumedFloor {
+            reading_um: if is_probe { of_file } else { reading_um },
+            between_runs_um: BETWEEN_RUNS_UM,
+        };
+        (instrument, floor)
+    });
+    let mut floors: Floors = usual.collect();
+    floors.extend(said.iter().map(|one| (one.instrument, one.floor)));
+    floors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_floor_names_an_instrument_and_two_numbers() {
+        let grid = argument("grid=0.2/0.5").unwrap();
+        assert_eq!(grid.instrument, Instrument::Grid);
+        assert_eq!(
+            grid.floor,
+            AssumedFloor {
+                reading_um: 0.2,
+                between_runs_um: 0.5
+            }
+        );
+        for (text, word) in [
+            ("grid", "INSTRUMENT=READING/BETWEEN"),
+            ("grid=0.2", "INSTRUMENT=READING/BETWEEN"),
+            ("plate=0.2/0.5", "known: motor, scale, grid"),
+            ("grid=-1/0.5", "above 0"),
+            ("grid=0.1/x", "above 0"),
+        ] {
+            let error = argument(text).unwrap_err();
+            assert!(error.contains(word), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_probes_repeatability_is_that_of_the_machine_file() {
+        const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
+        let machine = MachineFile::parse(MACHINE, "m").unwrap();
+        let floors = floors(&machine, &[argument("length=0.02/0.1").unwrap()]);
+        let reading = |instrument| floors[&instrument].reading_um;
+        assert!((reading(Instrument::Touch) - 0.3).abs() < 1e-12);
+        assert!((reading(Instrument::Length) - 0.02).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,232 @@
+//! Makes a run of what was recorded of it.
+
+use machine::twin::{Channel, Motion, Reading, Run, Touch};
+use metrology::PerAxis;
+use metrology::sample::{ProbeTrigger, TestSegment};
+
+use super::account::Reason;
+use super::builder::SessionBuilder;
+use super::channels::{Scope, Series, take_zero, touches_only};
+use super::error::SessionError;
+use super::motion::{of, thin, times_s, wanted};
+use super::nominal;
+use super::record::Record;
+use super::select::{Selection, index};
+use super::touching;
+
+/// A touch further from every tick than this has its own motion, s.
+const NEAR_S: f64 = 0.05;
+
+impl SessionBuilder {
+    /// Ends a run.
+    pub(super) fn close(&mut self, open: Record) {
+        self.account.note_many(Reason::TooLong, open.beyond_limit);
+        if open.compensation_broke_off() {
+            self.account.note(Reason::CompensationHeld);
+        }
+        // What is no motion was refused sample by sample before.
+        if let Ok(Some(run)) = self.run(open) {
+            self.runs.push(run);
+            self.closed += 1;
+        }
+    }
+
+    fn run(&mut self, open: Record) -> Result<Option<Run>, SessionError> {
+        if touches_only(open.segment.kind) && !is_followed(&open) {
+            return self.run_of_touches(&open);
+        }
+        let times = times_s(&open.ticks);
+        let motion = of(&open.ticks, times, self.axes)?;
+        let selection = Selection::of(&open.segment, &motion, open.lead_in, self.config.settle_s);
+        let block = self.block_of(&open.segment, selection.len());
+        let scope = Scope {
+            machine: &self.machine,
+            record: &open,
+            motion: &motion,
+        };
+        let mut series = scope.channels(&mut self.account);
+        for (_, readings) in &mut series {
+            *readings = selection.apply(readings, block);
+        }
+        take_zero(&mut self.zeros, &open, &mut series);
+        let touches = self.touches(&open, &motion);
+        let mut marks = vec![false; motion.len()];
+        wanted(&motion, &mut marks);
+        let places = series.iter().flat_map(|(_, readings)| readings);
+        for place in places.map(|raw| raw.place) {
+            marks[index(place)] = true;
+            if place.fract() > 0.0 && index(place) + 1 < marks.len() {
+                marks[index(place) + 1] = true;
+            }
+        }
+        for tick in touches.iter().filter_map(|(touch, _)| touch.tick) {
+            marks[tick] = true;
+        }
+        Ok(assemble(open.segment, &motion, &marks, series, touches))
+    }
+
+    /// A run whose motion was not recorded beyond where its touches were latched.
+    fn run_of_touches(&mut self, open: &Record) -> Result<Option<Run>, SessionError> {
+        let mut touches = self.touches(open, &Motion::default());
+        touches.sort_by(|a, b| a.0.time_s.total_cmp(&b.0.time_s));
+        let motion = touching::motion(&self.machine, self.axes, &mut touches)?;
+        let marks = vec![true; motion.len()];
+        let segment = open.segment.clone();
+        Ok(assemble(segment, &motion, &marks, vec![], touches))
+    }
+
+    /// How many neighbours make one reading: the same odd number in every repeat.
+    fn block_of(&mut self, segment: &TestSegment, n: usize) -> usize {
+        if let Some((_, block)) = self.blocks.iter().find(|(known, _)| alike(known, segment)) {
+            return *block;
+        }
+        let block = n.div_ceil(self.config.readings_per_run.max(1)).max(1) | 1;
+        self.blocks.push((segment.clone(), block));
+        block
+    }
+
+    /// Touches with their deviation (4); faces of blocks where there are none.
+    fn touches(&mut self, open: &Record, motion: &Motion) -> Vec<(Touch, f64)> {
+        let mut touches = vec![];
+        for (time_s, trigger) in &open.triggers {
+            let beyond = self.beyond(&trigger.feature_id, &trigger.latched, &trigger.approach);
+            let Some(deviation) = beyond else {
+                self.account.note(Reason::UnknownFeature);
+                continue;
+            };
+            let tick = nearest(open, trigger).filter(|tick| *tick < motion.len());
+            touches.push((
+                Touch {
+                    time_s: tick.map_or(*time_s, |tick| motion.time_s[tick]),
+                    feature_id: trigger.feature_id.clone(),
+                    approach: trigger.approach,
+                    feed_mm_s: trigger.feed_mm_s,
+                    position: trigger.latched,
+                    tick,
+                },
+                deviation,
+            ));
+        }
+        if touches.is_empty() && open.triggers.is_empty() {
+            for (time_s, feature, approach, positions) in &open.faces {
+                let touch = Touch {
+                    time_s: *time_s,
+                    feature_id: feature.clone(),
+                    approach: *approach,
+                    feed_mm_s: 0.0,
+                    position: *positions,
+                    tick: None,
+                };
+                let beyond = self.beyond(feature, positions, approach);
+                touches.extend(beyond.map(|deviation| (touch, deviation)));
+            }
+        }
+        touches
+    }
+
+    fn beyond(
+        &self,
+        feature: &str,
+        latched: &PerAxis<f64>,
+        approach: &nalgebra::Vector3<f64>,
+    ) -> Option<f64> {
+        nominal::beyond_surface_mm(&self.machine, &self.kinematics, feature, latched, approach)
+    }
+}
+
+/// The run with the marked ticks of its motion; none without a reading.
+fn assemble(
+    segment: TestSegment,
+    motion: &Motion,
+    marks: &[bool],
+    series: Vec<Series>,
+    touches: Vec<(Touch, f64)>,
+) -> Option<Run> {
+    let (thinned, kept) = thin(motion, marks);
+    let mut readings: Vec<Reading> = vec![];
+    for (channel, raws) in series {
+        readings.extend(raws.into_iter().map(|raw| {
+            let (at, fraction) = place_in(motion, &thinned, &kept, raw.place);
+            Reading {
+                channel: channel.clone(),
+                at,
+                fraction,
+                deviation: raw.deviation,
+            }
+        }));
+    }
+    let mut kept_touches = vec![];
+    for (mut touch, deviation) in touches {
+        touch.tick = touch.tick.map(|tick| kept[tick]);
+        readings.push(Reading {
+            channel: Channel::Touch,
+            at: kept_touches.len(),
+            fraction: 0.0,
+            deviation,
+        });
+        kept_touches.push(touch);
+    }
+    if readings.is_empty() {
+        return None;
+    }
+    Some(Run {
+        segment,
+        motion: thinned,
+        touches: kept_touches,
+        readings,
+    })
+}
+
+/// Tick nearest to a touch, by the controller's clock.
+fn nearest(open: &Record, trigger: &ProbeTrigger) -> Option<usize> {
+    let at = trigger.controller_at;
+    let after = open.ticks.partition_point(|tick| tick.controller_at <= at);
+    let before = after.checked_sub(1)?;
+    let off = |k: usize| {
+        let tick = open.ticks.get(k)?;
+        Some((tick.controller_at - at).nanos().abs())
+    };
+    match (off(before), off(after)) {
+        (Some(a), Some(b)) if b < a => Some(after),
+        _ => Some(before),
+    }
+}
+
+/// Whether the axis states tell how the axes went to each touch.
+fn is_followed(open: &Record) -> bool {
+    let is_near = |(_, trigger): &(f64, ProbeTrigger)| {
+        nearest(open, trigger).is_some_and(|tick| {
+            let off = open.ticks[tick].controller_at - trigger.controller_at;
+            off.as_secs_f64().abs() <= NEAR_S
+        })
+    };
+    if open.triggers.is_empty() {
+        return open.faces.is_empty();
+    }
+    open.triggers.iter().all(is_near)
+}
+
+/// Index and fraction in the thinned motion of a place in the full one.
+fn place_in(full: &Motion, thinned: &Motion, kept: &[usize], place: f64) -> (usize, f64) {
+    let k = index(place);
+    let time = |k: usize| full.time_s.get(k).copied();
+    let here = full.time_s[k];
+    let at_s = here + (time(k + 1).unwrap_or(here) - here) * place.fract();
+    let at = kept[k];
+    let before_s = thinned.time_s[at];
+    let fraction = thinned
+        .time_s
+        .get(at + 1)
+        .map_or(0.0, |after_s| (at_s - before_s) / (after_s - before_s));
+    (at, fraction.clamp(0.0, 1.0))
+}
+
+/// Whether two runs are repeats of one test.
+fn alike(a: &TestSegment, b: &TestSegment) -> bool {
+    a.kind == b.kind
+        && a.plane == b.plane
+        && a.stations == b.stations
+        && a.features == b.features
+        && (a.radius_mm - b.radius_mm).abs() < 1e-9
+        && (a.feed_mm_s - b.feed_mm_s).abs() < 1e-9
+}
