@@ -48,13 +48,15 @@ pub fn emit(interfaces: &Interfaces, own_package: &str) -> String {
 }
 
 /// The constants of an action that describe what ROS 2 derives from it, with the names' suffixes.
-const DERIVED: [(&str, &str); 7] = [
+const DERIVED: [(&str, &str); 9] = [
     ("SEND_GOAL", "_SendGoal"),
     ("SEND_GOAL_REQUEST", "_SendGoal_Request"),
     ("SEND_GOAL_RESPONSE", "_SendGoal_Response"),
+    ("SEND_GOAL_EVENT", "_SendGoal_Event"),
     ("GET_RESULT", "_GetResult"),
     ("GET_RESULT_REQUEST", "_GetResult_Request"),
     ("GET_RESULT_RESPONSE", "_GetResult_Response"),
+    ("GET_RESULT_EVENT", "_GetResult_Event"),
     ("FEEDBACK_MESSAGE", "_FeedbackMessage"),
 ];
 
@@ -74,6 +76,11 @@ fn emit_table(interfaces: &Interfaces, own_package: &str) -> String {
                 rows.insert(format!("{}{suffix}", action.full_name), row);
             }
         }
+    }
+    for service in &interfaces.services {
+        let path = rust_path(&service.full_name, own_package);
+        let row = format!("<{path} as crate::Service>::EVENT");
+        rows.insert(format!("{}_Event", service.full_name), row);
     }
     let rows: Vec<_> = rows.into_values().collect();
     format!(
@@ -211,12 +218,24 @@ fn emit_service(interfaces: &Interfaces, service: &Compound, own_package: &str) 
     let name = rust_name(&service.full_name);
     let part = |suffix: &str| rust_path(&format!("{}{suffix}", service.full_name), own_package);
     format!(
-        "{}#[derive(Clone, Copy, Debug, Default, PartialEq)]\npub struct {name};\nimpl crate::Service for {name} {{\ntype Request = {};\ntype Response = {};\nconst TYPE_NAME: &'static str = {:?};\nconst TYPE_HASH: &'static str = {:?};\n}}\n",
+        "{}#[derive(Clone, Copy, Debug, Default, PartialEq)]\npub struct {name};\nimpl crate::Service for {name} {{\ntype Request = {};\ntype Response = {};\nconst TYPE_NAME: &'static str = {:?};\nconst TYPE_HASH: &'static str = {:?};\n{}}}\n",
         doc_lines(&service.comment, None, &service.full_name),
         part("_Request"),
         part("_Response"),
         service.full_name,
         rihs01(interfaces, &interfaces.messages[&service.full_name]),
+        described(interfaces, "EVENT", &format!("{}_Event", service.full_name)),
+    )
+}
+
+/// A constant that describes a message that ROS 2 derives.
+fn described(interfaces: &Interfaces, constant: &str, full_name: &str) -> String {
+    let message = &interfaces.messages[full_name];
+    format!(
+        "const {constant}: crate::Description = crate::Description {{\ntype_name: {:?},\ntype_hash: {:?},\ndefinition: {:?},\n}};\n",
+        message.full_name,
+        rihs01(interfaces, message),
+        definition(interfaces, message)
     )
 }
 
@@ -240,16 +259,7 @@ fn emit_action(interfaces: &Interfaces, action: &Compound, own_package: &str) ->
         ),
     );
     for (constant, suffix) in DERIVED {
-        let message = &interfaces.messages[&full(suffix)];
-        put(
-            &mut out,
-            format_args!(
-                "const {constant}: crate::Description = crate::Description {{\ntype_name: {:?},\ntype_hash: {:?},\ndefinition: {:?},\n}};\n",
-                message.full_name,
-                rihs01(interfaces, message),
-                definition(interfaces, message)
-            ),
-        );
+        out.push_str(&described(interfaces, constant, &full(suffix)));
     }
     out.push_str("}\n");
     out

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::builtin_interfaces::msg::Time;
 use crate::unique_identifier_msgs::msg::UUID;
-use crate::{Action, Message, Service};
+use crate::{Action, Description, Message, Service};
 
 /// The service `<action>/_action/send_goal`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -93,6 +93,7 @@ impl<A: Action> Service for SendGoal<A> {
     type Response = SendGoalResponse<A>;
     const TYPE_NAME: &'static str = A::SEND_GOAL.type_name;
     const TYPE_HASH: &'static str = A::SEND_GOAL.type_hash;
+    const EVENT: Description = A::SEND_GOAL_EVENT;
 }
 
 impl<A: Action> Service for GetResult<A> {
@@ -100,4 +101,5 @@ impl<A: Action> Service for GetResult<A> {
     type Response = GetResultResponse<A>;
     const TYPE_NAME: &'static str = A::GET_RESULT.type_name;
     const TYPE_HASH: &'static str = A::GET_RESULT.type_hash;
+    const EVENT: Description = A::GET_RESULT_EVENT;
 }

@@ -45,7 +45,7 @@ pub fn description_of(type_name: &str) -> Option<&'static Description> {
 }
 
 /// A ROS 2 service.
-pub trait Service: Send + Sync + 'static {
+pub trait Service: Clone + Copy + Debug + Default + PartialEq + Send + Sync + 'static {
     /// What the client sends.
     type Request: Message;
     /// What the server answers.
@@ -54,6 +54,8 @@ pub trait Service: Send + Sync + 'static {
     const TYPE_NAME: &'static str;
     /// The RIHS01 hash of the whole service.
     const TYPE_HASH: &'static str;
+    /// The message on `<service>/_service_event`: [`crate::ServiceEvent`].
+    const EVENT: Description;
 }
 
 /// A ROS 2 action.
@@ -77,12 +79,16 @@ pub trait Action: Clone + Copy + Debug + Default + PartialEq + Send + Sync + 'st
     const SEND_GOAL_REQUEST: Description;
     /// Its response.
     const SEND_GOAL_RESPONSE: Description;
+    /// Its event.
+    const SEND_GOAL_EVENT: Description;
     /// The service `<action>/_action/get_result`.
     const GET_RESULT: Description;
     /// Its request.
     const GET_RESULT_REQUEST: Description;
     /// Its response.
     const GET_RESULT_RESPONSE: Description;
+    /// Its event.
+    const GET_RESULT_EVENT: Description;
     /// The message on `<action>/_action/feedback`.
     const FEEDBACK_MESSAGE: Description;
 }

@@ -24,6 +24,7 @@ mod motion;
 mod qos;
 mod segment;
 mod sensor;
+mod service_event;
 mod thermal;
 pub mod topics;
 mod touch;
@@ -38,6 +39,7 @@ pub use error::{Place, WireError};
 pub use interface::{Action, Description, Message, Service, description_of};
 pub use motion::joint_state;
 pub use qos::{Durability, Qos, Reliability};
+pub use service_event::{SERVICE_EVENT_SUFFIX, ServiceEvent};
 pub use wire::Wire;
 
 include!(concat!(env!("OUT_DIR"), "/interfaces.rs"));

@@ -40,7 +40,8 @@ fn val_jazzy_hashes_of_every_standard_message_are_equal() {
     let n_travelling = jazzy
         .keys()
         .filter(|name| {
-            name.contains("/msg/") || name.ends_with("_Request") || name.ends_with("_Response")
+            let parts = ["_Request", "_Response", "_Event"];
+            name.contains("/msg/") || parts.iter().any(|part| name.ends_with(part))
         })
         .count();
     // The parts of LookupTransform: goal, result, feedback and the feedback message.

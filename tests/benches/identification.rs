@@ -99,7 +99,8 @@ fn check(found: &Identification, peer: &PeerFigures) {
             (ours - beta).abs() < AGREEMENT * size,
             "{j}: {ours}, numpy {beta}"
         );
-        let our_u = found.covariance[(j, j)].sqrt() / found.scale[j];
+        // numpy takes the residuals as independent.
+        let our_u = (found.covariance[(j, j)] / found.variance_inflation).sqrt() / found.scale[j];
         assert!(
             (our_u / u - 1.0).abs() < AGREEMENT,
             "{j}: {our_u}, numpy {u}"

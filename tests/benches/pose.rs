@@ -6,7 +6,7 @@ use std::process::Stdio;
 use std::time::Instant;
 
 use axis_compensation::femtometre::{fm_from_mm, mm_from_fm};
-use axis_compensation::parts::parts_at;
+use axis_compensation::parts::thermal_parts_at;
 use axis_compensation::positioning::deviation_table::DeviationTable;
 use axis_compensation::positioning::direction::Direction;
 use machine::volumetric::{VolumetricModel, components_of};
@@ -180,8 +180,9 @@ fn offsets_mm(of: &Compensation) -> [f64; 3] {
     let tool_mm = Vector3::from(TOOL_OFFSET_MM);
     let geometric = of.geometry.command_offset(&positions, &tool_mm).unwrap();
     let p_mm = positions.xyz();
+    let thermal = thermal_parts_at(&of.thermal, &p_mm, at, Extrapolate::Hold);
     Axis::LINEAR.map(|axis| {
-        let mut parts = parts_at(&of.thermal, axis, &p_mm, at, Extrapolate::Hold).unwrap();
+        let mut parts = thermal[axis.index()].unwrap();
         let commanded_fm = fm_from_mm(positions[axis]).unwrap();
         let table = &of.positioning[axis.index()];
         parts.positioning = -mm_from_fm(table.deviation_fm(commanded_fm, Some(Direction::Up)));

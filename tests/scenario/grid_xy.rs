@@ -9,6 +9,7 @@ use metrology::sample::{GridSample, TestPlane, TestSegment};
 use recorder::Bag;
 use serde_json::Value;
 
+use crate::grid_truth::judge;
 use crate::recorded::{all, tests};
 
 /// The longest that a run and its page may take on two cores.
@@ -48,6 +49,12 @@ fn every_reading_of_grid_xy_is_of_its_segment_and_its_page_marks_what_one_circle
     // What `abbe preflight` says of the plan.
     let model = all(&bag, &topics::GEOMETRY_MODEL).pop().unwrap();
     assert_eq!(model.rank, 33);
+    let judged = judge(&scenario, &bag);
+    judged.print("grid_xy");
+    // Cubic functions leave 6 µm of this plant at the outer plates.
+    assert_eq!(judged.determined.len(), 15);
+    assert!(judged.held() >= 6, "{} of 15", judged.held());
+    assert!(judged.beyond_mm() < 0.006, "{}", judged.beyond_mm());
 
     let text = std::fs::read_to_string(run.join("report.json")).unwrap();
     let report: Value = serde_json::from_str(&text).unwrap();

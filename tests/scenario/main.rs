@@ -10,8 +10,8 @@
 mod bad_plan;
 mod blocks;
 mod cell;
-mod equal_bytes;
 mod five_axis;
+mod grid_truth;
 mod grid_xy;
 mod positioning;
 mod preflight;

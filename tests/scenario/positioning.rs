@@ -94,11 +94,11 @@ fn a_learned_table_takes_the_screw_out_of_a_semi_closed_axis_and_follows_its_gro
     );
     // The screw grew in that hour, or nothing is shown.
     assert!(semi_warm > 2.0 * semi_cold, "{p95_um:?}");
-    assert!(dual_cold < 0.5 * semi_cold, "{p95_um:?}");
-    assert!(dual_warm < 0.5 * semi_warm, "{p95_um:?}");
+    assert!(dual_cold < 0.25 * semi_cold, "{p95_um:?}");
+    assert!(dual_warm < 0.1 * semi_warm, "{p95_um:?}");
     // What no scale on X sees is in the true error as well.
     assert!(truths[1] < 0.75 * truths[0], "{truths:?}");
-    assert!(truths[2] < 0.55 * truths[3], "{truths:?}");
+    assert!(truths[2] < 0.35 * truths[3], "{truths:?}");
 }
 
 #[test]

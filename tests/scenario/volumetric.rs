@@ -28,9 +28,11 @@ use metrology::drift::Extrapolate;
 use metrology::sample::Sense;
 use metrology::{Axis, ErrorComponent, PerAxis, Stamp};
 use nalgebra::{DMatrix, DVector, Vector3};
+use recorder::Bag;
 use sequencer::{GridStep, GridTrajectory, Plan, Step};
 use serde_json::Value;
 
+use crate::grid_truth::judge;
 use abbe_tests::program::root;
 use abbe_tests::scenario::Scenario;
 
@@ -59,8 +61,11 @@ fn positions(p_mm: &Vector3<f64>) -> PerAxis<f64> {
 #[test]
 fn scenario_volumetric_error_is_reduced_tenfold() {
     let began = Instant::now();
-    let report = Scenario::copy_of("volumetric").run_for_report();
+    let scenario = Scenario::copy_of("volumetric");
+    let run = scenario.run();
     let took = began.elapsed();
+    let report = std::fs::read_to_string(run.join("report.json")).unwrap();
+    let report: Value = serde_json::from_str(&report).unwrap();
     let verified = report["verification"]["verifications"].as_array().unwrap();
     let p95_um = |label: &str| {
         let one = verified.iter().find(|one| one["label"] == label).unwrap();
@@ -83,6 +88,12 @@ fn scenario_volumetric_error_is_reduced_tenfold() {
         "{without:?} {with:?}"
     );
     assert!(took < LIMIT, "{took:?}");
+    let judged = judge(&scenario, &Bag::open(run.join("bag")).unwrap());
+    judged.print("volumetric");
+    let (held, all) = (judged.held(), judged.determined.len());
+    assert!(all >= 150 && 10 * held >= 6 * all, "{held} of {all}");
+    // An hour of heat lies between the plant at rest and the measurement.
+    assert!(judged.beyond_mm() < 0.0015, "{}", judged.beyond_mm());
 }
 
 /// The scenario's plant at rest and cold, measured stop by stop.

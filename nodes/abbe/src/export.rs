@@ -14,10 +14,13 @@ use machine::export::selection::{Control, Fanuc, Selected, Sinumerik, Wanted, se
 use machine::export::sinumerik::OtherAxes;
 use machine::export::{ExportFile, Unestimable};
 use metrology::{Axis, AxisSet, PerAxis};
+use recorder::Bag;
+
+use crate::evaluate::Tests;
 
 mod found;
 
-use found::{Found, looked_for, read};
+use found::{Found, looked_for, read, tables_of_stops};
 
 /// Controls that tables are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -98,6 +101,9 @@ pub struct Export {
     /// Keep the error at the reference point instead of counting from it.
     #[arg(long)]
     absolute: bool,
+    /// Where no positioning run gave a table, make one of the stops of a verification along one axis, as its scale or the control read them.
+    #[arg(long)]
+    stops: bool,
     /// Use components although the recordings do not determine them by themselves.
     #[arg(long)]
     accept_unestimable: bool,
@@ -226,10 +232,14 @@ impl Export {
             return Ok(ExitCode::from(USAGE));
         };
         let Found {
-            measured,
+            mut measured,
             losses,
             topics,
         } = read(&self.bag)?;
+        if self.stops {
+            let tests = Tests::of(&Bag::open(&self.bag)?)?;
+            tables_of_stops(&tests.stops, &mut measured);
+        }
         let selected = select(&measured, &self.wanted(), &self.set_up.control(format));
         for left in &selected.left_out {
             println!("left out: {}: {}", left.what, left.why);

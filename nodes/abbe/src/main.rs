@@ -10,6 +10,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use node_runtime::complaint;
 
+mod check;
 mod diagnose;
 mod evaluate;
 mod evidence;
@@ -40,6 +41,8 @@ enum Verb {
     Run(run::Run),
     /// Evaluate the tests that a bag holds.
     Report(report_bag::ReportBag),
+    /// Compute a bag's results again from its inputs and compare them byte for byte.
+    Check(check::Check),
     /// Say where simulator and machine differ, which effect causes it, and how far it shrinks.
     Diagnose(diagnose::Diagnose),
     /// Tell what a plan's recordings will determine, before they are made, and what to add.
@@ -58,6 +61,7 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().verb {
         Verb::Run(run) => run.execute(),
         Verb::Report(report) => report.execute(),
+        Verb::Check(check) => check.execute(),
         Verb::Diagnose(diagnose) => diagnose.execute(),
         Verb::Preflight(preflight) => preflight.execute(),
         Verb::Record(record) => record.execute(),

@@ -104,6 +104,14 @@ impl Report {
         text
     }
 
+    /// This report with another section behind it; its figures as `key`.
+    pub fn add(&mut self, key: &str, section: &section::Section) {
+        self.text.push('\n');
+        self.text.push_str(&section.terminal());
+        self.body = maud::html! { (self.body) (section.html()) };
+        self.figures[key] = section.figures.clone();
+    }
+
     /// This report with the diagnosis of its bag behind it.
     pub fn join_gap(&mut self, gap: &Self) {
         self.text.push_str("\n\n");

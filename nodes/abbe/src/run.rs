@@ -12,6 +12,7 @@ use crate::diagnose;
 use crate::evaluate::Tests;
 use crate::evidence::Evidence;
 use crate::report::Report;
+use crate::report::section::Section;
 use crate::report_bag;
 use crate::scenario::{ReportKind, Scenario};
 
@@ -20,6 +21,9 @@ mod composed;
 mod live;
 mod mirror;
 mod shortcomings;
+mod table_trial;
+
+use table_trial::TableTrial;
 
 /// Arguments of `abbe run`.
 #[derive(Args)]
@@ -77,7 +81,7 @@ impl Run {
         let interruption = Interruption::listen("the bag is closed, no page is written")?;
         let folder = new_folder(&self.runs, &scenario.name)?;
         let bag = folder.join("bag");
-        let outcome = match scenario.file.simulated_start_s {
+        let mut outcome = match scenario.file.simulated_start_s {
             Some(start_s) if !self.separate => {
                 let how = composed::How {
                     pace: self.pace,
@@ -100,6 +104,13 @@ impl Run {
             let tests = Tests::of(&Bag::open(&bag)?)?;
             report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
         }
+        if outcome.failure.is_none() {
+            match self.try_table(&scenario, &folder, &interruption) {
+                Ok(Some(section)) => report.add("linuxcnc_table", &section),
+                Ok(None) => {}
+                Err(error) => outcome.failure = Some(format!("{error:#}")),
+            }
+        }
         if scenario.file.diagnose && outcome.recorded > 0 {
             let machine = scenario.folder.join("machine.yaml");
             report.join_gap(&diagnose::of_run(&bag, &folder, &machine)?);
@@ -111,6 +122,25 @@ impl Run {
         println!("Bag:  {}", outcome.kept(&bag));
         println!("Page: {}", folder.join("report.html").display());
         Ok(outcome.end())
+    }
+
+    fn try_table(
+        &self,
+        scenario: &Scenario,
+        folder: &Path,
+        interruption: &Interruption,
+    ) -> Result<Option<Section>> {
+        let Some(table) = &scenario.file.linuxcnc_table else {
+            return Ok(None);
+        };
+        let trial = TableTrial {
+            scenario,
+            table,
+            folder,
+            separate: self.separate,
+            interruption,
+        };
+        trial.run(&folder.join("bag")).map(Some)
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
+use metrology::Axis;
 use node_runtime::complaint;
 use serde::Deserialize;
 
@@ -25,6 +26,19 @@ pub struct ScenarioFile {
     pub simulated_start_s: Option<i64>,
     /// Longest simulated (or real) time that the plan may take.
     pub limit_min: f64,
+    /// A table made of the run's own stops, which LinuxCNC then loads in two more runs.
+    #[serde(default)]
+    pub linuxcnc_table: Option<LinuxcncTable>,
+}
+
+/// A screw-compensation file that is tried on the control that it is made for.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinuxcncTable {
+    /// The axis.
+    pub axis: Axis,
+    /// The file that its INI file names, of type 0, below the scenario's folder.
+    pub loads: PathBuf,
 }
 
 /// Which page a run ends with.

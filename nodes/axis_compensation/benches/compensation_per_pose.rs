@@ -1,7 +1,7 @@
 //! Time per pose: thermal and positioning parts alone, and a whole servo tick of three axes.
 
 use axis_compensation::femtometre::{fm_from_mm, mm_from_fm};
-use axis_compensation::parts::parts_at;
+use axis_compensation::parts::thermal_parts_at;
 use axis_compensation::positioning::config::PositioningConfig;
 use axis_compensation::positioning::deviation_table::DeviationTable;
 use axis_compensation::positioning::direction::Direction;
@@ -59,7 +59,7 @@ fn thermal_part(bencher: Bencher<'_, '_>) {
     bencher.bench_local(|| {
         let p_mm = black_box(Vector3::new(12.0, -34.0, 56.0));
         let at = black_box(Stamp::from_nanos(400_000_000_000));
-        Axis::LINEAR.map(|axis| parts_at(&model, axis, &p_mm, at, Extrapolate::Hold))
+        thermal_parts_at(&model, &p_mm, at, Extrapolate::Hold)
     });
 }
 

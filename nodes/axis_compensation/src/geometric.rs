@@ -11,6 +11,10 @@
 //! the tip is compensated, the tool's orientation is not. The linear axes' positions are those of the
 //! machine file's functional point; t = `tool_offset_mm` leads from it to the tip that works.
 //!
+//! Reversal error is none of it: a geometric model is a function of position alone, and what `grid_encoder` finds as lost motion is an unknown of
+//! its fit that no message carries. It is compensated in the positioning part, by a table whose directions are `apart`.
+//! Of a rotary axis it is not compensated at all.
+//!
 //! A model is kept back when it changes the tip's error by more than `jump_limit_um` anywhere on a grid of
 //! the ends and middles of the axes' travel (2), until the next one, with another number, is
 //! like it. The first model of its kind has nothing to be compared with; the limits of the axes hold for it

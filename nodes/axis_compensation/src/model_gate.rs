@@ -22,7 +22,7 @@
 //! one in use lies in the future, the clock was set back and says nothing of their order.
 
 use metrology::drift::{
-    DriftRefusal, Extrapolate, axis_drift_at, axis_drift_whenever, drift_standard_uncertainty_mm,
+    DriftRefusal, Extrapolate, axis_drift_whenever, drift_at, drift_standard_uncertainty_mm,
 };
 use metrology::sample::{AxisDrift, ThermalModel};
 use metrology::{Axis, Host, PerAxis, Stamp};
@@ -119,19 +119,27 @@ impl ModelGate {
         self.limits.policy
     }
 
-    /// Drift of `axis` by the model in use, mm. Allocates nothing.
+    /// Drifts of X, Y and Z by the model in use, mm. Allocates nothing.
     ///
     /// # Errors
     /// When there is no model, when (2) refuses the axis, or when the model gives no drift there.
-    pub fn drift_mm(
+    pub fn drifts_mm(
         &self,
-        axis: Axis,
         point_mm: &Vector3<f64>,
         at: Stamp<Host>,
-    ) -> Result<f64, DriftRefusal> {
-        let model = self.current.as_ref();
-        let model = model.ok_or(DriftRefusal::NotModelled { axis })?;
-        let drift_mm = axis_drift_at(model, axis, point_mm, at, self.limits.policy)?;
+    ) -> [Result<f64, DriftRefusal>; 3] {
+        let Some(model) = &self.current else {
+            return Axis::LINEAR.map(|axis| Err(DriftRefusal::NotModelled { axis }));
+        };
+        let mut drifts_mm = drift_at(model, point_mm, at, self.limits.policy);
+        for (axis, drift_mm) in Axis::LINEAR.into_iter().zip(&mut drifts_mm) {
+            *drift_mm = drift_mm.and_then(|drift_mm| self.certain(axis, drift_mm));
+        }
+        drifts_mm
+    }
+
+    /// (2).
+    fn certain(&self, axis: Axis, drift_mm: f64) -> Result<f64, DriftRefusal> {
         let (expanded_mm, limit_mm) = (self.expanded_mm[axis], self.limits.expanded_uncertainty_mm);
         if expanded_mm > limit_mm {
             return Err(DriftRefusal::TooUncertain {
@@ -508,8 +516,9 @@ mod tests {
             let gate = &mut gate_with(policy);
             assert_eq!(offer(gate, uncertain(slope_u)), Passage::Accepted);
             let origin = Vector3::zeros();
-            assert_eq!(gate.drift_mm(Axis::Y, &origin, at(0)), Ok(0.010));
-            gate.drift_mm(Axis::X, &origin, at(0))
+            let [x, y, _] = gate.drifts_mm(&origin, at(0));
+            assert_eq!(y, Ok(0.010));
+            x
         };
         // 2 √(1² + (320 · 0.0153)²) µm is just below 10 µm, a little more is above.
         assert_eq!(judged(Extrapolate::Linear, 1.53e-5), Ok(0.010));

@@ -14,9 +14,9 @@
 use std::mem::discriminant;
 
 use machine::volumetric::PoseRefusal;
-use metrology::drift::{DriftRefusal, Extrapolate, axis_drift_at};
+use metrology::drift::{DriftRefusal, Extrapolate, drift_at};
 use metrology::sample::ThermalModel;
-use metrology::{Axis, Host, Stamp};
+use metrology::{Host, Stamp};
 use nalgebra::Vector3;
 
 use crate::positioning::refusal::PositioningRefusal;
@@ -83,19 +83,17 @@ impl PartRefusal {
     }
 }
 
-/// Parts for `axis` at a commanded pose; allocates nothing.
-///
-/// # Errors
-/// When the thermal model gives no drift there.
-pub fn parts_at(
+/// Thermal parts of X, Y and Z at a commanded pose; allocates nothing.
+pub fn thermal_parts_at(
     model: &ThermalModel,
-    axis: Axis,
     commanded_mm: &Vector3<f64>,
     at: Stamp<Host>,
     policy: Extrapolate,
-) -> Result<Parts, DriftRefusal> {
-    Ok(Parts {
-        thermal: axis_drift_at(model, axis, commanded_mm, at, policy)?,
-        ..Parts::default()
+) -> [Result<Parts, DriftRefusal>; 3] {
+    drift_at(model, commanded_mm, at, policy).map(|drift_mm| {
+        drift_mm.map(|thermal| Parts {
+            thermal,
+            ..Parts::default()
+        })
     })
 }

@@ -96,6 +96,9 @@ enum Shutdown {
     Done,
 }
 
+/// Drifts of X, Y and Z where they stand, mm.
+type Drifts = [Result<f64, DriftRefusal>; 3];
+
 /// How long the offsets acted since the last tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Elapsed {
@@ -252,11 +255,12 @@ impl AxisCompensationStage {
             remainder: PerAxis::default(),
             state: PerAxis::default(),
         };
+        let thermal = commanded_mm.map(|p_mm| self.gate.drifts_mm(p_mm, at));
         for axis in Axis::ALL {
             let Some(mut compensated) = self.states[axis] else {
                 continue;
             };
-            let (parts, wanted) = self.wanted(axis, at, commanded_mm);
+            let (parts, wanted) = self.wanted(axis, thermal.as_ref());
             if let (Wanted::Offset(_), Some(p_mm)) = (wanted, commanded_mm) {
                 self.watch_span(axis, p_mm, out);
             }
@@ -284,28 +288,23 @@ impl AxisCompensationStage {
         self.report_faded_out(out);
     }
 
-    /// The parts of one axis' offset. A part of which nothing was ever said is zero beside another.
-    fn parts(
-        &self,
-        axis: Axis,
-        at: Stamp<Host>,
-        commanded_mm: Option<&Vector3<f64>>,
-    ) -> Result<Parts, PartRefusal> {
+    /// The parts of one axis' offset; `thermal`: the drifts where the axes stand, none while that is not known. A part of which nothing was ever said is zero beside another.
+    fn parts(&self, axis: Axis, thermal: Option<&Drifts>) -> Result<Parts, PartRefusal> {
         let dual_loop = self.positioning[axis]
             .as_ref()
-            .filter(|_| commanded_mm.is_some());
+            .filter(|_| thermal.is_some());
         let positioning = dual_loop.map_or(Ok(None), DualLoop::offset_mm)?;
         let adds_thermal = dual_loop.is_none_or(DualLoop::adds_thermal);
         let geometric = self
             .geometric
             .as_ref()
-            .filter(|_| commanded_mm.is_some())
+            .filter(|_| thermal.is_some())
             .map_or(Ok(None), |geometric| geometric.offset_mm(axis))
             .map_err(|source| PartRefusal::Geometric { source })?;
-        let thermal = match commanded_mm {
-            Some(p_mm) if adds_thermal => self.gate.drift_mm(axis, p_mm, at),
-            _ => Err(DriftRefusal::NotModelled { axis }),
-        };
+        let thermal = thermal
+            .filter(|_| adds_thermal)
+            .and_then(|drifts| drifts.get(axis.index()).copied())
+            .unwrap_or(Err(DriftRefusal::NotModelled { axis }));
         let speaks = geometric.is_some() || positioning.is_some();
         let thermal = match thermal {
             Err(DriftRefusal::NotModelled { .. }) if speaks => 0.0,
@@ -318,13 +317,8 @@ impl AxisCompensationStage {
         })
     }
 
-    fn wanted(
-        &self,
-        axis: Axis,
-        at: Stamp<Host>,
-        commanded_mm: Option<&Vector3<f64>>,
-    ) -> (Parts, Wanted) {
-        let parts = self.parts(axis, at, commanded_mm);
+    fn wanted(&self, axis: Axis, thermal: Option<&Drifts>) -> (Parts, Wanted) {
+        let parts = self.parts(axis, thermal);
         let is_on = self.enabled && self.shutdown == Shutdown::No;
         match parts {
             Ok(parts) if is_on => (parts, Wanted::Offset(parts.sum())),

@@ -263,6 +263,11 @@ fn judged(
         .map(|place| !is_closed && is_beaten(scope, signatures, best, place))
         .collect();
     let unexplained = (after - freedom).max(0.0);
+    let instances: BTreeSet<usize> = best
+        .set
+        .iter()
+        .map(|form| signatures.forms[*form].instance)
+        .collect();
     let member = |(place, form): (usize, &usize)| {
         let instance = signatures.forms[*form].instance;
         let estimate = best.refit.estimates[place].clone();
@@ -271,6 +276,7 @@ fn judged(
         let cancels = estimate.d.powi(2) > MOST_CANCELLING * (before - after);
         let holds = !cancels
             && !beaten[place]
+            && rivals.is_needed(&instances, instance)
             && among.is_some_and(|k| {
                 confirmed[k] && (is_closed || gains[k] >= LEAST_RATIO * unexplained)
             });

@@ -50,6 +50,15 @@ impl Rivals {
         own.map(|(_, score)| weight(score)).sum::<f64>() / all
     }
 
+    /// Whether a set without this member, and with nothing in its place, is worse by the odds that exclude a rival. A
+    /// member that is barely worth its price is what chance brings.
+    pub fn is_needed(&self, best: &BTreeSet<usize>, instance: usize) -> bool {
+        let mut without = best.clone();
+        without.remove(&instance);
+        let less = self.sets.get(&without);
+        less.is_none_or(|score| *score > self.best + 2.0 * ODDS.ln())
+    }
+
     /// Instances that stand in sets nearly as good that do without this one.
     pub fn instead_of(&self, instance: usize) -> BTreeSet<usize> {
         let near = |score: &f64| *score <= self.best + 2.0 * ODDS.ln();

@@ -139,7 +139,7 @@ pub struct Identification {
     pub n_coefficients: usize,
     /// β of (1), minimum norm in units of the span; own units. Turns of plates and offsets include what was taken out.
     pub values: DVector<f64>,
-    /// cov(β) of (1).
+    /// cov(β) of (1), times `variance_inflation`.
     pub covariance: DMatrix<f64>,
     /// Verdict per unknown.
     pub visibility: Vec<Visibility>,
@@ -169,6 +169,9 @@ pub struct Identification {
     pub n_outliers: usize,
     /// Whether what is left is noise.
     pub judgement: Judgement,
+    /// By what the covariance is greater than if residuals were independent: (3) of `judge`, 1 where they are, or where the
+    /// stated uncertainties are taken as right.
+    pub variance_inflation: f64,
     /// Least and greatest recorded position per axis.
     pub spans: PerAxis<(f64, f64)>,
     /// g of (3) by recording.

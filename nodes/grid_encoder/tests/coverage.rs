@@ -321,6 +321,12 @@ fn a_machine_whose_errors_are_waves_is_told_to_lack_fit() {
         flagged[0] += usize::from(of_cubic.judgement.lacks_something(0.001));
         flagged[1] += usize::from(of_waves.judgement.lacks_something(0.001));
         assert!(of_waves.noise_ratio > 3.0, "{}", of_waves.noise_ratio);
+        assert!(
+            of_waves.variance_inflation > 1.2,
+            "{}",
+            of_waves.variance_inflation
+        );
+        assert!((of_cubic.variance_inflation - 1.0).abs() < 1e-12);
         if seed == 0 {
             println!(
                 "cubic {:?}\nwaves {:?}, noise ratio {}",

@@ -21,6 +21,7 @@ use crate::node::{Bytes, Emission, Event, GoalId, GoalStatus, Node, TopicPort};
 
 mod compose;
 mod deliver;
+mod replay;
 
 pub use compose::ComposeError;
 
@@ -113,6 +114,8 @@ pub struct Harness {
     /// Per node, publication port to place in `routes`.
     publications: Vec<Vec<usize>>,
     service_servers: BTreeMap<String, End>,
+    /// By service: the route of its events.
+    service_events: BTreeMap<String, usize>,
     action_servers: BTreeMap<String, End>,
     timers: BinaryHeap<Reverse<(Stamp<Host>, usize, usize)>>,
     periods: Vec<Vec<Span>>,
@@ -158,14 +161,11 @@ impl Harness {
     pub fn advance(&mut self) -> Option<Stamp<Host>> {
         let &Reverse((due, ..)) = self.timers.peek()?;
         self.now = due;
-        while let Some(&Reverse((at, node, timer))) = self.timers.peek() {
+        while let Some(&Reverse((at, ..))) = self.timers.peek() {
             if at != due {
                 break;
             }
-            self.timers.pop();
-            self.timers
-                .push(Reverse((at + self.periods[node][timer], node, timer)));
-            self.hand(node, Event::Timer { timer });
+            self.tick_next();
             self.drain();
         }
         Some(due)
@@ -225,9 +225,7 @@ impl Harness {
 
     /// Asks every node to stop and advances until all have, or until `patience` has passed; true if all have.
     pub fn shutdown(&mut self, patience: Span) -> bool {
-        for node in 0..self.nodes.len() {
-            self.inbox.push_back(Delivery::Shutdown { node });
-        }
+        self.ask_to_stop();
         self.drain();
         let deadline = self.now + patience;
         while !self.stopped.iter().all(|stopped| *stopped) {

@@ -7,7 +7,8 @@
 
 use std::sync::Arc;
 
-use abbe_msgs::Qos;
+use abbe_msgs::service_msgs::msg::ServiceEventInfo;
+use abbe_msgs::{Description, Qos, Service, ServiceEvent, WireError, from_cdr, to_cdr};
 use metrology::stamp::{Host, Span, Stamp};
 
 use crate::diagnostic::Diagnostic;
@@ -40,6 +41,48 @@ pub struct TopicPort {
     pub qos: Qos,
 }
 
+/// How the calls of a service are told on `<service>/_service_event`.
+#[derive(Clone, Copy, Debug)]
+pub struct ServiceEvents {
+    /// The message.
+    pub description: Description,
+    /// Forms the message that a request was sent, out of the serialised request.
+    pub sent: fn(ServiceEventInfo, &[u8]) -> Result<Bytes, WireError>,
+    /// The serialised request in such a message; `None`: it tells of another step.
+    pub request: fn(&[u8]) -> Result<Option<Bytes>, WireError>,
+}
+
+impl PartialEq for ServiceEvents {
+    fn eq(&self, other: &Self) -> bool {
+        self.description == other.description
+    }
+}
+
+impl ServiceEvents {
+    /// Of the calls of the service `V`.
+    #[must_use]
+    pub fn of<V: Service>() -> Self {
+        Self {
+            description: V::EVENT,
+            sent: |info, request| {
+                let request = vec![from_cdr(request)?];
+                let event = ServiceEvent::<V> {
+                    info,
+                    request,
+                    response: Vec::new(),
+                };
+                Ok(Arc::from(to_cdr(&event)))
+            },
+            request: |bytes| {
+                let event: ServiceEvent<V> = from_cdr(bytes)?;
+                let is_sent = event.info.event_type == ServiceEventInfo::REQUEST_SENT;
+                let request = event.request.first().filter(|_| is_sent);
+                Ok(request.map(|request| Arc::from(to_cdr(request))))
+            },
+        }
+    }
+}
+
 /// A service end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServicePort {
@@ -47,6 +90,8 @@ pub struct ServicePort {
     pub service: String,
     /// Type, e.g. `std_srvs/srv/SetBool`.
     pub type_name: &'static str,
+    /// How its calls are told.
+    pub events: ServiceEvents,
 }
 
 /// An action end.

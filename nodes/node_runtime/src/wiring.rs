@@ -25,7 +25,7 @@ use metrology::stamp::{Host, Span, Stamp};
 
 use crate::diagnostic::Diagnostic;
 use crate::node::{
-    Bytes, Emission, Event, Node, NodeFault, PATIENCE, Ports, ServicePort, TopicPort,
+    Bytes, Emission, Event, Node, NodeFault, PATIENCE, Ports, ServiceEvents, ServicePort, TopicPort,
 };
 use crate::parameter::Parameter;
 
@@ -229,6 +229,7 @@ where
         self.ports.services.push(ServicePort {
             service: service.name.to_owned(),
             type_name: V::TYPE_NAME,
+            events: ServiceEvents::of::<V>(),
         });
         self.services.push((
             Box::new(move |bytes| decode::<V::Request>(bytes).map(&request)),
@@ -249,6 +250,7 @@ where
         self.ports.clients.push(ServicePort {
             service: service.name.to_owned(),
             type_name: V::TYPE_NAME,
+            events: ServiceEvents::of::<V>(),
         });
         self.emitters.push(Box::new(move |output, out| {
             if let Some((id, request)) = call(output) {

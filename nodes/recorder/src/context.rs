@@ -17,10 +17,44 @@ use crate::read::Bag;
 const RUN_RECORD: &str = "abbe.run";
 /// Name of the metadata record with the hashes.
 const HASHES_RECORD: &str = "abbe.attachments";
+/// Name of the metadata record with the nodes, in the order in which they were composed.
+pub const NODES_RECORD: &str = "abbe.nodes";
+/// Name of the metadata record at the end of a run.
+pub const END_RECORD: &str = "abbe.end";
 /// Prefix of the metadata records with parameters.
 const PARAMETERS_PREFIX: &str = "abbe.parameters.";
 /// Keys under which a plant's true state would stand.
 const TRUTH_KEYS: [&str; 3] = ["plant", "truth", "plant_truth"];
+
+/// In which order the messages of a bag stand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MessageOrder {
+    /// As they reached the recorder.
+    #[default]
+    Arrival,
+    /// As they happened: the one order in which a composed run delivered them.
+    Total,
+}
+
+impl MessageOrder {
+    /// Its name in the bag.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Arrival => "arrival",
+            Self::Total => "total",
+        }
+    }
+}
+
+/// A node of a run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunNode {
+    /// Its name on the graph.
+    pub name: String,
+    /// Which node it is.
+    pub executable: String,
+}
 
 /// The context of one run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -41,6 +75,10 @@ pub struct RunContext {
     pub programs: BTreeMap<String, String>,
     /// Resolved parameters of each node as YAML text, by node name.
     pub parameters: BTreeMap<String, String>,
+    /// The nodes in the order in which they were composed.
+    pub nodes: Vec<RunNode>,
+    /// In which order the messages stand.
+    pub order: MessageOrder,
 }
 
 /// One text on its way into the file.
@@ -117,6 +155,7 @@ impl RunContext {
             ),
             ("scenario".to_owned(), self.scenario_name.clone()),
             ("commit".to_owned(), self.commit.clone()),
+            ("order".to_owned(), self.order.name().to_owned()),
         ]);
         if let Some(seed) = self.seed {
             run.insert("seed".to_owned(), seed.to_string());
@@ -129,6 +168,14 @@ impl RunContext {
             (RUN_RECORD.to_owned(), run),
             (HASHES_RECORD.to_owned(), hashes),
         ];
+        if !self.nodes.is_empty() {
+            let told = |(place, node): (usize, &RunNode)| {
+                let value = format!("{} {}", node.name, node.executable);
+                (format!("{place:03}"), value)
+            };
+            let nodes = self.nodes.iter().enumerate().map(told).collect();
+            records.push((NODES_RECORD.to_owned(), nodes));
+        }
         for (node, text) in &self.parameters {
             let tree = yaml_tree(&format!("params/{node}.yaml"), text)?;
             let mut flat = BTreeMap::new();
@@ -136,6 +183,55 @@ impl RunContext {
             records.push((format!("{PARAMETERS_PREFIX}{node}"), flat));
         }
         Ok(records)
+    }
+}
+
+/// What a bag tells of the run that it was recorded from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RecordedRun {
+    /// When the run began, on the clock of the log times, ns.
+    pub start_time_nanos: u64,
+    /// Name of the scenario, empty where there was none.
+    pub scenario_name: String,
+    /// Commit of the software.
+    pub commit: String,
+    /// In which order the messages stand.
+    pub order: MessageOrder,
+    /// The nodes in the order in which they were composed.
+    pub nodes: Vec<RunNode>,
+    /// When the nodes were asked to stop, ns; `None`: the bag does not know.
+    pub stop_time_nanos: Option<u64>,
+}
+
+impl RecordedRun {
+    /// Key of the time at which nodes were asked to stop, in [`END_RECORD`].
+    pub const STOP_KEY: &'static str = "stop_time_ns";
+
+    /// Reads it out of a bag; `None` where the bag has no such record.
+    #[must_use]
+    pub fn of(bag: &Bag) -> Option<Self> {
+        let run = bag.metadata(RUN_RECORD)?;
+        let text = |key: &str| run.get(key).cloned().unwrap_or_default();
+        let node = |told: &String| {
+            let (name, executable) = told.split_once(' ')?;
+            Some(RunNode {
+                name: name.to_owned(),
+                executable: executable.to_owned(),
+            })
+        };
+        let nodes = bag.metadata(NODES_RECORD);
+        let end = bag.metadata(END_RECORD);
+        Some(Self {
+            start_time_nanos: text("start_time_ns").parse().ok()?,
+            scenario_name: text("scenario"),
+            commit: text("commit"),
+            order: match text("order").as_str() {
+                "total" => MessageOrder::Total,
+                _ => MessageOrder::Arrival,
+            },
+            nodes: nodes.map_or_else(Vec::new, |told| told.values().filter_map(node).collect()),
+            stop_time_nanos: end.and_then(|end| end.get(Self::STOP_KEY)?.parse().ok()),
+        })
     }
 }
 

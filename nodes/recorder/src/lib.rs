@@ -33,7 +33,10 @@ mod split;
 pub use channel::{Channel, ChannelId, Durability, History, Liveliness, QosProfile, QosTime};
 pub use channel::{Reliability, qos_from_yaml, qos_to_yaml};
 pub use config::{ChunkCompression, NodeConfig, PARAMETERS, RecorderConfig, WhenFull};
-pub use context::{Attached, RunContext, verify_attachments};
+pub use context::{
+    Attached, END_RECORD, MessageOrder, NODES_RECORD, RecordedRun, RunContext, RunNode,
+    verify_attachments,
+};
 pub use dump::dump_json;
 pub use error::RecorderError;
 pub use layout::{BagMetadata, FileEntry, TopicEntry, split_file_name};

@@ -5,6 +5,7 @@
 //! limit; at the limit the sender waits or the loss is counted, as [`WhenFull`] says. After a
 //! failed write every further message is counted as lost, and the failure is kept for whoever asks.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -12,6 +13,7 @@ use std::time::Duration;
 use crate::channel::{Channel, ChannelId};
 use crate::config::{RecorderConfig, WhenFull};
 use crate::error::RecorderError;
+use crate::read::MetadataRecord;
 use crate::recording::{MessageStamp, Recording, RecordingSummary};
 use crate::shelf::Shelf;
 
@@ -85,6 +87,8 @@ struct State {
     topics: Vec<(String, String)>,
     stats: RecorderStats,
     lost_in_queue: u64,
+    /// Metadata records for the end of the bag.
+    notes: Vec<MetadataRecord>,
     stopped: bool,
     closing: bool,
     worker_waits: bool,
@@ -268,6 +272,12 @@ impl Recorder {
         self.sink.stats()
     }
 
+    /// Has a metadata record written behind the last message: what is known only at the end of a run.
+    pub fn note(&self, name: &str, metadata: BTreeMap<String, String>) {
+        let mut state = self.sink.shared.lock();
+        state.notes.push((name.to_owned(), metadata));
+    }
+
     /// Writes what waits, closes the bag and gives its summary.
     ///
     /// # Errors
@@ -315,10 +325,16 @@ impl<S: Shelf> Worker<S> {
             batch.clear();
             self.publish();
         }
-        let lost = self.shared.lock().lost_in_queue;
+        let (lost, notes) = {
+            let mut state = self.shared.lock();
+            (state.lost_in_queue, std::mem::take(&mut state.notes))
+        };
         self.recording.note_lost(lost);
         if let Some(failure) = self.failure.take() {
             return Err(failure);
+        }
+        for (name, metadata) in &notes {
+            self.recording.add_metadata(name, metadata)?;
         }
         let finished = self.recording.finish();
         if let Err(failure) = &finished {

@@ -33,6 +33,9 @@ pub struct RotaryStep {
     /// Whether a model is judged, not found.
     #[serde(default)]
     pub verification: bool,
+    /// Whether the sphere was put elsewhere since the rotary step before.
+    #[serde(default)]
+    pub set_up_anew: bool,
 }
 
 const fn once() -> u32 {
@@ -67,9 +70,18 @@ pub(crate) fn task(
         repeats,
         verification: step.verification,
     };
-    rotary(machine, &order)
+    let mut task = rotary(machine, &order)
         .map(|cycle| of_cycle(cycle, false, machine, Owner::Step))
-        .map_err(|source| SequencerError::Cycle { step: at, source })
+        .map_err(|source| SequencerError::Cycle { step: at, source })?;
+    task.trace.setup_id = setup_id(step, before.get(..at).unwrap_or(before));
+    Ok(task)
+}
+
+/// Number of the sphere's set-up, from 1.
+fn setup_id(step: &RotaryStep, before: &[Step]) -> u32 {
+    let is_new = |step: &Step| matches!(step, Step::Rotary(step) if step.set_up_anew);
+    let earlier = before.iter().filter(|step| is_new(step)).count();
+    u32::try_from(1 + earlier + usize::from(step.set_up_anew)).unwrap_or(u32::MAX)
 }
 
 /// The poses of a step, rad.
@@ -207,6 +219,16 @@ mod tests {
         let used = turns(&tasks[0]);
         assert_eq!((used.len(), turns(&tasks[1]).len()), (10, 5));
         assert!(turns(&tasks[1]).iter().all(|turn| !used.contains(turn)));
+    }
+
+    #[test]
+    fn a_sphere_that_was_put_elsewhere_has_a_set_up_of_its_own() {
+        let step = "  - {do: rotary, sphere: ball, planned: 5, points: 6";
+        let tasks = tasks(&format!(
+            "{step}}}\n{step}, set_up_anew: true}}\n{step}, verification: true}}"
+        ));
+        let setups: Vec<u32> = tasks.iter().map(|task| task.trace.setup_id).collect();
+        assert_eq!(setups, [1, 2, 2]);
     }
 
     #[test]

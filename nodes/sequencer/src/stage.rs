@@ -339,7 +339,7 @@ impl Sequencer {
     }
 
     fn begin(&mut self, task: Task, repeat: u32, out: &mut Vec<Output>) {
-        if task.trace.setup_id == 0 {
+        if task.trace.zero_id == 0 {
             self.setups.lose_count();
         }
         let repeat = if task.owner == Owner::Update {

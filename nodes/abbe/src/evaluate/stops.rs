@@ -4,13 +4,13 @@
 //! A stop counts when the command rests long enough; the mean of its last part is taken.
 
 use metrology::Axis;
-use metrology::sample::{AxisState, TestKind, TestSegment};
+use metrology::sample::{AxisState, PositioningTable, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 
 /// Rest after which readings count.
 const SETTLE: Span = Span::from_nanos(200_000_000);
 /// Commands closer than this are one place, mm.
-const SAME_MM: f64 = 1e-6;
+pub const SAME_MM: f64 = 1e-6;
 /// Readings that a stop needs.
 const LEAST_READINGS: u32 = 10;
 
@@ -38,6 +38,43 @@ pub struct Stops {
     pub compensated: bool,
     /// In the order of the program.
     pub stops: Vec<Stop>,
+}
+
+impl Stops {
+    /// Stops of one direction in the order of positions, one at each; of several the first.
+    #[must_use]
+    pub fn side(&self, up: bool) -> Vec<Stop> {
+        let mut side: Vec<Stop> = self.stops.iter().filter(|s| s.up == up).copied().collect();
+        side.sort_by(|a, b| a.commanded_mm.total_cmp(&b.commanded_mm));
+        side.dedup_by(|later, first| (later.commanded_mm - first.commanded_mm).abs() < SAME_MM);
+        side
+    }
+
+    /// Deviations at every `step`-th of the positions that were stopped at in both directions, times `sign`.
+    #[must_use]
+    pub fn table(&self, step: usize, sign: f64) -> PositioningTable {
+        let (up, down) = (self.side(true), self.side(false));
+        let pairs = up.iter().filter_map(|up| {
+            let same = |down: &&Stop| (down.commanded_mm - up.commanded_mm).abs() < SAME_MM;
+            Some((up, down.iter().find(same)?))
+        });
+        let mut table = PositioningTable {
+            at: Stamp::from_nanos(0),
+            axis: self.axis,
+            position: Vec::new(),
+            deviation_up: Vec::new(),
+            deviation_down: Vec::new(),
+            n_runs: 1,
+            weight: 0.0,
+            sequence: 0,
+        };
+        for (up, down) in pairs.step_by(step.max(1)) {
+            table.position.push(up.commanded_mm);
+            table.deviation_up.push(sign * up.deviation_mm);
+            table.deviation_down.push(sign * down.deviation_mm);
+        }
+        table
+    }
 }
 
 /// A rest of the command.

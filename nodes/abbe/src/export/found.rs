@@ -6,8 +6,11 @@ use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Wire, from_cdr};
 use anyhow::{Context, Result};
 use machine::export::selection::Measured;
-use metrology::{Axis, AxisSet};
+use metrology::sample::PositioningTable;
+use metrology::{Axis, AxisSet, PerAxis};
 use recorder::{Bag, Event, Order};
+
+use crate::evaluate::stops::Stops;
 
 /// What a bag has for an export.
 #[derive(Default)]
@@ -76,6 +79,17 @@ pub(super) fn read(path: &Path) -> Result<Found> {
     Ok(found)
 }
 
+/// A table for each axis that has none and stood at stops with nothing added to its commands; the last such run counts.
+pub(super) fn tables_of_stops(stops: &[Stops], measured: &mut Measured) {
+    let mut tables = PerAxis::<Option<PositioningTable>>::default();
+    for stops in stops.iter().filter(|stops| !stops.compensated) {
+        tables[stops.axis] = Some(stops.table(1, 1.0));
+    }
+    for (known, table) in measured.tables.0.iter_mut().zip(tables.0) {
+        *known = known.take().or(table);
+    }
+}
+
 /// Each source of tables with why it gave none.
 pub(super) fn looked_for(
     measured: &Measured,
@@ -112,10 +126,54 @@ pub(super) fn looked_for(
         })
         .collect();
     lines.push(format!("for axes {}", wanted.join(" ")));
+    lines.push("stops of verifications along one axis count with --stops alone".to_owned());
     lines
 }
 
 fn decode<M: Message + Wire>(topic: &Topic<M>, bytes: &[u8]) -> Result<M::Inner> {
     let message: M = from_cdr(bytes).with_context(|| topic.name.to_owned())?;
     message.into_inner().with_context(|| topic.name.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::stops::Stop;
+
+    fn stops(axis: Axis, slope: f64, compensated: bool) -> Stops {
+        let places = (0..10).map(|k| f64::from(k) * 15.0);
+        let both = places.flat_map(|at| [true, false].map(|up| (at, up)));
+        Stops {
+            run: 1,
+            axis,
+            by_scale: true,
+            compensated,
+            stops: both
+                .map(|(commanded_mm, up)| Stop {
+                    commanded_mm,
+                    deviation_mm: slope * commanded_mm,
+                    up,
+                })
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn stops_make_a_table_where_there_is_none_and_where_nothing_was_added() {
+        let mut measured = Measured::default();
+        let of_positioning = stops(Axis::Y, 7e-5, false).table(1, 1.0);
+        measured.tables[Axis::Y] = Some(of_positioning.clone());
+        let seen = [
+            stops(Axis::X, 1e-4, false),
+            stops(Axis::X, 2e-4, false),
+            stops(Axis::X, 3e-4, true),
+            stops(Axis::Y, 9e-5, false),
+        ];
+        tables_of_stops(&seen, &mut measured);
+        let x = measured.tables[Axis::X].as_ref().unwrap();
+        assert_eq!(x.position.len(), 10);
+        assert!((x.deviation_up[9] - 0.027).abs() < 1e-15);
+        assert_eq!(measured.tables[Axis::Y], Some(of_positioning));
+        assert!(measured.tables[Axis::Z].is_none());
+    }
 }

@@ -42,7 +42,7 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
     section.tables.push(Rows {
         head: head(&["coefficient", "at the end of the span", "± U (k = 2)", "span"]),
         rows: known.iter().map(|coefficient| coefficient.row()).collect(),
-        note: "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns. U: expanded uncertainty.".to_owned(),
+        note: "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns. U: expanded uncertainty as the residuals show it, those that follow each other counted as fewer; errors of the plate that are alike at every circle, and heat between recordings, are not in it.".to_owned(),
     });
     let (short, long): (Vec<_>, Vec<_>) = model
         .combinations

@@ -9,10 +9,16 @@
 //! ```
 //!
 //! (1) is a prediction: what an exported table does on the control is seen when the scenario is run with it.
+//! [`trial`] shows such runs beside the one that the table was made of.
 
-use super::section::{Rows, Section, head, um};
-use crate::evaluate::stops::{Stop, Stops};
+use anyhow::Result;
 
+use super::plot::{self, Plot, Trace};
+use super::section::{Drawing, Rows, Section, head, um};
+use crate::evaluate::stops::{SAME_MM, Stop, Stops};
+
+/// Of the stops of a direction each so-manyth is in the table that is tried.
+pub const TABLE_EVERY: usize = 2;
 /// Stops of one direction that a prediction needs.
 const LEAST_STOPS: usize = 5;
 /// Deviations below which there is nothing to take out, µm.
@@ -43,7 +49,7 @@ pub fn section(all: &[Stops]) -> Option<Section> {
     let predicted: Vec<_> = all
         .iter()
         .filter(|stops| !stops.compensated)
-        .filter_map(|stops| Some((stops, predicted_um(&stops.stops)?)))
+        .filter_map(|stops| Some((stops, predicted_um(stops)?)))
         .filter(|(_, [before_um, ..])| *before_um > WORTH_UM)
         .collect();
     if !predicted.is_empty() {
@@ -116,11 +122,10 @@ fn slope(stops: &[Stop]) -> f64 {
 }
 
 /// (1): p95 at the stops between as they are, with the table, and with its sign turned, µm.
-fn predicted_um(stops: &[Stop]) -> Option<[f64; 3]> {
+fn predicted_um(stops: &Stops) -> Option<[f64; 3]> {
     let mut between: Vec<[f64; 3]> = Vec::new();
     for up in [true, false] {
-        let mut side: Vec<&Stop> = stops.iter().filter(|stop| stop.up == up).collect();
-        side.sort_by(|a, b| a.commanded_mm.total_cmp(&b.commanded_mm));
+        let side = stops.side(up);
         if side.len() < LEAST_STOPS {
             return None;
         }
@@ -137,6 +142,118 @@ fn predicted_um(stops: &[Stop]) -> Option<[f64; 3]> {
     Some([0, 1, 2].map(|k| p95(between.iter().map(|values| values[k])) * 1e3))
 }
 
+/// Stops of one program under different tables of the control: (name, stops), the run without a table first.
+///
+/// # Errors
+/// When the plot cannot be drawn.
+pub fn trial(title: &str, runs: &[(&str, &Stops)]) -> Result<Section> {
+    let table = runs.first().map(|(_, bare)| bare.table(TABLE_EVERY, 1.0));
+    let in_table_mm = table.map_or_else(Vec::new, |table| table.position);
+    let left: Vec<Left> = runs
+        .iter()
+        .map(|(_, stops)| Left::of(stops, &in_table_mm))
+        .collect();
+    let bare_mm = left.first().map_or(f64::NAN, |bare| bare.rms_mm);
+    let rows = runs.iter().zip(&left).map(|((name, stops), left)| {
+        vec![
+            (*name).to_owned(),
+            left.n.to_string(),
+            um(left.max_mm),
+            um(left.p95_mm),
+            um(left.p95_between_mm),
+            um(left.rms_mm),
+            format!("{:.3}", left.rms_mm / bare_mm),
+            format!("{:.1}", slope(&stops.stops) * 1e6),
+        ]
+    });
+    let mut section = Section::new(title);
+    section.tables.push(Rows {
+        head: head(&[
+            "measured / µm",
+            "stops",
+            "max",
+            "p95",
+            "p95 between the table's points",
+            "rms",
+            "rms, share of the first",
+            "slope / (µm/m)",
+        ]),
+        rows: rows.collect(),
+        note: "The control was started anew for each row. The table is made of every second stop of the first run, up and down apart; the stops between were in no table.".to_owned(),
+    });
+    section.drawings.push(Drawing {
+        svg: plot::svg(&Plot {
+            x: "commanded position / mm".to_owned(),
+            y: "position minus command / µm".to_owned(),
+            traces: runs
+                .iter()
+                .flat_map(|(name, stops)| traces(name, stops))
+                .collect(),
+        })?,
+        caption: "Deviation at every stop.".to_owned(),
+    });
+    let figures = runs.iter().zip(&left).map(|((name, _), left)| {
+        serde_json::json!({
+            "run": name,
+            "stops": left.n,
+            "max_mm": left.max_mm,
+            "p95_mm": left.p95_mm,
+            "p95_between_mm": left.p95_between_mm,
+            "rms_mm": left.rms_mm,
+        })
+    });
+    section.figures = figures.collect::<Vec<_>>().into();
+    Ok(section)
+}
+
+/// Deviations that are left at the stops of one run, mm.
+struct Left {
+    n: usize,
+    max_mm: f64,
+    p95_mm: f64,
+    /// At the stops that no table was made of.
+    p95_between_mm: f64,
+    rms_mm: f64,
+}
+
+impl Left {
+    fn of(stops: &Stops, in_table_mm: &[f64]) -> Self {
+        let sides = [true, false].map(|up| stops.side(up));
+        let all = || sides.iter().flatten().map(|stop| stop.deviation_mm);
+        let n = all().count();
+        let squares: f64 = all().map(|deviation| deviation * deviation).sum();
+        Self {
+            n,
+            max_mm: all().map(f64::abs).fold(0.0, f64::max),
+            p95_mm: p95(all()),
+            p95_between_mm: p95(between(&sides, in_table_mm)),
+            rms_mm: (squares / n as f64).sqrt(),
+        }
+    }
+}
+
+/// Deviations at the stops that are in no table, mm.
+fn between(sides: &[Vec<Stop>; 2], in_table_mm: &[f64]) -> impl Iterator<Item = f64> {
+    let is_in = move |stop: &&Stop| {
+        let near = |at_mm: &f64| (at_mm - stop.commanded_mm).abs() < SAME_MM;
+        in_table_mm.iter().any(near)
+    };
+    let left = sides.iter().flatten().filter(move |stop| !is_in(stop));
+    left.map(|stop| stop.deviation_mm)
+}
+
+fn traces(name: &str, stops: &Stops) -> [Trace; 2] {
+    [(true, "up"), (false, "down")].map(|(up, direction)| Trace {
+        name: format!("{name}, {direction}"),
+        points: stops
+            .side(up)
+            .iter()
+            .map(|stop| (stop.commanded_mm, stop.deviation_mm * 1e3))
+            .collect(),
+        marks: false,
+    })
+}
+
 fn figures(title: &str, all: &[Stops]) -> serde_json::Value {
     let one = |stops: &Stops| {
         let deviations = || stops.stops.iter().map(|stop| stop.deviation_mm);
@@ -148,7 +265,7 @@ fn figures(title: &str, all: &[Stops]) -> serde_json::Value {
             "stops": stops.stops.len(),
             "p95_mm": p95(deviations()),
             "slope": slope(&stops.stops),
-            "predicted_p95_um": predicted_um(&stops.stops),
+            "predicted_p95_um": predicted_um(stops),
         })
     };
     serde_json::json!({ "test": title, "stops": all.iter().map(one).collect::<Vec<_>>() })
@@ -181,7 +298,7 @@ mod tests {
     #[test]
     fn eq1_a_table_takes_out_lead_and_lost_motion_and_doubles_them_with_the_wrong_sign() {
         let long = stops(|p, up| 1e-4 * p + if up { -0.004 } else { 0.004 });
-        let [before, after, wrong] = predicted_um(&long.stops).unwrap();
+        let [before, after, wrong] = predicted_um(&long).unwrap();
         assert!(after < 1e-9, "{after}");
         assert!((wrong - 2.0 * before).abs() < 1e-9 && before > 10.0);
         assert!((slope(&long.stops) - 1e-4).abs() < 1e-12);
@@ -192,5 +309,36 @@ mod tests {
             section.terminal()
         );
         assert!(super::section(&[]).is_none());
+    }
+
+    #[test]
+    fn a_table_of_stops_keeps_directions_apart_and_leaves_out_what_one_of_them_lacks() {
+        let mut bare = stops(|p, up| 1e-4 * p + if up { -0.004 } else { 0.004 });
+        // The way home ends at a place that was stopped at before.
+        bare.stops.push(Stop {
+            commanded_mm: 0.0,
+            deviation_mm: 9.0,
+            up: true,
+        });
+        bare.stops
+            .retain(|stop| stop.up || stop.commanded_mm < 140.0);
+        let table = bare.table(2, -1.0);
+        assert_eq!(table.position.len(), 10);
+        assert_eq!(table.position[1].to_bits(), (-120.0_f64).to_bits());
+        assert!((table.deviation_up[5] - 0.004).abs() < 1e-15);
+        assert!((table.deviation_down[1] - 0.008).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_trial_shows_what_is_left_beside_what_was_there() {
+        let bare = stops(|p, up| 1e-4 * p + if up { -0.004 } else { 0.004 });
+        let left = stops(|p, _| 1e-6 * p);
+        let twice = stops(|p, up| 2e-4 * p + if up { -0.008 } else { 0.008 });
+        let runs = [("without", &bare), ("with", &left), ("turned", &twice)];
+        let section = trial("Tables", &runs).unwrap();
+        let ratio = |row: usize| section.tables[0].rows[row][6].parse::<f64>().unwrap();
+        assert!(ratio(1) < 0.02 && (ratio(2) - 2.0).abs() < 1e-9);
+        assert_eq!(section.figures[0]["stops"], 42);
+        assert_eq!(section.drawings.len(), 1);
     }
 }

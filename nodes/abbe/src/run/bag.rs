@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use metrology::stamp::{Host, Stamp};
 use node_runtime::Node;
 use node_runtime::node::TopicPort;
 use node_runtime::parameter::{Parameter, Value};
 use recorder::{
-    Channel, ChunkCompression, Directory, Recorder, RecorderConfig, Recording, RunContext, WhenFull,
+    Channel, ChunkCompression, Directory, MessageOrder, RecordedRun, Recorder, RecorderConfig,
+    Recording, RunContext, RunNode, WhenFull,
 };
 
 use crate::scenario::Scenario;
@@ -17,7 +19,8 @@ use crate::scenario::Scenario;
 const SIMULATED_FLUSH_S: f64 = 60.0;
 const REAL_FLUSH_S: f64 = 1.0;
 
-/// Begins the bag of `scenario` with everything that a replay needs.
+/// Begins the bag of `scenario` with everything that a replay needs; `composed`: the nodes of a run in simulated time,
+/// in their order.
 ///
 /// # Errors
 /// When the folder exists or cannot be written, or the context holds what must not be in a bag.
@@ -26,8 +29,9 @@ pub fn begin(
     scenario: &Scenario,
     parameters: BTreeMap<String, String>,
     start_nanos: u64,
-    simulated: bool,
+    composed: Option<Vec<RunNode>>,
 ) -> Result<Recorder> {
+    let simulated = composed.is_some();
     let config = RecorderConfig {
         compression: ChunkCompression::Zstd,
         flush_period_s: if simulated {
@@ -48,7 +52,15 @@ pub fn begin(
         .to_string_lossy()
         .into_owned();
     let mut recording = Recording::begin(Directory::create(path)?, &name, config.clone())?;
-    recording.add_context(&context(scenario, parameters, start_nanos)?)?;
+    recording.add_context(&RunContext {
+        order: if simulated {
+            MessageOrder::Total
+        } else {
+            MessageOrder::Arrival
+        },
+        nodes: composed.unwrap_or_default(),
+        ..context(scenario, parameters, start_nanos)?
+    })?;
     Ok(Recorder::start(recording, &config)?)
 }
 
@@ -81,7 +93,14 @@ fn context(
         scenario_file: read("scenario.yaml"),
         programs,
         parameters,
+        ..RunContext::default()
     })
+}
+
+/// What is known at the end of a run: when its nodes were asked to stop.
+pub fn end(asked_to_stop: Stamp<Host>) -> BTreeMap<String, String> {
+    let nanos = asked_to_stop.nanos().to_string();
+    BTreeMap::from([(RecordedRun::STOP_KEY.to_owned(), nanos)])
 }
 
 /// Resolved parameters of a node as YAML text.

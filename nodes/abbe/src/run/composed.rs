@@ -14,7 +14,7 @@ use metrology::stamp::{Host, Span, Stamp};
 use node_runtime::arguments::Arguments;
 use node_runtime::harness::Published;
 use node_runtime::{Harness, Interruption, Node, Setup};
-use recorder::{ChannelId, MessageStamp, Recorder, RecorderSink};
+use recorder::{ChannelId, MessageStamp, Recorder, RecorderSink, RunNode};
 
 use super::mirror::Mirror;
 use super::{INTERRUPTED, Outcome, bag};
@@ -48,7 +48,8 @@ pub struct How<'a> {
 /// When a node cannot be built or the bag not written.
 pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> Result<Outcome> {
     let truth = Arc::new(Truth::default());
-    let nodes = build(scenario, &truth)?;
+    let nodes = replayer::sources_first(build(scenario, &truth)?);
+    let ran = ran(scenario, &nodes);
     let parameters = nodes
         .iter()
         .map(|node| Ok((node.name().to_owned(), bag::parameters(node.as_ref())?)))
@@ -56,7 +57,7 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
     let start = Stamp::from_nanos(start_s * metrology::stamp::NANOS_PER_S);
     let start_nanos = u64::try_from(start.nanos()).context("simulated_start_s is below 0")?;
     let mut harness = Harness::compose(nodes, start)?;
-    let recorder = bag::begin(bag_path, scenario, parameters, start_nanos, true)?;
+    let recorder = bag::begin(bag_path, scenario, parameters, start_nanos, Some(ran))?;
     record(&mut harness, &recorder)?;
     let mirror = if how.on_dds {
         Mirror::start(&mut harness)?
@@ -66,6 +67,7 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
     let evidence = gather(&mut harness, &truth);
     let failure = play(&mut harness, scenario, start, how, &evidence, &truth);
     if !how.interruption.is_forced() {
+        recorder.note(recorder::END_RECORD, bag::end(harness.now()));
         harness.shutdown(SHUTDOWN_PATIENCE);
     }
     drop(harness);
@@ -82,6 +84,21 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
         recorded: summary.messages_written,
         lost: summary.messages_lost,
     })
+}
+
+/// Which nodes run, in their order; a composition has no two of one name.
+fn ran(scenario: &Scenario, nodes: &[Box<dyn Node>]) -> Vec<RunNode> {
+    let executable = |name: &str| {
+        let launched = scenario.nodes.iter().find(|launched| launched.name == name);
+        launched
+            .map_or(name, |launched| launched.exec.as_str())
+            .to_owned()
+    };
+    let node = |node: &Box<dyn Node>| RunNode {
+        name: node.name().to_owned(),
+        executable: executable(node.name()),
+    };
+    nodes.iter().map(node).collect()
 }
 
 /// Builds every node of the launch file; the fake machine with the scenario's look at its truth.

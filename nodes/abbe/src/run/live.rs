@@ -168,7 +168,7 @@ fn prepare(scenario: &Scenario, separate: bool) -> Result<Prepared> {
 fn begin_bag(scenario: &Scenario, path: &Path, prepared: &Prepared) -> Result<Recorder> {
     let now = SystemTime::now().duration_since(UNIX_EPOCH)?;
     let start_nanos = u64::try_from(now.as_nanos()).context("the computer's clock")?;
-    bag::begin(path, scenario, prepared.parameters()?, start_nanos, false)
+    bag::begin(path, scenario, prepared.parameters()?, start_nanos, None)
 }
 
 /// Nodes at work.

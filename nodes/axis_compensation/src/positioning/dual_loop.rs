@@ -60,6 +60,7 @@ pub struct DualLoop {
     feed_limit_mm_s: f64,
     needed_runs: u32,
     lead_fm: i64,
+    pulse_mm: f64,
     known: Option<Known>,
     motion: DirectionOfMotion,
     learning: Learning,
@@ -114,6 +115,7 @@ impl DualLoop {
             feed_limit_mm_s,
             needed_runs: config.runs,
             lead_fm: fm_from_mm(linear.lead_mm).unwrap_or_default(),
+            pulse_mm: mm_from_fm(pulse_fm),
             is_changed: known.is_some(),
             known,
             motion: DirectionOfMotion::new(pulse_fm),
@@ -126,6 +128,7 @@ impl DualLoop {
                 config.directions,
                 feed_limit_mm_s,
                 believed_fm,
+                pulse_fm,
             ),
             sum: OffsetSum::new(config.reading, config.weight, config.loop_cycle_s),
             offset: Ok(None),
@@ -262,7 +265,7 @@ impl DualLoop {
             return;
         }
         self.sum.begin(table_fm);
-        let is_slow = step_mm <= self.feed_limit_mm_s * dt_s;
+        let is_slow = step_mm <= self.feed_limit_mm_s * dt_s + self.pulse_mm;
         let is_due = self.sum.wait(dt_s, reading.follows && is_slow);
         // Where the other parts want the slide is where it belongs: the loop must not take them out.
         let wanted_mm = reading.commanded_mm + reading.others_mm;

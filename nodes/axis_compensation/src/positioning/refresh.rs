@@ -84,23 +84,26 @@ pub struct Refresh {
     directions: Directions,
     feed_limit_mm_s: f64,
     believed_fm: i64,
+    pulse_fm: i64,
     before: Option<ScaleReading>,
 }
 
 impl Refresh {
-    /// Nothing passed yet.
+    /// Nothing passed yet, on a control whose commands are known to a pulse of `pulse_fm`.
     #[must_use]
     pub fn new(
         weight: f64,
         directions: Directions,
         feed_limit_mm_s: f64,
         believed_fm: i64,
+        pulse_fm: i64,
     ) -> Self {
         Self {
             weight,
             directions,
             feed_limit_mm_s,
             believed_fm,
+            pulse_fm,
             before: None,
         }
     }
@@ -123,7 +126,9 @@ impl Refresh {
         };
         let step_fm = now.commanded_fm.saturating_sub(before.commanded_fm);
         let step_mm = (step_fm as f64 / FM_PER_MM).abs();
-        let is_slow = step_mm <= PASS_STEP_MM && step_mm <= self.feed_limit_mm_s * dt_s;
+        // A command at the limit itself advances by a rounding more in every second tick.
+        let limit_mm = self.feed_limit_mm_s * dt_s + self.pulse_fm as f64 / FM_PER_MM;
+        let is_slow = step_mm <= PASS_STEP_MM && step_mm <= limit_mm;
         if step_fm == 0 || self.weight <= 0.0 || !is_slow {
             return refreshed;
         }

@@ -7,8 +7,9 @@ fn a_machine_without_a_gap_gets_no_name() {
     let mut named = Vec::new();
     let mut flagged = 0;
     let seeds = 24;
-    for seed in 0..seeds {
-        let diagnosis = diagnosed(&session(1000 + seed, Noise::default(), &|_| [0.0; 2]));
+    // 504 and 505 once got acceleration_lag, which was barely worth its price.
+    for seed in (1000..1000 + seeds).chain([504, 505]) {
+        let diagnosis = diagnosed(&session(seed, Noise::default(), &|_| [0.0; 2]));
         let found = names(&diagnosis);
         if !found.is_empty() {
             named.push((seed, found));

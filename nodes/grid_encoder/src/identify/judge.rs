@@ -5,11 +5,16 @@
 //! ```text
 //!   F = [S_lack/(K − rank)] / [S_pure/(N − K)]   over repeats of equal points             (1)
 //!   r₁ = Σ r_i r_{i+1} / Σ r_i²,   z = r₁ √n                                              (2)
+//!   var = (1 + r₁)/(1 − r₁) times that of independent residuals                           (3)
 //! ```
 //!
 //! (1) needs a recording that was repeated. (2) needs nothing: what the model lacks is smooth along the
 //! trajectory, so neighbours resemble each other. z is standard normal for noise, and a little below for few
 //! points for each unknown.
+//!
+//! (3) is the sum of r₁^|k| over all distances k: what the plate or the form of the curves leaves is alike over many stations, and
+//! so many of them count as one. It is taken where (2) is beyond chance. It knows nothing of what is alike in a whole recording, such as
+//! a machine that warmed between two of them.
 //!
 //! # References
 //! \[1\] NIST/SEMATECH e-Handbook of Statistical Methods, 4.4.4.6. \[2\] J. Durbin, G. S. Watson, Biometrika 37,
@@ -18,6 +23,7 @@
 use metrology::fit::{chi_square_p, lack_of_fit};
 use metrology::sample::{Sense, TestPlane};
 
+use super::Noise;
 use crate::equations::Equations;
 use crate::recording::{Place, in_plane};
 
@@ -47,8 +53,22 @@ impl Judgement {
     /// Whether the model lacks something: p of (1) below `p_limit`, or residuals that follow each other.
     #[must_use]
     pub fn lacks_something(&self, p_limit: f64) -> bool {
-        self.lack_of_fit_p < p_limit
-            || (self.correlation_z > SURE && self.correlation > MINDED_CORRELATION)
+        self.lack_of_fit_p < p_limit || self.is_correlated()
+    }
+
+    fn is_correlated(&self) -> bool {
+        self.correlation_z > SURE && self.correlation > MINDED_CORRELATION
+    }
+
+    /// (3); 1 where residuals do not follow each other, or where the stated uncertainties are taken as right.
+    #[must_use]
+    pub fn variance_inflation(&self, noise: Noise) -> f64 {
+        match noise {
+            Noise::FromResiduals if self.is_correlated() => {
+                (1.0 + self.correlation) / (1.0 - self.correlation)
+            }
+            _ => 1.0,
+        }
     }
 
     pub(super) fn of(

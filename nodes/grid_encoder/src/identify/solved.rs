@@ -144,7 +144,9 @@ impl Solved {
             Noise::FromResiduals if freedom >= LEAST_FREEDOM => sums.chi_square / freedom as f64,
             _ => 1.0,
         }; // s² of (1)
-        let cofactor = self.spectrum.cofactor() * variance_ratio;
+        let judgement = Judgement::of(equations, &self.ratios, &weights, rank, sums.chi_square);
+        let variance_inflation = judgement.variance_inflation(options.noise);
+        let cofactor = self.spectrum.cofactor() * (variance_ratio * variance_inflation);
         let visibility = self.spectrum.visibility();
         let scale = &equations.scale;
         let n_coefficients = equations.unknowns.n_coefficients;
@@ -154,18 +156,7 @@ impl Solved {
             .map(|support| combination(&support.weights, &self.beta, &cofactor, scale))
             .collect();
         let mut values = DVector::from_fn(scale.len(), |j, _| self.beta[j] * scale[j]);
-        for (setup_id, at) in &equations.unknowns.setup_at {
-            values[*at] += equations.turns_rad.get(setup_id).copied().unwrap_or(0.0);
-        }
-        for (zero_id, at) in &equations.unknowns.zero_at {
-            let zero_mm = equations
-                .offsets_mm
-                .get(zero_id)
-                .copied()
-                .unwrap_or_default();
-            values[*at] += zero_mm[0];
-            values[*at + 1] += zero_mm[1];
-        }
+        put_back(equations, &mut values);
         let points = || equations.recordings.iter().flat_map(|r| &r.points);
         Identification {
             components: options.components.clone(),
@@ -188,7 +179,8 @@ impl Solved {
             n_equations: self.n_equations,
             n_readings: points().map(|point| point.n_readings as usize).sum(),
             n_outliers: sums.n_outliers,
-            judgement: Judgement::of(equations, &self.ratios, &weights, rank, sums.chi_square),
+            judgement,
+            variance_inflation,
             spans: equations.spans,
             recording_noise: weighting.noise,
             residuals_mm: without_gaps(self.residuals_mm),
@@ -211,6 +203,19 @@ impl Solved {
             }
         }
         sums
+    }
+}
+
+/// Adds the turns and offsets that were taken out beforehand.
+fn put_back(equations: &Equations, values: &mut DVector<f64>) {
+    for (setup_id, at) in &equations.unknowns.setup_at {
+        values[*at] += equations.turns_rad.get(setup_id).copied().unwrap_or(0.0);
+    }
+    for (zero_id, at) in &equations.unknowns.zero_at {
+        let zero_mm = equations.offsets_mm.get(zero_id).copied();
+        let [u_mm, v_mm] = zero_mm.unwrap_or_default();
+        values[*at] += u_mm;
+        values[*at + 1] += v_mm;
     }
 }
 

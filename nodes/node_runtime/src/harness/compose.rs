@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 
 use abbe_msgs::diagnostic_msgs::msg::DiagnosticArray;
-use abbe_msgs::{Message, topics};
+use abbe_msgs::{Message, Qos, SERVICE_EVENT_SUFFIX, topics};
 use metrology::stamp::{Host, Stamp};
 
 use super::{Harness, Reverse, Route};
-use crate::node::{Node, TopicPort};
+use crate::node::{Node, ServicePort, TopicPort};
 
 /// Why nodes cannot be composed.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -34,6 +34,18 @@ pub enum ComposeError {
     OtherPorts { node: String },
 }
 
+/// The topic on which a service's calls are told.
+fn events_of(port: &ServicePort) -> TopicPort {
+    let description = port.events.description;
+    TopicPort {
+        topic: format!("{}{SERVICE_EVENT_SUFFIX}", port.service),
+        type_name: description.type_name,
+        type_hash: description.type_hash,
+        definition: description.definition,
+        qos: Qos::RELIABLE,
+    }
+}
+
 impl Harness {
     /// Wires `nodes` to each other; simulated time begins at `start`, each timer's first tick is one period later.
     ///
@@ -47,6 +59,7 @@ impl Harness {
             diagnostics: 0,
             publications: Vec::new(),
             service_servers: BTreeMap::new(),
+            service_events: BTreeMap::new(),
             action_servers: BTreeMap::new(),
             timers: BinaryHeap::new(),
             periods: Vec::new(),
@@ -90,6 +103,8 @@ impl Harness {
         self.publications.push(publications);
         for (at, port) in ports.services.iter().enumerate() {
             self.offer(false, &port.service, (place, at), &name)?;
+            let events = self.route(&name, &events_of(port))?;
+            self.service_events.insert(port.service.clone(), events);
         }
         for (at, port) in ports.action_servers.iter().enumerate() {
             self.offer(true, &port.action, (place, at), &name)?;

@@ -1,8 +1,11 @@
 //! Carrying emissions of one node to the others.
 
 use abbe_msgs::Durability;
+use abbe_msgs::service_msgs::msg::ServiceEventInfo;
 
+use super::replay::NOBODY;
 use super::{Bytes, Delivery, Emission, End, Event, GoalId, GoalStatus, Harness, Published};
+use crate::clock::ros_time;
 use crate::diagnostic::{Diagnostic, Level};
 
 const SERVICE: bool = false;
@@ -11,9 +14,17 @@ const ACTION: bool = true;
 impl Harness {
     /// Hands out everything that waits, and what follows from it.
     pub(super) fn drain(&mut self) {
-        while let Some(delivery) = self.inbox.pop_front() {
+        while self.deliver_next() {}
+    }
+
+    /// Hands out what has waited longest; false when nothing waits.
+    pub fn deliver_next(&mut self) -> bool {
+        let next = self.inbox.pop_front();
+        let waited = next.is_some();
+        if let Some(delivery) = next {
             self.deliver(delivery);
         }
+        waited
     }
 
     fn deliver(&mut self, delivery: Delivery) {
@@ -158,7 +169,9 @@ impl Harness {
             Emission::Diagnostic(diagnostic) => self.report(node, &diagnostic),
             Emission::Stopped => self.stopped[node] = true,
             Emission::Respond { service, id, bytes } => {
-                if let Some((client, id)) = self.asked.remove(&(SERVICE, (node, service), id)) {
+                if let Some((client, id)) = self.asked.remove(&(SERVICE, (node, service), id))
+                    && client != NOBODY
+                {
                     self.inbox.push_back(Delivery::Response {
                         client,
                         id,
@@ -189,6 +202,7 @@ impl Harness {
     }
 
     fn call(&mut self, node: usize, client: usize, id: u64, bytes: Bytes) {
+        self.tell_call(node, client, id, &bytes);
         let name = &self.nodes[node].ports().clients[client].service;
         let end = (node, client);
         let delivery = match self.service_servers.get(name) {
@@ -205,6 +219,27 @@ impl Harness {
             },
         };
         self.inbox.push_back(delivery);
+    }
+
+    /// Publishes that a request was sent, for a bag that is to replay without the node that called.
+    fn tell_call(&mut self, node: usize, client: usize, id: u64, bytes: &Bytes) {
+        let port = &self.nodes[node].ports().clients[client];
+        let Some(&route) = self.service_events.get(&port.service) else {
+            return;
+        };
+        let mut client_gid = [0; 16];
+        client_gid[..8].copy_from_slice(&(node as u64).to_be_bytes());
+        client_gid[8..].copy_from_slice(&(client as u64).to_be_bytes());
+        let info = ServiceEventInfo {
+            event_type: ServiceEventInfo::REQUEST_SENT,
+            stamp: ros_time(self.now),
+            client_gid,
+            sequence_number: i64::try_from(id).unwrap_or(i64::MAX),
+        };
+        // A request that cannot be read is refused by its server, who says so.
+        if let Ok(event) = (port.events.sent)(info, bytes) {
+            self.publish(route, event);
+        }
     }
 
     fn send_goal(&mut self, node: usize, client: usize, id: GoalId, bytes: Bytes) {

@@ -296,8 +296,8 @@ fn equal_nodes_publish_equal_bytes() {
         bytes.take()
     };
     let first = run();
-    // One request, and five conditions on /diagnostics.
-    assert_eq!(first.len(), 6);
+    // One request, the event of one call, and five conditions on /diagnostics.
+    assert_eq!(first.len(), 7);
     assert_eq!(first, run());
 }
 

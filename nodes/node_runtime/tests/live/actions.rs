@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use abbe_msgs::action::{RunProgram, RunProgramFeedback, RunProgramGoal, RunProgramResult};
 use abbe_msgs::std_srvs::srv::{SetBool, SetBoolRequest, SetBoolResponse};
-use abbe_msgs::{Action, GetResultResponse, Message, Service, from_cdr, to_cdr};
+use abbe_msgs::{Action, GetResultResponse, Message, from_cdr, to_cdr};
 use metrology::stamp::Span;
 use node_runtime::node::{ActionPort, Ports};
 use node_runtime::{Bytes, Emission, Event, GoalStatus};
@@ -68,7 +68,7 @@ fn client(ports: Ports, first: Vec<Emission>, heard: Sender<Heard>, cancel_at: u
 fn a_service_is_answered_and_an_absent_one_is_said_to_be() {
     let environment = environment(4);
     let ports = Ports {
-        services: vec![service("enable", SetBool::TYPE_NAME)],
+        services: vec![service::<SetBool>("enable")],
         ..Ports::default()
     };
     let server = Puppet::new("server", ports, |_, event, out| {
@@ -93,10 +93,7 @@ fn a_service_is_answered_and_an_absent_one_is_said_to_be() {
     });
     let serving = start(&environment, server);
     let ports = Ports {
-        clients: vec![
-            service("enable", SetBool::TYPE_NAME),
-            service("nobody", SetBool::TYPE_NAME),
-        ],
+        clients: vec![service::<SetBool>("enable"), service::<SetBool>("nobody")],
         ..Ports::default()
     };
     let call = |client, id, data| {

@@ -7,11 +7,11 @@ use metrology::Stamp;
 use metrology::stamp::Host;
 use node_runtime::arguments::Arguments;
 use node_runtime::environment::{DiscoveryRange, Environment};
-use node_runtime::node::{Ports, ServicePort, TopicPort};
+use node_runtime::node::{Ports, ServiceEvents, ServicePort, TopicPort};
 use node_runtime::parameter::Parameter;
 use node_runtime::{Emission, Event, Node, NodeFault, Running, Setup, launch};
 
-use abbe_msgs::{Message, Qos};
+use abbe_msgs::{Message, Qos, Service};
 
 type Handle = dyn FnMut(Stamp<Host>, Event<'_>, &mut Vec<Emission>) -> Result<(), String> + Send;
 
@@ -101,10 +101,11 @@ pub fn topic<M: Message>(name: &str, qos: Qos) -> TopicPort {
     }
 }
 
-pub fn service(name: &str, type_name: &'static str) -> ServicePort {
+pub fn service<V: Service>(name: &str) -> ServicePort {
     ServicePort {
         service: name.to_owned(),
-        type_name,
+        type_name: V::TYPE_NAME,
+        events: ServiceEvents::of::<V>(),
     }
 }
 

@@ -7,6 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 const MM: i64 = 1_000_000_000_000;
 const UM: i64 = 1_000_000_000;
+const PULSE_FM: i64 = UM / 10;
 
 fn table(n: usize) -> DeviationTable {
     let x_mm: Vec<_> = (0..n).map(|j| 10.0 * j as f64).collect();
@@ -15,7 +16,7 @@ fn table(n: usize) -> DeviationTable {
 }
 
 fn refresh(weight: f64, directions: Directions) -> Refresh {
-    Refresh::new(weight, directions, 30.0, 50 * UM)
+    Refresh::new(weight, directions, 30.0, 50 * UM, PULSE_FM)
 }
 
 fn at(commanded_mm: f64, deviation_um: f64) -> ScaleReading {
@@ -52,6 +53,25 @@ fn eq1_takes_the_deviation_where_the_command_passes_the_point() {
     // A quarter of the way from 2 µm to 6 µm: 3 µm, of which the table takes a quarter.
     assert_eq!(table.point_fm(2, Direction::Up), Some(750_000_000));
     assert_eq!(table.point_fm(2, Direction::Down), Some(0));
+}
+
+#[test]
+fn every_pass_at_the_feed_limit_itself_teaches_however_commands_are_rounded() {
+    // 1000 mm/min: 16.666... µm a tick, rounded to femtometres or to pulses.
+    for rounding_fm in [1, PULSE_FM] {
+        let mut table = table(5);
+        let mut refresh = Refresh::new(0.3, Directions::Together, 1000.0 / 60.0, 50 * UM, PULSE_FM);
+        let mut n_points = 0;
+        for tick in 0..2500_i64 {
+            let commanded_fm = (tick * MM / 60 - MM / 2) / rounding_fm * rounding_fm;
+            let reading = ScaleReading {
+                commanded_fm,
+                deviation_fm: UM,
+            };
+            n_points += refresh.observe(&mut table, reading, 1e-3).n_points;
+        }
+        assert_eq!(n_points, 5, "rounded to {rounding_fm} fm");
+    }
 }
 
 #[test]
@@ -103,7 +123,7 @@ fn what_is_beyond_belief_is_refused_with_place_and_change() {
 fn val_ewma_remembers_2_minus_w_over_w_passes() {
     for weight in [0.05, 0.1, 0.3] {
         let mut table = table(5);
-        let mut refresh = Refresh::new(weight, Directions::Together, 30.0, 5 * MM);
+        let mut refresh = Refresh::new(weight, Directions::Together, 30.0, 5 * MM, PULSE_FM);
         let impulse_fm = 4 * MM;
         let weights: Vec<f64> = (0..2_000)
             .map(|k| {

@@ -3,7 +3,7 @@
 use abbe_tests::scenario::{SHORT_PLAN, Scenario, mcap_file};
 
 #[test]
-fn two_runs_of_a_scenario_give_equal_bags() {
+fn replay_record_twice_gives_equal_bytes() {
     let scenario = Scenario::copy_of("first_run");
     scenario.write("plan.yaml", SHORT_PLAN);
     let bags = [(); 2].map(|()| std::fs::read(mcap_file(&scenario.run().join("bag"))).unwrap());

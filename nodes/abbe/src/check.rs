@@ -1,0 +1,188 @@
+//! `abbe check BAG`: a bag's results, computed again from its inputs.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use comfy_table::Table;
+use comfy_table::presets::NOTHING;
+use metrology::stamp::NANOS_PER_S;
+use node_runtime::arguments::Arguments;
+use node_runtime::{Node, Setup};
+use recorder::{Bag, RecordedRun, RunNode, verify_attachments};
+use replayer::{Difference, Discrepancy, Outcome, ReplayError};
+use serde_json::json;
+
+use crate::node;
+
+/// Exit code for a bag of which a part was lost and the rest is equal.
+const DONE_WITH_LOSS: u8 = 3;
+
+/// Nodes whose messages are what a replay puts in.
+const SOURCES: [&str; 3] = ["fake_cnc", "linuxcnc_bridge", "sequencer"];
+
+/// Arguments of `abbe check`.
+#[derive(Args)]
+pub struct Check {
+    /// Folder of the bag.
+    bag: PathBuf,
+    /// Write the outcome as JSON to standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Check {
+    /// Recomputes and compares. Exit code 1 when anything differs, 3 when a part of the bag was lost and the rest is
+    /// equal.
+    ///
+    /// # Errors
+    /// When the bag cannot be read or is none of a run in simulated time.
+    pub fn execute(self) -> Result<ExitCode> {
+        let outcome = of(&self.bag).with_context(|| format!("bag {}", self.bag.display()))?;
+        if self.json {
+            println!("{:#}", as_json(&self.bag, &outcome));
+        } else {
+            println!("{}", page(&self.bag, &outcome));
+        }
+        for loss in &outcome.losses {
+            eprintln!("abbe: {loss}");
+        }
+        Ok(match (&outcome.first, outcome.losses.is_empty()) {
+            (Some(_), _) => ExitCode::FAILURE,
+            (None, true) => ExitCode::SUCCESS,
+            (None, false) => ExitCode::from(DONE_WITH_LOSS),
+        })
+    }
+}
+
+/// Replays the bag with the nodes, parameters and machine file that it carries.
+fn of(path: &Path) -> Result<Outcome> {
+    let bag = Bag::open(path)?;
+    verify_attachments(&bag)?;
+    let run = RecordedRun::of(&bag).ok_or(ReplayError::NoRun)?;
+    if run.nodes.is_empty() && run.order == recorder::MessageOrder::Total {
+        return Err(ReplayError::NoNodes.into());
+    }
+    let files = tempfile::tempdir().context("a folder for the bag's parameter files")?;
+    if let Some(machine) = bag.attachment("machine.yaml")? {
+        std::fs::write(files.path().join("machine.yaml"), machine.data)?;
+    }
+    let nodes = run
+        .nodes
+        .iter()
+        .filter(|node| !SOURCES.contains(&node.executable.as_str()))
+        .map(|node| build(&bag, node, files.path()).with_context(|| format!("node {}", node.name)))
+        .collect::<Result<_>>()?;
+    Ok(replayer::check(&bag, &run, nodes)?)
+}
+
+/// A node as it ran, with the parameters in the bag.
+fn build(bag: &Bag, ran: &RunNode, files: &Path) -> Result<Box<dyn Node>> {
+    let name = format!("params/{}.yaml", ran.name);
+    let Some(parameters) = bag.attachment(&name)? else {
+        bail!("the bag has no attachment {name}");
+    };
+    let text = String::from_utf8(parameters.data).with_context(|| format!("attachment {name}"))?;
+    let file = files.join(format!("{}.yaml", ran.name));
+    std::fs::write(&file, parameter_file(&text))?;
+    let words = [
+        "--ros-args".to_owned(),
+        "-r".to_owned(),
+        format!("__node:={}", ran.name),
+        "--params-file".to_owned(),
+        file.display().to_string(),
+    ];
+    let setup = Setup::new(&ran.executable, &Arguments::parse(words)?)?;
+    match node::builder(&ran.executable) {
+        Some(build) => build(&setup),
+        None => bail!(
+            "executable \"{}\" is unknown (known: {})",
+            ran.executable,
+            node::names()
+        ),
+    }
+}
+
+/// Names and values as a ROS parameter file has them.
+fn parameter_file(flat: &str) -> String {
+    let mut file = "/**:\n  ros__parameters:\n".to_owned();
+    for line in flat.lines() {
+        file.push_str(&format!("    {line}\n"));
+    }
+    file
+}
+
+fn page(path: &Path, outcome: &Outcome) -> String {
+    let mut table = Table::new();
+    table.load_style(NOTHING);
+    table.set_header(["topic", "compared", "differing"]);
+    for (topic, compared) in &outcome.compared {
+        table.add_row([
+            topic.clone(),
+            compared.messages.to_string(),
+            compared.differing.to_string(),
+        ]);
+    }
+    let compared: u64 = outcome.compared.values().map(|c| c.messages).sum();
+    let verdict = match &outcome.first {
+        None => format!(
+            "equal: {compared} messages were computed again byte for byte from {} inputs",
+            outcome.inputs
+        ),
+        Some(first) => format!("differs; first {}", in_words(first)),
+    };
+    format!("{}\n\n{table}\n\n{verdict}", path.display())
+}
+
+fn in_words(difference: &Difference) -> String {
+    let seconds = difference.at_nanos.div_euclid(NANOS_PER_S);
+    let nanos = difference.at_nanos.rem_euclid(NANOS_PER_S);
+    let place = format!(
+        "on {}, message {}, at {seconds}.{nanos:09} s",
+        difference.topic, difference.message
+    );
+    match &difference.discrepancy {
+        Discrepancy::Field {
+            field,
+            recorded,
+            computed,
+            ulps,
+        } => {
+            let distance = ulps.map_or_else(String::new, |ulps| format!(" ({ulps} ulp apart)"));
+            format!("{place}: {field}: recorded {recorded}, computed {computed}{distance}")
+        }
+        Discrepancy::Bytes => format!("{place}: equal values in other bytes"),
+        Discrepancy::NotComputed => format!("{place}: recorded, and not computed again"),
+        Discrepancy::NotRecorded => format!("{place}: computed, and not in the bag"),
+        Discrepancy::Order => format!("{place}: recorded in another order than it was computed"),
+        Discrepancy::Unreadable { reason } => format!("{place}: {reason}"),
+    }
+}
+
+fn as_json(path: &Path, outcome: &Outcome) -> serde_json::Value {
+    let losses: Vec<String> = outcome.losses.iter().map(ToString::to_string).collect();
+    json!({
+        "schema": "abbe.check/1",
+        "bag": path.display().to_string(),
+        "equal": outcome.first.is_none(),
+        "inputs": outcome.inputs,
+        "compared": outcome.compared,
+        "first_difference": outcome.first,
+        "losses": losses,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recorded_parameters_become_a_parameter_file() {
+        let file = parameter_file("a: 1.0\nb:\n- c: 2\n");
+        assert_eq!(
+            file,
+            "/**:\n  ros__parameters:\n    a: 1.0\n    b:\n    - c: 2\n"
+        );
+    }
+}

@@ -1,0 +1,32 @@
+//! Why a bag cannot be replayed.
+
+use node_runtime::harness::ComposeError;
+
+/// Why a bag cannot be replayed.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "fields are named in the messages")]
+pub enum ReplayError {
+    #[error(
+        "the bag does not say what ran (metadata record \"abbe.run\"): no composed run recorded it"
+    )]
+    NoRun,
+    #[error(
+        "the bag's messages stand as they reached the recorder: when each node got them is not in it; only bags of runs in simulated time are recomputed"
+    )]
+    Arrival,
+    #[error("the bag does not name the nodes that ran (metadata record \"abbe.nodes\")")]
+    NoNodes,
+    #[error("start of the run {nanos} ns: must be below 2^63")]
+    Start { nanos: u64 },
+    #[error(
+        "topic {topic}: the bag's {type_name} is another version (hash {recorded}, here {known})"
+    )]
+    OtherVersion {
+        topic: String,
+        type_name: String,
+        recorded: String,
+        known: String,
+    },
+    #[error(transparent)]
+    Compose(#[from] ComposeError),
+}

@@ -1,0 +1,241 @@
+//! What a replay must do, and what it must notice.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use abbe_msgs::msg::ProbeTrigger;
+use abbe_msgs::{from_cdr, to_cdr};
+use abbe_tests::program::{Process, command, root};
+use abbe_tests::scenario::{SHORT_PLAN, Scenario, mcap_file};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::rewrite::{Change, Copied, rewrite};
+
+/// A parameter of the thermal model as it stands in the bag, and another value of it.
+const CHANGED: (&str, &str) = ("validity_min: 40.0", "validity_min: 41.0");
+
+/// Exit code and JSON of `abbe check --json`; what was said instead where there is no JSON.
+fn check(bag: &Path) -> (i32, Value) {
+    let bag = bag.display().to_string();
+    let mut command = command(0, &["check", "--json", &bag]);
+    command.stderr(std::process::Stdio::null());
+    let ended = Process::start(command).ended_within(Duration::from_secs(60));
+    let json = serde_json::from_str(&ended.said).unwrap_or(Value::Null);
+    (ended.status.code().unwrap(), json)
+}
+
+/// What `abbe check` says on the standard error.
+fn said(bag: &Path) -> String {
+    let bag = bag.display().to_string();
+    let ended = Process::start(command(0, &["check", &bag])).ended_within(Duration::from_secs(60));
+    ended.said
+}
+
+/// A short run of `first_run`, recorded once for all tests.
+fn short_run() -> &'static Path {
+    static RUN: OnceLock<(Scenario, PathBuf)> = OnceLock::new();
+    let (_, bag) = RUN.get_or_init(|| {
+        let scenario = Scenario::copy_of("first_run");
+        scenario.write("plan.yaml", SHORT_PLAN);
+        let bag = scenario.run().join("bag");
+        (scenario, bag)
+    });
+    bag
+}
+
+/// A changed copy of the short run.
+fn changed(change: &Change<'_>) -> TempDir {
+    let home = tempfile::tempdir().unwrap();
+    rewrite(&mcap_file(short_run()), home.path(), change);
+    home
+}
+
+fn differing(outcome: &Value, topic: &str) -> u64 {
+    outcome["compared"][topic]["differing"].as_u64().unwrap()
+}
+
+#[test]
+fn replay_from_inputs_reproduces_outputs() {
+    let (code, outcome) = check(short_run());
+    assert_eq!(code, 0, "{outcome:#}");
+    assert_eq!(outcome["equal"], true);
+    let compared = outcome["compared"].as_object().unwrap();
+    for topic in [
+        "/blocks/measurement",
+        "/compensation",
+        "/latency",
+        "/probe/point",
+        "/thermal/model",
+    ] {
+        let messages = compared[topic]["messages"].as_u64().unwrap();
+        eprintln!("{topic}: {messages} messages");
+        assert!(messages > 0, "{topic}");
+    }
+    // The compensation was switched on by a service call, which is in the bag.
+    assert!(compared["/compensation"]["messages"].as_u64().unwrap() > 1_000);
+}
+
+#[test]
+fn replay_of_a_copy_is_equal() {
+    let copy = changed(&Change::default());
+    let (code, outcome) = check(copy.path());
+    assert_eq!(code, 0, "{outcome:#}");
+}
+
+/// Changes the latched position of one touch by one unit in the last place.
+fn one_ulp(messages: &mut Vec<Copied>) {
+    let touch = messages.iter_mut().find(|m| m.topic == "/probe/trigger");
+    let touch = touch.unwrap();
+    let mut trigger: ProbeTrigger = from_cdr(&touch.data).unwrap();
+    for latched in &mut trigger.latched {
+        *latched = latched.next_up();
+    }
+    touch.data = to_cdr(&trigger);
+}
+
+#[test]
+fn replay_notices_one_ulp_of_an_input() {
+    let bag = changed(&Change {
+        messages: Some(&one_ulp),
+        ..Change::default()
+    });
+    let (code, outcome) = check(bag.path());
+    assert_eq!(code, 1, "{outcome:#}");
+    let first = &outcome["first_difference"];
+    eprintln!("{first:#}");
+    assert_eq!(first["topic"], "/probe/point");
+    assert_eq!(first["discrepancy"]["kind"], "field");
+    assert!(first["discrepancy"]["ulps"].as_u64().unwrap() < 100);
+}
+
+#[test]
+fn replay_notices_the_order_of_two_events() {
+    let swap = |messages: &mut Vec<Copied>| {
+        let touches: Vec<usize> = (0..messages.len())
+            .filter(|place| messages[*place].topic == "/probe/trigger")
+            .collect();
+        let other = std::mem::take(&mut messages[touches[1]].data);
+        messages[touches[1]].data = std::mem::replace(&mut messages[touches[0]].data, other);
+    };
+    let bag = changed(&Change {
+        messages: Some(&swap),
+        ..Change::default()
+    });
+    let (code, outcome) = check(bag.path());
+    assert_eq!(code, 1, "{outcome:#}");
+}
+
+#[test]
+fn replay_notices_a_message_more_and_a_message_less() {
+    let without = |messages: &mut Vec<Copied>| {
+        let first = messages.iter().position(|m| m.topic == "/probe/point");
+        messages.remove(first.unwrap());
+    };
+    let bag = changed(&Change {
+        messages: Some(&without),
+        ..Change::default()
+    });
+    let (code, outcome) = check(bag.path());
+    assert_eq!(code, 1, "{outcome:#}");
+    let kind = &outcome["first_difference"]["discrepancy"]["kind"];
+    assert!(
+        ["not_recorded", "order", "field"].contains(&kind.as_str().unwrap()),
+        "{kind}"
+    );
+    let without = |messages: &mut Vec<Copied>| {
+        let first = messages.iter().position(|m| m.topic == "/probe/trigger");
+        messages.remove(first.unwrap());
+    };
+    let bag = changed(&Change {
+        messages: Some(&without),
+        ..Change::default()
+    });
+    assert_eq!(check(bag.path()).0, 1);
+}
+
+#[test]
+fn replay_notices_a_parameter() {
+    let attachment = Some(("params/thermal_model.yaml", CHANGED.0, CHANGED.1));
+    let bag = changed(&Change {
+        attachment,
+        ..Change::default()
+    });
+    let (code, outcome) = check(bag.path());
+    assert_eq!(code, 1, "{outcome:#}");
+    let bag = changed(&Change {
+        attachment,
+        keeps_hash: true,
+        ..Change::default()
+    });
+    let words = said(bag.path());
+    assert!(words.contains("params/thermal_model.yaml"), "{words}");
+}
+
+#[test]
+fn replay_recorded_output_is_not_read() {
+    // The first result of every kind is spoiled: no other result may change.
+    let spoil = |messages: &mut Vec<Copied>| {
+        for topic in ["/latency", "/blocks/measurement", "/thermal/model"] {
+            let first = messages.iter_mut().find(|m| m.topic == topic).unwrap();
+            let middle = first.data.len() / 2;
+            first.data[middle] ^= 1;
+        }
+    };
+    let bag = changed(&Change {
+        messages: Some(&spoil),
+        ..Change::default()
+    });
+    let (code, outcome) = check(bag.path());
+    assert_eq!(code, 1, "{outcome:#}");
+    for topic in ["/latency", "/blocks/measurement", "/thermal/model"] {
+        assert_eq!(differing(&outcome, topic), 1, "{topic}: {outcome:#}");
+    }
+    assert_eq!(differing(&outcome, "/compensation"), 0, "{outcome:#}");
+}
+
+#[test]
+fn replay_ignores_wall_clock() {
+    let scenario = Scenario::copy_of("first_run");
+    scenario.write("plan.yaml", SHORT_PLAN);
+    let ended = scenario.run_to_end(&["--pace", "100"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    let slow = scenario.new_run(&[]).join("bag");
+    let bags = [slow.as_path(), short_run()].map(|bag| std::fs::read(mcap_file(bag)).unwrap());
+    assert_eq!(bags[0], bags[1], "a paced run has another bag");
+    assert_eq!(check(&slow).0, 0);
+}
+
+#[test]
+fn replay_of_a_cut_bag_is_equal_up_to_the_cut_and_says_so() {
+    let home = tempfile::tempdir().unwrap();
+    let bytes = std::fs::read(mcap_file(short_run())).unwrap();
+    std::fs::write(
+        home.path().join("bag_0.mcap"),
+        &bytes[..bytes.len() * 3 / 5],
+    )
+    .unwrap();
+    let (code, outcome) = check(home.path());
+    assert_eq!(code, 3, "{outcome:#}");
+    assert_eq!(outcome["equal"], true);
+    assert_eq!(outcome["losses"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn a_bag_without_a_run_says_what_it_lacks() {
+    let home = tempfile::tempdir().unwrap();
+    let bag = home.path().join("bag");
+    let shelf = recorder::Directory::create(&bag).unwrap();
+    let config = recorder::RecorderConfig::default();
+    let recording = recorder::Recording::begin(shelf, "bag", config).unwrap();
+    recording.finish().unwrap();
+    assert!(said(&bag).contains("abbe.run"), "{}", said(&bag));
+    assert_eq!(check(&bag).0, 1);
+}
+
+#[test]
+fn compat_format_v1_replays() {
+    let (code, outcome) = check(&root().join("bags/cold_reference"));
+    assert_eq!(code, 0, "{outcome:#}");
+}

@@ -1,0 +1,9 @@
+//! The replay contract: a bag of a run in simulated time determines its results, byte for byte, and a replay that could
+//! not fail is none.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(clippy::disallowed_methods, reason = "tests read files")]
+#![expect(clippy::print_stderr, reason = "figures that were seen are said")]
+
+mod contract;
+mod equal_bytes;
+mod rewrite;
