@@ -5,10 +5,11 @@ use gap_diagnosis::{GapConfig, GapError, Note, diagnose};
 use crate::plant::{Noise, State, diagnosed, machine, names, session, soft_play};
 
 #[test]
-fn without_the_class_a_play_is_flagged_and_placed_by_its_reversals() {
+fn without_the_classes_that_span_it_a_play_is_flagged_and_placed_by_its_reversals() {
+    // Lost motion that hardly changes with the feed, below its own speed, is a play in all but name.
     let session = session(11, Noise::default(), &soft_play(0, 5e-3));
     let config = GapConfig {
-        left_out: vec!["backlash".to_owned()],
+        left_out: ["backlash", "feed_lost_motion"].map(str::to_owned).to_vec(),
         ..GapConfig::default()
     };
     let diagnosis = diagnose(&machine(), &session, &config).unwrap();
