@@ -11,6 +11,7 @@ mod bad_plan;
 mod blocks;
 mod cell;
 mod five_axis;
+mod gap_first;
 mod grid_truth;
 mod grid_xy;
 mod positioning;

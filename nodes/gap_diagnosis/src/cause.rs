@@ -433,15 +433,6 @@ impl Found {
         }
     }
 
-    /// Whether something is left that no named effect explains.
-    pub fn is_unexplained(&self) -> bool {
-        self.leftover.flagged()
-            || self
-                .members
-                .iter()
-                .any(|member| member.status == Status::Surrogate)
-    }
-
     /// The causes of the report.
     pub fn causes(&self) -> Vec<Cause> {
         self.members

@@ -290,8 +290,7 @@ impl<'a> Base<'a> {
         let sizes = gap::by_block(&all, self.noise, &all.floated(all.raw.clone()));
         let floated = stack.floated(stack.raw.clone());
         let (rest, beside) = self.beside_named(&stack, &slots, &found, config);
-        let is_open = found.is_unexplained() || scattered.is_unexplained() || beside.flagged();
-        let flagged = reproduced && before.flagged() && is_open;
+        let flagged = reproduced && before.flagged() && beside.flagged();
         let report = GapReport {
             schema: SCHEMA.to_owned(),
             inputs: Inputs::default(),

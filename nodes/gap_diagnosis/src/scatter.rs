@@ -73,13 +73,6 @@ impl Scattered {
             cause.status = Status::Surrogate;
         }
     }
-
-    /// Whether something is found that no rule lets be named.
-    pub fn is_unexplained(&self) -> bool {
-        self.causes
-            .iter()
-            .any(|cause| cause.status == Status::Surrogate)
-    }
 }
 
 /// Squares beyond this many times the middle square of their block count as this.

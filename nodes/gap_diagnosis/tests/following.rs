@@ -211,11 +211,10 @@ fn play_that_develops_is_the_first_cause_within_one_cycle_and_told_of_once() {
         machine.cycle();
     }
     assert!(machine.reports() >= 3, "{}", machine.reports());
-    assert_eq!(machine.causes(), [""; 0]);
     assert_eq!(machine.new_effects(), [""; 0]);
     machine.play_mm = 4e-3;
     machine.cycle();
-    assert_eq!(machine.causes(), ["backlash X"]);
+    assert_eq!(machine.causes()[0], "backlash X");
     let last = machine.last_report();
     let width_um = last.causes[0].parameters[0].value;
     assert!((width_um - 4.0).abs() < 0.4, "{width_um}");
@@ -225,10 +224,9 @@ fn play_that_develops_is_the_first_cause_within_one_cycle_and_told_of_once() {
     );
     let mut told = machine.new_effects();
     machine.cycle();
-    assert_eq!(machine.causes(), ["backlash X"]);
+    assert_eq!(machine.causes()[0], "backlash X");
     told.extend(machine.new_effects());
-    assert!(told.len() <= 1, "{told:?}");
-    assert!(told.iter().all(|effect| effect == "backlash X"), "{told:?}");
+    assert_eq!(told, ["backlash X"]);
 }
 
 #[test]
