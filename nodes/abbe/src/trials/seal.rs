@@ -1,0 +1,106 @@
+//! The truth of a trial in a file that nobody may read until the diagnosis is over.
+
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use sha2::{Digest, Sha256};
+use trials::Truth;
+
+/// Nobody may do anything.
+const SHUT: u32 = 0o000;
+/// Its owner may read it.
+const OPEN: u32 = 0o400;
+/// Only the owner may look into the folder.
+const PRIVATE: u32 = 0o700;
+
+/// A sealed truth.
+pub struct Seal {
+    path: PathBuf,
+    /// SHA-256 of the file, hexadecimal.
+    pub sha256: String,
+}
+
+impl Seal {
+    /// Writes and shuts it.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(folder: &Path, name: &str, truth: &Truth) -> Result<Self> {
+        let place = |path: &Path| format!("seal {}", path.display());
+        std::fs::create_dir_all(folder).with_context(|| place(folder))?;
+        mode(folder, PRIVATE)?;
+        let path = folder.join(format!("{name}.json"));
+        let text = serde_json::to_string_pretty(truth)?;
+        if path.exists() {
+            std::fs::remove_file(&path).with_context(|| place(&path))?;
+        }
+        std::fs::write(&path, &text).with_context(|| place(&path))?;
+        mode(&path, SHUT)?;
+        Ok(Self {
+            sha256: format!("{:x}", Sha256::digest(&text)),
+            path,
+        })
+    }
+
+    /// Opens it.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is another file than was shut.
+    pub fn open(&self) -> Result<Truth> {
+        mode(&self.path, OPEN)?;
+        let text = std::fs::read_to_string(&self.path)
+            .with_context(|| format!("seal {}", self.path.display()))?;
+        if format!("{:x}", Sha256::digest(&text)) != self.sha256 {
+            bail!(
+                "seal {}: was changed after it was shut",
+                self.path.display()
+            );
+        }
+        Ok(serde_json::from_str(&text)?)
+    }
+}
+
+fn mode(path: &Path, mode: u32) -> Result<()> {
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode))
+        .with_context(|| format!("seal {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use trials::Arm;
+
+    use super::*;
+
+    fn truth() -> Truth {
+        Truth {
+            arm: Arm::Null,
+            index: 3,
+            seed: 7,
+            effects: vec![],
+            left_out: None,
+            between_runs_um: 0.2,
+            white_um: 0.1,
+            has_outliers: false,
+        }
+    }
+
+    #[test]
+    fn what_was_shut_is_what_is_opened() {
+        let folder = tempfile::tempdir().unwrap();
+        let seal = Seal::write(folder.path(), "iv-3", &truth()).unwrap();
+        let shut = std::fs::metadata(&seal.path).unwrap().permissions().mode();
+        assert_eq!(shut & 0o777, SHUT);
+        assert_eq!(seal.open().unwrap(), truth());
+    }
+
+    #[test]
+    fn a_seal_that_was_changed_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let seal = Seal::write(folder.path(), "iv-3", &truth()).unwrap();
+        mode(&seal.path, 0o600).unwrap();
+        let text = std::fs::read_to_string(&seal.path).unwrap();
+        std::fs::write(&seal.path, text.replace("0.2", "0.3")).unwrap();
+        assert!(seal.open().unwrap_err().to_string().contains("was changed"));
+    }
+}
