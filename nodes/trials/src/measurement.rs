@@ -154,8 +154,11 @@ impl Session<'_> {
 
     fn hear(&mut self, output: FromControl) -> Result<(), TrialError> {
         match output {
-            FromControl::State(state) => {
+            FromControl::State(mut state) => {
                 self.commanded = state.commanded;
+                if !self.rig.has_motors {
+                    state.motor = state.commanded;
+                }
                 (self.take)(state.received_at, Sample::State(state));
             }
             FromControl::Grid(sample) => self.grid(sample),

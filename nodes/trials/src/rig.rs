@@ -53,6 +53,8 @@ pub struct Rig {
     pub scatter: Scatter,
     /// How much later the grid encoder stamps its readings than it should, s.
     pub grid_late_s: f64,
+    /// Whether the motors' encoders are recorded; otherwise their positions are those that were commanded.
+    pub has_motors: bool,
 }
 
 impl Rig {
@@ -92,6 +94,7 @@ impl Rig {
             machine,
             plant,
             grid_late_s: 0.0,
+            has_motors: random.random(),
         })
     }
 

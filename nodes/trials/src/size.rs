@@ -11,6 +11,10 @@
 //!   s' C^-1 s = (s's - b' (v V^-1 + B'B)^-1 b) / v,   b = B's                             (3)
 //! ```
 //!
+//! The plant is not the same to the last digit either: loops chatter within a step of their encoders, differently once
+//! anything has changed. That part c^2 of the difference is taken from neighbouring rows, added to v, and its
+//! expectation, c^2/v for each row, taken from D^2.
+//!
 //! A row is the mean of m readings. B holds the waves of the smooth deviation, with their variance in V, and
 //! what every set-up leaves open, with an infinite one: zeros, the turn of the plate, the place of a touched face. They
 //! are left open in every run here, once for a set-up in the diagnosis, so that D is a little too small rather than too
@@ -27,6 +31,7 @@ use metrology::{Axis, PerAxis};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::measurement::{Sample, plane_axes};
+use crate::proportion::median;
 use crate::scatter::{Scatter, WAVES};
 
 /// Rows that a run's readings are thinned to.
@@ -186,12 +191,32 @@ fn gain(with: &Block, without: &Block, scatter: &Scatter) -> f64 {
         let memory = (1.0 + scatter.ar) / (1.0 - scatter.ar);
         scatter.white_mm.powi(2) * memory / mean_of + INSTRUMENT_MM.powi(2)
     };
-    quadratic_form(
+    let chatter_mm2 = if with.is_touch {
+        0.0
+    } else {
+        chatter_mm2(&signature)
+    };
+    let all_mm2 = variance_mm2 + chatter_mm2;
+    let gain = quadratic_form(
         &signature,
         &columns,
-        variance_mm2,
+        all_mm2,
         scatter.coefficient_variance_mm2(),
-    )
+    );
+    gain - signature.len() as f64 * chatter_mm2 / all_mm2
+}
+
+/// Middle square of a normal number of variance 1.
+const MIDDLE_SQUARE: f64 = 0.454_936;
+
+/// Variance of a row that its neighbours do not share, mm2, from second differences (six times it): slopes have none,
+/// and steps of a signature are too few to matter.
+fn chatter_mm2(signature: &DVector<f64>) -> f64 {
+    let squares = signature
+        .as_slice()
+        .windows(3)
+        .map(|rows| (rows[0] - 2.0 * rows[1] + rows[2]).powi(2));
+    median(squares.collect()).map_or(0.0, |middle| middle / (6.0 * MIDDLE_SQUARE))
 }
 
 /// Rows, their columns of B (waves first), and the readings that make a row.
@@ -289,6 +314,19 @@ mod tests {
         let dense = signature.dot(&(covariance.try_inverse().unwrap() * &signature));
         let fast = quadratic_form(&signature, &columns, white, wave);
         assert!((fast / dense - 1.0).abs() < 1e-5, "{fast} {dense}");
+    }
+
+    #[test]
+    fn rows_that_differ_from_their_neighbours_are_chatter_and_a_step_is_not() {
+        let step = DVector::from_fn(100, |row, _| {
+            let slope = row as f64 * 1e-5;
+            if row < 37 { slope } else { slope + 3e-3 }
+        });
+        assert!(chatter_mm2(&step).abs() < 1e-18);
+        // A full period of numbers that fill the unit interval evenly: variance 1/12.
+        let even = DVector::from_fn(1000, |row, _| (row as f64 * 0.618_033_988_749_895).fract());
+        let spread = DVector::from_fn(1000, |row, _| even[(row * 367) % 1000]);
+        assert!(chatter_mm2(&spread) > 0.02);
     }
 
     #[test]

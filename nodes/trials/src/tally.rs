@@ -151,9 +151,15 @@ fn rates(arm: Arm, own: &[&Verdict]) -> Vec<Rate> {
     let said: Vec<&Verdict> = own.iter().copied().filter(|v| v.said.is_some()).collect();
     let mut rates = Rates::default();
     rates.add("diagnosed", own, |v| v.said.is_some());
-    rates.add("floor reproduced", &said, |v| {
-        v.said.as_ref().is_some_and(|said| said.is_reproduced)
-    });
+    rates.add("floor reproduced", &said, is_reproduced);
+    let motors = |wanted: bool| -> Vec<&Verdict> {
+        let fits = |v: &&&Verdict| v.truth.has_motors == wanted;
+        said.iter().filter(fits).copied().collect()
+    };
+    for (what, wanted) in [("recorded", true), ("not recorded", false)] {
+        let what = format!("floor reproduced, motors {what}");
+        rates.add(&what, &motors(wanted), is_reproduced);
+    }
     rates.add("a cause named that is none", &said, has_wrong);
     rates.add("wrong and not flagged unknown", &said, |v| {
         has_wrong(v) && !v.is_flagged()
@@ -178,6 +184,10 @@ fn rates(arm: Arm, own: &[&Verdict]) -> Vec<Rate> {
         rates.of_effects(&said);
     }
     rates.0
+}
+
+fn is_reproduced(verdict: &Verdict) -> bool {
+    verdict.said.as_ref().is_some_and(|said| said.is_reproduced)
 }
 
 fn has_wrong(verdict: &Verdict) -> bool {
@@ -491,6 +501,7 @@ mod tests {
                 between_runs_um: 0.2,
                 white_um: 0.1,
                 has_outliers: false,
+                has_motors: true,
             },
             truth_sha256: String::new(),
             commit: String::new(),

@@ -7,6 +7,7 @@
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use sequencer::Step;
 
 use crate::arm::Arm;
 use crate::commissioning::Commissioning;
@@ -64,6 +65,7 @@ impl Trial {
             between_runs_um: rig.scatter.between_runs_mm * 1e3,
             white_um: rig.scatter.white_mm * 1e3,
             has_outliers: rig.scatter.outliers > 0.0,
+            has_motors: rig.has_motors,
         };
         Ok(Self { rig, truth })
     }
@@ -163,11 +165,21 @@ fn scaled(
     Ok((sized, d))
 }
 
+/// The same machine and programme with the touches at the end: when a touch comes depends on what is hidden, and would
+/// shift every reading behind it.
+fn touched_last(rig: &Rig) -> Rig {
+    let mut sorted = rig.clone();
+    sorted.has_motors = true;
+    let is_touch = |step: &Step| matches!(step, Step::Latency { .. });
+    sorted.plan.steps.sort_by_key(is_touch);
+    sorted
+}
+
 /// Adds what its maker knows of the loops to the machine file; the session without an effect.
 fn commissioned(rig: &mut Rig) -> Result<Deviations, TrialError> {
     let mut deviations = Deviations::default();
     let mut commissioning = Commissioning::new(&rig.machine, STATE_RATE_HZ);
-    measure(rig, &mut |at, sample| {
+    measure(&touched_last(rig), &mut |at, sample| {
         commissioning.take(&sample);
         deviations.take(at, &sample);
     })?;
@@ -177,7 +189,9 @@ fn commissioned(rig: &mut Rig) -> Result<Deviations, TrialError> {
 
 fn deviations(rig: &Rig) -> Result<Deviations, TrialError> {
     let mut deviations = Deviations::default();
-    measure(rig, &mut |at, sample| deviations.take(at, &sample))?;
+    measure(&touched_last(rig), &mut |at, sample| {
+        deviations.take(at, &sample);
+    })?;
     Ok(deviations)
 }
 

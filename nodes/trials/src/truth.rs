@@ -25,6 +25,8 @@ pub struct Truth {
     pub white_um: f64,
     /// Whether there are outliers.
     pub has_outliers: bool,
+    /// Whether the motors' encoders were recorded.
+    pub has_motors: bool,
 }
 
 /// One hidden effect.

@@ -90,6 +90,7 @@ mod tests {
                 between_runs_um: 0.2,
                 white_um: 0.1,
                 has_outliers: false,
+                has_motors: true,
             },
             truth_sha256: "ab".to_owned(),
             commit: "c".to_owned(),

@@ -82,6 +82,7 @@ mod tests {
             between_runs_um: 0.2,
             white_um: 0.1,
             has_outliers: false,
+            has_motors: true,
         }
     }
 
