@@ -5,12 +5,13 @@
 //! `scatter` what no two runs have in common, `trial` puts them together and `measurement` runs the plan on
 //! `fake_cnc`'s plant in simulated time. Its physics is the plant's own: nothing here calls the simulator or its
 //! catalogue, whose ids it only writes down. The *diagnoser* is `abbe diagnose`, a process that is given the bag and
-//! the machine file. The *judge* is `verdict` for one trial and `tally` for all of them.
+//! the machine file. The *judge* is `verdict` for one trial, `tally` and `calibration` for all of them.
 //!
 //! `size` says how large a hidden effect is for these measurements: D, the root of its chi-square against the
 //! trial's own scatter, of which the generator, unlike the diagnoser, knows the covariance.
 
 pub mod arm;
+pub mod calibration;
 mod commissioning;
 pub mod effect;
 pub mod error;

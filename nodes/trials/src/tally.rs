@@ -6,6 +6,7 @@ use gap_diagnosis::report::Status;
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
+use crate::calibration::{Reliability, calibration, reliability};
 use crate::effect::Class;
 use crate::proportion::{Proportion, auroc, median};
 use crate::truth::TrueEffect;
@@ -15,8 +16,6 @@ use crate::verdict::Verdict;
 pub const D_EDGES: [f64; 4] = [5.0, 10.0, 20.0, 50.0];
 /// Bins of D.
 pub const D_BINS: usize = D_EDGES.len() + 1;
-/// Bins of confidence.
-const CONFIDENCE_BINS: usize = 10;
 /// D beyond which a single effect should be named.
 const SINGLE_D: f64 = 10.0;
 /// D beyond which each of several effects should be named.
@@ -44,15 +43,6 @@ pub struct Figure {
     pub value: Option<f64>,
     /// Of how many.
     pub n: usize,
-}
-
-/// One bin of the reliability diagram.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Reliability {
-    /// Mean confidence of the named causes in it.
-    pub confidence: f64,
-    /// How many of them were right.
-    pub right: Proportion,
 }
 
 /// A class with how often it was found.
@@ -325,54 +315,6 @@ fn figures(own: &[&Verdict]) -> Vec<Figure> {
     });
     figures.extend(calibration(own));
     figures
-}
-
-/// Every named cause as (confidence, whether it is right).
-fn named(own: &[&Verdict]) -> Vec<(f64, bool)> {
-    let all = own
-        .iter()
-        .flat_map(|v| v.named().map(|c| (c.confidence, v.is_right(c))));
-    all.collect()
-}
-
-fn calibration(own: &[&Verdict]) -> [Figure; 2] {
-    let named = named(own);
-    let n = named.len();
-    let of = |sum: f64| (n > 0).then(|| sum / n as f64);
-    let brier: f64 = named
-        .iter()
-        .map(|(confidence, right)| (confidence - f64::from(u8::from(*right))).powi(2))
-        .sum();
-    let apart = reliability(own).into_iter().map(|bin| {
-        let share = bin.right.share().unwrap_or(0.0);
-        bin.right.n as f64 * (bin.confidence - share).abs()
-    });
-    [
-        Figure {
-            what: "expected calibration error of named causes".to_owned(),
-            value: of(apart.sum()),
-            n,
-        },
-        Figure {
-            what: "Brier score of named causes".to_owned(),
-            value: of(brier),
-            n,
-        },
-    ]
-}
-
-fn reliability(own: &[&Verdict]) -> Vec<Reliability> {
-    let mut bins = vec![Vec::<(f64, bool)>::new(); CONFIDENCE_BINS];
-    for (confidence, right) in named(own) {
-        let place = (confidence * CONFIDENCE_BINS as f64) as usize;
-        bins[place.min(CONFIDENCE_BINS - 1)].push((confidence, right));
-    }
-    let full = bins.into_iter().filter(|bin| !bin.is_empty());
-    full.map(|bin| Reliability {
-        confidence: bin.iter().map(|(c, _)| c).sum::<f64>() / bin.len() as f64,
-        right: Proportion::of(bin.iter().map(|(_, right)| *right)),
-    })
-    .collect()
 }
 
 fn classes(own: &[&Verdict]) -> Vec<ClassLine> {
