@@ -143,23 +143,3 @@ fn beside(out: &Path) -> PathBuf {
     name.push("-sealed");
     out.with_file_name(name)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_final_series_has_a_seed_of_its_commit() {
-        assert_ne!(seed_of("a"), seed_of("b"));
-        assert_eq!(seed_of("a"), seed_of("a"));
-        assert_ne!(seed_of("a"), DEVELOPMENT_SEED);
-    }
-
-    #[test]
-    fn seals_are_never_in_the_folder_of_the_trials() {
-        assert_eq!(
-            beside(Path::new("runs/trials")),
-            Path::new("runs/trials-sealed")
-        );
-    }
-}
