@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
 /// Crates without clock, file, environment, entropy, log or ROS.
-pub const PURE: [&str; 11] = [
+pub const PURE: [&str; 12] = [
     "metrology",
     "machine",
     "probe",
@@ -17,6 +17,7 @@ pub const PURE: [&str; 11] = [
     "sequencer",
     "gap_diagnosis",
     "fake_cnc",
+    "trials",
 ];
 
 /// Folders that no file of the project is in.

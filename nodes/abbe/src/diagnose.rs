@@ -38,6 +38,9 @@ pub struct Diagnose {
     /// Write the machine file with the named effects added.
     #[arg(long)]
     write_machine: Option<PathBuf>,
+    /// Id of an effect that is not considered; may be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
 }
 
 /// A diagnosis of bags, with what could not be used of them.
@@ -64,7 +67,11 @@ impl Diagnose {
             ),
             None => bags::machine_text(&self.bags[0])?,
         };
-        let diagnosed = of(&self.bags, &name, &text)?;
+        let config = GapConfig {
+            left_out: self.without.clone(),
+            ..GapConfig::default()
+        };
+        let diagnosed = of(&self.bags, &name, &text, &config)?;
         let title = format!("Simulator against machine: {}", listed(&self.bags));
         let page = gap::page(&title, &diagnosed)?;
         let json = serde_json::to_string_pretty(&diagnosed.diagnosis.report)?;
@@ -106,11 +113,16 @@ fn listed(paths: &[PathBuf]) -> String {
 ///
 /// # Errors
 /// As [`Diagnose::execute`].
-pub fn of(paths: &[PathBuf], name: &str, machine_text: &str) -> Result<Diagnosed> {
+pub fn of(
+    paths: &[PathBuf],
+    name: &str,
+    machine_text: &str,
+    config: &GapConfig,
+) -> Result<Diagnosed> {
     let began = Instant::now();
     let machine = MachineFile::parse(machine_text, name)?;
     let recorded = Recorded::read(paths, &machine)?;
-    let mut diagnosis = diagnose(&machine, &recorded.session, &GapConfig::default())?;
+    let mut diagnosis = diagnose(&machine, &recorded.session, config)?;
     diagnosis.report.inputs.bags = recorded.bags;
     diagnosis.report.inputs.machine_sha256 = format!("{:x}", Sha256::digest(machine_text));
     diagnosis.report.runtime_s = began.elapsed().as_secs_f64();
@@ -128,7 +140,8 @@ pub fn of(paths: &[PathBuf], name: &str, machine_text: &str) -> Result<Diagnosed
 pub fn of_run(bag: &Path, folder: &Path, machine: &Path) -> Result<Report> {
     let text = std::fs::read_to_string(machine)
         .with_context(|| format!("machine file {}", machine.display()))?;
-    match of(&[bag.to_owned()], &machine.display().to_string(), &text) {
+    let name = machine.display().to_string();
+    match of(&[bag.to_owned()], &name, &text, &GapConfig::default()) {
         Ok(diagnosed) => {
             let json = serde_json::to_string_pretty(&diagnosed.diagnosis.report)?;
             let path = folder.join("gap.json");

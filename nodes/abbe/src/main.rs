@@ -25,6 +25,7 @@ mod report;
 mod report_bag;
 mod run;
 mod scenario;
+mod trials;
 mod truth;
 
 /// Measures a CNC machine, models its errors, compensates its axes and records every run.
@@ -47,6 +48,8 @@ enum Verb {
     Diagnose(diagnose::Diagnose),
     /// Tell what a plan's recordings will determine, before they are made, and what to add.
     Preflight(preflight::Preflight),
+    /// Judge the diagnosis on machines whose hidden effect it is not told.
+    Trials(trials::Trials),
     /// Record topics of the ROS graph into a bag.
     Record(record::Record),
     /// Make a bag of a table that a laser, a ballbar or a logger wrote.
@@ -64,6 +67,7 @@ fn main() -> ExitCode {
         Verb::Check(check) => check.execute(),
         Verb::Diagnose(diagnose) => diagnose.execute(),
         Verb::Preflight(preflight) => preflight.execute(),
+        Verb::Trials(trials) => trials.execute(),
         Verb::Record(record) => record.execute(),
         Verb::Import(import) => import.execute(),
         Verb::Export(export) => export.execute(),

@@ -23,6 +23,7 @@ mod drive;
 
 mod backlash;
 mod friction;
+mod lead_cycle;
 
 mod heat;
 mod network;
@@ -33,6 +34,7 @@ mod thermometer;
 mod body;
 mod chain;
 mod error_motion;
+mod guide_form;
 mod oil_film;
 mod structure;
 
@@ -67,6 +69,7 @@ use drive::Drive;
 use grid_plate::GridPlate;
 use heat::Heat;
 use laser::Laser;
+use lead_cycle::LeadCycle;
 use linear_scale::LinearScales;
 use structure::{Standing, Structure};
 
@@ -111,6 +114,7 @@ pub struct TrueContact {
 pub struct Plant {
     axes: AxisSet,
     drives: PerAxis<Option<Drive>>,
+    lead_cycles: PerAxis<Option<LeadCycle>>,
     encoder_resolution: PerAxis<f64>,
     scale_resolution: PerAxis<Option<f64>>,
     heat: Heat,
@@ -140,6 +144,7 @@ impl Plant {
         let mut plant = Self {
             axes: machine.axis_set(),
             drives: drives(machine, truth)?,
+            lead_cycles: lead_cycles(machine, truth)?,
             encoder_resolution: PerAxis::default(),
             scale_resolution: PerAxis::from_fn(|_| None),
             structure: Structure::new(
@@ -245,7 +250,7 @@ impl Plant {
             feedback.motor[axis] = quantised(drive.motor, self.encoder_resolution[axis]);
             feedback.velocity[axis] = drive.motor_velocity;
             if let Some(resolution) = self.scale_resolution[axis] {
-                let carried_mm = drive.slide + self.heat.screw_growth_mm(axis, drive.slide);
+                let carried_mm = drive.slide + self.screw_error_mm(axis, drive.slide);
                 let true_mm = carried_mm + self.body.along_error_mm(axis, carried_mm);
                 let strain = self.structure.scale_strain;
                 let read_mm = self.scales.reading_mm(axis, true_mm, strain);
@@ -378,8 +383,14 @@ impl Plant {
         }))
     }
 
+    /// How far heat and its own turns make the screw carry a nut that stands at `nut_mm`, mm.
+    fn screw_error_mm(&self, axis: Axis, nut_mm: f64) -> f64 {
+        let cycle_mm = self.lead_cycles[axis].map_or(0.0, |cycle| cycle.at_mm(nut_mm));
+        self.heat.screw_growth_mm(axis, nut_mm) + cycle_mm
+    }
+
     fn carried(&self, slide: &PerAxis<f64>) -> PerAxis<f64> {
-        PerAxis::from_fn(|axis| slide[axis] + self.heat.screw_growth_mm(axis, slide[axis]))
+        PerAxis::from_fn(|axis| slide[axis] + self.screw_error_mm(axis, slide[axis]))
     }
 
     fn collect_edges(&mut self, start: Span, period: Span, motor_before: &PerAxis<f64>) {
@@ -402,6 +413,21 @@ impl Plant {
             });
         }
     }
+}
+
+fn lead_cycles(
+    machine: &MachineFile,
+    truth: &PlantFile,
+) -> Result<PerAxis<Option<LeadCycle>>, PlantError> {
+    let mut cycles = PerAxis::from_fn(|_| None);
+    for (&axis, entry) in &truth.linear_drives {
+        if let (Some(cycle), Some(linear)) = (&entry.lead_cycle, machine.linear(axis)) {
+            let place = format!("linear_drives.{axis}.lead_cycle");
+            let made = LeadCycle::new(&place, cycle, linear.lead_mm, linear.travel_mm)?;
+            cycles[axis] = Some(made);
+        }
+    }
+    Ok(cycles)
 }
 
 fn drives(machine: &MachineFile, truth: &PlantFile) -> Result<PerAxis<Option<Drive>>, PlantError> {

@@ -21,6 +21,7 @@ use super::chain::{Chain, Joint, Rigid, nominal_direction, shift};
 use super::error::{PlantError, require_finite, require_not_negative};
 use super::error_motion::ErrorMotion;
 use super::file::{GeometryEntry, LinearErrorEntry, OilFilmEntry, RotaryErrorEntry};
+use super::guide_form::GuideForm;
 use super::oil_film::OilFilm;
 use super::structure::Structure;
 
@@ -207,8 +208,7 @@ impl TrueJoint {
                     place: "geometry.linear",
                     axis,
                 })?;
-                let travel_mm = linear.travel_mm[1] - linear.travel_mm[0];
-                Self::linear(joint, entry, geometry, travel_mm, seed)
+                Self::linear(joint, entry, geometry, linear.travel_mm, seed)
             }
             _ => {
                 let entry = geometry.rotary.get(&axis).ok_or(PlantError::AxisMissing {
@@ -232,7 +232,7 @@ impl TrueJoint {
         joint: Joint,
         entry: &LinearErrorEntry,
         geometry: &GeometryEntry,
-        travel_mm: f64,
+        travel_mm: [f64; 2],
         seed: u64,
     ) -> Result<Self, PlantError> {
         let axis = joint.axis;
@@ -257,13 +257,20 @@ impl TrueJoint {
         deviation[axis.index()] = entry.positioning_um / 1e3;
         deviation[3..].fill(entry.angular_urad / 1e6);
         let centre_mm = Vector3::from(entry.carriage_mm);
+        let span_mm = travel_mm[1] - travel_mm[0];
+        let forms =
+            entry.form.iter().enumerate().map(|(index, form)| {
+                GuideForm::new(&at(&format!("form[{index}]")), form, travel_mm)
+            });
+        let forms = forms.collect::<Result<_, _>>()?;
         Ok(Self {
             joint,
             nominal_origin_mm: Vector3::zeros(),
             origin_mm: Vector3::zeros(),
             direction: nominal_direction(axis) + lean / 1e6,
             lead_error: entry.lead_um_per_m / 1e6,
-            errors: ErrorMotion::draw(seed, axis, PI / travel_mm, &deviation, centre_mm),
+            errors: ErrorMotion::draw(seed, axis, PI / span_mm, &deviation, centre_mm)
+                .with_forms(forms),
             film: None,
         })
     }

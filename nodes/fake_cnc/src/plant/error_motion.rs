@@ -16,6 +16,7 @@ use metrology::Axis;
 use nalgebra::{Rotation3, Vector3};
 
 use super::chain::{Rigid, shift, turn_about};
+use super::guide_form::GuideForm;
 use super::noise::{Effect, Stream};
 
 const HARMONICS: usize = 5;
@@ -28,6 +29,7 @@ pub(super) struct ErrorMotion {
     sine: [[f64; HARMONICS]; COMPONENTS],
     cosine: [[f64; HARMONICS]; COMPONENTS],
     centre_mm: Vector3<f64>,
+    forms: Vec<GuideForm>,
 }
 
 impl ErrorMotion {
@@ -54,10 +56,17 @@ impl ErrorMotion {
             sine: draw(),
             cosine: draw(),
             centre_mm,
+            forms: Vec::new(),
         }
     }
 
-    /// (1), (2): shift (mm) and turn (rad) at position `q`.
+    /// Adds forms that are known by their drawing.
+    pub(super) fn with_forms(mut self, forms: Vec<GuideForm>) -> Self {
+        self.forms = forms;
+        self
+    }
+
+    /// (1), (2) and the forms: shift (mm) and turn (rad) at position `q`.
     pub(super) fn at(&self, q: f64) -> (Vector3<f64>, Vector3<f64>) {
         let (sin, cos) = (q * self.angle_per_unit).sin_cos();
         let mut value = [0.0; COMPONENTS];
@@ -68,6 +77,9 @@ impl ErrorMotion {
                     + self.cosine[component][harmonic] * (cos_k - 1.0);
             }
             (sin_k, cos_k) = (sin_k * cos + cos_k * sin, cos_k * cos - sin_k * sin);
+        }
+        for form in &self.forms {
+            value[form.component] += form.at(q);
         }
         (
             Vector3::new(value[0], value[1], value[2]),
@@ -84,7 +96,8 @@ impl ErrorMotion {
             value += a * sin_k + b * (cos_k - 1.0);
             (sin_k, cos_k) = (sin_k * cos + cos_k * sin, cos_k * cos - sin_k * sin);
         }
-        value
+        let own = self.forms.iter().filter(|form| form.component == component);
+        value + own.map(|form| form.at(q)).sum::<f64>()
     }
 
     /// Leaves one component and puts the others to zero.

@@ -10,11 +10,12 @@ mod reference;
 mod touching;
 
 pub use body::{
-    GeometryEntry, LinearErrorEntry, OilFilmEntry, RotaryErrorEntry, SquarenessEntry,
-    StructureEntry,
+    GeometryEntry, GuideFormEntry, LinearErrorEntry, OilFilmEntry, RotaryErrorEntry,
+    SquarenessEntry, StructureEntry,
 };
 pub use drives::{
-    FrictionEntry, LinearDriveEntry, RotaryDriveEntry, RotaryFrictionEntry, WearEntry,
+    FrictionEntry, LeadCycleEntry, LinearDriveEntry, RotaryDriveEntry, RotaryFrictionEntry,
+    WearEntry,
 };
 pub use heat::{
     HeatEntry, LinkEntry, Place, PlaceEntry, ScrewEnd, ScrewEntry, ShopAirEntry, SpindleLossEntry,

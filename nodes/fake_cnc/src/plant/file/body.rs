@@ -85,6 +85,27 @@ pub struct LinearErrorEntry {
     pub lead_um_per_m: f64,
     /// Where the carriage is guided, machine frame, axes at zero: the centre of its rotations.
     pub carriage_mm: [f64; 3],
+    /// Forms that are known by their drawing, beside what is drawn at random; none where absent.
+    #[serde(default)]
+    pub form: Vec<GuideFormEntry>,
+}
+
+/// A form of a guide in one of its six error motions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GuideFormEntry {
+    /// X, Y, Z: a shift along it; A, B, C: a turn about X, Y, Z.
+    pub component: Axis,
+    /// Height of a bow over the travel's ends; µm of a shift, µrad of a turn.
+    pub bow_um_urad: f64,
+    /// Amplitude of one wave over the travel.
+    pub wave_um_urad: f64,
+    /// Depth of a dent.
+    pub dent_um_urad: f64,
+    /// Where the dent is.
+    pub dent_at_mm: f64,
+    /// Half width at 1/e of its depth.
+    pub dent_width_mm: f64,
 }
 
 /// How a slide floats on the oil of its guides, differently from minute to minute.

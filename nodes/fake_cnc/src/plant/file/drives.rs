@@ -39,6 +39,25 @@ pub struct LinearDriveEntry {
     pub motor_friction: FrictionEntry,
     /// Friction of the guides.
     pub guide_friction: FrictionEntry,
+    /// What the screw repeats with its turns; nothing where absent.
+    #[serde(default)]
+    pub lead_cycle: Option<LeadCycleEntry>,
+}
+
+/// Cyclic error of a screw.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LeadCycleEntry {
+    /// Amplitude of what comes once a period.
+    pub once_um: f64,
+    /// Amplitude of what comes twice.
+    pub twice_um: f64,
+    /// Phase where the axis stands at zero.
+    pub phase_deg: f64,
+    /// Periods a turn of the screw.
+    pub per_turn: f64,
+    /// Growth of the amplitudes from the middle of the travel to its high end, as a share.
+    pub growth: f64,
 }
 
 /// The gap from an instant on.

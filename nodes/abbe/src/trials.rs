@@ -1,0 +1,145 @@
+//! `abbe trials`: blind trials of the diagnosis, and the table of what it found.
+//!
+//! For each trial a machine is drawn and its session written as a bag; what is hidden in the plant goes into a sealed
+//! file of another folder, whose SHA-256 is told before the diagnosis starts. The diagnosis is this program's own
+//! `diagnose`, as a process that is given the bag and the machine file and that may not read the seal. Then the seal
+//! is opened and one line added to the journal; a series that was interrupted goes on behind its last line.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use sha2::{Digest, Sha256};
+use trials::{Arm, Verdict};
+
+mod blind;
+mod journal;
+mod seal;
+mod series;
+mod session_bag;
+mod table;
+
+use journal::Journal;
+use series::{How, Series};
+
+/// Seed of the trials that the diagnosis is developed with; those of `--final` are others.
+const DEVELOPMENT_SEED: u64 = 1;
+
+/// Arguments of `abbe trials`.
+#[derive(Args)]
+pub struct Trials {
+    /// Arms, by number: i catalogue, ii a class left out, iii different physics, iv null, v null with worse noise,
+    /// vi confusable pairs; alone: each class in turn, large enough to be named.
+    #[arg(long, value_delimiter = ',', default_value = "i")]
+    arm: Vec<Arm>,
+    /// Trials in each arm.
+    #[arg(long, default_value_t = 20)]
+    n: u64,
+    /// Seed of the series.
+    #[arg(long, conflicts_with = "final_series")]
+    seed: Option<u64>,
+    /// Draw the seed from the commit of this program: a series that nobody could have tuned to.
+    #[arg(long = "final")]
+    final_series: bool,
+    /// Trials at a time; 0: as many as there are cores.
+    #[arg(long, default_value_t = 0)]
+    jobs: usize,
+    /// Folder of the journal and of the trials under way.
+    #[arg(long, default_value = "runs/trials")]
+    out: PathBuf,
+    /// Folder of the sealed truths; beside `--out` where it is not named.
+    #[arg(long)]
+    sealed: Option<PathBuf>,
+    /// Diagnose within this process, without bag and seal: for development, never for a published table.
+    #[arg(long)]
+    in_process: bool,
+    /// Keep bags and reports.
+    #[arg(long)]
+    keep: bool,
+    /// Make no trials: tabulate the journal.
+    #[arg(long)]
+    tabulate: bool,
+    /// Write the table as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write the table as one HTML file.
+    #[arg(long)]
+    html: Option<PathBuf>,
+    /// Write the table as Markdown.
+    #[arg(long)]
+    markdown: Option<PathBuf>,
+}
+
+impl Trials {
+    /// Makes the trials and prints the table.
+    ///
+    /// # Errors
+    /// When a trial cannot be made or a file not written.
+    pub fn execute(self) -> Result<ExitCode> {
+        if self.n == 0 {
+            bail!("--n 0: must be 1 or more");
+        }
+        let seed = match (self.final_series, self.seed) {
+            (true, _) => seed_of(env!("ABBE_COMMIT")),
+            (false, seed) => seed.unwrap_or(DEVELOPMENT_SEED),
+        };
+        std::fs::create_dir_all(&self.out).with_context(|| format!("{}", self.out.display()))?;
+        let mut journal = Journal::open(&self.out.join("journal.jsonl"))?;
+        let arms: BTreeSet<Arm> = self.arm.iter().copied().collect();
+        if !self.tabulate {
+            let how = How {
+                in_process: self.in_process,
+                keep: self.keep,
+                out: self.out.clone(),
+                sealed: self.sealed.clone().unwrap_or_else(|| beside(&self.out)),
+            };
+            let series = Series {
+                seed,
+                n: self.n,
+                jobs: self.jobs,
+                how: &how,
+            };
+            for arm in &arms {
+                series.run(*arm, &mut journal)?;
+            }
+        }
+        let own = |verdict: &&Verdict| {
+            let truth = &verdict.truth;
+            truth.seed == seed && truth.index < self.n && arms.contains(&truth.arm)
+        };
+        let verdicts: Vec<Verdict> = journal.verdicts().iter().filter(own).cloned().collect();
+        self.publish(&table::Table::of(&arms, seed, verdicts, self.in_process))?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn publish(&self, table: &table::Table) -> Result<()> {
+        println!("{}", table.terminal());
+        for (path, contents) in [
+            (&self.json, table.json()?),
+            (&self.html, table.html()),
+            (&self.markdown, table.markdown()),
+        ] {
+            if let Some(path) = path {
+                std::fs::write(path, contents).with_context(|| format!("{}", path.display()))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A seed that follows from a commit and from nothing else.
+fn seed_of(commit: &str) -> u64 {
+    let hash = Sha256::digest(format!("blind trials of {commit}"));
+    hash.iter()
+        .take(8)
+        .fold(0, |seed, byte| seed << 8 | u64::from(*byte))
+}
+
+/// The folder of the seals for a folder of trials.
+fn beside(out: &Path) -> PathBuf {
+    let mut name = out.file_name().unwrap_or_default().to_owned();
+    name.push("-sealed");
+    out.with_file_name(name)
+}

@@ -1,0 +1,74 @@
+//! The journal: one line of JSON for each trial that was judged.
+
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use trials::{Arm, Verdict};
+
+/// A journal that goes on.
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+    verdicts: Vec<Verdict>,
+}
+
+impl Journal {
+    /// Opens or begins one. A last line that was cut short is taken away: its trial is made again.
+    ///
+    /// # Errors
+    /// When it cannot be read or written, or a line is no verdict.
+    pub fn open(path: &Path) -> Result<Self> {
+        let place = || format!("journal {}", path.display());
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(error) => return Err(error).with_context(place),
+        };
+        let whole = text.rfind('\n').map_or(0, |end| end + 1);
+        let mut verdicts = Vec::new();
+        for (number, line) in text[..whole].lines().enumerate() {
+            let verdict = serde_json::from_str(line)
+                .with_context(|| format!("{}, line {}", place(), number + 1))?;
+            verdicts.push(verdict);
+        }
+        let file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(path)
+            .with_context(place)?;
+        file.set_len(whole as u64).with_context(place)?;
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            verdicts,
+        })
+    }
+
+    /// Every verdict so far.
+    pub fn verdicts(&self) -> &[Verdict] {
+        &self.verdicts
+    }
+
+    /// Whether a trial was judged already.
+    pub fn has(&self, arm: Arm, seed: u64, index: u64) -> bool {
+        self.verdicts.iter().any(|verdict| {
+            let truth = &verdict.truth;
+            (truth.arm, truth.seed, truth.index) == (arm, seed, index)
+        })
+    }
+
+    /// Adds a line.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn add(&mut self, verdict: Verdict) -> Result<()> {
+        let line = serde_json::to_string(&verdict)? + "\n";
+        self.file
+            .write_all(line.as_bytes())
+            .with_context(|| format!("journal {}", self.path.display()))?;
+        self.verdicts.push(verdict);
+        Ok(())
+    }
+}

@@ -1,0 +1,84 @@
+//! Kinds of trials: what is hidden, and from whom.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::TrialError;
+
+/// One kind of trials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Arm {
+    /// 0 to 3 effects of the catalogue's classes.
+    Catalogue,
+    /// One effect whose class the diagnosis is told to leave out.
+    LeftOut,
+    /// 0 to 3 effects whose form is not quite the catalogue's.
+    Foreign,
+    /// No effect.
+    Null,
+    /// No effect, and runs that are no repeats scatter more than the repeats show.
+    HeavyNull,
+    /// One effect that has a double: another class that looks nearly like it.
+    Confusable,
+    /// One effect of a class, every class and every axis in turn, large enough to be named.
+    Alone,
+}
+
+impl Arm {
+    /// Every arm, in order.
+    pub const ALL: [Self; 7] = [
+        Self::Catalogue,
+        Self::LeftOut,
+        Self::Foreign,
+        Self::Null,
+        Self::HeavyNull,
+        Self::Confusable,
+        Self::Alone,
+    ];
+
+    /// Its number in the protocol; `alone` has none.
+    #[must_use]
+    pub const fn numeral(self) -> &'static str {
+        ["i", "ii", "iii", "iv", "v", "vi", "alone"][self as usize]
+    }
+
+    /// In words.
+    #[must_use]
+    pub const fn title(self) -> &'static str {
+        [
+            "classes of the catalogue",
+            "a class left out",
+            "different physics",
+            "nothing hidden",
+            "nothing hidden, noise worse than the repeats",
+            "confusable pairs",
+            "each class alone",
+        ][self as usize]
+    }
+
+    /// Whether its machines have nothing to be named.
+    #[must_use]
+    pub const fn is_null(self) -> bool {
+        matches!(self, Self::Null | Self::HeavyNull)
+    }
+}
+
+impl fmt::Display for Arm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.numeral())
+    }
+}
+
+impl FromStr for Arm {
+    type Err = TrialError;
+
+    fn from_str(name: &str) -> Result<Self, TrialError> {
+        let known = Self::ALL.into_iter().find(|arm| arm.numeral() == name);
+        known.ok_or_else(|| TrialError::UnknownArm {
+            name: name.to_owned(),
+        })
+    }
+}

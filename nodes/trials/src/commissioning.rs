@@ -1,0 +1,202 @@
+//! What the maker of a machine has measured of its loops: how each motor follows its command.
+//!
+//! # Model
+//!
+//! The programme is run once on the machine as it left the works, and the following error of every motor fitted by
+//!
+//! ```text
+//!   e = -L (v - a/K + j/K^2) - T v - c a - d j,   L = (1 - f) / K                         (1)
+//! ```
+//!
+//! The first bracket is the position loop alone, which gains and feed-forward of the machine file give; T, c and d are
+//! what velocity loop and sampling add. They go into the machine file's list of known effects.
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | e | motor less command | mm |
+//! | v, a, j | command's velocity, acceleration, jerk, from differences of the recording | mm/s, mm/s², mm/s³ |
+//! | K, f | gain and feed-forward of the machine file | 1/s, 1 |
+//!
+//! # Holds when
+//! The recording is even and fast against the motion: only ticks one period of the full rate apart are used, and of
+//! those the ones on circles, since starts and stops excite what (1) has not.
+//!
+//! # Agreement
+//! `eq1_coefficients_are_found_again`: 1e-3 relative, on a made-up loop.
+
+use std::collections::BTreeMap;
+
+use machine::MachineFile;
+use machine::file::EffectEntry;
+use metrology::sample::{AxisState, TestKind};
+use metrology::stamp::Span;
+use metrology::{Axis, PerAxis};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::measurement::Sample;
+
+/// Ticks that differences are taken over.
+const TICKS: usize = 5;
+
+/// The motors' following errors of a session.
+#[derive(Clone, Debug)]
+pub(crate) struct Commissioning {
+    period: Span,
+    last: Vec<AxisState>,
+    is_circle: bool,
+    normal: PerAxis<Matrix3<f64>>,
+    right: PerAxis<Vector3<f64>>,
+    /// L and K of each axis.
+    known: PerAxis<[f64; 2]>,
+}
+
+impl Commissioning {
+    /// Begins; `rate_hz` is the full rate of the recording.
+    pub(crate) fn new(machine: &MachineFile, rate_hz: f64) -> Self {
+        Self {
+            period: Span::from_secs_f64(1.0 / rate_hz),
+            last: Vec::with_capacity(TICKS),
+            is_circle: false,
+            normal: PerAxis::default(),
+            right: PerAxis::default(),
+            known: PerAxis::from_fn(|axis| {
+                machine.linear(axis).map_or([0.0, 1.0], |entry| {
+                    let gain = entry.position_gain_per_s;
+                    [(1.0 - entry.velocity_feedforward) / gain, gain]
+                })
+            }),
+        }
+    }
+
+    /// Takes a sample of the session.
+    pub(crate) fn take(&mut self, sample: &Sample) {
+        match sample {
+            Sample::Segment(segment) => {
+                self.is_circle = segment.begin && segment.kind == TestKind::Circle;
+                self.last.clear();
+            }
+            Sample::State(state) if self.is_circle => self.tick(state),
+            _ => {}
+        }
+    }
+
+    fn tick(&mut self, state: &AxisState) {
+        let follows = self.last.last().is_some_and(|before| {
+            let apart = state.received_at - before.received_at;
+            (apart.nanos() - self.period.nanos()).abs() <= 1
+        });
+        if !follows {
+            self.last.clear();
+        }
+        if self.last.len() == TICKS {
+            self.last.remove(0);
+        }
+        self.last.push(*state);
+        if let [a, b, c, d, e] = &self.last[..] {
+            let window = [a, b, c, d, e].map(|state| state.commanded);
+            let middle = *c;
+            let h = self.period.as_secs_f64();
+            for axis in Axis::LINEAR {
+                let r = window.map(|commanded| commanded[axis]);
+                let velocity = (r[3] - r[1]) / (2.0 * h);
+                let acceleration = (r[3] - 2.0 * r[2] + r[1]) / (h * h);
+                let jerk = (r[4] - 2.0 * r[3] + 2.0 * r[1] - r[0]) / (2.0 * h * h * h);
+                let [lag_s, gain] = self.known[axis];
+                let nominal = -lag_s * (velocity - acceleration / gain + jerk / (gain * gain));
+                let error = middle.motor[axis] - middle.commanded[axis] - nominal;
+                let row = Vector3::new(velocity, acceleration, jerk);
+                self.normal[axis] += row * row.transpose();
+                self.right[axis] += row * error;
+            }
+        }
+    }
+
+    /// T, c and d of every axis as entries of a machine file.
+    pub(crate) fn entries(&self) -> Vec<EffectEntry> {
+        let of = |axis: Axis| {
+            let scale = self.normal[axis]
+                .diagonal()
+                .map(|size| size.max(1e-30).sqrt());
+            let even = Matrix3::from_fn(|i, k| self.normal[axis][(i, k)] / (scale[i] * scale[k]));
+            let right = self.right[axis].component_div(&scale);
+            let found = even.cholesky()?.solve(&right).component_div(&scale);
+            let entry = |kind: &str, values: &[(&str, f64)]| EffectEntry {
+                kind: kind.to_owned(),
+                axis: Some(axis.letter().to_owned()),
+                parameters: values
+                    .iter()
+                    .map(|(name, value)| ((*name).to_owned(), *value))
+                    .collect::<BTreeMap<_, _>>(),
+            };
+            let [lag, squared, cubed] = [-found[0] * 1e3, -found[1] * 1e6, -found[2] * 1e9];
+            Some([
+                entry("servo_lag", &[("time_ms", lag)]),
+                entry(
+                    "acceleration_lag",
+                    &[
+                        ("time_squared_ms2", squared),
+                        ("free_time_cubed_ms3", cubed),
+                    ],
+                ),
+            ])
+        };
+        Axis::LINEAR.into_iter().filter_map(of).flatten().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use metrology::AxisSet;
+    use metrology::stamp::Stamp;
+
+    use super::*;
+
+    #[test]
+    fn eq1_coefficients_are_found_again() {
+        let text = include_str!("../data/machine.yaml");
+        let machine = MachineFile::parse(text, "data/machine.yaml").unwrap();
+        let entry = machine.linear(Axis::X).unwrap();
+        let gain = entry.position_gain_per_s;
+        let lag_s = (1.0 - entry.velocity_feedforward) / gain;
+        let (time_s, squared_s2, cubed_s3) = (2e-5, -5e-6, 3e-7);
+        let mut commissioning = Commissioning::new(&machine, 250.0);
+        for tick in 0..3000_i64 {
+            let t = tick as f64 * 0.004;
+            let wave = |size: f64, w: f64| {
+                let (sin, cos) = (w * t).sin_cos();
+                [
+                    size * sin,
+                    size * w * cos,
+                    -size * w * w * sin,
+                    -size * w.powi(3) * cos,
+                ]
+            };
+            let (slow, fast) = (wave(60.0, 0.9), wave(4.0, 6.0));
+            let [r, v, a, j] = [0, 1, 2, 3].map(|k| slow[k] + fast[k]);
+            let nominal = -lag_s * (v - a / gain + j / (gain * gain));
+            let error = nominal - time_s * v - squared_s2 * a - cubed_s3 * j;
+            let commanded = PerAxis::from_fn(|axis| if axis == Axis::X { r } else { 0.0 });
+            commissioning.tick(&AxisState {
+                received_at: Stamp::from_nanos(tick * 4_000_000),
+                controller_at: Stamp::from_nanos(tick * 4_000_000),
+                axes: AxisSet::XYZ,
+                commanded,
+                motor: PerAxis::from_fn(|axis| {
+                    commanded[axis] + if axis == Axis::X { error } else { 0.0 }
+                }),
+                scale: PerAxis::default(),
+                velocity: PerAxis::default(),
+            });
+        }
+        let entries = commissioning.entries();
+        let of = |kind: &str, name: &str| {
+            let own = entries
+                .iter()
+                .find(|e| e.kind == kind && e.axis.as_deref() == Some("X"));
+            own.unwrap().parameters[name]
+        };
+        assert!((of("servo_lag", "time_ms") / 0.02 - 1.0).abs() < 1e-3);
+        assert!((of("acceleration_lag", "time_squared_ms2") / -5.0 - 1.0).abs() < 1e-3);
+        assert!((of("acceleration_lag", "free_time_cubed_ms3") / 300.0 - 1.0).abs() < 1e-2);
+    }
+}

@@ -1,0 +1,83 @@
+//! What can keep a trial from being made.
+
+use fake_cnc::{CncError, PlantError};
+use machine::MachineFileError;
+use sequencer::SequencerError;
+
+/// A trial that cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum TrialError {
+    /// There is no such arm.
+    #[error(
+        "arm \"{name}\": must be one of i ii iii iv v vi alone (vii, two rounds, waits for proposals of the diagnosis)"
+    )]
+    UnknownArm {
+        /// The text that was read.
+        name: String,
+    },
+    /// The drawn machine file breaks a rule.
+    #[error("drawn machine: {source}")]
+    Machine {
+        /// Which.
+        #[from]
+        source: MachineFileError,
+    },
+    /// The machine file cannot be written as text.
+    #[error("drawn machine: {source}")]
+    Text {
+        /// Why.
+        #[from]
+        source: serde_saphyr::SerializeError,
+    },
+    /// The drawn plant breaks a rule.
+    #[error("drawn plant: {source}")]
+    Plant {
+        /// Which.
+        #[from]
+        source: PlantError,
+    },
+    /// The control refuses its parameters.
+    #[error("drawn control: {source}")]
+    Control {
+        /// Which.
+        #[from]
+        source: CncError,
+    },
+    /// The plan cannot be run on the drawn machine.
+    #[error("drawn programme: {source}")]
+    Programme {
+        /// Which step, and why.
+        #[from]
+        source: SequencerError,
+    },
+    /// The plan is no plan.
+    #[error("drawn programme: {source}")]
+    ProgrammeText {
+        /// Line and column.
+        source: serde_saphyr::Error,
+    },
+    /// A program ended early on the plant.
+    #[error("run {run} failed: {message}")]
+    Failed {
+        /// Which run.
+        run: u32,
+        /// Why.
+        message: String,
+    },
+    /// The plan did not end.
+    #[error("the programme takes more than {limit_s} s")]
+    Endless {
+        /// Simulated time that it had.
+        limit_s: f64,
+    },
+    /// An effect that this machine cannot have.
+    #[error("hidden {effect} {axis}: {size} cannot be hidden in this machine")]
+    Impossible {
+        /// Id of the effect.
+        effect: &'static str,
+        /// What it acts on.
+        axis: &'static str,
+        /// Its size.
+        size: f64,
+    },
+}

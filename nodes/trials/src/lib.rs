@@ -1,0 +1,36 @@
+//! Blind trials of the diagnosis: machines whose hidden effect it is not told, and the judge of what it says.
+//!
+//! Three programs share nothing but a bag. The *generator* is here: `arm` says what kind of trials there are, `rig`
+//! draws a machine with its plant, `commissioning` measures what its maker knows of its loops, `programme` is what is measured, `effect` what is hidden in the plant,
+//! `scatter` what no two runs have in common, `trial` puts them together and `measurement` runs the plan on
+//! `fake_cnc`'s plant in simulated time. Its physics is the plant's own: nothing here calls the simulator or its
+//! catalogue, whose ids it only writes down. The *diagnoser* is `abbe diagnose`, a process that is given the bag and
+//! the machine file. The *judge* is `verdict` for one trial, `tally` and `calibration` for all of them.
+//!
+//! `size` says how large a hidden effect is for these measurements: D, the root of its chi-square against the
+//! trial's own scatter, of which the generator, unlike the diagnoser, knows the covariance.
+
+pub mod arm;
+pub mod calibration;
+mod commissioning;
+pub mod effect;
+pub mod error;
+pub mod measurement;
+mod programme;
+pub mod proportion;
+pub mod rig;
+pub mod scatter;
+mod size;
+pub mod tally;
+pub mod trial;
+pub mod truth;
+pub mod verdict;
+
+pub use arm::Arm;
+pub use error::TrialError;
+pub use measurement::{Sample, measure};
+pub use rig::Rig;
+pub use tally::Tally;
+pub use trial::Trial;
+pub use truth::Truth;
+pub use verdict::{Verdict, judge};

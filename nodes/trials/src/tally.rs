@@ -1,0 +1,554 @@
+//! All verdicts of an arm as one table: rates with their intervals, by class and D, and who was taken for whom.
+
+use std::collections::BTreeMap;
+
+use gap_diagnosis::report::Status;
+use serde::{Deserialize, Serialize};
+
+use crate::arm::Arm;
+use crate::calibration::{Reliability, calibration, reliability};
+use crate::effect::Class;
+use crate::proportion::{Proportion, auroc, median};
+use crate::truth::TrueEffect;
+use crate::verdict::Verdict;
+
+/// Edges of the bins of D.
+pub const D_EDGES: [f64; 4] = [5.0, 10.0, 20.0, 50.0];
+/// Bins of D.
+pub const D_BINS: usize = D_EDGES.len() + 1;
+/// D beyond which a single effect should be named.
+const SINGLE_D: f64 = 10.0;
+/// D beyond which each of several effects should be named.
+const SEVERAL_D: f64 = 7.0;
+/// D beyond which other physics should be named.
+const LARGE_D: f64 = 20.0;
+
+/// One line of the table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rate {
+    /// What is counted.
+    pub what: String,
+    /// How often.
+    pub count: Proportion,
+    /// Its 95 % interval.
+    pub interval: [f64; 2],
+}
+
+/// One number with what it is of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Figure {
+    /// What it is.
+    pub what: String,
+    /// It; none where there is nothing to take it of.
+    pub value: Option<f64>,
+    /// Of how many.
+    pub n: usize,
+}
+
+/// A class with how often it was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ClassLine {
+    /// The class.
+    pub class: Class,
+    /// Named with its axis, by bin of D.
+    pub named: [Proportion; D_BINS],
+    /// Shown as a surrogate with its axis, over all D.
+    pub surrogate: Proportion,
+    /// What else was named in those trials that hide it alone, the most frequent first.
+    pub taken_for: Vec<(String, usize)>,
+}
+
+/// The table of one arm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tally {
+    /// The arm.
+    pub arm: Arm,
+    /// Trials.
+    pub trials: usize,
+    /// Rates.
+    pub rates: Vec<Rate>,
+    /// Other figures.
+    pub figures: Vec<Figure>,
+    /// By class.
+    pub classes: Vec<ClassLine>,
+    /// Who was named for whom: hidden class, named class, times; trials with one effect only.
+    pub confusion: Vec<(String, String, usize)>,
+    /// What was named though nothing of it was hidden, the most frequent first.
+    pub false_names: Vec<(String, usize)>,
+    /// Confidence beside precision.
+    pub reliability: Vec<Reliability>,
+}
+
+/// The bin of a D.
+#[must_use]
+pub fn bin(d: f64) -> usize {
+    D_EDGES.iter().filter(|edge| d >= **edge).count()
+}
+
+/// Name of a bin.
+#[must_use]
+pub fn bin_name(bin: usize) -> String {
+    match bin {
+        0 => format!("D < {}", D_EDGES[0]),
+        _ if bin == D_EDGES.len() => format!("> {}", D_EDGES[bin - 1]),
+        _ => format!("{}-{}", D_EDGES[bin - 1], D_EDGES[bin]),
+    }
+}
+
+impl Tally {
+    /// Tallies the verdicts of one arm.
+    #[must_use]
+    pub fn of(arm: Arm, verdicts: &[Verdict]) -> Self {
+        let own: Vec<&Verdict> = verdicts.iter().filter(|v| v.truth.arm == arm).collect();
+        Self {
+            arm,
+            trials: own.len(),
+            rates: rates(arm, &own),
+            figures: figures(&own),
+            classes: classes(&own),
+            confusion: confusion(&own),
+            false_names: false_names(&own),
+            reliability: reliability(&own),
+        }
+    }
+
+    /// A rate by what it counts.
+    #[must_use]
+    pub fn rate(&self, what: &str) -> Option<&Rate> {
+        self.rates.iter().find(|rate| rate.what == what)
+    }
+}
+
+/// Area under the curve of the unknown score: trials with a class left out against trials with known classes only.
+#[must_use]
+pub fn unknown_auroc(verdicts: &[Verdict], least_d: f64) -> Figure {
+    let scores = |arm: Arm| -> Vec<f64> {
+        let own = verdicts
+            .iter()
+            .filter(|v| v.truth.arm == arm && v.least_d().is_some_and(|d| d >= least_d));
+        own.filter_map(|v| Some(v.said.as_ref()?.unknown_ratio))
+            .collect()
+    };
+    let (positive, negative) = (scores(Arm::LeftOut), scores(Arm::Catalogue));
+    Figure {
+        what: format!("AUROC of unknown, D > {least_d}"),
+        value: auroc(&positive, &negative),
+        n: positive.len() + negative.len(),
+    }
+}
+
+fn rates(arm: Arm, own: &[&Verdict]) -> Vec<Rate> {
+    let said: Vec<&Verdict> = own.iter().copied().filter(|v| v.said.is_some()).collect();
+    let mut rates = Rates::default();
+    rates.add("diagnosed", own, |v| v.said.is_some());
+    rates.add("floor reproduced", &said, is_reproduced);
+    let motors = |wanted: bool| -> Vec<&Verdict> {
+        let fits = |v: &&&Verdict| v.truth.has_motors == wanted;
+        said.iter().filter(fits).copied().collect()
+    };
+    for (what, wanted) in [("recorded", true), ("not recorded", false)] {
+        let what = format!("floor reproduced, motors {what}");
+        rates.add(&what, &motors(wanted), is_reproduced);
+    }
+    rates.add("a cause named that is none", &said, has_wrong);
+    rates.add("wrong and not flagged unknown", &said, |v| {
+        has_wrong(v) && !v.is_flagged()
+    });
+    rates.add("unknown flagged", &said, Verdict::is_flagged);
+    if arm.is_null() {
+        rates.add("nothing named", &said, Verdict::is_exact);
+    } else if arm == Arm::LeftOut {
+        let large = beyond(&said, LARGE_D);
+        rates.add(
+            &format!("unknown flagged, D > {LARGE_D}"),
+            &large,
+            Verdict::is_flagged,
+        );
+        rates.add(
+            &format!("wrong cause named, D > {LARGE_D}"),
+            &large,
+            has_wrong,
+        );
+    } else {
+        rates.of_sets(&said);
+        rates.of_effects(&said);
+    }
+    rates.0
+}
+
+fn is_reproduced(verdict: &Verdict) -> bool {
+    verdict.said.as_ref().is_some_and(|said| said.is_reproduced)
+}
+
+fn has_wrong(verdict: &Verdict) -> bool {
+    verdict.wrong().next().is_some()
+}
+
+/// Those of which everything that is hidden is larger than `d`.
+fn beyond<'v>(all: &[&'v Verdict], d: f64) -> Vec<&'v Verdict> {
+    let is_large = |v: &&&Verdict| v.least_d().is_some_and(|least| least > d);
+    all.iter().filter(is_large).copied().collect()
+}
+
+#[derive(Default)]
+struct Rates(Vec<Rate>);
+
+impl Rates {
+    fn add(&mut self, what: &str, of: &[&Verdict], holds: impl Fn(&Verdict) -> bool) {
+        self.push(what, Proportion::of(of.iter().map(|v| holds(v))));
+    }
+
+    fn push(&mut self, what: &str, count: Proportion) {
+        self.0.push(Rate {
+            what: what.to_owned(),
+            count,
+            interval: count.wilson(),
+        });
+    }
+
+    /// Whole sets, by how many effects are hidden.
+    fn of_sets(&mut self, said: &[&Verdict]) {
+        let with = |least: usize, most: usize| -> Vec<&Verdict> {
+            let fits = |v: &&&Verdict| (least..=most).contains(&v.truth.effects.len());
+            said.iter().filter(fits).copied().collect()
+        };
+        self.add(
+            "nothing hidden: nothing named",
+            &with(0, 0),
+            Verdict::is_exact,
+        );
+        let single = beyond(&with(1, 1), SINGLE_D);
+        self.add(
+            &format!("1 effect, D > {SINGLE_D}: exact"),
+            &single,
+            Verdict::is_exact,
+        );
+        let several = beyond(&with(2, usize::MAX), SEVERAL_D);
+        let what = format!("2-3 effects, each D > {SEVERAL_D}: exact");
+        self.add(&what, &several, Verdict::is_exact);
+        let large = beyond(said, LARGE_D);
+        self.add(
+            &format!("all D > {LARGE_D}: exact"),
+            &large,
+            Verdict::is_exact,
+        );
+    }
+
+    /// Every hidden effect by itself.
+    fn of_effects(&mut self, said: &[&Verdict]) {
+        type Holds = fn(&Verdict, &TrueEffect) -> bool;
+        let questions: [(&str, Holds); 4] = [
+            ("named, class and axis", Verdict::has),
+            ("class named, on some axis", |v, e| {
+                v.named().any(|cause| cause.effect == e.class.id())
+            }),
+            ("in a reported set", |v, e| {
+                v.named().any(|cause| cause.may_be(e))
+            }),
+            ("shown as a surrogate", Verdict::shows),
+        ];
+        for least in [SEVERAL_D, LARGE_D] {
+            for (question, holds) in questions {
+                let pairs = said
+                    .iter()
+                    .flat_map(|v| v.truth.effects.iter().map(move |e| (v, e)));
+                let large = pairs.filter(|(_, effect)| effect.d > least);
+                let count = Proportion::of(large.map(|(v, effect)| holds(v, effect)));
+                self.push(&format!("each effect, D > {least}: {question}"), count);
+            }
+        }
+    }
+}
+
+fn figures(own: &[&Verdict]) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    let mut add = |what: &str, values: Vec<f64>| {
+        figures.push(Figure {
+            what: what.to_owned(),
+            n: values.len(),
+            value: median(values),
+        });
+    };
+    let pairs = || {
+        own.iter()
+            .flat_map(|v| v.truth.effects.iter().map(move |e| (v, e)))
+    };
+    let sized = || pairs().filter_map(|(v, e)| Some((e, v.sized(e)?)));
+    let scaled = sized()
+        .filter(|(e, _)| e.d > LARGE_D)
+        .map(|(e, (error, _))| error.abs() * e.d);
+    add(
+        "median relative error of a parameter times D, D > 20",
+        scaled.collect(),
+    );
+    let covered: Vec<bool> = sized().map(|(_, (_, covered))| covered).collect();
+    let said = || {
+        own.iter()
+            .filter_map(|v| v.said.as_ref().map(|said| (*v, said)))
+    };
+    let hidden = || said().filter(|(v, _)| v.least_d().is_some_and(|d| d > LARGE_D));
+    add(
+        "median gap closed on held-out runs, D > 20",
+        hidden()
+            .filter_map(|(_, said)| Some(said.closed?[0]))
+            .collect(),
+    );
+    add(
+        "median rms after over before on held-out runs, D > 20",
+        hidden()
+            .filter_map(|(_, said)| Some(said.held_out_um[1]? / said.held_out_um[0]?))
+            .collect(),
+    );
+    add(
+        "median time of a diagnosis, s",
+        own.iter().map(|v| v.diagnosis_s).collect(),
+    );
+    add(
+        "median time of making a trial, s",
+        own.iter().map(|v| v.making_s).collect(),
+    );
+    let count = Proportion::of(covered.into_iter());
+    figures.push(Figure {
+        what: "share of 95 % intervals that hold the parameter".to_owned(),
+        value: count.share(),
+        n: count.n,
+    });
+    figures.extend(calibration(own));
+    figures
+}
+
+fn classes(own: &[&Verdict]) -> Vec<ClassLine> {
+    let line = |class: Class| {
+        let pairs = || {
+            let said = own.iter().filter(|v| v.said.is_some());
+            let all = said.flat_map(|v| v.truth.effects.iter().map(move |e| (*v, e)));
+            all.filter(move |(_, effect)| effect.class == class)
+        };
+        let mut named = [Proportion::default(); D_BINS];
+        for (verdict, effect) in pairs() {
+            let own = &mut named[bin(effect.d)];
+            own.k += usize::from(verdict.has(effect));
+            own.n += 1;
+        }
+        let alone = pairs().filter(|(v, _)| v.truth.effects.len() == 1);
+        let others = alone.flat_map(|(v, _)| v.wrong().map(name).collect::<Vec<_>>());
+        ClassLine {
+            class,
+            named,
+            surrogate: Proportion::of(
+                pairs()
+                    .map(|(v, e)| v.shows(e))
+                    .collect::<Vec<_>>()
+                    .into_iter(),
+            ),
+            taken_for: most_frequent(others),
+        }
+    };
+    let lines = Class::ALL.into_iter().map(line);
+    lines
+        .filter(|line| line.named.iter().any(|bin| bin.n > 0))
+        .collect()
+}
+
+fn name(cause: &crate::verdict::SaidCause) -> String {
+    format!("{} {}", cause.effect, cause.axis).trim().to_owned()
+}
+
+fn most_frequent(names: impl Iterator<Item = String>) -> Vec<(String, usize)> {
+    let mut counts = BTreeMap::<String, usize>::new();
+    for name in names {
+        *counts.entry(name).or_default() += 1;
+    }
+    let mut sorted: Vec<(String, usize)> = counts.into_iter().collect();
+    sorted.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    sorted
+}
+
+fn false_names(own: &[&Verdict]) -> Vec<(String, usize)> {
+    most_frequent(
+        own.iter()
+            .flat_map(|v| v.wrong().map(name).collect::<Vec<_>>()),
+    )
+}
+
+/// Hidden class, named class (or what was said instead), times.
+fn confusion(own: &[&Verdict]) -> Vec<(String, String, usize)> {
+    let mut counts = BTreeMap::<(String, String), usize>::new();
+    for verdict in own.iter().filter(|v| v.said.is_some()) {
+        let [effect] = &verdict.truth.effects[..] else {
+            continue;
+        };
+        let mut said: Vec<String> = verdict.named().map(|c| c.effect.clone()).collect();
+        if said.is_empty() {
+            let causes = verdict.said.iter().flat_map(|said| &said.causes);
+            let surrogate = causes.into_iter().find(|c| c.status == Status::Surrogate);
+            said.push(match (surrogate, verdict.is_flagged()) {
+                (Some(cause), _) => format!("({})", cause.effect),
+                (None, true) => "unknown".to_owned(),
+                (None, false) => "nothing".to_owned(),
+            });
+        }
+        said.dedup();
+        for name in said {
+            *counts
+                .entry((effect.class.id().to_owned(), name))
+                .or_default() += 1;
+        }
+    }
+    counts
+        .into_iter()
+        .map(|((hidden, said), n)| (hidden, said, n))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::truth::Truth;
+    use crate::verdict::{Said, SaidCause};
+
+    fn effect(class: Class, axis: &str, d: f64) -> TrueEffect {
+        TrueEffect {
+            class,
+            axis: axis.to_owned(),
+            size: 4.0,
+            unit: "µm".to_owned(),
+            parameter: class.parameter().map(str::to_owned),
+            is_foreign: false,
+            d,
+        }
+    }
+
+    fn cause(id: &str, axis: &str, status: Status, value: f64) -> SaidCause {
+        SaidCause {
+            effect: id.to_owned(),
+            axis: axis.to_owned(),
+            status,
+            confidence: 0.9,
+            d: 30.0,
+            parameters: vec![("width_um".to_owned(), value, value - 0.2, value + 0.2)],
+            rivals: vec![],
+            constancy: (true, 1.0, String::new()),
+        }
+    }
+
+    fn verdict(effects: Vec<TrueEffect>, causes: Vec<SaidCause>, is_unknown: bool) -> Verdict {
+        Verdict {
+            truth: Truth {
+                arm: Arm::Catalogue,
+                index: 0,
+                seed: 1,
+                effects,
+                left_out: None,
+                between_runs_um: 0.2,
+                white_um: 0.1,
+                has_outliers: false,
+                has_motors: true,
+            },
+            truth_sha256: String::new(),
+            commit: String::new(),
+            said: Some(Said {
+                causes,
+                is_unknown,
+                unknown_ratio: 1.5,
+                covariate: String::new(),
+                is_reproduced: true,
+                above_floor: true,
+                gap_um: [3.0, 0.3],
+                held_out_um: [Some(3.0), Some(0.3)],
+                closed: Some([0.99, 0.98, 1.0]),
+            }),
+            refused: None,
+            diagnosis_s: 1.0,
+            making_s: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_right_name_a_wrong_axis_and_a_surrogate_are_told_apart() {
+        let play = || vec![effect(Class::Backlash, "X", 30.0)];
+        let verdicts = [
+            verdict(
+                play(),
+                vec![cause("backlash", "X", Status::Named, 4.1)],
+                false,
+            ),
+            verdict(
+                play(),
+                vec![cause("backlash", "Y", Status::Named, 4.1)],
+                false,
+            ),
+            verdict(
+                play(),
+                vec![cause("backlash", "X", Status::Surrogate, 4.1)],
+                true,
+            ),
+            verdict(vec![], vec![], false),
+        ];
+        let tally = Tally::of(Arm::Catalogue, &verdicts);
+        let count = |what: &str| tally.rate(what).unwrap().count;
+        assert_eq!(count("1 effect, D > 10: exact"), Proportion { k: 1, n: 3 });
+        assert_eq!(
+            count("wrong and not flagged unknown"),
+            Proportion { k: 1, n: 4 }
+        );
+        assert_eq!(
+            count("nothing hidden: nothing named"),
+            Proportion { k: 1, n: 1 }
+        );
+        let class_of_any = count("each effect, D > 20: class named, on some axis");
+        assert_eq!(class_of_any, Proportion { k: 2, n: 3 });
+        assert_eq!(tally.classes.len(), 1);
+        assert_eq!(tally.classes[0].named[3], Proportion { k: 1, n: 3 });
+        assert_eq!(tally.classes[0].surrogate, Proportion { k: 1, n: 3 });
+        assert_eq!(tally.classes[0].taken_for, [("backlash Y".to_owned(), 1)]);
+        assert_eq!(tally.false_names, [("backlash Y".to_owned(), 1)]);
+        let surrogate = ("backlash".to_owned(), "(backlash)".to_owned(), 1);
+        assert!(tally.confusion.contains(&surrogate));
+        assert_eq!(tally.reliability.len(), 1);
+        assert_eq!(tally.reliability[0].right, Proportion { k: 1, n: 2 });
+    }
+
+    #[test]
+    fn a_parameter_is_covered_where_its_interval_holds_the_truth() {
+        let play = effect(Class::Backlash, "X", 30.0);
+        let near = verdict(
+            vec![play.clone()],
+            vec![cause("backlash", "X", Status::Named, 4.1)],
+            false,
+        );
+        let (error, covered) = near.sized(&play).unwrap();
+        assert!((error - 0.025).abs() < 1e-12 && covered);
+        let far = verdict(
+            vec![play.clone()],
+            vec![cause("backlash", "X", Status::Named, 4.5)],
+            false,
+        );
+        assert!(!far.sized(&play).unwrap().1);
+    }
+
+    #[test]
+    fn a_class_that_was_left_out_is_never_rightly_named() {
+        let mut verdict = verdict(
+            vec![effect(Class::Backlash, "X", 30.0)],
+            vec![cause("reversal_spike", "X", Status::Named, 1.0)],
+            true,
+        );
+        verdict.truth.arm = Arm::LeftOut;
+        verdict.truth.left_out = Some("backlash".to_owned());
+        let tally = Tally::of(Arm::LeftOut, &[verdict]);
+        let count = |what: &str| tally.rate(what).unwrap().count;
+        assert_eq!(count("unknown flagged, D > 20"), Proportion { k: 1, n: 1 });
+        assert_eq!(
+            count("wrong cause named, D > 20"),
+            Proportion { k: 1, n: 1 }
+        );
+    }
+
+    #[test]
+    fn bins_cover_every_size() {
+        assert_eq!((bin(0.0), bin(5.0), bin(19.9), bin(50.0)), (0, 1, 2, 4));
+        assert_eq!(bin_name(bin(70.0)), "> 50");
+        assert_eq!(bin_name(0), "D < 5");
+    }
+}

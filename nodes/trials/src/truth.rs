@@ -1,0 +1,66 @@
+//! What was hidden: written before the diagnosis begins, sealed, and read by the judge alone.
+
+use serde::{Deserialize, Serialize};
+
+use crate::arm::Arm;
+use crate::effect::{Class, Hidden};
+
+/// The truth of one trial.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Truth {
+    /// Kind of trial.
+    pub arm: Arm,
+    /// Its number in the arm.
+    pub index: u64,
+    /// Seed of the series.
+    pub seed: u64,
+    /// What is hidden.
+    pub effects: Vec<TrueEffect>,
+    /// The class that the diagnosis is told to leave out.
+    pub left_out: Option<String>,
+    /// Smooth deviation of runs, µm.
+    pub between_runs_um: f64,
+    /// Noise of a reading, µm.
+    pub white_um: f64,
+    /// Whether there are outliers.
+    pub has_outliers: bool,
+    /// Whether the motors' encoders were recorded.
+    pub has_motors: bool,
+}
+
+/// One hidden effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueEffect {
+    /// Its class.
+    pub class: Class,
+    /// What it acts on, as the catalogue names it.
+    pub axis: String,
+    /// Size in the class' unit.
+    pub size: f64,
+    /// The unit.
+    pub unit: String,
+    /// The catalogue's parameter that has this size, where there is one and the form is the catalogue's.
+    pub parameter: Option<String>,
+    /// Whether its form is foreign.
+    pub is_foreign: bool,
+    /// Size against the trial's scatter.
+    #[serde(rename = "D")]
+    pub d: f64,
+}
+
+impl TrueEffect {
+    pub(crate) fn of(hidden: &Hidden, d: f64) -> Self {
+        let named = hidden.class.parameter().filter(|_| !hidden.is_foreign);
+        Self {
+            class: hidden.class,
+            axis: hidden.axis.to_owned(),
+            size: hidden.size,
+            unit: hidden.class.sizes().1.to_owned(),
+            parameter: named.map(str::to_owned),
+            is_foreign: hidden.is_foreign,
+            d,
+        }
+    }
+}

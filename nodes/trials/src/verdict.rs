@@ -1,0 +1,205 @@
+//! One trial judged: what was hidden beside what was said.
+//!
+//! A cause counts as *named* where its status is `named` or `set`; a surrogate is shown, not named. It is right where
+//! class and axis are those of a hidden effect.
+
+use gap_diagnosis::GapReport;
+use gap_diagnosis::report::Status;
+use serde::{Deserialize, Serialize};
+
+use crate::truth::{TrueEffect, Truth};
+
+/// The verdict on one trial: a line of the journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verdict {
+    /// What was hidden.
+    pub truth: Truth,
+    /// SHA-256 of the sealed file that said so, hexadecimal.
+    pub truth_sha256: String,
+    /// Commit of the program that diagnosed.
+    pub commit: String,
+    /// What was said; none where the diagnosis was refused.
+    pub said: Option<Said>,
+    /// Why it was refused.
+    pub refused: Option<String>,
+    /// Time that the diagnosis took with all reading, s.
+    pub diagnosis_s: f64,
+    /// Time that making the trial took, s.
+    pub making_s: f64,
+}
+
+/// The part of a report that is judged.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Said {
+    /// Every cause, also surrogates.
+    pub causes: Vec<SaidCause>,
+    /// Whether something unknown is left.
+    pub is_unknown: bool,
+    /// Score over threshold of what is left.
+    pub unknown_ratio: f64,
+    /// What it goes with.
+    pub covariate: String,
+    /// Whether every channel's scatter is that of its repeats.
+    pub is_reproduced: bool,
+    /// Whether there is a gap at all.
+    pub above_floor: bool,
+    /// Gap and floor, µm.
+    pub gap_um: [f64; 2],
+    /// On held-out runs before and after, µm.
+    pub held_out_um: [Option<f64>; 2],
+    /// Share of the gap that was closed, with its interval.
+    pub closed: Option<[f64; 3]>,
+}
+
+/// A cause as it was said.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SaidCause {
+    /// Id of its class.
+    pub effect: String,
+    /// What it acts on.
+    pub axis: String,
+    /// How sure.
+    pub status: Status,
+    /// Probability.
+    pub confidence: f64,
+    /// Size against the noise floor.
+    #[serde(rename = "D")]
+    pub d: f64,
+    /// Parameters: name, value, low, high.
+    pub parameters: Vec<(String, f64, f64, f64)>,
+    /// What else it may be, by class and axis, where the data do not exclude it.
+    pub rivals: Vec<(String, String)>,
+    /// Whether it has one size under all conditions, and by how many sigma it has not.
+    pub constancy: (bool, f64, String),
+}
+
+/// What a report says.
+#[must_use]
+pub fn judge(report: &GapReport) -> Said {
+    let causes = report.causes.iter().map(|cause| SaidCause {
+        effect: cause.effect.clone(),
+        axis: cause.axis.clone(),
+        status: cause.status,
+        confidence: cause.confidence,
+        d: cause.d,
+        parameters: cause
+            .parameters
+            .iter()
+            .map(|p| (p.name.clone(), p.value, p.low, p.high))
+            .collect(),
+        rivals: cause
+            .confusable_with
+            .iter()
+            .filter(|rival| !rival.excluded)
+            .map(|rival| (rival.effect.clone(), rival.axis.clone()))
+            .collect(),
+        constancy: (
+            cause.constancy.passed,
+            cause.constancy.worst_z,
+            cause.constancy.split_by.clone(),
+        ),
+    });
+    Said {
+        causes: causes.collect(),
+        is_unknown: report.unknown.flagged,
+        unknown_ratio: report.unknown.score / report.unknown.threshold.max(1e-9),
+        covariate: report.unknown.description.covariate.clone(),
+        is_reproduced: report.noise_floor.iter().all(|floor| floor.reproduced),
+        above_floor: report.gap.above_floor,
+        gap_um: [report.gap.rms_um, report.gap.floor_um],
+        held_out_um: [report.shrink.rms_um.before, report.shrink.rms_um.after],
+        closed: report
+            .shrink
+            .gap_closed
+            .map(|closed| [closed.value, closed.low, closed.high]),
+    }
+}
+
+impl SaidCause {
+    /// Whether it is named at all.
+    #[must_use]
+    pub fn is_named(&self) -> bool {
+        self.status != Status::Surrogate
+    }
+
+    /// Whether it is this effect: class and axis.
+    #[must_use]
+    pub fn is(&self, effect: &TrueEffect) -> bool {
+        self.effect == effect.class.id() && self.axis == effect.axis
+    }
+
+    /// Whether this effect is it or among its rivals.
+    #[must_use]
+    pub fn may_be(&self, effect: &TrueEffect) -> bool {
+        let rival = |(id, axis): &(String, String)| id == effect.class.id() && *axis == effect.axis;
+        self.is(effect) || self.rivals.iter().any(rival)
+    }
+}
+
+impl Verdict {
+    /// Causes that were named.
+    pub fn named(&self) -> impl Iterator<Item = &SaidCause> {
+        let causes = self.said.iter().flat_map(|said| &said.causes);
+        causes.filter(|cause| cause.is_named())
+    }
+
+    /// Whether a named cause is right.
+    #[must_use]
+    pub fn is_right(&self, cause: &SaidCause) -> bool {
+        let is_left_out = self.truth.left_out.as_deref() == Some(cause.effect.as_str());
+        !is_left_out && self.truth.effects.iter().any(|effect| cause.is(effect))
+    }
+
+    /// Named causes that are not hidden in the machine.
+    pub fn wrong(&self) -> impl Iterator<Item = &SaidCause> {
+        self.named().filter(|cause| !self.is_right(cause))
+    }
+
+    /// Whether the hidden effects are named and nothing else.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        self.wrong().next().is_none() && self.truth.effects.iter().all(|effect| self.has(effect))
+    }
+
+    /// Whether an effect is named, class and axis.
+    #[must_use]
+    pub fn has(&self, effect: &TrueEffect) -> bool {
+        self.named().any(|cause| cause.is(effect))
+    }
+
+    /// Whether an effect is shown as a surrogate.
+    #[must_use]
+    pub fn shows(&self, effect: &TrueEffect) -> bool {
+        let mut causes = self.said.iter().flat_map(|said| &said.causes);
+        causes.any(|cause| !cause.is_named() && cause.is(effect))
+    }
+
+    /// Whether something unknown was flagged.
+    #[must_use]
+    pub fn is_flagged(&self) -> bool {
+        self.said.as_ref().is_some_and(|said| said.is_unknown)
+    }
+
+    /// Least D of what is hidden; none where nothing is.
+    #[must_use]
+    pub fn least_d(&self) -> Option<f64> {
+        self.truth
+            .effects
+            .iter()
+            .map(|effect| effect.d)
+            .reduce(f64::min)
+    }
+
+    /// Relative error of a parameter that was sized, and whether its interval holds the truth.
+    #[must_use]
+    pub fn sized(&self, effect: &TrueEffect) -> Option<(f64, bool)> {
+        let name = effect.parameter.as_ref()?;
+        let cause = self.named().find(|cause| cause.is(effect))?;
+        let (_, value, low, high) = cause.parameters.iter().find(|(own, ..)| own == name)?;
+        let error = (value - effect.size) / effect.size;
+        Some((error, (*low..=*high).contains(&effect.size)))
+    }
+}
