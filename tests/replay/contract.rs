@@ -85,7 +85,7 @@ fn replay_of_a_copy_is_equal() {
 }
 
 /// Changes the latched position of one touch by one unit in the last place.
-fn one_ulp(messages: &mut Vec<Copied>) {
+fn one_ulp(messages: &mut [Copied]) {
     let touch = messages.iter_mut().find(|m| m.topic == "/probe/trigger");
     let touch = touch.unwrap();
     let mut trigger: ProbeTrigger = from_cdr(&touch.data).unwrap();
@@ -98,7 +98,7 @@ fn one_ulp(messages: &mut Vec<Copied>) {
 #[test]
 fn replay_notices_one_ulp_of_an_input() {
     let bag = changed(&Change {
-        messages: Some(&one_ulp),
+        messages: Some(&|messages| one_ulp(messages)),
         ..Change::default()
     });
     let (code, outcome) = check(bag.path());

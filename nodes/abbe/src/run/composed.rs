@@ -94,11 +94,11 @@ fn ran(scenario: &Scenario, nodes: &[Box<dyn Node>]) -> Vec<RunNode> {
             .map_or(name, |launched| launched.exec.as_str())
             .to_owned()
     };
-    let node = |node: &Box<dyn Node>| RunNode {
-        name: node.name().to_owned(),
-        executable: executable(node.name()),
+    let node = |name: &str| RunNode {
+        name: name.to_owned(),
+        executable: executable(name),
     };
-    nodes.iter().map(node).collect()
+    nodes.iter().map(|built| node(built.name())).collect()
 }
 
 /// Builds every node of the launch file; the fake machine with the scenario's look at its truth.
