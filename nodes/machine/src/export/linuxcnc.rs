@@ -33,7 +33,7 @@
 //! slope), with the sign turned round the error becomes 1.9998 to 2.0003 times as large; the examples of the documentation come out as printed.
 //! On LinuxCNC 2.9 itself, whose HAL adds lead error, thread error and lost motion of together 39.6 µm (rms 23.2 µm), files of both types
 //! made from stops every 30 mm leave 2.1 µm (rms 0.52 µm) at stops every 15 mm; with the sign turned round the rms
-//! becomes 1.996 times as large (`nodes/linuxcnc_bridge/tests/linuxcnc/screw_error.rs`).
+//! becomes 1.996 times as large (type 0 in `tests/linuxcnc`, type 1 in `nodes/linuxcnc_bridge/tests/linuxcnc/screw_error.rs`).
 //!
 //! # References
 //! \[1\] LinuxCNC documentation, INI Configuration, \[JOINT_n\] section, `COMP_FILE`, `COMP_FILE_TYPE`.
