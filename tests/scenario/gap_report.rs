@@ -1,0 +1,214 @@
+//! `abbe diagnose` as a person uses it on a recorded bag: the report against its schema, what each exit code
+//! means, and a bag that was cut.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use abbe_tests::program::{Ended, Process, command, root};
+use abbe_tests::scenario::{Scenario, mcap_file};
+use serde_json::Value;
+
+const SCHEMA: &str = include_str!("../../nodes/gap_diagnosis/schema/abbe.gap.1.schema.json");
+
+/// Two circles, three times each.
+const CIRCLES: &str = "\
+title: circles
+steps:
+  - {do: grid, placement: middle, trajectory: circle, radius_mm: 50.0, feed_mm_min: 3000.0, sense: both, on_the_fly: true, repeats: 3}
+  - {do: grid, placement: middle, trajectory: circle, radius_mm: 25.0, feed_mm_min: 3000.0, sense: both, on_the_fly: true, repeats: 3}
+";
+/// The same, each once.
+const ONCE: &str = "\
+title: circles once
+steps:
+  - {do: grid, placement: middle, trajectory: circle, radius_mm: 50.0, feed_mm_min: 3000.0, sense: both, on_the_fly: true}
+";
+
+struct Recorded {
+    scenario: Scenario,
+    bag: PathBuf,
+}
+
+fn recorded(plan: &str) -> Recorded {
+    let scenario = Scenario::copy_of("gap_first");
+    scenario.write("plan.yaml", plan);
+    scenario.replace("scenario.yaml", "diagnose: true", "diagnose: false");
+    let bag = scenario.run().join("bag");
+    Recorded { scenario, bag }
+}
+
+fn diagnose(bag: &Path, more: &[&str]) -> Ended {
+    let mut command = command(0, &["diagnose"]);
+    command.arg(bag).args(more).current_dir(root());
+    Process::start(command).ended_within(Duration::from_secs(60))
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Where a value does not obey its schema; of JSON Schema only what this one uses is known.
+fn against_schema(report: &Value) -> Vec<String> {
+    let mut found = vec![];
+    check(
+        "report",
+        &serde_json::from_str(SCHEMA).unwrap(),
+        report,
+        &mut found,
+    );
+    found
+}
+
+fn check(at: &str, schema: &Value, value: &Value, found: &mut Vec<String>) {
+    for (keyword, rule) in schema.as_object().unwrap() {
+        let obeys = match keyword.as_str() {
+            "$schema" | "$id" | "title" | "description" | "required" => true,
+            "type" => match rule {
+                Value::Array(types) => types.iter().any(|one| is_of(one, value)),
+                one => is_of(one, value),
+            },
+            "const" => value == rule,
+            "enum" => rule.as_array().unwrap().contains(value),
+            "minimum" => value.as_f64().is_none_or(|v| v >= rule.as_f64().unwrap()),
+            "maximum" => value.as_f64().is_none_or(|v| v <= rule.as_f64().unwrap()),
+            "pattern" => {
+                assert_eq!(rule, "^([0-9a-f]{64})?$", "{at}");
+                let text = value.as_str().unwrap();
+                let is_hex = |c: char| c.is_ascii_digit() || ('a'..='f').contains(&c);
+                text.is_empty() || text.len() == 64 && text.chars().all(is_hex)
+            }
+            "anyOf" => rule.as_array().unwrap().iter().any(|one| {
+                let mut of_one = vec![];
+                check(at, one, value, &mut of_one);
+                of_one.is_empty()
+            }),
+            "items" => {
+                for (k, item) in value.as_array().into_iter().flatten().enumerate() {
+                    check(&format!("{at}[{k}]"), rule, item, found);
+                }
+                true
+            }
+            "properties" => {
+                let properties = rule.as_object().unwrap();
+                for (key, of_key) in properties {
+                    match value.get(key) {
+                        Some(inner) => check(&format!("{at}.{key}"), of_key, inner, found),
+                        None => found.push(format!("{at}: no {key}")),
+                    }
+                }
+                let keys = value.as_object().into_iter().flatten();
+                keys.into_iter()
+                    .all(|(key, _)| properties.contains_key(key))
+            }
+            "additionalProperties" => *rule == Value::Bool(false),
+            other => panic!("{at}: the keyword {other} is not known here"),
+        };
+        if !obeys {
+            found.push(format!("{at}: {keyword} {rule}: {value}"));
+        }
+    }
+}
+
+fn is_of(name: &Value, value: &Value) -> bool {
+    match name.as_str().unwrap() {
+        "object" => value.is_object(),
+        "array" => value.is_array(),
+        "string" => value.is_string(),
+        "boolean" => value.is_boolean(),
+        "integer" => value.is_u64() || value.is_i64(),
+        "number" => value.is_number(),
+        "null" => value.is_null(),
+        other => panic!("{other} is no type"),
+    }
+}
+
+#[test]
+fn a_real_report_obeys_its_schema_and_a_cut_bag_is_read_up_to_the_cut_with_exit_code_3() {
+    let Recorded { scenario, bag } = recorded(CIRCLES);
+    let out = scenario.out();
+    let (report, html) = (out.join("gap.json"), out.join("gap.html"));
+    let written = out.join("better.yaml");
+    let machine = scenario.argument("machine.yaml");
+    let ended = diagnose(
+        &bag,
+        &[
+            "--machine",
+            &machine,
+            "--json",
+            &report.display().to_string(),
+            "--html",
+            &html.display().to_string(),
+            "--write-machine",
+            &written.display().to_string(),
+        ],
+    );
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    for word in ["Where:", "Which:", "How far:"] {
+        assert!(ended.said.contains(word), "{word}: {}", ended.said);
+    }
+    let whole = json(&report);
+    assert_eq!(against_schema(&whole), Vec::<String>::new());
+    assert_eq!(whole["inputs"]["bags"][0]["runs"], 12);
+    let mut wrong = whole.clone();
+    wrong["causes"] = Value::String("none".to_owned());
+    wrong["gap"]["rms_um"] = Value::from(-1.0);
+    wrong["score"] = Value::from(1);
+    assert_eq!(against_schema(&wrong).len(), 3, "a wrong report is noticed");
+    let page = std::fs::read_to_string(&html).unwrap();
+    for word in ["<svg", "What can be told from what", "prefers-color-scheme"] {
+        assert!(page.contains(word), "{word}");
+    }
+    assert!(
+        !page.contains("http://") || page.contains("http://www.w3.org"),
+        "one file"
+    );
+    assert!(written.is_file());
+
+    let file = mcap_file(&bag);
+    let bytes = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &bytes[..bytes.len() * 9 / 10]).unwrap();
+    let ended = diagnose(
+        &bag,
+        &[
+            "--machine",
+            &machine,
+            "--json",
+            &report.display().to_string(),
+        ],
+    );
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.said);
+    for word in ["bag_0.mcap", "messages were read before"] {
+        assert!(ended.said.contains(word), "{word}: {}", ended.said);
+    }
+    let cut = json(&report);
+    assert_eq!(against_schema(&cut), Vec::<String>::new());
+    let runs = cut["inputs"]["bags"][0]["runs"].as_u64().unwrap();
+    assert!((6..12).contains(&runs), "{runs}");
+}
+
+#[test]
+fn what_cannot_be_diagnosed_ends_with_1_and_what_to_record_and_a_wrong_question_with_2() {
+    let Recorded { scenario, bag } = recorded(ONCE);
+    let machine = scenario.argument("machine.yaml");
+    let cannot = |ended: &Ended, words: &[&str]| {
+        assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+        for word in words {
+            assert!(ended.said.contains(word), "{word}: {}", ended.said);
+        }
+    };
+    let once = diagnose(&bag, &["--machine", &machine]);
+    cannot(&once, &["no test was repeated", "three times"]);
+    let other = "launch_configs/five_axis/machine.yaml";
+    cannot(
+        &diagnose(&bag, &["--machine", other]),
+        &["another machine's"],
+    );
+    let nothing = scenario.out().join("nothing");
+    cannot(&diagnose(&nothing, &["--machine", &machine]), &["nothing"]);
+    let absent = scenario.argument("absent.yaml");
+    cannot(&diagnose(&bag, &["--machine", &absent]), &["absent.yaml"]);
+    for wrong in [&["--wrong"][..], &["--machine"]] {
+        let ended = diagnose(&bag, wrong);
+        assert_eq!(ended.status.code(), Some(2), "{}", ended.said);
+    }
+}
