@@ -13,7 +13,6 @@ mod cell;
 mod five_axis;
 mod gap_first;
 mod gap_import;
-mod gap_live;
 mod gap_report;
 mod grid_truth;
 mod grid_xy;
