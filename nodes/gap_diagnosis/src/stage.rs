@@ -1,7 +1,7 @@
 //! The node's whole computation: samples in, a diagnosis of the last runs out.
 //!
 //! After each segment that was recorded whole, and at most every `least_period_s`, the last runs are diagnosed as a
-//! bag of them would be. An effect that was not named in the diagnosis before is told of by itself.
+//! bag of them would be. An effect that was never named before, or not at that size, is told of by itself.
 //!
 //! Once the runs before the last test cycle have repeated its tests three times, the last cycle is what is diagnosed,
 //! and the runs before it say what noise is: a machine that changes between two cycles would else have its change taken
@@ -16,7 +16,7 @@
 //! On a live machine it is made beside ([`GapDiagnosisStage::go_beside`]): the stage gives a [`Task`] out, takes samples
 //! while somebody runs it, and is told its [`Finding`]; a new one begins only when the one before is back.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
 use machine::twin::{Run, Session};
@@ -106,7 +106,7 @@ pub enum Output {
     Due(Box<Task>),
     /// A diagnosis.
     Report(Box<GapSummary>),
-    /// An effect that was not named before: its id, what it acts on, its size in words.
+    /// An effect that was not told of before, or not at this size: its id, what it acts on, its size in words.
     NewEffect {
         /// Id and what it acts on.
         effect: String,
@@ -143,6 +143,8 @@ pub struct GapDiagnosisStage {
     /// The last session whose repeats said what noise is.
     quiet: Option<Session>,
     named: BTreeSet<String>,
+    /// Effects that were told of, with the interval of their first parameter then.
+    told: BTreeMap<String, [f64; 2]>,
     /// Runs that were closed when the rest that is there was first seen.
     rest_since: Option<usize>,
     had_rest: bool,
@@ -168,6 +170,7 @@ impl GapDiagnosisStage {
             steady_from: 0,
             quiet: None,
             named: BTreeSet::new(),
+            told: BTreeMap::new(),
             rest_since: None,
             had_rest: false,
             remarks: vec![],
@@ -261,13 +264,15 @@ impl GapDiagnosisStage {
     fn tell(&mut self, at: Stamp<Host>, runs: Vec<u32>, report: &GapReport, out: &mut Vec<Output>) {
         out.push(Output::Report(Box::new(summary(at, runs, report))));
         let mut named = BTreeSet::new();
-        let sure = report.causes.iter().filter(|cause| {
-            cause.status == Status::Named && cause.confidence >= self.config.least_confidence
-        });
+        let least_confidence = self.config.least_confidence;
+        let sure = report
+            .causes
+            .iter()
+            .filter(|cause| cause.status == Status::Named && cause.confidence >= least_confidence);
         for cause in sure {
             let effect = format!("{} {}", cause.effect, cause.axis);
             let effect = effect.trim_end().to_owned();
-            if !self.named.contains(&effect) {
+            if self.is_news(&effect, cause) {
                 out.push(Output::NewEffect {
                     effect: effect.clone(),
                     size: size(cause),
@@ -277,6 +282,19 @@ impl GapDiagnosisStage {
             named.insert(effect);
         }
         self.named = named;
+    }
+
+    /// Whether an effect was never told of, or has another size than when it was: one at the edge of what can be seen
+    /// comes and goes from diagnosis to diagnosis.
+    fn is_news(&mut self, effect: &str, cause: &Cause) -> bool {
+        let parameter = cause.parameters.first();
+        let now = parameter.map_or([0.0; 2], |p| [p.low, p.high]);
+        let before = self.told.get(effect);
+        let is_news = before.is_none_or(|[low, high]| now[0] > *high || now[1] < *low);
+        if is_news {
+            self.told.insert(effect.to_owned(), now);
+        }
+        is_news
     }
 
     /// A rest is told of once, when it is there in diagnoses of a whole cycle of new runs.

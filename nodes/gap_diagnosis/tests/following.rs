@@ -227,6 +227,15 @@ fn play_that_develops_is_the_first_cause_within_one_cycle_and_told_of_once() {
     assert_eq!(machine.causes()[0], "backlash X");
     told.extend(machine.new_effects());
     assert_eq!(told, ["backlash X"]);
+    // What is there, goes and comes back is no news; what has grown is.
+    for (play_mm, news) in [(0.0, 0), (4e-3, 0), (8e-3, 1)] {
+        machine.play_mm = play_mm;
+        machine.cycle();
+        machine.cycle();
+        let told = machine.new_effects();
+        let of_play = told.iter().filter(|effect| *effect == "backlash X");
+        assert_eq!(of_play.count(), news, "{play_mm} {told:?}");
+    }
 }
 
 #[test]
