@@ -218,6 +218,14 @@ impl Reflector {
     }
 }
 
+/// `package/Name` and its brackets of a type that says its kind, as the parts of services and actions do.
+fn without_kind(type_text: &str) -> String {
+    match type_text.split('/').collect::<Vec<_>>()[..] {
+        [package, _, name] => format!("{package}/{name}"),
+        _ => type_text.to_owned(),
+    }
+}
+
 /// Field names and types of each message by short name.
 type Parts = BTreeMap<String, Vec<(String, ros2msg::Type)>>;
 
@@ -269,8 +277,8 @@ fn parse_line(message: &str, line: &str) -> Result<Option<(String, ros2msg::Type
         return Err(wrong(format!("{name:?} is no field name")));
     }
     let package = message.split('/').next();
-    let parsed =
-        ros2msg::Type::new(type_text, package).map_err(|error| wrong(error.to_string()))?;
+    let parsed = ros2msg::Type::new(&without_kind(type_text), package)
+        .map_err(|error| wrong(error.to_string()))?;
     Ok(Some((name.to_owned(), parsed)))
 }
 

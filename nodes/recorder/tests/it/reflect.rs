@@ -38,6 +38,17 @@ fn numbers_stand_at_multiples_of_their_size_in_both_byte_orders() {
 }
 
 #[test]
+fn parts_of_services_are_found_by_their_kind() {
+    let definition = "std_srvs/srv/SetBool_Request[<=1] request\n".to_owned()
+        + &"=".repeat(80)
+        + "\nMSG: std_srvs/srv/SetBool_Request\nbool data\n";
+    let event = Reflector::new("std_srvs/srv/SetBool_Event", "ros2msg", &definition).unwrap();
+    let value = event.decode(&[0, 1, 0, 0, 1, 0, 0, 0, 1]).unwrap();
+    let request = Value::Message(vec![("data".into(), Value::Bool(true))]);
+    assert_eq!(field(&value, 0), Value::List(vec![request]));
+}
+
+#[test]
 fn what_the_definition_does_not_describe_is_refused_by_field() {
     let short = pair().decode(&[0, 1, 0, 0, 7, 0]).unwrap_err();
     assert!(matches!(short, ReflectError::Short { field, .. } if field == "b"));
