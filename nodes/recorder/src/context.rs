@@ -19,6 +19,8 @@ const RUN_RECORD: &str = "abbe.run";
 const HASHES_RECORD: &str = "abbe.attachments";
 /// Name of the metadata record with the nodes, in the order in which they were composed.
 pub const NODES_RECORD: &str = "abbe.nodes";
+/// Name of the metadata record of each service call.
+pub const CALL_RECORD: &str = "abbe.call";
 /// Name of the metadata record at the end of a run.
 pub const END_RECORD: &str = "abbe.end";
 /// Prefix of the metadata records with parameters.
@@ -183,6 +185,58 @@ impl RunContext {
             records.push((format!("{PARAMETERS_PREFIX}{node}"), flat));
         }
         Ok(records)
+    }
+}
+
+/// A service call of a composed run. Readers in other languages know no types of services, so calls are metadata.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordedCall {
+    /// Messages of the bag before it.
+    pub after_messages: u64,
+    /// When, ns.
+    pub time_nanos: u64,
+    /// The topic of the service's events.
+    pub topic: String,
+    /// The serialised event.
+    pub event: Vec<u8>,
+}
+
+impl RecordedCall {
+    /// The metadata record.
+    #[must_use]
+    pub fn metadata(&self) -> BTreeMap<String, String> {
+        let event: String = self
+            .event
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect();
+        [
+            ("after_messages", self.after_messages.to_string()),
+            ("time_ns", self.time_nanos.to_string()),
+            ("topic", self.topic.clone()),
+            ("event", event),
+        ]
+        .map(|(key, value)| (key.to_owned(), value))
+        .into()
+    }
+
+    /// The calls that a bag tells of, in their order.
+    #[must_use]
+    pub fn all_of(bag: &Bag) -> Vec<Self> {
+        let records = bag.metadata_records();
+        let calls = records.filter(|(name, _)| *name == CALL_RECORD);
+        calls.filter_map(|(_, record)| Self::read(record)).collect()
+    }
+
+    fn read(record: &BTreeMap<String, String>) -> Option<Self> {
+        let event = record.get("event")?.as_bytes().chunks(2);
+        let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
+        Some(Self {
+            after_messages: record.get("after_messages")?.parse().ok()?,
+            time_nanos: record.get("time_ns")?.parse().ok()?,
+            topic: record.get("topic")?.clone(),
+            event: event.map(byte).collect::<Option<_>>()?,
+        })
     }
 }
 

@@ -34,8 +34,8 @@ pub use channel::{Channel, ChannelId, Durability, History, Liveliness, QosProfil
 pub use channel::{Reliability, qos_from_yaml, qos_to_yaml};
 pub use config::{ChunkCompression, NodeConfig, PARAMETERS, RecorderConfig, WhenFull};
 pub use context::{
-    Attached, END_RECORD, MessageOrder, NODES_RECORD, RecordedRun, RunContext, RunNode,
-    verify_attachments,
+    Attached, CALL_RECORD, END_RECORD, MessageOrder, NODES_RECORD, RecordedCall, RecordedRun,
+    RunContext, RunNode, verify_attachments,
 };
 pub use dump::dump_json;
 pub use error::RecorderError;

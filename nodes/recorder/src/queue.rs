@@ -63,6 +63,8 @@ struct Batch {
     bytes: Vec<u8>,
     entries: Vec<Entry>,
     channels: Vec<Channel>,
+    /// Metadata records, each with the number of entries before it.
+    notes: Vec<(usize, MetadataRecord)>,
 }
 
 impl Batch {
@@ -71,13 +73,14 @@ impl Batch {
     }
 
     fn is_empty(&self) -> bool {
-        self.entries.is_empty() && self.channels.is_empty()
+        self.entries.is_empty() && self.channels.is_empty() && self.notes.is_empty()
     }
 
     fn clear(&mut self) {
         self.bytes.clear();
         self.entries.clear();
         self.channels.clear();
+        self.notes.clear();
     }
 }
 
@@ -87,8 +90,6 @@ struct State {
     topics: Vec<(String, String)>,
     stats: RecorderStats,
     lost_in_queue: u64,
-    /// Metadata records for the end of the bag.
-    notes: Vec<MetadataRecord>,
     stopped: bool,
     closing: bool,
     worker_waits: bool,
@@ -194,6 +195,15 @@ impl RecorderSink {
         Pushed::Queued
     }
 
+    /// Has a metadata record written behind the messages that were pushed before.
+    pub fn note(&self, name: &str, metadata: BTreeMap<String, String>) {
+        let mut state = self.shared.lock();
+        let place = state.batch.entries.len();
+        let record = (name.to_owned(), metadata);
+        state.batch.notes.push((place, record));
+        self.wake(state);
+    }
+
     /// Counts as of now.
     #[must_use]
     pub fn stats(&self) -> RecorderStats {
@@ -272,12 +282,6 @@ impl Recorder {
         self.sink.stats()
     }
 
-    /// Has a metadata record written behind the last message: what is known only at the end of a run.
-    pub fn note(&self, name: &str, metadata: BTreeMap<String, String>) {
-        let mut state = self.sink.shared.lock();
-        state.notes.push((name.to_owned(), metadata));
-    }
-
     /// Writes what waits, closes the bag and gives its summary.
     ///
     /// # Errors
@@ -325,16 +329,10 @@ impl<S: Shelf> Worker<S> {
             batch.clear();
             self.publish();
         }
-        let (lost, notes) = {
-            let mut state = self.shared.lock();
-            (state.lost_in_queue, std::mem::take(&mut state.notes))
-        };
+        let lost = self.shared.lock().lost_in_queue;
         self.recording.note_lost(lost);
         if let Some(failure) = self.failure.take() {
             return Err(failure);
-        }
-        for (name, metadata) in &notes {
-            self.recording.add_metadata(name, metadata)?;
         }
         let finished = self.recording.finish();
         if let Err(failure) = &finished {
@@ -396,7 +394,11 @@ impl<S: Shelf> Worker<S> {
                 self.fail(error);
             }
         }
+        let mut notes = batch.notes.iter().peekable();
         for (index, entry) in batch.entries.iter().enumerate() {
+            while let Some((_, record)) = notes.next_if(|(place, _)| *place <= index) {
+                self.add_note(record);
+            }
             if self.failure.is_some() {
                 self.recording
                     .note_lost((batch.entries.len() - index) as u64);
@@ -409,6 +411,15 @@ impl<S: Shelf> Worker<S> {
                 Err(RecorderError::TimeBeforeEpoch { .. }) => self.recording.note_lost(1),
                 Err(error) => self.fail(error),
             }
+        }
+        notes.for_each(|(_, record)| self.add_note(record));
+    }
+
+    fn add_note(&mut self, (name, metadata): &MetadataRecord) {
+        if self.failure.is_none()
+            && let Err(error) = self.recording.add_metadata(name, metadata)
+        {
+            self.fail(error);
         }
     }
 

@@ -4,11 +4,10 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, VecDeque};
 use std::rc::Rc;
 
-use abbe_msgs::SERVICE_EVENT_SUFFIX;
 use metrology::stamp::{Host, Stamp};
 use node_runtime::harness::Published;
 use node_runtime::{Bytes, Harness, Node};
-use recorder::{Bag, Event, Loss, MessageOrder, Order, RecordedRun};
+use recorder::{Bag, Event, Loss, MessageOrder, Order, RecordedCall, RecordedRun};
 use serde::Serialize;
 
 use crate::difference::{Difference, Discrepancy};
@@ -43,7 +42,6 @@ enum Role {
     Input {
         route: usize,
     },
-    Call,
     Result {
         route: usize,
     },
@@ -81,10 +79,11 @@ pub fn check(
     if run.order != MessageOrder::Total {
         return Err(ReplayError::Arrival);
     }
-    let stamp = |nanos: u64| {
-        let nanos = i64::try_from(nanos).map_err(|_| ReplayError::Start { nanos })?;
-        Ok::<_, ReplayError>(Stamp::from_nanos(nanos))
-    };
+    if i64::try_from(run.start_time_nanos).is_err() {
+        return Err(ReplayError::Start {
+            nanos: run.start_time_nanos,
+        });
+    }
     let nodes: Vec<_> = nodes
         .into_iter()
         .filter(|node| inputs::computes(node.as_ref()))
@@ -94,7 +93,7 @@ pub fn check(
         .flat_map(|node| &node.ports().publications)
         .map(|port| port.topic.clone())
         .collect();
-    let mut harness = Harness::compose(nodes, stamp(run.start_time_nanos)?)?;
+    let mut harness = Harness::compose(nodes, stamp(run.start_time_nanos))?;
     let roles = roles(bag, &harness, &computed)?;
     let said = listen(&mut harness, &roles);
     let mut replay = Replay {
@@ -102,7 +101,7 @@ pub fn check(
         harness,
         said,
         roles,
-        stop: run.stop_time_nanos.map(stamp).transpose()?,
+        stop: run.stop_time_nanos.map(stamp),
         outcome: Outcome::default(),
     };
     replay.run();
@@ -112,9 +111,6 @@ pub fn check(
 fn roles(bag: &Bag, harness: &Harness, computed: &[String]) -> Result<Vec<Role>, ReplayError> {
     let of = |topic: &recorder::TopicInfo| {
         let name = topic.topic.trim_start_matches('/');
-        if name.ends_with(SERVICE_EVENT_SUFFIX) {
-            return Ok(Role::Call);
-        }
         let (Some(entry), Some(route)) = (inputs::entry_of(name), harness.place_of_topic(name))
         else {
             return Ok(Role::Aside);
@@ -159,10 +155,16 @@ fn listen(harness: &mut Harness, roles: &[Role]) -> SaidQueue {
     said
 }
 
+fn stamp(nanos: u64) -> Stamp<Host> {
+    Stamp::from_nanos(i64::try_from(nanos).unwrap_or(i64::MAX))
+}
+
 impl Replay<'_> {
     fn run(&mut self) {
         let mut messages = self.bag.messages(Order::File);
         let mut last = None;
+        let mut calls = RecordedCall::all_of(self.bag).into_iter().peekable();
+        let mut read = 0;
         while let Some(event) = messages.next_event() {
             let message = match event {
                 Event::Message(message) => message,
@@ -171,23 +173,19 @@ impl Replay<'_> {
                     continue;
                 }
             };
-            let at = Stamp::from_nanos(i64::try_from(message.log_time_nanos).unwrap_or(i64::MAX));
-            if last.is_some_and(|last| at > last) || last.is_none() {
-                self.go_on(|due| due < at);
-                self.nothing_is_left();
-                self.harness.wait_until(at);
-                last = Some(at);
+            while let Some(call) = calls.next_if(|call| call.after_messages <= read) {
+                self.arrive(stamp(call.time_nanos), &mut last);
+                let is_request = self.harness.put_request(&call.topic, &call.event);
+                self.outcome.inputs += u64::from(is_request);
             }
+            read += 1;
+            let at = stamp(message.log_time_nanos);
+            self.arrive(at, &mut last);
             let topic = message.topic.index();
             match self.roles[topic] {
                 Role::Input { route } => {
                     self.outcome.inputs += 1;
                     self.harness.put(route, message.data);
-                }
-                Role::Call => {
-                    let name = self.bag.topics()[topic].topic.trim_start_matches('/');
-                    let is_request = self.harness.put_request(name, message.data);
-                    self.outcome.inputs += u64::from(is_request);
                 }
                 Role::Result { route } => self.compare(topic, route, at, message.data),
                 Role::Aside => {}
@@ -197,6 +195,16 @@ impl Replay<'_> {
         if let (Some(last), true) = (last, self.outcome.losses.is_empty()) {
             self.go_on(|due| due <= last);
             self.nothing_is_left();
+        }
+    }
+
+    /// Lets everything happen that is due before `at`, when time goes on.
+    fn arrive(&mut self, at: Stamp<Host>, last: &mut Option<Stamp<Host>>) {
+        if last.is_none_or(|last| at > last) {
+            self.go_on(|due| due < at);
+            self.nothing_is_left();
+            self.harness.wait_until(at);
+            *last = Some(at);
         }
     }
 

@@ -8,13 +8,16 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use abbe_msgs::SERVICE_EVENT_SUFFIX;
 use anyhow::{Context, Result, bail};
 use metrology::sample::PlanState;
 use metrology::stamp::{Host, Span, Stamp};
 use node_runtime::arguments::Arguments;
 use node_runtime::harness::Published;
 use node_runtime::{Harness, Interruption, Node, Setup};
-use recorder::{ChannelId, MessageStamp, Recorder, RecorderSink, RunNode};
+use recorder::{
+    CALL_RECORD, ChannelId, MessageStamp, RecordedCall, Recorder, RecorderSink, RunNode,
+};
 
 use super::mirror::Mirror;
 use super::{INTERRUPTED, Outcome, bag};
@@ -67,7 +70,9 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
     let evidence = gather(&mut harness, &truth);
     let failure = play(&mut harness, scenario, start, how, &evidence, &truth);
     if !how.interruption.is_forced() {
-        recorder.note(recorder::END_RECORD, bag::end(harness.now()));
+        recorder
+            .sink()
+            .note(recorder::END_RECORD, bag::end(harness.now()));
         harness.shutdown(SHUTDOWN_PATIENCE);
     }
     drop(harness);
@@ -130,18 +135,34 @@ fn build_node(launched: &LaunchNode, truth: &Arc<Truth>) -> Result<Box<dyn Node>
 /// Writes every publication into the bag, in total order.
 fn record(harness: &mut Harness, recorder: &Recorder) -> Result<()> {
     let sink: RecorderSink = recorder.sink();
-    let mut channels: Vec<ChannelId> = Vec::new();
+    let mut channels: Vec<Option<ChannelId>> = Vec::new();
+    let mut names = Vec::new();
     for port in harness.topics() {
-        channels.push(sink.add_channel(&bag::channel(bag::full_name(&port.topic), port))?);
+        let is_call = port.topic.ends_with(SERVICE_EVENT_SUFFIX);
+        let channel = || sink.add_channel(&bag::channel(bag::full_name(&port.topic), port));
+        channels.push(if is_call { None } else { Some(channel()?) });
+        names.push(port.topic.clone());
     }
+    let mut messages = 0;
     harness.observe(Box::new(move |published: Published<'_>| {
         let nanos = published.at.nanos();
+        let Some(channel) = channels[published.topic] else {
+            let call = RecordedCall {
+                after_messages: messages,
+                time_nanos: u64::try_from(nanos).unwrap_or(0),
+                topic: names[published.topic].clone(),
+                event: published.bytes.to_vec(),
+            };
+            sink.note(CALL_RECORD, call.metadata());
+            return;
+        };
+        messages += 1;
         let stamp = MessageStamp {
             log_time_nanos: nanos,
             publish_time_nanos: nanos,
             sequence: published.sequence,
         };
-        sink.push(channels[published.topic], stamp, published.bytes);
+        sink.push(channel, stamp, published.bytes);
     }));
     Ok(())
 }
