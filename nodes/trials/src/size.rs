@@ -291,6 +291,10 @@ fn quadratic_form(
 
 #[cfg(test)]
 mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64Mcg;
+
     use super::*;
 
     #[test]
@@ -323,10 +327,13 @@ mod tests {
             if row < 37 { slope } else { slope + 3e-3 }
         });
         assert!(chatter_mm2(&step).abs() < 1e-18);
-        // A full period of numbers that fill the unit interval evenly: variance 1/12.
-        let even = DVector::from_fn(1000, |row, _| (row as f64 * 0.618_033_988_749_895).fract());
-        let spread = DVector::from_fn(1000, |row, _| even[(row * 367) % 1000]);
-        assert!(chatter_mm2(&spread) > 0.02);
+        let mut rng = Pcg64Mcg::seed_from_u64(7);
+        let spread = DVector::from_fn(20_000, |_, _| {
+            let normal: f64 = rng.sample(StandardNormal);
+            0.3 * normal
+        });
+        let ratio = chatter_mm2(&spread) / 0.09;
+        assert!((0.95..1.05).contains(&ratio), "{ratio}");
     }
 
     #[test]
