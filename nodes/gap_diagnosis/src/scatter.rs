@@ -104,14 +104,19 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind], left: &DVector<f64>)
     let squares = Squares::new(scope, left);
     let variances = kinds.iter().filter(|kind| kind.moment == Moment::Variance);
     let instances = Instance::all(stack.twin.machine(), variances);
-    let library = squares.library(scope, instances);
-    let normal = library.normal(&squares.y);
-    let seen = library
+    let signatures = squares.signatures(scope, instances);
+    let normal = signatures.normal(&squares.y);
+    let seen = signatures
         .forms
         .iter()
-        .map(|form| library.instances[form.instance].kind.id)
+        .map(|form| signatures.instances[form.instance].kind.id)
         .collect();
-    let mut search = Search::new(&library, &normal, squares.y.norm_squared(), stack.freedom());
+    let mut search = Search::new(
+        &signatures,
+        &normal,
+        squares.y.norm_squared(),
+        stack.freedom(),
+    );
     let set = search.run(Limits {
         beam: scope.config.beam,
         most_effects: 3,
@@ -127,7 +132,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind], left: &DVector<f64>)
         let judge = Judge {
             scope,
             squares: &squares,
-            library: &library,
+            signatures: &signatures,
             normal: &normal,
             visited: &search.visited,
         };
@@ -181,35 +186,35 @@ impl Squares {
         (&column - &self.basis * self.basis.tr_mul(&column)) / self.unit
     }
 
-    fn library(&self, scope: &Scope<'_, '_>, instances: Vec<Instance>) -> Library {
-        let mut library = Library {
+    fn signatures(&self, scope: &Scope<'_, '_>, instances: Vec<Instance>) -> Library {
+        let mut signatures = Library {
             excited: vec![false; instances.len()],
             instances,
             forms: vec![],
             columns: vec![],
         };
-        for instance in 0..library.instances.len() {
-            let kind = library.instances[instance].kind;
+        for instance in 0..signatures.instances.len() {
+            let kind = signatures.instances[instance].kind;
             for values in crate::signature::shapes(kind) {
                 for wide in [false, true] {
                     if !wide || !kind.free.is_empty() {
-                        self.add(scope, &mut library, instance, &values, wide);
+                        self.add(scope, &mut signatures, instance, &values, wide);
                     }
                 }
             }
         }
-        library
+        signatures
     }
 
     fn add(
         &self,
         scope: &Scope<'_, '_>,
-        library: &mut Library,
+        signatures: &mut Library,
         instance: usize,
         values: &[f64],
         wide: bool,
     ) {
-        let kind = library.instances[instance].kind;
+        let kind = signatures.instances[instance].kind;
         let shown = if wide {
             usize::MAX
         } else {
@@ -222,7 +227,7 @@ impl Squares {
             }
             let mut on = values.to_vec();
             on[place] = parameter.high;
-            let column = self.column(spread(scope, &*library.instances[instance].effect(&on)));
+            let column = self.column(spread(scope, &*signatures.instances[instance].effect(&on)));
             if column.norm().is_finite() && column.norm() > LEAST_D {
                 amplitudes.push(place);
                 columns.push(column);
@@ -231,12 +236,12 @@ impl Squares {
         if columns.is_empty() {
             return;
         }
-        library.excited[instance] = true;
+        signatures.excited[instance] = true;
         let choices = kind
             .shapes()
             .filter(|p| matches!(p.role, Role::Shape { grid } if grid.len() > 1));
-        let first = library.columns.len();
-        library.forms.push(Form {
+        let first = signatures.columns.len();
+        signatures.forms.push(Form {
             instance,
             values: values.to_vec(),
             price: amplitudes.len() + choices.count(),
@@ -244,7 +249,7 @@ impl Squares {
             amplitudes,
             wide,
         });
-        library.columns.extend(columns);
+        signatures.columns.extend(columns);
     }
 }
 
@@ -362,7 +367,7 @@ fn spread(scope: &Scope<'_, '_>, effect: &dyn Effect) -> Vec<f64> {
 struct Judge<'j, 's, 'a> {
     scope: &'j Scope<'s, 'a>,
     squares: &'j Squares,
-    library: &'j Library,
+    signatures: &'j Library,
     normal: &'j Normal,
     visited: &'j BTreeMap<Set, f64>,
 }
@@ -370,17 +375,20 @@ struct Judge<'j, 's, 'a> {
 impl Judge<'_, '_, '_> {
     fn judge(&self, set: &Set, found: &mut Scattered) {
         let stack = self.scope.stack;
-        let forms: Vec<&Form> = set.iter().map(|form| &self.library.forms[*form]).collect();
+        let forms: Vec<&Form> = set
+            .iter()
+            .map(|form| &self.signatures.forms[*form])
+            .collect();
         let fit = self.fit(&forms);
         found.spread = fit.level.map(f64::sqrt);
         let parts = self.parts(&forms, &fit);
         let confirmed = confirm::held_out_gains_of(stack, &self.squares.y, &parts);
         let beats_runs = self.visited[set] < self.of_runs();
-        let rivals = Rivals::new(self.library, self.visited);
+        let rivals = Rivals::new(self.signatures, self.visited);
         let columns: Vec<DVector<f64>> = forms
             .iter()
             .flat_map(|f| &f.columns)
-            .map(|c| self.library.columns[*c].clone())
+            .map(|c| self.signatures.columns[*c].clone())
             .collect();
         let left = parts
             .iter()
@@ -389,7 +397,7 @@ impl Judge<'_, '_, '_> {
         for (place, form) in forms.iter().enumerate() {
             let own = first..first + form.columns.len();
             first = own.end;
-            let instance = &self.library.instances[form.instance];
+            let instance = &self.signatures.instances[form.instance];
             let (parameters, values) = sized(instance.kind, form, &fit, own.clone());
             let constancy = self.constancy(instance, &values, &columns, &left);
             let railed = parameters.iter().any(|p| p.at_bound && p.value > 0.0);
@@ -412,7 +420,7 @@ impl Judge<'_, '_, '_> {
                 parameters,
                 d: parts[place].norm(),
                 confusable_with: cause::confusable(
-                    self.library,
+                    self.signatures,
                     self.normal,
                     &rivals,
                     set[place],
@@ -430,7 +438,7 @@ impl Judge<'_, '_, '_> {
             let own = form.columns.iter().zip(sizes.by_ref());
             own.fold(
                 DVector::zeros(self.squares.y.len()),
-                |sum, (column, size)| sum + &self.library.columns[*column] * *size,
+                |sum, (column, size)| sum + &self.signatures.columns[*column] * *size,
             )
         };
         forms.iter().map(part).collect()
@@ -438,7 +446,7 @@ impl Judge<'_, '_, '_> {
 
     /// One form of each instance that could be seen.
     fn one_of_each(&self, set: &Set) -> Vec<usize> {
-        crate::isolability::forms(self.library, self.normal, set)
+        crate::isolability::forms(self.signatures, self.normal, set)
     }
 
     fn constancy(
@@ -495,7 +503,7 @@ impl Judge<'_, '_, '_> {
             .collect();
         let first = columns.len();
         for form in forms {
-            let instance = &self.library.instances[form.instance];
+            let instance = &self.signatures.instances[form.instance];
             for place in &form.amplitudes {
                 let mut on = form.values.clone();
                 on[*place] = parameters(instance.kind)
