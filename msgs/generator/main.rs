@@ -41,13 +41,19 @@ fn main() -> Result<()> {
         .with_context(|| format!("writing {}", out.display()))
 }
 
-fn read_package(interfaces: &mut Interfaces, package: &str, folder: &Path) -> Result<()> {
+fn watch(folder: &Path) {
+    println!("cargo::rerun-if-changed={}", folder.display());
+}
+
+fn read_package(interfaces: &mut Interfaces, package: &str, parent: &Path) -> Result<()> {
     for kind in ["msg", "srv", "action"] {
-        let folder = folder.join(kind);
-        println!("cargo::rerun-if-changed={}", folder.display());
+        let folder = parent.join(kind);
         if !folder.is_dir() {
+            // To watch what is not there would make every build begin anew: its parent is watched for it.
+            watch(parent);
             continue;
         }
+        watch(&folder);
         for file in sorted_entries(&folder)? {
             let path = folder.join(&file);
             let place = || format!("reading {}", path.display());
