@@ -3,7 +3,9 @@
 use std::time::Instant;
 
 use grid_encoder::basis::ModelComponent;
-use grid_encoder::identify::{Identification, IdentifyOptions, Noise, default_basis, identify};
+use grid_encoder::identify::{
+    Disturbed, Identification, IdentifyOptions, Noise, default_basis, identify,
+};
 use grid_encoder::recording::{Fixture, GridPoint, Place, Recording};
 use grid_encoder::unknown::Nuisances;
 use machine::Kinematics;
@@ -87,6 +89,7 @@ fn options() -> IdentifyOptions {
         outlier_limit: f64::INFINITY,
         recording_noise: false,
         noise: Noise::FromResiduals,
+        disturbed: Disturbed::Found { start: None },
     }
 }
 

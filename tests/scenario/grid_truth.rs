@@ -1,16 +1,16 @@
 //! What a grid encoder's recordings determine, judged by the plant itself.
 //!
-//! The truth is the plant of the scenario, cold and at rest, where the motors stood at the points of the recordings, read by a
-//! grid without error. Brought through the same equations with the same weights, it gives what perfect readings at these
-//! places would give, in the gauge of the estimate: the value of a coefficient, or of a sum of coefficients, that the recordings
-//! determine. What the functions of the model cannot follow is left over there and said. Nothing of the truth is in the bag.
+//! The truth is the plant of the scenario as warm as it was at the middle of each recording (`shadow`), at rest where the motors stood
+//! at the points of the recordings, read by a grid without error. Brought through the same equations with the same weights, it gives
+//! what perfect readings at these places would give, in the gauge of the estimate: the value of a coefficient, or of a sum of
+//! coefficients, that the recordings determine. What the functions of the model cannot follow is left over there and said. Nothing of
+//! the truth is in the bag.
 //!
-//! An interval states what the residuals show, those that follow each other counted as fewer. Not in it: the machine that is warmer than the
-//! plant here, errors that the plate shows alike at every circle, lost motion that is not the same all along an axis, and what functions
-//! that do not fit distort. That intervals hold the truth where only noise stands between them, the coverage tests of `grid_encoder` show.
+//! So an interval has to hold what the plate, noise, friction, play and drift within and between recordings put into an estimate. Not in
+//! it: that the machine was colder before. A heat that all recordings share is the machine's, as it was while it was measured.
 
 use fake_cnc::plant::{Plant, PlantFile};
-use grid_encoder::identify::{Combination, Identification, identify};
+use grid_encoder::identify::{Combination, Disturbed, Identification, identify};
 use grid_encoder::recording::{Place, Recording};
 use grid_encoder::{GridEncoderConfig, GridEncoderStage, Input, Output};
 use machine::file::GridPlacement;
@@ -26,10 +26,15 @@ use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Wire, from_cdr};
 use abbe_tests::scenario::Scenario;
 
+use crate::recorded::{all, for_each, tests};
+use crate::shadow::Shadow;
+
 /// Standard uncertainties that the interval of 95 % reaches to either side.
 const INTERVAL: f64 = 1.96;
 /// After the last message every recording is taken in.
 const AFTER: Span = Span::from_nanos(10_000_000_000);
+/// The plant taken along lags a little where axes accelerate, mm.
+const FOLLOWS_MM: f64 = 1.0;
 
 /// A coefficient, or a sum of coefficients, that is determined; mm at the edge of what was recorded.
 #[derive(Clone, Debug)]
@@ -73,6 +78,12 @@ impl Judged {
         self.determined.iter().map(beyond).fold(0.0, f64::max)
     }
 
+    /// Root of the mean square of estimate minus truth in standard uncertainties: 1 where these are right, less where they are too wide.
+    pub fn rms_score(&self) -> f64 {
+        let squares = self.determined.iter().map(|one| one.score().powi(2));
+        (squares.sum::<f64>() / self.determined.len() as f64).sqrt()
+    }
+
     /// How many intervals hold the truth.
     pub fn held(&self) -> usize {
         self.determined.iter().filter(|one| one.is_held()).count()
@@ -92,10 +103,11 @@ impl Judged {
         }
         let (greatest_mm, rms_mm) = self.outside_mm;
         eprintln!(
-            "{scenario}: {} of {} intervals of 95 % hold the truth, which lies {:.2} um beyond at most; outside of the model's functions lie {:.3} um rms, {:.3} um at most",
+            "{scenario}: {} of {} intervals of 95 % hold the truth, which lies {:.2} um beyond at most; rms score {:.2}; outside of the model's functions lie {:.3} um rms, {:.3} um at most",
             self.held(),
             self.determined.len(),
             self.beyond_mm() * 1e3,
+            self.rms_score(),
             rms_mm * 1e3,
             greatest_mm * 1e3
         );
@@ -111,12 +123,17 @@ pub fn judge(scenario: &Scenario, bag: &Bag) -> Judged {
     let config: GridEncoderConfig = serde_json::from_value(parameters).unwrap();
     let (found, recordings) = as_the_node(bag, &config, &machine);
     let plant_file = PlantFile::from_yaml(&text("plant.yaml")).unwrap();
-    let mut perfect = perfect_readings(&recordings, &machine, plant_file);
-    weigh_alike(&mut perfect, &recordings, &found, config.outlier_limit);
+    let mut perfect = perfect_readings(bag, &recordings, &machine, plant_file);
+    weigh_alike(&mut perfect, &found);
     let kinematics = Kinematics::new(&machine).unwrap();
     let mut options = config.options_for(kinematics.chain(), &recordings).unwrap();
     options.outlier_limit = f64::INFINITY;
     options.recording_noise = false;
+    options.disturbed = found
+        .disturbances
+        .map_or(Disturbed::Ignored, |told| Disturbed::Given {
+            ratios: told.ratios,
+        });
     let truth = identify(&kinematics, &perfect, &options).unwrap();
     assert_eq!(truth.rank, found.rank);
     let left = || truth.residuals_mm.iter().flatten().flatten();
@@ -131,19 +148,11 @@ pub fn judge(scenario: &Scenario, bag: &Bag) -> Judged {
 }
 
 /// Gives perfect readings the weights that the estimate gave the real ones, so that both are the same sums of readings.
-fn weigh_alike(
-    perfect: &mut [Recording],
-    recordings: &[Recording],
-    found: &Identification,
-    outlier_limit: f64,
-) {
-    for (idx, recording) in perfect.iter_mut().enumerate() {
-        let noise = found.recording_noise[idx];
-        for (place, point) in recording.points.iter_mut().enumerate() {
-            let stated_mm = recordings[idx].points[place].standard_uncertainty_mm;
-            for (along, u_mm) in point.standard_uncertainty_mm.iter_mut().enumerate() {
-                let ratio = found.residuals_mm[idx][place][along].abs() / stated_mm[along];
-                *u_mm *= noise * (ratio / (outlier_limit * noise)).max(1.0);
+fn weigh_alike(perfect: &mut [Recording], found: &Identification) {
+    for (recording, weights) in perfect.iter_mut().zip(&found.weights) {
+        for (point, weights) in recording.points.iter_mut().zip(weights) {
+            for (u_mm, weight) in point.standard_uncertainty_mm.iter_mut().zip(weights) {
+                *u_mm /= weight.sqrt();
             }
         }
     }
@@ -224,8 +233,11 @@ fn decoded<M: Message + Wire>(_: &Topic<M>, data: &[u8]) -> M::Inner {
     from_cdr::<M>(data).unwrap().into_inner().unwrap()
 }
 
-/// The same recordings, read by a grid without error on the plant at rest and cold.
+/// The same recordings, read by a grid without error on the plant at rest, each as warm as it was when the recording was half done.
+///
+/// Each recording is zeroed anew: how the place of the plate drifted between two recordings under one zero is no geometry.
 fn perfect_readings(
+    bag: &Bag,
     recordings: &[Recording],
     machine: &MachineFile,
     mut file: PlantFile,
@@ -235,21 +247,42 @@ fn perfect_readings(
     grid.rotation_urad = 0.0;
     grid.plate_error_um = 0.0;
     grid.head_noise_um = 0.0;
-    let mut plant = Plant::new(machine, &file).unwrap();
-    let mut perfect = recordings.to_vec();
-    let mut zero_id = None;
-    for recording in &mut perfect {
-        let place = &recording.place;
-        if zero_id.replace(place.fixture.zero_id) != Some(place.fixture.zero_id) {
-            plant.mount(placement_of(place, machine));
-            plant.settle_at(&positions(&place.centre_mm));
-            plant.zero_grid();
+    let cold = Plant::new(machine, &file).unwrap();
+    let segments = all(bag, &topics::TEST_SEGMENT);
+    let tests = tests(&segments);
+    let middle = |recording: &Recording| {
+        let mut of = tests.iter().filter(|(begin, _)| begin.run == recording.run);
+        let (begin, end) = of.next().unwrap();
+        begin.at + Span::from_nanos((end.at - begin.at).nanos() / 2)
+    };
+    let mut left = recordings.iter();
+    let mut next = left.next();
+    let mut perfect = Vec::new();
+    let mut shadow: Option<Shadow> = None;
+    for_each(bag, &topics::AXES_STATE, |state: AxisState| {
+        let Some(recording) = next else { return };
+        let shadow = shadow.get_or_insert_with(|| Shadow::new(cold.clone(), &state));
+        shadow.follow(&state);
+        if state.received_at >= middle(recording) {
+            assert!(shadow.apart_mm() < FOLLOWS_MM, "{}", shadow.apart_mm());
+            perfect.push(read_by(shadow.plant(), recording, machine));
+            next = left.next();
         }
-        for point in &mut recording.points {
-            plant.settle_at(&point.positions);
-            let reading = plant.grid_reading().unwrap();
-            point.reading_mm = [reading.u_mm, reading.v_mm];
-        }
+    });
+    assert_eq!(perfect.len(), recordings.len());
+    perfect
+}
+
+fn read_by(mut plant: Plant, recording: &Recording, machine: &MachineFile) -> Recording {
+    let place = &recording.place;
+    plant.mount(placement_of(place, machine));
+    plant.settle_at(&positions(&place.centre_mm));
+    plant.zero_grid();
+    let mut perfect = recording.clone();
+    for point in &mut perfect.points {
+        plant.settle_at(&point.positions);
+        let reading = plant.grid_reading().unwrap();
+        point.reading_mm = [reading.u_mm, reading.v_mm];
     }
     perfect
 }

@@ -51,10 +51,11 @@ fn every_reading_of_grid_xy_is_of_its_segment_and_its_page_marks_what_one_circle
     assert_eq!(model.rank, 33);
     let judged = judge(&scenario, &bag);
     judged.print("grid_xy");
-    // Cubic functions leave 6 µm of this plant at the outer plates.
+    // Cubic functions leave micrometres of this plant, friction and play as much: what is left is in the uncertainties. Of 15 intervals
+    // of 95 % fewer than 13 hold the truth once in 28 machines.
     assert_eq!(judged.determined.len(), 15);
-    assert!(judged.held() >= 6, "{} of 15", judged.held());
-    assert!(judged.beyond_mm() < 0.006, "{}", judged.beyond_mm());
+    assert!(judged.held() >= 13, "{} of 15", judged.held());
+    assert!(judged.rms_score() > 0.4, "{}", judged.rms_score());
 
     let text = std::fs::read_to_string(run.join("report.json")).unwrap();
     let report: Value = serde_json::from_str(&text).unwrap();

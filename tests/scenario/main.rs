@@ -21,5 +21,6 @@ mod preflight;
 mod probe_faults;
 mod recorded;
 mod rotary_coverage;
+mod shadow;
 mod volumetric;
 mod warm_up;

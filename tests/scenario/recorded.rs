@@ -8,6 +8,12 @@ use recorder::{Bag, Event, Order};
 /// Every message of a topic in the order of recording.
 pub fn all<M: Message + Wire>(bag: &Bag, topic: &Topic<M>) -> Vec<M::Inner> {
     let mut found = Vec::new();
+    for_each(bag, topic, |message| found.push(message));
+    found
+}
+
+/// Takes every message of a topic in the order of recording.
+pub fn for_each<M: Message + Wire>(bag: &Bag, topic: &Topic<M>, mut take: impl FnMut(M::Inner)) {
     let mut messages = bag.messages(Order::LogTime);
     while let Some(event) = messages.next_event() {
         match event {
@@ -15,13 +21,12 @@ pub fn all<M: Message + Wire>(bag: &Bag, topic: &Topic<M>) -> Vec<M::Inner> {
                 let name = &bag.topic(message.topic).topic;
                 if name.trim_start_matches('/') == topic.name {
                     let decoded: M = from_cdr(message.data).unwrap();
-                    found.push(decoded.into_inner().unwrap());
+                    take(decoded.into_inner().unwrap());
                 }
             }
             Event::Loss(loss) => panic!("{}: {loss:?}", topic.name),
         }
     }
-    found
 }
 
 /// Begin and end of each test, in the order in which they began.

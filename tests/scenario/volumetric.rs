@@ -4,15 +4,15 @@
 //! programme is measured on the plant at rest and cold, so that what the programme itself can and cannot see
 //! stands apart from what heat does between measurement and use.
 //!
-//! What is left of 17.5 µm (p95 about a datum), from one run of each:
+//! What is left of 17.5 µm (p95 about a datum), from one run of each, without and with the plate's error told apart (`plate_and_drift`):
 //!
-//! | with | µm |
-//! |---|---|
-//! | plate (0.2 µm) and tables alone, at rest and cold | 0.97 |
-//! | drives, friction and lost motion besides, no heat | 1.03 |
-//! | heat of cabinet, hydraulics and screws besides: the scenario | 1.31 |
-//! | 18 W in the middle of the table besides, whose growth no plate of glass ceramic shows | 2.28 |
-//! | poses in random order and approached from any side, at the end of the measurement, and those 18 W | 7.5 |
+//! | with | without, µm | with, µm |
+//! |---|---|---|
+//! | plate (0.2 µm) and tables alone, at rest and cold | 0.97 | 0.51 |
+//! | drives, friction and lost motion besides, no heat | 1.03 | |
+//! | heat of cabinet, hydraulics and screws besides: the scenario | 1.31 | 1.00 |
+//! | 18 W in the middle of the table besides, whose growth no plate of glass ceramic shows | 2.28 | |
+//! | poses in random order and approached from any side, at the end of the measurement, and those 18 W | 7.5 | |
 
 use std::time::{Duration, Instant};
 
@@ -42,6 +42,8 @@ const LIMIT: Duration = Duration::from_secs(120);
 const LEAST_REDUCTION: f64 = 10.0;
 /// Readings that are averaged at a station of the plant at rest.
 const READINGS: u32 = 20;
+/// Least rms of estimate minus truth in standard uncertainties: intervals that hold everything because they are wide say nothing.
+const NOT_TOO_WIDE: f64 = 0.5;
 /// Greatest effect of one component's remaining error on the tip, rms over the poses, µm.
 const LEFT_OF_COMPONENT_UM: f64 = 0.5;
 
@@ -84,16 +86,16 @@ fn scenario_volumetric_error_is_reduced_tenfold() {
         with.1
     );
     assert!(
-        without.0 / with.0 >= LEAST_REDUCTION,
+        without.0 / with.0 >= 1.4 * LEAST_REDUCTION,
         "{without:?} {with:?}"
     );
     assert!(took < LIMIT, "{took:?}");
     let judged = judge(&scenario, &Bag::open(run.join("bag")).unwrap());
     judged.print("volumetric");
+    // Of 166 intervals of 95 % 158 hold the truth on average, and fewer than 152 once in 40 machines.
     let (held, all) = (judged.held(), judged.determined.len());
-    assert!(all >= 150 && 10 * held >= 6 * all, "{held} of {all}");
-    // An hour of heat lies between the plant at rest and the measurement.
-    assert!(judged.beyond_mm() < 0.0015, "{}", judged.beyond_mm());
+    assert!(all == 166 && held >= 152, "{held} of {all}");
+    assert!(judged.rms_score() > NOT_TOO_WIDE, "{}", judged.rms_score());
 }
 
 /// The scenario's plant at rest and cold, measured stop by stop.
@@ -345,5 +347,5 @@ fn the_programme_sees_every_component_over_the_whole_travel() {
         without / with,
         found.residual_standard_deviation_mm * 1e3
     );
-    assert!(without / with > 1.4 * LEAST_REDUCTION, "{without} {with}");
+    assert!(without / with > 2.5 * LEAST_REDUCTION, "{without} {with}");
 }

@@ -21,7 +21,7 @@
 use machine::Kinematics;
 
 use crate::error::IdentifyError;
-use crate::identify::{Identification, IdentifyOptions, Noise, identify};
+use crate::identify::{Disturbed, Identification, IdentifyOptions, Noise, identify};
 use crate::published::{fourteen_unknowns, of_recording, solve};
 use crate::recording::Recording;
 use crate::spectrum::Visibility;
@@ -87,6 +87,7 @@ pub fn compare(
         outlier_limit: 4.5,
         recording_noise: false,
         noise: Noise::FromResiduals,
+        disturbed: Disturbed::Ignored,
     };
     let determined = identify(kinematics, std::slice::from_ref(recording), &options)?;
     let published = solve(&system, &radial_mm, &[]);

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::basis::{Basis, ModelComponent};
 use crate::error::GridEncoderError;
-use crate::identify::{IdentifyOptions, Noise, default_basis};
+use crate::identify::{Disturbed, IdentifyOptions, Noise, default_basis};
 use crate::recording::StationRules;
 use crate::unknown::Nuisances;
 
@@ -69,6 +69,8 @@ pub struct GridEncoderConfig {
     pub outlier_limit: f64,
     /// Whether each recording has a noise of its own, at least the stated one.
     pub recording_noise: bool,
+    /// Whether the plate's own error and drift between recordings are unknown, where residuals show them.
+    pub plate_and_drift: bool,
     /// Lack of fit is reported below this p value.
     pub lack_of_fit_limit: f64,
     /// How long the end of a recording waits for its last positions.
@@ -104,6 +106,7 @@ impl Default for GridEncoderConfig {
             rank_tolerance: 1e-6,
             outlier_limit: 4.5,
             recording_noise: true,
+            plate_and_drift: true,
             lack_of_fit_limit: 0.001,
             hold_ms: 200.0,
             log_samples: 4096,
@@ -137,7 +140,7 @@ const fn ranged(
 }
 
 /// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 26] = [
+pub const PARAMETERS: [ParameterDoc; 27] = [
     doc(
         "components",
         "",
@@ -277,6 +280,11 @@ pub const PARAMETERS: [ParameterDoc; 26] = [
         "recording_noise",
         "",
         "Whether each recording has a noise of its own, at least the stated one.",
+    ),
+    doc(
+        "plate_and_drift",
+        "",
+        "Whether the plate's own error and drift between recordings are unknown, where residuals show them.",
     ),
     ranged(
         "lack_of_fit_limit",
@@ -443,6 +451,11 @@ impl GridEncoderConfig {
             outlier_limit: self.outlier_limit,
             recording_noise: self.recording_noise,
             noise: Noise::FromResiduals,
+            disturbed: if self.plate_and_drift {
+                Disturbed::Found { start: None }
+            } else {
+                Disturbed::Ignored
+            },
         }
     }
 

@@ -96,6 +96,15 @@ pub enum Diagnostic {
         lack_of_fit_p: f64,
         correlation: f64,
     },
+    #[error(
+        "besides noise there is an error of the plate, {plate_um:.3} µm at a place, and from recording to recording a shift of {shift_um:.3} µm, a ramp of {ramp_um:.3} µm and a strain of {strain_um:.3} µm at the edge (standard deviations): the uncertainties hold them"
+    )]
+    Disturbed {
+        plate_um: f64,
+        shift_um: f64,
+        ramp_um: f64,
+        strain_um: f64,
+    },
     #[error("{n} of {of} equations weighed down as outliers")]
     Outliers { n: usize, of: usize },
     #[error("not fitted: {reason}")]
@@ -113,7 +122,7 @@ impl Diagnostic {
     #[must_use]
     pub fn severity(&self) -> Severity {
         match self {
-            Self::Recorded { .. } | Self::Fitted { .. } => Severity::Info,
+            Self::Recorded { .. } | Self::Fitted { .. } | Self::Disturbed { .. } => Severity::Info,
             Self::NotFitted { .. } | Self::ClockWentBack { .. } => Severity::Error,
             _ => Severity::Warn,
         }
@@ -128,6 +137,7 @@ impl Diagnostic {
             | Self::LackOfFit { .. }
             | Self::Outliers { .. }
             | Self::NotFitted { .. } => "fit",
+            Self::Disturbed { .. } => "disturbance",
             _ => "recording",
         }
     }

@@ -13,22 +13,27 @@
 //!
 //! (2) is repeated until no weight changes: a station that was bumped does not bend the curves, and is
 //! counted. (3) keeps a fast trace, whose readings scatter little about a path that servos and structure
-//! bent, from outweighing stations: what a recording leaves is its noise. Every unknown is told to be estimable, mixed or unseen; what is estimable beyond single ones is
+//! bent, from outweighing stations: what a recording leaves is its noise. Where residuals are more than noise, errors of the
+//! plate and drift between recordings are separated from β with (4) to (6) of `disturbance`, weights are taken anew from what is left then, and β
+//! and its covariance are those of generalised least squares. Every unknown is told to be estimable, mixed or unseen; what is estimable beyond single ones is
 //! in `combinations`.
 //!
 //! *Gauge.* Straightness has no linear term: what is linear in it is squareness, or the direction that
 //! a plate's rotation leaves open.
 //!
 //! # Holds when
-//! First order in the errors (1e-4 of 1 rad times 10 µm is 1 nm), plate flat and true, lost motion constant
-//! along an axis. Not modelled: reversal spikes, which (2) weighs down; errors of the plate.
+//! First order in the errors (1e-4 of 1 rad times 10 µm is 1 nm), plate flat, lost motion constant
+//! along an axis. Not modelled: reversal spikes, which (2) weighs down; a plate that is too long or not square as a whole, which nothing but
+//! its certificate can tell.
 //!
 //! # Agreement
-//! See `lib`.
+//! `val_coverage_of_a_thousand_machines`: 95.0 % of 51,000 intervals hold the truth. `val_coverage_where_the_plate_errs_and_the_machine_drifts`:
+//! 93.1 % of 2,040, and estimates 3.3 times nearer to the truth (rms) than if nothing is done about them.
 //!
 //! # References
 //! \[1\] P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., Wiley 2009, 7.
 
+mod disturbance;
 mod judge;
 mod solved;
 
@@ -45,6 +50,7 @@ use crate::recording::Recording;
 use crate::spectrum::{Gap, Visibility};
 use crate::unknown::{Nuisances, Unknown, Unknowns};
 
+pub use disturbance::{GROUPS, Told};
 pub use judge::Judgement;
 use solved::{Solved, Weighting};
 
@@ -68,6 +74,25 @@ pub struct IdentifyOptions {
     pub recording_noise: bool,
     /// Where s of (1) comes from.
     pub noise: Noise,
+    /// What is done about the plate's error and drift.
+    pub disturbed: Disturbed,
+}
+
+/// What is done about errors of the plate and drift between recordings, `disturbance`; with `radial_only` nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Disturbed {
+    /// Nothing.
+    Ignored,
+    /// Where residuals are more than noise, they are unknown, and how great they are is found.
+    Found {
+        /// Ratios of a similar fit to begin with, if there was one.
+        start: Option<[f64; GROUPS]>,
+    },
+    /// They are unknown, and as great as given.
+    Given {
+        /// Their variances, as [`Told::ratios`].
+        ratios: [f64; GROUPS],
+    },
 }
 
 /// Where the size of the noise comes from.
@@ -102,6 +127,7 @@ impl IdentifyOptions {
             outlier_limit: 4.5,
             recording_noise: false,
             noise: Noise::FromResiduals,
+            disturbed: Disturbed::Found { start: None },
         }
     }
 }
@@ -172,8 +198,12 @@ pub struct Identification {
     /// By what the covariance is greater than if residuals were independent: (3) of `judge`, 1 where they are, or where the
     /// stated uncertainties are taken as right.
     pub variance_inflation: f64,
+    /// How great errors of the plate and drift are; none where residuals are noise or nothing is done about them.
+    pub disturbances: Option<Told>,
     /// Least and greatest recorded position per axis.
     pub spans: PerAxis<(f64, f64)>,
+    /// Weight of each equation to 1/u², by recording and point.
+    pub weights: Vec<Vec<[f64; 2]>>,
     /// g of (3) by recording.
     pub recording_noise: Vec<f64>,
     /// Residuals along u and v (or the radius and 0), mm, by recording and point.
@@ -239,7 +269,22 @@ pub fn identify(
         }
         solved = Solved::new(&equations, &weighting, options)?;
     }
-    Ok(solved.into_identification(&equations, weighting, options))
+    let judgement = solved.judgement(&equations, &weighting);
+    match options.disturbed {
+        _ if options.radial_only => {}
+        Disturbed::Ignored => {}
+        Disturbed::Given { .. } => solved.separate(&equations, &weighting, &options.disturbed),
+        Disturbed::Found { .. } if judgement.is_disturbed() => {
+            // Weights that the disturbances bent, then those of what is left besides them.
+            solved.separate(&equations, &weighting, &options.disturbed);
+            solved.reweigh(&mut weighting, options);
+            solved.weigh_neighbours(&mut weighting);
+            solved = Solved::new(&equations, &weighting, options)?;
+            solved.separate(&equations, &weighting, &options.disturbed);
+        }
+        Disturbed::Found { .. } => {}
+    }
+    Ok(solved.into_identification(&equations, weighting, options, judgement))
 }
 
 fn check(recordings: &[Recording], options: &IdentifyOptions) -> Result<(), IdentifyError> {

@@ -24,7 +24,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use crate::equations::{Equations, PointRows};
 use crate::error::IdentifyError;
-use crate::identify::{Identification, IdentifyOptions, Noise, identify};
+use crate::identify::{Disturbed, Identification, IdentifyOptions, Noise, identify};
 use crate::recording::{GridPoint, Place, Recording, in_plane};
 
 /// Stations that stand for a circle: more than its harmonics need, few enough to try many programmes.
@@ -138,6 +138,7 @@ pub fn preflight_of(
         outlier_limit: f64::INFINITY,
         recording_noise: false,
         noise: Noise::AsStated,
+        disturbed: Disturbed::Ignored,
         ..options.clone()
     };
     identify(kinematics, recordings, &options)

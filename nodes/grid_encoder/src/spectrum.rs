@@ -105,11 +105,17 @@ impl Spectrum {
     /// (4) without s².
     #[must_use]
     pub fn cofactor(&self) -> DMatrix<f64> {
-        let p = self.v_t.ncols();
-        let half = DMatrix::from_fn(p, self.rank, |j, k| {
-            self.v_t[(k, j)] / self.singular_values[k]
-        });
+        let half = self.whitener();
         &half * half.transpose()
+    }
+
+    /// V_r Σ_r⁻¹: X times it is U_r, whose columns are orthonormal.
+    #[must_use]
+    pub fn whitener(&self) -> DMatrix<f64> {
+        let p = self.v_t.ncols();
+        DMatrix::from_fn(p, self.rank, |j, k| {
+            self.v_t[(k, j)] / self.singular_values[k]
+        })
     }
 
     /// X⁺X of (3).

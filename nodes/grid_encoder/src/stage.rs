@@ -17,7 +17,7 @@ use crate::config::GridEncoderConfig;
 use crate::diagnostic::{Diagnostic, Refusal};
 use crate::error::GridEncoderError;
 use crate::geometry::geometry_model;
-use crate::identify::{Identification, identify};
+use crate::identify::{Disturbed, GROUPS, Identification, identify};
 use crate::recording::{Collector, GridPoint, Place, Recording, reduce_moving, reduce_stationwise};
 
 /// Readings that may wait for positions.
@@ -64,6 +64,8 @@ pub struct GridEncoderStage {
     waiting: VecDeque<GridSample>,
     open: Option<Open>,
     recordings: Vec<Recording>,
+    /// How great disturbances were in the last fit: where the next begins.
+    disturbances: Option<[f64; GROUPS]>,
     sequence: u32,
 }
 
@@ -101,6 +103,7 @@ impl GridEncoderStage {
             waiting: VecDeque::new(),
             open: None,
             recordings: Vec::new(),
+            disturbances: None,
             sequence: 0,
             config: config.clone(),
         })
@@ -321,7 +324,10 @@ impl GridEncoderStage {
 
     fn fit(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
         let spans = self.spans();
-        let options = self.config.options(&self.components, &spans);
+        let mut options = self.config.options(&self.components, &spans);
+        if let Disturbed::Found { start } = &mut options.disturbed {
+            *start = self.disturbances;
+        }
         let found = match identify(&self.kinematics, &self.recordings, &options) {
             Ok(found) => found,
             Err(reason) => {
@@ -331,6 +337,7 @@ impl GridEncoderStage {
                 return;
             }
         };
+        self.disturbances = found.disturbances.map(|told| told.ratios);
         self.sequence += 1;
         let chain = self.kinematics.chain().to_string();
         out.push(Output::Model(geometry_model(
@@ -367,6 +374,15 @@ impl GridEncoderStage {
             say(Diagnostic::LackOfFit {
                 lack_of_fit_p: found.judgement.lack_of_fit_p,
                 correlation: found.judgement.correlation,
+            });
+        }
+        if let Some(told) = found.disturbances {
+            let um = |mm: f64| mm * 1e3;
+            say(Diagnostic::Disturbed {
+                plate_um: um(told.plate_mm),
+                shift_um: um(told.shift_mm),
+                ramp_um: um(told.ramp_mm),
+                strain_um: um(told.strain_mm),
             });
         }
         if found.n_outliers > 0 {

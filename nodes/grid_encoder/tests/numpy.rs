@@ -10,7 +10,7 @@
 )]
 
 use grid_encoder::basis::ModelComponent;
-use grid_encoder::identify::{IdentifyOptions, Noise, default_basis, identify};
+use grid_encoder::identify::{Disturbed, IdentifyOptions, Noise, default_basis, identify};
 use grid_encoder::recording::{Fixture, GridPoint, Place, Recording};
 use grid_encoder::spectrum::Visibility;
 use grid_encoder::unknown::Nuisances;
@@ -107,6 +107,7 @@ fn val_numpy_singular_values_and_pseudoinverse() {
         outlier_limit: f64::INFINITY,
         recording_noise: false,
         noise: Noise::AsStated,
+        disturbed: Disturbed::Ignored,
     };
     let found = identify(&kinematics, &recordings(), &options).unwrap();
     assert_eq!(vec![found.rank as f64], numbers("rank"));

@@ -9,7 +9,9 @@
 )]
 
 use grid_encoder::basis::{Basis, ModelComponent};
-use grid_encoder::identify::{Identification, IdentifyOptions, Noise, default_basis, identify};
+use grid_encoder::identify::{
+    Disturbed, Identification, IdentifyOptions, Noise, default_basis, identify,
+};
 use grid_encoder::recording::{Fixture, GridPoint, Place, Recording};
 use grid_encoder::unknown::Nuisances;
 use machine::Kinematics;
@@ -94,6 +96,7 @@ fn run(row: &Row, model: Model) -> Identification {
         outlier_limit: f64::INFINITY,
         recording_noise: false,
         noise: Noise::AsStated,
+        disturbed: Disturbed::Ignored,
     };
     identify(&kinematics, &recordings(&row.circles), &options).unwrap()
 }

@@ -28,7 +28,7 @@ use metrology::{Host, Stamp};
 
 use super::direction::Direction;
 use super::refusal::PositioningRefusal;
-use crate::femtometre::{fm_from_mm, mm_from_fm};
+use crate::femtometre::{fm_from_mm, mm_from_fm, rounded};
 
 /// Least number of points: a choice; the published text gives none.
 pub const LEAST_POINTS: usize = 5;
@@ -40,12 +40,19 @@ pub const SPACING_TOLERANCE_MM: f64 = 1e-3;
 pub const DEVIATION_LIMIT_MM: f64 = 5.0;
 
 /// Deviations at ascending points, apart for each direction of motion.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct DeviationTable {
     positions_fm: Vec<i64>,
     up_fm: Vec<i64>,
     down_fm: Vec<i64>,
+    /// Slopes of the cells, mm/mm, up and down.
+    slopes: [Vec<f64>; 2],
+    /// Cells per femtometre if all were alike: where the search for a cell begins.
+    density_per_fm: f64,
 }
+
+// Slopes are quotients of whole numbers by lengths above zero: never NaN.
+impl Eq for DeviationTable {}
 
 impl DeviationTable {
     /// A table of deviations xs − xm at `positions_mm`.
@@ -89,11 +96,27 @@ impl DeviationTable {
                 })
                 .collect()
         };
-        Ok(Self {
-            positions_fm,
+        let whole_fm = positions_fm[points - 1] - positions_fm[0];
+        let mut table = Self {
+            density_per_fm: (points - 1) as f64 / whole_fm as f64,
             up_fm: counted(up_mm)?,
             down_fm: counted(down_mm)?,
-        })
+            slopes: [vec![0.0; points - 1], vec![0.0; points - 1]],
+            positions_fm,
+        };
+        for cell in 0..points - 1 {
+            for direction in [Direction::Up, Direction::Down] {
+                table.find_slope(cell, direction);
+            }
+        }
+        Ok(table)
+    }
+
+    fn find_slope(&mut self, cell: usize, direction: Direction) {
+        let (x_fm, deviations_fm) = (&self.positions_fm, self.deviations_fm(direction));
+        let risen_fm = deviations_fm[cell + 1] - deviations_fm[cell];
+        let slope = risen_fm as f64 / (x_fm[cell + 1] - x_fm[cell]) as f64;
+        self.slopes[direction as usize][cell] = slope;
     }
 
     /// Number of points.
@@ -118,7 +141,25 @@ impl DeviationTable {
     /// The cell, from 0, that a motion from `position_fm` goes through; `None` outside of the points,
     /// where the slope is 0.
     #[must_use]
+    #[inline]
     pub fn cell(&self, position_fm: i64, direction: Direction) -> Option<usize> {
+        let above_fm = position_fm.saturating_sub(self.positions_fm[0]);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a guess: below the first point it is 0, above the last one no cell"
+        )]
+        let guess = (above_fm as f64 * self.density_per_fm) as usize;
+        if let Some(&[x_fm, x_next_fm]) = self.positions_fm.get(guess..guess + 2)
+            && x_fm < position_fm
+            && position_fm < x_next_fm
+        {
+            return Some(guess);
+        }
+        self.cell_by_search(position_fm, direction)
+    }
+
+    fn cell_by_search(&self, position_fm: i64, direction: Direction) -> Option<usize> {
         let before = match direction {
             Direction::Up => self
                 .positions_fm
@@ -141,21 +182,16 @@ impl DeviationTable {
     }
 
     fn line(&self, cell: usize, direction: Direction) -> Option<Line> {
-        let (&[x_fm, x_next_fm], &[from_fm, to_fm]) = (
-            self.positions_fm.get(cell..cell + 2)?.first_chunk()?,
-            self.deviations_fm(direction)
-                .get(cell..cell + 2)?
-                .first_chunk()?,
-        );
         Some(Line {
-            x_fm,
-            from_fm,
-            slope: (to_fm - from_fm) as f64 / (x_next_fm - x_fm) as f64,
+            x_fm: *self.positions_fm.get(cell)?,
+            from_fm: *self.deviations_fm(direction).get(cell)?,
+            slope: *self.slopes[direction as usize].get(cell)?,
         })
     }
 
     /// Deviation xs − xm at a position, fm: (1). Both directions' mean where none is known yet.
     #[must_use]
+    #[inline]
     pub fn deviation_fm(&self, position_fm: i64, direction: Option<Direction>) -> i64 {
         let Some(direction) = direction else {
             let up_fm = self.deviation_fm(position_fm, Some(Direction::Up));
@@ -216,8 +252,12 @@ impl DeviationTable {
             Direction::Up => &mut self.up_fm,
             Direction::Down => &mut self.down_fm,
         };
-        if let Some(old_fm) = deviations_fm.get_mut(point) {
-            *old_fm = deviation_fm;
+        let Some(old_fm) = deviations_fm.get_mut(point) else {
+            return;
+        };
+        *old_fm = deviation_fm;
+        for cell in point.saturating_sub(1)..(point + 1).min(self.n_points() - 1) {
+            self.find_slope(cell, direction);
         }
     }
 
@@ -263,12 +303,7 @@ impl Line {
     fn at(&self, position_fm: i64) -> i64 {
         // Up to 2e13 fm inside the cell and 1e13 fm of deviation: the product is exact to a few
         // hundredths of a femtometre, so the cell's end gets its own deviation back.
-        let risen_fm = (self.slope * (position_fm - self.x_fm) as f64).round();
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "inside a cell it is no more than the difference of two deviations"
-        )]
-        (self.from_fm + risen_fm as i64)
+        self.from_fm + rounded(self.slope * (position_fm - self.x_fm) as f64)
     }
 }
 

@@ -33,6 +33,8 @@ const SAME_POINT_MM: f64 = 0.1;
 const MINDED_CORRELATION: f64 = 0.1;
 /// z of (2) that chance exceeds once in 30,000.
 const SURE: f64 = 4.0;
+/// p of (1) that chance falls below once in 30,000.
+const CHANCE: f64 = 3e-5;
 
 /// Signs that the model lacks something.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +56,11 @@ impl Judgement {
     #[must_use]
     pub fn lacks_something(&self, p_limit: f64) -> bool {
         self.lack_of_fit_p < p_limit || self.is_correlated()
+    }
+
+    /// Whether residuals are more than noise, beyond chance.
+    pub(super) fn is_disturbed(&self) -> bool {
+        self.is_correlated() || self.lack_of_fit_p < CHANCE
     }
 
     fn is_correlated(&self) -> bool {
@@ -101,31 +108,94 @@ impl Judgement {
     }
 }
 
-/// (2) over all recordings and both coordinates; outliers are weighed down.
-fn correlation(ratios: &[Vec<[f64; 2]>], weights: &[Vec<[f64; 2]>]) -> (f64, usize) {
-    let (mut products, mut squares, mut n) = (0.0, 0.0, 0);
-    for (ratios, weights) in ratios.iter().zip(weights) {
+/// Sums of (2).
+#[derive(Clone, Copy, Default)]
+struct Neighbours {
+    products: f64,
+    squares: f64,
+    n: usize,
+}
+
+impl Neighbours {
+    /// Of one recording, both coordinates; outliers are weighed down.
+    fn of(ratios: &[[f64; 2]], weights: &[[f64; 2]]) -> Self {
+        let mut sums = Self::default();
         for k in 0..2 {
             let values = || {
                 let both = ratios.iter().zip(weights).map(|(r, w)| r[k] * w[k].sqrt());
                 both.filter(|r| r.is_finite())
             };
-            products += values()
+            sums.products += values()
                 .zip(values().skip(1))
                 .map(|(a, b)| a * b)
                 .sum::<f64>();
-            squares += values().map(|r| r * r).sum::<f64>();
-            n += values().count();
+            sums.squares += values().map(|r| r * r).sum::<f64>();
+            sums.n += values().count();
+        }
+        sums
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            products: self.products + other.products,
+            squares: self.squares + other.squares,
+            n: self.n + other.n,
         }
     }
-    (
-        if squares > 0.0 {
-            products / squares
+
+    /// r₁.
+    fn correlation(self) -> f64 {
+        if self.squares > 0.0 {
+            self.products / self.squares
         } else {
             0.0
-        },
-        n,
-    )
+        }
+    }
+
+    /// (3), 1 where (2) may be chance.
+    fn inflation(self) -> f64 {
+        let r = self.correlation();
+        if r * (self.n as f64).sqrt() > SURE && r > MINDED_CORRELATION {
+            (1.0 + r) / (1.0 - r)
+        } else {
+            1.0
+        }
+    }
+}
+
+/// (2) over all recordings and both coordinates.
+fn correlation(ratios: &[Vec<[f64; 2]>], weights: &[Vec<[f64; 2]>]) -> (f64, usize) {
+    let each = ratios
+        .iter()
+        .zip(weights)
+        .map(|(r, w)| Neighbours::of(r, w));
+    let all = each.fold(Neighbours::default(), Neighbours::and);
+    (all.correlation(), all.n)
+}
+
+/// (3) of each recording by itself.
+pub(super) fn alike_by_recording(ratios: &[Vec<[f64; 2]>], weights: &[Vec<[f64; 2]>]) -> Vec<f64> {
+    let each = ratios
+        .iter()
+        .zip(weights)
+        .map(|(r, w)| Neighbours::of(r, w));
+    each.map(Neighbours::inflation).collect()
+}
+
+/// (3) of those recordings together in which it was not sure of each by itself.
+pub(super) fn pooled_inflation(
+    ratios: &[Vec<[f64; 2]>],
+    weights: &[Vec<[f64; 2]>],
+    alike: &[f64],
+) -> f64 {
+    let unsure = ratios
+        .iter()
+        .zip(weights)
+        .zip(alike)
+        .filter(|(_, alike)| **alike <= 1.0);
+    let each = unsure.map(|((r, w), _)| Neighbours::of(r, w));
+    each.fold(Neighbours::default(), Neighbours::and)
+        .inflation()
 }
 
 /// Points of one place, each with the number of its level.

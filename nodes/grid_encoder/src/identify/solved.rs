@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::judge::Judgement;
-use super::{Combination, Identification, IdentifyOptions, LEAST_FREEDOM, Noise};
+use super::disturbance::{Disturbances, Separated};
+use super::judge::{Judgement, alike_by_recording, pooled_inflation};
+use super::{Combination, Disturbed, Identification, IdentifyOptions, LEAST_FREEDOM, Noise};
 use crate::combination::estimable_supports;
 use crate::equations::{Equations, PointRows};
 use crate::error::IdentifyError;
@@ -28,6 +29,8 @@ pub(super) struct Weighting {
     outlier: PerEquation,
     /// g of (3) by recording.
     noise: Vec<f64>,
+    /// How many neighbours count as one, by recording: (3) of `judge`.
+    alike: Vec<f64>,
 }
 
 impl Weighting {
@@ -36,22 +39,28 @@ impl Weighting {
         Self {
             outlier: recordings.iter().map(ones).collect(),
             noise: vec![1.0; recordings.len()],
+            alike: vec![1.0; recordings.len()],
         }
     }
 
-    fn of(&self, (recording, point, k): (usize, usize, usize)) -> f64 {
-        self.outlier[recording][point][k] / self.noise[recording].powi(2)
+    pub(super) fn of(&self, (recording, point, k): (usize, usize, usize)) -> f64 {
+        let noise = self.noise[recording];
+        self.outlier[recording][point][k] / (noise * noise * self.alike[recording])
+    }
+
+    /// Equations that one of a recording counts as.
+    pub(super) fn count(&self, recording: usize) -> f64 {
+        1.0 / self.alike[recording]
     }
 
     /// w of every equation.
     fn all(&self) -> PerEquation {
-        let scaled = |(points, noise): (&Vec<[f64; 2]>, &f64)| {
-            points
-                .iter()
-                .map(|w| w.map(|w| w / (noise * noise)))
+        let scaled = |(recording, points): (usize, &Vec<[f64; 2]>)| {
+            let each = 0..points.len();
+            each.map(|point| [0, 1].map(|k| self.of((recording, point, k))))
                 .collect()
         };
-        self.outlier.iter().zip(&self.noise).map(scaled).collect()
+        self.outlier.iter().enumerate().map(scaled).collect()
     }
 }
 
@@ -60,9 +69,11 @@ pub(super) struct Solved {
     spectrum: Spectrum,
     beta: DVector<f64>,
     n_equations: usize,
-    /// Weighted residual of each equation, r/u, by recording and point; NaN where there is none.
+    /// What is left of each equation besides disturbances, r/u, by recording and point; NaN where there is none.
     ratios: PerEquation,
+    /// What β alone leaves.
     residuals_mm: PerEquation,
+    separated: Option<Separated>,
 }
 
 impl Solved {
@@ -95,7 +106,61 @@ impl Solved {
             n_equations,
             ratios,
             residuals_mm,
+            separated: None,
         })
+    }
+
+    pub(super) fn rank(&self) -> usize {
+        self.spectrum.rank
+    }
+
+    /// Leads from the orthonormal basis of what is seen to the unknowns in units of the span.
+    pub(super) fn whitener(&self) -> DMatrix<f64> {
+        self.spectrum.whitener()
+    }
+
+    pub(super) fn residual_mm(&self, (recording, point, k): (usize, usize, usize)) -> f64 {
+        self.residuals_mm[recording][point][k]
+    }
+
+    /// Whether what is left is noise.
+    pub(super) fn judgement(&self, equations: &Equations, weighting: &Weighting) -> Judgement {
+        let weights = weighting.all();
+        let chi_square = self.sums(weighting, &weights).chi_square;
+        Judgement::of(equations, &self.ratios, &weights, self.rank(), chi_square)
+    }
+
+    /// Equations (4) to (6) of `disturbance`, with ratios that are given or found.
+    pub(super) fn separate(
+        &mut self,
+        equations: &Equations,
+        weighting: &Weighting,
+        disturbed: &Disturbed,
+    ) {
+        let disturbances = Disturbances::of(equations);
+        let sums = disturbances.sums(self, weighting);
+        let separated = match disturbed {
+            Disturbed::Given { ratios } => sums.given(ratios),
+            Disturbed::Found { start } => sums.estimated(*start),
+            Disturbed::Ignored => None,
+        };
+        let Some(separated) = separated else { return };
+        self.beta -= self.whitener() * &separated.correction;
+        let mut entries = Vec::new();
+        let (beta, residuals_mm, ratios) = (&self.beta, &mut self.residuals_mm, &mut self.ratios);
+        for_each_row(equations, |place, row, y, u| {
+            let (recording, point, k) = place;
+            let fitted: f64 = row.iter().zip(beta.iter()).map(|(x, b)| x * b).sum();
+            let disturbed_mm = disturbances.effect_mm(place, &separated.gamma, &mut entries);
+            residuals_mm[recording][point][k] = y - fitted;
+            ratios[recording][point][k] = (y - fitted - disturbed_mm) / u;
+        });
+        self.separated = Some(separated);
+    }
+
+    /// Counts neighbours that resemble each other as fewer, recording by recording.
+    pub(super) fn weigh_neighbours(&self, weighting: &mut Weighting) {
+        weighting.alike = alike_by_recording(&self.ratios, &weighting.all());
     }
 
     /// (2) and (3); whether a weight changed.
@@ -129,24 +194,30 @@ impl Solved {
         changed
     }
 
-    /// Everything that is told, in own units.
+    /// Everything that is told, in own units; `judgement` is of the residuals before anything was separated.
     pub(super) fn into_identification(
         self,
         equations: &Equations,
         weighting: Weighting,
         options: &IdentifyOptions,
+        judgement: Judgement,
     ) -> Identification {
         let rank = self.spectrum.rank;
         let freedom = self.n_equations.saturating_sub(rank);
         let weights = weighting.all();
         let sums = self.sums(&weighting, &weights);
-        let variance_ratio = match options.noise {
-            Noise::FromResiduals if freedom >= LEAST_FREEDOM => sums.chi_square / freedom as f64,
+        let variance_ratio = match (&self.separated, options.noise) {
+            (Some(separated), _) => separated.variance_ratio,
+            (None, Noise::FromResiduals) if freedom >= LEAST_FREEDOM => {
+                sums.chi_square / freedom as f64
+            }
             _ => 1.0,
         }; // s² of (1)
-        let judgement = Judgement::of(equations, &self.ratios, &weights, rank, sums.chi_square);
-        let variance_inflation = judgement.variance_inflation(options.noise);
-        let cofactor = self.spectrum.cofactor() * (variance_ratio * variance_inflation);
+        let variance_inflation = match (&self.separated, options.noise) {
+            (Some(_), _) => pooled_inflation(&self.ratios, &weights, &weighting.alike),
+            (None, noise) => judgement.variance_inflation(noise),
+        };
+        let cofactor = self.cofactor() * (variance_ratio * variance_inflation);
         let visibility = self.spectrum.visibility();
         let scale = &equations.scale;
         let n_coefficients = equations.unknowns.n_coefficients;
@@ -158,6 +229,9 @@ impl Solved {
         let mut values = DVector::from_fn(scale.len(), |j, _| self.beta[j] * scale[j]);
         put_back(equations, &mut values);
         let points = || equations.recordings.iter().flat_map(|r| &r.points);
+        let separated = self.separated.as_ref().map(|separated| {
+            Disturbances::of(equations).told(&separated.ratios, separated.variance_ratio)
+        });
         Identification {
             components: options.components.clone(),
             unknowns: equations.unknowns.all.clone(),
@@ -181,10 +255,22 @@ impl Solved {
             n_outliers: sums.n_outliers,
             judgement,
             variance_inflation,
+            disturbances: separated,
             spans: equations.spans,
+            weights,
             recording_noise: weighting.noise,
             residuals_mm: without_gaps(self.residuals_mm),
         }
+    }
+
+    /// Covariance of β for s² = 1.
+    fn cofactor(&self) -> DMatrix<f64> {
+        let plain = self.spectrum.cofactor();
+        let Some(separated) = &self.separated else {
+            return plain;
+        };
+        let whitener = self.whitener();
+        plain + &whitener * &separated.widening * whitener.transpose()
     }
 
     fn sums(&self, weighting: &Weighting, weights: &PerEquation) -> Sums {
@@ -258,7 +344,7 @@ fn combination(
 }
 
 /// Calls `take` with (recording, point, equation of the point), row, right-hand side and uncertainty.
-fn for_each_row(
+pub(super) fn for_each_row(
     equations: &Equations,
     mut take: impl FnMut((usize, usize, usize), &[f64], f64, f64),
 ) {
