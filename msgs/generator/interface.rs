@@ -36,6 +36,8 @@ pub struct Interfaces {
     pub services: Vec<Compound>,
     /// Actions.
     pub actions: Vec<Compound>,
+    /// Files by the full name of what they define: their kind and their text.
+    pub sources: BTreeMap<String, (&'static str, String)>,
 }
 
 impl Interfaces {
@@ -43,6 +45,7 @@ impl Interfaces {
     pub fn add_message_file(&mut self, package: &str, name: &str, text: &str) -> Result<()> {
         let spec = parse_message_string(package, name, text)?;
         self.add("msg", spec, Some(text.to_owned()));
+        self.add_source(package, "msg", name, text);
         Ok(())
     }
 
@@ -57,6 +60,7 @@ impl Interfaces {
         }
         self.add("srv", event, None);
         self.add_service_of(package, "srv", name)?;
+        self.add_source(package, "srv", name, text);
         self.services.push(Compound {
             full_name: format!("{package}/srv/{name}"),
             comment,
@@ -92,6 +96,7 @@ impl Interfaces {
             ("feedback_message", "_FeedbackMessage"),
         ];
         self.add_whole(package, "action", name, &fields)?;
+        self.add_source(package, "action", name, text);
         self.actions.push(Compound {
             full_name: format!("{package}/action/{name}"),
             comment,
@@ -142,6 +147,11 @@ impl Interfaces {
             ("event_message", "_Event"),
         ];
         self.add_whole(package, kind, name, &fields)
+    }
+
+    fn add_source(&mut self, package: &str, kind: &'static str, name: &str, text: &str) {
+        let full_name = format!("{package}/{kind}/{name}");
+        self.sources.insert(full_name, (kind, text.to_owned()));
     }
 
     fn add_whole(

@@ -13,6 +13,7 @@ mod interface;
 mod rust_code;
 mod schema;
 mod type_hash;
+mod type_text;
 
 use std::env;
 use std::fs;
@@ -37,8 +38,8 @@ fn main() -> Result<()> {
     interfaces.check_references()?;
     let out = env::var("OUT_DIR").context("cargo sets OUT_DIR")?;
     let out = Path::new(&out).join("interfaces.rs");
-    fs::write(&out, rust_code::emit(&interfaces, OWN_PACKAGE))
-        .with_context(|| format!("writing {}", out.display()))
+    let code = rust_code::emit(&interfaces, OWN_PACKAGE) + &type_text::emit(&interfaces);
+    fs::write(&out, code).with_context(|| format!("writing {}", out.display()))
 }
 
 fn watch(folder: &Path) {

@@ -355,7 +355,8 @@ fn is_rust_default(value: &PrimitiveValue) -> bool {
     ["false", "0", "0.0", "\"\""].contains(&literal(value).as_str())
 }
 
-fn literal(value: &PrimitiveValue) -> String {
+/// A value as Rust and interface files write it.
+pub fn literal(value: &PrimitiveValue) -> String {
     match value {
         PrimitiveValue::Bool(v) => v.to_string(),
         PrimitiveValue::Int8(v) => v.to_string(),

@@ -21,6 +21,8 @@ const UNBOUNDED_SEQUENCE: u32 = 144;
 
 /// What ROS 2 puts into a message that would otherwise be empty.
 pub const FILLER_FIELD: &str = "structure_needs_at_least_one_member";
+/// An octet.
+pub const FILLER_TYPE: u32 = 3;
 
 /// `RIHS01_` and the hash in hexadecimal.
 pub fn rihs01(interfaces: &Interfaces, message: &Message) -> String {
@@ -66,7 +68,7 @@ fn describe(interfaces: &Interfaces, message: &Message) -> String {
         })
         .collect();
     if fields.is_empty() {
-        fields.push(field_json(FILLER_FIELD, 3, 0, 0, ""));
+        fields.push(field_json(FILLER_FIELD, FILLER_TYPE, 0, 0, ""));
     }
     format!(
         r#"{{"type_name": "{}", "fields": [{}]}}"#,
@@ -100,7 +102,8 @@ fn field_json(
     )
 }
 
-fn type_number(kind: &Type) -> u32 {
+/// The number of a type in `type_description_interfaces/FieldType`.
+pub fn type_number(kind: &Type) -> u32 {
     let base = match kind.base_type.type_name.as_str() {
         _ if !kind.is_primitive_type() => 1,
         "int8" => 2,

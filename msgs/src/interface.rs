@@ -44,6 +44,47 @@ pub fn description_of(type_name: &str) -> Option<&'static Description> {
         .map(|idx| &crate::DESCRIPTIONS[idx])
 }
 
+/// What is known of a type by its parts: a message, a service or an action, or what ROS 2 derives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TypeParts {
+    /// `package/kind/Name`.
+    pub type_name: &'static str,
+    /// The RIHS01 hash.
+    pub type_hash: &'static str,
+    /// Fields in order.
+    pub fields: &'static [FieldParts],
+    /// Every type that it refers to, directly or not, sorted by name.
+    pub referenced: &'static [&'static str],
+    /// `msg`, `srv` or `action` and the file's text; `implicit` and none for what is part of another's.
+    pub source: (&'static str, &'static str),
+}
+
+/// A field as `type_description_interfaces/Field` has it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FieldParts {
+    /// Its name.
+    pub name: &'static str,
+    /// Number in `type_description_interfaces/FieldType`.
+    pub type_id: u8,
+    /// Length of an array or limit of a sequence; 0: neither.
+    pub capacity: u64,
+    /// Limit of a string; 0: none.
+    pub string_capacity: u64,
+    /// The type that it holds; empty: a basic one.
+    pub nested: &'static str,
+    /// Its default as the file has it; empty: none.
+    pub default: &'static str,
+}
+
+/// The parts of the type `package/kind/Name`; `None`: none of this crate.
+#[must_use]
+pub fn parts_of(type_name: &str) -> Option<&'static TypeParts> {
+    crate::TYPE_PARTS
+        .binary_search_by(|parts| parts.type_name.cmp(type_name))
+        .ok()
+        .map(|idx| &crate::TYPE_PARTS[idx])
+}
+
 /// A ROS 2 service.
 pub trait Service: Clone + Copy + Debug + Default + PartialEq + Send + Sync + 'static {
     /// What the client sends.

@@ -36,7 +36,9 @@ pub use action_types::{
 };
 pub use cdr::{ENCAPSULATION, from_cdr, to_cdr, to_cdr_into};
 pub use error::{Place, WireError};
-pub use interface::{Action, Description, Message, Service, description_of};
+pub use interface::{
+    Action, Description, FieldParts, Message, Service, TypeParts, description_of, parts_of,
+};
 pub use motion::joint_state;
 pub use qos::{Durability, Qos, Reliability};
 pub use service_event::{SERVICE_EVENT_SUFFIX, ServiceEvent};

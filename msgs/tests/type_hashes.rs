@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use abbe_msgs::tf2_msgs::action::LookupTransform;
 use abbe_msgs::{
     Action, DESCRIPTIONS, FeedbackMessage, GetResult, Message, SendGoal, Service, action_msgs,
-    description_of, msg, rcl_interfaces, std_msgs, std_srvs,
+    description_of, msg, rcl_interfaces, std_msgs, std_srvs, type_description_interfaces,
 };
 
 fn jazzy() -> BTreeMap<&'static str, &'static str> {
@@ -54,14 +54,17 @@ fn val_jazzy_hashes_of_services_are_equal() {
     let services = [
         service::<action_msgs::srv::CancelGoal>(),
         service::<rcl_interfaces::srv::DescribeParameters>(),
+        service::<rcl_interfaces::srv::GetLoggerLevels>(),
         service::<rcl_interfaces::srv::GetParameterTypes>(),
         service::<rcl_interfaces::srv::GetParameters>(),
         service::<rcl_interfaces::srv::ListParameters>(),
+        service::<rcl_interfaces::srv::SetLoggerLevels>(),
         service::<rcl_interfaces::srv::SetParameters>(),
         service::<rcl_interfaces::srv::SetParametersAtomically>(),
         service::<std_srvs::srv::Empty>(),
         service::<std_srvs::srv::SetBool>(),
         service::<std_srvs::srv::Trigger>(),
+        service::<type_description_interfaces::srv::GetTypeDescription>(),
         service::<SendGoal<LookupTransform>>(),
         service::<GetResult<LookupTransform>>(),
     ];

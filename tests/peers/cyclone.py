@@ -5,7 +5,11 @@
 A reader or writer is {"topic", "type", "reliable", "latched", "depth"}, with ROS names. Events go to
 standard output, one JSON object a line: `matched` and `sample`, each with its topic and the seconds
 since the participant was made. Commands come on standard input: {"topic", "message"} is written.
-The end of standard input ends the program, after everything written was acknowledged.
+
+A client is {"service", "type"}, as rmw_cyclonedds_cpp maps services onto topics. The command {"service",
+"number", "request"} asks; the event `reply` has service, number and message. `matched` names the
+service when both of its topics have the server. The end of standard input ends the program, after
+everything written was acknowledged.
 """
 
 from __future__ import annotations
@@ -63,6 +67,42 @@ def said(value):
     return value
 
 
+class Client:
+    """Asks a service; every client of the participant has a number of its own."""
+
+    def __init__(self, participant, types: Types, service: str, ros_type: str, number: int) -> None:
+        self.types = types
+        self.request_type = f"{ros_type}_Request"
+        self.number = number << 32 | 0xABBE
+        quality = Qos(
+            Policy.History.KeepAll,
+            Policy.Durability.Volatile,
+            Policy.Reliability.Reliable(duration(seconds=1)),
+        )
+        request = types.of_call(self.request_type)
+        reply = types.of_call(f"{ros_type}_Response")
+        requests = Topic(participant, f"rq{service}Request", request)
+        replies = Topic(participant, f"rr{service}Reply", reply)
+        self.writer = DataWriter(participant, requests, quality)
+        self.reader = DataReader(participant, replies, quality)
+
+    def is_matched(self) -> bool:
+        both = self.writer.get_matched_subscriptions(), self.reader.get_matched_publications()
+        return all(both)
+
+    def ask(self, number: int, values: dict) -> None:
+        request = self.types.build_call(self.request_type, self.number, number, values)
+        self.writer.write(request)
+
+    def replies(self):
+        """Numbers and contents of the answers to us, among those to everybody."""
+        for sample in self.reader.take(64):
+            if sample.sample_info.valid_data and sample.client == self.number:
+                message = plain(sample)
+                del message["client"]
+                yield message.pop("number"), message
+
+
 def main(plan: dict) -> None:
     types = Types()
     domain = Domain(plan["domain"], LOOPBACK)
@@ -87,17 +127,25 @@ def main(plan: dict) -> None:
     writers = {
         topic: DataWriter(participant, topic_of(end), quality(end)) for topic, end in ends.items()
     }
+    clients = {
+        end["service"]: Client(participant, types, end["service"], end["type"], place)
+        for place, end in enumerate(plan.get("clients", []), 1)
+    }
     ended = threading.Event()
 
     def obey() -> None:
         for line in sys.stdin:
             command = json.loads(line)
+            if "service" in command:
+                clients[command["service"]].ask(command["number"], command["request"])
+                continue
             topic = command["topic"]
             writers[topic].write(types.build(ends[topic]["type"], command["message"]))
         ended.set()
 
     threading.Thread(target=obey, daemon=True).start()
     unmatched = {**readers, **writers}
+    unmet = dict(clients)
     while not ended.is_set():
         for topic, end in list(unmatched.items()):
             matched = (
@@ -112,6 +160,13 @@ def main(plan: dict) -> None:
             for sample in reader.take(256):
                 if sample.sample_info.valid_data:
                     tell("sample", topic, message=plain(sample))
+        for service, client in list(unmet.items()):
+            if client.is_matched():
+                del unmet[service]
+                tell("matched", service)
+        for service, client in clients.items():
+            for number, message in client.replies():
+                tell("reply", service, number=number, message=message)
         time.sleep(0.002)
     for writer in writers.values():
         writer.wait_for_acks(duration(seconds=2))

@@ -8,5 +8,6 @@
 #![expect(clippy::print_stderr, reason = "figures that were seen are said")]
 
 mod bag;
+mod calls;
 mod latched;
 mod wire;

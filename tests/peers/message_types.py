@@ -1,4 +1,4 @@
-"""Cyclone DDS types made from the repository's own .msg files.
+"""Cyclone DDS types made from the repository's own .msg, .srv and .action files.
 
 No type is written by hand: a field that is added to a file, or a wrong order in our serialisation,
 is seen by the peer.
@@ -47,14 +47,35 @@ PRIMITIVES = {
 }
 
 LINE = re.compile(
-    r"^(?P<base>[A-Za-z][\w/]*)(?:<=\d+)?(?P<list>\[(?P<length>\d*|<=\d+)\])?\s+(?P<name>[a-z]\w*)$"
+    r"^(?P<base>[A-Za-z][\w/]*)(?:<=\d+)?(?P<list>\[(?P<length>\d*|<=\d+)\])?"
+    r"\s+(?P<name>[a-z]\w*)(?:\s+\S.*)?$"
 )
 
 
-def file_of(package: str, name: str) -> Path:
-    if package == "abbe_msgs":
-        return MSGS / "msg" / f"{name}.msg"
-    return MSGS / "standard" / package / "msg" / f"{name}.msg"
+SECTIONS = {"Request": 0, "Response": 1, "Goal": 0, "Result": 1, "Feedback": 2}
+"""Which part of a .srv or .action file a type with such an ending is."""
+
+DERIVED = {
+    "SendGoal_Request": ["unique_identifier_msgs/UUID goal_id", "{name}_Goal goal"],
+    "SendGoal_Response": ["bool accepted", "builtin_interfaces/Time stamp"],
+    "GetResult_Request": ["unique_identifier_msgs/UUID goal_id"],
+    "GetResult_Response": ["int8 status", "{name}_Result result"],
+    "FeedbackMessage": ["unique_identifier_msgs/UUID goal_id", "{name}_Feedback feedback"],
+}
+"""What ROS 2 makes of every action."""
+
+
+def lines_of(package: str, kind: str, name: str) -> list[str]:
+    """The lines that declare a type."""
+    folder = MSGS if package == "abbe_msgs" else MSGS / "standard" / package
+    if kind == "msg":
+        return (folder / kind / f"{name}.msg").read_text(encoding="utf-8").splitlines()
+    stem, _, ending = name.partition("_")
+    if ending in DERIVED:
+        return [line.format(name=stem) for line in DERIVED[ending]]
+    text = (folder / kind / f"{stem}.{kind}").read_text(encoding="utf-8")
+    parts = re.split(r"^---$", text, flags=re.MULTILINE)
+    return parts[SECTIONS[ending]].splitlines()
 
 
 @dataclass(frozen=True)
@@ -66,6 +87,20 @@ class Field:
     length: int | None
 
 
+def struct(ros_type: str, annotations: dict[str, type]) -> type:
+    """A class with its DDS name as ROS 2 mangles it."""
+    package, kind, name = ros_type.split("/")
+    made = types.new_class(
+        f"{name}_",
+        (IdlStruct,),
+        {"typename": f"{package}::{kind}::dds_::{name}_"},
+        lambda space: space.update(
+            {"__annotations__": annotations, "__module__": f"{package}.{kind}.dds_"}
+        ),
+    )
+    return dataclass(made)
+
+
 class Types:
     """Types by their ROS name, e.g. `sensor_msgs/msg/Temperature`."""
 
@@ -74,20 +109,21 @@ class Types:
         self.fields: dict[str, list[Field]] = {}
 
     def read(self, ros_type: str) -> list[Field]:
-        package, _, name = ros_type.split("/")
+        package, kind, name = ros_type.split("/")
         fields = []
-        path = file_of(package, name)
-        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        for number, line in enumerate(lines_of(package, kind, name), 1):
             line = line.split("#")[0].strip()
             if not line or "=" in line.replace("<=", ""):
                 continue
             match = LINE.match(line)
             if match is None:
-                raise ValueError(f"{path}:{number}: {line!r} is no field")
+                raise ValueError(f"{ros_type}:{number}: {line!r} is no field")
             base = match["base"]
             if base not in PRIMITIVES:
                 parts = base.split("/")
-                base = f"{parts[0] if len(parts) > 1 else package}/msg/{parts[-1]}"
+                # Parts of an action are of its own kind; everything else that is nested is a message.
+                nested = "action" if base.partition("_")[2] in SECTIONS else "msg"
+                base = f"{parts[0] if len(parts) > 1 else package}/{nested}/{parts[-1]}"
             length = None
             if match["list"]:
                 length = int(match["length"]) if match["length"].isdigit() else -1
@@ -108,17 +144,26 @@ class Types:
                 annotations[field.name] = sequence[single]
             else:
                 annotations[field.name] = array[single, field.length]
-        package, _, name = ros_type.split("/")
-        made = types.new_class(
-            f"{name}_",
-            (IdlStruct,),
-            {"typename": f"{package}::msg::dds_::{name}_"},
-            lambda space: space.update(
-                {"__annotations__": annotations, "__module__": f"{package}.msg.dds_"}
-            ),
-        )
-        self.classes[ros_type] = dataclass(made)
+        self.classes[ros_type] = struct(ros_type, annotations)
         return self.classes[ros_type]
+
+    def of_call(self, ros_type: str) -> type:
+        """The same with what rmw_cyclonedds puts in front of requests and replies.
+
+        That is `cdds_request_header_t`: the client's number and that of its request.
+        """
+        name = f"{ros_type} of a call"
+        if name not in self.classes:
+            plain_class = self.of(ros_type)
+            front = {"client": uint64, "number": int64}
+            self.classes[name] = struct(ros_type, {**front, **plain_class.__annotations__})
+        return self.classes[name]
+
+    def build_call(self, ros_type: str, client: int, number: int, values: dict):
+        """A request with its front."""
+        message = self.build(ros_type, values)
+        fields = {field.name: getattr(message, field.name) for field in self.fields[ros_type]}
+        return self.of_call(ros_type)(client=client, number=number, **fields)
 
     def build(self, ros_type: str, values: dict):
         """A message with `values`, and zeros where none is given."""

@@ -50,7 +50,32 @@ impl Cyclone {
     /// When it cannot be started.
     #[must_use]
     pub fn start(python: &PathBuf, domain: u16, readers: &[Value], writers: &[Value]) -> Self {
-        let plan = json!({"domain": domain, "readers": readers, "writers": writers});
+        Self::start_with(
+            python,
+            &json!({"domain": domain, "readers": readers, "writers": writers}),
+        )
+    }
+
+    /// Starts it with clients of services, each by absolute name and type, `package/srv/Name`.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn asking(
+        python: &PathBuf,
+        domain: u16,
+        clients: &[(&str, &str)],
+        readers: &[Value],
+    ) -> Self {
+        let clients: Vec<Value> = clients
+            .iter()
+            .map(|(service, ros_type)| json!({"service": service, "type": ros_type}))
+            .collect();
+        let plan = json!({"domain": domain, "clients": clients, "readers": readers});
+        Self::start_with(python, &plan)
+    }
+
+    fn start_with(python: &PathBuf, plan: &Value) -> Self {
         let mut child = script(python, "cyclone.py")
             .arg(plan.to_string())
             .env_remove("CYCLONEDDS_URI")
@@ -78,15 +103,34 @@ impl Cyclone {
         }
     }
 
+    /// Asks a service; fields that are not given are zero.
+    ///
+    /// # Panics
+    /// When the peer is gone.
+    pub fn ask(&mut self, service: &str, number: i64, request: &Value) {
+        self.command(&json!({"service": service, "number": number, "request": request}));
+    }
+
+    /// The answer to request `number` of a service.
+    ///
+    /// # Panics
+    /// When there was none within 10 s.
+    pub fn reply(&mut self, service: &str, number: i64) -> Value {
+        self.wait("reply", service, |event| event["number"] == number)["message"].take()
+    }
+
+    fn command(&mut self, line: &Value) {
+        let commands = self.commands.as_mut().unwrap();
+        writeln!(commands, "{line}").unwrap();
+        commands.flush().unwrap();
+    }
+
     /// Writes a message; fields that are not given are zero.
     ///
     /// # Panics
     /// When the peer is gone.
     pub fn write(&mut self, topic: &str, message: &Value) {
-        let line = json!({"topic": absolute(topic), "message": message});
-        let commands = self.commands.as_mut().unwrap();
-        writeln!(commands, "{line}").unwrap();
-        commands.flush().unwrap();
+        self.command(&json!({"topic": absolute(topic), "message": message}));
     }
 
     /// Seconds from the peer's start to its match on `topic`.

@@ -24,10 +24,12 @@ mod action_server;
 mod assembly;
 mod board;
 pub(crate) mod incoming;
+mod logger_levels;
 mod owner;
 mod parameters;
 mod service;
 mod timers;
+mod type_description;
 
 /// Exit code for arguments that cannot be understood.
 const USAGE: u8 = 2;

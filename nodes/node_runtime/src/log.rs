@@ -3,6 +3,9 @@
 //! A node's owner runs inside a span that carries its name; a line logged there goes out through that
 //! node's `/rosout` writer. Lines of RustDDS and ros2-client reach the console only, and only errors:
 //! at `warn` they flood.
+//!
+//! One filter stands before both. A node for which a level was chosen (`--log-level NAME:=LEVEL`, or
+//! its service) has that one for its lines; all else goes by the program's.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -23,6 +26,11 @@ use crate::arguments::Arguments;
 use crate::clock::{self, Clock};
 use crate::dds::Writer;
 
+mod levels;
+
+use levels::Levels;
+pub(crate) use levels::Severity;
+
 /// A node as the speaker of its log lines.
 #[derive(Clone)]
 struct Speaker {
@@ -30,6 +38,8 @@ struct Speaker {
     writer: Weak<Writer>,
     /// The node's time, as `rclcpp` stamps its lines with.
     clock: Clock,
+    /// From where on its lines are said, where that was chosen.
+    chosen: Option<Severity>,
 }
 
 /// Speakers by the spans of their nodes; a span is unique where a name need not be.
@@ -44,17 +54,23 @@ fn speakers() -> MutexGuard<'static, BTreeMap<u64, Speaker>> {
     ROSOUT.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// What the logger of a node is called.
+pub(crate) fn logger(node: &str) -> String {
+    node.trim_start_matches('/').replace('/', ".")
+}
+
 /// Lets what is logged in the present span out on `/rosout` as node `name`, as long as the writer lives,
-/// with stamps of the node's own `clock`.
-pub(crate) fn open(name: &str, writer: &Arc<Writer>, clock: &Clock) {
+/// with stamps of the node's own `clock`, from `chosen` on.
+pub(crate) fn open(name: &str, writer: &Arc<Writer>, clock: &Clock, chosen: Option<Severity>) {
     if let Some(id) = tracing::Span::current().id() {
-        let name = name.trim_start_matches('/').replace('/', ".");
         let speaker = Speaker {
-            name,
+            name: logger(name),
+            chosen,
             writer: Arc::downgrade(writer),
             clock: clock.clone(),
         };
         speakers().insert(id.into_u64(), speaker);
+        levels::changed();
     }
 }
 
@@ -62,18 +78,43 @@ pub(crate) fn open(name: &str, writer: &Arc<Writer>, clock: &Clock) {
 pub(crate) fn close() {
     if let Some(id) = tracing::Span::current().id() {
         speakers().remove(&id.into_u64());
+        levels::changed();
     }
+}
+
+/// Chooses from where on the lines of the present span's node are said; `None`: as the program's.
+/// Whether there is such a node in this program's log.
+pub(crate) fn choose(severity: Option<Severity>) -> bool {
+    let Some(id) = tracing::Span::current().id() else {
+        return false;
+    };
+    let is_there = match speakers().get_mut(&id.into_u64()) {
+        Some(speaker) => {
+            speaker.chosen = severity;
+            true
+        }
+        None => false,
+    };
+    levels::changed();
+    is_there
+}
+
+/// What was chosen for the present span's node.
+pub(crate) fn chosen() -> Option<Severity> {
+    let id = tracing::Span::current().id()?;
+    speakers().get(&id.into_u64())?.chosen
 }
 
 /// Starts logging for the process, unless the program has its own already.
 pub(crate) fn start(arguments: &[&Arguments], log_filter: Option<&str>) {
-    let levels = arguments.iter().flat_map(|arguments| &arguments.log_levels);
-    let level = levels
-        .last()
-        .map_or("info", |(_, level)| match level.as_str() {
-            "fatal" => "error",
-            level => level,
-        });
+    let mut levels = arguments.iter().flat_map(|arguments| &arguments.log_levels);
+    let level =
+        levels
+            .rfind(|(logger, _)| logger.is_none())
+            .map_or("info", |(_, level)| match level.as_str() {
+                "fatal" => "off",
+                level => level,
+            });
     // RustDDS complains of multicast groups when it leaves a loopback that has none.
     let quiet = "rustdds=error,rustdds::network::udp_listener=off,ros2_client=error";
     let default = format!("{level},{quiet}");
@@ -86,7 +127,7 @@ pub(crate) fn start(arguments: &[&Arguments], log_filter: Option<&str>) {
         .with_target(false);
     // A program that composes nodes may have a subscriber of its own: its lines are its affair then.
     let _ = tracing_subscriber::registry()
-        .with(filter)
+        .with(Levels::above(filter))
         .with(console)
         .with(Rosout)
         .try_init();

@@ -14,6 +14,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::arguments::{Arguments, ParameterSource};
+use crate::log::{self, Severity};
 use crate::names::{NameError, NodeNames};
 use crate::node::Node;
 use crate::parameter::{Parameter, Value};
@@ -81,6 +82,7 @@ pub struct Setup {
     parameters: Tree,
     origins: BTreeMap<String, Origin>,
     use_sim_time: bool,
+    log_level: Option<Severity>,
     /// Where the parameters go when nothing but these is asked for.
     asked: Option<Arc<OnceLock<Vec<Parameter>>>>,
 }
@@ -105,8 +107,14 @@ impl Setup {
             parameters: Tree::empty(),
             origins: BTreeMap::new(),
             use_sim_time: false,
+            log_level: None,
             asked: None,
         };
+        let logger = log::logger(&setup.names.fully_qualified());
+        let mut named = arguments.log_levels.iter().rev();
+        setup.log_level = named
+            .find(|(name, _)| name.as_ref() == Some(&logger))
+            .and_then(|(_, level)| Severity::of_word(level));
         for source in &arguments.parameters {
             match source {
                 ParameterSource::File(path) => setup.add_file(path)?,
@@ -163,6 +171,11 @@ impl Setup {
     #[must_use]
     pub const fn use_sim_time(&self) -> bool {
         self.use_sim_time
+    }
+
+    /// From where on the node's lines are said, where its logger is named on the command line.
+    pub(crate) const fn log_level(&self) -> Option<Severity> {
+        self.log_level
     }
 
     /// The parameters as given, without `use_sim_time`.

@@ -8,6 +8,7 @@
 
 mod live {
     pub mod actions;
+    pub mod log_levels;
     pub mod parameters;
     pub mod processes;
     pub mod puppet;

@@ -13,12 +13,14 @@ use super::action_client::ActionClient;
 use super::action_server::{ActionServer, GoalService};
 use super::board::Board;
 use super::incoming::{QUEUE_LEN, Readers};
+use super::logger_levels::LoggerService;
 use super::owner::{
     ActionEnd, ClientUse, Owner, Publication, ServerUse, Subscription, Timers, UsedAction,
 };
 use super::parameters::ParameterService;
 use super::service::{Client, Server};
 use super::timers::{HostTimers, SimulatedTimers};
+use super::type_description;
 use crate::clock::Clock;
 use crate::dds::{Participant, Writer};
 use crate::names::{self, NodeNames};
@@ -135,6 +137,13 @@ impl Assembly {
             let name = self.names.resolve(name)?;
             self.server(ServerUse::Parameter(service), &name, type_name)?;
         }
+        for (service, name, type_name) in LoggerService::ALL {
+            let name = self.names.resolve(name)?;
+            self.server(ServerUse::Logger(service), &name, type_name)?;
+        }
+        let (name, type_name) = type_description::SERVICE;
+        let name = self.names.resolve(name)?;
+        self.server(ServerUse::TypeDescription, &name, type_name)?;
         Ok(())
     }
 
@@ -262,12 +271,12 @@ pub(super) fn assemble(
     assembly.participant.announce()?;
     let fully_qualified = setup.names().fully_qualified();
     let patience_s = node.patience().as_secs_f64().max(0.0);
-    let parameters: Vec<Parameter> = with_sim_time(node.parameters(), setup);
     Ok(Owner {
+        log_level: setup.log_level(),
         board: Board::new(&fully_qualified),
         name: fully_qualified,
+        parameters: with_sim_time(node.parameters(), setup),
         node,
-        parameters,
         participant: assembly.participant,
         readers: assembly.readers,
         queue,

@@ -16,13 +16,14 @@ use super::action_client::ActionClient;
 use super::action_server::{ActionServer, GoalService};
 use super::board::Board;
 use super::incoming::{Incoming, Readers};
+use super::logger_levels::LoggerService;
 use super::parameters::{self, ParameterService};
 use super::service::{Client, ReplyTo, Server, shared};
 use super::timers::{HostTimers, SimulatedTimers};
 use crate::clock::{self, Clock};
 use crate::dds::{Participant, PublishError, Writer};
 use crate::diagnostic::{Diagnostic, Level};
-use crate::log;
+use crate::log::{self, Severity};
 use crate::node::{Bytes, Emission, Event, Node, RequestId};
 use crate::parameter::Parameter;
 
@@ -36,6 +37,8 @@ pub(super) enum ServerUse {
     Service(usize),
     Action(usize, GoalService),
     Parameter(ParameterService),
+    Logger(LoggerService),
+    TypeDescription,
 }
 
 /// What a client is there for.
@@ -102,6 +105,7 @@ pub(super) struct Owner {
     pub diagnostics: Writer,
     pub rosout: Arc<Writer>,
     pub parameter_events: Writer,
+    pub log_level: Option<Severity>,
     pub board: Board,
     pub emissions: Vec<Emission>,
     pub last_event: Stamp<Host>,
@@ -140,7 +144,7 @@ fn now() -> Instant {
 impl Owner {
     /// Drives the node until `stop` says so, then winds it down.
     pub async fn run(mut self, mut stop: watch::Receiver<Stop>) {
-        log::open(&self.name, &self.rosout, &self.clock);
+        log::open(&self.name, &self.rosout, &self.clock, self.log_level);
         for action in &self.actions {
             let _ = action.status.publish(&action.server.status(), None);
         }

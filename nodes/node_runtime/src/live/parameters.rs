@@ -185,7 +185,7 @@ impl Table<'_> {
         descriptor
     }
 
-    /// Why a parameter is not set: it is unknown, of another type, or frozen.
+    /// Why a parameter is not set: it is unknown, of another type, out of its range, or frozen.
     fn refuse(&self, wanted: &ParameterMessage) -> SetParametersResult {
         let name = &wanted.name;
         let reason = match self.find(name) {
@@ -193,7 +193,7 @@ impl Table<'_> {
             Some(known) => {
                 let (is, set) = (wire(&known.value).r#type, wanted.value.r#type);
                 if is == set {
-                    FROZEN.to_owned()
+                    out_of_range(known, &wanted.value).unwrap_or_else(|| FROZEN.to_owned())
                 } else {
                     format!(
                         "parameter `{name}` is {}, not {}",
@@ -208,6 +208,30 @@ impl Table<'_> {
             reason,
         }
     }
+}
+
+/// What is said of the first number that is outside a parameter's range.
+fn out_of_range(parameter: &Parameter, wanted: &ParameterValue) -> Option<String> {
+    let (from, to) = parameter.range?;
+    let outside = |number: &f64| !(from..=to).contains(number);
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "compared with limits that are doubles"
+    )]
+    let number = match &parameter.value {
+        Value::Double(_) => Some(wanted.double_value).filter(outside),
+        Value::DoubleArray(_) => wanted.double_array_value.iter().copied().find(outside),
+        Value::Integer(_) => Some(wanted.integer_value as f64).filter(outside),
+        Value::IntegerArray(_) => {
+            let mut numbers = wanted.integer_array_value.iter().map(|n| *n as f64);
+            numbers.find(outside)
+        }
+        _ => None,
+    }?;
+    let name = &parameter.name;
+    Some(format!(
+        "parameter `{name}`: {number} is outside {from} to {to}; and {FROZEN}"
+    ))
 }
 
 /// What of a name is below a prefix; the name itself when it is the prefix.
@@ -350,6 +374,13 @@ mod tests {
             refuse("fade.seconds_s", Value::Integer(3)),
             "parameter `fade.seconds_s` is a double, not an integer"
         );
+        for (wrong, shown) in [(11.0, "11"), (0.4, "0.4"), (f64::NAN, "NaN")] {
+            assert_eq!(
+                refuse("fade.seconds_s", Value::Double(wrong)),
+                format!("parameter `fade.seconds_s`: {shown} is outside 0.5 to 10; and {FROZEN}")
+            );
+        }
+        assert!(refuse("fade.steps", Value::Integer(10)).contains("10 is outside 1 to 9"));
         assert_eq!(
             refuse("fad", Value::Integer(3)),
             "parameter `fad` is unknown"

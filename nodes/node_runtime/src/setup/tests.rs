@@ -134,3 +134,14 @@ fn an_absent_parameter_file_is_named() {
     let error = Setup::new("probe", &Arguments::parse(arguments).unwrap()).unwrap_err();
     assert!(error.to_string().contains("nowhere.yaml"));
 }
+
+#[test]
+fn a_level_on_the_command_line_is_for_the_logger_that_it_names() {
+    let level = |arguments: &[&str]| setup(GOOD, arguments).1.unwrap().log_level();
+    assert_eq!(level(&["--log-level", "debug"]), None, "for the program");
+    assert_eq!(level(&["--log-level", "rcl:=debug"]), None);
+    let last = ["--log-level", "probe:=warn", "--log-level", "probe:=error"];
+    assert_eq!(level(&last), Some(Severity::Error));
+    let spaced = ["-r", "__ns:=/mill", "--log-level", "mill.probe:=trace"];
+    assert_eq!(level(&spaced), Some(Severity::Debug));
+}

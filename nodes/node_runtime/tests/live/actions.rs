@@ -126,6 +126,9 @@ fn a_service_is_answered_and_an_absent_one_is_said_to_be() {
     serving.stop().unwrap();
 }
 
+/// Does not end by itself.
+const ENDLESS: &str = "G4 P3600";
+
 /// Counts lines at every tick for every goal; ends at line 5, or when called off.
 fn counter() -> Puppet {
     let ports = Ports {
@@ -161,7 +164,8 @@ fn counter() -> Puppet {
                     out.push(Emission::RejectGoal { server, id });
                 } else {
                     out.push(Emission::AcceptGoal { server, id });
-                    goals.push((id, 0));
+                    let line = if goal.program == ENDLESS { 100 } else { 0 };
+                    goals.push((id, line));
                 }
             }
             Event::Cancel { id, .. } => {
@@ -192,7 +196,7 @@ fn counter() -> Puppet {
                         ));
                     }
                 }
-                goals.retain(|(_, line)| *line < 5);
+                goals.retain(|(_, line)| *line != 5);
             }
             _ => {}
         }
@@ -265,5 +269,87 @@ fn goals_run_side_by_side_are_refused_and_called_off() {
     let lines = std::iter::from_fn(|| heard.recv_timeout(Duration::from_millis(200)).ok()).count();
     assert_eq!(lines, 0, "nothing comes after the end");
     asking.stop().unwrap();
+    serving.stop().unwrap();
+}
+
+/// `RunProgram` as ros2-client would have it.
+mod foreign {
+    use serde::{Deserialize, Serialize};
+
+    #[derive(Clone, Debug, Serialize, Deserialize)]
+    pub struct Goal {
+        pub program: String,
+        pub name: String,
+    }
+
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    pub struct Result {
+        pub outcome: u8,
+        pub message: String,
+        pub line: u32,
+    }
+
+    #[derive(Clone, Debug, Serialize, Deserialize)]
+    pub struct Feedback {
+        pub line: u32,
+        pub state: u8,
+        pub progress: f64,
+    }
+
+    impl ros2_client::Message for Goal {}
+    impl ros2_client::Message for Result {}
+    impl ros2_client::Message for Feedback {}
+}
+
+#[test]
+fn an_action_serves_ros2_clients_client_in_the_mapping_of_fast_dds() {
+    let environment = environment(18);
+    let serving = start(&environment, counter());
+    let mut asker = super::parameters::Asker::new(environment.domain_id);
+    let qos = ros2_client::QosProfile::publisher_default();
+    let client = asker
+        .node
+        .create_action_client::<foreign::Goal, foreign::Result, foreign::Feedback>(
+            ros2_client::ServiceMapping::Enhanced,
+            &ros2_client::Name::new("/cnc", "run_program").unwrap(),
+            &ros2_client::ActionTypeName::new("abbe_msgs", "RunProgram"),
+            ros2_client::action::ActionClientQosPolicies {
+                goal_service: qos.clone(),
+                result_service: qos.clone(),
+                cancel_service: qos.clone(),
+                feedback_subscription: qos.clone(),
+                status_subscription: qos,
+            },
+        )
+        .unwrap();
+    std::thread::sleep(Duration::from_secs(1));
+    let goal = |program: &str| foreign::Goal {
+        program: program.to_owned(),
+        name: "foreign".to_owned(),
+    };
+    let story = async {
+        let (id, answer) = client.async_send_goal(goal("G0 X1")).await.unwrap();
+        assert!(answer.accepted);
+        let (status, result) = client.async_request_result(id).await.unwrap();
+        let outcome = RunProgramResult::OUTCOME_DONE;
+        assert_eq!((status as u8, result.outcome), (4, outcome), "succeeded");
+        let (_, answer) = client.async_send_goal(goal("")).await.unwrap();
+        assert!(!answer.accepted);
+        let (id, answer) = client.async_send_goal(goal(ENDLESS)).await.unwrap();
+        assert!(answer.accepted);
+        let any_time = ros2_client::builtin_interfaces::Time::ZERO;
+        let canceling = client.async_cancel_goal(id, any_time).await.unwrap();
+        assert_eq!(canceling.goals_canceling.len(), 1);
+        let (status, _) = client.async_request_result(id).await.unwrap();
+        assert_eq!(status as u8, 5, "canceled");
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .unwrap();
+    runtime
+        .block_on(async { tokio::time::timeout(Duration::from_secs(15), story).await })
+        .expect("the story's end within 15 s");
+    drop((client, asker));
     serving.stop().unwrap();
 }

@@ -37,13 +37,13 @@ fn puppet() -> Puppet {
 }
 
 /// Asks a service of the node through ros2-client, in the mapping of Fast DDS.
-struct Asker {
-    node: ros2_client::Node,
+pub struct Asker {
+    pub node: ros2_client::Node,
     _context: Context,
 }
 
 impl Asker {
-    fn new(domain_id: u16) -> Self {
+    pub fn new(domain_id: u16) -> Self {
         let participant = DomainParticipantBuilder::new(domain_id)
             .with_only_networks([std::net::Ipv4Addr::LOCALHOST])
             .build()

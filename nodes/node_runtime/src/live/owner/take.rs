@@ -1,7 +1,7 @@
 //! Taking in what happens.
 
 use abbe_msgs::action_msgs::srv::CancelGoalRequest;
-use abbe_msgs::{Reliability, from_cdr};
+use abbe_msgs::{Reliability, WireError, from_cdr};
 use metrology::Stamp;
 use metrology::stamp::Host;
 use tokio::time::Instant;
@@ -11,9 +11,9 @@ use crate::diagnostic::{Diagnostic, Level};
 use crate::live::action_client::{Ask, News};
 use crate::live::action_server::{Answer, GoalService};
 use crate::live::incoming::Incoming;
-use crate::live::parameters::ParameterService;
 use crate::live::service::ReplyTo;
 use crate::live::timers::SimulatedTimers;
+use crate::live::type_description;
 use crate::node::{Bytes, Event};
 
 impl Owner {
@@ -155,19 +155,23 @@ impl Owner {
                 let at = self.instant(None);
                 self.hand(at, Event::Request { service, id, bytes });
             }
-            ServerUse::Parameter(service) => self.parameter_request(place, service, to, bytes),
+            ServerUse::Parameter(service) => {
+                let answer = service.answer(&self.parameters, bytes);
+                self.answer_or_complain(place, to, answer);
+            }
+            ServerUse::Logger(service) => {
+                let answer = service.answer(&self.name, bytes);
+                self.answer_or_complain(place, to, answer);
+            }
+            ServerUse::TypeDescription => {
+                self.answer_or_complain(place, to, type_description::answer(bytes));
+            }
             ServerUse::Action(action, service) => self.goal_request(action, service, to, bytes),
         }
     }
 
-    fn parameter_request(
-        &mut self,
-        place: usize,
-        service: ParameterService,
-        to: ReplyTo,
-        bytes: &Bytes,
-    ) {
-        match service.answer(&self.parameters, bytes) {
+    fn answer_or_complain(&mut self, place: usize, to: ReplyTo, answer: Result<Bytes, WireError>) {
+        match answer {
             Ok(answer) => self.answer(place, to, &answer),
             Err(error) => self.malformed(place, &error.to_string()),
         }

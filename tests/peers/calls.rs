@@ -1,0 +1,111 @@
+//! Services and actions as a node on Cyclone DDS calls them: 16 bytes in front of every request and reply
+//! say whose it is. (Fast DDS's mapping, with the identity in RTPS, is tried by `node_runtime`'s own tests.)
+
+use abbe_tests::cyclone::{Cyclone, end};
+use abbe_tests::program::{Process, domain};
+use abbe_tests::python::interpreter;
+use abbe_tests::scenario::Scenario;
+use serde_json::{Value, json};
+
+const GET: &str = "/fake_cnc/get_parameters";
+const SET: &str = "/fake_cnc/set_parameters";
+const DESCRIBE: &str = "/fake_cnc/describe_parameters";
+const LEVEL: &str = "/fake_cnc/set_logger_levels";
+const SEND: &str = "/cnc/run_program/_action/send_goal";
+const CANCEL: &str = "/cnc/run_program/_action/cancel_goal";
+const RESULT: &str = "/cnc/run_program/_action/get_result";
+
+const CLIENTS: [(&str, &str); 7] = [
+    (GET, "rcl_interfaces/srv/GetParameters"),
+    (SET, "rcl_interfaces/srv/SetParameters"),
+    (DESCRIBE, "rcl_interfaces/srv/DescribeParameters"),
+    (LEVEL, "rcl_interfaces/srv/SetLoggerLevels"),
+    (SEND, "abbe_msgs/action/RunProgram_SendGoal"),
+    (CANCEL, "action_msgs/srv/CancelGoal"),
+    (RESULT, "abbe_msgs/action/RunProgram_GetResult"),
+];
+
+/// Statuses of `action_msgs/GoalStatus`.
+const SUCCEEDED: i64 = 4;
+const CANCELED: i64 = 5;
+
+#[test]
+fn cyclone_calls_services_and_an_action_in_its_own_mapping() {
+    let Some(python) = interpreter("cyclone calls services and an action") else {
+        return;
+    };
+    let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(3));
+    let file = scenario.argument("fake_cnc.yaml");
+    let node = Process::node(domain, "fake_cnc", &["--params-file", &file]);
+    let log = [end(&abbe_msgs::topics::ROSOUT)];
+    let mut cyclone = Cyclone::asking(&python, domain, &CLIENTS, &log);
+    for (service, _) in CLIENTS {
+        cyclone.matched_after_s(service);
+    }
+    parameters(&mut cyclone);
+    log_level(&mut cyclone);
+    action(&mut cyclone);
+    cyclone.stop();
+    node.stop();
+}
+
+fn asked(cyclone: &mut Cyclone, service: &str, number: i64, request: &Value) -> Value {
+    cyclone.ask(service, number, request);
+    cyclone.reply(service, number)
+}
+
+fn parameters(cyclone: &mut Cyclone) {
+    let names = json!({"names": ["background_rate_hz", "nobody"]});
+    // A number that needs more than four bytes, and the first one: each has its own answer.
+    for number in [5_000_000_000, 1] {
+        let got = asked(cyclone, GET, number, &names);
+        assert_eq!(got["values"][0]["type"], 3, "{got}");
+        assert_eq!(got["values"][0]["double_value"], 10.0, "{got}");
+        assert_eq!(got["values"][1]["type"], 0, "{got}");
+    }
+    let described = asked(cyclone, DESCRIBE, 2, &names);
+    let range = &described["descriptors"][0]["floating_point_range"][0];
+    let (from, to) = (range["from_value"].as_f64(), range["to_value"].as_f64());
+    assert!(from.unwrap() < to.unwrap(), "{described}");
+    let set = |value: f64| {
+        let value = json!({"type": 3, "double_value": value});
+        json!({"parameters": [{"name": "background_rate_hz", "value": value}]})
+    };
+    for (value, reason) in [(20.0, "frozen"), (-1.0, "-1 is outside")] {
+        let refused = asked(cyclone, SET, 3, &set(value))["results"][0].take();
+        assert_eq!(refused["successful"], false);
+        let said = refused["reason"].as_str().unwrap();
+        assert!(said.contains(reason), "{said}");
+    }
+}
+
+fn log_level(cyclone: &mut Cyclone) {
+    let levels = json!({"levels": [{"name": "fake_cnc", "level": 10}, {"name": "x", "level": 10}]});
+    let results = asked(cyclone, LEVEL, 4, &levels)["results"].take();
+    assert_eq!(results[0]["successful"], true, "{results}");
+    assert_eq!(results[1]["successful"], false, "{results}");
+}
+
+fn goal(uuid: u8, program: &str) -> Value {
+    let id = json!({"uuid": vec![uuid; 16]});
+    json!({"goal_id": id, "goal": {"name": "peer", "program": program}})
+}
+
+fn action(cyclone: &mut Cyclone) {
+    let id = |uuid: u8| json!({"goal_id": {"uuid": vec![uuid; 16]}});
+    let accepted = asked(cyclone, SEND, 1, &goal(7, "G21 G90\nG1 X2 F600\nM2\n"));
+    assert_eq!(accepted["accepted"], true, "{accepted}");
+    let result = asked(cyclone, RESULT, 1, &id(7));
+    assert_eq!(result["status"], SUCCEEDED, "{result}");
+    assert_eq!(result["result"]["outcome"], 0, "{result}");
+    // Ten minutes of motion, called off at once.
+    let accepted = asked(cyclone, SEND, 2, &goal(8, "G21 G90\nG1 X102 F10\nM2\n"));
+    assert_eq!(accepted["accepted"], true, "{accepted}");
+    let cancel = json!({"goal_info": id(8)});
+    let canceling = asked(cyclone, CANCEL, 1, &cancel);
+    assert_eq!(canceling["return_code"], 0, "{canceling}");
+    let named = &canceling["goals_canceling"][0]["goal_id"]["uuid"];
+    assert_eq!(*named, json!(vec![8; 16]), "{canceling}");
+    let result = asked(cyclone, RESULT, 2, &id(8));
+    assert_eq!(result["status"], CANCELED, "{result}");
+}
