@@ -1,14 +1,13 @@
 //! From signatures to named causes.
 //!
-//! The catalogue's own forms are tried first. Only where they leave more than noise would are the wide forms of
-//! the effects found (and of their rivals) tried as well, so that a form that is not quite the catalogue's does
-//! not call for a second cause. A member is named where it holds on runs left out, has one size under all conditions,
+//! The catalogue's own forms are tried first, then the wide forms of the effects found (and of their rivals) as well,
+//! so that a form that is not quite the catalogue's does not call for a second cause. A member is named where it holds on runs left out, has one size under all conditions,
 //! stands off its physical bounds, is not a small part of a gap that stays unexplained, and the noise is the repeats';
 //! otherwise it is a surrogate, shown and not added. A named member with rivals is a set.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::effects::{Kind, Moment};
+use machine::effects::{Kind, Moment, Parameter, Role};
 use machine::file::EffectEntry;
 use machine::twin::Channel;
 use nalgebra::{DMatrix, DVector};
@@ -20,6 +19,7 @@ use crate::confirm;
 use crate::families::Slot;
 use crate::figures::Note;
 use crate::form_doubt;
+use crate::form_error::FormError;
 use crate::isolability;
 use crate::noise::Noise;
 use crate::normal::Normal;
@@ -31,6 +31,7 @@ use crate::selection::{Limits, Search, Set};
 use crate::signature::{Form, Instance, Library};
 use crate::stack::Stack;
 use crate::unknown::{self, Leftover};
+use crate::widening;
 
 /// Everything that the search found.
 pub struct Found {
@@ -89,6 +90,13 @@ struct Best {
     leftover: Leftover,
 }
 
+impl Best {
+    /// C of the set.
+    fn score(&self) -> f64 {
+        self.visited[&self.set]
+    }
+}
+
 /// A member of an insufficient set must gain this many times what is left unexplained. A share of the whole gain
 /// instead would withdraw the smaller of two true causes (plays of 5 and 3 µm).
 const LEAST_RATIO: f64 = 2.0;
@@ -102,11 +110,17 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let mut normal = signatures.normal(&stack.z);
     let mut best = search(scope, &signatures, &normal);
     let is_closed = !best.leftover.flagged();
-    if !is_closed && !best.set.is_empty() {
-        widen(scope, &mut signatures, &best);
+    if !best.set.is_empty() {
+        let sizes: Vec<f64> = best.refit.estimates.iter().map(|e| e.d).collect();
+        widening::widen(stack, &mut signatures, &best.set, &sizes, &best.visited);
         normal = signatures.normal(&stack.z);
         let wide = search(scope, &signatures, &normal);
-        if wide.leftover.score < best.leftover.score {
+        let is_better = if is_closed {
+            wide.score() < best.score() - 1e-9 && !wide.leftover.flagged()
+        } else {
+            wide.leftover.score < best.leftover.score
+        };
+        if is_better {
             best = wide;
         }
     }
@@ -217,28 +231,6 @@ fn search(scope: &Scope<'_, '_>, signatures: &Library, normal: &Normal) -> Best 
     }
 }
 
-/// Adds the wide forms of the members and of what stood nearly as well in their place.
-fn widen(scope: &Scope<'_, '_>, signatures: &mut Library, best: &Best) {
-    let least = best.visited[&best.set];
-    let reach = 0.1 * (scope.stack.z.norm_squared() - least).max(0.0);
-    let near = best
-        .visited
-        .iter()
-        .filter(|(_, score)| **score <= least + reach);
-    let forms: BTreeSet<usize> = near.flat_map(|(set, _)| set.iter().copied()).collect();
-    let mut done = BTreeSet::new();
-    for form in best.set.iter().copied().chain(forms) {
-        let (instance, values) = (
-            signatures.forms[form].instance,
-            signatures.forms[form].values.clone(),
-        );
-        let has_free = !signatures.instances[instance].kind.free.is_empty();
-        if has_free && done.len() < 12 && done.insert(instance) {
-            signatures.add(scope.stack, instance, values, true);
-        }
-    }
-}
-
 fn judged(
     scope: &Scope<'_, '_>,
     signatures: &Library,
@@ -273,6 +265,7 @@ fn judged(
         let estimate = best.refit.estimates[place].clone();
         let constancy = steady[place].0.clone();
         let among = kept.iter().position(|other| *other == place);
+        let instead = rivals.instead_of(&instances, instance);
         let cancels = estimate.d.powi(2) > MOST_CANCELLING * (before - after);
         let holds = !cancels
             && !beaten[place]
@@ -290,7 +283,7 @@ fn judged(
             confidence: recalibrated(
                 rivals.probability(instance) * adequacy * if holds { 1.0 } else { 0.5 },
             ),
-            confusable: confusable(signatures, normal, &rivals, *form, forms),
+            confusable: confusable(signatures, normal, &instead, *form, forms),
             constancy,
             rivals: without(signatures, best, instance),
             estimate,
@@ -367,10 +360,42 @@ fn steady(scope: &Scope<'_, '_>, signatures: &Library, best: &Best) -> Vec<(Cons
         let raw = scope.stack.simulate(&[&*instance.effect(&estimate.values)]);
         let (jacobian, left) = (&best.refit.jacobian, &best.left);
         let constancy = confirm::constancy(scope.stack, &raw, jacobian, left, scope.config);
-        let holds = constancy.passed && !railed(signatures, *form, estimate);
+        let holds = constancy.passed
+            && !railed(signatures, *form, estimate)
+            && rises(scope.stack, raw, scope.config);
         (constancy, holds)
     };
-    best.set.iter().zip(&best.refit.estimates).map(of).collect()
+    let members = best.set.iter().zip(&best.refit.estimates);
+    let sure = surely(scope.stack, best);
+    let steady = members.map(of).zip(sure);
+    steady
+        .map(|((constancy, holds), sure)| (constancy, holds && sure))
+        .collect()
+}
+
+/// Standard uncertainties by which a size must be off zero.
+const SURE: f64 = 4.5;
+
+/// Whether the size of each member is surely not zero by how it differs from run to run: noise that a dozen touches
+/// show too small makes any D.
+fn surely(stack: &Stack<'_>, best: &Best) -> Vec<bool> {
+    if best.refit.parts.is_empty() {
+        return vec![];
+    }
+    let parts = DMatrix::from_columns(&best.refit.parts);
+    let relative = refit::standard_uncertainties(stack, &parts, &best.left);
+    relative.into_iter().map(|u| u * SURE < 1.0).collect()
+}
+
+/// Whether a signature rises anywhere above the error of form that every simulator has: below it nothing is named,
+/// however often it was measured.
+fn rises(stack: &Stack<'_>, raw: Vec<f64>, config: &GapConfig) -> bool {
+    let base = FormError::base(config);
+    let floated = stack.floated(raw);
+    stack.rows.blocks.iter().any(|block| {
+        let least = base.of(block);
+        floated[block.range()].iter().any(|row| row.abs() > least)
+    })
 }
 
 /// Whether an amplitude stands at a bound that is not zero.
@@ -396,16 +421,18 @@ fn drop_one_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<f64> {
     all.iter().map(|out| whole - without(out)).collect()
 }
 
-/// What looks like a form, among one form of each instance.
+/// What has a smaller cosine than this looks like nothing of the kind.
+const LEAST_COS: f64 = 0.05;
+
+/// What looks like a form, among one form of each instance; `instead` is what can stand in its place.
 pub fn confusable(
     signatures: &Library,
     normal: &Normal,
-    rivals: &Rivals,
+    instead: &BTreeSet<usize>,
     form: usize,
     forms: &[usize],
 ) -> Vec<Confusable> {
     let instance = signatures.forms[form].instance;
-    let instead = rivals.instead_of(instance);
     let mut all: Vec<Confusable> = forms
         .iter()
         .filter(|other| signatures.forms[**other].instance != instance)
@@ -418,7 +445,7 @@ pub fn confusable(
                 excluded: !instead.contains(&own),
             }
         })
-        .filter(|other| other.cos > 0.4 || !other.excluded)
+        .filter(|other| other.cos > 0.4 || (!other.excluded && other.cos > LEAST_COS))
         .collect();
     all.sort_by(|a, b| a.excluded.cmp(&b.excluded).then(b.cos.total_cmp(&a.cos)));
     all.truncate(6);
@@ -456,13 +483,7 @@ impl Found {
             confidence: member.confidence,
             parameters: parameters
                 .filter(|(place, _)| member.estimate.active.contains(place))
-                .map(|(place, parameter)| ParameterValue {
-                    name: parameter.name.to_owned(),
-                    value: member.estimate.values[place],
-                    low: member.estimate.low[place],
-                    high: member.estimate.high[place],
-                    at_bound: member.estimate.at_bound[place],
-                })
+                .map(|(place, parameter)| value(parameter, &member.estimate, place))
                 .collect(),
             d: member.estimate.d,
             confusable_with: member.confusable.clone(),
@@ -509,6 +530,26 @@ impl Found {
             }
         };
         of_sets.map(note).collect()
+    }
+}
+
+/// Share of its physical range from which an interval says nothing of a parameter.
+const WHOLE_RANGE: f64 = 0.9;
+
+/// A parameter as it is reported: of a shape nothing is said beyond its physical range.
+fn value(parameter: &Parameter, estimate: &Estimate, place: usize) -> ParameterValue {
+    let (mut low, mut high) = (estimate.low[place], estimate.high[place]);
+    if parameter.role != Role::Amplitude {
+        low = low.max(parameter.low);
+        high = high.min(parameter.high);
+    }
+    ParameterValue {
+        name: parameter.name.to_owned(),
+        value: estimate.values[place],
+        low,
+        high,
+        at_bound: estimate.at_bound[place],
+        determined: high - low < WHOLE_RANGE * (parameter.high - parameter.low),
     }
 }
 

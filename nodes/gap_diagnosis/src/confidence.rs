@@ -59,13 +59,13 @@ impl Rivals {
         less.is_none_or(|score| *score > self.best + 2.0 * ODDS.ln())
     }
 
-    /// Instances that stand in sets nearly as good that do without this one.
-    pub fn instead_of(&self, instance: usize) -> BTreeSet<usize> {
+    /// Instances that stand in sets nearly as good that do without this one, and not in the best set itself.
+    pub fn instead_of(&self, best: &BTreeSet<usize>, instance: usize) -> BTreeSet<usize> {
         let near = |score: &f64| *score <= self.best + 2.0 * ODDS.ln();
         self.sets
             .iter()
             .filter(|(set, score)| near(score) && !set.contains(&instance))
-            .flat_map(|(set, _)| set.iter().copied())
+            .flat_map(|(set, _)| set.difference(best).copied())
             .collect()
     }
 

@@ -15,16 +15,16 @@ use crate::experiment::Experiment;
 use crate::families::Slot;
 use crate::figures::{Figures, Note};
 use crate::form_error::FormError;
-use crate::gap::{self, Size};
+use crate::gap;
 use crate::guard;
 use crate::next::{self, Bench};
-use crate::noise::{self, Noise};
-use crate::report::{ChannelGap, Gap, GapReport, Inputs, NoiseFloor, NotExcited, SCHEMA};
+use crate::noise::{self, Noise, Readings};
+use crate::report::{GapReport, Inputs, NoiseFloor, NotExcited, SCHEMA};
 use crate::rows::Rows;
 use crate::scatter::{self, Scattered};
 use crate::shrink::{self, Named, Shrunk};
 use crate::split::{self, Split};
-use crate::stack::Stack;
+use crate::stack::{Simulated, Stack};
 use crate::unknown::Leftover;
 use crate::{families, isolability, localise, places, recalibration, unknown, whiteness};
 
@@ -96,6 +96,7 @@ pub fn diagnose_against(
         stations,
         noise: &noise,
         residual: &residual,
+        listed: listed(machine)?,
     };
     Ok(base.diagnosis(&kinds, config, notes(&rows, &noise)))
 }
@@ -113,7 +114,12 @@ fn noise_of(
     for &run in &all {
         rows.average(run, &residual[run], &mut raw);
     }
-    noise::noise(session, &rows, &raw, config)
+    let readings = Readings {
+        session,
+        rows: &rows,
+        residual,
+    };
+    noise::noise(readings, &raw, config)
 }
 
 /// What every stack is made of.
@@ -124,6 +130,8 @@ struct Base<'a> {
     stations: usize,
     noise: &'a BTreeMap<Channel, Noise>,
     residual: &'a [Vec<f64>],
+    /// The effects that the machine file has.
+    listed: Vec<Box<dyn Effect>>,
 }
 
 impl<'a> Base<'a> {
@@ -153,7 +161,19 @@ impl<'a> Base<'a> {
         config: &GapConfig,
     ) -> Searched<'a> {
         let base = FormError::base(config);
-        let first = self.search(runs, self.noise, &base, kinds, config);
+        let listed: Vec<&dyn Effect> = self.listed.iter().map(|effect| &**effect).collect();
+        let (listed, base) = if listed.is_empty() {
+            (None, base)
+        } else {
+            let stack = self.stack(runs, self.noise, &base);
+            let listed = stack.simulate(&listed);
+            let nothing = vec![0.0; stack.rows.len];
+            let form = FormError::beside(&stack, &listed, &nothing, config);
+            (Some(listed), form)
+        };
+        let simulated = Simulated::default();
+        let stack = self.stack(runs, self.noise, &base).sharing(&simulated);
+        let first = self.search(stack, self.noise, kinds, config);
         let told = told(&first.stack, first.found.members.iter(), &first.found);
         let rest = less(&first.stack.raw, &told);
         let inflation = guard::inflation(&first.stack, &first.slots, self.noise, rest, &base);
@@ -173,8 +193,10 @@ impl<'a> Base<'a> {
             (channel.clone(), noise.scaled(ratio))
         };
         let noise: BTreeMap<Channel, Noise> = self.noise.iter().map(scaled).collect();
-        let form = FormError::beside(&first.stack, &told, config);
-        let second = self.search(runs, &noise, &form, kinds, config);
+        let listed = listed.unwrap_or_else(|| vec![0.0; told.len()]);
+        let form = FormError::beside(&first.stack, &listed, &told, config);
+        let stack = self.stack(runs, &noise, &form).sharing(&simulated);
+        let second = self.search(stack, &noise, kinds, config);
         Searched {
             before: first.before,
             inflation,
@@ -232,13 +254,11 @@ impl<'a> Base<'a> {
 
     fn search(
         &self,
-        runs: &[usize],
+        stack: Stack<'a>,
         noise: &BTreeMap<Channel, Noise>,
-        form: &FormError,
         kinds: &[&'static Kind],
         config: &GapConfig,
     ) -> Searched<'a> {
-        let stack = self.stack(runs, noise, form);
         let slots = families::families(&stack);
         let scope = Scope {
             stack: &stack,
@@ -274,7 +294,7 @@ impl<'a> Base<'a> {
             inflation,
             ..
         } = searched;
-        let reproduced = judge_noise(&inflation, config, &mut notes);
+        let reproduced = guard::judge(&inflation, config, &mut notes);
         if !reproduced {
             found.withdraw();
         }
@@ -295,7 +315,7 @@ impl<'a> Base<'a> {
             schema: SCHEMA.to_owned(),
             inputs: Inputs::default(),
             noise_floor: noise_floor(self.noise, &inflation, config),
-            gap: gap_of(&all, &sizes, before.flagged()),
+            gap: gap::table(&all, &sizes, before.flagged()),
             r#where: places::places(&stack, &slots, &before.families, &floated),
             causes: [found.causes(), scattered.causes].concat(),
             unknown: unknown::unknown(&stack, &slots, &beside, flagged, &rest),
@@ -417,28 +437,6 @@ fn less(raw: &[f64], told: &[f64]) -> Vec<f64> {
     raw.iter().zip(told).map(|(raw, told)| raw - told).collect()
 }
 
-/// Whether the noise of the repeats is the session's: the middle channel's. A channel whose noise is worse is said.
-fn judge_noise(
-    inflation: &BTreeMap<Channel, f64>,
-    config: &GapConfig,
-    notes: &mut Vec<Note>,
-) -> bool {
-    let worse = inflation
-        .iter()
-        .filter(|(_, ratio)| **ratio > config.most_inflation);
-    let said: Vec<Note> = worse
-        .map(|(channel, ratio)| Note::NotReproduced {
-            channel: channel.to_string(),
-            inflation: *ratio,
-        })
-        .collect();
-    notes.extend(said);
-    let mut all: Vec<f64> = inflation.values().copied().collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2)
-        .is_none_or(|middle| *middle <= config.most_inflation)
-}
-
 fn no_repeats(session: &Session, rows: &Rows) -> GapError {
     let channels: BTreeSet<String> = rows
         .blocks
@@ -480,6 +478,13 @@ fn residuals(
             .collect()
     };
     Ok(session.runs.iter().map(of_run).collect())
+}
+
+/// The effects that a machine file lists, its nominal loops not among them.
+fn listed(machine: &MachineFile) -> Result<Vec<Box<dyn Effect>>, GapError> {
+    let entries = machine.effects.iter().enumerate();
+    let effects = entries.map(|(index, entry)| effects::from_entry(machine, index, entry));
+    Ok(effects.collect::<Result<_, _>>()?)
 }
 
 /// Stations a circle or pass, fewer where the session would have too many rows.
@@ -529,37 +534,6 @@ fn noise_floor(
             .is_none_or(|ratio| *ratio <= config.most_inflation),
     };
     noise.iter().map(of).collect()
-}
-
-fn gap_of(stack: &Stack<'_>, sizes: &[Size], above_floor: bool) -> Gap {
-    let whole = gap::together(sizes.iter());
-    let channels: BTreeSet<&Channel> = stack
-        .rows
-        .blocks
-        .iter()
-        .map(|block| &block.channel)
-        .collect();
-    let of_channel = |channel: &Channel| {
-        let own = stack.rows.blocks.iter().zip(sizes);
-        let size = gap::together(
-            own.filter(|(b, _)| b.channel == *channel)
-                .map(|(_, size)| size),
-        );
-        ChannelGap {
-            channel: channel.to_string(),
-            rms_um: size.rms_um(),
-            p95_um: size.p95_um(),
-            floor_um: size.floor_um(),
-            above_floor: above_floor && size.rms_um() > 1.2 * size.floor_um(),
-        }
-    };
-    Gap {
-        rms_um: whole.rms_um(),
-        p95_um: whole.p95_um(),
-        floor_um: whole.floor_um(),
-        above_floor,
-        per_channel: channels.into_iter().map(of_channel).collect(),
-    }
 }
 
 /// Kinds of which no instance could be seen.

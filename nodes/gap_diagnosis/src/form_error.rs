@@ -73,9 +73,10 @@ impl FormError {
         }
     }
 
-    /// (2) for effects that tell `told` of a stack, mm.
-    pub fn beside(stack: &Stack<'_>, told: &[f64], config: &GapConfig) -> Self {
-        let floated = stack.floated(told.to_vec());
+    /// (2) and (3) for effects that were found and tell `found` of a stack, mm, beside those that the machine file has,
+    /// which tell `listed`: these have the size that is theirs, but jump no more exactly.
+    pub fn beside(stack: &Stack<'_>, listed: &[f64], found: &[f64], config: &GapConfig) -> Self {
+        let floated = stack.floated(found.to_vec());
         let of = |block: &Block| {
             let squares: f64 = floated[block.range()].iter().map(|v| v * v).sum();
             let rms = (squares / count(block.rows.len())).sqrt();
@@ -90,7 +91,9 @@ impl FormError {
         };
         for block in &stack.rows.blocks {
             if block.channel != Channel::Touch {
-                let edges = edges(&told[block.range()], form.of(block));
+                let rows = listed[block.range()].iter().zip(&found[block.range()]);
+                let told: Vec<f64> = rows.map(|(listed, found)| listed + found).collect();
+                let edges = edges(&told, form.of(block));
                 let key = (block.run, block.channel.clone());
                 form.edges_mm.insert(key, edges);
             }

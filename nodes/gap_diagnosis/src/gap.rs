@@ -11,12 +11,13 @@
 //!
 //! with s the noise within a run, b_m the modes of the smooth field between runs and var_m their variances.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use machine::twin::Channel;
 
 use crate::field::{self, Mode};
 use crate::noise::Noise;
+use crate::report::{ChannelGap, Gap};
 use crate::rows::{Block, count};
 use crate::stack::Stack;
 
@@ -76,8 +77,9 @@ pub fn by_block(stack: &Stack<'_>, noise: &BTreeMap<Channel, Noise>, floated: &[
 
 /// (2) times n.
 fn floor_squares(stack: &Stack<'_>, block: &Block, noise: &Noise, share: f64) -> f64 {
-    let (kinds, columns) = field::modes(&stack.session.runs[block.run], block);
-    let within = noise.row_sigma_mm.powi(2) * share * count(block.rows.len());
+    let run = &stack.session.runs[block.run];
+    let (kinds, columns) = field::modes(run, block);
+    let within = noise.within(run, block).variances[0] * share * count(block.rows.len());
     let between = kinds
         .iter()
         .zip(columns.column_iter())
@@ -99,4 +101,36 @@ pub fn together<'s>(sizes: impl Iterator<Item = &'s Size>) -> Size {
         sum.join(size);
         sum
     })
+}
+
+/// The report's table of a stack.
+pub fn table(stack: &Stack<'_>, sizes: &[Size], above_floor: bool) -> Gap {
+    let whole = together(sizes.iter());
+    let channels: BTreeSet<&Channel> = stack
+        .rows
+        .blocks
+        .iter()
+        .map(|block| &block.channel)
+        .collect();
+    let of_channel = |channel: &Channel| {
+        let own = stack.rows.blocks.iter().zip(sizes);
+        let size = together(
+            own.filter(|(b, _)| b.channel == *channel)
+                .map(|(_, size)| size),
+        );
+        ChannelGap {
+            channel: channel.to_string(),
+            rms_um: size.rms_um(),
+            p95_um: size.p95_um(),
+            floor_um: size.floor_um(),
+            above_floor: above_floor && size.rms_um() > 1.2 * size.floor_um(),
+        }
+    };
+    Gap {
+        rms_um: whole.rms_um(),
+        p95_um: whole.p95_um(),
+        floor_um: whole.floor_um(),
+        above_floor,
+        per_channel: channels.into_iter().map(of_channel).collect(),
+    }
 }

@@ -10,6 +10,12 @@
 //!   inflation = 1 + (s2 - 1)+ s_w^2 / (s_w^2 + s_0^2 / 16)                       (2)
 //! ```
 //!
+//! of which only that counts that is sure where n rows, and nu of the repeats, tell of it:
+//!
+//! ```text
+//!   s2 -> s2 exp(-sqrt(5.4 / (n - k) + 2 / nu))                                  (3)
+//! ```
+//!
 //! with rho the autocorrelation at lag one where it is above a quarter, s_w the noise of a row within a run and
 //! s_0 the simulator's own error of form, of which a quarter may stay beside such a model. What repeats leave alike at the same stations is structure, not noise: where
 //! their mean product says so, it is taken from (1). The median keeps a few sharp places (reversals) from
@@ -26,8 +32,10 @@ use std::collections::BTreeMap;
 use machine::twin::Channel;
 use nalgebra::DVector;
 
+use crate::config::GapConfig;
 use crate::families::Slot;
 use crate::field::{self, Smooth};
+use crate::figures::Note;
 use crate::form_error::{self, FormError};
 use crate::noise::Noise;
 use crate::nuisance::orthonormal;
@@ -40,6 +48,10 @@ use crate::whitener::Whitener;
 const STRUCTURE: f64 = 0.15;
 /// Median of the square of a normal number.
 const MEDIAN_SQUARE: f64 = 0.454_936;
+/// Relative variance of a variance that is found by the median of n squares, times n.
+const OF_MEDIAN: f64 = 5.4;
+/// Standard deviations by which worse noise must be sure.
+const SURE: f64 = 1.0;
 /// Share of the error of form that stays beside the biggest model.
 const ROUGH: f64 = 0.25;
 /// Rows beyond the terms of the models below which a channel is not judged.
@@ -64,7 +76,8 @@ pub fn inflation(
         let left = n - terms.get(&channel).copied().unwrap_or(0.0);
         (left > FEWEST).then(|| {
             let s2 = median_square(&parts) / MEDIAN_SQUARE * n / left;
-            (channel, s2)
+            let doubt = (OF_MEDIAN / left + 2.0 / noise[&channel].freedom.max(1.0)).sqrt();
+            (channel, s2 * (-SURE * doubt).exp()) // (3)
         })
     };
     let scales: BTreeMap<Channel, f64> = sums.into_iter().filter_map(scale).collect();
@@ -78,6 +91,28 @@ pub fn inflation(
         (channel.clone(), 1.0 + beyond) // (2)
     };
     scales.iter().map(judged).collect()
+}
+
+/// Whether the noise of the repeats is the session's: the middle channel's. A channel whose noise is worse is said.
+pub fn judge(
+    inflation: &BTreeMap<Channel, f64>,
+    config: &GapConfig,
+    notes: &mut Vec<Note>,
+) -> bool {
+    let worse = inflation
+        .iter()
+        .filter(|(_, ratio)| **ratio > config.most_inflation);
+    let said: Vec<Note> = worse
+        .map(|(channel, ratio)| Note::NotReproduced {
+            channel: channel.to_string(),
+            inflation: *ratio,
+        })
+        .collect();
+    notes.extend(said);
+    let mut all: Vec<f64> = inflation.values().copied().collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2)
+        .is_none_or(|middle| *middle <= config.most_inflation)
 }
 
 /// Share of the variance of a row that is noise, where the error of form is added.
@@ -105,7 +140,10 @@ fn rough(
     let within = Whitener::new(
         stack.session,
         &stack.rows,
-        |block| (&noise[&block.channel].within, &still),
+        |block| {
+            let run = &stack.session.runs[block.run];
+            (noise[&block.channel].within(run, block), &still)
+        },
         &FormError::default(),
     );
     within.apply(&mut rest);
@@ -117,9 +155,10 @@ fn rough(
         let touches: Vec<Vec<f64>> = touches.into_iter().map(|(column, _)| column).collect();
         let modes = form_error::beside(modes, &touches);
         let rows: Vec<usize> = block.range().collect();
+        let filter = noise[&block.channel].within(run, block);
         let columns = modes.column_iter().map(|column| {
             let mut column = column.into_owned();
-            noise[&block.channel].within.filter(column.as_mut_slice());
+            filter.filter(column.as_mut_slice());
             column
         });
         let used = take_out(&mut rest, &rows, columns);

@@ -6,10 +6,11 @@
 //! `report` is the answer, in the form that people's programs read; `figures` is what pages draw beside it.
 //!
 //! `session` makes a session of recorded samples. `rows` thins readings to stations; `repeats` finds what was
-//! measured twice, `field` and `noise` make the noise floor of it, `form_error`
+//! measured twice, `field`, `pace` and `noise` make the noise floor of it, `form_error`
 //! adds what every simulator is off by; `whitener` makes every row's noise one,
 //! `nuisance` takes out what set-ups leave open, `stack` keeps both. `signature` asks the twin what each effect of
-//! the catalogue would look like, `normal` and `selection` find the set that explains the residual, `refit` sizes
+//! the catalogue would look like, `normal` and `selection` find the set that explains the residual, `widening` gives
+//! its effects forms of their own, `refit` sizes
 //! it, `form_doubt` says what a size owes to its form, `confirm` tries it on runs left out and under every
 //! condition, `challenge` against shapes without a physics; `confidence` weighs its rivals, `recalibration` what a
 //! confidence is worth, `cause` judges it. `scatter` looks for effects that move no mean, `whiteness` says whether
@@ -43,6 +44,7 @@ mod next;
 mod noise;
 mod normal;
 mod nuisance;
+mod pace;
 mod places;
 pub mod preflight;
 mod recalibration;
@@ -61,6 +63,7 @@ pub mod stage;
 mod unknown;
 mod whitener;
 mod whiteness;
+mod widening;
 
 pub use config::GapConfig;
 pub use diagnose::{Diagnosis, diagnose};

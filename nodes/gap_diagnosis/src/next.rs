@@ -379,6 +379,7 @@ impl Bench<'_> {
         let Some(noisiest) = noisiest else { return all };
         let mut assumed = noisiest.clone();
         assumed.within = Autoregression::white(noisiest.row_sigma_mm.powi(2));
+        assumed.pace = crate::pace::Pace::default();
         let linear = metrology::Axis::LINEAR.into_iter().map(Channel::Length);
         for channel in [
             Channel::GridU,

@@ -14,10 +14,10 @@
 //! with G and g the filtered, scaled B'B and B'd. (3) is taken over grids of amplitude and length, first of
 //! the field over place, then of offset and drift. A few repeats leave an amplitude open by a factor; its
 //! posterior quantile `CAUTION` is used rather than the best value, so that a lucky pair of repeats does not
-//! name a cause.
+//! name a cause; likewise `CAUTION_WITHIN` of the variance within runs, which a dozen touches leave open by a third.
 //!
 //! # Holds when
-//! All runs of a channel have the noise that its repeats have, at the spacing of their stations in time.
+//! All runs of a channel have the noise that its repeats have, at their own pace (`pace`).
 //!
 //! # References
 //! \[1\] G. Schwarz, Ann. Stat. 6, 1978 (BIC). \[2\] H. D. Patterson, R. Thompson, Biometrika 58, 1971
@@ -25,11 +25,13 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::{Channel, Session};
+use machine::twin::{Channel, Run, Session};
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::config::GapConfig;
 use crate::field::{self, Mode, Smooth};
+use crate::pace::{self, Pace, Repeated};
 use crate::repeats::{self, Contrasts};
 use crate::rows::{Block, Rows, count};
 use crate::whitener::Autoregression;
@@ -37,8 +39,10 @@ use crate::whitener::Autoregression;
 /// Noise of one channel.
 #[derive(Clone, Debug)]
 pub struct Noise {
-    /// Within a run, between rows.
+    /// Within a run, between rows, at the pace of the repeats.
     pub within: Autoregression,
+    /// The same at other paces.
+    pub pace: Pace,
     /// Between runs.
     pub between: Smooth,
     /// Standard deviation of a row within a run, mm.
@@ -58,12 +62,18 @@ impl Noise {
     pub fn scaled(&self, ratio: f64) -> Self {
         let mut scaled = self.clone();
         let size = ratio.sqrt();
-        for variance in &mut scaled.within.variances {
-            *variance *= ratio;
-        }
+        scaled.within = scaled.within.scaled(ratio);
+        scaled.pace = scaled.pace.scaled(ratio);
         scaled.row_sigma_mm *= size;
         scaled.reading_sigma_mm *= size;
         scaled
+    }
+
+    /// Within a block, at its pace.
+    pub fn within(&self, run: &Run, block: &Block) -> Autoregression {
+        let row_s = pace::row_s(run, block);
+        let at_pace = row_s.and_then(|row_s| self.pace.at(row_s));
+        at_pace.unwrap_or_else(|| self.within.clone())
     }
 
     /// Standard deviation of a row about the truth, mm.
@@ -78,40 +88,57 @@ const CAUTION: f64 = 0.7;
 const FIELD_MODES: usize = 6;
 /// Fewest rows of differences that say what noise is.
 const FEWEST_ROWS: usize = 6;
+/// Fewest rows that say what it is at a pace of its own.
+const FEWEST_OF_A_PACE: f64 = 60.0;
 
-/// Noise of every channel that was repeated.
-pub fn noise(
-    session: &Session,
-    rows: &Rows,
-    residual: &[f64],
-    config: &GapConfig,
-) -> BTreeMap<Channel, Noise> {
-    repeats::contrasts(session, rows, residual)
+/// A session's readings as rows, with the residual of each reading of each run, mm.
+#[derive(Clone, Copy)]
+pub struct Readings<'r> {
+    /// The session.
+    pub session: &'r Session,
+    /// Its rows.
+    pub rows: &'r Rows,
+    /// By run.
+    pub residual: &'r [Vec<f64>],
+}
+
+/// Noise of every channel that was repeated; `raw` is the residual of each row.
+pub fn noise(readings: Readings<'_>, raw: &[f64], config: &GapConfig) -> BTreeMap<Channel, Noise> {
+    repeats::contrasts(readings.session, readings.rows, raw)
         .into_iter()
         .filter_map(|(channel, groups)| {
-            let found = of_channel(session, rows, &groups, config)?;
+            let found = of_channel(readings, &groups, config)?;
             Some((channel, found))
         })
         .collect()
 }
 
+/// Share of the posterior of a variance within runs below what is used.
+const CAUTION_WITHIN: f64 = 0.9;
+
+/// How much greater a variance that is known from so many rows may well be.
+fn doubt(freedom: f64) -> f64 {
+    let law = ChiSquared::new(freedom.max(1.0)).ok();
+    law.map_or(1.0, |law| {
+        freedom.max(1.0) / law.inverse_cdf(1.0 - CAUTION_WITHIN)
+    })
+}
+
 /// One difference with its modes, before and after the filter.
 struct Difference {
+    /// Duration of a row and time between readings, s, and the variance within a row, mm2; none without a pace.
+    paced: Option<[f64; 3]>,
     values: DVector<f64>,
     kinds: Vec<Mode>,
     modes: DMatrix<f64>,
     open: DMatrix<f64>,
 }
 
-fn of_channel(
-    session: &Session,
-    rows: &Rows,
-    groups: &[Contrasts],
-    config: &GapConfig,
-) -> Option<Noise> {
+fn of_channel(readings: Readings<'_>, groups: &[Contrasts], config: &GapConfig) -> Option<Noise> {
+    let rows = readings.rows;
     let differences: Vec<Difference> = groups
         .iter()
-        .flat_map(|group| differences(session, rows, group))
+        .flat_map(|group| differences(readings, group))
         .collect();
     let modes = |d: &Difference| d.values.len().min(FIELD_MODES);
     let field_freedom = count(differences.iter().map(modes).sum());
@@ -119,10 +146,17 @@ fn of_channel(
     if total < FEWEST_ROWS {
         return None;
     }
-    let (within, freedom) = autoregression(&differences, config.most_ar)?;
+    let all: Vec<&Difference> = differences.iter().collect();
+    let (within, freedom) = autoregression(&all, config.most_ar)?;
+    let pace = Pace::new(&repeated(&differences, config.most_ar));
+    let doubt = doubt(freedom);
+    let (within, pace) = (within.scaled(doubt), pace.scaled(doubt));
     let filtered: Vec<Difference> = differences
         .into_iter()
-        .map(|difference| difference.filtered(&within))
+        .map(|difference| {
+            let at_pace = difference.paced.and_then(|[row_s, ..]| pace.at(row_s));
+            difference.filtered(&at_pace.unwrap_or_else(|| within.clone()))
+        })
         .collect();
     let between = amplitudes(&filtered, within.variances[0].sqrt());
     let places: Vec<usize> = groups
@@ -130,8 +164,8 @@ fn of_channel(
         .flat_map(|group| group.blocks.clone())
         .collect();
     let blocks: Vec<&Block> = places.iter().map(|place| &rows.blocks[*place]).collect();
-    let row_sigma_mm = within.variances[0].sqrt();
-    let within_row = repeats::within_row_variance(&session.runs, &blocks);
+    let row_sigma_mm = (within.variances[0] / doubt).sqrt();
+    let within_row = repeats::within_row_variance(readings.residual, &blocks);
     let repeats = groups
         .iter()
         .map(|group| group.values.len() + 1)
@@ -141,6 +175,7 @@ fn of_channel(
         row_sigma_mm,
         reading_sigma_mm: (row_sigma_mm.powi(2) + within_row).sqrt(),
         within,
+        pace,
         between,
         repeats,
         freedom,
@@ -148,18 +183,60 @@ fn of_channel(
     })
 }
 
-fn differences(session: &Session, rows: &Rows, group: &Contrasts) -> Vec<Difference> {
-    let block = &rows.blocks[group.blocks[0]];
-    let (kinds, modes) = field::modes(&session.runs[block.run], block);
+fn differences(readings: Readings<'_>, group: &Contrasts) -> Vec<Difference> {
+    let block = &readings.rows.blocks[group.blocks[0]];
+    let (kinds, modes) = field::modes(&readings.session.runs[block.run], block);
     let modes = modes.select_rows(&group.rows);
     let open = open_columns(block, group, &kinds, &modes);
+    let paced = paced(readings, group);
     let difference = |values: &Vec<f64>| Difference {
+        paced,
         values: DVector::from_vec(values.clone()),
         kinds: kinds.clone(),
         modes: modes.clone(),
         open: open.clone(),
     };
     group.values.iter().map(difference).collect()
+}
+
+/// Duration of a row and time between readings of a group of repeats, and their variance within a row.
+fn paced(of: Readings<'_>, group: &Contrasts) -> Option<[f64; 3]> {
+    let block = &of.rows.blocks[group.blocks[0]];
+    let row_s = pace::row_s(&of.session.runs[block.run], block)?;
+    let readings: usize = block.rows.iter().map(|row| row.readings.len()).sum();
+    let reading_s = row_s * count(block.rows.len()) / count(readings);
+    let blocks = group.blocks.iter().map(|at| &of.rows.blocks[*at]);
+    let blocks: Vec<&Block> = blocks.collect();
+    let within_row = repeats::within_row_variance(of.residual, &blocks);
+    Some([row_s, reading_s, within_row])
+}
+
+/// What differences show at each pace.
+fn repeated(differences: &[Difference], most: usize) -> Vec<Repeated> {
+    let mut paces = Vec::<(f64, Vec<&Difference>)>::new();
+    for difference in differences {
+        let Some([row_s, ..]) = difference.paced else {
+            continue;
+        };
+        let same = |pace: &&mut (f64, _)| (pace.0 / row_s).ln().abs() < pace::SAME;
+        match paces.iter_mut().find(same) {
+            Some((_, own)) => own.push(difference),
+            None => paces.push((row_s, vec![difference])),
+        }
+    }
+    let of_pace = |(row_s, own): (f64, Vec<&Difference>)| {
+        let (noise, freedom) = autoregression(&own, most)?;
+        let [_, reading_s, within_row] = own.first()?.paced?;
+        (freedom >= FEWEST_OF_A_PACE).then(|| Repeated {
+            row_s,
+            reading_s,
+            autocovariances: autocovariances(&own, most).0,
+            within_row,
+            freedom,
+            noise,
+        })
+    };
+    paces.into_iter().filter_map(of_pace).collect()
 }
 
 /// What floats between the repeats: the offset where zeros differ; centre and radius of a ballbar.
@@ -198,48 +275,96 @@ impl Difference {
         self
     }
 
-    /// What no smooth mode explains.
-    fn rough(&self) -> (DVector<f64>, usize) {
-        if self.values.len() < 3 * self.modes.ncols() {
-            return (self.values.clone(), 0);
+    /// What no smooth mode explains, and the modes that were taken out.
+    fn rough(&self) -> (DVector<f64>, DMatrix<f64>) {
+        let rows = self.values.len();
+        if rows < 3 * self.modes.ncols() {
+            return (self.values.clone(), DMatrix::zeros(rows, 0));
         }
-        let basis = crate::nuisance::orthonormal(
-            self.values.len(),
-            self.modes.column_iter().map(|c| c.into_owned()),
-        );
+        let modes = self.modes.column_iter().map(|c| c.into_owned());
+        let basis = crate::nuisance::orthonormal(rows, modes);
         let rough = &self.values - &basis * basis.tr_mul(&self.values);
-        (rough, basis.ncols())
+        (rough, basis)
     }
 }
 
-/// (2) over all differences, and the rows it is known from.
-fn autoregression(differences: &[Difference], most: usize) -> Option<(Autoregression, f64)> {
-    let mut sums = vec![0.0; most + 1];
-    let mut freedom = 0.0;
-    let mut longest = 0;
-    for difference in differences {
-        let (rough, used) = difference.rough();
-        freedom += count(rough.len() - used);
-        longest = longest.max(rough.len());
-        for (lag, sum) in sums.iter_mut().enumerate().take(rough.len()) {
-            *sum += (lag..rough.len())
-                .map(|t| rough[t] * rough[t - lag])
-                .sum::<f64>();
-        }
-    }
+/// (2) over some differences, and the rows it is known from.
+fn autoregression(differences: &[&Difference], most: usize) -> Option<(Autoregression, f64)> {
+    let (mut sums, freedom) = autocovariances(differences, most);
     if sums[0] <= 0.0 {
         return None;
     }
-    for sum in &mut sums {
-        *sum /= freedom;
-    }
-    if longest < 30 {
+    let longest = differences.iter().map(|d| d.values.len()).max();
+    if longest.unwrap_or(0) < 30 {
         sums.truncate(1);
     }
     let full = Autoregression::levinson(&sums);
     let bic = |order: usize| freedom * full.variances[order].ln() + count(order) * freedom.ln();
     let order = (0..=full.order()).min_by(|a, b| bic(*a).total_cmp(&bic(*b)))?;
     Some((full.up_to(order), freedom))
+}
+
+/// Autocovariances of the noise within runs, and the rows they are known from. The modes that are taken out (Q, P = I -
+/// QQ') take their share of it with them, which makes neighbours look opposed; with G_k one where rows are k apart
+///
+/// ```text
+///   E r'G_k r = sum_j gamma_j <G_k, P G_j P>,   j = 0 .. p                 (4)
+/// ```
+///
+/// Memory beyond p rows is not in it: the field between runs takes what lasts longer.
+fn autocovariances(differences: &[&Difference], most: usize) -> (Vec<f64>, f64) {
+    let lags = most + 1;
+    let mut sums = DVector::<f64>::zeros(lags);
+    let mut shares = DMatrix::<f64>::zeros(lags, lags);
+    let mut freedom = 0.0;
+    for difference in differences {
+        let (rough, basis) = difference.rough();
+        let rows = rough.len();
+        freedom += count(rows - basis.ncols());
+        let moved: Vec<DMatrix<f64>> = (0..lags).map(|lag| neighbours(&basis, lag)).collect();
+        let within: Vec<DMatrix<f64>> = moved.iter().map(|moved| basis.tr_mul(moved)).collect();
+        for k in 0..lags.min(rows) {
+            let products = (k..rows).map(|t| rough[t] * rough[t - k]);
+            sums[k] += products.sum::<f64>() * pairs(k);
+            shares[(k, k)] += count(rows - k) * pairs(k);
+            for j in 0..lags {
+                shares[(k, j)] += within[k].dot(&within[j]) - 2.0 * moved[k].dot(&moved[j]);
+            }
+        }
+    }
+    let found = shares.lu().solve(&sums).filter(|found| found[0] > 0.0);
+    let plain = || {
+        let counted = (0..lags).map(|lag| pairs(lag) * freedom.max(1.0));
+        sums.iter().zip(counted).map(|(sum, n)| sum / n).collect()
+    };
+    let found = found.map_or_else(plain, |found| found.as_slice().to_vec());
+    (found, freedom)
+}
+
+/// How often a pair of rows this far apart is counted in G_k.
+const fn pairs(lag: usize) -> f64 {
+    if lag == 0 { 1.0 } else { 2.0 }
+}
+
+/// G_k Q.
+fn neighbours(basis: &DMatrix<f64>, lag: usize) -> DMatrix<f64> {
+    if lag == 0 {
+        return basis.clone();
+    }
+    let rows = basis.nrows();
+    DMatrix::from_fn(rows, basis.ncols(), |row, column| {
+        let before = if row >= lag {
+            basis[(row - lag, column)]
+        } else {
+            0.0
+        };
+        let after = if row + lag < rows {
+            basis[(row + lag, column)]
+        } else {
+            0.0
+        };
+        before + after
+    })
 }
 
 /// (3) over the grids.
@@ -350,4 +475,48 @@ fn one_likelihood(difference: &Difference, smooth: &Smooth) -> f64 {
         .sum();
     let explained = along.dot(&cholesky.solve(&along));
     -0.5 * log_det - 0.5 * (difference.values.norm_squared() - explained)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_pcg::Pcg64Mcg;
+
+    /// A difference over the angle of a circle with two dozen modes taken out of a hundred rows.
+    fn difference(phi: f64, random: &mut Pcg64Mcg) -> Difference {
+        let rows = 100;
+        let mut last = 0.0;
+        let values = DVector::from_fn(rows, |_, _| {
+            let draw: f64 = StandardNormal.sample(random);
+            last = phi * last + (1.0 - phi * phi).sqrt() * draw;
+            last
+        });
+        let angle = |row: usize| std::f64::consts::TAU * row as f64 / 100.0;
+        Difference {
+            paced: None,
+            values,
+            kinds: vec![],
+            modes: DMatrix::from_fn(rows, 25, |row, k| {
+                let turn = if k % 2 == 0 { 0.0 } else { 0.25 };
+                (angle(row) * count(k.div_ceil(2)) - std::f64::consts::TAU * turn).cos()
+            }),
+            open: DMatrix::zeros(rows, 0),
+        }
+    }
+
+    #[test]
+    fn eq4_modes_that_are_taken_out_do_not_colour_the_noise() {
+        let mut random = Pcg64Mcg::seed_from_u64(7);
+        for phi in [0.0, 0.2, 0.35] {
+            let all: Vec<Difference> = (0..400).map(|_| difference(phi, &mut random)).collect();
+            let all: Vec<&Difference> = all.iter().collect();
+            let (found, freedom) = autocovariances(&all, 3);
+            assert!((freedom - 400.0 * 75.0).abs() < 1.0, "{freedom}");
+            for (lag, wanted) in [1.0, phi, phi * phi].into_iter().enumerate() {
+                assert!((found[lag] - wanted).abs() < 0.08, "{phi} {lag}: {found:?}");
+            }
+        }
+    }
 }

@@ -40,6 +40,7 @@ use crate::figures::Isolability;
 use crate::form_error::FormError;
 use crate::isolability::{self, isolability};
 use crate::noise::Noise;
+use crate::pace::Pace;
 use crate::repeats;
 use crate::report::NotExcited;
 use crate::rows::{Rows, count};
@@ -218,6 +219,7 @@ fn assumed(rows: &Rows, floors: &Floors) -> BTreeMap<Channel, Noise> {
         let third = between / 3.0_f64.sqrt();
         let _ = noise.entry(block.channel.clone()).or_insert(Noise {
             within: Autoregression::white(row_sigma_mm.powi(2)),
+            pace: Pace::default(),
             between: Smooth {
                 place_mm: third,
                 length_rad: 0.5,

@@ -229,17 +229,18 @@ fn touches_between(run: &Run, place: usize, block: &Block, residual: &[f64]) -> 
         .collect()
 }
 
-/// Mean variance of the readings within a row about their mean, mm2; the middle one over all rows.
-pub fn within_row_variance(runs: &[Run], blocks: &[&Block]) -> f64 {
-    let of_row = |run: &Run, row: &Row| {
+/// Mean variance of the readings within a row about their mean, mm2; the middle one over all rows. `residual` is that
+/// of each reading of each run: what the machine is known to do within a row is no noise.
+pub fn within_row_variance(residual: &[Vec<f64>], blocks: &[&Block]) -> f64 {
+    let of_row = |run: usize, row: &Row| {
         let n = count(row.readings.len());
-        let values = || row.readings.iter().map(|k| run.readings[*k].deviation);
+        let values = || row.readings.iter().map(|k| residual[run][*k]);
         let mean = values().sum::<f64>() / n;
         values().map(|v| (v - mean).powi(2)).sum::<f64>() / n
     };
     let mut all: Vec<f64> = blocks
         .iter()
-        .flat_map(|block| block.rows.iter().map(|row| of_row(&runs[block.run], row)))
+        .flat_map(|block| block.rows.iter().map(|row| of_row(block.run, row)))
         .collect();
     if all.is_empty() {
         return 0.0;

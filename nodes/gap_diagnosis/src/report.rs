@@ -190,6 +190,8 @@ pub struct ParameterValue {
     pub high: f64,
     /// Whether it rails at its physical bound.
     pub at_bound: bool,
+    /// Whether the recording tells more of it than its physical range does.
+    pub determined: bool,
 }
 
 /// Something that looks like a cause.

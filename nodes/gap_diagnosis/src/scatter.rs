@@ -275,8 +275,9 @@ fn rough(scope: &Scope<'_, '_>, left: &DVector<f64>) -> DVector<f64> {
     let stack = scope.stack;
     let mut squares = left.map(|z| z * z);
     for block in &stack.rows.blocks {
-        let filter = &scope.noise[&block.channel].within;
-        let (_, mut modes) = field::modes(&stack.session.runs[block.run], block);
+        let run = &stack.session.runs[block.run];
+        let filter = scope.noise[&block.channel].within(run, block);
+        let (_, mut modes) = field::modes(run, block);
         for mut column in modes.column_iter_mut() {
             filter.filter(column.as_mut_slice());
         }
@@ -331,7 +332,8 @@ fn levels(scope: &Scope<'_, '_>) -> DMatrix<f64> {
 
 /// (2) of the rows of a block.
 fn passed(scope: &Scope<'_, '_>, block: &Block, variances: &[f64]) -> Vec<f64> {
-    let filter = &scope.noise[&block.channel].within;
+    let run = &scope.stack.session.runs[block.run];
+    let filter = scope.noise[&block.channel].within(run, block);
     let of_row = |t: usize| {
         let used = filter.order().min(t);
         let before = filter.coefficients[used].iter().enumerate();
@@ -393,6 +395,7 @@ impl Judge<'_, '_, '_> {
         let left = parts
             .iter()
             .fold(self.squares.y.clone(), |left, part| left - part);
+        let instances = forms.iter().map(|form| form.instance).collect();
         let mut first = 0;
         for (place, form) in forms.iter().enumerate() {
             let own = first..first + form.columns.len();
@@ -422,7 +425,7 @@ impl Judge<'_, '_, '_> {
                 confusable_with: cause::confusable(
                     self.signatures,
                     self.normal,
-                    &rivals,
+                    &rivals.instead_of(&instances, form.instance),
                     set[place],
                     &self.one_of_each(set),
                 ),
@@ -576,11 +579,13 @@ fn sized(
         let by = 1.96 * fit.doubts[k];
         let value = amplitude(fit.sizes[k]).min(parameter.high);
         values[*place] = value;
+        let (low, high) = (amplitude(fit.sizes[k] - by), amplitude(fit.sizes[k] + by));
         listed.push(ParameterValue {
             name: parameter.name.to_owned(),
             value,
-            low: amplitude(fit.sizes[k] - by),
-            high: amplitude(fit.sizes[k] + by),
+            low,
+            high,
+            determined: high - low < parameter.high - parameter.low,
             at_bound: fit.sizes[k] >= 1.0 || fit.sizes[k] <= 0.0,
         });
     }

@@ -10,7 +10,8 @@
 //! ```
 //!
 //! Parameters that shape the response are tried over their grids. The wide form has the free amplitudes of
-//! the catalogue as further columns: it keeps the name and widens the form.
+//! the catalogue as further columns: it keeps the name and widens the form. A form may also have some of the
+//! amplitudes only, and pays for these.
 //!
 //! # Holds when
 //! The response is proportional to each amplitude; the joint refit checks it and corrects where it is not.
@@ -112,8 +113,14 @@ impl Library {
         signatures
     }
 
-    /// Adds one form; a form that stays below [`LEAST_D`] at its greatest size has no columns.
-    pub fn add(&mut self, stack: &Stack<'_>, instance: usize, values: Vec<f64>, wide: bool) {
+    /// Adds one form and says its place; a form that stays below [`LEAST_D`] at its greatest size is left out.
+    pub fn add(
+        &mut self,
+        stack: &Stack<'_>,
+        instance: usize,
+        values: Vec<f64>,
+        wide: bool,
+    ) -> Option<usize> {
         let kind = self.instances[instance].kind;
         let parameters = || kind.parameters.iter().chain(kind.free).enumerate();
         let shown = if wide {
@@ -130,7 +137,8 @@ impl Library {
             }
             let mut on = values.clone();
             on[place] = parameter.typical;
-            let column = stack.signature(&*self.instances[instance].effect(&on));
+            let own = &self.instances[instance];
+            let column = stack.signature_of(&own.name(), &on, &*own.effect(&on));
             let most = parameter.low.abs().max(parameter.high.abs()) / parameter.typical;
             let size = column.norm();
             if !size.is_finite() || size * most < 1e-3 {
@@ -141,7 +149,7 @@ impl Library {
             columns.push(column);
         }
         if greatest < LEAST_D {
-            return;
+            return None;
         }
         self.excited[instance] = true;
         let choices = kind
@@ -157,6 +165,21 @@ impl Library {
             wide,
         });
         self.columns.extend(columns);
+        Some(self.forms.len() - 1)
+    }
+
+    /// Adds a form with some of another one's amplitudes (places in its list): the others are zero and not paid for.
+    pub fn add_part(&mut self, whole: usize, wanted: &[usize]) -> usize {
+        let form = &self.forms[whole];
+        let choices = form.price - form.amplitudes.len();
+        let part = Form {
+            amplitudes: wanted.iter().map(|k| form.amplitudes[*k]).collect(),
+            columns: wanted.iter().map(|k| form.columns[*k]).collect(),
+            price: wanted.len() + choices,
+            ..form.clone()
+        };
+        self.forms.push(part);
+        self.forms.len() - 1
     }
 
     /// Number of instances that could be seen.

@@ -9,7 +9,9 @@
 //!
 //! Responses of effects add up, so the signature of one is what the twin predicts for it alone.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use machine::effects::Effect;
 use machine::twin::{Channel, Session, Twin};
@@ -20,6 +22,9 @@ use crate::noise::Noise;
 use crate::nuisance::Nuisance;
 use crate::rows::{Block, Rows, count};
 use crate::whitener::Whitener;
+
+/// What the twin predicted for the rows of some runs, by effect and the bits of its values.
+pub type Simulated = Rc<RefCell<BTreeMap<(String, Vec<u64>), Rc<[f64]>>>>;
 
 /// The rows of some runs with their noise.
 pub struct Stack<'a> {
@@ -39,6 +44,8 @@ pub struct Stack<'a> {
     weight: Option<DVector<f64>>,
     nuisance: Nuisance,
     unweighted: Nuisance,
+    /// Predictions that stacks of the same runs share; none are kept where they are not shared.
+    simulated: Option<Simulated>,
 }
 
 impl<'a> Stack<'a> {
@@ -57,7 +64,8 @@ impl<'a> Stack<'a> {
         });
         let of = |block: &Block| {
             let noise = &noise[&block.channel];
-            (&noise.within, &noise.between)
+            let within = noise.within(&session.runs[block.run], block);
+            (within, &noise.between)
         };
         let whitener = Whitener::new(session, &rows, of, form);
         let nuisance = Nuisance::new(session, &rows, |column| whitener.apply(column));
@@ -77,6 +85,7 @@ impl<'a> Stack<'a> {
             weight: None,
             nuisance,
             unweighted,
+            simulated: None,
         };
         stack.z = stack.whitened(raw.clone());
         stack.raw = raw;
@@ -99,6 +108,7 @@ impl<'a> Stack<'a> {
             weight: Some(weight),
             nuisance,
             unweighted: self.unweighted.clone(),
+            simulated: self.simulated.clone(),
             ..*self
         };
         weighed.z = weighed.whitened(weighed.raw.clone());
@@ -120,6 +130,32 @@ impl<'a> Stack<'a> {
     /// Signature (2) of one effect.
     pub fn signature(&self, effect: &dyn Effect) -> DVector<f64> {
         self.whitened(self.simulate(&[effect]))
+    }
+
+    /// The same stack, that keeps what it simulates where others of the same runs find it.
+    pub fn sharing(self, simulated: &Simulated) -> Self {
+        Self {
+            simulated: Some(Rc::clone(simulated)),
+            ..self
+        }
+    }
+
+    /// Signature (2) of the effect of a name at some values, which may be known from another stack of these runs.
+    pub fn signature_of(&self, name: &str, values: &[f64], effect: &dyn Effect) -> DVector<f64> {
+        let Some(simulated) = &self.simulated else {
+            return self.signature(effect);
+        };
+        let key = (
+            name.to_owned(),
+            values.iter().map(|value| value.to_bits()).collect(),
+        );
+        let known = simulated.borrow().get(&key).cloned();
+        let rows = known.unwrap_or_else(|| {
+            let rows: Rc<[f64]> = self.simulate(&[effect]).into();
+            simulated.borrow_mut().insert(key, Rc::clone(&rows));
+            rows
+        });
+        self.whitened(rows.to_vec())
     }
 
     /// P W of a stack.

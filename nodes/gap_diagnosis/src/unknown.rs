@@ -156,13 +156,13 @@ fn describe(
     }
 }
 
-/// The parity whose families stand out more.
+/// The parity whose families explain more beyond noise: of shares nothing can be said where the noise is taken with
+/// caution, and two families of one parity may share all of it.
 fn parity(slots: &[Slot], scores: &[Score]) -> &'static str {
     let best = |wanted: Parity| {
-        let own = scores
-            .iter()
-            .filter(|s| slots[s.slot].families[s.family].parity == wanted);
-        own.map(|score| score.unique + 1e-6 * score.z.max(0.0))
+        let family = |score: &Score| &slots[score.slot].families[score.family];
+        let own = scores.iter().filter(|score| family(score).parity == wanted);
+        own.map(|score| score.square - count(family(score).columns.len()))
             .fold(0.0, f64::max)
     };
     let (odd, even) = (best(Parity::Odd), best(Parity::Even));

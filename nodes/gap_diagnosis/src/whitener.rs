@@ -87,6 +87,15 @@ impl Autoregression {
         Self::levinson(&all)
     }
 
+    /// The same noise with another variance.
+    pub fn scaled(&self, ratio: f64) -> Self {
+        let mut scaled = self.clone();
+        for variance in &mut scaled.variances {
+            *variance *= ratio;
+        }
+        scaled
+    }
+
     /// Keeps the orders up to one.
     pub fn up_to(mut self, order: usize) -> Self {
         self.coefficients.truncate(order + 1);
@@ -136,7 +145,7 @@ impl Whitener {
     pub fn new<'n>(
         session: &Session,
         rows: &Rows,
-        noise: impl Fn(&Block) -> (&'n Autoregression, &'n Smooth),
+        noise: impl Fn(&Block) -> (Autoregression, &'n Smooth),
         form: &FormError,
     ) -> Self {
         let sharing = form_error::sharing(session, rows);
@@ -148,7 +157,7 @@ impl Whitener {
             let (kinds, mut columns) = field::modes(run, block);
             let is_touch = block.channel == Channel::Touch;
             let (filter, form_field) = if is_touch {
-                (within.clone(), Smooth::default())
+                (within, Smooth::default())
             } else {
                 (
                     within.with_white((form_error::ROUGH * size).powi(2), WHITE_ORDER),

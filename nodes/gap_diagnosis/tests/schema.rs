@@ -15,7 +15,7 @@ const FULL: &str = r#"{
 "where": [{"channel": "grid.u", "direction": "X", "covariate": "", "share_unique": 0.6, "share_shared": 0.1, "p_value": 0.001,
   "z": 19.0, "per_condition": [{"condition": "", "rms_um": 1.0}]}],
 "causes": [{"effect": "backlash", "axis": "X", "status": "set", "confidence": 0.97,
-  "parameters": [{"name": "width_um", "value": 5.9, "low": 5.6, "high": 6.2, "at_bound": false}], "D": 88.0,
+  "parameters": [{"name": "width_um", "value": 5.9, "low": 5.6, "high": 6.2, "at_bound": false, "determined": true}], "D": 88.0,
   "confusable_with": [{"effect": "", "axis": "", "cos": 0.6, "excluded": true}],
   "constancy": {"passed": true, "worst_z": 1.2, "split_by": "feed"}}],
 "unknown": {"flagged": false, "score": 1.4, "threshold": 3.1,

@@ -1,33 +1,36 @@
-//! What the maker of a machine has measured of its loops: how each motor follows its command.
+//! What the maker of a machine has measured of its loops: how much later each velocity loop sees its motion.
 //!
 //! # Model
 //!
 //! The programme is run once on the machine as it left the works, and the following error of every motor fitted by
 //!
 //! ```text
-//!   e = -L (v - a/K + j/K^2) - T v - c a - d j,   L = (1 - f) / K                         (1)
+//!   e = -L (v - a/K + j/K^2) - j/(w^2 K) + p v + q a + s j,   L = (1 - f) / K             (1)
+//!   t = q K                                                                              (2)
 //! ```
 //!
-//! The first bracket is the position loop alone, which gains and feed-forward of the machine file give; T, c and d are
-//! what velocity loop and sampling add. They go into the machine file's list of known effects.
+//! What stands before p is what gains, feed-forward and velocity loop of the machine file leave without a filter. The
+//! filter's time t, into which sampling goes as well, takes q and is written into the machine file; p and s are next to
+//! nothing.
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | e | motor less command | mm |
 //! | v, a, j | command's velocity, acceleration, jerk, from differences of the recording | mm/s, mm/s², mm/s³ |
 //! | K, f | gain and feed-forward of the machine file | 1/s, 1 |
+//! | w | natural frequency of its velocity loop | rad/s |
 //!
 //! # Holds when
 //! The recording is even and fast against the motion: only ticks one period of the full rate apart are used, and of
 //! those the ones on circles, since starts and stops excite what (1) has not.
 //!
 //! # Agreement
-//! `eq1_coefficients_are_found_again`: 1e-3 relative, on a made-up loop.
+//! `eq2_the_filter_of_a_made_up_loop_is_found_again`: 1e-3 relative.
 
-use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 use machine::MachineFile;
-use machine::file::EffectEntry;
+use machine::file::AxisEntry;
 use metrology::sample::{AxisState, TestKind};
 use metrology::stamp::Span;
 use metrology::{Axis, PerAxis};
@@ -46,8 +49,8 @@ pub(crate) struct Commissioning {
     is_circle: bool,
     normal: PerAxis<Matrix3<f64>>,
     right: PerAxis<Vector3<f64>>,
-    /// L and K of each axis.
-    known: PerAxis<[f64; 2]>,
+    /// L, K and 1/w2 of each axis.
+    known: PerAxis<[f64; 3]>,
 }
 
 impl Commissioning {
@@ -60,9 +63,11 @@ impl Commissioning {
             normal: PerAxis::default(),
             right: PerAxis::default(),
             known: PerAxis::from_fn(|axis| {
-                machine.linear(axis).map_or([0.0, 1.0], |entry| {
+                machine.linear(axis).map_or([0.0, 1.0, 0.0], |entry| {
                     let gain = entry.position_gain_per_s;
-                    [(1.0 - entry.velocity_feedforward) / gain, gain]
+                    let inner = entry.velocity_loop.as_ref();
+                    let soft = inner.map_or(0.0, |inner| (TAU * inner.frequency_hz).powi(-2));
+                    [(1.0 - entry.velocity_feedforward) / gain, gain, soft]
                 })
             }),
         }
@@ -101,8 +106,9 @@ impl Commissioning {
                 let velocity = (r[3] - r[1]) / (2.0 * h);
                 let acceleration = (r[3] - 2.0 * r[2] + r[1]) / (h * h);
                 let jerk = (r[4] - 2.0 * r[3] + 2.0 * r[1] - r[0]) / (2.0 * h * h * h);
-                let [lag_s, gain] = self.known[axis];
-                let nominal = -lag_s * (velocity - acceleration / gain + jerk / (gain * gain));
+                let [lag_s, gain, soft] = self.known[axis];
+                let nominal = -lag_s * (velocity - acceleration / gain + jerk / (gain * gain))
+                    - soft / gain * jerk;
                 let error = middle.motor[axis] - middle.commanded[axis] - nominal;
                 let row = Vector3::new(velocity, acceleration, jerk);
                 self.normal[axis] += row * row.transpose();
@@ -111,54 +117,55 @@ impl Commissioning {
         }
     }
 
-    /// T, c and d of every axis as entries of a machine file.
-    pub(crate) fn entries(&self) -> Vec<EffectEntry> {
-        let of = |axis: Axis| {
-            let scale = self.normal[axis]
-                .diagonal()
-                .map(|size| size.max(1e-30).sqrt());
-            let even = Matrix3::from_fn(|i, k| self.normal[axis][(i, k)] / (scale[i] * scale[k]));
-            let right = self.right[axis].component_div(&scale);
-            let found = even.cholesky()?.solve(&right).component_div(&scale);
-            let entry = |kind: &str, values: &[(&str, f64)]| EffectEntry {
-                kind: kind.to_owned(),
-                axis: Some(axis.letter().to_owned()),
-                parameters: values
-                    .iter()
-                    .map(|(name, value)| ((*name).to_owned(), *value))
-                    .collect::<BTreeMap<_, _>>(),
+    /// Writes (2) into the machine file.
+    pub(crate) fn tune(&self, machine: &mut MachineFile) {
+        for axis in Axis::LINEAR {
+            let Some(AxisEntry::Linear(entry)) = machine.axes.get_mut(&axis) else {
+                continue;
             };
-            let [lag, squared, cubed] = [-found[0] * 1e3, -found[1] * 1e6, -found[2] * 1e9];
-            Some([
-                entry("servo_lag", &[("time_ms", lag)]),
-                entry(
-                    "acceleration_lag",
-                    &[
-                        ("time_squared_ms2", squared),
-                        ("free_time_cubed_ms3", cubed),
-                    ],
-                ),
-            ])
-        };
-        Axis::LINEAR.into_iter().filter_map(of).flatten().collect()
+            if let (Some(inner), Some(filter_s)) = (&mut entry.velocity_loop, self.filter_s(axis)) {
+                inner.filter_ms = filter_s * 1e3;
+            }
+        }
+    }
+
+    /// (2), where it is a delay.
+    fn filter_s(&self, axis: Axis) -> Option<f64> {
+        let scale = self.normal[axis]
+            .diagonal()
+            .map(|size| size.max(1e-30).sqrt());
+        let even = Matrix3::from_fn(|i, k| self.normal[axis][(i, k)] / (scale[i] * scale[k]));
+        let right = self.right[axis].component_div(&scale);
+        let found = even.cholesky()?.solve(&right).component_div(&scale);
+        let filter_s = found[1] * self.known[axis][1];
+        (filter_s > 0.0).then_some(filter_s)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use machine::file::VelocityLoopEntry;
     use metrology::AxisSet;
     use metrology::stamp::Stamp;
 
     use super::*;
 
     #[test]
-    fn eq1_coefficients_are_found_again() {
+    fn eq2_the_filter_of_a_made_up_loop_is_found_again() {
         let text = include_str!("../data/machine.yaml");
-        let machine = MachineFile::parse(text, "data/machine.yaml").unwrap();
+        let mut machine = MachineFile::parse(text, "data/machine.yaml").unwrap();
+        let (frequency_hz, filter_s) = (35.0, 2.3e-4);
+        if let Some(AxisEntry::Linear(entry)) = machine.axes.get_mut(&Axis::X) {
+            entry.velocity_loop = Some(VelocityLoopEntry {
+                frequency_hz,
+                damping: 1.1,
+                filter_ms: 0.0,
+            });
+        }
         let entry = machine.linear(Axis::X).unwrap();
         let gain = entry.position_gain_per_s;
         let lag_s = (1.0 - entry.velocity_feedforward) / gain;
-        let (time_s, squared_s2, cubed_s3) = (2e-5, -5e-6, 3e-7);
+        let soft = (TAU * frequency_hz).powi(-2) / gain;
         let mut commissioning = Commissioning::new(&machine, 250.0);
         for tick in 0..3000_i64 {
             let t = tick as f64 * 0.004;
@@ -174,7 +181,7 @@ mod tests {
             let (slow, fast) = (wave(60.0, 0.9), wave(4.0, 6.0));
             let [r, v, a, j] = [0, 1, 2, 3].map(|k| slow[k] + fast[k]);
             let nominal = -lag_s * (v - a / gain + j / (gain * gain));
-            let error = nominal - time_s * v - squared_s2 * a - cubed_s3 * j;
+            let error = nominal - soft * j + filter_s / gain * a;
             let commanded = PerAxis::from_fn(|axis| if axis == Axis::X { r } else { 0.0 });
             commissioning.tick(&AxisState {
                 received_at: Stamp::from_nanos(tick * 4_000_000),
@@ -188,15 +195,9 @@ mod tests {
                 velocity: PerAxis::default(),
             });
         }
-        let entries = commissioning.entries();
-        let of = |kind: &str, name: &str| {
-            let own = entries
-                .iter()
-                .find(|e| e.kind == kind && e.axis.as_deref() == Some("X"));
-            own.unwrap().parameters[name]
-        };
-        assert!((of("servo_lag", "time_ms") / 0.02 - 1.0).abs() < 1e-3);
-        assert!((of("acceleration_lag", "time_squared_ms2") / -5.0 - 1.0).abs() < 1e-3);
-        assert!((of("acceleration_lag", "free_time_cubed_ms3") / 300.0 - 1.0).abs() < 1e-2);
+        commissioning.tune(&mut machine);
+        let found = machine.linear(Axis::X).unwrap().velocity_loop.unwrap();
+        let ratio = found.filter_ms / (filter_s * 1e3);
+        assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
     }
 }

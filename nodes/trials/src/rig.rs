@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use fake_cnc::PlantFile;
 use fake_cnc::config::Config as ControlConfig;
 use machine::MachineFile;
-use machine::file::{AxisEntry, EffectEntry, LinearAxisEntry};
+use machine::file::{AxisEntry, EffectEntry, LinearAxisEntry, VelocityLoopEntry};
 use metrology::Axis;
 use nalgebra::Vector3;
 use rand::Rng;
@@ -80,16 +80,24 @@ impl Rig {
             factor: random.random_range(1.3..2.0),
             ar: 0.9,
         });
+        let plan = plan(random, &machine, &conditions)?;
+        let config = ControlConfig {
+            state_rate_hz: STATE_RATE_HZ,
+            background_rate_hz: BACKGROUND_RATE_HZ,
+            velocity_gain_per_s: random.random_range(450.0..650.0),
+            start_mm: BTreeMap::from([(Axis::Z, 240.0)]),
+            ..ControlConfig::default()
+        };
+        for axis in Axis::LINEAR {
+            if let Some(entry) = linear(&mut machine, axis) {
+                entry.velocity_loop = Some(velocity_loop(&config));
+            }
+        }
+        machine.check("drawn machine")?;
         Ok(Self {
-            plan: plan(random, &machine, &conditions)?,
+            plan,
             control: machine.clone(),
-            config: ControlConfig {
-                state_rate_hz: STATE_RATE_HZ,
-                background_rate_hz: BACKGROUND_RATE_HZ,
-                velocity_gain_per_s: random.random_range(450.0..650.0),
-                start_mm: BTreeMap::from([(Axis::Z, 240.0)]),
-                ..ControlConfig::default()
-            },
+            config,
             scatter: scatter(random, heavier),
             machine,
             plant,
@@ -180,6 +188,17 @@ fn drive(random: &mut Pcg64Mcg, axis: Axis, machine: &mut MachineFile, plant: &m
     if let Some(drive) = plant.linear_drives.get_mut(&axis) {
         drive.slide_mass_kg *= random.random_range(0.7..1.3);
         drive.screw_stiffness_n_per_um = [random.random_range(350.0..500.0); 2];
+    }
+}
+
+/// A velocity loop as its maker's data sheet tells it, from gain and integral time; its filter is for `commissioning`.
+fn velocity_loop(config: &ControlConfig) -> VelocityLoopEntry {
+    let gain_per_s = config.velocity_gain_per_s;
+    let frequency_rad_s = (gain_per_s / config.velocity_integral_time_s).sqrt();
+    VelocityLoopEntry {
+        frequency_hz: frequency_rad_s / TAU,
+        damping: 0.5 * gain_per_s / frequency_rad_s,
+        filter_ms: 0.0,
     }
 }
 

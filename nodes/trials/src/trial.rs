@@ -183,7 +183,7 @@ fn commissioned(rig: &mut Rig) -> Result<Deviations, TrialError> {
         commissioning.take(&sample);
         deviations.take(at, &sample);
     })?;
-    rig.machine.effects.extend(commissioning.entries());
+    commissioning.tune(&mut rig.machine);
     Ok(deviations)
 }
 

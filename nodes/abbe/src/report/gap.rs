@@ -177,18 +177,26 @@ fn causes(report: &GapReport) -> Section {
     section
 }
 
+/// What is said of a parameter of which the recording tells nothing.
+const NOT_DETERMINED: &str = "not determined by these runs";
+
 /// Parameters, one a row.
 fn sizes(report: &GapReport) -> Rows {
     let of_cause = |cause: &Cause| -> Vec<Vec<String>> {
         let title = name(&cause.effect, &cause.axis);
         let row = |p: &gap_diagnosis::report::ParameterValue| {
+            let remark = match (p.determined, p.at_bound) {
+                (false, _) => NOT_DETERMINED,
+                (true, true) => "at its bound",
+                (true, false) => "",
+            };
             vec![
                 title.clone(),
                 p.name.clone(),
                 three(p.value),
                 three(p.low),
                 three(p.high),
-                if p.at_bound { "at its bound" } else { "" }.to_owned(),
+                remark.to_owned(),
             ]
         };
         let shown = cause.parameters.iter();
@@ -220,6 +228,9 @@ fn status(status: Status) -> &'static str {
 
 fn values(cause: &Cause) -> String {
     let value = |p: &gap_diagnosis::report::ParameterValue| {
+        if !p.determined {
+            return format!("{} {NOT_DETERMINED}", p.name);
+        }
         let bound = if p.at_bound { ", at its bound" } else { "" };
         format!(
             "{} = {} ({} to {}{bound})",

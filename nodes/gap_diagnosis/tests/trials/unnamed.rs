@@ -30,7 +30,9 @@ fn an_error_of_no_class_is_flagged() {
     let diagnosis = diagnosed(&session(12, Noise::default(), &wrong));
     assert!(diagnosis.report.unknown.flagged);
     assert!(names(&diagnosis).is_empty());
-    assert_eq!(diagnosis.report.unknown.description.parity, "odd");
+    let description = &diagnosis.report.unknown.description;
+    let places = &diagnosis.report.r#where;
+    assert_eq!(description.parity, "odd", "{description:?} {places:#?}");
 }
 
 #[test]

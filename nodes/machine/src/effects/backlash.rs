@@ -21,7 +21,7 @@
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | b | `width_um` | µm |
-//! | f_k | `free_0p03mm_um` .. `free_3mm_um` | µm |
+//! | f_k | `free_0p01mm_um` .. `free_3mm_um` | µm |
 //! | s | `since_reversal` | mm |
 //!
 //! # Holds when
@@ -48,6 +48,7 @@ pub static KIND: Kind = Kind {
     targets: Targets::LinearAxes,
     parameters: &[Parameter::amplitude("width_um", 30.0, 4.0)],
     free: &[
+        Parameter::amplitude("free_0p01mm_um", 30.0, 1.0),
         Parameter::amplitude("free_0p03mm_um", 30.0, 1.0),
         Parameter::amplitude("free_0p1mm_um", 30.0, 1.0),
         Parameter::amplitude("free_0p3mm_um", 30.0, 1.0),
@@ -60,7 +61,7 @@ pub static KIND: Kind = Kind {
 };
 
 /// Nearer to the reversal the wider form stays at its first hat's height, as presliding begins there.
-const FIRST_HAT_MM: f64 = 0.031_622_776_601_683_79;
+const FIRST_HAT_MM: f64 = 0.01;
 
 struct Backlash {
     axis: Axis,

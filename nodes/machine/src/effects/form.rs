@@ -23,11 +23,11 @@ pub(super) fn hats(first: f64, spacing: f64, heights: &[f64], at: f64) -> f64 {
 }
 
 /// Number of hats over the way since a reversal.
-pub(super) const WAY_HATS: usize = 5;
+pub(super) const WAY_HATS: usize = 6;
 
-/// Hats over the decimal logarithm of the way since a reversal, at 0.03, 0.1, 0.3, 1 and 3 mm.
+/// Hats over the decimal logarithm of the way since a reversal, at 0.01, 0.03, 0.1, 0.3, 1 and 3 mm.
 pub(super) fn way_hats(heights: &[f64; WAY_HATS], way_mm: f64) -> f64 {
-    hats(-1.5, 0.5, heights, way_mm.max(1e-9).log10())
+    hats(-2.0, 0.5, heights, way_mm.max(1e-9).log10())
 }
 
 /// Sum of Legendre polynomials of the orders `first`, `first + 1`, ... at x.

@@ -84,6 +84,7 @@ fn val_the_wider_form_takes_presliding_friction() {
     };
     let names = [
         "width_um",
+        "free_0p01mm_um",
         "free_0p03mm_um",
         "free_0p1mm_um",
         "free_0p3mm_um",

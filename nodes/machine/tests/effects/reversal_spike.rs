@@ -89,6 +89,7 @@ fn val_lugre_friction_under_a_cascaded_loop() {
     columns.extend(
         [
             "free_at_100mm_s2_um",
+            "free_0p01mm_um",
             "free_0p03mm_um",
             "free_0p1mm_um",
             "free_0p3mm_um",
