@@ -37,11 +37,13 @@
 //! `eq1_is_the_line_through_both_blocks`: below 1e-15 mm. `eq3_grows_with_distance_from_the_blocks`:
 //! factors 0.71, 1, 1.58, 2.24 and 3.61 at λ = 0.5, 1, 1.5, 2 and 3.
 
+mod at_once;
 mod growth;
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use at_once::at_once;
 pub use growth::relaxed_s;
 use growth::{Relaxed, growth_mm};
 
@@ -131,6 +133,9 @@ pub fn drift_at(
         return [Err(refusal); 3];
     }
     let mut relaxed = Relaxed::since((at - model.at).as_secs_f64());
+    if let Some(all) = at_once(model, point_mm, policy, &mut relaxed) {
+        return all;
+    }
     Axis::LINEAR.map(|axis| evaluated(model, axis, point_mm, policy, &mut relaxed))
 }
 
@@ -185,16 +190,26 @@ fn evaluated(
     relaxed: &mut Relaxed,
 ) -> Result<f64, DriftRefusal> {
     let (drift, levers) = levers(model, axis, point_mm, policy)?;
-    let lever_mm = levers.inside_mm;
+    valued(drift, axis, &levers.inside_mm, relaxed)
+}
+
+/// (1) with its levers.
+#[inline]
+fn valued(
+    drift: &AxisDrift,
+    axis: Axis,
+    lever_mm: &Vector3<f64>,
+    relaxed: &mut Relaxed,
+) -> Result<f64, DriftRefusal> {
     let mut gradient = drift.cross_slope_mm_per_mm;
     gradient[axis.index()] = drift.slope_mm_per_mm;
     let growth_mm: f64 = drift
         .growth
         .iter()
         .flatten()
-        .map(|growth| growth_mm(growth, &lever_mm, relaxed))
+        .map(|growth| growth_mm(growth, lever_mm, relaxed))
         .sum();
-    let drift_mm = drift.k0_mm + gradient.dot(&lever_mm) + growth_mm;
+    let drift_mm = drift.k0_mm + gradient.dot(lever_mm) + growth_mm;
     if drift_mm.is_finite() {
         Ok(drift_mm)
     } else {

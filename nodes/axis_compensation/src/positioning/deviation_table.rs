@@ -131,6 +131,7 @@ impl DeviationTable {
         self.positions_fm.get(point).copied()
     }
 
+    #[inline]
     fn deviations_fm(&self, direction: Direction) -> &[i64] {
         match direction {
             Direction::Up => &self.up_fm,
@@ -181,6 +182,7 @@ impl DeviationTable {
             .map_or(0.0, |line| line.slope)
     }
 
+    #[inline]
     fn line(&self, cell: usize, direction: Direction) -> Option<Line> {
         Some(Line {
             x_fm: *self.positions_fm.get(cell)?,
@@ -300,6 +302,7 @@ struct Line {
 }
 
 impl Line {
+    #[inline]
     fn at(&self, position_fm: i64) -> i64 {
         // Up to 2e13 fm inside the cell and 1e13 fm of deviation: the product is exact to a few
         // hundredths of a femtometre, so the cell's end gets its own deviation back.

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use crate::sample::DriftGrowth;
 
 /// What one growth has added to the drift since the model was fitted, mm: the sum's term of (1).
+#[inline]
 pub(super) fn growth_mm(
     growth: &DriftGrowth,
     lever_mm: &Vector3<f64>,
