@@ -16,6 +16,7 @@ mod evaluate;
 mod evidence;
 mod export;
 mod import;
+mod install_ros;
 mod launch;
 mod node;
 mod preflight;
@@ -58,6 +59,8 @@ enum Verb {
     Export(export::Export),
     /// Run one node on the ROS graph, with the arguments of any ROS 2 node.
     Node(node::NodeVerb),
+    /// Install the nodes and scenarios as a ROS 2 package, for `ros2 run` and `ros2 launch`.
+    InstallRos(install_ros::InstallRos),
 }
 
 fn main() -> ExitCode {
@@ -72,6 +75,7 @@ fn main() -> ExitCode {
         Verb::Import(import) => import.execute(),
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => return node.execute(),
+        Verb::InstallRos(install) => install.execute(),
     };
     outcome.unwrap_or_else(|error| {
         eprintln!("abbe: {}", complaint::in_words(&error));
