@@ -15,7 +15,7 @@ use super::board::Board;
 use super::incoming::{QUEUE_LEN, Readers};
 use super::logger_levels::LoggerService;
 use super::owner::{
-    ActionEnd, ClientUse, Owner, Publication, ServerUse, Subscription, Timers, UsedAction,
+    ActionEnd, ClientUse, Hearing, Owner, Publication, ServerUse, Subscription, Timers, UsedAction,
 };
 use super::parameters::ParameterService;
 use super::service::{Client, Server};
@@ -269,13 +269,13 @@ pub(super) fn assemble(
         Timers::Host(HostTimers::start(&ports.timers, sender).context("thread of the timers")?)
     };
     assembly.participant.announce()?;
-    let fully_qualified = setup.names().fully_qualified();
-    let patience_s = node.patience().as_secs_f64().max(0.0);
+    let name = setup.names().fully_qualified();
     Ok(Owner {
         log_level: setup.log_level(),
-        board: Board::new(&fully_qualified),
-        name: fully_qualified,
+        board: Board::new(&name),
+        name,
         parameters: with_sim_time(node.parameters(), setup),
+        patience: patience(node.as_ref()),
         node,
         participant: assembly.participant,
         readers: assembly.readers,
@@ -295,7 +295,7 @@ pub(super) fn assemble(
         last_event: Stamp::from_nanos(i64::MIN),
         next_request: 0,
         requests: std::collections::BTreeMap::new(),
-        patience: Duration::from_secs_f64(patience_s),
+        hearing: Hearing::default(),
         stopping_since: None,
         stopped: false,
         forced: false,
@@ -304,6 +304,11 @@ pub(super) fn assemble(
         next_service: Instant::now(),
         last_publication: None,
     })
+}
+
+/// How long the node may take to wind down.
+fn patience(node: &dyn Node) -> Duration {
+    Duration::from_secs_f64(node.patience().as_secs_f64().max(0.0))
 }
 
 /// Every node has `use_sim_time`, whether or not it took its parameters from [`Setup`].

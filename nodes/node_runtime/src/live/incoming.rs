@@ -35,6 +35,7 @@ pub(super) enum Incoming {
     /// A request at one of our servers.
     Request {
         server: usize,
+        client: Guid,
         to: ReplyTo,
         bytes: Bytes,
     },
@@ -136,8 +137,14 @@ impl Readers {
 
     pub fn requests(&mut self, topic: &str, reader: Reader, server: usize) {
         self.spawn(topic, reader, move |sample| {
+            let client = sample.writer;
             let (to, bytes) = service::request(sample)?;
-            Some(Incoming::Request { server, to, bytes })
+            Some(Incoming::Request {
+                server,
+                client,
+                to,
+                bytes,
+            })
         });
     }
 

@@ -28,8 +28,11 @@ use crate::node::{Bytes, Emission, Event, Node, RequestId};
 use crate::parameter::Parameter;
 
 mod carry;
+mod early;
 mod graph;
 mod take;
+
+pub(super) use early::Hearing;
 
 /// What a server is there for.
 #[derive(Clone, Copy, Debug)]
@@ -111,6 +114,7 @@ pub(super) struct Owner {
     pub last_event: Stamp<Host>,
     pub next_request: RequestId,
     pub requests: BTreeMap<(usize, RequestId), (usize, ReplyTo)>,
+    pub hearing: Hearing,
     pub patience: Duration,
     pub stopping_since: Option<Instant>,
     pub stopped: bool,
@@ -197,6 +201,9 @@ impl Owner {
         } else if clients().any(Client::has_asked) {
             wake = wake.min(now() + LIMIT_POLL);
         }
+        if !self.hearing.early.is_empty() {
+            wake = wake.min(now() + early::POLL);
+        }
         if self.board.has_changed() {
             wake = wake.min(
                 self.last_publication
@@ -276,6 +283,9 @@ impl Owner {
     }
 
     fn chores(&mut self, now: Instant) {
+        if !self.hearing.early.is_empty() {
+            self.take_early(now);
+        }
         if self
             .clients
             .iter()

@@ -41,7 +41,12 @@ impl Owner {
                 let diagnostic = Diagnostic::new(Level::Error, "sample_unreadable", message);
                 self.notice(diagnostic.with("topic", topic));
             }
-            Incoming::Request { server, to, bytes } => self.request(server, to, &bytes),
+            Incoming::Request {
+                server,
+                client,
+                to,
+                bytes,
+            } => self.request_of(server, &client, to, bytes),
             Incoming::Reply {
                 client,
                 identity,
@@ -146,7 +151,7 @@ impl Owner {
         }
     }
 
-    fn request(&mut self, place: usize, to: ReplyTo, bytes: &Bytes) {
+    pub(super) fn request(&mut self, place: usize, to: ReplyTo, bytes: &Bytes) {
         match self.servers[place].0 {
             ServerUse::Service(service) => {
                 let id = self.next_request;
