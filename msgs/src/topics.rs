@@ -15,7 +15,7 @@ use crate::qos::{Durability, Qos, Reliability};
 use crate::rcl_interfaces::msg::{Log, ParameterEvent};
 use crate::rosgraph_msgs::msg::Clock;
 use crate::sensor_msgs::msg::{JointState, Temperature};
-use crate::std_srvs::srv::SetBool;
+use crate::std_srvs::srv::{SetBool, Trigger};
 use crate::tf2_msgs::msg::TFMessage;
 use crate::{Action, Description, Message, Service, WireError};
 
@@ -245,6 +245,24 @@ pub const TEMPERATURE: TopicFamily<Temperature> = TopicFamily {
 /// Switches the compensation on or off.
 pub const SET_COMPENSATION: ServiceName<SetBool> = ServiceName {
     name: "axis_compensation/enable",
+    service: PhantomData,
+};
+
+/// Lets a bag that is played stand.
+pub const PAUSE_PLAYING: ServiceName<Trigger> = ServiceName {
+    name: "replayer/pause",
+    service: PhantomData,
+};
+
+/// Lets it go on.
+pub const RESUME_PLAYING: ServiceName<Trigger> = ServiceName {
+    name: "replayer/resume",
+    service: PhantomData,
+};
+
+/// Sends its next message while it stands.
+pub const STEP_PLAYING: ServiceName<Trigger> = ServiceName {
+    name: "replayer/step",
     service: PhantomData,
 };
 

@@ -168,3 +168,17 @@ fn arch_the_standard_packages_are_no_ros_packages_of_their_own() {
         assert!(!folder.join("package.xml").exists(), "{}", folder.display());
     }
 }
+
+#[test]
+fn what_the_generator_watches_is_there_so_that_a_second_build_has_nothing_to_do() {
+    let said = Path::new(env!("OUT_DIR")).with_file_name("output");
+    let said = fs::read_to_string(&said).unwrap();
+    let watched: Vec<&str> = said
+        .lines()
+        .filter_map(|line| line.strip_prefix("cargo::rerun-if-changed="))
+        .collect();
+    assert!(watched.len() > 10, "{said}");
+    for path in watched {
+        assert!(Path::new(path).exists(), "{path}");
+    }
+}

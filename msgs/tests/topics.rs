@@ -62,6 +62,15 @@ fn arch_readme_lists_services_and_actions() {
             std_srvs::srv::SetBool::TYPE_NAME,
         ),
         row(
+            topics::PAUSE_PLAYING.name,
+            std_srvs::srv::Trigger::TYPE_NAME,
+        ),
+        row(
+            topics::RESUME_PLAYING.name,
+            std_srvs::srv::Trigger::TYPE_NAME,
+        ),
+        row(topics::STEP_PLAYING.name, std_srvs::srv::Trigger::TYPE_NAME),
+        row(
             topics::RUN_PROGRAM.name,
             abbe_msgs::action::RunProgram::TYPE_NAME,
         ),

@@ -74,6 +74,13 @@ impl Graph {
         found
     }
 
+    /// Every message of an absolute topic so far, as it came.
+    pub fn bytes_of(&self, topic: &str) -> Vec<Vec<u8>> {
+        let heard = self.heard.lock().unwrap();
+        let of_topic = heard.samples.iter().filter(|(_, name, _)| name == topic);
+        of_topic.map(|(_, _, bytes)| bytes.to_vec()).collect()
+    }
+
     /// The same in inner units.
     pub fn inner_since<M: Wire>(&self, topic: &Topic<M>, since: Instant) -> Vec<M::Inner> {
         let messages = self.since(topic, since);

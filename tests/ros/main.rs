@@ -10,4 +10,5 @@ mod bad_topics;
 mod graph;
 mod interruptions;
 mod kills;
+mod playing;
 mod refusals;

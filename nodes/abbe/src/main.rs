@@ -19,6 +19,7 @@ mod import;
 mod install_ros;
 mod launch;
 mod node;
+mod play;
 mod preflight;
 mod progress;
 mod record;
@@ -53,6 +54,8 @@ enum Verb {
     Trials(trials::Trials),
     /// Record topics of the ROS graph into a bag.
     Record(record::Record),
+    /// Publish a bag's messages again, with `/clock`, at any rate.
+    Play(play::Play),
     /// Make a bag of a table that a laser, a ballbar or a logger wrote.
     Import(import::Import),
     /// Make compensation tables for a control from what a bag knows.
@@ -72,6 +75,7 @@ fn main() -> ExitCode {
         Verb::Preflight(preflight) => preflight.execute(),
         Verb::Trials(trials) => trials.execute(),
         Verb::Record(record) => record.execute(),
+        Verb::Play(play) => play.execute(),
         Verb::Import(import) => import.execute(),
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => return node.execute(),

@@ -21,6 +21,7 @@ pub const NODES: &[(&str, Builder)] = &[
     ("linuxcnc_bridge", linuxcnc_bridge_node::node),
     ("probe", probe_node::node),
     ("recorder", recorder_node::node),
+    ("replayer", replayer_node::node),
     ("rotary_axes", rotary_axes_node::node),
     ("sequencer", sequencer_node::node),
     ("thermal_model", thermal_model_node::node),

@@ -292,10 +292,17 @@ async fn read(reader: Reader, topic: Arc<TappedTopic>, queue: mpsc::Sender<TapEv
 }
 
 /// A sample on its way out.
-struct Outgoing {
+struct Sample {
     place: usize,
     source: Option<Stamp<Host>>,
     bytes: Bytes,
+}
+
+/// What the publishing thread is given.
+enum Outgoing {
+    Sample(Sample),
+    /// Answer when everything before has been acknowledged, or at the latest in so long.
+    Settle(Duration, oneshot::Sender<bool>),
 }
 
 /// Speaks on topics from any thread: the mirror of a run in one process, and a replay.
@@ -332,31 +339,58 @@ impl RawPublisher {
         queue_len: usize,
         patience: Duration,
     ) -> anyhow::Result<Self> {
+        let topics: Vec<TappedTopic> = topics
+            .iter()
+            .map(|port| TappedTopic {
+                name: port.topic.clone(),
+                type_name: port.type_name.to_owned(),
+                qos: port.qos,
+            })
+            .collect();
+        Self::of_found(environment, names, &topics, queue_len, patience)
+    }
+
+    /// The same for topics that were found somewhere, e.g. in a bag.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub fn of_found(
+        environment: &Environment,
+        names: &NodeNames,
+        topics: &[TappedTopic],
+        queue_len: usize,
+        patience: Duration,
+    ) -> anyhow::Result<Self> {
         let runtime = runtime()?;
         let (participant, warning) = Participant::join(environment, names)?;
         if let Some(warning) = warning {
             tracing::warn!("{warning}");
         }
         let mut writers = Vec::with_capacity(topics.len());
-        for port in topics {
-            let dds_topic = names::dds_topic(&names.resolve(&port.topic)?);
-            let dds_type = names::dds_type(port.type_name);
-            writers.push(participant.writer(&dds_topic, &dds_type, port.qos)?);
+        for topic in topics {
+            let dds_topic = names::dds_topic(&names.resolve(&topic.name)?);
+            let dds_type = names::dds_type(&topic.type_name);
+            writers.push(participant.writer(&dds_topic, &dds_type, topic.qos)?);
         }
         participant.announce()?;
         let (queue, mut outgoing) = mpsc::channel::<Outgoing>(queue_len.max(1));
         let publishing = runtime.spawn(async move {
             let mut refused = 0;
-            while let Some(Outgoing {
-                place,
-                source,
-                bytes,
-            }) = outgoing.recv().await
-            {
-                let sent = writers
-                    .get(place)
-                    .map(|writer| writer.publish(&bytes, source));
-                refused += u64::from(!matches!(sent, Some(Ok(()))));
+            while let Some(next) = outgoing.recv().await {
+                match next {
+                    Outgoing::Sample(sample) => {
+                        let writer = writers.get(sample.place);
+                        let sent = writer.map(|w| w.publish(&sample.bytes, sample.source));
+                        refused += u64::from(!matches!(sent, Some(Ok(()))));
+                    }
+                    Outgoing::Settle(patience, answer) => {
+                        let all =
+                            futures::future::join_all(writers.iter().map(Writer::acknowledged));
+                        let settled = tokio::time::timeout(patience, all).await.is_ok();
+                        // Who asked may have gone.
+                        let _ = answer.send(settled);
+                    }
+                }
             }
             (participant, writers, refused)
         });
@@ -372,11 +406,11 @@ impl RawPublisher {
     /// Publishes on the topic at `place`; `source` is the sample's own time, else the present. False
     /// when it was dropped.
     pub fn publish(&mut self, place: usize, source: Option<Stamp<Host>>, bytes: Bytes) -> bool {
-        let outgoing = Outgoing {
+        let outgoing = Outgoing::Sample(Sample {
             place,
             source,
             bytes,
-        };
+        });
         let taken = match self.queue.try_send(outgoing) {
             Ok(()) => true,
             Err(mpsc::error::TrySendError::Closed(_)) => false,
@@ -386,6 +420,15 @@ impl RawPublisher {
         };
         self.dropped += u64::from(!taken);
         taken
+    }
+
+    /// Waits until every reliable reader has acknowledged what was published so far; false when that took longer
+    /// than `patience`. Not from within an event loop.
+    #[must_use]
+    pub fn settle(&self, patience: Duration) -> bool {
+        let (answer, settled) = oneshot::channel();
+        let asked = self.queue.blocking_send(Outgoing::Settle(patience, answer));
+        asked.is_ok() && settled.blocking_recv().unwrap_or(false)
     }
 
     /// How many samples find room in the queue now.

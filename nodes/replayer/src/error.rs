@@ -1,4 +1,4 @@
-//! Why a bag cannot be replayed.
+//! Why a bag cannot be replayed or played.
 
 use node_runtime::harness::ComposeError;
 
@@ -29,4 +29,26 @@ pub enum ReplayError {
     },
     #[error(transparent)]
     Compose(#[from] ComposeError),
+}
+
+/// Why a bag cannot be played.
+#[derive(Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "fields are named in the messages")]
+pub enum PlaybackError {
+    #[error("{key} = {value}: must be {least} to {greatest}")]
+    OutOfRange {
+        key: &'static str,
+        value: f64,
+        least: f64,
+        greatest: f64,
+    },
+    #[error("to_s = {to_s} s is before from_s = {from_s} s: nothing would be played")]
+    EmptyRange { from_s: f64, to_s: f64 },
+    #[error("{bag}: no message of {topics:?} between {from_s} s and its end; it holds {held:?}")]
+    Nothing {
+        bag: String,
+        topics: Vec<String>,
+        from_s: f64,
+        held: Vec<String>,
+    },
 }

@@ -1,4 +1,5 @@
-//! Recomputes what a bag's nodes published from what they were given, and compares it byte for byte.
+//! Recomputes what a bag's nodes published from what they were given, and compares it byte for byte; and says when
+//! each message of a bag is due while it is played ([`pace`]).
 //!
 //! A bag of a composed run holds every message in the one order in which it happened. What came from outside (the
 //! controller, its instruments, the sequencer and its service calls) is put in again; everything else is computed
@@ -14,9 +15,12 @@
 mod difference;
 mod error;
 mod inputs;
+pub mod pace;
+pub mod playback;
 mod replay;
 
 pub use difference::{Difference, Discrepancy};
-pub use error::ReplayError;
+pub use error::{PlaybackError, ReplayError};
 pub use inputs::{is_source, sources_first};
+pub use playback::{PARAMETERS, Playback, PlaybackConfig};
 pub use replay::{Compared, Outcome, check};

@@ -1,0 +1,144 @@
+//! `abbe play BAG`: a bag's messages on the network again, with `/clock`, at any rate.
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use node_runtime::arguments::Arguments;
+use node_runtime::environment::Environment;
+use node_runtime::{Interruption, Setup};
+use replayer::PlaybackConfig;
+use replayer_node::{Desk, Played};
+
+/// Arguments of `abbe play`.
+#[derive(Args)]
+pub struct Play {
+    /// Folder of the bag, or one .mcap file.
+    bag: PathBuf,
+    /// Time of the bag over time; 0: as fast as subscribers acknowledge.
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+    rate: f64,
+    /// Absolute names of topics, `*` stands for any run of characters; none: every topic.
+    #[arg(long, num_args = 1..)]
+    topics: Vec<String>,
+    /// Leave out what comes before, s from the bag's first message.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    from: f64,
+    /// Leave out what comes after, s from the bag's first message.
+    #[arg(long)]
+    to: Option<f64>,
+    /// Begin again at the end, until Ctrl-C.
+    #[arg(long = "loop")]
+    repeat: bool,
+    /// Wait for the service `replayer/resume` or `replayer/step` before the first message.
+    #[arg(long)]
+    paused: bool,
+    /// Time for subscribers to find the topics before the first message, s.
+    #[arg(long, default_value_t = 0.5)]
+    delay: f64,
+    /// Do not publish `/clock`; one that was recorded is played as it is.
+    #[arg(long)]
+    no_clock: bool,
+    /// Rules as of any ROS 2 node: `--ros-args -r FROM:=TO …`.
+    #[arg(last = true)]
+    ros: Vec<String>,
+}
+
+/// The player's name on the graph.
+const NAME: &str = "replayer";
+/// Between two looks at how far it is.
+const LOOK: Duration = Duration::from_millis(100);
+/// Exit code for a bag that could not be read whole, or messages that did not arrive.
+const DONE_WITH_LOSS: u8 = 3;
+
+impl Play {
+    /// Plays to the end or to SIGINT; exit code 3 when something was lost.
+    ///
+    /// # Errors
+    /// When the bag cannot be opened, holds nothing of what is asked for, or there is no network.
+    pub fn execute(self) -> Result<ExitCode> {
+        let interruption = Interruption::listen("what was sent is being acknowledged")?;
+        let bag = self.bag.to_str().context("BAG: must be UTF-8")?;
+        let config = PlaybackConfig {
+            rate: self.rate,
+            from_s: self.from,
+            to_s: self.to,
+            repeat: self.repeat,
+            start_paused: self.paused,
+            delay_s: self.delay,
+            clock: !self.no_clock,
+            topics: if self.topics.is_empty() {
+                vec!["*".to_owned()]
+            } else {
+                self.topics.clone()
+            },
+            ..PlaybackConfig::whole(bag.to_owned())
+        };
+        config.checked()?;
+        let setup = Setup::new(NAME, &Arguments::parse(self.ros.clone())?)?;
+        let (node, desk) = replayer_node::play(&setup, &config)?;
+        let mut running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
+        eprintln!("Playing {bag}; Ctrl-C ends it.");
+        let mut shown = Shown::new();
+        while desk.progress().over.is_none() && !interruption.wait(LOOK) {
+            if let Some(error) = running.ended() {
+                return Err(error);
+            }
+            shown.show(&desk);
+        }
+        running.stop_unless_forced(&interruption)?;
+        shown.end();
+        ended(&desk, bag)
+    }
+}
+
+fn ended(desk: &Desk, bag: &str) -> Result<ExitCode> {
+    let played: Played = match desk.progress().over {
+        Some(Ok(played)) => played,
+        Some(Err(reason)) => bail!("{bag}: {reason}"),
+        None => bail!("{bag}: the player has left without a word"),
+    };
+    for loss in &played.losses {
+        eprintln!("abbe: {loss}");
+    }
+    println!("{bag}: {} messages, {} lost", played.messages, played.lost);
+    Ok(if played.lost == 0 && played.losses.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(DONE_WITH_LOSS)
+    })
+}
+
+/// The line on a terminal.
+struct Shown {
+    bar: Option<indicatif::ProgressBar>,
+}
+
+impl Shown {
+    fn new() -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        Self {
+            bar: terminal.then(indicatif::ProgressBar::new_spinner),
+        }
+    }
+
+    fn show(&mut self, desk: &Desk) {
+        let Some(bar) = &self.bar else {
+            return;
+        };
+        let progress = desk.progress();
+        let state = if progress.paused { "paused at" } else { "at" };
+        let at_s = progress.at.as_secs_f64();
+        bar.set_message(format!("{state} {at_s:.3} s, {} messages", progress.sent));
+        bar.tick();
+    }
+
+    fn end(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! What is played of a bag, and how: the node's parameters.
+
+use metrology::ParameterDoc;
+use metrology::stamp::Span;
+use serde::{Deserialize, Serialize};
+
+use crate::error::PlaybackError;
+
+/// The parameter file of the node that plays.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlaybackConfig {
+    /// Folder of the bag, or one file of it.
+    pub bag: String,
+    /// Absolute names of topics; `*` stands for any run of characters.
+    #[serde(default = "PlaybackConfig::every_topic")]
+    pub topics: Vec<String>,
+    /// Time of the bag over time; 0: as fast as subscribers acknowledge.
+    #[serde(default = "PlaybackConfig::default_rate")]
+    pub rate: f64,
+    /// Messages before this are left out, from the bag's first message.
+    #[serde(default)]
+    pub from_s: f64,
+    /// Messages after this are left out, from the bag's first message; none: to the end.
+    #[serde(default)]
+    pub to_s: Option<f64>,
+    /// Begin again at the end.
+    #[serde(default)]
+    pub repeat: bool,
+    /// Wait for `replayer/resume` or `replayer/step` before the first message.
+    #[serde(default)]
+    pub start_paused: bool,
+    /// Time for subscribers to find the topics before the first message.
+    #[serde(default = "PlaybackConfig::default_delay_s")]
+    pub delay_s: f64,
+    /// Publish `/clock` with the bag's time instead of a recorded one.
+    #[serde(default = "PlaybackConfig::default_clock")]
+    pub clock: bool,
+}
+
+/// What the parameters of the node mean.
+pub const PARAMETERS: &[ParameterDoc] = &[
+    text(
+        "bag",
+        "Folder of the bag, or one file of it, relative to where the program was started.",
+    ),
+    text(
+        "topics",
+        "Absolute names of topics to publish; * stands for any run of characters.",
+    ),
+    number(
+        "rate",
+        "",
+        (0.0, 1000.0),
+        "Time of the bag over time; 0: as fast as subscribers acknowledge.",
+    ),
+    number(
+        "from_s",
+        "s",
+        (0.0, 1e9),
+        "Messages before this are left out, from the bag's first message.",
+    ),
+    number(
+        "to_s",
+        "s",
+        (0.0, 1e9),
+        "Messages after this are left out, from the bag's first message; absent: to the end.",
+    ),
+    text("repeat", "Begin again at the end."),
+    text(
+        "start_paused",
+        "Wait for replayer/resume or replayer/step before the first message.",
+    ),
+    number(
+        "delay_s",
+        "s",
+        (0.0, 60.0),
+        "Time for subscribers to find the topics before the first message.",
+    ),
+    text(
+        "clock",
+        "Publish /clock with the bag's time; a recorded /clock is left out then.",
+    ),
+];
+
+const fn text(name: &'static str, description: &'static str) -> ParameterDoc {
+    ParameterDoc {
+        name,
+        unit: "",
+        description,
+        range: None,
+    }
+}
+
+const fn number(
+    name: &'static str,
+    unit: &'static str,
+    range: (f64, f64),
+    description: &'static str,
+) -> ParameterDoc {
+    ParameterDoc {
+        name,
+        unit,
+        description,
+        range: Some(range),
+    }
+}
+
+/// Checked settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Playback {
+    /// Time of the bag over time; none: as fast as subscribers acknowledge.
+    pub rate: Option<f64>,
+    /// First time that is played, from the bag's first message.
+    pub from: Span,
+    /// Last time that is played.
+    pub to: Option<Span>,
+    /// Time for subscribers to find the topics.
+    pub delay: Span,
+}
+
+impl PlaybackConfig {
+    fn every_topic() -> Vec<String> {
+        vec!["*".to_owned()]
+    }
+
+    const fn default_rate() -> f64 {
+        1.0
+    }
+
+    const fn default_delay_s() -> f64 {
+        0.5
+    }
+
+    const fn default_clock() -> bool {
+        true
+    }
+
+    /// The whole of a bag at its own rate.
+    #[must_use]
+    pub fn whole(bag: String) -> Self {
+        Self {
+            bag,
+            topics: Self::every_topic(),
+            rate: Self::default_rate(),
+            from_s: 0.0,
+            to_s: None,
+            repeat: false,
+            start_paused: false,
+            delay_s: Self::default_delay_s(),
+            clock: Self::default_clock(),
+        }
+    }
+
+    /// Checks every value once.
+    ///
+    /// # Errors
+    /// A value out of its range, or a range of time that holds nothing.
+    pub fn checked(&self) -> Result<Playback, PlaybackError> {
+        let from_s = within("from_s", self.from_s)?;
+        let to_s = self.to_s.map(|to_s| within("to_s", to_s)).transpose()?;
+        if let Some(to_s) = to_s
+            && to_s < from_s
+        {
+            return Err(PlaybackError::EmptyRange { from_s, to_s });
+        }
+        let rate = within("rate", self.rate)?;
+        Ok(Playback {
+            rate: (rate > 0.0).then_some(rate),
+            from: Span::from_secs_f64(from_s),
+            to: to_s.map(Span::from_secs_f64),
+            delay: Span::from_secs_f64(within("delay_s", self.delay_s)?),
+        })
+    }
+}
+
+/// A number within the range that [`PARAMETERS`] states for it.
+fn within(key: &'static str, value: f64) -> Result<f64, PlaybackError> {
+    let doc = PARAMETERS.iter().find(|doc| doc.name == key);
+    let (least, greatest) = doc
+        .and_then(|doc| doc.range)
+        .expect("every number of the configuration has a range in the table");
+    if value >= least && value <= greatest {
+        Ok(value)
+    } else {
+        Err(PlaybackError::OutOfRange {
+            key,
+            value,
+            least,
+            greatest,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_out_of_range_are_refused_by_name_value_and_limit() {
+        let with = |change: fn(&mut PlaybackConfig)| {
+            let mut config = PlaybackConfig::whole("bag".to_owned());
+            change(&mut config);
+            config.checked().unwrap_err().to_string()
+        };
+        assert_eq!(with(|c| c.rate = -1.0), "rate = -1: must be 0 to 1000");
+        assert_eq!(with(|c| c.rate = f64::NAN), "rate = NaN: must be 0 to 1000");
+        let text = with(|c| (c.from_s, c.to_s) = (5.0, Some(4.0)));
+        assert_eq!(
+            text,
+            "to_s = 4 s is before from_s = 5 s: nothing would be played"
+        );
+        let whole = PlaybackConfig {
+            rate: 0.0,
+            ..PlaybackConfig::whole("bag".to_owned())
+        };
+        assert_eq!(whole.checked().unwrap().rate, None);
+    }
+}

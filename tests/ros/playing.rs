@@ -1,0 +1,123 @@
+//! A bag on the network again: every message, byte for byte, with the bag's time on `/clock`.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use abbe_msgs::topics;
+use abbe_tests::program::{Process, command, domain, root};
+use recorder::{Bag, Event, Order};
+
+use crate::graph::Graph;
+
+const END: Duration = Duration::from_secs(60);
+
+/// Messages of each topic of the bag that asks for acknowledgement, in their order; what every node says of itself,
+/// the player too, left out.
+fn reliable(bag: &Bag) -> BTreeMap<String, Vec<Vec<u8>>> {
+    let mut found = BTreeMap::<String, Vec<Vec<u8>>>::new();
+    let mut messages = bag.messages(Order::LogTime);
+    while let Some(event) = messages.next_event() {
+        let Event::Message(message) = event else {
+            panic!("{event:?}")
+        };
+        let topic = bag.topic(message.topic);
+        let of_every_node = [topics::DIAGNOSTICS.name, topics::ROSOUT.name];
+        if topic.qos_yaml.contains("reliability: reliable")
+            && !of_every_node.contains(&topic.topic.as_str())
+        {
+            let of_topic = found.entry(topic.topic.clone()).or_default();
+            of_topic.push(message.data.to_vec());
+        }
+    }
+    found
+}
+
+/// Whether a sample came as it was sent: on its way it is filled up to four bytes.
+fn is_whole(heard: &[u8], sent: &[u8]) -> bool {
+    let filling = heard.strip_prefix(sent);
+    filling.is_some_and(|filling| filling.len() < 4 && filling.iter().all(|byte| *byte == 0))
+}
+
+#[test]
+fn a_bag_played_as_fast_as_can_be_arrives_whole_and_in_order_with_its_time() {
+    let path = root().join("bags/cold_reference");
+    let bag = Bag::open(&path).unwrap();
+    let domain = domain(0);
+    let graph = Graph::join(domain);
+    let began = Instant::now();
+    let mut play = command(domain, &["play"]);
+    play.arg(&path).args(["--rate", "0", "--delay", "2"]);
+    let ended = Process::start(play).ended_within(END);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    for (topic, sent) in reliable(&bag) {
+        graph.wait(&topic, |graph| {
+            (graph.bytes_of(&topic).len() >= sent.len()).then_some(())
+        });
+        let heard = graph.bytes_of(&topic);
+        let mut pairs = heard.iter().zip(&sent);
+        let differs = pairs.position(|(heard, sent)| !is_whole(heard, sent));
+        assert_eq!((heard.len(), differs), (sent.len(), None), "{topic}");
+    }
+    let (first, last) = bag.log_times_nanos().unwrap();
+    let clocks = graph.since(&topics::CLOCK, began);
+    let nanos = clocks
+        .iter()
+        .map(|(_, m)| m.clock.sec as u64 * 1_000_000_000 + u64::from(m.clock.nanosec));
+    let nanos: Vec<u64> = nanos.collect();
+    eprintln!("{} /clock, {first} to {last} ns", nanos.len());
+    assert!(nanos.len() > 10 && nanos.is_sorted());
+    assert!(nanos[0] >= first && *nanos.last().unwrap() <= last);
+}
+
+#[test]
+fn a_part_of_a_bag_at_a_rate_takes_its_time_and_holds_nothing_else() {
+    let path = root().join("bags/cold_reference");
+    let bag = Bag::open(&path).unwrap();
+    let (first, last) = bag.log_times_nanos().unwrap();
+    let length_s = (last - first) as f64 * 1e-9;
+    let (from_s, to_s) = (0.25 * length_s, 0.75 * length_s);
+    let rate = (to_s - from_s) / 2.0;
+    let domain = domain(1);
+    let graph = Graph::join(domain);
+    let mut play = command(domain, &["play"]);
+    play.arg(&path)
+        .args(["--topics", "/probe/*", "--delay", "0"]);
+    play.args([
+        "--rate",
+        &rate.to_string(),
+        "--from",
+        &from_s.to_string(),
+        "--to",
+        &to_s.to_string(),
+    ]);
+    let began = Instant::now();
+    let ended = Process::start(play).ended_within(END);
+    let took_s = began.elapsed().as_secs_f64();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    eprintln!(
+        "{:.1} s of the bag at rate {rate:.1}: {took_s:.1} s",
+        to_s - from_s
+    );
+    assert!(took_s > 1.9, "{took_s}");
+    let states = topics::AXES_STATE.name;
+    assert!(graph.bytes_of(&format!("/{states}")).is_empty());
+}
+
+#[test]
+fn what_cannot_be_played_is_refused_with_what_the_bag_holds() {
+    let path = root().join("bags/cold_reference");
+    for (arguments, words) in [
+        (&["--rate", "-2"][..], "rate = -2: must be 0 to 1000"),
+        (&["--topics", "/nobody"], "no message of [\"/nobody\"]"),
+        (
+            &["--from", "5", "--to", "4"],
+            "to_s = 4 s is before from_s = 5 s",
+        ),
+    ] {
+        let mut play = command(domain(2), &["play"]);
+        play.arg(&path).args(arguments);
+        let ended = Process::start(play).ended_within(END);
+        assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+        assert!(ended.said.contains(words), "{}", ended.said);
+    }
+}
