@@ -304,10 +304,9 @@ impl<'a> Base<'a> {
         notes.extend(remarks(&stack, &split, &found));
         let next = next::propose(&self.bench(), &found);
         notes.extend(next.notes);
-        let shrunk = self.shrunk(&split, &found, before.flagged(), config);
-        let both = [&split.fit[..], &split.held_out].concat();
-        let all = self.stack(&both, self.noise, &FormError::base(config));
-        let sizes = gap::by_block(&all, self.noise, &all.floated(all.raw.clone()));
+        let all = self.stack(&split.all(), self.noise, &FormError::base(config));
+        let shrunk = self.shrunk(&all, &split, &found, before.flagged(), config);
+        let sizes = gap::by_block(&all, self.noise, &all.floated(all.raw.clone()), &all.runs);
         let floated = stack.floated(stack.raw.clone());
         let (rest, beside) = self.beside_named(&stack, &slots, &found, config);
         let flagged = reproduced && before.flagged() && beside.flagged();
@@ -358,13 +357,14 @@ impl<'a> Base<'a> {
         (rest, leftover)
     }
 
-    fn shrunk(&self, split: &Split, found: &Found, has_gap: bool, config: &GapConfig) -> Shrunk {
-        let judged = if split.held_out.is_empty() {
-            &split.fit
-        } else {
-            &split.held_out
-        };
-        let stack = self.stack(judged, self.noise, &FormError::base(config));
+    fn shrunk(
+        &self,
+        all: &Stack<'_>,
+        split: &Split,
+        found: &Found,
+        has_gap: bool,
+        config: &GapConfig,
+    ) -> Shrunk {
         let effects: Vec<Box<dyn Effect>> = found
             .named()
             .map(|member| found.instance(member).effect(&member.estimate.values))
@@ -378,7 +378,7 @@ impl<'a> Base<'a> {
                 simulated: &**effect,
             })
             .collect();
-        shrink::shrink(&stack, self.noise, split, &named, has_gap, config)
+        shrink::shrink(all, self.noise, split, &named, has_gap, config)
     }
 }
 

@@ -6,6 +6,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+pub(crate) mod over_session;
+
 /// Everything that is drawn.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
@@ -44,12 +46,14 @@ pub enum Abscissa {
     Time,
     /// Number of the touch.
     Touch,
+    /// Time since the first touch of the session, min.
+    SessionTime,
 }
 
-/// One channel of one run.
+/// One channel of one run, or one surface over all runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trace {
-    /// The run.
+    /// The run; of a surface, the first.
     pub run: u32,
     /// The channel.
     pub channel: String,

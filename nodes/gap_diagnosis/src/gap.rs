@@ -61,10 +61,18 @@ impl Size {
     }
 }
 
-/// Size of a floated residual in each block of a stack.
-pub fn by_block(stack: &Stack<'_>, noise: &BTreeMap<Channel, Noise>, floated: &[f64]) -> Vec<Size> {
+/// Size of a floated residual in each block of a stack that belongs to one of `runs`; nothing for the others.
+pub fn by_block(
+    stack: &Stack<'_>,
+    noise: &BTreeMap<Channel, Noise>,
+    floated: &[f64],
+    runs: &[usize],
+) -> Vec<Size> {
     let share = stack.freedom() / count(stack.rows.len.max(1));
     let of_block = |block: &Block| {
+        if !runs.contains(&block.run) {
+            return Size::default();
+        }
         let rows = &floated[block.range()];
         Size {
             squares: rows.iter().map(|r| r * r).sum(),

@@ -2,7 +2,9 @@
 //!
 //! # Model
 //!
-//! The held-out runs are simulated anew with and without the named effects; only set-ups float:
+//! All runs are simulated anew with and without the named effects, and the held-out ones are judged. Only set-ups
+//! float; a float that fitted runs share with held-out ones is one float (a block that stays on the table stays
+//! where it was), so that growth since the fitted runs is not taken for a new place of the block:
 //!
 //! ```text
 //!   G2 = rms2 - floor2,   closed = 1 - G2_after / G2_before               (1)
@@ -21,6 +23,7 @@ use rand_pcg::Pcg64Mcg;
 use crate::bootstrap;
 use crate::config::GapConfig;
 use crate::field::{self, Place};
+use crate::figures::over_session::over_session;
 use crate::figures::{Abscissa, HeldOut, Trace};
 use crate::gap::{self, Size};
 use crate::noise::Noise;
@@ -49,10 +52,10 @@ pub struct Shrunk {
     pub traces: Vec<Trace>,
 }
 
-/// Most traces that are drawn.
+/// Most runs and channels of which a trace is given.
 const MOST_TRACES: usize = 40;
 
-/// Judges a stack of held-out runs.
+/// Judges the held-out runs of a stack of all runs, or all where none was held out.
 pub fn shrink(
     stack: &Stack<'_>,
     noise: &BTreeMap<Channel, Noise>,
@@ -63,7 +66,9 @@ pub fn shrink(
 ) -> Shrunk {
     let before = stack.floated(stack.raw.clone());
     let after = with_effects(stack, named.iter());
-    let sizes = [&before, &after].map(|floated| gap::by_block(stack, noise, floated));
+    let judged = split.judged();
+    let size = |floated: &[f64]| gap::by_block(stack, noise, floated, judged);
+    let sizes = [size(&before), size(&after)];
     let [whole, left] = [0, 1].map(|k| gap::together(sizes[k].iter()));
     let is_judged = !split.held_out.is_empty();
     let value = |number: f64| is_judged.then_some(number);
@@ -77,7 +82,7 @@ pub fn shrink(
         LeftOut {
             effect: named[out].effect.clone(),
             axis: named[out].axis.clone(),
-            rms_um_without: gap::together(gap::by_block(stack, noise, &floated).iter()).rms_um(),
+            rms_um_without: gap::together(size(&floated).iter()).rms_um(),
         }
     });
     let number = |run: &usize| stack.session.runs[*run].segment.run;
@@ -93,18 +98,18 @@ pub fn shrink(
             after: value(left.p95_um()),
         },
         gap_closed: (is_judged && has_gap)
-            .then(|| closed(stack, &sizes, config))
+            .then(|| closed(stack, judged, &sizes, config))
             .flatten(),
         leave_one_out: leave_one_out.collect(),
     };
     Shrunk {
         shrink,
         held_out: if is_judged {
-            by_run(stack, &sizes)
+            by_run(stack, judged, &sizes)
         } else {
             vec![]
         },
-        traces: traces(stack, noise, &before, &after),
+        traces: traces(stack, noise, judged, &before, &after),
     }
 }
 
@@ -137,7 +142,12 @@ fn squares(size: &Size) -> [f64; 2] {
     ]
 }
 
-fn closed(stack: &Stack<'_>, sizes: &[Vec<Size>; 2], config: &GapConfig) -> Option<Interval> {
+fn closed(
+    stack: &Stack<'_>,
+    judged: &[usize],
+    sizes: &[Vec<Size>; 2],
+    config: &GapConfig,
+) -> Option<Interval> {
     let of_run = |run: usize| -> [[f64; 2]; 2] {
         let of = |sizes: &[Size]| {
             let own = stack
@@ -150,7 +160,7 @@ fn closed(stack: &Stack<'_>, sizes: &[Vec<Size>; 2], config: &GapConfig) -> Opti
         };
         [of(&sizes[0]), of(&sizes[1])]
     };
-    let runs: Vec<[[f64; 2]; 2]> = stack.runs.iter().map(|run| of_run(*run)).collect();
+    let runs: Vec<[[f64; 2]; 2]> = judged.iter().map(|run| of_run(*run)).collect();
     let total = |chosen: &mut dyn Iterator<Item = &[[f64; 2]; 2]>| {
         chosen.fold([[0.0; 2]; 2], |sum, run| {
             [add(sum[0], run[0]), add(sum[1], run[1])]
@@ -192,7 +202,7 @@ fn add(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] + b[0], a[1] + b[1]]
 }
 
-fn by_run(stack: &Stack<'_>, sizes: &[Vec<Size>; 2]) -> Vec<HeldOut> {
+fn by_run(stack: &Stack<'_>, judged: &[usize], sizes: &[Vec<Size>; 2]) -> Vec<HeldOut> {
     let of_run = |run: &usize| {
         let of = |sizes: &[Size]| {
             let own = stack
@@ -213,12 +223,13 @@ fn by_run(stack: &Stack<'_>, sizes: &[Vec<Size>; 2]) -> Vec<HeldOut> {
             floor_um: before.floor_um(),
         }
     };
-    stack.runs.iter().map(of_run).collect()
+    judged.iter().map(of_run).collect()
 }
 
 fn traces(
     stack: &Stack<'_>,
     noise: &BTreeMap<Channel, Noise>,
+    judged: &[usize],
     before: &[f64],
     after: &[f64],
 ) -> Vec<Trace> {
@@ -237,13 +248,13 @@ fn traces(
             floor_um: 1e3 * noise[&block.channel].total_mm(),
         }
     };
-    stack
-        .rows
-        .blocks
-        .iter()
-        .take(MOST_TRACES)
-        .map(trace)
-        .collect()
+    let own = stack.rows.blocks.iter();
+    let own = own.filter(|block| judged.contains(&block.run));
+    let mut all: Vec<Trace> = own.take(MOST_TRACES).map(trace).collect();
+    if let Some(noise) = noise.get(&Channel::Touch) {
+        all.extend(over_session(stack, before, after, 1e3 * noise.total_mm()));
+    }
+    all
 }
 
 fn abscissa(stack: &Stack<'_>, block: &Block) -> (Abscissa, Vec<f64>) {

@@ -22,6 +22,24 @@ pub struct Split {
     pub held_out: Vec<usize>,
 }
 
+impl Split {
+    /// The runs that are judged: those held out, or all where none was.
+    pub fn judged(&self) -> &[usize] {
+        if self.held_out.is_empty() {
+            &self.fit
+        } else {
+            &self.held_out
+        }
+    }
+
+    /// All runs, in the order of the session.
+    pub fn all(&self) -> Vec<usize> {
+        let mut all = [self.fit.as_slice(), &self.held_out].concat();
+        all.sort_unstable();
+        all
+    }
+}
+
 /// Splits the runs that hold readings.
 pub fn split(session: &Session, hold_out: bool) -> Split {
     let used: Vec<usize> = (0..session.runs.len())

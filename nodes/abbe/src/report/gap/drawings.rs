@@ -44,12 +44,13 @@ fn along(line: &Trace) -> Result<Markup> {
             .zip(values.iter().copied())
             .collect()
     };
-    let marks = line.abscissa == Abscissa::Touch;
+    let marks = matches!(line.abscissa, Abscissa::Touch | Abscissa::SessionTime);
     let x = match line.abscissa {
         Abscissa::Angle => "angle in rad",
         Abscissa::Position => "position in mm",
         Abscissa::Time => "time in s",
         Abscissa::Touch => "touch",
+        Abscissa::SessionTime => "time of the session in min",
     };
     let svg = plot::svg(&plot::Plot {
         x: x.to_owned(),

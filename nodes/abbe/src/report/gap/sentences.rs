@@ -2,7 +2,7 @@
 
 use gap_diagnosis::report::{Cause, GapReport, Status};
 
-use super::{maybe, name, three, values};
+use super::{FREE_FORM, maybe, name, three, values};
 
 /// The three answers.
 pub(super) fn answers(report: &GapReport) -> Vec<String> {
@@ -26,11 +26,12 @@ fn place(report: &GapReport) -> String {
     );
     match report.r#where.first() {
         Some(place) => format!(
-            "Where: {size}; most of it is in {} {}, going with {} ({:.0} % of the structured gap lies there alone).",
+            "Where: {size}; most of it is in {} {}, going with {} (of the structured gap {:.0} % goes with that alone, {:.0} % with other covariates as well).",
             place.channel,
             place.direction,
             place.covariate,
-            100.0 * place.share_unique
+            100.0 * place.share_unique,
+            100.0 * place.share_shared
         ),
         None => {
             let most = report.gap.per_channel.iter();
@@ -47,7 +48,7 @@ fn cause(report: &GapReport) -> String {
         let title = name(&cause.effect, &cause.axis);
         format!(
             "{title} ({}; confidence {:.2})",
-            values(cause),
+            sizes(cause),
             cause.confidence
         )
     };
@@ -81,6 +82,26 @@ fn cause(report: &GapReport) -> String {
         return "Which: no effect of the catalogue is named.".to_owned();
     }
     format!("Which: {}.", parts.join(". And "))
+}
+
+/// Most parameters that a sentence holds.
+const MOST_SAID: usize = 2;
+
+/// The sizes of an effect, as many as a sentence can hold; all are in the table.
+fn sizes(cause: &Cause) -> String {
+    let shown = cause
+        .parameters
+        .iter()
+        .filter(|p| !p.name.starts_with(FREE_FORM));
+    let shown = shown.count();
+    if shown <= MOST_SAID {
+        return values(cause);
+    }
+    let first = Cause {
+        parameters: cause.parameters[..1].to_vec(),
+        ..cause.clone()
+    };
+    format!("{} and {} more in the table", values(&first), shown - 1)
 }
 
 fn unknown(report: &GapReport) -> String {
