@@ -64,7 +64,8 @@ fn scenario_gap_first_names_the_backlash_and_a_run_on_the_new_file_ends_at_the_f
     eprintln!(
         "gap_first: backlash X {low:.2} to {high:.2} um; held out {before:.2} to {after:.2} um; then {gap}"
     );
-    // What the soft edge of the play leaves is beyond the floor, and no effect of the catalogue.
+    assert_eq!(gap["above_floor"], false, "{gap}");
+    assert_eq!(again["unknown"]["flagged"], false, "{}", again["unknown"]);
     let first = number(&report["gap"]["rms_um"]);
     assert!(number(&gap["rms_um"]) < 0.25 * first, "{gap}");
 }

@@ -1,5 +1,6 @@
 //! The scenarios of launch_configs, as a person runs them, judged by the numbers that they leave.
 
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use abbe_tests::scenario::Scenario;
@@ -13,9 +14,16 @@ fn number(report: &Value, key: &str) -> f64 {
     value.unwrap_or_else(|| panic!("report.json: {key} in {report}"))
 }
 
-fn warm_up(scenario: &str, least_reduction: f64) {
+fn read(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Runs a scenario and judges its page; gives the scenario and the folder of its run.
+fn warm_up(name: &str, least_reduction: f64) -> (Scenario, PathBuf) {
     let began = Instant::now();
-    let report = Scenario::copy_of(scenario).run_for_report();
+    let scenario = Scenario::copy_of(name);
+    let run = scenario.run();
+    let report = read(&run.join("report.json"));
     let took = began.elapsed();
     let error_s = number(&report, "latency_s") - number(&report, "true_latency_s");
     let uncertainty_s = number(&report, "latency_standard_uncertainty_s");
@@ -28,7 +36,7 @@ fn warm_up(scenario: &str, least_reduction: f64) {
         of_tool("with_compensation"),
     );
     eprintln!(
-        "{scenario}: {:.1} s; latency off by {:.4} ms = {:.2} u; p95 {:.2} um without, {:.2} um with, {:.1}-fold",
+        "{name}: {:.1} s; latency off by {:.4} ms = {:.2} u; p95 {:.2} um without, {:.2} um with, {:.1}-fold",
         took.as_secs_f64(),
         error_s * 1e3,
         error_s / uncertainty_s,
@@ -44,11 +52,33 @@ fn warm_up(scenario: &str, least_reduction: f64) {
     );
     assert!(without_mm / with_mm >= least_reduction);
     assert!(took < LIMIT, "{took:?}");
+    (scenario, run)
 }
 
 #[test]
-fn scenario_warm_up_two_blocks() {
-    warm_up("first_run", 5.0);
+fn scenario_warm_up_two_blocks_and_what_its_machine_file_lacks() {
+    let (_scenario, run) = warm_up("first_run", 5.0);
+    let gap = read(&run.join("gap.json"));
+    let report = read(&run.join("report.json"));
+    let causes = gap["causes"].as_array().unwrap().iter();
+    let named: Vec<&Value> = causes.filter(|c| c["status"] == "named").collect();
+    let effects: Vec<&str> = named
+        .iter()
+        .map(|c| c["effect"].as_str().unwrap())
+        .collect();
+    let closed = &gap["shrink"]["gap_closed"];
+    eprintln!("named: {effects:?}; gap closed: {closed}");
+    let latency = named.iter().find(|c| c["effect"] == "probe_latency");
+    let latency = &latency.expect("the latency is a gap")["parameters"][0];
+    let true_ms = 1e3 * number(&report, "true_latency_s");
+    assert!(
+        number(latency, "low") <= true_ms && true_ms <= number(latency, "high"),
+        "{true_ms} ms, {latency}"
+    );
+    // The plant heats its spindle, its X screw and its column; no part of it is the catalogue's formula.
+    assert!(effects.contains(&"spindle_growth"), "{effects:?}");
+    assert!(number(closed, "low") > 0.9, "{closed}");
+    assert_eq!(gap["unknown"]["flagged"], false, "{}", gap["unknown"]);
 }
 
 #[test]

@@ -80,11 +80,11 @@ pub fn diagnose_against(
         return Err(GapError::NoReadings);
     }
     let noise = if std::ptr::eq(session, quiet) {
-        noise_of(session, stations, &residual, config)
+        noise_of(machine, session, stations, &residual, config)
     } else {
         simulate::check(quiet)?;
         let residual = residuals(machine, &twin, quiet)?;
-        noise_of(quiet, stations, &residual, config)
+        noise_of(machine, quiet, stations, &residual, config)
     };
     if noise.is_empty() {
         return Err(no_repeats(session, &rows));
@@ -103,6 +103,7 @@ pub fn diagnose_against(
 
 /// Noise of the repeats of a session.
 fn noise_of(
+    machine: &MachineFile,
     session: &Session,
     stations: usize,
     residual: &[Vec<f64>],
@@ -115,6 +116,7 @@ fn noise_of(
         rows.average(run, &residual[run], &mut raw);
     }
     let readings = Readings {
+        machine,
         session,
         rows: &rows,
         residual,

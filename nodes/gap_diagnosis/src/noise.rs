@@ -16,15 +16,20 @@
 //! posterior quantile `CAUTION` is used rather than the best value, so that a lucky pair of repeats does not
 //! name a cause; likewise `CAUTION_WITHIN` of the variance within runs, which a dozen touches leave open by a third.
 //!
+//! Repeats that differ by less than the encoder can tell (a machine that is simulated without noise differs by
+//! nothing at all) have the noise of its resolution r, white: v = r2 / 12 \[3\].
+//!
 //! # Holds when
 //! All runs of a channel have the noise that its repeats have, at their own pace (`pace`).
 //!
 //! # References
 //! \[1\] G. Schwarz, Ann. Stat. 6, 1978 (BIC). \[2\] H. D. Patterson, R. Thompson, Biometrika 58, 1971
-//! (variances from contrasts).
+//! (variances from contrasts). \[3\] JCGM 100:2008 (GUM), F.2.2.1 (resolution of a digital indication).
 
 use std::collections::BTreeMap;
 
+use machine::MachineFile;
+use machine::file::AxisEntry;
 use machine::twin::{Channel, Run, Session};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -94,6 +99,8 @@ const FEWEST_OF_A_PACE: f64 = 60.0;
 /// A session's readings as rows, with the residual of each reading of each run, mm.
 #[derive(Clone, Copy)]
 pub struct Readings<'r> {
+    /// The machine as its file describes it.
+    pub machine: &'r MachineFile,
     /// The session.
     pub session: &'r Session,
     /// Its rows.
@@ -147,8 +154,10 @@ fn of_channel(readings: Readings<'_>, groups: &[Contrasts], config: &GapConfig) 
         return None;
     }
     let all: Vec<&Difference> = differences.iter().collect();
-    let (within, freedom) = autoregression(&all, config.most_ar)?;
-    let pace = Pace::new(&repeated(&differences, config.most_ar));
+    let channel = &rows.blocks[groups.first()?.blocks[0]].channel;
+    let least_mm2 = resolution_mm(readings.machine, channel).powi(2) / 12.0;
+    let (within, freedom) = autoregression(&all, config.most_ar, least_mm2)?;
+    let pace = Pace::new(&repeated(&differences, config.most_ar, least_mm2));
     let doubt = doubt(freedom);
     let (within, pace) = (within.scaled(doubt), pace.scaled(doubt));
     let filtered: Vec<Difference> = differences
@@ -212,7 +221,7 @@ fn paced(of: Readings<'_>, group: &Contrasts) -> Option<[f64; 3]> {
 }
 
 /// What differences show at each pace.
-fn repeated(differences: &[Difference], most: usize) -> Vec<Repeated> {
+fn repeated(differences: &[Difference], most: usize, least_mm2: f64) -> Vec<Repeated> {
     let mut paces = Vec::<(f64, Vec<&Difference>)>::new();
     for difference in differences {
         let Some([row_s, ..]) = difference.paced else {
@@ -225,7 +234,7 @@ fn repeated(differences: &[Difference], most: usize) -> Vec<Repeated> {
         }
     }
     let of_pace = |(row_s, own): (f64, Vec<&Difference>)| {
-        let (noise, freedom) = autoregression(&own, most)?;
+        let (noise, freedom) = autoregression(&own, most, least_mm2)?;
         let [_, reading_s, within_row] = own.first()?.paced?;
         (freedom >= FEWEST_OF_A_PACE).then(|| Repeated {
             row_s,
@@ -288,11 +297,33 @@ impl Difference {
     }
 }
 
-/// (2) over some differences, and the rows it is known from.
-fn autoregression(differences: &[&Difference], most: usize) -> Option<(Autoregression, f64)> {
+/// Resolution of an encoder, mm (rad for a rotary axis); zero where the machine file has none.
+fn resolution_mm(machine: &MachineFile, channel: &Channel) -> f64 {
+    let (axis, is_scale) = match channel {
+        Channel::Motor(axis) => (axis, false),
+        Channel::Scale(axis) => (axis, true),
+        _ => return 0.0,
+    };
+    match machine.axes.get(axis) {
+        Some(AxisEntry::Linear(linear)) if is_scale => {
+            1e-3 * linear.scale_resolution_um.unwrap_or(0.0)
+        }
+        Some(AxisEntry::Linear(linear)) => 1e-3 * linear.encoder_resolution_um,
+        Some(AxisEntry::Rotary(rotary)) => (rotary.encoder_resolution_arcsec / 3600.0).to_radians(),
+        None => 0.0,
+    }
+}
+
+/// (2) over some differences, and the rows it is known from; white where they show less than `least_mm2`.
+fn autoregression(
+    differences: &[&Difference],
+    most: usize,
+    least_mm2: f64,
+) -> Option<(Autoregression, f64)> {
     let (mut sums, freedom) = autocovariances(differences, most);
-    if sums[0] <= 0.0 {
-        return None;
+    if sums[0] <= least_mm2 {
+        let resolved = Autoregression::levinson(&[least_mm2]);
+        return (least_mm2 > 0.0 && freedom > 0.0).then_some((resolved, freedom));
     }
     let longest = differences.iter().map(|d| d.values.len()).max();
     if longest.unwrap_or(0) < 30 {

@@ -72,7 +72,7 @@ pub fn is_repeat(session: &Session, a: &Block, b: &Block) -> bool {
     a.run != b.run && a.channel == b.channel && same_condition(one, other) && {
         let (from, to) = (extent(one, a), extent(other, b));
         one.motion.axes.iter().all(|axis| {
-            let near = |p: f64, q: f64| (p - q).abs() < 0.2;
+            let near = |p: f64, q: f64| (p - q).abs() < 0.2 + 0.02 * (from[axis].1 - from[axis].0);
             near(from[axis].0, to[axis].0) && near(from[axis].1, to[axis].1)
         })
     }

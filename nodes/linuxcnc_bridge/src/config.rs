@@ -104,6 +104,8 @@ impl BridgeConfig {
 pub struct Settings {
     /// Axis of each joint, from joint 0.
     pub joints: Vec<Axis>,
+    /// Axes with a linear scale, in the order of the joints.
+    pub scales: Vec<Axis>,
     /// The same as a set.
     pub axes: AxisSet,
     /// Servo period of the machine file.
@@ -160,6 +162,16 @@ fn word(key: &'static str, value: &str) -> Result<String, BridgeError> {
     Ok(value.to_owned())
 }
 
+/// Those joints whose axis has a linear scale in the machine file.
+fn scaled(joints: &[Axis], machine: &MachineFile) -> Vec<Axis> {
+    let has_scale = |axis: &Axis| {
+        machine
+            .linear(*axis)
+            .is_some_and(|linear| linear.scale_resolution_um.is_some())
+    };
+    joints.iter().copied().filter(has_scale).collect()
+}
+
 fn servo_period(machine: &MachineFile) -> Result<Span, BridgeError> {
     let (key, value) = ("control.servo_period_ms", machine.control.servo_period_ms);
     let (least, greatest) = (0.01, 100.0);
@@ -199,6 +211,7 @@ impl Settings {
         checked("connection.start_timeout_s", connection.start_timeout_s)?;
         Ok(Self {
             joints: config.joints.clone(),
+            scales: scaled(&config.joints, machine),
             axes,
             servo_period: servo_period(machine)?,
             prepare: config.prepare,

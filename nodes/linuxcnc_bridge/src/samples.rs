@@ -2,7 +2,7 @@
 //!
 //! Columns, in the order in which the HAL file wires the sampler's pins: record number; position
 //! commanded to each joint (mm or deg, compensation not included); position of each motor (mm or
-//! deg, compensation included); probe input; motion type; program line; motion enabled. The sampler
+//! deg, compensation included); position read by the linear scale of each joint that has one (mm); probe input; motion type; program line; motion enabled. The sampler
 //! runs *before* motion in the servo thread: a record holds exactly what motion is about to see, and
 //! the commanded positions are those which the drives have just been following. Six decimals are
 //! printed: 1 nm, or 0.0036 arcsec.
@@ -16,7 +16,7 @@ pub const LINE_LIMIT_BYTES: usize = 1024;
 pub const PROBING: i32 = 5;
 
 /// One servo period.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
     /// Counts servo periods; wraps.
     pub number: i32,
@@ -24,6 +24,8 @@ pub struct Record {
     pub commanded: PerAxis<f64>,
     /// Where the motors are, compensation included; mm or rad.
     pub motor: PerAxis<f64>,
+    /// What the linear scales read, compensation included; mm, NaN where there is none.
+    pub scale: PerAxis<f64>,
     /// Probe input as motion is about to see it.
     pub probe_closed: bool,
     /// `motion.motion-type`.
@@ -32,6 +34,21 @@ pub struct Record {
     pub line: u32,
     /// Whether the drives are enabled.
     pub enabled: bool,
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Self {
+            number: 0,
+            commanded: PerAxis([0.0; 6]),
+            motor: PerAxis([0.0; 6]),
+            scale: PerAxis([f64::NAN; 6]),
+            probe_closed: false,
+            motion_type: 0,
+            line: 0,
+            enabled: false,
+        }
+    }
 }
 
 /// What a line says.
@@ -54,16 +71,18 @@ pub enum SampleEvent {
 #[derive(Clone, Debug, Default)]
 pub struct SampleReader {
     joints: Vec<Axis>,
+    scales: Vec<Axis>,
     line: Vec<u8>,
     too_long: bool,
 }
 
 impl SampleReader {
-    /// For a sampler of these joints.
+    /// For a sampler of these joints, of which some have linear scales.
     #[must_use]
-    pub fn new(joints: &[Axis]) -> Self {
+    pub fn new(joints: &[Axis], scales: &[Axis]) -> Self {
         Self {
             joints: joints.to_vec(),
+            scales: scales.to_vec(),
             line: Vec::with_capacity(LINE_LIMIT_BYTES),
             too_long: false,
         }
@@ -92,7 +111,7 @@ impl SampleReader {
     }
 
     fn columns(&self) -> usize {
-        2 * self.joints.len() + 5
+        2 * self.joints.len() + self.scales.len() + 5
     }
 
     fn read_line(&self) -> SampleEvent {
@@ -120,6 +139,9 @@ impl SampleReader {
         }
         for axis in &self.joints {
             record.motor[*axis] = position(*axis, words.next()?)?;
+        }
+        for axis in &self.scales {
+            record.scale[*axis] = position(*axis, words.next()?)?;
         }
         record.probe_closed = bit(words.next()?)?;
         record.motion_type = words.next()?.parse().ok()?;
@@ -156,7 +178,7 @@ mod tests {
     const XC: [Axis; 2] = [Axis::X, Axis::C];
 
     fn check(text: &[u8]) -> Vec<SampleEvent> {
-        let mut reader = SampleReader::new(&XC);
+        let mut reader = SampleReader::new(&XC, &[]);
         let mut events = Vec::new();
         for chunk in text.chunks(3) {
             reader.receive(chunk, |event| events.push(event));
@@ -174,6 +196,24 @@ mod tests {
         assert!(record.probe_closed && record.enabled);
         assert!((record.motor[Axis::X] - 1.499).abs() < 1e-12);
         assert!((record.commanded[Axis::C] - std::f64::consts::PI).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_scale_is_read_behind_the_motors_and_is_no_number_where_there_is_none() {
+        let mut reader = SampleReader::new(&XC, &[Axis::X]);
+        let mut events = Vec::new();
+        let text = b"12 1.5 180.0 1.499 179.0 1.4945 1 5 8 1\n12 1.5 180.0 1.499 179.0 1 5 8 1\n";
+        reader.receive(text, |event| events.push(event));
+        let [
+            SampleEvent::Record(record),
+            SampleEvent::Malformed { columns, expected },
+        ] = events.as_slice()
+        else {
+            panic!("{events:?}")
+        };
+        assert!((record.scale[Axis::X] - 1.4945).abs() < 1e-12);
+        assert!(record.scale[Axis::C].is_nan());
+        assert_eq!((*columns, *expected), (9, 10));
     }
 
     #[test]

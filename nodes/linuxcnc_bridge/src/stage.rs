@@ -2,7 +2,6 @@
 
 use std::convert::Infallible;
 
-use metrology::PerAxis;
 use metrology::Stage;
 use metrology::sample::{AxisCompensation, AxisState, ProbeTrigger};
 use metrology::stamp::{Host, Machine, Span, Stamp};
@@ -180,7 +179,7 @@ impl BridgeStage {
             stored: 0,
             news: None,
             sampling: Sampling::Off { retry_at: None },
-            reader: SampleReader::new(&settings.joints),
+            reader: SampleReader::new(&settings.joints, &settings.scales),
             clock: SampleClock::new(settings.servo_period),
             touches: TouchDetector::new(settings.servo_period, settings.axes),
             joints_at: None,
@@ -442,7 +441,7 @@ impl BridgeStage {
             axes: self.settings.axes,
             commanded: record.commanded,
             motor: record.motor,
-            scale: PerAxis([f64::NAN; 6]),
+            scale: record.scale,
             velocity: self.touches.velocity(record),
         };
         out.push(Output::State(state));

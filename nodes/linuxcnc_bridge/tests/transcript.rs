@@ -239,6 +239,7 @@ impl Desk {
         let connection = ConnectionConfig::default();
         let settings = Settings {
             joints: Axis::LINEAR.to_vec(),
+            scales: vec![],
             axes: AxisSet::XYZ,
             servo_period: Span::from_nanos(1_000_000),
             prepare,
