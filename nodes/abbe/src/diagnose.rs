@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use gap_diagnosis::{Diagnosis, GapConfig, diagnose};
+use gap_diagnosis::{Diagnosis, GapConfig, Rule, diagnose};
 use machine::MachineFile;
 use sha2::{Digest, Sha256};
 
@@ -41,6 +41,10 @@ pub struct Diagnose {
     /// Id of an effect that is not considered; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
+    /// Rule that is switched off, to see what it is worth: constancy, free_shapes, swap_search, held_out,
+    /// recalibration; may be given several times.
+    #[arg(long, value_name = "RULE")]
+    ablate: Vec<Rule>,
 }
 
 /// A diagnosis of bags, with what could not be used of them.
@@ -69,6 +73,7 @@ impl Diagnose {
         };
         let config = GapConfig {
             left_out: self.without.clone(),
+            ablated: self.ablate.iter().copied().collect(),
             ..GapConfig::default()
         };
         let diagnosed = of(&self.bags, &name, &text, &config)?;

@@ -16,7 +16,7 @@ pub mod gap;
 pub mod geometry;
 mod latency;
 mod page;
-mod plot;
+pub mod plot;
 pub mod positioning;
 pub mod probing;
 pub mod published;

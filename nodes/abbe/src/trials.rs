@@ -11,18 +11,23 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use gap_diagnosis::Rule;
 use sha2::{Digest, Sha256};
 use trials::{Arm, Verdict};
 
 mod blind;
 mod journal;
+mod later;
 mod seal;
 mod series;
 mod session_bag;
 mod table;
+mod tree;
+mod trial;
 
 use journal::Journal;
-use series::{How, Series};
+use series::Series;
+use trial::How;
 
 /// Seed of the trials that the diagnosis is developed with; those of `--final` are others.
 const DEVELOPMENT_SEED: u64 = 1;
@@ -31,7 +36,7 @@ const DEVELOPMENT_SEED: u64 = 1;
 #[derive(Args)]
 pub struct Trials {
     /// Arms, by number: i catalogue, ii a class left out, iii different physics, iv null, v null with worse noise,
-    /// vi confusable pairs; alone: each class in turn, large enough to be named.
+    /// vi confusable pairs, vii the same with one more run of the diagnosis' choice; alone: each class in turn, large enough to be named.
     #[arg(long, value_delimiter = ',', default_value = "i")]
     arm: Vec<Arm>,
     /// Trials in each arm.
@@ -40,7 +45,8 @@ pub struct Trials {
     /// Seed of the series.
     #[arg(long, conflicts_with = "final_series")]
     seed: Option<u64>,
-    /// Draw the seed from the commit of this program: a series that nobody could have tuned to.
+    /// Draw the seed from the commit of this program: a series that nobody could have tuned to. Refused where the
+    /// working tree is not that commit.
     #[arg(long = "final")]
     final_series: bool,
     /// Trials at a time; 0: as many as there are cores.
@@ -55,6 +61,13 @@ pub struct Trials {
     /// Diagnose within this process, without bag and seal: for development, never for a published table.
     #[arg(long)]
     in_process: bool,
+    /// Switch a rule of the diagnosis off, in a diagnosis of its own beside the whole one: constancy, free_shapes,
+    /// swap_search, held_out, recalibration.
+    #[arg(long, value_delimiter = ',', value_name = "RULE")]
+    ablate: Vec<Rule>,
+    /// Put other methods before the same judge, and predict who looks like whom.
+    #[arg(long)]
+    baselines: bool,
     /// Keep bags and reports.
     #[arg(long)]
     keep: bool,
@@ -82,7 +95,10 @@ impl Trials {
             bail!("--n 0: must be 1 or more");
         }
         let seed = match (self.final_series, self.seed) {
-            (true, _) => seed_of(env!("ABBE_COMMIT")),
+            (true, _) => {
+                tree::check(env!("ABBE_COMMIT"))?;
+                seed_of(env!("ABBE_COMMIT"))
+            }
             (false, seed) => seed.unwrap_or(DEVELOPMENT_SEED),
         };
         std::fs::create_dir_all(&self.out).with_context(|| format!("{}", self.out.display()))?;
@@ -92,12 +108,14 @@ impl Trials {
             let how = How {
                 in_process: self.in_process,
                 keep: self.keep,
+                baselines: self.baselines,
                 out: self.out.clone(),
                 sealed: self.sealed.clone().unwrap_or_else(|| beside(&self.out)),
             };
             let series = Series {
                 seed,
                 n: self.n,
+                ablated: &blind::once(&self.ablate),
                 jobs: self.jobs,
                 how: &how,
             };
@@ -110,16 +128,16 @@ impl Trials {
             truth.seed == seed && truth.index < self.n && arms.contains(&truth.arm)
         };
         let verdicts: Vec<Verdict> = journal.verdicts().iter().filter(own).cloned().collect();
-        self.publish(&table::Table::of(&arms, seed, verdicts, self.in_process))?;
+        self.publish(&table::Table::of(&arms, seed, &verdicts, self.in_process))?;
         Ok(ExitCode::SUCCESS)
     }
 
     fn publish(&self, table: &table::Table) -> Result<()> {
-        println!("{}", table.terminal());
+        println!("{}", table.terminal()?);
         for (path, contents) in [
             (&self.json, table.json()?),
-            (&self.html, table.html()),
-            (&self.markdown, table.markdown()),
+            (&self.html, table.html()?),
+            (&self.markdown, table.markdown()?),
         ] {
             if let Some(path) = path {
                 std::fs::write(path, contents).with_context(|| format!("{}", path.display()))?;

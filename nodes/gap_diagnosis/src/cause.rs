@@ -27,6 +27,7 @@ use crate::recalibration::recalibrated;
 use crate::refit::{self, Estimate, Refit};
 use crate::report::{Cause, Confusable, Constancy, ParameterValue, Status};
 use crate::rows::count;
+use crate::rule::Rule;
 use crate::selection::{Limits, Search, Set};
 use crate::signature::{Form, Instance, Library};
 use crate::stack::Stack;
@@ -110,7 +111,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let mut normal = signatures.normal(&stack.z);
     let mut best = search(scope, &signatures, &normal);
     let is_closed = !best.leftover.flagged();
-    if !best.set.is_empty() {
+    if !best.set.is_empty() && scope.config.applies(Rule::FreeShapes) {
         let sizes: Vec<f64> = best.refit.estimates.iter().map(|e| e.d).collect();
         widening::widen(stack, &mut signatures, &best.set, &sizes, &best.visited);
         normal = signatures.normal(&stack.z);
@@ -208,6 +209,7 @@ fn search(scope: &Scope<'_, '_>, signatures: &Library, normal: &Normal) -> Best 
     let set = search.run(Limits {
         beam: scope.config.beam,
         most_effects: scope.config.most_effects,
+        swaps: scope.config.applies(Rule::SwapSearch),
     });
     search.alternatives(&set, 8);
     let sizes = search.fit(&set).sizes;
@@ -271,7 +273,8 @@ fn judged(
             && !beaten[place]
             && rivals.is_needed(&instances, instance)
             && among.is_some_and(|k| {
-                confirmed[k] && (is_closed || gains[k] >= LEAST_RATIO * unexplained)
+                (confirmed[k] || !scope.config.applies(Rule::HeldOut))
+                    && (is_closed || gains[k] >= LEAST_RATIO * unexplained)
             });
         Member {
             form: *form,
@@ -281,6 +284,7 @@ fn judged(
                 (true, false) => Status::Set,
             },
             confidence: recalibrated(
+                scope.config,
                 rivals.probability(instance) * adequacy * if holds { 1.0 } else { 0.5 },
             ),
             confusable: confusable(signatures, normal, &instead, *form, forms),

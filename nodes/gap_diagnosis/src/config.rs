@@ -1,8 +1,11 @@
 //! How a diagnosis is made: how finely readings are thinned, how hard is searched, how sure is sure.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
 use crate::error::GapError;
+use crate::rule::Rule;
 
 /// Settings of a diagnosis. The defaults are those that the trials were judged with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,6 +41,8 @@ pub struct GapConfig {
     pub hold_out: bool,
     /// Ids of effects that are not considered.
     pub left_out: Vec<String>,
+    /// Rules that are switched off, to see what they are worth.
+    pub ablated: BTreeSet<Rule>,
 }
 
 impl Default for GapConfig {
@@ -58,11 +63,18 @@ impl Default for GapConfig {
             constancy_spread: 0.1,
             hold_out: true,
             left_out: vec![],
+            ablated: BTreeSet::new(),
         }
     }
 }
 
 impl GapConfig {
+    /// Whether a rule is on.
+    #[must_use]
+    pub fn applies(&self, rule: Rule) -> bool {
+        !self.ablated.contains(&rule)
+    }
+
     /// Refuses settings that mean nothing.
     ///
     /// # Errors

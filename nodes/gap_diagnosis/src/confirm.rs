@@ -33,6 +33,7 @@ use crate::normal::Normal;
 use crate::nuisance::plane_name;
 use crate::report::Constancy;
 use crate::rows::{Block, Row, count, position, time_s};
+use crate::rule::Rule;
 use crate::stack::Stack;
 
 /// A level of a condition needs this D of the effect to say something of its size.
@@ -199,7 +200,9 @@ pub fn constancy_of(
             worst.worst_z = z;
             worst.split_by = name.to_owned();
         }
-        worst.passed &= z < config.constancy_z || spread < config.constancy_spread;
+        worst.passed &= z < config.constancy_z
+            || spread < config.constancy_spread
+            || !config.applies(Rule::Constancy);
     }
     worst
 }

@@ -19,6 +19,7 @@ use crate::gap;
 use crate::guard;
 use crate::next::{self, Bench};
 use crate::noise::{self, Noise, Readings};
+use crate::regression::Regression;
 use crate::report::{GapReport, Inputs, NoiseFloor, NotExcited, SCHEMA};
 use crate::rows::Rows;
 use crate::scatter::{self, Scattered};
@@ -68,9 +69,36 @@ pub fn diagnose_against(
     quiet: &Session,
     config: &GapConfig,
 ) -> Result<Diagnosis, GapError> {
+    let kinds = considered(config)?;
+    prepared(machine, session, quiet, config, |base, notes| {
+        base.diagnosis(&kinds, config, notes)
+    })
+}
+
+/// The signatures of the catalogue on the runs that a diagnosis is fitted to, before it has found anything.
+pub(crate) fn signatures(
+    machine: &MachineFile,
+    session: &Session,
+    config: &GapConfig,
+) -> Result<Regression, GapError> {
+    let kinds = considered(config)?;
+    prepared(machine, session, session, config, |base, _| {
+        let split = split::split(session, config.hold_out);
+        let stack = base.stack(&split.fit, base.noise, &FormError::base(config));
+        Regression::new(&stack, &kinds)
+    })
+}
+
+/// Takes the residuals and their noise, and goes on with them.
+fn prepared<R>(
+    machine: &MachineFile,
+    session: &Session,
+    quiet: &Session,
+    config: &GapConfig,
+    then: impl FnOnce(&Base<'_>, Vec<Note>) -> R,
+) -> Result<R, GapError> {
     config.check()?;
     simulate::check(session)?;
-    let kinds = considered(config)?;
     let twin = Twin::new(machine)?;
     let residual = residuals(machine, &twin, session)?;
     let all = (0..session.runs.len()).collect::<Vec<_>>();
@@ -98,7 +126,7 @@ pub fn diagnose_against(
         residual: &residual,
         listed: listed(machine)?,
     };
-    Ok(base.diagnosis(&kinds, config, notes(&rows, &noise)))
+    Ok(then(&base, notes(&rows, &noise)))
 }
 
 /// Noise of the repeats of a session.

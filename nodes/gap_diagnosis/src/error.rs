@@ -42,6 +42,11 @@ pub enum GapError {
     /// An id that the catalogue does not have.
     #[error("left_out: `{id}` is not in the catalogue")]
     LeftOut { id: String },
+    /// A rule that the diagnosis does not have.
+    #[error(
+        "rule \"{name}\": must be one of constancy free_shapes swap_search held_out recalibration"
+    )]
+    Rule { name: String },
     /// The twin cannot simulate it.
     #[error(transparent)]
     Twin(#[from] machine::twin::TwinError),

@@ -18,7 +18,8 @@
 //! noise is that of the repeats, `unknown` what no effect explains, `isolability` what could be told from what. `gap` is how much there was to explain, `split` and
 //! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`. `experiment` knows what could
 //! be measured next and `next` which of it would decide. `diagnose` puts the questions in their order,
-//! `preflight` some of them before anything is measured. `stage` is the node's whole computation, `following` its
+//! `preflight` some of them before anything is measured; `regression` is what other methods than these would start
+//! from, `rule` what of these can be switched off. `stage` is the node's whole computation, `following` its
 //! parameters.
 
 mod bootstrap;
@@ -49,9 +50,11 @@ mod places;
 pub mod preflight;
 mod recalibration;
 mod refit;
+pub mod regression;
 mod repeats;
 pub mod report;
 mod rows;
+pub mod rule;
 mod scatter;
 mod selection;
 pub mod session;
@@ -71,4 +74,5 @@ pub use error::GapError;
 pub use figures::{Figures, Note};
 pub use following::{GapDiagnosisConfig, PARAMETERS};
 pub use report::GapReport;
+pub use rule::Rule;
 pub use stage::{GapDiagnosisStage, Input, Output};

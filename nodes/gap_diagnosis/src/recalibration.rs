@@ -18,6 +18,9 @@
 //! \[1\] B. Zadrozny, C. Elkan, Transforming classifier scores into accurate multiclass probability estimates,
 //! KDD 2002 (isotonic recalibration).
 
+use crate::config::GapConfig;
+use crate::rule::Rule;
+
 /// Where a table is from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Provenance {
@@ -32,9 +35,13 @@ pub const TABLE: &[[f64; 2]] = &[[0.0, 0.0], [1.0, 1.0]];
 /// Trials behind [`TABLE`]: none yet.
 pub const PROVENANCE: Option<Provenance> = None;
 
-/// (1).
-pub fn recalibrated(probability: f64) -> f64 {
-    along(TABLE, probability)
+/// (1); the probability itself where that rule is switched off.
+pub fn recalibrated(config: &GapConfig, probability: f64) -> f64 {
+    if config.applies(Rule::Recalibration) {
+        along(TABLE, probability)
+    } else {
+        probability
+    }
 }
 
 fn along(table: &[[f64; 2]], probability: f64) -> f64 {
@@ -64,7 +71,7 @@ mod tests {
             );
         }
         for p in [0.0, 0.3, 0.97, 1.0] {
-            let is_identity = (recalibrated(p) - p).abs() < 1e-12;
+            let is_identity = (recalibrated(&GapConfig::default(), p) - p).abs() < 1e-12;
             assert!(is_identity || PROVENANCE.is_some(), "{p}");
         }
     }

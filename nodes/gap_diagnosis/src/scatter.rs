@@ -43,6 +43,7 @@ use crate::nuisance::orthonormal;
 use crate::recalibration::recalibrated;
 use crate::report::{Cause, Constancy, ParameterValue, Status};
 use crate::rows::{Block, Row, count};
+use crate::rule::Rule;
 use crate::selection::{Limits, Search, Set};
 use crate::signature::{Form, Instance, Library};
 
@@ -120,6 +121,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind], left: &DVector<f64>)
     let set = search.run(Limits {
         beam: scope.config.beam,
         most_effects: 3,
+        swaps: scope.config.applies(Rule::SwapSearch),
     });
     search.alternatives(&set, 6);
     let mut found = Scattered {
@@ -385,6 +387,8 @@ impl Judge<'_, '_, '_> {
         found.spread = fit.level.map(f64::sqrt);
         let parts = self.parts(&forms, &fit);
         let confirmed = confirm::held_out_gains_of(stack, &self.squares.y, &parts);
+        let config = self.scope.config;
+        let is_confirmed = |place: usize| confirmed[place] || !config.applies(Rule::HeldOut);
         let beats_runs = self.visited[set] < self.of_runs();
         let rivals = Rivals::new(self.signatures, self.visited);
         let columns: Vec<DVector<f64>> = forms
@@ -404,7 +408,7 @@ impl Judge<'_, '_, '_> {
             let (parameters, values) = sized(instance.kind, form, &fit, own.clone());
             let constancy = self.constancy(instance, &values, &columns, &left);
             let railed = parameters.iter().any(|p| p.at_bound && p.value > 0.0);
-            let holds = confirmed[place] && beats_runs && constancy.passed && !railed;
+            let holds = is_confirmed(place) && beats_runs && constancy.passed && !railed;
             let status = match (holds, rivals.is_alone(form.instance)) {
                 (false, _) => Status::Surrogate,
                 (true, true) => Status::Named,
@@ -418,6 +422,7 @@ impl Judge<'_, '_, '_> {
                 axis: instance.target.to_string(),
                 status,
                 confidence: recalibrated(
+                    config,
                     rivals.probability(form.instance) * if holds { 1.0 } else { 0.5 },
                 ),
                 parameters,

@@ -46,6 +46,8 @@ pub struct Limits {
     pub beam: usize,
     /// Most effects in one set.
     pub most_effects: usize,
+    /// Whether a member may be swapped for another effect.
+    pub swaps: bool,
 }
 
 impl<'l> Search<'l> {
@@ -182,7 +184,7 @@ impl<'l> Search<'l> {
     }
 
     /// Improves one set by taking out and by swapping until nothing helps.
-    fn polished(&mut self, mut set: Set) -> Set {
+    fn polished(&mut self, mut set: Set, swaps: bool) -> Set {
         loop {
             let now = self.score(&set);
             let mut best = (now - 1e-9, set.clone());
@@ -192,7 +194,8 @@ impl<'l> Search<'l> {
                 if score < best.0 {
                     best = (score, less.clone());
                 }
-                if let Some((score, swapped)) = self.beside(&less, 4).into_iter().next()
+                if swaps
+                    && let Some((score, swapped)) = self.beside(&less, 4).into_iter().next()
                     && score < best.0
                 {
                     best = (score, swapped);
@@ -220,7 +223,13 @@ impl<'l> Search<'l> {
             beam = next
                 .into_iter()
                 .enumerate()
-                .map(|(rank, (_, set))| if rank < 2 { self.polished(set) } else { set })
+                .map(|(rank, (_, set))| {
+                    if rank < 2 {
+                        self.polished(set, limits.swaps)
+                    } else {
+                        set
+                    }
+                })
                 .collect();
             beam.sort();
             beam.dedup();

@@ -25,11 +25,13 @@ pub enum Arm {
     Confusable,
     /// One effect of a class, every class and every axis in turn, large enough to be named.
     Alone,
+    /// As `Confusable`; the diagnosis is given one more run, the first that it asks for.
+    TwoRounds,
 }
 
 impl Arm {
     /// Every arm, in order.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Catalogue,
         Self::LeftOut,
         Self::Foreign,
@@ -37,12 +39,13 @@ impl Arm {
         Self::HeavyNull,
         Self::Confusable,
         Self::Alone,
+        Self::TwoRounds,
     ];
 
     /// Its number in the protocol; `alone` has none.
     #[must_use]
     pub const fn numeral(self) -> &'static str {
-        ["i", "ii", "iii", "iv", "v", "vi", "alone"][self as usize]
+        ["i", "ii", "iii", "iv", "v", "vi", "alone", "vii"][self as usize]
     }
 
     /// In words.
@@ -56,6 +59,7 @@ impl Arm {
             "nothing hidden, noise worse than the repeats",
             "confusable pairs",
             "each class alone",
+            "confusable pairs, with one more run of the diagnosis' choice",
         ][self as usize]
     }
 

@@ -8,9 +8,7 @@ use sequencer::SequencerError;
 #[derive(Debug, thiserror::Error)]
 pub enum TrialError {
     /// There is no such arm.
-    #[error(
-        "arm \"{name}\": must be one of i ii iii iv v vi alone (vii, two rounds, waits for proposals of the diagnosis)"
-    )]
+    #[error("arm \"{name}\": must be one of i ii iii iv v vi vii alone")]
     UnknownArm {
         /// The text that was read.
         name: String,

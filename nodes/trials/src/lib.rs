@@ -4,17 +4,25 @@
 //! draws a machine with its plant, `commissioning` measures what its maker knows of its loops, `programme` is what is measured, `effect` what is hidden in the plant,
 //! `scatter` what no two runs have in common, `trial` puts them together and `measurement` runs the plan on
 //! `fake_cnc`'s plant in simulated time. Its physics is the plant's own: nothing here calls the simulator or its
-//! catalogue, whose ids it only writes down. The *diagnoser* is `abbe diagnose`, a process that is given the bag and
-//! the machine file. The *judge* is `verdict` for one trial, `tally` and `calibration` for all of them.
+//! catalogue, whose ids it only writes down; `extra_run` is the one that a diagnosis asks for. The *diagnoser* is `abbe diagnose`, a process that is given the bag and
+//! the machine file. The *judge* is `verdict` for one trial, `tally`, `calibration`, `confusion` and `detection` for all of
+//! them, `covariate` knows what a leftover should go with, `target` says which figures are as good as they should be;
+//! `comparison` puts  the methods of `baseline` and diagnoses without one of their rules before the same judge.
 //!
 //! `size` says how large a hidden effect is for these measurements: D, the root of its chi-square against the
 //! trial's own scatter, of which the generator, unlike the diagnoser, knows the covariance.
 
 pub mod arm;
+pub mod baseline;
 pub mod calibration;
 mod commissioning;
+pub mod comparison;
+pub mod confusion;
+pub mod covariate;
+pub mod detection;
 pub mod effect;
 pub mod error;
+mod extra_run;
 pub mod measurement;
 mod programme;
 pub mod proportion;
@@ -22,15 +30,18 @@ pub mod rig;
 pub mod scatter;
 mod size;
 pub mod tally;
+pub mod target;
 pub mod trial;
 pub mod truth;
 pub mod verdict;
 
 pub use arm::Arm;
+pub use baseline::Method;
 pub use error::TrialError;
+pub use extra_run::extra_run;
 pub use measurement::{Sample, measure};
 pub use rig::Rig;
 pub use tally::Tally;
 pub use trial::Trial;
 pub use truth::Truth;
-pub use verdict::{Verdict, judge};
+pub use verdict::{Second, Verdict, judge, likeness};

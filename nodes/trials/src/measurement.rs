@@ -17,8 +17,6 @@ use crate::error::TrialError;
 use crate::rig::Rig;
 use crate::scatter::Scattering;
 
-/// First instant of a session, s since the epoch.
-pub const START_S: i64 = 1_767_600_000;
 /// Time between two looks of the sequencer, s.
 const LOOK_S: f64 = 0.1;
 /// Longest programme, s.
@@ -74,7 +72,7 @@ pub fn measure(rig: &Rig, take: &mut dyn FnMut(Stamp<Host>, Sample)) -> Result<(
             &rig.control,
             Plant::new(&rig.control, &rig.plant)?,
         )?,
-        now: Stamp::from_nanos(START_S * NANOS_PER_S),
+        now: Stamp::from_nanos(rig.start_s * NANOS_PER_S),
         scattering: Scattering::new(&rig.scatter),
         commanded: PerAxis::default(),
         take,

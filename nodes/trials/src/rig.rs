@@ -36,6 +36,11 @@ const WAVE_MM: [f64; 2] = [80.0, 800.0];
 /// Share of machines that have outliers, and how many of their readings are.
 const OUTLIERS: [f64; 2] = [0.05, 0.01];
 
+/// First instant of a session, s since the epoch.
+const START_S: i64 = 1_767_600_000;
+/// Time from one session to the next, s.
+const LATER_S: i64 = 3600;
+
 /// Everything that a trial's session follows from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
@@ -53,6 +58,8 @@ pub struct Rig {
     pub scatter: Scatter,
     /// How much later the grid encoder stamps its readings than it should, s.
     pub grid_late_s: f64,
+    /// When the session begins, s since the epoch.
+    pub start_s: i64,
     /// Whether the motors' encoders are recorded; otherwise their positions are those that were commanded.
     pub has_motors: bool,
 }
@@ -102,8 +109,20 @@ impl Rig {
             machine,
             plant,
             grid_late_s: 0.0,
+            start_s: START_S,
             has_motors: random.random(),
         })
+    }
+
+    /// The same machine an hour later, measured once more by another plan: it is cold again, and what its runs do not
+    /// have in common is drawn anew.
+    #[must_use]
+    pub fn later(&self, plan: Plan) -> Self {
+        let mut later = self.clone();
+        later.plan = plan;
+        later.start_s += LATER_S;
+        later.scatter.seed ^= 0x5851_f42d_4c95_7f2d;
+        later
     }
 
     /// The machine file as text.

@@ -15,6 +15,21 @@
 //! anything has changed. That part c^2 of the difference is taken from neighbouring rows, added to v, and its
 //! expectation, c^2/v for each row, taken from D^2.
 //!
+//! What the simulator itself is off by belongs to the noise as well, whatever is averaged: a smooth error of form along
+//! the waves and a rough one from row to row, of which the n repeats of a test see the same draw:
+//!
+//! ```text
+//!   V += n f^2 / K,   v += n (f/2)^2                                                      (4)
+//! ```
+//!
+//! A touch has f for its feature and feed instead.
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | sigma, phi, V | `Scatter` | mm, 1, mm² |
+//! | q | `INSTRUMENT_MM` | mm |
+//! | f | `FORM_MM` | mm |
+//!
 //! A row is the mean of m readings. B holds the waves of the smooth deviation, with their variance in V, and
 //! what every set-up leaves open, with an infinite one: zeros, the turn of the plate, the place of a touched face. They
 //! are left open in every run here, once for a set-up in the diagnosis, so that D is a little too small rather than too
@@ -40,6 +55,10 @@ const ROWS: usize = 120;
 const INSTRUMENT_MM: f64 = 5e-5;
 /// Repeatability of one touch, mm.
 const TOUCH_MM: f64 = 3e-4;
+/// Error of form that every simulator of a machine has, f, mm.
+const FORM_MM: f64 = 2e-4;
+/// Part of it that is rough.
+const ROUGH: f64 = 0.5;
 /// An axis that moved by less than this since the reading before stands, mm.
 const STANDS_MM: f64 = 1e-6;
 
@@ -51,6 +70,9 @@ struct Reading {
     direction: usize,
     place_mm: Vector3<f64>,
 }
+
+/// What repeats of a test have in common.
+type Condition = String;
 
 /// What a row is floated by besides the waves.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,6 +89,7 @@ struct Block {
     floats: Floats,
     readings: Vec<Reading>,
     is_touch: bool,
+    condition: Condition,
 }
 
 /// Which block: run, then what is touched.
@@ -115,7 +138,7 @@ impl Deviations {
                 let here_mm = self.commanded.xyz();
                 let direction = sample.axis.index();
                 self.push(
-                    "",
+                    sample.axis.letter(),
                     Floats::Zero,
                     false,
                     Reading {
@@ -152,28 +175,47 @@ impl Deviations {
         let block = self
             .blocks
             .entry((segment.run, what.to_owned()))
-            .or_insert(Block {
+            .or_insert_with(|| Block {
                 floats,
                 readings: vec![],
                 is_touch,
+                condition: condition(segment, what),
             });
         block.readings.push(reading);
     }
 
     /// D of what is in `self` and not in `without`, equation (1).
     pub(crate) fn d_against(&self, without: &Self, scatter: &Scatter) -> f64 {
+        let mut repeats = BTreeMap::<&str, f64>::new();
+        for block in self.blocks.values() {
+            *repeats.entry(&block.condition).or_default() += 1.0;
+        }
         let squares = self.blocks.iter().map(|(key, with)| {
-            without
-                .blocks
-                .get(key)
-                .map_or(0.0, |other| gain(with, other, scatter))
+            let other = without.blocks.get(key);
+            let repeats = repeats[&*with.condition];
+            other.map_or(0.0, |other| gain(with, other, scatter, repeats))
         });
         squares.sum::<f64>().max(0.0).sqrt()
     }
 }
 
-/// Gain of one block, (3).
-fn gain(with: &Block, without: &Block, scatter: &Scatter) -> f64 {
+/// What a run has in common with its repeats.
+fn condition(segment: &TestSegment, what: &str) -> Condition {
+    format!(
+        "{:?} {:?} {:?} {:.1} {:.1} {:.1} {:.1} {:.2} {what}",
+        segment.kind,
+        segment.plane,
+        segment.sense,
+        segment.centre_mm.x,
+        segment.centre_mm.y,
+        segment.centre_mm.z,
+        segment.radius_mm,
+        segment.feed_mm_s
+    )
+}
+
+/// Gain of one block, (3), which a number of repeats share the error of form of.
+fn gain(with: &Block, without: &Block, scatter: &Scatter, repeats: f64) -> f64 {
     let both: Vec<(Reading, f64)> = with
         .readings
         .iter()
@@ -186,10 +228,12 @@ fn gain(with: &Block, without: &Block, scatter: &Scatter) -> f64 {
         return 0.0;
     }
     let variance_mm2 = if with.is_touch {
-        TOUCH_MM.powi(2)
+        TOUCH_MM.powi(2) + TOUCHES_ALIKE * FORM_MM.powi(2)
     } else {
         let memory = (1.0 + scatter.ar) / (1.0 - scatter.ar);
-        scatter.white_mm.powi(2) * memory / mean_of + INSTRUMENT_MM.powi(2)
+        scatter.white_mm.powi(2) * memory / mean_of
+            + INSTRUMENT_MM.powi(2)
+            + repeats * (ROUGH * FORM_MM).powi(2)
     };
     let chatter_mm2 = if with.is_touch {
         0.0
@@ -197,15 +241,23 @@ fn gain(with: &Block, without: &Block, scatter: &Scatter) -> f64 {
         chatter_mm2(&signature)
     };
     let all_mm2 = variance_mm2 + chatter_mm2;
+    // (4): the place of a touched face floats, and the waves hardly vary over it.
+    let form_mm2 = if with.is_touch {
+        0.0
+    } else {
+        repeats * FORM_MM.powi(2) / WAVES as f64
+    };
     let gain = quadratic_form(
         &signature,
         &columns,
         all_mm2,
-        scatter.coefficient_variance_mm2(),
+        scatter.coefficient_variance_mm2() + form_mm2,
     );
     gain - signature.len() as f64 * chatter_mm2 / all_mm2
 }
 
+/// Touches of one face at one feed in a run (`programme`).
+const TOUCHES_ALIKE: f64 = 2.0;
 /// Middle square of a normal number of variance 1.
 const MIDDLE_SQUARE: f64 = 0.454_936;
 

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use gap_diagnosis::report::Status;
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
 use crate::calibration::{Reliability, calibration, reliability};
+use crate::comparison::{MethodLine, methods};
+use crate::confusion::{Predicted, agreement, observed, predicted};
 use crate::effect::Class;
 use crate::proportion::{Proportion, auroc, median};
 use crate::truth::TrueEffect;
@@ -17,11 +18,11 @@ pub const D_EDGES: [f64; 4] = [5.0, 10.0, 20.0, 50.0];
 /// Bins of D.
 pub const D_BINS: usize = D_EDGES.len() + 1;
 /// D beyond which a single effect should be named.
-const SINGLE_D: f64 = 10.0;
+pub(crate) const SINGLE_D: f64 = 10.0;
 /// D beyond which each of several effects should be named.
-const SEVERAL_D: f64 = 7.0;
+pub(crate) const SEVERAL_D: f64 = 7.0;
 /// D beyond which other physics should be named.
-const LARGE_D: f64 = 20.0;
+pub(crate) const LARGE_D: f64 = 20.0;
 
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,6 +53,8 @@ pub struct ClassLine {
     pub class: Class,
     /// Named with its axis, by bin of D.
     pub named: [Proportion; D_BINS],
+    /// Least and greatest D that its physical range allowed.
+    pub d_range: [f64; 2],
     /// Shown as a surrogate with its axis, over all D.
     pub surrogate: Proportion,
     /// What else was named in those trials that hide it alone, the most frequent first.
@@ -73,6 +76,12 @@ pub struct Tally {
     pub classes: Vec<ClassLine>,
     /// Who was named for whom: hidden class, named class, times; trials with one effect only.
     pub confusion: Vec<(String, String, usize)>,
+    /// What each hidden class was predicted to look like.
+    pub predicted: Vec<Predicted>,
+    /// How often one got the name of another class: with a predicted double, and without.
+    pub agreement: [Proportion; 2],
+    /// Other methods before the same judge.
+    pub methods: Vec<MethodLine>,
     /// What was named though nothing of it was hidden, the most frequent first.
     pub false_names: Vec<(String, usize)>,
     /// Confidence beside precision.
@@ -106,7 +115,10 @@ impl Tally {
             rates: rates(arm, &own),
             figures: figures(&own),
             classes: classes(&own),
-            confusion: confusion(&own),
+            confusion: observed(&own),
+            predicted: predicted(&own),
+            agreement: agreement(&own),
+            methods: methods(arm, &own),
             false_names: false_names(&own),
             reliability: reliability(&own),
         }
@@ -176,16 +188,16 @@ fn rates(arm: Arm, own: &[&Verdict]) -> Vec<Rate> {
     rates.0
 }
 
-fn is_reproduced(verdict: &Verdict) -> bool {
+pub(crate) fn is_reproduced(verdict: &Verdict) -> bool {
     verdict.said.as_ref().is_some_and(|said| said.is_reproduced)
 }
 
-fn has_wrong(verdict: &Verdict) -> bool {
+pub(crate) fn has_wrong(verdict: &Verdict) -> bool {
     verdict.wrong().next().is_some()
 }
 
 /// Those of which everything that is hidden is larger than `d`.
-fn beyond<'v>(all: &[&'v Verdict], d: f64) -> Vec<&'v Verdict> {
+pub(crate) fn beyond<'v>(all: &[&'v Verdict], d: f64) -> Vec<&'v Verdict> {
     let is_large = |v: &&&Verdict| v.least_d().is_some_and(|least| least > d);
     all.iter().filter(is_large).copied().collect()
 }
@@ -300,13 +312,10 @@ fn figures(own: &[&Verdict]) -> Vec<Figure> {
             .collect(),
     );
     add(
-        "median time of a diagnosis, s",
-        own.iter().map(|v| v.diagnosis_s).collect(),
+        "median gap closed over that of an oracle, D > 20",
+        hidden().filter_map(|(v, _)| v.closed_of_oracle()).collect(),
     );
-    add(
-        "median time of making a trial, s",
-        own.iter().map(|v| v.making_s).collect(),
-    );
+    figures.extend(times(own));
     let count = Proportion::of(covered.into_iter());
     figures.push(Figure {
         what: "share of 95 % intervals that hold the parameter".to_owned(),
@@ -315,6 +324,27 @@ fn figures(own: &[&Verdict]) -> Vec<Figure> {
     });
     figures.extend(calibration(own));
     figures
+}
+
+/// Times of diagnoses, and of making their trials.
+fn times(own: &[&Verdict]) -> [Figure; 3] {
+    let middle = |what: &str, values: Vec<f64>| Figure {
+        what: what.to_owned(),
+        n: values.len(),
+        value: median(values),
+    };
+    let said = own.iter().filter_map(|v| Some(v.said.as_ref()?.runtime_s));
+    [
+        middle("median time of a diagnosis, s", said.collect()),
+        middle(
+            "median time of a diagnosis with its program and bag, s",
+            own.iter().map(|v| v.diagnosis_s).collect(),
+        ),
+        middle(
+            "median time of making a trial, s",
+            own.iter().map(|v| v.making_s).collect(),
+        ),
+    ]
 }
 
 fn classes(own: &[&Verdict]) -> Vec<ClassLine> {
@@ -335,6 +365,9 @@ fn classes(own: &[&Verdict]) -> Vec<ClassLine> {
         ClassLine {
             class,
             named,
+            d_range: pairs().fold([f64::INFINITY, 0.0], |[low, high], (_, effect)| {
+                [effect.d.min(low), effect.d.max(high)]
+            }),
             surrogate: Proportion::of(
                 pairs()
                     .map(|(v, e)| v.shows(e))
@@ -371,38 +404,10 @@ fn false_names(own: &[&Verdict]) -> Vec<(String, usize)> {
     )
 }
 
-/// Hidden class, named class (or what was said instead), times.
-fn confusion(own: &[&Verdict]) -> Vec<(String, String, usize)> {
-    let mut counts = BTreeMap::<(String, String), usize>::new();
-    for verdict in own.iter().filter(|v| v.said.is_some()) {
-        let [effect] = &verdict.truth.effects[..] else {
-            continue;
-        };
-        let mut said: Vec<String> = verdict.named().map(|c| c.effect.clone()).collect();
-        if said.is_empty() {
-            let causes = verdict.said.iter().flat_map(|said| &said.causes);
-            let surrogate = causes.into_iter().find(|c| c.status == Status::Surrogate);
-            said.push(match (surrogate, verdict.is_flagged()) {
-                (Some(cause), _) => format!("({})", cause.effect),
-                (None, true) => "unknown".to_owned(),
-                (None, false) => "nothing".to_owned(),
-            });
-        }
-        said.dedup();
-        for name in said {
-            *counts
-                .entry((effect.class.id().to_owned(), name))
-                .or_default() += 1;
-        }
-    }
-    counts
-        .into_iter()
-        .map(|((hidden, said), n)| (hidden, said, n))
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
+    use gap_diagnosis::report::Status;
+
     use super::*;
     use crate::truth::Truth;
     use crate::verdict::{Said, SaidCause};
@@ -444,6 +449,7 @@ mod tests {
                 white_um: 0.1,
                 has_outliers: false,
                 has_motors: true,
+                bare_um: Some(0.28),
             },
             truth_sha256: String::new(),
             commit: String::new(),
@@ -457,10 +463,17 @@ mod tests {
                 gap_um: [3.0, 0.3],
                 held_out_um: [Some(3.0), Some(0.3)],
                 closed: Some([0.99, 0.98, 1.0]),
+                runtime_s: 0.9,
+                next: None,
             }),
             refused: None,
             diagnosis_s: 1.0,
             making_s: 1.0,
+            ablated: None,
+            baselines: BTreeMap::new(),
+            likeness: vec![],
+            later_closed: None,
+            second: None,
         }
     }
 

@@ -30,6 +30,8 @@ const HOW_MANY: [f64; 3] = [0.2, 0.4, 0.25];
 pub struct Trial {
     /// Everything that its session follows from.
     pub rig: Rig,
+    /// The same before anything was hidden.
+    pub bare: Rig,
     /// What is to be found.
     pub truth: Truth,
 }
@@ -49,6 +51,7 @@ impl Trial {
             let (sized, true_d) = scaled(&rig, &bare, hidden, d)?;
             effects.push((sized, true_d));
         }
+        let unspoilt = rig.clone();
         for (hidden, _) in &effects {
             hidden.hide(&mut rig)?;
         }
@@ -66,8 +69,13 @@ impl Trial {
             white_um: rig.scatter.white_mm * 1e3,
             has_outliers: rig.scatter.outliers > 0.0,
             has_motors: rig.has_motors,
+            bare_um: None,
         };
-        Ok(Self { rig, truth })
+        Ok(Self {
+            rig,
+            bare: unspoilt,
+            truth,
+        })
     }
 }
 
@@ -87,7 +95,7 @@ fn stream(arm: Arm, seed: u64, index: u64) -> Pcg64Mcg {
 fn wanted(random: &mut Pcg64Mcg, arm: Arm, index: u64) -> Vec<(Hidden, f64)> {
     let count = match arm {
         Arm::Null | Arm::HeavyNull => 0,
-        Arm::LeftOut | Arm::Confusable | Arm::Alone => 1,
+        Arm::LeftOut | Arm::Confusable | Arm::TwoRounds | Arm::Alone => 1,
         Arm::Catalogue | Arm::Foreign => how_many(random),
     };
     let mut effects = Vec::<(Hidden, f64)>::new();
@@ -95,7 +103,7 @@ fn wanted(random: &mut Pcg64Mcg, arm: Arm, index: u64) -> Vec<(Hidden, f64)> {
         let class = match arm {
             // Every class equally often.
             Arm::LeftOut | Arm::Alone => Class::ALL[(index % Class::ALL.len() as u64) as usize],
-            Arm::Confusable => {
+            Arm::Confusable | Arm::TwoRounds => {
                 Class::CONFUSABLE[(index % Class::CONFUSABLE.len() as u64) as usize].0
             }
             _ => *Class::ALL.choose(random).unwrap_or(&Class::Backlash),

@@ -27,6 +27,10 @@ pub struct Truth {
     pub has_outliers: bool,
     /// Whether the motors' encoders were recorded.
     pub has_motors: bool,
+    /// What a simulator that knows the truth would leave on the held-out runs: their root mean square on the same
+    /// machine with the same scatter and nothing hidden, µm.
+    #[serde(default)]
+    pub bare_um: Option<f64>,
 }
 
 /// One hidden effect.

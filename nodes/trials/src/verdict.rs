@@ -3,11 +3,18 @@
 //! A cause counts as *named* where its status is `named` or `set`; a surrogate is shown, not named. It is right where
 //! class and axis are those of a hidden effect.
 
-use gap_diagnosis::GapReport;
+use std::collections::BTreeMap;
+
+use gap_diagnosis::regression::Regression;
 use gap_diagnosis::report::Status;
+use gap_diagnosis::{GapReport, Rule};
 use serde::{Deserialize, Serialize};
 
+use crate::baseline::{Method, Names};
 use crate::truth::{TrueEffect, Truth};
+
+/// Least share of the squared gap that the truth must close for a ratio to mean something.
+const LEAST_CLOSED: f64 = 0.1;
 
 /// The verdict on one trial: a line of the journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,6 +34,51 @@ pub struct Verdict {
     pub diagnosis_s: f64,
     /// Time that making the trial took, s.
     pub making_s: f64,
+    /// Rule of the diagnosis that was switched off.
+    #[serde(default)]
+    pub ablated: Option<Rule>,
+    /// What other methods named on the same session, where they were asked.
+    #[serde(default)]
+    pub baselines: BTreeMap<Method, Names>,
+    /// What each hidden effect was predicted to look like, where that was asked.
+    #[serde(default)]
+    pub likeness: Vec<Likeness>,
+    /// Share of the gap that the named effects close on the same programme measured once more, where that was asked.
+    #[serde(default)]
+    pub later_closed: Option<f64>,
+    /// What one more run, of the diagnosis' choice, changed.
+    #[serde(default)]
+    pub second: Option<Second>,
+}
+
+/// What a hidden effect looks like on the recording, by the signatures alone, before anything is measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Likeness {
+    /// Id of its class.
+    pub effect: String,
+    /// What it acts on.
+    pub axis: String,
+    /// Part of its signature that no other class can imitate, 0 to 1.
+    pub sin_alone: f64,
+    /// Greatest cosine with an effect of each other class.
+    pub cos: BTreeMap<String, f64>,
+}
+
+/// A second round: the diagnosis of the session and of one more run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Second {
+    /// The run that was asked for.
+    pub run: String,
+    /// What it was to tell apart.
+    pub separates: Vec<String>,
+    /// Squared distance that it was to put between them.
+    pub delta: f64,
+    /// What was said of both; none where the run could not be made or the diagnosis was refused.
+    pub said: Option<Said>,
+    /// Why there is nothing.
+    pub refused: Option<String>,
 }
 
 /// The part of a report that is judged.
@@ -51,6 +103,12 @@ pub struct Said {
     pub held_out_um: [Option<f64>; 2],
     /// Share of the gap that was closed, with its interval.
     pub closed: Option<[f64; 3]>,
+    /// Time that the diagnosis itself took, without starting a program, s.
+    #[serde(default)]
+    pub runtime_s: f64,
+    /// The first run that was asked for: what, what it tells apart, and the squared distance that it puts between.
+    #[serde(default)]
+    pub next: Option<(String, Vec<String>, f64)>,
 }
 
 /// A cause as it was said.
@@ -115,7 +173,38 @@ pub fn judge(report: &GapReport) -> Said {
             .shrink
             .gap_closed
             .map(|closed| [closed.value, closed.low, closed.high]),
+        runtime_s: report.runtime_s,
+        next: report.next_experiments.first().map(|next| {
+            let separates = next.separates.clone();
+            (next.run.clone(), separates, next.delta)
+        }),
     }
+}
+
+/// What the hidden effects look like, by the signatures of a session.
+#[must_use]
+pub fn likeness(truth: &Truth, regression: &Regression) -> Vec<Likeness> {
+    let matrix = &regression.isolability;
+    let class = |name: &str| name.split(' ').next().unwrap_or(name).to_owned();
+    let of = |effect: &TrueEffect| {
+        let (id, axis) = (effect.class.id(), &effect.axis);
+        let own = format!("{id} {axis}");
+        let row = matrix.names.iter().position(|name| name == own.trim())?;
+        let mut cos = BTreeMap::<String, f64>::new();
+        for (name, value) in matrix.names.iter().zip(&matrix.cos[row]) {
+            if class(name) != id {
+                let most = cos.entry(class(name)).or_default();
+                *most = most.max(*value);
+            }
+        }
+        Some(Likeness {
+            effect: id.to_owned(),
+            axis: axis.clone(),
+            sin_alone: matrix.sin_alone[row],
+            cos,
+        })
+    };
+    truth.effects.iter().filter_map(of).collect()
 }
 
 impl SaidCause {
@@ -140,6 +229,56 @@ impl SaidCause {
 }
 
 impl Verdict {
+    /// What the verdict would be on another method; none where it was not asked.
+    #[must_use]
+    pub fn by(&self, method: Method) -> Option<Self> {
+        let names = match method {
+            Method::AlwaysUnknown => Names::new(),
+            Method::Oracle => {
+                let hidden = self.truth.effects.iter();
+                let known = hidden.filter(|e| self.truth.left_out.as_deref() != Some(e.class.id()));
+                known
+                    .map(|e| (e.class.id().to_owned(), e.axis.clone()))
+                    .collect()
+            }
+            _ => self.baselines.get(&method)?.clone(),
+        };
+        let cause = |(effect, axis): (String, String)| SaidCause {
+            effect,
+            axis,
+            status: Status::Named,
+            confidence: 1.0,
+            d: 0.0,
+            parameters: vec![],
+            rivals: vec![],
+            constancy: (true, 0.0, String::new()),
+        };
+        let said = self.said.clone()?;
+        let is_unknown = match method {
+            Method::AlwaysUnknown => true,
+            Method::Oracle => self.truth.left_out.is_some(),
+            _ => false,
+        };
+        Some(Self {
+            said: Some(Said {
+                causes: names.into_iter().map(cause).collect(),
+                is_unknown,
+                ..said
+            }),
+            ..self.clone()
+        })
+    }
+
+    /// Share of the gap that the named effects close, over that which the truth would close; none without held-out
+    /// runs, or where the truth closes none.
+    #[must_use]
+    pub fn closed_of_oracle(&self) -> Option<f64> {
+        let [before, after] = self.said.as_ref()?.held_out_um;
+        let (before, after, bare) = (before?, after?, self.truth.bare_um?);
+        let closes = 1.0 - (bare / before).powi(2);
+        (closes > LEAST_CLOSED).then(|| (1.0 - (after / before).powi(2)) / closes)
+    }
+
     /// Causes that were named.
     pub fn named(&self) -> impl Iterator<Item = &SaidCause> {
         let causes = self.said.iter().flat_map(|said| &said.causes);

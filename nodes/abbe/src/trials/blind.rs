@@ -1,42 +1,89 @@
-//! The diagnosis of one trial: as a process that sees the bag and the machine file, or within this one.
+//! The diagnosis of one trial: as a process that sees bags and the machine file, or within this one.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Instant;
 
 use anyhow::{Context, Result};
+use gap_diagnosis::regression::{Regression, regression};
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
-use gap_diagnosis::{GapConfig, GapReport, diagnose};
+use gap_diagnosis::{GapConfig, GapReport, Rule, diagnose};
 use machine::MachineFile;
-use trials::{Rig, Sample, measure};
+use machine::twin::Session;
+use trials::baseline::{self, Names};
+use trials::{Method, Rig, Sample, measure};
+
+use super::later;
+use crate::diagnose::bags::Recorded;
 
 /// A user that owns nothing: whom the diagnosis runs as where this program runs as one who may read everything.
 const NOBODY: u32 = 65_534;
 
-/// What came of a diagnosis: a report, or the reason why there is none.
-pub type Diagnosed = Result<GapReport, String>;
+/// The machine file with the named effects, in a trial's folder.
+const FOUND: &str = "found.yaml";
 
-/// Runs `abbe diagnose` on a bag in its own folder.
+/// What a diagnosis said.
+#[derive(Debug)]
+pub struct Answer {
+    /// The report.
+    pub report: GapReport,
+    /// The machine file with the named effects, where it was asked for.
+    pub machine: Option<MachineFile>,
+}
+
+/// What came of a diagnosis: an answer, or the reason why there is none.
+pub type Diagnosed = Result<Answer, String>;
+
+/// How a diagnosis is asked.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Question<'q> {
+    /// The class that it may not name.
+    pub left_out: Option<&'q str>,
+    /// The rule that is switched off.
+    pub ablated: Option<Rule>,
+    /// Whether the machine file with the named effects is wanted.
+    pub writes_machine: bool,
+}
+
+impl Question<'_> {
+    fn config(&self) -> GapConfig {
+        GapConfig {
+            left_out: self.left_out.map(str::to_owned).into_iter().collect(),
+            ablated: self.ablated.into_iter().collect(),
+            ..GapConfig::default()
+        }
+    }
+}
+
+/// Runs `abbe diagnose` on bags in its own folder.
 ///
 /// # Errors
 /// When the process cannot be started, or says what is no report.
-pub fn as_process(folder: &Path, left_out: Option<&str>) -> Result<Diagnosed> {
+pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Result<Diagnosed> {
     let program = std::env::current_exe().context("path of this program")?;
     let mut command = Command::new(program);
     command
-        .args([
-            "diagnose",
-            "bag",
-            "--machine",
-            "machine.yaml",
-            "--json",
-            "-",
-        ])
+        .arg("diagnose")
+        .args(bags)
+        .args(["--machine", "machine.yaml", "--json", "-"])
         .current_dir(folder)
         .env_clear()
         .stdin(Stdio::null());
-    if let Some(class) = left_out {
+    if let Some(class) = question.left_out {
         command.args(["--without", class]);
+    }
+    let found = folder.join(FOUND);
+    if question.writes_machine {
+        // In a folder that it may not write into, a file of its own.
+        std::fs::write(&found, "")?;
+        std::fs::set_permissions(&found, std::fs::Permissions::from_mode(0o666))?;
+        command.args(["--write-machine", FOUND]);
+    }
+    if let Some(rule) = question.ablated {
+        command.args(["--ablate", rule.id()]);
     }
     if nix::unistd::geteuid().is_root() {
         command.uid(NOBODY).gid(NOBODY);
@@ -47,29 +94,107 @@ pub fn as_process(folder: &Path, left_out: Option<&str>) -> Result<Diagnosed> {
         return Ok(Err(format!("{}: {told}", output.status)));
     }
     let report = serde_json::from_slice(&output.stdout).context("report of abbe diagnose")?;
-    Ok(Ok(report))
+    let machine = if question.writes_machine {
+        let text = std::fs::read_to_string(&found)?;
+        Some(MachineFile::parse(&text, FOUND)?)
+    } else {
+        None
+    };
+    Ok(Ok(Answer { report, machine }))
 }
 
-/// Diagnoses a rig's session without a bag.
+/// A machine with its session.
+pub type Recording = (MachineFile, Session);
+
+/// The sessions of rigs of one machine, without a bag; or why there is none.
+///
+/// # Errors
+/// When a rig cannot be measured.
+pub fn recorded(rigs: &[&Rig]) -> Result<Result<Recording, String>> {
+    let [first, ..] = rigs else {
+        return Ok(Err("nothing was measured".to_owned()));
+    };
+    let machine = MachineFile::parse(&first.machine_text()?, "machine.yaml")?;
+    let mut builder = SessionBuilder::new(&machine, SessionConfig::default())?;
+    for rig in rigs {
+        builder.next_bag();
+        measure(rig, &mut |_, sample| builder.take(input(sample)))?;
+        builder.end_bag();
+    }
+    Ok(match builder.finish() {
+        Ok((session, _)) => Ok((machine, session)),
+        Err(error) => Err(error.to_string()),
+    })
+}
+
+/// Diagnoses within this process.
+pub fn in_process((machine, session): &Recording, question: &Question<'_>) -> Diagnosed {
+    let began = Instant::now();
+    let diagnosis = diagnose(machine, session, &question.config());
+    let diagnosis = diagnosis.map_err(|error| error.to_string())?;
+    let mut with = machine.clone();
+    with.effects.extend(diagnosis.effects);
+    let mut report = diagnosis.report;
+    report.runtime_s = began.elapsed().as_secs_f64();
+    Ok(Answer {
+        report,
+        machine: question.writes_machine.then_some(with),
+    })
+}
+
+/// What is left on held-out runs where nothing is hidden, µm.
 ///
 /// # Errors
 /// When the rig cannot be measured.
-pub fn in_process(rig: &Rig, left_out: Option<&str>) -> Result<Diagnosed> {
-    let machine = MachineFile::parse(&rig.machine_text()?, "machine.yaml")?;
-    let mut builder = SessionBuilder::new(&machine, SessionConfig::default())?;
-    measure(rig, &mut |_, sample| builder.take(input(sample)))?;
-    let config = GapConfig {
-        left_out: left_out.map(str::to_owned).into_iter().collect(),
-        ..GapConfig::default()
+pub fn bare_um(rig: &Rig) -> Result<Option<f64>> {
+    let Ok((machine, session)) = recorded(&[rig])? else {
+        return Ok(None);
     };
-    let session = match builder.finish() {
-        Ok((session, _)) => session,
-        Err(error) => return Ok(Err(error.to_string())),
+    let diagnosis = diagnose(&machine, &session, &later::nothing_named()).ok();
+    Ok(diagnosis.and_then(|diagnosis| diagnosis.report.shrink.rms_um.before))
+}
+
+/// What other methods name, and the signatures of the whole catalogue.
+pub struct Beside {
+    /// Names of each method.
+    pub baselines: BTreeMap<Method, Names>,
+    /// Signatures, classes that are left out included.
+    pub signatures: Option<Regression>,
+}
+
+/// Asks other methods about a recording.
+pub fn beside((machine, session): &Recording, left_out: Option<&str>) -> Beside {
+    let question = Question {
+        left_out,
+        ..Question::default()
     };
-    Ok(match diagnose(&machine, &session, &config) {
-        Ok(diagnosis) => Ok(diagnosis.report),
-        Err(error) => Err(error.to_string()),
-    })
+    let ask = |question: &Question<'_>| regression(machine, session, &question.config()).ok();
+    let asked = ask(&question);
+    Beside {
+        baselines: asked.as_ref().map(baseline::named).unwrap_or_default(),
+        signatures: match left_out {
+            None => asked,
+            Some(_) => ask(&Question::default()),
+        },
+    }
+}
+
+/// The recording that bags in a folder hold.
+///
+/// # Errors
+/// When they cannot be read.
+pub fn read(folder: &Path, bags: &[&str], machine_text: &str) -> Result<Recording> {
+    let machine = MachineFile::parse(machine_text, "machine.yaml")?;
+    let paths: Vec<PathBuf> = bags.iter().map(|bag| folder.join(bag)).collect();
+    let recorded = Recorded::read(&paths, &machine)?;
+    Ok((machine, recorded.session))
+}
+
+/// The rules in the order of the command line, each once.
+#[must_use]
+pub fn once(rules: &[Rule]) -> Vec<Rule> {
+    let rules: BTreeSet<Rule> = rules.iter().copied().collect();
+    rules.into_iter().collect()
 }
 
 fn input(sample: Sample) -> Input {

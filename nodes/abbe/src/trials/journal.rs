@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use gap_diagnosis::Rule;
 use trials::{Arm, Verdict};
 
 /// A journal that goes on.
@@ -51,11 +52,11 @@ impl Journal {
         &self.verdicts
     }
 
-    /// Whether a trial was judged already.
-    pub fn has(&self, arm: Arm, seed: u64, index: u64) -> bool {
+    /// Whether a trial was judged already, with all rules or without one.
+    pub fn has(&self, arm: Arm, seed: u64, index: u64, ablated: Option<Rule>) -> bool {
         self.verdicts.iter().any(|verdict| {
             let truth = &verdict.truth;
-            (truth.arm, truth.seed, truth.index) == (arm, seed, index)
+            (truth.arm, truth.seed, truth.index, verdict.ablated) == (arm, seed, index, ablated)
         })
     }
 

@@ -1,29 +1,15 @@
 //! A series of trials of one arm, several at a time.
 
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
-use std::time::Instant;
 
 use anyhow::{Context, Result};
+use gap_diagnosis::Rule;
 use indicatif::{ProgressBar, ProgressStyle};
-use trials::{Arm, Trial, Verdict, judge};
+use trials::{Arm, Verdict};
 
 use super::journal::Journal;
-use super::seal::Seal;
-use super::{blind, session_bag};
-
-/// How trials are made.
-pub struct How {
-    /// Without bag, seal and process.
-    pub in_process: bool,
-    /// Whether bags and reports stay.
-    pub keep: bool,
-    /// Folder of the trials.
-    pub out: PathBuf,
-    /// Folder of the seals.
-    pub sealed: PathBuf,
-}
+use super::trial::{How, Which};
 
 /// A series.
 pub struct Series<'a> {
@@ -31,6 +17,8 @@ pub struct Series<'a> {
     pub seed: u64,
     /// Trials in it.
     pub n: u64,
+    /// Rules that are switched off one at a time, beside the whole diagnosis.
+    pub ablated: &'a [Rule],
     /// How many at a time; 0: as many as there are cores.
     pub jobs: usize,
     /// How.
@@ -43,9 +31,7 @@ impl Series<'_> {
     /// # Errors
     /// When a trial cannot be made or the journal not written.
     pub fn run(&self, arm: Arm, journal: &mut Journal) -> Result<()> {
-        let wanted: Vec<u64> = (0..self.n)
-            .filter(|index| !journal.has(arm, self.seed, *index))
-            .collect();
+        let wanted = self.wanted(arm, journal);
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
         let jobs = if self.jobs == 0 { cores() } else { self.jobs };
         let bar = bar(arm, wanted.len());
@@ -55,22 +41,32 @@ impl Series<'_> {
             for _ in 0..jobs.min(wanted.len()) {
                 let (said, next, wanted, bar) = (said.clone(), &next, &wanted, &bar);
                 scope.spawn(move || {
-                    while let Some(index) = wanted.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let verdict = self
-                            .trial(arm, *index, bar)
+                    while let Some((index, rules)) =
+                        wanted.get(next.fetch_add(1, Ordering::Relaxed))
+                    {
+                        let which = Which {
+                            arm,
+                            seed: self.seed,
+                            index: *index,
+                            rules,
+                        };
+                        let verdicts = self
+                            .how
+                            .trial(&which, &|line| tell(bar, line))
                             .with_context(|| format!("trial {arm} {index}, seed {}", self.seed));
-                        if said.send(verdict).is_err() {
+                        if said.send(verdicts).is_err() {
                             return;
                         }
                     }
                 });
             }
             drop(said);
-            for verdict in &heard {
-                let verdict = verdict?;
-                tell(&bar, &sentence(&verdict));
+            for verdicts in &heard {
+                for verdict in verdicts? {
+                    tell(&bar, &sentence(&verdict));
+                    journal.add(verdict)?;
+                }
                 bar.inc(1);
-                journal.add(verdict)?;
             }
             drop(heard);
             Ok::<(), anyhow::Error>(())
@@ -79,69 +75,17 @@ impl Series<'_> {
         Ok(())
     }
 
-    fn trial(&self, arm: Arm, index: u64, bar: &ProgressBar) -> Result<Verdict> {
-        let began = Instant::now();
-        let trial = Trial::draw(arm, self.seed, index)?;
-        let left_out = trial.truth.left_out.clone();
-        let name = format!("{arm}-{}-{index:05}", self.seed);
-        if self.how.in_process {
-            let making_s = began.elapsed().as_secs_f64();
-            let began = Instant::now();
-            let diagnosed = blind::in_process(&trial.rig, left_out.as_deref())?;
-            let times_s = [making_s, began.elapsed().as_secs_f64()];
-            return Ok(verdict(trial.truth, String::new(), diagnosed, times_s));
-        }
-        let folder = self.how.out.join(&name);
-        if folder.exists() {
-            std::fs::remove_dir_all(&folder)?;
-        }
-        std::fs::create_dir_all(&folder).with_context(|| format!("{}", folder.display()))?;
-        let machine_text = trial.rig.machine_text()?;
-        std::fs::write(folder.join("machine.yaml"), &machine_text)?;
-        session_bag::write(&trial.rig, &folder.join("bag"), machine_text)?;
-        let seal = Seal::write(&self.how.sealed, &name, &trial.truth)?;
-        drop(trial);
-        tell(bar, &format!("sealed {name}: sha256 {}", seal.sha256));
-        let making_s = began.elapsed().as_secs_f64();
-        let began = Instant::now();
-        let diagnosed = blind::as_process(&folder, left_out.as_deref())?;
-        let diagnosis_s = began.elapsed().as_secs_f64();
-        if self.how.keep {
-            if let Ok(report) = &diagnosed {
-                let json = serde_json::to_string_pretty(report)?;
-                std::fs::write(folder.join("gap.json"), json)?;
-            }
-        } else {
-            std::fs::remove_dir_all(&folder)?;
-        }
-        let truth = seal.open()?;
-        Ok(verdict(
-            truth,
-            seal.sha256,
-            diagnosed,
-            [making_s, diagnosis_s],
-        ))
-    }
-}
-
-fn verdict(
-    truth: trials::Truth,
-    truth_sha256: String,
-    diagnosed: blind::Diagnosed,
-    [making_s, diagnosis_s]: [f64; 2],
-) -> Verdict {
-    let (said, refused) = match diagnosed {
-        Ok(report) => (Some(judge(&report)), None),
-        Err(reason) => (None, Some(reason)),
-    };
-    Verdict {
-        truth,
-        truth_sha256,
-        commit: env!("ABBE_COMMIT").to_owned(),
-        said,
-        refused,
-        diagnosis_s,
-        making_s,
+    /// Trials of which the journal lacks a diagnosis, with the rules that are off in those.
+    fn wanted(&self, arm: Arm, journal: &Journal) -> Vec<(u64, Vec<Option<Rule>>)> {
+        let all = || std::iter::once(None).chain(self.ablated.iter().copied().map(Some));
+        let lacking = |index: u64| -> Vec<Option<Rule>> {
+            let has = |rule: &Option<Rule>| journal.has(arm, self.seed, index, *rule);
+            all().filter(|rule| !has(rule)).collect()
+        };
+        (0..self.n)
+            .map(|index| (index, lacking(index)))
+            .filter(|(_, rules)| !rules.is_empty())
+            .collect()
     }
 }
 
@@ -210,8 +154,11 @@ fn sentence(verdict: &Verdict) -> String {
         }
     };
     let (making_s, diagnosis_s) = (verdict.making_s, verdict.diagnosis_s);
+    let without = verdict
+        .ablated
+        .map_or(String::new(), |rule| format!(" without {rule}"));
     format!(
-        "{} {}: {hidden} -> {said}  [{making_s:.1} + {diagnosis_s:.1} s]",
+        "{} {}{without}: {hidden} -> {said}  [{making_s:.1} + {diagnosis_s:.1} s]",
         truth.arm, truth.index
     )
 }

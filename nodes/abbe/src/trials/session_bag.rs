@@ -11,7 +11,7 @@ use recorder::{
     Channel, ChannelId, ChunkCompression, Directory, MessageStamp, RecorderConfig, Recording,
     RunContext,
 };
-use trials::{Rig, Sample, measure, measurement::START_S};
+use trials::{Rig, Sample, measure};
 
 /// Simulated time passes quickly: a chunk may span this much of it.
 const FLUSH_S: f64 = 60.0;
@@ -39,7 +39,7 @@ pub fn write(rig: &Rig, path: &Path, machine_text: String) -> Result<()> {
     };
     let mut recording = Recording::begin(Directory::create(path)?, &name, config)?;
     recording.add_context(&RunContext {
-        start_time_nanos: u64::try_from(START_S * NANOS_PER_S).context("start of a session")?,
+        start_time_nanos: u64::try_from(rig.start_s * NANOS_PER_S).context("start of a session")?,
         commit: env!("ABBE_COMMIT").to_owned(),
         machine_file: Some(machine_text),
         ..RunContext::default()

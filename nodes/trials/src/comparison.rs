@@ -1,0 +1,93 @@
+//! Methods side by side on the same trials: the diagnosis, itself without one of its rules, and others.
+
+use gap_diagnosis::Rule;
+use serde::{Deserialize, Serialize};
+
+use crate::arm::Arm;
+use crate::baseline::Method;
+use crate::proportion::Proportion;
+use crate::tally::{LARGE_D, beyond, has_wrong};
+use crate::verdict::Verdict;
+
+/// One method's line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MethodLine {
+    /// Its name.
+    pub method: String,
+    /// Nothing else than what is hidden named, everything of D > 20.
+    pub exact: Proportion,
+    /// Hidden effects of D > 20 that it named, class and axis.
+    pub named: Proportion,
+    /// Machines with a name that is none.
+    pub wrong: Proportion,
+    /// The same, and no unknown flagged.
+    pub unflagged: Proportion,
+}
+
+impl MethodLine {
+    fn of(method: &str, own: &[&Verdict]) -> Self {
+        let said: Vec<&Verdict> = own.iter().copied().filter(|v| v.said.is_some()).collect();
+        let large = beyond(&said, LARGE_D);
+        let pairs = said
+            .iter()
+            .flat_map(|v| v.truth.effects.iter().map(move |e| (v, e)));
+        let large_pairs = pairs.filter(|(_, effect)| effect.d > LARGE_D);
+        Self {
+            method: method.to_owned(),
+            exact: Proportion::of(large.iter().map(|v| v.is_exact())),
+            named: Proportion::of(large_pairs.map(|(v, effect)| v.has(effect))),
+            wrong: Proportion::of(said.iter().map(|v| has_wrong(v))),
+            unflagged: Proportion::of(said.iter().map(|v| has_wrong(v) && !v.is_flagged())),
+        }
+    }
+}
+
+/// The diagnosis and the other methods on one arm; none where no other was asked.
+#[must_use]
+pub fn methods(arm: Arm, own: &[&Verdict]) -> Vec<MethodLine> {
+    let asked: Vec<&Verdict> = own
+        .iter()
+        .copied()
+        .filter(|v| !v.baselines.is_empty() && v.truth.arm == arm)
+        .collect();
+    if asked.is_empty() {
+        return vec![];
+    }
+    let mut lines = vec![MethodLine::of("this diagnosis", &asked)];
+    for method in Method::ALL {
+        let judged: Vec<Verdict> = asked.iter().filter_map(|v| v.by(method)).collect();
+        let judged: Vec<&Verdict> = judged.iter().collect();
+        lines.push(MethodLine::of(method.title(), &judged));
+    }
+    lines
+}
+
+/// The diagnosis with all its rules and without each, on the trials of an arm that all of them had.
+#[must_use]
+pub fn ablations(arm: Arm, verdicts: &[Verdict]) -> Vec<MethodLine> {
+    let of = |rule: Option<Rule>| -> Vec<&Verdict> {
+        let own = |v: &&Verdict| v.truth.arm == arm && v.ablated == rule;
+        verdicts.iter().filter(own).collect()
+    };
+    let tried: Vec<(Rule, Vec<&Verdict>)> = Rule::ALL
+        .into_iter()
+        .map(|rule| (rule, of(Some(rule))))
+        .filter(|(_, own)| !own.is_empty())
+        .collect();
+    if tried.is_empty() {
+        return vec![];
+    }
+    let in_all = |v: &&Verdict| {
+        tried
+            .iter()
+            .all(|(_, own)| own.iter().any(|other| other.truth.index == v.truth.index))
+    };
+    let whole: Vec<&Verdict> = of(None).into_iter().filter(in_all).collect();
+    let has = |v: &&Verdict| whole.iter().any(|other| other.truth.index == v.truth.index);
+    let mut lines = vec![MethodLine::of("all rules", &whole)];
+    for (rule, own) in tried {
+        let own: Vec<&Verdict> = own.into_iter().filter(has).collect();
+        lines.push(MethodLine::of(&format!("without {rule}"), &own));
+    }
+    lines
+}

@@ -1,0 +1,273 @@
+//! The run that a diagnosis asks for, as steps of a plan.
+//!
+//! A report names it in words (`gap_diagnosis::experiment`); this reads the words as whoever stands at the machine would.
+//! What this machine's instruments or its plan cannot do is not made, and the judge says so.
+//!
+//! | words | steps |
+//! |---|---|
+//! | `circle XY R50 F3000 and F6000 both senses at middle` | circles on a plate of that plane |
+//! | `line X F1000 and F4000 there and back on the plate`, `… along beam along_x` | lines, moving |
+//! | `positioning X F2000, 20 stops of 2 s each way …` | lines with stops |
+//! | `steps of 0.4 mm along X with 2 s dwell, there and back` | the same over 8 mm |
+//! | `the same touches at F60, F120 and F480` | touches of every face |
+//! | `the session's 9 tests in reverse order` | each condition once, the last first |
+
+use std::fmt::Write as _;
+
+use machine::MachineFile;
+use machine::file::GridPlacement;
+use metrology::Axis;
+use metrology::sample::TestPlane;
+use sequencer::{Plan, Step};
+
+use crate::measurement::plane_axes;
+
+/// Way of a beam at each end that a run leaves, mm.
+const MARGIN_MM: f64 = 60.0;
+/// Way before the first target and behind the last one, for reaching the feed and settling, mm.
+const OVERRUN_MM: f64 = 40.0;
+/// Share of a plate's radius that a line goes to.
+const REACH: f64 = 0.9;
+/// Stops of a line.
+const STOPS: u32 = 20;
+/// Rest at each, s.
+const DWELL_S: f64 = 2.0;
+
+/// The plan of a run, where this machine can do it; `done` is what was measured already.
+#[must_use]
+pub fn extra_run(machine: &MachineFile, done: &Plan, words: &str) -> Option<Plan> {
+    let steps = steps(machine, done, words)?;
+    let mut text = "title: a run that was asked for\nsteps:\n".to_owned();
+    for step in &steps {
+        let _ = writeln!(text, "  - {step}");
+    }
+    match steps.first() {
+        None => Some(Plan {
+            steps: reversed(done),
+            ..done.clone()
+        }),
+        Some(_) => Plan::from_yaml(&text).ok(),
+    }
+}
+
+/// The steps as text; none at all for the session's own in reverse.
+fn steps(machine: &MachineFile, done: &Plan, words: &str) -> Option<Vec<String>> {
+    let feeds = feeds_mm_min(words);
+    if let Some(rest) = words.strip_prefix("circle ") {
+        let mut parts = rest.split(' ');
+        let placement = &placement(machine, parts.next()?, words)?.id;
+        let radius_mm: f64 = parts.next()?.strip_prefix('R')?.parse().ok()?;
+        let circle = |feed: &f64| {
+            format!(
+                "{{do: grid, placement: {placement}, trajectory: circle, radius_mm: {radius_mm:.1}, \
+                 feed_mm_min: {feed:.1}, sense: both, on_the_fly: true}}"
+            )
+        };
+        let is_whole = !words.contains("to and fro") && !feeds.is_empty();
+        return is_whole.then(|| feeds.iter().map(circle).collect());
+    }
+    if words.starts_with("line ") || words.starts_with("positioning ") {
+        let axis: Axis = words.split(' ').nth(1)?.parse().ok()?;
+        let has_stops = words.starts_with("positioning ");
+        let line = |feed: &f64| match words.split_once("along beam ") {
+            Some((_, beam)) => along_beam(machine, axis, beam, *feed, has_stops),
+            None => {
+                let plate = placement_along(machine, axis, words)?;
+                let reach_mm = REACH * machine.grid_encoder.as_ref()?.radius_mm;
+                let length_mm = 2.0 * REACH * reach_mm;
+                Some(on_plate(plate, axis, length_mm, *feed, has_stops))
+            }
+        };
+        return feeds.iter().map(line).collect();
+    }
+    if let Some(rest) = words.strip_prefix("steps of 0.4 mm along ") {
+        let axis: Axis = rest.split(' ').next()?.parse().ok()?;
+        let plate = placement_along(machine, axis, words)?;
+        return Some(vec![on_plate(plate, axis, 8.0, 500.0, true)]);
+    }
+    if words.starts_with("the same touches at ") {
+        let list: Vec<String> = feeds.iter().map(|feed| format!("{feed:.1}")).collect();
+        let touches = |step: &Step| match step {
+            Step::Latency { feature, .. } => Some(format!(
+                "{{do: latency, feature: {feature}, feeds_mm_min: [{}], repeats: 2}}",
+                list.join(", ")
+            )),
+            _ => None,
+        };
+        let all: Vec<String> = done.steps.iter().filter_map(touches).collect();
+        return (!all.is_empty() && !list.is_empty()).then_some(all);
+    }
+    words.ends_with("tests in reverse order").then(Vec::new)
+}
+
+/// Each condition once, the last first.
+fn reversed(done: &Plan) -> Vec<Step> {
+    let mut kept = Vec::<Step>::new();
+    for step in done.steps.iter().rev() {
+        if !kept.contains(step) {
+            kept.push(step.clone());
+        }
+    }
+    kept
+}
+
+/// Every number behind an F.
+fn feeds_mm_min(words: &str) -> Vec<f64> {
+    let parts = words.split([' ', ',']);
+    let feeds = parts.filter_map(|part| part.strip_prefix('F')?.parse().ok());
+    feeds.collect()
+}
+
+/// The placement that is named, or the first in a plane.
+fn placement<'m>(machine: &'m MachineFile, plane: &str, words: &str) -> Option<&'m GridPlacement> {
+    let all = &machine.grid_encoder.as_ref()?.placements;
+    let named = |placement: &&GridPlacement| words.ends_with(&format!(" at {}", placement.id));
+    let in_plane =
+        |placement: &&GridPlacement| plane_words(TestPlane::from(placement.plane)) == plane;
+    all.iter().find(named).or_else(|| all.iter().find(in_plane))
+}
+
+fn placement_along<'m>(
+    machine: &'m MachineFile,
+    axis: Axis,
+    words: &str,
+) -> Option<&'m GridPlacement> {
+    let all = &machine.grid_encoder.as_ref()?.placements;
+    let named = |placement: &&GridPlacement| words.ends_with(&format!(" at {}", placement.id));
+    let reads = |placement: &&GridPlacement| {
+        plane_axes(TestPlane::from(placement.plane)).contains(&axis.index())
+    };
+    all.iter().find(named).or_else(|| all.iter().find(reads))
+}
+
+const fn plane_words(plane: TestPlane) -> &'static str {
+    match plane {
+        TestPlane::Xy => "XY",
+        TestPlane::Yz => "YZ",
+        TestPlane::Zx => "ZX",
+        TestPlane::None => "",
+    }
+}
+
+fn on_plate(
+    placement: &GridPlacement,
+    axis: Axis,
+    length_mm: f64,
+    feed_mm_min: f64,
+    has_stops: bool,
+) -> String {
+    let [first, _] = plane_axes(TestPlane::from(placement.plane));
+    let angle_deg = if first == axis.index() { 0.0 } else { 90.0 };
+    let pace = if has_stops {
+        format!("stations: {STOPS}, dwell_s: {DWELL_S:.1}")
+    } else {
+        "on_the_fly: true".to_owned()
+    };
+    format!(
+        "{{do: grid, placement: {}, trajectory: line, angle_deg: {angle_deg:.1}, \
+         length_mm: {length_mm:.1}, feed_mm_min: {feed_mm_min:.1}, sense: both, {pace}}}",
+        placement.id
+    )
+}
+
+fn along_beam(
+    machine: &MachineFile,
+    axis: Axis,
+    beam: &str,
+    feed_mm_min: f64,
+    has_stops: bool,
+) -> Option<String> {
+    let beams = &machine.length_reference.as_ref()?.beams;
+    let beam = beams.iter().find(|own| own.id == beam)?;
+    let (low, high) = (beam.from_mm[axis.index()], beam.to_mm[axis.index()]);
+    let (from_mm, to_mm) = (low + MARGIN_MM, high - MARGIN_MM);
+    let (what, rest) = if has_stops {
+        ("positioning", format!("dwell_s: {DWELL_S:.1}, "))
+    } else {
+        ("scan", String::new())
+    };
+    let spacing_mm = (to_mm - from_mm) / f64::from(STOPS - 1);
+    Some(format!(
+        "{{do: {what}, axis: {axis}, from_mm: {from_mm:.1}, to_mm: {to_mm:.1}, \
+         spacing_mm: {spacing_mm:.1}, runs: 1, {rest}feed_mm_min: {feed_mm_min:.1}, \
+         overrun_mm: {OVERRUN_MM:.1}, beam: {}}}",
+        beam.id
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_pcg::Pcg64Mcg;
+
+    use super::*;
+    use crate::measurement::{Sample, measure};
+    use crate::rig::Rig;
+
+    fn rig() -> Rig {
+        Rig::draw(&mut Pcg64Mcg::seed_from_u64(6), false).unwrap()
+    }
+
+    #[test]
+    fn a_circle_is_run_on_the_plate_of_its_plane_at_every_feed() {
+        let rig = rig();
+        let words = "circle ZX R40 F3000 and F6000 both senses";
+        let plan = extra_run(&rig.machine, &rig.plan, words).unwrap();
+        assert_eq!(plan.steps.len(), 2);
+        let Step::Grid(step) = &plan.steps[1] else {
+            panic!("{plan:?}");
+        };
+        assert_eq!(
+            (step.placement.as_str(), step.feed_mm_min),
+            ("side", 6000.0)
+        );
+        assert_eq!(step.radius_mm, Some(40.0));
+    }
+
+    #[test]
+    fn the_machine_can_run_what_is_asked_for_and_it_reads_something() {
+        let rig = rig();
+        for words in [
+            "circle XY R40 F3000 both senses at middle",
+            "line Y F4000 there and back on the plate",
+            "positioning Z F2000, 20 stops of 2 s each way along beam along_z",
+            "line X F4000 there and back along beam along_x",
+            "steps of 0.4 mm along X with 2 s dwell, there and back",
+            "the same touches at F60, F120 and F480",
+        ] {
+            let plan = extra_run(&rig.machine, &rig.plan, words).unwrap();
+            let later = rig.later(plan);
+            let mut readings = 0;
+            let measured = measure(&later, &mut |_, sample| {
+                let reads = matches!(
+                    sample,
+                    Sample::Grid(_) | Sample::Length(_) | Sample::Trigger(_)
+                );
+                readings += u32::from(reads);
+            });
+            measured.unwrap_or_else(|error| panic!("{words}: {error}"));
+            assert!(readings > 10, "{words}: {readings}");
+        }
+    }
+
+    #[test]
+    fn the_session_in_reverse_has_each_condition_once() {
+        let rig = rig();
+        let words = "the session's 9 tests in reverse order";
+        let plan = extra_run(&rig.machine, &rig.plan, words).unwrap();
+        assert_eq!(plan.steps.first(), rig.plan.steps.last());
+        assert!(plan.steps.len() < rig.plan.steps.len());
+    }
+
+    #[test]
+    fn what_a_plan_cannot_do_is_not_made() {
+        let rig = rig();
+        for words in [
+            "standing still for 10 min on the plate",
+            "circle XY R40 F3000 both senses before and after 15 min of X to and fro, the other axes idle",
+            "the same touches with stylus long",
+        ] {
+            assert_eq!(extra_run(&rig.machine, &rig.plan, words), None, "{words}");
+        }
+    }
+}

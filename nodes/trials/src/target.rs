@@ -1,0 +1,422 @@
+//! What the diagnosis should reach, and whether it does: the protocol's table.
+//!
+//! A share meets its target where the share itself does; the interval beside it says how surely. Shares of nothing
+//! and figures without a trial are not measured, which is neither met nor missed.
+
+use serde::{Deserialize, Serialize};
+
+use crate::arm::Arm;
+use crate::calibration::calibration;
+use crate::confusion::ISOLABLE;
+use crate::covariate;
+use crate::detection::d95;
+use crate::effect::Class;
+use crate::proportion::{Proportion, auroc, median};
+use crate::tally::{LARGE_D, SEVERAL_D, SINGLE_D, beyond, has_wrong, is_reproduced};
+use crate::truth::TrueEffect;
+use crate::verdict::{Said, Verdict};
+
+/// One line of the protocol's table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Target {
+    /// What is counted or taken.
+    pub metric: String,
+    /// Where it should be.
+    pub wanted: String,
+    /// How often, where it is a share.
+    pub count: Option<Proportion>,
+    /// Its 95 % interval.
+    pub interval: Option<[f64; 2]>,
+    /// The figure; none where nothing was measured.
+    pub value: Option<f64>,
+    /// Of how many.
+    pub n: usize,
+    /// Whether it is where it should be.
+    pub met: Option<bool>,
+}
+
+/// Where a figure should be.
+#[derive(Clone, Copy)]
+enum Bound {
+    AtLeast(f64),
+    AtMost(f64),
+    Within(f64, f64),
+}
+
+use Bound::{AtLeast, AtMost, Within};
+
+impl Bound {
+    fn holds(self, value: f64) -> bool {
+        match self {
+            AtLeast(low) => value >= low,
+            AtMost(high) => value <= high,
+            Within(low, high) => (low..=high).contains(&value),
+        }
+    }
+
+    fn words(self, as_percent: bool) -> String {
+        let number = |value: f64| {
+            if as_percent {
+                format!("{:.0} %", 100.0 * value)
+            } else {
+                format!("{value}")
+            }
+        };
+        match self {
+            AtLeast(low) => format!("≥ {}", number(low)),
+            AtMost(high) => format!("≤ {}", number(high)),
+            Within(low, high) => format!("{} to {}", number(low), number(high)),
+        }
+    }
+}
+
+/// The table as it fills.
+struct Sheet(Vec<Target>);
+
+impl Sheet {
+    fn share(&mut self, metric: &str, bound: Bound, all: impl Iterator<Item = bool>) {
+        let count = Proportion::of(all);
+        let value = count.share();
+        self.0.push(Target {
+            metric: metric.to_owned(),
+            wanted: bound.words(true),
+            count: Some(count),
+            interval: value.map(|_| count.wilson()),
+            value,
+            n: count.n,
+            met: value.map(|value| bound.holds(value)),
+        });
+    }
+
+    fn figure(&mut self, metric: &str, bound: Bound, value: Option<f64>, n: usize) {
+        self.0.push(Target {
+            metric: metric.to_owned(),
+            wanted: bound.words(false),
+            count: None,
+            interval: None,
+            value,
+            n,
+            met: value.map(|value| bound.holds(value)),
+        });
+    }
+
+    fn middle(&mut self, metric: &str, bound: Bound, values: Vec<f64>) {
+        let n = values.len();
+        self.figure(metric, bound, median(values), n);
+    }
+}
+
+/// The whole table; verdicts of a diagnosis without one of its rules are not in it.
+#[must_use]
+pub fn targets(verdicts: &[Verdict]) -> Vec<Target> {
+    let of = |arm: Arm| -> Vec<&Verdict> {
+        let own = |v: &&Verdict| v.truth.arm == arm && v.ablated.is_none() && v.said.is_some();
+        verdicts.iter().filter(own).collect()
+    };
+    let mut sheet = Sheet(vec![]);
+    of_nulls(&mut sheet, &of(Arm::Null), &of(Arm::HeavyNull));
+    let (known, foreign) = (of(Arm::Catalogue), of(Arm::Foreign));
+    of_known(&mut sheet, &known);
+    of_foreign(&mut sheet, &foreign);
+    of_left_out(&mut sheet, &of(Arm::LeftOut), &known);
+    of_sets(&mut sheet, &known);
+    of_calibration(&mut sheet, &known, &foreign);
+    of_sizes(&mut sheet, &known);
+    of_shrink(&mut sheet, &known, &foreign);
+    of_two_rounds(&mut sheet, &of(Arm::TwoRounds));
+    let times = verdicts.iter().filter(|v| v.ablated.is_none());
+    let times = times.filter_map(|v| Some(v.said.as_ref()?.runtime_s));
+    sheet.middle(
+        "time of a diagnosis with all its simulations, median, s",
+        AtMost(60.0),
+        times.collect(),
+    );
+    sheet.0
+}
+
+fn has_name(verdict: &Verdict) -> bool {
+    verdict.named().next().is_some()
+}
+
+fn of_nulls(sheet: &mut Sheet, null: &[&Verdict], heavy: &[&Verdict]) {
+    sheet.share(
+        "iv: any cause named",
+        AtMost(0.01),
+        null.iter().map(|v| has_name(v)),
+    );
+    sheet.share(
+        "iv: any alarm, unknown included",
+        AtMost(0.02),
+        null.iter().map(|v| has_name(v) || v.is_flagged()),
+    );
+    sheet.share(
+        "v: any cause named",
+        AtMost(0.05),
+        heavy.iter().map(|v| has_name(v)),
+    );
+    sheet.share(
+        "v: floor not reproduced said",
+        AtLeast(0.9),
+        heavy.iter().map(|v| !is_reproduced(v)),
+    );
+}
+
+/// Every hidden effect with its verdict.
+fn pairs<'v>(own: &[&'v Verdict]) -> impl Iterator<Item = (&'v Verdict, &'v TrueEffect)> {
+    let all: Vec<(&Verdict, &TrueEffect)> = own
+        .iter()
+        .flat_map(|v| v.truth.effects.iter().map(move |e| (*v, e)))
+        .collect();
+    all.into_iter()
+}
+
+/// Least trials of a class, and least of either answer, that a detection limit is taken of.
+const FEWEST: [usize; 2] = [12, 2];
+
+fn of_known(sheet: &mut Sheet, known: &[&Verdict]) {
+    let limit = |class: Option<Class>| -> Option<f64> {
+        let own = pairs(known).filter(|(_, e)| class.is_none_or(|class| e.class == class));
+        let trials: Vec<(f64, bool)> = own.map(|(v, e)| (e.d, v.has(e))).collect();
+        let named = trials.iter().filter(|(_, named)| *named).count();
+        let enough = trials.len() >= FEWEST[0] && named.min(trials.len() - named) >= FEWEST[1];
+        enough.then(|| d95(&trials)).flatten()
+    };
+    let by_class: Vec<f64> = Class::ALL
+        .into_iter()
+        .filter_map(|c| limit(Some(c)))
+        .collect();
+    let worst = by_class.iter().copied().reduce(f64::max);
+    let classes = by_class.len();
+    sheet.figure(
+        "i: D named in 95 %, all classes together",
+        AtMost(8.0),
+        limit(None),
+        known.len(),
+    );
+    sheet.middle(
+        "i: D named in 95 %, median of the classes that have one",
+        AtMost(8.0),
+        by_class,
+    );
+    sheet.figure(
+        "i: D named in 95 %, worst of these",
+        AtMost(10.0),
+        worst,
+        classes,
+    );
+    let with = |least: usize, most: usize| -> Vec<&Verdict> {
+        let fits = |v: &&&Verdict| (least..=most).contains(&v.truth.effects.len());
+        known.iter().filter(fits).copied().collect()
+    };
+    let single = beyond(&with(1, 1), SINGLE_D);
+    sheet.share(
+        "i: 1 effect, D > 10, exact",
+        AtLeast(0.98),
+        single.iter().map(|v| v.is_exact()),
+    );
+    let several = beyond(&with(2, usize::MAX), SEVERAL_D);
+    sheet.share(
+        "i: 2 or 3 effects, each D > 7, exact set",
+        AtLeast(0.9),
+        several.iter().map(|v| v.is_exact()),
+    );
+    let each = pairs(&several).map(|(v, e)| v.has(e));
+    sheet.share(
+        "i: each of 2 or 3 effects, D > 7, named",
+        AtLeast(0.96),
+        each,
+    );
+}
+
+fn of_foreign(sheet: &mut Sheet, foreign: &[&Verdict]) {
+    let large = pairs(foreign).filter(|(_, e)| e.d > LARGE_D);
+    sheet.share(
+        "iii: true class named on its axis, D > 20",
+        AtLeast(0.93),
+        large.map(|(v, e)| v.has(e)),
+    );
+    let all = beyond(foreign, LARGE_D);
+    sheet.share(
+        "iii: exact set, D > 20",
+        AtLeast(0.75),
+        all.iter().map(|v| v.is_exact()),
+    );
+    let wrong = foreign.iter().map(|v| has_wrong(v) && !v.is_flagged());
+    sheet.share("iii: wrong cause named, unflagged", AtMost(0.08), wrong);
+}
+
+fn of_left_out(sheet: &mut Sheet, left_out: &[&Verdict], known: &[&Verdict]) {
+    let score = |v: &&Verdict| v.said.as_ref().map(|said| said.unknown_ratio);
+    let large =
+        |all: &[&Verdict]| -> Vec<f64> { beyond(all, SINGLE_D).iter().filter_map(score).collect() };
+    let area = |own: &[&Verdict]| {
+        let (positive, negative) = (large(own), large(known));
+        (auroc(&positive, &negative), positive.len() + negative.len())
+    };
+    let (value, n) = area(left_out);
+    sheet.figure("ii: AUROC of unknown, D > 10", AtLeast(0.95), value, n);
+    let isolable = |v: &&&Verdict| v.likeness.iter().any(|one| one.sin_alone >= ISOLABLE);
+    let (value, n) = area(
+        &left_out
+            .iter()
+            .filter(isolable)
+            .copied()
+            .collect::<Vec<_>>(),
+    );
+    sheet.figure("ii: the same, isolable classes", AtLeast(0.985), value, n);
+    let large = beyond(left_out, LARGE_D);
+    sheet.share(
+        "ii: wrong cause named, D > 20",
+        AtMost(0.2),
+        large.iter().map(|v| has_wrong(v)),
+    );
+    sheet.share(
+        "ii: the same, and not flagged unknown",
+        AtMost(0.05),
+        large.iter().map(|v| has_wrong(v) && !v.is_flagged()),
+    );
+    let described = left_out.iter().filter(|v| v.is_flagged()).filter_map(|v| {
+        let covariate = &v.said.as_ref()?.covariate;
+        let effect = v.truth.effects.first()?;
+        Some(covariate::is_right(effect, covariate))
+    });
+    sheet.share(
+        "ii: covariate of a flagged leftover right",
+        AtLeast(0.9),
+        described,
+    );
+}
+
+fn of_sets(sheet: &mut Sheet, known: &[&Verdict]) {
+    let told = pairs(known).filter(|(v, e)| e.d > SINGLE_D && has_name(v));
+    sheet.share(
+        "i: truth among the named and their rivals, D > 10",
+        AtLeast(0.98),
+        told.map(|(v, e)| v.named().any(|cause| cause.may_be(e))),
+    );
+    let sizes = known.iter().flat_map(|v| v.named());
+    let sizes: Vec<f64> = sizes.map(|cause| 1.0 + cause.rivals.len() as f64).collect();
+    let n = sizes.len();
+    let mean = (n > 0).then(|| sizes.iter().sum::<f64>() / n as f64);
+    sheet.figure("i: mean size of a set", AtMost(1.3), mean, n);
+}
+
+fn of_calibration(sheet: &mut Sheet, known: &[&Verdict], foreign: &[&Verdict]) {
+    for (arm, own, most) in [("i", known, [0.03, 0.03]), ("iii", foreign, [0.08, 0.12])] {
+        for (figure, most) in calibration(own).into_iter().zip(most) {
+            let metric = format!("{arm}: {}", figure.what);
+            sheet.figure(&metric, AtMost(most), figure.value, figure.n);
+        }
+    }
+    for (arm, own, least) in [("i", known, 0.9), ("iii", foreign, 0.75)] {
+        let confidences: Vec<f64> = pairs(own).filter_map(|(v, e)| on_truth(v, e)).collect();
+        let n = confidences.len();
+        let mean = (n > 0).then(|| confidences.iter().sum::<f64>() / n as f64);
+        let metric = format!("{arm}: mean probability on the truth where anything was detected");
+        sheet.figure(&metric, AtLeast(least), mean, n);
+    }
+}
+
+/// Confidence in a hidden effect; none where nothing was detected.
+fn on_truth(verdict: &Verdict, effect: &TrueEffect) -> Option<f64> {
+    let said = verdict.said.as_ref()?;
+    let detected = !said.causes.is_empty() || said.is_unknown;
+    let own = said.causes.iter().find(|cause| cause.is(effect));
+    detected.then(|| own.map_or(0.0, |cause| cause.confidence))
+}
+
+fn of_sizes(sheet: &mut Sheet, known: &[&Verdict]) {
+    let sized: Vec<(f64, bool)> = pairs(known)
+        .filter(|(_, e)| e.d > LARGE_D)
+        .filter_map(|(v, e)| {
+            v.sized(e)
+                .map(|(error, covered)| (error.abs() * e.d, covered))
+        })
+        .collect();
+    sheet.middle(
+        "i: relative error of a parameter times D, median, D > 20",
+        AtMost(2.0),
+        sized.iter().map(|(error, _)| *error).collect(),
+    );
+    sheet.share(
+        "i: 95 % intervals that hold the parameter, D > 20",
+        Within(0.92, 0.97),
+        sized.iter().map(|(_, covered)| *covered),
+    );
+}
+
+fn of_shrink(sheet: &mut Sheet, known: &[&Verdict], foreign: &[&Verdict]) {
+    for (arm, own, closed, left) in [("i", known, 0.98, 0.03), ("iii", foreign, 0.9, 0.1)] {
+        let large = beyond(own, LARGE_D);
+        let of = |ratio: &dyn Fn(&Verdict) -> Option<f64>| -> Vec<f64> {
+            large.iter().filter_map(|v| ratio(v)).collect()
+        };
+        sheet.middle(
+            &format!("{arm}: gap closed over that of an oracle, median, D > 20"),
+            AtLeast(closed),
+            of(&Verdict::closed_of_oracle),
+        );
+        sheet.middle(
+            &format!("{arm}: rms after over before, held out, median, D > 20"),
+            AtMost(left),
+            of(&|v| v.said.as_ref().and_then(after_over_before)),
+        );
+    }
+    let told = known.iter().chain(foreign).filter_map(|v| {
+        let [_, low, high] = v.said.as_ref()?.closed?;
+        let best = v.later_closed?;
+        Some((low..=high).contains(&best))
+    });
+    sheet.share(
+        "i, iii: intervals of the gap closed that hold it on later runs",
+        Within(0.9, 0.98),
+        told,
+    );
+}
+
+fn after_over_before(said: &Said) -> Option<f64> {
+    let [before, after] = said.held_out_um;
+    Some(after? / before?)
+}
+
+/// Squared distance from which a run was to decide.
+const DECIDES: f64 = 9.0;
+
+fn of_two_rounds(sheet: &mut Sheet, own: &[&Verdict]) {
+    let asked = own.iter().filter_map(|v| {
+        let second = v.second.as_ref().filter(|second| second.delta >= DECIDES)?;
+        let said = second.said.clone()?;
+        (!v.is_exact()).then(|| {
+            let after = Verdict {
+                said: Some(said),
+                ..(*v).clone()
+            };
+            after.is_exact()
+        })
+    });
+    sheet.share(
+        "vii: open after one round, exact after the run asked for (Δ ≥ 9)",
+        AtLeast(0.85),
+        asked,
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_trials_nothing_is_met_and_nothing_missed() {
+        let all = targets(&[]);
+        assert!(all.len() >= 28, "{}", all.len());
+        assert!(all.iter().all(|target| target.met.is_none()), "{all:#?}");
+    }
+
+    #[test]
+    fn bounds_are_met_on_their_edge() {
+        assert!(AtLeast(0.98).holds(0.98) && !AtLeast(0.98).holds(0.979));
+        assert!(AtMost(2.0).holds(2.0) && !AtMost(2.0).holds(2.1));
+        assert!(Within(0.9, 0.98).holds(0.95) && !Within(0.9, 0.98).holds(0.99));
+        assert_eq!(Within(0.92, 0.97).words(true), "92 % to 97 %");
+    }
+}
