@@ -305,6 +305,26 @@ fn val_linuxcnc_the_latency_is_the_delay_that_only_hal_holds_and_corrected_point
 }
 
 #[test]
+fn val_linuxcnc_lost_motion_that_only_hal_holds_is_named_with_its_size_from_the_runs_own_bag() {
+    let Some(finished) = run("linuxcnc_gap") else {
+        return;
+    };
+    let half_mm = in_hal("linuxcnc_gap", "effect.hal", "slide-greatest.x.offset");
+    let width_um = 2e3 * half_mm;
+    let (names, [found_um, low_um, high_um]) = named(&finished, "backlash", "width_um");
+    assert_eq!(names, ["backlash X"]);
+    assert!(
+        low_um <= width_um && width_um <= high_um,
+        "{low_um} to {high_um}, {width_um} in HAL"
+    );
+    assert!(low_um < found_um && found_um < high_um && high_um - low_um < 0.2);
+    let gap = finished.gap.as_ref().unwrap();
+    assert_eq!(gap["unknown"]["flagged"], false, "{}", gap["unknown"]);
+    let closed = gap["shrink"]["gap_closed"]["low"].as_f64().unwrap();
+    assert!(closed > 0.99, "{closed}");
+}
+
+#[test]
 fn val_linuxcnc_both_blocks_are_measured_twice_and_every_face_of_them() {
     let Some(finished) = run("linuxcnc_block_cycle") else {
         return;

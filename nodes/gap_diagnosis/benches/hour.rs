@@ -1,5 +1,6 @@
 //! A session of an hour at 1 kHz, from its samples to its diagnosis: circles on a grid encoder, 200 touches at
-//! several feeds, 16 cycles of two blocks. Says what each part takes, and the most memory that was ever held.
+//! several feeds, 16 cycles of two blocks. Says what each part takes, and the most memory that was ever held; the search
+//! on the Gram matrix of the signatures beside the same search with numpy, which must find the same set.
 
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(
@@ -9,8 +10,12 @@
 )]
 
 use std::f64::consts::TAU;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use std::time::Instant;
 
+use gap_diagnosis::problem::Posed;
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use gap_diagnosis::{GapConfig, diagnose};
 use machine::MachineFile;
@@ -31,6 +36,8 @@ const PLAY_MM: f64 = 4e-3;
 /// Latency of the probe, s.
 const LATENCY_S: f64 = 2e-3;
 const CYCLES: i64 = 16;
+/// Searches of which the mean is taken.
+const SEARCHES: u32 = 20;
 
 struct Hour {
     machine: MachineFile,
@@ -209,11 +216,61 @@ fn peak_mib() -> Option<f64> {
     Some(kib / 1024.0)
 }
 
-fn main() {
-    let text = MACHINE.replace("velocity_feedforward: 0.98", "velocity_feedforward: 1.0");
-    let machine = MachineFile::parse(&text, "machine.yaml").unwrap();
+/// Seconds of a search here, and with numpy where there is a Python; both from one Gram matrix.
+fn searches(posed: &Posed) {
+    let began = Instant::now();
+    let mut found = posed.solved();
+    for _ in 1..SEARCHES {
+        found = posed.solved();
+    }
+    let own_s = began.elapsed().as_secs_f64() / f64::from(SEARCHES);
+    let (set, score) = found;
+    let [columns, forms] = [posed.problem.along.len(), posed.problem.forms.len()];
+    println!(
+        "searched {columns} columns in {forms} forms in {:.1} ms",
+        own_s * 1e3
+    );
+    let Some(peer) = by_numpy(posed) else { return };
+    let other: Vec<usize> = serde_json::from_value(peer["set"].clone()).unwrap();
+    let other_score = peer["score"].as_f64().unwrap();
+    assert_eq!(set, other, "{score} here, {other_score} with numpy");
+    assert!((score - other_score).abs() < 1e-6 * posed.problem.square);
+    let seconds: Vec<f64> = serde_json::from_value(peer["seconds"].clone()).unwrap();
+    let peer_s = seconds.iter().sum::<f64>() / seconds.len() as f64;
+    println!(
+        "numpy: the same set in {:.1} ms, ratio {:.1}",
+        peer_s * 1e3,
+        peer_s / own_s
+    );
+}
+
+fn by_numpy(posed: &Posed) -> Option<serde_json::Value> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let python = std::env::var("ABBE_PYTHON");
+    let python = python.map_or_else(|_| root.join(".venv/bin/python"), PathBuf::from);
+    if !python.exists() {
+        let python = python.display();
+        println!("peer not run: no {python} (set ABBE_PYTHON, or let tests/run install it)");
+        return None;
+    }
+    let mut problem = serde_json::to_value(&posed.problem).unwrap();
+    problem["repeats"] = SEARCHES.into();
+    let mut peer = Command::new(python)
+        .arg(root.join("tests/peers/bench_selection.py"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let text = serde_json::to_vec(&problem).unwrap();
+    peer.stdin.take().unwrap().write_all(&text).unwrap();
+    let output = peer.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", output.status);
+    Some(serde_json::from_slice(&output.stdout).unwrap())
+}
+
+fn gathered(machine: &MachineFile) -> Hour {
     let mut hour = Hour {
-        builder: SessionBuilder::new(&machine, SessionConfig::default()).unwrap(),
+        builder: SessionBuilder::new(machine, SessionConfig::default()).unwrap(),
         machine: machine.clone(),
         nanos: 0,
         run: 0,
@@ -222,28 +279,32 @@ fn main() {
         last: [0.0; 3],
         touches: 0,
     };
-    let began = Instant::now();
     let mut k = 0_u32;
     while hour.nanos < HOUR_NANOS {
         let (radius_mm, feed_mm_s) = [(50.0, 25.0), (25.0, 25.0), (50.0, 75.0)][k as usize / 2 % 3];
-        hour.circle(
-            radius_mm,
-            feed_mm_s,
-            if k.is_multiple_of(2) { 1.0 } else { -1.0 },
-        );
-        let due = i64::from(k) < CYCLES * 8 && k.is_multiple_of(8);
-        if due {
+        let turn = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        hour.circle(radius_mm, feed_mm_s, turn);
+        if i64::from(k) < CYCLES * 8 && k.is_multiple_of(8) {
             hour.cycle();
             hour.latency();
         }
         k += 1;
     }
+    hour
+}
+
+fn main() {
+    let text = MACHINE.replace("velocity_feedforward: 0.98", "velocity_feedforward: 1.0");
+    let machine = MachineFile::parse(&text, "machine.yaml").unwrap();
+    let began = Instant::now();
+    let hour = gathered(&machine);
     let (samples, touches) = (hour.nanos / TICK_NANOS, hour.touches);
     let (session, account) = hour.builder.finish().unwrap();
     let gathered_s = began.elapsed().as_secs_f64();
     let held_mib = peak_mib();
+    let config = GapConfig::default();
     let began = Instant::now();
-    let found = diagnose(&machine, &session, &GapConfig::default()).unwrap();
+    let found = diagnose(&machine, &session, &config).unwrap();
     let diagnosed_s = began.elapsed().as_secs_f64();
     println!(
         "{samples} axis states, {touches} touches, {} runs, {} readings kept",
@@ -251,7 +312,7 @@ fn main() {
     );
     println!("gathered in {gathered_s:.1} s, most memory {held_mib:.0?} MiB");
     println!(
-        "diagnosed in {diagnosed_s:.1} s, most memory {:.0?} MiB",
+        "diagnosed in {diagnosed_s:.1} s with all simulations, most memory {:.0?} MiB",
         peak_mib()
     );
     for cause in &found.report.causes {
@@ -260,4 +321,11 @@ fn main() {
             cause.status, cause.effect, cause.axis, cause.d
         );
     }
+    let began = Instant::now();
+    let posed = Posed::new(&machine, &session, &config).unwrap();
+    println!(
+        "noise and signatures of the first search in {:.1} s",
+        began.elapsed().as_secs_f64()
+    );
+    searches(&posed);
 }

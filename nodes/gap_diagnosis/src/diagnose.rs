@@ -81,11 +81,23 @@ pub(crate) fn signatures(
     session: &Session,
     config: &GapConfig,
 ) -> Result<Regression, GapError> {
+    first_stack(machine, session, config, |stack, kinds| {
+        Regression::new(stack, kinds)
+    })
+}
+
+/// Goes on with the runs that a diagnosis is fitted to, as they are stacked for its first search, and the kinds of it.
+pub(crate) fn first_stack<R>(
+    machine: &MachineFile,
+    session: &Session,
+    config: &GapConfig,
+    then: impl FnOnce(&Stack<'_>, &[&'static Kind]) -> R,
+) -> Result<R, GapError> {
     let kinds = considered(config)?;
     prepared(machine, session, session, config, |base, _| {
         let split = split::split(session, config.hold_out);
         let stack = base.stack(&split.fit, base.noise, &FormError::base(config));
-        Regression::new(&stack, &kinds)
+        then(&stack, &kinds)
     })
 }
 

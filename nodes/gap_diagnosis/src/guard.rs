@@ -6,19 +6,21 @@
 //! physics: every family of `families` and every smooth mode of every block, each with a size of its own.
 //!
 //! ```text
-//!   s2 = median z_i^2 / 0.4549  n / (n - k),   times (1 + rho) / (1 - rho)       (1)
-//!   inflation = 1 + (s2 - 1)+ s_w^2 / (s_w^2 + s_0^2 / 16)                       (2)
+//!   s2 = median (z_i^2 / 0.4549  n / (n - k) + f_i) / (1 + f_i),   f_i = s_f^2 / s_w^2   (1)
+//!   inflation = max(1, s2 + (c - 1) (s2 - 2 f / (1 + f))+),   c = (1 + rho) / (1 - rho)  (2)
 //! ```
 //!
 //! of which only that counts that is sure where n rows, and nu of the repeats, tell of it:
 //!
 //! ```text
-//!   s2 -> s2 exp(-sqrt(5.4 / (n - k) + 2 / nu))                                  (3)
+//!   z^2 -> z^2 exp(-sqrt(5.4 / (n - k) + 2 / nu))                                        (3)
 //! ```
 //!
-//! with rho the autocorrelation at lag one where it is above a quarter, s_w the noise of a row within a run and
-//! s_0 the simulator's own error of form, of which a quarter may stay beside such a model. What repeats leave alike at the same stations is structure, not noise: where
-//! their mean product says so, it is taken from (1). The median keeps a few sharp places (reversals) from
+//! with rho the autocorrelation at lag one where it is above a quarter, s_w the noise of the row at its run's pace and
+//! s_f a quarter of the simulator's own error of form, which may stay beside such a model. That is smooth: colour tells
+//! of noise only where there is more than it, so that a machine whose repeats are exact is not blamed for it. What repeats leave alike at the same stations is structure, not noise: where
+//! their mean product says so, it is taken from (1). Least squares spread a few rows that stand far off over all others:
+//! where the median is less without such a model, that is the noise. The median keeps a few sharp places (reversals) from
 //! passing for noise; products are clipped at three standard deviations.
 //!
 //! # Holds when
@@ -65,32 +67,78 @@ pub fn inflation(
     rest: Vec<f64>,
     form: &FormError,
 ) -> BTreeMap<Channel, f64> {
-    let (rest, terms) = rough(stack, slots, noise, rest);
-    let mut sums = BTreeMap::<Channel, Vec<&[f64]>>::new();
+    let (mut white, mut rest, terms) = rough(stack, slots, noise, rest);
+    let mut sums = BTreeMap::<Channel, Vec<(&Block, f64)>>::new();
     for block in &stack.rows.blocks {
-        let part = &rest[block.range()];
-        sums.entry(block.channel.clone()).or_default().push(part);
+        let smooth = smooth(stack, noise, block, form);
+        for row in white[block.range()]
+            .iter_mut()
+            .chain(&mut rest[block.range()])
+        {
+            *row /= (1.0 + smooth).sqrt();
+        }
+        let share = smooth / (1.0 + smooth);
+        sums.entry(block.channel.clone())
+            .or_default()
+            .push((block, share));
     }
-    let scale = |(channel, parts): (Channel, Vec<&[f64]>)| {
-        let n = count(parts.iter().map(|part| part.len()).sum());
+    let mut scales = BTreeMap::<Channel, [f64; 2]>::new();
+    for (channel, blocks) in sums {
+        let n = count(blocks.iter().map(|(block, _)| block.rows.len()).sum());
         let left = n - terms.get(&channel).copied().unwrap_or(0.0);
-        (left > FEWEST).then(|| {
-            let s2 = median_square(&parts) / MEDIAN_SQUARE * n / left;
-            let doubt = (OF_MEDIAN / left + 2.0 / noise[&channel].freedom.max(1.0)).sqrt();
-            (channel, s2 * (-SURE * doubt).exp()) // (3)
-        })
-    };
-    let scales: BTreeMap<Channel, f64> = sums.into_iter().filter_map(scale).collect();
+        if left <= FEWEST {
+            continue;
+        }
+        let doubt = (OF_MEDIAN / left + 2.0 / noise[&channel].freedom.max(1.0)).sqrt();
+        let sure = (-SURE * doubt).exp(); // (3)
+        let [s2, without] = [
+            middle_square(&blocks, &rest, n / left * sure),
+            middle_square(&blocks, &white, sure),
+        ];
+        if without < s2 {
+            for (block, _) in &blocks {
+                rest[block.range()].copy_from_slice(&white[block.range()]);
+            }
+        }
+        scales.insert(channel, [s2.min(without), middle(shares(&blocks))]);
+    }
     let shared = shared_by_repeats(stack, &rest, &scales);
-    let judged = |(channel, s2): (&Channel, &f64)| {
+    let judged = |(channel, [s2, smooth]): (&Channel, &[f64; 2])| {
         let worse = match shared.get(channel) {
             Some(common) if *common > STRUCTURE.min(0.3 * (s2 - 1.0)).max(0.05) => s2 - common,
-            _ => s2 * of_neighbours(stack, &rest, channel, *s2),
+            _ => {
+                let colour = of_neighbours(stack, &rest, channel, *s2);
+                s2 + (colour - 1.0) * (s2 - 2.0 * smooth).max(0.0)
+            }
         };
-        let beyond = (worse - 1.0).max(0.0) * allowed(stack, noise, channel, form);
-        (channel.clone(), 1.0 + beyond) // (2)
+        (channel.clone(), worse.max(1.0)) // (2)
     };
     scales.iter().map(judged).collect()
+}
+
+/// (1) of some blocks' rows.
+fn middle_square(blocks: &[(&Block, f64)], rows: &[f64], size: f64) -> f64 {
+    let squares = blocks.iter().flat_map(|(block, share)| {
+        let squares = rows[block.range()]
+            .iter()
+            .map(|v| v * v / MEDIAN_SQUARE * size);
+        squares.map(|square| square + *share)
+    });
+    middle(squares)
+}
+
+/// Part of the error of form in what each row may have.
+fn shares<'b>(blocks: &'b [(&Block, f64)]) -> impl Iterator<Item = f64> + 'b {
+    let rows = blocks
+        .iter()
+        .map(|(block, share)| (block.rows.len(), *share));
+    rows.flat_map(|(rows, share)| std::iter::repeat_n(share, rows))
+}
+
+fn middle(values: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = values.collect();
+    let middle = all.len() / 2;
+    *all.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Whether the noise of the repeats is the session's: the middle channel's. A channel whose noise is worse is said.
@@ -115,27 +163,24 @@ pub fn judge(
         .is_none_or(|middle| *middle <= config.most_inflation)
 }
 
-/// Share of the variance of a row that is noise, where the error of form is added.
-fn allowed(
+/// f of (1).
+fn smooth(
     stack: &Stack<'_>,
     noise: &BTreeMap<Channel, Noise>,
-    channel: &Channel,
+    block: &Block,
     form: &FormError,
 ) -> f64 {
-    let own = |block: &&Block| block.channel == *channel;
-    let found = stack.rows.blocks.iter().find(own);
-    let form = ROUGH * found.map_or(0.0, |block| form.of(block));
-    let within = noise[channel].row_sigma_mm.powi(2);
-    within / (within + form * form)
+    let within = noise[&block.channel].within(&stack.session.runs[block.run], block);
+    (ROUGH * form.of(block)).powi(2) / within.variances[0]
 }
 
-/// What is left beside the biggest model, and its terms by channel.
+/// What the effects leave, and what is left beside the biggest model as well, with its terms by channel.
 fn rough(
     stack: &Stack<'_>,
     slots: &[Slot],
     noise: &BTreeMap<Channel, Noise>,
     mut rest: Vec<f64>,
-) -> (Vec<f64>, BTreeMap<Channel, f64>) {
+) -> (Vec<f64>, Vec<f64>, BTreeMap<Channel, f64>) {
     let still = Smooth::default();
     let within = Whitener::new(
         stack.session,
@@ -147,6 +192,7 @@ fn rough(
         &FormError::default(),
     );
     within.apply(&mut rest);
+    let white = rest.clone();
     let mut terms = BTreeMap::<Channel, f64>::new();
     for block in &stack.rows.blocks {
         let run = &stack.session.runs[block.run];
@@ -182,7 +228,7 @@ fn rough(
         let used = take_out(&mut rest, &slot.rows, columns);
         *terms.entry(slot.key.clone()).or_default() += used;
     }
-    (rest, terms)
+    (white, rest, terms)
 }
 
 /// Takes some columns over some rows out of the rest; how many there were.
@@ -194,12 +240,6 @@ fn take_out(rest: &mut [f64], rows: &[usize], columns: impl Iterator<Item = DVec
         rest[*place] -= told;
     }
     count(basis.ncols())
-}
-
-fn median_square(parts: &[&[f64]]) -> f64 {
-    let mut squares: Vec<f64> = parts.concat().iter().map(|v| v * v).collect();
-    let middle = squares.len() / 2;
-    *squares.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn clipped(value: f64, s2: f64) -> f64 {
@@ -228,14 +268,14 @@ fn of_neighbours(stack: &Stack<'_>, rest: &[f64], channel: &Channel, s2: f64) ->
 fn shared_by_repeats(
     stack: &Stack<'_>,
     rest: &[f64],
-    scales: &BTreeMap<Channel, f64>,
+    scales: &BTreeMap<Channel, [f64; 2]>,
 ) -> BTreeMap<Channel, f64> {
     let mut sums = BTreeMap::<Channel, [f64; 2]>::new();
     let blocks = &stack.rows.blocks;
     for group in repeats::groups(stack.session, &stack.rows) {
         for pair in group.windows(2) {
             let (one, other) = (&blocks[pair[0]], &blocks[pair[1]]);
-            let Some(s2) = scales.get(&one.channel) else {
+            let Some([s2, _]) = scales.get(&one.channel) else {
                 continue;
             };
             let sum = sums.entry(one.channel.clone()).or_default();

@@ -19,7 +19,7 @@
 //! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`. `experiment` knows what could
 //! be measured next and `next` which of it would decide. `diagnose` puts the questions in their order,
 //! `preflight` some of them before anything is measured; `regression` is what other methods than these would start
-//! from, `rule` what of these can be switched off. `stage` is the node's whole computation, `following` its
+//! from, `problem` the first search as numbers alone, `rule` what of these can be switched off. `stage` is the node's whole computation, `following` its
 //! parameters.
 
 mod bootstrap;
@@ -48,6 +48,7 @@ mod nuisance;
 mod pace;
 mod places;
 pub mod preflight;
+pub mod problem;
 mod recalibration;
 mod refit;
 pub mod regression;

@@ -5,10 +5,15 @@
 //! ```text
 //!   T = |U'z|^2,   z_T = ((T/k)^(1/3) - (1 - 2/(9k))) / sqrt(2/(9k))      (1)
 //!   p = (1 + #{draws: max z_T* >= z_T}) / (1 + draws)                     (2)
-//!   E = (T - k)+ / (|z|^2 - n)+,  unique = what is lost without it        (3)
+//!   S = sum over slots ((T_all - k_all)+ + (|z|^2 - T_all - (n - k_all))+)                (3)
+//!   E = (T - k)+ / S = unique + shared,   unique = (T_all - T_others - k)+ / S            (4)
 //! ```
 //!
-//! A draw of (2) turns the sign of whole runs of z; with fewer than ten runs it draws U'z from noise of one
+//! A slot is one channel in one direction, n its rows, T_all what its k_all columns tell together. S is what is beyond
+//! noise: a slot that has less than its noise, as one has whose error of form is small, takes nothing from another's.
+//!
+//! A draw of (2) turns the sign of whole runs of z; in a slot with fewer than ten runs, where turning them is no draw,
+//! it draws U'z from noise of one
 //! instead, scaled by the square root of nu / chi2_nu: the field between runs is known from nu coefficients of few
 //! repeats only. The maximum is over all families, so that p holds however many are looked at.
 //!
@@ -83,18 +88,30 @@ pub fn scores(
             });
         }
     }
-    let greatest = if stack.runs.len() < FEWEST_RUNS {
-        parametric(slots, noise, config)
-    } else {
-        flipped(stack, slots, z, config)
-    };
+    let (many, few): (Vec<&Slot>, Vec<&Slot>) = slots
+        .iter()
+        .partition(|slot| runs_of(stack, slot) >= FEWEST_RUNS);
+    let greatest: Vec<f64> = flipped(stack, &many, z, config)
+        .into_iter()
+        .zip(parametric(&few, noise, config))
+        .map(|(a, b)| a.max(b))
+        .collect();
     for score in &mut scores {
         let above = greatest.iter().filter(|draw| **draw >= score.z).count();
         score.p_value = (1.0 + count(above)) / (1.0 + count(greatest.len()));
     }
-    shares(slots, z, &along, stack.freedom(), &mut scores);
+    shares(slots, z, &along, &mut scores);
     scores.sort_by(|a, b| b.unique.total_cmp(&a.unique).then(b.z.total_cmp(&a.z)));
     scores
+}
+
+/// Runs that a slot has rows of.
+fn runs_of(stack: &Stack<'_>, slot: &Slot) -> usize {
+    let blocks = slot.blocks.iter().map(|index| &stack.rows.blocks[*index]);
+    let mut runs: Vec<usize> = blocks.map(|block| block.run).collect();
+    runs.sort_unstable();
+    runs.dedup();
+    runs.len()
 }
 
 fn project(slot: &Slot, z: &DVector<f64>) -> DVector<f64> {
@@ -117,7 +134,7 @@ fn most(slot: &Slot, along: &DVector<f64>) -> f64 {
 }
 
 /// Greatest score of each draw of flipped runs.
-fn flipped(stack: &Stack<'_>, slots: &[Slot], z: &DVector<f64>, config: &GapConfig) -> Vec<f64> {
+fn flipped(stack: &Stack<'_>, slots: &[&Slot], z: &DVector<f64>, config: &GapConfig) -> Vec<f64> {
     let parts: Vec<Vec<DVector<f64>>> = slots
         .iter()
         .map(|slot| by_run(stack, slot, &rows_of(slot, z)))
@@ -130,7 +147,7 @@ fn flipped(stack: &Stack<'_>, slots: &[Slot], z: &DVector<f64>, config: &GapConf
                 .iter()
                 .map(|_| if random.random() { 1.0 } else { -1.0 })
                 .collect();
-            let of_slot = |(slot, parts): (&Slot, &Vec<DVector<f64>>)| {
+            let of_slot = |(slot, parts): (&&Slot, &Vec<DVector<f64>>)| {
                 let mut along = DVector::zeros(slot.basis.ncols());
                 for (part, sign) in parts.iter().zip(&signs) {
                     along.axpy(*sign, part, 1.0);
@@ -162,7 +179,7 @@ fn by_run(stack: &Stack<'_>, slot: &Slot, z: &DVector<f64>) -> Vec<DVector<f64>>
 }
 
 /// Greatest score of each draw of noise of one.
-fn parametric(slots: &[Slot], noise: &BTreeMap<Channel, Noise>, config: &GapConfig) -> Vec<f64> {
+fn parametric(slots: &[&Slot], noise: &BTreeMap<Channel, Noise>, config: &GapConfig) -> Vec<f64> {
     let grams: Vec<DMatrix<f64>> = slots
         .iter()
         .map(|slot| slot.basis.tr_mul(&slot.basis))
@@ -172,7 +189,7 @@ fn parametric(slots: &[Slot], noise: &BTreeMap<Channel, Noise>, config: &GapConf
 
 /// Greatest score over families of draws with the given covariances of U'z.
 pub fn noise_maxima(
-    slots: &[Slot],
+    slots: &[&Slot],
     noise: &BTreeMap<Channel, Noise>,
     grams: &[DMatrix<f64>],
     draws: usize,
@@ -219,42 +236,85 @@ fn root(gram: &DMatrix<f64>) -> DMatrix<f64> {
     lower
 }
 
-/// (3) of the families that stand out.
-fn shares(
-    slots: &[Slot],
-    z: &DVector<f64>,
-    along: &[DVector<f64>],
-    freedom: f64,
-    scores: &mut [Score],
-) {
-    let structured = (z.norm_squared() - freedom).max(1.0);
-    let normals: Vec<Normal> = slots
+/// (4) of the families that stand out.
+fn shares(slots: &[Slot], z: &DVector<f64>, along: &[DVector<f64>], scores: &mut [Score]) {
+    let told: Vec<Told> = slots
         .iter()
         .zip(along)
-        .map(|(slot, along)| Normal {
-            gram: slot.basis.tr_mul(&slot.basis),
-            along: along.clone(),
-        })
+        .map(|(slot, along)| Told::new(&slot.basis, along))
         .collect();
-    let all: Vec<f64> = slots
-        .iter()
-        .zip(&normals)
-        .map(|(slot, normal)| {
-            normal
-                .solve(&(0..slot.basis.ncols()).collect::<Vec<_>>())
-                .gain
-        })
-        .collect();
+    let beyond = told.iter().zip(slots).map(|(told, slot)| {
+        let rows = rows_of(slot, z);
+        told.beyond_noise(rows.norm_squared(), count(rows.len()))
+    });
+    let structured = beyond.sum::<f64>().max(1.0);
     for score in scores.iter_mut().filter(|score| score.z > 3.0) {
-        let slot = &slots[score.slot];
-        let own = &slot.families[score.family].columns;
-        let others: Vec<usize> = (0..slot.basis.ncols())
+        let own = &slots[score.slot].families[score.family].columns;
+        let [unique, whole] = told[score.slot].energies(own, score.square);
+        score.unique = unique / structured;
+        score.shared = (whole - unique) / structured;
+    }
+}
+
+/// What all families of a slot tell together.
+struct Told {
+    normal: Normal,
+    /// T_all.
+    all: f64,
+}
+
+impl Told {
+    fn new(basis: &DMatrix<f64>, along: &DVector<f64>) -> Self {
+        let normal = Normal {
+            gram: basis.tr_mul(basis),
+            along: along.clone(),
+        };
+        let columns: Vec<usize> = (0..basis.ncols()).collect();
+        let all = normal.solve(&columns).gain;
+        Self { normal, all }
+    }
+
+    /// The slot's part of (3).
+    fn beyond_noise(&self, square: f64, rows: f64) -> f64 {
+        let columns = count(self.normal.along.len());
+        let told = (self.all - columns).max(0.0);
+        told + (square - self.all - (rows - columns).max(0.0)).max(0.0)
+    }
+
+    /// Numerators of (4) for some columns that tell `square`: alone, and at all.
+    fn energies(&self, own: &std::ops::Range<usize>, square: f64) -> [f64; 2] {
+        let others: Vec<usize> = (0..self.normal.along.len())
             .filter(|k| !own.contains(k))
             .collect();
         let k = count(own.len());
-        let lost = all[score.slot] - normals[score.slot].solve(&others).gain;
-        let whole = ((score.square - k).max(0.0) / structured).min(1.0);
-        score.unique = ((lost - k).max(0.0) / structured).min(whole);
-        score.shared = whole - score.unique;
+        let most = (self.all - count(self.normal.along.len())).max(0.0);
+        let whole = (square - k).max(0.0).min(most);
+        let lost = self.all - self.normal.solve(&others).gain;
+        [(lost - k).max(0.0).min(whole), whole]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four rows; two unit columns at 60 degrees to each other in the first two, and z along the first: it tells 100
+    /// together, the second alone a quarter of it.
+    #[test]
+    fn eq4_what_two_families_share_is_counted_once_and_both_parts_make_the_whole() {
+        let (sin, cos) = std::f64::consts::FRAC_PI_3.sin_cos();
+        let basis = DMatrix::from_column_slice(4, 2, &[1.0, 0.0, 0.0, 0.0, cos, sin, 0.0, 0.0]);
+        let z = DVector::from_column_slice(&[10.0, 0.0, 0.0, 0.0]);
+        let told = Told::new(&basis, &basis.tr_mul(&z));
+        assert!((told.all - 100.0).abs() < 1e-9);
+        // 100 told by two columns; the two rows beside them have less than their noise and take nothing from it.
+        assert!((told.beyond_noise(100.0, 4.0) - 98.0).abs() < 1e-9);
+        let [unique, whole] = told.energies(&(0..1), 100.0);
+        assert!((unique - 74.0).abs() < 1e-9, "{unique}");
+        assert!((whole - 98.0).abs() < 1e-9, "{whole}");
+        let [unique, whole] = told.energies(&(1..2), 25.0);
+        assert!(unique.abs() < 1e-9 && (whole - 24.0).abs() < 1e-9);
+        // A rest that no family tells is part of what is beyond noise.
+        assert!((told.beyond_noise(150.0, 4.0) - 98.0 - 48.0).abs() < 1e-9);
     }
 }

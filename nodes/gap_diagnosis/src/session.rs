@@ -28,7 +28,8 @@
 //! | run | readings |
 //! |---|---|
 //! | circle in motion | on the nominal circle at 98 % of the feed or more |
-//! | other contours in motion | from the first motion to the last, while the record is at its full rate |
+//! | other contours in motion | from where they first have their feed to where they last have it, while the record is at its full rate; the whole motion where they never have it; of lines the passes at the feed after 50 ms |
+//! | encoders | of axes that move in what is read |
 //! | with stations, positioning, diagonals | the mean of each stop after [`SessionConfig::settle_s`] |
 //! | touches | each touch of a feature that the machine file has, up to 2 s after the end of its segment |
 //!

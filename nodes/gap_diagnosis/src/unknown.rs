@@ -62,7 +62,8 @@ pub fn leftover(
     let of_families = families.iter().map(|score| score.z).fold(0.0, f64::max);
     let (of_channels, channels) = channel_score(stack, noise, left);
     let grams = left_grams(slots, fitted);
-    let mut maxima = noise_maxima(slots, noise, &grams, DRAWS, config.seed ^ 0x51);
+    let all: Vec<&Slot> = slots.iter().collect();
+    let mut maxima = noise_maxima(&all, noise, &grams, DRAWS, config.seed ^ 0x51);
     let mut random = Pcg64Mcg::seed_from_u64(config.seed ^ 0x52);
     for greatest in &mut maxima {
         for _ in 0..channels {

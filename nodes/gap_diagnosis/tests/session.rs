@@ -49,6 +49,10 @@ struct Rig {
     compensation_mm: f64,
     /// What the plate reads beyond the command and its compensation along X, by the angle.
     error_mm: fn(f64) -> f64,
+    /// States arrive so many together.
+    burst: i64,
+    /// Whether the controller stamps its states.
+    stamped: bool,
 }
 
 impl Rig {
@@ -58,18 +62,21 @@ impl Rig {
             millis: 0,
             compensation_mm: 0.0,
             error_mm,
+            burst: 1,
+            stamped: true,
         }
     }
 
     fn tick(&mut self, x: f64, y: f64) {
-        let at = Stamp::from_nanos(self.millis * 1_000_000);
+        let at = Stamp::from_nanos(self.millis / self.burst * self.burst * 1_000_000);
+        let controller_millis = if self.stamped { self.millis + 7000 } else { 0 };
         let mut commanded = PerAxis::default();
         (commanded[Axis::X], commanded[Axis::Y], commanded[Axis::Z]) = (x, y, 30.0);
         let mut motor = commanded;
         motor[Axis::X] += self.compensation_mm + 1e-3;
         self.builder.take(Input::State(AxisState {
             received_at: at,
-            controller_at: Stamp::from_nanos((self.millis + 7000) * 1_000_000),
+            controller_at: Stamp::from_nanos(controller_millis * 1_000_000),
             axes: AxisSet::XYZ,
             commanded,
             motor,
@@ -224,6 +231,38 @@ fn a_clock_that_jumps_back_cuts_the_run_and_time_goes_on() {
     assert_eq!(session.runs.len(), 2);
     let last = |run: usize| *session.runs[run].motion.time_s.last().expect("ticks");
     assert!(last(1) > last(0));
+}
+
+#[test]
+fn states_that_arrive_together_are_told_apart_by_the_controllers_clock_and_without_one_only_the_first_counts()
+ {
+    let of_bursts = |stamped: bool| {
+        let mut rig = Rig::new(|_| 0.0);
+        (rig.burst, rig.stamped) = (20, stamped);
+        rig.circle(1, 1.0);
+        rig.end(1);
+        rig.builder.finish().expect("a session")
+    };
+    let (session, account) = of_bursts(true);
+    assert_eq!(
+        account.left_out.values().sum::<usize>(),
+        account.count(Reason::InGap)
+    );
+    assert_eq!(account.count(Reason::WentBack), 0);
+    let motion = &session.runs[0].motion;
+    for reading in session.runs[0]
+        .readings
+        .iter()
+        .filter(|r| r.channel == Channel::Motor(Axis::X))
+    {
+        let speed =
+            motion.velocity[Axis::X][reading.at].hypot(motion.velocity[Axis::Y][reading.at]);
+        assert!((speed - 25.0).abs() < 1e-3, "{speed}");
+    }
+    let (session, account) = of_bursts(false);
+    assert!(account.count(Reason::WentBack) > 5000, "{account:?}");
+    let motor = of(&session, 0, &Channel::Motor(Axis::X));
+    assert!(motor.len() > 500, "{}", motor.len());
 }
 
 #[test]

@@ -231,13 +231,20 @@ impl Setup {
         }
     }
 
+    fn where_not_set(&self) -> String {
+        match self.files() {
+            files if self.origins.is_empty() => format!("{files} (its default)"),
+            files => format!("{files} (not set there: its default)"),
+        }
+    }
+
     fn bad(&self, name: &str, value: &Tree, reason: String) -> SetupError {
         let below = format!("{name}.");
         let origin = self
             .origins
             .iter()
             .find(|(key, _)| key.as_str() == name || key.starts_with(&below))
-            .map_or_else(|| "default".to_owned(), |(_, origin)| describe(origin));
+            .map_or_else(|| self.where_not_set(), |(_, origin)| describe(origin));
         SetupError::BadParameter {
             origin,
             name: name.to_owned(),

@@ -9,12 +9,13 @@ body { color: var(--ink); background: var(--paper); font: 16px/1.5 system-ui, sa
 h1 { font-size: 1.5rem; margin: .5rem 0; } h2 { font-size: 1.15rem; margin: 1.8rem 0 .4rem; }
 table { border-collapse: collapse; margin: .6rem 0; font-variant-numeric: tabular-nums; display: block; overflow-x: auto; }
 th, td { padding: .25rem .8rem .25rem 0; border-bottom: 1px solid var(--rule); text-align: right; white-space: nowrap; }
-th:first-child, td:first-child { text-align: left; } th { color: var(--soft); font-weight: 600; }
+th:first-child, td:first-child { text-align: left; } th { color: var(--soft); font-weight: 600; white-space: normal; }
 th.prose, td.prose { text-align: left; white-space: normal; min-width: 10rem; }
 .plot { width: 100%; height: auto; } .note { color: var(--soft); font-size: .9rem; } .good { color: var(--good); } .bad { color: var(--bad); }
-@media (max-width: 40rem) { h1 { font-size: 1.25rem; } table { font-size: .85rem; } th, td { padding-right: .6rem; }
-  th:first-child, td:first-child { position: sticky; left: 0; background: var(--paper); max-width: 9rem; white-space: normal; } }
-th, td { vertical-align: top; } code { font-size: .9em; } @media print { body { max-width: none; font-size: 11px; } table { font-size: 9px; overflow: visible; } th, td { white-space: normal; } h2 { break-after: avoid; } .plot, table { break-inside: avoid; } }
+@media (prefers-color-scheme: dark) { .plot [stroke=\"#0072B2\"] { stroke: #56b4e9; } .plot [fill=\"#0072B2\"] { fill: #56b4e9; } }
+@media (max-width: 40rem) { h1 { font-size: 1.25rem; } .plot text { font-size: 17px; } table { font-size: .85rem; } th, td { padding-right: .6rem; }
+  th:first-child, td:first-child { position: sticky; left: 0; background: var(--paper); min-width: 6.5rem; max-width: 9rem; white-space: normal; } }
+th, td { vertical-align: top; } code { font-size: .9em; } @media print { html { font-size: 11px; } body { max-width: none; font-size: 1rem; } table { font-size: 9px; overflow: visible; } th, td { white-space: normal; } h2 { break-after: avoid; } .plot, table { break-inside: avoid; } }
 ";
 
 /// Puts `body` on a page.

@@ -237,7 +237,10 @@ impl SessionBuilder {
         let time_s = self.session_time(state.received_at);
         let open = self.open.as_ref();
         let last = open.map_or(self.recent.back(), |open| open.ticks.last());
-        if last.is_some_and(|last| state.received_at <= last.at) {
+        // Many states may arrive at one instant: their order is the controller's then.
+        let is_later =
+            |last: &Tick| (state.received_at, state.controller_at) > (last.at, last.controller_at);
+        if last.is_some_and(|last| !is_later(last)) {
             self.account.note(Reason::WentBack);
             return;
         }

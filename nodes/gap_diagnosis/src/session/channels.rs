@@ -1,5 +1,7 @@
 //! Deviations of every instrument along one run, placed at the ticks of its motion.
 
+use std::ops::Range;
+
 use machine::MachineFile;
 use machine::twin::simulate::plate_axes;
 use machine::twin::{Channel, Motion};
@@ -20,7 +22,7 @@ const BOW: f64 = 1e-4;
 const TURNED_RAD: f64 = 1e-6;
 /// A sensor that does not change over this way stands, mm.
 const STUCK_MM: f64 = 5e-3;
-/// An axis that covers less in a run does not move, mm or rad.
+/// An axis that covers less in what is judged of a run does not move, mm or rad.
 const MOVES: f64 = 1e-2;
 
 /// A deviation at a place among the ticks: index and fraction towards the next.
@@ -47,6 +49,8 @@ pub(super) struct Scope<'a> {
     pub machine: &'a MachineFile,
     pub record: &'a Record,
     pub motion: &'a Motion,
+    /// Ticks from the first to the last that is judged.
+    pub judged: Range<usize>,
 }
 
 impl Scope<'_> {
@@ -74,7 +78,7 @@ impl Scope<'_> {
 
     fn moves(&self, axis: Axis) -> bool {
         let run = self.motion.position[axis]
-            .get(self.record.lead_in..)
+            .get(self.judged.clone())
             .unwrap_or(&[]);
         let (low, high) = run.iter().fold((f64::MAX, f64::MIN), |(low, high), p| {
             (low.min(*p), high.max(*p))

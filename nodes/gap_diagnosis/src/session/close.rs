@@ -19,7 +19,9 @@ const NEAR_S: f64 = 0.05;
 
 impl SessionBuilder {
     /// Ends a run.
-    pub(super) fn close(&mut self, open: Record) {
+    pub(super) fn close(&mut self, mut open: Record) {
+        let unordered = open.leave_out_unordered();
+        self.account.note_many(Reason::WentBack, unordered);
         self.account.note_many(Reason::TooLong, open.beyond_limit);
         if open.compensation_broke_off() {
             self.account.note(Reason::CompensationHeld);
@@ -43,6 +45,7 @@ impl SessionBuilder {
             machine: &self.machine,
             record: &open,
             motion: &motion,
+            judged: selection.span(),
         };
         let mut series = scope.channels(&mut self.account);
         for (_, readings) in &mut series {

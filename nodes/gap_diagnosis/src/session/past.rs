@@ -45,13 +45,16 @@ impl Past {
         (time_s.max(0.0) / self.step_s) as usize
     }
 
-    /// Commanded positions at an instant; instants grow.
+    /// Commanded positions at an instant; of several at one instant the first counts.
     pub(super) fn axes(&mut self, time_s: f64, position: &PerAxis<f64>) {
+        if self.last.is_some_and(|(last_s, _)| time_s <= last_s) {
+            return;
+        }
         let Some((before_s, before)) = self.last.replace((time_s, *position)) else {
             return;
         };
         let dt_s = time_s - before_s;
-        if dt_s <= 0.0 || dt_s > HOLE_S {
+        if dt_s > HOLE_S {
             return;
         }
         let at = self.cell(time_s);

@@ -107,6 +107,20 @@ impl Record {
         }
     }
 
+    /// Where the controller's stamps do not grow throughout, of ticks that arrived at one instant the first is kept;
+    /// how many were left out.
+    pub(super) fn leave_out_unordered(&mut self) -> usize {
+        let grows = |pair: &[Tick]| pair[1].controller_at > pair[0].controller_at;
+        if self.ticks.windows(2).all(grows) {
+            return 0;
+        }
+        let (before, lead_in) = (self.ticks.len(), &self.ticks[..self.lead_in]);
+        self.lead_in = lead_in.chunk_by(|a, b| a.at == b.at).count();
+        self.ticks.dedup_by_key(|tick| tick.at);
+        self.lead_in = self.lead_in.min(self.ticks.len());
+        before - self.ticks.len()
+    }
+
     /// Offsets that were added to the command at an instant: the last message at or before it.
     pub(super) fn offset(&self, at: Stamp<Host>) -> PerAxis<f64> {
         let next = self.offsets.partition_point(|offset| offset.at <= at);

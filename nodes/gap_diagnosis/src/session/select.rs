@@ -13,6 +13,8 @@ use super::channels::Raw;
 const ON_CIRCLE_MM: f64 = 2e-3;
 /// Share of the feed below which the command is still running in.
 const AT_FEED: f64 = 0.98;
+/// A test keeps its feed for so long where it reaches it at all, s.
+const HOLDS_FEED_S: f64 = 0.05;
 /// A command that changes by less stands, mm or rad.
 const STANDSTILL: f64 = 1e-6;
 /// Ticks further apart than this times the finest spacing are not at the full rate.
@@ -48,8 +50,24 @@ impl Selection {
             on_circle(segment, motion, &mut counts);
         } else if segment.kind != TestKind::Dwell {
             between_motions(motion, lead_in, &mut counts);
+            on_the_way_of_the_test(segment, motion, &mut counts);
         }
         Self::Motion(counts)
+    }
+
+    /// From the first tick that counts to the last.
+    pub(super) fn span(&self) -> Range<usize> {
+        let (first, last) = match self {
+            Self::Stops(stops) => (stops.first().map(|s| s.start), stops.last().map(|s| s.end)),
+            Self::Motion(counts) => {
+                let last = counts.iter().rposition(|counts| *counts);
+                (
+                    counts.iter().position(|counts| *counts),
+                    last.map(|k| k + 1),
+                )
+            }
+        };
+        first.unwrap_or(0)..last.unwrap_or(0)
     }
 
     /// Ticks in motion that count.
@@ -180,10 +198,63 @@ fn between_motions(motion: &Motion, lead_in: usize, counts: &mut [bool]) {
     }
 }
 
+/// From where the path is at the feed of the test for the first time to where it is for the last time: how the machine
+/// comes there and goes away, faster than that, is not what is tested. Where the record of a run holds the end of
+/// the one before, the longer part counts. Of a line only the passes at its feed count, once the loops have settled.
+/// A test too short to reach its feed counts as a whole.
+fn on_the_way_of_the_test(segment: &TestSegment, motion: &Motion, counts: &mut [bool]) {
+    let speeds: Vec<f64> = (0..counts.len()).map(|k| speed(motion, k)).collect();
+    let slack = (1.0 - AT_FEED) * segment.feed_mm_s;
+    let is_at_feed = |k: &usize| (speeds[*k] - segment.feed_mm_s).abs() < slack;
+    let ticks: Vec<usize> = (0..counts.len()).filter(is_at_feed).collect();
+    let passes = ticks.chunk_by(|a, b| a + 1 == *b).filter_map(|pass| {
+        let (first, last) = (*pass.first()?, *pass.last()?);
+        let lasts = motion.time_s[last] - motion.time_s[first] >= HOLDS_FEED_S;
+        lasts.then_some(first..last + 1)
+    });
+    let passes: Vec<Range<usize>> = passes.collect();
+    let is_slower = |a: &Range<usize>, b: &Range<usize>| {
+        let between = speeds.get(a.end..b.start).unwrap_or(&[]);
+        let limit = segment.feed_mm_s + 5.0 * slack;
+        between.iter().all(|speed| *speed < limit)
+    };
+    let at_feed = |part: &&[Range<usize>]| part.iter().map(Range::len).sum::<usize>();
+    let Some(part) = passes.chunk_by(is_slower).max_by_key(at_feed) else {
+        return;
+    };
+    let settled = |pass: &Range<usize>| {
+        let since_s = motion.time_s[pass.start] + HOLDS_FEED_S;
+        let first = pass.clone().find(|k| motion.time_s[*k] >= since_s);
+        first.unwrap_or(pass.end)..pass.end
+    };
+    let judged: Vec<Range<usize>> = if segment.kind == TestKind::Line {
+        part.iter().map(settled).collect()
+    } else {
+        let (first, last) = (&part[0], &part[part.len() - 1]);
+        std::iter::once(first.start..last.end).collect()
+    };
+    for (k, counts) in counts.iter_mut().enumerate() {
+        *counts &= judged.iter().any(|judged| judged.contains(&k));
+    }
+}
+
+fn speed(motion: &Motion, k: usize) -> f64 {
+    let of = |axis: Axis| motion.velocity[axis].get(k).copied().unwrap_or(0.0);
+    Axis::LINEAR
+        .map(of)
+        .iter()
+        .map(|v| v * v)
+        .sum::<f64>()
+        .sqrt()
+}
+
 #[cfg(test)]
 mod tests {
+    use metrology::sample::{Sense, TestPlane};
+    use metrology::{AxisSet, PerAxis, Stamp};
+    use nalgebra::Vector3;
+
     use super::*;
-    use metrology::{AxisSet, PerAxis};
 
     /// 1 s at 0, then 10 mm in 1 s, 2 s at 10, and on by another 10 mm.
     fn stepping() -> Motion {
@@ -201,6 +272,82 @@ mod tests {
         assert_eq!(stops.len(), 2, "{stops:?}");
         assert!((motion.time_s[stops[0].start] - 2.3).abs() < 0.02);
         assert!((motion.time_s[stops[0].end - 1] - 4.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn the_way_in_and_what_is_before_it_are_not_judged_and_a_turn_within_the_test_is() {
+        // The end of the test before, in at 50 mm/s, 30 mm up and down again at 10 mm/s, out at 50 mm/s.
+        let place = |t: f64| match t {
+            t if t < 0.2 => 10.0 * t - 42.0,
+            t if t < 1.0 => 50.0 * (t - 1.0),
+            t if t < 4.0 => 10.0 * (t - 1.0),
+            t if t < 7.0 => 30.0 - 10.0 * (t - 4.0),
+            t => -50.0 * (t - 7.0),
+        };
+        let time_s: Vec<f64> = (0..8000).map(|k| f64::from(k) * 1e-3).collect();
+        let mut position = PerAxis::<Vec<f64>>::default();
+        position[Axis::X] = time_s.iter().map(|t| place(*t)).collect();
+        let motion = Motion::new(time_s, AxisSet::EMPTY.with(Axis::X), position).expect("a motion");
+        let mut segment = segment(TestKind::Corner, 10.0);
+        let span_s = |segment: &TestSegment| {
+            let span = Selection::of(segment, &motion, 0, 0.3).span();
+            [span.start, span.end - 1].map(|k| motion.time_s[k])
+        };
+        let [first_s, last_s] = span_s(&segment);
+        assert!((first_s - 1.0).abs() < 3e-3 && (last_s - 7.0).abs() < 3e-3);
+        segment.feed_mm_s = 50.0;
+        let [first_s, last_s] = span_s(&segment);
+        assert!(
+            (first_s - 0.2).abs() < 3e-3 && last_s > 7.99,
+            "slower motion is within a test"
+        );
+        segment.feed_mm_s = 30.0;
+        let [first_s, last_s] = span_s(&segment);
+        assert!(first_s < 3e-3 && last_s > 7.99, "it never had its feed");
+    }
+
+    #[test]
+    fn of_a_line_the_passes_at_its_feed_count_once_they_have_settled() {
+        // 30 mm up, a rest, and down again.
+        let place = |t: f64| 10.0 * (t - 1.0).clamp(0.0, 3.0) - 10.0 * (t - 5.0).clamp(0.0, 3.0);
+        let time_s: Vec<f64> = (0..9000).map(|k| f64::from(k) * 1e-3).collect();
+        let mut position = PerAxis::<Vec<f64>>::default();
+        position[Axis::X] = time_s.iter().map(|t| place(*t)).collect();
+        let motion = Motion::new(time_s, AxisSet::EMPTY.with(Axis::X), position).expect("a motion");
+        let selection = Selection::of(&segment(TestKind::Line, 10.0), &motion, 0, 0.3);
+        let Selection::Motion(counts) = selection else {
+            panic!("a line in motion");
+        };
+        for (k, counts) in counts.iter().enumerate() {
+            let time_s = motion.time_s[k];
+            let is_in = |from: f64| time_s > from + HOLDS_FEED_S + 3e-3 && time_s < from + 2.997;
+            let is_out = |from: f64| time_s < from + HOLDS_FEED_S - 3e-3 || time_s > from + 3.003;
+            assert!(*counts || !(is_in(1.0) || is_in(5.0)), "{time_s}");
+            assert!(!(*counts && is_out(1.0) && is_out(5.0)), "{time_s}");
+        }
+    }
+
+    fn segment(kind: TestKind, feed_mm_s: f64) -> TestSegment {
+        TestSegment {
+            at: Stamp::from_nanos(0),
+            run: 1,
+            begin: true,
+            kind,
+            plane: TestPlane::None,
+            centre_mm: Vector3::zeros(),
+            radius_mm: 0.0,
+            feed_mm_s,
+            sense: Sense::None,
+            repeat: 0,
+            stylus: String::new(),
+            tool_offset_mm: Vector3::zeros(),
+            stations: 0,
+            zero_id: 0,
+            setup_id: 0,
+            cold: false,
+            features: vec![],
+            completed: true,
+        }
     }
 
     #[test]

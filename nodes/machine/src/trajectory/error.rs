@@ -51,6 +51,14 @@ pub enum TrajectoryError {
         needed_mm: f64,
         acceleration_mm_s2: f64,
     },
+    #[error(
+        "overrun_mm = {overrun_mm}: feed {feed_mm_min} mm/min is reached and settled only {needed_mm:.1} mm before the first target"
+    )]
+    OverrunTooShort {
+        overrun_mm: f64,
+        needed_mm: f64,
+        feed_mm_min: f64,
+    },
     #[error("targets[{index}] = {position_mm} mm: must be above targets[{}] = {before_mm} mm", index - 1)]
     TargetsNotAscending {
         index: usize,

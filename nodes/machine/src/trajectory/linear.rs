@@ -134,10 +134,10 @@ pub fn positioning(file: &MachineFile, order: &AxisRun<'_>) -> Result<Trajectory
 pub fn scan(file: &MachineFile, order: &AxisRun<'_>) -> Result<Trajectory, TrajectoryError> {
     let needed_mm = run_in_mm(file, &[order.axis], order.feed_mm_min)?;
     if order.overrun_mm < needed_mm {
-        return Err(TrajectoryError::Number {
-            key: "overrun_mm",
-            value: order.overrun_mm,
-            rule: "is too short to reach the feed and settle before the first target",
+        return Err(TrajectoryError::OverrunTooShort {
+            overrun_mm: order.overrun_mm,
+            needed_mm,
+            feed_mm_min: order.feed_mm_min,
         });
     }
     let line = Line::new(file, order)?;

@@ -129,6 +129,28 @@ fn a_value_outside_of_its_range_or_of_a_wrong_kind_is_refused() {
 }
 
 #[test]
+fn a_bad_default_is_said_with_the_file_that_does_not_set_it() {
+    let config = Config {
+        rate_hz: 1000.0,
+        machine_file: String::new(),
+        count: 5,
+    };
+    let refused = |setup: &Setup| setup.resolved(&config, &DOCS).unwrap_err().to_string();
+    let (_folder, setup) = setup("/**:\n  ros__parameters: {count: 5}", &[]);
+    let error = refused(&setup.unwrap());
+    assert!(
+        error.contains("probe.yaml (not set there: its default): parameter `rate_hz`"),
+        "{error}"
+    );
+    let alone = Setup::new("probe", &Arguments::parse([]).unwrap()).unwrap();
+    let error = refused(&alone);
+    assert!(
+        error.contains("no parameter file (its default): parameter `rate_hz`"),
+        "{error}"
+    );
+}
+
+#[test]
 fn an_absent_parameter_file_is_named() {
     let arguments = ["--ros-args", "--params-file", "nowhere.yaml"].map(str::to_owned);
     let error = Setup::new("probe", &Arguments::parse(arguments).unwrap()).unwrap_err();

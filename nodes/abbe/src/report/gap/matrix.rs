@@ -20,10 +20,12 @@ pub(super) fn style() -> Markup {
         style { (PreEscaped("
 .shaded td, .shaded th { padding: .15rem .4rem; font-size: .8rem; text-align: center; }
 .shaded td:first-child { text-align: left; }
-.shaded th { white-space: normal; min-width: 4.4rem; vertical-align: bottom; }
+.shaded th { vertical-align: bottom; }
+.heat th:nth-child(n+2), .matrix th:nth-child(n+4) { writing-mode: vertical-rl; transform: rotate(180deg); text-align: left; white-space: nowrap; padding: .4rem .15rem; }
 .shaded td { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 .traces { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 22rem), 1fr)); gap: 0 1rem; }
 figure { margin: .8rem 0; break-inside: avoid; }
+@media print { .shaded td, .shaded th { font-size: 7.5px; padding: 1px 2px; } }
 ")) }
     }
 }
@@ -34,19 +36,34 @@ fn cell(text: &str, share: f64) -> Markup {
     html! { td style=(style) { (text) } }
 }
 
+/// Covariates, those that most goes with before first.
+fn columns(map: &HeatMap) -> Vec<usize> {
+    let most = |k: &usize| {
+        let scores = map
+            .z
+            .iter()
+            .filter_map(|cells| cells.get(*k).copied().flatten());
+        scores.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let mut order: Vec<usize> = (0..map.columns.len()).collect();
+    order.sort_by(|a, b| most(b).total_cmp(&most(a)));
+    order
+}
+
 /// The heat map: channel against covariate, before and after.
 pub(super) fn heat(map: &HeatMap) -> Markup {
+    let order = columns(map);
     let one = |title: &str, values: &[Vec<Option<f64>>]| {
         html! {
-            table.shaded {
-                thead { tr { th { (title) } @for column in &map.columns { th { (column.replace('_', " ")) } } } }
+            table.shaded.heat {
+                thead { tr { th { (title) } @for k in &order { th { (map.columns[*k].replace('_', " ")) } } } }
                 tbody {
                     @for (row, cells) in map.rows.iter().zip(values) {
                         tr {
                             td { (row) }
-                            @for z in cells {
-                                @match z {
-                                    Some(z) => { (cell(&three(*z), (z / FIRST_Z).max(1.0).ln() / FULL_RATIO.ln())) }
+                            @for k in &order {
+                                @match cells.get(*k).copied().flatten() {
+                                    Some(z) => { (cell(&three(z), (z / FIRST_Z).max(1.0).ln() / FULL_RATIO.ln())) }
                                     None => { td { "" } }
                                 }
                             }
@@ -87,7 +104,7 @@ pub(super) fn isolability(isolability: &Isolability) -> Markup {
     html! {
         @if !order.is_empty() {
             h2 { "What can be told from what" }
-            table.shaded {
+            table.shaded.matrix {
                 thead { tr {
                     th { "cosine" } th { "sine alone" } th { "found from" }
                     @for k in &order { th { (isolability.names[*k]) } }
