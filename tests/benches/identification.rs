@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use grid_encoder::basis::ModelComponent;
 use grid_encoder::identify::{
-    Disturbed, Identification, IdentifyOptions, Noise, default_basis, identify,
+    Disturbed, Identification, IdentifyOptions, Noise, PlateCertificate, default_basis, identify,
 };
 use grid_encoder::recording::{Fixture, GridPoint, Place, Recording};
 use grid_encoder::unknown::Nuisances;
@@ -90,6 +90,7 @@ fn options() -> IdentifyOptions {
         recording_noise: false,
         noise: Noise::FromResiduals,
         disturbed: Disturbed::Found { start: None },
+        certificate: PlateCertificate::EXACT,
     }
 }
 

@@ -181,14 +181,15 @@ fn offsets_mm(of: &Compensation) -> [f64; 3] {
     let geometric = of.geometry.command_offset(&positions, &tool_mm).unwrap();
     let p_mm = positions.xyz();
     let thermal = thermal_parts_at(&of.thermal, &p_mm, at, Extrapolate::Hold);
-    Axis::LINEAR.map(|axis| {
+    let sum_of = |axis: Axis| {
         let mut parts = thermal[axis.index()].unwrap();
         let commanded_fm = fm_from_mm(positions[axis]).unwrap();
         let table = &of.positioning[axis.index()];
         parts.positioning = -mm_from_fm(table.deviation_fm(commanded_fm, Some(Direction::Up)));
         parts.geometric = geometric[axis];
         parts.sum()
-    })
+    };
+    [sum_of(Axis::X), sum_of(Axis::Y), sum_of(Axis::Z)]
 }
 
 /// Time per pose, ns: median of the fastest quarter of all passes, and of all.

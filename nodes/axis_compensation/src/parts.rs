@@ -90,10 +90,10 @@ pub fn thermal_parts_at(
     at: Stamp<Host>,
     policy: Extrapolate,
 ) -> [Result<Parts, DriftRefusal>; 3] {
-    drift_at(model, commanded_mm, at, policy).map(|drift_mm| {
-        drift_mm.map(|thermal| Parts {
-            thermal,
-            ..Parts::default()
-        })
-    })
+    let [x, y, z] = drift_at(model, commanded_mm, at, policy);
+    let only = |thermal| Parts {
+        thermal,
+        ..Parts::default()
+    };
+    [x.map(only), y.map(only), z.map(only)]
 }

@@ -21,7 +21,9 @@
 use machine::Kinematics;
 
 use crate::error::IdentifyError;
-use crate::identify::{Disturbed, Identification, IdentifyOptions, Noise, identify};
+use crate::identify::{
+    Disturbed, Identification, IdentifyOptions, Noise, PlateCertificate, identify,
+};
 use crate::published::{fourteen_unknowns, of_recording, solve};
 use crate::recording::Recording;
 use crate::spectrum::Visibility;
@@ -88,6 +90,7 @@ pub fn compare(
         recording_noise: false,
         noise: Noise::FromResiduals,
         disturbed: Disturbed::Ignored,
+        certificate: PlateCertificate::EXACT,
     };
     let determined = identify(kinematics, std::slice::from_ref(recording), &options)?;
     let published = solve(&system, &radial_mm, &[]);

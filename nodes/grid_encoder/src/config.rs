@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::basis::{Basis, ModelComponent};
 use crate::error::GridEncoderError;
-use crate::identify::{Disturbed, IdentifyOptions, Noise, default_basis};
+use crate::identify::{Disturbed, IdentifyOptions, Noise, PlateCertificate, default_basis};
 use crate::recording::StationRules;
 use crate::unknown::Nuisances;
 
@@ -71,6 +71,10 @@ pub struct GridEncoderConfig {
     pub recording_noise: bool,
     /// Whether the plate's own error and drift between recordings are unknown, where residuals show them.
     pub plate_and_drift: bool,
+    /// Expanded uncertainty (k = 2) of the plate's length, as its certificate states it.
+    pub plate_scale_um_per_m: f64,
+    /// Expanded uncertainty (k = 2) of the angle between the plate's u and v, as its certificate states it.
+    pub plate_squareness_urad: f64,
     /// Lack of fit is reported below this p value.
     pub lack_of_fit_limit: f64,
     /// How long the end of a recording waits for its last positions.
@@ -80,6 +84,9 @@ pub struct GridEncoderConfig {
     /// Machine file, relative to the parameter file; read by whoever builds the node.
     pub machine_file: String,
 }
+
+/// Of what the plate's certificate states.
+const CERTIFICATE_COVERAGE_FACTOR: f64 = 2.0;
 
 impl Default for GridEncoderConfig {
     fn default() -> Self {
@@ -107,6 +114,8 @@ impl Default for GridEncoderConfig {
             outlier_limit: 4.5,
             recording_noise: true,
             plate_and_drift: true,
+            plate_scale_um_per_m: 0.0,
+            plate_squareness_urad: 0.0,
             lack_of_fit_limit: 0.001,
             hold_ms: 200.0,
             log_samples: 4096,
@@ -140,7 +149,7 @@ const fn ranged(
 }
 
 /// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 27] = [
+pub const PARAMETERS: [ParameterDoc; 29] = [
     doc(
         "components",
         "",
@@ -287,6 +296,20 @@ pub const PARAMETERS: [ParameterDoc; 27] = [
         "Whether the plate's own error and drift between recordings are unknown, where residuals show them.",
     ),
     ranged(
+        "plate_scale_um_per_m",
+        "µm/m",
+        "Expanded uncertainty (k = 2) of the plate's length, as its certificate states it.",
+        0.0,
+        1e3,
+    ),
+    ranged(
+        "plate_squareness_urad",
+        "µrad",
+        "Expanded uncertainty (k = 2) of the angle between the plate's u and v, as its certificate states it.",
+        0.0,
+        1e3,
+    ),
+    ranged(
         "lack_of_fit_limit",
         "",
         "Lack of fit is reported below this p value.",
@@ -315,7 +338,7 @@ pub const PARAMETERS: [ParameterDoc; 27] = [
 ];
 
 impl GridEncoderConfig {
-    fn numbers(&self) -> [(&'static str, f64); 19] {
+    fn numbers(&self) -> [(&'static str, f64); 21] {
         [
             ("greatest_power", f64::from(self.greatest_power)),
             ("table_points", f64::from(self.table_points)),
@@ -332,6 +355,8 @@ impl GridEncoderConfig {
             ("recordings_limit", self.recordings_limit as f64),
             ("rank_tolerance", self.rank_tolerance),
             ("outlier_limit", self.outlier_limit),
+            ("plate_scale_um_per_m", self.plate_scale_um_per_m),
+            ("plate_squareness_urad", self.plate_squareness_urad),
             ("lack_of_fit_limit", self.lack_of_fit_limit),
             ("hold_ms", self.hold_ms),
             ("log_samples", self.log_samples as f64),
@@ -455,6 +480,10 @@ impl GridEncoderConfig {
                 Disturbed::Found { start: None }
             } else {
                 Disturbed::Ignored
+            },
+            certificate: PlateCertificate {
+                scale: self.plate_scale_um_per_m * 1e-6 / CERTIFICATE_COVERAGE_FACTOR,
+                squareness_rad: self.plate_squareness_urad * 1e-6 / CERTIFICATE_COVERAGE_FACTOR,
             },
         }
     }

@@ -128,6 +128,25 @@ impl<'a> Equations<'a> {
         }
     }
 
+    /// What a change of one point's reading changes in the right-hand sides of its equations, mm.
+    pub(crate) fn right_side_of(
+        &self,
+        recording_idx: usize,
+        point_idx: usize,
+        change_mm: [f64; 2],
+    ) -> [f64; 2] {
+        let recording = &self.recordings[recording_idx];
+        let place = &recording.place;
+        let turned_mm = self.turned_back(place.fixture.setup_id, change_mm);
+        if !self.radial_only {
+            return turned_mm;
+        }
+        let p = in_plane(place.plane, &recording.points[point_idx].positions.xyz());
+        let centre = in_plane(place.plane, &place.centre_mm);
+        let n = direction([p[0] - centre[0], p[1] - centre[1]]).unwrap_or_default();
+        [n[0] * turned_mm[0] + n[1] * turned_mm[1], 0.0]
+    }
+
     fn fill_components(&self, recording: &Recording, point: &GridPoint, out: &mut PointRows) {
         let place = &recording.place;
         let mut column = 0;
@@ -256,14 +275,18 @@ impl<'a> Equations<'a> {
     }
 }
 
+/// Of unit length; none at the centre.
+fn direction(arm: [f64; 2]) -> Option<[f64; 2]> {
+    let length = arm[0].hypot(arm[1]);
+    (length > 0.0).then(|| [arm[0] / length, arm[1] / length])
+}
+
 /// Turns two equations into the one along `arm`.
 fn fold_to_radius(arm: [f64; 2], out: &mut PointRows) {
-    let length = arm[0].hypot(arm[1]);
-    if length <= 0.0 {
+    let Some(n) = direction(arm) else {
         out.n = 0;
         return;
-    }
-    let n = [arm[0] / length, arm[1] / length];
+    };
     let [row_u, row_v] = &mut out.rows;
     for (u, v) in row_u.iter_mut().zip(row_v) {
         *u = n[0] * *u + n[1] * *v;

@@ -23,8 +23,8 @@
 //!
 //! # Holds when
 //! First order in the errors (1e-4 of 1 rad times 10 µm is 1 nm), plate flat, lost motion constant
-//! along an axis. Not modelled: reversal spikes, which (2) weighs down; a plate that is too long or not square as a whole, which nothing but
-//! its certificate can tell.
+//! along an axis. Not modelled: reversal spikes, which (2) weighs down. That the plate may be too long or not square as a whole nothing but
+//! its certificate can tell: `certificate` adds it to the covariance.
 //!
 //! # Agreement
 //! `val_coverage_of_a_thousand_machines`: 95.0 % of 51,000 intervals hold the truth. `val_coverage_where_the_plate_errs_and_the_machine_drifts`:
@@ -33,6 +33,7 @@
 //! # References
 //! \[1\] P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., Wiley 2009, 7.
 
+mod certificate;
 mod disturbance;
 mod judge;
 mod solved;
@@ -50,6 +51,7 @@ use crate::recording::Recording;
 use crate::spectrum::{Gap, Visibility};
 use crate::unknown::{Nuisances, Unknown, Unknowns};
 
+pub use certificate::PlateCertificate;
 pub use disturbance::{GROUPS, Told};
 pub use judge::Judgement;
 use solved::{Solved, Weighting};
@@ -76,6 +78,8 @@ pub struct IdentifyOptions {
     pub noise: Noise,
     /// What is done about the plate's error and drift.
     pub disturbed: Disturbed,
+    /// What the plate's certificate leaves open.
+    pub certificate: PlateCertificate,
 }
 
 /// What is done about errors of the plate and drift between recordings, `disturbance`; with `radial_only` nothing.
@@ -128,6 +132,7 @@ impl IdentifyOptions {
             recording_noise: false,
             noise: Noise::FromResiduals,
             disturbed: Disturbed::Found { start: None },
+            certificate: PlateCertificate::EXACT,
         }
     }
 }
@@ -165,7 +170,7 @@ pub struct Identification {
     pub n_coefficients: usize,
     /// β of (1), minimum norm in units of the span; own units. Turns of plates and offsets include what was taken out.
     pub values: DVector<f64>,
-    /// cov(β) of (1), times `variance_inflation`.
+    /// cov(β) of (1), times `variance_inflation`, with what the plate's certificate leaves open.
     pub covariance: DMatrix<f64>,
     /// Verdict per unknown.
     pub visibility: Vec<Visibility>,

@@ -10,7 +10,9 @@
 )]
 
 use grid_encoder::basis::ModelComponent;
-use grid_encoder::identify::{Disturbed, IdentifyOptions, Noise, default_basis, identify};
+use grid_encoder::identify::{
+    Disturbed, IdentifyOptions, Noise, PlateCertificate, default_basis, identify,
+};
 use grid_encoder::recording::{Fixture, GridPoint, Place, Recording};
 use grid_encoder::spectrum::Visibility;
 use grid_encoder::unknown::Nuisances;
@@ -108,6 +110,7 @@ fn val_numpy_singular_values_and_pseudoinverse() {
         recording_noise: false,
         noise: Noise::AsStated,
         disturbed: Disturbed::Ignored,
+        certificate: PlateCertificate::EXACT,
     };
     let found = identify(&kinematics, &recordings(), &options).unwrap();
     assert_eq!(vec![found.rank as f64], numbers("rank"));

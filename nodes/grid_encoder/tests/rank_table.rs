@@ -10,7 +10,7 @@
 
 use grid_encoder::basis::{Basis, ModelComponent};
 use grid_encoder::identify::{
-    Disturbed, Identification, IdentifyOptions, Noise, default_basis, identify,
+    Disturbed, Identification, IdentifyOptions, Noise, PlateCertificate, default_basis, identify,
 };
 use grid_encoder::recording::{Fixture, GridPoint, Place, Recording};
 use grid_encoder::unknown::Nuisances;
@@ -97,6 +97,7 @@ fn run(row: &Row, model: Model) -> Identification {
         recording_noise: false,
         noise: Noise::AsStated,
         disturbed: Disturbed::Ignored,
+        certificate: PlateCertificate::EXACT,
     };
     identify(&kinematics, &recordings(&row.circles), &options).unwrap()
 }

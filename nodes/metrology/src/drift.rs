@@ -203,13 +203,13 @@ fn valued(
 ) -> Result<f64, DriftRefusal> {
     let mut gradient = drift.cross_slope_mm_per_mm;
     gradient[axis.index()] = drift.slope_mm_per_mm;
-    let growth_mm: f64 = drift
-        .growth
-        .iter()
-        .flatten()
-        .map(|growth| growth_mm(growth, lever_mm, relaxed))
-        .sum();
-    let drift_mm = drift.k0_mm + gradient.dot(lever_mm) + growth_mm;
+    let mut grown_mm = 0.0;
+    for growth in &drift.growth {
+        if let Some(growth) = growth {
+            grown_mm += growth_mm(growth, lever_mm, relaxed);
+        }
+    }
+    let drift_mm = drift.k0_mm + gradient.dot(lever_mm) + grown_mm;
     if drift_mm.is_finite() {
         Ok(drift_mm)
     } else {

@@ -45,8 +45,8 @@ pub struct DeviationTable {
     positions_fm: Vec<i64>,
     up_fm: Vec<i64>,
     down_fm: Vec<i64>,
-    /// Slopes of the cells, mm/mm, up and down.
-    slopes: [Vec<f64>; 2],
+    /// The cells, up and down.
+    lines: [Vec<Line>; 2],
     /// Cells per femtometre if all were alike: where the search for a cell begins.
     density_per_fm: f64,
 }
@@ -101,22 +101,27 @@ impl DeviationTable {
             density_per_fm: (points - 1) as f64 / whole_fm as f64,
             up_fm: counted(up_mm)?,
             down_fm: counted(down_mm)?,
-            slopes: [vec![0.0; points - 1], vec![0.0; points - 1]],
+            lines: [Vec::new(), Vec::new()],
             positions_fm,
         };
-        for cell in 0..points - 1 {
-            for direction in [Direction::Up, Direction::Down] {
-                table.find_slope(cell, direction);
-            }
-        }
+        table.lines = [Direction::Up, Direction::Down].map(|direction| {
+            (1..points)
+                .map(|next| table.drawn(next - 1, direction))
+                .collect()
+        });
         Ok(table)
     }
 
-    fn find_slope(&mut self, cell: usize, direction: Direction) {
+    /// The straight line through both ends of a cell.
+    fn drawn(&self, cell: usize, direction: Direction) -> Line {
         let (x_fm, deviations_fm) = (&self.positions_fm, self.deviations_fm(direction));
         let risen_fm = deviations_fm[cell + 1] - deviations_fm[cell];
-        let slope = risen_fm as f64 / (x_fm[cell + 1] - x_fm[cell]) as f64;
-        self.slopes[direction as usize][cell] = slope;
+        Line {
+            x_fm: x_fm[cell],
+            x_next_fm: x_fm[cell + 1],
+            from_fm: deviations_fm[cell],
+            slope: risen_fm as f64 / (x_fm[cell + 1] - x_fm[cell]) as f64,
+        }
     }
 
     /// Number of points.
@@ -139,25 +144,21 @@ impl DeviationTable {
         }
     }
 
-    /// The cell, from 0, that a motion from `position_fm` goes through; `None` outside of the points,
-    /// where the slope is 0.
-    #[must_use]
+    /// The cell that a motion from `position_fm` goes through; `None` outside of the points, where the slope is 0.
     #[inline]
-    pub fn cell(&self, position_fm: i64, direction: Direction) -> Option<usize> {
+    fn line(&self, position_fm: i64, direction: Direction) -> Option<&Line> {
+        let lines = &self.lines[direction as usize];
         let above_fm = position_fm.saturating_sub(self.positions_fm[0]);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "a guess: below the first point it is 0, above the last one no cell"
         )]
-        let guess = (above_fm as f64 * self.density_per_fm) as usize;
-        if let Some(&[x_fm, x_next_fm]) = self.positions_fm.get(guess..guess + 2)
-            && x_fm < position_fm
-            && position_fm < x_next_fm
-        {
-            return Some(guess);
+        let guess = (above_fm as f64 * self.density_per_fm) as u32;
+        match lines.get(guess as usize) {
+            Some(line) if line.x_fm < position_fm && position_fm < line.x_next_fm => Some(line),
+            _ => lines.get(self.cell_by_search(position_fm, direction)?),
         }
-        self.cell_by_search(position_fm, direction)
     }
 
     fn cell_by_search(&self, position_fm: i64, direction: Direction) -> Option<usize> {
@@ -177,18 +178,8 @@ impl DeviationTable {
     /// Slope of the deviation in the cell that a motion from `position_fm` goes through, mm/mm.
     #[must_use]
     pub fn slope(&self, position_fm: i64, direction: Direction) -> f64 {
-        self.cell(position_fm, direction)
-            .and_then(|cell| self.line(cell, direction))
-            .map_or(0.0, |line| line.slope)
-    }
-
-    #[inline]
-    fn line(&self, cell: usize, direction: Direction) -> Option<Line> {
-        Some(Line {
-            x_fm: *self.positions_fm.get(cell)?,
-            from_fm: *self.deviations_fm(direction).get(cell)?,
-            slope: *self.slopes[direction as usize].get(cell)?,
-        })
+        let line = self.line(position_fm, direction);
+        line.map_or(0.0, |line| line.slope)
     }
 
     /// Deviation xs − xm at a position, fm: (1). Both directions' mean where none is known yet.
@@ -200,13 +191,15 @@ impl DeviationTable {
             let down_fm = self.deviation_fm(position_fm, Some(Direction::Down));
             return up_fm.midpoint(down_fm);
         };
-        let deviations_fm = self.deviations_fm(direction);
-        let line = self
-            .cell(position_fm, direction)
-            .and_then(|cell| self.line(cell, direction));
-        if let Some(line) = line {
-            return line.at(position_fm);
+        match self.line(position_fm, direction) {
+            Some(line) => line.at(position_fm),
+            None => self.beyond_fm(position_fm, direction),
         }
+    }
+
+    /// What holds outside of the points, fm.
+    fn beyond_fm(&self, position_fm: i64, direction: Direction) -> i64 {
+        let deviations_fm = self.deviations_fm(direction);
         let is_below = self
             .positions_fm
             .first()
@@ -259,7 +252,7 @@ impl DeviationTable {
         };
         *old_fm = deviation_fm;
         for cell in point.saturating_sub(1)..(point + 1).min(self.n_points() - 1) {
-            self.find_slope(cell, direction);
+            self.lines[direction as usize][cell] = self.drawn(cell, direction);
         }
     }
 
@@ -294,9 +287,10 @@ pub struct Published {
 }
 
 /// The deviation inside one cell.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Line {
     x_fm: i64,
+    x_next_fm: i64,
     from_fm: i64,
     slope: f64,
 }

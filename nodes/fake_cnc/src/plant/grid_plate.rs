@@ -3,12 +3,13 @@
 //! ```text
 //!   w = R(-rho) (head_uv - plate_uv - offset)                                             (1)
 //!   reading = w + e(w) + noise - zero                                                     (2)
-//!   e(w) = sum_{k=1..6} a_k sin(kappa_k . w + phi_k)                                       (3)
+//!   e(w) = sum_{k=1..6} a_k sin(kappa_k . w + phi_k) - s w - q/2 (w_v, w_u)                (3)
 //! ```
 //!
 //! head and plate are in the workpiece frame, u and v along the plane's two axes. `offset` and `rho` are
 //! drawn at each mounting; e belongs to the plate and goes with it. The head's measuring point rides on
-//! the tool, so that the tool's angular errors act on it through the head's offset.
+//! the tool, so that the tool's angular errors act on it through the head's offset. s: the graduation is too long; q: its
+//! directions u and v are closer to each other than a right angle.
 //!
 //! The count is incremental: once the head has left the field, or been lifted off, there is no reading
 //! until it is set to zero again.
@@ -23,7 +24,7 @@ use metrology::sample::TestPlane;
 use nalgebra::{Point3, Rotation2, Vector2, Vector3};
 
 use super::chain::Rigid;
-use super::error::{PlantError, require_not_negative, require_positive};
+use super::error::{PlantError, require_finite, require_not_negative, require_positive};
 use super::file::GridPlateEntry;
 use super::noise::{Effect, Stream};
 use super::structure::{Standing, Structure};
@@ -52,6 +53,8 @@ pub(super) struct GridPlate {
     placement_mm: f64,
     rotation_rad: f64,
     noise_mm: f64,
+    scale: f64,
+    squareness_rad: f64,
     waves: [Wave; WAVES],
     mounting: Stream,
     head: Stream,
@@ -101,6 +104,8 @@ impl GridPlate {
             placement_mm: entry.placement_um / 1e3,
             rotation_rad: entry.rotation_urad / 1e6,
             noise_mm: entry.head_noise_um / 1e3,
+            scale: entry.plate_scale_um_per_m * 1e-6,
+            squareness_rad: entry.plate_squareness_urad * 1e-6,
             waves,
             mounting: Stream::new(seed, Effect::GridPlate, 1),
             head: Stream::new(seed, Effect::GridPlate, 2),
@@ -185,7 +190,9 @@ impl GridPlate {
 
     /// (3).
     fn error_mm(&self, at_mm: &Vector2<f64>) -> Vector2<f64> {
-        self.waves.iter().fold(Vector2::zeros(), |sum, wave| {
+        let half = 0.5 * self.squareness_rad;
+        let whole = -self.scale * at_mm - half * Vector2::new(at_mm.y, at_mm.x);
+        self.waves.iter().fold(whole, |sum, wave| {
             sum + wave.amplitude_mm * (wave.per_mm.dot(at_mm) + wave.phase_rad).sin()
         })
     }
@@ -203,5 +210,7 @@ fn check(entry: &GridPlateEntry) -> Result<(), PlantError> {
     ] {
         require_not_negative(at(key), value)?;
     }
+    require_finite(at("plate_scale_um_per_m"), entry.plate_scale_um_per_m)?;
+    require_finite(at("plate_squareness_urad"), entry.plate_squareness_urad)?;
     Ok(())
 }

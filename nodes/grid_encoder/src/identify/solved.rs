@@ -217,7 +217,9 @@ impl Solved {
             (Some(_), _) => pooled_inflation(&self.ratios, &weights, &weighting.alike),
             (None, noise) => judgement.variance_inflation(noise),
         };
-        let cofactor = self.cofactor() * (variance_ratio * variance_inflation);
+        let mut cofactor = self.cofactor() * (variance_ratio * variance_inflation);
+        let certificate = options.certificate;
+        certificate.widen(equations, &weighting, &self.whitener(), &mut cofactor);
         let visibility = self.spectrum.visibility();
         let scale = &equations.scale;
         let n_coefficients = equations.unknowns.n_coefficients;

@@ -10,6 +10,7 @@
     reason = "a test fails by panicking and shows its figures"
 )]
 
+mod certificate;
 mod disturbed;
 mod machines;
 

@@ -35,6 +35,8 @@ pub(super) struct Motions {
     /// Where all of them were recorded.
     span: (f64, f64),
     together: Polynomials,
+    /// Whether they are one set of cubics, the usual machine.
+    is_cubic: bool,
     /// Whether `together` is more than constants.
     has_powers: bool,
     tables: Vec<Tables>,
@@ -68,6 +70,7 @@ impl Motions {
     pub(super) const NONE: Self = Self {
         span: EVERYWHERE,
         together: Polynomials::NONE,
+        is_cubic: false,
         has_powers: false,
         tables: Vec::new(),
         others: Vec::new(),
@@ -110,6 +113,10 @@ impl Motions {
                 }
             }
         }
+        self.is_cubic = self.has_powers
+            && self.together.high.is_empty()
+            && self.tables.is_empty()
+            && self.others.is_empty();
     }
 
     fn narrow(&mut self, (lower, upper): (f64, f64)) {
@@ -124,6 +131,13 @@ impl Motions {
     /// Values at a position; the policy `Refuse` is for the caller to have asked about.
     #[inline(always)]
     pub(super) fn at(&self, position: f64, policy: Extrapolate) -> Lanes {
+        if self.is_cubic {
+            return self.together.cubics_at(position, policy);
+        }
+        self.of_any_form(position, policy)
+    }
+
+    fn of_any_form(&self, position: f64, policy: Extrapolate) -> Lanes {
         let mut six = if self.has_powers {
             self.together.at(position, policy)
         } else {
@@ -177,22 +191,40 @@ impl Polynomials {
         }
     }
 
+    /// Nearest position of the span. Two comparisons that a processor has as one instruction each, since no position is NaN.
     #[inline(always)]
-    fn at(&self, position: f64, policy: Extrapolate) -> Lanes {
-        let inside = position.max(self.span.0).min(self.span.1);
+    fn inside(&self, position: f64) -> f64 {
+        let (lower, upper) = self.span;
+        let raised = if position < lower { lower } else { position };
+        if raised > upper { upper } else { raised }
+    }
+
+    /// Without powers above 3.
+    #[inline(always)]
+    fn cubics_at(&self, position: f64, policy: Extrapolate) -> Lanes {
+        let inside = self.inside(position);
         let u = inside - self.origin;
-        let (mut six, low) = if self.high.is_empty() {
-            (self.low[0], &self.low[1..])
-        } else {
-            (Lanes::default(), &self.low[..])
-        };
-        let mut horner = |coefficients: &Lanes| {
+        let [mut six, square, line, constant] = self.low;
+        for coefficients in [&square, &line, &constant] {
             for (value, c) in six.iter_mut().zip(coefficients) {
                 *value = *value * u + c; // (1)
             }
-        };
-        self.high.iter().for_each(&mut horner);
-        low.iter().for_each(horner);
+        }
+        if policy == Extrapolate::Linear && (position - inside).abs() > 0.0 {
+            return self.continued_by(position - inside, u, six);
+        }
+        six
+    }
+
+    fn at(&self, position: f64, policy: Extrapolate) -> Lanes {
+        let inside = self.inside(position);
+        let u = inside - self.origin;
+        let mut six = Lanes::default();
+        for coefficients in self.high.iter().chain(&self.low) {
+            for (value, c) in six.iter_mut().zip(coefficients) {
+                *value = *value * u + c; // (1)
+            }
+        }
         if policy == Extrapolate::Linear && (position - inside).abs() > 0.0 {
             return self.continued_by(position - inside, u, six);
         }

@@ -18,7 +18,7 @@
 //! between knots 75 mm apart: of at most 0.257 mm, one step leaves at most 0.18 µm (the slope of the steepest
 //! table), iterating at most 5e-12 mm.
 
-use metrology::{Axis, PerAxis};
+use metrology::PerAxis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::PoseRefusal;
@@ -76,23 +76,18 @@ impl VolumetricModel {
     }
 
     /// Of the axes that the chain has.
+    #[inline]
     fn offsets(&self, step_mm: &Vector3<f64>) -> PerAxis<f64> {
-        let mut offset = PerAxis::default();
-        for (axis, has) in Axis::LINEAR.into_iter().zip(self.has_linear) {
-            if has {
-                offset[axis] = step_mm[axis.index()];
-            }
-        }
-        offset
+        let [x, y, z] = self.has_linear;
+        let of = |row: usize, has: bool| if has { step_mm[row] } else { 0.0 };
+        PerAxis([of(0, x), of(1, y), of(2, z), 0.0, 0.0, 0.0])
     }
 
     /// Motion of the linear axes that moves the tip by a vector of the workpiece frame: J^-1 v.
+    #[inline]
     fn in_axes(&self, tips: &Tips, v: &Vector3<f64>) -> Result<Vector3<f64>, PoseRefusal> {
         if self.linear_on_bed {
-            let tables = self.links.iter().rev();
-            let tables = tables.filter(|l| l.member.carries_workpiece && l.is_rotary());
-            return Ok(tables.fold(*v, |v, link| {
-                let row = link.member.axis.index() % 3;
+            return Ok(self.table_rows.iter().fold(*v, |v, &row| {
                 let (sin, cos) = tips.turn[row];
                 turned_about(row, (-sin, cos), &v)
             }));

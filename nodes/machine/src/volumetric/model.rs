@@ -34,6 +34,8 @@ pub struct VolumetricModel {
     pub(super) has_linear: [bool; 3],
     /// Whether no rotary axis stands between the bed and a linear axis.
     pub(super) linear_on_bed: bool,
+    /// Rows (0, 1, 2: about X, Y, Z) of the rotary axes that carry the workpiece, from the bed outwards.
+    pub(super) table_rows: Vec<usize>,
 }
 
 /// One member with its errors.
@@ -123,6 +125,7 @@ impl VolumetricModel {
         Ok(Self {
             has_linear: Axis::LINEAR.map(|axis| chain.axes().contains(axis)),
             has_shifted_datum: links.iter().any(Link::shifts_datum),
+            table_rows: links.iter().rev().filter_map(Link::table_row).collect(),
             links,
             locations,
             policy: Extrapolate::Refuse,
@@ -258,6 +261,12 @@ impl VolumetricModel {
 impl Link {
     pub(super) const fn is_rotary(&self) -> bool {
         matches!(self.joint, Joint::Rotary { .. })
+    }
+
+    /// The row of a rotary axis that carries the workpiece.
+    fn table_row(&self) -> Option<usize> {
+        let is_table = self.member.carries_workpiece && self.is_rotary();
+        is_table.then(|| self.member.axis.index() % 3)
     }
 
     fn shifts_datum(&self) -> bool {

@@ -37,12 +37,13 @@ pub(super) fn at_once(
             };
         }
     }
-    Some(Axis::LINEAR.map(|axis| {
-        let drift = drifts[axis.index()];
+    let mut of = |drift: &AxisDrift, axis: Axis| {
         let mut origin_mm = drift.cross_origin_mm;
         origin_mm[axis.index()] = drift.p0_mm;
         valued(drift, axis, &(position_mm - origin_mm), relaxed)
-    }))
+    };
+    // One after the other: what `map` of an array becomes is a third slower.
+    Some([of(x, Axis::X), of(y, Axis::Y), of(z, Axis::Z)])
 }
 
 #[cfg(test)]

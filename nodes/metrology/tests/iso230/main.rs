@@ -6,6 +6,7 @@
 mod coverage;
 mod exact;
 mod laws;
+mod published;
 mod refusals;
 mod scipy;
 

@@ -63,8 +63,9 @@ fn points_that_make_no_table_are_refused_by_name() {
 fn a_border_belongs_to_the_cell_that_the_motion_enters() {
     let table = table(&[0.0, 1.0, 5.0, 6.0, 6.5], &[0.0, 1.0, 5.0, 6.0, 6.5]);
     let border_fm = -90 * MM;
-    assert_eq!(table.cell(border_fm, Direction::Up), Some(1));
-    assert_eq!(table.cell(border_fm, Direction::Down), Some(0));
+    let begins = |direction| table.line(border_fm, direction).map(|line| line.x_fm / MM);
+    assert_eq!(begins(Direction::Up), Some(-90));
+    assert_eq!(begins(Direction::Down), Some(-100));
     assert!((table.slope(border_fm, Direction::Up) - 4e-4).abs() < 1e-18);
     assert!((table.slope(border_fm, Direction::Down) - 1e-4).abs() < 1e-18);
     // At the ends a motion that leaves the points has no slope.
@@ -73,10 +74,10 @@ fn a_border_belongs_to_the_cell_that_the_motion_enters() {
         (-60 * MM, Direction::Up, Direction::Down),
     ] {
         assert_eq!(
-            (table.cell(end_fm, out), table.slope(end_fm, out)),
+            (table.line(end_fm, out), table.slope(end_fm, out)),
             (None, 0.0)
         );
-        assert!(table.cell(end_fm, back).is_some());
+        assert!(table.line(end_fm, back).is_some());
     }
 }
 

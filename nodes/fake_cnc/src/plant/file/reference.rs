@@ -30,6 +30,12 @@ pub struct GridPlateEntry {
     pub plate_error_um: f64,
     /// Shortest wave of the graduation's errors.
     pub plate_error_length_mm: f64,
+    /// By how much the graduation is too long, per length: it then reads too little.
+    #[serde(default)]
+    pub plate_scale_um_per_m: f64,
+    /// By how much the angle between its lines along u and v is less than a right one.
+    #[serde(default)]
+    pub plate_squareness_urad: f64,
     /// Standard deviation of one reading.
     pub head_noise_um: f64,
 }
