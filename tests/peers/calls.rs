@@ -1,8 +1,11 @@
 //! Services and actions as a node on Cyclone DDS calls them: 16 bytes in front of every request and reply
 //! say whose it is. (Fast DDS's mapping, with the identity in RTPS, is tried by `node_runtime`'s own tests.)
 
+use std::time::Duration;
+
+use abbe_msgs::topics;
 use abbe_tests::cyclone::{Cyclone, end};
-use abbe_tests::program::{Process, domain};
+use abbe_tests::program::{Process, command, domain, root};
 use abbe_tests::python::interpreter;
 use abbe_tests::scenario::Scenario;
 use serde_json::{Value, json};
@@ -24,6 +27,13 @@ const CLIENTS: [(&str, &str); 7] = [
     (CANCEL, "action_msgs/srv/CancelGoal"),
     (RESULT, "abbe_msgs/action/RunProgram_GetResult"),
 ];
+
+const PAUSE: &str = "/replayer/pause";
+const RESUME: &str = "/replayer/resume";
+const STEP: &str = "/replayer/step";
+
+/// Behind the bag's only latency, s.
+const FROM_S: &str = "10.5";
 
 /// Statuses of `action_msgs/GoalStatus`.
 const SUCCEEDED: i64 = 4;
@@ -108,4 +118,44 @@ fn action(cyclone: &mut Cyclone) {
     assert_eq!(*named, json!(vec![8; 16]), "{canceling}");
     let result = asked(cyclone, RESULT, 2, &id(8));
     assert_eq!(result["status"], CANCELED, "{result}");
+}
+
+#[test]
+fn cyclone_pauses_steps_and_resumes_a_bag_that_is_played() {
+    let Some(python) = interpreter("cyclone steers a bag that is played") else {
+        return;
+    };
+    let domain = domain(4);
+    let bag = root().join("bags/cold_reference");
+    let mut play = command(domain, &["play"]);
+    // From behind the only latency on: it is latched, and comes first.
+    play.arg(&bag)
+        .args(["--topics", "/latency", "/probe/point", "--paused"])
+        .args(["--from", FROM_S, "--rate", "1000", "--delay", "0"]);
+    let playing = Process::start(play);
+    let clients = [PAUSE, RESUME, STEP].map(|service| (service, "std_srvs/srv/Trigger"));
+    let (latency, point) = (&topics::LATENCY, &topics::PROBE_POINT);
+    let mut cyclone = Cyclone::asking(&python, domain, &clients, &[end(latency), end(point)]);
+    for name in [PAUSE, RESUME, STEP, latency.name, point.name] {
+        cyclone.matched_after_s(name);
+    }
+    let nothing = json!({});
+    let told = |reply: Value| {
+        assert_eq!(reply["success"], true, "{reply}");
+        reply["message"].as_str().unwrap().to_owned()
+    };
+    let still = Duration::from_millis(500);
+    assert!(cyclone.samples_within(point.name, still).is_empty());
+    let said = told(asked(&mut cyclone, STEP, 1, &nothing));
+    assert!(said.starts_with("paused at "), "{said}");
+    let first = cyclone.sample(point.name, |_| true);
+    cyclone.sample(latency.name, |_| true);
+    assert!(cyclone.samples_within(point.name, still).is_empty());
+    let said = told(asked(&mut cyclone, RESUME, 2, &nothing));
+    assert!(said.starts_with("playing at "), "{said}");
+    let second = cyclone.sample(point.name, |_| true);
+    assert_ne!(first["header"], second["header"]);
+    cyclone.stop();
+    let ended = playing.ended_within(Duration::from_secs(30));
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
 }

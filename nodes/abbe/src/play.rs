@@ -24,7 +24,7 @@ pub struct Play {
     /// Absolute names of topics, `*` stands for any run of characters; none: every topic.
     #[arg(long, num_args = 1..)]
     topics: Vec<String>,
-    /// Leave out what comes before, s from the bag's first message.
+    /// Leave out what comes before, s from the bag's first message; of latched topics the last ones are sent first.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     from: f64,
     /// Leave out what comes after, s from the bag's first message.

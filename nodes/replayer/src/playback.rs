@@ -58,7 +58,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "from_s",
         "s",
         (0.0, 1e9),
-        "Messages before this are left out, from the bag's first message.",
+        "Messages before this are left out, from the bag's first message; of latched topics the last ones are sent first.",
     ),
     number(
         "to_s",

@@ -42,7 +42,7 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
     section.tables.push(Rows {
         head: head(&["coefficient", "at the end of the span", "± U (k = 2)", "span"]),
         rows: known.iter().map(|coefficient| coefficient.row()).collect(),
-        note: "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns. U: expanded uncertainty as the residuals show it, those that follow each other counted as fewer; errors of the plate that are alike at every circle, and heat between recordings, are not in it.".to_owned(),
+        note: "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns. U: expanded uncertainty as the residuals show it, those that follow each other counted as fewer, with what errors of the plate and heat between recordings leave open. How long and how square the plate is as a whole no recording can tell: that is in U where grid_encoder was given the plate's certificate (plate_scale_um_per_m, plate_squareness_urad).".to_owned(),
     });
     let (short, long): (Vec<_>, Vec<_>) = model
         .combinations

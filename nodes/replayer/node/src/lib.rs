@@ -12,6 +12,7 @@ use replayer::{PARAMETERS, PlaybackConfig};
 
 mod contents;
 mod desk;
+mod latched;
 mod player;
 mod watch;
 

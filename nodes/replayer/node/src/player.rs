@@ -18,6 +18,7 @@ use replayer::PlaybackConfig;
 
 use crate::contents::Contents;
 use crate::desk::{Desk, Next};
+use crate::latched::Latched;
 
 /// Messages between the reader and the network.
 const QUEUE_LEN: usize = 4_096;
@@ -70,6 +71,7 @@ impl Player {
             publisher,
             settles: playback.rate.is_none(),
             repeat: config.repeat,
+            latched: Latched::default(),
             told: None,
             told_at: None,
             played: Played::default(),
@@ -108,6 +110,8 @@ struct Playing {
     publisher: RawPublisher,
     settles: bool,
     repeat: bool,
+    /// What still holds of the time before the first one that is played.
+    latched: Latched,
     told: Option<Instant>,
     told_at: Option<Stamp<Host>>,
     played: Played,
@@ -143,11 +147,12 @@ impl Playing {
                 Event::Message(message) => {
                     goes = self.take(&message);
                     if goes == Goes::Out {
-                        break;
+                        return goes;
                     }
                 }
             }
         }
+        self.send_latched();
         goes
     }
 
@@ -157,7 +162,12 @@ impl Playing {
         };
         let nanos = i64::try_from(message.log_time_nanos).unwrap_or(i64::MAX);
         let at = Stamp::from_nanos(nanos);
-        if at < self.contents.from || at > self.contents.to {
+        if at < self.contents.from {
+            let qos = self.contents.offered[place].qos;
+            self.latched.keep(place, qos, message.data);
+            return Goes::On;
+        }
+        if at > self.contents.to {
             return Goes::On;
         }
         loop {
@@ -170,12 +180,23 @@ impl Playing {
         if self.is_time_told_again(at) {
             self.tell_time(at);
         }
-        self.publisher.publish(place, None, message.data.into());
+        self.send_latched();
+        self.send(place, message.data.into());
+        Goes::On
+    }
+
+    fn send_latched(&mut self) {
+        for (place, data) in self.latched.take() {
+            self.send(place, data);
+        }
+    }
+
+    fn send(&mut self, place: usize, data: Box<[u8]>) {
+        self.publisher.publish(place, None, data.into());
         self.played.messages += 1;
         if self.settles && self.played.messages.is_multiple_of(ON_THE_WAY) {
             self.settle();
         }
-        Goes::On
     }
 
     fn settle(&mut self) {
