@@ -98,6 +98,12 @@ pub enum Diagnostic {
         sequence: u32,
         cause: Box<VolumetricError>,
     },
+    #[error("{model} {sequence} is not used: nothing is recorded along {axis} yet")]
+    GeometryIncomplete {
+        model: GeometrySource,
+        sequence: u32,
+        axis: Axis,
+    },
     #[error("{model} {sequence} is not used: the parameters have no `geometry`")]
     GeometryUnused {
         model: GeometrySource,
@@ -164,6 +170,7 @@ impl Diagnostic {
             | Self::MeasurementBelieved { .. }
             | Self::GeometryAccepted { .. }
             | Self::GeometryConfirmed { .. }
+            | Self::GeometryIncomplete { .. }
             | Self::ModelConfirmed { .. } => Severity::Info,
             Self::StateChanged { to, cause, .. } => match to {
                 CompensationState::Active => Severity::Info,
@@ -217,6 +224,7 @@ impl Diagnostic {
             | Self::GeometryConfirmed { model, .. }
             | Self::GeometryQuarantined { model, .. }
             | Self::GeometryRefused { model, .. }
+            | Self::GeometryIncomplete { model, .. }
             | Self::GeometryUnused { model, .. } => match model {
                 GeometrySource::Linear => "geometry",
                 GeometrySource::Rotary => "geometry_rotary",

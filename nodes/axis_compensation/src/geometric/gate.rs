@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use machine::volumetric::{VolumetricError, VolumetricModel};
 use machine::{Kinematics, MachineFile};
 use metrology::drift::Extrapolate;
-use metrology::sample::GeometryModel;
+use metrology::sample::{CurveForm, GeometryModel};
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
 
@@ -24,6 +24,11 @@ pub enum GeometryPassage {
         change_mm: f64,
         /// What is allowed, mm.
         limit_mm: f64,
+    },
+    /// An axis was not moved yet while it was recorded: its errors are not in the model.
+    Incomplete {
+        /// The axis.
+        axis: Axis,
     },
     /// It is no model of this machine.
     Refused {
@@ -76,6 +81,9 @@ impl GeometryGate {
 
     /// Judges a new model.
     pub fn offer(&mut self, source: GeometrySource, model: GeometryModel) -> GeometryPassage {
+        if let Some(axis) = standing(&model) {
+            return GeometryPassage::Incomplete { axis };
+        }
         let place = source as usize;
         let with = |one: &GeometryModel| {
             let other = self.published[1 - place].as_ref();
@@ -166,11 +174,22 @@ pub fn poses(machine: &MachineFile) -> Vec<PerAxis<f64>> {
     poses
 }
 
+/// The first axis whose errors are told at one position alone: it stood while it was recorded.
+fn standing(model: &GeometryModel) -> Option<Axis> {
+    let mut motions = model
+        .curves
+        .iter()
+        .filter(|curve| curve.form != CurveForm::Constant);
+    let at_one = |span: (f64, f64)| span.0.is_finite() && span.0.to_bits() == span.1.to_bits();
+    let found = motions.find(|curve| at_one(curve.span));
+    found.map(|curve| curve.component.of)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use metrology::Stamp;
-    use metrology::sample::{CurveForm, ErrorCurve};
+    use metrology::sample::ErrorCurve;
     use nalgebra::DMatrix;
 
     const CHAIN: &str = "[w C' A' Y' b X Z t]";
@@ -267,6 +286,18 @@ mod tests {
             component: "EXX".parse().unwrap(),
         });
         assert_eq!(twice, GeometryPassage::Refused { cause });
+    }
+
+    #[test]
+    fn a_model_of_recordings_in_which_an_axis_stood_waits_for_more() {
+        let mut gate = gate();
+        let mut early = model(1, CHAIN, "EXX", 0.01);
+        early.curves[0].form = CurveForm::Polynomial;
+        early.curves[0].power = vec![1];
+        early.curves[0].span = (40.0, 40.0);
+        let passage = gate.offer(GeometrySource::Linear, early);
+        assert_eq!(passage, GeometryPassage::Incomplete { axis: Axis::X });
+        assert!(gate.current().is_none());
     }
 
     #[test]

@@ -43,6 +43,11 @@ impl AxisCompensationStage {
                 change_mm,
                 limit_mm,
             },
+            GeometryPassage::Incomplete { axis } => Diagnostic::GeometryIncomplete {
+                model: source,
+                sequence,
+                axis,
+            },
             GeometryPassage::Refused { cause } => Diagnostic::GeometryRefused {
                 model: source,
                 sequence,
