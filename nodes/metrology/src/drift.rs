@@ -204,10 +204,8 @@ fn valued(
     let mut gradient = drift.cross_slope_mm_per_mm;
     gradient[axis.index()] = drift.slope_mm_per_mm;
     let mut grown_mm = 0.0;
-    for growth in &drift.growth {
-        if let Some(growth) = growth {
-            grown_mm += growth_mm(growth, lever_mm, relaxed);
-        }
+    for growth in drift.growth.iter().flatten() {
+        grown_mm += growth_mm(growth, lever_mm, relaxed);
     }
     let drift_mm = drift.k0_mm + gradient.dot(lever_mm) + grown_mm;
     if drift_mm.is_finite() {

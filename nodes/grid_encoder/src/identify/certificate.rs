@@ -32,6 +32,9 @@ use nalgebra::{DMatrix, DVector};
 use super::solved::{Weighting, for_each_row};
 use crate::equations::Equations;
 
+/// What one error of the plate, of size 1, makes of a reading, mm.
+type Change = fn([f64; 2]) -> [f64; 2];
+
 /// Standard uncertainties of the plate as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PlateCertificate {
@@ -56,7 +59,7 @@ impl PlateCertificate {
         whitener: &DMatrix<f64>,
         covariance: &mut DMatrix<f64>,
     ) {
-        let whole: [(f64, fn([f64; 2]) -> [f64; 2]); 2] = [
+        let whole: [(f64, Change); 2] = [
             (self.scale, |w| w),
             (self.squareness_rad, |[u, v]| [0.5 * v, 0.5 * u]),
         ];
@@ -74,7 +77,7 @@ fn moved(
     equations: &Equations,
     weighting: &Weighting,
     whitener: &DMatrix<f64>,
-    change: fn([f64; 2]) -> [f64; 2],
+    change: Change,
 ) -> DVector<f64> {
     let mut with_x = DVector::zeros(equations.scale.len());
     for_each_row(equations, |place, row, _, u| {

@@ -217,16 +217,15 @@ impl Solved {
             (Some(_), _) => pooled_inflation(&self.ratios, &weights, &weighting.alike),
             (None, noise) => judgement.variance_inflation(noise),
         };
-        let mut cofactor = self.cofactor() * (variance_ratio * variance_inflation);
-        let certificate = options.certificate;
-        certificate.widen(equations, &weighting, &self.whitener(), &mut cofactor);
+        let mut covariance = self.cofactor() * (variance_ratio * variance_inflation);
+        self.widen(equations, &weighting, options, &mut covariance);
         let visibility = self.spectrum.visibility();
         let scale = &equations.scale;
         let n_coefficients = equations.unknowns.n_coefficients;
         let supports = estimable_supports(&self.spectrum.projector(), &visibility, n_coefficients);
         let combinations = supports
             .iter()
-            .map(|support| combination(&support.weights, &self.beta, &cofactor, scale))
+            .map(|support| combination(&support.weights, &self.beta, &covariance, scale))
             .collect();
         let mut values = DVector::from_fn(scale.len(), |j, _| self.beta[j] * scale[j]);
         put_back(equations, &mut values);
@@ -239,7 +238,7 @@ impl Solved {
             unknowns: equations.unknowns.all.clone(),
             n_coefficients,
             covariance: DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
-                cofactor[(i, j)] * scale[i] * scale[j]
+                covariance[(i, j)] * scale[i] * scale[j]
             }),
             values,
             visibility,
@@ -273,6 +272,19 @@ impl Solved {
         };
         let whitener = self.whitener();
         plain + &whitener * &separated.widening * whitener.transpose()
+    }
+
+    /// Adds what the plate's certificate leaves open.
+    fn widen(
+        &self,
+        equations: &Equations,
+        weighting: &Weighting,
+        options: &IdentifyOptions,
+        covariance: &mut DMatrix<f64>,
+    ) {
+        let whitener = self.whitener();
+        let certificate = &options.certificate;
+        certificate.widen(equations, weighting, &whitener, covariance);
     }
 
     fn sums(&self, weighting: &Weighting, weights: &PerEquation) -> Sums {
@@ -324,7 +336,7 @@ struct Sums {
 fn combination(
     weights: &[(usize, f64)],
     beta: &DVector<f64>,
-    cofactor: &DMatrix<f64>,
+    covariance: &DMatrix<f64>,
     scale: &[f64],
 ) -> Combination {
     let variance: f64 = weights
@@ -332,7 +344,7 @@ fn combination(
         .flat_map(|(i, wi)| {
             weights
                 .iter()
-                .map(move |(j, wj)| wi * wj * cofactor[(*i, *j)])
+                .map(move |(j, wj)| wi * wj * covariance[(*i, *j)])
         })
         .sum();
     Combination {
