@@ -65,6 +65,10 @@ DERIVED = {
 """What ROS 2 makes of every action."""
 
 
+FILLER = "structure_needs_at_least_one_member"
+"""What ROS 2 puts where a type has no field."""
+
+
 def lines_of(package: str, kind: str, name: str) -> list[str]:
     """The lines that declare a type."""
     folder = MSGS if package == "abbe_msgs" else MSGS / "standard" / package
@@ -128,7 +132,7 @@ class Types:
             if match["list"]:
                 length = int(match["length"]) if match["length"].isdigit() else -1
             fields.append(Field(match["name"], base, length))
-        return fields
+        return fields or [Field(FILLER, "uint8", None)]
 
     def of(self, ros_type: str) -> type:
         """The class for `ros_type`, with its DDS name as ROS 2 mangles it."""
