@@ -37,6 +37,7 @@ mod error_motion;
 mod guide_form;
 mod oil_film;
 mod structure;
+mod vibration;
 
 mod artefact;
 mod contact;
@@ -154,11 +155,9 @@ impl Plant {
                 &heat.network,
             )?,
             heat,
-            body: Body::new(machine, &truth.geometry, truth.seed)?.floating(
-                machine,
-                &truth.oil_film,
-                truth.seed,
-            )?,
+            body: Body::new(machine, &truth.geometry, truth.seed)?
+                .floating(machine, &truth.oil_film, truth.seed)?
+                .shaking(truth.vibration.as_ref(), truth.seed)?,
             contact,
             scales: LinearScales::new(&truth.linear_scales, truth.seed)?,
             plate: machine

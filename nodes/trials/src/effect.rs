@@ -14,10 +14,12 @@
 //! | `servo_lag` | another velocity feed-forward | a softer position loop |
 //! | `reversal_spike` | friction of the motor's side | with a breakaway force twice as large |
 //! | `probe_latency` | a later trigger | a triggering force that grows with the feed |
-//! | `clock_offset` | late stamps of the grid encoder | the same |
+//! | `clock_offset` | late stamps of the grid encoder | by 10 to 40 % more and less from minute to minute |
 //! | `length_wavelength` | wrong wavelength of the laser | which drifts |
 //! | `screw_elongation` | a nut that rubs | and a bearing that rubs |
 //! | `drive_windup` | a softer screw | softer in one direction |
+//!
+//! The tool of a machine whose effects are foreign shakes besides, at a frequency that wanders.
 
 use fake_cnc::plant::{GuideFormEntry, LeadCycleEntry};
 use metrology::Axis;
@@ -214,6 +216,9 @@ impl Hidden {
             }
             ClockOffset => {
                 rig.grid_late_s += self.size * 1e-3;
+                if self.is_foreign {
+                    rig.grid_late_wander = 0.1 + 0.3 * self.shape[0];
+                }
                 Some(())
             }
             LengthWavelength => {

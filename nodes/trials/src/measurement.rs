@@ -19,6 +19,8 @@ use crate::scatter::Scattering;
 
 /// Time between two looks of the sequencer, s.
 const LOOK_S: f64 = 0.1;
+/// Time in which late stamps go through all that they wander, s.
+const LATE_TURN_S: f64 = 97.0;
 /// Longest programme, s.
 const LIMIT_S: f64 = 3600.0;
 
@@ -44,6 +46,7 @@ struct Session<'a> {
     rig: &'a Rig,
     sequencer: Sequencer,
     control: Cnc<Plant>,
+    began: Stamp<Host>,
     now: Stamp<Host>,
     scattering: Scattering<'a>,
     commanded: PerAxis<f64>,
@@ -72,6 +75,7 @@ pub fn measure(rig: &Rig, take: &mut dyn FnMut(Stamp<Host>, Sample)) -> Result<(
             &rig.control,
             Plant::new(&rig.control, &rig.plant)?,
         )?,
+        began: Stamp::from_nanos(rig.start_s * NANOS_PER_S),
         now: Stamp::from_nanos(rig.start_s * NANOS_PER_S),
         scattering: Scattering::new(&rig.scatter),
         commanded: PerAxis::default(),
@@ -200,7 +204,9 @@ impl Session<'_> {
         let [u, v] = plane_axes(sample.plane);
         sample.u_mm += self.scattering.reading_mm(u, &place_mm);
         sample.v_mm += self.scattering.reading_mm(v, &place_mm);
-        sample.at += Span::from_secs_f64(self.rig.grid_late_s);
+        let turns = (self.now - self.began).as_secs_f64() / LATE_TURN_S;
+        let wander = self.rig.grid_late_wander * (std::f64::consts::TAU * turns).sin();
+        sample.at += Span::from_secs_f64(self.rig.grid_late_s * (1.0 + wander));
         (self.take)(recorded_at, Sample::Grid(sample));
     }
 

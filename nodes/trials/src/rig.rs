@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 
 use fake_cnc::PlantFile;
 use fake_cnc::config::Config as ControlConfig;
+use fake_cnc::plant::VibrationEntry;
 use machine::MachineFile;
 use machine::file::{AxisEntry, EffectEntry, LinearAxisEntry, VelocityLoopEntry};
 use metrology::Axis;
@@ -58,6 +59,8 @@ pub struct Rig {
     pub scatter: Scatter,
     /// How much later the grid encoder stamps its readings than it should, s.
     pub grid_late_s: f64,
+    /// How much of that wanders, as a share, from minute to minute.
+    pub grid_late_wander: f64,
     /// When the session begins, s since the epoch.
     pub start_s: i64,
     /// Whether the motors' encoders are recorded; otherwise their positions are those that were commanded.
@@ -109,6 +112,7 @@ impl Rig {
             machine,
             plant,
             grid_late_s: 0.0,
+            grid_late_wander: 0.0,
             start_s: START_S,
             has_motors: random.random(),
         })
@@ -123,6 +127,24 @@ impl Rig {
         later.start_s += LATER_S;
         later.scatter.seed ^= 0x5851_f42d_4c95_7f2d;
         later
+    }
+
+    /// Lets the tool shake at a frequency that wanders, in every run alike.
+    pub(crate) fn shake(&mut self, random: &mut Pcg64Mcg) {
+        self.plant.vibration = Some(VibrationEntry {
+            amplitude_um: std::array::from_fn(|_| random.random_range(0.02..0.2)),
+            frequency_hz: random.random_range(18.0..70.0),
+            wander_hz: random.random_range(0.5..4.0),
+            wander_time_s: random.random_range(0.3..5.0),
+        });
+    }
+
+    /// Variance of a reading by the shaking of the tool, in the direction that shakes most, mm2.
+    pub(crate) fn shaking_mm2(&self) -> f64 {
+        let most_um = self.plant.vibration.as_ref().map_or(0.0, |vibration| {
+            vibration.amplitude_um.iter().copied().fold(0.0, f64::max)
+        });
+        0.5 * (most_um / 1e3).powi(2)
     }
 
     /// The machine file as text.

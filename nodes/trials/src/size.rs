@@ -184,8 +184,9 @@ impl Deviations {
         block.readings.push(reading);
     }
 
-    /// D of what is in `self` and not in `without`, equation (1).
-    pub(crate) fn d_against(&self, without: &Self, scatter: &Scatter) -> f64 {
+    /// D of what is in `self` and not in `without`, equation (1); a reading also has the variance of the tool's shaking,
+    /// which turns often within a row.
+    pub(crate) fn d_against(&self, without: &Self, scatter: &Scatter, shaking_mm2: f64) -> f64 {
         let mut repeats = BTreeMap::<&str, f64>::new();
         for block in self.blocks.values() {
             *repeats.entry(&block.condition).or_default() += 1.0;
@@ -193,7 +194,9 @@ impl Deviations {
         let squares = self.blocks.iter().map(|(key, with)| {
             let other = without.blocks.get(key);
             let repeats = repeats[&*with.condition];
-            other.map_or(0.0, |other| gain(with, other, scatter, repeats))
+            other.map_or(0.0, |other| {
+                gain(with, other, scatter, shaking_mm2, repeats)
+            })
         });
         squares.sum::<f64>().max(0.0).sqrt()
     }
@@ -215,7 +218,7 @@ fn condition(segment: &TestSegment, what: &str) -> Condition {
 }
 
 /// Gain of one block, (3), which a number of repeats share the error of form of.
-fn gain(with: &Block, without: &Block, scatter: &Scatter, repeats: f64) -> f64 {
+fn gain(with: &Block, without: &Block, scatter: &Scatter, shaking_mm2: f64, repeats: f64) -> f64 {
     let both: Vec<(Reading, f64)> = with
         .readings
         .iter()
@@ -231,7 +234,7 @@ fn gain(with: &Block, without: &Block, scatter: &Scatter, repeats: f64) -> f64 {
         TOUCH_MM.powi(2) + TOUCHES_ALIKE * FORM_MM.powi(2)
     } else {
         let memory = (1.0 + scatter.ar) / (1.0 - scatter.ar);
-        scatter.white_mm.powi(2) * memory / mean_of
+        (scatter.white_mm.powi(2) * memory + shaking_mm2) / mean_of
             + INSTRUMENT_MM.powi(2)
             + repeats * (ROUGH * FORM_MM).powi(2)
     };

@@ -45,6 +45,9 @@ impl Trial {
         let mut random = stream(arm, seed, index);
         let mut rig = Rig::draw(&mut random, arm == Arm::HeavyNull)?;
         let wanted = wanted(&mut random, arm, index);
+        if arm == Arm::Foreign {
+            rig.shake(&mut random);
+        }
         let bare = commissioned(&mut rig)?;
         let mut effects = Vec::new();
         for (hidden, d) in wanted {
@@ -162,7 +165,7 @@ fn scaled(
     let d_of = |hidden: &Hidden| -> Result<f64, TrialError> {
         let mut with = rig.clone();
         hidden.hide(&mut with)?;
-        Ok(deviations(&with)?.d_against(bare, &rig.scatter))
+        Ok(deviations(&with)?.d_against(bare, &rig.scatter, rig.shaking_mm2()))
     };
     let middle_d = d_of(&hidden)?;
     let ([low, high], _) = hidden.class.sizes();

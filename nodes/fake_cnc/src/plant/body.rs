@@ -20,10 +20,13 @@ use nalgebra::{Rotation3, Vector3};
 use super::chain::{Chain, Joint, Rigid, nominal_direction, shift};
 use super::error::{PlantError, require_finite, require_not_negative};
 use super::error_motion::ErrorMotion;
-use super::file::{GeometryEntry, LinearErrorEntry, OilFilmEntry, RotaryErrorEntry};
+use super::file::{
+    GeometryEntry, LinearErrorEntry, OilFilmEntry, RotaryErrorEntry, VibrationEntry,
+};
 use super::guide_form::GuideForm;
 use super::oil_film::OilFilm;
 use super::structure::Structure;
+use super::vibration::Vibration;
 
 /// One joint with its true line.
 #[derive(Clone, Debug)]
@@ -46,6 +49,7 @@ pub(super) struct Body {
     before_head: usize,
     head_moves_in_z: bool,
     table_moves_in_y: bool,
+    vibration: Option<Vibration>,
 }
 
 impl Body {
@@ -91,6 +95,7 @@ impl Body {
                 .iter()
                 .any(|joint| joint.axis == Axis::Y),
             head_moves_in_z: chain.tool_side.iter().any(|joint| joint.axis == Axis::Z),
+            vibration: None,
         })
     }
 
@@ -114,6 +119,16 @@ impl Body {
         Ok(self)
     }
 
+    /// Lets the tool shake.
+    pub(super) fn shaking(
+        mut self,
+        entry: Option<&VibrationEntry>,
+        seed: u64,
+    ) -> Result<Self, PlantError> {
+        self.vibration = entry.map(|entry| Vibration::new(entry, seed)).transpose()?;
+        Ok(self)
+    }
+
     fn joint_mut(&mut self, axis: Axis) -> Option<&mut TrueJoint> {
         self.joints_mut().find(|joint| joint.joint.axis == axis)
     }
@@ -126,6 +141,9 @@ impl Body {
     pub(super) fn pass(&mut self, period_s: f64) {
         for film in self.joints_mut().filter_map(|joint| joint.film.as_mut()) {
             film.pass(period_s);
+        }
+        if let Some(vibration) = &mut self.vibration {
+            vibration.pass(period_s);
         }
     }
 
@@ -190,7 +208,11 @@ impl Body {
             0.0
         };
         let table = walk(structure.workpiece_side(table_y_mm), &self.workpiece_side);
-        table.inverse() * tool
+        let mut shaken = table.inverse() * tool;
+        if let Some(vibration) = &self.vibration {
+            shaken.translation.vector += vibration.at_mm();
+        }
+        shaken
     }
 }
 

@@ -11,7 +11,7 @@ mod touching;
 
 pub use body::{
     GeometryEntry, GuideFormEntry, LinearErrorEntry, OilFilmEntry, RotaryErrorEntry,
-    SquarenessEntry, StructureEntry,
+    SquarenessEntry, StructureEntry, VibrationEntry,
 };
 pub use drives::{
     FrictionEntry, LeadCycleEntry, LinearDriveEntry, RotaryDriveEntry, RotaryFrictionEntry,
@@ -51,6 +51,9 @@ pub struct PlantFile {
     /// The oil under the slides; where absent, a slide comes back to where it was.
     #[serde(default)]
     pub oil_film: BTreeMap<Axis, OilFilmEntry>,
+    /// How the tool shakes against the workpiece; where absent, not at all.
+    #[serde(default)]
+    pub vibration: Option<VibrationEntry>,
     /// The touch probe.
     pub touch_probe: TouchProbeEntry,
     /// The artefacts.

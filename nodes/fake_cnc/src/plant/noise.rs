@@ -18,6 +18,7 @@ pub(super) enum Effect {
     GridPlate = 9,
     Laser = 10,
     OilFilm = 11,
+    Vibration = 12,
 }
 
 /// Random numbers of one effect.

@@ -122,6 +122,20 @@ pub struct OilFilmEntry {
     pub time_s: f64,
 }
 
+/// How the tool shakes against the workpiece.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VibrationEntry {
+    /// Amplitude along X, Y and Z of the workpiece.
+    pub amplitude_um: [f64; 3],
+    /// Frequency that it wanders about.
+    pub frequency_hz: f64,
+    /// Standard deviation of the frequency.
+    pub wander_hz: f64,
+    /// Time over which the frequency changes (correlation falls to exp(-1)).
+    pub wander_time_s: f64,
+}
+
 /// Error motions and location of a rotary axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
