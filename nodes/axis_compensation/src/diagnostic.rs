@@ -174,8 +174,11 @@ impl Diagnostic {
             | Self::ModelConfirmed { .. } => Severity::Info,
             Self::StateChanged { to, cause, .. } => match to {
                 CompensationState::Active => Severity::Info,
-                CompensationState::Off if cause.is_some() => Severity::Error,
-                CompensationState::Off => Severity::Info,
+                // Switched off: as somebody wanted it.
+                CompensationState::Off | CompensationState::Fading if cause.is_none() => {
+                    Severity::Info
+                }
+                CompensationState::Off => Severity::Error,
                 _ => Severity::Warn,
             },
             Self::ModelNotFinite { .. } | Self::GeometryRefused { .. } => Severity::Error,

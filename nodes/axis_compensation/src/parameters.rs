@@ -182,6 +182,10 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         config::FEED_MM_MIN,
         "greatest feed at which is measured while the machine works",
     ),
+    word(
+        "positioning.X.ends_follow",
+        "whether points beyond those that are passed while the machine works move with the outermost one that is",
+    ),
     row(
         "positioning.X.loop_cycle_s",
         "s",
@@ -228,6 +232,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         config::FEED_MM_MIN,
         "as for X",
     ),
+    word("positioning.Y.ends_follow", "as for X"),
     row(
         "positioning.Y.loop_cycle_s",
         "s",
@@ -262,6 +267,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         config::FEED_MM_MIN,
         "as for X",
     ),
+    word("positioning.Z.ends_follow", "as for X"),
     row(
         "positioning.Z.loop_cycle_s",
         "s",

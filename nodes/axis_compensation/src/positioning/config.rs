@@ -37,6 +37,9 @@ pub struct PositioningConfig {
     /// Greatest feed at which is measured while the machine works.
     #[serde(default = "default_measuring_feed_limit_mm_min")]
     pub measuring_feed_limit_mm_min: f64,
+    /// Whether points beyond those that are passed move with the outermost one that is.
+    #[serde(default)]
+    pub ends_follow: bool,
     /// Cycle of the measured loop of `weighted_increments`.
     #[serde(default = "default_loop_cycle_s")]
     pub loop_cycle_s: f64,

@@ -129,7 +129,8 @@ impl DualLoop {
                 feed_limit_mm_s,
                 believed_fm,
                 pulse_fm,
-            ),
+            )
+            .with_ends_following(config.ends_follow),
             sum: OffsetSum::new(config.reading, config.weight, config.loop_cycle_s),
             offset: Ok(None),
             commanded_fm: None,
@@ -233,7 +234,7 @@ impl DualLoop {
     ) {
         // What is being learned anew must not creep into the old table as well.
         if self.learning.is_under_way() {
-            self.refresh.forget();
+            self.refresh.begin_anew();
             return;
         }
         let Some(known) = &mut self.known else {

@@ -22,6 +22,15 @@
 //! With tables apart, a pass upwards refreshes the table of upwards. Together, each pass refreshes the one
 //! there is, which then trembles by ω/(2 − ω) of half the lost motion as directions alternate.
 //!
+//! Work seldom reaches both ends. Points that are never passed would stay as they were learned while the screw beside them
+//! grows: with `ends_follow` they move as the outermost point that was passed,
+//!
+//! ```text
+//!   Δ(i) ← Δ(i) + change of Δ(m) in (1)   for all i beyond m,  m the outermost point passed so far     (5)
+//! ```
+//!
+//! a choice of ours, and an extrapolation: right for what grows or shifts as a whole.
+//!
 //! # Agreement
 //! `val_ewma_remembers_2_minus_w_over_w_passes`: 5.667 to 1e-9. `val_ewma_noise_gain`: variance ratio of 4,000
 //! points within its 99.9 % χ² interval about 0.1765. `val_ewma_lags_a_drift_by_its_closed_form`: within 4 fm.
@@ -85,6 +94,9 @@ pub struct Refresh {
     feed_limit_mm_s: f64,
     believed_fm: i64,
     pulse_fm: i64,
+    ends_follow: bool,
+    /// Least and greatest point passed, up and down.
+    passed: [Option<(usize, usize)>; 2],
     before: Option<ScaleReading>,
 }
 
@@ -104,13 +116,28 @@ impl Refresh {
             feed_limit_mm_s,
             believed_fm,
             pulse_fm,
+            ends_follow: false,
+            passed: [None; 2],
             before: None,
         }
+    }
+
+    /// The same, with (5) or without.
+    #[must_use]
+    pub fn with_ends_following(mut self, ends_follow: bool) -> Self {
+        self.ends_follow = ends_follow;
+        self
     }
 
     /// The next state does not follow the last one.
     pub fn forget(&mut self) {
         self.before = None;
+    }
+
+    /// Another table may follow: nothing was passed yet.
+    pub fn begin_anew(&mut self) {
+        self.before = None;
+        self.passed = [None; 2];
     }
 
     /// One state, `dt_s` after the one before; (1) for each point passed in between.
@@ -159,7 +186,7 @@ impl Refresh {
 
     /// (1) for one point; what was measured less the table where that is not believed, fm.
     fn take(
-        &self,
+        &mut self,
         table: &mut DeviationTable,
         point: usize,
         direction: Direction,
@@ -172,15 +199,41 @@ impl Refresh {
         if change_fm.saturating_abs() > self.believed_fm {
             return Err(change_fm);
         }
-        let new_fm = old_fm + share_fm(self.weight, change_fm);
-        match self.directions {
-            Directions::Apart => table.replace(point, direction, new_fm),
-            Directions::Together => {
-                table.replace(point, Direction::Up, new_fm);
-                table.replace(point, Direction::Down, new_fm);
+        let moved_fm = share_fm(self.weight, change_fm);
+        let (least, greatest) = self.beyond(point, direction, table.n_points());
+        for place in least..greatest {
+            let tables = match self.directions {
+                Directions::Apart => &[direction][..],
+                Directions::Together => &[Direction::Up, Direction::Down],
+            };
+            for &of in tables {
+                if let Some(before_fm) = table.point_fm(place, of) {
+                    table.replace(place, of, before_fm + moved_fm);
+                }
             }
         }
         Ok(())
+    }
+
+    /// The point and those that follow it by (5), from the first to one behind the last.
+    fn beyond(&mut self, point: usize, direction: Direction, n_points: usize) -> (usize, usize) {
+        if !self.ends_follow {
+            return (point, point + 1);
+        }
+        let table = match self.directions {
+            Directions::Apart => direction as usize,
+            Directions::Together => 0,
+        };
+        let (least, greatest) = self.passed[table].unwrap_or((point, point));
+        let (least, greatest) = (least.min(point), greatest.max(point));
+        self.passed[table] = Some((least, greatest));
+        let from = if point == least { 0 } else { point };
+        let to = if point == greatest {
+            n_points
+        } else {
+            point + 1
+        };
+        (from, to)
     }
 }
 

@@ -56,6 +56,27 @@ fn eq1_takes_the_deviation_where_the_command_passes_the_point() {
 }
 
 #[test]
+fn eq5_points_beyond_those_that_are_passed_move_with_the_outermost() {
+    let mut table = table(5);
+    let mut refresh = refresh(0.3, Directions::Apart).with_ends_following(true);
+    // The screw has grown: 4 µm at 20 mm and 6 µm at 30 mm; work goes to and fro between 15 and 35 mm.
+    for _ in 0..60 {
+        for (from_mm, to_mm, deviation_um) in [(19.99, 20.01, 4.0), (29.99, 30.01, 6.0)] {
+            refresh.forget();
+            refresh.observe(&mut table, at(from_mm, deviation_um), 1e-3);
+            refresh.observe(&mut table, at(to_mm, deviation_um), 1e-3);
+        }
+    }
+    let up_um = |point| table.point_fm(point, Direction::Up).unwrap() as f64 / UM as f64;
+    let found: Vec<f64> = (0..5).map(up_um).collect();
+    for (found, expected) in found.iter().zip([4.0, 4.0, 4.0, 6.0, 6.0]) {
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    }
+    // Nothing was passed downwards.
+    assert_eq!(table.point_fm(4, Direction::Down), Some(0));
+}
+
+#[test]
 fn every_pass_at_the_feed_limit_itself_teaches_however_commands_are_rounded() {
     // 1000 mm/min: 16.666... µm a tick, rounded to femtometres or to pulses.
     for rounding_fm in [1, PULSE_FM] {
