@@ -107,6 +107,17 @@ impl DualLoop {
             Reading::RefreshedTable => config.weight,
             Reading::WeightedIncrements => 0.0,
         };
+        let mut refresh = Refresh::new(
+            refresh_weight,
+            config.directions,
+            feed_limit_mm_s,
+            believed_fm,
+            pulse_fm,
+        )
+        .with_ends_following(config.ends_follow);
+        if let Some(known) = &known {
+            refresh.begin(known.table.n_points());
+        }
         Ok(Self {
             axis,
             weight: config.weight,
@@ -123,14 +134,7 @@ impl DualLoop {
                 lesson,
                 Dwells::new(pulse_fm, config.settle_s, config.dwell_s),
             ),
-            refresh: Refresh::new(
-                refresh_weight,
-                config.directions,
-                feed_limit_mm_s,
-                believed_fm,
-                pulse_fm,
-            )
-            .with_ends_following(config.ends_follow),
+            refresh,
             sum: OffsetSum::new(config.reading, config.weight, config.loop_cycle_s),
             offset: Ok(None),
             commanded_fm: None,
@@ -234,7 +238,7 @@ impl DualLoop {
     ) {
         // What is being learned anew must not creep into the old table as well.
         if self.learning.is_under_way() {
-            self.refresh.begin_anew();
+            self.refresh.forget();
             return;
         }
         let Some(known) = &mut self.known else {
@@ -362,6 +366,7 @@ impl DualLoop {
                 } else {
                     Diagnostic::LeadSeen { axis, lead_mm }
                 });
+                self.refresh.begin(table.n_points());
                 self.known = Some(Known {
                     table,
                     runs,

@@ -26,10 +26,11 @@
 //! grows: with `ends_follow` they move as the outermost point that was passed,
 //!
 //! ```text
-//!   Δ(i) ← Δ(i) + change of Δ(m) in (1)   for all i beyond m,  m the outermost point passed so far     (5)
+//!   Δ(i) ← Δ(i) + change of Δ(m) in (1)   for all i beyond m,  m the outermost point passed n > (2 − ω)/ω times     (5)
 //! ```
 //!
-//! a choice of ours, and an extrapolation: right for what grows or shifts as a whole.
+//! a choice of ours, and an extrapolation: right for what grows or shifts as a whole. What m takes in its first n passes is its
+//! own: readings of a moving axis differ a little from those at its dwells, by which the table was learned.
 //!
 //! # Agreement
 //! `val_ewma_remembers_2_minus_w_over_w_passes`: 5.667 to 1e-9. `val_ewma_noise_gain`: variance ratio of 4,000
@@ -87,7 +88,7 @@ pub struct Refreshed {
 }
 
 /// Refreshes one table.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Refresh {
     weight: f64,
     directions: Directions,
@@ -95,8 +96,8 @@ pub struct Refresh {
     believed_fm: i64,
     pulse_fm: i64,
     ends_follow: bool,
-    /// Least and greatest point passed, up and down.
-    passed: [Option<(usize, usize)>; 2],
+    /// How often each point was passed, up and down.
+    passes: [Vec<u32>; 2],
     before: Option<ScaleReading>,
 }
 
@@ -117,7 +118,7 @@ impl Refresh {
             believed_fm,
             pulse_fm,
             ends_follow: false,
-            passed: [None; 2],
+            passes: [Vec::new(), Vec::new()],
             before: None,
         }
     }
@@ -134,10 +135,10 @@ impl Refresh {
         self.before = None;
     }
 
-    /// Another table may follow: nothing was passed yet.
-    pub fn begin_anew(&mut self) {
+    /// A table of so many points begins, none of which was passed yet.
+    pub fn begin(&mut self, n_points: usize) {
         self.before = None;
-        self.passed = [None; 2];
+        self.passes = [vec![0; n_points], vec![0; n_points]];
     }
 
     /// One state, `dt_s` after the one before; (1) for each point passed in between.
@@ -217,21 +218,28 @@ impl Refresh {
 
     /// The point and those that follow it by (5), from the first to one behind the last.
     fn beyond(&mut self, point: usize, direction: Direction, n_points: usize) -> (usize, usize) {
-        if !self.ends_follow {
-            return (point, point + 1);
-        }
         let table = match self.directions {
             Directions::Apart => direction as usize,
             Directions::Together => 0,
         };
-        let (least, greatest) = self.passed[table].unwrap_or((point, point));
-        let (least, greatest) = (least.min(point), greatest.max(point));
-        self.passed[table] = Some((least, greatest));
-        let from = if point == least { 0 } else { point };
-        let to = if point == greatest {
-            n_points
+        let passes = &mut self.passes[table];
+        let Some(count) = passes.get_mut(point) else {
+            return (point, point + 1);
+        };
+        *count = count.saturating_add(1);
+        let is_settled = |count: &u32| f64::from(*count) * self.weight > 2.0 - self.weight;
+        if !self.ends_follow || !is_settled(&passes[point]) {
+            return (point, point + 1);
+        }
+        let from = if passes[..point].iter().any(is_settled) {
+            point
         } else {
+            0
+        };
+        let to = if passes[point + 1..].iter().any(is_settled) {
             point + 1
+        } else {
+            n_points
         };
         (from, to)
     }

@@ -59,21 +59,34 @@ fn eq1_takes_the_deviation_where_the_command_passes_the_point() {
 fn eq5_points_beyond_those_that_are_passed_move_with_the_outermost() {
     let mut table = table(5);
     let mut refresh = refresh(0.3, Directions::Apart).with_ends_following(true);
-    // The screw has grown: 4 µm at 20 mm and 6 µm at 30 mm; work goes to and fro between 15 and 35 mm.
-    for _ in 0..60 {
-        for (from_mm, to_mm, deviation_um) in [(19.99, 20.01, 4.0), (29.99, 30.01, 6.0)] {
-            refresh.forget();
-            refresh.observe(&mut table, at(from_mm, deviation_um), 1e-3);
-            refresh.observe(&mut table, at(to_mm, deviation_um), 1e-3);
+    refresh.begin(5);
+    // Work goes to and fro between 15 and 35 mm; `grown_um` is what the screw has grown.
+    let mut work = |grown_um: f64| {
+        for _ in 0..60 {
+            for (before_mm, deviation_um) in [(19.99, 4.0), (29.99, 6.0)] {
+                refresh.forget();
+                for commanded_mm in [before_mm, before_mm + 0.02] {
+                    let state = at(commanded_mm, deviation_um + grown_um);
+                    refresh.observe(&mut table, state, 1e-3);
+                }
+            }
         }
+        let um = |fm: i64| fm as f64 / UM as f64;
+        let up_um = |point| um(table.point_fm(point, Direction::Up).unwrap());
+        assert_eq!(table.point_fm(4, Direction::Down), Some(0));
+        [0, 1, 2, 3, 4].map(up_um)
+    };
+    let (cold_um, warm_um) = (work(0.0), work(10.0));
+    // What five passes leave of what is measured.
+    let left = 0.7_f64.powi(5);
+    assert!((cold_um[0] - 4.0 * left).abs() < 1e-6, "{cold_um:?}");
+    assert!((cold_um[4] - 6.0 * left).abs() < 1e-6, "{cold_um:?}");
+    for (cold_um, warm_um) in cold_um.iter().zip(warm_um) {
+        assert!(
+            (warm_um - cold_um - 10.0).abs() < 1e-6,
+            "{cold_um} {warm_um}"
+        );
     }
-    let up_um = |point| table.point_fm(point, Direction::Up).unwrap() as f64 / UM as f64;
-    let found: Vec<f64> = (0..5).map(up_um).collect();
-    for (found, expected) in found.iter().zip([4.0, 4.0, 4.0, 6.0, 6.0]) {
-        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
-    }
-    // Nothing was passed downwards.
-    assert_eq!(table.point_fm(4, Direction::Down), Some(0));
 }
 
 #[test]
