@@ -42,7 +42,7 @@ impl Normal {
     /// Of some columns and a right side.
     pub fn new(columns: &DMatrix<f64>, z: &DVector<f64>) -> Self {
         Self {
-            gram: columns.tr_mul(columns),
+            gram: gram(columns),
             along: columns.tr_mul(z),
         }
     }
@@ -122,6 +122,19 @@ impl Normal {
         }
         gains
     }
+}
+
+/// Rows that are multiplied at once: their part of hundreds of columns stays in the cache.
+const ROWS: usize = 512;
+
+/// A'A. A product of matrices takes a tenth of the time of as many products of columns.
+fn gram(columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut gram = DMatrix::zeros(columns.ncols(), columns.ncols());
+    for first in (0..columns.nrows()).step_by(ROWS) {
+        let part = columns.rows(first, ROWS.min(columns.nrows() - first));
+        gram.gemm(1.0, &part.transpose(), &part, 1.0);
+    }
+    gram
 }
 
 impl Factor {

@@ -128,12 +128,9 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     fn new(run: &'a Run, response: &'a Response, axes: AxisSet) -> Self {
-        let beam_of = |axis: Axis| {
-            let read = run
-                .readings
-                .iter()
-                .any(|r| r.channel == Channel::Length(axis));
-            if read { beam(run, axis) } else { unit(axis) }
+        let beam_of = |axis: Axis| match run.segment.kind {
+            TestKind::Diagonal => beam(run, axis),
+            _ => unit(axis),
         };
         Self {
             run,
@@ -154,8 +151,8 @@ impl<'a> Reader<'a> {
                     + between(&r.drive[*axis])
                     + between(&r.scale_reading[*axis])
             }
-            Channel::GridU => along(&plate(self.run, 0)) + between(&r.grid_reading_mm[0]),
-            Channel::GridV => along(&plate(self.run, 1)) + between(&r.grid_reading_mm[1]),
+            Channel::GridU => self.on_plate(reading, 0) + between(&r.grid_reading_mm[0]),
+            Channel::GridV => self.on_plate(reading, 1) + between(&r.grid_reading_mm[1]),
             Channel::Radial => along(&radial(self.run, reading)),
             Channel::Length(axis) => along(&self.beams[*axis]) + between(&r.length_reading_mm),
             Channel::Touch => self.touch(reading),
@@ -164,16 +161,24 @@ impl<'a> Reader<'a> {
         stands_on + r.reading.get(row).copied().unwrap_or(0.0)
     }
 
+    /// Error of the tip along a coordinate of the plate.
+    fn on_plate(&self, reading: &Reading, coordinate: usize) -> f64 {
+        let axes = plate_axes(self.run.segment.plane);
+        axes.map_or(0.0, |axes| self.tip_along(reading, axes[coordinate], true))
+    }
+
     /// Error of the tip with (or without) what the control loop leaves, machine frame.
     fn tip_at(&self, reading: &Reading, with_servo: bool) -> Vector3<f64> {
-        let mut tip = Vector3::zeros();
-        for (index, axis) in Axis::LINEAR.into_iter().enumerate() {
-            tip[index] = interpolate(&self.response.tip_mm[index], reading);
-            if self.axes.contains(axis) {
-                tip[index] += interpolate(&self.response.drive[axis], reading);
-                if with_servo {
-                    tip[index] += interpolate(&self.response.servo[axis], reading);
-                }
+        Vector3::from(Axis::LINEAR.map(|axis| self.tip_along(reading, axis, with_servo)))
+    }
+
+    /// The same along one of the linear axes.
+    fn tip_along(&self, reading: &Reading, axis: Axis, with_servo: bool) -> f64 {
+        let mut tip = interpolate(&self.response.tip_mm[axis.index()], reading);
+        if self.axes.contains(axis) {
+            tip += interpolate(&self.response.drive[axis], reading);
+            if with_servo {
+                tip += interpolate(&self.response.servo[axis], reading);
             }
         }
         tip
