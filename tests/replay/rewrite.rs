@@ -10,12 +10,14 @@ use mcap::records::{AttachmentHeader, MessageHeader, Metadata, Record};
 use sha2::{Digest, Sha256};
 
 /// A message on its way into the changed bag.
+#[derive(Clone)]
 pub struct Copied {
     /// Full name of its topic.
     pub topic: String,
     /// Its bytes.
     pub data: Vec<u8>,
-    header: MessageHeader,
+    /// Times and channel.
+    pub header: MessageHeader,
 }
 
 /// Changes the messages, all in the order of recording.

@@ -11,6 +11,7 @@ mod bad_plan;
 mod blocks;
 mod cell;
 mod five_axis;
+mod gap_bad_bags;
 mod gap_first;
 mod gap_import;
 mod gap_pair;
@@ -22,6 +23,8 @@ mod positioning;
 mod preflight;
 mod probe_faults;
 mod recorded;
+#[path = "../replay/rewrite.rs"]
+mod rewrite;
 mod rotary_coverage;
 mod shadow;
 mod volumetric;
