@@ -79,6 +79,13 @@ fn five_places_of_one_head_leave_straightness_and_yaw_together_and_another_head_
 }
 
 #[test]
+fn a_plan_for_another_control_is_rehearsed_with_the_lag_that_its_own_loops_leave() {
+    let ended = preflight(&["launch_configs/linuxcnc_gap"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    assert!(ended.said.contains("scale.X"), "{}", ended.said);
+}
+
+#[test]
 fn a_question_that_cannot_be_answered_is_refused_with_its_place_and_value() {
     let grid_xy = "launch_configs/grid_xy";
     for (arguments, words) in [

@@ -55,10 +55,7 @@ impl Planned {
             Self {
                 programs: programs(&plan, what)?,
                 plan,
-                control: fake_cnc::Config {
-                    start_mm: start_mm(&machine),
-                    ..fake_cnc::Config::default()
-                },
+                control: control(&machine),
                 machine,
                 fit: GridEncoderConfig::default(),
                 what: String::new(),
@@ -139,10 +136,7 @@ fn of_scenario(folder: &Path, machine: Option<&Path>) -> Result<Planned> {
         plan,
         control: match find("fake_cnc") {
             Some(node) => self::setup(node)?.config()?,
-            None => fake_cnc::Config {
-                start_mm: start_mm(&machine),
-                ..fake_cnc::Config::default()
-            },
+            None => control(&machine),
         },
         machine,
         fit: match find("grid_encoder") {
@@ -151,6 +145,44 @@ fn of_scenario(folder: &Path, machine: Option<&Path>) -> Result<Planned> {
         },
         what: String::new(),
     })
+}
+
+/// The control of a machine whose scenario has none: it allows twice what the machine's own loops leave at rapid speed.
+fn control(machine: &MachineFile) -> fake_cnc::Config {
+    let usual = fake_cnc::Config::default();
+    let (mut mm, mut deg) = (
+        usual.following_error_limit_mm,
+        usual.following_error_limit_deg,
+    );
+    let lag = |feed_per_min: f64, feedforward: f64, gain_per_s: f64| {
+        2.0 * feed_per_min / 60.0 * (1.0 - feedforward) / gain_per_s
+    };
+    for entry in machine.axes.values() {
+        match entry {
+            AxisEntry::Linear(a) => {
+                let own = lag(
+                    a.feed_limit_mm_min,
+                    a.velocity_feedforward,
+                    a.position_gain_per_s,
+                );
+                mm = mm.max(own);
+            }
+            AxisEntry::Rotary(a) => {
+                let own = lag(
+                    a.feed_limit_deg_min,
+                    a.velocity_feedforward,
+                    a.position_gain_per_s,
+                );
+                deg = deg.max(own);
+            }
+        }
+    }
+    fake_cnc::Config {
+        start_mm: start_mm(machine),
+        following_error_limit_mm: mm,
+        following_error_limit_deg: deg,
+        ..usual
+    }
 }
 
 fn start_mm(machine: &MachineFile) -> BTreeMap<Axis, f64> {

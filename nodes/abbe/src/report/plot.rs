@@ -82,7 +82,7 @@ fn draw(plot: &Plot, text: &mut String) -> Result<(), Box<dyn std::error::Error>
     let mut chart = ChartBuilder::on(&root)
         .margin(8)
         .x_label_area_size(36)
-        .y_label_area_size(58)
+        .y_label_area_size(76)
         .build_cartesian_2d(x0..x1, y0..y1)?;
     chart
         .configure_mesh()
