@@ -202,7 +202,7 @@ fn cold_and_set_back(messages: &mut Vec<Copied>) {
 }
 
 /// Single readings of the grid encoder that are far off, and a while in which it stands.
-fn off_and_standing(messages: &mut Vec<Copied>) {
+fn off_and_standing(messages: &mut [Copied]) {
     let readings = messages.iter_mut();
     let mut readings: Vec<&mut Copied> = readings
         .filter(|message| is(message, &topics::GRID_POSITION))
@@ -243,7 +243,7 @@ fn what_is_broken_in_a_bag_is_counted_and_the_play_is_named_all_the_same() {
     said(&jumped, "1 times the clock jumped back");
     assert!(runs(&jumped) >= RUNS - 1);
 
-    let stood = recorded.with("off_and_standing", &off_and_standing);
+    let stood = recorded.with("off_and_standing", &|messages| off_and_standing(messages));
     said(&stood, "readings stood while the axes moved");
     assert!(
         outliers(&stood) > outliers(&whole) + 20,
