@@ -59,6 +59,8 @@ const TOUCH_MM: f64 = 3e-4;
 const FORM_MM: f64 = 2e-4;
 /// Part of it that is rough.
 const ROUGH: f64 = 0.5;
+/// Least time between two states, s.
+const LEAST_PERIOD_S: f64 = 1e-4;
 /// An axis that moved by less than this since the reading before stands, mm.
 const STANDS_MM: f64 = 1e-6;
 
@@ -101,16 +103,22 @@ pub(crate) struct Deviations {
     blocks: BTreeMap<Key, Block>,
     segment: Option<TestSegment>,
     commanded: PerAxis<f64>,
+    commanded_at: Stamp<Host>,
+    velocity_mm_s: Vector3<f64>,
     stands: bool,
 }
 
 impl Deviations {
     /// Takes a sample of the session.
-    pub(crate) fn take(&mut self, _: Stamp<Host>, sample: &Sample) {
+    pub(crate) fn take(&mut self, at: Stamp<Host>, sample: &Sample) {
         match sample {
             Sample::State(state) => {
                 let way = (state.commanded.xyz() - self.commanded.xyz()).norm();
                 self.stands = way < STANDS_MM;
+                let since_s = (state.received_at - self.commanded_at).as_secs_f64();
+                let moved = state.commanded.xyz() - self.commanded.xyz();
+                self.velocity_mm_s = moved / since_s.max(LEAST_PERIOD_S);
+                self.commanded_at = state.received_at;
                 self.commanded = state.commanded;
             }
             Sample::Segment(segment) => {
@@ -119,7 +127,9 @@ impl Deviations {
             }
             Sample::Grid(sample) => {
                 let axes = plane_axes(sample.plane);
-                let here_mm = self.commanded.xyz();
+                // A reading is compared with the command at its stamp, which may be late.
+                let late_s = (sample.at - at).as_secs_f64();
+                let here_mm = self.commanded.xyz() + self.velocity_mm_s * late_s;
                 let readings = [sample.u_mm, sample.v_mm].into_iter().zip(axes);
                 for (read_mm, direction) in readings {
                     self.push(

@@ -228,6 +228,25 @@ mod tests {
     }
 
     #[test]
+    fn late_stamps_have_a_size_that_grows_with_them() {
+        let mut random = stream(Arm::Catalogue, 2, 0);
+        let rig = Rig::draw(&mut random, false).unwrap();
+        let bare = deviations(&rig).unwrap();
+        let d = |late_ms: f64| {
+            let hidden = draw(&mut Pcg64Mcg::seed_from_u64(1), Class::ClockOffset, false);
+            let mut with = rig.clone();
+            hidden.sized(late_ms).hide(&mut with).unwrap();
+            let with = deviations(&with).unwrap();
+            with.d_against(&bare, &rig.scatter, 0.0)
+        };
+        let (small, large) = (d(0.05), d(0.1));
+        assert!(
+            small > 2.0 && (large / small - 2.0).abs() < 0.1,
+            "{small} {large}"
+        );
+    }
+
+    #[test]
     fn a_class_that_is_left_out_comes_as_often_as_every_other() {
         let mut random = stream(Arm::LeftOut, 1, 0);
         for (index, class) in (0..).zip(Class::ALL) {
