@@ -14,8 +14,11 @@
 //! a row i has besides, on its own,
 //!
 //! ```text
-//!   f_i ~ N(0, e_i^2),   e_i = |J b_(i+1) - J b_(i-1)| / 2   where above s        (3)
+//!   f_i ~ N(0, e_i^2),   e_i = |J b_(i+1) - J b_(i-1)| / 2 - 2 m   where above s        (3)
 //! ```
+//!
+//! with m the middle |J b_(i+1) - J b_i| of the block where 2 m itself is above s, else zero: targets that lie far apart
+//! have a slope between them, and no jump.
 //!
 //! with B and Lambda of `field`, w from station to station, and the root mean square of (2) over the block: a
 //! signature that is large is wrong by more. For touches B is one column for each feature, approach and feed.
@@ -123,9 +126,18 @@ impl FormError {
 
 /// (3) of the rows of a block.
 fn edges(told: &[f64], least_mm: f64) -> Vec<(usize, f64)> {
+    let mut steps: Vec<f64> = told.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    steps.sort_by(f64::total_cmp);
+    let middle_mm = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+    let slope_mm = if 2.0 * middle_mm > least_mm {
+        2.0 * middle_mm
+    } else {
+        0.0
+    };
     let jump = |row: usize| {
         let (before, after) = (row.saturating_sub(1), (row + 1).min(told.len() - 1));
-        (row, 0.5 * (told[after] - told[before]).abs())
+        let height_mm = 0.5 * (told[after] - told[before]).abs();
+        (row, height_mm - slope_mm)
     };
     let mut edges: Vec<(usize, f64)> = (0..told.len())
         .map(jump)
@@ -216,4 +228,31 @@ pub fn beside(columns: DMatrix<f64>, more: &[Vec<f64>]) -> DMatrix<f64> {
         all.column_mut(first + k).copy_from_slice(column);
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eq3_a_slope_between_distant_targets_is_no_jump_and_a_step_is_one() {
+        // Nine targets to and nine fro, 1.1 um apart: the known lead error of a screw.
+        let slope: Vec<f64> = (0..18)
+            .map(|k: usize| 1.1e-3 * count(k.min(17 - k)))
+            .collect();
+        assert_eq!(edges(&slope, 2e-4), vec![]);
+        let step: Vec<f64> = (0..200)
+            .map(|k| 1e-5 * count(k) + if k < 90 { 0.0 } else { 4e-3 })
+            .collect();
+        let found = edges(&step, 2e-4);
+        let mut rows: Vec<usize> = found.iter().map(|(row, _)| *row).collect();
+        rows.sort_unstable();
+        assert_eq!(rows, vec![89, 90]);
+        let wanted_mm = 0.5 * (4e-3 + 2e-5);
+        assert!(
+            found
+                .iter()
+                .all(|(_, height)| (height - wanted_mm).abs() < 1e-9)
+        );
+    }
 }

@@ -38,7 +38,9 @@ impl SessionBuilder {
             return self.run_of_touches(&open);
         }
         let times = times_s(&open.ticks);
-        let motion = of(&open.ticks, times, self.axes)?;
+        let mut motion = of(&open.ticks, times, self.axes)?;
+        let touches = self.touches(&open, &motion);
+        as_approached(&touches, &mut motion);
         let selection = Selection::of(&open.segment, &motion, open.lead_in, self.config.settle_s);
         let block = self.block_of(&open.segment, selection.len());
         let scope = Scope {
@@ -52,7 +54,6 @@ impl SessionBuilder {
             *readings = selection.apply(readings, block);
         }
         take_zero(&mut self.zeros, &open, &mut series);
-        let touches = self.touches(&open, &motion);
         let mut marks = vec![false; motion.len()];
         wanted(&motion, &mut marks);
         let places = series.iter().flat_map(|(_, readings)| readings);
@@ -180,6 +181,23 @@ fn assemble(
     })
 }
 
+/// Ticks before the one nearest to a latch at which second differences, which reach two ticks further, end before it.
+const BEFORE_LATCH: usize = 3;
+
+/// Gives the tick of each touch the speed and acceleration of the approach. Differences about the tick would mix
+/// them with the stop behind it, while the ball had met its surface before the axes began to slow down.
+fn as_approached(touches: &[(Touch, f64)], motion: &mut Motion) {
+    for tick in touches.iter().filter_map(|(touch, _)| touch.tick) {
+        let Some(before) = tick.checked_sub(BEFORE_LATCH) else {
+            continue;
+        };
+        for axis in motion.axes.iter() {
+            motion.velocity[axis][tick] = motion.velocity[axis][before];
+            motion.acceleration[axis][tick] = motion.acceleration[axis][before];
+        }
+    }
+}
+
 /// Tick nearest to a touch, by the controller's clock.
 fn nearest(open: &Record, trigger: &ProbeTrigger) -> Option<usize> {
     let at = trigger.controller_at;
@@ -232,4 +250,37 @@ fn alike(a: &TestSegment, b: &TestSegment) -> bool {
         && a.features == b.features
         && (a.radius_mm - b.radius_mm).abs() < 1e-9
         && (a.feed_mm_s - b.feed_mm_s).abs() < 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use metrology::{Axis, AxisSet};
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    #[test]
+    fn a_touch_has_the_acceleration_of_its_approach_and_not_that_of_the_stop_behind_it() {
+        let period_s = 0.008;
+        let times: Vec<f64> = (0..40).map(|k| period_s * f64::from(k)).collect();
+        // 8 mm/s until the latch at tick 25, standing one tick later.
+        let mut position = PerAxis::<Vec<f64>>::default();
+        position[Axis::X] = times.iter().map(|t| 8.0 * t.min(25.5 * period_s)).collect();
+        let axes = AxisSet::EMPTY.with(Axis::X);
+        let mut motion = Motion::new(times, axes, position).expect("a motion");
+        assert!(motion.acceleration[Axis::X][25] < -100.0);
+        let touch = Touch {
+            time_s: 25.0 * period_s,
+            feature_id: String::new(),
+            approach: Vector3::x(),
+            feed_mm_s: 8.0,
+            position: PerAxis::default(),
+            tick: Some(25),
+        };
+        as_approached(&[(touch, 0.0)], &mut motion);
+        assert!(motion.acceleration[Axis::X][25].abs() < 1e-9);
+        assert!((motion.velocity[Axis::X][25] - 8.0).abs() < 1e-9);
+        // The stop itself stays what it was.
+        assert!(motion.acceleration[Axis::X][26] < -100.0);
+    }
 }
