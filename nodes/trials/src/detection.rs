@@ -7,7 +7,7 @@
 //!   D95 = exp((ln 19 - a) / b)                                            (2)
 //! ```
 //!
-//! with a and b of greatest likelihood, b held towards [`SLOPE`] by a normal prior as wide as itself, so that trials
+//! with a and b of greatest likelihood, b held towards `SLOPE` by a normal prior as wide as itself, so that trials
 //! that separate cleanly have an answer too.
 //!
 //! # Holds when
