@@ -22,7 +22,8 @@
 //! taken out or not. One plate was used for all recordings.
 //!
 //! # Agreement
-//! `val_a_plate_that_is_too_long_is_held_by_the_interval`: an estimate from the readings of a stretched plate moves by what (2) says, to 1e-9.
+//! `val_a_plate_that_is_too_long_is_held_by_the_interval`: an estimate from the readings of a stretched plate moves by what (2) says, within 1e-6 mm.
+//! `intervals_hold_the_truth_for_plates_of_the_certificate`: 95.3 % of 5,100, 86.9 % without (3).
 //!
 //! # References
 //! \[1\] JCGM 100:2008 (GUM), 5.2.2 and F.1.2.3: what several quantities have in common correlates them.
