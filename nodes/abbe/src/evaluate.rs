@@ -14,6 +14,7 @@ use recorder::{Bag, Event, Loss, Order};
 
 pub mod budget;
 pub mod circles;
+pub mod limits;
 pub mod linear;
 pub mod stationwise;
 pub mod stops;

@@ -10,6 +10,7 @@ use recorder::{Bag, Loss};
 
 use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
+use crate::evaluate::limits::Limits;
 use crate::report::section::Section;
 use crate::report::{self, Report};
 
@@ -21,6 +22,9 @@ pub struct ReportBag {
     /// What is not known about the measurements; without it no uncertainty is stated.
     #[arg(long)]
     budget: Option<PathBuf>,
+    /// Limits of figures, which are then judged by ISO 14253-1; an example stands in launch_configs/README.md.
+    #[arg(long, requires = "budget")]
+    limits: Option<PathBuf>,
     /// Folder to write `report.html` and `report.json` into; without it the terminal alone.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -39,6 +43,7 @@ impl ReportBag {
     /// When bag or budget cannot be read, or the page not written.
     pub fn execute(self) -> Result<ExitCode> {
         let budget = self.budget.as_deref().map(read_budget).transpose()?;
+        let limits = self.limits.as_deref().map(read_limits).transpose()?;
         eprintln!("Evaluating the tests of {}", self.bag.display());
         let bag = Bag::open(&self.bag)?;
         let tests = Tests::of(&bag).with_context(|| format!("bag {}", self.bag.display()))?;
@@ -46,7 +51,7 @@ impl ReportBag {
             eprintln!("abbe: {loss}");
         }
         let title = format!("Tests in {}", self.bag.display());
-        let report = page(&title, &tests, budget.as_ref())?;
+        let report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;
         if self.json {
             println!("{}", serde_json::to_string_pretty(&report.figures)?);
         } else {
@@ -70,12 +75,28 @@ fn read_budget(path: &Path) -> Result<Budget> {
     Budget::read(&text, path)
 }
 
+fn read_limits(path: &Path) -> Result<Limits> {
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("limits file {}", path.display()))?;
+    Limits::read(&text, path)
+}
+
 /// The page of everything that `tests` hold.
 ///
 /// # Errors
 /// When a plot cannot be drawn.
 pub fn page(title: &str, tests: &Tests, budget: Option<&Budget>) -> Result<Report> {
-    let sections = sections(tests, budget)?;
+    judged_page(title, tests, budget, None)
+}
+
+/// The same with the figures judged by their limits.
+fn judged_page(
+    title: &str,
+    tests: &Tests,
+    budget: Option<&Budget>,
+    limits: Option<&Limits>,
+) -> Result<Report> {
+    let mut sections = sections(tests, budget)?;
     let mut lines = losses_in_words(&tests.losses);
     if sections.is_empty() {
         lines.push("The bag holds no test that can be evaluated.".to_owned());
@@ -88,6 +109,9 @@ pub fn page(title: &str, tests: &Tests, budget: Option<&Budget>) -> Result<Repor
     if budget.is_none() {
         figures.iter_mut().for_each(unstate);
     }
+    let judged = limits.map(|limits| limits.section(&figures)).transpose()?;
+    let conformance = judged.as_ref().map(|section| section.figures.clone());
+    sections.extend(judged);
     Ok(Report {
         title: title.to_owned(),
         text: sections
@@ -105,6 +129,7 @@ pub fn page(title: &str, tests: &Tests, budget: Option<&Budget>) -> Result<Repor
             "loss": losses(&tests.losses),
             "uncertainty": uncertainty(budget.is_some()),
             "tests": figures,
+            "conformance": conformance,
         }),
         lines,
     })
