@@ -22,6 +22,7 @@ mod geometry;
 mod interface;
 mod motion;
 mod qos;
+mod report;
 mod segment;
 mod sensor;
 mod service_event;

@@ -8,8 +8,8 @@ use crate::action::{RunCycle, RunProgram};
 use crate::diagnostic_msgs::msg::DiagnosticArray;
 use crate::msg::{
     AxisCompensation, AxisState, BlockMeasurement, GapReport, GeometryModel, GridSample,
-    LengthSample, PlanStatus, PositioningTable, ProbeLatency, ProbeTrigger, ProbedFeature,
-    ProbedPoint, TestSegment, ThermalModel, ThermalUpdateRequest,
+    LengthSample, MachineValue, PlanStatus, PositioningTable, ProbeLatency, ProbeTrigger,
+    ProbedFeature, ProbedPoint, TestSegment, ThermalModel, ThermalUpdateRequest,
 };
 use crate::qos::{Durability, Qos, Reliability};
 use crate::rcl_interfaces::msg::{Log, ParameterEvent};
@@ -161,7 +161,7 @@ macro_rules! topics {
         /// Every topic, then every family, in the order of this file.
         #[must_use]
         pub const fn all() -> &'static [Entry] {
-            const { &[$($name.entry(),)* TEMPERATURE.entry()] }
+            const { &[$($name.entry(),)* TEMPERATURE.entry(), MACHINE.entry()] }
         }
     };
 }
@@ -238,6 +238,14 @@ const PARAMETER_EVENTS_QOS: Qos = Qos {
 pub const TEMPERATURE: TopicFamily<Temperature> = TopicFamily {
     base: "temperature/",
     qos: Qos::SENSOR_DATA,
+    origin: Origin::Raw,
+    message: PhantomData,
+};
+
+/// What a machine reports of itself, one topic per value.
+pub const MACHINE: TopicFamily<MachineValue> = TopicFamily {
+    base: "machine/",
+    qos: Qos::RELIABLE_DEEP,
     origin: Origin::Raw,
     message: PhantomData,
 };

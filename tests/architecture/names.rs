@@ -35,7 +35,7 @@ fn metres(path: &str, source: &Source) -> Vec<String> {
 #[test]
 fn arch_metres_exist_only_on_the_wire() {
     let mut found = Vec::new();
-    for name in PURE.iter().chain(&["linuxcnc_bridge"]) {
+    for name in PURE.iter().chain(&["linuxcnc_bridge", "mtconnect_bridge"]) {
         let sources = sources(&format!("nodes/{name}/src"));
         found.extend(
             sources

@@ -19,6 +19,7 @@ mod gap_report;
 mod gap_wear;
 mod grid_truth;
 mod grid_xy;
+mod mtconnect_log;
 mod positioning;
 mod preflight;
 mod probe_faults;

@@ -20,7 +20,12 @@ use crate::node;
 const DONE_WITH_LOSS: u8 = 3;
 
 /// Nodes whose messages are what a replay puts in.
-const SOURCES: [&str; 3] = ["fake_cnc", "linuxcnc_bridge", "sequencer"];
+const SOURCES: [&str; 4] = [
+    "fake_cnc",
+    "linuxcnc_bridge",
+    "mtconnect_bridge",
+    "sequencer",
+];
 
 /// Arguments of `abbe check`.
 #[derive(Args)]

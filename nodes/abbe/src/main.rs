@@ -16,6 +16,7 @@ mod evaluate;
 mod evidence;
 mod export;
 mod import;
+mod import_map;
 mod install_ros;
 mod launch;
 mod node;
@@ -58,6 +59,8 @@ enum Verb {
     Play(play::Play),
     /// Make a bag of a table that a laser, a ballbar or a logger wrote.
     Import(import::Import),
+    /// Propose a mapping for mtconnect_bridge from an agent's `probe`.
+    ImportMap(import_map::ImportMap),
     /// Make compensation tables for a control from what a bag knows.
     Export(export::Export),
     /// Run one node on the ROS graph, with the arguments of any ROS 2 node.
@@ -77,6 +80,7 @@ fn main() -> ExitCode {
         Verb::Record(record) => record.execute(),
         Verb::Play(play) => play.execute(),
         Verb::Import(import) => import.execute(),
+        Verb::ImportMap(import) => import.execute(),
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => return node.execute(),
         Verb::InstallRos(install) => install.execute(),

@@ -19,6 +19,7 @@ pub const NODES: &[(&str, Builder)] = &[
     ("grid_encoder", grid_encoder_node::node),
     ("latency_calibrator", latency_calibrator_node::node),
     ("linuxcnc_bridge", linuxcnc_bridge_node::node),
+    ("mtconnect_bridge", mtconnect_bridge_node::node),
     ("probe", probe_node::node),
     ("recorder", recorder_node::node),
     ("replayer", replayer_node::node),

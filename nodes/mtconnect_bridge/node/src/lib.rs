@@ -1,0 +1,53 @@
+//! ROS shell of mtconnect_bridge.
+
+use abbe_msgs::topics;
+use anyhow::{Context, Result};
+use metrology::sample::Quantity;
+use metrology::stamp::Span;
+use mtconnect_bridge::live::{LiveBridge, LiveInput};
+use mtconnect_bridge::mapping::{MapFile, Use};
+use mtconnect_bridge::{BridgeConfig, Output, PARAMETERS, Settings};
+use node_runtime::{Node, Setup, Wiring};
+
+mod forms;
+
+/// Time between two looks at what has come from the machine; every look takes all that came since the last.
+const TICK: Span = Span::from_nanos(10_000_000);
+
+/// Builds the node; it looks for the machine at its first tick.
+///
+/// # Errors
+/// When a parameter or the mapping is wrong.
+pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
+    let config: BridgeConfig = setup.config()?;
+    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let (path, text) = setup.file_text("map_file")?;
+    let map = MapFile::from_yaml(&text).with_context(|| path.display().to_string())?;
+    let settings = Settings::new(&config, &map).with_context(|| path.display().to_string())?;
+    let bridge = LiveBridge::open(&settings)?;
+    let mut wiring = Wiring::new(setup.name(), parameters, bridge)
+        .every(TICK, || LiveInput::Tick)
+        .publish(&topics::AXES_STATE, forms::state)
+        .publish_message(&topics::JOINT_STATES, forms::joints)
+        .diagnose(forms::condition)
+        .shutdown(
+            || LiveInput::Shutdown,
+            |output| matches!(output, Output::Stopped),
+        );
+    for (_, used) in settings.mapping.uses() {
+        let (Use::Number { name, quantity, .. } | Use::Text { name, quantity, .. }) = used else {
+            continue;
+        };
+        let id = name.clone();
+        wiring = wiring.publish_member(&topics::MACHINE, name, move |output| {
+            forms::value(output, &id)
+        })?;
+        if *quantity == Quantity::Temperature {
+            let id = name.clone();
+            wiring = wiring.publish_member(&topics::TEMPERATURE, name, move |output| {
+                forms::temperature(output, &id)
+            })?;
+        }
+    }
+    Ok(wiring.node())
+}

@@ -1,0 +1,135 @@
+//! Questions to an agent, in HTTP 1.1 without encryption, as agents speak it.
+
+use std::time::Duration;
+
+use http_body_util::{BodyExt, Empty, Limited};
+use hyper::body::{Bytes, Incoming};
+use hyper::client::conn::http1;
+use hyper::{Request, Response};
+use hyper_util::rt::TokioIo;
+use tokio::net::TcpStream;
+use tokio::time::timeout;
+
+use crate::error::BridgeError;
+use crate::multipart::PART_LIMIT;
+
+/// A whole answer must be there after this time; the stage has a limit of its own.
+const ANSWER_LIMIT: Duration = Duration::from_secs(60);
+/// The head of an answer must be there after this time.
+const HEAD_LIMIT: Duration = Duration::from_secs(10);
+
+/// An answer that does not end.
+pub struct Stream {
+    /// HTTP status.
+    pub status: u16,
+    /// Value of `Content-Type`; empty: none.
+    pub content_type: String,
+    body: Incoming,
+}
+
+impl Stream {
+    /// The next bytes; `None` at the end.
+    pub async fn next(&mut self) -> Option<Result<Vec<u8>, String>> {
+        loop {
+            match self.body.frame().await? {
+                Ok(frame) => {
+                    // Trailers are of no use here.
+                    if let Ok(bytes) = frame.into_data() {
+                        return Some(Ok(bytes.to_vec()));
+                    }
+                }
+                Err(error) => return Some(Err(error.to_string())),
+            }
+        }
+    }
+}
+
+async fn ask(address: &str, path: &str) -> Result<Response<Incoming>, String> {
+    let socket = TcpStream::connect(address).await;
+    let socket = TokioIo::new(socket.map_err(|error| error.to_string())?);
+    let (mut sender, connection) = http1::handshake(socket)
+        .await
+        .map_err(|error| error.to_string())?;
+    // It ends with the answer's body; what it has to say is told by the body as well.
+    tokio::spawn(async move {
+        let _ = connection.await;
+    });
+    let request = Request::get(path)
+        .header("Host", address)
+        .header("Accept", "text/xml, multipart/x-mixed-replace")
+        .body(Empty::<Bytes>::new())
+        .map_err(|error| error.to_string())?;
+    sender
+        .send_request(request)
+        .await
+        .map_err(|error| error.to_string())
+}
+
+/// Asks for a whole answer: status and body.
+///
+/// # Errors
+/// In words: nobody listens, no answer in time, an answer over the limit.
+pub async fn get(address: &str, path: &str) -> Result<(u16, Vec<u8>), String> {
+    let whole = async {
+        let answer = ask(address, path).await?;
+        let status = answer.status().as_u16();
+        let body = Limited::new(answer.into_body(), PART_LIMIT).collect().await;
+        let body = body.map_err(|error| error.to_string())?;
+        Ok((status, body.to_bytes().to_vec()))
+    };
+    let answer = timeout(ANSWER_LIMIT, whole).await;
+    answer.unwrap_or_else(|_| Err("no answer in time".to_owned()))
+}
+
+/// Asks for an answer that does not end.
+///
+/// # Errors
+/// As [`get`].
+pub async fn stream(address: &str, path: &str) -> Result<Stream, String> {
+    let answer = timeout(HEAD_LIMIT, ask(address, path)).await;
+    let answer = answer.unwrap_or_else(|_| Err("no answer in time".to_owned()))?;
+    let content_type = answer.headers().get("content-type");
+    let content_type = content_type.and_then(|value| value.to_str().ok());
+    Ok(Stream {
+        status: answer.status().as_u16(),
+        content_type: content_type.unwrap_or_default().to_owned(),
+        body: answer.into_body(),
+    })
+}
+
+/// The body of an answer to `http://host:port/path`, for a program that has no event loop.
+///
+/// # Errors
+/// When the address is none, nobody answers, or the system has no event loop left.
+pub fn fetch(url: &str) -> Result<Vec<u8>, BridgeError> {
+    let failed = |reason: String| BridgeError::Ask {
+        url: url.to_owned(),
+        reason,
+    };
+    let plain = url.strip_prefix("http://");
+    let plain = plain.ok_or_else(|| failed("must begin with http://".to_owned()))?;
+    let (host, path) = plain.split_once('/').unwrap_or((plain, ""));
+    let address = if host.contains(':') {
+        host.to_owned()
+    } else {
+        format!("{host}:80")
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|source| BridgeError::Io {
+            action: "starting the event loop",
+            source,
+        })?;
+    let (status, body) = runtime
+        .block_on(get(&address, &format!("/{path}")))
+        .map_err(failed)?;
+    if status == 200 {
+        Ok(body)
+    } else {
+        Err(BridgeError::Ask {
+            url: url.to_owned(),
+            reason: format!("HTTP status {status}"),
+        })
+    }
+}

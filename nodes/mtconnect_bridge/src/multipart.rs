@@ -1,0 +1,193 @@
+//! The parts of an answer that does not end (`multipart/x-mixed-replace`).
+//!
+//! ```text
+//!   --boundary CRLF  headers CRLF  CRLF  document CRLF   again and again
+//! ```
+//!
+//! A part is as long as its `Content-length` says, or reaches to the next boundary where it does not say it.
+//!
+//! # References
+//! \[1\] RFC 2046, 5.1.1.
+
+/// A part over this length is refused, bytes.
+pub const PART_LIMIT: usize = 16 << 20;
+/// A header over this length is none, bytes.
+const HEADER_LIMIT: usize = 4096;
+
+/// Why the parts cannot be read on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PartFlaw {
+    /// A part is too long.
+    #[error("a part of {length} bytes, limit {PART_LIMIT}")]
+    TooLong {
+        /// Its length, or what has come of it.
+        length: usize,
+    },
+    /// No boundary where one must be.
+    #[error("no boundary within {HEADER_LIMIT} bytes")]
+    NoBoundary,
+}
+
+/// The boundary in a `Content-Type`, where it is multipart.
+#[must_use]
+pub fn boundary(content_type: &str) -> Option<&str> {
+    let mut parts = content_type.split(';').map(str::trim);
+    let kind = parts.next()?.to_ascii_lowercase();
+    if !kind.starts_with("multipart/") {
+        return None;
+    }
+    let named = parts.find_map(|part| {
+        let (name, value) = part.split_once('=')?;
+        name.trim()
+            .eq_ignore_ascii_case("boundary")
+            .then_some(value.trim())
+    })?;
+    let plain = named.trim_matches('"');
+    (!plain.is_empty()).then_some(plain)
+}
+
+/// Cuts an answer into its parts.
+#[derive(Clone, Debug)]
+pub struct Parts {
+    mark: Vec<u8>,
+    bytes: Vec<u8>,
+}
+
+fn find(bytes: &[u8], wanted: &[u8]) -> Option<usize> {
+    bytes
+        .windows(wanted.len())
+        .position(|window| window == wanted)
+}
+
+impl Parts {
+    /// For parts between `boundary`.
+    #[must_use]
+    pub fn new(boundary: &str) -> Self {
+        Self {
+            mark: format!("--{boundary}").into_bytes(),
+            bytes: Vec::new(),
+        }
+    }
+
+    /// Takes bytes and hands over every part that is whole by them.
+    ///
+    /// # Errors
+    /// When what comes is no sequence of parts; the connection is then of no more use.
+    pub fn receive(&mut self, bytes: &[u8], mut take: impl FnMut(&[u8])) -> Result<(), PartFlaw> {
+        self.bytes.extend_from_slice(bytes);
+        while let Some(used) = self.next(&mut take)? {
+            self.bytes.drain(..used);
+        }
+        Ok(())
+    }
+
+    /// Hands over the first part where it is whole, and says how many bytes it took.
+    fn next(&self, take: &mut impl FnMut(&[u8])) -> Result<Option<usize>, PartFlaw> {
+        let Some(mark_at) = find(&self.bytes, &self.mark) else {
+            let is_lost = self.bytes.len() > HEADER_LIMIT;
+            return if is_lost {
+                Err(PartFlaw::NoBoundary)
+            } else {
+                Ok(None)
+            };
+        };
+        let header_at = mark_at + self.mark.len();
+        let behind = &self.bytes[header_at..];
+        let Some(header_length) = find(behind, b"\r\n\r\n") else {
+            let is_lost = behind.len() > HEADER_LIMIT;
+            return if is_lost {
+                Err(PartFlaw::NoBoundary)
+            } else {
+                Ok(None)
+            };
+        };
+        let body = &behind[header_length + 4..];
+        let told = content_length(&behind[..header_length]);
+        let length = told.or_else(|| find(body, &self.mark));
+        if let Some(length) = length.filter(|length| *length > PART_LIMIT) {
+            return Err(PartFlaw::TooLong { length });
+        }
+        match length.and_then(|length| body.get(..length)) {
+            Some(part) => {
+                take(part);
+                Ok(Some(header_at + header_length + 4 + part.len()))
+            }
+            None if body.len() > PART_LIMIT => Err(PartFlaw::TooLong { length: body.len() }),
+            None => Ok(None),
+        }
+    }
+}
+
+fn content_length(headers: &[u8]) -> Option<usize> {
+    let headers = std::str::from_utf8(headers).ok()?;
+    headers.lines().find_map(|line| {
+        let (name, value) = line.split_once(':')?;
+        let is_length = name.trim().eq_ignore_ascii_case("content-length");
+        is_length.then(|| value.trim().parse().ok()).flatten()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const ANSWER: &[u8] = b"\r\n--b7\r\nContent-type: text/xml\r\nContent-length: 6\r\n\r\n<a>\r\n\r\r\n--b7\r\nContent-type: text/xml\r\n\r\n<b/>\r\n--b7\r\nContent-length: 4\r\n\r\n<c/>";
+
+    fn parts(chunks: &[&[u8]]) -> Vec<String> {
+        let mut parts = Parts::new("b7");
+        let mut found = Vec::new();
+        for chunk in chunks {
+            let take = |part: &[u8]| found.push(String::from_utf8(part.to_vec()).unwrap());
+            parts.receive(chunk, take).unwrap();
+        }
+        found
+    }
+
+    #[test]
+    fn parts_are_as_long_as_they_say_or_reach_to_the_next_boundary() {
+        assert_eq!(parts(&[ANSWER]), ["<a>\r\n\r", "<b/>\r\n", "<c/>"]);
+    }
+
+    #[test]
+    fn the_boundary_may_be_quoted_and_only_multipart_has_one() {
+        let kind = "multipart/x-mixed-replace;boundary=b7";
+        assert_eq!(boundary(kind), Some("b7"));
+        let kind = "Multipart/X-Mixed-Replace; charset=x; Boundary=\"b 7\"";
+        assert_eq!(boundary(kind), Some("b 7"));
+        assert_eq!(boundary("text/xml;boundary=b7"), None);
+        assert_eq!(boundary("multipart/mixed"), None);
+    }
+
+    #[test]
+    fn a_part_without_end_and_a_stream_without_boundary_are_refused() {
+        let mut stream = Parts::new("b7");
+        let head = format!("--b7\r\nContent-length: {}\r\n\r\n", PART_LIMIT + 1);
+        let refused = stream.receive(head.as_bytes(), |_| {});
+        assert_eq!(
+            refused,
+            Err(PartFlaw::TooLong {
+                length: PART_LIMIT + 1
+            })
+        );
+        let mut stream = Parts::new("b7");
+        assert_eq!(
+            stream.receive(&[b'x'; 5000], |_| {}),
+            Err(PartFlaw::NoBoundary)
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn prop_cuts_in_the_stream_change_no_part(cut in 0..ANSWER.len()) {
+            let (front, back) = ANSWER.split_at(cut);
+            prop_assert_eq!(parts(&[front, back]), parts(&[ANSWER]));
+        }
+
+        #[test]
+        fn prop_no_bytes_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
+            let mut stream = Parts::new("-");
+            let _ = stream.receive(&bytes, |_| {});
+        }
+    }
+}
