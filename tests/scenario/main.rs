@@ -23,6 +23,7 @@ mod mtconnect_log;
 mod positioning;
 mod preflight;
 mod probe_faults;
+mod real_shift;
 mod recorded;
 #[path = "../replay/rewrite.rs"]
 mod rewrite;

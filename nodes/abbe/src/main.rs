@@ -17,6 +17,7 @@ mod evidence;
 mod export;
 mod import;
 mod import_map;
+mod import_shift;
 mod install_ros;
 mod launch;
 mod node;
@@ -61,6 +62,8 @@ enum Verb {
     Import(import::Import),
     /// Propose a mapping for mtconnect_bridge from an agent's `probe`.
     ImportMap(import_map::ImportMap),
+    /// Make part programs that load a machine as a logged shift loaded another.
+    ImportShift(import_shift::ImportShift),
     /// Make compensation tables for a control from what a bag knows.
     Export(export::Export),
     /// Run one node on the ROS graph, with the arguments of any ROS 2 node.
@@ -81,6 +84,7 @@ fn main() -> ExitCode {
         Verb::Play(play) => play.execute(),
         Verb::Import(import) => import.execute(),
         Verb::ImportMap(import) => import.execute(),
+        Verb::ImportShift(import) => import.execute(),
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => return node.execute(),
         Verb::InstallRos(install) => install.execute(),

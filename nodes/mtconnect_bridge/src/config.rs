@@ -14,9 +14,14 @@ pub struct BridgeConfig {
     /// Who speaks.
     pub source: Source,
     /// Where the adapter or agent listens.
+    #[serde(default = "BridgeConfig::default_host")]
     pub host: String,
     /// Its TCP port.
+    #[serde(default = "BridgeConfig::default_port")]
     pub port: u16,
+    /// Lines of an adapter that were logged, relative to the parameter file; for the source `log` alone.
+    #[serde(default)]
+    pub log_file: Option<String>,
     /// What each key is, relative to the parameter file.
     pub map_file: String,
     /// Times and limits of the connection.
@@ -35,6 +40,18 @@ pub enum Source {
     Shdr,
     /// An agent, in XML over HTTP.
     Agent,
+    /// A file of an adapter's lines, each told when the host's clock reaches its stamp.
+    Log,
+}
+
+impl BridgeConfig {
+    fn default_host() -> String {
+        "127.0.0.1".to_owned()
+    }
+
+    const fn default_port() -> u16 {
+        7878
+    }
 }
 
 /// Times and limits of the connection.
@@ -166,6 +183,9 @@ impl Settings {
         checked("agent.heartbeat_ms", f64::from(config.agent.heartbeat_ms))?;
         checked("agent.count", f64::from(config.agent.count))?;
         checked("port", f64::from(config.port))?;
+        if (config.source == Source::Log) != config.log_file.is_some() {
+            return Err(BridgeError::LogFile);
+        }
         word("host", &config.host)?;
         word("agent.device", &config.agent.device)?;
         Ok(Self {

@@ -25,6 +25,9 @@ pub enum BridgeError {
         /// What was read.
         value: String,
     },
+    /// A log without the source, or the source without a log.
+    #[error("log_file: belongs to source = log, and to no other")]
+    LogFile,
     /// The mapping file is none.
     #[error("mapping: {0}")]
     MapFile(serde_saphyr::Error),
@@ -91,5 +94,23 @@ pub enum BridgeError {
         url: String,
         /// Why.
         reason: String,
+    },
+    /// The mapping has no such spindle.
+    #[error("the mapping has no spindle speed {name:?}")]
+    NoSpindle {
+        /// Its name.
+        name: String,
+    },
+    /// A part of a shift is too fast for the other machine.
+    #[error(
+        "at {at_s} s: feed {feed_mm_min:.0} mm/min, limit {limit_mm_min:.0} mm/min: take longer bins"
+    )]
+    FeedTooHigh {
+        /// Time from the shift's begin, s.
+        at_s: f64,
+        /// The feed.
+        feed_mm_min: f64,
+        /// The limit.
+        limit_mm_min: f64,
     },
 }

@@ -29,7 +29,7 @@ const EVENTS_PER_TICK: usize = 256;
 #[derive(Debug)]
 pub struct LiveBridge {
     stage: BridgeStage,
-    io: BridgeIo,
+    io: Option<BridgeIo>,
     said: Vec<Output>,
 }
 
@@ -41,9 +41,19 @@ impl LiveBridge {
     pub fn open(settings: &Settings) -> Result<Self, BridgeError> {
         Ok(Self {
             stage: BridgeStage::new(settings),
-            io: BridgeIo::start(settings.address.clone())?,
+            io: Some(BridgeIo::start(settings.address.clone())?),
             said: Vec::new(),
         })
+    }
+
+    /// Tells a log; nothing is opened.
+    #[must_use]
+    pub fn of_log(settings: &Settings, text: &str) -> Self {
+        Self {
+            stage: BridgeStage::of_log(settings, text),
+            io: None,
+            said: Vec::new(),
+        }
     }
 
     fn pass(
@@ -55,7 +65,11 @@ impl LiveBridge {
         self.stage.step(at, input, &mut self.said)?;
         for output in self.said.drain(..) {
             match output {
-                Output::Io(command) => self.io.command(command),
+                Output::Io(command) => {
+                    if let Some(io) = &self.io {
+                        io.command(command);
+                    }
+                }
                 other => out.push(other),
             }
         }
@@ -78,7 +92,7 @@ impl Stage for LiveBridge {
             return self.pass(at, Input::Shutdown, out);
         }
         for _ in 0..EVENTS_PER_TICK {
-            let Some((came_at, event)) = self.io.event() else {
+            let Some((came_at, event)) = self.io.as_ref().and_then(BridgeIo::event) else {
                 break;
             };
             self.pass(came_at, Input::Io(event), out)?;

@@ -350,6 +350,13 @@ impl Mapping {
         self.uses.iter().map(|(key, used)| (key.as_str(), used))
     }
 
+    /// Whether an axis is told.
+    #[must_use]
+    pub fn has_axes(&self) -> bool {
+        let is_position = |used: &Use| matches!(used, Use::Position { .. });
+        self.uses.values().any(is_position)
+    }
+
     /// The axes of which no commanded position is told.
     #[must_use]
     pub fn uncommanded(&self) -> AxisSet {

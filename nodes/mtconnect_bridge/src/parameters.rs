@@ -29,7 +29,7 @@ const fn number(
 pub const PARAMETERS: &[ParameterDoc] = &[
     text(
         "source",
-        "shdr: an adapter, in lines over TCP; agent: an agent, in XML over HTTP.",
+        "shdr: an adapter, in lines over TCP; agent: an agent, in XML over HTTP; log: a file of an adapter's lines, each told when the clock reaches its stamp.",
     ),
     text("host", "Where the adapter or agent listens."),
     number(
@@ -37,6 +37,10 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "",
         "TCP port of the adapter (often 7878) or agent (often 5000).",
         (1.0, 65535.0),
+    ),
+    text(
+        "log_file",
+        "Lines of an adapter that were logged, relative to the parameter file; for the source log alone.",
     ),
     text(
         "map_file",

@@ -10,6 +10,7 @@ use crate::agent::{AgentLink, Heard};
 use crate::condition::{Condition, Lost};
 use crate::config::{Settings, Source};
 use crate::framing::{Framed, Lines};
+use crate::logged::Log;
 use crate::shdr::{self, Line, Shape};
 use crate::values::Values;
 
@@ -115,6 +116,7 @@ struct ShdrLink {
 enum Link {
     Shdr(ShdrLink),
     Agent(AgentLink),
+    Log(Log),
 }
 
 /// The bridge.
@@ -141,6 +143,7 @@ impl BridgeStage {
                 heartbeat: None,
                 pinged_at: None,
             }),
+            Source::Log => Link::Log(Log::default()),
             Source::Agent => Link::Agent(AgentLink::new(&settings.agent, &settings.mapping)),
         };
         Self {
@@ -156,17 +159,39 @@ impl BridgeStage {
         }
     }
 
+    /// A bridge that tells the lines of a log when their time has come.
+    #[must_use]
+    pub fn of_log(settings: &Settings, text: &str) -> Self {
+        Self {
+            link: Link::Log(Log::new(text)),
+            ..Self::new(settings)
+        }
+    }
+
     fn tick(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
         self.greet(out);
+        if let Link::Log(log) = &mut self.link {
+            let (values, refused) = (&mut self.values, &mut self.refused_lines);
+            log.due(at, |line| {
+                let flaw = take(line, at, values, &mut None, out);
+                out.extend(flaw.map(|flaw| {
+                    *refused += 1;
+                    let count = *refused;
+                    Output::Condition(Condition::Malformed { flaw, count })
+                }));
+            });
+            return self.values.wait(at, out);
+        }
         self.values.wait(at, out);
         match self.phase {
             Phase::Waiting { until } if until.is_none_or(|until| at >= until) => {
                 self.phase = Phase::Asking { since: at };
                 self.heard_at = at;
-                out.push(Output::Io(match &mut self.link {
-                    Link::Shdr(_) => IoCommand::Connect,
-                    Link::Agent(agent) => agent.begin(),
-                }));
+                out.extend(match &mut self.link {
+                    Link::Shdr(_) => Some(Output::Io(IoCommand::Connect)),
+                    Link::Agent(agent) => Some(Output::Io(agent.begin())),
+                    Link::Log(_) => None,
+                });
             }
             Phase::Asking { since } if at - since > self.settings.reply_timeout => {
                 let limit_s = self.settings.reply_timeout.as_secs_f64();
@@ -200,6 +225,7 @@ impl BridgeStage {
                     .map(|heartbeat| Span::from_nanos(heartbeat.nanos().saturating_mul(2)))
             }
             Link::Agent(agent) => agent.silence_limit(),
+            Link::Log(_) => None,
         };
         if let Some(limit) = limit.filter(|limit| silence > *limit) {
             let limit_s = limit.as_secs_f64();
@@ -266,7 +292,8 @@ impl BridgeStage {
             (Link::Agent(agent), IoEvent::Closed { reason, status }) => {
                 agent.ended(&reason, status, &mut heard)
             }
-            (Link::Shdr(_), IoEvent::Answered { .. } | IoEvent::Began { .. })
+            (Link::Log(_), _)
+            | (Link::Shdr(_), IoEvent::Answered { .. } | IoEvent::Began { .. })
             | (Link::Agent(_), IoEvent::Connected) => Ok(()),
         };
         self.follow(at, heard, out);
@@ -383,7 +410,7 @@ impl Stage for BridgeStage {
             Input::Io(event) => self.handle(at, event, out),
             Input::Shutdown => {
                 self.stopping = true;
-                self.values.absent_all(at, out);
+                self.values.finish(out);
                 out.push(Output::Io(IoCommand::Disconnect));
                 out.push(Output::Stopped);
             }

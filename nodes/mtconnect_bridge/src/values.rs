@@ -328,6 +328,17 @@ impl Values {
         }
     }
 
+    /// The bridge stops: what waits is told.
+    pub fn finish(&mut self, out: &mut Vec<Output>) {
+        out.extend(self.positions.take().map(Output::State));
+        for channel in self.channels.values_mut() {
+            if let Some(judge) = &mut channel.judge {
+                judge.absent(&mut self.judged);
+                channel.tell(&mut self.judged, None, out);
+            }
+        }
+    }
+
     /// The connection is lost: nothing is known.
     pub fn absent_all(&mut self, now: Stamp<Host>, out: &mut Vec<Output>) {
         out.extend(self.positions.take().map(Output::State));

@@ -173,6 +173,7 @@ fn bridge(port: u16) -> LiveBridge {
         source: Source::Agent,
         host: "127.0.0.1".to_owned(),
         port,
+        log_file: None,
         map_file: String::new(),
         connection: ConnectionConfig {
             reconnect_first_s: 0.05,

@@ -16,6 +16,7 @@ fn config() -> BridgeConfig {
         source: Source::Shdr,
         host: "127.0.0.1".to_owned(),
         port: 7878,
+        log_file: None,
         map_file: "map.yaml".to_owned(),
         connection: ConnectionConfig::default(),
         agent: AgentConfig::default(),
@@ -52,9 +53,10 @@ fn readme_table_defaults_and_configuration_agree() {
     let mut given = BTreeMap::new();
     leaves("", &serde_json::to_value(config()).unwrap(), &mut given);
     for doc in PARAMETERS {
-        let default = match doc.name.contains('.') {
-            true => format!(" {} ", given[doc.name]),
-            false => "  ".to_owned(),
+        let default = match doc.name {
+            "log_file" => " none ".to_owned(),
+            "source" | "map_file" => "  ".to_owned(),
+            name => format!(" {} ", given[name]),
         };
         let (name, unit, meaning) = (doc.name, doc.unit, doc.description);
         let row = format!("| `{name}` | {unit} |{default}| {meaning} |");
@@ -78,6 +80,10 @@ fn wrong_values_are_refused_by_name() {
     let mut wrong = config();
     wrong.agent.device = "a/b HTTP/1.1\r\n".to_owned();
     assert!(refusal(&wrong).starts_with("agent.device = "));
+    let mut wrong = config();
+    wrong.log_file = Some("day.shdr".to_owned());
+    let said = "log_file: belongs to source = log, and to no other";
+    assert_eq!(refusal(&wrong), said);
     let mut wrong = config();
     wrong.port = 0;
     assert_eq!(refusal(&wrong), "port = 0: must be from 1 to 65535");

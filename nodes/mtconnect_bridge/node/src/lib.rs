@@ -4,6 +4,7 @@ use abbe_msgs::topics;
 use anyhow::{Context, Result};
 use metrology::sample::Quantity;
 use metrology::stamp::Span;
+use mtconnect_bridge::config::Source;
 use mtconnect_bridge::live::{LiveBridge, LiveInput};
 use mtconnect_bridge::mapping::{MapFile, Use};
 use mtconnect_bridge::{BridgeConfig, Output, PARAMETERS, Settings};
@@ -24,16 +25,23 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let (path, text) = setup.file_text("map_file")?;
     let map = MapFile::from_yaml(&text).with_context(|| path.display().to_string())?;
     let settings = Settings::new(&config, &map).with_context(|| path.display().to_string())?;
-    let bridge = LiveBridge::open(&settings)?;
+    let bridge = match settings.source {
+        Source::Log => LiveBridge::of_log(&settings, &setup.file_text("log_file")?.1),
+        Source::Shdr | Source::Agent => LiveBridge::open(&settings)?,
+    };
     let mut wiring = Wiring::new(setup.name(), parameters, bridge)
         .every(TICK, || LiveInput::Tick)
-        .publish(&topics::AXES_STATE, forms::state)
-        .publish_message(&topics::JOINT_STATES, forms::joints)
         .diagnose(forms::condition)
         .shutdown(
             || LiveInput::Shutdown,
             |output| matches!(output, Output::Stopped),
         );
+    // Without an axis in its mapping it may stand beside a controller that tells them.
+    if settings.mapping.has_axes() {
+        wiring = wiring
+            .publish(&topics::AXES_STATE, forms::state)
+            .publish_message(&topics::JOINT_STATES, forms::joints);
+    }
     for (_, used) in settings.mapping.uses() {
         let (Use::Number { name, quantity, .. } | Use::Text { name, quantity, .. }) = used else {
             continue;

@@ -1,0 +1,420 @@
+//! A logged shift as part programs: another machine turns its spindle and moves its axes as this one did.
+//!
+//! The log is cut into equal times, each of which becomes one line or a few:
+//!
+//! ```text
+//!   n     = ∫ n(t) dt / Δ                      speed of the spindle                            (1)
+//!   d_i   = Σ |p_i,k − p_i,k−1|                travel of axis i                                (2)
+//!   F     = √(d_X² + d_Y² + d_Z²) / Δ          feed                                            (3)
+//! ```
+//!
+//! A value holds until the next is told. A spindle that is absent is taken to stand, an axis that is absent not to
+//! move. Each axis goes its travel to and fro within a window of the other machine, so heat from nuts, guides and
+//! motors comes in as it did; where the axis stood is not followed. Nothing moves: a dwell.
+//!
+//! # Holds when
+//! Speeds last longer than Δ: heat grows faster than speed, and (1) takes the mean.
+
+use metrology::sample::Quantity;
+use metrology::stamp::{Host, Machine, Span, Stamp};
+use metrology::{Axis, PerAxis};
+
+use crate::error::BridgeError;
+use crate::mapping::{Mapping, Use};
+use crate::observation::{MachineClock, Told};
+use crate::shdr::{self, Line};
+
+/// A spindle that turns more slowly than this stands, 1/s.
+const STANDS_RAD_S: f64 = 1.0;
+/// A travel below this is none, mm: dither at rest.
+const REST_MM: f64 = 0.01;
+/// Greatest travel of one line over the window's length.
+const WINDOW_SHARE: f64 = 0.5;
+
+/// What is asked of a log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShiftOrder {
+    /// First instant.
+    pub from: Stamp<Machine>,
+    /// Last instant.
+    pub to: Stamp<Machine>,
+    /// Time of one line, s.
+    pub bin_s: f64,
+    /// Time of one program, s.
+    pub slice_s: f64,
+    /// Which spindle: name of its value in the mapping.
+    pub spindle: String,
+    /// Least and greatest position of X, Y and Z on the other machine, mm.
+    pub window_mm: PerAxis<(f64, f64)>,
+    /// Height at which a program begins and ends, mm.
+    pub clear_mm: f64,
+    /// Greatest feed of the other machine, mm/s.
+    pub feed_limit_mm_s: f64,
+}
+
+/// What happened in one bin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bin {
+    /// (1), rad/s.
+    pub spindle_rad_s: f64,
+    /// (2), mm.
+    pub travel_mm: PerAxis<f64>,
+}
+
+/// One value of the log that matters here.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Event {
+    Spindle(Option<f64>),
+    Axis(Axis, Option<f64>),
+}
+
+/// A log as bins.
+#[derive(Debug)]
+struct Cutter {
+    bin: Span,
+    from: Stamp<Machine>,
+    bins: Vec<Bin>,
+    spindle: Option<(Stamp<Machine>, f64)>,
+    position_mm: PerAxis<Option<f64>>,
+}
+
+impl Cutter {
+    fn new(order: &ShiftOrder) -> Self {
+        let n = ((order.to - order.from).as_secs_f64() / order.bin_s).round();
+        Self {
+            bin: Span::from_secs_f64(order.bin_s),
+            from: order.from,
+            bins: vec![Bin::default(); n.clamp(0.0, 1e6) as usize],
+            spindle: None,
+            position_mm: PerAxis::default(),
+        }
+    }
+
+    fn place(&self, at: Stamp<Machine>) -> Option<usize> {
+        let since = (at - self.from).nanos();
+        usize::try_from(since.div_euclid(self.bin.nanos())).ok()
+    }
+
+    /// (1) of a speed that held from one instant to another.
+    fn turn(&mut self, from: Stamp<Machine>, to: Stamp<Machine>, speed_rad_s: f64) {
+        for (at, bin) in self.bins.iter_mut().enumerate() {
+            let offset = self
+                .bin
+                .nanos()
+                .saturating_mul(i64::try_from(at).unwrap_or(i64::MAX));
+            let begin = self.from + Span::from_nanos(offset);
+            let (first, last) = (from.max(begin), to.min(begin + self.bin));
+            if last > first {
+                let share = (last - first).as_secs_f64() / self.bin.as_secs_f64();
+                bin.spindle_rad_s += speed_rad_s * share;
+            }
+        }
+    }
+
+    fn take(&mut self, at: Stamp<Machine>, event: Event) {
+        match event {
+            Event::Spindle(speed_rad_s) => {
+                let now = speed_rad_s.map(|speed_rad_s| (at, speed_rad_s));
+                if let Some((since, before_rad_s)) = std::mem::replace(&mut self.spindle, now) {
+                    self.turn(since, at, before_rad_s);
+                }
+            }
+            Event::Axis(axis, position_mm) => {
+                let before = std::mem::replace(&mut self.position_mm[axis], position_mm);
+                let travel_mm = position_mm
+                    .zip(before)
+                    .map(|(now, before)| (now - before).abs());
+                let bin = self.place(at).and_then(|place| self.bins.get_mut(place));
+                if let (Some(bin), Some(travel_mm)) = (bin, travel_mm) {
+                    bin.travel_mm[axis] += travel_mm;
+                }
+            }
+        }
+    }
+}
+
+fn number(told: &Told) -> Option<Option<f64>> {
+    match told {
+        Told::Unavailable => Some(None),
+        Told::Value(text) => {
+            let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+            number.map(Some)
+        }
+        Told::Series { .. } | Told::Alarm(_) => None,
+    }
+}
+
+fn event(used: &Use, spindle: &str, told: &Told) -> Option<Event> {
+    let number = number(told)?;
+    match used {
+        Use::Number {
+            name,
+            quantity: Quantity::SpindleSpeed,
+            to_inner,
+            ..
+        } if name == spindle => Some(Event::Spindle(number.map(|n| n.abs() * to_inner.0))),
+        Use::Position {
+            axes,
+            commanded: false,
+            factor,
+        } => match axes.as_slice() {
+            [axis] if axis.is_linear() => Some(Event::Axis(*axis, number.map(|n| n * factor))),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Cuts the lines of an adapter's log into bins.
+///
+/// # Errors
+/// When the mapping has no such spindle.
+pub fn bins<'a>(
+    lines: impl Iterator<Item = &'a str>,
+    mapping: &Mapping,
+    order: &ShiftOrder,
+) -> Result<Vec<Bin>, BridgeError> {
+    let is_spindle = |used: &Use| matches!(used, Use::Number { name, quantity: Quantity::SpindleSpeed, .. } if *name == order.spindle);
+    if !mapping.uses().any(|(_, used)| is_spindle(used)) {
+        return Err(BridgeError::NoSpindle {
+            name: order.spindle.clone(),
+        });
+    }
+    let mut cutter = Cutter::new(order);
+    let mut clock = MachineClock::default();
+    for line in lines {
+        let shape = |key: &str| mapping.find(key, None).map(|(_, used)| used.shape());
+        let Line::Observations(observations) = shdr::read(line, shape) else {
+            continue;
+        };
+        for observation in observations {
+            let at = clock.stamp(observation.time, Stamp::<Host>::default());
+            let found = mapping.find(&observation.key, None);
+            let event = found.and_then(|(_, used)| event(used, &order.spindle, &observation.told));
+            if let Some(event) = event {
+                cutter.take(at, event);
+            }
+        }
+    }
+    cutter.take(order.to, Event::Spindle(None));
+    Ok(cutter.bins)
+}
+
+/// Writes programs.
+#[derive(Debug)]
+struct Writer<'a> {
+    order: &'a ShiftOrder,
+    text: String,
+    at_mm: PerAxis<f64>,
+    rpm: i64,
+}
+
+impl Writer<'_> {
+    fn line(&mut self, line: &str) {
+        self.text.push_str(line);
+        self.text.push('\n');
+    }
+
+    fn begin(&mut self, title: &str) {
+        let order = self.order;
+        self.at_mm = PerAxis::from_fn(|axis| {
+            let (low, high) = order.window_mm[axis];
+            round((low + high) / 2.0)
+        });
+        let [x, y, z] = Axis::LINEAR.map(|axis| self.at_mm[axis]);
+        self.text = format!(
+            "({title})\nG21 G90 G17\nG0 Z{}\nG0 X{x} Y{y}\nG0 Z{z}\n",
+            order.clear_mm
+        );
+        self.rpm = 0;
+    }
+
+    fn end(&mut self) {
+        let clear = format!("G0 Z{}", self.order.clear_mm);
+        self.line(&clear);
+        if self.rpm != 0 {
+            self.line("M5");
+        }
+        self.line("M2");
+    }
+
+    fn bin(&mut self, bin: &Bin) {
+        let rpm = (bin.spindle_rad_s * 30.0 / std::f64::consts::PI).round() as i64;
+        let rpm = if bin.spindle_rad_s < STANDS_RAD_S {
+            0
+        } else {
+            rpm
+        };
+        if rpm != self.rpm {
+            let line = if rpm == 0 {
+                "M5".to_owned()
+            } else {
+                format!("S{rpm} M3")
+            };
+            self.line(&line);
+            self.rpm = rpm;
+        }
+        let travel_mm = PerAxis::from_fn(|axis| {
+            let travel_mm = bin.travel_mm[axis];
+            if travel_mm < REST_MM { 0.0 } else { travel_mm }
+        });
+        let length_mm = travel_mm.xyz().norm();
+        if length_mm > 0.0 {
+            self.travel(&travel_mm, length_mm);
+        } else {
+            let line = format!("G4 P{}", self.order.bin_s);
+            self.line(&line);
+        }
+    }
+
+    /// To and fro, so that no axis leaves its window.
+    fn travel(&mut self, travel_mm: &PerAxis<f64>, length_mm: f64) {
+        let order = self.order;
+        let parts = Axis::LINEAR.map(|axis| {
+            let (low, high) = order.window_mm[axis];
+            (travel_mm[axis] / ((high - low) * WINDOW_SHARE))
+                .ceil()
+                .max(1.0)
+        });
+        let n = parts.into_iter().fold(1.0, f64::max);
+        let feed_mm_min = (length_mm / order.bin_s * 60.0 * 10.0).round() / 10.0;
+        for _ in 0..n as usize {
+            let mut line = "G1".to_owned();
+            for axis in Axis::LINEAR {
+                let step_mm = travel_mm[axis] / n;
+                if step_mm == 0.0 {
+                    continue;
+                }
+                let ahead_mm = self.at_mm[axis] + step_mm;
+                let is_inside = ahead_mm <= order.window_mm[axis].1;
+                let next_mm = if is_inside {
+                    ahead_mm
+                } else {
+                    self.at_mm[axis] - step_mm
+                };
+                self.at_mm[axis] = round(next_mm);
+                line.push_str(&format!(" {axis}{}", self.at_mm[axis]));
+            }
+            line.push_str(&format!(" F{feed_mm_min}"));
+            self.line(&line);
+        }
+    }
+}
+
+/// To a micrometre, as programs are written.
+fn round(position_mm: f64) -> f64 {
+    (position_mm * 1e3).round() / 1e3
+}
+
+/// One program for each slice; the last may be shorter.
+///
+/// # Errors
+/// When a bin needs a feed that the other machine has not.
+pub fn programs(bins: &[Bin], title: &str, order: &ShiftOrder) -> Result<Vec<String>, BridgeError> {
+    for (at, bin) in bins.iter().enumerate() {
+        let feed_mm_s = bin.travel_mm.xyz().norm() / order.bin_s;
+        if feed_mm_s > order.feed_limit_mm_s {
+            return Err(BridgeError::FeedTooHigh {
+                at_s: at as f64 * order.bin_s,
+                feed_mm_min: feed_mm_s * 60.0,
+                limit_mm_min: order.feed_limit_mm_s * 60.0,
+            });
+        }
+    }
+    let per_slice = (order.slice_s / order.bin_s).round().max(1.0) as usize;
+    let mut writer = Writer {
+        order,
+        text: String::new(),
+        at_mm: PerAxis::default(),
+        rpm: 0,
+    };
+    let slices = bins.chunks(per_slice).enumerate();
+    Ok(slices
+        .map(|(n, slice)| {
+            writer.begin(&format!("{title}, part {}", n + 1));
+            for bin in slice {
+                writer.bin(bin);
+            }
+            writer.end();
+            std::mem::take(&mut writer.text)
+        })
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mapping::MapFile;
+    use crate::observation::read_stamp;
+
+    const MAP: &str = "values:\n  Xabs: {is: position, axis: X, unit: MILLIMETER}\n  Srpm: {is: spindle_speed, name: spindle, unit: REVOLUTION/MINUTE}\n";
+
+    fn order() -> ShiftOrder {
+        ShiftOrder {
+            from: read_stamp("2016-11-29T10:00:00Z").unwrap(),
+            to: read_stamp("2016-11-29T10:00:30Z").unwrap(),
+            bin_s: 10.0,
+            slice_s: 20.0,
+            spindle: "spindle".to_owned(),
+            window_mm: PerAxis::from_fn(|_| (0.0, 100.0)),
+            clear_mm: 240.0,
+            feed_limit_mm_s: 200.0,
+        }
+    }
+
+    fn mapping() -> Mapping {
+        Mapping::new(&MapFile::from_yaml(MAP).unwrap()).unwrap()
+    }
+
+    const LOG: [&str; 7] = [
+        "2016-11-29T09:59:00Z|Srpm|600|Xabs|5",
+        "2016-11-29T10:00:04Z|Xabs|35",
+        "2016-11-29T10:00:05Z|Srpm|1200",
+        "2016-11-29T10:00:06Z|Xabs|5",
+        "2016-11-29T10:00:20Z|Srpm|UNAVAILABLE",
+        "2016-11-29T10:00:21Z|Xabs|UNAVAILABLE",
+        "2016-11-29T10:00:22Z|Xabs|500",
+    ];
+
+    /// By hand: half of the first bin at 600, half at 1200; 30 mm forth and back; absent, it stands.
+    #[test]
+    fn eq1_eq2_a_log_becomes_mean_speeds_and_travels() {
+        let bins = bins(LOG.into_iter(), &mapping(), &order()).unwrap();
+        let rpm = bins
+            .iter()
+            .map(|bin| bin.spindle_rad_s * 30.0 / std::f64::consts::PI);
+        let rpm: Vec<_> = rpm.map(|rpm| rpm.round() as i64).collect();
+        assert_eq!(rpm, [900, 1200, 0]);
+        let travel: Vec<_> = bins.iter().map(|bin| bin.travel_mm[Axis::X]).collect();
+        assert!((travel[0] - 60.0).abs() < 1e-12, "{travel:?}");
+        assert!(travel[1..].iter().all(|travel_mm| *travel_mm == 0.0));
+    }
+
+    #[test]
+    fn eq3_a_program_goes_the_travel_within_its_window_and_lasts_the_time() {
+        let bins = bins(LOG.into_iter(), &mapping(), &order()).unwrap();
+        let programs = programs(&bins, "a shift", &order()).unwrap();
+        let first = "(a shift, part 1)\nG21 G90 G17\nG0 Z240\nG0 X50 Y50\nG0 Z50\nS900 M3\nG1 X80 F360\nG1 X50 F360\nS1200 M3\nG4 P10\nG0 Z240\nM5\nM2\n";
+        let second =
+            "(a shift, part 2)\nG21 G90 G17\nG0 Z240\nG0 X50 Y50\nG0 Z50\nG4 P10\nG0 Z240\nM2\n";
+        assert_eq!(programs, [first, second]);
+    }
+
+    #[test]
+    fn what_the_other_machine_cannot_is_refused() {
+        let mut slow = order();
+        slow.feed_limit_mm_s = 5.0;
+        let bins = bins(LOG.into_iter(), &mapping(), &slow).unwrap();
+        let refused = programs(&bins, "a", &slow).unwrap_err().to_string();
+        assert_eq!(
+            refused,
+            "at 0 s: feed 360 mm/min, limit 300 mm/min: take longer bins"
+        );
+        slow.spindle = "main".to_owned();
+        let refused = super::bins(LOG.into_iter(), &mapping(), &slow).unwrap_err();
+        assert_eq!(
+            refused.to_string(),
+            "the mapping has no spindle speed \"main\""
+        );
+    }
+}
