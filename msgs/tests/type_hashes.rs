@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use abbe_msgs::tf2_msgs::action::LookupTransform;
 use abbe_msgs::{
     Action, DESCRIPTIONS, FeedbackMessage, GetResult, Message, SendGoal, Service, action_msgs,
-    description_of, msg, rcl_interfaces, std_msgs, std_srvs, type_description_interfaces,
+    description_of, lifecycle_msgs, msg, rcl_interfaces, std_msgs, std_srvs,
+    type_description_interfaces,
 };
 
 fn jazzy() -> BTreeMap<&'static str, &'static str> {
@@ -53,6 +54,10 @@ fn val_jazzy_hashes_of_services_are_equal() {
     let jazzy = jazzy();
     let services = [
         service::<action_msgs::srv::CancelGoal>(),
+        service::<lifecycle_msgs::srv::ChangeState>(),
+        service::<lifecycle_msgs::srv::GetAvailableStates>(),
+        service::<lifecycle_msgs::srv::GetAvailableTransitions>(),
+        service::<lifecycle_msgs::srv::GetState>(),
         service::<rcl_interfaces::srv::DescribeParameters>(),
         service::<rcl_interfaces::srv::GetLoggerLevels>(),
         service::<rcl_interfaces::srv::GetParameterTypes>(),

@@ -3,8 +3,9 @@
 
 use std::time::Duration;
 
+use abbe_msgs::lifecycle_msgs::msg::TransitionEvent;
 use abbe_msgs::topics;
-use abbe_tests::cyclone::{Cyclone, end};
+use abbe_tests::cyclone::{Cyclone, end, named_end};
 use abbe_tests::program::{Process, command, domain, root};
 use abbe_tests::python::interpreter;
 use abbe_tests::scenario::Scenario;
@@ -18,11 +19,19 @@ const SEND: &str = "/cnc/run_program/_action/send_goal";
 const CANCEL: &str = "/cnc/run_program/_action/cancel_goal";
 const RESULT: &str = "/cnc/run_program/_action/get_result";
 
-const CLIENTS: [(&str, &str); 7] = [
+const GET_STATE: &str = "/fake_cnc/get_state";
+const CHANGE_STATE: &str = "/fake_cnc/change_state";
+const GRAPH: &str = "/fake_cnc/get_transition_graph";
+const TRANSITIONS: &str = "fake_cnc/transition_event";
+
+const CLIENTS: [(&str, &str); 10] = [
     (GET, "rcl_interfaces/srv/GetParameters"),
     (SET, "rcl_interfaces/srv/SetParameters"),
     (DESCRIBE, "rcl_interfaces/srv/DescribeParameters"),
     (LEVEL, "rcl_interfaces/srv/SetLoggerLevels"),
+    (GET_STATE, "lifecycle_msgs/srv/GetState"),
+    (CHANGE_STATE, "lifecycle_msgs/srv/ChangeState"),
+    (GRAPH, "lifecycle_msgs/srv/GetAvailableTransitions"),
     (SEND, "abbe_msgs/action/RunProgram_SendGoal"),
     (CANCEL, "action_msgs/srv/CancelGoal"),
     (RESULT, "abbe_msgs/action/RunProgram_GetResult"),
@@ -38,6 +47,7 @@ const FROM_S: &str = "10.5";
 /// Statuses of `action_msgs/GoalStatus`.
 const SUCCEEDED: i64 = 4;
 const CANCELED: i64 = 5;
+const ABORTED: i64 = 6;
 
 #[test]
 fn cyclone_calls_services_and_an_action_in_its_own_mapping() {
@@ -47,14 +57,16 @@ fn cyclone_calls_services_and_an_action_in_its_own_mapping() {
     let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(3));
     let file = scenario.argument("fake_cnc.yaml");
     let node = Process::node(domain, "fake_cnc", &["--params-file", &file]);
-    let log = [end(&abbe_msgs::topics::ROSOUT)];
-    let mut cyclone = Cyclone::asking(&python, domain, &CLIENTS, &log);
+    let transitions = named_end::<TransitionEvent>(TRANSITIONS, true, false, 10);
+    let heard = [end(&abbe_msgs::topics::ROSOUT), transitions];
+    let mut cyclone = Cyclone::asking(&python, domain, &CLIENTS, &heard);
     for (service, _) in CLIENTS {
         cyclone.matched_after_s(service);
     }
     parameters(&mut cyclone);
     log_level(&mut cyclone);
     action(&mut cyclone);
+    lifecycle(&mut cyclone);
     cyclone.stop();
     node.stop();
 }
@@ -94,6 +106,55 @@ fn log_level(cyclone: &mut Cyclone) {
     let results = asked(cyclone, LEVEL, 4, &levels)["results"].take();
     assert_eq!(results[0]["successful"], true, "{results}");
     assert_eq!(results[1]["successful"], false, "{results}");
+}
+
+fn state(cyclone: &mut Cyclone, number: i64) -> String {
+    let state = asked(cyclone, GET_STATE, number, &json!({}));
+    state["current_state"]["label"].as_str().unwrap().to_owned()
+}
+
+fn lifecycle(cyclone: &mut Cyclone) {
+    cyclone.matched_after_s(TRANSITIONS);
+    assert_eq!(state(cyclone, 1), "active");
+    let graph = asked(cyclone, GRAPH, 1, &json!({}));
+    let steps = graph["available_transitions"].as_array().unwrap();
+    assert_eq!(steps.len(), 25, "{graph}");
+    let deactivate = &steps[12];
+    assert_eq!(deactivate["transition"]["label"], "deactivate");
+    assert_eq!(deactivate["goal_state"]["label"], "deactivating");
+    // By number, as `ros2 lifecycle set` asks.
+    let change = |id: u8| json!({"transition": {"id": id, "label": ""}});
+    let refused = asked(cyclone, CHANGE_STATE, 1, &change(3));
+    assert_eq!(refused["success"], false, "it is active already");
+    let done = asked(cyclone, CHANGE_STATE, 2, &change(4));
+    assert_eq!(done["success"], true, "{done}");
+    for goal in ["deactivating", "inactive"] {
+        cyclone.sample(TRANSITIONS, |event| event["goal_state"]["label"] == goal);
+    }
+    assert_eq!(state(cyclone, 2), "inactive");
+    // Taken and aborted at once, so that the reason reaches its client.
+    let taken = asked(cyclone, SEND, 3, &goal(9, "G21 G90\nG1 X3 F600\nM2\n"));
+    assert_eq!(taken["accepted"], true, "{taken}");
+    let result = asked(
+        cyclone,
+        RESULT,
+        3,
+        &json!({"goal_id": {"uuid": vec![9; 16]}}),
+    );
+    assert_eq!(result["status"], ABORTED, "{result}");
+    let message = &result["result"]["message"];
+    assert_eq!(*message, "the control is not active");
+    let done = asked(cyclone, CHANGE_STATE, 3, &change(3));
+    assert_eq!(done["success"], true, "{done}");
+    let accepted = asked(cyclone, SEND, 4, &goal(10, "G21 G90\nG1 X3 F600\nM2\n"));
+    assert_eq!(accepted["accepted"], true, "{accepted}");
+    let result = asked(
+        cyclone,
+        RESULT,
+        4,
+        &json!({"goal_id": {"uuid": vec![10; 16]}}),
+    );
+    assert_eq!(result["status"], SUCCEEDED, "{result}");
 }
 
 fn goal(uuid: u8, program: &str) -> Value {

@@ -107,8 +107,3 @@ def in_simulated_time(desk: Desk, abbe: str, root: Path) -> None:
         )
     desk.end(system, 30.0)
 
-
-def bags(desk: Desk) -> None:
-    code, _ = desk.run(["ros2", "bag", "--help"], 20.0)
-    if code != 0:
-        desk.lack("ros2 bag record, info, play", "this ROS 2 has no rosbag2")

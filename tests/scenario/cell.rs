@@ -56,12 +56,17 @@ pub fn known_latency() -> Scenario {
     scenario
 }
 
+/// What one node of the scenario is told before it is built.
+pub fn setup(scenario: &Scenario, name: &str) -> anyhow::Result<Setup> {
+    let file = scenario.argument(&format!("{name}.yaml"));
+    let arguments = ["--ros-args".to_owned(), "--params-file".to_owned(), file];
+    Ok(Setup::new(name, &Arguments::parse(arguments)?)?)
+}
+
 /// Builds one node of the scenario.
 pub fn build(scenario: &Scenario, name: &str) -> anyhow::Result<Box<dyn Node>> {
     let (_, builder) = NODES.iter().find(|(known, _)| *known == name).unwrap();
-    let file = scenario.argument(&format!("{name}.yaml"));
-    let arguments = ["--ros-args".to_owned(), "--params-file".to_owned(), file];
-    builder(&Setup::new(name, &Arguments::parse(arguments)?)?)
+    builder(&setup(scenario, name)?)
 }
 
 impl Cell {

@@ -19,6 +19,7 @@ mod gap_report;
 mod gap_wear;
 mod grid_truth;
 mod grid_xy;
+mod lifecycle;
 mod mtconnect_log;
 mod positioning;
 mod preflight;

@@ -57,6 +57,8 @@ pub struct AxisState {
     lags: bool,
     tolerance: f64,
     let_go: LetGo,
+    /// Time that the next fade takes.
+    fade_s: f64,
 }
 
 impl AxisState {
@@ -71,6 +73,7 @@ impl AxisState {
             lags: false,
             tolerance: pulse,
             let_go,
+            fade_s: let_go.fade_s,
         }
     }
 
@@ -119,20 +122,31 @@ impl AxisState {
         }
     }
 
-    /// The node is told to end: what is left goes to zero in `shutdown_fade_s`, as far as the limits allow.
+    /// The node is told to end, or not to act: what is left goes to zero in `shutdown_fade_s`, as far as the limits allow.
     pub fn hasten(&mut self) {
         let fade_s = self.let_go.shutdown_fade_s;
         match self.mode {
-            Mode::Fading { for_s, .. } if self.let_go.fade_s - for_s <= fade_s => {}
+            Mode::Fading { for_s, .. } if self.fade_s - for_s <= fade_s => {}
             Mode::Fading { .. } => {
-                self.let_go.fade_s = fade_s;
+                self.fade_s = fade_s;
                 self.mode = Mode::Fading {
                     from: self.target,
                     for_s: 0.0,
                 };
             }
-            _ => self.let_go.fade_s = self.let_go.fade_s.min(fade_s),
+            _ => self.fade_s = self.fade_s.min(fade_s),
         }
+    }
+
+    /// The node may act again: the next fade takes its ordinary time.
+    pub fn take_time(&mut self) {
+        if let Mode::Fading { .. } = self.mode {
+            self.mode = Mode::Fading {
+                from: self.target,
+                for_s: 0.0,
+            };
+        }
+        self.fade_s = self.let_go.fade_s;
     }
 
     /// One tick of `dt_s` > 0; the offset follows.
@@ -145,7 +159,7 @@ impl AxisState {
             }
             (Mode::Following, Wanted::Offset(offset)) => self.oversize = Some(offset),
             (Mode::Fading { from, for_s }, _) => {
-                let left = 1.0 - for_s / self.let_go.fade_s;
+                let left = 1.0 - for_s / self.fade_s;
                 self.target = if left > 0.0 { from * left } else { 0.0 };
             }
             (Mode::Off, _) => self.target = 0.0,
@@ -284,6 +298,19 @@ mod tests {
             run(&mut axis, Wanted::Nothing, 0.7);
             assert!(axis.is_off(), "fading before: {fading}");
         }
+    }
+
+    #[test]
+    fn after_a_hastened_fade_the_next_one_takes_its_time_again() {
+        let mut axis = axis();
+        run(&mut axis, Wanted::Offset(0.02), 2.0);
+        axis.hasten();
+        run(&mut axis, Wanted::Nothing, 0.25);
+        axis.take_time();
+        run(&mut axis, Wanted::Offset(0.02), 1.0);
+        assert!((axis.offset() - 0.02).abs() < 1e-12);
+        run(&mut axis, Wanted::Nothing, 1.0);
+        assert!((axis.offset() - 0.01).abs() < 1e-3, "{}", axis.offset());
     }
 
     #[test]

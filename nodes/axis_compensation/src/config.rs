@@ -40,6 +40,9 @@ pub struct AxisCompensationConfig {
     /// Whether compensation is on from the start.
     #[serde(default = "default_enabled")]
     pub enabled: bool,
+    /// Whether the node configures and activates itself at its start.
+    #[serde(default = "default_autostart")]
+    pub autostart: bool,
     /// Dual loop of the axes that have a scale, or a table of their own.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub positioning: BTreeMap<Axis, PositioningConfig>,
@@ -60,6 +63,10 @@ fn default_gap_s() -> f64 {
 }
 
 fn default_enabled() -> bool {
+    true
+}
+
+fn default_autostart() -> bool {
     true
 }
 

@@ -135,6 +135,10 @@ pub const PARAMETERS: &[ParameterDoc] = &[
     ),
     word("enabled", "whether compensation is on from the start"),
     word(
+        "autostart",
+        "whether the node configures and activates itself at its start; otherwise somebody does so (`ros2 lifecycle set`)",
+    ),
+    word(
         "positioning.X.reading",
         "refreshed_table or weighted_increments: which reading of the dual loop compensates; the same keys exist for Y and Z",
     ),

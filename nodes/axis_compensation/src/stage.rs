@@ -44,6 +44,8 @@ pub enum Input {
     Segment(Box<TestSegment>),
     /// Compensation on or off.
     Enable(bool),
+    /// The node may act, or is to come to rest and say when it has.
+    Active(bool),
     /// Fade to zero and say when it is done.
     Shutdown,
     /// Time went on.
@@ -63,6 +65,8 @@ pub enum Output {
     Diagnostic(Diagnostic),
     /// A positioning table that was learned or refreshed.
     Table(Box<PositioningTable>),
+    /// After [`Input::Active`] with false: nothing is added any more, and nothing is published until it may act again.
+    AtRest,
     /// After [`Input::Shutdown`]: nothing is added any more, the node may stop.
     FadedOut,
 }
@@ -81,12 +85,21 @@ pub struct AxisCompensationStage {
     servo_period_s: f64,
     gap: Span,
     enabled: bool,
+    activity: Activity,
     shutdown: Shutdown,
     controller_at: Option<Stamp<Machine>>,
     heard_at: Option<Stamp<Host>>,
     driven_at: Option<Stamp<Host>>,
     is_stale: bool,
     model_in_doubt: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Activity {
+    Active,
+    /// Fading to rest.
+    Ending,
+    Inactive,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -111,7 +124,7 @@ enum Elapsed {
 }
 
 impl AxisCompensationStage {
-    /// A stage for `machine`, at rest at zero.
+    /// A stage for `machine`, at rest at zero, that may act at once.
     ///
     /// # Errors
     /// When a parameter is outside its limits or an axis is no linear axis of the machine.
@@ -168,6 +181,7 @@ impl AxisCompensationStage {
             servo_period_s,
             gap: Span::from_secs_f64(config.gap_s),
             enabled: config.enabled,
+            activity: Activity::Active,
             shutdown: Shutdown::No,
             controller_at: None,
             heard_at: None,
@@ -175,6 +189,13 @@ impl AxisCompensationStage {
             is_stale: false,
             model_in_doubt: false,
         })
+    }
+
+    /// The same, but it acts only once [`Input::Active`] says so.
+    #[must_use]
+    pub fn inactive(mut self) -> Self {
+        self.activity = Activity::Inactive;
+        self
     }
 
     fn state(&mut self, at: Stamp<Host>, state: &AxisState, out: &mut Vec<Output>) {
@@ -284,7 +305,9 @@ impl AxisCompensationStage {
             message.remainder[axis] = train.remainder_mm();
             message.state[axis] = compensated.state();
         }
-        out.push(Output::Compensation(message));
+        if self.activity != Activity::Inactive {
+            out.push(Output::Compensation(message));
+        }
         self.report_faded_out(out);
     }
 
@@ -319,7 +342,8 @@ impl AxisCompensationStage {
 
     fn wanted(&self, axis: Axis, thermal: Option<&Drifts>) -> (Parts, Wanted) {
         let parts = self.parts(axis, thermal);
-        let is_on = self.enabled && self.shutdown == Shutdown::No;
+        let may_act = self.activity == Activity::Active && self.shutdown == Shutdown::No;
+        let is_on = self.enabled && may_act;
         match parts {
             Ok(parts) if is_on => (parts, Wanted::Offset(parts.sum())),
             Ok(parts) => (parts, Wanted::Nothing),
@@ -344,7 +368,7 @@ impl AxisCompensationStage {
                 silence_s: silence.as_secs_f64(),
             }));
         }
-        if self.shutdown == Shutdown::Fading {
+        if self.shutdown == Shutdown::Fading || self.activity == Activity::Ending {
             let elapsed = self.elapsed_on_host(at);
             // The next state must not count this time again.
             self.controller_at = None;
@@ -363,8 +387,31 @@ impl AxisCompensationStage {
         }
     }
 
+    /// Activated, or deactivated, which fades as an end does; either may come while the other is under way.
+    fn act(&mut self, active: bool, out: &mut Vec<Output>) {
+        let states = self.states.0.iter_mut().flatten();
+        if active {
+            self.activity = Activity::Active;
+            if self.shutdown == Shutdown::No {
+                states.for_each(Compensated::take_time);
+            }
+            return;
+        }
+        if self.activity == Activity::Active {
+            self.activity = Activity::Ending;
+            states.for_each(Compensated::hasten);
+            self.report_faded_out(out);
+        } else if self.activity == Activity::Inactive {
+            out.push(Output::AtRest);
+        }
+    }
+
     fn report_faded_out(&mut self, out: &mut Vec<Output>) {
         let all_off = self.states.0.iter().flatten().all(Compensated::is_off);
+        if self.activity == Activity::Ending && all_off {
+            self.activity = Activity::Inactive;
+            out.push(Output::AtRest);
+        }
         if self.shutdown == Shutdown::Fading && all_off {
             self.shutdown = Shutdown::Done;
             out.push(Output::FadedOut);
@@ -427,6 +474,7 @@ impl Stage for AxisCompensationStage {
                     out.push(Output::Diagnostic(Diagnostic::Enabled { enabled }));
                 }
             }
+            Input::Active(active) => self.act(active, out),
             Input::Shutdown => self.shut_down(out),
             Input::Tick => self.tick(at, out),
         }

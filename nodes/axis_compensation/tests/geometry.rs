@@ -61,7 +61,7 @@ impl Scene {
             match output {
                 Output::Compensation(c) => self.last = Some(c),
                 Output::Diagnostic(d) => self.diagnostics.push(d),
-                Output::Table(_) | Output::FadedOut => {}
+                Output::Table(_) | Output::AtRest | Output::FadedOut => {}
             }
         }
     }

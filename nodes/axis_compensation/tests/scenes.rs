@@ -17,6 +17,7 @@ struct Scene {
     nanos: i64,
     diagnostics: Vec<Diagnostic>,
     faded_out: bool,
+    at_rest: bool,
     sequence: u32,
     /// Of the model's offset, mm².
     variance_mm2: f64,
@@ -46,6 +47,7 @@ impl Scene {
             nanos: 0,
             diagnostics: Vec::new(),
             faded_out: false,
+            at_rest: false,
             sequence: 0,
             variance_mm2: 0.0,
             told: None,
@@ -63,6 +65,7 @@ impl Scene {
                 Output::Compensation(c) => self.last = Some(c),
                 Output::Diagnostic(d) => self.diagnostics.push(d),
                 Output::FadedOut => self.faded_out = true,
+                Output::AtRest => self.at_rest = true,
                 Output::Table(_) => {}
             }
         }
@@ -464,4 +467,97 @@ fn a_copy_in_mid_run_goes_on_exactly_as_the_original() {
         copy.run(0.2, x_mm);
         assert_eq!(scene.x().0.to_bits(), copy.x().0.to_bits());
     }
+}
+
+/// Runs for a while and gives the greatest step of X between two messages, mm, and how many came.
+fn steps(scene: &mut Scene, seconds: f64) -> (f64, u32) {
+    let (mut greatest_mm, mut messages) = (0.0_f64, 0);
+    let mut before = scene.last.map(|last| last.total[Axis::X]);
+    for _ in 0..(seconds * 1e3).round() as i64 {
+        scene.last = None;
+        scene.nanos += MILLISECOND;
+        scene.state(0.0);
+        if let Some(last) = scene.last {
+            let now = last.total[Axis::X];
+            greatest_mm = greatest_mm.max((now - before.unwrap_or(0.0)).abs());
+            before = Some(now);
+            messages += 1;
+        }
+    }
+    (greatest_mm, messages)
+}
+
+/// The rate limit of the scenes' axes over a servo period, mm.
+const RATE_STEP_MM: f64 = 0.05 * 1e-3 + 1e-12;
+
+#[test]
+fn deactivated_it_fades_says_so_once_and_is_silent_until_it_is_active_again() {
+    let mut scene = Scene::with("linear", "fade_s: 30.0, shutdown_fade_s: 1.0");
+    scene.model(0.020, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.assert_x(0.020, CompensationState::Active);
+    scene.step(Input::Active(false));
+    assert!(!scene.at_rest);
+    let (greatest_mm, messages) = steps(&mut scene, 0.5);
+    assert!(
+        greatest_mm > 0.0 && greatest_mm <= RATE_STEP_MM,
+        "{greatest_mm}"
+    );
+    assert_eq!(messages, 500);
+    assert_eq!(scene.x().1, CompensationState::Fading);
+    // As an end does: a fade of 1 s, not of 30 s.
+    let (greatest_mm, messages) = steps(&mut scene, 1.0);
+    assert!(scene.at_rest && !scene.faded_out);
+    assert!(greatest_mm <= RATE_STEP_MM && messages < 700, "{messages}");
+    scene.at_rest = false;
+    let (_, silence) = steps(&mut scene, 2.0);
+    assert_eq!(silence, 0, "an inactive node publishes no offset");
+    assert!(!scene.at_rest, "said once");
+    scene.step(Input::Active(true));
+    let (greatest_mm, messages) = steps(&mut scene, 3.0);
+    assert_eq!(messages, 3000);
+    assert!(greatest_mm <= RATE_STEP_MM, "{greatest_mm}");
+    scene.assert_x(0.020, CompensationState::Active);
+}
+
+#[test]
+fn activated_in_the_middle_of_the_last_fade_it_goes_on_from_where_it_is() {
+    let mut scene = Scene::with("linear", "fade_s: 2.0, shutdown_fade_s: 2.0");
+    scene.model(0.020, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.step(Input::Active(false));
+    scene.run(1.0, 0.0);
+    let halfway_mm = scene.x().0;
+    assert!((halfway_mm - 0.010).abs() < 1e-3, "{halfway_mm}");
+    scene.step(Input::Active(true));
+    let (greatest_mm, _) = steps(&mut scene, 2.0);
+    assert!(greatest_mm <= RATE_STEP_MM && !scene.at_rest);
+    scene.assert_x(0.020, CompensationState::Active);
+}
+
+#[test]
+fn deactivated_without_states_it_fades_on_the_computers_clock() {
+    let mut scene = Scene::with("linear", "fade_s: 2.0, shutdown_fade_s: 0.5");
+    scene.model(0.020, 0.0, 1e6);
+    scene.run(3.0, 0.0);
+    scene.step(Input::Active(false));
+    for _ in 0..300 {
+        scene.nanos += 10 * MILLISECOND;
+        scene.step(Input::Tick);
+    }
+    assert!(scene.at_rest);
+    assert!(scene.x().0.abs() <= 0.0);
+}
+
+#[test]
+fn an_inactive_stage_is_at_rest_at_once_and_still_ends_in_order() {
+    let mut scene = Scene::with("linear", "fade_s: 2.0");
+    scene.stage = scene.stage.clone().inactive();
+    scene.model(0.020, 0.0, 1e6);
+    let (_, messages) = steps(&mut scene, 1.0);
+    assert_eq!(messages, 0);
+    scene.step(Input::Active(false));
+    assert!(scene.at_rest && !scene.faded_out);
+    scene.step(Input::Shutdown);
+    assert!(scene.faded_out);
 }

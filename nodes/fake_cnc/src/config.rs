@@ -62,6 +62,8 @@ pub struct Config {
     pub clock_drift_ppm: f64,
     /// Jump of the host clock beyond which time is skipped rather than simulated, s.
     pub longest_catch_up_s: f64,
+    /// Whether the node configures and activates itself at its start.
+    pub autostart: bool,
     /// What closes the position loop of each linear axis, by letter; others: the motor.
     pub feedback: BTreeMap<Axis, FeedbackSource>,
     /// Positions of linear axes at the start, by letter; others start at 0.
@@ -95,6 +97,7 @@ impl Default for Config {
             clock_offset_s: 0.0,
             clock_drift_ppm: 0.0,
             longest_catch_up_s: 60.0,
+            autostart: true,
             feedback: BTreeMap::new(),
             start_mm: BTreeMap::new(),
             start_deg: BTreeMap::new(),
@@ -259,6 +262,18 @@ impl Settings {
 }
 
 impl Config {
+    /// Longest time from the call to come to rest until no offset is in effect and no program runs, s.
+    ///
+    /// The greatest offset goes to zero at the rate of fading; a program that is called off slows down, which no axis needs a
+    /// minute for.
+    #[must_use]
+    pub fn rest_s(&self) -> f64 {
+        const SLOWING_DOWN_S: f64 = 60.0;
+        let linear_s = self.compensation_limit_um / self.compensation_fade_um_s;
+        let rotary_s = self.compensation_limit_arcsec / self.compensation_fade_arcsec_s;
+        linear_s.max(rotary_s) + SLOWING_DOWN_S
+    }
+
     /// Checks every number against the range in [`PARAMETERS`].
     fn check(&self) -> Result<(), CncError> {
         let numbers = [

@@ -130,6 +130,11 @@ impl<H: Hardware> Control<H> {
         self.offset.applied()
     }
 
+    /// Whether no compensation is in effect.
+    pub fn offset_is_zero(&self) -> bool {
+        Axis::ALL.iter().all(|axis| self.offset()[*axis] == 0.0)
+    }
+
     /// Goal of the program on its way.
     pub fn goal(&self) -> Option<u64> {
         self.run.as_ref().map(|run| run.goal)

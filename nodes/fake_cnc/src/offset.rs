@@ -71,6 +71,12 @@ impl OffsetInput {
         }
     }
 
+    /// Lets go of what is applied, as if it were stale; a new message takes it up again.
+    pub fn release(&mut self) {
+        self.stale = true;
+        self.wanted = PerAxis::default();
+    }
+
     fn wanted_by(&self, message: &AxisCompensation) -> Result<PerAxis<f64>, Diagnostic> {
         let mut wanted = PerAxis::default();
         for axis in self.axes.iter().filter(|axis| message.axes.contains(*axis)) {
@@ -193,6 +199,27 @@ mod tests {
         let again = input.receive(&message(0.001));
         assert_eq!(again, Some(Diagnostic::CompensationFollowed));
         assert_eq!(input.receive(&message(0.001)), None);
+    }
+
+    #[test]
+    fn what_is_released_fades_without_a_step_and_is_taken_up_again_at_the_rate_limit() {
+        let mut input = input();
+        assert_eq!(input.receive(&message(0.001)), None);
+        (0..20).for_each(|_| assert_eq!(input.advance(), None));
+        input.release();
+        let mut last = 0.001;
+        for _ in 0..150 {
+            assert_eq!(input.advance(), None, "asked for, so nothing is stale");
+            let now = input.applied()[Axis::X];
+            assert!((last - now - LIMITS.fade_step).abs() < 1e-15);
+            last = now;
+        }
+        assert_eq!(input.receive(&message(0.001)), None);
+        assert_eq!(input.advance(), None);
+        assert!(input.applied()[Axis::X] - last <= LIMITS.step);
+        input.release();
+        (0..400).for_each(|_| assert_eq!(input.advance(), None));
+        assert!(input.applied()[Axis::X].abs() <= 0.0);
     }
 
     #[test]

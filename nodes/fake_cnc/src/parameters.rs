@@ -124,6 +124,10 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "Jump of the host clock beyond which time is skipped rather than simulated.",
         (1e-3, 1e6),
     ),
+    text(
+        "autostart",
+        "Whether the node configures and activates itself at its start; otherwise somebody does so (`ros2 lifecycle set`).",
+    ),
     feedback("feedback.X"),
     feedback("feedback.Y"),
     feedback("feedback.Z"),

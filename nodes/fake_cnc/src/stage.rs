@@ -39,6 +39,8 @@ pub enum Input {
     },
     /// Offsets to add to the commands.
     Compensation(AxisCompensation),
+    /// The control may act, or is to come to rest and say when it has.
+    Active(bool),
     /// Time has come this far: simulate the servo periods that fit.
     Tick,
 }
@@ -61,7 +63,7 @@ pub enum Output {
         /// Its request.
         goal: u64,
     },
-    /// The request is not taken: another program is on its way.
+    /// The request is not taken: another program is on its way, or the control is not active.
     Refused {
         /// Its request.
         goal: u64,
@@ -92,6 +94,17 @@ pub enum Output {
     },
     /// A condition worth telling.
     Diagnostic(Diagnostic),
+    /// After [`Input::Active`] with false: no program is on its way, and no offset is in effect.
+    AtRest,
+}
+
+/// Whether programs and offsets are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Activity {
+    Active,
+    /// On the way to rest.
+    Ending,
+    Inactive,
 }
 
 #[derive(Clone, Debug)]
@@ -107,6 +120,7 @@ pub struct Cnc<H = Plant> {
     clocks: Clocks,
     sensors: Vec<Sensor>,
     last_tick: Option<Stamp<Host>>,
+    activity: Activity,
     touches: u32,
     faulted: bool,
     time_disturbed: bool,
@@ -114,7 +128,7 @@ pub struct Cnc<H = Plant> {
 }
 
 impl<H: Hardware> Cnc<H> {
-    /// A control of `hardware` as `machine` describes it.
+    /// A control of `hardware` as `machine` describes it, that may act at once.
     ///
     /// # Errors
     /// A parameter out of its range, by name.
@@ -133,11 +147,19 @@ impl<H: Hardware> Cnc<H> {
             control: Control::new(settings, hardware),
             sensors,
             last_tick: None,
+            activity: Activity::Active,
             touches: 0,
             faulted: false,
             time_disturbed: false,
             events: Vec::new(),
         })
+    }
+
+    /// The same, but it takes programs and offsets only once [`Input::Active`] says so.
+    #[must_use]
+    pub fn inactive(mut self) -> Self {
+        self.activity = Activity::Inactive;
+        self
     }
 
     /// The machine, whose truth a scenario may read and no node may.
@@ -161,11 +183,15 @@ impl<H: Hardware> Cnc<H> {
     }
 
     fn run_program(&mut self, goal: u64, text: &str, out: &mut Vec<Output>) {
-        if let Some(other) = self.control.goal() {
-            out.push(Output::Refused {
-                goal,
-                message: format!("program {other} is running"),
-            });
+        let refused = match self.control.goal() {
+            Some(other) => Some(format!("program {other} is running")),
+            None if self.activity != Activity::Active => {
+                Some("the control is not active".to_owned())
+            }
+            None => None,
+        };
+        if let Some(message) = refused {
+            out.push(Output::Refused { goal, message });
             return;
         }
         out.push(Output::Accepted { goal });
@@ -189,6 +215,27 @@ impl<H: Hardware> Cnc<H> {
             self.control.cancel();
         } else {
             out.push(Output::Diagnostic(Diagnostic::NothingToCancel { goal }));
+        }
+    }
+
+    fn act(&mut self, active: bool, out: &mut Vec<Output>) {
+        match (self.activity, active) {
+            (_, true) => self.activity = Activity::Active,
+            (Activity::Active, false) => {
+                self.activity = Activity::Ending;
+                self.control.cancel();
+                self.control.offset_mut().release();
+                self.look_whether_at_rest(out);
+            }
+            (Activity::Ending, false) => {}
+            (Activity::Inactive, false) => out.push(Output::AtRest),
+        }
+    }
+
+    fn look_whether_at_rest(&mut self, out: &mut Vec<Output>) {
+        if self.activity == Activity::Ending && self.idle() && self.control.offset_is_zero() {
+            self.activity = Activity::Inactive;
+            out.push(Output::AtRest);
         }
     }
 
@@ -233,6 +280,7 @@ impl<H: Hardware> Cnc<H> {
         }
         self.report_progress(out);
         self.report_temperatures(end, out);
+        self.look_whether_at_rest(out);
     }
 
     fn report_state(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
@@ -360,6 +408,8 @@ impl<H: Hardware> Stage for Cnc<H> {
         match input {
             Input::RunProgram { goal, text, .. } => self.run_program(goal, &text, out),
             Input::CancelProgram { goal } => self.cancel(goal, out),
+            Input::Active(active) => self.act(active, out),
+            Input::Compensation(_) if self.activity != Activity::Active => {}
             Input::Compensation(message) => {
                 let told = self.control.offset_mut().receive(&message);
                 out.extend(told.map(Output::Diagnostic));

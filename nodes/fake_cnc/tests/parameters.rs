@@ -27,6 +27,7 @@ fn readme_and_table_and_defaults_agree() {
         let default = match &defaults[top] {
             serde_json::Value::Number(number) => format!("{}", number.as_f64().unwrap()),
             serde_json::Value::String(text) => format!("{text:?}"),
+            serde_json::Value::Bool(truth) => truth.to_string(),
             _ if top == "feedback" => "motor".to_owned(),
             _ => "0".to_owned(),
         };

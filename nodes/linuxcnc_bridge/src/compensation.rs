@@ -91,6 +91,11 @@ impl CompensationPath {
         self.beat_at = None;
     }
 
+    /// Says nothing more to HAL, which fades out what it has; new offsets take it up again.
+    pub fn release(&mut self) {
+        self.received = None;
+    }
+
     /// Takes new offsets; the whole set is refused when one of them is, and the last good one stays.
     ///
     /// # Errors

@@ -21,6 +21,9 @@ pub struct BridgeConfig {
     /// INI file to start, relative to the parameter file; absent: LinuxCNC is started by others.
     #[serde(default)]
     pub start_ini: Option<String>,
+    /// Whether the node configures and activates itself at its start.
+    #[serde(default = "BridgeConfig::default_autostart")]
+    pub autostart: bool,
     /// Ordinary user who owns LinuxCNC's processes and memory.
     #[serde(default = "BridgeConfig::default_user")]
     pub user: String,
@@ -94,6 +97,10 @@ pub struct CompensationConfig {
 }
 
 impl BridgeConfig {
+    fn default_autostart() -> bool {
+        true
+    }
+
     fn default_user() -> String {
         "nobody".to_owned()
     }

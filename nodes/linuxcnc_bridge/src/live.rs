@@ -4,7 +4,7 @@
 //! over all that has come from outside since the last, with the instants at which it came.
 
 use std::convert::Infallible;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use machine::MachineFile;
 use metrology::Stage;
@@ -41,34 +41,26 @@ pub enum LiveInput {
     Compensation(AxisCompensation),
     /// Time has passed.
     Tick,
+    /// The bridge may act, or is to come to rest.
+    Active(bool),
     /// The bridge is to stop.
     Shutdown,
 }
 
-/// A bridge at work.
-#[derive(Debug)]
-pub struct LiveBridge {
-    stage: BridgeStage,
-    // Before the controller, so that its processes leave HAL before HAL ends.
-    io: BridgeIo,
-    _controller: Option<Controller>,
-    said: Vec<Output>,
+/// What it takes to open a bridge, again and again.
+#[derive(Clone, Debug)]
+struct Opening {
+    config: BridgeConfig,
+    settings: Settings,
+    /// Where the INI file lies.
+    folder: PathBuf,
 }
 
-impl LiveBridge {
-    /// Checks the configuration, starts LinuxCNC where the configuration says so (its INI file lies
-    /// relative to `folder`), and looks for it.
-    ///
-    /// # Errors
-    /// A wrong configuration, or LinuxCNC cannot be started.
-    pub fn open(
-        config: &BridgeConfig,
-        machine: &MachineFile,
-        folder: &Path,
-    ) -> Result<Self, BridgeError> {
-        let stage = BridgeStage::new(&Settings::new(config, machine)?);
+impl Opening {
+    fn open(&self) -> Result<Work, BridgeError> {
+        let config = &self.config;
         let controller = match &config.start_ini {
-            Some(ini) => Some(Controller::start(config, &folder.join(ini))?),
+            Some(ini) => Some(Controller::start(config, &self.folder.join(ini))?),
             None => None,
         };
         let io = BridgeIo::start(Address {
@@ -76,18 +68,85 @@ impl LiveBridge {
             port: config.connection.port,
             account: Account::ordinary(&config.user)?,
         })?;
-        Ok(Self::new(stage, io, controller))
+        Ok(Work {
+            stage: BridgeStage::new(&self.settings).inactive(),
+            io,
+            _controller: controller,
+        })
+    }
+}
+
+#[derive(Debug)]
+struct Work {
+    stage: BridgeStage,
+    // Before the controller, so that its processes leave HAL before HAL ends.
+    io: BridgeIo,
+    _controller: Option<Controller>,
+}
+
+/// A bridge, open (at work) or closed.
+#[derive(Debug)]
+pub struct LiveBridge {
+    opening: Option<Opening>,
+    work: Option<Work>,
+    said: Vec<Output>,
+}
+
+impl LiveBridge {
+    /// Checks the configuration and, where the bridge starts by itself, opens it; it is not active yet. The INI file
+    /// of the configuration lies relative to `folder`.
+    ///
+    /// # Errors
+    /// A wrong configuration, or LinuxCNC cannot be started.
+    pub fn prepare(
+        config: &BridgeConfig,
+        machine: &MachineFile,
+        folder: &Path,
+    ) -> Result<Self, BridgeError> {
+        let opening = Opening {
+            config: config.clone(),
+            settings: Settings::new(config, machine)?,
+            folder: folder.to_owned(),
+        };
+        let mut bridge = Self {
+            opening: Some(opening),
+            work: None,
+            said: Vec::new(),
+        };
+        if config.autostart {
+            bridge.open()?;
+        }
+        Ok(bridge)
     }
 
-    /// A bridge over `io`; `controller`, where it was started here, ends with it.
+    /// An active bridge over `io`; `controller`, where it was started here, ends with it.
     #[must_use]
     pub fn new(stage: BridgeStage, io: BridgeIo, controller: Option<Controller>) -> Self {
         Self {
-            stage,
-            io,
-            _controller: controller,
+            opening: None,
+            work: Some(Work {
+                stage,
+                io,
+                _controller: controller,
+            }),
             said: Vec::new(),
         }
+    }
+
+    /// Starts LinuxCNC where the configuration says so, and looks for it; nothing where that was done.
+    ///
+    /// # Errors
+    /// LinuxCNC cannot be started.
+    pub fn open(&mut self) -> Result<(), BridgeError> {
+        if let (None, Some(opening)) = (&self.work, &self.opening) {
+            self.work = Some(opening.open()?);
+        }
+        Ok(())
+    }
+
+    /// Leaves LinuxCNC, and ends it where it was started here.
+    pub fn close(&mut self) {
+        self.work = None;
     }
 
     fn pass(
@@ -96,10 +155,13 @@ impl LiveBridge {
         input: Input,
         out: &mut Vec<Output>,
     ) -> Result<(), Infallible> {
-        self.stage.step(at, input, &mut self.said)?;
+        let Some(work) = &mut self.work else {
+            return Ok(());
+        };
+        work.stage.step(at, input, &mut self.said)?;
         for output in self.said.drain(..) {
             match output {
-                Output::Io(command) => self.io.command(command),
+                Output::Io(command) => work.io.command(command),
                 other => out.push(other),
             }
         }
@@ -122,9 +184,11 @@ impl Stage for LiveBridge {
             LiveInput::Goal { goal, program } => self.pass(at, Input::Goal { goal, program }, out),
             LiveInput::Cancel { goal } => self.pass(at, Input::Cancel { goal }, out),
             LiveInput::Compensation(offsets) => self.pass(at, Input::Compensation(offsets), out),
+            LiveInput::Active(active) => self.pass(at, Input::Active(active), out),
             LiveInput::Shutdown => self.pass(at, Input::Shutdown, out),
             LiveInput::Tick => {
-                while let Some((came_at, event)) = self.io.event() {
+                let event = |work: &mut Work| work.io.event();
+                while let Some((came_at, event)) = self.work.as_mut().and_then(event) {
                     self.pass(came_at, Input::Io(event), out)?;
                 }
                 self.pass(at, Input::Tick, out)

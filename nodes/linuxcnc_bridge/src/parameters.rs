@@ -21,6 +21,10 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "INI file to start, relative to the parameter file; absent: LinuxCNC is started by others.",
     ),
     text(
+        "autostart",
+        "Whether the node configures and activates itself at its start; otherwise somebody does so (`ros2 lifecycle set`).",
+    ),
+    text(
         "user",
         "Ordinary user who owns LinuxCNC's processes; used when the bridge runs as root.",
     ),

@@ -288,6 +288,9 @@ pub enum Refusal {
     /// One runs already.
     #[error("another program is running")]
     Busy,
+    /// The bridge is not active.
+    #[error("the bridge is not active")]
+    Inactive,
     /// There is no connection.
     #[error("not connected to the controller")]
     NotConnected,

@@ -48,6 +48,8 @@ pub enum Input {
     Tick,
     /// News from outside.
     Io(IoEvent),
+    /// The bridge may act, or is to come to rest and say when it has: a running program is called off first.
+    Active(bool),
     /// The bridge is to stop: a running program is called off first.
     Shutdown,
 }
@@ -134,6 +136,8 @@ pub enum Output {
     Condition(Condition),
     /// Something to be done outside.
     Io(IoCommand),
+    /// After [`Input::Active`] with false: no program is on its way, and HAL is told of offsets no longer.
+    AtRest,
     /// The answer to [`Input::Shutdown`].
     Stopped,
 }
@@ -164,6 +168,8 @@ pub struct BridgeStage {
     motion_type: i32,
     compensation: CompensationPath,
     freshness: Option<Freshness>,
+    active: bool,
+    resting: bool,
     stopping: bool,
     stopped: bool,
     conditions: Vec<Condition>,
@@ -188,6 +194,8 @@ impl BridgeStage {
             motion_type: 0,
             compensation: CompensationPath::new(settings),
             freshness: None,
+            active: true,
+            resting: false,
             stopping: false,
             stopped: false,
             conditions: Vec::new(),
@@ -195,10 +203,29 @@ impl BridgeStage {
         }
     }
 
+    /// The same, but it takes programs and offsets only once [`Input::Active`] says so.
+    #[must_use]
+    pub fn inactive(mut self) -> Self {
+        self.active = false;
+        self
+    }
+
+    fn act(&mut self, active: bool) {
+        self.active = active;
+        self.resting = !active;
+        if !active {
+            self.call_off(None);
+            self.compensation.release();
+            self.freshness = None;
+        }
+    }
+
     fn refusal(&self, program: &str) -> Option<Refusal> {
         let state = self.session.state();
         if self.run.is_some() || self.stopping {
             Some(Refusal::Busy)
+        } else if !self.active {
+            Some(Refusal::Inactive)
         } else if program.trim().is_empty() {
             Some(Refusal::Empty)
         } else if !self.session.is_up() {
@@ -526,6 +553,8 @@ impl Stage for BridgeStage {
         match input {
             Input::Goal { goal, program } => self.begin(goal, program, out),
             Input::Cancel { goal } => self.call_off(Some(goal)),
+            Input::Active(active) => self.act(active),
+            Input::Compensation(_) if !self.active => {}
             Input::Compensation(compensation) => {
                 if let Err(refused) = self.compensation.receive(at, &compensation) {
                     self.conditions
@@ -543,6 +572,10 @@ impl Stage for BridgeStage {
             out.push(Output::Io(IoCommand::Send(line)));
         }
         out.extend(self.conditions.drain(..).map(Output::Condition));
+        if self.resting && self.run.is_none() {
+            self.resting = false;
+            out.push(Output::AtRest);
+        }
         if self.stopping && self.run.is_none() && !self.stopped {
             self.stopped = true;
             out.push(Output::Stopped);

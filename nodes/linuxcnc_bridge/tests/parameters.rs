@@ -16,6 +16,7 @@ fn config() -> BridgeConfig {
         machine_file: "machine.yaml".to_owned(),
         joints: Axis::LINEAR.to_vec(),
         prepare: Prepare::Observe,
+        autostart: true,
         start_ini: None,
         user: "nobody".to_owned(),
         connection: ConnectionConfig::default(),
@@ -58,6 +59,7 @@ fn readme_table_defaults_and_configuration_agree() {
             },
             None if doc.name == "user" => " \"nobody\" ".to_owned(),
             None if doc.name == "start_ini" => " none ".to_owned(),
+            None if doc.name == "autostart" => " true ".to_owned(),
             None => "  ".to_owned(),
         };
         let row = format!(

@@ -30,8 +30,10 @@ use crate::node::{
 use crate::parameter::Parameter;
 
 mod action;
+mod managed;
 
 pub use action::{ClientSignal, GoalNews, GoalSignal};
+pub use managed::Lifecycle;
 
 /// Turns serialised bytes into a stage input, or says why it cannot.
 type Decode<I> = Box<dyn Fn(&[u8]) -> Result<I, String> + Send>;
@@ -318,6 +320,12 @@ where
     #[must_use]
     pub fn node(self) -> Box<dyn Node> {
         Box::new(self)
+    }
+
+    /// Closes the table of a node that acts only while it is active.
+    #[must_use]
+    pub fn managed(self, lifecycle: Lifecycle<S>) -> Box<dyn Node> {
+        Box::new(managed::Managed::new(self, lifecycle))
     }
 }
 

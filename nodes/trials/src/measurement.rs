@@ -192,7 +192,7 @@ impl Session<'_> {
                 let end = Some(ProgramEnd { done, message });
                 self.ask(ToSequencer::ProgramEnd { id: goal, end })?;
             }
-            FromControl::Feedback { .. } | FromControl::Diagnostic(_) => {}
+            FromControl::Feedback { .. } | FromControl::Diagnostic(_) | FromControl::AtRest => {}
         }
         Ok(())
     }

@@ -136,7 +136,7 @@ impl Rehearsal {
                     message,
                 }),
             },
-            Said::Feedback { .. } | Said::Diagnostic(_) => return,
+            Said::Feedback { .. } | Said::Diagnostic(_) | Said::AtRest => return,
         };
         self.news.push_back(news);
     }

@@ -8,7 +8,7 @@ use axis_compensation::parameters::PARAMETERS;
 use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output};
 use machine::MachineFile;
 use metrology::stamp::Span;
-use node_runtime::{Node, Setup, Wiring};
+use node_runtime::{Lifecycle, Node, Setup, Wiring};
 
 mod conditions;
 
@@ -27,7 +27,16 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(&config, PARAMETERS)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
-    let stage = AxisCompensationStage::new(&config, &machine)?;
+    let stage = AxisCompensationStage::new(&config, &machine)?.inactive();
+    let fresh = stage.clone();
+    let wind_down = Span::from_secs_f64(config.wind_down_s() + BUSY_S);
+    let at_rest = |output: &Output| *output == Output::AtRest;
+    let lifecycle = Lifecycle::new(config.autostart, wind_down, Input::Active, at_rest).cleaned_up(
+        move |stage: &mut AxisCompensationStage| {
+            stage.clone_from(&fresh);
+            Ok(())
+        },
+    );
     Ok(Wiring::new(setup.name(), parameters, stage)
         .on(&topics::AXES_STATE, Input::State)
         .on(&topics::THERMAL_MODEL, |model| {
@@ -58,8 +67,8 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         })
         .diagnose(conditions::condition)
         .shutdown(|| Input::Shutdown, |output| *output == Output::FadedOut)
-        .wound_down_within(Span::from_secs_f64(config.wind_down_s() + BUSY_S))
-        .node())
+        .wound_down_within(wind_down)
+        .managed(lifecycle))
 }
 
 fn switched(outcome: Result<&[Output], &str>) -> SetBoolResponse {

@@ -153,7 +153,7 @@ impl Machine {
                 Output::Compensation(compensation) => self.last = Some(compensation),
                 Output::Diagnostic(said) => self.diagnostics.push(said),
                 Output::Table(table) => self.tables.push(*table),
-                Output::FadedOut => {}
+                Output::FadedOut | Output::AtRest => {}
             }
         }
     }

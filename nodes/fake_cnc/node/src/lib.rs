@@ -3,10 +3,10 @@
 use abbe_msgs::topics;
 use anyhow::{Context, Result};
 use fake_cnc::config::PARAMETERS;
-use fake_cnc::{Cnc, Config, Input, Plant, PlantFile};
+use fake_cnc::{Cnc, Config, Input, Output, Plant, PlantFile};
 use machine::MachineFile;
 use metrology::stamp::Span;
-use node_runtime::{Node, Setup, Wiring};
+use node_runtime::{Lifecycle, Node, Setup, Wiring};
 
 mod forms;
 mod witness;
@@ -36,8 +36,11 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
         PlantFile::from_yaml(&text).with_context(|| format!("plant file {}", path.display()))?;
     let plant =
         Plant::new(&machine, &truth).with_context(|| format!("plant file {}", path.display()))?;
-    let cnc = Cnc::new(&config, &machine, plant)?;
+    let cnc = Cnc::new(&config, &machine, plant)?.inactive();
     let period = Span::from_secs_f64(machine.control.servo_period_ms / 1e3);
+    let within = Span::from_secs_f64(config.rest_s());
+    let at_rest = |output: &Output| *output == Output::AtRest;
+    let lifecycle = Lifecycle::new(config.autostart, within, Input::Active, at_rest);
     let mut wiring = Wiring::new(setup.name(), parameters, Witnessed { cnc, witness })
         .every(period, || Input::Tick)
         .on(&topics::COMPENSATION, Input::Compensation)
@@ -59,5 +62,5 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
             forms::temperature(output, &id)
         })?;
     }
-    Ok(wiring.stops_last().node())
+    Ok(wiring.stops_last().managed(lifecycle))
 }

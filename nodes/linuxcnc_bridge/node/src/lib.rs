@@ -8,12 +8,15 @@ use linuxcnc_bridge::live::{LiveBridge, LiveInput};
 use linuxcnc_bridge::{BridgeConfig, Output, PARAMETERS};
 use machine::MachineFile;
 use metrology::stamp::Span;
-use node_runtime::{Node, Setup, Wiring};
+use node_runtime::{Lifecycle, Node, Setup, Wiring};
 
 mod forms;
 
 /// Time between two looks at what has come from LinuxCNC; every look takes all servo periods since the last.
 const TICK: Span = Span::from_nanos(5_000_000);
+
+/// How long LinuxCNC may take to call a program off.
+const STOP: Span = Span::from_nanos(60_000_000_000);
 
 /// Builds the node; starts LinuxCNC where its parameters name an INI file.
 ///
@@ -28,7 +31,14 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         Some(ini) => forms::folder_of(&setup.file_path("start_ini")?, ini),
         None => PathBuf::new(),
     };
-    let bridge = LiveBridge::open(&config, &machine, &folder)?;
+    let bridge = LiveBridge::prepare(&config, &machine, &folder)?;
+    let at_rest = |output: &Output| *output == Output::AtRest;
+    let lifecycle = Lifecycle::new(config.autostart, STOP, LiveInput::Active, at_rest)
+        .configured(|bridge: &mut LiveBridge| bridge.open().map_err(|error| error.to_string()))
+        .cleaned_up(|bridge| {
+            bridge.close();
+            Ok(())
+        });
     Ok(Wiring::new(setup.name(), parameters, bridge)
         .every(TICK, || LiveInput::Tick)
         .on(&topics::COMPENSATION, LiveInput::Compensation)
@@ -47,5 +57,5 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
             |output| matches!(output, Output::Stopped),
         )
         .stops_last()
-        .node())
+        .managed(lifecycle))
 }

@@ -89,4 +89,28 @@ fn offsets_reach_the_motor_without_a_step_and_fade_when_their_source_dies() {
     println!("greatest rate of the motor {rate_mm_s:.4} mm/s");
     // HAL's limit is 0.02 mm/s; positions are printed to 1 nm.
     assert!(rate_mm_s < 0.0225, "{rate_mm_s} mm/s");
+    deactivated_it_lets_go(&mut rig);
+}
+
+/// Not active, the bridge hears no offsets and takes no program, and HAL fades what it has.
+fn deactivated_it_lets_go(rig: &mut Rig) {
+    for _ in 0..80 {
+        rig.tell(offsets(0.030));
+        rig.turn();
+    }
+    assert!(offset_mm(rig) > 0.005, "{}", offset_mm(rig));
+    rig.tell(LiveInput::Active(false));
+    assert!(rig.at_rest, "no program runs");
+    let goal = rig.begin("G21 G90\nG1 X1 F600\nM2\n");
+    assert_eq!(rig.finish(goal).message, "the bridge is not active");
+    rig.states.clear();
+    for _ in 0..900 {
+        rig.tell(offsets(0.030));
+        rig.turn();
+    }
+    assert!(offset_mm(rig).abs() < 2e-6, "{}", offset_mm(rig));
+    assert!(greatest_rate_mm_s(rig) < 0.0225);
+    rig.tell(LiveInput::Active(true));
+    let goal = rig.begin("G21 G90\nG1 X1 F600\nM2\n");
+    assert_eq!(rig.finish(goal).message, "");
 }

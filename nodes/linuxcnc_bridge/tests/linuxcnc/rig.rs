@@ -34,6 +34,7 @@ pub struct Rig {
     pub conditions: Vec<Condition>,
     pub endings: Vec<(u64, Ending)>,
     pub lines: Vec<u32>,
+    pub at_rest: bool,
     pub machine: MachineFile,
     pub config: BridgeConfig,
     ini: PathBuf,
@@ -122,6 +123,7 @@ impl Rig {
             conditions: Vec::new(),
             endings: Vec::new(),
             lines: Vec::new(),
+            at_rest: false,
             machine,
             config,
             ini,
@@ -157,6 +159,7 @@ impl Rig {
                 Output::Finished { goal, ending } => self.endings.push((goal, ending)),
                 Output::Feedback { line, .. } => self.lines.push(line),
                 Output::Refused { goal, refusal } => self.endings.push((goal, refusal.ending())),
+                Output::AtRest => self.at_rest = true,
                 Output::Accepted { .. } | Output::Joints(_) | Output::Stopped | Output::Io(_) => {}
             }
         }

@@ -39,8 +39,14 @@ const HEADER_LEN: usize = 4;
 const CDR_LE_HEADER: [u8; HEADER_LEN] = [0, 1, 0, 0];
 const CDR_BE_HEADER: [u8; HEADER_LEN] = [0, 0, 0, 0];
 
-/// Passes payloads through as they are.
+/// Passes payloads through as they are, but for their end: RustDDS pads a sample to whole words unless it is sent in
+/// fragments, and Cyclone DDS 0.10 refuses a last fragment that is not padded.
 pub(super) struct Raw;
+
+/// Submessages are whole words.
+const ALIGNMENT: usize = 4;
+/// Samples up to this length are never sent in fragments.
+const UNFRAGMENTED_LEN: usize = 1024;
 
 /// Decoder that only puts the header back in front.
 #[derive(Clone)]
@@ -92,6 +98,12 @@ impl SerializerAdapter<Bytes> for Raw {
     }
 
     fn to_bytes(value: &Bytes) -> Result<rustdds::bytes::Bytes, Infallible> {
+        let lacking = value.len().wrapping_neg() % ALIGNMENT;
+        if value.len() > UNFRAGMENTED_LEN && lacking > 0 {
+            let mut padded = value[HEADER_LEN..].to_vec();
+            padded.resize(padded.len() + lacking, 0);
+            return Ok(padded.into());
+        }
         let whole = rustdds::bytes::Bytes::from_owner(Arc::clone(value));
         Ok(whole.slice(HEADER_LEN.min(value.len())..))
     }
@@ -230,6 +242,17 @@ mod tests {
                 "{nanos} came back as {}",
                 back.nanos()
             );
+        }
+    }
+
+    #[test]
+    fn what_may_be_sent_in_fragments_ends_with_a_whole_word() {
+        for (len, padded) in [(1023, 1023), (1025, 1028), (1494, 1496), (1496, 1496)] {
+            let mut sent = vec![7; len];
+            sent[..HEADER_LEN].copy_from_slice(&CDR_LE_HEADER);
+            let payload = Raw::to_bytes(&Arc::from(sent.as_slice())).unwrap();
+            assert_eq!(payload.len() + HEADER_LEN, padded);
+            assert_eq!(payload[..len - HEADER_LEN], sent[HEADER_LEN..]);
         }
     }
 
