@@ -274,6 +274,12 @@ pub const STEP_PLAYING: ServiceName<Trigger> = ServiceName {
     service: PhantomData,
 };
 
+/// Writes what a recorder keeps in memory into a bag.
+pub const SAVE_RECORDING: ServiceName<Trigger> = ServiceName {
+    name: "recorder/save",
+    service: PhantomData,
+};
+
 /// Runs a program on the controller.
 pub const RUN_PROGRAM: ActionName<RunProgram> = ActionName {
     name: "cnc/run_program",

@@ -75,6 +75,10 @@ fn arch_readme_lists_services_and_actions() {
         ),
         row(topics::STEP_PLAYING.name, std_srvs::srv::Trigger::TYPE_NAME),
         row(
+            topics::SAVE_RECORDING.name,
+            std_srvs::srv::Trigger::TYPE_NAME,
+        ),
+        row(
             topics::RUN_PROGRAM.name,
             abbe_msgs::action::RunProgram::TYPE_NAME,
         ),

@@ -10,4 +10,5 @@
 mod bag;
 mod calls;
 mod latched;
+mod ring;
 mod wire;

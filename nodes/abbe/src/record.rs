@@ -6,8 +6,10 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use node_runtime::Interruption;
-use recorder::{ChunkCompression, NodeConfig, RecorderConfig};
+use node_runtime::arguments::Arguments;
+use node_runtime::environment::Environment;
+use node_runtime::{Interruption, Setup};
+use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RingConfig};
 
 /// Compression inside the bag's chunks.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -20,7 +22,7 @@ enum Compression {
 /// Arguments of `abbe record`.
 #[derive(Args)]
 pub struct Record {
-    /// Folder of the bag; it must not exist.
+    /// Folder of the bag, which must not exist; with --ring the folder in which bags are saved.
     #[arg(short, long)]
     output: PathBuf,
     /// Compression inside the chunks.
@@ -29,12 +31,32 @@ pub struct Record {
     /// A new file is begun at this size, bytes; 0: one file.
     #[arg(long, default_value_t = 0)]
     max_file_bytes: u64,
+    /// A new file is begun when this one spans so much time, s; 0: one file.
+    #[arg(long, default_value_t = 0.0)]
+    max_file_s: f64,
+    /// Absolute names of topics that are left out, `*` stands for any run of characters.
+    #[arg(long, num_args = 1..)]
+    exclude: Vec<String>,
+    /// Machine file that goes into every bag.
+    #[arg(long)]
+    machine: Option<PathBuf>,
+    /// Keep the last seconds in memory, and save them when `recorder/save` is called.
+    #[arg(long, value_name = "SECONDS")]
+    ring: Option<f64>,
+    /// Most bytes that the ring keeps.
+    #[arg(long, default_value_t = 256 << 20, requires = "ring")]
+    ring_bytes: u64,
+    /// Save the ring when an error begins on `/diagnostics` too.
+    #[arg(long, requires = "ring")]
+    save_on_error: bool,
     /// Absolute names of topics, `*` stands for any run of characters; none: every topic.
     topics: Vec<String>,
 }
 
 /// The recorder's own name on the graph.
 const NAME: &str = "abbe_record";
+/// The name of a recorder that keeps, before which its services stand.
+const KEEPER: &str = "recorder";
 /// Between two looks at whether it is over; a signal wakes it at once.
 const A_WHILE: Duration = Duration::from_secs(60);
 /// Exit code for a bag that has not all that was said.
@@ -48,8 +70,21 @@ impl Record {
     pub fn execute(self) -> Result<ExitCode> {
         let interruption = Interruption::listen("the bag is being closed")?;
         let bag = self.output.to_str().context("--output: must be UTF-8")?;
+        let machine = self.machine.as_ref().map(|path| {
+            let text = std::fs::read_to_string(path);
+            text.with_context(|| format!("--machine {}", path.display()))
+        });
+        let machine = machine.transpose()?;
+        let ring = self.ring.map(|window_s| RingConfig {
+            window_s,
+            limit_bytes: self.ring_bytes,
+            save_on_error: self.save_on_error,
+        });
         let config = NodeConfig {
             bag: bag.to_owned(),
+            exclude: self.exclude,
+            machine_file: String::new(),
+            ring,
             topics: if self.topics.is_empty() {
                 vec!["*".to_owned()]
             } else {
@@ -62,10 +97,14 @@ impl Record {
                     Compression::Zstd => ChunkCompression::Zstd,
                 },
                 max_file_bytes: self.max_file_bytes,
+                max_file_s: self.max_file_s,
                 ..RecorderConfig::default()
             },
         };
-        let capture = recorder_node::record(&config, NAME)?;
+        if ring.is_some() {
+            return keep(&config, machine, &interruption);
+        }
+        let capture = recorder_node::record(&config, machine, NAME)?;
         eprintln!("Recording into {bag}; Ctrl-C ends it.");
         while !interruption.wait(A_WHILE) {}
         let captured = capture.finish()?;
@@ -84,4 +123,22 @@ impl Record {
             ExitCode::from(DONE_WITH_LOSS)
         })
     }
+}
+
+/// Keeps the last minutes as the node `recorder`, whose services save them.
+fn keep(
+    config: &NodeConfig,
+    machine: Option<String>,
+    interruption: &Interruption,
+) -> Result<ExitCode> {
+    let setup = Setup::new(KEEPER, &Arguments::parse(Vec::new())?)?;
+    let node = recorder_node::listen(&setup, config, machine)?;
+    let running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
+    let words = "ros2 service call /recorder/save std_srvs/srv/Trigger";
+    eprintln!(
+        "Keeping what is said; `{words}` saves it below {}; Ctrl-C ends it.",
+        config.bag
+    );
+    running.until(interruption)?;
+    Ok(ExitCode::SUCCESS)
 }

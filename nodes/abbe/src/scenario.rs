@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, anyhow, bail};
 use metrology::Axis;
 use node_runtime::complaint;
+use recorder::ChunkCompression;
 use serde::Deserialize;
 
 use crate::evaluate::budget::Budget;
@@ -29,6 +30,23 @@ pub struct ScenarioFile {
     /// A table made of the run's own stops, which LinuxCNC then loads in two more runs.
     #[serde(default)]
     pub linuxcnc_table: Option<LinuxcncTable>,
+    /// How the run's bag is written.
+    #[serde(default)]
+    pub recording: RecordingFile,
+}
+
+/// How a run's bag is written; what is not said is as everywhere.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecordingFile {
+    /// Inside the chunks.
+    pub compression: ChunkCompression,
+    /// A new file is begun at this size; 0: one file.
+    pub max_file_bytes: u64,
+    /// A new file is begun when this one spans so much log time, s; 0: one file.
+    pub max_file_s: f64,
+    /// Absolute names of topics that are left out; `*` stands for any run of characters. A bag without its inputs cannot be computed again.
+    pub exclude: Vec<String>,
 }
 
 /// A screw-compensation file that is tried on the control that it is made for.

@@ -78,6 +78,8 @@ pub enum Selection {
     All,
     /// Those whose absolute names fit one of the patterns; `*` is any run of characters.
     Matching(Vec<String>),
+    /// Those of another selection whose names fit none of the patterns.
+    Without(Box<Selection>, Vec<String>),
 }
 
 impl Selection {
@@ -86,9 +88,22 @@ impl Selection {
     pub fn takes(&self, topic: &str) -> bool {
         match self {
             Self::All => true,
-            Self::Matching(patterns) => patterns.iter().any(|pattern| fits(pattern, topic)),
+            Self::Matching(patterns) => fits_any(patterns, topic),
+            Self::Without(selection, patterns) => {
+                selection.takes(topic) && !fits_any(patterns, topic)
+            }
         }
     }
+
+    /// The same without those whose absolute names fit one of the patterns.
+    #[must_use]
+    pub fn without(self, patterns: Vec<String>) -> Self {
+        Self::Without(Box::new(self), patterns)
+    }
+}
+
+fn fits_any(patterns: &[String], topic: &str) -> bool {
+    patterns.iter().any(|pattern| fits(pattern, topic))
 }
 
 fn fits(pattern: &str, text: &str) -> bool {
@@ -494,6 +509,9 @@ mod tests {
             assert_eq!(some.takes(topic), taken, "{topic}");
         }
         assert!(Selection::All.takes("/anything"));
+        let less = some.without(vec!["/cell/*".to_owned()]);
+        assert!(less.takes("/axes/state") && !less.takes("/cell/axes/state"));
+        assert!(!less.takes("/latency"));
     }
 
     #[test]

@@ -61,6 +61,8 @@ pub struct RecorderConfig {
     pub metadata_period_s: f64,
     /// A new file is begun when the current one reaches this many bytes; 0 means one file.
     pub max_file_bytes: u64,
+    /// A new file is begun when the current one spans this much log time, s; 0 means one file.
+    pub max_file_s: f64,
     /// Most bytes that wait for the disk.
     pub queue_limit_bytes: u64,
     /// What happens to a message that finds the queue full.
@@ -75,6 +77,7 @@ impl Default for RecorderConfig {
             flush_period_s: 1.0,
             metadata_period_s: 10.0,
             max_file_bytes: 0,
+            max_file_s: 0.0,
             queue_limit_bytes: 256 << 20,
             when_full: WhenFull::CountLoss,
         }
@@ -85,14 +88,58 @@ impl Default for RecorderConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NodeConfig {
-    /// Folder of the bag, relative to where the program was started; it must not exist.
+    /// Folder of the bag, or with `ring` of the bags that are saved, relative to where the program was started; it must
+    /// not exist.
     pub bag: String,
     /// Absolute names of topics; `*` stands for any run of characters.
     #[serde(default = "every_topic")]
     pub topics: Vec<String>,
+    /// Topics of these names are left out, whatever `topics` says.
+    #[serde(default)]
+    pub exclude: Vec<String>,
+    /// Machine file that goes into every bag, relative to the parameter file.
+    #[serde(default)]
+    pub machine_file: String,
+    /// Keep the last minutes in memory, and write them when asked; absent: write everything.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ring: Option<RingConfig>,
     /// How the bag is written.
     #[serde(default)]
     pub writing: RecorderConfig,
+}
+
+/// What is kept in memory, and when it is saved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RingConfig {
+    /// How far back it reaches, s of log time.
+    pub window_s: f64,
+    /// Most bytes that are kept; where they do not last for the window, it is shorter.
+    #[serde(default = "ring_limit_bytes")]
+    pub limit_bytes: u64,
+    /// Whether an error on `/diagnostics` saves it.
+    #[serde(default)]
+    pub save_on_error: bool,
+}
+
+fn ring_limit_bytes() -> u64 {
+    256 << 20
+}
+
+impl RingConfig {
+    /// Checks every value once.
+    ///
+    /// # Errors
+    /// A value out of its range, with the range.
+    pub fn checked(&self) -> Result<(), RecorderError> {
+        check_period("ring.window_s", self.window_s, LONGEST_SPAN_S)?;
+        check_size("ring.limit_bytes", self.limit_bytes, LARGEST_RING_BYTES)
+    }
+
+    pub(crate) fn window_nanos(&self) -> i64 {
+        // Checked above: between 0 and a week.
+        (self.window_s * 1e9).round() as i64
+    }
 }
 
 fn every_topic() -> Vec<String> {
@@ -126,11 +173,35 @@ const fn number(
 pub const PARAMETERS: &[ParameterDoc] = &[
     text(
         "bag",
-        "Folder of the bag, relative to where the program was started; it must not exist.",
+        "Folder of the bag, or with ring of the bags that are saved, relative to where the program was started; it must not exist.",
     ),
     text(
         "topics",
         "Absolute names of topics to record; * stands for any run of characters.",
+    ),
+    text(
+        "exclude",
+        "Topics of these names are left out, whatever topics says.",
+    ),
+    text(
+        "machine_file",
+        "Machine file that goes into every bag, relative to the parameter file.",
+    ),
+    number(
+        "ring.window_s",
+        "s",
+        (1e-3, 604_800.0),
+        "Keep so much in memory, and write it when asked; without ring everything is written.",
+    ),
+    number(
+        "ring.limit_bytes",
+        "byte",
+        (1024.0, 68_719_476_736.0),
+        "Most bytes that are kept; where they do not last for the window, it is shorter, and that is said.",
+    ),
+    text(
+        "ring.save_on_error",
+        "Whether an error that begins on /diagnostics saves what is kept.",
     ),
     text(
         "writing.compression",
@@ -161,6 +232,12 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "A new file is begun at this size; 0: one file.",
     ),
     number(
+        "writing.max_file_s",
+        "s",
+        (0.0, 604_800.0),
+        "A new file is begun when this one spans so much log time; 0: one file.",
+    ),
+    number(
         "writing.queue_limit_bytes",
         "byte",
         (1024.0, 9e18),
@@ -178,6 +255,37 @@ const SMALLEST_BYTES: u64 = 1024;
 const LARGEST_CHUNK_BYTES: u64 = 64 << 20;
 /// Longest period, s: an hour of loss is no longer a recording.
 const LONGEST_PERIOD_S: f64 = 3600.0;
+/// Longest file and ring, s: a week.
+const LONGEST_SPAN_S: f64 = 604_800.0;
+/// Largest ring: 64 GiB.
+const LARGEST_RING_BYTES: u64 = 64 << 30;
+
+fn check_period(key: &'static str, value_s: f64, limit_s: f64) -> Result<(), RecorderError> {
+    if value_s > 0.0 && value_s <= limit_s {
+        return Ok(());
+    }
+    Err(RecorderError::PeriodOutOfRange {
+        key,
+        value_s,
+        limit_s,
+    })
+}
+
+fn check_size(
+    key: &'static str,
+    value_bytes: u64,
+    largest_bytes: u64,
+) -> Result<(), RecorderError> {
+    if (SMALLEST_BYTES..=largest_bytes).contains(&value_bytes) {
+        return Ok(());
+    }
+    Err(RecorderError::SizeOutOfRange {
+        key,
+        value_bytes,
+        smallest_bytes: SMALLEST_BYTES,
+        largest_bytes,
+    })
+}
 
 impl RecorderConfig {
     /// Checks every value once.
@@ -185,37 +293,26 @@ impl RecorderConfig {
     /// # Errors
     /// A value out of its range, with the range.
     pub fn checked(&self) -> Result<(), RecorderError> {
-        for (key, value_s) in [
-            ("flush_period_s", self.flush_period_s),
-            ("metadata_period_s", self.metadata_period_s),
-        ] {
-            if !(value_s > 0.0 && value_s <= LONGEST_PERIOD_S) {
-                return Err(RecorderError::PeriodOutOfRange {
-                    key,
-                    value_s,
-                    limit_s: LONGEST_PERIOD_S,
-                });
-            }
+        check_period("flush_period_s", self.flush_period_s, LONGEST_PERIOD_S)?;
+        check_period(
+            "metadata_period_s",
+            self.metadata_period_s,
+            LONGEST_PERIOD_S,
+        )?;
+        if self.max_file_s.to_bits() != 0 {
+            check_period("max_file_s", self.max_file_s, LONGEST_SPAN_S)?;
         }
-        let sizes = [
-            (
-                "chunk_size_bytes",
-                self.chunk_size_bytes,
-                LARGEST_CHUNK_BYTES,
-            ),
-            ("queue_limit_bytes", self.queue_limit_bytes, u64::MAX),
-        ];
-        for (key, value_bytes, largest_bytes) in sizes {
-            if !(SMALLEST_BYTES..=largest_bytes).contains(&value_bytes) {
-                return Err(RecorderError::SizeOutOfRange {
-                    key,
-                    value_bytes,
-                    smallest_bytes: SMALLEST_BYTES,
-                    largest_bytes,
-                });
-            }
-        }
-        Ok(())
+        check_size(
+            "chunk_size_bytes",
+            self.chunk_size_bytes,
+            LARGEST_CHUNK_BYTES,
+        )?;
+        check_size("queue_limit_bytes", self.queue_limit_bytes, u64::MAX)
+    }
+
+    /// Longest log time of a file; `None`: any.
+    pub(crate) fn max_file_nanos(&self) -> Option<u64> {
+        (self.max_file_s > 0.0).then(|| nanos_of(self.max_file_s))
     }
 
     pub(crate) fn flush_period_nanos(&self) -> u64 {
@@ -228,7 +325,7 @@ impl RecorderConfig {
 }
 
 fn nanos_of(period_s: f64) -> u64 {
-    // Checked above: between 0 and an hour, so neither sign nor size is lost.
+    // Checked above: between 0 and a week, so neither sign nor size is lost.
     (period_s * 1e9).round() as u64
 }
 

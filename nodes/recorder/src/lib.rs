@@ -12,6 +12,8 @@
 //! index comes last; a file without it is read from its beginning by [`Bag`], which says where and
 //! why it stops, and [`recover`] writes it anew with an index.
 //!
+//! A [`Ring`] keeps the last minutes in memory instead, and gives them out when asked.
+//!
 //! A [`RunContext`] puts what a replay needs into the same file: the machine file, programs, the
 //! scenario, the resolved parameters, the seed and the commit. The plant's true state has no place
 //! in it.
@@ -27,12 +29,13 @@ mod read;
 mod recording;
 mod recover;
 mod reflect;
+mod ring;
 mod shelf;
 mod split;
 
 pub use channel::{Channel, ChannelId, Durability, History, Liveliness, QosProfile, QosTime};
 pub use channel::{Reliability, qos_from_yaml, qos_to_yaml};
-pub use config::{ChunkCompression, NodeConfig, PARAMETERS, RecorderConfig, WhenFull};
+pub use config::{ChunkCompression, NodeConfig, PARAMETERS, RecorderConfig, RingConfig, WhenFull};
 pub use context::{
     Attached, CALL_RECORD, END_RECORD, MessageOrder, NODES_RECORD, RecordedCall, RecordedRun,
     RunContext, RunNode, verify_attachments,
@@ -47,4 +50,5 @@ pub use read::{
 pub use recording::{MessageStamp, Recording, RecordingSummary};
 pub use recover::{Recovered, recover};
 pub use reflect::{ReflectError, Reflector, Value};
+pub use ring::{Ring, RingSink, RingStats, Snapshot};
 pub use shelf::{Directory, Shelf};

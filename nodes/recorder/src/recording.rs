@@ -232,11 +232,17 @@ impl<S: Shelf> Recording<S> {
     }
 
     fn after_seal(&mut self, log_time_nanos: u64) -> Result<(), RecorderError> {
-        let full = self.config.max_file_bytes > 0
-            && self
-                .current
-                .as_ref()
-                .is_some_and(|split| split.sealed_bytes() >= self.config.max_file_bytes);
+        let config = &self.config;
+        let is_large = |split: &Split<S::File>| {
+            config.max_file_bytes > 0 && split.sealed_bytes() >= config.max_file_bytes
+        };
+        // A file ends with a chunk, so that it spans up to a chunk more.
+        let is_long = |split: &Split<S::File>| {
+            let longest = config.max_file_nanos();
+            let since = split.since_nanos().unwrap_or(log_time_nanos);
+            longest.is_some_and(|longest| log_time_nanos.abs_diff(since) >= longest)
+        };
+        let full = (self.current.as_ref()).is_some_and(|split| is_large(split) || is_long(split));
         if full {
             self.finish_split(None)?;
             self.open_split()?;

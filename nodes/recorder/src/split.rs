@@ -245,6 +245,11 @@ impl<F: Write> Split<F> {
         self.sealed_bytes
     }
 
+    /// Earliest log time of its whole chunks.
+    pub(crate) fn since_nanos(&self) -> Option<u64> {
+        self.sealed_span.bounds_nanos().map(|(first, _)| first)
+    }
+
     pub(crate) fn entry(&self) -> FileEntry {
         FileEntry {
             path: self.name.clone(),

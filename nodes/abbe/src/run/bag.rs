@@ -9,8 +9,8 @@ use node_runtime::Node;
 use node_runtime::node::TopicPort;
 use node_runtime::parameter::{Parameter, Value};
 use recorder::{
-    Channel, ChunkCompression, Directory, MessageOrder, RecordedRun, Recorder, RecorderConfig,
-    Recording, RunContext, RunNode, WhenFull,
+    Channel, Directory, MessageOrder, RecordedRun, Recorder, RecorderConfig, Recording, RunContext,
+    RunNode, WhenFull,
 };
 
 use crate::scenario::Scenario;
@@ -33,7 +33,9 @@ pub fn begin(
 ) -> Result<Recorder> {
     let simulated = composed.is_some();
     let config = RecorderConfig {
-        compression: ChunkCompression::Zstd,
+        compression: scenario.file.recording.compression,
+        max_file_bytes: scenario.file.recording.max_file_bytes,
+        max_file_s: scenario.file.recording.max_file_s,
         flush_period_s: if simulated {
             SIMULATED_FLUSH_S
         } else {

@@ -14,6 +14,7 @@ use metrology::sample::PlanState;
 use metrology::stamp::{Host, Span, Stamp};
 use node_runtime::arguments::Arguments;
 use node_runtime::harness::Published;
+use node_runtime::tap::Selection;
 use node_runtime::{Harness, Interruption, Node, Setup};
 use recorder::{
     CALL_RECORD, ChannelId, MessageStamp, RecordedCall, Recorder, RecorderSink, RunNode,
@@ -61,7 +62,7 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
     let start_nanos = u64::try_from(start.nanos()).context("simulated_start_s is below 0")?;
     let mut harness = Harness::compose(nodes, start)?;
     let recorder = bag::begin(bag_path, scenario, parameters, start_nanos, Some(ran))?;
-    record(&mut harness, &recorder)?;
+    record(&mut harness, &recorder, &scenario.file.recording.exclude)?;
     let mirror = if how.on_dds {
         Mirror::start(&mut harness)?
     } else {
@@ -132,21 +133,41 @@ fn build_node(launched: &LaunchNode, truth: &Arc<Truth>) -> Result<Box<dyn Node>
     }
 }
 
+/// Where a topic goes.
+#[derive(Clone, Copy)]
+enum Place {
+    Channel(ChannelId),
+    /// The calls of a service: a reader such as PyPI `rosbags` opens no bag with such a type.
+    Note,
+    Nowhere,
+}
+
 /// Writes every publication into the bag, in total order.
-fn record(harness: &mut Harness, recorder: &Recorder) -> Result<()> {
+fn record(harness: &mut Harness, recorder: &Recorder, exclude: &[String]) -> Result<()> {
     let sink: RecorderSink = recorder.sink();
-    let mut channels: Vec<Option<ChannelId>> = Vec::new();
+    let picked = Selection::All.without(exclude.to_vec());
+    let mut places = Vec::new();
     let mut names = Vec::new();
     for port in harness.topics() {
-        let is_call = port.topic.ends_with(SERVICE_EVENT_SUFFIX);
-        let channel = || sink.add_channel(&bag::channel(bag::full_name(&port.topic), port));
-        channels.push(if is_call { None } else { Some(channel()?) });
+        let name = bag::full_name(&port.topic);
+        places.push(if port.topic.ends_with(SERVICE_EVENT_SUFFIX) {
+            Place::Note
+        } else if picked.takes(&name) {
+            Place::Channel(sink.add_channel(&bag::channel(name, port))?)
+        } else {
+            Place::Nowhere
+        });
         names.push(port.topic.clone());
     }
     let mut messages = 0;
     harness.observe(Box::new(move |published: Published<'_>| {
         let nanos = published.at.nanos();
-        let Some(channel) = channels[published.topic] else {
+        let channel = match places[published.topic] {
+            Place::Channel(channel) => Some(channel),
+            Place::Note => None,
+            Place::Nowhere => return,
+        };
+        let Some(channel) = channel else {
             let call = RecordedCall {
                 after_messages: messages,
                 time_nanos: u64::try_from(nanos).unwrap_or(0),

@@ -53,7 +53,7 @@ pub fn run(
     let capture = Capture::start(
         &environment,
         &NodeNames::new(TAP, &[])?,
-        Selection::All,
+        Selection::All.without(scenario.file.recording.exclude.clone()),
         recorder,
         move |event| {
             if let TapEvent::Sample(sample) = event {

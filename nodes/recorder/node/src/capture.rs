@@ -11,17 +11,27 @@ use node_runtime::names::NodeNames;
 use node_runtime::tap::{RawTap, Selection, TapEvent, Tapped, TappedTopic};
 use recorder::{
     Channel, ChannelId, MessageStamp, Recorder, RecorderError, RecorderSink, RecorderStats,
-    RecordingSummary,
+    RecordingSummary, RingSink,
 };
 
 /// What the listener counts and cannot put into the bag.
 #[derive(Default)]
-struct Troubles {
+pub(crate) struct Troubles {
     lost_on_network: AtomicU64,
     topics: Mutex<Vec<String>>,
 }
 
 impl Troubles {
+    /// Samples that were sent and never arrived here.
+    pub fn lost_on_network(&self) -> u64 {
+        self.lost_on_network.load(Ordering::Relaxed)
+    }
+
+    /// Topics that cannot be recorded, a sentence each, since the last call.
+    pub fn unrecorded(&self) -> Vec<String> {
+        std::mem::take(&mut *self.topics())
+    }
+
     fn topics(&self) -> MutexGuard<'_, Vec<String>> {
         self.topics.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -76,14 +86,31 @@ fn channel(topic: &TappedTopic) -> Option<Channel> {
     })
 }
 
-struct Scribe {
-    sink: RecorderSink,
+/// Where messages go.
+pub(crate) enum Store {
+    /// Into a bag.
+    Bag(RecorderSink),
+    /// Into memory.
+    Ring(RingSink),
+}
+
+/// Writes down what a tap hears.
+pub(crate) struct Scribe {
+    store: Store,
     channels: BTreeMap<String, ChannelId>,
     troubles: Arc<Troubles>,
 }
 
 impl Scribe {
-    fn take(&mut self, event: &TapEvent) {
+    pub fn new(store: Store, troubles: Arc<Troubles>) -> Self {
+        Self {
+            store,
+            channels: BTreeMap::new(),
+            troubles,
+        }
+    }
+
+    pub fn take(&mut self, event: &TapEvent) {
         match event {
             TapEvent::Found(topic) => self.found(topic),
             TapEvent::Sample(sample) => self.sample(sample),
@@ -100,7 +127,11 @@ impl Scribe {
         let Some(channel) = channel(topic) else {
             return;
         };
-        match self.sink.add_channel(&channel) {
+        let added = match &self.store {
+            Store::Bag(sink) => sink.add_channel(&channel),
+            Store::Ring(sink) => sink.add_channel(&channel),
+        };
+        match added {
             Ok(id) => {
                 self.channels.insert(topic.name.clone(), id);
             }
@@ -121,7 +152,10 @@ impl Scribe {
             sequence: (sample.sequence & i64::from(u32::MAX)) as u32,
         };
         // What finds the queue full is counted there.
-        let _ = self.sink.push(*channel, stamp, &sample.bytes);
+        let _ = match &self.store {
+            Store::Bag(sink) => sink.push(*channel, stamp, &sample.bytes),
+            Store::Ring(sink) => sink.push(*channel, stamp, &sample.bytes),
+        };
     }
 
     fn lose(&self, samples: u64) {
@@ -144,11 +178,7 @@ impl Capture {
         mut look: impl FnMut(&TapEvent) + Send + 'static,
     ) -> Result<Self> {
         let troubles = Arc::<Troubles>::default();
-        let mut scribe = Scribe {
-            sink: recorder.sink(),
-            channels: BTreeMap::new(),
-            troubles: Arc::clone(&troubles),
-        };
+        let mut scribe = Scribe::new(Store::Bag(recorder.sink()), Arc::clone(&troubles));
         let tap = RawTap::start(environment, names, selection, move |event| {
             look(&event);
             scribe.take(&event);
@@ -169,13 +199,13 @@ impl Capture {
     /// Samples that were sent and never arrived here.
     #[must_use]
     pub fn lost_on_network(&self) -> u64 {
-        self.troubles.lost_on_network.load(Ordering::Relaxed)
+        self.troubles.lost_on_network()
     }
 
     /// Topics that cannot be recorded, a sentence each, since the last call.
     #[must_use]
     pub fn unrecorded(&self) -> Vec<String> {
-        std::mem::take(&mut *self.troubles.topics())
+        self.troubles.unrecorded()
     }
 
     /// Takes what has arrived, leaves the network and closes the bag. Not from within another event loop.
@@ -190,8 +220,8 @@ impl Capture {
         Ok(Captured {
             bag,
             stats: sink.stats(),
-            lost_on_network: self.troubles.lost_on_network.load(Ordering::Relaxed),
-            unrecorded: std::mem::take(&mut *self.troubles.topics()),
+            lost_on_network: self.troubles.lost_on_network(),
+            unrecorded: self.troubles.unrecorded(),
         })
     }
 }

@@ -2,19 +2,24 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use abbe_msgs::std_srvs::srv::TriggerResponse;
+use abbe_msgs::topics;
+use anyhow::Result;
 use metrology::stamp::Span;
-use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
-use node_runtime::tap::Selection;
 use node_runtime::{Node, Setup, Wiring};
-use recorder::{Directory, NodeConfig, PARAMETERS, Recorder, Recording};
+use recorder::{NodeConfig, PARAMETERS};
 
+mod begin;
 mod capture;
+mod ring;
 mod watch;
 
+pub use begin::record;
+use begin::{context, selection};
 pub use capture::{Capture, Captured};
-use watch::{Input, Output, Watch};
+use ring::RingCapture;
+use watch::{Input, Output, Watch, Work};
 
 /// Time between two looks at the counts.
 const TICK: Span = Span::from_nanos(500_000_000);
@@ -25,34 +30,46 @@ const TICK: Span = Span::from_nanos(500_000_000);
 /// When a parameter is wrong, the bag is there already or cannot be written, or there is no network.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: NodeConfig = setup.config()?;
-    let parameters = setup.resolved(&config, PARAMETERS)?;
-    let capture = record(&config, &format!("{}_tap", setup.name()))?;
-    Ok(Wiring::new(setup.name(), parameters, Watch::new(capture))
+    let machine = (!config.machine_file.is_empty()).then(|| setup.file_text("machine_file"));
+    let machine = machine.transpose()?.map(|(_, text)| text);
+    listen(setup, &config, machine)
+}
+
+/// The same for given parameters and the text of the machine file.
+///
+/// # Errors
+/// As [`node`].
+pub fn listen(
+    setup: &Setup,
+    config: &NodeConfig,
+    machine: Option<String>,
+) -> Result<Box<dyn Node>> {
+    let parameters = setup.resolved(config, PARAMETERS)?;
+    let tap = format!("{}_tap", setup.name());
+    let work = match config.ring {
+        None => Work::Bag(record(config, machine, &tap)?),
+        Some(own) => {
+            let kept = (Path::new(&config.bag), context(machine));
+            let (names, writing) = (NodeNames::new(&tap, &[])?, config.writing.clone());
+            let picked = selection(config);
+            let ring = RingCapture::start(&names, picked, &own, writing, kept)?;
+            Work::Ring(Box::new(ring))
+        }
+    };
+    let answer = |outcome: Result<&[Output], &str>| match outcome {
+        Ok(outputs) => outputs.iter().find_map(Output::answer).unwrap_or_default(),
+        Err(reason) => TriggerResponse {
+            success: false,
+            message: reason.to_owned(),
+        },
+    };
+    Ok(Wiring::new(setup.name(), parameters, Watch::new(work))
         .every(TICK, || Input::Tick)
-        .diagnose(|output| match output {
-            Output::Condition(diagnostic) => Some(diagnostic.clone()),
-            Output::Stopped => None,
-        })
+        .service(&topics::SAVE_RECORDING, |_| Input::Save, answer)
+        .diagnose(Output::diagnostic)
         .shutdown(
             || Input::Shutdown,
             |output| matches!(output, Output::Stopped),
         )
         .node())
-}
-
-/// Records the network into a new bag; `name` is the listener's own name on the graph.
-///
-/// # Errors
-/// When the bag is there already or cannot be written, or there is no network.
-pub fn record(config: &NodeConfig, name: &str) -> Result<Capture> {
-    let path = Path::new(&config.bag);
-    let file = path
-        .file_name()
-        .with_context(|| format!("bag = \"{}\": must be a folder's name", config.bag))?;
-    let directory = Directory::create(path)?;
-    let recording = Recording::begin(directory, &file.to_string_lossy(), config.writing.clone())?;
-    let recorder = Recorder::start(recording, &config.writing)?;
-    let selection = Selection::Matching(config.topics.clone());
-    let names = NodeNames::new(name, &[])?;
-    Capture::start(&Environment::read()?, &names, selection, recorder, |_| ())
 }

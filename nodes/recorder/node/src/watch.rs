@@ -1,44 +1,89 @@
-//! Watches a recording that goes on and says when something is lost.
+//! Watches a recording that goes on and says when something is lost, or was saved.
 
 use std::convert::Infallible;
 
+use abbe_msgs::std_srvs::srv::TriggerResponse;
 use metrology::{Host, Stage, Stamp};
 use node_runtime::{Diagnostic, Level};
 
 use crate::capture::Capture;
+use crate::ring::{RingCapture, Saved};
 
 pub(crate) enum Input {
     Tick,
+    Save,
     Shutdown,
 }
 
 pub(crate) enum Output {
     Condition(Diagnostic),
+    Answer(TriggerResponse),
     Stopped,
 }
 
+impl Output {
+    pub fn diagnostic(&self) -> Option<Diagnostic> {
+        match self {
+            Self::Condition(diagnostic) => Some(diagnostic.clone()),
+            _ => None,
+        }
+    }
+
+    pub fn answer(&self) -> Option<TriggerResponse> {
+        match self {
+            Self::Answer(answer) => Some(answer.clone()),
+            _ => None,
+        }
+    }
+}
+
+/// What is going on.
+pub(crate) enum Work {
+    Bag(Capture),
+    Ring(Box<RingCapture>),
+}
+
 pub(crate) struct Watch {
-    capture: Option<Capture>,
+    work: Option<Work>,
     lost: (u64, u64),
+    is_short: bool,
 }
 
 impl Watch {
-    pub fn new(capture: Capture) -> Self {
+    pub fn new(work: Work) -> Self {
         Self {
-            capture: Some(capture),
+            work: Some(work),
             lost: (0, 0),
+            is_short: false,
         }
     }
 
     fn look(&mut self, out: &mut Vec<Output>) {
-        let Some(capture) = &self.capture else {
-            return;
+        let (lost, unrecorded) = match &mut self.work {
+            None => return,
+            Some(Work::Bag(capture)) => {
+                let stats = capture.stats();
+                if let Some(reason) = &stats.failure {
+                    out.push(failure(reason));
+                }
+                let lost = (stats.messages_lost, capture.lost_on_network());
+                (lost, capture.unrecorded())
+            }
+            Some(Work::Ring(ring)) => {
+                if ring.is_alarmed() {
+                    save(ring, out);
+                }
+                out.extend(ring.ended(false).into_iter().map(told));
+                let stats = ring.stats();
+                let is_short = stats.messages_crowded_out > 0;
+                if is_short && !self.is_short {
+                    out.push(short(stats.reach_s, stats.bytes_kept));
+                }
+                self.is_short = is_short;
+                let troubles = ring.troubles();
+                ((0, troubles.lost_on_network()), troubles.unrecorded())
+            }
         };
-        let stats = capture.stats();
-        if let Some(reason) = &stats.failure {
-            out.push(failure(reason));
-        }
-        let lost = (stats.messages_lost, capture.lost_on_network());
         if lost != self.lost {
             self.lost = lost;
             let message = format!(
@@ -50,7 +95,7 @@ impl Watch {
                 .with("network", lost.1);
             out.push(Output::Condition(diagnostic));
         }
-        for message in capture.unrecorded() {
+        for message in unrecorded {
             let diagnostic = Diagnostic::new(Level::Error, "topic_not_recorded", message);
             out.push(Output::Condition(diagnostic));
         }
@@ -58,19 +103,76 @@ impl Watch {
 
     /// Leaving the network waits, which the runtime's own threads must not: a thread for it.
     fn close(&mut self, out: &mut Vec<Output>) {
-        let Some(capture) = self.capture.take() else {
-            return;
-        };
-        match std::thread::spawn(move || capture.finish()).join() {
-            Ok(Ok(captured)) => {
-                if let Err(error) = captured.bag {
-                    out.push(failure(&error.to_string()));
-                }
+        let outcome = match self.work.take() {
+            None => return,
+            Some(Work::Bag(capture)) => {
+                let finished = std::thread::spawn(move || capture.finish()).join();
+                finished.map(|captured| captured.map(|captured| captured.bag.err()))
             }
+            Some(Work::Ring(mut ring)) => {
+                out.extend(ring.ended(true).into_iter().map(told));
+                let finished = std::thread::spawn(move || ring.finish()).join();
+                finished.map(|finished| finished.map(|()| None))
+            }
+        };
+        match outcome {
+            Ok(Ok(None)) => {}
+            Ok(Ok(Some(error))) => out.push(failure(&error.to_string())),
             Ok(Err(error)) => out.push(failure(&format!("{error:#}"))),
             Err(_) => out.push(failure("the bag's thread panicked")),
         }
     }
+
+    fn asked_to_save(&mut self, out: &mut Vec<Output>) {
+        let answer = match &mut self.work {
+            Some(Work::Ring(ring)) => save(ring, out),
+            _ => TriggerResponse {
+                success: false,
+                message: "nothing is kept to be saved: everything is written (parameter ring)"
+                    .to_owned(),
+            },
+        };
+        out.push(Output::Answer(answer));
+    }
+}
+
+/// Begins to save, and says where or why not.
+fn save(ring: &mut RingCapture, out: &mut Vec<Output>) -> TriggerResponse {
+    let reach_s = ring.stats().reach_s;
+    match ring.save() {
+        Ok((path, messages)) => TriggerResponse {
+            success: true,
+            message: format!(
+                "{}: {messages} messages of {reach_s:.1} s are being written",
+                path.display()
+            ),
+        },
+        Err(error) => {
+            let message = error.to_string();
+            out.push(failure(&message));
+            TriggerResponse {
+                success: false,
+                message,
+            }
+        }
+    }
+}
+
+fn told((path, outcome): Saved) -> Output {
+    let path = path.display();
+    match outcome {
+        Ok(messages) => Output::Condition(Diagnostic::new(
+            Level::Ok,
+            "recording",
+            format!("{path}: {messages} messages are saved"),
+        )),
+        Err(reason) => failure(&format!("{path}: {reason}")),
+    }
+}
+
+fn short(reach_s: f64, bytes: u64) -> Output {
+    let message = format!("the last {reach_s:.1} s are kept: more needs more than {bytes} bytes");
+    Output::Condition(Diagnostic::new(Level::Warn, "ring_short", message).with("reach_s", reach_s))
 }
 
 fn failure(reason: &str) -> Output {
@@ -93,9 +195,13 @@ impl Stage for Watch {
         out: &mut Vec<Output>,
     ) -> Result<(), Infallible> {
         self.look(out);
-        if matches!(input, Input::Shutdown) {
-            self.close(out);
-            out.push(Output::Stopped);
+        match input {
+            Input::Tick => {}
+            Input::Save => self.asked_to_save(out),
+            Input::Shutdown => {
+                self.close(out);
+                out.push(Output::Stopped);
+            }
         }
         Ok(())
     }

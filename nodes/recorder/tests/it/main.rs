@@ -11,6 +11,7 @@ mod damage;
 mod peers;
 mod queue;
 mod reflect;
+mod ring;
 mod sample;
 mod storage;
 mod write_and_read;

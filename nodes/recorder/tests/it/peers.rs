@@ -7,6 +7,7 @@ use std::process::{Command, Output};
 
 use recorder::{Bag, ChunkCompression, Order, RecorderConfig, dump_json, recover};
 
+use crate::ring;
 use crate::sample::{expect_first, read, record, small_chunks};
 
 fn root() -> PathBuf {
@@ -57,6 +58,32 @@ fn peers_read_a_recording_of_several_files() {
         max_file_bytes: 16_384,
         ..small_chunks(ChunkCompression::Zstd)
     });
+}
+
+#[test]
+fn peers_read_files_split_by_time_as_one_bag() {
+    check(RecorderConfig {
+        max_file_s: 0.1,
+        flush_period_s: 0.02,
+        ..small_chunks(ChunkCompression::Zstd)
+    });
+}
+
+#[test]
+fn peers_read_a_ring_that_was_saved() {
+    let home = tempfile::tempdir().unwrap();
+    let mut ring = ring::ring(0.3, 1 << 20);
+    ring::fill(&mut ring, 0..2_000);
+    let bag = ring::save(&ring, home.path());
+    let dumped = home.path().join("dump.jsonl");
+    dump(&bag, &dumped);
+    let output = run("read_bag.py", &[&bag, &dumped]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        text.starts_with("302 messages on 5 topics equal"),
+        "{text}{error}"
+    );
 }
 
 #[test]

@@ -103,6 +103,36 @@ fn splits_are_read_in_order_and_listed_in_the_description() {
 }
 
 #[test]
+fn files_split_by_time_span_no_more_than_they_may_and_a_chunk() {
+    let home = tempfile::tempdir().unwrap();
+    let config = RecorderConfig {
+        max_file_s: 0.5,
+        flush_period_s: 0.05,
+        ..RecorderConfig::default()
+    };
+    let (path, summary) = record(home.path(), 3_000, config);
+    assert!(
+        (5..=6).contains(&summary.files.len()),
+        "{:?}",
+        summary.files
+    );
+    for file in &summary.files {
+        let file = Bag::open(path.join(file)).unwrap();
+        let (first, last) = file.log_times_nanos().unwrap();
+        assert!(last - first <= 560_000_000, "{}", last - first);
+    }
+    let (found, losses) = read(&Bag::open(&path).unwrap(), Order::LogTime);
+    assert_eq!(losses, []);
+    expect_first(&found, 3_000);
+    let wrong = RecorderConfig {
+        max_file_s: -1.0,
+        ..RecorderConfig::default()
+    };
+    let refusal = wrong.checked().unwrap_err().to_string();
+    assert!(refusal.starts_with("max_file_s = -1"), "{refusal}");
+}
+
+#[test]
 fn a_killed_recording_loses_the_open_chunk_and_no_more() {
     let home = tempfile::tempdir().unwrap();
     let path = home.path().join("run");
