@@ -7,9 +7,9 @@
 #![expect(clippy::print_stderr, reason = "figures that were seen are said")]
 
 mod bad_topics;
-mod debian;
 mod graph;
 mod interruptions;
 mod kills;
+mod machine_that_reports;
 mod playing;
 mod refusals;
