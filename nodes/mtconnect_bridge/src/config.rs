@@ -40,7 +40,7 @@ pub enum Source {
     Shdr,
     /// An agent, in XML over HTTP.
     Agent,
-    /// A file of an adapter's lines, each told when the host's clock reaches its stamp.
+    /// A file of an adapter's lines, told at its own pace.
     Log,
 }
 

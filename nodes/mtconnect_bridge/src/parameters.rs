@@ -29,7 +29,7 @@ const fn number(
 pub const PARAMETERS: &[ParameterDoc] = &[
     text(
         "source",
-        "shdr: an adapter, in lines over TCP; agent: an agent, in XML over HTTP; log: a file of an adapter's lines, each told when the clock reaches its stamp.",
+        "shdr: an adapter, in lines over TCP; agent: an agent, in XML over HTTP; log: a file of an adapter's lines, told at its own pace.",
     ),
     text("host", "Where the adapter or agent listens."),
     number(

@@ -23,6 +23,10 @@
 //! # Holds when
 //! A wrong reading is over within `confirm_s`. A sensor that is wrong for longer, or by less than (1), is not
 //! found.
+//!
+//! # Agreement
+//! `val_nist_a_day_of_a_mill_turn_centre_is_in_the_bag`: of 2,207 readings of 0 °C of two spindles in a day 2,206 are
+//! found impossible and one, before an absence, unconfirmed; none of the 7,111 others is.
 
 use metrology::sample::Verdict;
 use metrology::stamp::{Host, Machine, Span, Stamp};

@@ -14,6 +14,10 @@
 //!
 //! # Holds when
 //! Speeds last longer than Δ: heat grows faster than speed, and (1) takes the mean.
+//!
+//! # Agreement
+//! `val_nist_the_programs_of_the_shift_have_its_turns_and_travels`: four hours of a log, summed by another program, have
+//! 479,879 turns and travels of 80,172, 6,071 and 29,979 mm; the programs agree within 6e-6 of each, and last 14,400.2 s.
 
 use metrology::sample::Quantity;
 use metrology::stamp::{Host, Machine, Span, Stamp};
