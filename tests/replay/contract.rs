@@ -84,6 +84,24 @@ fn replay_of_a_copy_is_equal() {
     assert_eq!(code, 0, "{outcome:#}");
 }
 
+#[test]
+fn replay_of_a_bag_in_several_files_and_without_what_was_left_out_is_equal() {
+    let scenario = Scenario::copy_of("first_run");
+    scenario.write("plan.yaml", SHORT_PLAN);
+    let recording = "recording: {max_file_s: 60.0, compression: lz4, exclude: [/joint_*]}\n";
+    scenario.append("scenario.yaml", recording);
+    let bag = scenario.run().join("bag");
+    let (code, outcome) = check(&bag);
+    assert_eq!(code, 0, "{outcome:#}");
+    let bag = recorder::Bag::open(&bag).unwrap();
+    assert!(bag.files().count() > 1);
+    let topics: Vec<_> = bag.topics().iter().map(|one| one.topic.as_str()).collect();
+    assert!(
+        topics.contains(&"/axes/state") && topics.contains(&"/axis_compensation/transition_event")
+    );
+    assert!(!topics.contains(&"/joint_states"), "{topics:?}");
+}
+
 /// Changes the latched position of one touch by one unit in the last place.
 fn one_ulp(messages: &mut [Copied]) {
     let touch = messages.iter_mut().find(|m| m.topic == "/probe/trigger");
