@@ -272,6 +272,9 @@ impl AgentLink {
 
     fn gap(&mut self, from: u64, to: u64, out: &mut Vec<Heard>) {
         let lost = to.saturating_sub(from);
+        if lost == 0 {
+            return;
+        }
         self.lost += lost;
         out.push(Heard::Condition(Condition::SequenceGap {
             from,

@@ -358,6 +358,8 @@ impl BridgeStage {
 }
 
 const PING: &str = "* PING\n";
+/// An adapter that wants to be asked more or less often than this is not watched, ms.
+const HEARTBEATS_MS: std::ops::RangeInclusive<f64> = 100.0..=3.6e6;
 
 /// Takes one line; returns what is wrong with it.
 fn take(
@@ -382,8 +384,8 @@ fn take(
             None
         }
         Line::Pong { period_ms } => {
-            // An hour: an adapter that wants longer is not watched.
-            *heartbeat = (period_ms <= 3.6e6).then(|| Span::from_secs_f64(period_ms * 1e-3));
+            let is_sensible = HEARTBEATS_MS.contains(&period_ms);
+            *heartbeat = is_sensible.then(|| Span::from_secs_f64(period_ms * 1e-3));
             None
         }
         Line::Command => None,

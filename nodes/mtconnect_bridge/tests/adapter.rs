@@ -153,9 +153,12 @@ fn an_adapter_with_a_heartbeat_is_asked_and_given_up_when_it_is_silent_twice_as_
         conditions(&said)[0].contains("silent for more than 2 s"),
         "{said:?}"
     );
-    // One without is not watched.
-    let mut desk = Desk::connected();
-    assert!(commands(&desk.after(3600.0)).is_empty());
+    // One without, or with a senseless one, is not watched.
+    for pong in ["", "* PONG 0.001\n", "* PONG 1e300\n"] {
+        let mut desk = Desk::connected();
+        desk.lines(pong);
+        assert!(commands(&desk.after(3600.0)).is_empty(), "{pong}");
+    }
 }
 
 #[test]
