@@ -261,7 +261,8 @@ fn an_agent_is_asked_what_there_is_what_holds_and_what_happens() {
                     12,
                     &[(11, "Temperature", "t", "43.5"), exec(10, "ACTIVE")],
                 ),
-                streams(7, 1, 12, &[]),
+                // A sign of life, with a value that was told before.
+                streams(7, 1, 12, &[exec(10, "ACTIVE")]),
                 streams(7, 1, 14, &[(12, "Fault", "c1", "hot"), exec(13, "STOPPED")]),
             ],
             false,
