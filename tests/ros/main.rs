@@ -7,6 +7,7 @@
 #![expect(clippy::print_stderr, reason = "figures that were seen are said")]
 
 mod bad_topics;
+mod debian;
 mod graph;
 mod interruptions;
 mod kills;

@@ -112,6 +112,7 @@ enum Event {
         rate_mm_s: f64,
     },
     Enable(bool),
+    Active(bool),
     Tick,
     Wait {
         host_nanos: i64,
@@ -155,6 +156,7 @@ fn event() -> impl Strategy<Value = Event> {
         4 => (number(-0.15..0.15), number(-3e-4..3e-4), number(0.0..2.0), number(-1e-4..1e-4))
             .prop_map(|(k0_mm, slope, life_s, rate_mm_s)| Event::Model { k0_mm, slope, life_s, rate_mm_s }),
         2 => any::<bool>().prop_map(Event::Enable),
+        3 => any::<bool>().prop_map(Event::Active),
         3 => Just(Event::Tick),
         2 => (-1_000_000_000..1_000_000_000_i64).prop_map(|host_nanos| Event::Wait { host_nanos }),
         1 => prop::bool::weighted(0.1).prop_map(|b| if b { Event::Shutdown } else { Event::Tick }),
@@ -231,6 +233,8 @@ struct Bench {
     last_state: Option<i64>,
     last_driven: Option<i64>,
     sequence: u32,
+    /// States since the last that was answered.
+    silent_states: u32,
     watch: Watch,
 }
 
@@ -264,8 +268,17 @@ impl Bench {
         let mut out = Vec::new();
         let at = Stamp::from_nanos(self.host_nanos);
         self.stage.step(at, input, &mut out).unwrap();
+        let is_compensation = |output: &Output| matches!(output, Output::Compensation(_));
+        if by_state && !out.iter().any(is_compensation) {
+            // Not active: nothing is said, and time goes on.
+            self.last_driven = Some(self.host_nanos);
+            self.last_state = Some(self.machine_nanos);
+            self.watch.velocity = PerAxis::default();
+            self.silent_states += 1;
+        }
         for output in &out {
             if let Output::Compensation(c) = output {
+                self.silent_states = 0;
                 let host = self
                     .last_driven
                     .map(|last| self.host_nanos.saturating_sub(last));
@@ -334,6 +347,7 @@ impl Bench {
                 false,
             ),
             Event::Enable(on) => (Input::Enable(on), false),
+            Event::Active(active) => (Input::Active(active), false),
             Event::Tick => (Input::Tick, false),
             Event::Wait { host_nanos } => {
                 self.host_nanos = self.host_nanos.saturating_add(host_nanos);
@@ -353,6 +367,7 @@ fn bench(extrapolate: &str) -> Bench {
         last_state: None,
         last_driven: None,
         sequence: 0,
+        silent_states: 0,
         watch: Watch {
             last: PerAxis::default(),
             velocity: PerAxis::default(),
@@ -376,6 +391,33 @@ proptest! {
     ) {
         let mut bench = bench(extrapolate);
         for event in &events {
+            bench.run(event)?;
+        }
+    }
+
+    #[test]
+    fn prop_after_deactivation_every_offset_reaches_zero_and_activation_takes_it_up_without_a_step(
+        events in prop::collection::vec(event(), 1..60),
+        later in prop::collection::vec(event(), 1..60),
+    ) {
+        let mut bench = bench("linear");
+        for event in events.iter().filter(|e| !matches!(e, Event::Shutdown)) {
+            bench.run(event)?;
+        }
+        bench.machine_nanos /= 4;
+        bench.host_nanos /= 4;
+        bench.run(&Event::Active(false))?;
+        let state = Event::State { step_nanos: 1_000_000, position_mm: [0.0; 3], all_axes: true, beyond_motor_mm: 0.0 };
+        for _ in 0..12_000 {
+            bench.run(&state)?;
+            if bench.silent_states > 100 {
+                break;
+            }
+        }
+        prop_assert!(bench.silent_states > 100, "it is not at rest within 12 s");
+        prop_assert!(bench.watch.last.0.iter().all(|mm| mm.abs() <= 0.0), "{:?}", bench.watch.last);
+        bench.run(&Event::Active(true))?;
+        for event in &later {
             bench.run(event)?;
         }
     }

@@ -136,6 +136,7 @@ mod tests {
     use super::*;
     use metrology::sample::CompensationState;
     use metrology::{Axis, Stamp};
+    use proptest::prelude::*;
 
     const LIMITS: OffsetLimits = OffsetLimits {
         size: 0.5,
@@ -220,6 +221,57 @@ mod tests {
         input.release();
         (0..400).for_each(|_| assert_eq!(input.advance(), None));
         assert!(input.applied()[Axis::X].abs() <= 0.0);
+    }
+
+    #[derive(Clone, Debug)]
+    enum Event {
+        Told(f64),
+        Passed(u32),
+        Released,
+    }
+
+    fn event() -> impl Strategy<Value = Event> {
+        // Two publishers that contradict each other, and values that are none.
+        let value = prop_oneof![
+            10 => -0.6..0.6_f64,
+            4 => prop_oneof![Just(0.45), Just(-0.45)],
+            1 => prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-1e300)],
+        ];
+        prop_oneof![
+            10 => value.prop_map(Event::Told),
+            5 => (1..300_u32).prop_map(Event::Passed),
+            1 => Just(Event::Released),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn prop_no_messages_of_any_number_of_publishers_make_a_step(
+            events in prop::collection::vec(event(), 1..300),
+        ) {
+            let mut input = input();
+            let mut last = 0.0_f64;
+            for event in events {
+                let periods = match event {
+                    Event::Told(value) => {
+                        input.receive(&message(value));
+                        1
+                    }
+                    Event::Released => {
+                        input.release();
+                        1
+                    }
+                    Event::Passed(periods) => periods,
+                };
+                for _ in 0..periods {
+                    input.advance();
+                    let now = input.applied()[Axis::X];
+                    prop_assert!(now.abs() <= LIMITS.size, "{}", now);
+                    prop_assert!((now - last).abs() <= LIMITS.step + 1e-15, "{} to {}", last, now);
+                    last = now;
+                }
+            }
+        }
     }
 
     #[test]

@@ -1,0 +1,161 @@
+//! The Debian package: what is in it, and that its units would start.
+//!
+//! Building it needs the cargo subcommand `cargo-deb`, looking at units needs systemd; where one is not there that is
+//! said, and what does not need it is tried.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use abbe_tests::program::{abbe, root};
+
+fn folder() -> PathBuf {
+    root().join("nodes/abbe/debian")
+}
+
+fn said(output: &Output) -> String {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    text(&output.stdout) + &text(&output.stderr)
+}
+
+/// What a program says, or why it cannot be asked here.
+fn asked(program: &str, arguments: &[&str]) -> Option<Output> {
+    let output = Command::new(program).args(arguments).output();
+    if output.is_err() {
+        eprintln!("not tried: {program} is not installed");
+    }
+    output.ok()
+}
+
+fn start_node(scenarios: &Path, program: &Path, which: &str) -> Output {
+    Command::new(folder().join("start-node"))
+        .arg(which)
+        .env("ABBE_SCENARIOS", scenarios)
+        .env("ABBE_PROGRAM", program)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn the_units_start_with_a_program_and_folders_that_are_there() {
+    if asked("systemd-analyze", &["--version"]).is_none() {
+        return;
+    }
+    let home = tempfile::tempdir().unwrap();
+    for unit in ["abbe@.service", "abbe-node@.service"] {
+        let text = fs::read_to_string(folder().join(unit)).unwrap();
+        let start = folder().join("start-node");
+        let here = text
+            .replace("/usr/bin/abbe", &abbe().display().to_string())
+            .replace("/usr/lib/abbe/start-node", &start.display().to_string());
+        assert_ne!(here, text, "{unit} starts neither of the two");
+        let instance = unit.replace("@.", "@short_cell.");
+        let path = home.path().join(&instance);
+        fs::write(home.path().join(unit), &here).unwrap();
+        fs::write(&path, here).unwrap();
+        let path = path.display().to_string();
+        let output = asked("systemd-analyze", &["verify", "--man=no", &path]).unwrap();
+        let said = said(&output);
+        let ours: Vec<_> = said.lines().filter(|line| line.contains("abbe")).collect();
+        assert_eq!(ours, [""; 0], "{unit}");
+    }
+}
+
+#[test]
+fn a_node_is_started_with_its_scenarios_parameters_and_nothing_else() {
+    let home = tempfile::tempdir().unwrap();
+    let echo = home.path().join("program");
+    fs::write(&echo, "#!/bin/sh\necho \"$@\"\n").unwrap();
+    fs::set_permissions(&echo, fs::Permissions::from_mode(0o755)).unwrap();
+    let scenarios = root().join("launch_configs");
+    let started = start_node(&scenarios, &echo, "short_cell:probe");
+    let file = scenarios.join("short_cell/probe.yaml");
+    let expected = format!("node probe --ros-args --params-file {}\n", file.display());
+    assert_eq!(said(&started), expected);
+    for (wrong, code, word) in [
+        ("short_cell", 2, "must be SCENARIO:NODE"),
+        (":probe", 2, "must be SCENARIO:NODE"),
+        ("short_cell:nobody", 1, "nobody.yaml cannot be read"),
+    ] {
+        let refused = start_node(&scenarios, &echo, wrong);
+        assert_eq!(refused.status.code(), Some(code), "{wrong}");
+        assert!(said(&refused).contains(word), "{}", said(&refused));
+    }
+}
+
+#[test]
+fn the_package_holds_program_units_and_scenarios() {
+    if asked("cargo-deb", &["--version"]).is_none() || asked("dpkg-deb", &["--version"]).is_none() {
+        return;
+    }
+    let home = tempfile::tempdir().unwrap();
+    let package = home.path().join("abbe.deb");
+    let built = Command::new("cargo-deb")
+        .args([
+            "deb",
+            "--no-build",
+            "--no-strip",
+            "--fast",
+            "-p",
+            "abbe",
+            "-o",
+        ])
+        .arg(&package)
+        .current_dir(root())
+        .output()
+        .unwrap();
+    assert!(built.status.success(), "{}", said(&built));
+    let package = package.display().to_string();
+    let contents = said(&asked("dpkg-deb", &["-c", &package]).unwrap());
+    let holds = |rights: &str, path: &str| {
+        let mut lines = contents.lines();
+        let right = |line: &str| line.starts_with(rights) && line.ends_with(path);
+        assert!(lines.any(right), "{rights} {path}\n{contents}");
+    };
+    holds("-rwxr-xr-x", "./usr/bin/abbe");
+    holds("-rwxr-xr-x", "./usr/lib/abbe/start-node");
+    holds("-rw-r--r--", "./usr/lib/systemd/system/abbe@.service");
+    holds("-rw-r--r--", "./usr/lib/systemd/system/abbe-node@.service");
+    holds("-rw-r--r--", "./etc/default/abbe");
+    let scenarios = "./usr/share/abbe/launch_configs";
+    holds(
+        "-rw-r--r--",
+        &format!("{scenarios}/short_cell/short_cell.launch.xml"),
+    );
+    holds(
+        "-rw-r--r--",
+        &format!("{scenarios}/linuxcnc_latency/linuxcnc_bridge.yaml"),
+    );
+    let control = said(&asked("dpkg-deb", &["-f", &package]).unwrap());
+    assert!(control.contains("Package: abbe\n"), "{control}");
+    installed(home.path(), &package);
+}
+
+/// Does what the scripts of a package do, below `home`.
+fn installed(home: &Path, package: &str) {
+    let unpacked = home.join("unpacked");
+    let to = unpacked.display().to_string();
+    assert!(
+        asked("dpkg-deb", &["-R", package, &to])
+            .unwrap()
+            .status
+            .success()
+    );
+    for script in ["postinst", "prerm"] {
+        let path = unpacked.join("DEBIAN").join(script);
+        let checked = asked("sh", &["-n", &path.display().to_string()]).unwrap();
+        assert!(checked.status.success(), "{script}: {}", said(&checked));
+    }
+    // What postinst does with the program and the scenarios of the package.
+    let prefix = home.join("opt");
+    let installed = Command::new(unpacked.join("usr/bin/abbe"))
+        .arg("install-ros")
+        .arg(&prefix)
+        .arg("--scenarios")
+        .arg(unpacked.join("usr/share/abbe/launch_configs"))
+        .output()
+        .unwrap();
+    assert!(installed.status.success(), "{}", said(&installed));
+    assert!(prefix.join("lib/abbe/probe").is_file());
+}
