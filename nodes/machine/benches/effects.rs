@@ -88,6 +88,7 @@ fn session(machine: &MachineFile) -> Session {
         speed: PerAxis([30.0; 6].map(series)),
         speed_squared: PerAxis([1500.0; 6].map(series)),
         temperature_degc: BTreeMap::from(temperatures),
+        ..History::default()
     };
     Session {
         history,

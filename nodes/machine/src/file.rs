@@ -87,11 +87,25 @@ pub struct LinearAxisEntry {
     /// The velocity loop inside the position loop; ideal where absent.
     #[serde(default)]
     pub velocity_loop: Option<VelocityLoopEntry>,
+    /// Friction of the guides over the mass of the slide; where absent a slide stays where its drive lets go of it.
+    #[serde(default)]
+    pub guide_friction: Option<GuideFrictionEntry>,
     /// Resolution of the motor encoder, seen at the slide.
     pub encoder_resolution_um: f64,
     /// Resolution of the linear scale, where there is one.
     #[serde(default)]
     pub scale_resolution_um: Option<f64>,
+}
+
+/// How a slide slows down by the friction of its guides alone: force over mass, as the drive's commissioning tells them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GuideFrictionEntry {
+    /// Its part at every speed.
+    pub coulomb_mm_s2: f64,
+    /// Its part that grows with the speed.
+    #[serde(default)]
+    pub viscous_per_s: f64,
 }
 
 /// A velocity loop with proportional and integral action, as it is tuned.

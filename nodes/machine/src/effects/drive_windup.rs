@@ -3,15 +3,18 @@
 //! # Model
 //!
 //! ```text
-//!   E = -(a / a_0) (c + c_u x),   a_0 = 1000 mm/s2                        (1)
+//!   E = -(a + f) (c + c_u x) / a_0,   a_0 = 1000 mm/s2                    (1)
+//!   f = sgn(last motion) f_0 + f_1 v                                      (2)
 //! ```
 //!
-//! x is the place within the travel, -1 to 1: a screw that is held at one end is softer at the other.
+//! x is the place within the travel, -1 to 1: a screw that is held at one end is softer at the other. The screw drags the
+//! slide through the friction of its guides as well: f is `guide_friction` of the machine file, zero where it tells none.
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | c | `windup_um`, at 1000 mm/s²: m a_0 / k | µm |
 //! | c_u | `free_by_place_um` | µm |
+//! | f_0, f_1 | `coulomb_mm_s2`, `viscous_per_s` of the machine file | mm/s², 1/s |
 //!
 //! # Holds when
 //! The motion is slow against the drive's natural frequency. The motor's encoder does not see it; `acceleration_lag`
@@ -57,12 +60,20 @@ impl Effect for DriveWindup {
     fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
         let motion = &scene.run.motion;
         let travel = Travel::of(scene, self.axis);
+        let linear = scene.machine.linear(self.axis);
+        let friction = linear.and_then(|linear| linear.guide_friction);
+        let (velocity, sense) = (&motion.velocity[self.axis], &motion.sense[self.axis]);
         let ticks = motion.acceleration[self.axis]
             .iter()
             .zip(&motion.position[self.axis]);
-        for (sum, (a, here)) in response.drive[self.axis].iter_mut().zip(ticks) {
+        let sums = response.drive[self.axis].iter_mut();
+        for (tick, (sum, (a, here))) in sums.zip(ticks).enumerate() {
             let compliance = self.per_acceleration_s2 + self.by_place_s2 * travel.share(*here);
-            *sum -= a * compliance; // (1)
+            let dragged = friction.map_or(0.0, |friction| {
+                let even = f64::from(sense[tick]) * friction.coulomb_mm_s2;
+                even + friction.viscous_per_s * velocity[tick] // (2)
+            });
+            *sum -= (a + dragged) * compliance; // (1)
         }
     }
 }

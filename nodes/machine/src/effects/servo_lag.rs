@@ -7,11 +7,17 @@
 //!
 //! ```text
 //!   E = -T v - c_2 (v / v_0) |v / v_0| - c_3 (v / v_0)^3,   v_0 = 100 mm/s      (1)
+//!   E += -T_w (u - v),   du/dt = K (v - u)                                      (2)
 //! ```
+//!
+//! (2) is the wider form of a lag that the position loop itself works off by its gain: T_w is T where the feed-forward is
+//! wrong, and zero where the whole command comes late.
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | T | `time_ms` | ms |
+//! | T_w | `free_worked_off_ms` | ms |
+//! | K | `position_gain_per_s` of the machine file | 1/s |
 //! | c_2, c_3 | `free_square_um`, `free_cube_um`, at 100 mm/s | µm |
 //!
 //! # Holds when
@@ -39,6 +45,7 @@ pub static KIND: Kind = Kind {
     free: &[
         Parameter::amplitude("free_square_um", 200.0, 2.0),
         Parameter::amplitude("free_cube_um", 200.0, 2.0),
+        Parameter::amplitude("free_worked_off_ms", 60.0, 0.3),
     ],
     moment: Moment::Mean,
     needs: "readings while the axis moves, at two speeds or in both senses",
@@ -50,6 +57,7 @@ struct ServoLag {
     time_s: f64,
     square_mm: f64,
     cube_mm: f64,
+    worked_off_s: f64,
 }
 
 impl ServoLag {
@@ -59,6 +67,7 @@ impl ServoLag {
             time_s: values[0] * 1e-3,
             square_mm: values[1] * 1e-3,
             cube_mm: values[2] * 1e-3,
+            worked_off_s: values[3] * 1e-3,
         }
     }
 }
@@ -73,6 +82,29 @@ impl Effect for ServoLag {
             let share = v / REFERENCE_MM_S;
             let bent_mm = share * (self.square_mm * share.abs() + self.cube_mm * share * share);
             *sum -= self.time_s * v + bent_mm; // (1)
+        }
+        if self.worked_off_s != 0.0 {
+            self.add_worked_off(scene, response);
+        }
+    }
+}
+
+impl ServoLag {
+    /// (2); a command whose velocity goes evenly from tick to tick is followed exactly.
+    fn add_worked_off(&self, scene: &Scene<'_>, response: &mut Response) {
+        let Some(linear) = scene.machine.linear(self.axis) else {
+            return;
+        };
+        let motion = &scene.run.motion;
+        let velocity = &motion.velocity[self.axis];
+        let mut followed = velocity.first().copied().unwrap_or(0.0);
+        for (tick, sum) in response.servo[self.axis].iter_mut().enumerate().skip(1) {
+            let period_s = motion.time_s[tick] - motion.time_s[tick - 1];
+            let step = linear.position_gain_per_s * period_s;
+            let [from, to] = [velocity[tick - 1], velocity[tick]];
+            let lag = (to - from) / step;
+            followed = to - lag + (followed - from + lag) * (-step).exp();
+            *sum -= self.worked_off_s * (followed - to);
         }
     }
 }

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use metrology::Axis;
 
 use super::{
-    ArtefactEntry, AxisEntry, BlockEntry, LinearAxisEntry, MachineFile, RotaryAxisEntry,
-    VelocityLoopEntry, reference,
+    ArtefactEntry, AxisEntry, BlockEntry, GuideFrictionEntry, LinearAxisEntry, MachineFile,
+    RotaryAxisEntry, VelocityLoopEntry, reference,
 };
 use crate::chain::Chain;
 use crate::cycle::artefact_id;
@@ -157,8 +157,22 @@ impl Check<'_> {
         if let Some(value) = entry.scale_resolution_um {
             self.positive(&format!("{key}.scale_resolution_um"), value)?;
         }
+        self.guide_friction(key, entry.guide_friction.as_ref())?;
         self.velocity_loop(key, entry.velocity_loop.as_ref())?;
         self.loop_of(key, entry.position_gain_per_s, entry.velocity_feedforward)
+    }
+
+    fn guide_friction(
+        &self,
+        key: &str,
+        entry: Option<&GuideFrictionEntry>,
+    ) -> Result<(), MachineFileError> {
+        let Some(entry) = entry else { return Ok(()) };
+        let at = |field: &str| format!("{key}.guide_friction.{field}");
+        self.positive(&at("coulomb_mm_s2"), entry.coulomb_mm_s2)?;
+        let viscous = entry.viscous_per_s;
+        let holds = viscous >= 0.0 && viscous.is_finite();
+        self.number(&at("viscous_per_s"), viscous, holds, NOT_NEGATIVE)
     }
 
     fn rotary(&self, key: &str, entry: &RotaryAxisEntry) -> Result<(), MachineFileError> {

@@ -48,6 +48,8 @@
 //! \[1\] C. F. Van Loan, IEEE Trans. Autom. Control 23(3), 1978, doi:10.1109/TAC.1978.1101743 (exact step of
 //! a driven linear system by one exponential).
 
+use std::collections::BTreeMap;
+
 use metrology::Axis;
 use nalgebra::{SMatrix, SVector};
 
@@ -62,21 +64,37 @@ pub struct Following;
 
 impl Effect for Following {
     fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
-        for (axis, entry) in &scene.machine.axes {
-            let (gains, velocity_loop) = Gains::of(entry);
-            let errors = &mut response.servo[*axis];
-            match velocity_loop {
-                None => gains.around_ideal(&scene.run.motion, *axis, errors),
-                Some(velocity_loop) => {
-                    gains.around(velocity_loop, &scene.run.motion, *axis, errors);
-                }
-            }
+        for axis in scene.machine.axes.keys() {
+            add_errors(scene, *axis, &mut response.servo[*axis]);
         }
+    }
+}
+
+fn add_errors(scene: &Scene<'_>, axis: Axis, errors: &mut [f64]) {
+    let Some(entry) = scene.machine.axes.get(&axis) else {
+        return;
+    };
+    let motion = &scene.run.motion;
+    let mut follower = Follower::new(entry, motion, axis);
+    for (tick, sum) in errors
+        .iter_mut()
+        .enumerate()
+        .take(motion.position[axis].len())
+    {
+        if tick > 0 {
+            let step_s = motion.time_s[tick] - motion.time_s[tick - 1];
+            let (begin, change) = within(motion, axis, tick, step_s);
+            follower.advance(begin, change, step_s);
+        }
+        *sum += follower.error();
     }
 }
 
 /// Steps that differ by less are one, s.
 const SAME_STEP_S: f64 = 1e-9;
+
+/// Steps that are remembered.
+const MOST_KNOWN: usize = 256;
 
 /// K and f.
 #[derive(Clone, Copy, Debug)]
@@ -110,55 +128,83 @@ impl Gains {
     fn left_s(&self) -> f64 {
         (1.0 - self.feedforward) / self.position_per_s
     }
+}
 
-    /// (1).
-    fn around_ideal(&self, motion: &Motion, axis: Axis, errors: &mut [f64]) {
-        let position = &motion.position[axis];
+/// A motor that follows its command.
+pub(crate) struct Follower {
+    gains: Gains,
+    /// Rates of change of the state around a velocity loop.
+    rate: Option<SMatrix<f64, STATES, STATES>>,
+    period_s: f64,
+    /// Share of an error that a period leaves, around an ideal velocity loop.
+    kept: f64,
+    passed: SMatrix<f64, STATES, STATES>,
+    /// What passes a period, by its nanoseconds: a thinned record has a few dozen different ones.
+    known: BTreeMap<u64, SMatrix<f64, STATES, STATES>>,
+    state: Driven,
+}
+
+impl Follower {
+    /// In the state (2).
+    pub(crate) fn new(entry: &AxisEntry, motion: &Motion, axis: Axis) -> Self {
+        let (gains, velocity_loop) = Gains::of(entry);
         let first = motion.velocity[axis].first().copied().unwrap_or(0.0);
-        let mut error = -self.left_s() * first; // (2)
-        let (mut period_s, mut kept) = (0.0_f64, 1.0);
-        for (tick, sum) in errors.iter_mut().enumerate().take(position.len()) {
-            if tick > 0 {
-                let step_s = motion.time_s[tick] - motion.time_s[tick - 1];
-                if (step_s - period_s).abs() > SAME_STEP_S {
-                    (period_s, kept) = (step_s, (-self.position_per_s * step_s).exp());
-                }
-                let (begin, change) = within(motion, axis, tick, step_s);
-                let lag = change / step_s / self.position_per_s;
-                let steady = [begin - lag, begin + change - lag].map(|v| -self.left_s() * v);
-                error = steady[1] + (error - steady[0]) * kept; // (1)
-            }
-            *sum += error;
+        Self {
+            rate: velocity_loop.map(|velocity_loop| gains.rate(velocity_loop)),
+            period_s: 0.0,
+            kept: 1.0,
+            passed: SMatrix::identity(),
+            known: BTreeMap::new(),
+            state: Driven::from([-gains.left_s() * first, first, 0.0, first, first, 0.0]),
+            gains,
         }
     }
 
-    /// (3) to (5).
-    fn around(
-        &self,
-        velocity_loop: &VelocityLoopEntry,
-        motion: &Motion,
-        axis: Axis,
-        errors: &mut [f64],
-    ) {
-        let rate = self.rate(velocity_loop);
-        let position = &motion.position[axis];
-        let first = motion.velocity[axis].first().copied().unwrap_or(0.0);
-        let mut state = Driven::from([-self.left_s() * first, first, 0.0, first, first, 0.0]);
-        let (mut period_s, mut passed) = (0.0_f64, SMatrix::identity());
-        for (tick, sum) in errors.iter_mut().enumerate().take(position.len()) {
-            if tick > 0 {
-                let step_s = motion.time_s[tick] - motion.time_s[tick - 1];
-                if (step_s - period_s).abs() > SAME_STEP_S {
-                    (period_s, passed) = (step_s, (rate * step_s).exp());
-                }
-                let (begin, change) = within(motion, axis, tick, step_s);
-                (state[COMMAND], state[CHANGE]) = (begin, change / step_s);
-                state = passed * state;
-            }
-            *sum += state[ERROR];
-        }
+    /// Motor minus command.
+    pub(crate) fn error(&self) -> f64 {
+        self.state[ERROR]
     }
 
+    /// Velocity of the motor.
+    pub(crate) fn velocity(&self) -> f64 {
+        self.state[VELOCITY]
+    }
+
+    /// Goes on by a step in which the command's velocity changes evenly from `begin` by `change`.
+    pub(crate) fn advance(&mut self, begin: f64, change: f64, step_s: f64) {
+        let is_new = (step_s - self.period_s).abs() > SAME_STEP_S;
+        let gains = self.gains;
+        if let Some(rate) = &self.rate {
+            if is_new {
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a step is positive and far below a century"
+                )]
+                let key = (step_s / SAME_STEP_S).round() as u64;
+                if self.known.len() >= MOST_KNOWN {
+                    self.known.clear();
+                }
+                let passed = self.known.entry(key);
+                self.passed = *passed.or_insert_with(|| (rate * step_s).exp());
+                self.period_s = step_s;
+            }
+            (self.state[COMMAND], self.state[CHANGE]) = (begin, change / step_s);
+            self.state = self.passed * self.state; // (3) to (5)
+            return;
+        }
+        if is_new {
+            (self.period_s, self.kept) = (step_s, (-gains.position_per_s * step_s).exp());
+        }
+        let lag = change / step_s / gains.position_per_s;
+        let steady = [begin - lag, begin + change - lag].map(|v| -gains.left_s() * v);
+        let error = steady[1] + (self.state[ERROR] - steady[0]) * self.kept; // (1)
+        self.state[ERROR] = error;
+        self.state[VELOCITY] = gains.feedforward * (begin + change) - gains.position_per_s * error;
+    }
+}
+
+impl Gains {
     /// Rates of change of the state, the acceleration of the command held.
     fn rate(&self, velocity_loop: &VelocityLoopEntry) -> SMatrix<f64, STATES, STATES> {
         let frequency = std::f64::consts::TAU * velocity_loop.frequency_hz;
@@ -187,7 +233,7 @@ impl Gains {
 }
 
 /// (7) of the step that ends at a tick: the command's velocity where it begins, and its change.
-fn within(motion: &Motion, axis: Axis, tick: usize, step_s: f64) -> (f64, f64) {
+pub(crate) fn within(motion: &Motion, axis: Axis, tick: usize, step_s: f64) -> (f64, f64) {
     let (position, velocity) = (&motion.position[axis], &motion.velocity[axis]);
     let mean = (position[tick] - position[tick - 1]) / step_s;
     let change = velocity[tick] - velocity[tick - 1];

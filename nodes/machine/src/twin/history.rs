@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use metrology::PerAxis;
 
+use super::rubbing::Rubbing;
+
 /// Mean motion and temperatures of the whole session, equally spaced in time from 0.
 ///
 /// Entry k covers the time from k to k + 1 times [`History::step_s`]. All vectors have one length.
@@ -17,6 +19,8 @@ pub struct History {
     pub speed: PerAxis<Vec<f64>>,
     /// Mean of the velocity squared.
     pub speed_squared: PerAxis<Vec<f64>>,
+    /// Where along its travel each axis has moved; without entries where that is not known.
+    pub rubbing: PerAxis<Rubbing>,
     /// Temperature of each sensor by the name in the machine file, degC; NaN before the first reading.
     pub temperature_degc: BTreeMap<String, Vec<f64>>,
 }
@@ -82,12 +86,18 @@ impl History {
     /// entries and constant beyond the first and last; NaN for an empty series.
     #[must_use]
     pub fn at(&self, series: &[f64], time_s: f64) -> f64 {
+        self.between(series, time_s, |value| *value)
+    }
+
+    /// What `of` makes of the entries of any series at an instant, as [`History::at`].
+    #[must_use]
+    pub fn between<T>(&self, series: &[T], time_s: f64, of: impl Fn(&T) -> f64) -> f64 {
         let (Some(first), Some(last)) = (series.first(), series.last()) else {
             return f64::NAN;
         };
         let place = time_s / self.step_s - 0.5;
         if place <= 0.0 || self.step_s <= 0.0 {
-            return *first;
+            return of(first);
         }
         #[expect(
             clippy::cast_possible_truncation,
@@ -96,8 +106,11 @@ impl History {
         )]
         let k = place as usize;
         match (series.get(k), series.get(k + 1)) {
-            (Some(a), Some(b)) => a + (b - a) * place.fract(),
-            _ => *last,
+            (Some(a), Some(b)) => {
+                let (a, b) = (of(a), of(b));
+                a + (b - a) * place.fract()
+            }
+            _ => of(last),
         }
     }
 }

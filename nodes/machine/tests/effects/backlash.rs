@@ -1,5 +1,6 @@
 //! Backlash against a dragged slide, and its wider form against presliding friction.
 
+use machine::file::{AxisEntry, GuideFrictionEntry, MachineFile};
 use metrology::{Axis, AxisSet};
 
 use crate::scene::{TICK_S, fit, greatest, integrate, response_of, rms, run, three_axes};
@@ -29,6 +30,98 @@ fn val_a_slide_dragged_through_a_gap() {
     println!("play operator off a dragged slide by {off_um:.2} um of 20");
     // The contact of the dragged slide yields by velocity times its time constant: 11 mm/s, 0.2 ms.
     assert!(off_um < 11.0 * 0.2 * 1.05, "{off_um}");
+}
+
+/// A slide of 500 kg with 40 N of dry and 0.15 N s/mm of viscous friction between two stiff, damped flanks, carried by a
+/// motor that its position loop lets follow a circle of 300 mm/s2: it runs ahead across the play long before it turns.
+#[test]
+fn val_a_light_slide_runs_ahead_of_its_drive() {
+    let mut machine = three_axes(CHAIN);
+    let (coulomb_mm_s2, viscous_per_s) = (80.0, 0.3);
+    let (gain_per_s, feedforward) = (50.0, 0.97);
+    let Some(AxisEntry::Linear(entry)) = machine.axes.get_mut(&Axis::X) else {
+        panic!("X is linear")
+    };
+    (entry.position_gain_per_s, entry.velocity_feedforward) = (gain_per_s, feedforward);
+    entry.velocity_loop = None;
+    let held = machine.clone();
+    let Some(AxisEntry::Linear(entry)) = machine.axes.get_mut(&Axis::X) else {
+        panic!("X is linear")
+    };
+    entry.guide_friction = Some(GuideFrictionEntry {
+        coulomb_mm_s2,
+        viscous_per_s,
+    });
+    let (half_mm, radius_mm, rate) = (0.004, 40.0, 2.74);
+    let place = |t: f64| radius_mm * (rate * t).cos();
+    let speed = |t: f64| -radius_mm * rate * (rate * t).sin();
+    let run = run(6000, AxisSet::XYZ, |t| [place(t), 0.0, 0.0, 0.0, 0.0, 0.0]);
+    // Motor's error, slide and its speed; flanks of 200 Hz, critically damped.
+    let (stiff, damped) = (1.6e6, 2.5e3);
+    let carried = |t: f64, y: &[f64; 3]| {
+        let motor_mm_s = feedforward * speed(t) - gain_per_s * y[0];
+        let (gap, closing) = (place(t) + y[0] - y[1], motor_mm_s - y[2]);
+        let beyond = gap - gap.clamp(-half_mm, half_mm);
+        let pushed = if beyond == 0.0 {
+            0.0
+        } else {
+            stiff * beyond + damped * closing
+        };
+        let friction = coulomb_mm_s2 * (y[2] / 0.05).tanh() + viscous_per_s * y[2];
+        [motor_mm_s - speed(t), y[2], pushed - friction]
+    };
+    let parts = 40;
+    let states = integrate(
+        [0.0, radius_mm, 0.0],
+        TICK_S / 40.0,
+        parts * 5999,
+        parts,
+        carried,
+    );
+    let given = [("width_um", 2e3 * half_mm)];
+    let wanted =
+        (3000..5998).map(|k| states[k][1] - states[k][0] - run.motion.position[Axis::X][k]);
+    let off_um = |machine: &MachineFile| {
+        let response = response_of(machine, &run, "backlash", "X", &given);
+        let lags = response.drive[Axis::X][3000..5998].to_vec();
+        let off = wanted.clone().zip(lags).map(|(wanted, lag)| wanted - lag);
+        rms(off) * 1e3
+    };
+    let size_um = rms(wanted.clone()) * 1e3;
+    let (coasting, held) = (off_um(&machine), off_um(&held));
+    println!(
+        "of {size_um:.2} um: {coasting:.2} left, {held:.2} of a slide that stays where it is left"
+    );
+    assert!(
+        coasting < 0.12 * size_um && held > 0.7 * size_um,
+        "{coasting} {held}"
+    );
+}
+
+/// An axis that is braked at 2 m/s2 has its slide on the front flank; while the motor creeps the last micrometres the
+/// guides hold the slide back, and it comes to rest on the flank that pushes it: what positioning tests see.
+#[test]
+fn a_light_slide_comes_to_rest_on_the_flank_that_pushes_it() {
+    let mut machine = three_axes(CHAIN);
+    let Some(AxisEntry::Linear(entry)) = machine.axes.get_mut(&Axis::X) else {
+        panic!("X is linear")
+    };
+    (entry.position_gain_per_s, entry.velocity_feedforward) = (45.0, 0.97);
+    entry.velocity_loop = None;
+    entry.guide_friction = Some(GuideFrictionEntry {
+        coulomb_mm_s2: 15.0,
+        viscous_per_s: 0.3,
+    });
+    let run = run(3000, AxisSet::XYZ, |t| {
+        let brake = (t - 1.0).clamp(0.0, 0.05);
+        let x = 100.0 * t.min(1.0) + 100.0 * brake - 1000.0 * brake * brake;
+        [x, 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+    let response = response_of(&machine, &run, "backlash", "X", &[("width_um", 2.0)]);
+    let at = |tick: usize| response.drive[Axis::X][tick] * 1e3;
+    assert!((at(900) + 1.0).abs() < 1e-9, "pushed: {}", at(900));
+    assert!((at(1045) - 1.0).abs() < 1e-9, "braked: {}", at(1045));
+    assert!((at(2990) + 1.0).abs() < 1e-9, "at rest: {}", at(2990));
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Wind-up of a drive against a mass on a spring.
 
+use machine::file::{AxisEntry, GuideFrictionEntry};
 use metrology::{Axis, AxisSet};
 
 use crate::scene::{TICK_S, greatest, integrate, response_of, run, three_axes};
@@ -33,6 +34,38 @@ fn val_a_mass_on_a_spring() {
     let off_um = greatest(off) * 1e3;
     println!("wind-up {most_um:.2} um, off by {off_um:.3} um");
     assert!(off_um < 1.2 * ratio * most_um, "{off_um}");
+}
+
+/// A slide that a spring drags at constant speed through friction lags by friction over stiffness: Hooke.
+#[test]
+fn val_a_spring_that_drags_its_mass_through_friction() {
+    let mut machine = three_axes("[w X' Y' b Z t]");
+    let natural = 120.0_f64;
+    let (coulomb_mm_s2, viscous_per_s, speed_mm_s) = (60.0, 0.4, 50.0);
+    let Some(AxisEntry::Linear(entry)) = machine.axes.get_mut(&Axis::X) else {
+        panic!("X is linear")
+    };
+    entry.guide_friction = Some(GuideFrictionEntry {
+        coulomb_mm_s2,
+        viscous_per_s,
+    });
+    let run = run(1000, AxisSet::XYZ, |t| {
+        [speed_mm_s * t, 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+    let drag = |t: f64, y: &[f64; 2]| {
+        let force = natural * natural * (speed_mm_s * t - y[0]) - 40.0 * (y[1] - speed_mm_s);
+        [
+            y[1],
+            force - coulomb_mm_s2 * y[1].signum() - viscous_per_s * y[1],
+        ]
+    };
+    let slide = integrate([0.0, speed_mm_s], TICK_S / 10.0, 9990, 10, drag);
+    let given = [("windup_um", 1e6 / (natural * natural))];
+    let response = response_of(&machine, &run, "drive_windup", "X", &given);
+    let lag_mm = slide[990][0] - run.motion.position[Axis::X][990];
+    let off_um = (response.drive[Axis::X][990] - lag_mm) * 1e3;
+    println!("lag {:.3} um, off by {off_um:.5} um", lag_mm * 1e3);
+    assert!(off_um.abs() < 1e-3, "{off_um}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::scene::bench;
 fn val_length_misalignment_projected() {
     let machine = bench();
     let mut worst = 0.0_f64;
-    for angle_rad in [1e-3_f64, 3e-3, 10e-3] {
+    for angle_rad in [0.5e-3_f64, 1e-3, 3e-3] {
         let mut run = stands(&instants(11, 1.0), |k| [-250.0 + 50.0 * k as f64, 0.0, 0.0]);
         read(&mut run, &Channel::Length(Axis::X));
         let given = [("cosine_um_per_m", 0.5e6 * angle_rad * angle_rad)];
@@ -22,7 +22,7 @@ fn val_length_misalignment_projected() {
         }
     }
     println!("cosine: worst {worst:.2e} mm");
-    assert!(worst < 3e-7, "{worst}");
+    assert!(worst < 1e-8, "{worst}");
 }
 
 #[test]

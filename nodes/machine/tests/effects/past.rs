@@ -102,6 +102,7 @@ pub fn past(
         speed,
         speed_squared,
         temperature_degc: BTreeMap::from([(sensor.to_owned(), series(degc))]),
+        ..History::default()
     }
 }
 

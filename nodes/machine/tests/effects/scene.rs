@@ -246,6 +246,7 @@ fn history() -> History {
         speed: PerAxis([40.0, 35.0, 20.0, 0.1, 0.0, 0.2].map(series)),
         speed_squared: PerAxis([2000.0, 1500.0, 600.0, 0.02, 0.0, 0.05].map(series)),
         temperature_degc,
+        ..History::default()
     }
 }
 

@@ -76,3 +76,29 @@ fn eq1_odd_powers_are_given_at_100_mm_s() {
         assert!((found - cube).abs() < 1e-9, "{on} {found}");
     }
 }
+
+/// A position loop whose velocity feed-forward lacks a share of it: the lag that it leaves beside the nominal one, by fine
+/// integration of both loops.
+#[test]
+fn val_a_loop_that_lacks_feed_forward() {
+    let machine = three_axes(CHAIN);
+    let gain_per_s = machine.linear(Axis::X).unwrap().position_gain_per_s;
+    let (radius_mm, feed_mm_s, time_s) = (40.0, 120.0, 0.2e-3);
+    let rate: f64 = feed_mm_s / radius_mm;
+    let run = circle(radius_mm, feed_mm_s, 2.0);
+    let speed = |t: f64| -radius_mm * rate * (rate * t).sin();
+    let lacks = |t: f64, e: &[f64; 1]| [-gain_per_s * e[0] - time_s * gain_per_s * speed(t)];
+    let ticks = run.motion.len();
+    let error = integrate([0.0], TICK_S / 10.0, 10 * (ticks - 1), 10, lacks);
+    let off_um = |given: &[(&str, f64)]| {
+        let response = response_of(&machine, &run, "servo_lag", "X", given);
+        let off = (ticks / 2..ticks - 2).map(|k| error[k][0] - response.servo[Axis::X][k]);
+        greatest(off) * 1e3
+    };
+    let narrow = off_um(&[("time_ms", 0.2)]);
+    let wide = off_um(&[("time_ms", 0.2), ("free_worked_off_ms", 0.2)]);
+    println!(
+        "lack of feed-forward: {narrow:.3} um left, {wide:.5} um with what the loop works off"
+    );
+    assert!(narrow > 0.5 && wide < 0.02 * narrow, "{narrow} {wide}");
+}
