@@ -28,7 +28,7 @@ use crate::refit::{self, Estimate, Refit};
 use crate::report::{Cause, Confusable, Constancy, ParameterValue, Status};
 use crate::rows::count;
 use crate::rule::Rule;
-use crate::selection::{Limits, Search, Set};
+use crate::selection::{Limits, MOST_CANCELLING, Search, Set};
 use crate::signature::{Form, Instance, Library};
 use crate::stack::Stack;
 use crate::unknown::{self, Leftover};
@@ -199,9 +199,6 @@ fn leave_out_small(stack: &Stack<'_>, signatures: &Library, members: &mut Vec<Me
     });
     members.len() < before
 }
-
-/// A member whose own signature is this many times what the whole set explains (in squares) only cancels another.
-const MOST_CANCELLING: f64 = 2.0;
 
 fn search(scope: &Scope<'_, '_>, signatures: &Library, normal: &Normal) -> Best {
     let stack = scope.stack;
@@ -378,7 +375,7 @@ fn steady(scope: &Scope<'_, '_>, signatures: &Library, best: &Best) -> Vec<(Cons
 }
 
 /// Standard uncertainties by which a size must be off zero.
-const SURE: f64 = 4.5;
+pub const SURE: f64 = 4.5;
 
 /// Whether the size of each member is surely not zero by how it differs from run to run: noise that a dozen touches
 /// show too small makes any D.

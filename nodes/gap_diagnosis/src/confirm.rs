@@ -14,7 +14,7 @@
 //! sizes is a score of Wilson and Hilferty's (`localise`):
 //!
 //! ```text
-//!   z - sum_h J_h d_h - sum_level e_level f_g 1[level],   e_level = 0?    (2)
+//!   z - sum_h J_h d_h - sum_level e_level f_g 1[level],   e_level = e?    (2)
 //! ```
 //!
 //! An effect passes where the score stays below `constancy_z` or its sizes differ by less than
@@ -246,13 +246,24 @@ fn split_score(
     jacobian: &[DVector<f64>],
     left: &DVector<f64>,
 ) -> (f64, f64) {
-    let columns: Vec<DVector<f64>> = jacobian.iter().chain(levels).cloned().collect();
+    // What is not proportional to its size has a derivative that is not along the signature: one size for all levels
+    // is a column of its own.
+    let whole = levels
+        .iter()
+        .fold(DVector::zeros(left.len()), |sum, level| sum + level);
+    let free = jacobian.len() + 1;
+    let columns: Vec<DVector<f64>> = jacobian
+        .iter()
+        .chain([&whole])
+        .chain(levels)
+        .cloned()
+        .collect();
     let normal = Normal::new(&DMatrix::from_columns(&columns), left);
-    let common: Vec<usize> = (0..jacobian.len()).collect();
+    let common: Vec<usize> = (0..free).collect();
     let more: Vec<usize> = (0..columns.len()).collect();
     let gain = normal.solve(&more).gain - normal.solve(&common).gain;
     let freedom = count(levels.len() - 1);
-    let alone: Vec<usize> = (jacobian.len()..columns.len()).collect();
+    let alone: Vec<usize> = (free..columns.len()).collect();
     let apart = normal.solve(&alone).sizes;
     let mean = apart.iter().sum::<f64>() / count(apart.len());
     let spread = apart.iter().map(|e| (e - mean).abs()).fold(0.0, f64::max);
@@ -260,4 +271,40 @@ fn split_score(
         wilson_hilferty(gain, freedom),
         spread / (1.0 + mean).abs().max(0.1),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two levels of 200 rows in which a signature is alike.
+    fn levels() -> [DVector<f64>; 2] {
+        [0, 1].map(|level| {
+            DVector::from_fn(400, |row, _| {
+                let own = row / 200 == level;
+                if own { (0.1 * row as f64).sin() } else { 0.0 }
+            })
+        })
+    }
+
+    #[test]
+    fn eq2_one_size_that_is_off_everywhere_is_no_second_size() {
+        let [a, b] = levels();
+        // A size that was sought along a derivative which is not the signature itself is off everywhere alike.
+        let derivative = DVector::from_fn(400, |row, _| (0.037 * row as f64).cos());
+        let (z, spread) = split_score(
+            &[&a, &b].map(Clone::clone),
+            &[derivative],
+            &((&a + &b) * 0.8),
+        );
+        assert!(z < 1.0 && spread < 1e-6, "{z} {spread}");
+    }
+
+    #[test]
+    fn eq2_two_sizes_are_told() {
+        let [a, b] = levels();
+        let left = &a * 0.8 - &b * 0.8;
+        let (z, spread) = split_score(&[a, b], &[], &left);
+        assert!(z > 4.0 && spread > 0.5, "{z} {spread}");
+    }
 }

@@ -25,6 +25,9 @@ use crate::signature::{Form, Library};
 /// The free part of a wide form is at most this share of the rest of its signature.
 const MOST_FREE: f64 = 0.5;
 
+/// A member whose own signature is this many times what the whole set explains (in squares) only cancels another.
+pub const MOST_CANCELLING: f64 = 2.0;
+
 /// A set of forms, growing places among the signatures.
 pub type Set = Vec<usize>;
 
@@ -89,13 +92,31 @@ impl<'l> Search<'l> {
             return *score;
         }
         let fit = self.fit(set);
-        let score = if self.is_physical(set, &fit) && self.keeps_form(set, &fit) {
+        let is_sound = self.is_physical(set, &fit) && self.keeps_form(set, &fit);
+        let score = if is_sound && !self.cancels(set, &fit) {
             self.square - fit.gain + self.price(set)
         } else {
             f64::INFINITY
         };
         self.visited.insert(set.clone(), score);
         score
+    }
+
+    /// Whether some member is much larger than what the whole set explains: two look-alikes that all but cancel each other
+    /// explain with what they differ by, which no two causes of a machine do.
+    fn cancels(&self, set: &[usize], fit: &Fit) -> bool {
+        let mut first = 0;
+        set.len() > 1
+            && set.iter().any(|form| {
+                let columns = &self.signatures.forms[*form].columns;
+                let sizes = &fit.sizes[first..first + columns.len()];
+                first += columns.len();
+                let own: f64 = (0..columns.len())
+                    .flat_map(|i| (0..columns.len()).map(move |j| (i, j)))
+                    .map(|(i, j)| sizes[i] * sizes[j] * self.normal.gram[(columns[i], columns[j])])
+                    .sum();
+                own > MOST_CANCELLING * fit.gain
+            })
     }
 
     /// Whether the free part of every wide form only widens the form: one that is as large as the rest of its

@@ -86,7 +86,7 @@ impl SessionBuilder {
         Ok(Self {
             kinematics: Kinematics::new(machine)?,
             axes: machine.axis_set(),
-            past: Past::new(config.history_step_s),
+            past: Past::new(machine, config.history_step_s),
             machine: machine.clone(),
             config,
             time: SessionTime::default(),

@@ -16,8 +16,10 @@ use super::thermometers;
 
 /// Greatest distance between ticks on either side of a reading, s.
 const GAP_S: f64 = 0.25;
-/// Greatest bow of the path between those ticks, mm or rad.
+/// Greatest distance of the path between those ticks from the parabola that is taken for it, mm or rad.
 const BOW: f64 = 1e-4;
+/// What an acceleration that changes evenly by 1 makes of it in a time of 1: the peak of s (1 - s) (1 - 2 s) / 12.
+const OFF_PARABOLA: f64 = 0.008_02;
 /// Rotary axes beyond this are turned, rad.
 const TURNED_RAD: f64 = 1e-6;
 /// A sensor that does not change over this way stands, mm.
@@ -247,7 +249,7 @@ impl Scope<'_> {
         let dt_s = (after.at - ticks[k].at).as_secs_f64();
         let bow = |axis: Axis| {
             let a = &self.motion.acceleration[axis];
-            a[k].abs().max(a[next].abs()) * dt_s * dt_s / 8.0
+            (a[next] - a[k]).abs() * dt_s * dt_s * OFF_PARABOLA
         };
         if dt_s > GAP_S || self.motion.axes.iter().any(|axis| bow(axis) > BOW) {
             return Err(Reason::InGap);
@@ -265,10 +267,19 @@ impl Scope<'_> {
         )]
         let k = place as usize;
         let ticks = &self.record.ticks;
-        let after = ticks.get(k + 1).unwrap_or(&ticks[k]);
+        let next = (k + 1).min(ticks.len() - 1);
+        let dt_s = (ticks[next].at - ticks[k].at).as_secs_f64();
+        let share = place.fract();
         PerAxis::from_fn(|axis| {
-            let (a, b) = (ticks[k].commanded[axis], after.commanded[axis]);
-            a + (b - a) * place.fract() + offset[axis]
+            let (a, b) = (ticks[k].commanded[axis], ticks[next].commanded[axis]);
+            let along = &self.motion.acceleration[axis];
+            let bent = match (along.get(k), along.get(next)) {
+                (Some(first), Some(last)) if share > 0.0 => {
+                    0.25 * (first + last) * dt_s * dt_s * share * (1.0 - share)
+                }
+                _ => 0.0,
+            };
+            a + (b - a) * share - bent + offset[axis]
         })
     }
 }

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::History;
-use metrology::{AxisSet, PerAxis};
+use machine::MachineFile;
+use machine::twin::{History, Rubbing, rubbing::ZONES};
+use metrology::{Axis, AxisSet, PerAxis};
 
 /// A hole beyond which nothing is said of the motion in it, s.
 const HOLE_S: f64 = 2.0;
@@ -14,12 +15,15 @@ struct Cell {
     position_s: PerAxis<f64>,
     way: PerAxis<f64>,
     way_speed: PerAxis<f64>,
+    way_by_zone: [[f64; ZONES]; 3],
 }
 
 /// Gathers the history while samples come.
 #[derive(Clone, Debug)]
 pub(super) struct Past {
     step_s: f64,
+    /// Of X, Y, Z; what the machine lacks has none.
+    travels_mm: [Option<[f64; 2]>; 3],
     cells: Vec<Cell>,
     last: Option<(f64, PerAxis<f64>)>,
     /// (sum, count) per sensor and cell.
@@ -27,9 +31,10 @@ pub(super) struct Past {
 }
 
 impl Past {
-    pub(super) fn new(step_s: f64) -> Self {
+    pub(super) fn new(machine: &MachineFile, step_s: f64) -> Self {
         Self {
             step_s,
+            travels_mm: Axis::LINEAR.map(|axis| machine.linear(axis).map(|entry| entry.travel_mm)),
             cells: vec![],
             last: None,
             temperatures: BTreeMap::new(),
@@ -68,6 +73,10 @@ impl Past {
             cell.position_s.0[index] += position.0[index] * dt_s;
             cell.way.0[index] += way;
             cell.way_speed.0[index] += way * way / dt_s;
+            if let Some(Some(travel_mm)) = self.travels_mm.get(index) {
+                let middle = 0.5 * (position.0[index] + before.0[index]);
+                cell.way_by_zone[index][Rubbing::zone(*travel_mm, middle)] += way;
+            }
         }
     }
 
@@ -113,6 +122,19 @@ impl Past {
                     .push(mean(cell.map_or(0.0, |cell| cell.way_speed[axis])));
             }
         }
+        for (index, axis) in Axis::LINEAR.into_iter().enumerate() {
+            let Some(travel) = self.travels_mm[index].filter(|_| axes.contains(axis)) else {
+                continue;
+            };
+            let speed = |k: usize| match self.cells.get(k).filter(|cell| cell.time_s > 0.0) {
+                Some(cell) => cell.way_by_zone[index].map(|way| way / cell.time_s),
+                None => [0.0; ZONES],
+            };
+            history.rubbing[axis] = Rubbing {
+                travel,
+                speed: (0..n).map(speed).collect(),
+            };
+        }
         for (sensor, cells) in &self.temperatures {
             let mut here = f64::NAN;
             let series = (0..n).map(|k| {
@@ -132,11 +154,34 @@ impl Past {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metrology::Axis;
+
+    fn machine() -> MachineFile {
+        let text = include_str!("../../../trials/data/machine.yaml");
+        MachineFile::parse(text, "machine.yaml").expect("a machine file")
+    }
+
+    #[test]
+    fn ways_are_told_by_the_place_where_they_were_made() {
+        let mut past = Past::new(&machine(), 10.0);
+        for k in 0..=40 {
+            let mut position = PerAxis::default();
+            position[Axis::X] = 100.0 + f64::from(k);
+            past.axes(f64::from(k) * 0.25, &position);
+        }
+        let history = past.history(AxisSet::EMPTY.with(Axis::X));
+        let [low, high] = history.rubbing[Axis::X].travel;
+        let zones = history.rubbing[Axis::X].speed[0];
+        let sum: f64 = zones.iter().sum();
+        assert!((sum - history.speed[Axis::X][0]).abs() < 1e-9);
+        let rubbed = |zone: &usize| zones[*zone] > 0.0;
+        let wanted = Rubbing::zone([low, high], 100.0)..=Rubbing::zone([low, high], 140.0);
+        assert!((0..ZONES).filter(rubbed).eq(wanted), "{zones:?}");
+        assert!(history.rubbing[Axis::Y].speed.is_empty());
+    }
 
     #[test]
     fn speed_and_its_square_are_means_over_the_time_that_was_recorded() {
-        let mut past = Past::new(10.0);
+        let mut past = Past::new(&machine(), 10.0);
         for k in 0..=40 {
             let mut position = PerAxis::default();
             position[Axis::X] = f64::from(k) * 5.0;
@@ -156,7 +201,7 @@ mod tests {
 
     #[test]
     fn a_hole_is_rest_at_the_last_place() {
-        let mut past = Past::new(10.0);
+        let mut past = Past::new(&machine(), 10.0);
         let mut position = PerAxis::default();
         position[Axis::X] = 7.0;
         past.axes(0.0, &position);
