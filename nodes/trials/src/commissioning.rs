@@ -1,4 +1,5 @@
-//! What the maker of a machine has measured of its loops: how much later each velocity loop sees its motion.
+//! What the maker of a machine has measured of its loops: how much later each velocity loop sees its motion, and how far
+//! each motor stays behind at a reversal (`reversals`).
 //!
 //! # Model
 //!
@@ -38,6 +39,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::measurement::Sample;
 
+use reversals::{Reversals, Tick};
+
+mod reversals;
+
 /// Ticks that differences are taken over.
 const TICKS: usize = 5;
 
@@ -51,6 +56,7 @@ pub(crate) struct Commissioning {
     right: PerAxis<Vector3<f64>>,
     /// L, K and 1/w2 of each axis.
     known: PerAxis<[f64; 3]>,
+    reversals: [Reversals; 3],
 }
 
 impl Commissioning {
@@ -62,6 +68,7 @@ impl Commissioning {
             is_circle: false,
             normal: PerAxis::default(),
             right: PerAxis::default(),
+            reversals: std::array::from_fn(|_| Reversals::default()),
             known: PerAxis::from_fn(|axis| {
                 machine.linear(axis).map_or([0.0, 1.0, 0.0], |entry| {
                     let gain = entry.position_gain_per_s;
@@ -92,6 +99,7 @@ impl Commissioning {
         });
         if !follows {
             self.last.clear();
+            self.reversals.iter_mut().for_each(Reversals::interrupt);
         }
         if self.last.len() == TICKS {
             self.last.remove(0);
@@ -113,13 +121,19 @@ impl Commissioning {
                 let row = Vector3::new(velocity, acceleration, jerk);
                 self.normal[axis] += row * row.transpose();
                 self.right[axis] += row * error;
+                self.reversals[axis.index()].take(Tick {
+                    velocity_mm_s: velocity,
+                    acceleration_mm_s2: acceleration,
+                    error_mm: error,
+                });
             }
         }
     }
 
-    /// Writes (2) into the machine file.
+    /// Writes (2) and the spikes into the machine file.
     pub(crate) fn tune(&self, machine: &mut MachineFile) {
-        for axis in Axis::LINEAR {
+        for (axis, reversals) in Axis::LINEAR.into_iter().zip(&self.reversals) {
+            machine.effects.extend(reversals.entry(axis));
             let Some(AxisEntry::Linear(entry)) = machine.axes.get_mut(&axis) else {
                 continue;
             };

@@ -11,7 +11,9 @@ use fake_cnc::PlantFile;
 use fake_cnc::config::Config as ControlConfig;
 use fake_cnc::plant::VibrationEntry;
 use machine::MachineFile;
-use machine::file::{AxisEntry, EffectEntry, LinearAxisEntry, VelocityLoopEntry};
+use machine::file::{
+    AxisEntry, EffectEntry, GuideFrictionEntry, LinearAxisEntry, VelocityLoopEntry,
+};
 use metrology::Axis;
 use nalgebra::Vector3;
 use rand::Rng;
@@ -33,7 +35,7 @@ const BACKGROUND_RATE_HZ: f64 = 125.0;
 /// How much of a screw is beyond the travel at each end, mm.
 const SCREW_BEYOND_MM: f64 = 80.0;
 /// Shortest and longest wave of the deviation between runs, mm.
-const WAVE_MM: [f64; 2] = [80.0, 800.0];
+pub(crate) const WAVE_MM: [f64; 2] = [80.0, 800.0];
 /// Share of machines that have outliers, and how many of their readings are.
 const OUTLIERS: [f64; 2] = [0.05, 0.01];
 
@@ -229,6 +231,15 @@ fn drive(random: &mut Pcg64Mcg, axis: Axis, machine: &mut MachineFile, plant: &m
     if let Some(drive) = plant.linear_drives.get_mut(&axis) {
         drive.slide_mass_kg *= random.random_range(0.7..1.3);
         drive.screw_stiffness_n_per_um = [random.random_range(350.0..500.0); 2];
+        let per_mass = 1e3 / drive.slide_mass_kg;
+        let guides = &drive.guide_friction;
+        let friction = GuideFrictionEntry {
+            coulomb_mm_s2: guides.coulomb_n * per_mass,
+            viscous_per_s: guides.viscous_n_s_per_mm * per_mass,
+        };
+        if let Some(entry) = linear(machine, axis) {
+            entry.guide_friction = Some(friction);
+        }
     }
 }
 

@@ -2,13 +2,13 @@
 //!
 //! ```text
 //!   x = 2 (q - middle) / travel                                                              (1)
-//!   f(q) = b cos(pi x / 2) + s sin(pi x) + d exp(-((q - q_d) / w)^2)                          (2)
+//!   f(q) = b cos(pi x / 2) + s (sin(pi x) - 3 x / pi) + d exp(-((q - q_d) / w)^2)             (2)
 //!   e(q) = f(q) - f(0)                                                                       (3)
 //! ```
 //!
 //! Rails that are screwed down at both ends bow like (2)'s first term, rails that are screwed down in the
-//! middle as well like its second; a joint or a crushed ball track is a dent. The axis was referenced where it
-//! stands at zero (3). A form adds to the error motions that `error_motion` draws.
+//! middle as well like its second, about the straight line that fits it best: its slope would be another error, a lead or a
+//! squareness. A joint or a crushed ball track is a dent. The axis was referenced where it stands at zero (3). A form adds to the error motions that `error_motion` draws.
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
@@ -75,7 +75,8 @@ impl GuideForm {
     /// (3): mm or rad at position `q_mm`.
     pub(super) fn at(&self, q_mm: f64) -> f64 {
         let x = (q_mm - self.middle_mm) / self.half_travel_mm;
-        let mut form = self.bow * (FRAC_PI_2 * x).cos() + self.wave * (PI * x).sin();
+        let wave = (PI * x).sin() - 3.0 * x / PI;
+        let mut form = self.bow * (FRAC_PI_2 * x).cos() + self.wave * wave;
         if self.dent.abs() > 0.0 {
             let away = (q_mm - self.dent_at_mm) / self.dent_width_mm;
             form += self.dent * (-away * away).exp();
@@ -105,12 +106,24 @@ mod tests {
     fn eq2_a_bow_rises_in_the_middle_and_a_wave_at_the_quarters() {
         let form = GuideForm::new("form", &entry(), [-200.0, 400.0]).unwrap();
         assert_eq!(form.component, 1);
-        let at = |q: f64| (form.at(q) - form.at(400.0)) * 1e3;
-        assert!((at(100.0) - 4.0).abs() < 1e-12);
-        let quarter = 4.0 * (PI / 4.0).cos();
-        assert!((at(250.0) - (quarter - 1.0)).abs() < 1e-12);
-        assert!((at(-50.0) - (quarter + 1.0)).abs() < 1e-12);
-        assert!(at(-200.0).abs() < 1e-12);
+        let at = |q: f64| (form.at(q) - form.at(100.0)) * 1e3;
+        let (ends, quarters) = (at(400.0) + at(-200.0), at(250.0) - at(-50.0));
+        assert!((ends + 8.0).abs() < 1e-12);
+        assert!((at(400.0) - at(-200.0) - 6.0 / PI).abs() < 1e-12);
+        assert!((quarters + 2.0 * (1.0 - 1.5 / PI)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn eq2_a_wave_has_no_slope_by_least_squares() {
+        let wave = GuideFormEntry {
+            bow_um_urad: 0.0,
+            ..entry()
+        };
+        let form = GuideForm::new("form", &wave, [-300.0, 300.0]).unwrap();
+        let places = (0..=6000).map(|k| -300.0 + 0.1 * f64::from(k));
+        let slope: f64 = places.clone().map(|q| q * form.at(q)).sum();
+        let size: f64 = places.map(|q| (q * form.at(q)).abs()).sum();
+        assert!((slope / size).abs() < 1e-3, "{slope} of {size}");
     }
 
     #[test]
