@@ -109,7 +109,7 @@ impl Backlash {
 /// A slide in its play.
 struct Slide {
     half_mm: f64,
-    friction: Option<GuideFrictionEntry>,
+    friction: GuideFrictionEntry,
     /// q - m.
     lag_mm: f64,
     velocity_mm_s: f64,
@@ -142,14 +142,12 @@ impl Slide {
 
     /// The motor has moved by `by_mm` in `period_s`, and is now this fast.
     fn step(&mut self, by_mm: f64, period_s: f64, motor_mm_s: f64) {
-        let coasted_mm = self.friction.map_or(0.0, |friction| {
-            let speed = self.velocity_mm_s.abs();
-            let braking = friction.coulomb_mm_s2 + friction.viscous_per_s * speed;
-            let runs_s = period_s.min(speed / braking);
-            let sense = self.velocity_mm_s.signum();
-            self.velocity_mm_s = sense * (speed - braking * runs_s); // (3)
-            sense * (speed - 0.5 * braking * runs_s) * runs_s
-        });
+        let speed = self.velocity_mm_s.abs();
+        let braking = self.friction.coulomb_mm_s2 + self.friction.viscous_per_s * speed;
+        let runs_s = period_s.min(speed / braking);
+        let sense = self.velocity_mm_s.signum();
+        self.velocity_mm_s = sense * (speed - braking * runs_s); // (3)
+        let coasted_mm = sense * (speed - 0.5 * braking * runs_s) * runs_s;
         let lag_mm = self.lag_mm + coasted_mm - by_mm;
         self.lag_mm = lag_mm.clamp(-self.half_mm, self.half_mm); // (1)
         if lag_mm.abs() > self.half_mm {
@@ -161,39 +159,32 @@ impl Slide {
 impl Backlash {
     /// q - m at every tick.
     fn lags_mm(&self, scene: &Scene<'_>) -> Vec<f64> {
-        let motion = &scene.run.motion;
-        let position = &motion.position[self.axis];
+        let position = &scene.run.motion.position[self.axis];
         let half_mm = 0.5 * self.width_mm.abs();
-        let held = || {
-            let mut lag = 0.0_f64;
-            let steps = position.iter().zip(position.iter().skip(1));
-            let steps = steps.map(|(last, here)| here - last);
-            let follow = std::iter::once(0.0).chain(steps).map(|by| {
-                lag = (lag - by).clamp(-half_mm, half_mm); // (1)
-                lag
-            });
-            follow.collect()
-        };
         let entry = scene.machine.axes.get(&self.axis);
-        match (half_mm > 0.0, entry) {
-            (false, _) => vec![0.0; position.len()],
-            (true, Some(AxisEntry::Linear(linear))) if linear.guide_friction.is_some() => {
-                self.coasting_mm(scene, half_mm)
-            }
-            _ => held(),
+        let friction = scene
+            .machine
+            .linear(self.axis)
+            .and_then(|linear| linear.guide_friction);
+        match (entry, friction) {
+            _ if half_mm <= 0.0 => vec![0.0; position.len()],
+            (Some(entry), Some(friction)) => self.coasting_mm(scene, entry, friction, half_mm),
+            _ => held_mm(position, half_mm),
         }
     }
 
     /// (3) and (4), the motor creeping into its place as its loop lets it: that decides on which flank a slide stops.
-    fn coasting_mm(&self, scene: &Scene<'_>, half_mm: f64) -> Vec<f64> {
+    fn coasting_mm(
+        &self,
+        scene: &Scene<'_>,
+        entry: &AxisEntry,
+        friction: GuideFrictionEntry,
+        half_mm: f64,
+    ) -> Vec<f64> {
         let motion = &scene.run.motion;
-        let Some(entry) = scene.machine.axes.get(&self.axis) else {
-            return vec![];
-        };
-        let linear = scene.machine.linear(self.axis);
         let mut slide = Slide {
             half_mm,
-            friction: linear.and_then(|linear| linear.guide_friction),
+            friction,
             lag_mm: 0.0,
             velocity_mm_s: motion.velocity[self.axis].first().copied().unwrap_or(0.0),
         };
@@ -214,6 +205,18 @@ impl Backlash {
         };
         (0..motion.len()).map(follow).collect()
     }
+}
+
+/// (1): the slide stays where it is left.
+fn held_mm(position: &[f64], half_mm: f64) -> Vec<f64> {
+    let mut lag_mm = 0.0_f64;
+    let mut last = position.first().copied().unwrap_or(0.0);
+    let follow = |here: &f64| {
+        lag_mm = (lag_mm - (here - last)).clamp(-half_mm, half_mm); // (1)
+        last = *here;
+        lag_mm
+    };
+    position.iter().map(follow).collect()
 }
 
 impl Effect for Backlash {

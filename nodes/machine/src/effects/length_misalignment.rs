@@ -22,7 +22,7 @@
 //! from `length_wavelength` and from a scale error of the axis.
 //!
 //! # Agreement
-//! `val_length_misalignment_projected`: 0.5, 1 and 3 mrad over 500 mm by the cosine itself, to 3e-9 mm.
+//! `val_length_misalignment_projected`: 0.5, 1 and 3 mrad over 500 mm by the cosine itself, to 2e-9 mm.
 //!
 //! # References
 //! \[1\] ISO 230-1:2012, 8 (linear positioning measurement: cosine error; from memory).
