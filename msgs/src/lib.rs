@@ -13,6 +13,7 @@
 mod action_types;
 mod block;
 mod cdr;
+mod clock;
 mod compensation;
 mod cycle;
 mod error;

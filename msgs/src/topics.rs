@@ -7,9 +7,10 @@ use std::marker::PhantomData;
 use crate::action::{RunCycle, RunProgram};
 use crate::diagnostic_msgs::msg::DiagnosticArray;
 use crate::msg::{
-    AxisCompensation, AxisState, BlockMeasurement, GapReport, GeometryModel, GridSample,
-    LengthSample, MachineValue, PlanStatus, PositioningTable, ProbeLatency, ProbeTrigger,
-    ProbedFeature, ProbedPoint, TestSegment, ThermalModel, ThermalUpdateRequest,
+    AxisCompensation, AxisState, BlockMeasurement, ClockAnswer, ClockQuestion, GapReport,
+    GeometryModel, GridSample, HostClock, LengthSample, MachineValue, PlanStatus, PositioningTable,
+    ProbeLatency, ProbeTrigger, ProbedFeature, ProbedPoint, TestSegment, ThermalModel,
+    ThermalUpdateRequest,
 };
 use crate::qos::{Durability, Qos, Reliability};
 use crate::rcl_interfaces::msg::{Log, ParameterEvent};
@@ -201,6 +202,12 @@ topics! {
     GAP_REPORT: GapReport = "gap/report", Qos::LATCHED, Housekeeping;
     /// Begin and end of tests.
     TEST_SEGMENT: TestSegment = "test/segment", Qos::RELIABLE, Raw;
+    /// A host asks what time it is; best effort, for a question that is sent again tells nothing.
+    CLOCK_QUESTION: ClockQuestion = "host_clock/question", CLOCK_QOS, Housekeeping;
+    /// The answer of the reference.
+    CLOCK_ANSWER: ClockAnswer = "host_clock/answer", CLOCK_QOS, Raw;
+    /// How a host's clock stands to the reference's.
+    HOST_CLOCK: HostClock = "host_clock/map", Qos::LATCHED, Computed;
     /// What the sequencer is doing.
     PLAN_STATUS: PlanStatus = "sequencer/status", Qos::LATCHED, Housekeeping;
     /// Health of the nodes.

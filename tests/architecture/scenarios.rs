@@ -100,7 +100,7 @@ fn flatten(value: &serde_json::Value, before: &str, names: &mut Vec<String>) {
 }
 
 /// Parameters that the runtime gives to every node.
-const OF_EVERY_NODE: [&str; 1] = ["use_sim_time"];
+const OF_EVERY_NODE: [&str; 2] = ["use_sim_time", "clock_host"];
 
 fn unknown_parameters(path: &str, yaml: &str, known: &[String]) -> Vec<String> {
     let set = set_parameters(yaml).into_iter();

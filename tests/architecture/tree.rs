@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
 /// Crates without clock, file, environment, entropy, log or ROS.
-pub const PURE: [&str; 12] = [
+pub const PURE: [&str; 13] = [
     "metrology",
     "machine",
     "probe",
+    "host_clock",
     "latency_calibrator",
     "thermal_model",
     "grid_encoder",

@@ -73,6 +73,10 @@ fn a_node_is_started_with_its_scenarios_parameters_and_nothing_else() {
     let file = scenarios.join("short_cell/probe.yaml");
     let expected = format!("node probe --ros-args --params-file {}\n", file.display());
     assert_eq!(said(&started), expected);
+    let named = start_node(&scenarios, &echo, "three_hosts:host_clock:clock_of_models");
+    let file = scenarios.join("three_hosts/clock_of_models.yaml");
+    let words = "node host_clock --ros-args -r __node:=clock_of_models --params-file";
+    assert_eq!(said(&named), format!("{words} {}\n", file.display()));
     for (wrong, code, word) in [
         ("short_cell", 2, "must be SCENARIO:NODE"),
         (":probe", 2, "must be SCENARIO:NODE"),

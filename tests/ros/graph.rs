@@ -29,11 +29,14 @@ pub struct Graph {
 
 impl Graph {
     pub fn join(domain: u16) -> Self {
-        let environment = Environment {
+        Self::join_by(Environment {
             domain_id: domain,
             range: DiscoveryRange::Localhost,
             log_filter: None,
-        };
+        })
+    }
+
+    pub fn join_by(environment: Environment) -> Self {
         let names = NodeNames::new("witness", &[]).unwrap();
         let heard = Arc::<Mutex<Heard>>::default();
         let ear = Arc::clone(&heard);

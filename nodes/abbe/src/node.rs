@@ -17,6 +17,7 @@ pub const NODES: &[(&str, Builder)] = &[
     ("fake_cnc", fake_cnc_node::node),
     ("gap_diagnosis", gap_diagnosis_node::node),
     ("grid_encoder", grid_encoder_node::node),
+    ("host_clock", host_clock_node::node),
     ("latency_calibrator", latency_calibrator_node::node),
     ("linuxcnc_bridge", linuxcnc_bridge_node::node),
     ("mtconnect_bridge", mtconnect_bridge_node::node),

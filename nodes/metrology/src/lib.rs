@@ -7,6 +7,7 @@
 
 pub mod axis;
 pub mod breakdown;
+pub mod clock_map;
 pub mod drift;
 pub mod error_component;
 pub mod fit;
@@ -19,8 +20,9 @@ pub mod stage;
 pub mod stamp;
 
 pub use axis::{Axis, AxisSet, PerAxis};
+pub use clock_map::ClockMap;
 pub use error_component::ErrorComponent;
 pub use parameter::ParameterDoc;
 pub use severity::Severity;
 pub use stage::Stage;
-pub use stamp::{Clock, Host, Machine, Stamp};
+pub use stamp::{Clock, Host, Machine, Reference, Stamp};

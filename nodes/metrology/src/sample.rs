@@ -3,6 +3,7 @@
 //! `abbe_msgs` holds the wire form (SI) of each and the only conversion between the two.
 
 mod block;
+mod clock;
 mod compensation;
 mod cycle;
 mod feature;
@@ -18,6 +19,7 @@ mod thermal;
 mod touch;
 
 pub use block::{BlockMeasurement, FacePosition, LatencyShare};
+pub use clock::{ClockAnswer, ClockExchange, ClockQuestion, HostClock};
 pub use compensation::{AxisCompensation, CompensationState};
 pub use cycle::{CycleKind, CycleOrder};
 pub use feature::{FeatureKind, ProbedFeature};

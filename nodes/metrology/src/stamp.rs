@@ -21,8 +21,13 @@ pub struct Machine;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Host;
 
+/// The clock of the host by which the others of a cell go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Reference;
+
 impl Clock for Machine {}
 impl Clock for Host {}
+impl Clock for Reference {}
 
 /// Length of one second in nanoseconds.
 pub const NANOS_PER_S: i64 = 1_000_000_000;

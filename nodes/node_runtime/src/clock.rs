@@ -9,6 +9,11 @@ use abbe_msgs::builtin_interfaces::msg::Time;
 use metrology::Stamp;
 use metrology::stamp::{Host, NANOS_PER_S};
 
+mod host_time;
+
+pub use host_time::HostTime;
+pub(crate) use host_time::{Change, ClockError};
+
 /// The computer's clock.
 pub(crate) fn host_now() -> Stamp<Host> {
     let nanos = match SystemTime::now().duration_since(UNIX_EPOCH) {
@@ -21,24 +26,24 @@ pub(crate) fn host_now() -> Stamp<Host> {
 /// A node's time.
 #[derive(Clone, Debug)]
 pub(crate) enum Clock {
-    /// The computer's.
-    Host,
+    /// The computer's, taken over to the reference's where it is related to it.
+    Host(HostTime),
     /// The last `/clock`; 0 before the first.
     Simulated(Arc<AtomicI64>),
 }
 
 impl Clock {
-    pub fn new(use_sim_time: bool) -> Self {
+    pub fn new(use_sim_time: bool, host: HostTime) -> Self {
         if use_sim_time {
             Self::Simulated(Arc::default())
         } else {
-            Self::Host
+            Self::Host(host)
         }
     }
 
     pub fn now(&self) -> Stamp<Host> {
         match self {
-            Self::Host => host_now(),
+            Self::Host(host) => host.now(),
             Self::Simulated(nanos) => Stamp::from_nanos(nanos.load(Ordering::Relaxed)),
         }
     }
@@ -46,8 +51,24 @@ impl Clock {
     /// Takes a `/clock` in; the time before it.
     pub fn set(&self, now: Stamp<Host>) -> Stamp<Host> {
         match self {
-            Self::Host => host_now(),
+            Self::Host(host) => host.now(),
             Self::Simulated(nanos) => Stamp::from_nanos(nanos.swap(now.nanos(), Ordering::Relaxed)),
+        }
+    }
+
+    /// What this clock showed when the computer's clock was at `computer`.
+    pub fn taken_over(&self, computer: Stamp<Host>) -> Stamp<Host> {
+        match self {
+            Self::Host(host) => host.shown(computer),
+            Self::Simulated(_) => self.now(),
+        }
+    }
+
+    /// What a sample is stamped with when it is sent; `None`: the computer's clock as it is.
+    pub fn source(&self) -> Option<Stamp<Host>> {
+        match self {
+            Self::Host(host) if !host.is_plain() => Some(host.now()),
+            _ => None,
         }
     }
 

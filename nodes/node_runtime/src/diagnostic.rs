@@ -40,6 +40,8 @@ pub struct Diagnostic {
     pub message: String,
     /// Values by name, unit in the name.
     pub values: Vec<(&'static str, String)>,
+    /// Whether it stays on `/diagnostics` although it is `Ok`: a figure that people look for.
+    pub stays: bool,
 }
 
 impl Diagnostic {
@@ -51,6 +53,7 @@ impl Diagnostic {
             name: name.into(),
             message,
             values: Vec::new(),
+            stays: false,
         }
     }
 
@@ -58,6 +61,13 @@ impl Diagnostic {
     #[must_use]
     pub fn with(mut self, name: &'static str, value: impl ToString) -> Self {
         self.values.push((name, value.to_string()));
+        self
+    }
+
+    /// The same, shown while it is `Ok` as well.
+    #[must_use]
+    pub fn staying(mut self) -> Self {
+        self.stays = true;
         self
     }
 

@@ -24,6 +24,7 @@ pub mod setup;
 pub mod tap;
 pub mod wiring;
 
+pub use clock::HostTime;
 pub use diagnostic::{Diagnostic, Level};
 pub use harness::Harness;
 pub use interruption::Interruption;

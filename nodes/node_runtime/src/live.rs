@@ -27,6 +27,7 @@ pub(crate) mod incoming;
 mod logger_levels;
 mod owner;
 mod parameters;
+mod related;
 mod service;
 mod timers;
 mod type_description;

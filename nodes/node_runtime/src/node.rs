@@ -271,6 +271,12 @@ pub trait Node: Send {
         false
     }
 
+    /// Whether it goes by its computer's clock as it is, and by the moment at which an event is handed to it: a node that
+    /// compares clocks.
+    fn keeps_own_time(&self) -> bool {
+        false
+    }
+
     /// The node is put on a live graph: real time passes while it computes. Told once, before any event; a node in the
     /// harness is never told.
     fn goes_live(&mut self) {}

@@ -14,13 +14,17 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::arguments::{Arguments, ParameterSource};
+use crate::clock::HostTime;
 use crate::log::{self, Severity};
 use crate::names::{NameError, NodeNames};
 use crate::node::Node;
 use crate::parameter::{Parameter, Value};
 
 mod file;
+mod of_every_node;
 mod tree;
+
+use of_every_node::OfEveryNode;
 
 pub use tree::{Tree, TreeError};
 
@@ -81,7 +85,7 @@ pub struct Setup {
     names: NodeNames,
     parameters: Tree,
     origins: BTreeMap<String, Origin>,
-    use_sim_time: bool,
+    every: OfEveryNode,
     log_level: Option<Severity>,
     /// Where the parameters go when nothing but these is asked for.
     asked: Option<Arc<OnceLock<Vec<Parameter>>>>,
@@ -91,9 +95,6 @@ pub struct Setup {
 #[derive(Debug, thiserror::Error)]
 #[error("only the parameters were asked for")]
 struct ParametersOnly;
-
-/// The one parameter that every node has.
-const USE_SIM_TIME: &str = "use_sim_time";
 
 impl Setup {
     /// Resolves what a node that calls itself `default_name` is told by the arguments.
@@ -106,7 +107,7 @@ impl Setup {
             names,
             parameters: Tree::empty(),
             origins: BTreeMap::new(),
-            use_sim_time: false,
+            every: OfEveryNode::default(),
             log_level: None,
             asked: None,
         };
@@ -129,13 +130,7 @@ impl Setup {
                 }
             }
         }
-        match setup.parameters.remove(USE_SIM_TIME) {
-            None => {}
-            Some(Tree::Bool(simulated)) => setup.use_sim_time = simulated,
-            Some(other) => {
-                return Err(setup.bad(USE_SIM_TIME, &other, "must be true or false".to_owned()));
-            }
-        }
+        setup.every = OfEveryNode::take_from(&mut setup)?;
         Ok(setup)
     }
 
@@ -170,7 +165,18 @@ impl Setup {
     /// Whether time comes from `/clock`.
     #[must_use]
     pub const fn use_sim_time(&self) -> bool {
-        self.use_sim_time
+        self.every.use_sim_time
+    }
+
+    /// The host by whose map stamps are taken over; empty: they are left as they are.
+    pub(crate) fn clock_host(&self) -> &str {
+        &self.every.clock_host
+    }
+
+    /// The clock by which this node stamps where time is not simulated; its copies are one clock.
+    #[must_use]
+    pub fn host_time(&self) -> HostTime {
+        self.every.host_time.clone()
     }
 
     /// From where on the node's lines are said, where its logger is named on the command line.
@@ -178,7 +184,7 @@ impl Setup {
         self.log_level
     }
 
-    /// The parameters as given, without `use_sim_time`.
+    /// The parameters as given, without those of every node.
     #[must_use]
     pub const fn tree(&self) -> &Tree {
         &self.parameters
@@ -343,18 +349,13 @@ impl Setup {
         Ok(built?.parameters().to_vec())
     }
 
-    /// The one parameter that every node has.
-    pub(crate) fn sim_time_parameter(&self) -> Parameter {
-        Parameter {
-            name: USE_SIM_TIME.to_owned(),
-            value: Value::Bool(self.use_sim_time),
-            description: "Whether time comes from /clock.".to_owned(),
-            range: None,
-        }
+    /// The parameters that the runtime gives to every node.
+    pub(crate) fn runtime_parameters(&self) -> Vec<Parameter> {
+        self.every.parameters()
     }
 
     fn served(&self, tree: &Tree, docs: &[ParameterDoc]) -> anyhow::Result<Vec<Parameter>> {
-        let mut parameters = vec![self.sim_time_parameter()];
+        let mut parameters = self.runtime_parameters();
         for (name, leaf) in tree.leaves() {
             let bad = |reason| anyhow::Error::from(self.bad(&name, leaf, reason));
             let Some(value) = value(leaf).map_err(bad)? else {

@@ -68,6 +68,7 @@ pub struct Wiring<S: Stage> {
     stopped: Option<Satisfied<S::Output>>,
     patience: Span,
     last: bool,
+    own_time: bool,
     live: Option<Told<S>>,
     outputs: Vec<S::Output>,
 }
@@ -116,6 +117,7 @@ where
             stopped: None,
             patience: PATIENCE,
             last: false,
+            own_time: false,
             live: None,
             outputs: Vec::new(),
         }
@@ -309,6 +311,13 @@ where
         self
     }
 
+    /// Times events by the computer's clock as it is, when they are handed over: for a node that compares clocks.
+    #[must_use]
+    pub fn keeps_own_time(mut self) -> Self {
+        self.own_time = true;
+        self
+    }
+
     /// Tells the stage when it is put on a live graph, where real time passes while it computes.
     #[must_use]
     pub fn live(mut self, told: impl Fn(&mut S) + Send + 'static) -> Self {
@@ -455,6 +464,10 @@ where
 
     fn stops_last(&self) -> bool {
         self.last
+    }
+
+    fn keeps_own_time(&self) -> bool {
+        self.own_time
     }
 
     fn goes_live(&mut self) {

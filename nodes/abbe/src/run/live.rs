@@ -12,7 +12,7 @@ use node_runtime::arguments::Arguments;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::{Selection, TapEvent};
-use node_runtime::{Interruption, Node, Running, Setup};
+use node_runtime::{HostTime, Interruption, Node, Running, Setup};
 use recorder::Recorder;
 use recorder_node::Capture;
 
@@ -55,6 +55,7 @@ pub fn run(
         &NodeNames::new(TAP, &[])?,
         Selection::All.without(scenario.file.recording.exclude.clone()),
         recorder,
+        HostTime::default(),
         move |event| {
             if let TapEvent::Sample(sample) = event {
                 lock(&seen).take(sample);

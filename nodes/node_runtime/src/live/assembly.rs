@@ -18,6 +18,7 @@ use super::owner::{
     ActionEnd, ClientUse, Hearing, Owner, Publication, ServerUse, Subscription, Timers, UsedAction,
 };
 use super::parameters::ParameterService;
+use super::related;
 use super::service::{Client, Server};
 use super::timers::{HostTimers, SimulatedTimers};
 use super::type_description;
@@ -214,6 +215,17 @@ impl Assembly {
         self.readers.clock(&topic, reader);
         Ok(())
     }
+
+    fn host_clock(&mut self) -> anyhow::Result<()> {
+        let topic = self.names.resolve(topics::HOST_CLOCK.name)?;
+        let type_name = names::dds_type(abbe_msgs::msg::HostClock::TYPE_NAME);
+        let qos = topics::HOST_CLOCK.qos;
+        let reader = self
+            .participant
+            .reader(&names::dds_topic(&topic), &type_name, qos)?;
+        self.readers.host_clock(&topic, reader);
+        Ok(())
+    }
 }
 
 fn goal_service_type(service: GoalService, action_type: &str) -> String {
@@ -261,26 +273,31 @@ pub(super) fn assemble(
     let actions = assembly.action_servers(&ports.action_servers)?;
     let used_actions = assembly.action_clients(&ports.action_clients)?;
     let subscriptions = assembly.subscriptions(&ports)?;
-    let clock = Clock::new(setup.use_sim_time());
+    let clock = Clock::new(setup.use_sim_time(), setup.host_time());
     let timers = if clock.is_simulated() {
         assembly.clock()?;
         Timers::Simulated(SimulatedTimers::new(&ports.timers))
     } else {
         Timers::Host(HostTimers::start(&ports.timers, sender).context("thread of the timers")?)
     };
+    let relation = related::Related::of(setup, &clock, node.keeps_own_time());
+    if relation.listens() {
+        assembly.host_clock()?;
+    }
     assembly.participant.announce()?;
     let name = setup.names().fully_qualified();
     Ok(Owner {
         log_level: setup.log_level(),
         board: Board::new(&name),
         name,
-        parameters: with_sim_time(node.parameters(), setup),
+        parameters: with_runtime_parameters(node.parameters(), setup),
         patience: patience(node.as_ref()),
         node,
         participant: assembly.participant,
         readers: assembly.readers,
         queue,
         clock,
+        relation,
         timers,
         subscriptions,
         publications,
@@ -311,13 +328,14 @@ fn patience(node: &dyn Node) -> Duration {
     Duration::from_secs_f64(node.patience().as_secs_f64().max(0.0))
 }
 
-/// Every node has `use_sim_time`, whether or not it took its parameters from [`Setup`].
-fn with_sim_time(parameters: &[Parameter], setup: &Setup) -> Vec<Parameter> {
+/// Every node has those of the runtime, whether or not it took its parameters from [`Setup`].
+fn with_runtime_parameters(parameters: &[Parameter], setup: &Setup) -> Vec<Parameter> {
     let mut all = parameters.to_vec();
-    let own = setup.sim_time_parameter();
-    if !all.iter().any(|parameter| parameter.name == own.name) {
-        all.push(own);
-        all.sort_by(|a, b| a.name.cmp(&b.name));
+    for own in setup.runtime_parameters() {
+        if !all.iter().any(|parameter| parameter.name == own.name) {
+            all.push(own);
+        }
     }
+    all.sort_by(|a, b| a.name.cmp(&b.name));
     all
 }

@@ -33,6 +33,8 @@ pub(super) struct Board {
     state: &'static str,
     standing: BTreeMap<Cow<'static, str>, Standing>,
     counters: BTreeMap<String, u64>,
+    /// `Ok` and shown all the same.
+    figures: BTreeMap<Cow<'static, str>, Diagnostic>,
     /// Reported `Ok` since the last publication, so that the end of a condition is seen.
     ended: Vec<Diagnostic>,
     changed: bool,
@@ -45,6 +47,7 @@ impl Board {
             state: "running",
             standing: BTreeMap::new(),
             counters: BTreeMap::new(),
+            figures: BTreeMap::new(),
             ended: Vec::new(),
             changed: true,
         }
@@ -76,10 +79,17 @@ impl Board {
 
     fn put(&mut self, diagnostic: Diagnostic, now: Instant, expires: Option<Instant>) {
         let name = diagnostic.name.clone();
+        if diagnostic.stays && diagnostic.level == Level::Ok {
+            self.figures.insert(name.clone(), diagnostic.clone());
+        } else {
+            self.figures.remove(&name);
+        }
         if diagnostic.level == Level::Ok {
             if self.standing.remove(&name).is_some() {
                 tracing::info!(condition = &*name, "{}", diagnostic.message);
-                self.ended.push(diagnostic);
+                if !diagnostic.stays {
+                    self.ended.push(diagnostic);
+                }
                 self.changed = true;
             }
             return;
@@ -156,6 +166,7 @@ impl Board {
         let ended = std::mem::take(&mut self.ended);
         let conditions = standing
             .chain(&ended)
+            .chain(self.figures.values())
             .map(|diagnostic| diagnostic.status(&self.node));
         DiagnosticArray {
             status: std::iter::once(state).chain(conditions).collect(),
@@ -220,6 +231,21 @@ mod tests {
         assert!(board.has_changed());
         assert_eq!(names(&mut board)[1], ("/probe: model_stale".to_owned(), 0));
         assert_eq!(names(&mut board).len(), 1);
+    }
+
+    #[test]
+    fn a_figure_that_stays_is_shown_while_it_is_ok_and_gives_way_to_its_condition() {
+        let mut board = Board::new("/probe");
+        let told = |level| Diagnostic::new(level, "clock", "3 us".into()).staying();
+        board.report(told(Level::Ok), Instant::now());
+        for _ in 0..2 {
+            assert_eq!(names(&mut board)[1], ("/probe: clock".to_owned(), 0));
+        }
+        board.report(told(Level::Warn), Instant::now());
+        let stands = [("/probe".to_owned(), 1), ("/probe: clock".to_owned(), 1)];
+        assert_eq!(names(&mut board), stands);
+        board.report(told(Level::Ok), Instant::now());
+        assert_eq!(names(&mut board)[1..], [("/probe: clock".to_owned(), 0)]);
     }
 
     #[test]

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use abbe_msgs::from_cdr;
+use abbe_msgs::msg::HostClock as HostClockMessage;
 use abbe_msgs::rosgraph_msgs::msg::Clock as ClockMessage;
+use abbe_msgs::{Wire, from_cdr};
 use metrology::Stamp;
+use metrology::sample::HostClock;
 use metrology::stamp::Host;
 use tokio::sync::mpsc::Sender;
 use tokio::task::JoinSet;
@@ -51,6 +53,8 @@ pub(super) enum Incoming {
     Timer { timer: usize, missed: u64 },
     /// Simulated time.
     Clock(Stamp<Host>),
+    /// How the clock of a host stands to the reference's.
+    HostClock(Box<HostClock>),
 }
 
 /// Counts what a topic's writers sent and we never got.
@@ -173,6 +177,20 @@ impl Readers {
         self.spawn(topic, reader, move |sample| {
             Some(match from_cdr::<ClockMessage>(&sample.bytes) {
                 Ok(message) => Incoming::Clock(clock::stamp(&message.clock)),
+                Err(error) => Incoming::Unreadable {
+                    topic: Arc::clone(&name),
+                    reason: error.to_string(),
+                },
+            })
+        });
+    }
+
+    pub fn host_clock(&mut self, topic: &str, reader: Reader) {
+        let name: Arc<str> = Arc::from(topic);
+        self.spawn(topic, reader, move |sample| {
+            let read = from_cdr::<HostClockMessage>(&sample.bytes).and_then(Wire::into_inner);
+            Some(match read {
+                Ok(clock) => Incoming::HostClock(Box::new(clock)),
                 Err(error) => Incoming::Unreadable {
                     topic: Arc::clone(&name),
                     reason: error.to_string(),

@@ -18,9 +18,10 @@ use super::board::Board;
 use super::incoming::{Incoming, Readers};
 use super::logger_levels::LoggerService;
 use super::parameters::{self, ParameterService};
+use super::related::Related;
 use super::service::{Client, ReplyTo, Server, shared};
 use super::timers::{HostTimers, SimulatedTimers};
-use crate::clock::{self, Clock};
+use crate::clock::Clock;
 use crate::dds::{Participant, PublishError, Writer};
 use crate::diagnostic::{Diagnostic, Level};
 use crate::log::{self, Severity};
@@ -98,6 +99,7 @@ pub(super) struct Owner {
     pub readers: Readers,
     pub queue: mpsc::Receiver<Incoming>,
     pub clock: Clock,
+    pub relation: Related,
     pub timers: Timers,
     pub subscriptions: Vec<Subscription>,
     pub publications: Vec<Publication>,
@@ -236,7 +238,11 @@ impl Owner {
         if self.clock.is_simulated() {
             return self.clock.now();
         }
-        let at = received.unwrap_or_else(clock::host_now);
+        let at = match received {
+            _ if self.relation.keeps_own_time => self.relation.own_now(),
+            Some(received) => self.clock.taken_over(received),
+            None => self.clock.now(),
+        };
         if at >= self.last_event {
             self.last_event = at;
         } else if (self.last_event - at).nanos() > DISORDER_NANOS {
@@ -316,6 +322,7 @@ impl Owner {
                 let _ = action.status.publish(&action.server.status(), None);
             }
         }
+        self.tell_relation();
         self.look_for_servers(now);
         for place in 0..self.clients.len() {
             for token in self.clients[place].1.abandoned() {
@@ -350,7 +357,7 @@ impl Owner {
         }
         self.last_publication = Some(now);
         let message = shared(&to_cdr(&self.board.message(self.clock.now())));
-        let _ = self.diagnostics.publish(&message, None);
+        let _ = self.diagnostics.publish(&message, self.clock.source());
     }
 
     /// Stop reading, say the last things, wait until they have arrived, leave the graph.

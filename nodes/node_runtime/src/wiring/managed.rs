@@ -227,6 +227,10 @@ where
         Node::stops_last(&self.wiring)
     }
 
+    fn keeps_own_time(&self) -> bool {
+        Node::keeps_own_time(&self.wiring)
+    }
+
     fn goes_live(&mut self) {
         Node::goes_live(&mut self.wiring);
     }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use node_runtime::HostTime;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::Selection;
@@ -29,6 +30,16 @@ pub(crate) fn context(machine_file: Option<String>) -> RunContext {
 /// # Errors
 /// When the bag is there already or cannot be written, or there is no network.
 pub fn record(config: &NodeConfig, machine: Option<String>, name: &str) -> Result<Capture> {
+    record_by(config, machine, name, HostTime::default())
+}
+
+/// The same, with receive stamps by the clock `time`.
+pub(crate) fn record_by(
+    config: &NodeConfig,
+    machine: Option<String>,
+    name: &str,
+    time: HostTime,
+) -> Result<Capture> {
     let path = Path::new(&config.bag);
     let file = path
         .file_name()
@@ -46,6 +57,7 @@ pub fn record(config: &NodeConfig, machine: Option<String>, name: &str) -> Resul
         &names,
         selection(config),
         recorder,
+        time,
         |_| (),
     )
 }

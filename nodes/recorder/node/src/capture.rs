@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use abbe_msgs::{Qos, description_of, topics};
 use anyhow::Result;
+use node_runtime::HostTime;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::{RawTap, Selection, TapEvent, Tapped, TappedTopic};
@@ -99,14 +100,16 @@ pub(crate) struct Scribe {
     store: Store,
     channels: BTreeMap<String, ChannelId>,
     troubles: Arc<Troubles>,
+    time: HostTime,
 }
 
 impl Scribe {
-    pub fn new(store: Store, troubles: Arc<Troubles>) -> Self {
+    pub fn new(store: Store, troubles: Arc<Troubles>, time: HostTime) -> Self {
         Self {
             store,
             channels: BTreeMap::new(),
             troubles,
+            time,
         }
     }
 
@@ -144,7 +147,7 @@ impl Scribe {
             return;
         };
         self.lose(sample.lost);
-        let received = sample.received.nanos();
+        let received = self.time.shown(sample.received).nanos();
         let stamp = MessageStamp {
             log_time_nanos: received,
             publish_time_nanos: sample.source.map_or(received, |at| at.nanos()),
@@ -166,7 +169,7 @@ impl Scribe {
 }
 
 impl Capture {
-    /// Records into `recorder` what `selection` picks; `look` sees every event first.
+    /// Records into `recorder` what `selection` picks, received by the clock `time`; `look` sees every event first.
     ///
     /// # Errors
     /// When there is no network.
@@ -175,10 +178,11 @@ impl Capture {
         names: &NodeNames,
         selection: Selection,
         recorder: Recorder,
+        time: HostTime,
         mut look: impl FnMut(&TapEvent) + Send + 'static,
     ) -> Result<Self> {
         let troubles = Arc::<Troubles>::default();
-        let mut scribe = Scribe::new(Store::Bag(recorder.sink()), Arc::clone(&troubles));
+        let mut scribe = Scribe::new(Store::Bag(recorder.sink()), Arc::clone(&troubles), time);
         let tap = RawTap::start(environment, names, selection, move |event| {
             look(&event);
             scribe.take(&event);

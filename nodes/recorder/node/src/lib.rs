@@ -47,12 +47,13 @@ pub fn listen(
     let parameters = setup.resolved(config, PARAMETERS)?;
     let tap = format!("{}_tap", setup.name());
     let work = match config.ring {
-        None => Work::Bag(record(config, machine, &tap)?),
+        None => Work::Bag(begin::record_by(config, machine, &tap, setup.host_time())?),
         Some(own) => {
             let kept = (Path::new(&config.bag), context(machine));
             let (names, writing) = (NodeNames::new(&tap, &[])?, config.writing.clone());
             let picked = selection(config);
-            let ring = RingCapture::start(&names, picked, &own, writing, kept)?;
+            let time = setup.host_time();
+            let ring = RingCapture::start(&names, picked, &own, writing, kept, time)?;
             Work::Ring(Box::new(ring))
         }
     };

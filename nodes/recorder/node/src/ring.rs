@@ -9,6 +9,7 @@ use std::thread::JoinHandle;
 use abbe_msgs::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus};
 use abbe_msgs::{Message as _, from_cdr};
 use anyhow::{Context, Result};
+use node_runtime::HostTime;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::{RawTap, Selection, TapEvent, Tapped};
@@ -79,6 +80,7 @@ impl RingCapture {
         config: &RingConfig,
         writing: RecorderConfig,
         (folder, context): (&Path, RunContext),
+        time: HostTime,
     ) -> Result<Self> {
         writing.checked()?;
         let name = folder.file_name().with_context(|| {
@@ -88,7 +90,7 @@ impl RingCapture {
         let sink = RingSink::new(Ring::new(config)?);
         let troubles = Arc::<Troubles>::default();
         let alarmed = Arc::<AtomicBool>::default();
-        let mut scribe = Scribe::new(Store::Ring(sink.clone()), Arc::clone(&troubles));
+        let mut scribe = Scribe::new(Store::Ring(sink.clone()), Arc::clone(&troubles), time);
         let mut alarm = config.save_on_error.then(Alarm::default);
         let raised = Arc::clone(&alarmed);
         let tap = RawTap::start(&Environment::read()?, names, selection, move |event| {

@@ -50,7 +50,7 @@ impl Owner {
 
     fn publish(&mut self, place: usize, bytes: &Bytes) {
         let publication = &mut self.publications[place];
-        match publication.writer.publish(bytes, None) {
+        match publication.writer.publish(bytes, self.clock.source()) {
             Ok(()) => publication.sent += 1,
             Err(error) => {
                 publication.unsent += 1;

@@ -77,6 +77,7 @@ impl Owner {
                 self.hand(at, Event::Timer { timer });
             }
             Incoming::Clock(now) => self.set_clock(now),
+            Incoming::HostClock(clock) => self.relate(*clock),
         }
     }
 

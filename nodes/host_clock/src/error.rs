@@ -1,0 +1,38 @@
+//! Parameters that cannot work and inputs that break the stage's contract.
+
+/// Why a stage is not built, or an event not taken.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum HostClockError {
+    /// A parameter outside its range.
+    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    OutOfRange {
+        /// Parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Least value.
+        least: f64,
+        /// Greatest value.
+        greatest: f64,
+    },
+    /// A host without a name.
+    #[error("{name} is empty: must be the name of a host")]
+    Nameless {
+        /// Parameter.
+        name: &'static str,
+    },
+    /// The window cannot hold as many exchanges as an estimate needs.
+    #[error(
+        "window_s = {window_s}: holds {holds} exchanges at period_ms = {period_ms}, least_exchanges = {least_exchanges} are needed"
+    )]
+    WindowTooShort {
+        /// Time that is looked back, s.
+        window_s: f64,
+        /// Between questions, ms.
+        period_ms: f64,
+        /// Exchanges that fit.
+        holds: usize,
+        /// Exchanges that are needed.
+        least_exchanges: usize,
+    },
+}

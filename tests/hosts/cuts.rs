@@ -1,0 +1,205 @@
+//! The models' link breaks again and again: the controller lets the compensation fade, and has it back soon after the link is.
+
+use std::time::{Duration, Instant};
+
+use abbe_msgs::builtin_interfaces::msg::Time;
+use abbe_msgs::msg::{AxisDrift, AxisState, ThermalModel};
+use abbe_msgs::topics;
+use abbe_tests::scenario::Scenario;
+
+use crate::graph::{Graph, Voice, now, port};
+use crate::network::Network;
+use crate::switch::{Link, Way};
+
+const WAY: Way = Way {
+    delay_s: 2.5e-3,
+    jitter_s: 0.5e-3,
+    loss: 0.0,
+    reorder: 0.0,
+};
+/// Drift that the model of this test has everywhere, m.
+const DRIFT_M: f64 = 20e-6;
+/// What is left of it when it has faded, m: friction holds the motors so far from where they should be.
+const FADED_M: f64 = 1.5e-6;
+/// What counts as compensated again, m.
+const COMPENSATED_M: f64 = 19e-6;
+/// The controller follows and fades at 40 um/s: 0.5 s for all of it.
+const RATES: &str = "background_rate_hz: 1000.0\n    compensation_hold_s: 0.2\n    compensation_fade_um_s: 40.0\n    \
+                     compensation_rate_limit_um_s: 40.0";
+/// Fastest motion of an offset, and creep by friction, in 0.1 s, m.
+const FASTEST_M: f64 = 40e-6 * 0.1 + 1.5e-6;
+const CUTS: usize = 10;
+const CUT: Duration = Duration::from_millis(1500);
+/// What is wanted after a cut.
+const RECOVERY: Duration = Duration::from_secs(3);
+
+fn seconds(time: &Time) -> f64 {
+    f64::from(time.sec) + f64::from(time.nanosec) * 1e-9
+}
+
+/// What the controller adds to X.
+fn added_m(state: &AxisState) -> f64 {
+    state.motor[0] - state.commanded[0]
+}
+
+fn tell_drift(voice: &mut Voice) {
+    let mut model = ThermalModel {
+        n_blocks: 2,
+        lack_of_fit_p: 1.0,
+        sequence: 1,
+        ..ThermalModel::default()
+    };
+    let mut until = now();
+    until.sec += 1800;
+    (model.header.stamp, model.valid_from, model.valid_until) = (now(), now(), until);
+    model.axes = ["X", "Y", "Z"]
+        .map(|axis| AxisDrift {
+            axis: axis.to_owned(),
+            k0_m: DRIFT_M,
+            covariance: std::array::from_fn(|entry| if entry == 0 { 1e-14 } else { 0.0 }),
+            span_m: [-0.3, 0.3],
+            offset_identifiable: true,
+            slope_identifiable: true,
+            ..AxisDrift::default()
+        })
+        .into();
+    voice.say(0, &model);
+}
+
+/// How long after `since` the controller first has all of the compensation.
+fn compensated(controller: &Graph, since: Instant) -> Duration {
+    controller.wait("all of the compensation is there", |graph| {
+        let states = graph.since(&topics::AXES_STATE, since);
+        let found = states
+            .iter()
+            .find(|(_, state)| added_m(state) > COMPENSATED_M);
+        found.map(|(at, _)| at.duration_since(since))
+    })
+}
+
+/// What one cut was like.
+#[derive(Clone, Copy, Default)]
+struct Cut {
+    /// Least that the controller added before the link was back, m.
+    left_m: f64,
+    /// From the link to the first compensation at the controller, s.
+    first_s: f64,
+    /// To one that answers a state of after the cut, s.
+    fresh_s: f64,
+    /// Until the controller added all of it again, s.
+    whole_s: f64,
+}
+
+fn cut(network: &Network, controller: &Graph) -> Cut {
+    let begins = Instant::now();
+    network.cut("models", true);
+    std::thread::sleep(CUT);
+    let back = Instant::now();
+    let states = controller.since(&topics::AXES_STATE, begins);
+    let left_m = states.last().map_or(f64::NAN, |(_, state)| added_m(state));
+    network.cut("models", false);
+    let offsets = |graph: &Graph| graph.since(&topics::COMPENSATION, back);
+    let first = controller.wait("compensation again", |graph| {
+        offsets(graph)
+            .first()
+            .map(|(at, _)| at.duration_since(back))
+    });
+    let whole = compensated(controller, back);
+    // The wanted position moves with each state: an offset is as old as the state that it answers.
+    let computed = offsets(controller);
+    let fresh = computed.iter().find_map(|(at, offset)| {
+        let age_s = seconds(&now()) - at.elapsed().as_secs_f64() - seconds(&offset.header.stamp);
+        (age_s < 0.05).then(|| at.duration_since(back))
+    });
+    Cut {
+        left_m,
+        first_s: first.as_secs_f64(),
+        fresh_s: fresh.map_or(f64::INFINITY, |fresh| fresh.as_secs_f64()),
+        whole_s: whole.as_secs_f64(),
+    }
+}
+
+#[test]
+fn a_cut_link_fades_the_compensation_and_it_is_back_within_three_seconds() {
+    let Some(network) = Network::of(&["controller", "models"], 62, 4) else {
+        return;
+    };
+    network.links(Link::even(WAY));
+    let scenario = Scenario::copy_of("short_cell");
+    scenario.replace("fake_cnc.yaml", "background_rate_hz: 10.0", RATES);
+    scenario.replace("axis_compensation.yaml", "enabled: false", "enabled: true");
+    for axis in ["X", "Y", "Z"] {
+        let limits = format!("{axis}: {{size_limit_um: 150.0, rate_limit_um_per_s: 20.0");
+        let faster = format!("{axis}: {{size_limit_um: 150.0, rate_limit_um_per_s: 60.0");
+        scenario.replace("axis_compensation.yaml", &limits, &faster);
+    }
+    let file = |node: &str| {
+        let file = scenario.argument(&format!("{node}.yaml"));
+        ["--params-file".to_owned(), file]
+    };
+    let nodes = [
+        network.node("controller", "fake_cnc", &file("fake_cnc")),
+        network.node("models", "axis_compensation", &file("axis_compensation")),
+    ];
+    let controller = network.on("controller", |own| Graph::join_by(own.clone()));
+    let models = network.on("models", |own| Graph::join_by(own.clone()));
+    let mut voice = network.on("models", |_| models.voice(&[port(&topics::THERMAL_MODEL)]));
+    let began = Instant::now();
+    for (graph, node) in [(&controller, "fake_cnc"), (&models, "axis_compensation")] {
+        graph.alive(node, began);
+    }
+    tell_drift(&mut voice);
+    compensated(&controller, began);
+
+    let cuts: Vec<Cut> = (0..CUTS)
+        .map(|_| {
+            let seen = cut(&network, &controller);
+            std::thread::sleep(Duration::from_millis(300));
+            seen
+        })
+        .collect();
+    let of = |value: fn(&Cut) -> f64| {
+        let mut all: Vec<f64> = cuts.iter().map(value).collect();
+        all.sort_by(f64::total_cmp);
+        (all[all.len() / 2], all[all.len() - 1])
+    };
+    let words =
+        |name: &str, (median, most): (f64, f64)| format!("{name} {median:.3} (at most {most:.3})");
+    eprintln!(
+        "{CUTS} cuts of {CUT:?}: {}, {}, {}; {}",
+        words("first compensation after", of(|cut| cut.first_s)),
+        words("fresh after", of(|cut| cut.fresh_s)),
+        words("whole after s", of(|cut| cut.whole_s)),
+        words("left um", of(|cut| cut.left_m * 1e6)),
+    );
+    assert!(of(|cut| cut.left_m.abs()).1 < FADED_M, "faded at each cut");
+    assert!(of(|cut| cut.first_s).1 < RECOVERY.as_secs_f64());
+    assert!(of(|cut| cut.fresh_s).1 < RECOVERY.as_secs_f64());
+    assert!(of(|cut| cut.whole_s).1 < RECOVERY.as_secs_f64());
+    never_stepped(&controller, began);
+    voice.stop();
+    drop(models);
+    for node in nodes {
+        node.stop();
+    }
+}
+
+/// What the controller adds moves no faster than its own limit, whatever the link does.
+fn never_stepped(controller: &Graph, since: Instant) {
+    let states = controller.since(&topics::AXES_STATE, since);
+    let at_s = |state: &AxisState| seconds(&state.controller_stamp);
+    let mut fastest_m = 0.0_f64;
+    let mut later = 0;
+    for (_, state) in &states {
+        while later + 1 < states.len() && at_s(&states[later].1) < at_s(state) + 0.1 {
+            later += 1;
+        }
+        fastest_m = fastest_m.max((added_m(&states[later].1) - added_m(state)).abs());
+    }
+    eprintln!(
+        "{} states: moved by {:.2} um in 0.1 s at most",
+        states.len(),
+        fastest_m * 1e6
+    );
+    assert!(fastest_m <= FASTEST_M, "{fastest_m}");
+}

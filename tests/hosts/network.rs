@@ -1,0 +1,179 @@
+//! Hosts on one computer: a network namespace each, and a switch between them.
+//!
+//! Nothing of the computer's own network is touched: each tap is made inside its namespace, and with the namespaces everything is
+//! gone, also when a test fails.
+
+use std::process::{Command, Stdio};
+
+use abbe_tests::program::{Process, abbe, root};
+use nix::sched::{CloneFlags, setns};
+use node_runtime::environment::{DiscoveryRange, Environment};
+use tun_rs::{DeviceBuilder, Layer, SyncDevice};
+
+use crate::switch::{Counts, Link, Switch};
+
+/// A host's interface to the switch.
+const INTERFACE: &str = "link0";
+
+/// A network namespace that is removed with it.
+struct Namespace(String);
+
+impl Namespace {
+    fn make(name: String) -> Result<Self, String> {
+        ip(&["netns", "add", &name])?;
+        Ok(Self(name))
+    }
+
+    fn ip(&self, arguments: &[&str]) -> Result<(), String> {
+        let inside: Vec<&str> = ["-n", &self.0].iter().chain(arguments).copied().collect();
+        ip(&inside)
+    }
+
+    /// Does something in a thread that is inside; what it starts stays there.
+    fn inside<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, String> {
+        let path = format!("/run/netns/{}", self.0);
+        let door = std::fs::File::open(&path).map_err(|error| format!("{path}: {error}"))?;
+        std::thread::scope(|scope| {
+            let enter = || {
+                setns(door, CloneFlags::CLONE_NEWNET).map_err(|e| format!("setns: {e}"))?;
+                Ok(work())
+            };
+            scope
+                .spawn(enter)
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
+    }
+}
+
+impl Drop for Namespace {
+    fn drop(&mut self) {
+        if let Err(reason) = ip(&["netns", "del", &self.0]) {
+            eprintln!("network namespace {}: {reason}", self.0);
+        }
+    }
+}
+
+fn ip(arguments: &[&str]) -> Result<(), String> {
+    let words = || format!("ip {}", arguments.join(" "));
+    let output = Command::new("ip")
+        .args(arguments)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| format!("{} (package iproute2): {error}", words()))?;
+    if output.status.success() {
+        return Ok(());
+    }
+    let said = String::from_utf8_lossy(&output.stderr);
+    Err(format!("{}: {}", words(), said.trim()))
+}
+
+/// Hosts that see each other through a switch.
+pub struct Network {
+    /// Before the namespaces, so that its taps are closed first.
+    switch: Switch,
+    hosts: Vec<(String, Namespace)>,
+    domain: u16,
+}
+
+impl Network {
+    /// `hosts` on a network of their own, where DDS uses `domain`; `None` where this computer cannot, which is said and a failure
+    /// where `CI=true`.
+    pub fn of(hosts: &[&str], domain: u16, seed: u64) -> Option<Self> {
+        match Self::make(hosts, domain, seed) {
+            Ok(network) => Some(network),
+            Err(reason) => {
+                assert!(std::env::var("CI").as_deref() != Ok("true"), "{reason}");
+                eprintln!("NOT TESTED: no network namespaces with taps here: {reason}");
+                None
+            }
+        }
+    }
+
+    fn make(names: &[&str], domain: u16, seed: u64) -> Result<Self, String> {
+        let (mut hosts, mut taps) = (Vec::new(), Vec::new());
+        for (place, name) in names.iter().enumerate() {
+            let namespace =
+                Namespace::make(format!("abbe-{}-{domain}-{name}", std::process::id()))?;
+            taps.push(namespace.inside(tap)??);
+            let address = format!("10.77.0.{}/24", place + 1);
+            namespace.ip(&["address", "add", &address, "dev", INTERFACE])?;
+            namespace.ip(&["link", "set", "lo", "up"])?;
+            namespace.ip(&["link", "set", INTERFACE, "up"])?;
+            hosts.push(((*name).to_owned(), namespace));
+        }
+        Ok(Self {
+            switch: Switch::start(taps, seed),
+            hosts,
+            domain,
+        })
+    }
+
+    fn place(&self, host: &str) -> usize {
+        let found = self.hosts.iter().position(|(name, _)| name == host);
+        found.unwrap_or_else(|| panic!("no host {host}"))
+    }
+
+    /// What becomes of frames of every host.
+    pub fn links(&self, link: Link) {
+        for place in 0..self.hosts.len() {
+            self.switch.set(place, link);
+        }
+    }
+
+    /// What becomes of a host's frames.
+    pub fn link(&self, host: &str, link: Link) {
+        self.switch.set(self.place(host), link);
+    }
+
+    pub fn cut(&self, host: &str, is_cut: bool) {
+        self.switch.cut(self.place(host), is_cut);
+    }
+
+    pub fn counts(&self) -> Counts {
+        self.switch.counts()
+    }
+
+    /// Does something in a thread of a host.
+    pub fn on<T: Send>(&self, host: &str, work: impl FnOnce(&Environment) -> T + Send) -> T {
+        let environment = Environment {
+            domain_id: self.domain,
+            range: DiscoveryRange::Subnet,
+            log_filter: None,
+        };
+        let namespace = &self.hosts[self.place(host)].1;
+        namespace.inside(|| work(&environment)).unwrap()
+    }
+
+    /// Starts `abbe node NAME --ros-args …` on a host.
+    pub fn node(&self, host: &str, name: &str, ros_args: &[String]) -> Process {
+        let namespace = &self.hosts[self.place(host)].1.0;
+        let mut command = Command::new("ip");
+        command
+            .args(["netns", "exec", namespace])
+            .arg(abbe())
+            .args(["node", name, "--ros-args"])
+            .args(ros_args)
+            .current_dir(root())
+            .env("ROS_DOMAIN_ID", self.domain.to_string())
+            .env_remove("ROS_AUTOMATIC_DISCOVERY_RANGE")
+            .env_remove("ROS_LOCALHOST_ONLY")
+            .env_remove("RUST_LOG")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        Process::start(command)
+    }
+}
+
+fn tap() -> Result<SyncDevice, String> {
+    let made = DeviceBuilder::new()
+        .name(INTERFACE)
+        .layer(Layer::L2)
+        .enable(false)
+        .build_sync();
+    let tap = made.map_err(|error| format!("/dev/net/tun: {error}"))?;
+    tap.set_nonblocking(true)
+        .map_err(|error| error.to_string())?;
+    Ok(tap)
+}

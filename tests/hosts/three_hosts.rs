@@ -1,0 +1,246 @@
+//! The suite on three hosts whose clocks differ, over links with 5 ms, jitter, loss and reordering.
+
+use std::path::Path;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use abbe_msgs::topics;
+use abbe_tests::program::Process;
+use abbe_tests::scenario::Scenario;
+use metrology::sample::HostClock;
+use metrology::stamp::{Host, Span, Stamp};
+
+use crate::bag;
+use crate::network::Network;
+use crate::switch::{Link, Way};
+
+const HOSTS: [&str; 3] = ["controller", "models", "archive"];
+/// Jitter of a whole way between two hosts, from nothing to this, s.
+const JITTER_S: f64 = 1e-3;
+/// Of both links of a way together: 5 ms, 1 % loss, 1 % overtaking.
+const HALF_WAY: Way = Way {
+    delay_s: 2.5e-3,
+    jitter_s: JITTER_S / 2.0,
+    loss: 0.005,
+    reorder: 0.005,
+};
+/// By how much longer the way of the archive's questions is than that of its answers, s.
+const UNEQUAL_S: f64 = 1e-3;
+/// What a host's clock may be off by: 50 us, and a tenth of the jitter.
+const LIMIT_S: f64 = 50e-6 + 0.1 * JITTER_S;
+/// How long the cell works.
+const WORK: Duration = Duration::from_secs(22);
+/// The clocks are judged by their maps of the end.
+const JUDGED: Span = Span::from_nanos(6_000_000_000);
+
+/// What a host's clock is made to show: the truth that its map is held against.
+#[derive(Clone, Copy)]
+struct ClockError {
+    offset_s: f64,
+    drift: f64,
+    since: Stamp<Host>,
+}
+
+impl ClockError {
+    fn of(offset_s: f64, drift: f64) -> Self {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+        let seconds = i64::try_from(now.as_secs()).unwrap();
+        Self {
+            offset_s,
+            drift,
+            since: Stamp::from_nanos(seconds * 1_000_000_000),
+        }
+    }
+
+    fn arguments(&self) -> Vec<String> {
+        let values = [
+            ("offset_s", self.offset_s),
+            ("drift_us_per_s", self.drift * 1e6),
+            ("since_s", self.since.as_secs_f64()),
+        ];
+        let set = |(key, value)| ["-p".to_owned(), format!("clock_error.{key}:={value:?}")];
+        values.into_iter().flat_map(set).collect()
+    }
+
+    /// What the true clock is ahead of this one when it shows `own`.
+    fn true_offset_s(&self, own: Stamp<Host>) -> f64 {
+        let shown_s = (own - self.since).as_secs_f64() - self.offset_s;
+        -self.offset_s - self.drift * shown_s / (1.0 + self.drift)
+    }
+}
+
+fn parameter(name: &str, value: &str) -> [String; 2] {
+    ["-p".to_owned(), format!("{name}:={value}")]
+}
+
+/// Nodes of a host and their arguments.
+struct Site<'n> {
+    network: &'n Network,
+    host: &'static str,
+    clock: Option<ClockError>,
+    nodes: Vec<Process>,
+}
+
+impl<'n> Site<'n> {
+    fn new(network: &'n Network, host: &'static str, clock: Option<ClockError>) -> Self {
+        let mut site = Self {
+            network,
+            host,
+            clock,
+            nodes: Vec::new(),
+        };
+        let mut names = parameter("host", host).to_vec();
+        names.extend(parameter("reference", "controller"));
+        names.extend(parameter_of_name(host));
+        site.start("host_clock", names);
+        site
+    }
+
+    fn start(&mut self, node: &str, mut arguments: Vec<String>) {
+        if let Some(clock) = self.clock {
+            arguments.extend(clock.arguments());
+            arguments.extend(parameter("clock_host", self.host));
+        }
+        self.nodes
+            .push(self.network.node(self.host, node, &arguments));
+    }
+
+    fn stop(self) {
+        for node in self.nodes {
+            node.stop();
+        }
+    }
+}
+
+/// Every host clock is a node of its own name.
+fn parameter_of_name(host: &str) -> [String; 2] {
+    ["-r".to_owned(), format!("__node:=clock_of_{host}")]
+}
+
+fn file_of(scenario: &Scenario, node: &str) -> Vec<String> {
+    let file = scenario.argument(&format!("{node}.yaml"));
+    vec!["--params-file".to_owned(), file]
+}
+
+#[test]
+fn three_hosts_lose_nothing_at_1_khz_and_their_clocks_are_taken_out() {
+    let Some(network) = Network::of(&HOSTS, 61, 20_261_121) else {
+        return;
+    };
+    network.links(Link::even(HALF_WAY));
+    let mut slower = Link::even(HALF_WAY);
+    slower.up.delay_s += UNEQUAL_S;
+    network.link("archive", slower);
+    let scenario = Scenario::copy_of("short_cell");
+    let often = "background_rate_hz: 1000.0";
+    scenario.replace("fake_cnc.yaml", "background_rate_hz: 10.0", often);
+    let clocks = [ClockError::of(0.35, 40e-6), ClockError::of(-1.2, -25e-6)];
+    let into = scenario.path("bag");
+
+    let mut archive = Site::new(&network, "archive", Some(clocks[1]));
+    let mut models = Site::new(&network, "models", Some(clocks[0]));
+    let mut controller = Site::new(&network, "controller", None);
+    archive.start(
+        "recorder",
+        parameter("bag", &into.display().to_string()).into(),
+    );
+    for node in ["axis_compensation", "latency_calibrator", "thermal_model"] {
+        models.start(node, file_of(&scenario, node));
+    }
+    controller.start("fake_cnc", file_of(&scenario, "fake_cnc"));
+    std::thread::sleep(WORK);
+    archive.stop();
+    models.stop();
+    controller.stop();
+
+    eprintln!("switch: {:?}", network.counts());
+    nothing_is_lost(&into);
+    clock_is_found(&into, "models", clocks[0], 0.0);
+    clock_is_found(&into, "archive", clocks[1], UNEQUAL_S / 2.0);
+    delays_are_those_of_the_links(&into);
+}
+
+/// Between the first and the last number that were recorded every number is there, and no reader of a reliable topic counted a
+/// loss.
+fn nothing_is_lost(bag: &Path) {
+    for topic in [topics::AXES_STATE.name, topics::COMPENSATION.name] {
+        let (there, missing) = bag::missing(bag, topic);
+        eprintln!("{topic}: {there} recorded, {missing} missing");
+        assert!(there > 10_000, "{topic}");
+        assert_eq!(missing, 0, "{topic}");
+    }
+    let mut reliable = 0;
+    for ((node, counter), count) in bag::counters(bag) {
+        let best_effort = [
+            "temperature/",
+            "joint_states",
+            "host_clock/question",
+            "host_clock/answer",
+        ];
+        if counter.ends_with(" lost") && !best_effort.iter().any(|topic| counter.contains(topic)) {
+            reliable += 1;
+            assert_eq!(count, 0, "{node}: {counter}");
+        }
+    }
+    assert!(reliable >= 6, "{reliable} counters of reliable topics");
+}
+
+fn clock_is_found(bag: &Path, host: &str, truth: ClockError, unequal_s: f64) {
+    let maps: Vec<HostClock> = bag::messages(bag, &topics::HOST_CLOCK)
+        .into_iter()
+        .map(|(_, clock)| clock)
+        .filter(|clock| clock.host == host)
+        .collect();
+    let last = maps.last().unwrap_or_else(|| panic!("no map of {host}"));
+    let from = last.map.at() - JUDGED;
+    let (mut worst_s, mut worst_drift) = (0.0_f64, 0.0_f64);
+    for clock in maps.iter().filter(|clock| clock.map.at() >= from) {
+        let at = clock.map.at();
+        let off_s = clock.map.offset(at).as_secs_f64() - truth.true_offset_s(at) - unequal_s;
+        worst_s = worst_s.max(off_s.abs());
+        let true_drift = -truth.drift / (1.0 + truth.drift);
+        worst_drift = worst_drift.max((clock.map.drift() - true_drift).abs());
+        assert!(
+            (off_s + unequal_s).abs() <= clock.bound_s,
+            "{host}: beyond its bound"
+        );
+    }
+    eprintln!(
+        "{host}: {} maps, the last of {} exchanges over {:.1} s: offset off by {:.1} us at most beside {:.0} us of unequal ways, \
+         drift by {:.2} us/s; u {:.1} us, bound {:.0} us, least round trip {:.2} ms",
+        maps.len(),
+        last.n,
+        last.span_s,
+        worst_s * 1e6,
+        unequal_s * 1e6,
+        worst_drift * 1e6,
+        last.standard_uncertainty_s * 1e6,
+        last.bound_s * 1e6,
+        last.least_round_trip_s * 1e3
+    );
+    assert!(worst_s <= LIMIT_S, "{host}: {worst_s} s");
+    assert!(worst_drift <= 15e-6, "{host}: {worst_drift}");
+}
+
+/// A state's stamp is by the controller's clock, its arrival by the archive's, which is 1.2 s behind.
+fn delays_are_those_of_the_links(bag: &Path) {
+    let states = bag::messages(bag, &topics::AXES_STATE);
+    let last = states.last().unwrap().0;
+    let mut delays_ms: Vec<f64> = states
+        .iter()
+        .filter(|(arrived, _)| *arrived >= last - JUDGED)
+        .map(|(arrived, state)| (*arrived - state.received_at).as_secs_f64() * 1e3)
+        .collect();
+    delays_ms.sort_by(f64::total_cmp);
+    let of = |share| bag::quantile(&delays_ms, share);
+    eprintln!(
+        "axes/state, controller to archive: {} samples, least {:.3}, p50 {:.3}, p90 {:.3}, p99 {:.3}, most {:.3} ms",
+        delays_ms.len(),
+        of(0.0),
+        of(0.5),
+        of(0.9),
+        of(0.99),
+        of(1.0)
+    );
+    // 5 ms and the jitter; half of what the ways differ by stays in the archive's clock.
+    assert!((4.0..8.0).contains(&of(0.5)), "{}", of(0.5));
+}
