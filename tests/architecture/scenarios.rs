@@ -178,7 +178,10 @@ fn wind_down_s(scenario: &str, exec: &str) -> Option<f64> {
     let path = format!("{FOLDER}/{scenario}/{exec}.yaml");
     let yaml = tree::text(&path).unwrap();
     let mut file: BTreeMap<String, serde_json::Value> = serde_saphyr::from_str(&yaml).unwrap();
-    let parameters = file.remove("/**").unwrap()["ros__parameters"].take();
+    let mut parameters = file.remove("/**").unwrap()["ros__parameters"].take();
+    for own in OF_EVERY_NODE {
+        parameters.as_object_mut().unwrap().remove(own);
+    }
     let config: AxisCompensationConfig = serde_json::from_value(parameters).unwrap();
     // A busy computer adds to it: axis_compensation's shell counts a second.
     Some(config.wind_down_s() + 1.0)

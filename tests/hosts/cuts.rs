@@ -28,6 +28,8 @@ const RATES: &str = "background_rate_hz: 1000.0\n    compensation_hold_s: 0.2\n 
                      compensation_rate_limit_um_s: 40.0";
 /// Fastest motion of an offset, and creep by friction, in 0.1 s, m.
 const FASTEST_M: f64 = 40e-6 * 0.1 + 1.5e-6;
+/// An offset is as old as the state that it answers; younger than this it is fresh, s.
+const FRESH_S: f64 = 0.05;
 const CUTS: usize = 10;
 const CUT: Duration = Duration::from_millis(1500);
 /// What is wanted after a cut.
@@ -105,16 +107,16 @@ fn cut(network: &Network, controller: &Graph) -> Cut {
             .map(|(at, _)| at.duration_since(back))
     });
     let whole = compensated(controller, back);
-    // The wanted position moves with each state: an offset is as old as the state that it answers.
-    let computed = offsets(controller);
-    let fresh = computed.iter().find_map(|(at, offset)| {
-        let age_s = seconds(&now()) - at.elapsed().as_secs_f64() - seconds(&offset.header.stamp);
-        (age_s < 0.05).then(|| at.duration_since(back))
+    let fresh = controller.wait("a fresh compensation", |graph| {
+        offsets(graph).iter().find_map(|(at, offset)| {
+            let came_s = seconds(&now()) - at.elapsed().as_secs_f64();
+            (came_s - seconds(&offset.header.stamp) < FRESH_S).then(|| at.duration_since(back))
+        })
     });
     Cut {
         left_m,
         first_s: first.as_secs_f64(),
-        fresh_s: fresh.map_or(f64::INFINITY, |fresh| fresh.as_secs_f64()),
+        fresh_s: fresh.as_secs_f64(),
         whole_s: whole.as_secs_f64(),
     }
 }

@@ -4,6 +4,7 @@
 //! gone, also when a test fails.
 
 use std::process::{Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use abbe_tests::program::{Process, abbe, root};
 use nix::sched::{CloneFlags, setns};
@@ -11,6 +12,9 @@ use node_runtime::environment::{DiscoveryRange, Environment};
 use tun_rs::{DeviceBuilder, Layer, SyncDevice};
 
 use crate::switch::{Counts, Link, Switch};
+
+/// Cells of several hosts wait for each other: they are judged by their delays.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 /// A host's interface to the switch.
 const INTERFACE: &str = "link0";
@@ -74,6 +78,7 @@ pub struct Network {
     switch: Switch,
     hosts: Vec<(String, Namespace)>,
     domain: u16,
+    _turn: MutexGuard<'static, ()>,
 }
 
 impl Network {
@@ -91,6 +96,7 @@ impl Network {
     }
 
     fn make(names: &[&str], domain: u16, seed: u64) -> Result<Self, String> {
+        let turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
         let (mut hosts, mut taps) = (Vec::new(), Vec::new());
         for (place, name) in names.iter().enumerate() {
             let namespace =
@@ -106,6 +112,7 @@ impl Network {
             switch: Switch::start(taps, seed),
             hosts,
             domain,
+            _turn: turn,
         })
     }
 

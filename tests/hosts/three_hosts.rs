@@ -28,9 +28,9 @@ const UNEQUAL_S: f64 = 1e-3;
 /// What a host's clock may be off by: 50 us, and a tenth of the jitter.
 const LIMIT_S: f64 = 50e-6 + 0.1 * JITTER_S;
 /// How long the cell works.
-const WORK: Duration = Duration::from_secs(22);
+const WORK: Duration = Duration::from_secs(26);
 /// The clocks are judged by their maps of the end.
-const JUDGED: Span = Span::from_nanos(6_000_000_000);
+const JUDGED: Span = Span::from_nanos(4_000_000_000);
 
 /// What a host's clock is made to show: the truth that its map is held against.
 #[derive(Clone, Copy)]
@@ -90,6 +90,7 @@ impl<'n> Site<'n> {
         };
         let mut names = parameter("host", host).to_vec();
         names.extend(parameter("reference", "controller"));
+        names.extend(parameter("period_ms", "20.0"));
         names.extend(parameter_of_name(host));
         site.start("host_clock", names);
         site
@@ -156,7 +157,12 @@ fn three_hosts_lose_nothing_at_1_khz_and_their_clocks_are_taken_out() {
     nothing_is_lost(&into);
     clock_is_found(&into, "models", clocks[0], 0.0);
     clock_is_found(&into, "archive", clocks[1], UNEQUAL_S / 2.0);
-    delays_are_those_of_the_links(&into);
+    let states = bag::messages(&into, &topics::AXES_STATE);
+    let stamped = states.iter().map(|(at, state)| (*at, state.received_at));
+    delays_are_those_of_the_links("axes/state, controller to archive", stamped.collect());
+    let offsets = bag::messages(&into, &topics::COMPENSATION);
+    let stamped = offsets.iter().map(|(at, offset)| (*at, offset.at));
+    delays_are_those_of_the_links("compensation, models to archive", stamped.collect());
 }
 
 /// Between the first and the last number that were recorded every number is there, and no reader of a reliable topic counted a
@@ -221,19 +227,18 @@ fn clock_is_found(bag: &Path, host: &str, truth: ClockError, unequal_s: f64) {
     assert!(worst_drift <= 15e-6, "{host}: {worst_drift}");
 }
 
-/// A state's stamp is by the controller's clock, its arrival by the archive's, which is 1.2 s behind.
-fn delays_are_those_of_the_links(bag: &Path) {
-    let states = bag::messages(bag, &topics::AXES_STATE);
-    let last = states.last().unwrap().0;
-    let mut delays_ms: Vec<f64> = states
+/// A message's stamp is by the clock of its node's host, its arrival by the archive's, which is 1.2 s behind.
+fn delays_are_those_of_the_links(way: &str, stamped: Vec<(Stamp<Host>, Stamp<Host>)>) {
+    let last = stamped.last().unwrap().0;
+    let mut delays_ms: Vec<f64> = stamped
         .iter()
         .filter(|(arrived, _)| *arrived >= last - JUDGED)
-        .map(|(arrived, state)| (*arrived - state.received_at).as_secs_f64() * 1e3)
+        .map(|(arrived, sent)| (*arrived - *sent).as_secs_f64() * 1e3)
         .collect();
     delays_ms.sort_by(f64::total_cmp);
     let of = |share| bag::quantile(&delays_ms, share);
     eprintln!(
-        "axes/state, controller to archive: {} samples, least {:.3}, p50 {:.3}, p90 {:.3}, p99 {:.3}, most {:.3} ms",
+        "{way}: {} samples, least {:.3}, p50 {:.3}, p90 {:.3}, p99 {:.3}, most {:.3} ms",
         delays_ms.len(),
         of(0.0),
         of(0.5),
@@ -242,5 +247,5 @@ fn delays_are_those_of_the_links(bag: &Path) {
         of(1.0)
     );
     // 5 ms and the jitter; half of what the ways differ by stays in the archive's clock.
-    assert!((4.0..8.0).contains(&of(0.5)), "{}", of(0.5));
+    assert!((4.0..12.0).contains(&of(0.5)), "{way}: {}", of(0.5));
 }

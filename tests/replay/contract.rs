@@ -17,7 +17,7 @@ use crate::rewrite::{Change, Copied, rewrite};
 const CHANGED: (&str, &str) = ("validity_min: 40.0", "validity_min: 41.0");
 
 /// Exit code and JSON of `abbe check --json`; what was said instead where there is no JSON.
-fn check(bag: &Path) -> (i32, Value) {
+pub fn check(bag: &Path) -> (i32, Value) {
     let bag = bag.display().to_string();
     let mut command = command(0, &["check", "--json", &bag]);
     command.stderr(std::process::Stdio::null());

@@ -6,4 +6,5 @@
 
 mod contract;
 mod equal_bytes;
+mod host_clocks;
 mod rewrite;

@@ -15,8 +15,8 @@ use crate::diagnostic::Diagnostic;
 use crate::error::HostClockError;
 use crate::estimate::{Estimator, Taken};
 
-/// Questions that may wait for their answer; older ones are given up.
-const OPEN_QUESTIONS: usize = 256;
+/// Answers that are remembered, so that none counts twice.
+const REMEMBERED: usize = 256;
 /// How long no exchange must be senseless until they agree again.
 const AGREED: Span = Span::from_nanos(10_000_000_000);
 
@@ -51,7 +51,7 @@ pub enum Output {
 pub struct HostClockStage {
     config: HostClockConfig,
     estimator: Estimator,
-    open: VecDeque<(u32, Stamp<Host>)>,
+    answered: VecDeque<(u32, Stamp<Host>)>,
     sequence: u32,
     steps: u32,
     heard_at: Option<Stamp<Host>>,
@@ -68,7 +68,7 @@ impl HostClockStage {
         config.check()?;
         Ok(Self {
             estimator: Estimator::new(config.rules()),
-            open: VecDeque::new(),
+            answered: VecDeque::new(),
             sequence: 0,
             steps: 0,
             heard_at: None,
@@ -84,10 +84,6 @@ impl HostClockStage {
         }
         self.heard_at.get_or_insert(at);
         self.sequence = self.sequence.wrapping_add(1);
-        if self.open.len() == OPEN_QUESTIONS {
-            self.open.pop_front();
-        }
-        self.open.push_back((self.sequence, at));
         out.push(Output::Question(ClockQuestion {
             asked_at: at,
             host: self.config.host.clone(),
@@ -123,12 +119,16 @@ impl HostClockStage {
                 expected: self.config.reference.clone(),
             });
         }
-        // Answers to somebody of our name before us, and second answers, belong to no question of ours.
+        // The answer says when it was asked, so no list of questions is kept: a replay puts an answer in before the tick of the
+        // same instant at which it was asked.
         let asked = (answer.sequence, answer.asked_at);
-        let Some(place) = self.open.iter().position(|open| *open == asked) else {
+        if self.answered.contains(&asked) {
             return;
-        };
-        self.open.remove(place);
+        }
+        if self.answered.len() == REMEMBERED {
+            self.answered.pop_front();
+        }
+        self.answered.push_back(asked);
         self.heard_at = Some(at);
         let reference = || self.config.reference.clone();
         if std::mem::take(&mut self.is_silent) {

@@ -1,4 +1,5 @@
 //! Offset and drift against clocks and networks that are drawn here and know nothing of the estimator.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use host_clock::estimate::{Estimate, Estimator, Rules, Taken};
 use metrology::sample::ClockExchange;

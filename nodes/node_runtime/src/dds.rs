@@ -17,11 +17,13 @@ use rustdds::{
     CDRDeserializerAdapter, CDRSerializerAdapter, DomainParticipant, DomainParticipantBuilder,
     RTPSEntity, TopicKind, no_key,
 };
+use tokio::time::Instant;
 
 use crate::environment::{self, DiscoveryRange, Environment};
 use crate::names::NodeNames;
 
 mod endpoint;
+mod meeting;
 mod policies;
 
 pub(crate) use endpoint::{Guid, PublishError, Reader, RequestIdentity, Sample, Writer};
@@ -32,6 +34,15 @@ type GraphReader = no_key::SimpleDataReader<
     ParticipantEntitiesInfo,
     CDRDeserializerAdapter<ParticipantEntitiesInfo>,
 >;
+
+/// What makes a participant where `environment` says.
+fn builder(environment: &Environment) -> DomainParticipantBuilder {
+    let builder = DomainParticipantBuilder::new(environment.domain_id);
+    match environment.range {
+        DiscoveryRange::Subnet => builder,
+        DiscoveryRange::Localhost => builder.with_only_networks([Ipv4Addr::LOCALHOST]),
+    }
+}
 
 /// Somebody's reader or writer, as discovery describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +64,8 @@ pub(crate) struct Participant {
     subscriber: rustdds::Subscriber,
     node: NodeName,
     entities: Mutex<NodeEntitiesInfo>,
+    environment: Environment,
+    missed: Mutex<meeting::Missed>,
     participant: DomainParticipant,
 }
 
@@ -65,11 +78,7 @@ impl Participant {
     ) -> anyhow::Result<(Self, Option<String>)> {
         let interfaces = environment::interfaces();
         environment.check_interfaces(&interfaces)?;
-        let mut builder = DomainParticipantBuilder::new(environment.domain_id);
-        if environment.range == DiscoveryRange::Localhost {
-            builder = builder.with_only_networks([Ipv4Addr::LOCALHOST]);
-        }
-        let participant = builder.build().map_err(|error| {
+        let participant = builder(environment).build().map_err(|error| {
             anyhow!(
                 "DDS participant in domain {}: {error}",
                 environment.domain_id
@@ -79,12 +88,16 @@ impl Participant {
         let node = NodeName::new(&names.namespace, &names.name)
             .map_err(|error| anyhow!("node {}: {error:?}", names.fully_qualified()))?;
         Ok((
-            Self::of(participant, node).context("ROS graph on DDS")?,
+            Self::of(environment, participant, node).context("ROS graph on DDS")?,
             warning,
         ))
     }
 
-    fn of(participant: DomainParticipant, node: NodeName) -> anyhow::Result<Self> {
+    fn of(
+        environment: &Environment,
+        participant: DomainParticipant,
+        node: NodeName,
+    ) -> anyhow::Result<Self> {
         let default = policies::policies(Qos::RELIABLE, policies::Side::Reader);
         let publisher = participant.create_publisher(&default)?;
         let subscriber = participant.create_subscriber(&default)?;
@@ -109,6 +122,8 @@ impl Participant {
             graph_reader,
             node,
             entities,
+            environment: environment.clone(),
+            missed: Mutex::default(),
         })
     }
 
@@ -167,6 +182,15 @@ impl Participant {
         self.graph_writer
             .write(info, Some(rustdds::Timestamp::now()))
             .map_err(|error| anyhow!("ros_discovery_info: {error}"))
+    }
+
+    /// Looks whether somebody is missed, and sees to it that they are met soon after they are back.
+    pub fn meet_again(&self) {
+        let now = Instant::now();
+        let mut missed = self.missed.lock().unwrap_or_else(PoisonError::into_inner);
+        if missed.look(&self.participant, now) {
+            meeting::show_newcomer(&self.environment, now);
+        }
     }
 
     /// Waits until everybody has the last news of the graph.

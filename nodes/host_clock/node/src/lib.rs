@@ -52,7 +52,7 @@ fn figure(clock: &HostClock) -> Diagnostic {
         "host {} is {offset_s:.6} s ahead of {}, standard uncertainty {:.6} s",
         clock.reference, clock.host, clock.standard_uncertainty_s
     );
-    Diagnostic::new(Level::Ok, "clock", message)
+    Diagnostic::new(Level::Ok, "clock_relation", message)
         .with("offset_s", format!("{offset_s:.9}"))
         .with("standard_uncertainty_s", clock.standard_uncertainty_s)
         .with("drift_us_per_s", clock.map.drift() * 1e6)

@@ -12,7 +12,7 @@ use tokio::time::Instant;
 use super::action_client::ActionClient;
 use super::action_server::{ActionServer, GoalService};
 use super::board::Board;
-use super::incoming::{QUEUE_LEN, Readers};
+use super::incoming::{Incoming, QUEUE_LEN, Readers};
 use super::logger_levels::LoggerService;
 use super::owner::{
     ActionEnd, ClientUse, Hearing, Owner, Publication, ServerUse, Subscription, Timers, UsedAction,
@@ -216,6 +216,20 @@ impl Assembly {
         Ok(())
     }
 
+    fn timers(
+        &mut self,
+        clock: &Clock,
+        ports: &Ports,
+        queue: mpsc::Sender<Incoming>,
+    ) -> anyhow::Result<Timers> {
+        if clock.is_simulated() {
+            self.clock()?;
+            return Ok(Timers::Simulated(SimulatedTimers::new(&ports.timers)));
+        }
+        let timers = HostTimers::start(&ports.timers, queue).context("thread of the timers")?;
+        Ok(Timers::Host(timers))
+    }
+
     fn host_clock(&mut self) -> anyhow::Result<()> {
         let topic = self.names.resolve(topics::HOST_CLOCK.name)?;
         let type_name = names::dds_type(abbe_msgs::msg::HostClock::TYPE_NAME);
@@ -274,12 +288,7 @@ pub(super) fn assemble(
     let used_actions = assembly.action_clients(&ports.action_clients)?;
     let subscriptions = assembly.subscriptions(&ports)?;
     let clock = Clock::new(setup.use_sim_time(), setup.host_time());
-    let timers = if clock.is_simulated() {
-        assembly.clock()?;
-        Timers::Simulated(SimulatedTimers::new(&ports.timers))
-    } else {
-        Timers::Host(HostTimers::start(&ports.timers, sender).context("thread of the timers")?)
-    };
+    let timers = assembly.timers(&clock, &ports, sender)?;
     let relation = related::Related::of(setup, &clock, node.keeps_own_time());
     if relation.listens() {
         assembly.host_clock()?;

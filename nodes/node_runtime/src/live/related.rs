@@ -9,6 +9,8 @@ use crate::clock::{Change, Clock, HostTime};
 use crate::diagnostic::{Diagnostic, Level};
 use crate::setup::Setup;
 
+/// How well the clock is known.
+const CONDITION: &str = "clock_relation";
 /// A map whose newest exchange is older is told of.
 const OLD: Span = Span::from_nanos(10_000_000_000);
 
@@ -71,7 +73,7 @@ impl Owner {
         let told = match self.relation.time.related() {
             None => {
                 let message = format!("no map of host {host} yet: stamps are by its own clock");
-                Diagnostic::new(Level::Warn, "clock", message)
+                Diagnostic::new(Level::Warn, CONDITION, message)
             }
             Some((clock, age)) => {
                 let is_old = age > OLD;
@@ -84,7 +86,7 @@ impl Owner {
                     if is_old { ", by an old map" } else { "" }
                 );
                 let level = if is_old { Level::Warn } else { Level::Ok };
-                Diagnostic::new(level, "clock", message)
+                Diagnostic::new(level, CONDITION, message)
                     .with("offset_s", format!("{offset_s:.9}"))
                     .with("standard_uncertainty_s", format!("{uncertainty_s:.9}"))
                     .with("bound_s", format!("{:.9}", clock.bound_s))

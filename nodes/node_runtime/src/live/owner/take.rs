@@ -27,13 +27,12 @@ impl Owner {
             } => {
                 self.count_message(subscription, lost);
                 let at = self.instant(Some(received));
-                self.hand(
-                    at,
-                    Event::Message {
-                        subscription,
-                        bytes: &bytes,
-                    },
-                );
+                let bytes = &bytes;
+                let event = Event::Message {
+                    subscription,
+                    bytes,
+                };
+                self.hand(at, event);
             }
             Incoming::Unreadable { topic, reason } => {
                 self.board.count("samples unreadable", 1);
@@ -70,9 +69,7 @@ impl Owner {
                 }
             }
             Incoming::Timer { timer, missed } => {
-                if missed > 0 {
-                    self.missed(timer, missed);
-                }
+                self.missed(timer, missed);
                 let at = self.instant(None);
                 self.hand(at, Event::Timer { timer });
             }
@@ -99,6 +96,9 @@ impl Owner {
     /// Counts missed periods; a stall that a person would notice is a condition too.
     fn missed(&mut self, timer: usize, missed: u64) {
         const NOTICED_STALL_NANOS: u64 = 20_000_000;
+        if missed == 0 {
+            return;
+        }
         let period = self
             .node
             .ports()
