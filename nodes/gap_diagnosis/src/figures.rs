@@ -6,6 +6,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::veto::Veto;
+
 pub(crate) mod over_session;
 
 /// Everything that is drawn.
@@ -128,6 +130,8 @@ pub enum Note {
     },
     /// An effect was found and is not written to a machine file.
     NotWritten { effect: String, others: Vec<String> },
+    /// Something looks like an effect and is not named, for these reasons.
+    OnlyLooksLike { effect: String, why: Vec<Veto> },
     /// No run that can be proposed tells these apart.
     NoRunSeparates {
         effects: Vec<String>,
@@ -181,6 +185,10 @@ impl fmt::Display for Note {
                 "{effect} is not written to a machine file: {} would do as well on this recording",
                 others.join(", ")
             ),
+            Self::OnlyLooksLike { effect, why } => {
+                let why: Vec<String> = why.iter().map(Veto::to_string).collect();
+                write!(f, "{effect} is not named: {}", why.join("; "))
+            }
             Self::NoRunSeparates {
                 effects,
                 delta,

@@ -13,7 +13,7 @@
 //! its effects forms of their own, `refit` sizes
 //! it, `form_doubt` says what a size owes to its form, `confirm` tries it on runs left out and under every
 //! condition, `challenge` against shapes without a physics; `confidence` weighs its rivals, `recalibration` what a
-//! confidence is worth, `cause` judges it. `scatter` looks for effects that move no mean, `whiteness` says whether
+//! confidence is worth, `veto` what speaks against naming it, `cause` puts that together and `searched` says how often. `scatter` looks for effects that move no mean, `whiteness` says whether
 //! the search may stop. `families`, `localise` and `places` say where the gap lies, `guard` whether the
 //! noise is that of the repeats, `unknown` what no effect explains, `isolability` what could be told from what. `gap` is how much there was to explain, `split` and
 //! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`. `experiment` knows what could
@@ -57,6 +57,7 @@ pub mod report;
 mod rows;
 pub mod rule;
 mod scatter;
+mod searched;
 mod selection;
 pub mod session;
 mod shrink;
@@ -65,6 +66,7 @@ mod split;
 mod stack;
 pub mod stage;
 mod unknown;
+mod veto;
 mod whitener;
 mod whiteness;
 mod widening;
@@ -77,3 +79,4 @@ pub use following::{GapDiagnosisConfig, PARAMETERS};
 pub use report::GapReport;
 pub use rule::Rule;
 pub use stage::{GapDiagnosisStage, Input, Output};
+pub use veto::Veto;

@@ -25,6 +25,9 @@ use crate::signature::{Form, Library};
 /// The free part of a wide form is at most this share of the rest of its signature.
 const MOST_FREE: f64 = 0.5;
 
+/// Forms of one instance that are tried beside a set before it is given up.
+const MOST_FORMS: usize = 16;
+
 /// A member whose own signature is this many times what the whole set explains (in squares) only cancels another.
 pub const MOST_CANCELLING: f64 = 2.0;
 
@@ -120,19 +123,18 @@ impl<'l> Search<'l> {
     }
 
     /// Whether the free part of every wide form only widens the form: one that is as large as the rest of its
-    /// signature would be another effect under this one's name.
+    /// signature would be another effect under this one's name. Heights of a curve that may have any form are no such part.
     fn keeps_form(&self, set: &[usize], fit: &Fit) -> bool {
         let mut first = 0;
         set.iter().all(|form| {
             let entry = &self.signatures.forms[*form];
             let sizes = &fit.sizes[first..first + entry.columns.len()];
             first += entry.columns.len();
-            let own = self.signatures.instances[entry.instance]
-                .kind
-                .parameters
-                .len();
+            let kind = self.signatures.instances[entry.instance].kind;
+            let own = kind.parameters.len();
+            let widens = |place: usize| place >= own && !kind.free[place - own].is_ordinate;
             let square = |is_free: bool| -> f64 {
-                let wanted = |k: &usize| (entry.amplitudes[*k] >= own) == is_free;
+                let wanted = |k: &usize| widens(entry.amplitudes[*k]) == is_free;
                 let part: Vec<usize> = (0..sizes.len()).filter(wanted).collect();
                 let of = |i: &usize, j: &usize| {
                     let gram = self.normal.gram[(entry.columns[*i], entry.columns[*j])];
@@ -180,28 +182,41 @@ impl<'l> Search<'l> {
             .iter()
             .map(|form| &self.signatures.forms[*form].columns[..]);
         let gains = self.normal.gains_beside(&columns, groups);
-        let mut best = BTreeMap::<usize, (f64, usize)>::new();
+        let mut worths = BTreeMap::<usize, Vec<(f64, usize)>>::new();
         for (form, gain) in open.into_iter().zip(gains) {
             let entry = &self.signatures.forms[form];
             let worth = gain - count(entry.price) * self.log_rows;
-            let known = best.entry(entry.instance).or_insert((worth, form));
-            if worth > known.0 {
-                *known = (worth, form);
-            }
+            worths
+                .entry(entry.instance)
+                .or_default()
+                .push((worth, form));
         }
-        let mut ranked: Vec<(f64, usize)> = best.into_values().collect();
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let sets: Vec<Set> = ranked
+        let mut ranked: Vec<Vec<(f64, usize)>> = worths.into_values().collect();
+        for forms in &mut ranked {
+            forms.sort_by(|a, b| b.0.total_cmp(&a.0));
+        }
+        ranked.sort_by(|a, b| b[0].0.total_cmp(&a[0].0));
+        let mut scored: Vec<(f64, Set)> = ranked
             .iter()
             .take(most)
-            .map(|(_, form)| with(set, *form))
-            .collect();
-        let mut scored: Vec<(f64, Set)> = sets
-            .into_iter()
-            .map(|set| (self.score(&set), set))
+            .map(|forms| self.best_sound(set, forms))
             .collect();
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
         scored
+    }
+
+    /// The first of some forms of an instance, the best first, whose sizes beside a set physics lets be. A wide form that
+    /// would be another effect under this one's name does not keep the instance's own form from the set.
+    fn best_sound(&mut self, set: &Set, forms: &[(f64, usize)]) -> (f64, Set) {
+        let mut tried = forms.iter().take(MOST_FORMS).map(|(_, form)| {
+            let set = with(set, *form);
+            (self.score(&set), set)
+        });
+        let first = tried.next().expect("an instance has a form");
+        if first.0.is_finite() {
+            return first;
+        }
+        tried.find(|(score, _)| score.is_finite()).unwrap_or(first)
     }
 
     /// Improves one set by taking out and by swapping until nothing helps.
@@ -292,4 +307,53 @@ pub fn with(set: &[usize], form: usize) -> Set {
 /// A set with one form less.
 pub fn without(set: &[usize], form: usize) -> Set {
     set.iter().copied().filter(|f| *f != form).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use machine::effects::{self, Target};
+    use metrology::Axis;
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::signature::Instance;
+
+    /// A play in its own form (one column) and in a wide one (a free column more).
+    fn library() -> Library {
+        let form = |columns: &[usize], amplitudes: &[usize], wide| Form {
+            instance: 0,
+            values: vec![0.0; 7],
+            amplitudes: amplitudes.to_vec(),
+            columns: columns.to_vec(),
+            price: columns.len(),
+            wide,
+        };
+        Library {
+            instances: vec![Instance {
+                kind: effects::kind("backlash").unwrap(),
+                target: Target::Axis(Axis::X),
+            }],
+            forms: vec![form(&[0], &[0], false), form(&[0, 1], &[0, 1], true)],
+            columns: [[1.0, 0.0], [0.0, 1.0]]
+                .map(|column| DVector::from_row_slice(&column))
+                .to_vec(),
+            excited: vec![true],
+        }
+    }
+
+    #[test]
+    fn a_wide_form_that_is_mostly_free_does_not_keep_the_effects_own_form_out() {
+        let library = library();
+        // The free column explains most: under this name that would be another effect.
+        let z = DVector::from_row_slice(&[8.0, 20.0]);
+        let normal = library.normal(&z);
+        let mut search = Search::new(&library, &normal, z.norm_squared(), 100.0);
+        let limits = Limits {
+            beam: 3,
+            most_effects: 2,
+            swaps: true,
+        };
+        assert_eq!(search.run(limits), vec![0]);
+        assert!(search.visited[&vec![1]].is_infinite());
+    }
 }

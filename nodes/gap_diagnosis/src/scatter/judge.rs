@@ -20,6 +20,7 @@ use crate::rows::count;
 use crate::rule::Rule;
 use crate::selection::Set;
 use crate::signature::{Form, Instance, Library};
+use crate::veto;
 
 /// A set that was found, with what it is judged by.
 pub(super) struct Judge<'j, 's, 'a> {
@@ -60,7 +61,7 @@ impl Judge<'_, '_, '_> {
             let (parameters, values) = sized(instance.kind, form, &fit, own.clone());
             let constancy = self.constancy(instance, &values, &columns, &left);
             let railed = parameters.iter().any(|p| p.at_bound && p.value > 0.0);
-            let is_sure = own_sizes(&fit, &own).any(|(size, doubt)| size > cause::SURE * doubt);
+            let is_sure = own_sizes(&fit, &own).any(|(size, doubt)| size > veto::SURE * doubt);
             let is_needed = rivals.is_needed(&instances, form.instance);
             let holds = is_confirmed(place)
                 && beats_runs
@@ -86,7 +87,7 @@ impl Judge<'_, '_, '_> {
                 confidence: recalibrated(config, probability),
                 parameters,
                 d: parts[place].norm(),
-                confusable_with: cause::confusable(
+                confusable_with: veto::confusable(
                     signatures, normal, &instead, set[place], &of_set,
                 ),
                 constancy,

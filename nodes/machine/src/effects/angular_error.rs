@@ -4,14 +4,16 @@
 //!
 //! ```text
 //!   w = sum_n p_n P_n(x),   n = 1, 2 and, wider, 3, 4                     (1)
-//!   E = w times the lever of `volumetric::sensitivity` at the pose        (2)
+//!   w += sum_k f_k h_k(x),   hats at 1/8 .. 7/8 of the travel             (2)
+//!   E = w times the lever of `volumetric::sensitivity` at the pose        (3)
 //! ```
 //!
 //! x is the place within the travel, -1 to 1. The mean angle is left out: it is squareness, or the frame.
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
-//! | p_n | `p1_urad`, `p2_urad`, `free_p3_urad`, `free_p4_urad` | µrad |
+//! | p_n | `p1_urad`, `p2_urad`, wider form `free_p3_urad`, `free_p4_urad` | µrad |
+//! | f_k | `free_1_of_8_urad` .. `free_7_of_8_urad` | µrad |
 //!
 //! # Holds when
 //! Angles are small. The straightness that belongs to an angular error is that at the machine's zero of the
@@ -26,7 +28,7 @@
 
 use metrology::ErrorComponent;
 
-use super::form::{Travel, legendre};
+use super::form::{PLACE_HATS, Travel, legendre, place_hats};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets, lever};
 use crate::twin::Response;
 
@@ -40,8 +42,15 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("p2_urad", 300.0, 8.0),
     ],
     free: &[
-        Parameter::amplitude("free_p3_urad", 300.0, 4.0),
-        Parameter::amplitude("free_p4_urad", 300.0, 3.0),
+        Parameter::ordinate("free_p3_urad", 300.0, 4.0),
+        Parameter::ordinate("free_p4_urad", 300.0, 3.0),
+        Parameter::ordinate("free_1_of_8_urad", 300.0, 3.0),
+        Parameter::ordinate("free_2_of_8_urad", 300.0, 3.0),
+        Parameter::ordinate("free_3_of_8_urad", 300.0, 3.0),
+        Parameter::ordinate("free_4_of_8_urad", 300.0, 3.0),
+        Parameter::ordinate("free_5_of_8_urad", 300.0, 3.0),
+        Parameter::ordinate("free_6_of_8_urad", 300.0, 3.0),
+        Parameter::ordinate("free_7_of_8_urad", 300.0, 3.0),
     ],
     moment: Moment::Mean,
     needs: "positions over the axis' travel, with two arms",
@@ -51,6 +60,7 @@ pub static KIND: Kind = Kind {
 struct AngularError {
     component: ErrorComponent,
     polynomial_rad: [f64; 4],
+    local_rad: [f64; PLACE_HATS],
 }
 
 impl AngularError {
@@ -58,6 +68,7 @@ impl AngularError {
         Self {
             component: target.component(),
             polynomial_rad: std::array::from_fn(|k| values[k] * 1e-6),
+            local_rad: std::array::from_fn(|k| values[4 + k] * 1e-6),
         }
     }
 }
@@ -67,7 +78,9 @@ impl Effect for AngularError {
         let travel = Travel::of(scene, self.component.of);
         let position = &scene.run.motion.position[self.component.of];
         lever::add(scene, self.component, response, |tick| {
-            legendre(1, &self.polynomial_rad, travel.share(position[tick])) // (1)
+            let x = travel.share(position[tick]);
+            let local_rad = place_hats(&self.local_rad, x); // (2)
+            legendre(1, &self.polynomial_rad, x) + local_rad // (1)
         });
     }
 }

@@ -30,6 +30,14 @@ pub(super) fn way_hats(heights: &[f64; WAY_HATS], way_mm: f64) -> f64 {
     hats(-2.0, 0.5, heights, way_mm.max(1e-9).log10())
 }
 
+/// Number of hats over the travel.
+pub(super) const PLACE_HATS: usize = 7;
+
+/// Hats at 1/8 .. 7/8 of the travel, at a share of the half travel.
+pub(super) fn place_hats(heights: &[f64; PLACE_HATS], share: f64) -> f64 {
+    hats(-0.75, 0.25, heights, share)
+}
+
 /// Sum of Legendre polynomials of the orders `first`, `first + 1`, ... at x.
 pub(super) fn legendre(first: usize, amplitudes: &[f64], x: f64) -> f64 {
     let (mut before, mut here) = (1.0, x);

@@ -109,9 +109,20 @@ pub struct Parameter {
     pub high: f64,
     /// Typical magnitude, the scale of its prior.
     pub typical: f64,
+    /// Whether it is a height of a curve that its effect may have any form of: of a wide form such heights are as much
+    /// the effect as its own parameters, while others only widen these.
+    pub is_ordinate: bool,
 }
 
 impl Parameter {
+    /// A height of a curve of any form, of either sign, at most `limit` in magnitude.
+    #[must_use]
+    pub const fn ordinate(name: &'static str, limit: f64, typical: f64) -> Self {
+        let mut height = Self::amplitude(name, limit, typical);
+        height.is_ordinate = true;
+        height
+    }
+
     /// An amplitude of either sign, at most `limit` in magnitude.
     #[must_use]
     pub const fn amplitude(name: &'static str, limit: f64, typical: f64) -> Self {
@@ -121,6 +132,7 @@ impl Parameter {
             low: -limit,
             high: limit,
             typical,
+            is_ordinate: false,
         }
     }
 
@@ -133,6 +145,7 @@ impl Parameter {
             low: 0.0,
             high,
             typical,
+            is_ordinate: false,
         }
     }
 
@@ -150,6 +163,7 @@ impl Parameter {
             low,
             high,
             typical,
+            is_ordinate: false,
         }
     }
 }

@@ -27,7 +27,7 @@
 
 use metrology::Axis;
 
-use super::form::{Travel, hats, legendre};
+use super::form::{PLACE_HATS, Travel, legendre, place_hats};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
 use crate::twin::Response;
 
@@ -41,15 +41,15 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("p3_um", 60.0, 3.0),
     ],
     free: &[
-        Parameter::amplitude("free_p4_um", 60.0, 1.0),
-        Parameter::amplitude("free_p5_um", 60.0, 1.0),
-        Parameter::amplitude("free_1_of_8_um", 60.0, 1.0),
-        Parameter::amplitude("free_2_of_8_um", 60.0, 1.0),
-        Parameter::amplitude("free_3_of_8_um", 60.0, 1.0),
-        Parameter::amplitude("free_4_of_8_um", 60.0, 1.0),
-        Parameter::amplitude("free_5_of_8_um", 60.0, 1.0),
-        Parameter::amplitude("free_6_of_8_um", 60.0, 1.0),
-        Parameter::amplitude("free_7_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_p4_um", 60.0, 1.0),
+        Parameter::ordinate("free_p5_um", 60.0, 1.0),
+        Parameter::ordinate("free_1_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_2_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_3_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_4_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_5_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_6_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_7_of_8_um", 60.0, 1.0),
     ],
     moment: Moment::Mean,
     needs: "positions over the axis' travel",
@@ -59,7 +59,7 @@ pub static KIND: Kind = Kind {
 struct PitchError {
     axis: Axis,
     polynomial_mm: [f64; 4],
-    local_mm: [f64; 7],
+    local_mm: [f64; PLACE_HATS],
 }
 
 impl PitchError {
@@ -81,7 +81,7 @@ impl Effect for PitchError {
             let x = travel.share(*here);
             *sum += legendre(2, &self.polynomial_mm, x); // (1)
             if is_local {
-                *sum += hats(-0.75, 0.25, &self.local_mm, x); // (2)
+                *sum += place_hats(&self.local_mm, x); // (2)
             }
         }
     }

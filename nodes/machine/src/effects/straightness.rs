@@ -6,11 +6,15 @@
 //!
 //! ```text
 //!   E = sum_n p_n P_n(x),   n = 2, 3 and, wider, 4, 5                     (1)
+//!   E += sum_k f_k h_k(x),   hats at 1/8 .. 7/8 of the travel             (2)
 //! ```
+//!
+//! (2) is for a guide that is worn or dented in one place.
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
-//! | p_n | `p2_um`, `p3_um`, `free_p4_um`, `free_p5_um` | µm |
+//! | p_n | `p2_um`, `p3_um`, wider form `free_p4_um`, `free_p5_um` | µm |
+//! | f_k | `free_1_of_8_um` .. `free_7_of_8_um` | µm |
 //!
 //! # Holds when
 //! The line is that of the point whose position the axes name, with the other axes anywhere.
@@ -23,7 +27,7 @@
 
 use metrology::ErrorComponent;
 
-use super::form::{Travel, legendre};
+use super::form::{PLACE_HATS, Travel, legendre, place_hats};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets, lever};
 use crate::twin::Response;
 
@@ -37,8 +41,15 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("p3_um", 60.0, 2.0),
     ],
     free: &[
-        Parameter::amplitude("free_p4_um", 60.0, 1.0),
-        Parameter::amplitude("free_p5_um", 60.0, 1.0),
+        Parameter::ordinate("free_p4_um", 60.0, 1.0),
+        Parameter::ordinate("free_p5_um", 60.0, 1.0),
+        Parameter::ordinate("free_1_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_2_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_3_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_4_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_5_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_6_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_7_of_8_um", 60.0, 1.0),
     ],
     moment: Moment::Mean,
     needs: "readings across the axis over its travel",
@@ -48,6 +59,7 @@ pub static KIND: Kind = Kind {
 struct Straightness {
     component: ErrorComponent,
     polynomial_mm: [f64; 4],
+    local_mm: [f64; PLACE_HATS],
 }
 
 impl Straightness {
@@ -55,6 +67,7 @@ impl Straightness {
         Self {
             component: target.component(),
             polynomial_mm: std::array::from_fn(|k| values[k] * 1e-3),
+            local_mm: std::array::from_fn(|k| values[4 + k] * 1e-3),
         }
     }
 }
@@ -64,7 +77,9 @@ impl Effect for Straightness {
         let travel = Travel::of(scene, self.component.of);
         let position = &scene.run.motion.position[self.component.of];
         lever::add(scene, self.component, response, |tick| {
-            legendre(2, &self.polynomial_mm, travel.share(position[tick])) // (1)
+            let x = travel.share(position[tick]);
+            let local_mm = place_hats(&self.local_mm, x); // (2)
+            legendre(2, &self.polynomial_mm, x) + local_mm // (1)
         });
     }
 }

@@ -46,3 +46,42 @@ fn the_sign_is_that_of_the_tool_relative_to_the_workpiece_on_either_side() {
         assert!((response.tip_mm[2][5] - 0.005).abs() < 1e-12, "{chain}");
     }
 }
+
+/// A slide of 120 mm on a guide whose middle is worn over 70 mm: the slide's centre is the mean of what is under it.
+#[test]
+fn val_a_slide_on_a_guide_that_is_worn_in_one_place() {
+    let machine = three_axes("[w b X Y Z t]");
+    let ticks = 6401;
+    let run = run(ticks, AxisSet::XYZ, |t| {
+        [-320.0 + 100.0 * t, 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+    let worn_um = |u_mm: f64| {
+        let way = (u_mm - 30.0) / 35.0;
+        if way.abs() < 1.0 {
+            -6.0 * (1.0 - way * way)
+        } else {
+            0.0
+        }
+    };
+    let under = |centre_mm: f64| {
+        let places = (-60..=60).map(|k| worn_um(centre_mm + f64::from(k)));
+        places.sum::<f64>() / 121.0
+    };
+    let line = run.motion.position[metrology::Axis::X].clone();
+    let height: Vec<f64> = line.iter().map(|u| under(*u)).collect();
+    let column = |name: &str| -> Vec<f64> {
+        let mut given = vec![("p2_um", 0.0), ("p3_um", 0.0)];
+        given.retain(|(other, _)| *other != name);
+        given.push((name, 1.0));
+        let response = response_of(&machine, &run, "straightness", "ZX", &given);
+        response.tip_mm[2].iter().map(|z| z * 1e3).collect()
+    };
+    let mut columns = vec![vec![1.0; ticks], line.clone()];
+    columns.extend(["p2_um", "p3_um", "free_p4_um", "free_p5_um"].map(column));
+    let (_, smooth) = fit(&columns, &height);
+    columns.extend((1..8).map(|k| column(&format!("free_{k}_of_8_um"))));
+    let (_, wide) = fit(&columns, &height);
+    let (_, straight) = fit(&columns[..2], &height);
+    println!("worn guide {straight:.2} um: P2 to P5 leave {smooth:.3}, with hats {wide:.3}");
+    assert!(smooth > 0.3 * straight && wide < 0.15 * straight);
+}
