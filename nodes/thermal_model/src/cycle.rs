@@ -129,6 +129,16 @@ impl Cycle {
     }
 }
 
+/// Whether a measurement has faces and none of them can be used: one that is old, told again, or senseless.
+pub fn is_useless(
+    measurement: &BlockMeasurement,
+    not_before: Option<Stamp<Host>>,
+    not_after: Stamp<Host>,
+) -> bool {
+    let mut faces = measurement.faces.0.iter().flatten().peekable();
+    faces.peek().is_some() && faces.all(|face| usable(face, not_before, not_after).is_err())
+}
+
 fn usable(
     face: &FacePosition,
     not_before: Option<Stamp<Host>>,

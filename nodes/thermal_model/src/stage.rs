@@ -11,7 +11,7 @@ use metrology::stamp::Span;
 use metrology::{Axis, Host, PerAxis, Stage, Stamp};
 
 use crate::config::{Method, ThermalModelConfig};
-use crate::cycle::Cycle;
+use crate::cycle::{Cycle, FaceRefusal, is_useless};
 use crate::diagnostic::Diagnostic;
 use crate::drift_field;
 use crate::error::ThermalModelError;
@@ -214,27 +214,38 @@ impl ThermalModelStage {
             }));
             return;
         };
-        let other = |c: &Cycle| c.run != measured.run || c.cold != measured.cold;
-        if self.cycle.as_ref().is_some_and(other) {
-            self.close_cycle(now, out);
-        }
-        let closes_at = now + Span::from_secs_f64(self.config.cycle.window_s);
-        let not_before = self.updated_at().filter(|_| !measured.cold);
+        let is_other = |c: &Cycle| c.run != measured.run || c.cold != measured.cold;
         let not_after = now + Span::from_secs_f64(self.config.cycle.clock_tolerance_s);
         let n_blocks = self.reference.n_blocks();
-        let cycle = self
-            .cycle
-            .get_or_insert_with(|| Cycle::new(n_blocks, measured.run, measured.cold, closes_at));
-        cycle.closes_at = closes_at;
-        for (axis, reason) in cycle.add(block, measured, not_before, not_after) {
-            out.push(Output::Diagnostic(Diagnostic::FaceRefused {
-                block_id: measured.block_id.clone(),
-                axis,
-                reason,
-            }));
+        let closes_at = now + Span::from_secs_f64(self.config.cycle.window_s);
+        let new = || Cycle::new(n_blocks, measured.run, measured.cold, closes_at);
+        let not_before = self.not_before(measured.cold);
+        if self.cycle.as_ref().is_none_or(is_other) && is_useless(measured, not_before, not_after) {
+            let refused = new().add(block, measured, not_before, not_after);
+            return refuse(measured, refused, out);
         }
-        if cycle.is_complete() && !self.segment_is_open {
+        if self.cycle.as_ref().is_some_and(is_other) {
             self.close_cycle(now, out);
+        }
+        let not_before = self.not_before(measured.cold);
+        let cycle = self.cycle.get_or_insert_with(new);
+        cycle.closes_at = closes_at;
+        let refused = cycle.add(block, measured, not_before, not_after);
+        let is_complete = cycle.is_complete();
+        refuse(measured, refused, out);
+        if is_complete && !self.segment_is_open {
+            self.close_cycle(now, out);
+        }
+    }
+
+    /// When the faces of a measurement must have been touched at the earliest. What the reference was taken from and is
+    /// told again must not replace it, with the other blocks missing.
+    fn not_before(&self, is_cold: bool) -> Option<Stamp<Host>> {
+        if is_cold {
+            let taken_at = self.reference.taken_at();
+            taken_at.map(|at| at + Span::from_nanos(1))
+        } else {
+            self.updated_at()
         }
     }
 
@@ -391,4 +402,14 @@ impl Stage for ThermalModelStage {
         }
         Ok(())
     }
+}
+
+fn refuse(measured: &BlockMeasurement, refused: Vec<(Axis, FaceRefusal)>, out: &mut Vec<Output>) {
+    out.extend(refused.into_iter().map(|(axis, reason)| {
+        Output::Diagnostic(Diagnostic::FaceRefused {
+            block_id: measured.block_id.clone(),
+            axis,
+            reason,
+        })
+    }));
 }

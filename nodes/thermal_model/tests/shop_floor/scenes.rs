@@ -446,3 +446,50 @@ fn a_copy_in_mid_run_goes_on_exactly_as_the_original() {
     }
     assert_eq!(format!("{:?}", shop.model()), format!("{:?}", copy.model()));
 }
+
+/// A message that comes twice: the cycle of the reference is over, and its last block must not begin another.
+#[test]
+fn a_cold_block_that_is_told_twice_leaves_the_whole_reference() {
+    let mut shop = Shop::new(config(""));
+    shop.run = 1;
+    for block in 0..2 {
+        shop.wait_s(30.0);
+        let measured = shop.measurement(block, true, |axis, corner| corner[axis.index()]);
+        shop.step(Input::Block(measured.clone()));
+        shop.step(Input::Block(measured));
+    }
+    shop.wait_s(600.0);
+    shop.tick();
+    drifted(&mut shop, 0.012);
+    assert_eq!(
+        seen(&shop, |d| matches!(d, Diagnostic::BlockMissing { .. })),
+        0
+    );
+    assert_eq!(
+        seen(&shop, |d| matches!(d, Diagnostic::FaceRefused { .. })),
+        3
+    );
+    assert!((k0_um(&shop, Axis::X) - 12.0).abs() < 1e-9);
+}
+
+/// What an earlier run measured comes again while another cycle is open: that one goes on.
+#[test]
+fn a_block_of_an_earlier_run_does_not_end_an_open_cycle() {
+    let mut shop = Shop::new(config(""));
+    shop.cold();
+    let cold = |axis: Axis, corner: Vector3<f64>| corner[axis.index()];
+    let old = shop.measurement(1, true, cold);
+    shop.wait_s(900.0);
+    shop.run += 1;
+    for block in 0..2 {
+        let warm = |axis: Axis, corner: Vector3<f64>| corner[axis.index()] + 0.012;
+        let measured = shop.measurement(block, false, warm);
+        shop.step(Input::Block(measured));
+        shop.step(Input::Block(old.clone()));
+    }
+    assert_eq!(
+        seen(&shop, |d| matches!(d, Diagnostic::BlockMissing { .. })),
+        0
+    );
+    assert!((k0_um(&shop, Axis::X) - 12.0).abs() < 1e-9);
+}
