@@ -6,6 +6,7 @@ use std::io::{Read, Seek};
 use mcap::records::{Record, Statistics, op};
 
 use super::chunk::{ChunkBuffer, Inside};
+use super::framing::is_framed;
 use super::walk::{Frame, Walker};
 use super::{LARGEST_CHUNK_BYTES, LossReason, MetadataRecord};
 use crate::layout::TimeSpan;
@@ -387,30 +388,10 @@ impl FileIndex {
 
 /// Parses one record, whatever its bytes are.
 pub(super) fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, LossReason> {
-    // mcap 0.26 subtracts the 4 bytes of an attachment's CRC before it has compared lengths.
-    if opcode == op::ATTACHMENT && !attachment_is_framed(body) {
+    if !is_framed(opcode, body) {
         return Err(LossReason::BadRecord { opcode });
     }
     mcap::parse_record(opcode, body).map_err(|_| LossReason::BadRecord { opcode })
-}
-
-fn attachment_is_framed(body: &[u8]) -> bool {
-    let text_end = |begin: usize| {
-        let length = body
-            .get(begin..)?
-            .first_chunk()
-            .map(|b| u32::from_le_bytes(*b))?;
-        begin.checked_add(4)?.checked_add(length as usize)
-    };
-    let framed = || {
-        let data_length_at = text_end(text_end(16)?)?;
-        let data_at = data_length_at.checked_add(8)?;
-        let data = body.get(data_length_at..data_at)?.first_chunk();
-        let data_bytes = data.map(|b| u64::from_le_bytes(*b))?;
-        let left = body.len().checked_sub(data_at.checked_add(4)?)?;
-        Some(data_bytes == left as u64)
-    };
-    framed().unwrap_or(false)
 }
 
 #[cfg(test)]
