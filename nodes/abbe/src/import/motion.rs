@@ -17,6 +17,10 @@ const REST_S: f64 = 2.0;
 const READINGS: u32 = 5;
 /// Rest before the readings of a stop, s.
 const SETTLE_S: f64 = 0.4;
+/// Longest motion that is made up for a table, s: a day.
+const LONGEST_S: f64 = 86_400.0;
+/// Slowest feed of one, mm/min.
+const SLOWEST_MM_MIN: f64 = 0.01;
 /// Share of a turn that a circle runs ahead of its first row.
 const AHEAD_RAD: f64 = std::f64::consts::FRAC_PI_2;
 
@@ -50,6 +54,7 @@ pub fn write(map: &Map, table: &Table, writer: &mut Writer) -> Result<u32> {
         }
         return Ok(n);
     }
+    check_time(&map.test, table)?;
     for rows in table.runs() {
         n += 1;
         match &map.test {
@@ -58,6 +63,37 @@ pub fn write(map: &Map, table: &Table, writer: &mut Writer) -> Result<u32> {
         }
     }
     Ok(n)
+}
+
+/// Refuses stops so far apart, or a feed so slow, that the motion would go on for days.
+fn check_time(test: &Test, table: &Table) -> Result<()> {
+    let (Test::Positioning { feed_mm_min, .. } | Test::Circle { feed_mm_min, .. }) = test else {
+        return Ok(());
+    };
+    if !(*feed_mm_min >= SLOWEST_MM_MIN) {
+        bail!("feed_mm_min = {feed_mm_min}: must be at least {SLOWEST_MM_MIN}");
+    }
+    let Test::Positioning {
+        dwell_s,
+        overrun_mm,
+        ..
+    } = test
+    else {
+        return Ok(());
+    };
+    let stops = table.rows.len() as f64;
+    let targets_mm = table
+        .rows
+        .windows(2)
+        .map(|two| (two[1][1] - two[0][1]).abs());
+    let way_mm = targets_mm.sum::<f64>() + 2.0 * stops * overrun_mm;
+    let time_s = way_mm / (feed_mm_min / 60.0) + stops * dwell_s;
+    if !(time_s <= LONGEST_S) {
+        bail!(
+            "{stops} stops, {way_mm} mm of way at feed_mm_min = {feed_mm_min} take {time_s:.0} s: at most {LONGEST_S} s"
+        );
+    }
+    Ok(())
 }
 
 fn segment(kind: TestKind, run: u32, feed_mm_min: f64) -> TestSegment {
@@ -245,7 +281,11 @@ fn circle(
 fn sense(angles: &[f64], run: u32) -> Result<f64> {
     let swept = angles.last().unwrap_or(&0.0) - angles.first().unwrap_or(&0.0);
     let sign = swept.signum();
-    if angles.windows(2).any(|two| (two[1] - two[0]) * sign <= 0.0) {
+    let goes_on = |two: &[f64]| {
+        let step = (two[1] - two[0]) * sign;
+        step > 0.0 && step <= std::f64::consts::PI
+    };
+    if !angles.windows(2).all(goes_on) {
         bail!("run {run}: angles must go round in one sense, in steps below half a turn");
     }
     Ok(sign)
@@ -286,4 +326,42 @@ fn log<'a>(
         }
     }
     writer.segment(&test, false)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn positioning(targets_mm: &[f64]) -> Result<()> {
+        let test = Test::Positioning {
+            axis: Axis::X,
+            feed_mm_min: 6000.0,
+            dwell_s: 2.0,
+            overrun_mm: 5.0,
+            run: "run".to_owned(),
+            target_mm: "target".to_owned(),
+            deviation_um: "deviation".to_owned(),
+        };
+        let rows = targets_mm.iter().map(|mm| vec![1.0, *mm, 0.0]).collect();
+        check_time(&test, &Table { rows })
+    }
+
+    #[test]
+    fn stops_that_would_take_days_to_reach_are_refused_with_the_time() {
+        assert!(positioning(&[0.0, 100.0, 200.0]).is_ok());
+        for far_mm in [1e8, 1e300, f64::MAX] {
+            let error = positioning(&[-far_mm, far_mm]).expect_err("without end");
+            assert!(format!("{error}").contains("at most 86400 s"), "{error}");
+        }
+    }
+
+    #[test]
+    fn angles_beyond_all_turns_are_refused_and_not_followed() {
+        for far_deg in [1e18, 1e300, f64::MAX] {
+            let angles = [0.0, 10.0, far_deg].map(f64::to_radians);
+            assert!(sense(&unwrapped(angles.into_iter()), 1).is_err());
+        }
+        let turn = (0..=36).map(|k| f64::from(k * 10).to_radians());
+        assert!(sense(&unwrapped(turn), 1).is_ok());
+    }
 }
