@@ -25,6 +25,8 @@ struct Standing {
     /// Since when it has not been seen; only for what the runtime itself reports.
     expires: Option<Instant>,
     silenced: u64,
+    /// Whether it has been published.
+    shown: bool,
 }
 
 /// All standing conditions and counters of one node.
@@ -35,6 +37,8 @@ pub(super) struct Board {
     counters: BTreeMap<String, u64>,
     /// `Ok` and shown all the same.
     figures: BTreeMap<Cow<'static, str>, Diagnostic>,
+    /// Began and ended since the last publication, so that it is seen all the same.
+    passing: BTreeMap<Cow<'static, str>, Diagnostic>,
     /// Reported `Ok` since the last publication, so that the end of a condition is seen.
     ended: Vec<Diagnostic>,
     changed: bool,
@@ -48,6 +52,7 @@ impl Board {
             standing: BTreeMap::new(),
             counters: BTreeMap::new(),
             figures: BTreeMap::new(),
+            passing: BTreeMap::new(),
             ended: Vec::new(),
             changed: true,
         }
@@ -85,9 +90,13 @@ impl Board {
             self.figures.remove(&name);
         }
         if diagnostic.level == Level::Ok {
-            if self.standing.remove(&name).is_some() {
-                tracing::info!(condition = &*name, "{}", diagnostic.message);
+            if let Some(standing) = self.standing.remove(&name) {
+                if !standing.shown {
+                    self.passing.insert(name, standing.diagnostic);
+                }
+                tracing::info!(condition = &*diagnostic.name, "{}", diagnostic.message);
                 if !diagnostic.stays {
+                    self.ended.retain(|ended| ended.name != diagnostic.name);
                     self.ended.push(diagnostic);
                 }
                 self.changed = true;
@@ -113,6 +122,7 @@ impl Board {
                     logged: now,
                     expires,
                     silenced: 0,
+                    shown: false,
                 };
                 self.standing.insert(name, standing);
             }
@@ -162,10 +172,17 @@ impl Board {
             hardware_id: String::new(),
             values,
         };
+        for standing in self.standing.values_mut() {
+            standing.shown = true;
+        }
         let standing = self.standing.values().map(|standing| &standing.diagnostic);
+        let passing = std::mem::take(&mut self.passing);
         let ended = std::mem::take(&mut self.ended);
-        let conditions = standing
+        // The last word on each is how it is now.
+        let conditions = passing
+            .values()
             .chain(&ended)
+            .chain(standing)
             .chain(self.figures.values())
             .map(|diagnostic| diagnostic.status(&self.node));
         DiagnosticArray {
@@ -260,6 +277,24 @@ mod tests {
         assert_eq!(names(&mut board).len(), 2);
         board.expire(now + Duration::from_secs(11));
         assert_eq!(names(&mut board)[1].1, 0);
+        assert_eq!(names(&mut board).len(), 1);
+    }
+
+    #[test]
+    fn a_condition_that_is_over_before_it_was_published_is_seen_once_all_the_same() {
+        let mut board = Board::new("/fake_cnc");
+        let now = Instant::now();
+        let say = |board: &mut Board, level| {
+            board.report(Diagnostic::new(level, "time", "jumped".into()), now);
+        };
+        for _ in 0..3 {
+            say(&mut board, Level::Warn);
+            say(&mut board, Level::Ok);
+        }
+        assert!(board.has_changed());
+        let time = "/fake_cnc: time".to_owned();
+        let seen = [("/fake_cnc".to_owned(), 0), (time.clone(), 1), (time, 0)];
+        assert_eq!(names(&mut board), seen);
         assert_eq!(names(&mut board).len(), 1);
     }
 }
