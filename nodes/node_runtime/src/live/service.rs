@@ -6,7 +6,7 @@
 //! bytes keep the alignment of what follows, so that they are put on and taken off without a look
 //! at the types.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use tokio::time::Instant;
@@ -104,6 +104,14 @@ struct Waiting {
     deadline: Option<Instant>,
 }
 
+/// A request that is open.
+struct Asked {
+    token: u64,
+    deadline: Option<Instant>,
+    /// The servers that were there: one that was started since never got it.
+    of: BTreeSet<Guid>,
+}
+
 /// The asking side. Requests wait until a server is there and has had time to find us too.
 pub(super) struct Client {
     pub name: String,
@@ -111,9 +119,10 @@ pub(super) struct Client {
     request_topic: String,
     reply_topic: String,
     queue: VecDeque<Waiting>,
-    asked: BTreeMap<RequestIdentity, (u64, Option<Instant>)>,
-    /// The reader of a server, and since when it has been seen.
-    server: Option<(Guid, Instant)>,
+    asked: BTreeMap<RequestIdentity, Asked>,
+    /// The readers of servers, and since when each has been seen. Besides the one that answers there may be one that was
+    /// killed and whose lease is not over.
+    servers: BTreeMap<Guid, Instant>,
     cyclone_requests: i64,
 }
 
@@ -130,7 +139,7 @@ impl Client {
             reply_topic,
             queue: VecDeque::new(),
             asked: BTreeMap::new(),
-            server: None,
+            servers: BTreeMap::new(),
             cyclone_requests: 0,
         }
     }
@@ -156,7 +165,7 @@ impl Client {
 
     /// The token of the request that a reply answers, once.
     pub fn answered(&mut self, identity: RequestIdentity) -> Option<u64> {
-        self.asked.remove(&identity).map(|(token, _)| token)
+        self.asked.remove(&identity).map(|asked| asked.token)
     }
 
     /// Looks whether a server is there, among everybody's writers and readers.
@@ -164,18 +173,19 @@ impl Client {
         let replies = writers
             .iter()
             .any(|writer| writer.dds_topic == self.reply_topic);
-        let reader = readers
+        let found = readers
             .iter()
-            .find(|reader| replies && reader.dds_topic == self.request_topic);
-        self.server = reader.map(|reader| {
-            let since = self.server.map_or(now, |(_, since)| since);
-            (reader.guid, since)
-        });
+            .filter(|reader| replies && reader.dds_topic == self.request_topic);
+        let since = |guid: Guid| self.servers.get(&guid).copied().unwrap_or(now);
+        self.servers = found
+            .map(|reader| (reader.guid, since(reader.guid)))
+            .collect();
     }
 
     /// Sends what waits, if a server is there.
     pub fn send(&mut self, now: Instant) -> Result<(), PublishError> {
-        let Some((server, since)) = self.server else {
+        let newest = self.servers.iter().max_by_key(|(_, since)| **since);
+        let Some((server, since)) = newest.map(|(server, since)| (*server, *since)) else {
             return Ok(());
         };
         if now.duration_since(since) < SETTLING {
@@ -193,8 +203,12 @@ impl Client {
             } else {
                 self.writer.request(&waiting.bytes)?
             };
-            self.asked
-                .insert(identity, (waiting.token, waiting.deadline));
+            let asked = Asked {
+                token: waiting.token,
+                deadline: waiting.deadline,
+                of: self.servers.keys().copied().collect(),
+            };
+            self.asked.insert(identity, asked);
         }
         Ok(())
     }
@@ -210,25 +224,28 @@ impl Client {
             }
             !expired
         });
-        self.asked.retain(|_, (token, deadline)| {
-            let expired = over(*deadline);
+        self.asked.retain(|_, asked| {
+            let expired = over(asked.deadline);
             if expired {
-                tokens.push(*token);
+                tokens.push(asked.token);
             }
             !expired
         });
         tokens
     }
 
-    /// Whether the server of open requests has gone; forgets them and gives their tokens.
+    /// Forgets open requests whose servers have all gone, also where another one is there by now; gives their tokens.
     pub fn abandoned(&mut self) -> Vec<u64> {
-        if self.server.is_some() {
-            return Vec::new();
-        }
-        std::mem::take(&mut self.asked)
-            .into_values()
-            .map(|(token, _)| token)
-            .collect()
+        let servers = &self.servers;
+        let mut tokens = Vec::new();
+        self.asked.retain(|_, asked| {
+            let is_there = asked.of.iter().any(|server| servers.contains_key(server));
+            if !is_there {
+                tokens.push(asked.token);
+            }
+            is_there
+        });
+        tokens
     }
 }
 
