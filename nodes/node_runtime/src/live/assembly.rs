@@ -100,6 +100,7 @@ impl Assembly {
                 qos,
                 received: 0,
                 lost: 0,
+                turns: 0,
             });
         }
         Ok(subscriptions)

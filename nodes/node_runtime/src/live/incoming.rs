@@ -1,6 +1,6 @@
 //! What reaches a node's owner through its one queue, and the tasks that put it there.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use abbe_msgs::msg::HostClock as HostClockMessage;
@@ -25,12 +25,13 @@ pub(super) const QUEUE_LEN: usize = 1_024;
 /// One thing that happened.
 #[derive(Debug)]
 pub(super) enum Incoming {
-    /// A message for the node; `lost` came never since the one before.
+    /// A message for the node; `lost` came never since the one before, `takes_turns` is of [`Turns`].
     Message {
         subscription: usize,
         bytes: Bytes,
         received: Stamp<Host>,
         lost: u64,
+        takes_turns: bool,
     },
     /// A sample that is no plain CDR.
     Unreadable { topic: Arc<str>, reason: String },
@@ -82,6 +83,26 @@ impl GapCounter {
     }
 }
 
+/// Tells writers that speak by turns from one that took over: who was started anew does not fall silent again.
+#[derive(Debug, Default)]
+pub(crate) struct Turns {
+    speaks: Option<Guid>,
+    spoke: BTreeSet<Guid>,
+}
+
+impl Turns {
+    /// Whether `writer`, whose sample came, had spoken before another one did.
+    pub fn take(&mut self, writer: Guid) -> bool {
+        match self.speaks.replace(writer) {
+            Some(before) if before != writer => {
+                self.spoke.insert(before);
+                self.spoke.contains(&writer)
+            }
+            _ => false,
+        }
+    }
+}
+
 /// The reading tasks of a node; they end with it.
 pub(super) struct Readers {
     tasks: JoinSet<()>,
@@ -125,8 +146,10 @@ impl Readers {
 
     pub fn messages(&mut self, topic: &str, reader: Reader, subscription: usize) {
         let mut gaps = GapCounter::default();
+        let mut turns = Turns::default();
         self.spawn(topic, reader, move |sample| {
             let lost = gaps.count(sample.writer, sample.sequence);
+            let takes_turns = turns.take(sample.writer);
             let Sample {
                 bytes, received, ..
             } = sample;
@@ -135,6 +158,7 @@ impl Readers {
                 bytes,
                 received,
                 lost,
+                takes_turns,
             })
         });
     }
@@ -217,5 +241,14 @@ mod tests {
             .map(|(writer, sequence)| gaps.count(writer, sequence))
             .into();
         assert_eq!(lost, [0, 0, 0, 2, 0, 0, 0]);
+    }
+
+    #[test]
+    fn a_writer_that_comes_back_takes_turns_and_one_that_takes_over_does_not() {
+        let (a, b, c) = ([1; 16], [2; 16], [3; 16]);
+        let mut turns = Turns::default();
+        let found: Vec<_> = [a, a, b, b, c, c, b, c, c].map(|w| turns.take(w)).into();
+        let expected = [false, false, false, false, false, false, true, true, false];
+        assert_eq!(found, expected);
     }
 }

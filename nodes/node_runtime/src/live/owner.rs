@@ -59,6 +59,8 @@ pub(super) struct Subscription {
     pub qos: Qos,
     pub received: u64,
     pub lost: u64,
+    /// Samples since the last look at which another publisher came back.
+    pub turns: u64,
 }
 
 pub(super) struct Publication {

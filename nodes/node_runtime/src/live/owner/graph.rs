@@ -1,4 +1,4 @@
-//! Looking at the others on the network: wrong types, impossible QoS, a second node of our name.
+//! Looking at the others on the network: wrong types, impossible QoS, a second node of our name, a second publisher.
 
 use abbe_msgs::{Durability, Qos, Reliability};
 
@@ -80,9 +80,28 @@ impl Owner {
         }
         self.complain("type_mismatch", of_type);
         self.complain("qos_incompatible", of_qos);
+        self.check_publishers();
         if self.participant.namesake() {
             let message = format!("another node is called {}", self.name);
             self.notice(Diagnostic::new(Level::Error, "second_node", message));
+        }
+    }
+
+    /// Says which topics more than one publisher speaks on by turns.
+    fn check_publishers(&mut self) {
+        let mut complaints = Vec::new();
+        for subscription in &mut self.subscriptions {
+            let turns = std::mem::take(&mut subscription.turns);
+            if turns > 0 {
+                let topic = &subscription.topic;
+                complaints.push(format!(
+                    "{topic}: more than one publisher, {turns} changes between them since the last look"
+                ));
+            }
+        }
+        if !complaints.is_empty() {
+            let message = complaints.join("; ");
+            self.notice(Diagnostic::new(Level::Warn, "second_publisher", message));
         }
     }
 

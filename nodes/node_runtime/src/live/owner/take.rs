@@ -24,7 +24,9 @@ impl Owner {
                 bytes,
                 received,
                 lost,
+                takes_turns,
             } => {
+                self.subscriptions[subscription].turns += u64::from(takes_turns);
                 self.count_message(subscription, lost);
                 let at = self.instant(Some(received));
                 let bytes = &bytes;
