@@ -10,6 +10,7 @@
 mod dependencies;
 mod documents;
 mod folders;
+mod layouts;
 mod names;
 mod packages;
 mod parameters;
