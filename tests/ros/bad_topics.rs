@@ -8,7 +8,7 @@ use abbe_msgs::{to_cdr, topics};
 use abbe_tests::program::{Process, domain};
 use abbe_tests::scenario::Scenario;
 
-use crate::graph::{Graph, Voice, now, port};
+use abbe_tests::graph::{Graph, Voice, now, port};
 
 fn state(controller_stamp: Time) -> AxisState {
     let mut state = AxisState::default();

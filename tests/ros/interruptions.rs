@@ -9,7 +9,7 @@ use metrology::sample::CompensationState;
 use nix::sys::signal::Signal;
 use recorder::{Bag, Event, Order};
 
-use crate::graph::Graph;
+use abbe_tests::graph::Graph;
 
 /// A cell in real time takes this long to its first probed point, with discovery.
 const FIRST_POINT: Duration = Duration::from_secs(60);

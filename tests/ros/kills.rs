@@ -13,7 +13,7 @@ use metrology::sample::PlanState;
 use nix::sys::signal::Signal;
 use recorder::{Bag, Event, Order};
 
-use crate::graph::{Graph, Voice, now, port};
+use abbe_tests::graph::{Graph, Voice, now, port};
 
 const NODES: [&str; 6] = [
     "fake_cnc",
@@ -286,12 +286,28 @@ fn check_bags(bags: &[std::path::PathBuf; 2]) {
 /// has failed rather than hangs.
 #[test]
 fn a_controller_that_dies_under_a_program_fails_the_plan_and_says_so() {
+    dies_under_a_program(domain(8), |_| ());
+}
+
+/// The same when it is there again before its lease is over, and knows nothing of the program.
+#[test]
+fn a_controller_that_comes_back_without_its_program_fails_the_plan_and_says_so() {
+    abbe_tests::namespace::alone("a controller that comes back", || {
+        dies_under_a_program(domain(8), |cell| {
+            let restarted = Instant::now();
+            cell.launch("fake_cnc");
+            cell.graph.next(&topics::AXES_STATE, restarted, |_| true);
+        });
+    });
+}
+
+fn dies_under_a_program(domain: u16, then: impl FnOnce(&mut Cell)) {
     let scenario = Scenario::copy_of("short_cell");
     scenario.write(
         "plan.yaml",
         "title: part\nsteps:\n  - {do: produce, program: production.ngc, minutes: 10.0, serve_updates: false}\n",
     );
-    let mut cell = Cell::start(scenario, domain(8), &["fake_cnc", "sequencer"]);
+    let mut cell = Cell::start(scenario, domain, &["fake_cnc", "sequencer"]);
     let began = Instant::now() - Duration::from_secs(60);
     cell.graph.wait("the axes move", |graph| {
         let states = graph.inner_since(&topics::AXES_STATE, began);
@@ -301,6 +317,7 @@ fn a_controller_that_dies_under_a_program_fails_the_plan_and_says_so() {
     });
     let killed = cell.kill("fake_cnc");
     cell.others_go_on(killed);
+    then(&mut cell);
     let patience = Duration::from_secs(90);
     let words = ["vanished"];
     cell.graph

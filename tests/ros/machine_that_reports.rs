@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use abbe_msgs::{from_cdr, msg, sensor_msgs, topics};
 use abbe_tests::program::{Process, domain};
 
-use crate::graph::Graph;
+use abbe_tests::graph::Graph;
 
 const NODE: &str = "mtconnect_bridge";
 const MAP: &str = "values:

@@ -8,7 +8,6 @@
 
 mod bad_topics;
 mod debian;
-mod graph;
 mod interruptions;
 mod kills;
 mod machine_that_reports;

@@ -7,7 +7,7 @@ use abbe_msgs::topics;
 use abbe_tests::program::{Process, command, domain, root};
 use recorder::{Bag, Event, Order};
 
-use crate::graph::Graph;
+use abbe_tests::graph::Graph;
 
 const END: Duration = Duration::from_secs(60);
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use abbe_tests::program::{Ended, Process, abbe, command, domain};
 use abbe_tests::scenario::Scenario;
 
-use crate::graph::Graph;
+use abbe_tests::graph::Graph;
 
 const PATIENCE: Duration = Duration::from_secs(20);
 

@@ -1,5 +1,6 @@
 //! The graph as a test sees it: every topic, and a voice on some.
 
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -28,6 +29,11 @@ pub struct Graph {
 }
 
 impl Graph {
+    /// Joins it as a node that only listens.
+    ///
+    /// # Panics
+    /// When there is no network.
+    #[must_use]
     pub fn join(domain: u16) -> Self {
         Self::join_by(Environment {
             domain_id: domain,
@@ -54,6 +60,10 @@ impl Graph {
     }
 
     /// A node that can speak on `topics`.
+    ///
+    /// # Panics
+    /// When there is no network.
+    #[must_use]
     pub fn voice(&self, topics: &[TopicPort]) -> Voice {
         let names = NodeNames::new("voice", &[]).unwrap();
         let patience = Duration::from_millis(100);
@@ -61,6 +71,10 @@ impl Graph {
     }
 
     /// Messages of a topic since `since`, with the time of their arrival.
+    ///
+    /// # Panics
+    /// When one cannot be decoded.
+    #[must_use]
     pub fn since<M: Message>(&self, topic: &Topic<M>, since: Instant) -> Vec<(Instant, M)> {
         let name = format!("/{}", topic.name.trim_start_matches('/'));
         let heard = self.heard.lock().unwrap();
@@ -78,6 +92,10 @@ impl Graph {
     }
 
     /// Every message of an absolute topic so far, as it came.
+    ///
+    /// # Panics
+    /// When the listener has panicked.
+    #[must_use]
     pub fn bytes_of(&self, topic: &str) -> Vec<Vec<u8>> {
         let heard = self.heard.lock().unwrap();
         let of_topic = heard.samples.iter().filter(|(_, name, _)| name == topic);
@@ -85,6 +103,10 @@ impl Graph {
     }
 
     /// The same in inner units.
+    ///
+    /// # Panics
+    /// When one has no inner form.
+    #[must_use]
     pub fn inner_since<M: Wire>(&self, topic: &Topic<M>, since: Instant) -> Vec<M::Inner> {
         let messages = self.since(topic, since);
         messages
@@ -94,10 +116,17 @@ impl Graph {
     }
 
     /// Waits until `look` finds what it looks for.
+    ///
+    /// # Panics
+    /// When it does not within 15 s.
     pub fn wait<T>(&self, what: &str, look: impl FnMut(&Self) -> Option<T>) -> T {
         self.wait_longer(PATIENCE, what, look)
     }
 
+    /// The same with a patience of its own.
+    ///
+    /// # Panics
+    /// When it does not within `patience`.
     pub fn wait_longer<T>(
         &self,
         patience: Duration,
@@ -115,6 +144,9 @@ impl Graph {
     }
 
     /// Waits for a message of `topic` since `since` that `pick` takes.
+    ///
+    /// # Panics
+    /// As [`Self::wait`].
     pub fn next<M: Message>(
         &self,
         topic: &Topic<M>,
@@ -128,6 +160,9 @@ impl Graph {
     }
 
     /// Waits until `node` says anything about itself since `since`.
+    ///
+    /// # Panics
+    /// As [`Self::wait`].
     pub fn alive(&self, node: &str, since: Instant) {
         let name = format!("/{node}");
         self.wait(
@@ -141,6 +176,9 @@ impl Graph {
     }
 
     /// Waits for a condition of `node`, above OK, whose message holds all of `words`.
+    ///
+    /// # Panics
+    /// As [`Self::wait`].
     pub fn condition(
         &self,
         node: &str,
@@ -151,6 +189,38 @@ impl Graph {
         self.condition_within(PATIENCE, node, condition, words, since)
     }
 
+    /// What `node` said of its conditions since `since`, each once.
+    fn conditions_of(&self, node: &str, since: Instant) -> BTreeSet<String> {
+        let all = self.since(&topics::DIAGNOSTICS, since);
+        let statuses = all.into_iter().flat_map(|(_, array)| array.status);
+        let own = statuses.filter(|status| status.name.starts_with(&format!("/{node}: ")));
+        own.map(|status| format!("{} {}: {}", status.level, status.name, status.message))
+            .collect()
+    }
+
+    /// A condition of `node`, above OK, that was said since `since` and whose message holds all of `words`.
+    #[must_use]
+    pub fn hears_condition(
+        &self,
+        node: &str,
+        condition: &str,
+        words: &[&str],
+        since: Instant,
+    ) -> Option<DiagnosticStatus> {
+        let name = format!("/{node}: {condition}");
+        let all = self.since(&topics::DIAGNOSTICS, since);
+        let mut statuses = all.into_iter().flat_map(|(_, array)| array.status);
+        statuses.find(|status| {
+            status.name.starts_with(&name)
+                && status.level > 0
+                && words.iter().all(|word| status.message.contains(word))
+        })
+    }
+
+    /// The same with a patience of its own.
+    ///
+    /// # Panics
+    /// As [`Self::wait_longer`].
     pub fn condition_within(
         &self,
         patience: Duration,
@@ -159,17 +229,18 @@ impl Graph {
         words: &[&str],
         since: Instant,
     ) -> DiagnosticStatus {
-        let name = format!("/{node}: {condition}");
-        let what = format!("{name} with {words:?}");
-        let found = self.wait_longer(patience, &what, |graph| {
-            let all = graph.since(&topics::DIAGNOSTICS, since);
-            let mut statuses = all.into_iter().flat_map(|(_, array)| array.status);
-            statuses.find(|status| {
-                status.name.starts_with(&name)
-                    && status.level > 0
-                    && words.iter().all(|word| status.message.contains(word))
-            })
-        });
+        let deadline = Instant::now() + patience;
+        let found = loop {
+            if let Some(found) = self.hears_condition(node, condition, words, since) {
+                break found;
+            }
+            assert!(
+                Instant::now() < deadline,
+                "/{node}: {condition} with {words:?}: not within {patience:?}, but {:?}",
+                self.conditions_of(node, since)
+            );
+            std::thread::sleep(Duration::from_millis(20));
+        };
         eprintln!("{}: {}", found.name, found.message);
         found
     }
@@ -187,20 +258,33 @@ impl Drop for Graph {
 pub struct Voice(RawPublisher);
 
 impl Voice {
+    /// Says a message on the topic at `place`.
+    ///
+    /// # Panics
+    /// As [`Self::bytes`].
     pub fn say(&mut self, place: usize, message: &impl Message) {
         self.bytes(place, &to_cdr(message));
     }
 
+    /// Says bytes.
+    ///
+    /// # Panics
+    /// When they find no room within 100 ms.
     pub fn bytes(&mut self, place: usize, bytes: &[u8]) {
         assert!(self.0.publish(place, None, Arc::from(bytes)));
     }
 
+    /// Leaves.
+    ///
+    /// # Panics
+    /// When its thread panicked.
     pub fn stop(self) {
         self.0.stop().unwrap();
     }
 }
 
 /// A topic of ours as a port.
+#[must_use]
 pub fn port<M: Message>(topic: &Topic<M>) -> TopicPort {
     TopicPort {
         topic: topic.name.to_owned(),
@@ -212,6 +296,10 @@ pub fn port<M: Message>(topic: &Topic<M>) -> TopicPort {
 }
 
 /// Now, as the wire has it.
+///
+/// # Panics
+/// When the computer's clock is beyond 2038.
+#[must_use]
 pub fn now() -> abbe_msgs::builtin_interfaces::msg::Time {
     let nanos = RawPublisher::now().nanos();
     abbe_msgs::builtin_interfaces::msg::Time {

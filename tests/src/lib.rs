@@ -1,5 +1,5 @@
 //! What no crate can test alone, and what those tests share: the built program, nodes as processes,
-//! Python as the other side, scenarios in a folder of their own.
+//! the graph as a witness hears it, Python as the other side, scenarios in a folder of their own.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 #![expect(
     clippy::disallowed_methods,
@@ -8,6 +8,8 @@
 #![expect(clippy::print_stderr, reason = "what is not tested is said")]
 
 pub mod cyclone;
+pub mod graph;
+pub mod namespace;
 pub mod program;
 pub mod python;
 pub mod scenario;

@@ -1,0 +1,125 @@
+//! A disk that fills up while a bag is written to it.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use abbe_msgs::topics;
+use abbe_tests::graph::Graph;
+use abbe_tests::namespace;
+use abbe_tests::program::{Process, command, domain};
+use abbe_tests::scenario::Scenario;
+use nix::sys::signal::Signal;
+use recorder::{Bag, Event, Order};
+
+/// Size of the disk, KiB.
+const DISK_KIB: u32 = 512;
+
+/// Messages and losses of a bag.
+fn content(bag: &Path) -> (u64, Vec<String>) {
+    let bag = Bag::open(bag).unwrap();
+    let mut events = bag.messages(Order::File);
+    let (mut messages, mut losses) = (0, Vec::new());
+    while let Some(event) = events.next_event() {
+        match event {
+            Event::Message(_) => messages += 1,
+            Event::Loss(loss) => losses.push(loss.to_string()),
+        }
+    }
+    (messages, losses)
+}
+
+/// The number before `word` in a text.
+fn number_before(text: &str, word: &str) -> u64 {
+    let before = text[..text.find(word).unwrap()].trim_end();
+    let digits = before.rsplit(' ').next().unwrap();
+    digits
+        .parse()
+        .unwrap_or_else(|_| panic!("{digits}: {text}"))
+}
+
+/// A machine that stands and says where a thousand times a second.
+fn standing_machine() -> Scenario {
+    let scenario = Scenario::copy_of("short_cell");
+    scenario.replace("fake_cnc.yaml", "    background_rate_hz: 10.0\n", "");
+    scenario
+}
+
+#[test]
+fn a_recorder_whose_disk_fills_says_where_and_how_much_and_the_cell_goes_on() {
+    namespace::alone("a recorder on a full disk", || {
+        let (scenario, domain) = (standing_machine(), domain(5));
+        let disk = scenario.path("disk");
+        namespace::small_disk(&disk, DISK_KIB);
+        let bag = disk.join("bag");
+        let graph = Graph::join(domain);
+        let file = scenario.argument("fake_cnc.yaml");
+        let machine = Process::node(domain, "fake_cnc", &["--params-file", &file]);
+        let place = format!("bag:={}", bag.display());
+        let arguments = ["-p", &place, "-p", "writing.compression:=none"];
+        let mut recorder = Process::node(domain, "recorder", &arguments);
+        let began = Instant::now();
+        let path = bag.join("bag_0.mcap").display().to_string();
+        let patience = Duration::from_secs(40);
+        let words = [path.as_str(), "no space", "messages"];
+        let said = graph.condition_within(patience, "recorder", "recording", &words, began);
+        // What it says to stay is there, and is all of the bag.
+        let (messages, losses) = content(&bag);
+        assert!(messages > 100, "{messages}");
+        assert_eq!(losses.len(), 1, "{losses:?}");
+        assert_eq!(
+            number_before(&said.message, " messages are written"),
+            messages
+        );
+        // The cell and the recorder go on; whoever looks later is told too.
+        let later = Instant::now() + Duration::from_secs(1);
+        graph.next(&topics::AXES_STATE, later, |_| true);
+        graph.condition("recorder", "recording", &words, later);
+        graph.alive("recorder", later);
+        assert!(recorder.is_running());
+        recorder.stop();
+        assert_eq!(content(&bag).0, messages);
+        machine.stop();
+    });
+}
+
+#[test]
+fn abbe_record_on_a_full_disk_ends_with_the_reason_and_exit_code_1() {
+    namespace::alone("abbe record on a full disk", || {
+        let (scenario, domain) = (standing_machine(), domain(6));
+        let disk = scenario.path("disk");
+        namespace::small_disk(&disk, DISK_KIB);
+        let bag = disk.join("bag");
+        let file = scenario.argument("fake_cnc.yaml");
+        let machine = Process::node(domain, "fake_cnc", &["--params-file", &file]);
+        let place = bag.display().to_string();
+        let arguments = ["record", "-o", &place, "--compression", "none"];
+        let record = Process::start(command(domain, &arguments));
+        std::thread::sleep(Duration::from_secs(8));
+        record.signal(Signal::SIGINT);
+        let ended = record.ended_within(Duration::from_secs(20));
+        eprintln!("{}", ended.said.trim());
+        assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+        for word in ["bag_0.mcap", "no space"] {
+            assert!(ended.said.contains(word), "{word}: {}", ended.said);
+        }
+        let (messages, losses) = content(&bag);
+        assert!(messages > 100 && losses.len() == 1, "{messages} {losses:?}");
+        machine.stop();
+    });
+}
+
+#[test]
+fn a_scenario_whose_disk_fills_ends_with_the_reason_and_its_bag_is_read() {
+    namespace::alone("a scenario on a full disk", || {
+        let scenario = Scenario::copy_of("cold_reference");
+        namespace::small_disk(&scenario.out(), DISK_KIB / 2);
+        let ended = scenario.run_to_end(&[]);
+        eprintln!("{}", ended.said.trim());
+        assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+        for word in ["bag_0.mcap", "no space"] {
+            assert!(ended.said.contains(word), "{word}: {}", ended.said);
+        }
+        let (messages, losses) = content(&scenario.new_run(&[]).join("bag"));
+        assert!(messages > 100 && losses.len() == 1, "{messages} {losses:?}");
+    });
+}

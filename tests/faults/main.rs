@@ -1,0 +1,15 @@
+//! Faults from outside: full disks, messages that are doubled, out of order, stale or senseless, clocks that step, second
+//! publishers, more participants than find each other. Each in a network of its own.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "tests wait, look at clocks and read files"
+)]
+#![expect(clippy::print_stderr, reason = "figures that were seen are said")]
+
+mod crowd;
+mod disk;
+mod messages;
+mod offsets;
+mod said;
+mod tables;
