@@ -153,5 +153,8 @@ fn records(path: &Path) -> (u64, u64) {
     // A publisher numbers what it says from 1.
     let published: u64 = counts.values().map(|(_, last)| u64::from(*last)).sum();
     assert_eq!(told("messages"), records, "{own:?}");
-    (records, told("lost") + published.saturating_sub(records))
+    (
+        records,
+        told("messages_lost") + published.saturating_sub(records),
+    )
 }

@@ -218,25 +218,7 @@ fn the_thermal_model_refuses_stale_and_senseless_measurements_and_says_so() {
         std::thread::sleep(Duration::from_secs(1));
         let lost = graph.hears_condition("thermal_model", "", &["was not measured"], since);
         assert_eq!(lost, None);
-        // Of an hour ago and of the next: neither makes a model.
-        for (age_s, word) in [
-            (3_600, "before the last update"),
-            (-3_600, "later than reported"),
-        ] {
-            let since = Instant::now();
-            for (id, position_m) in blocks {
-                let shifted = position_m.map(|m| m + 50e-6);
-                let mut old = block(id, shifted, age_s);
-                old.cold = false;
-                old.run = 2;
-                voice.say(0, &old);
-            }
-            graph.condition("thermal_model", "", &[word], since);
-            let models = graph.since(&topics::THERMAL_MODEL, since);
-            let moved = |k0_m: f64| k0_m.abs() > 1e-9;
-            let mut axes = models.iter().flat_map(|(_, model)| &model.axes);
-            assert!(!axes.any(|axis| moved(axis.k0_m)), "{models:?}");
-        }
+        of_another_hour(&graph, &mut voice, &blocks);
         let since = Instant::now();
         voice.say(1, &warmth(20.5));
         std::thread::sleep(Duration::from_secs(4));
@@ -247,6 +229,28 @@ fn the_thermal_model_refuses_stale_and_senseless_measurements_and_says_so() {
         voice.stop();
         node.stop();
     });
+}
+
+/// Of an hour ago and of the next: neither makes a model.
+fn of_another_hour(graph: &Graph, voice: &mut Voice, blocks: &[(&str, [f64; 3])]) {
+    for (age_s, word) in [
+        (3_600, "before the last update"),
+        (-3_600, "later than reported"),
+    ] {
+        let since = Instant::now();
+        for (id, position_m) in blocks {
+            let shifted = position_m.map(|m| m + 50e-6);
+            let mut old = block(id, shifted, age_s);
+            old.cold = false;
+            old.run = 2;
+            voice.say(0, &old);
+        }
+        graph.condition("thermal_model", "", &[word], since);
+        let models = graph.since(&topics::THERMAL_MODEL, since);
+        let moved = |k0_m: f64| k0_m.abs() > 1e-9;
+        let mut axes = models.iter().flat_map(|(_, model)| &model.axes);
+        assert!(!axes.any(|axis| moved(axis.k0_m)), "{models:?}");
+    }
 }
 
 fn block(id: &str, position_m: [f64; 3], age_s: i64) -> BlockMeasurement {

@@ -106,7 +106,7 @@ fn run((name, target): &Target, executions: Option<u64>, seed: u64) -> bool {
     for input in seeds.iter().cloned().chain(changed) {
         let enough = match executions {
             Some(executions) => executed >= executions,
-            None => executed >= LEAST && executed % ROUND == 0 && began.elapsed() > SHORT,
+            None => executed >= LEAST && executed.is_multiple_of(ROUND) && began.elapsed() > SHORT,
         };
         if enough {
             break;

@@ -70,7 +70,7 @@ fn check_time(test: &Test, table: &Table) -> Result<()> {
     let (Test::Positioning { feed_mm_min, .. } | Test::Circle { feed_mm_min, .. }) = test else {
         return Ok(());
     };
-    if !(*feed_mm_min >= SLOWEST_MM_MIN) {
+    if feed_mm_min.is_nan() || *feed_mm_min < SLOWEST_MM_MIN {
         bail!("feed_mm_min = {feed_mm_min}: must be at least {SLOWEST_MM_MIN}");
     }
     let Test::Positioning {
@@ -88,7 +88,7 @@ fn check_time(test: &Test, table: &Table) -> Result<()> {
         .map(|two| (two[1][1] - two[0][1]).abs());
     let way_mm = targets_mm.sum::<f64>() + 2.0 * stops * overrun_mm;
     let time_s = way_mm / (feed_mm_min / 60.0) + stops * dwell_s;
-    if !(time_s <= LONGEST_S) {
+    if time_s.is_nan() || time_s > LONGEST_S {
         bail!(
             "{stops} stops, {way_mm} mm of way at feed_mm_min = {feed_mm_min} take {time_s:.0} s: at most {LONGEST_S} s"
         );

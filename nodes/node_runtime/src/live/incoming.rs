@@ -25,13 +25,12 @@ pub(super) const QUEUE_LEN: usize = 1_024;
 /// One thing that happened.
 #[derive(Debug)]
 pub(super) enum Incoming {
-    /// A message for the node; `lost` came never since the one before, `takes_turns` is of [`Turns`].
+    /// A message for the node.
     Message {
         subscription: usize,
         bytes: Bytes,
         received: Stamp<Host>,
-        lost: u64,
-        takes_turns: bool,
+        after: After,
     },
     /// A sample that is no plain CDR.
     Unreadable { topic: Arc<str>, reason: String },
@@ -56,6 +55,15 @@ pub(super) enum Incoming {
     Clock(Stamp<Host>),
     /// How the clock of a host stands to the reference's.
     HostClock(Box<HostClock>),
+}
+
+/// How a message follows what came on its topic before.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct After {
+    /// Samples of its writer that never came since the one before.
+    pub lost: u64,
+    /// Whether another writer spoke in between: [`Turns::take`].
+    pub takes_turns: bool,
 }
 
 /// Counts what a topic's writers sent and we never got.
@@ -148,8 +156,10 @@ impl Readers {
         let mut gaps = GapCounter::default();
         let mut turns = Turns::default();
         self.spawn(topic, reader, move |sample| {
-            let lost = gaps.count(sample.writer, sample.sequence);
-            let takes_turns = turns.take(sample.writer);
+            let after = After {
+                lost: gaps.count(sample.writer, sample.sequence),
+                takes_turns: turns.take(sample.writer),
+            };
             let Sample {
                 bytes, received, ..
             } = sample;
@@ -157,8 +167,7 @@ impl Readers {
                 subscription,
                 bytes,
                 received,
-                lost,
-                takes_turns,
+                after,
             })
         });
     }

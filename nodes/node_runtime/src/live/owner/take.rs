@@ -10,7 +10,7 @@ use super::{ClientUse, Owner, Reply, ServerUse, Timers};
 use crate::diagnostic::{Diagnostic, Level};
 use crate::live::action_client::{Ask, News};
 use crate::live::action_server::{Answer, GoalService};
-use crate::live::incoming::Incoming;
+use crate::live::incoming::{After, Incoming};
 use crate::live::service::ReplyTo;
 use crate::live::timers::SimulatedTimers;
 use crate::live::type_description;
@@ -23,11 +23,9 @@ impl Owner {
                 subscription,
                 bytes,
                 received,
-                lost,
-                takes_turns,
+                after,
             } => {
-                self.subscriptions[subscription].turns += u64::from(takes_turns);
-                self.count_message(subscription, lost);
+                self.count_message(subscription, after);
                 let at = self.instant(Some(received));
                 let bytes = &bytes;
                 let event = Event::Message {
@@ -80,9 +78,10 @@ impl Owner {
         }
     }
 
-    fn count_message(&mut self, place: usize, lost: u64) {
+    fn count_message(&mut self, place: usize, After { lost, takes_turns }: After) {
         let subscription = &mut self.subscriptions[place];
         subscription.received += 1;
+        subscription.turns += u64::from(takes_turns);
         if lost == 0 {
             return;
         }
