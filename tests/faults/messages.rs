@@ -16,7 +16,7 @@ use rand_pcg::Pcg64Mcg;
 use crate::said::{later, state};
 
 /// Nodes, the scenario of each, and the topic that it hears here.
-const LISTENERS: [(&str, &str, &str); 7] = [
+const LISTENERS: [(&str, &str, &str); 8] = [
     ("probe", "short_cell", topics::AXES_STATE.name),
     ("latency_calibrator", "short_cell", topics::AXES_STATE.name),
     ("axis_compensation", "short_cell", topics::AXES_STATE.name),
@@ -24,6 +24,7 @@ const LISTENERS: [(&str, &str, &str); 7] = [
     ("thermal_model", "short_cell", topics::TEST_SEGMENT.name),
     ("sequencer", "short_cell", topics::PROBE_TRIGGER.name),
     ("rotary_axes", "five_axis", topics::TEST_SEGMENT.name),
+    ("gap_diagnosis", "gap_wear", topics::AXES_STATE.name),
 ];
 
 const STATES: usize = 0;

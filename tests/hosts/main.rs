@@ -11,9 +11,6 @@
 
 mod bag;
 mod cuts;
-#[expect(dead_code, reason = "what it has for other tests")]
-#[path = "../ros/graph.rs"]
-mod graph;
 mod network;
 mod switch;
 mod three_hosts;

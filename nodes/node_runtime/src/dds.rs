@@ -17,13 +17,11 @@ use rustdds::{
     CDRDeserializerAdapter, CDRSerializerAdapter, DomainParticipant, DomainParticipantBuilder,
     RTPSEntity, TopicKind, no_key,
 };
-use tokio::time::Instant;
 
 use crate::environment::{self, DiscoveryRange, Environment};
 use crate::names::NodeNames;
 
 mod endpoint;
-mod meeting;
 mod policies;
 
 pub(crate) use endpoint::{Guid, PublishError, Reader, RequestIdentity, Sample, Writer};
@@ -64,8 +62,6 @@ pub(crate) struct Participant {
     subscriber: rustdds::Subscriber,
     node: NodeName,
     entities: Mutex<NodeEntitiesInfo>,
-    environment: Environment,
-    missed: Mutex<meeting::Missed>,
     participant: DomainParticipant,
 }
 
@@ -88,16 +84,12 @@ impl Participant {
         let node = NodeName::new(&names.namespace, &names.name)
             .map_err(|error| anyhow!("node {}: {error:?}", names.fully_qualified()))?;
         Ok((
-            Self::of(environment, participant, node).context("ROS graph on DDS")?,
+            Self::of(participant, node).context("ROS graph on DDS")?,
             warning,
         ))
     }
 
-    fn of(
-        environment: &Environment,
-        participant: DomainParticipant,
-        node: NodeName,
-    ) -> anyhow::Result<Self> {
+    fn of(participant: DomainParticipant, node: NodeName) -> anyhow::Result<Self> {
         let default = policies::policies(Qos::RELIABLE, policies::Side::Reader);
         let publisher = participant.create_publisher(&default)?;
         let subscriber = participant.create_subscriber(&default)?;
@@ -122,8 +114,6 @@ impl Participant {
             graph_reader,
             node,
             entities,
-            environment: environment.clone(),
-            missed: Mutex::default(),
         })
     }
 
@@ -182,15 +172,6 @@ impl Participant {
         self.graph_writer
             .write(info, Some(rustdds::Timestamp::now()))
             .map_err(|error| anyhow!("ros_discovery_info: {error}"))
-    }
-
-    /// Looks whether somebody is missed, and sees to it that they are met soon after they are back.
-    pub fn meet_again(&self) {
-        let now = Instant::now();
-        let mut missed = self.missed.lock().unwrap_or_else(PoisonError::into_inner);
-        if missed.look(&self.participant, now) {
-            meeting::show_newcomer(&self.environment, now);
-        }
     }
 
     /// Waits until everybody has the last news of the graph.

@@ -206,7 +206,6 @@ async fn look(
     let mut found: BTreeMap<String, (Arc<TappedTopic>, Vec<String>)> = BTreeMap::new();
     let mut readers = tokio::task::JoinSet::new();
     loop {
-        participant.meet_again();
         for (name, writers) in offered(&participant.writers(), &selection) {
             let Some(first) = writers.first() else {
                 continue;

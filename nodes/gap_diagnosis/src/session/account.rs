@@ -22,7 +22,7 @@ pub enum Reason {
     NotFinite,
     /// A sample older than one before it.
     WentBack,
-    /// The recording's clock jumped back by more than a second.
+    /// The recording's clock jumped back by more than a second, or ahead by more than a week.
     ClockJump,
     /// A reading between two axis states that lie too far apart.
     InGap,
@@ -53,7 +53,7 @@ impl Reason {
         match self {
             Self::NotFinite => "samples were no numbers",
             Self::WentBack => "samples were older than one before them",
-            Self::ClockJump => "times the clock jumped back",
+            Self::ClockJump => "times the clock jumped back, or ahead by more than a week",
             Self::InGap => "readings lie in holes of the axis states",
             Self::OtherZero => "readings belong to another zero",
             Self::Stuck => "readings stood while the axes moved",

@@ -4,7 +4,10 @@ use metrology::stamp::{Host, Span, Stamp};
 
 /// A sample this much older than the newest one is late; an older one means that the clock jumped.
 const LATE: Span = Span::from_nanos(1_000_000_000);
-/// Between a jump back, or a bag that is older than the one before it, and what came before.
+/// A sample this much newer than the newest one means that the clock jumped: no session rests longer, and what is held of
+/// its past grows with it.
+const LONGEST_REST: Span = Span::from_nanos(7 * 86_400 * 1_000_000_000);
+/// Between a jump, or a bag that is older than the one before it, and what came before.
 const PAUSE: Span = Span::from_nanos(60_000_000_000);
 
 /// Maps stamps to seconds since the session's start.
@@ -20,7 +23,7 @@ pub(super) struct SessionTime {
 pub(super) enum At {
     /// Seconds since the session's start.
     Time(f64),
-    /// The clock jumped back; the seconds go on after a pause.
+    /// The clock jumped back, or far ahead; the seconds go on after a pause.
     Jumped(f64),
 }
 
@@ -47,7 +50,7 @@ impl SessionTime {
             at
         });
         let mut shifted = at + self.shift;
-        let jumped = self.newest - shifted > LATE;
+        let jumped = self.newest - shifted > LATE || shifted - self.newest > LONGEST_REST;
         if jumped {
             self.shift = self.newest + PAUSE - at;
             shifted = at + self.shift;
@@ -77,6 +80,17 @@ mod tests {
         assert_eq!(time.take(at(110)), At::Time(10.0));
         assert_eq!(time.take(at(50)), At::Jumped(70.0));
         assert_eq!(time.take(at(55)), At::Time(75.0));
+    }
+
+    #[test]
+    fn a_jump_far_ahead_goes_on_after_a_pause_and_a_weekend_is_none() {
+        let mut time = SessionTime::default();
+        assert_eq!(time.take(at(100)), At::Time(0.0));
+        assert_eq!(time.take(at(180_100)), At::Time(180_000.0));
+        assert_eq!(time.take(at(9_000_000_000)), At::Jumped(180_060.0));
+        assert_eq!(time.take(at(9_000_000_005)), At::Time(180_065.0));
+        // Back from there to the true time.
+        assert_eq!(time.take(at(180_110)), At::Jumped(180_125.0));
     }
 
     #[test]

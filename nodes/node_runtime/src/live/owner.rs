@@ -318,7 +318,6 @@ impl Owner {
     fn every_second(&mut self, now: Instant) {
         self.board.expire(now);
         self.check_graph();
-        self.participant.meet_again();
         for place in 0..self.actions.len() {
             let action = &mut self.actions[place];
             if action.server.forget(now) {
