@@ -92,12 +92,7 @@ fn run(scenario: &str) -> Option<Finished> {
         return None;
     }
     let turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let program = root().join("target/release/abbe");
-    assert!(
-        program.is_file(),
-        "{} is not there: cargo build --release -p abbe",
-        program.display()
-    );
+    let program = abbe_tests::program::abbe();
     let folder = tempfile::tempdir().unwrap();
     let said = (1..=ATTEMPTS)
         .find_map(|attempt| attempted(&program, scenario, &folder.path().join(attempt.to_string())))

@@ -42,6 +42,11 @@ impl Graph {
         })
     }
 
+    /// Joins the network that `environment` tells of, as [`Self::join`] does that of this computer.
+    ///
+    /// # Panics
+    /// When there is no network.
+    #[must_use]
     pub fn join_by(environment: Environment) -> Self {
         let names = NodeNames::new("witness", &[]).unwrap();
         let heard = Arc::<Mutex<Heard>>::default();

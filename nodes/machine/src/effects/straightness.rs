@@ -20,7 +20,8 @@
 //! The line is that of the point whose position the axes name, with the other axes anywhere.
 //!
 //! # Agreement
-//! `val_a_guide_bent_to_a_circle`: 3e-7 µm of 6.8 µm.
+//! `val_a_guide_bent_to_a_circle`: 3e-7 µm of 6.8 µm. `val_a_slide_on_a_guide_that_is_worn_in_one_place`: of 0.82 µm
+//! P2 to P5 leave 0.50, with hats 0.20.
 //!
 //! # References (from memory)
 //! \[1\] ISO 230-1:2012, 3.4.
