@@ -54,8 +54,8 @@ const MEDIAN_SQUARE: f64 = 0.454_936;
 const OF_MEDIAN: f64 = 5.4;
 /// Standard deviations by which worse noise must be sure.
 const SURE: f64 = 1.0;
-/// Share of the error of form that stays beside the biggest model.
-const ROUGH: f64 = 0.25;
+/// Share of the error of form that is not smooth: it stays beside the biggest model.
+pub const ROUGH: f64 = 0.25;
 /// Rows beyond the terms of the models below which a channel is not judged.
 const FEWEST: f64 = 20.0;
 

@@ -18,6 +18,7 @@ use crate::config::GapConfig;
 use crate::confirm;
 use crate::field;
 use crate::form_error::FormError;
+use crate::guard;
 use crate::isolability;
 use crate::normal::Normal;
 use crate::nuisance::orthonormal;
@@ -280,8 +281,6 @@ fn surely(stack: &Stack<'_>, best: &Best) -> Vec<bool> {
     relative.into_iter().map(|u| u * SURE < 1.0).collect()
 }
 
-/// Share of the error of form that a simulator may be off by from station to station, as [`crate::guard`] has it.
-const ROUGH: f64 = 0.25;
 /// A block with fewer stations shows no waves.
 const FEWEST_STATIONS: usize = 24;
 
@@ -298,7 +297,7 @@ fn rises(stack: &Stack<'_>, raw: Vec<f64>, config: &GapConfig) -> bool {
         above(rows, least)
             || (block.channel != Channel::Touch
                 && rows.len() >= FEWEST_STATIONS
-                && above(&rough(stack, block, rows), ROUGH * least))
+                && above(&rough(stack, block, rows), guard::ROUGH * least))
     })
 }
 
