@@ -17,6 +17,7 @@ use crate::families::Slot;
 use crate::figures::Note;
 use crate::form_doubt;
 use crate::isolability;
+use crate::lines;
 use crate::noise::Noise;
 use crate::normal::Normal;
 use crate::refit::{self, Estimate, Refit};
@@ -108,6 +109,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let means = kinds.iter().filter(|kind| kind.moment == Moment::Mean);
     let instances = Instance::all(stack.twin.machine(), means);
     let mut signatures = Library::new(stack, instances);
+    lines::add(stack, scope.slots, &mut signatures);
     let mut normal = signatures.normal(&stack.z);
     let mut best = search(scope, &signatures, &normal);
     let is_closed = !best.leftover.flagged();

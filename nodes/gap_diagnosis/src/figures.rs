@@ -113,7 +113,12 @@ pub enum Note {
     /// Readings were left out.
     Dropped { channel: String, readings: usize },
     /// The noise of the repeats is not that of the session.
-    NotReproduced { channel: String, inflation: f64 },
+    NotReproduced {
+        channel: String,
+        inflation: f64,
+        /// Whether that keeps every effect from being named; else this channel's readings count for less.
+        withdraws: bool,
+    },
     /// Too few runs to flip signs.
     FewRuns { runs: usize },
     /// Nothing could be held out.
@@ -153,10 +158,19 @@ impl fmt::Display for Note {
                     "{channel}: {readings} readings left out as outliers or no numbers"
                 )
             }
-            Self::NotReproduced { channel, inflation } => write!(
+            Self::NotReproduced {
+                channel,
+                inflation,
+                withdraws,
+            } => write!(
                 f,
                 "{channel}: noise floor not reproduced by the session, its variance is {inflation:.2} \
-                 times that of the repeats; nothing is named"
+                 times that of the repeats; {}",
+                if *withdraws {
+                    "nothing is named"
+                } else {
+                    "its readings count for so much less"
+                }
             ),
             Self::FewRuns { runs } => write!(
                 f,

@@ -26,7 +26,7 @@ use crate::stack::Stack;
 pub struct Size {
     squares: f64,
     magnitudes: Vec<f64>,
-    floor_squares: f64,
+    floor: [f64; 2],
 }
 
 impl Size {
@@ -45,18 +45,25 @@ impl Size {
 
     /// (2), µm.
     pub fn floor_um(&self) -> f64 {
-        1e3 * (self.floor_squares / count(self.magnitudes.len().max(1))).sqrt()
+        1e3 * ((self.floor[0] + self.floor[1]) / count(self.magnitudes.len().max(1))).sqrt()
     }
 
-    /// Number of rows.
-    pub fn rows(&self) -> f64 {
-        count(self.magnitudes.len())
+    /// Sum of squares, mm².
+    pub const fn squares(&self) -> f64 {
+        self.squares
+    }
+
+    /// What (2) says of it, within runs and between them, mm².
+    pub const fn floor_squares(&self) -> [f64; 2] {
+        self.floor
     }
 
     /// Adds the rows of another.
     pub fn join(&mut self, other: &Self) {
         self.squares += other.squares;
-        self.floor_squares += other.floor_squares;
+        for (own, other) in self.floor.iter_mut().zip(other.floor) {
+            *own += other;
+        }
         self.magnitudes.extend(&other.magnitudes);
     }
 }
@@ -77,14 +84,14 @@ pub fn by_block(
         Size {
             squares: rows.iter().map(|r| r * r).sum(),
             magnitudes: rows.iter().map(|r| r.abs()).collect(),
-            floor_squares: floor_squares(stack, block, &noise[&block.channel], share),
+            floor: floor_squares(stack, block, &noise[&block.channel], share),
         }
     };
     stack.rows.blocks.iter().map(of_block).collect()
 }
 
-/// (2) times n.
-fn floor_squares(stack: &Stack<'_>, block: &Block, noise: &Noise, share: f64) -> f64 {
+/// Both terms of (2) times n.
+fn floor_squares(stack: &Stack<'_>, block: &Block, noise: &Noise, share: f64) -> [f64; 2] {
     let run = &stack.session.runs[block.run];
     let (kinds, columns) = field::modes(run, block);
     let within = noise.within(run, block).variances[0] * share * count(block.rows.len());
@@ -100,7 +107,7 @@ fn floor_squares(stack: &Stack<'_>, block: &Block, noise: &Noise, share: f64) ->
             whole[block.range()].copy_from_slice(column.as_slice());
             variance * stack.floated(whole).iter().map(|v| v * v).sum::<f64>()
         });
-    within + between.sum::<f64>()
+    [within, between.sum::<f64>()]
 }
 
 /// All blocks of one channel, or of all, together.

@@ -147,20 +147,20 @@ pub fn judge(
     config: &GapConfig,
     notes: &mut Vec<Note>,
 ) -> bool {
+    let mut all: Vec<f64> = inflation.values().copied().collect();
+    all.sort_by(f64::total_cmp);
+    let is_reproduced = all
+        .get(all.len() / 2)
+        .is_none_or(|middle| *middle <= config.most_inflation);
     let worse = inflation
         .iter()
         .filter(|(_, ratio)| **ratio > config.most_inflation);
-    let said: Vec<Note> = worse
-        .map(|(channel, ratio)| Note::NotReproduced {
-            channel: channel.to_string(),
-            inflation: *ratio,
-        })
-        .collect();
-    notes.extend(said);
-    let mut all: Vec<f64> = inflation.values().copied().collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2)
-        .is_none_or(|middle| *middle <= config.most_inflation)
+    notes.extend(worse.map(|(channel, ratio)| Note::NotReproduced {
+        channel: channel.to_string(),
+        inflation: *ratio,
+        withdraws: !is_reproduced,
+    }));
+    is_reproduced
 }
 
 /// f of (1).
@@ -304,4 +304,33 @@ fn same_stations(one: &Block, other: &Block) -> Vec<(usize, usize)> {
         }
     }
     pairs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_channel_with_worse_noise_is_said_and_only_a_middle_one_withdraws_names() {
+        let config = GapConfig::default();
+        let judged = |ratios: [f64; 3]| {
+            let channels = [Channel::GridU, Channel::GridV, Channel::Touch];
+            let inflation = channels.into_iter().zip(ratios).collect();
+            let mut notes = vec![];
+            let is_reproduced = judge(&inflation, &config, &mut notes);
+            let words: Vec<String> = notes.iter().map(ToString::to_string).collect();
+            (is_reproduced, words.join("; "))
+        };
+        let (is_reproduced, words) = judged([1.0, 4.0, 1.0]);
+        assert!(
+            is_reproduced && words.contains("count for so much less"),
+            "{words}"
+        );
+        let (is_reproduced, words) = judged([3.0, 4.0, 1.0]);
+        assert!(
+            !is_reproduced && words.contains("nothing is named"),
+            "{words}"
+        );
+        assert_eq!(judged([1.0; 3]), (true, String::new()));
+    }
 }

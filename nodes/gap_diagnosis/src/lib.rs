@@ -25,6 +25,7 @@
 mod bootstrap;
 mod cause;
 mod challenge;
+mod closed;
 mod confidence;
 pub mod config;
 mod confirm;
@@ -40,6 +41,7 @@ mod form_error;
 mod gap;
 mod guard;
 mod isolability;
+mod lines;
 mod localise;
 mod next;
 mod noise;

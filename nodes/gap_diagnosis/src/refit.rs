@@ -18,6 +18,7 @@
 use machine::effects::{Parameter, Role};
 use nalgebra::{DMatrix, DVector};
 
+use crate::lines;
 use crate::normal::Normal;
 use crate::rows::count;
 use crate::signature::{Form, Instance, Library};
@@ -120,7 +121,7 @@ fn start<'f>(
         values[*place] = (size * parameter.typical).clamp(parameter.low, parameter.high);
     }
     for (place, parameter) in instance.kind.parameters.iter().enumerate() {
-        if matches!(parameter.role, Role::Shape { grid } if grid.len() > 1) {
+        if parameter.role.grid().is_some_and(|grid| grid.len() > 1) {
             active.push(place);
         }
     }
@@ -146,23 +147,38 @@ fn refine_shapes(
         }
     }
     for place in members[index].active.clone() {
-        let Role::Shape { grid } = parameter(members[index].instance, place).role else {
+        let member = &members[index];
+        let left = |value: f64| scaled(stack, member, place, value, &rest).1;
+        let Some([low, high]) = near(stack, member, place) else {
             continue;
         };
-        let at = members[index].values[place];
-        let near = grid
-            .iter()
-            .position(|g| *g >= at - 1e-12 * at.abs())
-            .unwrap_or(grid.len() - 1);
-        let low = grid[near.saturating_sub(1)];
-        let high = grid[(near + 1).min(grid.len() - 1)];
-        let best = golden(low, high, |value| {
-            scaled(stack, &members[index], place, value, &rest).1
-        });
+        let at = member.values[place];
+        let best = golden(low, high, left);
+        // Between two points of a grid a shape may have more than one least.
+        let best = if left(best) < left(at) { best } else { at };
         let (values, _) = scaled(stack, &members[index], place, best, &rest);
         members[index].values = values;
     }
     parts[index] = members[index].signature(stack);
+}
+
+/// Where a shape is refined: between its neighbours on the grid, or about its line.
+fn near(stack: &Stack<'_>, member: &Member<'_>, place: usize) -> Option<[f64; 2]> {
+    let at = member.values[place];
+    let role = parameter(member.instance, place).role;
+    if let Role::Frequency { .. } = role {
+        let width = lines::width(stack.twin.machine(), &member.instance.target)?;
+        return Some([at - 0.5 * width, at + 0.5 * width]);
+    }
+    let grid = role.grid()?;
+    let near = grid
+        .iter()
+        .position(|g| *g >= at - 1e-12 * at.abs())
+        .unwrap_or(grid.len() - 1);
+    Some([
+        grid[near.saturating_sub(1)],
+        grid[(near + 1).min(grid.len() - 1)],
+    ])
 }
 
 /// Values with one shape set and the sizes solved anew, and the square that is left.

@@ -242,7 +242,7 @@ impl Squares {
         signatures.excited[instance] = true;
         let choices = kind
             .shapes()
-            .filter(|p| matches!(p.role, Role::Shape { grid } if grid.len() > 1));
+            .filter(|p| p.role.grid().is_some_and(|grid| grid.len() > 1));
         let first = signatures.columns.len();
         signatures.forms.push(Form {
             instance,

@@ -6,31 +6,23 @@
 //! float; a float that fitted runs share with held-out ones is one float (a block that stays on the table stays
 //! where it was), so that growth since the fitted runs is not taken for a new place of the block:
 //!
-//! ```text
-//!   G2 = rms2 - floor2,   closed = 1 - G2_after / G2_before               (1)
-//! ```
-//!
-//! The interval draws whole runs with replacement, the same before and after (`bootstrap`). It is absent where
-//! the gap before cannot be told from none.
+//! What share of the gap is closed, with its interval, is taken in `closed`.
 
 use std::collections::BTreeMap;
 
-use machine::effects::Effect;
-use machine::twin::Channel;
-use rand::{Rng, SeedableRng};
-use rand_pcg::Pcg64Mcg;
-
-use crate::bootstrap;
+use crate::closed;
 use crate::config::GapConfig;
 use crate::field::{self, Place};
 use crate::figures::over_session::over_session;
 use crate::figures::{Abscissa, HeldOut, Trace};
 use crate::gap::{self, Size};
 use crate::noise::Noise;
-use crate::report::{BeforeAfter, Interval, LeftOut, Shrink};
+use crate::report::{BeforeAfter, LeftOut, Shrink};
 use crate::rows::{Block, count, position, time_s};
 use crate::split::{Split, title};
 use crate::stack::Stack;
+use machine::effects::Effect;
+use machine::twin::Channel;
 
 /// One named effect.
 pub struct Named<'e> {
@@ -98,7 +90,7 @@ pub fn shrink(
             after: value(left.p95_um()),
         },
         gap_closed: (is_judged && has_gap)
-            .then(|| closed(stack, judged, &sizes, config))
+            .then(|| closed::closed(stack, noise, judged, &sizes, config))
             .flatten(),
         leave_one_out: leave_one_out.collect(),
     };
@@ -127,79 +119,6 @@ fn with_effects<'n, 'e: 'n>(
             .map(|(raw, told)| raw - told)
             .collect(),
     )
-}
-
-/// (1) of sums before and after, each of squares, floor and rows.
-fn share(sums: &[[f64; 2]; 2]) -> Option<f64> {
-    let gap = |sum: [f64; 2]| (sum[0] - sum[1]).max(0.0);
-    (gap(sums[0]) > 0.0).then(|| 1.0 - gap(sums[1]) / gap(sums[0]))
-}
-
-fn squares(size: &Size) -> [f64; 2] {
-    [
-        size.rms_um().powi(2) * size.rows(),
-        size.floor_um().powi(2) * size.rows(),
-    ]
-}
-
-fn closed(
-    stack: &Stack<'_>,
-    judged: &[usize],
-    sizes: &[Vec<Size>; 2],
-    config: &GapConfig,
-) -> Option<Interval> {
-    let of_run = |run: usize| -> [[f64; 2]; 2] {
-        let of = |sizes: &[Size]| {
-            let own = stack
-                .rows
-                .blocks
-                .iter()
-                .zip(sizes)
-                .filter(|(block, _)| block.run == run);
-            own.map(|(_, size)| squares(size)).fold([0.0; 2], add)
-        };
-        [of(&sizes[0]), of(&sizes[1])]
-    };
-    let runs: Vec<[[f64; 2]; 2]> = judged.iter().map(|run| of_run(*run)).collect();
-    let total = |chosen: &mut dyn Iterator<Item = &[[f64; 2]; 2]>| {
-        chosen.fold([[0.0; 2]; 2], |sum, run| {
-            [add(sum[0], run[0]), add(sum[1], run[1])]
-        })
-    };
-    let value = share(&total(&mut runs.iter()))?;
-    let mut random = Pcg64Mcg::seed_from_u64(config.seed ^ 0x7);
-    let draws: Vec<f64> = (0..config.bootstrap_draws)
-        .filter_map(|_| {
-            let drawn: Vec<[[f64; 2]; 2]> = runs
-                .iter()
-                .map(|_| runs[random.random_range(0..runs.len())])
-                .collect();
-            share(&total(&mut drawn.iter()))
-        })
-        .collect();
-    if draws.len() * 40 < config.bootstrap_draws * 39 {
-        return None;
-    }
-    let without_each: Vec<f64> = (0..runs.len())
-        .filter_map(|out| {
-            let mut others = runs
-                .iter()
-                .enumerate()
-                .filter(|(run, _)| *run != out)
-                .map(|(_, run)| run);
-            share(&total(&mut others))
-        })
-        .collect();
-    let [low, high] = bootstrap::bca(value, draws, &without_each);
-    Some(Interval {
-        value,
-        low: low.min(value),
-        high: high.max(value),
-    })
-}
-
-fn add(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] + b[0], a[1] + b[1]]
 }
 
 fn by_run(stack: &Stack<'_>, judged: &[usize], sizes: &[Vec<Size>; 2]) -> Vec<HeldOut> {

@@ -154,7 +154,7 @@ impl Library {
         self.excited[instance] = true;
         let choices = kind
             .shapes()
-            .filter(|p| matches!(p.role, Role::Shape { grid } if grid.len() > 1));
+            .filter(|p| p.role.grid().is_some_and(|grid| grid.len() > 1));
         let first = self.columns.len();
         self.forms.push(Form {
             instance,
@@ -205,10 +205,7 @@ pub fn shapes(kind: &Kind) -> Vec<Vec<f64>> {
         .parameters
         .iter()
         .enumerate()
-        .filter_map(|(place, parameter)| match parameter.role {
-            Role::Shape { grid } => Some((place, grid)),
-            Role::Amplitude => None,
-        })
+        .filter_map(|(place, parameter)| Some((place, parameter.role.grid()?)))
         .collect();
     let mut all = vec![vec![0.0; kind.parameters.len() + kind.free.len()]];
     let product: usize = grids.iter().map(|(_, grid)| grid.len()).product();

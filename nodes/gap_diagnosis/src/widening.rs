@@ -23,7 +23,7 @@ use crate::stack::Stack;
 /// Most instances that are widened.
 const MOST_WIDENED: usize = 12;
 /// Most free amplitudes that are taken one after another.
-const MOST_PARTS: usize = 4;
+const MOST_PARTS: usize = 6;
 /// Sets whose C is worse by this share of what the best one explains stand nearly as well.
 const NEAR: f64 = 0.1;
 

@@ -53,6 +53,7 @@ mod tests {
             unit: String::new(),
             parameter: None,
             is_foreign: false,
+            besides: vec![],
             d: 10.0,
         };
         let play = effect(Class::Backlash, "Y");

@@ -6,18 +6,27 @@
 //!
 //! | class | hidden as | foreign form |
 //! |---|---|---|
-//! | `backlash` | play of the drive with slightly rounded corners | corners as wide as a third of the play |
-//! | `scale_error` | lead error of the screw | and a quarter as much of a bow |
-//! | `squareness` | lean of an axis | and a tenth of µm per µrad as a bow |
+//! | `backlash` | play of the drive with slightly rounded corners | corners as wide as a third of the play, or (1) |
+//! | `scale_error` | lead error of the screw | and a quarter as much of a bow, which is a `pitch_error` |
+//! | `squareness` | lean of an axis | and a tenth of µm per µrad as a bow, which is its `straightness` |
 //! | `pitch_error`, `straightness`, `angular_error` | bow and S of a guide, as cosine and sine | a dent besides |
 //! | `cyclic_error` | once and twice a turn | not quite once a turn, growing along the screw |
 //! | `servo_lag` | another velocity feed-forward | a softer position loop |
 //! | `reversal_spike` | friction of the motor's side | with a breakaway force twice as large |
 //! | `probe_latency` | a later trigger | a triggering force that grows with the feed |
-//! | `clock_offset` | late stamps of the grid encoder | by 10 to 40 % more and less from minute to minute |
+//! | `clock_offset` | late stamps of the grid encoder | by 10 to 40 % more and less from minute to minute, a `clock_drift` |
 //! | `length_wavelength` | wrong wavelength of the laser | which drifts |
 //! | `screw_elongation` | a nut that rubs | and a bearing that rubs |
 //! | `drive_windup` | a softer screw | softer in one direction |
+//!
+//! Corners of a play are no wider than the friction of the guides, a deflection f of the screw, presses the slide
+//! through: of a play b whose corners are wider than
+//!
+//! ```text
+//!   eps = sqrt(f b / 2)                                                   (1)
+//! ```
+//!
+//! friction alone would not cross three quarters; the slide would hang on a soft spring, which is another effect.
 //!
 //! The tool of a machine whose effects are foreign shakes besides, at a frequency that wanders.
 
@@ -195,6 +204,17 @@ impl Hidden {
         Self { size, ..self }
     }
 
+    /// The catalogue's entry that its form brings along on the same target.
+    #[must_use]
+    pub const fn besides(&self) -> Option<&'static str> {
+        match self.class {
+            ScaleError if self.is_foreign => Some("pitch_error"),
+            Squareness if self.is_foreign => Some("straightness"),
+            ClockOffset if self.is_foreign => Some("clock_drift"),
+            _ => None,
+        }
+    }
+
     /// Hides it.
     ///
     /// # Errors
@@ -251,7 +271,10 @@ impl Hidden {
             Backlash => {
                 drive.backlash_um += self.size;
                 if self.is_foreign {
-                    drive.backlash_softness_um += 0.3 * self.size;
+                    let stiffness_n_per_um = drive.screw_stiffness_n_per_um[0];
+                    let pressed_um = drive.guide_friction.coulomb_n / stiffness_n_per_um;
+                    let widest_um = (0.5 * pressed_um * self.size).sqrt(); // (1)
+                    drive.backlash_softness_um += (0.3 * self.size).min(widest_um);
                 }
             }
             CyclicError => {

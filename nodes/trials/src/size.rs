@@ -241,13 +241,14 @@ impl Deviations {
         for block in self.blocks.values() {
             *repeats.entry(&block.condition).or_default() += 1.0;
         }
+        let waves = Waves::default();
         let mut by_set_up = BTreeMap::<&str, Gain>::new();
         for (key, with) in &self.blocks {
             let Some(other) = without.blocks.get(key) else {
                 continue;
             };
             let repeats = repeats[&*with.condition];
-            let Some(gain) = gain(with, other, scatter, shaking_mm2, repeats) else {
+            let Some(gain) = gain(with, other, scatter, shaking_mm2, repeats, &waves) else {
                 continue;
             };
             let sum = by_set_up.entry(&with.set_up).or_insert_with(|| Gain {
@@ -308,6 +309,7 @@ fn gain(
     scatter: &Scatter,
     shaking_mm2: f64,
     repeats: f64,
+    waves: &Waves,
 ) -> Option<Gain> {
     let both: Vec<(Reading, f64)> = with
         .readings
@@ -342,7 +344,7 @@ fn gain(
     };
     let smooth_mm2 = scatter.between_runs_mm.powi(2) + form_mm2;
     Some(Gain {
-        products: rows.products(all_mm2, smooth_mm2),
+        products: rows.products(all_mm2, smooth_mm2, waves),
         of_chatter: rows.signature.len() as f64 * chatter_mm2 / all_mm2,
     })
 }
@@ -415,19 +417,23 @@ impl Rows {
     }
 
     /// a' C^-1 b of the signature and the floats, with (2).
-    fn products(&self, variance_mm2: f64, smooth_mm2: f64) -> DMatrix<f64> {
+    fn products(&self, variance_mm2: f64, smooth_mm2: f64, waves: &Waves) -> DMatrix<f64> {
         let mut sides = self.floats.clone().insert_column(0, 0.0);
         sides.set_column(0, &self.signature);
         let count = sides.ncols();
         let mut sum = DMatrix::zeros(count, count);
         for range in &self.directions {
             let n = range.len();
-            let covariance = DMatrix::from_fn(n, n, |i, j| {
-                let (a, b) = (range.start + i, range.start + j);
-                let apart_mm = (self.places_mm[a] - self.places_mm[b]).norm();
-                let own_mm2 = if i == j { variance_mm2 } else { 0.0 };
-                own_mm2 + smooth_mm2 * alike(apart_mm)
-            });
+            // The factor reads the lower half only.
+            let mut covariance = DMatrix::zeros(n, n);
+            for j in 0..n {
+                covariance[(j, j)] = variance_mm2 + smooth_mm2;
+                for i in j + 1..n {
+                    let (a, b) = (range.start + i, range.start + j);
+                    let apart_mm = (self.places_mm[a] - self.places_mm[b]).norm();
+                    covariance[(i, j)] = smooth_mm2 * waves.alike(apart_mm);
+                }
+            }
             let own = sides.rows(range.start, n).into_owned();
             if let Some(factor) = covariance.cholesky() {
                 sum += own.tr_mul(&factor.solve(&own));
@@ -439,6 +445,40 @@ impl Rows {
 
 /// Lengths that (3) is averaged over, evenly in their logarithm.
 const LENGTHS: u32 = 24;
+
+/// (3) at whole multiples of [`Waves::STEP_MM`], and linear between them: within 1e-5 of 1.
+struct Waves {
+    alike: Vec<f64>,
+}
+
+impl Waves {
+    const STEP_MM: f64 = 0.25;
+    /// Longer than any travel's diagonal, in steps.
+    const STEPS: u32 = 8000;
+
+    fn alike(&self, apart_mm: f64) -> f64 {
+        let place = apart_mm / Self::STEP_MM;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a distance of less than two metres"
+        )]
+        let below = place as usize;
+        match self.alike.get(below..below + 2) {
+            Some(&[before, after]) => before + (after - before) * (place - below as f64),
+            _ => alike(apart_mm),
+        }
+    }
+}
+
+impl Default for Waves {
+    fn default() -> Self {
+        let at = |step: u32| alike(f64::from(step) * Self::STEP_MM);
+        Self {
+            alike: (0..Self::STEPS).map(at).collect(),
+        }
+    }
+}
 
 /// (3).
 fn alike(apart_mm: f64) -> f64 {
@@ -478,6 +518,11 @@ mod tests {
         let drawn = sum / f64::from(count);
         assert!((drawn - alike(apart.norm())).abs() < 0.02, "{drawn}");
         assert!((alike(0.0) - 1.0).abs() < 1e-12);
+        let waves = Waves::default();
+        for apart_mm in [0.0, 0.1, 33.33, 80.0, 611.7, 1999.9, 2500.0] {
+            let off = waves.alike(apart_mm) - alike(apart_mm);
+            assert!(off.abs() < 1e-5, "{apart_mm}: {off}");
+        }
     }
 
     #[test]
@@ -494,7 +539,7 @@ mod tests {
                     (reading, run * 1e-3)
                 };
                 let both: Vec<_> = (0..40).map(reading).collect();
-                Rows::of(&both, &Floats::Zero).products(1e-8, 0.0)
+                Rows::of(&both, &Floats::Zero).products(1e-8, 0.0, &Waves::default())
             });
             let products = each.fold(DMatrix::zeros(3, 3), |sum, part| sum + part);
             let gain = Gain {

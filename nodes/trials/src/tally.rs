@@ -420,6 +420,7 @@ mod tests {
             unit: "µm".to_owned(),
             parameter: class.parameter().map(str::to_owned),
             is_foreign: false,
+            besides: vec![],
             d,
         }
     }
@@ -556,6 +557,23 @@ mod tests {
             count("wrong cause named, D > 20"),
             Proportion { k: 1, n: 1 }
         );
+    }
+
+    #[test]
+    fn what_a_foreign_form_brings_along_is_no_wrong_name_and_no_stand_in_for_the_effect() {
+        let lean = TrueEffect {
+            besides: vec![("straightness".to_owned(), "XZ".to_owned())],
+            ..effect(Class::Squareness, "XZ", 30.0)
+        };
+        let named = |ids: &[&str]| {
+            let all = ids.iter().map(|id| cause(id, "XZ", Status::Named, 1.0));
+            verdict(vec![lean.clone()], all.collect(), false)
+        };
+        assert!(named(&["squareness", "straightness"]).is_exact());
+        assert!(named(&["squareness"]).is_exact());
+        let bow_only = named(&["straightness"]);
+        assert!(!bow_only.is_exact() && bow_only.wrong().next().is_none());
+        assert!(named(&["squareness", "guide_bow"]).wrong().next().is_some());
     }
 
     #[test]

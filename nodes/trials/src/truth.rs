@@ -49,6 +49,10 @@ pub struct TrueEffect {
     pub parameter: Option<String>,
     /// Whether its form is foreign.
     pub is_foreign: bool,
+    /// What else the machine has by this form, as the catalogue names it: class and axis. To name it is right, not to
+    /// name it is no miss.
+    #[serde(default)]
+    pub besides: Vec<(String, String)>,
     /// Size against the trial's scatter.
     #[serde(rename = "D")]
     pub d: f64,
@@ -64,6 +68,11 @@ impl TrueEffect {
             unit: hidden.class.sizes().1.to_owned(),
             parameter: named.map(str::to_owned),
             is_foreign: hidden.is_foreign,
+            besides: hidden
+                .besides()
+                .map(|id| (id.to_owned(), hidden.axis.to_owned()))
+                .into_iter()
+                .collect(),
             d,
         }
     }

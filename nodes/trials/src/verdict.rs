@@ -220,6 +220,13 @@ impl SaidCause {
         self.effect == effect.class.id() && self.axis == effect.axis
     }
 
+    /// Whether it is what the form of this effect brings along.
+    #[must_use]
+    pub fn is_beside(&self, effect: &TrueEffect) -> bool {
+        let own = |(id, axis): &(String, String)| *id == self.effect && *axis == self.axis;
+        effect.besides.iter().any(own)
+    }
+
     /// Whether this effect is it or among its rivals.
     #[must_use]
     pub fn may_be(&self, effect: &TrueEffect) -> bool {
@@ -289,7 +296,8 @@ impl Verdict {
     #[must_use]
     pub fn is_right(&self, cause: &SaidCause) -> bool {
         let is_left_out = self.truth.left_out.as_deref() == Some(cause.effect.as_str());
-        !is_left_out && self.truth.effects.iter().any(|effect| cause.is(effect))
+        let is_own = |effect: &TrueEffect| cause.is(effect) || cause.is_beside(effect);
+        !is_left_out && self.truth.effects.iter().any(is_own)
     }
 
     /// Named causes that are not hidden in the machine.

@@ -4,7 +4,7 @@
 //!
 //! ```text
 //!   w = sum_n p_n P_n(x),   n = 1, 2 and, wider, 3, 4                     (1)
-//!   w += sum_k f_k h_k(x),   hats at 1/8 .. 7/8 of the travel             (2)
+//!   w += sum_k f_k h_k(x),   hats at every sixteenth of the travel        (2)
 //!   E = w times the lever of `volumetric::sensitivity` at the pose        (3)
 //! ```
 //!
@@ -13,7 +13,7 @@
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | p_n | `p1_urad`, `p2_urad`, wider form `free_p3_urad`, `free_p4_urad` | µrad |
-//! | f_k | `free_1_of_8_urad` .. `free_7_of_8_urad` | µrad |
+//! | f_k | `free_1_of_8_urad` .. `free_7_of_8_urad`, `free_1_of_16_urad`, `free_3_of_16_urad` .. `free_15_of_16_urad` | µrad |
 //!
 //! # Holds when
 //! Angles are small. The straightness that belongs to an angular error is that at the machine's zero of the
@@ -51,6 +51,14 @@ pub static KIND: Kind = Kind {
         Parameter::ordinate("free_5_of_8_urad", 300.0, 3.0),
         Parameter::ordinate("free_6_of_8_urad", 300.0, 3.0),
         Parameter::ordinate("free_7_of_8_urad", 300.0, 3.0),
+        Parameter::ordinate("free_1_of_16_urad", 300.0, 3.0),
+        Parameter::ordinate("free_3_of_16_urad", 300.0, 3.0),
+        Parameter::ordinate("free_5_of_16_urad", 300.0, 3.0),
+        Parameter::ordinate("free_7_of_16_urad", 300.0, 3.0),
+        Parameter::ordinate("free_9_of_16_urad", 300.0, 3.0),
+        Parameter::ordinate("free_11_of_16_urad", 300.0, 3.0),
+        Parameter::ordinate("free_13_of_16_urad", 300.0, 3.0),
+        Parameter::ordinate("free_15_of_16_urad", 300.0, 3.0),
     ],
     moment: Moment::Mean,
     needs: "positions over the axis' travel, with two arms",

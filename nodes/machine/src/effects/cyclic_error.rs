@@ -43,13 +43,11 @@ pub static KIND: Kind = Kind {
     parameters: &[
         Parameter::amplitude("sin_um", 20.0, 1.0),
         Parameter::amplitude("cos_um", 20.0, 1.0),
-        Parameter::shape(
+        Parameter::frequency(
             "per_turn",
             [0.1, 10.0],
             1.0,
-            &[
-                0.2, 0.25, 0.5, 0.94, 0.96, 0.98, 0.99, 1.0, 1.01, 1.02, 1.04, 1.06, 2.0, 4.0,
-            ],
+            &[0.2, 0.25, 0.5, 1.0, 2.0, 4.0],
         ),
     ],
     free: &[

@@ -30,12 +30,30 @@ pub(super) fn way_hats(heights: &[f64; WAY_HATS], way_mm: f64) -> f64 {
     hats(-2.0, 0.5, heights, way_mm.max(1e-9).log10())
 }
 
+/// Places of the wide hats over the travel.
+const WIDE_HATS: usize = 7;
 /// Number of hats over the travel.
-pub(super) const PLACE_HATS: usize = 7;
+pub(super) const PLACE_HATS: usize = 2 * WIDE_HATS + 1;
 
-/// Hats at 1/8 .. 7/8 of the travel, at a share of the half travel.
+/// Hats over the travel at a share of the half travel: at 1/8 .. 7/8 of it, each an eighth wide to either side, then halfway
+/// between these and beyond them, half as wide, for what is shorter. Together they have any height at every sixteenth.
 pub(super) fn place_hats(heights: &[f64; PLACE_HATS], share: f64) -> f64 {
-    hats(-0.75, 0.25, heights, share)
+    let (wide, narrow) = heights.split_at(WIDE_HATS);
+    let place = (share + 0.875) / 0.25;
+    let nearest = place.round();
+    let height = |k: &usize| narrow.get(*k).copied().unwrap_or(0.0);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "one of eight places"
+    )]
+    let of_narrow = if (0.0..=WIDE_HATS as f64).contains(&nearest) {
+        let distance = 2.0 * (place - nearest).abs();
+        height(&(nearest as usize)) * (1.0 - distance).max(0.0)
+    } else {
+        0.0
+    };
+    hats(-0.75, 0.25, wide, share) + of_narrow
 }
 
 /// Sum of Legendre polynomials of the orders `first`, `first + 1`, ... at x.
@@ -90,5 +108,32 @@ impl Travel {
     /// Share of the half travel, (2).
     pub(super) fn share(self, position: f64) -> f64 {
         (position - self.middle) * self.per_half
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hats_over_the_travel_have_any_height_at_every_sixteenth() {
+        let mut random = (1..16)
+            .map(|k| f64::from(k * k % 7) - 3.0)
+            .collect::<Vec<_>>();
+        random.insert(0, 0.0);
+        random.push(0.0);
+        let mut heights = [0.0; PLACE_HATS];
+        for k in 1..8 {
+            heights[k - 1] = random[2 * k];
+        }
+        for k in 0..8 {
+            let (before, here, after) = (random[2 * k], random[2 * k + 1], random[2 * k + 2]);
+            heights[WIDE_HATS + k] = here - 0.5 * (before + after);
+        }
+        for (k, wanted) in (0_u32..).zip(&random) {
+            let share = -1.0 + f64::from(k) / 8.0;
+            assert!((place_hats(&heights, share) - wanted).abs() < 1e-12, "{k}");
+        }
+        assert!(place_hats(&heights, -1.3).abs() < 1e-12);
     }
 }

@@ -94,6 +94,23 @@ pub enum Role {
         /// Grid, in the parameter's unit, growing.
         grid: &'static [f64],
     },
+    /// It shapes the response as the number of periods over a lead of its axis: besides the values of the grid that is
+    /// tried which a line in the readings tells.
+    Frequency {
+        /// Grid, growing.
+        grid: &'static [f64],
+    },
+}
+
+impl Role {
+    /// Values that are tried of what shapes the response.
+    #[must_use]
+    pub const fn grid(self) -> Option<&'static [f64]> {
+        match self {
+            Self::Amplitude => None,
+            Self::Shape { grid } | Self::Frequency { grid } => Some(grid),
+        }
+    }
 }
 
 /// One parameter, in the unit of the machine file (its name ends in it).
@@ -147,6 +164,19 @@ impl Parameter {
             typical,
             is_ordinate: false,
         }
+    }
+
+    /// A number of periods over a lead between two physical limits, tried at the values of a grid and wherever a line is.
+    #[must_use]
+    pub const fn frequency(
+        name: &'static str,
+        limits: [f64; 2],
+        typical: f64,
+        grid: &'static [f64],
+    ) -> Self {
+        let mut frequency = Self::shape(name, limits, typical, grid);
+        frequency.role = Role::Frequency { grid };
+        frequency
     }
 
     /// A parameter of shape between two physical limits, tried at the values of a grid.

@@ -6,20 +6,21 @@
 //!
 //! ```text
 //!   E = sum_n p_n P_n(x)                                                  (1)
-//!   E += sum_k f_k h_k(x),   hats at 1/8 .. 7/8 of the travel             (2)
+//!   E += sum_k f_k h_k(x),   hats at every sixteenth of the travel        (2)
 //! ```
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | p_n | `p2_um`, `p3_um`, wider form `free_p4_um`, `free_p5_um` | µm |
-//! | f_k | `free_1_of_8_um` .. `free_7_of_8_um` | µm |
+//! | f_k | `free_1_of_8_um` .. `free_7_of_8_um`, `free_1_of_16_um`, `free_3_of_16_um` .. `free_15_of_16_um` | µm |
 //!
 //! # Holds when
-//! The error is of the screw, between motor and slide. Not modelled: a period shorter than a quarter of the
+//! The error is of the screw, between motor and slide. Not modelled: a period shorter than an eighth of the
 //! travel (see `cyclic_error`).
 //!
 //! # Agreement
-//! `val_a_screw_of_drifting_lead`: of 1.44 µm with a bump 0.1 m long, (1) leaves 0.44, (2) 0.094.
+//! `val_a_screw_of_drifting_lead`: of 1.44 µm with a bump 0.1 m long, (1) leaves 0.44, hats at the eighths
+//! 0.094, at the sixteenths 0.018.
 //!
 //! # References (from memory)
 //! \[1\] ISO 230-2:2014, clause 3 (positioning deviations). \[2\] ISO 3408-3:2006 (travel deviation of
@@ -50,6 +51,14 @@ pub static KIND: Kind = Kind {
         Parameter::ordinate("free_5_of_8_um", 60.0, 1.0),
         Parameter::ordinate("free_6_of_8_um", 60.0, 1.0),
         Parameter::ordinate("free_7_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_1_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_3_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_5_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_7_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_9_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_11_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_13_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_15_of_16_um", 60.0, 1.0),
     ],
     moment: Moment::Mean,
     needs: "positions over the axis' travel",

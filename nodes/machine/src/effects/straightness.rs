@@ -6,7 +6,7 @@
 //!
 //! ```text
 //!   E = sum_n p_n P_n(x),   n = 2, 3 and, wider, 4, 5                     (1)
-//!   E += sum_k f_k h_k(x),   hats at 1/8 .. 7/8 of the travel             (2)
+//!   E += sum_k f_k h_k(x),   hats at every sixteenth of the travel        (2)
 //! ```
 //!
 //! (2) is for a guide that is worn or dented in one place.
@@ -14,14 +14,14 @@
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | p_n | `p2_um`, `p3_um`, wider form `free_p4_um`, `free_p5_um` | µm |
-//! | f_k | `free_1_of_8_um` .. `free_7_of_8_um` | µm |
+//! | f_k | `free_1_of_8_um` .. `free_7_of_8_um`, `free_1_of_16_um`, `free_3_of_16_um` .. `free_15_of_16_um` | µm |
 //!
 //! # Holds when
 //! The line is that of the point whose position the axes name, with the other axes anywhere.
 //!
 //! # Agreement
 //! `val_a_guide_bent_to_a_circle`: 3e-7 µm of 6.8 µm. `val_a_slide_on_a_guide_that_is_worn_in_one_place`: of 0.82 µm
-//! P2 to P5 leave 0.50, with hats 0.20.
+//! P2 to P5 leave 0.50, with hats at the eighths 0.20, at the sixteenths 0.068.
 //!
 //! # References (from memory)
 //! \[1\] ISO 230-1:2012, 3.4.
@@ -51,6 +51,14 @@ pub static KIND: Kind = Kind {
         Parameter::ordinate("free_5_of_8_um", 60.0, 1.0),
         Parameter::ordinate("free_6_of_8_um", 60.0, 1.0),
         Parameter::ordinate("free_7_of_8_um", 60.0, 1.0),
+        Parameter::ordinate("free_1_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_3_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_5_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_7_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_9_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_11_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_13_of_16_um", 60.0, 1.0),
+        Parameter::ordinate("free_15_of_16_um", 60.0, 1.0),
     ],
     moment: Moment::Mean,
     needs: "readings across the axis over its travel",

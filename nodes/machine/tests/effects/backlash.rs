@@ -124,6 +124,73 @@ fn a_light_slide_comes_to_rest_on_the_flank_that_pushes_it() {
     assert!((at(2990) + 1.0).abs() < 1e-9, "at rest: {}", at(2990));
 }
 
+/// A slide of 400 kg in a dead zone of 5 µm whose flanks of 400 N/µm begin over 0.4 µm, in balance with the force that
+/// carries it through circles at 40 and 80 mm/s: its lead is where spring and force are equal, found by bisection.
+#[test]
+fn val_the_wider_form_takes_soft_corners() {
+    let mut machine = three_axes(CHAIN);
+    let (mass_kg, n_per_um, half_um, corner_um) = (400.0, 400.0, 2.5, 0.4_f64);
+    let (coulomb_mm_s2, viscous_per_s) = (30.0, 0.3);
+    let Some(AxisEntry::Linear(entry)) = machine.axes.get_mut(&Axis::X) else {
+        panic!("X is linear")
+    };
+    entry.guide_friction = Some(GuideFrictionEntry {
+        coulomb_mm_s2,
+        viscous_per_s,
+    });
+    let rate = |t: f64| if t < 8.0 { 0.8 } else { 1.6 };
+    let turned = |t: f64| 0.8 * t.min(8.0) + 1.6 * (t - 8.0).max(0.0);
+    let run = run(14_000, AxisSet::XYZ, |t| {
+        [50.0 * turned(t).cos(), 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+    let ramp = |x: f64| 0.5 * (x + x.hypot(corner_um));
+    let spring_n = |lead: f64| n_per_um * (ramp(lead - half_um) - ramp(-lead - half_um));
+    let lead_um = |force_n: f64| {
+        let (mut low, mut high) = (-20.0, 20.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if spring_n(middle) < force_n {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    };
+    // Away from what is between the two feeds and at the ends.
+    let own: Vec<usize> = (500..13_500_usize)
+        .filter(|k| k.abs_diff(8000) > 50)
+        .collect();
+    let wanted_um: Vec<f64> = own
+        .iter()
+        .map(|k| {
+            let (t, w) = (*k as f64 * TICK_S, rate(*k as f64 * TICK_S));
+            let v = -50.0 * w * turned(t).sin();
+            let a = -50.0 * w * w * turned(t).cos();
+            let force_mm_s2 = a + coulomb_mm_s2 * v.signum() + viscous_per_s * v;
+            -lead_um(force_mm_s2 * 1e-3 * mass_kg)
+        })
+        .collect();
+    let column = |name: &str| {
+        let mut given = vec![("width_um", if name == "width_um" { 1.0 } else { 0.0 })];
+        given.extend((name != "width_um").then_some((name, 1.0)));
+        let response = response_of(&machine, &run, "backlash", "X", &given);
+        own.iter()
+            .map(|k| response.drive[Axis::X][*k] * 1e3)
+            .collect::<Vec<_>>()
+    };
+    let whole_um = rms(wanted_um.iter().copied());
+    let held: Vec<f64> = own
+        .iter()
+        .map(|k| -f64::from(run.motion.sense[Axis::X][*k]))
+        .collect();
+    let (_, step) = fit(&[held.clone()], &wanted_um);
+    let soft = [3, 10, 30, 100].map(|k| column(&format!("free_soft_{k}mm_s2_um")));
+    let (_, wide) = fit(&[&[held][..], &soft].concat(), &wanted_um);
+    println!("of {whole_um:.2} um a step leaves {step:.2}, with soft corners {wide:.2}");
+    assert!(wide < 0.35 * step && step > 0.3 * whole_um, "{step} {wide}");
+}
+
 #[test]
 fn eq2_reversal_value_of_iso_230_2_is_the_width() {
     let machine = three_axes(CHAIN);

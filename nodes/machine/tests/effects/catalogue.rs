@@ -62,7 +62,7 @@ fn every_effect_is_described() {
             names.push(p.name);
             if p.role == Role::Amplitude {
                 assert!((p.low..=p.high).contains(&0.0), "{id} {}", p.name);
-            } else if let Role::Shape { grid } = p.role {
+            } else if let Some(grid) = p.role.grid() {
                 assert!(grid.is_sorted_by(|a, b| a < b), "{id} {}", p.name);
                 assert!(
                     grid.iter().all(|value| (p.low..=p.high).contains(value)),
@@ -90,7 +90,7 @@ fn values(kind: &Kind, factor: f64) -> Vec<f64> {
     let all = kind.parameters.iter().chain(kind.free);
     all.map(|p| match p.role {
         Role::Amplitude => p.typical * factor,
-        Role::Shape { .. } => p.typical,
+        Role::Shape { .. } | Role::Frequency { .. } => p.typical,
     })
     .collect()
 }

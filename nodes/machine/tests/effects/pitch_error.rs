@@ -38,9 +38,17 @@ fn val_a_screw_of_drifting_lead() {
     columns.extend(["free_p4_um", "free_p5_um"].map(column));
     columns.extend((1..8).map(|k| column(&format!("free_{k}_of_8_um"))));
     let (_, wide) = fit(&columns, &travelled);
+    columns.extend(
+        (1..16)
+            .step_by(2)
+            .map(|k| column(&format!("free_{k}_of_16_um"))),
+    );
+    let (_, fine) = fit(&columns, &travelled);
     let (_, straight) = fit(&columns[..2], &travelled);
-    println!("screw {straight:.2} um: P2, P3 leave {narrow:.3}, the wider form {wide:.3}");
-    assert!(narrow < 0.5 * straight && wide < 0.1 * straight);
+    println!(
+        "screw {straight:.2} um: P2, P3 leave {narrow:.3}, the wider form {wide:.3}, to the sixteenth {fine:.3}"
+    );
+    assert!(narrow < 0.5 * straight && wide < 0.1 * straight && fine < 0.5 * wide);
     assert!(rms(travelled) > 1.0);
 }
 

@@ -81,7 +81,15 @@ fn val_a_slide_on_a_guide_that_is_worn_in_one_place() {
     let (_, smooth) = fit(&columns, &height);
     columns.extend((1..8).map(|k| column(&format!("free_{k}_of_8_um"))));
     let (_, wide) = fit(&columns, &height);
+    columns.extend(
+        (1..16)
+            .step_by(2)
+            .map(|k| column(&format!("free_{k}_of_16_um"))),
+    );
+    let (_, fine) = fit(&columns, &height);
     let (_, straight) = fit(&columns[..2], &height);
-    println!("worn guide {straight:.2} um: P2 to P5 leave {smooth:.3}, with hats {wide:.3}");
-    assert!(smooth > 0.5 * straight && wide < 0.3 * straight);
+    println!(
+        "worn guide {straight:.2} um: P2 to P5 leave {smooth:.3}, with hats {wide:.3}, to the sixteenth {fine:.3}"
+    );
+    assert!(smooth > 0.5 * straight && wide < 0.3 * straight && fine < 0.6 * wide);
 }
