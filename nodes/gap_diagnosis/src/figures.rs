@@ -145,6 +145,24 @@ pub enum Note {
     },
 }
 
+fn worse_noise(
+    f: &mut fmt::Formatter<'_>,
+    channel: &str,
+    inflation: f64,
+    withdraws: bool,
+) -> fmt::Result {
+    let then = if withdraws {
+        "nothing is named"
+    } else {
+        "its readings count for so much less"
+    };
+    write!(
+        f,
+        "{channel}: noise floor not reproduced by the session, its variance is {inflation:.2} times that of the repeats; \
+         {then}"
+    )
+}
+
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -162,16 +180,7 @@ impl fmt::Display for Note {
                 channel,
                 inflation,
                 withdraws,
-            } => write!(
-                f,
-                "{channel}: noise floor not reproduced by the session, its variance is {inflation:.2} \
-                 times that of the repeats; {}",
-                if *withdraws {
-                    "nothing is named"
-                } else {
-                    "its readings count for so much less"
-                }
-            ),
+            } => worse_noise(f, channel, *inflation, *withdraws),
             Self::FewRuns { runs } => write!(
                 f,
                 "{runs} runs are too few to flip signs; significance is from a parametric bootstrap"

@@ -11,8 +11,8 @@
 //! never by those that judge the diagnosis.
 //!
 //! # Holds when
-//! [`PROVENANCE`] names trials. Until then the table is the identity, a page says so, and a confidence above 0.9
-//! means "no rival in the catalogue", not one error in ten.
+//! [`PROVENANCE`] names trials; without, the table is the identity and a page says so. The machines of those trials are of
+//! one kind: on others a confidence says which name is surer, and not how often it is right.
 //!
 //! # References
 //! \[1\] B. Zadrozny, C. Elkan, Transforming classifier scores into accurate multiclass probability estimates,
@@ -26,14 +26,26 @@ use crate::rule::Rule;
 pub struct Provenance {
     /// Trials that it was fitted to.
     pub trials: u32,
-    /// The arm of those trials.
+    /// The arms of those trials.
     pub arm: &'static str,
 }
 
-/// Points of f: probability, share of right names; both rise from 0 to 1.
-pub const TABLE: &[[f64; 2]] = &[[0.0, 0.0], [1.0, 1.0]];
-/// Trials behind [`TABLE`]: none yet.
-pub const PROVENANCE: Option<Provenance> = None;
+/// Points of f: probability, share of right names; both rise. Of names with a p of 0.2 to 0.5 2 of 6 were right, to 0.8 2
+/// of 5, to 0.95 9 of 13, to 0.999 24 of 29, to 0.99995 7 of 8, beyond 119 of 119, which is taken for 120 of 121.
+pub const TABLE: &[[f64; 2]] = &[
+    [0.0, 0.0],
+    [0.35, 0.33],
+    [0.65, 0.4],
+    [0.9, 0.7],
+    [0.98, 0.83],
+    [0.9998, 0.88],
+    [1.0, 0.99],
+];
+/// Trials behind [`TABLE`]: 90 of arm i and 100 of arm iii, seed 1.
+pub const PROVENANCE: Option<Provenance> = Some(Provenance {
+    trials: 190,
+    arm: "i, iii",
+});
 
 /// (1); the probability itself where that rule is switched off.
 pub fn recalibrated(config: &GapConfig, probability: f64) -> f64 {
@@ -61,19 +73,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_rises_from_nothing_to_certainty_and_is_the_identity_without_trials() {
+    fn the_table_rises_from_nothing_and_promises_certainty_to_nobody() {
         assert_eq!(TABLE.first(), Some(&[0.0, 0.0]));
-        assert_eq!(TABLE.last(), Some(&[1.0, 1.0]));
+        assert!(TABLE.last().is_some_and(|[p, f]| *p >= 1.0 && *f < 1.0));
         for pair in TABLE.windows(2) {
             assert!(
                 pair[0][0] < pair[1][0] && pair[0][1] <= pair[1][1],
                 "{pair:?}"
             );
         }
-        for p in [0.0, 0.3, 0.97, 1.0] {
-            let is_identity = (recalibrated(&GapConfig::default(), p) - p).abs() < 1e-12;
-            assert!(is_identity || PROVENANCE.is_some(), "{p}");
-        }
+        assert!(PROVENANCE.is_some_and(|behind| behind.trials >= 100));
+    }
+
+    #[test]
+    fn a_diagnosis_without_this_rule_tells_the_probability_itself() {
+        let mut config = GapConfig::default();
+        assert!(recalibrated(&config, 0.97) < 0.9);
+        config.ablated = [Rule::Recalibration].into();
+        assert!((recalibrated(&config, 0.97) - 0.97).abs() < 1e-12);
     }
 
     #[test]

@@ -577,6 +577,21 @@ mod tests {
     }
 
     #[test]
+    fn a_set_that_holds_the_truth_is_not_wrong_and_not_exact() {
+        let play = effect(Class::Backlash, "X", 30.0);
+        let mut spike = cause("reversal_spike", "X", Status::Set, 1.0);
+        spike.rivals = vec![("backlash".to_owned(), "X".to_owned())];
+        let open = verdict(vec![play.clone()], vec![spike.clone()], false);
+        assert!(open.wrong().next().is_none() && !open.is_exact());
+        let twice = cause("backlash", "X", Status::Named, 4.0);
+        let doubled = verdict(vec![play.clone()], vec![twice, spike.clone()], false);
+        assert!(doubled.wrong().next().is_some());
+        spike.status = Status::Named;
+        let sure = verdict(vec![play], vec![spike], false);
+        assert!(sure.wrong().next().is_some());
+    }
+
+    #[test]
     fn bins_cover_every_size() {
         assert_eq!((bin(0.0), bin(5.0), bin(19.9), bin(50.0)), (0, 1, 2, 4));
         assert_eq!(bin_name(bin(70.0)), "> 50");

@@ -286,6 +286,18 @@ impl Verdict {
         (closes > LEAST_CLOSED).then(|| (1.0 - (after / before).powi(2)) / closes)
     }
 
+    /// Whether a cause says that it cannot be told from a hidden effect which is not named itself: a set is right as far
+    /// as the truth is in it.
+    fn holds_truth(&self, cause: &SaidCause) -> bool {
+        let is_left_out = |effect: &TrueEffect| {
+            self.truth.left_out.as_deref() == Some(effect.class.id()) || self.has(effect)
+        };
+        let mut open = self.truth.effects.iter().filter(|e| !is_left_out(e));
+        let brings =
+            |effect: &TrueEffect| effect.besides.iter().any(|own| cause.rivals.contains(own));
+        cause.status == Status::Set && open.any(|effect| cause.may_be(effect) || brings(effect))
+    }
+
     /// Causes that were named.
     pub fn named(&self) -> impl Iterator<Item = &SaidCause> {
         let causes = self.said.iter().flat_map(|said| &said.causes);
@@ -300,9 +312,10 @@ impl Verdict {
         !is_left_out && self.truth.effects.iter().any(is_own)
     }
 
-    /// Named causes that are not hidden in the machine.
+    /// Named causes that are not hidden in the machine, nor members of a set that holds one that is.
     pub fn wrong(&self) -> impl Iterator<Item = &SaidCause> {
-        self.named().filter(|cause| !self.is_right(cause))
+        self.named()
+            .filter(|cause| !self.is_right(cause) && !self.holds_truth(cause))
     }
 
     /// Whether the hidden effects are named and nothing else.

@@ -40,6 +40,11 @@ pub struct Which<'w> {
 }
 
 impl Which<'_> {
+    /// Whether what is left on held-out runs is compared with a machine that hides nothing.
+    fn has_oracle(&self) -> bool {
+        matches!(self.arm, Arm::Catalogue | Arm::Foreign | Arm::Alone)
+    }
+
     /// Whether its interval of the gap closed is judged on later runs.
     fn has_later_runs(&self) -> bool {
         matches!(self.arm, Arm::Catalogue | Arm::Foreign)
@@ -66,7 +71,7 @@ impl How {
     pub fn trial(&self, which: &Which<'_>, tell: &dyn Fn(&str)) -> Result<Vec<Verdict>> {
         let began = Instant::now();
         let mut trial = Trial::draw(which.arm, which.seed, which.index)?;
-        if !trial.truth.effects.is_empty() {
+        if which.has_oracle() {
             trial.truth.bare_um = blind::bare_um(&trial.bare)?;
         }
         if self.in_process {
