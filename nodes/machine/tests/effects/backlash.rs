@@ -184,7 +184,7 @@ fn val_the_wider_form_takes_soft_corners() {
         .iter()
         .map(|k| -f64::from(run.motion.sense[Axis::X][*k]))
         .collect();
-    let (_, step) = fit(&[held.clone()], &wanted_um);
+    let (_, step) = fit(std::slice::from_ref(&held), &wanted_um);
     let soft = [3, 10, 30, 100].map(|k| column(&format!("free_soft_{k}mm_s2_um")));
     let (_, wide) = fit(&[&[held][..], &soft].concat(), &wanted_um);
     println!("of {whole_um:.2} um a step leaves {step:.2}, with soft corners {wide:.2}");
