@@ -37,7 +37,7 @@ impl Default for GapDiagnosisConfig {
             least_runs: 6,
             cycle_runs: 12,
             least_period_s: 5.0,
-            least_confidence: 0.9,
+            least_confidence: 0.8,
             stations_per_pass: 120,
             draws_of_significance: 199,
             draws_of_intervals: 500,
