@@ -37,6 +37,7 @@ pub mod verdict;
 
 pub use arm::Arm;
 pub use baseline::Method;
+pub use effect::Class;
 pub use error::TrialError;
 pub use extra_run::extra_run;
 pub use measurement::{Sample, measure};

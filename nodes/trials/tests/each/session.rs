@@ -1,0 +1,122 @@
+//! Recordings to which one effect is added: the commands, stamps, touches and temperatures of a programme that the plant has
+//! run, with readings that are noise alone.
+
+use std::f64::consts::TAU;
+
+use fake_cnc::PlantFile;
+use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
+use machine::MachineFile;
+use machine::twin::{Channel, Run, Session};
+use metrology::PerAxis;
+use nalgebra::Vector3;
+use rand::{Rng, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+use sequencer::Plan;
+use trials::{Arm, Rig, Sample, Trial, measure};
+
+const ROTARY: &str = "title: two spheres
+steps:
+  - {do: latency, feature: top, feeds_mm_min: [60.0, 120.0, 240.0, 480.0], repeats: 6}
+  - {do: artefact, id: high, points: 25}
+  - {do: rotary, sphere: high, planned: 16, points: 6, repeats: 3}
+  - {do: artefact, id: high, points: 25}
+  - {do: rotary, sphere: low, planned: 16, points: 6, repeats: 3}
+  - {do: artefact, id: high, points: 25}
+  - {do: rotary, sphere: high, planned: 8, points: 6, verification: true}
+";
+
+/// A recording and the machine that it is of.
+pub struct Recording {
+    pub title: &'static str,
+    pub machine: MachineFile,
+    pub session: Session,
+}
+
+/// Circles, positioning and touches of three axes; two spheres on rotary axes.
+pub fn recordings() -> Vec<Recording> {
+    let mut rig = Trial::draw(Arm::Null, 5, 0).unwrap().rig;
+    rig.has_motors = true;
+    let rotary = five_axis(&rig);
+    vec![recording("circles", &rig), recording("spheres", &rotary)]
+}
+
+/// The five-axis machine of `launch_configs`.
+fn five_axis(like: &Rig) -> Rig {
+    let machine = include_str!("../../../../launch_configs/five_axis/machine.yaml");
+    let plant = include_str!("../../../../launch_configs/five_axis/plant.yaml");
+    let machine = MachineFile::parse(machine, "five_axis/machine.yaml").unwrap();
+    Rig {
+        control: machine.clone(),
+        machine,
+        plant: PlantFile::from_yaml(plant).unwrap(),
+        plan: Plan::from_yaml(ROTARY).unwrap(),
+        ..like.clone()
+    }
+}
+
+fn recording(title: &'static str, rig: &Rig) -> Recording {
+    let mut builder = SessionBuilder::new(&rig.machine, SessionConfig::default()).unwrap();
+    builder.next_bag();
+    measure(rig, &mut |_, sample| builder.take(input(sample))).unwrap();
+    builder.end_bag();
+    let (mut session, _) = builder.finish().unwrap();
+    for run in &mut session.runs {
+        scatter(run);
+    }
+    Recording {
+        title,
+        machine: rig.machine.clone(),
+        session,
+    }
+}
+
+fn input(sample: Sample) -> Input {
+    match sample {
+        Sample::State(sample) => Input::State(sample),
+        Sample::Grid(sample) => Input::Grid(sample),
+        Sample::Length(sample) => Input::Length(sample),
+        Sample::Trigger(sample) => Input::Trigger(sample),
+        Sample::Temperature(sample) => Input::Temperature(sample),
+        Sample::Segment(sample) => Input::Segment(sample),
+    }
+}
+
+/// White noise, and waves over the place that are drawn anew for each run.
+fn scatter(run: &mut Run) {
+    let mut random = Pcg64Mcg::seed_from_u64(7 ^ u64::from(run.segment.run) << 20);
+    let waves: Vec<(Vector3<f64>, Vector3<f64>, Vector3<f64>)> = (0..6)
+        .map(|_| {
+            let rad_per_mm = Vector3::from_fn(|_, _| random.random_range(-0.02..0.02));
+            let phase = Vector3::from_fn(|_, _| random.random_range(0.0..TAU));
+            let size_mm = Vector3::from_fn(|_, _| 1e-4 * random.sample::<f64, _>(StandardNormal));
+            (rad_per_mm, phase, size_mm)
+        })
+        .collect();
+    for reading in &mut run.readings {
+        let place_mm = if reading.channel == Channel::Touch {
+            run.touches[reading.at].position.xyz()
+        } else {
+            let at = |axis| run.motion.position[axis].get(reading.at).copied();
+            PerAxis::from_fn(|axis| at(axis).unwrap_or(0.0)).xyz()
+        };
+        let direction = match &reading.channel {
+            Channel::GridU => 0,
+            Channel::GridV => 1,
+            Channel::Length(axis) => axis.index() % 3,
+            _ => 2,
+        };
+        let smooth_mm: f64 = waves
+            .iter()
+            .map(|(k, phase, size)| size[direction] * (k.dot(&place_mm) + phase[direction]).cos())
+            .sum();
+        let white: f64 = random.sample(StandardNormal);
+        reading.deviation = match &reading.channel {
+            Channel::Motor(axis) | Channel::Scale(axis) if axis.is_linear() => 3e-5 * white,
+            Channel::Motor(_) | Channel::Scale(_) => 3e-7 * white,
+            Channel::Thermometer(_) => 0.02 * white,
+            Channel::Touch => 3e-4 * white + smooth_mm,
+            _ => 1.5e-4 * white + smooth_mm,
+        };
+    }
+}
