@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn the_readme_lists_every_parameter_with_its_default() {
         let readme = include_str!("../README.md");
-        let defaults = ["40", "6", "12", "5.0", "0.9", "120", "199", "500", "\"\""];
+        let defaults = ["40", "6", "12", "5.0", "0.8", "120", "199", "500", "\"\""];
         for (doc, default) in PARAMETERS.iter().zip(defaults) {
             let unit = if doc.unit.is_empty() { "-" } else { doc.unit };
             let name = doc.name;
