@@ -238,14 +238,16 @@ fn delays_are_those_of_the_links(way: &str, stamped: Vec<(Stamp<Host>, Stamp<Hos
     delays_ms.sort_by(f64::total_cmp);
     let of = |share| bag::quantile(&delays_ms, share);
     eprintln!(
-        "{way}: {} samples, least {:.3}, p50 {:.3}, p90 {:.3}, p99 {:.3}, most {:.3} ms",
+        "{way}: {} samples, least {:.3}, p10 {:.3}, p50 {:.3}, p90 {:.3}, p99 {:.3}, most {:.3} ms",
         delays_ms.len(),
         of(0.0),
+        of(0.1),
         of(0.5),
         of(0.9),
         of(0.99),
         of(1.0)
     );
-    // 5 ms and the jitter; half of what the ways differ by stays in the archive's clock.
-    assert!((4.0..12.0).contains(&of(0.5)), "{way}: {}", of(0.5));
+    // 5 ms and the jitter; half of what the ways differ by stays in the archive's clock. On a computer with too much to do most
+    // samples wait besides, and of those that do not the links' delay shows.
+    assert!((4.0..12.0).contains(&of(0.1)), "{way}: {}", of(0.1));
 }

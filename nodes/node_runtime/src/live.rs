@@ -23,6 +23,7 @@ mod action_client;
 mod action_server;
 mod assembly;
 mod board;
+mod event_time;
 pub(crate) mod incoming;
 mod logger_levels;
 mod owner;

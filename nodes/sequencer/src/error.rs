@@ -56,6 +56,4 @@ pub enum SequencerError {
     NoRepeats { step: usize },
     #[error("steps: the plan has none")]
     NoSteps,
-    #[error("time went back by {back_s} s to {at_s} s: the event was not used")]
-    TimeWentBack { at_s: f64, back_s: f64 },
 }

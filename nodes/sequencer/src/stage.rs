@@ -1,6 +1,7 @@
 //! Steps of a plan and cycle goals, one program at a time.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::convert::Infallible;
 
 use machine::MachineFile;
 use metrology::Stage;
@@ -470,22 +471,35 @@ impl Sequencer {
     }
 }
 
+impl Sequencer {
+    /// The host's clock was set back: what is waited for comes as much later as it would have.
+    fn set_back(&mut self, by: Span) {
+        let job = self.job.as_mut();
+        let of_job = job.map(|job| [job.retry_at.as_mut(), job.awaits_touches_until.as_mut()]);
+        let production = self.production.as_mut();
+        let of_production = production.map(|part| [Some(&mut part.from), Some(&mut part.until)]);
+        let own = [self.started_at.as_mut(), self.waiting_until.as_mut()];
+        for all in [Some(own), of_job, of_production].into_iter().flatten() {
+            for stamp in all.into_iter().flatten() {
+                *stamp = *stamp - by;
+            }
+        }
+    }
+}
+
 impl Stage for Sequencer {
     type Input = Input;
     type Output = Output;
-    type Error = SequencerError;
+    type Error = Infallible;
 
     fn step(
         &mut self,
         at: Stamp<Host>,
         input: Input,
         out: &mut Vec<Output>,
-    ) -> Result<(), SequencerError> {
+    ) -> Result<(), Infallible> {
         if at < self.now {
-            return Err(SequencerError::TimeWentBack {
-                at_s: at.as_secs_f64(),
-                back_s: (self.now - at).as_secs_f64(),
-            });
+            self.set_back(self.now - at);
         }
         self.now = at;
         match input {

@@ -95,7 +95,7 @@ impl Rehearsal {
                     self.of_control(output);
                 }
             } else if let Some(news) = self.news.pop_front() {
-                self.sequencer.step(self.now, news, &mut told)?;
+                let Ok(()) = self.sequencer.step(self.now, news, &mut told);
                 for output in told.drain(..) {
                     self.of_sequencer(output);
                 }

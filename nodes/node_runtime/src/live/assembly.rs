@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use abbe_msgs::{Message, Qos, topics};
 use anyhow::Context as _;
-use metrology::Stamp;
 use tokio::sync::mpsc;
 use tokio::time::Instant;
 
 use super::action_client::ActionClient;
 use super::action_server::{ActionServer, GoalService};
 use super::board::Board;
+use super::event_time::EventTime;
 use super::incoming::{Incoming, QUEUE_LEN, Readers};
 use super::logger_levels::LoggerService;
 use super::owner::{
@@ -319,7 +319,7 @@ pub(super) fn assemble(
         rosout,
         parameter_events,
         emissions: Vec::new(),
-        last_event: Stamp::from_nanos(i64::MIN),
+        event_time: EventTime::new(),
         next_request: 0,
         requests: std::collections::BTreeMap::new(),
         hearing: Hearing::default(),

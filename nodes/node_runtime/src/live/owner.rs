@@ -15,6 +15,7 @@ use super::Stop;
 use super::action_client::ActionClient;
 use super::action_server::{ActionServer, GoalService};
 use super::board::Board;
+use super::event_time::EventTime;
 use super::incoming::{Incoming, Readers};
 use super::logger_levels::LoggerService;
 use super::parameters::{self, ParameterService};
@@ -115,7 +116,7 @@ pub(super) struct Owner {
     pub log_level: Option<Severity>,
     pub board: Board,
     pub emissions: Vec<Emission>,
-    pub last_event: Stamp<Host>,
+    pub event_time: EventTime,
     pub next_request: RequestId,
     pub requests: BTreeMap<(usize, RequestId), (usize, ReplyTo)>,
     pub hearing: Hearing,
@@ -235,31 +236,23 @@ impl Owner {
 
     /// The time of an event; it does not go back unless the clock was set back.
     fn instant(&mut self, received: Option<Stamp<Host>>) -> Stamp<Host> {
-        /// Samples of several topics overtake each other by less than this.
-        const DISORDER_NANOS: i64 = 100_000_000;
         if self.clock.is_simulated() {
             return self.clock.now();
         }
-        let at = match received {
-            _ if self.relation.keeps_own_time => self.relation.own_now(),
-            Some(received) => self.clock.taken_over(received),
-            None => self.clock.now(),
+        let (now, arrived) = if self.relation.keeps_own_time {
+            (self.relation.own_now(), None)
+        } else {
+            let arrived = received.map(|at| self.clock.taken_over(at));
+            (self.clock.now(), arrived)
         };
-        if at >= self.last_event {
-            self.last_event = at;
-        } else if (self.last_event - at).nanos() > DISORDER_NANOS {
-            let back_s = (self.last_event - at).as_secs_f64();
-            self.last_event = at;
-            self.notice(
-                Diagnostic::new(
-                    Level::Warn,
-                    "clock_stepped_back",
-                    format!("clock went back {back_s} s"),
-                )
-                .with("step_s", -back_s),
-            );
+        let (at, set_back) = self.event_time.of(now, arrived);
+        if let Some(back) = set_back {
+            let back_s = back.as_secs_f64();
+            let message = format!("clock went back {back_s} s");
+            let diagnostic = Diagnostic::new(Level::Warn, "clock_stepped_back", message);
+            self.notice(diagnostic.with("step_s", -back_s));
         }
-        self.last_event
+        at
     }
 
     fn notice(&mut self, diagnostic: Diagnostic) {

@@ -4,6 +4,7 @@ use metrology::Stamp;
 use metrology::sample::HostClock;
 use metrology::stamp::{Host, Span};
 
+use super::event_time::EventTime;
 use super::owner::Owner;
 use crate::clock::{Change, Clock, HostTime};
 use crate::diagnostic::{Diagnostic, Level};
@@ -57,7 +58,7 @@ impl Owner {
         let reference = clock.reference.clone();
         if let Change::Steps(by) = self.relation.time.relate(clock) {
             // The step is meant: what comes next is not late.
-            self.last_event = Stamp::from_nanos(i64::MIN);
+            self.event_time = EventTime::new();
             let by_s = by.as_secs_f64();
             tracing::info!(by_s, "the clock goes by that of host {reference} now");
         }

@@ -316,14 +316,23 @@ fn a_plan_that_cannot_run_is_refused_before_anything_moves() {
 }
 
 #[test]
-fn time_that_goes_back_is_refused_and_changes_nothing() {
-    let mut sequencer = sequencer(vec![produce(1.0)]);
-    give(&mut sequencer, 5.0, Input::Tick);
-    let error = sequencer
-        .step(at(4.0), Input::Tick, &mut Vec::new())
-        .unwrap_err();
-    assert!(error.to_string().contains("went back by 1 s"), "{error}");
-    give(&mut sequencer, 6.0, Input::Tick);
+fn a_wait_lasts_as_long_as_it_should_when_the_clock_is_set_back() {
+    let wait = Step::Wait { seconds: 5.0 };
+    let mut sequencer = sequencer(vec![wait, produce(1.0)]);
+    give(&mut sequencer, 100.0, Input::Tick);
+    give(&mut sequencer, 101.0, Input::Tick);
+    assert_eq!(sent(&give(&mut sequencer, 41.0, Input::Tick)), None);
+    assert_eq!(sent(&give(&mut sequencer, 45.9, Input::Tick)), None);
+    assert!(sent(&give(&mut sequencer, 46.0, Input::Tick)).is_some());
+}
+
+#[test]
+fn touches_count_and_are_awaited_also_when_the_clock_is_set_back() {
+    let (mut sequencer, id) = block_touches();
+    touch(&mut sequencer, 10.0, 5);
+    give(&mut sequencer, 60.0, Input::ProgramEnd { id, end: done() });
+    let judged = give(&mut sequencer, 30.0, Input::Touch);
+    assert_eq!(segments(&judged)[0], (TestKind::Block, false, true));
 }
 
 #[test]
