@@ -10,8 +10,8 @@
 //!   P(n) = 2 |sum_i z_i exp(2 pi i n x_i / lead)|^2 / rows                (1)
 //! ```
 //!
-//! z is white, so that P has mean 2 and is above [`LEAST_POWER`] in one of a thousand sessions of noise. The line is a form
-//! like any other, which pays for its choice by one parameter more.
+//! z is white, so that P has mean 2, and noise makes more than [`LEAST_POWER`] at one of the few hundred n that are tried with
+//! a chance of some 1e-4 (exp(-15) each). The line is a form like any other, which pays for its choice by one parameter more.
 //!
 //! # References
 //! \[1\] J. D. Scargle, Astrophys. J. 263, 1982 (the periodogram of places that are not evenly spaced).

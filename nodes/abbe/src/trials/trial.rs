@@ -71,7 +71,7 @@ impl How {
     pub fn trial(&self, which: &Which<'_>, tell: &dyn Fn(&str)) -> Result<Vec<Verdict>> {
         let began = Instant::now();
         let mut trial = Trial::draw(which.arm, which.seed, which.index)?;
-        if which.has_oracle() {
+        if which.has_oracle() && !trial.truth.effects.is_empty() {
             trial.truth.bare_um = blind::bare_um(&trial.bare)?;
         }
         if self.in_process {

@@ -7,7 +7,7 @@
 
 use metrology::Axis;
 
-use super::Scene;
+use super::{Parameter, Scene};
 
 /// Sum of hats (1) with places `first`, `first + spacing`, ...; zero beyond the outer ones.
 pub(super) fn hats(first: f64, spacing: f64, heights: &[f64], at: f64) -> f64 {
@@ -55,6 +55,27 @@ pub(super) fn place_hats(heights: &[f64; PLACE_HATS], share: f64) -> f64 {
     };
     hats(-0.75, 0.25, wide, share) + of_narrow
 }
+
+/// Heights of any curve over the travel beside P2 and P3: P4 and P5, then the hats in the order of [`place_hats`].
+pub(super) const CURVE_UM: &[Parameter] = &[
+    Parameter::ordinate("free_p4_um", 60.0, 1.0),
+    Parameter::ordinate("free_p5_um", 60.0, 1.0),
+    Parameter::ordinate("free_1_of_8_um", 60.0, 1.0),
+    Parameter::ordinate("free_2_of_8_um", 60.0, 1.0),
+    Parameter::ordinate("free_3_of_8_um", 60.0, 1.0),
+    Parameter::ordinate("free_4_of_8_um", 60.0, 1.0),
+    Parameter::ordinate("free_5_of_8_um", 60.0, 1.0),
+    Parameter::ordinate("free_6_of_8_um", 60.0, 1.0),
+    Parameter::ordinate("free_7_of_8_um", 60.0, 1.0),
+    Parameter::ordinate("free_1_of_16_um", 60.0, 1.0),
+    Parameter::ordinate("free_3_of_16_um", 60.0, 1.0),
+    Parameter::ordinate("free_5_of_16_um", 60.0, 1.0),
+    Parameter::ordinate("free_7_of_16_um", 60.0, 1.0),
+    Parameter::ordinate("free_9_of_16_um", 60.0, 1.0),
+    Parameter::ordinate("free_11_of_16_um", 60.0, 1.0),
+    Parameter::ordinate("free_13_of_16_um", 60.0, 1.0),
+    Parameter::ordinate("free_15_of_16_um", 60.0, 1.0),
+];
 
 /// Sum of Legendre polynomials of the orders `first`, `first + 1`, ... at x.
 pub(super) fn legendre(first: usize, amplitudes: &[f64], x: f64) -> f64 {

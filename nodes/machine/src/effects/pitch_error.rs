@@ -28,7 +28,7 @@
 
 use metrology::Axis;
 
-use super::form::{PLACE_HATS, Travel, legendre, place_hats};
+use super::form::{CURVE_UM, PLACE_HATS, Travel, legendre, place_hats};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
 use crate::twin::Response;
 
@@ -41,25 +41,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("p2_um", 60.0, 4.0),
         Parameter::amplitude("p3_um", 60.0, 3.0),
     ],
-    free: &[
-        Parameter::ordinate("free_p4_um", 60.0, 1.0),
-        Parameter::ordinate("free_p5_um", 60.0, 1.0),
-        Parameter::ordinate("free_1_of_8_um", 60.0, 1.0),
-        Parameter::ordinate("free_2_of_8_um", 60.0, 1.0),
-        Parameter::ordinate("free_3_of_8_um", 60.0, 1.0),
-        Parameter::ordinate("free_4_of_8_um", 60.0, 1.0),
-        Parameter::ordinate("free_5_of_8_um", 60.0, 1.0),
-        Parameter::ordinate("free_6_of_8_um", 60.0, 1.0),
-        Parameter::ordinate("free_7_of_8_um", 60.0, 1.0),
-        Parameter::ordinate("free_1_of_16_um", 60.0, 1.0),
-        Parameter::ordinate("free_3_of_16_um", 60.0, 1.0),
-        Parameter::ordinate("free_5_of_16_um", 60.0, 1.0),
-        Parameter::ordinate("free_7_of_16_um", 60.0, 1.0),
-        Parameter::ordinate("free_9_of_16_um", 60.0, 1.0),
-        Parameter::ordinate("free_11_of_16_um", 60.0, 1.0),
-        Parameter::ordinate("free_13_of_16_um", 60.0, 1.0),
-        Parameter::ordinate("free_15_of_16_um", 60.0, 1.0),
-    ],
+    free: CURVE_UM,
     moment: Moment::Mean,
     needs: "positions over the axis' travel",
     build: |target, values| Box::new(PitchError::new(&target, values)),

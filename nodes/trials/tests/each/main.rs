@@ -35,7 +35,7 @@ const OPEN: [(&str, &str); 4] = [
     ),
     (
         "workpiece_expansion",
-        "at its greatest size D 16 in two hours of block cycles, and none here",
+        "at its greatest size D 16 in eight spells of work with block cycles, and none here",
     ),
 ];
 /// D below which an effect need not be named.
@@ -54,7 +54,7 @@ fn name(kind: &Kind, target: &Target) -> String {
     format!("{} {target}", kind.id).trim_end().to_owned()
 }
 
-/// Norm of what an effect adds to the readings, over that of noise of a micrometre's tenth: which shape shows most.
+/// Norm of what an effect adds to the readings, in their own units: which shape shows most.
 fn shown(recording: &Recording, effect: &dyn Effect) -> f64 {
     let twin = Twin::new(&recording.machine).unwrap();
     let session = &recording.session;
