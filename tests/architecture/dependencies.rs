@@ -5,12 +5,13 @@ use crate::packages::{self, Package};
 use crate::tree::{self, PURE};
 
 /// What speaks ROS.
-const ROS: [&str; 2] = ["ros2-client", "rustdds"];
+const ROS: [&str; 4] = ["ros2-client", "rustdds", "zenoh", "zenoh-ext"];
 
-/// What a pure crate never reaches: ROS, its wire, runtimes, logs and clocks.
-const IMPURE: [&str; 11] = [
+/// What a pure crate never reaches: ROS, its middlewares and wire, runtimes, logs and clocks.
+const IMPURE: [&str; 12] = [
     "ros2-client",
     "rustdds",
+    "zenoh",
     "abbe_msgs",
     "node_runtime",
     "tokio",

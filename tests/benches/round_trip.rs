@@ -352,7 +352,7 @@ pub fn run(seconds: u32, program: Option<PathBuf>) {
     let environment = Environment {
         domain_id,
         range: DiscoveryRange::Localhost,
-        log_filter: None,
+        ..Environment::default()
     };
     let node = compensating_node(&environment, &program.unwrap_or_else(built_program));
     let mut ours = Loop::join(&environment);

@@ -7,9 +7,9 @@ use abbe_msgs::msg::{AxisDrift, AxisState, ThermalModel};
 use abbe_msgs::topics;
 use abbe_tests::scenario::Scenario;
 
-use crate::network::Network;
-use crate::switch::{Link, Way};
 use abbe_tests::graph::{Graph, Voice, now, port};
+use abbe_tests::hosts::network::Network;
+use abbe_tests::hosts::switch::{Link, Way};
 
 const WAY: Way = Way {
     delay_s: 2.5e-3,

@@ -1,6 +1,6 @@
 //! Several hosts: the controller on one, models on another, the recorder on a third, over links that delay, lose and break.
 //!
-//! Each host is a network namespace with a tap; between them is a switch of the test's own (`switch`), which does to frames what
+//! Each host is a network namespace with a tap; between them is a switch of the test's own, which does to frames what
 //! the test says. What needs namespaces and taps that this computer does not have is said, and fails where `CI=true`.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
@@ -9,8 +9,5 @@
     reason = "programs are run, time passes, and CI is asked"
 )]
 
-mod bag;
 mod cuts;
-mod network;
-mod switch;
 mod three_hosts;

@@ -9,9 +9,9 @@ use abbe_tests::scenario::Scenario;
 use metrology::sample::HostClock;
 use metrology::stamp::{Host, Span, Stamp};
 
-use crate::bag;
-use crate::network::Network;
-use crate::switch::{Link, Way};
+use abbe_tests::hosts::bag;
+use abbe_tests::hosts::network::Network;
+use abbe_tests::hosts::switch::{Link, Way};
 
 const HOSTS: [&str; 3] = ["controller", "models", "archive"];
 /// Jitter of a whole way between two hosts, from nothing to this, s.

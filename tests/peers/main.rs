@@ -12,3 +12,4 @@ mod calls;
 mod latched;
 mod ring;
 mod wire;
+mod zenoh;

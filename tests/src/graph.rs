@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use abbe_msgs::diagnostic_msgs::msg::DiagnosticStatus;
 use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Wire, from_cdr, to_cdr};
-use node_runtime::environment::{DiscoveryRange, Environment};
+use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::node::TopicPort;
 use node_runtime::tap::{RawPublisher, RawTap, Selection, TapEvent};
@@ -35,11 +35,7 @@ impl Graph {
     /// When there is no network.
     #[must_use]
     pub fn join(domain: u16) -> Self {
-        Self::join_by(Environment {
-            domain_id: domain,
-            range: DiscoveryRange::Localhost,
-            log_filter: None,
-        })
+        Self::join_by(crate::zenoh::environment(domain))
     }
 
     /// Joins the network that `environment` tells of, as [`Self::join`] does that of this computer.

@@ -9,7 +9,9 @@
 
 pub mod cyclone;
 pub mod graph;
+pub mod hosts;
 pub mod namespace;
 pub mod program;
 pub mod python;
 pub mod scenario;
+pub mod zenoh;

@@ -56,6 +56,7 @@ pub fn command(domain: u16, arguments: &[&str]) -> Command {
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
+    crate::zenoh::put_on_it(&mut command, domain);
     command
 }
 
@@ -107,13 +108,21 @@ impl Process {
         Self::start(command(domain, &arguments))
     }
 
+    /// Its number.
+    ///
+    /// # Panics
+    /// When the process is gone.
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        self.child.as_ref().unwrap().id()
+    }
+
     /// Sends a signal.
     ///
     /// # Panics
     /// When the process is gone.
     pub fn signal(&self, signal: Signal) {
-        let id = self.child.as_ref().unwrap().id();
-        kill(Pid::from_raw(i32::try_from(id).unwrap()), signal).unwrap();
+        kill(Pid::from_raw(i32::try_from(self.id()).unwrap()), signal).unwrap();
     }
 
     /// Whether it still runs.

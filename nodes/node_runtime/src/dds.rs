@@ -2,8 +2,8 @@
 //!
 //! One participant per node. Endpoints are RustDDS's own with serialised samples in and out; they
 //! are put into the ROS graph by our own `ros_discovery_info`, since ros2-client registers only
-//! endpoints whose samples it decodes itself. What leaves this module is free of DDS types, so that
-//! a second middleware can stand beside it.
+//! endpoints whose samples it decodes itself. What leaves this module is free of DDS types: Zenoh
+//! stands beside it.
 
 use std::net::Ipv4Addr;
 use std::sync::{Mutex, PoisonError};
@@ -19,12 +19,16 @@ use rustdds::{
 };
 
 use crate::environment::{self, DiscoveryRange, Environment};
-use crate::names::NodeNames;
+use crate::names::{self, NodeNames};
+use crate::network::{Guid, Remote, Role};
 
 mod endpoint;
 mod policies;
 
-pub(crate) use endpoint::{Guid, PublishError, Reader, RequestIdentity, Sample, Writer};
+pub(crate) use endpoint::{Reader, Writer};
+
+/// Requests and replies: reliable, volatile.
+const SERVICE_QOS: Qos = Qos::RELIABLE;
 
 type GraphWriter =
     no_key::DataWriter<ParticipantEntitiesInfo, CDRSerializerAdapter<ParticipantEntitiesInfo>>;
@@ -42,14 +46,22 @@ fn builder(environment: &Environment) -> DomainParticipantBuilder {
     }
 }
 
-/// Somebody's reader or writer, as discovery describes it.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Remote {
-    pub guid: Guid,
-    pub dds_topic: String,
-    pub dds_type: String,
-    pub reliable: bool,
-    pub latched: bool,
+const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
+
+/// Whose endpoint it is: the vendor is in the first two bytes.
+pub(crate) fn is_cyclone(guid: &Guid) -> bool {
+    guid[..2] == CYCLONE_VENDOR
+}
+
+/// What a DDS topic carries and its name in ROS; `None` for what is not of ROS.
+fn role_of(dds_topic: &str) -> Option<(Role, &str)> {
+    let (role, rest) = match dds_topic.split_at_checked(2)? {
+        ("rt", rest) => (Role::Message, rest),
+        ("rq", rest) => (Role::Request, rest.strip_suffix("Request")?),
+        ("rr", rest) => (Role::Reply, rest.strip_suffix("Reply")?),
+        _ => return None,
+    };
+    rest.starts_with('/').then_some((role, rest))
 }
 
 /// A node's place on the network.
@@ -128,8 +140,31 @@ impl Participant {
             .map_err(|error| anyhow!("DDS topic {name}: {error}"))
     }
 
-    /// A writer of serialised samples.
-    pub fn writer(&self, dds_topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Writer> {
+    /// A writer of serialised samples of a topic of ROS.
+    pub fn writer(&self, topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Writer> {
+        self.writer_of(&names::dds_topic(topic), dds_type, qos)
+    }
+
+    /// A reader of serialised samples of a topic of ROS.
+    pub fn reader(&self, topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Reader> {
+        self.reader_of(&names::dds_topic(topic), dds_type, qos)
+    }
+
+    /// Both ends of a service's server: of requests, of replies.
+    pub fn server(&self, service: &str, type_name: &str) -> anyhow::Result<(Reader, Writer)> {
+        let [(requests, request), (replies, reply)] = service_topics(service, type_name);
+        let reader = self.reader_of(&requests, &request, SERVICE_QOS)?;
+        Ok((reader, self.writer_of(&replies, &reply, SERVICE_QOS)?))
+    }
+
+    /// Both ends of a service's client: of replies, of requests.
+    pub fn client(&self, service: &str, type_name: &str) -> anyhow::Result<(Reader, Writer)> {
+        let [(requests, request), (replies, reply)] = service_topics(service, type_name);
+        let writer = self.writer_of(&requests, &request, SERVICE_QOS)?;
+        Ok((self.reader_of(&replies, &reply, SERVICE_QOS)?, writer))
+    }
+
+    fn writer_of(&self, dds_topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Writer> {
         let topic = self.topic(dds_topic, dds_type, qos)?;
         let policies = policies::policies(qos, policies::Side::Writer);
         let writer = self
@@ -140,8 +175,7 @@ impl Participant {
         Ok(Writer::new(writer))
     }
 
-    /// A reader of serialised samples.
-    pub fn reader(&self, dds_topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Reader> {
+    fn reader_of(&self, dds_topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Reader> {
         let topic = self.topic(dds_topic, dds_type, qos)?;
         let policies = policies::policies(qos, policies::Side::Reader);
         let reader = self
@@ -206,38 +240,72 @@ impl Participant {
     pub fn writers(&self) -> Vec<Remote> {
         let describe = |found: rustdds::discovery::DiscoveredWriterData| {
             let data = found.publication_topic_data;
-            Remote {
+            let (role, name) = role_of(&data.topic_name)?;
+            Some(Remote {
                 guid: data.key.to_bytes(),
+                role,
+                name: name.to_owned(),
+                dds_type: data.type_name.clone(),
+                type_hash: None,
                 reliable: policies::is_reliable(data.reliability),
                 latched: policies::is_latched(data.durability),
-                dds_topic: data.topic_name,
-                dds_type: data.type_name,
-            }
+            })
         };
-        self.participant
-            .discovered_writers()
-            .into_iter()
-            .map(describe)
-            .collect()
+        let all = self.participant.discovered_writers();
+        all.into_iter().filter_map(describe).collect()
     }
 
     /// Everybody's readers, ours included.
     pub fn readers(&self) -> Vec<Remote> {
         let describe = |found: rustdds::discovery::DiscoveredReaderData| {
             let data = found.subscription_topic_data;
+            let (role, name) = role_of(data.topic_name())?;
             let qos = data.qos();
-            Remote {
+            Some(Remote {
                 guid: data.key().to_bytes(),
+                role,
+                name: name.to_owned(),
+                dds_type: data.type_name().clone(),
+                type_hash: None,
                 reliable: policies::is_reliable(qos.reliability()),
                 latched: policies::is_latched(qos.durability()),
-                dds_topic: data.topic_name().clone(),
-                dds_type: data.type_name().clone(),
-            }
+            })
         };
-        self.participant
-            .discovered_readers()
-            .into_iter()
-            .map(describe)
-            .collect()
+        let all = self.participant.discovered_readers();
+        all.into_iter().filter_map(describe).collect()
+    }
+}
+
+/// DDS topic and type of requests and of replies.
+fn service_topics(service: &str, type_name: &str) -> [(String, String); 2] {
+    [
+        (
+            names::dds_request_topic(service),
+            names::dds_type(&format!("{type_name}_Request")),
+        ),
+        (
+            names::dds_reply_topic(service),
+            names::dds_type(&format!("{type_name}_Response")),
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn topics_of_dds_tell_what_they_carry() {
+        let request = names::dds_request_topic("/cell/save");
+        assert_eq!(role_of(&request), Some((Role::Request, "/cell/save")));
+        let reply = names::dds_reply_topic("/cell/save");
+        assert_eq!(role_of(&reply), Some((Role::Reply, "/cell/save")));
+        assert_eq!(
+            role_of("rt/axes/state"),
+            Some((Role::Message, "/axes/state"))
+        );
+        for other in ["ros_discovery_info", "rtx", "rq/save", "é", ""] {
+            assert_eq!(role_of(other), None, "{other}");
+        }
     }
 }

@@ -16,9 +16,45 @@ pub enum DiscoveryRange {
     Localhost,
 }
 
+/// What carries the ROS graph (`RMW_IMPLEMENTATION`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Middleware {
+    /// DDS, on which `rmw_cyclonedds_cpp` and `rmw_fastrtps_cpp` are met; also where nothing is said.
+    #[default]
+    Dds,
+    /// Zenoh, as `rmw_zenoh_cpp` speaks it.
+    Zenoh,
+}
+
+/// How a session of Zenoh is made; the variables of `rmw_zenoh_cpp`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ZenohSettings {
+    /// `ZENOH_SESSION_CONFIG_URI`: a file that replaces the whole configuration.
+    pub config_uri: Option<String>,
+    /// `ZENOH_CONFIG_OVERRIDE`: `key/path=value;…` on top of it.
+    pub config_override: Option<String>,
+    /// `ZENOH_ROUTER_CHECK_ATTEMPTS`: looks for a router, one a second, before a node goes on without;
+    /// 0: until there is one, below 0: none.
+    pub router_checks: i64,
+}
+
+impl Default for ZenohSettings {
+    fn default() -> Self {
+        Self {
+            config_uri: None,
+            config_override: None,
+            router_checks: 1,
+        }
+    }
+}
+
 /// What the environment says about the ROS graph.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Environment {
+    /// `RMW_IMPLEMENTATION`.
+    pub middleware: Middleware,
+    /// Where that is Zenoh.
+    pub zenoh: ZenohSettings,
     /// `ROS_DOMAIN_ID`.
     pub domain_id: u16,
     /// How far discovery goes.
@@ -40,6 +76,11 @@ pub enum EnvironmentError {
         /// What it may be.
         allowed: &'static str,
     },
+    /// Zenoh is asked for, and is not in this program.
+    #[error(
+        "RMW_IMPLEMENTATION=rmw_zenoh_cpp: this program was built without Zenoh (cargo build --features zenoh)"
+    )]
+    NoZenoh,
     /// Nothing to talk through.
     #[error("no network interface: none of {found} is up with an IPv4 address")]
     NoInterface {
@@ -79,9 +120,13 @@ impl Environment {
     /// Reads the process's environment.
     ///
     /// # Errors
-    /// When a variable has a value that it cannot have.
+    /// When a variable has a value that it cannot have, or that this program was not built for.
     pub fn read() -> Result<Self, EnvironmentError> {
-        Self::from_variables(|name| std::env::var(name).ok())
+        let read = Self::from_variables(|name| std::env::var(name).ok())?;
+        if read.middleware == Middleware::Zenoh && cfg!(not(feature = "zenoh")) {
+            return Err(EnvironmentError::NoZenoh);
+        }
+        Ok(read)
     }
 
     /// The same from any source of variables.
@@ -129,7 +174,10 @@ impl Environment {
                 });
             }
         };
+        let (middleware, zenoh) = middleware(set)?;
         Ok(Self {
+            middleware,
+            zenoh,
             domain_id,
             range,
             log_filter: set("RUST_LOG"),
@@ -180,6 +228,37 @@ impl Environment {
              the first {PARTICIPANTS_WITHOUT_MULTICAST} find each other; `ip link set lo multicast on` cures it"
         ))
     }
+}
+
+/// What carries the graph, and how Zenoh is set up where it does.
+fn middleware(
+    set: impl Fn(&'static str) -> Option<String>,
+) -> Result<(Middleware, ZenohSettings), EnvironmentError> {
+    let middleware = match set("RMW_IMPLEMENTATION").as_deref() {
+        None | Some("rmw_cyclonedds_cpp" | "rmw_fastrtps_cpp") => Middleware::Dds,
+        Some("rmw_zenoh_cpp") => Middleware::Zenoh,
+        Some(value) => {
+            return Err(EnvironmentError::BadVariable {
+                variable: "RMW_IMPLEMENTATION",
+                value: value.to_owned(),
+                allowed: "rmw_zenoh_cpp, or, all of them DDS, rmw_cyclonedds_cpp, rmw_fastrtps_cpp or nothing",
+            });
+        }
+    };
+    let router_checks = match set("ZENOH_ROUTER_CHECK_ATTEMPTS") {
+        None => ZenohSettings::default().router_checks,
+        Some(value) => value.parse().map_err(|_| EnvironmentError::BadVariable {
+            variable: "ZENOH_ROUTER_CHECK_ATTEMPTS",
+            value,
+            allowed: "a whole number",
+        })?,
+    };
+    let zenoh = ZenohSettings {
+        config_uri: set("ZENOH_SESSION_CONFIG_URI"),
+        config_override: set("ZENOH_CONFIG_OVERRIDE"),
+        router_checks,
+    };
+    Ok((middleware, zenoh))
 }
 
 /// The interfaces of this computer.
@@ -236,12 +315,35 @@ mod tests {
     }
 
     #[test]
+    fn the_middleware_is_chosen_by_the_name_of_its_rmw() {
+        for name in ["", "rmw_cyclonedds_cpp", "rmw_fastrtps_cpp"] {
+            let environment = read(&[("RMW_IMPLEMENTATION", name)]).unwrap();
+            assert_eq!(environment.middleware, Middleware::Dds, "{name}");
+        }
+        let zenoh = [
+            ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp"),
+            ("ZENOH_CONFIG_OVERRIDE", "mode=\"client\""),
+            ("ZENOH_ROUTER_CHECK_ATTEMPTS", "-1"),
+        ];
+        let environment = read(&zenoh).unwrap();
+        assert_eq!(environment.middleware, Middleware::Zenoh);
+        let expected = ZenohSettings {
+            config_uri: None,
+            config_override: Some("mode=\"client\"".to_owned()),
+            router_checks: -1,
+        };
+        assert_eq!(environment.zenoh, expected);
+    }
+
+    #[test]
     fn bad_variables_are_refused_by_name() {
         for (name, value) in [
             ("ROS_DOMAIN_ID", "233"),
             ("ROS_DOMAIN_ID", "cell"),
             ("ROS_LOCALHOST_ONLY", "yes"),
             ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"),
+            ("RMW_IMPLEMENTATION", "rmw_connextdds"),
+            ("ZENOH_ROUTER_CHECK_ATTEMPTS", "often"),
         ] {
             let error = read(&[(name, value)]).unwrap_err().to_string();
             assert!(error.contains(name) && error.contains(value), "{error}");

@@ -18,11 +18,14 @@ pub mod lifecycle;
 pub mod live;
 mod log;
 pub mod names;
+mod network;
 pub mod node;
 pub mod parameter;
 pub mod setup;
 pub mod tap;
 pub mod wiring;
+#[cfg(feature = "zenoh")]
+mod zenoh;
 
 pub use clock::HostTime;
 pub use diagnostic::{Diagnostic, Level};

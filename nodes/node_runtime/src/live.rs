@@ -12,10 +12,10 @@ use tracing::Instrument as _;
 
 use crate::arguments::Arguments;
 use crate::complaint;
-use crate::dds::Participant;
 use crate::environment::Environment;
 use crate::interruption::Interruption;
 use crate::log;
+use crate::network::Participant;
 use crate::node::Node;
 use crate::setup::Setup;
 

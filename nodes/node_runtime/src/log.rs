@@ -1,7 +1,7 @@
 //! Log lines to the console and to `/rosout`, from `tracing`.
 //!
 //! A node's owner runs inside a span that carries its name; a line logged there goes out through that
-//! node's `/rosout` writer. Lines of RustDDS and ros2-client reach the console only, and only errors:
+//! node's `/rosout` writer. Lines of RustDDS, ros2-client and Zenoh reach the console only, and only errors:
 //! at `warn` they flood.
 //!
 //! One filter stands before both. A node for which a level was chosen (`--log-level NAME:=LEVEL`, or
@@ -24,7 +24,7 @@ use tracing_subscriber::{EnvFilter, Layer};
 
 use crate::arguments::Arguments;
 use crate::clock::{self, Clock};
-use crate::dds::Writer;
+use crate::network::Writer;
 
 mod levels;
 
@@ -116,7 +116,7 @@ pub(crate) fn start(arguments: &[&Arguments], log_filter: Option<&str>) {
                 level => level,
             });
     // RustDDS complains of multicast groups when it leaves a loopback that has none.
-    let quiet = "rustdds=error,rustdds::network::udp_listener=off,ros2_client=error";
+    let quiet = "rustdds=error,rustdds::network::udp_listener=off,ros2_client=error,zenoh=error";
     let default = format!("{level},{quiet}");
     let filter = log_filter
         .and_then(|directives| EnvFilter::try_new(directives).ok())

@@ -195,14 +195,6 @@ pub fn dds_topic(name: &str) -> String {
     format!("rt{name}")
 }
 
-/// The ROS topic of a DDS topic of messages; `None` for services and for what is not of ROS.
-#[must_use]
-pub fn ros_topic(dds_topic: &str) -> Option<&str> {
-    dds_topic
-        .strip_prefix("rt")
-        .filter(|name| name.starts_with('/'))
-}
-
 /// `/a/b` as the DDS topic of a service's requests.
 #[must_use]
 pub fn dds_request_topic(service: &str) -> String {
@@ -276,7 +268,5 @@ mod tests {
         let dds = "abbe_msgs::msg::dds_::AxisState_";
         assert_eq!(dds_type("abbe_msgs/msg/AxisState"), dds);
         assert_eq!(ros_type(dds).unwrap(), "abbe_msgs/msg/AxisState");
-        assert_eq!(ros_topic("rt/axes/state"), Some("/axes/state"));
-        assert_eq!(ros_topic("rq/xRequest"), None);
     }
 }

@@ -14,10 +14,10 @@ use tokio::task::JoinHandle;
 use tokio::time::Instant;
 
 use crate::clock;
-use crate::dds::{Participant, Reader, Remote, Writer};
 use crate::environment::Environment;
 use crate::live::incoming::GapCounter;
 use crate::names::{self, NodeNames};
+use crate::network::{Participant, Reader, Remote, Role, Writer};
 use crate::node::{Bytes, TopicPort};
 
 /// A topic that was found on the network.
@@ -212,7 +212,7 @@ async fn look(
             };
             if !found.contains_key(&name) {
                 let qos = common_qos(&writers);
-                let Ok(reader) = participant.reader(&first.dds_topic, &first.dds_type, qos) else {
+                let Ok(reader) = participant.reader(&name, &first.dds_type, qos) else {
                     continue;
                 };
                 let type_name =
@@ -257,10 +257,8 @@ async fn look(
 fn offered<'w>(writers: &'w [Remote], selection: &Selection) -> BTreeMap<String, Vec<&'w Remote>> {
     let mut offered: BTreeMap<String, Vec<&Remote>> = BTreeMap::new();
     for writer in writers {
-        if let Some(name) = names::ros_topic(&writer.dds_topic)
-            && selection.takes(name)
-        {
-            offered.entry(name.to_owned()).or_default().push(writer);
+        if writer.role == Role::Message && selection.takes(&writer.name) {
+            offered.entry(writer.name.clone()).or_default().push(writer);
         }
     }
     offered
@@ -377,15 +375,16 @@ impl RawPublisher {
         patience: Duration,
     ) -> anyhow::Result<Self> {
         let runtime = runtime()?;
-        let (participant, warning) = Participant::join(environment, names)?;
+        let (mut participant, warning) = Participant::join(environment, names)?;
+        participant.wait_for_room();
         if let Some(warning) = warning {
             tracing::warn!("{warning}");
         }
         let mut writers = Vec::with_capacity(topics.len());
         for topic in topics {
-            let dds_topic = names::dds_topic(&names.resolve(&topic.name)?);
+            let name = names.resolve(&topic.name)?;
             let dds_type = names::dds_type(&topic.type_name);
-            writers.push(participant.writer(&dds_topic, &dds_type, topic.qos)?);
+            writers.push(participant.writer(&name, &dds_type, topic.qos)?);
         }
         participant.announce()?;
         let (queue, mut outgoing) = mpsc::channel::<Outgoing>(queue_len.max(1));
@@ -518,8 +517,10 @@ mod tests {
     fn a_tap_asks_for_what_every_writer_offers() {
         let writer = |reliable, latched| Remote {
             guid: [0; 16],
-            dds_topic: "rt/x".to_owned(),
+            role: Role::Message,
+            name: "/x".to_owned(),
             dds_type: "t".to_owned(),
+            type_hash: None,
             reliable,
             latched,
         };

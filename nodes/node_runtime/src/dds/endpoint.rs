@@ -11,29 +11,8 @@ use rustdds::no_key::{self, Decode, DefaultDecoder, DeserializerAdapter, Seriali
 use rustdds::rpc::SampleIdentity;
 use rustdds::{GUID, RepresentationIdentifier, SequenceNumber, Timestamp, WriteOptionsBuilder};
 
+use crate::network::{Guid, PublishError, RequestIdentity, Sample, check_encapsulation};
 use crate::node::Bytes;
-
-/// Names an endpoint: vendor in the first two bytes, participant in the first twelve.
-pub(crate) type Guid = [u8; 16];
-
-/// Names a request: its writer (or what the client calls so) and its number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct RequestIdentity {
-    pub writer: Guid,
-    pub sequence: i64,
-}
-
-/// A sample as it came.
-#[derive(Clone, Debug)]
-pub(crate) struct Sample {
-    pub bytes: Bytes,
-    pub writer: Guid,
-    /// Counts the writer's samples from 1; a jump is a loss.
-    pub sequence: i64,
-    pub source: Option<Stamp<Host>>,
-    pub received: Stamp<Host>,
-    pub related: Option<RequestIdentity>,
-}
 
 const HEADER_LEN: usize = 4;
 const CDR_LE_HEADER: [u8; HEADER_LEN] = [0, 1, 0, 0];
@@ -156,17 +135,6 @@ impl Reader {
     }
 }
 
-/// Why a sample was not sent.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum PublishError {
-    #[error("encapsulation {found:02x?} is not little-endian plain CDR, 00 01")]
-    Encapsulation { found: Vec<u8> },
-    #[error("too many samples wait for an acknowledgement")]
-    Full,
-    #[error("{0}")]
-    Broken(String),
-}
-
 /// Writes one topic; writing never waits.
 pub(crate) struct Writer {
     writer: no_key::DataWriter<Bytes, Raw>,
@@ -207,10 +175,7 @@ impl Writer {
         source: Option<Stamp<Host>>,
         related: Option<SampleIdentity>,
     ) -> Result<RequestIdentity, PublishError> {
-        if bytes.get(..2) != Some(&CDR_LE_HEADER[..2]) || bytes.len() < HEADER_LEN {
-            let found = bytes.iter().take(2).copied().collect();
-            return Err(PublishError::Encapsulation { found });
-        }
+        check_encapsulation(bytes)?;
         let options = WriteOptionsBuilder::new()
             .source_timestamp(source.map_or_else(Timestamp::now, timestamp))
             .related_sample_identity_opt(related)

@@ -242,7 +242,7 @@ mod tests {
     use abbe_msgs::from_cdr;
 
     use super::*;
-    use crate::dds::RequestIdentity;
+    use crate::network::RequestIdentity;
 
     fn to(sequence: i64) -> ReplyTo {
         ReplyTo::Related(RequestIdentity {

@@ -23,14 +23,13 @@ use super::service::{Client, Server};
 use super::timers::{HostTimers, SimulatedTimers};
 use super::type_description;
 use crate::clock::Clock;
-use crate::dds::{Participant, Writer};
+
 use crate::names::{self, NodeNames};
+use crate::network::{Participant, Writer};
 use crate::node::{ActionPort, Node, Ports};
 use crate::parameter::Parameter;
 use crate::setup::Setup;
 
-/// Requests and replies: reliable, volatile.
-const SERVICE_QOS: Qos = Qos::RELIABLE;
 const FEEDBACK_QOS: Qos = Qos::RELIABLE;
 const STATUS_QOS: Qos = Qos::LATCHED;
 
@@ -50,17 +49,13 @@ struct Assembly {
 
 impl Assembly {
     fn standard<M: Message>(&self, topic: &topics::Topic<M>) -> anyhow::Result<Writer> {
-        let name = names::dds_topic(&self.names.resolve(topic.name)?);
+        let name = self.names.resolve(topic.name)?;
         self.participant
             .writer(&name, &names::dds_type(M::TYPE_NAME), topic.qos)
     }
 
     fn server(&mut self, used: ServerUse, service: &str, type_name: &str) -> anyhow::Result<()> {
-        let [request, reply] = service_topics(service, type_name);
-        let reader = self
-            .participant
-            .reader(&request.0, &request.1, SERVICE_QOS)?;
-        let writer = self.participant.writer(&reply.0, &reply.1, SERVICE_QOS)?;
+        let (reader, writer) = self.participant.server(service, type_name)?;
         self.readers.requests(service, reader, self.servers.len());
         self.servers.push((
             used,
@@ -73,13 +68,9 @@ impl Assembly {
     }
 
     fn client(&mut self, used: ClientUse, service: &str, type_name: &str) -> anyhow::Result<()> {
-        let [request, reply] = service_topics(service, type_name);
-        let writer = self
-            .participant
-            .writer(&request.0, &request.1, SERVICE_QOS)?;
-        let reader = self.participant.reader(&reply.0, &reply.1, SERVICE_QOS)?;
+        let (reader, writer) = self.participant.client(service, type_name)?;
         self.readers.replies(service, reader, self.clients.len());
-        let client = Client::new(service.to_owned(), writer, (request.0, reply.0));
+        let client = Client::new(service.to_owned(), writer);
         self.clients.push((used, client));
         Ok(())
     }
@@ -88,14 +79,12 @@ impl Assembly {
         let mut subscriptions = Vec::with_capacity(ports.subscriptions.len());
         for (place, port) in ports.subscriptions.iter().enumerate() {
             let topic = self.names.resolve(&port.topic)?;
-            let dds_topic = names::dds_topic(&topic);
             let dds_type = names::dds_type(port.type_name);
-            let reader = self.participant.reader(&dds_topic, &dds_type, port.qos)?;
+            let reader = self.participant.reader(&topic, &dds_type, port.qos)?;
             self.readers.messages(&topic, reader, place);
             let qos = port.qos;
             subscriptions.push(Subscription {
                 topic,
-                dds_topic,
                 dds_type,
                 qos,
                 received: 0,
@@ -109,13 +98,11 @@ impl Assembly {
     fn publications(&self, ports: &Ports) -> anyhow::Result<Vec<Publication>> {
         let open = |port: &crate::node::TopicPort| {
             let topic = self.names.resolve(&port.topic)?;
-            let dds_topic = names::dds_topic(&topic);
             let dds_type = names::dds_type(port.type_name);
-            let writer = self.participant.writer(&dds_topic, &dds_type, port.qos)?;
+            let writer = self.participant.writer(&topic, &dds_type, port.qos)?;
             let qos = port.qos;
             Ok(Publication {
                 topic,
-                dds_topic,
                 dds_type,
                 qos,
                 writer,
@@ -160,12 +147,12 @@ impl Assembly {
                 self.server(ServerUse::Action(place, service), &service_name, &type_name)?;
             }
             let feedback = self.participant.writer(
-                &names::dds_topic(&format!("{name}/_action/feedback")),
+                &format!("{name}/_action/feedback"),
                 &names::dds_type(&format!("{}_FeedbackMessage", port.type_name)),
                 FEEDBACK_QOS,
             )?;
             let status = self.participant.writer(
-                &names::dds_topic(&format!("{name}/_action/status")),
+                &format!("{name}/_action/status"),
                 &names::dds_type("action_msgs/msg/GoalStatusArray"),
                 STATUS_QOS,
             )?;
@@ -193,7 +180,7 @@ impl Assembly {
             }
             let topic = format!("{name}/_action/feedback");
             let feedback = self.participant.reader(
-                &names::dds_topic(&topic),
+                &topic,
                 &names::dds_type(&format!("{}_FeedbackMessage", port.type_name)),
                 FEEDBACK_QOS,
             )?;
@@ -210,9 +197,9 @@ impl Assembly {
         let topic = self.names.resolve(topics::CLOCK.name)?;
         // ros2-client's own subscription has the type builtin_interfaces/Time, which nobody publishes.
         let type_name = names::dds_type(abbe_msgs::rosgraph_msgs::msg::Clock::TYPE_NAME);
-        let reader =
-            self.participant
-                .reader(&names::dds_topic(&topic), &type_name, topics::CLOCK.qos)?;
+        let reader = self
+            .participant
+            .reader(&topic, &type_name, topics::CLOCK.qos)?;
         self.readers.clock(&topic, reader);
         Ok(())
     }
@@ -235,9 +222,7 @@ impl Assembly {
         let topic = self.names.resolve(topics::HOST_CLOCK.name)?;
         let type_name = names::dds_type(abbe_msgs::msg::HostClock::TYPE_NAME);
         let qos = topics::HOST_CLOCK.qos;
-        let reader = self
-            .participant
-            .reader(&names::dds_topic(&topic), &type_name, qos)?;
+        let reader = self.participant.reader(&topic, &type_name, qos)?;
         self.readers.host_clock(&topic, reader);
         Ok(())
     }
@@ -249,20 +234,6 @@ fn goal_service_type(service: GoalService, action_type: &str) -> String {
         GoalService::CancelGoal => "action_msgs/srv/CancelGoal".to_owned(),
         GoalService::GetResult => format!("{action_type}_GetResult"),
     }
-}
-
-/// DDS topic and type of requests and of replies.
-fn service_topics(service: &str, type_name: &str) -> [(String, String); 2] {
-    [
-        (
-            names::dds_request_topic(service),
-            names::dds_type(&format!("{type_name}_Request")),
-        ),
-        (
-            names::dds_reply_topic(service),
-            names::dds_type(&format!("{type_name}_Response")),
-        ),
-    ]
 }
 
 /// Gives a node its endpoints and an owner that drives it.

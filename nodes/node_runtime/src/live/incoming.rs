@@ -13,7 +13,7 @@ use tokio::sync::mpsc::Sender;
 use tokio::task::JoinSet;
 
 use crate::clock;
-use crate::dds::{Guid, Reader, RequestIdentity, Sample};
+use crate::network::{Guid, Reader, RequestIdentity, Sample};
 use crate::node::Bytes;
 
 use super::service::{self, ReplyTo};

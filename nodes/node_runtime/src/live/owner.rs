@@ -23,9 +23,9 @@ use super::related::Related;
 use super::service::{Client, ReplyTo, Server, shared};
 use super::timers::{HostTimers, SimulatedTimers};
 use crate::clock::Clock;
-use crate::dds::{Participant, PublishError, Writer};
 use crate::diagnostic::{Diagnostic, Level};
 use crate::log::{self, Severity};
+use crate::network::{Participant, PublishError, Writer};
 use crate::node::{Bytes, Emission, Event, Node, RequestId};
 use crate::parameter::Parameter;
 
@@ -55,7 +55,6 @@ pub(super) enum ClientUse {
 
 pub(super) struct Subscription {
     pub topic: String,
-    pub dds_topic: String,
     pub dds_type: String,
     pub qos: Qos,
     pub received: u64,
@@ -66,7 +65,6 @@ pub(super) struct Subscription {
 
 pub(super) struct Publication {
     pub topic: String,
-    pub dds_topic: String,
     pub dds_type: String,
     pub qos: Qos,
     pub writer: Writer,

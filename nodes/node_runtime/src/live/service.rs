@@ -1,20 +1,20 @@
-//! Services on DDS: both mappings of requests and replies that ROS 2 has on the wire.
+//! Services: on DDS both mappings of requests and replies that ROS 2 has on the wire.
 //!
 //! Fast DDS's (`Enhanced`): the identity of a request travels in RTPS's related-sample-identity.
 //! Cyclone DDS's: 16 bytes in front of the payload, the client's number and its request's number. We
 //! speak to everybody in its own way: the vendor is in the first two bytes of every GUID. The 16
 //! bytes keep the alignment of what follows, so that they are put on and taken off without a look
-//! at the types.
+//! at the types. Zenoh names a request beside its payload and needs none of this.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use tokio::time::Instant;
 
-use crate::dds::{Guid, PublishError, Remote, RequestIdentity, Sample, Writer};
+use crate::dds::is_cyclone;
+use crate::network::{Guid, PublishError, Remote, RequestIdentity, Role, Sample, Writer};
 use crate::node::Bytes;
 
-const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
 const HEADER_LEN: usize = 4;
 const CYCLONE_LEN: usize = 16;
 
@@ -23,10 +23,6 @@ const CYCLONE_LEN: usize = 16;
 pub(super) enum ReplyTo {
     Related(RequestIdentity),
     Cyclone([u8; CYCLONE_LEN]),
-}
-
-fn is_cyclone(guid: &Guid) -> bool {
-    guid[..2] == CYCLONE_VENDOR
 }
 
 /// Takes `count` bytes out from behind the encapsulation header.
@@ -42,9 +38,15 @@ pub(super) fn put_front(front: &[u8], bytes: &[u8]) -> Bytes {
     header.iter().chain(front).chain(payload).copied().collect()
 }
 
+/// Whether what a request is called stands in front of its payload. Zenoh's endpoints have names of any
+/// bytes, and its samples always say what they relate to.
+fn is_in_payload(sample: &Sample) -> bool {
+    sample.related.is_none() && is_cyclone(&sample.writer)
+}
+
 /// A sample as a request; `None` when it is too short to be one.
 pub(super) fn request(sample: Sample) -> Option<(ReplyTo, Bytes)> {
-    if is_cyclone(&sample.writer) {
+    if is_in_payload(&sample) {
         let (client, bytes) = take_front(&sample.bytes)?;
         return Some((ReplyTo::Cyclone(client), bytes));
     }
@@ -62,7 +64,7 @@ pub(super) fn request(sample: Sample) -> Option<(ReplyTo, Bytes)> {
 
 /// A sample as a reply; `None` when it says not to what.
 pub(super) fn reply(sample: Sample) -> Option<(RequestIdentity, Bytes)> {
-    if is_cyclone(&sample.writer) {
+    if is_in_payload(&sample) {
         let (front, bytes) = take_front::<CYCLONE_LEN>(&sample.bytes)?;
         return Some((cyclone_identity(front), bytes));
     }
@@ -116,8 +118,6 @@ struct Asked {
 pub(super) struct Client {
     pub name: String,
     pub writer: Writer,
-    request_topic: String,
-    reply_topic: String,
     queue: VecDeque<Waiting>,
     asked: BTreeMap<RequestIdentity, Asked>,
     /// The readers of servers, and since when each has been seen. Besides the one that answers there may be one that was
@@ -130,13 +130,10 @@ pub(super) struct Client {
 const SETTLING: std::time::Duration = std::time::Duration::from_millis(100);
 
 impl Client {
-    pub fn new(name: String, writer: Writer, topics: (String, String)) -> Self {
-        let (request_topic, reply_topic) = topics;
+    pub fn new(name: String, writer: Writer) -> Self {
         Self {
             name,
             writer,
-            request_topic,
-            reply_topic,
             queue: VecDeque::new(),
             asked: BTreeMap::new(),
             servers: BTreeMap::new(),
@@ -172,10 +169,10 @@ impl Client {
     pub fn look(&mut self, writers: &[Remote], readers: &[Remote], now: Instant) {
         let replies = writers
             .iter()
-            .any(|writer| writer.dds_topic == self.reply_topic);
+            .any(|writer| writer.is_of(Role::Reply, &self.name));
         let found = readers
             .iter()
-            .filter(|reader| replies && reader.dds_topic == self.request_topic);
+            .filter(|reader| replies && reader.is_of(Role::Request, &self.name));
         let since = |guid: Guid| self.servers.get(&guid).copied().unwrap_or(now);
         self.servers = found
             .map(|reader| (reader.guid, since(reader.guid)))
@@ -192,7 +189,7 @@ impl Client {
             return Ok(());
         }
         while let Some(waiting) = self.queue.pop_front() {
-            let identity = if is_cyclone(&server) {
+            let identity = if self.writer.meets_cyclone(&server) {
                 self.cyclone_requests += 1;
                 let mut front = [0; CYCLONE_LEN];
                 front[..8].copy_from_slice(&self.writer.guid()[8..]);

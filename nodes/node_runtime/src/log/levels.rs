@@ -86,10 +86,12 @@ fn most_talkative() -> Option<LevelFilter> {
 
 /// Whose lines are not a node's, wherever they are said.
 const FOREIGN: [&str; 3] = ["rustdds", "ros2_client", "mio"];
+/// What the names of all of Zenoh's crates begin with.
+const ZENOH: &str = "zenoh";
 
 fn is_ours(metadata: &Metadata<'_>) -> bool {
     let owner = metadata.target().split("::").next().unwrap_or_default();
-    metadata.is_event() && !FOREIGN.contains(&owner)
+    metadata.is_event() && !FOREIGN.contains(&owner) && !owner.starts_with(ZENOH)
 }
 
 /// The span that says whose lines are said inside it; without it a node could not be told from others.

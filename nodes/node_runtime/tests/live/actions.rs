@@ -9,7 +9,7 @@ use metrology::stamp::Span;
 use node_runtime::node::{ActionPort, Ports};
 use node_runtime::{Bytes, Emission, Event, GoalStatus};
 
-use super::puppet::{Puppet, environment, service, start, wait};
+use super::puppet::{Puppet, environment, on_dds, service, start, wait};
 
 fn bytes<M: Message>(message: &M) -> Bytes {
     Arc::from(to_cdr(message))
@@ -303,7 +303,7 @@ mod foreign {
 
 #[test]
 fn an_action_serves_ros2_clients_client_in_the_mapping_of_fast_dds() {
-    let environment = environment(18);
+    let environment = on_dds(18);
     let serving = start(&environment, counter());
     let mut asker = super::parameters::Asker::new(environment.domain_id);
     let qos = ros2_client::QosProfile::publisher_default();

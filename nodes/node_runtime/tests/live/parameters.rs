@@ -19,7 +19,7 @@ use ros2_client::{
 };
 use rustdds::DomainParticipantBuilder;
 
-use super::puppet::{Puppet, environment, start, topic, wait};
+use super::puppet::{Puppet, environment, on_dds, start, topic, wait};
 
 fn puppet() -> Puppet {
     let parameter = |name: &str, value, range| Parameter {
@@ -90,7 +90,7 @@ impl Asker {
 
 #[test]
 fn ros2_param_can_list_get_and_describe_but_not_set() {
-    let environment = environment(6);
+    let environment = on_dds(6);
     let running = start(&environment, puppet());
     let mut asker = Asker::new(environment.domain_id);
     let everything = ListParametersRequest {

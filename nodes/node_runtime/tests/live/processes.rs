@@ -12,18 +12,16 @@ use node_runtime::environment::Environment;
 use node_runtime::node::Ports;
 use node_runtime::{Emission, Event, Running};
 
-use super::puppet::{Puppet, environment, start, topic, wait};
+use super::puppet::{Puppet, environment, put_into, start, topic, wait};
 
 fn relay(environment: &Environment, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_relay"));
     command
         .args(arguments)
-        .env("ROS_DOMAIN_ID", environment.domain_id.to_string())
-        .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        .env_remove("ROS_LOCALHOST_ONLY")
         .env_remove("RUST_LOG")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
+    put_into(&mut command, environment);
     command
 }
 

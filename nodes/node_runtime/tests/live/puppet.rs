@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use metrology::Stamp;
 use metrology::stamp::Host;
 use node_runtime::arguments::Arguments;
-use node_runtime::environment::{DiscoveryRange, Environment};
+use node_runtime::environment::{DiscoveryRange, Environment, Middleware};
 use node_runtime::node::{Ports, ServiceEvents, ServicePort, TopicPort};
 use node_runtime::parameter::Parameter;
 use node_runtime::{Emission, Event, Node, NodeFault, Running, Setup, launch};
@@ -71,14 +71,50 @@ impl Node for Puppet {
     }
 }
 
-/// A network of its own for one test; other processes of this test program get others.
+/// A network of its own for one test; other processes of this test program get others. The middleware is
+/// the one that `RMW_IMPLEMENTATION` names; on Zenoh the test is the router through which programs meet it.
 pub fn environment(test: u16) -> Environment {
     let process = u16::try_from(std::process::id() % 7).unwrap();
-    Environment {
-        domain_id: 10 + process * 30 + test,
+    let domain_id = 10 + process * 30 + test;
+    let mut environment = Environment {
+        middleware: Environment::read().unwrap().middleware,
+        domain_id,
         range: DiscoveryRange::Localhost,
-        log_filter: None,
+        ..Environment::default()
+    };
+    let listening = format!(
+        "mode=\"router\";connect/endpoints=[];listen/endpoints=[\"{}\"]",
+        endpoint(domain_id)
+    );
+    environment.zenoh.config_override = Some(listening);
+    environment.zenoh.router_checks = -1;
+    environment
+}
+
+/// The same on DDS, whatever is named: for tests of DDS's own mappings.
+pub fn on_dds(test: u16) -> Environment {
+    Environment {
+        middleware: Middleware::Dds,
+        ..environment(test)
     }
+}
+
+fn endpoint(domain_id: u16) -> String {
+    format!("tcp/127.0.0.1:{}", 17_000 + domain_id)
+}
+
+/// Puts a program into the same network.
+pub fn put_into(command: &mut std::process::Command, environment: &Environment) {
+    let endpoint = endpoint(environment.domain_id);
+    command
+        .env("ROS_DOMAIN_ID", environment.domain_id.to_string())
+        .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        .env_remove("ROS_LOCALHOST_ONLY")
+        .env(
+            "ZENOH_CONFIG_OVERRIDE",
+            format!("connect/endpoints=[\"{endpoint}\"]"),
+        )
+        .env("ZENOH_ROUTER_CHECK_ATTEMPTS", "-1");
 }
 
 pub fn start_with(environment: &Environment, puppet: Puppet, arguments: &[&str]) -> Running {

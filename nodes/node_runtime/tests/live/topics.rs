@@ -7,6 +7,7 @@ use abbe_msgs::diagnostic_msgs::msg::DiagnosticArray;
 use abbe_msgs::std_msgs::msg::{Int64, String as Text};
 use abbe_msgs::{Message, Qos, from_cdr, to_cdr, topics};
 use metrology::stamp::Span;
+use node_runtime::environment::Middleware;
 use node_runtime::node::Ports;
 use node_runtime::{Emission, Event};
 
@@ -171,10 +172,13 @@ fn wrong_types_and_faults_are_on_diagnostics() {
         mismatch,
         "/ticks: expected std_msgs/msg/String, found std_msgs/msg/Int64"
     );
-    let fault = wait(&diagnostics, "input_refused", |(a, _)| {
-        condition(&a, "/reader: input_refused")
-    });
-    assert!(fault.contains("std_msgs/msg/String"), "{fault}");
+    // On Zenoh other types have other keys: their samples never come.
+    if environment.middleware == Middleware::Dds {
+        let fault = wait(&diagnostics, "input_refused", |(a, _)| {
+            condition(&a, "/reader: input_refused")
+        });
+        assert!(fault.contains("std_msgs/msg/String"), "{fault}");
+    }
     ticking.stop().unwrap();
     reading.stop().unwrap();
     watching.stop().unwrap();

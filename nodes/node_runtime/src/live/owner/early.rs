@@ -9,9 +9,8 @@ use std::time::Duration;
 use tokio::time::Instant;
 
 use super::Owner;
-use crate::dds::Guid;
 use crate::live::service::ReplyTo;
-use crate::names;
+use crate::network::{Guid, Role};
 use crate::node::Bytes;
 
 /// The part of a GUID that names the participant.
@@ -98,10 +97,12 @@ impl Owner {
 
     fn is_heard(&mut self, server: usize, client: Prefix, now: Instant) -> bool {
         let (participant, name) = (&self.participant, &self.servers[server].1.name);
+        if !participant.must_see_clients() {
+            return true;
+        }
         self.hearing.hears((server, client), now, || {
-            let topic = names::dds_reply_topic(name);
             let mut readers = participant.readers().into_iter();
-            readers.any(|reader| reader.dds_topic == topic && reader.guid[..12] == client)
+            readers.any(|reader| reader.is_of(Role::Reply, name) && reader.guid[..12] == client)
         })
     }
 }

@@ -1,16 +1,15 @@
 //! Looking at the others on the network: wrong types, impossible QoS, a second node of our name, a second publisher.
 
-use abbe_msgs::{Durability, Qos, Reliability};
+use abbe_msgs::{Durability, Qos, Reliability, parts_of};
 
 use super::Owner;
-use crate::dds::Remote;
 use crate::diagnostic::{Diagnostic, Level};
 use crate::names;
+use crate::network::{Remote, Role};
 
 /// Our end of a topic.
 struct End<'o> {
     topic: &'o str,
-    dds_topic: &'o str,
     dds_type: &'o str,
     qos: Qos,
     is_reader: bool,
@@ -19,20 +18,28 @@ struct End<'o> {
 impl End<'_> {
     /// What stands between us and another end of the same topic: its type, its quality of service.
     fn complaints(&self, other: &Remote) -> (Option<String>, Option<String>) {
-        if other.dds_topic != self.dds_topic {
+        if !other.is_of(Role::Message, self.topic) {
             return (None, None);
         }
         let topic = self.topic;
         let shown =
             |dds_type: &str| names::ros_type(dds_type).unwrap_or_else(|| dds_type.to_owned());
-        // RustDDS matches by topic name alone, so that samples of another type would be decoded.
-        let of_type = (other.dds_type != self.dds_type).then(|| {
-            format!(
+        // RustDDS matches by topic name alone, so that samples of another type would be decoded; Zenoh by
+        // name, type and hash, so that they would be missed in silence.
+        let own_hash = names::ros_type(self.dds_type).and_then(|name| parts_of(&name));
+        let own_hash = own_hash.map(|parts| parts.type_hash);
+        let of_type = match (other.type_hash.as_deref(), own_hash) {
+            _ if other.dds_type != self.dds_type => Some(format!(
                 "{topic}: expected {}, found {}",
                 shown(self.dds_type),
                 shown(&other.dds_type)
-            )
-        });
+            )),
+            (Some(found), Some(expected)) if found != expected => Some(format!(
+                "{topic}: {} has the hash {expected} here, {found} there",
+                shown(self.dds_type)
+            )),
+            _ => None,
+        };
         let reliable = self.qos.reliability == Reliability::Reliable;
         let latched = self.qos.durability == Durability::TransientLocal;
         let (wants, offers) = if self.is_reader {
@@ -58,14 +65,12 @@ impl Owner {
         let (writers, readers) = (self.participant.writers(), self.participant.readers());
         let subscriptions = self.subscriptions.iter().map(|subscription| End {
             topic: &subscription.topic,
-            dds_topic: &subscription.dds_topic,
             dds_type: &subscription.dds_type,
             qos: subscription.qos,
             is_reader: true,
         });
         let publications = self.publications.iter().map(|publication| End {
             topic: &publication.topic,
-            dds_topic: &publication.dds_topic,
             dds_type: &publication.dds_type,
             qos: publication.qos,
             is_reader: false,
@@ -122,19 +127,23 @@ mod tests {
     fn complaints_name_topic_expectation_and_finding() {
         let end = End {
             topic: "/latency",
-            dds_topic: "rt/latency",
             dds_type: "abbe_msgs::msg::dds_::ProbeLatency_",
             qos: Qos::LATCHED,
             is_reader: true,
         };
         let mut other = Remote {
             guid: [0; 16],
-            dds_topic: "rt/latency".to_owned(),
+            role: Role::Message,
+            name: "/latency".to_owned(),
             dds_type: end.dds_type.to_owned(),
+            type_hash: None,
             reliable: true,
             latched: true,
         };
         assert_eq!(end.complaints(&other), (None, None));
+        other.type_hash = Some("RIHS01_00".to_owned());
+        let of_hash = end.complaints(&other).0.unwrap();
+        assert!(of_hash.contains("RIHS01_00 there"), "{of_hash}");
         other.latched = false;
         other.dds_type = "std_msgs::msg::dds_::String_".to_owned();
         let (of_type, of_qos) = end.complaints(&other);
@@ -152,7 +161,7 @@ mod tests {
             None,
             "a volatile reader takes what is latched"
         );
-        other.dds_topic = "rt/other".to_owned();
+        other.name = "/other".to_owned();
         assert_eq!(offering.complaints(&other), (None, None));
     }
 }

@@ -11,16 +11,19 @@ use recorder::{Bag, Event, Order};
 
 /// How many messages of a topic there are, and how many numbers of its one writer are missing between the first and the last.
 pub fn missing(bag: &Path, topic: &str) -> (u64, u64) {
-    let numbers: Vec<u32> = raw(bag, topic)
-        .into_iter()
-        .map(|said| said.sequence)
-        .collect();
+    let numbers = numbers(bag, topic);
     let (Some(first), Some(last)) = (numbers.iter().min(), numbers.iter().max()) else {
         return (0, 0);
     };
     let all: std::collections::BTreeSet<u32> = numbers.iter().copied().collect();
     let there = u64::try_from(all.len()).unwrap();
     (there, u64::from(last - first) + 1 - there)
+}
+
+/// The numbers of a topic's messages, as they came.
+pub fn numbers(bag: &Path, topic: &str) -> Vec<u32> {
+    let said = raw(bag, topic).into_iter();
+    said.map(|said| said.sequence).collect()
 }
 
 /// A message as it was recorded.

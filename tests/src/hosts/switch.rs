@@ -31,8 +31,11 @@ pub struct Way {
 /// Both directions between a host and the switch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Link {
+    /// From the host.
     pub up: Way,
+    /// To the host.
     pub down: Way,
+    /// Nothing passes.
     pub is_cut: bool,
 }
 
@@ -50,8 +53,11 @@ impl Link {
 /// What the switch did so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
+    /// Frames that went on.
     pub forwarded: u64,
+    /// Frames that vanished.
     pub lost: u64,
+    /// Frames that were overtaken by one that came later.
     pub overtaken: u64,
     /// Frames that met a cut link.
     pub cut: u64,
@@ -116,6 +122,7 @@ impl Shared {
 const LOOK: Duration = Duration::from_millis(50);
 const LONGEST_FRAME: usize = 65_536;
 
+/// The switch; it ends with its value.
 pub struct Switch {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
@@ -150,14 +157,18 @@ impl Switch {
         Self { shared, threads }
     }
 
+    /// What becomes of a host's frames, by the place of its tap.
     pub fn set(&self, place: usize, link: Link) {
         self.shared.state().links[place] = link;
     }
 
+    /// Cuts a host's link, or mends it.
     pub fn cut(&self, place: usize, is_cut: bool) {
         self.shared.state().links[place].is_cut = is_cut;
     }
 
+    /// What it did so far.
+    #[must_use]
     pub fn counts(&self) -> Counts {
         self.shared.state().counts
     }

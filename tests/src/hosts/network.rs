@@ -3,15 +3,17 @@
 //! Nothing of the computer's own network is touched: each tap is made inside its namespace, and with the namespaces everything is
 //! gone, also when a test fails.
 
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use abbe_tests::program::{Process, abbe, root};
+use crate::program::{Process, abbe, root};
+use crate::zenoh::Router;
 use nix::sched::{CloneFlags, setns};
 use node_runtime::environment::{DiscoveryRange, Environment};
 use tun_rs::{DeviceBuilder, Layer, SyncDevice};
 
-use crate::switch::{Counts, Link, Switch};
+use super::switch::{Counts, Link, Switch};
 
 /// Cells of several hosts wait for each other: they are judged by their delays.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -78,6 +80,8 @@ pub struct Network {
     switch: Switch,
     hosts: Vec<(String, Namespace)>,
     domain: u16,
+    /// A router on each host, where nodes speak Zenoh.
+    routers: Vec<Router>,
     _turn: MutexGuard<'static, ()>,
 }
 
@@ -112,8 +116,21 @@ impl Network {
             switch: Switch::start(taps, seed),
             hosts,
             domain,
+            routers: Vec::new(),
             _turn: turn,
         })
+    }
+
+    /// Lets nodes speak Zenoh, as `rmw_zenoh_cpp` does without more settings: each with the router of its
+    /// host alone, and the routers with each other.
+    pub fn over_zenoh(&mut self, python: &PathBuf) {
+        let port = |place: usize| format!("tcp/10.77.0.{}:7447", place + 1);
+        for (place, (_, namespace)) in self.hosts.iter().enumerate() {
+            let inside = ["ip", "netns", "exec", &namespace.0];
+            let earlier: Vec<String> = (0..place).map(port).collect();
+            let router = Router::start(python, &inside, "tcp/[::]:7447", &earlier);
+            self.routers.push(router);
+        }
     }
 
     fn place(&self, host: &str) -> usize {
@@ -133,10 +150,13 @@ impl Network {
         self.switch.set(self.place(host), link);
     }
 
+    /// Cuts a host's link, or mends it.
     pub fn cut(&self, host: &str, is_cut: bool) {
         self.switch.cut(self.place(host), is_cut);
     }
 
+    /// What the switch did so far.
+    #[must_use]
     pub fn counts(&self) -> Counts {
         self.switch.counts()
     }
@@ -146,7 +166,7 @@ impl Network {
         let environment = Environment {
             domain_id: self.domain,
             range: DiscoveryRange::Subnet,
-            log_filter: None,
+            ..Environment::default()
         };
         let namespace = &self.hosts[self.place(host)].1;
         namespace.inside(|| work(&environment)).unwrap()
@@ -169,6 +189,17 @@ impl Network {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
+        for setting in [
+            "RMW_IMPLEMENTATION",
+            "ZENOH_CONFIG_OVERRIDE",
+            "ZENOH_SESSION_CONFIG_URI",
+        ] {
+            command.env_remove(setting);
+        }
+        if !self.routers.is_empty() {
+            command.env("RMW_IMPLEMENTATION", "rmw_zenoh_cpp");
+            command.env("ZENOH_ROUTER_CHECK_ATTEMPTS", "10");
+        }
         Process::start(command)
     }
 }

@@ -1,0 +1,297 @@
+//! The network as the runners see it, whichever middleware carries it.
+//!
+//! Names are ROS's, absolute. Types are in the form that DDS and Zenoh share, `pkg::msg::dds_::Name_`.
+//! The middleware is chosen when a node joins ([`Environment::middleware`]) and known nowhere above this
+//! module.
+
+use abbe_msgs::Qos;
+use metrology::Stamp;
+use metrology::stamp::Host;
+
+use crate::dds;
+use crate::environment::{Environment, Middleware};
+use crate::names::NodeNames;
+use crate::node::Bytes;
+#[cfg(feature = "zenoh")]
+use crate::zenoh;
+
+/// Names an endpoint.
+pub(crate) type Guid = [u8; 16];
+
+/// Names a request: its writer (or what the client calls so) and its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct RequestIdentity {
+    pub writer: Guid,
+    pub sequence: i64,
+}
+
+/// A sample as it came.
+#[derive(Clone, Debug)]
+pub(crate) struct Sample {
+    pub bytes: Bytes,
+    pub writer: Guid,
+    /// Counts the writer's samples from 1; a jump is a loss.
+    pub sequence: i64,
+    pub source: Option<Stamp<Host>>,
+    pub received: Stamp<Host>,
+    /// The request that is meant; in Cyclone DDS's mapping it stands in the payload instead.
+    pub related: Option<RequestIdentity>,
+}
+
+/// Why a sample was not sent.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum PublishError {
+    #[error("encapsulation {found:02x?} is not little-endian plain CDR, 00 01")]
+    Encapsulation { found: Vec<u8> },
+    #[error("too many samples wait for an acknowledgement")]
+    Full,
+    #[error("{0}")]
+    Broken(String),
+}
+
+const HEADER_LEN: usize = 4;
+const CDR_LE: [u8; 2] = [0, 1];
+
+/// Whether bytes can be sent: little-endian plain CDR behind its header.
+pub(crate) fn check_encapsulation(bytes: &[u8]) -> Result<(), PublishError> {
+    if bytes.get(..2) == Some(&CDR_LE) && bytes.len() >= HEADER_LEN {
+        return Ok(());
+    }
+    let found = bytes.iter().take(2).copied().collect();
+    Err(PublishError::Encapsulation { found })
+}
+
+/// What a reader or writer carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// Messages of a topic.
+    Message,
+    /// Requests of a service: clients write them, its server reads them.
+    Request,
+    /// Replies of a service.
+    Reply,
+}
+
+/// Somebody's reader or writer, as discovery describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Remote {
+    pub guid: Guid,
+    pub role: Role,
+    /// Of the topic or service.
+    pub name: String,
+    pub dds_type: String,
+    /// Where the middleware tells it.
+    pub type_hash: Option<String>,
+    pub reliable: bool,
+    pub latched: bool,
+}
+
+impl Remote {
+    /// Whether this is an end of a topic or service.
+    pub fn is_of(&self, role: Role, name: &str) -> bool {
+        self.role == role && self.name == name
+    }
+}
+
+/// A node's place on the network.
+pub(crate) enum Participant {
+    Dds(Box<dds::Participant>),
+    #[cfg(feature = "zenoh")]
+    Zenoh(zenoh::Participant),
+}
+
+/// Does the same with whichever middleware it is.
+macro_rules! either {
+    ($end:ident, $which:expr, $inner:ident => $work:expr) => {
+        match $which {
+            $end::Dds($inner) => $work,
+            #[cfg(feature = "zenoh")]
+            $end::Zenoh($inner) => $work,
+        }
+    };
+}
+
+impl Participant {
+    /// Joins the network as `names`; nobody sees the node before [`Self::announce`]. A warning comes
+    /// with it where not everybody may be found.
+    pub fn join(
+        environment: &Environment,
+        names: &NodeNames,
+    ) -> anyhow::Result<(Self, Option<String>)> {
+        match environment.middleware {
+            Middleware::Dds => {
+                let (joined, warning) = dds::Participant::join(environment, names)?;
+                Ok((Self::Dds(Box::new(joined)), warning))
+            }
+            #[cfg(feature = "zenoh")]
+            Middleware::Zenoh => {
+                let (joined, warning) = zenoh::Participant::join(environment, names)?;
+                Ok((Self::Zenoh(joined), warning))
+            }
+            #[cfg(not(feature = "zenoh"))]
+            Middleware::Zenoh => Err(crate::environment::EnvironmentError::NoZenoh.into()),
+        }
+    }
+
+    /// Lets writers that are made from now on wait while the way out is full, instead of dropping: for
+    /// who speaks from a thread of its own. On DDS nothing changes: there the caller waits for
+    /// acknowledgements.
+    pub fn wait_for_room(&mut self) {
+        match self {
+            Self::Dds(_) => {}
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(participant) => participant.wait_for_room(),
+        }
+    }
+
+    /// A writer of serialised samples.
+    pub fn writer(&self, topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Writer> {
+        Ok(match self {
+            Self::Dds(participant) => Writer::Dds(participant.writer(topic, dds_type, qos)?),
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(participant) => Writer::Zenoh(participant.writer(topic, dds_type, qos)?),
+        })
+    }
+
+    /// A reader of serialised samples.
+    pub fn reader(&self, topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Reader> {
+        Ok(match self {
+            Self::Dds(participant) => {
+                Reader::Dds(Box::new(participant.reader(topic, dds_type, qos)?))
+            }
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(participant) => Reader::Zenoh(participant.reader(topic, dds_type, qos)?),
+        })
+    }
+
+    /// Both ends of a service's server, for a type `pkg/srv/Name`: of requests, of replies.
+    pub fn server(&self, service: &str, type_name: &str) -> anyhow::Result<(Reader, Writer)> {
+        Ok(match self {
+            Self::Dds(participant) => {
+                let (reader, writer) = participant.server(service, type_name)?;
+                (Reader::Dds(Box::new(reader)), Writer::Dds(writer))
+            }
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(participant) => {
+                let (reader, writer) = participant.server(service, type_name)?;
+                (Reader::Zenoh(reader), Writer::Zenoh(writer))
+            }
+        })
+    }
+
+    /// Both ends of a service's client: of replies, of requests.
+    pub fn client(&self, service: &str, type_name: &str) -> anyhow::Result<(Reader, Writer)> {
+        Ok(match self {
+            Self::Dds(participant) => {
+                let (reader, writer) = participant.client(service, type_name)?;
+                (Reader::Dds(Box::new(reader)), Writer::Dds(writer))
+            }
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(participant) => {
+                let (reader, writer) = participant.client(service, type_name)?;
+                (Reader::Zenoh(reader), Writer::Zenoh(writer))
+            }
+        })
+    }
+
+    /// Whether an answer reaches only a client whose reader of replies has been seen. Zenoh's answers go
+    /// back the way of their question.
+    pub fn must_see_clients(&self) -> bool {
+        matches!(self, Self::Dds(_))
+    }
+
+    /// Shows the node with all its endpoints on the ROS graph.
+    pub fn announce(&self) -> anyhow::Result<()> {
+        either!(Self, self, participant => participant.announce())
+    }
+
+    /// Takes the node off the ROS graph.
+    pub fn withdraw(&self) -> anyhow::Result<()> {
+        either!(Self, self, participant => participant.withdraw())
+    }
+
+    /// Waits until everybody has the last news of the graph, as far as the middleware can tell.
+    pub async fn graph_acknowledged(&self) {
+        match self {
+            Self::Dds(participant) => participant.graph_acknowledged().await,
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(_) => {}
+        }
+    }
+
+    /// Whether somebody else has announced a node of our name.
+    pub fn namesake(&self) -> bool {
+        either!(Self, self, participant => participant.namesake())
+    }
+
+    /// Everybody's writers, ours included.
+    pub fn writers(&self) -> Vec<Remote> {
+        either!(Self, self, participant => participant.writers())
+    }
+
+    /// Everybody's readers, ours included.
+    pub fn readers(&self) -> Vec<Remote> {
+        either!(Self, self, participant => participant.readers())
+    }
+}
+
+/// Reads one topic, or the requests or replies of one service.
+pub(crate) enum Reader {
+    Dds(Box<dds::Reader>),
+    #[cfg(feature = "zenoh")]
+    Zenoh(zenoh::Reader),
+}
+
+impl Reader {
+    /// The next sample; an error is a sample that cannot be read.
+    pub async fn next(&self) -> Result<Sample, String> {
+        either!(Self, self, reader => reader.next().await)
+    }
+}
+
+/// Writes one topic, or the requests or replies of one service. Writing never waits, unless
+/// [`Participant::wait_for_room`] was asked for.
+pub(crate) enum Writer {
+    Dds(dds::Writer),
+    #[cfg(feature = "zenoh")]
+    Zenoh(zenoh::Writer),
+}
+
+impl Writer {
+    pub fn guid(&self) -> Guid {
+        either!(Self, self, writer => writer.guid())
+    }
+
+    /// Whether the other end speaks Cyclone DDS's mapping of services.
+    pub fn meets_cyclone(&self, other: &Guid) -> bool {
+        match self {
+            Self::Dds(_) => dds::is_cyclone(other),
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(_) => false,
+        }
+    }
+
+    /// Sends a sample; `source` is its own time where it has one, else the present.
+    pub fn publish(&self, bytes: &Bytes, source: Option<Stamp<Host>>) -> Result<(), PublishError> {
+        either!(Self, self, writer => writer.publish(bytes, source))
+    }
+
+    /// Sends a reply.
+    pub fn reply(&self, bytes: &Bytes, to: RequestIdentity) -> Result<(), PublishError> {
+        either!(Self, self, writer => writer.reply(bytes, to))
+    }
+
+    /// Sends a request and says under which identity the reply will come.
+    pub fn request(&self, bytes: &Bytes) -> Result<RequestIdentity, PublishError> {
+        either!(Self, self, writer => writer.request(bytes))
+    }
+
+    /// Waits until every reliable reader has everything that was sent; Zenoh cannot tell.
+    pub async fn acknowledged(&self) {
+        match self {
+            Self::Dds(writer) => writer.acknowledged().await,
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(_) => {}
+        }
+    }
+}

@@ -1,0 +1,210 @@
+"""PyPI eclipse-zenoh as the other side of a graph over Zenoh, and as its router.
+
+    zenoh_peer.py router ENDPOINT [ROUTER...]      until standard input ends
+    zenoh_peer.py meet ENDPOINT DOMAIN             meets a fake_cnc, says as JSON what it saw
+
+Keys, tokens and attachments are written here from the design of rmw_zenoh, type hashes are those of
+PyPI rosbags: nothing is taken from the side under test.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import sys
+import time
+from pathlib import Path
+
+import zenoh
+import zenoh.ext
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+MSGS = Path(__file__).resolve().parents[2] / "msgs"
+GOAL = bytes(range(16))
+SENDER = bytes(range(100, 116))
+CDR = bytes([0, 1, 0, 0])
+
+
+def config(mode: str, listen: list[str], connect: list[str]) -> zenoh.Config:
+    made = zenoh.Config()
+    made.insert_json5("mode", json.dumps(mode))
+    made.insert_json5("listen/endpoints", json.dumps(listen))
+    made.insert_json5("connect/endpoints", json.dumps(connect))
+    made.insert_json5("connect/exit_on_failure", "false")
+    retry = {"period_init_ms": 1000, "period_max_ms": 1000, "period_increase_factor": 1}
+    made.insert_json5("connect/retry", json.dumps(retry))
+    made.insert_json5("scouting/multicast/enabled", "false")
+    made.insert_json5("transport/link/tx/lease", "5000")
+    made.insert_json5("transport/unicast/open_timeout", "2000")
+    made.insert_json5("timestamping/enabled", "true")
+    return made
+
+
+def route(endpoint: str, others: list[str]) -> None:
+    with zenoh.open(config("router", [endpoint], others)):
+        print("listening", flush=True)
+        sys.stdin.read()
+
+
+def attachment(number: int) -> bytes:
+    return struct.pack("<qqB", number, time.time_ns(), 16) + SENDER
+
+
+def read(attached) -> tuple[int, int, str]:
+    number, nanos, length = struct.unpack_from("<qqB", attached)
+    assert length == 16 and len(attached) == 33
+    return number, nanos, attached[17:].hex()
+
+
+def types():
+    store = get_typestore(Stores.ROS2_JAZZY)
+    found = {}
+    for file in sorted((MSGS / "msg").glob("*.msg")):
+        found.update(get_types_from_msg(file.read_text(), f"abbe_msgs/msg/{file.stem}"))
+    store.register(found)
+    return store
+
+
+def dds(ros_type: str) -> str:
+    package, kind, name = ros_type.split("/")
+    return f"{package}::{kind}::dds_::{name}_"
+
+
+class Desk:
+    """A session in a domain."""
+
+    def __init__(self, endpoint: str, domain: int) -> None:
+        self.session = zenoh.open(config("peer", ["tcp/127.0.0.1:0"], [endpoint]))
+        self.domain = domain
+        self.types = types()
+
+    def tokens(self, wanted: str) -> list[str]:
+        """All tokens of the domain, once one of them has `wanted` in it."""
+        deadline = time.monotonic() + 15
+        while time.monotonic() < deadline:
+            replies = self.session.liveliness().get(f"@ros2_lv/{self.domain}/**", timeout=2.0)
+            found = [str(reply.ok.key_expr) for reply in replies if reply.ok]
+            if any(wanted in token for token in found):
+                return sorted(found)
+            time.sleep(0.1)
+        raise SystemExit(f"no token with {wanted}")
+
+    def key(self, topic: str, ros_type: str) -> str:
+        digest = self.types.hash_rihs01(ros_type)
+        return f"{self.domain}{topic}/{dds(ros_type)}/{digest}"
+
+    def hear(self, topic: str, ros_type: str, count: int) -> dict:
+        samples = []
+
+        def take(sample) -> None:
+            samples.append((sample, time.time_ns()))
+
+        subscriber = self.session.declare_subscriber(self.key(topic, ros_type), take)
+        deadline = time.monotonic() + 20
+        while len(samples) < count and time.monotonic() < deadline:
+            time.sleep(0.01)
+        subscriber.undeclare()
+        attached = [read(sample.attachment.to_bytes()) for sample, _ in samples]
+        last = self.types.deserialize_cdr(samples[-1][0].payload.to_bytes(), ros_type)
+        delays = sorted(came - nanos for (_, nanos, _), (_, came) in zip(attached, samples))
+        return {
+            "numbers": [number for number, _, _ in attached],
+            "senders": sorted({sender for _, _, sender in attached}),
+            "delay_us": [delays[len(delays) * share // 1000] / 1e3 for share in (500, 990)],
+            "frame": last.header.frame_id,
+            "motor": list(last.motor),
+        }
+
+    def latched(self, topic: str, ros_type: str) -> int:
+        """How many samples who comes late gets."""
+        found = []
+        subscriber = zenoh.ext.declare_advanced_subscriber(
+            self.session,
+            self.key(topic, ros_type),
+            found.append,
+            history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
+        )
+        deadline = time.monotonic() + 5
+        while not found and time.monotonic() < deadline:
+            time.sleep(0.01)
+        subscriber.undeclare()
+        return len(found)
+
+    def ask(self, token: str, number: int, request: bytes, timeout: float = 10.0) -> bytes:
+        """Asks the server that a token stands for."""
+        *_, service, service_type, digest, _qos = token.split("/")
+        key = f"{self.domain}{service.replace('%', '/')}/{service_type}/{digest}"
+        replies = self.session.get(
+            key,
+            payload=CDR + request,
+            attachment=attachment(number),
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout,
+        )
+        for reply in replies:
+            if reply.ok:
+                echoed, _, sender = read(reply.ok.attachment.to_bytes())
+                assert (echoed, sender) == (number, SENDER.hex()), "the reply names its request"
+                return reply.ok.payload.to_bytes()
+        raise SystemExit(f"no reply of {key}")
+
+    def say(self, topic: str, ros_type: str, digest: str, payloads: list[bytes]) -> None:
+        """Says something with the token of a publisher, which stays until the end."""
+        session = self.session
+        key = f"{self.domain}{topic}/{dds(ros_type)}/{digest}"
+        place = f"@ros2_lv/{self.domain}/{session.zid()}/0"
+        token = f"{place}/1/MP/%/%/peer/{topic.replace('/', '%')}/{dds(ros_type)}/{digest}/::,10:,:,:,,"
+        self.kept = [
+            session.liveliness().declare_token(f"{place}/0/NN/%/%/peer"),
+            session.liveliness().declare_token(token),
+        ]
+        publisher = session.declare_publisher(key)
+        time.sleep(1.0)
+        for number, payload in enumerate(payloads, 1):
+            publisher.put(payload, attachment=attachment(number))
+            time.sleep(0.002)
+        time.sleep(0.5)
+
+
+def one(tokens: list[str], kind: str, name: str) -> str:
+    mangled = name.replace("/", "%")
+    found = [t for t in tokens if t.split("/")[5] == kind and t.split("/")[9:10] == [mangled]]
+    assert len(found) == 1, f"{kind} {name}: {found}"
+    return found[0]
+
+
+def meet(endpoint: str, domain: int) -> None:
+    desk = Desk(endpoint, domain)
+    tokens = desk.tokens("%fake_cnc%get_type_description")
+    seen = {"tokens": tokens}
+    state = "abbe_msgs/msg/AxisState"
+    seen["hash"] = desk.types.hash_rihs01(state)
+    seen["states"] = desk.hear("/axes/state", state, 200)
+    status = "/cnc/run_program/_action/status"
+    seen["latched"] = desk.latched(status, "action_msgs/msg/GoalStatusArray")
+    listed = desk.ask(
+        one(tokens, "SS", "/fake_cnc/list_parameters"), 1, struct.pack("<IIQ", 0, 0, 0)
+    )
+    seen["parameters"] = "background_rate_hz" in listed.decode("utf-8", "replace")
+    program = b"G21 G90\nG1 X2 F600\nM2\n\0"
+    goal = GOAL + struct.pack("<I", len(program)) + program
+    goal += bytes(-len(goal) % 4) + struct.pack("<I", 1) + b"\0"
+    answer = desk.ask(one(tokens, "SS", "/cnc/run_program/_action/send_goal"), 1, goal)
+    seen["accepted"] = answer[4] == 1
+    result = desk.ask(one(tokens, "SS", "/cnc/run_program/_action/get_result"), 1, GOAL, 30.0)
+    seen["status"] = result[4]
+    numbers = [CDR + struct.pack("<q", number) for number in range(100)]
+    desk.say("/from_python", "strange_msgs/msg/Bar", "RIHS01_" + "7" * 64, numbers)
+    print(json.dumps(seen), flush=True)
+    desk.session.close()
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["router", endpoint, *others]:
+            route(endpoint, others)
+        case ["meet", endpoint, domain]:
+            meet(endpoint, int(domain))
+        case _:
+            sys.exit(__doc__)
