@@ -46,7 +46,7 @@ fn builder(environment: &Environment) -> DomainParticipantBuilder {
     }
 }
 
-const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
+pub(crate) const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
 
 /// Whose endpoint it is: the vendor is in the first two bytes.
 pub(crate) fn is_cyclone(guid: &Guid) -> bool {

@@ -256,6 +256,7 @@ mod tests {
     use metrology::Stamp;
 
     use super::*;
+    use crate::dds::CYCLONE_VENDOR;
 
     fn sample(writer: Guid, related: Option<RequestIdentity>, bytes: &[u8]) -> Sample {
         let received = Stamp::from_nanos(0);

@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use fake_cnc::PlantFile;
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
+use machine::file::{SensorEntry, SensorPlace};
 use machine::twin::{Channel, Run, Session};
 use metrology::PerAxis;
 use nalgebra::Vector3;
@@ -33,12 +34,32 @@ pub struct Recording {
     pub session: Session,
 }
 
-/// Circles, positioning and touches of three axes; two spheres on rotary axes.
+/// Circles, positioning and touches of three axes; the same in a shop that is warm and draughty, with two thermometers in its
+/// air; two spheres on rotary axes.
 pub fn recordings() -> Vec<Recording> {
     let mut rig = Trial::draw(Arm::Null, 5, 0).unwrap().rig;
     rig.has_motors = true;
-    let rotary = five_axis(&rig);
-    vec![recording("circles", &rig), recording("spheres", &rotary)]
+    let (warm, rotary) = (warm_shop(&rig), five_axis(&rig));
+    vec![
+        recording("circles", &rig),
+        recording("warm shop", &warm),
+        recording("spheres", &rotary),
+    ]
+}
+
+fn warm_shop(like: &Rig) -> Rig {
+    let mut rig = like.clone();
+    let air = &mut rig.plant.heat.shop_air;
+    (air.start_temp_degc, air.draught_k, air.draught_time_s) = (27.0, 1.5, 300.0);
+    let sensors = &rig.machine.temperature_sensors;
+    let ambient = sensors.iter().find(|s| s.place == SensorPlace::Ambient);
+    let second = SensorEntry {
+        id: "ambient_2".to_owned(),
+        ..ambient.unwrap().clone()
+    };
+    rig.machine.temperature_sensors.push(second.clone());
+    rig.control.temperature_sensors.push(second);
+    rig
 }
 
 /// The five-axis machine of `launch_configs`.
