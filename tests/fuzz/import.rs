@@ -7,6 +7,8 @@
     )
 )]
 
+#[path = "../../nodes/abbe/src/import/limits.rs"]
+pub mod limits;
 #[path = "../../nodes/abbe/src/import/map.rs"]
 pub mod map;
 #[path = "../../nodes/abbe/src/import/motion.rs"]

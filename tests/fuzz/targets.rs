@@ -116,6 +116,9 @@ const MAPS: [&str; 3] = [
     include_str!("../import/drift.yaml"),
 ];
 
+/// The machine that the tables of the maps are of.
+const MEASURED: &str = include_str!("../../launch_configs/gap_first/machine.yaml");
+
 /// A byte for the kind of measurement, then its table.
 pub fn csv_import(data: &[u8]) {
     let Some((kind, text)) = data.split_first() else {
@@ -123,8 +126,11 @@ pub fn csv_import(data: &[u8]) {
     };
     let map: import::map::Map = serde_saphyr::from_str(MAPS[usize::from(*kind) % MAPS.len()])
         .expect("the maps of the examples");
+    let machine = MachineFile::parse(MEASURED, "machine.yaml").expect("the machine of a scenario");
+    import::limits::check(&map, &machine).expect("the examples are of this machine");
+    let ranges = import::limits::ranges(&map.test, &machine);
     let text = String::from_utf8_lossy(text);
-    if let Ok(table) = import::table::Table::read(&text, &map) {
+    if let Ok(table) = import::table::Table::read(&text, &map, &ranges) {
         let mut writer = import::writer::Writer::default();
         let _ = import::motion::write(&map, &table, &mut writer);
     }

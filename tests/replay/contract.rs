@@ -21,7 +21,7 @@ pub fn check(bag: &Path) -> (i32, Value) {
     let bag = bag.display().to_string();
     let mut command = command(0, &["check", "--json", &bag]);
     command.stderr(std::process::Stdio::null());
-    let ended = Process::start(command).ended_within(Duration::from_secs(60));
+    let ended = Process::start(command).ended_within(Duration::from_secs(300));
     let json = serde_json::from_str(&ended.said).unwrap_or(Value::Null);
     (ended.status.code().unwrap(), json)
 }
@@ -29,7 +29,7 @@ pub fn check(bag: &Path) -> (i32, Value) {
 /// What `abbe check` says on the standard error.
 fn said(bag: &Path) -> String {
     let bag = bag.display().to_string();
-    let ended = Process::start(command(0, &["check", &bag])).ended_within(Duration::from_secs(60));
+    let ended = Process::start(command(0, &["check", &bag])).ended_within(Duration::from_secs(300));
     ended.said
 }
 

@@ -36,7 +36,7 @@ fn scenario_gap_first_names_the_backlash_and_a_run_on_the_new_file_ends_at_the_f
     diagnose.arg(run.join("bag"));
     diagnose.args(["--machine", &scenario.argument("machine.yaml")]);
     diagnose.args(["--write-machine", &scenario.argument("better.yaml")]);
-    let ended = Process::start(diagnose).ended_within(Duration::from_secs(60));
+    let ended = Process::start(diagnose).ended_within(Duration::from_secs(300));
     assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
 
     let report = read(&run.join("gap.json"));

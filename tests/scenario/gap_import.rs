@@ -18,7 +18,7 @@ const WARM: &str = "launch_configs/first_run/machine.yaml";
 fn run(arguments: &[&str]) -> Ended {
     let mut command = command(0, arguments);
     command.current_dir(root());
-    Process::start(command).ended_within(Duration::from_secs(60))
+    Process::start(command).ended_within(Duration::from_secs(300))
 }
 
 fn shown(path: &Path) -> String {

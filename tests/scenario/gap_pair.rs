@@ -64,7 +64,7 @@ impl Ballbar {
         import.arg(path(".csv")).arg("--map").arg(path(".yaml"));
         import.args(["--machine", MACHINE, "-o"]).arg(path(""));
         import.current_dir(root());
-        let ended = Process::start(import).ended_within(Duration::from_secs(60));
+        let ended = Process::start(import).ended_within(Duration::from_secs(300));
         assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
         path("")
     }
@@ -74,7 +74,7 @@ impl Ballbar {
         let mut diagnose = command(0, &["diagnose"]);
         diagnose.args(bags).arg("--json").arg(&json);
         diagnose.current_dir(root());
-        let ended = Process::start(diagnose).ended_within(Duration::from_secs(60));
+        let ended = Process::start(diagnose).ended_within(Duration::from_secs(300));
         assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
         let begin = ended.said.find("Which:").unwrap();
         eprintln!("{}", ended.said[begin..].lines().next().unwrap());

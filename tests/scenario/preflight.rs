@@ -8,7 +8,7 @@ use serde_json::Value;
 fn preflight(arguments: &[&str]) -> Ended {
     let mut command = command(0, &["preflight"]);
     command.args(arguments).current_dir(root());
-    Process::start(command).ended_within(Duration::from_secs(30))
+    Process::start(command).ended_within(Duration::from_secs(300))
 }
 
 fn told(arguments: &[&str]) -> Value {

@@ -108,7 +108,7 @@ impl Scenario {
         let (folder, out) = (self.folder(), self.out());
         let mut command = command(0, &["run", "--no-dds"]);
         command.arg(folder).arg("--runs").arg(out).args(more);
-        Process::start(command).ended_within(Duration::from_secs(120))
+        Process::start(command).ended_within(Duration::from_secs(600))
     }
 
     /// Runs it and reads its `report.json`.

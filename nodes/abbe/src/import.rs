@@ -12,6 +12,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use machine::MachineFile;
 
+mod limits;
 mod map;
 mod motion;
 mod table;
@@ -47,11 +48,21 @@ impl Import {
             .with_context(|| format!("map {}", self.map.display()))?;
         let machine_text = text(&self.machine)?;
         let machine = MachineFile::parse(&machine_text, &self.machine.display().to_string())?;
-        let table = Table::read(&text(&self.csv)?, &map)
+        limits::check(&map, &machine).with_context(|| format!("map {}", self.map.display()))?;
+        let ranges = limits::ranges(&map.test, &machine);
+        let table = Table::read(&text(&self.csv)?, &map, &ranges)
             .with_context(|| format!("table {}", self.csv.display()))?;
         let mut writer = Writer::begin(&self.output, &machine, machine_text, map.start_s)?;
-        let runs = motion::write(&map, &table, &mut writer)
-            .with_context(|| format!("table {}", self.csv.display()))?;
+        let runs = match motion::write(&map, &table, &mut writer) {
+            Ok(runs) => runs,
+            Err(error) => {
+                drop(writer);
+                // What was begun is no bag, and would stand in the way of the next attempt.
+                std::fs::remove_dir_all(&self.output)
+                    .with_context(|| format!("{}", self.output.display()))?;
+                return Err(error.context(format!("table {}", self.csv.display())));
+            }
+        };
         let messages = writer.finish()?;
         println!(
             "{}: {runs} runs, {messages} messages",

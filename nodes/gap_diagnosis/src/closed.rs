@@ -12,7 +12,8 @@
 //! each channel and either part with its degrees of freedom nu. A gap after that is smaller than its floor counts as it
 //! is while the interval is made, or gaps that are closed whole would be closed without any doubt; told is at most one.
 //!
-//! The interval is absent where the gap before cannot be told from none.
+//! The interval is absent where the gap before cannot be told from none, and where fewer than [`LEAST_RUNS`] runs were judged:
+//! what one or two runs have alike says nothing of others.
 
 use std::collections::BTreeMap;
 
@@ -27,6 +28,9 @@ use crate::gap::Size;
 use crate::noise::Noise;
 use crate::report::Interval;
 use crate::stack::Stack;
+
+/// Fewest runs that are drawn from.
+pub const LEAST_RUNS: usize = 3;
 
 /// Sums of one run, one entry a channel.
 type Sums = Vec<Sum>;
@@ -77,6 +81,9 @@ fn of_run(stack: &Stack<'_>, channels: &[&Channel], run: usize, sizes: &[Vec<Siz
 }
 
 fn interval(runs: &[Sums], freedom: &[[f64; 2]], config: &GapConfig) -> Option<Interval> {
+    if runs.len() < LEAST_RUNS {
+        return None;
+    }
     let known = vec![[1.0; 2]; freedom.len()];
     let value = share(runs.iter(), &known)?;
     let mut random = Pcg64Mcg::seed_from_u64(config.seed ^ 0x7);
@@ -145,6 +152,13 @@ mod tests {
         assert!((found.value - 1.0).abs() < 1e-12, "{found:?}");
         assert!(found.low < 0.97 && found.low > 0.8, "{found:?}");
         assert!((found.high - 1.0).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn one_run_or_two_have_no_interval() {
+        let runs = runs([0.7, 1.2, 0.8, 1.1, 0.9, 1.0]);
+        let of = |n: usize| interval(&runs[..n], &[[200.0, 12.0]], &GapConfig::default());
+        assert!(of(1).is_none() && of(2).is_none() && of(3).is_some());
     }
 
     #[test]

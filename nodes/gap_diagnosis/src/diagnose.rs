@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
-use machine::effects::{self, CATALOGUE, Effect, Kind};
+use machine::effects::{self, CATALOGUE, Effect, Kind, Moment};
 use machine::file::EffectEntry;
 use machine::twin::{Channel, Session, Twin, simulate};
 
@@ -418,7 +418,11 @@ fn not_excited(found: &Found, scattering: &[&str], kinds: &[&'static Kind]) -> V
     };
     let entry = |kind: &&'static Kind| NotExcited {
         effect: kind.id.to_owned(),
-        needs: kind.needs.to_owned(),
+        needs: match kind.moment {
+            Moment::Mean => kind.needs.to_owned(),
+            // What scatters alike everywhere is the noise floor itself.
+            Moment::Variance => format!("{}, under conditions that it differs with", kind.needs),
+        },
     };
     kinds.iter().filter(|kind| !seen(kind)).map(entry).collect()
 }

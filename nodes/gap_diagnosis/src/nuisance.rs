@@ -181,7 +181,9 @@ fn floats(session: &Session, block: &Block) -> Vec<(Key, Vec<f64>)> {
             vec![(key(group, String::new()), vec![1.0; n])]
         }
         Channel::Touch => touch_floats(session, block),
-        Channel::Motor(_) | Channel::Scale(_) | Channel::Thermometer(_) => {
+        // What one thermometer shows beyond another at its place is nothing by itself, and its offset an effect.
+        Channel::Thermometer(_) => vec![],
+        Channel::Motor(_) | Channel::Scale(_) => {
             let group = format!("{} {}", block.channel, segment.setup_id);
             vec![(key(group, String::new()), vec![1.0; n])]
         }

@@ -290,6 +290,22 @@ fn readings_in_a_hole_of_the_states_and_broken_values_are_counted_and_left_out()
     assert_eq!(account.count(Reason::InGap), 500);
 }
 
+#[test]
+fn a_run_whose_states_are_missing_in_the_midst_of_its_motion_is_left_out_and_counted() {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.circle(1, 0.5);
+    // Half a second of the other half is not recorded.
+    rig.millis += 500;
+    rig.tick(-40.0, -30.0);
+    rig.end(1);
+    rig.circle(2, 1.0);
+    rig.end(2);
+    let (session, account) = rig.builder.finish().expect("a session");
+    assert_eq!(account.count(Reason::HoleInMotion), 1, "{account:?}");
+    let runs: Vec<u32> = session.runs.iter().map(|run| run.segment.run).collect();
+    assert_eq!(runs, [2]);
+}
+
 /// At 150 mm/s, 4 ms apart, on a radius of 40 mm the path stands 1.1 µm off the chord between two states: a plate that
 /// stamps its readings between them is read on the path.
 #[test]

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 
+use super::limits::Range;
 use super::map::Map;
 
 /// Rows of numbers, in the order of the map's columns.
@@ -12,11 +13,11 @@ pub struct Table {
 }
 
 impl Table {
-    /// Reads a CSV text; lines that begin with `#` are comments.
+    /// Reads a CSV text; lines that begin with `#` are comments. `ranges` are those of the map's columns.
     ///
     /// # Errors
-    /// Names the column that is missing, or line, column and text of a cell that is no number.
-    pub fn read(text: &str, map: &Map) -> Result<Self> {
+    /// Names the column that is missing, or line, column and text of a cell that is no number or out of its range.
+    pub fn read(text: &str, map: &Map, ranges: &[Option<Range>]) -> Result<Self> {
         let separator = u8::try_from(map.separator).context("separator: must be one byte")?;
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(separator)
@@ -37,11 +38,16 @@ impl Table {
             let record = record?;
             let line = record.position().map_or(0, csv::Position::line);
             let mut row = vec![];
-            for (place, name) in places.iter().zip(&columns) {
+            for ((place, name), range) in places.iter().zip(&columns).zip(ranges) {
                 let cell = record.get(*place).unwrap_or("");
                 let number = cell.replace(map.decimal, ".").parse::<f64>();
                 match number {
-                    Ok(number) if number.is_finite() => row.push(number),
+                    Ok(number) if number.is_finite() => {
+                        if let Some(range) = range.as_ref().filter(|range| !range.holds(number)) {
+                            bail!("line {line}, column \"{name}\": {cell}: must be {range}");
+                        }
+                        row.push(number);
+                    }
                     _ => bail!("line {line}, column \"{name}\": \"{cell}\": must be a number"),
                 }
             }
@@ -76,22 +82,35 @@ test:
         serde_saphyr::from_str(MAP).expect("a map")
     }
 
+    fn read(text: &str) -> Result<Table> {
+        let deviation = Range::new(-1e5, 1e5, "µm");
+        Table::read(text, &map(), &[None, None, Some(deviation)])
+    }
+
     #[test]
     fn columns_are_found_by_name_with_the_decimals_of_the_map() {
-        let table =
-            Table::read("# made by hand\nn;x;r;w\n1;9;0,5;10\n2;9;-1;20\n", &map()).expect("rows");
+        let table = read("# made by hand\nn;x;r;w\n1;9;0,5;10\n2;9;-1;20\n").expect("rows");
         assert_eq!(table.rows, [vec![1.0, 10.0, 0.5], vec![2.0, 20.0, -1.0]]);
         assert_eq!(table.runs().count(), 2);
     }
 
     #[test]
     fn a_missing_column_and_a_broken_cell_are_named() {
-        let missing = Table::read("n;r\n1;2\n", &map()).expect_err("no angle");
+        let missing = read("n;r\n1;2\n").expect_err("no angle");
         assert!(format!("{missing:#}").contains("no column \"w\"; there are n, r"));
-        let broken = Table::read("n;w;r\n1;2;abc\n", &map()).expect_err("no number");
+        let broken = read("n;w;r\n1;2;abc\n").expect_err("no number");
         assert_eq!(
             format!("{broken:#}"),
             "line 2, column \"r\": \"abc\": must be a number"
+        );
+    }
+
+    #[test]
+    fn a_number_that_no_instrument_reads_is_refused_with_its_range() {
+        let absurd = read("n;w;r\n1;2;3\n1;3;1e300\n").expect_err("out of range");
+        assert_eq!(
+            format!("{absurd:#}"),
+            "line 3, column \"r\": 1e300: must be from -100000 to 100000 µm"
         );
     }
 }

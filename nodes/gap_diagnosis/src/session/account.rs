@@ -26,6 +26,10 @@ pub enum Reason {
     ClockJump,
     /// A reading between two axis states that lie too far apart.
     InGap,
+    /// A run with a hole in the axis states while they moved.
+    HoleInMotion,
+    /// A reading that is further from its nominal value than any machine is.
+    Beyond,
     /// A reading under another zero than its segment's.
     OtherZero,
     /// A reading that stood while the axes moved.
@@ -55,6 +59,10 @@ impl Reason {
             Self::WentBack => "samples were older than one before them",
             Self::ClockJump => "times the clock jumped back, or ahead by more than a week",
             Self::InGap => "readings lie in holes of the axis states",
+            Self::HoleInMotion => {
+                "runs lack axis states in the midst of their motion and are left out"
+            }
+            Self::Beyond => "readings are more than 10 m or 10 rad from their nominal values",
             Self::OtherZero => "readings belong to another zero",
             Self::Stuck => "readings stood while the axes moved",
             Self::RotaryTurned => "readings were taken with a turned rotary axis",

@@ -17,6 +17,9 @@ use super::touching;
 /// A touch further from every tick than this has its own motion, s.
 const NEAR_S: f64 = 0.05;
 
+/// A reading further from its nominal value is none, mm, rad or K.
+const BEYOND: f64 = 1e4;
+
 impl SessionBuilder {
     /// Ends a run.
     pub(super) fn close(&mut self, mut open: Record) {
@@ -37,6 +40,10 @@ impl SessionBuilder {
         if touches_only(open.segment.kind) && !is_followed(&open) {
             return self.run_of_touches(&open);
         }
+        if open.has_hole_in_motion() {
+            self.account.note(Reason::HoleInMotion);
+            return Ok(None);
+        }
         let times = times_s(&open.ticks);
         let mut motion = of(&open.ticks, times, self.axes)?;
         let touches = self.touches(&open, &motion);
@@ -51,6 +58,10 @@ impl SessionBuilder {
         };
         let mut series = scope.channels(&mut self.account);
         for (_, readings) in &mut series {
+            let before = readings.len();
+            readings.retain(|raw| raw.deviation.abs() <= BEYOND);
+            self.account
+                .note_many(Reason::Beyond, before - readings.len());
             *readings = selection.apply(readings, block);
         }
         take_zero(&mut self.zeros, &open, &mut series);

@@ -75,6 +75,12 @@ const STANDING_S: f64 = 0.02;
 /// A command that changes by less stands, mm or rad.
 const STANDSTILL: f64 = 1e-6;
 
+/// States further apart than this, and than so many times their middle spacing, leave a hole, s.
+const HOLE_S: f64 = 0.25;
+const HOLE_SPACINGS: f64 = 20.0;
+/// Axes that are further on after a hole moved in it, mm or rad.
+const MOVED: f64 = 1e-2;
+
 /// Silence of the compensation beyond which its last value is only held, s.
 const COMPENSATION_SILENCE_S: f64 = 1.0;
 
@@ -127,6 +133,27 @@ impl Record {
         next.checked_sub(1)
             .and_then(|k| self.offsets.get(k))
             .map_or_else(PerAxis::default, |offset| offset.total)
+    }
+
+    /// Whether states are missing from the midst of a motion: speed, acceleration and turns there would be made up, and with
+    /// them all that an effect remembers of them.
+    pub(super) fn has_hole_in_motion(&self) -> bool {
+        let run = self.ticks.get(self.lead_in..).unwrap_or(&[]);
+        let mut spacings_s: Vec<f64> = run
+            .windows(2)
+            .map(|two| two[1].time_s - two[0].time_s)
+            .collect();
+        if spacings_s.is_empty() {
+            return false;
+        }
+        let middle = spacings_s.len() / 2;
+        let (_, middle_s, _) = spacings_s.select_nth_unstable_by(middle, f64::total_cmp);
+        let least_s = HOLE_S.max(HOLE_SPACINGS * *middle_s);
+        run.windows(2).any(|two| {
+            let pairs = two[0].commanded.0.iter().zip(&two[1].commanded.0);
+            two[1].time_s - two[0].time_s > least_s
+                && pairs.into_iter().any(|(a, b)| (a - b).abs() > MOVED)
+        })
     }
 
     /// Whether the compensation acted and its messages broke off during the run.

@@ -20,10 +20,16 @@ use trials::Class;
 /// Size that is added, as D on the rows of the recording; less where the greatest physical size is less.
 const WANTED_D: f64 = 40.0;
 /// Effects that these recordings cannot tell, and why.
-const OPEN: [(&str, &str); 1] = [(
-    "length_misalignment",
-    "a wrong wavelength is its double, and at its greatest size it has D 14",
-)];
+const OPEN: [(&str, &str); 2] = [
+    (
+        "length_misalignment",
+        "a wrong wavelength is its double, and at its greatest size it has D 14",
+    ),
+    (
+        "workpiece_expansion",
+        "at its greatest size D 16 in eight spells of work with block cycles, and none here",
+    ),
+];
 /// D below which an effect need not be named.
 const LEAST_D: f64 = 20.0;
 
@@ -211,6 +217,6 @@ fn every_effect_that_a_recording_shows_is_named_alone() {
             lost.push(kind.id);
         }
     }
-    assert!(all.len() >= 25, "{}", all.len());
+    assert!(all.len() >= 24, "{}", all.len());
     assert_eq!(lost, Vec::<&str>::new());
 }

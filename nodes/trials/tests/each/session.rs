@@ -51,14 +51,17 @@ fn warm_shop(like: &Rig) -> Rig {
     let mut rig = like.clone();
     let air = &mut rig.plant.heat.shop_air;
     (air.start_temp_degc, air.draught_k, air.draught_time_s) = (27.0, 1.5, 300.0);
-    let sensors = &rig.machine.temperature_sensors;
-    let ambient = sensors.iter().find(|s| s.place == SensorPlace::Ambient);
-    let second = SensorEntry {
-        id: "ambient_2".to_owned(),
-        ..ambient.unwrap().clone()
-    };
-    rig.machine.temperature_sensors.push(second.clone());
-    rig.control.temperature_sensors.push(second);
+    for file in [&mut rig.machine, &mut rig.control] {
+        let mut sensors = file.temperature_sensors.iter_mut();
+        let ambient = sensors.find(|s| s.place == SensorPlace::Ambient).unwrap();
+        // A circle takes seconds.
+        ambient.period_s = 0.5;
+        let second = SensorEntry {
+            id: "ambient_2".to_owned(),
+            ..ambient.clone()
+        };
+        file.temperature_sensors.push(second);
+    }
     rig
 }
 

@@ -4,6 +4,18 @@ use gap_diagnosis::report::{Cause, GapReport, Status};
 
 use super::{FREE_FORM, maybe, name, three, values};
 
+/// That a part of the recording could not be read.
+pub(super) fn lost(losses: &[String]) -> Option<String> {
+    let first = losses.first()?;
+    let more = match losses.len() {
+        1 => String::new(),
+        n => format!(", and {} more (see the remarks)", n - 1),
+    };
+    Some(format!(
+        "Lost: a part of the recording could not be read: {first}{more}. What follows is of the rest."
+    ))
+}
+
 /// The three answers.
 pub(super) fn answers(report: &GapReport) -> Vec<String> {
     vec![place(report), cause(report), shrink(report)]
@@ -146,7 +158,13 @@ fn shrink(report: &GapReport) -> String {
         .map(ToString::to_string)
         .collect();
     let closed = shrink.gap_closed.map_or_else(
-        || "there was no gap above the floor on them".to_owned(),
+        || {
+            if shrink.held_out_runs.len() < gap_diagnosis::LEAST_JUDGED_RUNS {
+                "so few say nothing of how much of the gap is closed".to_owned()
+            } else {
+                "there was no gap above the floor on them".to_owned()
+            }
+        },
         |closed| {
             format!(
                 "{:.1} % of the gap is closed ({:.1} to {:.1} %)",
