@@ -50,7 +50,7 @@ pub fn recordings() -> Vec<Recording> {
 fn warm_shop(like: &Rig) -> Rig {
     let mut rig = like.clone();
     let air = &mut rig.plant.heat.shop_air;
-    (air.start_temp_degc, air.draught_k, air.draught_time_s) = (27.0, 1.5, 300.0);
+    (air.start_temp_degc, air.draught_k, air.draught_time_s) = (27.0, 4.0, 300.0);
     for file in [&mut rig.machine, &mut rig.control] {
         let mut sensors = file.temperature_sensors.iter_mut();
         let ambient = sensors.find(|s| s.place == SensorPlace::Ambient).unwrap();
