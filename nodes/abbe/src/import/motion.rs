@@ -204,7 +204,8 @@ fn positioning(
         for _ in 0..READINGS {
             writer.tick(position)?;
             writer.length(*axis, target_mm + deviation_um * 1e-3)?;
-            writer.wait(spacing_s);
+            writer.wait(TICK_S);
+            rest(position, spacing_s - TICK_S, writer)?;
         }
     }
     writer.tick(position)?;
