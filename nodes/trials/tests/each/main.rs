@@ -205,7 +205,13 @@ fn every_effect_that_a_recording_shows_is_named_alone() {
         };
         let own = answer.own.as_ref();
         let words = own.map_or_else(String::new, |cause| {
-            format!("{:?}, D {:.0}", cause.status, cause.d)
+            let [value, unit] = cause
+                .parameters
+                .first()
+                .map_or_else(Default::default, |of| {
+                    [format!("{:.3}", of.value), of.name.clone()]
+                });
+            format!("{:?}, D {:.0}, {unit} {value}", cause.status, cause.d)
         });
         println!(
             "{:28} {:9} {words} {}",
