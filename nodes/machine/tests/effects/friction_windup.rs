@@ -15,7 +15,11 @@ fn val_hooke_s_law_of_a_screw() {
         [-300.0 + 300.0 * up, 0.0, 0.0, 0.0, 0.0, 0.0]
     });
     let strain = 500.0 / (206_000.0 * PI * 16.0 * 16.0);
-    let given = [("windup_um_per_m", strain * 1e6), ("presliding_mm", 0.05)];
+    let given = [
+        ("windup_um_per_m", strain * 1e6),
+        ("presliding_mm", 0.05),
+        ("bearing_half_travels", -1.0),
+    ];
     let response = response_of(&machine, &run, "friction_windup", "X", &given);
     for place in [200, 700, 1500_usize] {
         let from_fixed_mm = run.motion.position[Axis::X][place] + 320.0;
