@@ -27,6 +27,24 @@ fn named(report: &Value) -> Vec<&Value> {
     causes.filter(|c| c["status"] != "surrogate").collect()
 }
 
+/// A file that does not tell the loop of velocity is no reason to take the backlash for something else.
+fn named_without_its_loop(scenario: &Scenario, run: &Path) {
+    let text = std::fs::read_to_string(scenario.path("machine.yaml")).unwrap();
+    let told = "velocity_loop: {frequency_hz: 35.6, damping: 1.118, filter_ms: 0.25}, ";
+    assert_eq!(text.matches(told).count(), 3);
+    let bare = scenario.path("bare.yaml");
+    std::fs::write(&bare, text.replace(told, "")).unwrap();
+    let gap = scenario.path("bare_gap.json");
+    let mut diagnose = command(0, &["diagnose"]);
+    diagnose.arg(run.join("bag")).arg("--machine").arg(&bare);
+    diagnose.arg("--json").arg(&gap);
+    let ended = Process::start(diagnose).ended_within(Duration::from_secs(300));
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    let report = read(&gap);
+    let first = &named(&report)[0];
+    assert_eq!([&first["effect"], &first["axis"]], ["backlash", "X"]);
+}
+
 #[test]
 fn scenario_gap_first_names_the_backlash_and_a_run_on_the_new_file_ends_at_the_floor() {
     let scenario = Scenario::copy_of("gap_first");
@@ -57,6 +75,7 @@ fn scenario_gap_first_names_the_backlash_and_a_run_on_the_new_file_ends_at_the_f
     assert!(after < 0.4 * before, "{shrink}");
     assert!(number(&shrink["gap_closed"]["low"]) > 0.8, "{shrink}");
 
+    named_without_its_loop(&scenario, &run);
     std::fs::copy(&better, scenario.path("machine.yaml")).unwrap();
     let again = read(&scenario.run().join("gap.json"));
     assert!(named(&again).is_empty(), "{:#}", again["causes"]);
