@@ -122,6 +122,14 @@ fn is_of(name: &Value, value: &Value) -> bool {
     }
 }
 
+fn loss_is_said_first(said: &str) {
+    for word in ["bag_0.mcap", "messages were read before"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    let place = |word: &str| said.find(word).unwrap_or(usize::MAX);
+    assert!(place("Lost:") < place("Where:"), "{said}");
+}
+
 #[test]
 fn a_real_report_obeys_its_schema_and_a_cut_bag_is_read_up_to_the_cut_with_exit_code_3() {
     let Recorded { scenario, bag } = recorded(CIRCLES);
@@ -177,11 +185,7 @@ fn a_real_report_obeys_its_schema_and_a_cut_bag_is_read_up_to_the_cut_with_exit_
         ],
     );
     assert_eq!(ended.status.code(), Some(3), "{}", ended.said);
-    for word in ["bag_0.mcap", "messages were read before"] {
-        assert!(ended.said.contains(word), "{word}: {}", ended.said);
-    }
-    let place = |word: &str| ended.said.find(word).unwrap_or(usize::MAX);
-    assert!(place("Lost:") < place("Where:"), "{}", ended.said);
+    loss_is_said_first(&ended.said);
     let cut = json(&report);
     assert_eq!(against_schema(&cut), Vec::<String>::new());
     let runs = cut["inputs"]["bags"][0]["runs"].as_u64().unwrap();
