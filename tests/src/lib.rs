@@ -14,4 +14,5 @@ pub mod namespace;
 pub mod program;
 pub mod python;
 pub mod scenario;
+pub mod security;
 pub mod zenoh;

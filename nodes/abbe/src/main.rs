@@ -19,6 +19,7 @@ mod import;
 mod import_map;
 mod import_shift;
 mod install_ros;
+mod keystore;
 mod launch;
 mod node;
 mod play;
@@ -70,6 +71,8 @@ enum Verb {
     Node(node::NodeVerb),
     /// Install the nodes and scenarios as a ROS 2 package, for `ros2 run` and `ros2 launch`.
     InstallRos(install_ros::InstallRos),
+    /// Make credentials of DDS Security for the nodes of scenarios.
+    Keystore(keystore::Keystore),
 }
 
 fn main() -> ExitCode {
@@ -88,6 +91,7 @@ fn main() -> ExitCode {
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => return node.execute(),
         Verb::InstallRos(install) => install.execute(),
+        Verb::Keystore(keystore) => keystore.execute(),
     };
     outcome.unwrap_or_else(|error| {
         eprintln!("abbe: {}", complaint::in_words(&error));

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::environment::{ENCLAVE, is_enclave};
 use crate::names::RemapRule;
 use crate::setup::Tree;
 
@@ -14,6 +15,8 @@ pub struct Arguments {
     pub parameters: Vec<ParameterSource>,
     /// `--log-level LEVEL` and `--log-level NAME:=LEVEL`.
     pub log_levels: Vec<(Option<String>, String)>,
+    /// `--enclave NAME`: where the credentials of DDS Security are.
+    pub enclave: Option<String>,
 }
 
 /// One `--params-file` or `-p`.
@@ -44,7 +47,7 @@ pub enum UsageError {
     /// Inside of `--ros-args`, but none of them.
     #[error(
         "ROS argument `{argument}` is unknown: -r|--remap FROM:=TO, -p|--param NAME:=VALUE, \
-         --params-file FILE, --log-level [NAME:=]LEVEL"
+         --params-file FILE, --log-level [NAME:=]LEVEL, -e|--enclave NAME"
     )]
     UnknownRosArgument {
         /// As given.
@@ -71,6 +74,12 @@ pub enum UsageError {
         parameter: String,
         /// What is wrong.
         reason: String,
+    },
+    /// None that can be a folder of a keystore.
+    #[error("enclave `{enclave}`: must be {ENCLAVE}")]
+    BadEnclave {
+        /// As given.
+        enclave: String,
     },
     /// None of the levels of ROS.
     #[error("log level `{level}`: must be debug, info, warn, error or fatal")]
@@ -118,6 +127,7 @@ impl Arguments {
                 Ok(())
             },
             "--log-level" => Self::log_level,
+            "-e" | "--enclave" => Self::enclave,
             _ => return Err(UsageError::UnknownRosArgument { argument }),
         };
         match rest.next() {
@@ -156,6 +166,14 @@ impl Arguments {
             name: name.to_owned(),
             value,
         });
+        Ok(())
+    }
+
+    fn enclave(&mut self, enclave: String) -> Result<(), UsageError> {
+        if !is_enclave(&enclave) {
+            return Err(UsageError::BadEnclave { enclave });
+        }
+        self.enclave = Some(enclave);
         Ok(())
     }
 
@@ -224,6 +242,7 @@ mod tests {
             (&["--ros-args", "-p", "rate:=[1"], "rate:=[1"),
             (&["--ros-args", "-r", "a b:=c"], "a b:=c"),
             (&["--ros-args", "--log-level", "loud"], "loud"),
+            (&["--ros-args", "--enclave", "/../keys"], "/../keys"),
             (&["--ros-args", "--", "x"], "`x`"),
         ] {
             let error = parse(arguments).unwrap_err().to_string();

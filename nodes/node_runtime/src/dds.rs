@@ -46,6 +46,40 @@ fn builder(environment: &Environment) -> DomainParticipantBuilder {
     }
 }
 
+/// Gives a participant the credentials of its node; a warning where it goes without.
+#[cfg(feature = "security")]
+fn secured(
+    builder: DomainParticipantBuilder,
+    environment: &Environment,
+    names: &NodeNames,
+) -> anyhow::Result<(DomainParticipantBuilder, Option<String>)> {
+    use rustdds::DomainParticipantSecurityConfigFiles;
+    let Some(security) = &environment.security else {
+        return Ok((builder, None));
+    };
+    match security.credentials(&names.fully_qualified()) {
+        Ok(folder) => {
+            let files =
+                DomainParticipantSecurityConfigFiles::with_ros_default_names(folder, String::new());
+            Ok((builder.builtin_security(files), None))
+        }
+        Err(missing) if security.enforced => Err(missing.into()),
+        Err(missing) => Ok((builder, Some(format!("{missing}; goes unsecured")))),
+    }
+}
+
+#[cfg(not(feature = "security"))]
+fn secured(
+    builder: DomainParticipantBuilder,
+    environment: &Environment,
+    _: &NodeNames,
+) -> anyhow::Result<(DomainParticipantBuilder, Option<String>)> {
+    if environment.security.is_some() {
+        return Err(environment::EnvironmentError::NoSecurity.into());
+    }
+    Ok((builder, None))
+}
+
 pub(crate) const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
 
 /// Whose endpoint it is: the vendor is in the first two bytes.
@@ -86,13 +120,16 @@ impl Participant {
     ) -> anyhow::Result<(Self, Option<String>)> {
         let interfaces = environment::interfaces();
         environment.check_interfaces(&interfaces)?;
-        let participant = builder(environment).build().map_err(|error| {
+        let (builder, unsecured) = secured(builder(environment), environment, names)?;
+        let participant = builder.build().map_err(|error| {
             anyhow!(
                 "DDS participant in domain {}: {error}",
                 environment.domain_id
             )
         })?;
-        let warning = environment.multicast_warning(&interfaces, participant.participant_id());
+        let hidden = environment.multicast_warning(&interfaces, participant.participant_id());
+        let warnings: Vec<String> = unsecured.into_iter().chain(hidden).collect();
+        let warning = (!warnings.is_empty()).then(|| warnings.join("; "));
         let node = NodeName::new(&names.namespace, &names.name)
             .map_err(|error| anyhow!("node {}: {error:?}", names.fully_qualified()))?;
         Ok((

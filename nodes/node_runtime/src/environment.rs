@@ -6,6 +6,11 @@
 
 use std::net::Ipv4Addr;
 
+mod security;
+
+pub(crate) use security::ENCLAVE;
+pub use security::{FILES as ENCLAVE_FILES, NoCredentials, Security, is_enclave};
+
 /// How far discovery goes (`ROS_AUTOMATIC_DISCOVERY_RANGE`, `ROS_LOCALHOST_ONLY`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DiscoveryRange {
@@ -57,6 +62,8 @@ pub struct Environment {
     pub zenoh: ZenohSettings,
     /// `ROS_DOMAIN_ID`.
     pub domain_id: u16,
+    /// DDS Security, where it is asked for.
+    pub security: Option<Security>,
     /// How far discovery goes.
     pub range: DiscoveryRange,
     /// `RUST_LOG`.
@@ -81,6 +88,17 @@ pub enum EnvironmentError {
         "RMW_IMPLEMENTATION=rmw_zenoh_cpp: this program was built without Zenoh (cargo build --features zenoh)"
     )]
     NoZenoh,
+    /// DDS Security is asked for, and is not in this program.
+    #[error(
+        "ROS_SECURITY_ENABLE=true: this program was built without DDS Security (cargo build --features security)"
+    )]
+    NoSecurity,
+    /// DDS Security is asked for, and not DDS.
+    #[error(
+        "ROS_SECURITY_ENABLE=true with RMW_IMPLEMENTATION=rmw_zenoh_cpp: only DDS is secured by enclaves; \
+         access control and TLS of Zenoh stand in the file that ZENOH_SESSION_CONFIG_URI names"
+    )]
+    SecurityOfZenoh,
     /// Nothing to talk through.
     #[error("no network interface: none of {found} is up with an IPv4 address")]
     NoInterface {
@@ -125,6 +143,9 @@ impl Environment {
         let read = Self::from_variables(|name| std::env::var(name).ok())?;
         if read.middleware == Middleware::Zenoh && cfg!(not(feature = "zenoh")) {
             return Err(EnvironmentError::NoZenoh);
+        }
+        if read.security.is_some() && cfg!(not(feature = "security")) {
+            return Err(EnvironmentError::NoSecurity);
         }
         Ok(read)
     }
@@ -175,10 +196,15 @@ impl Environment {
             }
         };
         let (middleware, zenoh) = middleware(set)?;
+        let security = Security::from_variables(set)?;
+        if security.is_some() && middleware == Middleware::Zenoh {
+            return Err(EnvironmentError::SecurityOfZenoh);
+        }
         Ok(Self {
             middleware,
             zenoh,
             domain_id,
+            security,
             range,
             log_filter: set("RUST_LOG"),
         })

@@ -6,6 +6,7 @@
 //! order and simulated time; a scenario in one process and a replay both use it, so that equal inputs
 //! give equal bytes.
 
+pub mod access;
 pub mod arguments;
 mod clock;
 pub mod complaint;

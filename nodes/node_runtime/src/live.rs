@@ -97,11 +97,13 @@ fn prepare(compositions: Vec<Composition>) -> anyhow::Result<(Environment, Prepa
     for composition in &compositions {
         all_arguments.push(Arguments::parse(composition.arguments.iter().cloned())?);
     }
-    let environment = Environment::read()?;
-    log::start(
-        &all_arguments.iter().collect::<Vec<_>>(),
-        environment.log_filter.as_deref(),
-    );
+    let mut environment = Environment::read()?;
+    if let Some(security) = &mut environment.security {
+        let mut told = all_arguments.iter();
+        let told = || told.find_map(|arguments| arguments.enclave.clone());
+        security.enclave = security.enclave.take().or_else(told);
+    }
+    log::start(&all_arguments.iter().collect::<Vec<_>>(), &environment);
     let mut nodes = Vec::with_capacity(compositions.len());
     for (composition, arguments) in compositions.into_iter().zip(&all_arguments) {
         let setup = Setup::new(&composition.name, arguments)
@@ -128,7 +130,7 @@ pub fn launch(
         .enable_all()
         .build()
         .context("tokio runtime")?;
-    log::start(&[], environment.log_filter.as_deref());
+    log::start(&[], environment);
     let mut shifts = [Shift::new(), Shift::new()];
     let mut seen = BTreeSet::new();
     for (setup, _) in &nodes {

@@ -24,6 +24,7 @@ use tracing_subscriber::{EnvFilter, Layer};
 
 use crate::arguments::Arguments;
 use crate::clock::{self, Clock};
+use crate::environment::Environment;
 use crate::network::Writer;
 
 mod levels;
@@ -106,7 +107,7 @@ pub(crate) fn chosen() -> Option<Severity> {
 }
 
 /// Starts logging for the process, unless the program has its own already.
-pub(crate) fn start(arguments: &[&Arguments], log_filter: Option<&str>) {
+pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
     let mut levels = arguments.iter().flat_map(|arguments| &arguments.log_levels);
     let level =
         levels
@@ -117,8 +118,13 @@ pub(crate) fn start(arguments: &[&Arguments], log_filter: Option<&str>) {
             });
     // RustDDS complains of multicast groups when it leaves a loopback that has none.
     let quiet = "rustdds=error,rustdds::network::udp_listener=off,ros2_client=error,zenoh=error";
-    let default = format!("{level},{quiet}");
-    let filter = log_filter
+    // Where DDS is secured it complains of every message of whoever is not.
+    let secured = environment.security.as_ref();
+    let strangers = secured.map_or("", |_| ",rustdds::rtps::message_receiver=off");
+    let default = format!("{level},{quiet}{strangers}");
+    let filter = environment
+        .log_filter
+        .as_deref()
         .and_then(|directives| EnvFilter::try_new(directives).ok())
         .unwrap_or_else(|| EnvFilter::new(default));
     let console = tracing_subscriber::fmt::layer()

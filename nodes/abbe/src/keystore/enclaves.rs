@@ -1,0 +1,117 @@
+//! Which enclaves the nodes of scenarios need, and what each may do.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use abbe_msgs::topics;
+use anyhow::{Context, Result, bail};
+use node_runtime::Setup;
+use node_runtime::access::Access;
+use node_runtime::arguments::Arguments;
+use node_runtime::names::NodeNames;
+use node_runtime::node::Ports;
+
+use crate::launch::LaunchNode;
+use crate::node;
+use crate::scenario::Scenario;
+
+/// One enclave.
+pub struct Enclave {
+    /// As ROS names it.
+    pub name: String,
+    /// What its holder may do.
+    pub access: Access,
+}
+
+/// Listeners of this program itself.
+const LISTENERS: [&str; 3] = ["/abbe_run_tap", "/abbe_record", "/viewer"];
+const OPERATOR: &str = "/operator";
+/// Begins its bag when it is built.
+const RECORDER: &str = "recorder";
+
+/// Enclaves of every node of some scenarios, of those who listen to them, and of an operator.
+///
+/// # Errors
+/// When a scenario or a node's parameters cannot be read.
+pub fn of_scenarios(folders: &[PathBuf]) -> Result<Vec<Enclave>> {
+    let mut all = BTreeMap::<String, Access>::new();
+    let mut add = |name: String, access: Access| {
+        let known = all.remove(&name);
+        let access = known.map_or_else(|| access.clone(), |known| known.and(access.clone()));
+        all.insert(name, access);
+    };
+    for folder in folders {
+        let scenario = Scenario::read(folder)?;
+        for launched in &scenario.nodes {
+            let context = || format!("node {}", launched.name);
+            let (name, access) = of_node(launched).with_context(context)?;
+            if launched.exec == RECORDER {
+                add(format!("/{}_tap", launched.name), Access::to_listen());
+            }
+            add(name, access);
+        }
+    }
+    for name in LISTENERS {
+        add(name.to_owned(), Access::to_listen());
+    }
+    add(OPERATOR.to_owned(), Access::to_operate());
+    let enclave = |(name, access)| Enclave { name, access };
+    Ok(all.into_iter().map(enclave).collect())
+}
+
+fn of_node(launched: &LaunchNode) -> Result<(String, Access)> {
+    let arguments = Arguments::parse(launched.ros_args())?;
+    let names = NodeNames::new(&launched.exec, &arguments.remaps)?;
+    let Some(build) = node::builder(&launched.exec) else {
+        bail!(
+            "exec \"{}\" is unknown (known: {})",
+            launched.exec,
+            node::names()
+        );
+    };
+    if launched.exec == RECORDER {
+        let mut access = Access::of(&names, &Ports::default())?;
+        let save = names.resolve(topics::SAVE_RECORDING.name)?;
+        access.subscribe.insert(format!("rq{save}Request"));
+        access.publish.insert(format!("rr{save}Reply"));
+        return Ok((names.fully_qualified(), access));
+    }
+    let built = build(&Setup::new(&launched.exec, &arguments)?)?;
+    Ok((names.fully_qualified(), Access::of(&names, built.ports())?))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn only_axis_compensation_and_its_machine_touch_the_compensation() {
+        let home = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../launch_configs");
+        let folders: Vec<PathBuf> = std::fs::read_dir(home)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .filter(|folder| folder.join("scenario.yaml").is_file())
+            .collect();
+        assert!(folders.len() > 10);
+        let all = of_scenarios(&folders).unwrap();
+        let writers = all.iter().filter(|enclave| {
+            enclave
+                .access
+                .publish
+                .iter()
+                .any(|t| t == "rt/compensation")
+        });
+        let writers: Vec<&str> = writers.map(|enclave| enclave.name.as_str()).collect();
+        assert_eq!(writers, ["/axis_compensation"]);
+        for enclave in &all {
+            let is_free = enclave
+                .access
+                .publish
+                .iter()
+                .any(|topic| topic == "*" || topic == "rt/*");
+            assert!(!is_free, "{}", enclave.name);
+        }
+    }
+}

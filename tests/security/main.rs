@@ -1,0 +1,178 @@
+//! DDS Security: a cell whose nodes have credentials, and who has none.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "tests wait, look at clocks and read files"
+)]
+#![expect(clippy::print_stderr, reason = "figures that were seen are said")]
+
+use std::path::Path;
+use std::time::Duration;
+
+use abbe_msgs::{from_cdr, topics};
+use abbe_tests::cyclone::{Cyclone, end};
+use abbe_tests::namespace;
+use abbe_tests::program::{Ended, Process, command, domain};
+use abbe_tests::python::interpreter;
+use abbe_tests::scenario::{Scenario, mcap_file};
+use abbe_tests::security::{enforce, keystore};
+use serde_json::json;
+
+/// What the stranger asks for on X, m: no model of the cell gives as much.
+const INJECTED_M: f64 = 123e-6;
+/// Between two of its messages.
+const BEAT: Duration = Duration::from_millis(100);
+
+/// A reader of states and compensations and a writer of compensations, by Cyclone DDS without credentials.
+fn stranger(python: &std::path::PathBuf, domain: u16) -> Cyclone {
+    let readers = [end(&topics::AXES_STATE), end(&topics::COMPENSATION)];
+    Cyclone::start(python, domain, &readers, &[end(&topics::COMPENSATION)])
+}
+
+fn inject(stranger: &mut Cyclone) {
+    let total = [INJECTED_M, 0.0, 0.0];
+    stranger.write(
+        topics::COMPENSATION.name,
+        &json!({"total": total, "valid": true}),
+    );
+}
+
+/// What the stranger heard while it spoke for some time.
+fn heard(stranger: &mut Cyclone, time: Duration) -> usize {
+    let beats = time.as_millis() / BEAT.as_millis();
+    let mut heard = 0;
+    for _ in 0..beats {
+        inject(stranger);
+        heard += stranger.samples_within(topics::AXES_STATE.name, BEAT).len();
+        heard += stranger
+            .samples_within(topics::COMPENSATION.name, Duration::ZERO)
+            .len();
+    }
+    heard
+}
+
+/// Greatest offsets on X in a bag, m, and how many messages there are.
+fn compensations(bag: &Path) -> (f64, usize) {
+    let bytes = std::fs::read(mcap_file(bag)).unwrap();
+    let mut greatest_m = 0.0_f64;
+    let mut n = 0;
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        if message.channel.topic == "/compensation" {
+            let said: abbe_msgs::msg::AxisCompensation = from_cdr(&message.data).unwrap();
+            greatest_m = greatest_m.max(said.total[0].abs());
+            n += 1;
+        }
+    }
+    (greatest_m, n)
+}
+
+#[test]
+fn a_secured_cell_does_its_plan_while_a_stranger_hears_nothing_and_injects_nothing() {
+    let test = "a secured cell";
+    let Some(python) = interpreter(test) else {
+        return;
+    };
+    namespace::alone(test, || {
+        let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(0));
+        let keys = scenario.folder().join("keys");
+        if !keystore(test, &keys, &scenario.folder()) {
+            return;
+        }
+        let mut run = command(domain, &["run", "--separate"]);
+        run.arg(scenario.folder()).arg("--runs").arg(scenario.out());
+        enforce(&mut run, &keys);
+        let run = Process::start(run);
+        let mut stranger = stranger(&python, domain);
+        let heard = heard(&mut stranger, Duration::from_secs(30));
+        let ended = run.ended_within(Duration::from_secs(240));
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+        assert!(ended.said.contains("0 lost"), "{}", ended.said);
+        let bag = scenario.new_run(&[]).join("bag");
+        let (greatest_m, n) = compensations(&bag);
+        eprintln!(
+            "stranger heard {heard}; {n} compensations, at most {:.2} um",
+            greatest_m * 1e6
+        );
+        assert_eq!(heard, 0);
+        assert!(
+            n > 1000 && greatest_m < 0.5 * INJECTED_M,
+            "{n} {greatest_m}"
+        );
+        assert!(
+            !ended.said.contains("more than one publisher"),
+            "{}",
+            ended.said
+        );
+    });
+}
+
+#[test]
+fn the_same_stranger_hears_a_machine_without_credentials() {
+    let test = "a machine that is not secured";
+    let Some(python) = interpreter(test) else {
+        return;
+    };
+    namespace::alone(test, || {
+        let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(1));
+        let file = scenario.argument("fake_cnc.yaml");
+        let node = Process::node(domain, "fake_cnc", &["--params-file", &file]);
+        let mut stranger = stranger(&python, domain);
+        assert!(heard(&mut stranger, Duration::from_secs(10)) > 100);
+        node.stop();
+    });
+}
+
+/// Starts axis_compensation in a keystore's enclave, its own or another, and lets it end.
+fn started(scenario: &Scenario, keys: &Path, more: &[&str], change: &[(&str, &str)]) -> Ended {
+    let file = scenario.argument("axis_compensation.yaml");
+    let mut arguments = vec![
+        "node",
+        "axis_compensation",
+        "--ros-args",
+        "--params-file",
+        &file,
+    ];
+    arguments.extend(more);
+    let mut node = command(domain(2), &arguments);
+    enforce(&mut node, keys);
+    node.envs(change.iter().copied());
+    Process::start(node).ended_within(Duration::from_secs(30))
+}
+
+#[test]
+fn credentials_of_another_node_and_none_keep_a_node_from_its_topics() {
+    let test = "wrong credentials";
+    namespace::alone(test, || {
+        let scenario = Scenario::copy_of("short_cell");
+        let keys = scenario.folder().join("keys");
+        if !keystore(test, &keys, &scenario.folder()) {
+            return;
+        }
+        let other = started(&scenario, &keys, &["--enclave", "/probe"], &[]);
+        assert_eq!(other.status.code(), Some(1), "{}", other.said);
+        assert!(other.said.contains("rt/compensation"), "{}", other.said);
+        let own = keys.join("enclaves/axis_compensation");
+        std::fs::remove_file(own.join("permissions.p7s")).unwrap();
+        let none = started(&scenario, &keys, &[], &[]);
+        assert_eq!(none.status.code(), Some(1), "{}", none.said);
+        for word in ["/axis_compensation", "permissions.p7s", "abbe keystore"] {
+            assert!(none.said.contains(word), "{word}: {}", none.said);
+        }
+        let forged = keys.join("enclaves/probe/permissions.p7s");
+        let text = std::fs::read_to_string(&forged).unwrap();
+        assert!(text.contains("rt/probe"), "{text}");
+        std::fs::write(&forged, text.replace("rt/probe", "rt/compensation")).unwrap();
+        let forged = started(&scenario, &keys, &["--enclave", "/probe"], &[]);
+        assert_eq!(forged.status.code(), Some(1), "{}", forged.said);
+        assert!(forged.said.contains("participant"), "{}", forged.said);
+        let wrong = [("ROS_SECURITY_STRATEGY", "enforce")];
+        let wrong = started(&scenario, &keys, &[], &wrong);
+        assert_eq!(wrong.status.code(), Some(1), "{}", wrong.said);
+        assert!(
+            wrong.said.contains("ROS_SECURITY_STRATEGY=enforce"),
+            "{}",
+            wrong.said
+        );
+    });
+}
