@@ -11,7 +11,6 @@ use std::time::Duration;
 
 use abbe_msgs::{from_cdr, topics};
 use abbe_tests::cyclone::{Cyclone, end};
-use abbe_tests::namespace;
 use abbe_tests::program::{Ended, Process, command, domain};
 use abbe_tests::python::interpreter;
 use abbe_tests::scenario::{Scenario, mcap_file};
@@ -73,38 +72,36 @@ fn a_secured_cell_does_its_plan_while_a_stranger_hears_nothing_and_injects_nothi
     let Some(python) = interpreter(test) else {
         return;
     };
-    namespace::alone(test, || {
-        let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(0));
-        let keys = scenario.folder().join("keys");
-        if !keystore(test, &keys, &scenario.folder()) {
-            return;
-        }
-        let mut run = command(domain, &["run", "--separate"]);
-        run.arg(scenario.folder()).arg("--runs").arg(scenario.out());
-        enforce(&mut run, &keys);
-        let run = Process::start(run);
-        let mut stranger = stranger(&python, domain);
-        let heard = heard(&mut stranger, Duration::from_secs(30));
-        let ended = run.ended_within(Duration::from_secs(240));
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
-        assert!(ended.said.contains("0 lost"), "{}", ended.said);
-        let bag = scenario.new_run(&[]).join("bag");
-        let (greatest_m, n) = compensations(&bag);
-        eprintln!(
-            "stranger heard {heard}; {n} compensations, at most {:.2} um",
-            greatest_m * 1e6
-        );
-        assert_eq!(heard, 0);
-        assert!(
-            n > 1000 && greatest_m < 0.5 * INJECTED_M,
-            "{n} {greatest_m}"
-        );
-        assert!(
-            !ended.said.contains("more than one publisher"),
-            "{}",
-            ended.said
-        );
-    });
+    let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(0));
+    let keys = scenario.folder().join("keys");
+    if !keystore(test, &keys, &scenario.folder()) {
+        return;
+    }
+    let mut run = command(domain, &["run", "--separate"]);
+    run.arg(scenario.folder()).arg("--runs").arg(scenario.out());
+    enforce(&mut run, &keys);
+    let run = Process::start(run);
+    let mut stranger = stranger(&python, domain);
+    let heard = heard(&mut stranger, Duration::from_secs(30));
+    let ended = run.ended_within(Duration::from_secs(240));
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    assert!(ended.said.contains("0 lost"), "{}", ended.said);
+    let bag = scenario.new_run(&[]).join("bag");
+    let (greatest_m, n) = compensations(&bag);
+    eprintln!(
+        "stranger heard {heard}; {n} compensations, at most {:.2} um",
+        greatest_m * 1e6
+    );
+    assert_eq!(heard, 0);
+    assert!(
+        n > 1000 && greatest_m < 0.5 * INJECTED_M,
+        "{n} {greatest_m}"
+    );
+    assert!(
+        !ended.said.contains("more than one publisher"),
+        "{}",
+        ended.said
+    );
 }
 
 #[test]
@@ -113,14 +110,14 @@ fn the_same_stranger_hears_a_machine_without_credentials() {
     let Some(python) = interpreter(test) else {
         return;
     };
-    namespace::alone(test, || {
-        let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(1));
-        let file = scenario.argument("fake_cnc.yaml");
-        let node = Process::node(domain, "fake_cnc", &["--params-file", &file]);
-        let mut stranger = stranger(&python, domain);
-        assert!(heard(&mut stranger, Duration::from_secs(10)) > 100);
-        node.stop();
-    });
+    let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(1));
+    let file = scenario.argument("fake_cnc.yaml");
+    let node = Process::node(domain, "fake_cnc", &["--params-file", &file]);
+    let mut stranger = stranger(&python, domain);
+    let heard = heard(&mut stranger, Duration::from_secs(10));
+    eprintln!("the same stranger heard {heard} where nothing is secured");
+    assert!(heard > 20, "{heard}");
+    node.stop();
 }
 
 /// Starts axis_compensation in a keystore's enclave, its own or another, and lets it end.
@@ -143,36 +140,34 @@ fn started(scenario: &Scenario, keys: &Path, more: &[&str], change: &[(&str, &st
 #[test]
 fn credentials_of_another_node_and_none_keep_a_node_from_its_topics() {
     let test = "wrong credentials";
-    namespace::alone(test, || {
-        let scenario = Scenario::copy_of("short_cell");
-        let keys = scenario.folder().join("keys");
-        if !keystore(test, &keys, &scenario.folder()) {
-            return;
-        }
-        let other = started(&scenario, &keys, &["--enclave", "/probe"], &[]);
-        assert_eq!(other.status.code(), Some(1), "{}", other.said);
-        assert!(other.said.contains("rt/compensation"), "{}", other.said);
-        let own = keys.join("enclaves/axis_compensation");
-        std::fs::remove_file(own.join("permissions.p7s")).unwrap();
-        let none = started(&scenario, &keys, &[], &[]);
-        assert_eq!(none.status.code(), Some(1), "{}", none.said);
-        for word in ["/axis_compensation", "permissions.p7s", "abbe keystore"] {
-            assert!(none.said.contains(word), "{word}: {}", none.said);
-        }
-        let forged = keys.join("enclaves/probe/permissions.p7s");
-        let text = std::fs::read_to_string(&forged).unwrap();
-        assert!(text.contains("rt/probe"), "{text}");
-        std::fs::write(&forged, text.replace("rt/probe", "rt/compensation")).unwrap();
-        let forged = started(&scenario, &keys, &["--enclave", "/probe"], &[]);
-        assert_eq!(forged.status.code(), Some(1), "{}", forged.said);
-        assert!(forged.said.contains("participant"), "{}", forged.said);
-        let wrong = [("ROS_SECURITY_STRATEGY", "enforce")];
-        let wrong = started(&scenario, &keys, &[], &wrong);
-        assert_eq!(wrong.status.code(), Some(1), "{}", wrong.said);
-        assert!(
-            wrong.said.contains("ROS_SECURITY_STRATEGY=enforce"),
-            "{}",
-            wrong.said
-        );
-    });
+    let scenario = Scenario::copy_of("short_cell");
+    let keys = scenario.folder().join("keys");
+    if !keystore(test, &keys, &scenario.folder()) {
+        return;
+    }
+    let other = started(&scenario, &keys, &["--enclave", "/probe"], &[]);
+    assert_eq!(other.status.code(), Some(1), "{}", other.said);
+    assert!(other.said.contains("rt/compensation"), "{}", other.said);
+    let own = keys.join("enclaves/axis_compensation");
+    std::fs::remove_file(own.join("permissions.p7s")).unwrap();
+    let none = started(&scenario, &keys, &[], &[]);
+    assert_eq!(none.status.code(), Some(1), "{}", none.said);
+    for word in ["/axis_compensation", "permissions.p7s", "abbe keystore"] {
+        assert!(none.said.contains(word), "{word}: {}", none.said);
+    }
+    let forged = keys.join("enclaves/probe/permissions.p7s");
+    let text = std::fs::read_to_string(&forged).unwrap();
+    assert!(text.contains("rt/probe"), "{text}");
+    std::fs::write(&forged, text.replace("rt/probe", "rt/compensation")).unwrap();
+    let forged = started(&scenario, &keys, &["--enclave", "/probe"], &[]);
+    assert_eq!(forged.status.code(), Some(1), "{}", forged.said);
+    assert!(forged.said.contains("participant"), "{}", forged.said);
+    let wrong = [("ROS_SECURITY_STRATEGY", "enforce")];
+    let wrong = started(&scenario, &keys, &[], &wrong);
+    assert_eq!(wrong.status.code(), Some(1), "{}", wrong.said);
+    assert!(
+        wrong.said.contains("ROS_SECURITY_STRATEGY=enforce"),
+        "{}",
+        wrong.said
+    );
 }
