@@ -2,8 +2,9 @@
 
 use anyhow::Result;
 use gap_diagnosis::report::{Cause, GapReport, Status};
-use machine::effects;
 use maud::html;
+
+use words::{covariate, name};
 
 use super::Report;
 use super::section::{Rows, Section, head};
@@ -13,6 +14,7 @@ mod drawings;
 mod matrix;
 pub mod planned;
 mod sentences;
+mod words;
 
 /// Begin of the names of amplitudes that only widen an effect's form.
 const FREE_FORM: &str = "free_";
@@ -115,12 +117,6 @@ fn three(value: f64) -> String {
 
 fn maybe(value: Option<f64>) -> String {
     value.map_or_else(|| "—".to_owned(), three)
-}
-
-/// Name of an effect as a metrologist says it, with what it acts on.
-fn name(effect: &str, axis: &str) -> String {
-    let title = effects::kind(effect).map_or(effect, |kind| kind.title);
-    format!("{title} {axis}").trim_end().to_owned()
 }
 
 fn sections(diagnosed: &Diagnosed) -> Vec<Section> {
@@ -284,7 +280,7 @@ fn places(report: &GapReport) -> Section {
         vec![
             place.channel.clone(),
             place.direction.clone(),
-            place.covariate.clone(),
+            covariate(&place.covariate),
             format!("{:.0} %", 100.0 * place.share_unique),
             format!("{:.0} %", 100.0 * place.share_shared),
             format!("{:.3}", place.p_value),

@@ -2,7 +2,8 @@
 
 use gap_diagnosis::report::{Cause, GapReport, Status};
 
-use super::{FREE_FORM, maybe, name, three, values};
+use super::words::{self, name};
+use super::{FREE_FORM, maybe, three, values};
 
 /// That a part of the recording could not be read.
 pub(super) fn lost(losses: &[String]) -> Option<String> {
@@ -36,15 +37,8 @@ fn place(report: &GapReport) -> String {
         three(gap.p95_um),
         three(gap.floor_um)
     );
-    match report.r#where.first() {
-        Some(place) => format!(
-            "Where: {size}; most of it is in {} {}, going with {} (of the structured gap {:.0} % goes with that alone, {:.0} % with other covariates as well).",
-            place.channel,
-            place.direction,
-            place.covariate,
-            100.0 * place.share_unique,
-            100.0 * place.share_shared
-        ),
+    match words::place(report) {
+        Some(place) => format!("Where: {size}; {place}."),
         None => {
             let most = report.gap.per_channel.iter();
             let most = most.max_by(|a, b| a.rms_um.total_cmp(&b.rms_um));
@@ -118,30 +112,33 @@ fn sizes(cause: &Cause) -> String {
 
 fn unknown(report: &GapReport) -> String {
     let found = &report.unknown.description;
-    let mut words = vec![];
+    let mut said = vec![];
     if !found.covariate.is_empty() {
-        words.push(format!("it goes with {}", found.covariate));
+        said.push(format!(
+            "it goes with {}",
+            words::covariate(&found.covariate)
+        ));
     }
     if !found.parity.is_empty() {
-        words.push(format!("is {} in the direction of motion", found.parity));
+        said.push(format!("is {} in the direction of motion", found.parity));
     }
     if !found.period.is_empty() {
-        words.push(format!("has a period of {}", found.period));
+        said.push(format!("has a period of {}", found.period));
     }
     if let Some(exponent) = found.feed_exponent {
-        words.push(format!("grows with feed to the power {exponent:.1}"));
+        said.push(words::feed_exponent(exponent));
     }
     if let Some(time_s) = found.time_constant_s {
-        words.push(format!("has a time constant of {} s", three(time_s)));
+        said.push(format!("has a time constant of {} s", three(time_s)));
     }
     format!(
         "a rest that no known effect explains (score {} over {}): {}",
         three(report.unknown.score),
         three(report.unknown.threshold),
-        if words.is_empty() {
+        if said.is_empty() {
             "without a clear shape".to_owned()
         } else {
-            words.join(", ")
+            said.join(", ")
         }
     )
 }
