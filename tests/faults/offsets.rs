@@ -8,11 +8,12 @@ use abbe_msgs::{to_cdr, topics};
 use abbe_tests::graph::{Graph, Voice, now, port};
 use abbe_tests::namespace;
 use abbe_tests::program::{Process, domain};
+use abbe_tests::said::compensation;
 use abbe_tests::scenario::Scenario;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use crate::said::{compensation, later, model, state};
+use crate::said::{later, model, state};
 
 /// Between two messages of a voice.
 const BEAT: Duration = Duration::from_millis(10);

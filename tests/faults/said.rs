@@ -1,7 +1,7 @@
 //! Messages as a good publisher says them.
 
 use abbe_msgs::builtin_interfaces::msg::Time;
-use abbe_msgs::msg::{AxisCompensation, AxisDrift, AxisState, ThermalModel};
+use abbe_msgs::msg::{AxisDrift, AxisState, ThermalModel};
 
 /// An instant `nanos` later.
 pub fn later(time: &Time, nanos: i64) -> Time {
@@ -23,21 +23,6 @@ pub fn state(at: &Time, x_m: f64) -> AxisState {
     state.scale = vec![f64::NAN; 3];
     state.velocity = vec![0.0; 3];
     state
-}
-
-/// Offsets of X; the other linear axes have none.
-pub fn compensation(at: &Time, x_m: f64) -> AxisCompensation {
-    let mut message = AxisCompensation::default();
-    message.header.stamp = at.clone();
-    message.axis = ["X", "Y", "Z"].map(str::to_owned).into();
-    message.total = vec![x_m, 0.0, 0.0];
-    message.thermal = vec![x_m, 0.0, 0.0];
-    message.geometric = vec![0.0; 3];
-    message.positioning = vec![0.0; 3];
-    message.pulses = vec![0; 3];
-    message.remainder = vec![0.0; 3];
-    message.state = vec![AxisCompensation::STATE_ACTIVE; 3];
-    message
 }
 
 /// A model whose drift of X grows with the position by `slope`.

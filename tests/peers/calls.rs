@@ -1,5 +1,5 @@
 //! Services and actions as a node on Cyclone DDS calls them: 16 bytes in front of every request and reply
-//! say whose it is. (Fast DDS's mapping, with the identity in RTPS, is tried by `node_runtime`'s own tests.)
+//! say whose it is. Fast DDS's is in `fast.rs`.
 
 use std::time::Duration;
 

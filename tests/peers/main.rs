@@ -9,6 +9,7 @@
 
 mod bag;
 mod calls;
+mod fast;
 mod latched;
 mod ring;
 mod wire;

@@ -11,14 +11,15 @@ use std::time::Duration;
 
 use abbe_msgs::{from_cdr, topics};
 use abbe_tests::cyclone::{Cyclone, end};
+use abbe_tests::graph::now;
 use abbe_tests::program::{Ended, Process, command, domain};
 use abbe_tests::python::interpreter;
+use abbe_tests::said::compensation;
 use abbe_tests::scenario::{Scenario, mcap_file};
 use abbe_tests::security::{enforce, keystore};
-use serde_json::json;
 
-/// What the stranger asks for on X, m: no model of the cell gives as much.
-const INJECTED_M: f64 = 123e-6;
+/// What the stranger asks for on X, m: no model of this short cell gives as much.
+const INJECTED_M: f64 = 40e-6;
 /// Between two of its messages.
 const BEAT: Duration = Duration::from_millis(100);
 
@@ -28,26 +29,24 @@ fn stranger(python: &std::path::PathBuf, domain: u16) -> Cyclone {
     Cyclone::start(python, domain, &readers, &[end(&topics::COMPENSATION)])
 }
 
-fn inject(stranger: &mut Cyclone) {
-    let total = [INJECTED_M, 0.0, 0.0];
-    stranger.write(
-        topics::COMPENSATION.name,
-        &json!({"total": total, "valid": true}),
-    );
-}
-
-/// What the stranger heard while it spoke for some time.
-fn heard(stranger: &mut Cyclone, time: Duration) -> usize {
+/// What the stranger heard while it spoke for some time: how many messages, and the furthest that a motor of X was from
+/// its command, m.
+fn heard(stranger: &mut Cyclone, time: Duration) -> (usize, f64) {
     let beats = time.as_millis() / BEAT.as_millis();
-    let mut heard = 0;
+    let (mut heard, mut furthest_m) = (0, 0.0_f64);
     for _ in 0..beats {
-        inject(stranger);
-        heard += stranger.samples_within(topics::AXES_STATE.name, BEAT).len();
-        heard += stranger
-            .samples_within(topics::COMPENSATION.name, Duration::ZERO)
-            .len();
+        let message = serde_json::to_value(compensation(&now(), INJECTED_M)).unwrap();
+        stranger.write(topics::COMPENSATION.name, &message);
+        for state in stranger.samples_within(topics::AXES_STATE.name, BEAT) {
+            let x = |key: &str| state[key][0].as_f64().unwrap();
+            furthest_m = furthest_m.max((x("motor") - x("commanded")).abs());
+            heard += 1;
+        }
+        let offsets = stranger.samples_within(topics::COMPENSATION.name, Duration::ZERO);
+        let others = offsets.iter().filter(|said| said["total"][0] != INJECTED_M);
+        heard += others.count();
     }
-    heard
+    (heard, furthest_m)
 }
 
 /// Greatest offsets on X in a bag, m, and how many messages there are.
@@ -82,7 +81,7 @@ fn a_secured_cell_does_its_plan_while_a_stranger_hears_nothing_and_injects_nothi
     enforce(&mut run, &keys);
     let run = Process::start(run);
     let mut stranger = stranger(&python, domain);
-    let heard = heard(&mut stranger, Duration::from_secs(30));
+    let (heard, _) = heard(&mut stranger, Duration::from_secs(30));
     let ended = run.ended_within(Duration::from_secs(240));
     assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
     assert!(ended.said.contains("0 lost"), "{}", ended.said);
@@ -105,7 +104,7 @@ fn a_secured_cell_does_its_plan_while_a_stranger_hears_nothing_and_injects_nothi
 }
 
 #[test]
-fn the_same_stranger_hears_a_machine_without_credentials() {
+fn the_same_stranger_hears_and_moves_a_machine_without_credentials() {
     let test = "a machine that is not secured";
     let Some(python) = interpreter(test) else {
         return;
@@ -114,9 +113,13 @@ fn the_same_stranger_hears_a_machine_without_credentials() {
     let file = scenario.argument("fake_cnc.yaml");
     let node = Process::node(domain, "fake_cnc", &["--params-file", &file]);
     let mut stranger = stranger(&python, domain);
-    let heard = heard(&mut stranger, Duration::from_secs(10));
-    eprintln!("the same stranger heard {heard} where nothing is secured");
+    let (heard, furthest_m) = heard(&mut stranger, Duration::from_secs(10));
+    eprintln!(
+        "the same stranger heard {heard} where nothing is secured, and moved a motor by {:.1} um",
+        furthest_m * 1e6
+    );
     assert!(heard > 20, "{heard}");
+    assert!(furthest_m > 0.5 * INJECTED_M, "{furthest_m}");
     node.stop();
 }
 

@@ -8,11 +8,13 @@
 #![expect(clippy::print_stderr, reason = "what is not tested is said")]
 
 pub mod cyclone;
+pub mod fast_dds;
 pub mod graph;
 pub mod hosts;
 pub mod namespace;
 pub mod program;
 pub mod python;
+pub mod said;
 pub mod scenario;
 pub mod security;
 pub mod zenoh;

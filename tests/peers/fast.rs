@@ -1,0 +1,102 @@
+//! Topics, services and an action as a node on Fast DDS meets them: the identity of a request is in RTPS.
+
+use abbe_msgs::action::{RunProgram, RunProgramGoal};
+use abbe_msgs::action_msgs::msg::GoalStatus;
+use abbe_msgs::lifecycle_msgs::srv::{GetState, GetStateRequest};
+use abbe_msgs::rcl_interfaces::srv::{GetParameters, GetParametersRequest};
+use abbe_msgs::unique_identifier_msgs::msg::UUID;
+use abbe_msgs::{GetResult, GetResultRequest, SendGoal, SendGoalRequest, topics};
+use abbe_tests::fast_dds::FastDds;
+use abbe_tests::graph::now;
+use abbe_tests::program::{Process, domain};
+use abbe_tests::said::compensation;
+use abbe_tests::scenario::Scenario;
+
+const GET: &str = "/fake_cnc/get_parameters";
+const STATE: &str = "/fake_cnc/get_state";
+const SEND: &str = "/cnc/run_program/_action/send_goal";
+const RESULT: &str = "/cnc/run_program/_action/get_result";
+/// What is asked for on X, m, and what of it must be seen at the motor.
+const ASKED_M: f64 = 20e-6;
+const SEEN_M: f64 = 5e-6;
+
+/// A machine with the peer in its domain; `None`: Fast DDS is not here.
+fn machine(test: &str, place: u16) -> Option<(Scenario, Process, FastDds)> {
+    let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(place));
+    let peer = FastDds::start(test, domain)?;
+    let file = scenario.argument("fake_cnc.yaml");
+    let node = Process::node(domain, "fake_cnc", &["--params-file", &file]);
+    Some((scenario, node, peer))
+}
+
+#[test]
+fn fast_dds_hears_states_and_its_compensations_move_the_machine() {
+    let test = "fast_dds hears states";
+    let Some((_scenario, node, mut peer)) = machine(test, 10) else {
+        return;
+    };
+    peer.read(&topics::AXES_STATE);
+    peer.speak(&topics::COMPENSATION);
+    let at_rest = peer.sample(&topics::AXES_STATE, |_| true);
+    assert!(
+        (at_rest.motor[0] - at_rest.commanded[0]).abs() < SEEN_M,
+        "{at_rest:?}"
+    );
+    let mut moved = false;
+    for _ in 0..100 {
+        let asked = compensation(&now(), ASKED_M);
+        peer.write(&topics::COMPENSATION, &asked);
+        let state = peer.sample(&topics::AXES_STATE, |_| true);
+        moved |= state.motor[0] - state.commanded[0] > SEEN_M;
+        if moved {
+            break;
+        }
+    }
+    assert!(moved, "the motor has not followed");
+    node.stop();
+}
+
+#[test]
+fn fast_dds_calls_services_and_an_action_in_its_own_mapping() {
+    let test = "fast_dds calls services and an action";
+    let Some((_scenario, node, mut peer)) = machine(test, 11) else {
+        return;
+    };
+    peer.client::<GetParameters>(GET);
+    peer.client::<GetState>(STATE);
+    peer.client::<SendGoal<RunProgram>>(SEND);
+    peer.client::<GetResult<RunProgram>>(RESULT);
+    let names = |name: &str| GetParametersRequest {
+        names: vec![name.to_owned()],
+    };
+    // Two questions at once: each answer finds its own.
+    peer.ask::<GetParameters>(GET, 1, &names("background_rate_hz"));
+    peer.ask::<GetParameters>(GET, 2, &names("nobody"));
+    let nobody = peer.reply::<GetParameters>(GET, 2);
+    let rate = peer.reply::<GetParameters>(GET, 1);
+    assert_eq!(nobody.values[0].r#type, 0, "{nobody:?}");
+    assert!(
+        (rate.values[0].double_value - 10.0).abs() < 1e-12,
+        "{rate:?}"
+    );
+    let state = peer.asked::<GetState>(STATE, 3, &GetStateRequest::default());
+    assert_eq!(state.current_state.label, "active");
+    let goal_id = UUID { uuid: [7; 16] };
+    let goal = SendGoalRequest {
+        goal_id: goal_id.clone(),
+        goal: RunProgramGoal {
+            program: "G21 G90\nG1 X2 F600\nM2\n".to_owned(),
+            name: "peer".to_owned(),
+        },
+    };
+    let accepted = peer.asked::<SendGoal<RunProgram>>(SEND, 4, &goal);
+    assert!(accepted.accepted, "{accepted:?}");
+    let asked = GetResultRequest {
+        goal_id,
+        ..Default::default()
+    };
+    let result = peer.asked::<GetResult<RunProgram>>(RESULT, 5, &asked);
+    assert_eq!(result.status, GoalStatus::STATUS_SUCCEEDED, "{result:?}");
+    assert_eq!(result.result.outcome, 0, "{result:?}");
+    node.stop();
+}

@@ -1,0 +1,220 @@
+//! Fast DDS as the other side: `tests/peers/fast_dds.cpp` on Debian's libfastrtps, driven line by line.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use abbe_msgs::topics::Topic;
+use abbe_msgs::{Durability, Message, Reliability, Service, from_cdr, to_cdr};
+use node_runtime::names;
+use tempfile::TempDir;
+
+use crate::program::root;
+
+/// How long anything that is waited for may take.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// A running peer.
+pub struct FastDds {
+    child: Child,
+    commands: ChildStdin,
+    lines: Receiver<String>,
+    kept: Vec<String>,
+    _built: TempDir,
+}
+
+/// Compiles the peer. Where that cannot be done the test's name and the reason are printed.
+///
+/// # Panics
+/// When it cannot and `CI=true`.
+fn built(test: &str) -> Option<(TempDir, PathBuf)> {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("fast_dds");
+    let compiled = Command::new("g++")
+        .args(["-std=c++17", "-O1", "-o"])
+        .arg(&program)
+        .arg(root().join("tests/peers/fast_dds.cpp"))
+        .args(["-lfastrtps", "-lfastcdr"])
+        .output();
+    let lack = match compiled {
+        Ok(output) if output.status.success() => return Some((folder, program)),
+        Ok(output) => String::from_utf8_lossy(&output.stderr).into_owned(),
+        Err(error) => error.to_string(),
+    };
+    let first = lack.lines().next().unwrap_or_default().to_owned();
+    let reason = format!("g++ with libfastrtps-dev: {first} (tests/run installs them)");
+    assert!(std::env::var("CI").as_deref() != Ok("true"), "{reason}");
+    eprintln!("NOT TESTED: {test}: {reason}");
+    None
+}
+
+fn quality<M: Message>(topic: &Topic<M>) -> String {
+    let reliable = match topic.qos.reliability {
+        Reliability::Reliable => "reliable",
+        Reliability::BestEffort => "best_effort",
+    };
+    let latched = match topic.qos.durability {
+        Durability::TransientLocal => "latched",
+        Durability::Volatile => "volatile",
+    };
+    format!("{reliable} {latched}")
+}
+
+fn dds_topic<M: Message>(topic: &Topic<M>) -> String {
+    names::dds_topic(&format!("/{}", topic.name.trim_start_matches('/')))
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn bytes_of(text: &str) -> Vec<u8> {
+    let digits = text.as_bytes().chunks(2);
+    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
+    digits.map(byte).collect()
+}
+
+impl FastDds {
+    /// Starts it in a domain of this computer's loopback; `None`: it cannot be compiled here.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn start(test: &str, domain: u16) -> Option<Self> {
+        let (built, program) = built(test)?;
+        let mut child = Command::new(program)
+            .arg(domain.to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (sender, lines) = channel();
+        let output = BufReader::new(child.stdout.take().unwrap());
+        std::thread::spawn(move || {
+            for line in output.lines() {
+                if line.is_err() || sender.send(line.unwrap()).is_err() {
+                    return;
+                }
+            }
+        });
+        Some(Self {
+            commands: child.stdin.take().unwrap(),
+            child,
+            lines,
+            kept: vec![],
+            _built: built,
+        })
+    }
+
+    fn say(&mut self, line: &str) {
+        writeln!(self.commands, "{line}").unwrap();
+        self.commands.flush().unwrap();
+    }
+
+    /// Listens to a topic of ours.
+    pub fn read<M: Message>(&mut self, topic: &Topic<M>) {
+        let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
+        self.say(&format!("reader {name} {dds_type} {}", quality(topic)));
+        self.wait(&format!("matched {name}"), |_| true);
+    }
+
+    /// Makes a writer of a topic of ours.
+    pub fn speak<M: Message>(&mut self, topic: &Topic<M>) {
+        let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
+        self.say(&format!("writer {name} {dds_type} {}", quality(topic)));
+        self.wait(&format!("matched {name}"), |_| true);
+    }
+
+    /// Writes a message.
+    pub fn write<M: Message>(&mut self, topic: &Topic<M>, message: &M) {
+        let bytes = hexadecimal(&to_cdr(message));
+        self.say(&format!("write {} {bytes}", dds_topic(topic)));
+    }
+
+    /// The next sample of a topic that `pick` takes.
+    ///
+    /// # Panics
+    /// When there was none in time, or one cannot be decoded.
+    pub fn sample<M: Message>(&mut self, topic: &Topic<M>, pick: impl Fn(&M) -> bool) -> M {
+        let start = format!("sample {} ", dds_topic(topic));
+        let read = |line: &str| -> M { from_cdr(&bytes_of(&line[start.len()..])).unwrap() };
+        let line = self.wait(&start, |line| pick(&read(line)));
+        read(&line)
+    }
+
+    /// Makes a client of a service, by its absolute name.
+    pub fn client<V: Service>(&mut self, service: &str) {
+        let (requests, replies) = (
+            names::dds_request_topic(service),
+            names::dds_reply_topic(service),
+        );
+        let request = names::dds_type(&format!("{}_Request", V::TYPE_NAME));
+        let reply = names::dds_type(&format!("{}_Response", V::TYPE_NAME));
+        self.say(&format!("client {requests} {request} {replies} {reply}"));
+        self.wait(&format!("matched {requests}"), |_| true);
+        self.wait(&format!("matched {replies}"), |_| true);
+    }
+
+    /// Sends a request.
+    pub fn ask<V: Service>(&mut self, service: &str, number: i64, request: &V::Request) {
+        let requests = names::dds_request_topic(service);
+        let bytes = hexadecimal(&to_cdr(request));
+        self.say(&format!("ask {requests} {number} {bytes}"));
+    }
+
+    /// The answer to a request.
+    ///
+    /// # Panics
+    /// When there was none in time, or it cannot be decoded.
+    pub fn reply<V: Service>(&mut self, service: &str, number: i64) -> V::Response {
+        let requests = names::dds_request_topic(service);
+        let start = format!("reply {requests} {number} ");
+        let line = self.wait(&start, |_| true);
+        from_cdr(&bytes_of(&line[start.len()..])).unwrap()
+    }
+
+    /// Asks and waits for the answer.
+    ///
+    /// # Panics
+    /// As [`Self::reply`].
+    pub fn asked<V: Service>(
+        &mut self,
+        service: &str,
+        number: i64,
+        request: &V::Request,
+    ) -> V::Response {
+        self.ask::<V>(service, number, request);
+        self.reply::<V>(service, number)
+    }
+
+    fn wait(&mut self, start: &str, pick: impl Fn(&str) -> bool) -> String {
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            let found = self
+                .kept
+                .iter()
+                .position(|line| line.starts_with(start) && pick(line));
+            if let Some(place) = found {
+                return self.kept.remove(place);
+            }
+            // What is not picked now is of no use later.
+            self.kept
+                .retain(|line| !line.starts_with(start) || !line.starts_with("sample"));
+            let left = deadline.saturating_duration_since(Instant::now());
+            match self.lines.recv_timeout(left) {
+                Ok(line) => self.kept.push(line),
+                Err(RecvTimeoutError::Timeout) => panic!("{start}: not within {PATIENCE:?}"),
+                Err(RecvTimeoutError::Disconnected) => panic!("{start}: Fast DDS has ended"),
+            }
+        }
+    }
+}
+
+impl Drop for FastDds {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
