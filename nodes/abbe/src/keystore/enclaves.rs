@@ -28,6 +28,9 @@ const LISTENERS: [&str; 3] = ["/abbe_run_tap", "/abbe_record", "/viewer"];
 const OPERATOR: &str = "/operator";
 /// Begins its bag when it is built.
 const RECORDER: &str = "recorder";
+/// Starts its controller when it is built, unless it is told to wait.
+const STARTER: &str = "linuxcnc_bridge";
+const WAIT: [&str; 2] = ["-p", "autostart:=false"];
 
 /// Enclaves of every node of some scenarios, of those who listen to them, and of an operator.
 ///
@@ -60,7 +63,9 @@ pub fn of_scenarios(folders: &[PathBuf]) -> Result<Vec<Enclave>> {
 }
 
 fn of_node(launched: &LaunchNode) -> Result<(String, Access)> {
-    let arguments = Arguments::parse(launched.ros_args())?;
+    let wait = (launched.exec == STARTER).then_some(WAIT).into_iter();
+    let wait = wait.flatten().map(ToOwned::to_owned);
+    let arguments = Arguments::parse(launched.ros_args().into_iter().chain(wait))?;
     let names = NodeNames::new(&launched.exec, &arguments.remaps)?;
     let Some(build) = node::builder(&launched.exec) else {
         bail!(
