@@ -45,8 +45,9 @@ impl Access {
     pub fn to_operate() -> Self {
         let mut access = Self::to_listen();
         access.publish.insert("rq/*".to_owned());
-        access.publish.insert(names::dds_topic("/rosout"));
-        access.publish.insert(names::dds_topic("/parameter_events"));
+        for topic in [topics::ROSOUT.name, topics::PARAMETER_EVENTS.name] {
+            access.writes(topic);
+        }
         access
     }
 

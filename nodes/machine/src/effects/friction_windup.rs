@@ -41,7 +41,7 @@ pub static KIND: Kind = Kind {
     parameters: &[
         Parameter::amplitude("windup_um_per_m", 100.0, 5.0),
         Parameter::shape("presliding_mm", [0.001, 10.0], 0.05, &[0.01, 0.1, 1.0]),
-        Parameter::shape("bearing_half_travels", [-1.6, 1.6], -1.0, &[-1.2, 1.2]),
+        Parameter::shape("bearing_half_travels", [-1.6, 1.6], 1.0, &[-1.2, 1.2]),
     ],
     free: &[],
     moment: Moment::Mean,
