@@ -7,7 +7,7 @@
 //! FOLDER/enclaves/probe/…             key, certificate and signed permissions of the node /probe
 //! ```
 //!
-//! A node may write and read what its ports are and nothing else ([`Access`]); `/operator` may listen to everything and
+//! A node may write and read what its ports are and nothing else ([`node_runtime::access::Access`]); `/operator` may listen to everything and
 //! call every service, `/viewer` only listen. The authority of a keystore that `ros2 security create_keystore` made is used
 //! as it is, its governance replaced by ours (why: `keystore/documents.rs`).
 
