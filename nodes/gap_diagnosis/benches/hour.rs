@@ -233,12 +233,17 @@ fn searches(posed: &Posed) {
     let Some(peer) = by_numpy(posed) else { return };
     let other: Vec<usize> = serde_json::from_value(peer["set"].clone()).unwrap();
     let other_score = peer["score"].as_f64().unwrap();
-    assert_eq!(set, other, "{score} here, {other_score} with numpy");
+    // Forms that look alike to the last digits may stand for each other.
+    let is_tie = (score - other_score).abs() < 1e-9 * score.abs();
+    assert!(
+        set == other || is_tie,
+        "{set:?} {score} here, {other:?} {other_score} with numpy"
+    );
     assert!((score - other_score).abs() < 1e-6 * posed.problem.square);
     let seconds: Vec<f64> = serde_json::from_value(peer["seconds"].clone()).unwrap();
     let peer_s = seconds.iter().sum::<f64>() / seconds.len() as f64;
     println!(
-        "numpy: the same set in {:.1} ms, ratio {:.1}",
+        "numpy: a set as good in {:.1} ms, ratio {:.1}",
         peer_s * 1e3,
         peer_s / own_s
     );
