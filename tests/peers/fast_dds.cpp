@@ -156,12 +156,7 @@ class Peer {
   Hearing* read(const std::string& name, const std::string& type, bool reliable, bool latched,
                 const std::string& requests) {
     DataReaderQos qos = DATAREADER_QOS_DEFAULT;
-    qos.reliability().kind = reliable ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
-    qos.durability().kind = latched ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
-    qos.history().kind = KEEP_LAST_HISTORY_QOS;
-    qos.history().depth = 1000;
-    qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
-    qos.data_sharing().off();
+    set(qos, reliable, latched, 1000);
     auto* hearing = new Hearing(name, requests);
     auto* reader = subscriber_->create_datareader(topic(name, type), qos, hearing);
     if (reader == nullptr) throw std::runtime_error("no reader of " + name);
@@ -171,12 +166,7 @@ class Peer {
 
   void write_to(const std::string& name, const std::string& type, bool reliable, bool latched) {
     DataWriterQos qos = DATAWRITER_QOS_DEFAULT;
-    qos.reliability().kind = reliable ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
-    qos.durability().kind = latched ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
-    qos.history().kind = KEEP_LAST_HISTORY_QOS;
-    qos.history().depth = 100;
-    qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
-    qos.data_sharing().off();
+    set(qos, reliable, latched, 100);
     auto* writer = publisher_->create_datawriter(topic(name, type), qos, new Speaking(name));
     if (writer == nullptr) throw std::runtime_error("no writer of " + name);
     writers_[name] = writer;
@@ -205,6 +195,16 @@ class Peer {
   }
 
  private:
+  template <class Qos>
+  static void set(Qos& qos, bool reliable, bool latched, int depth) {
+    qos.reliability().kind = reliable ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
+    qos.durability().kind = latched ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
+    qos.history().kind = KEEP_LAST_HISTORY_QOS;
+    qos.history().depth = depth;
+    qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
+    qos.data_sharing().off();
+  }
+
   Topic* topic(const std::string& name, const std::string& type) {
     auto*& known = topics_[name];
     if (known == nullptr) {

@@ -84,7 +84,7 @@ fn a_secured_cell_does_its_plan_while_a_stranger_hears_nothing_and_injects_nothi
     let (heard, _) = heard(&mut stranger, Duration::from_secs(30));
     let ended = run.ended_within(Duration::from_secs(240));
     assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
-    assert!(ended.said.contains("0 lost"), "{}", ended.said);
+    assert!(ended.said.contains(", 0 lost)"), "{}", ended.said);
     let bag = scenario.new_run(&[]).join("bag");
     let (greatest_m, n) = compensations(&bag);
     eprintln!(
