@@ -29,6 +29,8 @@ pub struct GapConfig {
     pub seed: u64,
     /// Scatter over that of the repeats, as a ratio of variances, above which the floor is not reproduced.
     pub most_inflation: f64,
+    /// The same of both directions of a grid encoder, as a geometric mean.
+    pub most_inflation_of_two: f64,
     /// Error of form that every simulator has, below which nothing is named, µm.
     pub form_error_um: f64,
     /// What is added to it where effects were found, as a share of their signatures.
@@ -57,6 +59,7 @@ impl Default for GapConfig {
             bootstrap_draws: 2000,
             seed: 20_260_101,
             most_inflation: 1.2,
+            most_inflation_of_two: 1.08,
             form_error_um: 0.2,
             form_error_share: 0.05,
             constancy_z: 4.0,
@@ -101,6 +104,7 @@ impl GapConfig {
         }
         let reals = [
             ("most_inflation", self.most_inflation, 1.0),
+            ("most_inflation_of_two", self.most_inflation_of_two, 1.0),
             ("form_error_um", self.form_error_um, 0.0),
             ("form_error_share", self.form_error_share, 0.0),
             ("constancy_z", self.constancy_z, 0.0),

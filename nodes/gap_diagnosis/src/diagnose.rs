@@ -396,9 +396,7 @@ fn noise_floor(
         ar: noise.within.coefficients[noise.within.order()].clone(),
         between_runs_um: 1e3 * noise.between.total_mm(),
         repeats: noise.repeats,
-        reproduced: inflation
-            .get(channel)
-            .is_none_or(|ratio| *ratio <= config.most_inflation),
+        reproduced: guard::reproduces(channel, inflation, config),
     };
     noise.iter().map(of).collect()
 }

@@ -16,7 +16,7 @@
 //!   z^2 -> z^2 exp(-sqrt(5.4 / (n - k) + 2 / nu))                                        (3)
 //! ```
 //!
-//! with rho the autocorrelation at lag one where it is above a quarter, s_w the noise of the row at its run's pace and
+//! with rho the autocorrelation at lag one, less its standard error, where it is above a quarter, s_w the noise of the row at its run's pace and
 //! s_f a quarter of the simulator's own error of form, which may stay beside such a model. That is smooth: colour tells
 //! of noise only where there is more than it, so that a machine whose repeats are exact is not blamed for it. What repeats leave alike at the same stations is structure, not noise: where
 //! their mean product says so, it is taken from (1). Least squares spread a few rows that stand far off over all others:
@@ -154,13 +154,28 @@ pub fn judge(
         .is_none_or(|middle| *middle <= config.most_inflation);
     let worse = inflation
         .iter()
-        .filter(|(_, ratio)| **ratio > config.most_inflation);
+        .filter(|(channel, _)| !reproduces(channel, inflation, config));
     notes.extend(worse.map(|(channel, ratio)| Note::NotReproduced {
         channel: channel.to_string(),
         inflation: *ratio,
         withdraws: !is_reproduced,
     }));
     is_reproduced
+}
+
+/// Whether a channel's noise is that of the repeats. Two directions of one grid encoder have the same noise, and two that
+/// say the same are surer than one: of both together, the geometric mean counts.
+pub fn reproduces(
+    channel: &Channel,
+    inflation: &BTreeMap<Channel, f64>,
+    config: &GapConfig,
+) -> bool {
+    let of = |channel: &Channel| inflation.get(channel).copied();
+    let own = of(channel).is_none_or(|ratio| ratio <= config.most_inflation);
+    let is_grid = matches!(channel, Channel::GridU | Channel::GridV);
+    let both = of(&Channel::GridU).zip(of(&Channel::GridV));
+    let joint = both.filter(|_| is_grid).map(|(u, v)| (u * v).sqrt());
+    own && joint.is_none_or(|ratio| ratio <= config.most_inflation_of_two)
 }
 
 /// f of (1).
@@ -249,14 +264,23 @@ fn clipped(value: f64, s2: f64) -> f64 {
 
 /// What correlation of neighbours adds to the variance of their means.
 fn of_neighbours(stack: &Stack<'_>, rest: &[f64], channel: &Channel, s2: f64) -> f64 {
-    let (mut product, mut pairs) = (0.0, 0.0);
-    for block in stack.rows.blocks.iter().filter(|b| b.channel == *channel) {
-        for pair in rest[block.range()].windows(2) {
-            product += clipped(pair[0], s2) * clipped(pair[1], s2);
-            pairs += 1.0;
-        }
+    let blocks = stack.rows.blocks.iter().filter(|b| b.channel == *channel);
+    colour(
+        blocks.flat_map(|block| rest[block.range()].windows(2)),
+        |value| clipped(value, s2),
+    )
+}
+
+/// c of (2), of pairs of neighbours.
+fn colour<'p>(pairs: impl Iterator<Item = &'p [f64]>, clipped: impl Fn(f64) -> f64) -> f64 {
+    let (mut product, mut square, mut n) = (0.0, 0.0, 0.0);
+    for pair in pairs {
+        let (one, other) = (clipped(pair[0]), clipped(pair[1]));
+        product += one * other;
+        square += f64::midpoint(one * one, other * other);
+        n += 1.0;
     }
-    let rho = product / f64::max(pairs, 1.0) / s2.max(f64::MIN_POSITIVE);
+    let rho = product / f64::max(square, f64::MIN_POSITIVE) - 1.0 / f64::max(n, 1.0).sqrt();
     if rho > 0.25 {
         (1.0 + rho) / (1.0 - rho).max(0.05)
     } else {
@@ -308,6 +332,10 @@ fn same_stations(one: &Block, other: &Block) -> Vec<(usize, usize)> {
 
 #[cfg(test)]
 mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64Mcg;
+
     use super::*;
 
     #[test]
@@ -332,5 +360,37 @@ mod tests {
             "{words}"
         );
         assert_eq!(judged([1.0; 3]), (true, String::new()));
+    }
+
+    #[test]
+    fn two_directions_of_one_grid_say_together_what_neither_says_alone() {
+        let config = GapConfig::default();
+        let says = |u: f64, v: f64, touch: f64| {
+            let channels = [Channel::GridU, Channel::GridV, Channel::Touch];
+            let inflation = channels.iter().cloned().zip([u, v, touch]).collect();
+            channels.map(|channel| reproduces(&channel, &inflation, &config))
+        };
+        assert_eq!(says(1.1, 1.12, 1.12), [false, false, true]);
+        assert_eq!(says(1.0, 1.12, 1.0), [true; 3]);
+        assert_eq!(says(1.0, 1.0, 1.3), [true, true, false]);
+        let alone = BTreeMap::from([(Channel::GridU, 1.15)]);
+        assert!(reproduces(&Channel::GridU, &alone, &config));
+    }
+
+    #[test]
+    fn fifty_readings_of_white_noise_have_no_colour_and_those_of_a_walk_have() {
+        let mut random = Pcg64Mcg::seed_from_u64(7);
+        let mut coloured = [0, 0];
+        for _ in 0..1000 {
+            let white: [f64; 50] = std::array::from_fn(|_| random.sample(StandardNormal));
+            let mut walk = white;
+            for i in 1..50 {
+                walk[i] += 0.9 * walk[i - 1];
+            }
+            for (rows, count) in [&white, &walk].into_iter().zip(&mut coloured) {
+                *count += usize::from(colour(rows.windows(2), |value| value) > 1.0);
+            }
+        }
+        assert!(coloured[0] < 10 && coloured[1] > 950, "{coloured:?}");
     }
 }

@@ -73,10 +73,7 @@ impl<'a> Base<'a> {
         let told = told(&first.stack, first.found.members.iter(), &first.found);
         let rest = less(&first.stack.raw, &told);
         let inflation = guard::inflation(&first.stack, &first.slots, self.noise, rest, &base);
-        let worse = |channel: &Channel| {
-            let ratio = inflation.get(channel).copied().unwrap_or(1.0);
-            ratio > config.most_inflation
-        };
+        let worse = |channel: &Channel| !guard::reproduces(channel, &inflation, config);
         if first.found.members.is_empty() && !inflation.keys().any(worse) {
             return Searched { inflation, ..first };
         }
