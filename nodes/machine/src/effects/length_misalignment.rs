@@ -2,7 +2,8 @@
 //!
 //! # Model
 //!
-//! With L the displacement from the run's first position and theta the angle between beam and motion:
+//! A length reference is put up anew for every axis. With L the displacement along the axis it was put up for, from the
+//! run's first position, and theta the angle between beam and motion:
 //!
 //! ```text
 //!   d = L (cos theta - 1) = -(theta2 / 2) L                               (1)
@@ -18,8 +19,9 @@
 //!
 //! # Holds when
 //! The beam still meets the receiver at the end of the travel: at 3 mrad (4.5 µm/m) it is off by twice 3 mm in a metre,
-//! and nobody measures with more. The interferometer measures along its own beam. Its sign and its change with each set-up are what tells it
-//! from `length_wavelength` and from a scale error of the axis.
+//! and nobody measures with more. The interferometer measures along its own beam. That it is one axis' alone tells it from
+//! `length_wavelength`, and that other instruments do not see it from a scale error of the axis. A set-up along a diagonal
+//! is another one, and not modelled.
 //!
 //! # Agreement
 //! `val_length_misalignment_projected`: 0.5, 1 and 3 mrad over 500 mm by the cosine itself, to 2e-9 mm.
@@ -27,21 +29,25 @@
 //! # References
 //! \[1\] ISO 230-1:2012, 8 (linear positioning measurement: cosine error; from memory).
 
+use metrology::Axis;
+use metrology::sample::TestKind;
+
 use super::length_wavelength::way_mm;
 use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
-use crate::twin::Response;
+use crate::twin::{Channel, Response};
 
 /// Entry of the catalogue.
 pub static KIND: Kind = Kind {
     id: "length_misalignment",
     title: "misalignment of the length reference",
-    targets: Targets::Machine,
+    targets: Targets::LinearAxes,
     parameters: &[Parameter::size("cosine_um_per_m", 5.0, 0.5)],
     free: &[Parameter::amplitude("free_curve_um_per_m2", 100.0, 2.0)],
     moment: Moment::Mean,
-    needs: "readings of the length reference at two places, with two set-ups",
-    build: |_, values| {
+    needs: "readings of the length reference at two places of the axis, and another instrument's or another axis'",
+    build: |target, values| {
         Box::new(LengthMisalignment {
+            axis: target.axis(),
             cosine_per_mm: values[0] * 1e-6,
             curve_per_mm2: values[1] * 1e-9,
         })
@@ -49,12 +55,23 @@ pub static KIND: Kind = Kind {
 };
 
 struct LengthMisalignment {
+    axis: Axis,
     cosine_per_mm: f64,
     curve_per_mm2: f64,
 }
 
 impl Effect for LengthMisalignment {
     fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        let own = Channel::Length(self.axis);
+        let is_along = scene.run.segment.kind != TestKind::Diagonal
+            && scene
+                .run
+                .readings
+                .iter()
+                .any(|reading| reading.channel == own);
+        if !is_along {
+            return;
+        }
         let ways = way_mm(scene.run);
         for (sum, way_mm) in response.length_reading_mm.iter_mut().zip(ways) {
             *sum += way_mm * (self.curve_per_mm2 * way_mm - self.cosine_per_mm); // (1), (2)

@@ -19,17 +19,12 @@ use trials::Class;
 
 /// Size that is added, as D on the rows of the recording; less where the greatest physical size is less.
 const WANTED_D: f64 = 40.0;
-/// Effects that these recordings cannot tell, and why.
-const OPEN: [(&str, &str); 2] = [
-    (
-        "length_misalignment",
-        "a wrong wavelength is its double, and at its greatest size it has D 14",
-    ),
-    (
-        "workpiece_expansion",
-        "at its greatest size D 16 in eight spells of work with block cycles, and none here",
-    ),
-];
+/// The effect that these recordings cannot tell, and why.
+const OPEN: [(&str, &str); 1] = [(
+    "workpiece_expansion",
+    "D 16 at its greatest size, in eight spells of work with block cycles; what the temperature of the part changes from \
+     repeat to repeat counts as noise",
+)];
 /// D below which an effect need not be named.
 const LEAST_D: f64 = 20.0;
 
@@ -223,6 +218,6 @@ fn every_effect_that_a_recording_shows_is_named_alone() {
             lost.push(kind.id);
         }
     }
-    assert!(all.len() >= 24, "{}", all.len());
+    assert!(all.len() >= 25, "{}", all.len());
     assert_eq!(lost, Vec::<&str>::new());
 }

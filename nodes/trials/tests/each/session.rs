@@ -6,14 +6,14 @@ use std::f64::consts::TAU;
 use fake_cnc::PlantFile;
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
-use machine::file::{SensorEntry, SensorPlace};
+use machine::file::{AxisEntry, SensorEntry, SensorPlace};
 use machine::twin::{Channel, Run, Session};
-use metrology::PerAxis;
+use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
-use sequencer::Plan;
+use sequencer::{Plan, Step};
 use trials::{Arm, Rig, Sample, Trial, measure};
 
 const ROTARY: &str = "title: two spheres
@@ -39,16 +39,51 @@ const SWING_K: f64 = 1.5;
 const PERIOD_S: f64 = 720.0;
 
 /// Circles, positioning and touches of three axes; the same in a warm shop with two thermometers in the air that its air
-/// conditioning swings; two spheres on rotary axes.
+/// conditioning swings; two spheres on rotary axes; an axis of 1.9 m.
 pub fn recordings() -> Vec<Recording> {
     let mut rig = Trial::draw(Arm::Null, 5, 0).unwrap().rig;
     rig.has_motors = true;
     let (warm, rotary) = (warm_shop(&rig), five_axis(&rig));
+    let long = long_axis(&rig);
     vec![
         recording("circles", &rig, input),
         recording("warm shop", &warm, conditioned),
         recording("spheres", &rotary, input),
+        recording("long axis", &long, input),
     ]
+}
+
+/// Ends of the long axis, mm, and how often it is measured.
+const LONG_MM: f64 = 950.0;
+const LONG_RUNS: usize = 4;
+
+/// The programme on a machine whose X is as long as a portal's.
+fn long_axis(like: &Rig) -> Rig {
+    let mut rig = like.clone();
+    for file in [&mut rig.machine, &mut rig.control] {
+        let Some(AxisEntry::Linear(x)) = file.axes.get_mut(&Axis::X) else {
+            unreachable!("X is linear")
+        };
+        x.travel_mm = [-LONG_MM, LONG_MM];
+        let beam = &mut file.length_reference.as_mut().unwrap().beams[0];
+        (beam.from_mm[0], beam.to_mm[0]) = (20.0 - LONG_MM, LONG_MM - 20.0);
+    }
+    let screw = rig.plant.heat.screws.get_mut(&Axis::X).unwrap();
+    screw.ends_mm = [-LONG_MM - 100.0, LONG_MM + 100.0];
+    let mut steps = vec![];
+    for mut step in rig.plan.steps.drain(..) {
+        let mut times = 1;
+        if let Step::Positioning(of) = &mut step
+            && of.axis == Axis::X
+        {
+            let last = LONG_MM - 40.0;
+            (of.from_mm, of.to_mm, of.spacing_mm) = (Some(-last), Some(last), Some(0.2 * last));
+            times = LONG_RUNS;
+        }
+        steps.extend(std::iter::repeat_n(step, times));
+    }
+    rig.plan.steps = steps;
+    rig
 }
 
 fn warm_shop(like: &Rig) -> Rig {
