@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use fake_cnc::PlantFile;
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
-use machine::file::{AxisEntry, SensorEntry, SensorPlace};
+use machine::file::{ArtefactEntry, AxisEntry, SensorEntry, SensorPlace};
 use machine::twin::{Channel, Run, Session};
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
@@ -35,11 +35,12 @@ pub struct Recording {
 }
 
 /// The air conditioning of a warm shop: its swing, K, and its period, s.
-const SWING_K: f64 = 1.5;
-const PERIOD_S: f64 = 720.0;
+const CONDITIONING: [f64; 2] = [1.5, 720.0];
+/// The same beside a gate that was opened.
+const GATE: [f64; 2] = [5.0, 9000.0];
 
 /// Circles, positioning and touches of three axes; the same in a warm shop with two thermometers in the air that its air
-/// conditioning swings; two spheres on rotary axes; an axis of 1.9 m.
+/// conditioning swings; two spheres on rotary axes; an axis of 1.9 m; a ring gauge in a shop whose gate was opened.
 pub fn recordings() -> Vec<Recording> {
     let mut rig = Trial::draw(Arm::Null, 5, 0).unwrap().rig;
     rig.has_motors = true;
@@ -50,7 +51,34 @@ pub fn recordings() -> Vec<Recording> {
         recording("warm shop", &warm, conditioned),
         recording("spheres", &rotary, input),
         recording("long axis", &long, input),
+        recording("ring gauge", &ring_gauge(&warm), beside_a_gate),
     ]
+}
+
+/// How often the ring is touched, how long is waited before each, s, and its radius, mm.
+///
+/// Of so many repeats what changes slowly is told from noise.
+const RINGS: usize = 15;
+const BETWEEN_RINGS_S: f64 = 150.0;
+const RING_MM: f64 = 120.0;
+
+/// The programme of a shop, and a ring gauge that is touched again and again.
+fn ring_gauge(like: &Rig) -> Rig {
+    let mut rig = like.clone();
+    let id = "ring".to_owned();
+    for file in [&mut rig.machine, &mut rig.control] {
+        file.artefacts.push(ArtefactEntry::Bore {
+            id: id.clone(),
+            centre_mm: [0.0, 0.0, -30.0],
+            radius_mm: RING_MM,
+        });
+    }
+    for _ in 0..RINGS {
+        let (id, seconds) = (id.clone(), BETWEEN_RINGS_S);
+        rig.plan.steps.push(Step::Wait { seconds });
+        rig.plan.steps.push(Step::Artefact { id, points: 24 });
+    }
+    rig
 }
 
 /// Ends of the long axis, mm, and how often it is measured.
@@ -134,14 +162,22 @@ fn recording(title: &'static str, rig: &Rig, heard: fn(Sample) -> Input) -> Reco
     }
 }
 
-/// As it is in air that goes up and down.
 fn conditioned(sample: Sample) -> Input {
+    in_air(sample, CONDITIONING)
+}
+
+fn beside_a_gate(sample: Sample) -> Input {
+    in_air(sample, GATE)
+}
+
+/// As it is in air that goes up and down.
+fn in_air(sample: Sample, [swing_k, period_s]: [f64; 2]) -> Input {
     let mut heard = input(sample);
     if let Input::Temperature(sample) = &mut heard
         && sample.sensor.starts_with("ambient")
     {
-        let turns = sample.at.as_secs_f64() / PERIOD_S;
-        sample.temperature_degc += SWING_K * (TAU * turns).sin();
+        let turns = sample.at.as_secs_f64() / period_s;
+        sample.temperature_degc += swing_k * (TAU * turns).sin();
     }
     heard
 }
