@@ -24,7 +24,9 @@ pub struct InstallRos {
 }
 
 const PROGRAM: &str = "abbe";
-const PACKAGE: &str = include_str!("install_ros/package.xml");
+const PACKAGE: &str = include_str!("../package.xml");
+/// Starts the node that it is named after.
+const NODE: &[u8] = include_bytes!("install_ros/node");
 const SETUP: &str = include_str!("install_ros/local_setup.sh");
 /// What `ros2` takes for a program.
 const EXECUTABLE: u32 = 0o755;
@@ -89,14 +91,12 @@ fn package(prefix: &Path, program: &[u8]) -> Result<()> {
     let programs = prefix.join("lib").join(PROGRAM);
     put(&programs.join(PROGRAM), program, EXECUTABLE)?;
     for (name, _) in node::NODES {
-        let start = format!("#!/bin/sh\nexec \"${{0%/*}}/{PROGRAM}\" node {name} \"$@\"\n");
-        put(&programs.join(name), start.as_bytes(), EXECUTABLE)?;
+        put(&programs.join(name), NODE, EXECUTABLE)?;
     }
     let index = prefix.join("share/ament_index/resource_index/packages");
     put(&index.join(PROGRAM), b"", READABLE)?;
-    let description = PACKAGE.replace("@VERSION@", env!("CARGO_PKG_VERSION"));
     let share = prefix.join("share").join(PROGRAM);
-    put(&share.join("package.xml"), description.as_bytes(), READABLE)
+    put(&share.join("package.xml"), PACKAGE.as_bytes(), READABLE)
 }
 
 /// Makes the prefix known to a shell, unless it is a workspace that has its own way.
@@ -173,6 +173,17 @@ mod tests {
         assert_eq!(version.unwrap().text(), Some(env!("CARGO_PKG_VERSION")));
         let marker = "share/ament_index/resource_index/packages/abbe";
         assert!(prefix.path().join(marker).is_file());
+    }
+
+    #[test]
+    fn colcon_installs_the_same_nodes() {
+        let manifest = include_str!("../Cargo.toml");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("ament");
+        for (name, _) in node::NODES {
+            assert!(manifest.contains(&format!("    \"ament/{name}\",\n")), "{name}");
+            assert_eq!(fs::read(folder.join(name)).unwrap(), NODE, "{name}");
+        }
+        assert_eq!(fs::read_dir(folder).unwrap().count(), node::NODES.len());
     }
 
     #[test]
