@@ -6,7 +6,9 @@
 //        client REQUESTS TYPE REPLIES TYPE
 //        write TOPIC BYTES
 //        ask REQUESTS NUMBER BYTES
-//   out: matched TOPIC | sample TOPIC BYTES | reply REQUESTS NUMBER BYTES
+//   out: matched TOPIC | refused TOPIC | sample TOPIC BYTES | reply REQUESTS NUMBER BYTES
+//
+// Arguments are the domain and, where it is secured, the folder of an enclave.
 
 #include <chrono>
 #include <iostream>
@@ -138,10 +140,31 @@ class Speaking : public DataWriterListener {
   std::string topic_;
 };
 
+// The files of an enclave as rmw_fastrtps_cpp gives them to Fast DDS.
+static void secure(DomainParticipantQos& qos, const std::string& enclave) {
+  auto& properties = qos.properties().properties();
+  const auto set = [&](const std::string& name, const std::string& value) {
+    properties.emplace_back(name, value);
+  };
+  const auto file = [&](const std::string& name) { return "file://" + enclave + "/" + name; };
+  const std::string identity = "dds.sec.auth.builtin.PKI-DH.";
+  set("dds.sec.auth.plugin", "builtin.PKI-DH");
+  set(identity + "identity_ca", file("identity_ca.cert.pem"));
+  set(identity + "identity_certificate", file("cert.pem"));
+  set(identity + "private_key", file("key.pem"));
+  const std::string access = "dds.sec.access.builtin.Access-Permissions.";
+  set("dds.sec.access.plugin", "builtin.Access-Permissions");
+  set(access + "permissions_ca", file("permissions_ca.cert.pem"));
+  set(access + "governance", file("governance.p7s"));
+  set(access + "permissions", file("permissions.p7s"));
+  set("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
+}
+
 class Peer {
  public:
-  explicit Peer(int domain) {
+  Peer(int domain, const std::string& enclave) {
     DomainParticipantQos qos;
+    if (!enclave.empty()) secure(qos, enclave);
     qos.name("fast_dds_peer");
     auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
     udp->interfaceWhiteList.push_back("127.0.0.1");
@@ -168,7 +191,7 @@ class Peer {
     DataWriterQos qos = DATAWRITER_QOS_DEFAULT;
     set(qos, reliable, latched, 100);
     auto* writer = publisher_->create_datawriter(topic(name, type), qos, new Speaking(name));
-    if (writer == nullptr) throw std::runtime_error("no writer of " + name);
+    if (writer == nullptr) return say("refused " + name);
     writers_[name] = writer;
   }
 
@@ -225,8 +248,8 @@ class Peer {
   std::map<std::string, std::pair<std::string, Hearing*>> clients_;
 };
 
-int main(int, char** arguments) {
-  Peer peer(std::stoi(arguments[1]));
+int main(int count, char** arguments) {
+  Peer peer(std::stoi(arguments[1]), count > 2 ? arguments[2] : "");
   std::string line;
   while (std::getline(std::cin, line)) {
     std::istringstream words(line);

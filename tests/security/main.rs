@@ -9,8 +9,10 @@
 use std::path::Path;
 use std::time::Duration;
 
+use abbe_msgs::lifecycle_msgs::srv::{GetState, GetStateRequest};
 use abbe_msgs::{from_cdr, topics};
 use abbe_tests::cyclone::{Cyclone, end};
+use abbe_tests::fast_dds::FastDds;
 use abbe_tests::graph::now;
 use abbe_tests::program::{Ended, Process, command, domain};
 use abbe_tests::python::interpreter;
@@ -120,6 +122,34 @@ fn the_same_stranger_hears_and_moves_a_machine_without_credentials() {
     );
     assert!(heard > 20, "{heard}");
     assert!(furthest_m > 0.5 * INJECTED_M, "{furthest_m}");
+    node.stop();
+}
+
+#[test]
+fn fast_dds_with_an_operators_credentials_hears_and_asks_and_may_not_compensate() {
+    let test = "Fast DDS with credentials";
+    let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(3));
+    let keys = scenario.folder().join("keys");
+    if !keystore(test, &keys, &scenario.folder()) {
+        return;
+    }
+    let operator = keys.join("enclaves/operator");
+    let Some(mut peer) = FastDds::start_in(test, domain, &operator) else {
+        return;
+    };
+    let file = scenario.argument("fake_cnc.yaml");
+    let arguments = ["node", "fake_cnc", "--ros-args", "--params-file", &file];
+    let mut node = command(domain, &arguments);
+    enforce(&mut node, &keys);
+    let node = Process::start(node);
+    peer.read(&topics::AXES_STATE);
+    let state = peer.sample(&topics::AXES_STATE, |_| true);
+    assert!(!state.commanded.is_empty(), "{state:?}");
+    let service = "/fake_cnc/get_state";
+    peer.client::<GetState>(service);
+    let state = peer.asked::<GetState>(service, 1, &GetStateRequest::default());
+    assert_eq!(state.current_state.label, "active");
+    peer.may_not_speak(&topics::COMPENSATION);
     node.stop();
 }
 

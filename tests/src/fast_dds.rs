@@ -1,7 +1,7 @@
 //! Fast DDS as the other side: `tests/peers/fast_dds.cpp` on Debian's libfastrtps, driven line by line.
 
 use std::io::{BufRead, BufReader, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
@@ -83,9 +83,23 @@ impl FastDds {
     /// When it cannot be started.
     #[must_use]
     pub fn start(test: &str, domain: u16) -> Option<Self> {
+        Self::start_with(test, domain, None)
+    }
+
+    /// The same with the credentials of an enclave's folder.
+    ///
+    /// # Panics
+    /// As [`Self::start`].
+    #[must_use]
+    pub fn start_in(test: &str, domain: u16, enclave: &Path) -> Option<Self> {
+        Self::start_with(test, domain, Some(enclave))
+    }
+
+    fn start_with(test: &str, domain: u16, enclave: Option<&Path>) -> Option<Self> {
         let (built, program) = built(test)?;
         let mut child = Command::new(program)
             .arg(domain.to_string())
+            .args(enclave)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -125,6 +139,16 @@ impl FastDds {
         let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
         self.say(&format!("writer {name} {dds_type} {}", quality(topic)));
         self.wait(&format!("matched {name}"), |_| true);
+    }
+
+    /// Tries to make a writer of a topic of ours that its permissions do not allow.
+    ///
+    /// # Panics
+    /// When it is not refused.
+    pub fn may_not_speak<M: Message>(&mut self, topic: &Topic<M>) {
+        let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
+        self.say(&format!("writer {name} {dds_type} {}", quality(topic)));
+        self.wait(&format!("refused {name}"), |_| true);
     }
 
     /// Writes a message.

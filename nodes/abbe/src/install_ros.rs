@@ -180,7 +180,10 @@ mod tests {
         let manifest = include_str!("../Cargo.toml");
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("ament");
         for (name, _) in node::NODES {
-            assert!(manifest.contains(&format!("    \"ament/{name}\",\n")), "{name}");
+            assert!(
+                manifest.contains(&format!("    \"ament/{name}\",\n")),
+                "{name}"
+            );
             assert_eq!(fs::read(folder.join(name)).unwrap(), NODE, "{name}");
         }
         assert_eq!(fs::read_dir(folder).unwrap().count(), node::NODES.len());

@@ -1,10 +1,13 @@
-//! Governance and permissions, as DDS Security 1.1, 9.4.1 has them.
+//! Governance and permissions, as DDS Security 1.1, 9.4.1 has them; its domains end at 230, and Cyclone DDS refuses others.
 
 use std::fmt::Write as _;
 
 use node_runtime::access::Access;
 
 use super::authority::Validity;
+
+/// Greatest domain that documents may name.
+const LAST_DOMAIN: u16 = 230;
 
 /// Who may take part, what is protected and how: every packet is encrypted and signed as a whole, with keys that only
 /// participants have whom the authority admits; who may write and read which topic stands in their permissions.
@@ -13,11 +16,12 @@ use super::authority::Validity;
 /// many endpoints ("Could not find a remote EndpointCryptoHandle"), and calls of services go unanswered. Without them, who
 /// is admitted and reads the wire could decipher what it may not subscribe to.
 pub fn governance() -> String {
-    r#"<?xml version="1.0" encoding="UTF-8"?>
+    format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
 <dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_governance.xsd">
   <domain_access_rules>
     <domain_rule>
-      <domains><id_range><min>0</min><max>232</max></id_range></domains>
+      <domains><id_range><min>0</min><max>{LAST_DOMAIN}</max></id_range></domains>
       <allow_unauthenticated_participants>false</allow_unauthenticated_participants>
       <enable_join_access_control>true</enable_join_access_control>
       <discovery_protection_kind>ENCRYPT</discovery_protection_kind>
@@ -38,7 +42,7 @@ pub fn governance() -> String {
   </domain_access_rules>
 </dds>
 "#
-    .to_owned()
+    )
 }
 
 /// What the holder of a certificate may do. Names are ROS's own, of which none needs an escape.
@@ -61,7 +65,7 @@ pub fn permissions(enclave: &str, access: &Access, validity: &Validity) -> Strin
       <subject_name>CN={enclave}</subject_name>
       <validity><not_before>{from}</not_before><not_after>{until}</not_after></validity>
       <allow_rule>
-        <domains><id_range><min>0</min><max>232</max></id_range></domains>
+        <domains><id_range><min>0</min><max>{LAST_DOMAIN}</max></id_range></domains>
 {publish}{subscribe}      </allow_rule>
       <default>DENY</default>
     </grant>
@@ -69,4 +73,21 @@ pub fn permissions(enclave: &str, access: &Access, validity: &Validity) -> Strin
 </dds>
 "#
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn documents_name_no_domain_beyond_those_of_the_standard() {
+        let document = governance();
+        let document = roxmltree::Document::parse(&document).unwrap();
+        let last = document
+            .descendants()
+            .find(|node| node.has_tag_name("max"))
+            .and_then(|node| node.text());
+        // Cyclone DDS 0.10.2 refuses a document with 231 or more.
+        assert_eq!(last.unwrap().parse::<u16>().unwrap(), 230);
+    }
 }
