@@ -16,8 +16,8 @@
 //!   z^2 -> z^2 exp(-sqrt(5.4 / (n - k) + 2 / nu))                                        (3)
 //! ```
 //!
-//! with rho the autocorrelation at lag one, less its standard error, where it is above a quarter, s_w the noise of the row at its run's pace and
-//! s_f a quarter of the simulator's own error of form, which may stay beside such a model. That is smooth: colour tells
+//! with rho the autocorrelation at lag one, less its standard error, where it is above a quarter, s_w the noise of the row
+//! at its run's pace and s_f a quarter of the simulator's own error of form, which may stay beside such a model. That is smooth: colour tells
 //! of noise only where there is more than it, so that a machine whose repeats are exact is not blamed for it. What repeats leave alike at the same stations is structure, not noise: where
 //! their mean product says so, it is taken from (1). Least squares spread a few rows that stand far off over all others:
 //! where the median is less without such a model, that is the noise. The median keeps a few sharp places (reversals) from
