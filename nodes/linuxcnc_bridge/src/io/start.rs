@@ -46,6 +46,8 @@ wait
 /// and after such a pause, it is started again.
 const START_ATTEMPTS: u32 = 3;
 const REALTIME_CLEANUP: Duration = Duration::from_secs(3);
+/// The process whose threads are LinuxCNC's servo and base thread, and the priority they get.
+const REAL_TIME: (&str, &str) = ("rtapi_app", "50");
 /// A clean end takes about 3 s.
 const END_LIMIT: Duration = Duration::from_secs(20);
 /// Length of the last words in an error.
@@ -132,6 +134,31 @@ fn running() -> Vec<(String, i32)> {
     found
 }
 
+/// Gives LinuxCNC's real-time part the priority that it has only under a real-time kernel by itself.
+///
+/// Without it any process may stop the servo thread between taking a command and telling of it, and
+/// LinuxCNC's task, which then believes that a probing move has ended, gives the program up ("Queue is not
+/// empty after probing").
+fn prefer_real_time() {
+    for (_, pid) in running()
+        .into_iter()
+        .filter(|(name, _)| name == REAL_TIME.0)
+    {
+        let outcome = Command::new("chrt")
+            .args(["--all-tasks", "--fifo", "--pid", REAL_TIME.1])
+            .arg(pid.to_string())
+            .output();
+        match outcome {
+            Ok(output) if output.status.success() => {}
+            Ok(output) => tracing::info!(
+                "LinuxCNC runs without real-time priority: {}",
+                String::from_utf8_lossy(&output.stderr).trim()
+            ),
+            Err(error) => tracing::info!("LinuxCNC runs without real-time priority: chrt: {error}"),
+        }
+    }
+}
+
 impl Controller {
     /// Starts the INI file `ini` and waits until LinuxCNC listens.
     ///
@@ -171,6 +198,7 @@ impl Controller {
             _lock: lock,
         };
         controller.wait_ready(config, ini)?;
+        prefer_real_time();
         Ok(controller)
     }
 

@@ -1,5 +1,7 @@
 //! LinuxCNC is started once, as told, and leaves nothing behind.
 
+use std::process::Command;
+
 use linuxcnc_bridge::BridgeError;
 use linuxcnc_bridge::io::start::Controller;
 
@@ -51,4 +53,35 @@ fn a_second_start_is_refused_and_a_wrong_configuration_says_what_is_wrong() {
         assert!(matches!(root, BridgeError::NoSuchUser { .. }), "{root}");
     }
     rig.start_controller();
+}
+
+/// Scheduling policies of all threads of the processes called `name`, as `chrt` tells them.
+fn policies(name: &str) -> String {
+    let pids = Command::new("pidof").arg(name).output().unwrap().stdout;
+    String::from_utf8(pids)
+        .unwrap()
+        .split_whitespace()
+        .map(|pid| {
+            let told = Command::new("chrt")
+                .args(["--all-tasks", "--pid", pid])
+                .output()
+                .unwrap();
+            String::from_utf8(told.stdout).unwrap()
+        })
+        .collect()
+}
+
+#[test]
+fn the_servo_thread_cannot_be_stopped_by_other_processes_where_that_may_be_asked_for() {
+    let allowed = Command::new("chrt").args(["--fifo", "1", "true"]).status();
+    if !allowed.is_ok_and(|status| status.success()) {
+        eprintln!("NOT TESTED: real-time priority is forbidden here");
+        return;
+    }
+    let Some(_rig) = Rig::new("linuxcnc_latency") else {
+        return;
+    };
+    let policies = policies("rtapi_app");
+    assert!(policies.contains("SCHED_FIFO"), "{policies}");
+    assert!(!policies.contains("SCHED_OTHER"), "{policies}");
 }
