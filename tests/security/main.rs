@@ -14,7 +14,7 @@ use abbe_msgs::{from_cdr, topics};
 use abbe_tests::cyclone::{Cyclone, end};
 use abbe_tests::fast_dds::FastDds;
 use abbe_tests::graph::now;
-use abbe_tests::program::{Ended, Process, command, domain};
+use abbe_tests::program::{Ended, Process, command, domain, root};
 use abbe_tests::python::interpreter;
 use abbe_tests::said::compensation;
 use abbe_tests::scenario::{Scenario, mcap_file};
@@ -203,4 +203,51 @@ fn credentials_of_another_node_and_none_keep_a_node_from_its_topics() {
         "{}",
         wrong.said
     );
+}
+
+/// Messages of one topic in a bag.
+fn messages(bag: &Path, topic: &str) -> usize {
+    let bytes = std::fs::read(mcap_file(bag)).unwrap();
+    let all = mcap::MessageStream::new(&bytes).unwrap();
+    all.filter(|message| message.as_ref().unwrap().channel.topic == topic)
+        .count()
+}
+
+#[test]
+fn a_bag_is_played_with_credentials_for_it_and_not_without() {
+    let test = "playing with credentials";
+    let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(4));
+    let keys = scenario.folder().join("keys");
+    if !keystore(test, &keys, &scenario.folder()) {
+        return;
+    }
+    let bag = root().join("bags/cold_reference");
+    let play = || {
+        let mut play = command(domain, &["play"]);
+        play.arg(&bag).args(["--rate", "0", "--delay", "8"]);
+        enforce(&mut play, &keys);
+        Process::start(play).ended_within(Duration::from_secs(120))
+    };
+    let refused = play();
+    assert_eq!(refused.status.code(), Some(1), "{}", refused.said);
+    assert!(refused.said.contains("/replayer"), "{}", refused.said);
+
+    let mut make = command(domain, &["keystore"]);
+    make.arg(&keys).arg("--play").arg(&bag);
+    let made = Process::start(make).ended_within(Duration::from_secs(60));
+    assert_eq!(made.status.code(), Some(0), "{}", made.said);
+    let copy = scenario.folder().join("copy");
+    let mut record = command(domain, &["record", "-o"]);
+    record.arg(&copy);
+    enforce(&mut record, &keys);
+    let record = Process::start(record);
+    let played = play();
+    assert_eq!(played.status.code(), Some(0), "{}", played.said);
+    assert!(played.said.contains(" 0 lost"), "{}", played.said);
+    record.stop();
+    let topic = "/axes/state";
+    let (sent, heard) = (messages(&bag, topic), messages(&copy, topic));
+    eprintln!("{heard} of {sent} messages of {topic} arrived encrypted");
+    assert!(sent > 0);
+    assert_eq!(heard, sent);
 }

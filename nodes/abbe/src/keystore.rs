@@ -8,7 +8,8 @@
 //! ```
 //!
 //! A node may write and read what its ports are and nothing else ([`node_runtime::access::Access`]); `/operator` may listen to everything and
-//! call every service, `/viewer` only listen. The authority of a keystore that `ros2 security create_keystore` made is used
+//! call every service, `/viewer` only listen. `--play BAG` adds `/replayer`, who may write the topics of that bag, the compensation too if it
+//! is recorded: for a graph of its own, not for one with a machine. The authority of a keystore that `ros2 security create_keystore` made is used
 //! as it is, its governance replaced by ours (why: `keystore/documents.rs`).
 
 use std::path::PathBuf;
@@ -30,8 +31,11 @@ pub struct Keystore {
     /// Folder of the keystore; it is made where there is none, and what it holds is kept.
     folder: PathBuf,
     /// Scenario whose nodes get credentials; may be given again.
-    #[arg(long, required = true)]
+    #[arg(long, required_unless_present = "play")]
     scenario: Vec<PathBuf>,
+    /// Bag that `abbe play` may publish whole, `/compensation` too: not for a graph with a machine; may be given again.
+    #[arg(long, value_name = "BAG")]
+    play: Vec<PathBuf>,
     /// Days for which the credentials are valid.
     #[arg(long, default_value_t = 365, value_parser = clap::value_parser!(u32).range(1..=3650))]
     days: u32,
@@ -45,9 +49,10 @@ impl Keystore {
     /// Always: this program has no DDS Security.
     pub fn execute(self) -> Result<ExitCode> {
         anyhow::bail!(
-            "keystore {} for {} scenarios and {} days: {}",
+            "keystore {} for {} scenarios, {} bags and {} days: {}",
             self.folder.display(),
             self.scenario.len(),
+            self.play.len(),
             self.days,
             node_runtime::environment::EnvironmentError::NoSecurity
         )
@@ -63,7 +68,7 @@ impl Keystore {
     pub fn execute(self) -> Result<ExitCode> {
         use authority::{Authority, Validity};
 
-        let wanted = enclaves::of_scenarios(&self.scenario)?;
+        let wanted = enclaves::of(&self.scenario, &self.play)?;
         let validity = Validity::from_now(chrono::Utc::now(), self.days)?;
         let authority = Authority::open_or_make(&self.folder, &validity)?;
         for enclave in &wanted {

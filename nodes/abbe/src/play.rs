@@ -48,7 +48,7 @@ pub struct Play {
 }
 
 /// The player's name on the graph.
-const NAME: &str = "replayer";
+pub const NAME: &str = "replayer";
 /// Between two looks at how far it is.
 const LOOK: Duration = Duration::from_millis(100);
 /// Exit code for a bag that could not be read whole, or messages that did not arrive.

@@ -110,11 +110,7 @@ impl Scenario {
     /// # Errors
     /// With file, key and value when something is missing or unknown.
     pub fn read(folder: &Path) -> Result<Self> {
-        let name = folder
-            .file_name()
-            .with_context(|| format!("scenario {}: no folder name", folder.display()))?
-            .to_string_lossy()
-            .into_owned();
+        let name = name_of(folder)?;
         let path = folder.join(SCENARIO_FILE);
         if !path.is_file() {
             bail!("{}", no_scenario(folder));
@@ -133,6 +129,22 @@ impl Scenario {
             nodes,
         })
     }
+}
+
+/// Name of a folder, however it is told: `.` and `..` too.
+fn name_of(folder: &Path) -> Result<String> {
+    let context = || format!("scenario {}", folder.display());
+    let name = match folder.file_name() {
+        Some(name) => name.to_owned(),
+        None => folder
+            .canonicalize()
+            .with_context(context)?
+            .file_name()
+            .context("has no name")
+            .with_context(context)?
+            .to_owned(),
+    };
+    Ok(name.to_string_lossy().into_owned())
 }
 
 const SCENARIO_FILE: &str = "scenario.yaml";
@@ -188,6 +200,21 @@ fn scenarios_in(home: &Path) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_has_its_name_however_it_is_told() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = home.path().join("cell_3");
+        std::fs::create_dir_all(folder.join("programs")).unwrap();
+        let from_below = folder.join("programs").join("..");
+        for told in [folder, from_below] {
+            assert_eq!(name_of(&told).unwrap(), "cell_3", "{}", told.display());
+        }
+        let root = name_of(Path::new("/")).unwrap_err();
+        assert!(format!("{root:#}").contains("scenario /"), "{root:#}");
+        let absent = name_of(&home.path().join("absent").join("..")).unwrap_err();
+        assert!(format!("{absent:#}").contains("absent"), "{absent:#}");
+    }
 
     #[test]
     fn a_wrong_path_says_what_was_looked_for_and_what_is_near() {

@@ -108,7 +108,8 @@ impl Access {
         self
     }
 
-    fn writes(&mut self, topic: &str) {
+    /// Adds a topic that it writes, by its absolute name.
+    pub fn writes(&mut self, topic: &str) {
         self.publish.insert(names::dds_topic(topic));
     }
 
@@ -116,8 +117,8 @@ impl Access {
         self.subscribe.insert(names::dds_topic(topic));
     }
 
-    /// Also tells of its calls.
-    fn serves(&mut self, service: &str) {
+    /// Adds a service that it answers, by its absolute name; it also tells of its calls.
+    pub fn serves(&mut self, service: &str) {
         self.subscribe.insert(names::dds_request_topic(service));
         self.publish.insert(names::dds_reply_topic(service));
         self.writes(&format!("{service}/_service_event"));

@@ -1,7 +1,7 @@
-//! Which enclaves the nodes of scenarios need, and what each may do.
+//! Which enclaves the nodes of scenarios and the players of bags need, and what each may do.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use abbe_msgs::topics;
 use anyhow::{Context, Result, bail};
@@ -10,9 +10,11 @@ use node_runtime::access::Access;
 use node_runtime::arguments::Arguments;
 use node_runtime::names::NodeNames;
 use node_runtime::node::Ports;
+use replayer::PlaybackConfig;
 
 use crate::launch::LaunchNode;
 use crate::node;
+use crate::play::NAME as PLAYER;
 use crate::scenario::Scenario;
 
 /// One enclave.
@@ -32,11 +34,11 @@ const RECORDER: &str = "recorder";
 const STARTER: &str = "linuxcnc_bridge";
 const WAIT: [&str; 2] = ["-p", "autostart:=false"];
 
-/// Enclaves of every node of some scenarios, of those who listen to them, and of an operator.
+/// Enclaves of every node of some scenarios, of a player of some bags, of those who listen, and of an operator.
 ///
 /// # Errors
-/// When a scenario or a node's parameters cannot be read.
-pub fn of_scenarios(folders: &[PathBuf]) -> Result<Vec<Enclave>> {
+/// When a scenario, a node's parameters, or a bag cannot be read.
+pub fn of(folders: &[PathBuf], bags: &[PathBuf]) -> Result<Vec<Enclave>> {
     let mut all = BTreeMap::<String, Access>::new();
     let mut add = |name: String, access: Access| {
         let known = all.remove(&name);
@@ -51,6 +53,11 @@ pub fn of_scenarios(folders: &[PathBuf]) -> Result<Vec<Enclave>> {
             if launched.exec == RECORDER {
                 add(format!("/{}_tap", launched.name), Access::to_listen());
             }
+            add(name, access);
+        }
+    }
+    for bag in bags {
+        for (name, access) in of_player(bag).with_context(|| bag.display().to_string())? {
             add(name, access);
         }
     }
@@ -77,17 +84,22 @@ fn of_node(launched: &LaunchNode) -> Result<(String, Access)> {
     if launched.exec == RECORDER {
         let mut access = Access::of(&names, &Ports::default())?;
         let save = names.resolve(topics::SAVE_RECORDING.name)?;
-        access.subscribe.insert(format!("rq{save}Request"));
-        access.publish.insert(format!("rr{save}Reply"));
+        access.serves(&save);
         return Ok((names.fully_qualified(), access));
     }
     let built = build(&Setup::new(&launched.exec, &arguments)?)?;
     Ok((names.fully_qualified(), Access::of(&names, built.ports())?))
 }
 
+/// The participants of a player of one bag: they write the bag's topics, whoever wrote them when it was recorded.
+fn of_player(bag: &Path) -> Result<[(String, Access); 2]> {
+    let names = NodeNames::new(PLAYER, &[])?;
+    let bag = bag.to_str().context("must be UTF-8")?;
+    replayer_node::access(&names, &PlaybackConfig::whole(bag.to_owned()))
+}
+
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use super::*;
 
@@ -100,7 +112,7 @@ mod tests {
             .filter(|folder| folder.join("scenario.yaml").is_file())
             .collect();
         assert!(folders.len() > 10);
-        let all = of_scenarios(&folders).unwrap();
+        let all = of(&folders, &[]).unwrap();
         let writers = all.iter().filter(|enclave| {
             enclave
                 .access
@@ -118,5 +130,19 @@ mod tests {
                 .any(|topic| topic == "*" || topic == "rt/*");
             assert!(!is_free, "{}", enclave.name);
         }
+    }
+
+    #[test]
+    fn a_player_may_write_what_its_bag_holds_and_the_time() {
+        let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../bags/cold_reference");
+        let all = of(&[], &[bag]).unwrap();
+        let voice = all.iter().find(|enclave| enclave.name == "/replayer_voice");
+        let access = &voice.unwrap().access;
+        for topic in ["rt/axes/state", "rt/clock"] {
+            assert!(access.publish.contains(topic), "{access:?}");
+        }
+        assert!(!access.publish.contains("*") && !access.publish.contains("rt/*"));
+        let node = all.iter().find(|enclave| enclave.name == "/probe");
+        assert!(node.is_none());
     }
 }
