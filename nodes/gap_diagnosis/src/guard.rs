@@ -152,30 +152,40 @@ pub fn judge(
     let is_reproduced = all
         .get(all.len() / 2)
         .is_none_or(|middle| *middle <= config.most_inflation);
-    let worse = inflation
-        .iter()
-        .filter(|(channel, _)| !reproduces(channel, inflation, config));
-    notes.extend(worse.map(|(channel, ratio)| Note::NotReproduced {
-        channel: channel.to_string(),
-        inflation: *ratio,
-        withdraws: !is_reproduced,
-    }));
+    for channel in inflation.keys() {
+        if let Some(inflation) = excess(channel, inflation, config) {
+            notes.push(Note::NotReproduced {
+                channel: channel.to_string(),
+                inflation,
+                withdraws: !is_reproduced,
+            });
+        }
+    }
     is_reproduced
 }
 
-/// Whether a channel's noise is that of the repeats. Two directions of one grid encoder have the same noise, and two that
-/// say the same are surer than one: of both together, the geometric mean counts.
+/// Whether a channel's noise is that of the repeats.
 pub fn reproduces(
     channel: &Channel,
     inflation: &BTreeMap<Channel, f64>,
     config: &GapConfig,
 ) -> bool {
+    excess(channel, inflation, config).is_none()
+}
+
+/// By how much a channel's noise is worse than that of the repeats, if it is. Two directions of one grid encoder have the
+/// same noise, and two that say the same are surer than one: of both together, the geometric mean counts.
+fn excess(
+    channel: &Channel,
+    inflation: &BTreeMap<Channel, f64>,
+    config: &GapConfig,
+) -> Option<f64> {
     let of = |channel: &Channel| inflation.get(channel).copied();
-    let own = of(channel).is_none_or(|ratio| ratio <= config.most_inflation);
+    let own = of(channel).filter(|ratio| *ratio > config.most_inflation);
     let is_grid = matches!(channel, Channel::GridU | Channel::GridV);
     let both = of(&Channel::GridU).zip(of(&Channel::GridV));
     let joint = both.filter(|_| is_grid).map(|(u, v)| (u * v).sqrt());
-    own && joint.is_none_or(|ratio| ratio <= config.most_inflation_of_two)
+    own.or(joint.filter(|ratio| *ratio > config.most_inflation_of_two))
 }
 
 /// f of (1).
@@ -360,6 +370,12 @@ mod tests {
             "{words}"
         );
         assert_eq!(judged([1.0; 3]), (true, String::new()));
+        // The quieter direction is told by what was judged: both together.
+        let (_, words) = judged([1.0, 1.69, 1.0]);
+        for ratio in ["1.69", "1.30"] {
+            assert!(words.contains(ratio), "{words}");
+        }
+        assert!(!words.contains("1.00"), "{words}");
     }
 
     #[test]
