@@ -40,6 +40,7 @@ mod form_doubt;
 mod form_error;
 mod gap;
 mod guard;
+mod in_common;
 mod isolability;
 mod lines;
 mod localise;

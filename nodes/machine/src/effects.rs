@@ -8,6 +8,7 @@
 mod form;
 mod kind;
 mod lever;
+mod line;
 mod slow;
 mod stale;
 
@@ -61,6 +62,7 @@ pub mod workpiece_expansion;
 use metrology::Axis;
 
 pub use kind::{Kind, Moment, Parameter, Role, Target, Targets};
+pub use line::line;
 
 use crate::file::{EffectEntry, MachineFile};
 use crate::kinematics::Kinematics;
