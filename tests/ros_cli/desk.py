@@ -13,7 +13,7 @@ from pathlib import Path
 SHOWN = 160
 """Longest text that is shown of what was seen, characters."""
 BETWEEN_TRIES_S = 0.5
-NO_HASH = re.compile(r"^.*Failed to parse type hash for topic .*\n", re.MULTILINE)
+NO_HASH = re.compile(r"^.*Failed to parse (?:a )?type hash for (?:a )?topic .*\n", re.MULTILINE)
 """What rmw_cyclonedds_cpp says of every end that sends no type hash: all of ours (README, known limits)."""
 
 

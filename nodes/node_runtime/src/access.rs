@@ -9,6 +9,8 @@ use crate::node::Ports;
 
 /// Nodes of each participant.
 const GRAPH: &str = "ros_discovery_info";
+/// How the names of `ros2`'s own nodes begin.
+const COMMAND_LINE: &str = "_ros2cli";
 /// Services of an action.
 const OF_ACTION: [&str; 3] = ["send_goal", "cancel_goal", "get_result"];
 
@@ -40,14 +42,23 @@ impl Access {
         access
     }
 
-    /// Of one that besides calls every service: parameters, lifecycles, actions.
+    /// Of a person with `ros2` who listens: its nodes tell of themselves and answer what their type descriptions are,
+    /// and without the right to do so they do not start.
     #[must_use]
-    pub fn to_operate() -> Self {
+    pub fn to_view() -> Self {
         let mut access = Self::to_listen();
-        access.publish.insert("rq/*".to_owned());
+        access.publish.insert(format!("rr/{COMMAND_LINE}*"));
         for topic in [topics::ROSOUT.name, topics::PARAMETER_EVENTS.name] {
             access.writes(topic);
         }
+        access
+    }
+
+    /// Of one who besides calls every service: parameters, lifecycles, actions.
+    #[must_use]
+    pub fn to_operate() -> Self {
+        let mut access = Self::to_view();
+        access.publish.insert("rq/*".to_owned());
         access
     }
 
@@ -137,6 +148,17 @@ mod tests {
     use crate::node::{ActionPort, TopicPort};
     use abbe_msgs::Message;
     use abbe_msgs::msg::AxisState;
+
+    #[test]
+    fn the_command_line_may_answer_for_itself_and_for_nobody_else() {
+        for access in [Access::to_view(), Access::to_operate()] {
+            let answers = access.publish.iter().filter(|t| t.starts_with("rr/"));
+            assert_eq!(answers.collect::<Vec<_>>(), ["rr/_ros2cli*"]);
+            assert!(access.publish.contains("rt/rosout"));
+            assert!(!access.publish.contains("*") && !access.publish.contains("rt/*"));
+        }
+        assert!(!Access::to_view().publish.contains("rq/*"));
+    }
 
     #[test]
     fn a_node_may_write_what_its_ports_say_and_nothing_else() {

@@ -26,7 +26,8 @@ pub struct Enclave {
 }
 
 /// Listeners of this program itself.
-const LISTENERS: [&str; 3] = ["/abbe_run_tap", "/abbe_record", "/viewer"];
+const LISTENERS: [&str; 2] = ["/abbe_run_tap", "/abbe_record"];
+const VIEWER: &str = "/viewer";
 const OPERATOR: &str = "/operator";
 /// Begins its bag when it is built.
 const RECORDER: &str = "recorder";
@@ -64,6 +65,7 @@ pub fn of(folders: &[PathBuf], bags: &[PathBuf]) -> Result<Vec<Enclave>> {
     for name in LISTENERS {
         add(name.to_owned(), Access::to_listen());
     }
+    add(VIEWER.to_owned(), Access::to_view());
     add(OPERATOR.to_owned(), Access::to_operate());
     let enclave = |(name, access)| Enclave { name, access };
     Ok(all.into_iter().map(enclave).collect())
