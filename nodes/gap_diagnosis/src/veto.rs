@@ -364,7 +364,7 @@ fn rough(stack: &Stack<'_>, block: &Block, rows: &[f64]) -> Vec<f64> {
 
 /// Whether an amplitude of a member stands at a bound that is not zero, or a shape that the recording tells of at one that is
 /// no machine's: a form that wants to be beyond is another's. A range as far below zero as above tells an end of an
-/// axis, and either is as good as the middle.
+/// axis, and either is as good as the middle; warmth flows with every time constant, of which a model has one or two.
 fn railed(instance: &Instance, estimate: &Estimate, best: &Best, member: usize) -> bool {
     let own = instance.kind.parameters;
     let all: Vec<&Parameter> = own.iter().chain(instance.kind.free).collect();
@@ -376,12 +376,16 @@ fn railed(instance: &Instance, estimate: &Estimate, best: &Best, member: usize) 
             Role::Amplitude => true,
             Role::Shape { .. } | Role::Frequency { .. } => {
                 let told = beside_others(&best.refit.jacobian, first + k) * parameter.typical;
-                parameter.low != -parameter.high && told > SAME
+                let is_end = parameter.low + parameter.high <= 0.0;
+                !is_end && !parameter.name.ends_with(LAG) && told > SAME
             }
         };
         estimate.at_bound[*place] && estimate.values[*place] != 0.0 && is_told()
     })
 }
+
+/// End of the names of time constants of heat.
+const LAG: &str = "_min";
 
 /// What a derivative has beside all others, its norm.
 fn beside_others(jacobian: &[DVector<f64>], own: usize) -> f64 {

@@ -1,27 +1,23 @@
 //! ROS shell of replayer: a bag's messages on the topics on which they were recorded.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use abbe_msgs::std_srvs::srv::TriggerResponse;
 use abbe_msgs::topics;
 use anyhow::Result;
 use metrology::stamp::Span;
-use node_runtime::access::Access;
 use node_runtime::environment::Environment;
-use node_runtime::names::NodeNames;
-use node_runtime::node::Ports;
 use node_runtime::{Node, Setup, Wiring};
-use recorder::Bag;
 use replayer::{PARAMETERS, PlaybackConfig};
 
+mod access;
 mod contents;
 mod desk;
 mod latched;
 mod player;
 mod watch;
 
-use contents::Contents;
+pub use access::access;
 pub use desk::{Desk, Progress};
 pub use player::Played;
 use player::Player;
@@ -38,46 +34,13 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     play(setup, &setup.config()?).map(|(node, _)| node)
 }
 
-/// Name of the second participant of the node `names`, which sends what the bag holds.
-fn voice(names: &NodeNames) -> NodeNames {
-    let mut names = names.clone();
-    names.name.push_str("_voice");
-    names
-}
-
-/// What each participant of the player `names` of a whole bag may do: the node answers its services, its voice
-/// writes the bag's topics and the time.
-///
-/// # Errors
-/// When the bag cannot be opened or a topic has no name of ROS.
-pub fn access(names: &NodeNames, config: &PlaybackConfig) -> Result<[(String, Access); 2]> {
-    let bag = Bag::open(Path::new(&config.bag))?;
-    let contents = Contents::of(&bag, config, &config.checked()?)?;
-    let mut node = Access::of(names, &Ports::default())?;
-    for service in [
-        topics::PAUSE_PLAYING.name,
-        topics::RESUME_PLAYING.name,
-        topics::STEP_PLAYING.name,
-    ] {
-        node.serves(&names.resolve(service)?);
-    }
-    let mut sent = Access::to_graph();
-    for topic in &contents.offered {
-        sent.writes(&topic.name);
-    }
-    Ok([
-        (names.fully_qualified(), node),
-        (voice(names).fully_qualified(), sent),
-    ])
-}
-
 /// The same for given parameters, with the desk at which the playing can be watched.
 ///
 /// # Errors
 /// As [`node`].
 pub fn play(setup: &Setup, config: &PlaybackConfig) -> Result<(Box<dyn Node>, Arc<Desk>)> {
     let parameters = setup.resolved(config, PARAMETERS)?;
-    let names = voice(setup.names());
+    let names = access::voice(setup.names());
     let player = Player::start(&Environment::read()?, &names, config)?;
     let desk = player.desk();
     let done = |answered: Result<&[Output], &str>| match answered {
