@@ -19,6 +19,7 @@ use abbe_tests::python::interpreter;
 use abbe_tests::said::compensation;
 use abbe_tests::scenario::{Scenario, mcap_file};
 use abbe_tests::security::{enforce, keystore};
+use recorder::{Bag, Event, Order};
 
 /// What the stranger asks for on X, m: no model of this short cell gives as much.
 const INJECTED_M: f64 = 40e-6;
@@ -207,10 +208,16 @@ fn credentials_of_another_node_and_none_keep_a_node_from_its_topics() {
 
 /// Messages of one topic in a bag.
 fn messages(bag: &Path, topic: &str) -> usize {
-    let bytes = std::fs::read(mcap_file(bag)).unwrap();
-    let all = mcap::MessageStream::new(&bytes).unwrap();
-    all.filter(|message| message.as_ref().unwrap().channel.topic == topic)
-        .count()
+    let bag = Bag::open(bag).unwrap();
+    let mut all = bag.messages(Order::LogTime);
+    let mut n = 0;
+    while let Some(event) = all.next_event() {
+        let Event::Message(message) = event else {
+            panic!("{event:?}")
+        };
+        n += usize::from(bag.topic(message.topic).topic == topic);
+    }
+    n
 }
 
 #[test]
