@@ -4,7 +4,7 @@
 //!
 //! ```text
 //!   w = sum_n p_n P_n(x),   n = 1, 2 and, wider, 3, 4                     (1)
-//!   w += sum_k f_k h_k(x),   hats at every sixteenth of the travel        (2)
+//!   w += sum_k f_k b_k(x),   splines with knots at the sixteenths of the travel        (2)
 //!   E = w times the lever of `volumetric::sensitivity` at the pose        (3)
 //! ```
 //!
@@ -28,7 +28,7 @@
 
 use metrology::ErrorComponent;
 
-use super::form::{PLACE_HATS, Travel, legendre, place_hats};
+use super::form::{PLACE_SPLINES, Travel, legendre, place_splines};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets, lever};
 use crate::twin::Response;
 
@@ -68,7 +68,7 @@ pub static KIND: Kind = Kind {
 struct AngularError {
     component: ErrorComponent,
     polynomial_rad: [f64; 4],
-    local_rad: [f64; PLACE_HATS],
+    local_rad: [f64; PLACE_SPLINES],
 }
 
 impl AngularError {
@@ -87,7 +87,7 @@ impl Effect for AngularError {
         let position = &scene.run.motion.position[self.component.of];
         lever::add(scene, self.component, response, |tick| {
             let x = travel.share(position[tick]);
-            let local_rad = place_hats(&self.local_rad, x); // (2)
+            let local_rad = place_splines(&self.local_rad, x); // (2)
             legendre(1, &self.polynomial_rad, x) + local_rad // (1)
         });
     }

@@ -1,8 +1,9 @@
-//! Curves that effects are made of: Legendre polynomials over the travel, hats, harmonics.
+//! Curves that effects are made of: Legendre polynomials and splines over the travel, hats.
 //!
 //! ```text
 //!   h_k(x) = max(0, 1 - |x - x_k| / d), equally spaced by d               (1)
 //!   P_n of ((u - middle) / half travel)                                   (2)
+//!   B(t) = 1 - 3/2 t^2 + 3/4 |t|^3 to |t| = 1, then (2 - |t|)^3 / 4 to |t| = 2    (3)
 //! ```
 
 use metrology::Axis;
@@ -30,33 +31,38 @@ pub(super) fn way_hats(heights: &[f64; WAY_HATS], way_mm: f64) -> f64 {
     hats(-2.0, 0.5, heights, way_mm.max(1e-9).log10())
 }
 
-/// Places of the wide hats over the travel.
-const WIDE_HATS: usize = 7;
-/// Number of hats over the travel.
-pub(super) const PLACE_HATS: usize = 2 * WIDE_HATS + 1;
+/// Places of the wide splines over the travel.
+const WIDE_SPLINES: usize = 7;
+/// Number of splines over the travel.
+pub(super) const PLACE_SPLINES: usize = 2 * WIDE_SPLINES + 1;
 
-/// Hats over the travel at a share of the half travel: at 1/8 .. 7/8 of it, each an eighth wide to either side, then halfway
-/// between these and beyond them, half as wide, for what is shorter. Together they have any height at every sixteenth.
-pub(super) fn place_hats(heights: &[f64; PLACE_HATS], share: f64) -> f64 {
-    let (wide, narrow) = heights.split_at(WIDE_HATS);
-    let place = (share + 0.875) / 0.25;
-    let nearest = place.round();
-    let height = |k: &usize| narrow.get(*k).copied().unwrap_or(0.0);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "one of eight places"
-    )]
-    let of_narrow = if (0.0..=WIDE_HATS as f64).contains(&nearest) {
-        let distance = 2.0 * (place - nearest).abs();
-        height(&(nearest as usize)) * (1.0 - distance).max(0.0)
+/// Cubic B-spline with its peak of 1 at zero, its knots 1 apart: what a beam does that is pressed at one place.
+fn spline(distance: f64) -> f64 {
+    let t = distance.abs();
+    if t < 1.0 {
+        1.0 - 0.75 * t * t * (2.0 - t)
     } else {
-        0.0
-    };
-    hats(-0.75, 0.25, wide, share) + of_narrow
+        0.25 * (2.0 - t).max(0.0).powi(3)
+    }
 }
 
-/// Heights of any curve over the travel beside P2 and P3: P4 and P5, then the hats in the order of [`place_hats`].
+/// Splines (3) over the travel at a share of the half travel: at 1/8 .. 7/8 of it with knots an eighth apart, then halfway
+/// between these and beyond them with knots a sixteenth apart. Together they are any cubic spline with knots at the
+/// sixteenths that is nothing beyond both ends.
+pub(super) fn place_splines(heights: &[f64; PLACE_SPLINES], share: f64) -> f64 {
+    let (wide, narrow) = heights.split_at(WIDE_SPLINES);
+    let place = (share + 0.75) / 0.25;
+    let mut sum = 0.0;
+    for (k, height) in wide.iter().enumerate() {
+        sum += height * spline(place - k as f64);
+    }
+    for (k, height) in narrow.iter().enumerate() {
+        sum += height * spline(2.0 * (place - k as f64) + 1.0);
+    }
+    sum
+}
+
+/// Heights of any curve over the travel beside P2 and P3: P4 and P5, then the splines in the order of [`place_splines`].
 pub(super) const CURVE_UM: &[Parameter] = &[
     Parameter::ordinate("free_p4_um", 60.0, 1.0),
     Parameter::ordinate("free_p5_um", 60.0, 1.0),
@@ -137,24 +143,42 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hats_over_the_travel_have_any_height_at_every_sixteenth() {
-        let mut random = (1..16)
-            .map(|k| f64::from(k * k % 7) - 3.0)
-            .collect::<Vec<_>>();
-        random.insert(0, 0.0);
-        random.push(0.0);
-        let mut heights = [0.0; PLACE_HATS];
-        for k in 1..8 {
-            heights[k - 1] = random[2 * k];
+    fn splines_over_the_travel_are_any_cubic_spline_with_knots_at_the_sixteenths() {
+        let fine = |k: i32, share: f64| spline(8.0 * (share + 1.0) - f64::from(k));
+        let alone = |number: usize, share: f64| {
+            let mut heights = [0.0; PLACE_SPLINES];
+            heights[number] = 1.0;
+            place_splines(&heights, share)
+        };
+        let shares = || (0..=260).map(|k| -1.3 + f64::from(k) / 100.0);
+        for share in shares() {
+            for number in 0..WIDE_SPLINES {
+                let k = 2 * i32::try_from(number).unwrap() + 2;
+                let around = |apart: i32| fine(k - apart, share) + fine(k + apart, share);
+                let wanted = 0.75 * fine(k, share) + 0.5 * around(1) + 0.125 * around(2);
+                assert!(
+                    (alone(number, share) - wanted).abs() < 1e-12,
+                    "{number} {share}"
+                );
+            }
+            for number in 0..=WIDE_SPLINES {
+                let k = 2 * i32::try_from(number).unwrap() + 1;
+                let found = alone(WIDE_SPLINES + number, share);
+                assert!((found - fine(k, share)).abs() < 1e-12, "{number} {share}");
+            }
         }
-        for k in 0..8 {
-            let (before, here, after) = (random[2 * k], random[2 * k + 1], random[2 * k + 2]);
-            heights[WIDE_HATS + k] = here - 0.5 * (before + after);
+    }
+
+    #[test]
+    fn splines_add_up_to_a_constant_within() {
+        let mut heights = [2.0 / 3.0; PLACE_SPLINES];
+        heights[WIDE_SPLINES..].fill(0.0);
+        for k in 0..20 {
+            let share = -0.5 + 0.05 * f64::from(k);
+            assert!(
+                (place_splines(&heights, share) - 1.0).abs() < 1e-12,
+                "{share}"
+            );
         }
-        for (k, wanted) in (0_u32..).zip(&random) {
-            let share = -1.0 + f64::from(k) / 8.0;
-            assert!((place_hats(&heights, share) - wanted).abs() < 1e-12, "{k}");
-        }
-        assert!(place_hats(&heights, -1.3).abs() < 1e-12);
     }
 }

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //!   E = sum_n p_n P_n(x)                                                  (1)
-//!   E += sum_k f_k h_k(x),   hats at every sixteenth of the travel        (2)
+//!   E += sum_k f_k b_k(x),   splines with knots at the sixteenths of the travel        (2)
 //! ```
 //!
 //! | symbol | here | unit |
@@ -19,8 +19,8 @@
 //! travel (see `cyclic_error`).
 //!
 //! # Agreement
-//! `val_a_screw_of_drifting_lead`: of 1.44 µm with a bump 0.1 m long, (1) leaves 0.44, hats at the eighths
-//! 0.094, at the sixteenths 0.018.
+//! `val_a_screw_of_drifting_lead`: of 1.44 µm with a bump 0.1 m long, (1) leaves 0.44, splines at the
+//! eighths 0.065, at the sixteenths 0.003.
 //!
 //! # References (from memory)
 //! \[1\] ISO 230-2:2014, clause 3 (positioning deviations). \[2\] ISO 3408-3:2006 (travel deviation of
@@ -28,7 +28,7 @@
 
 use metrology::Axis;
 
-use super::form::{CURVE_UM, PLACE_HATS, Travel, legendre, place_hats};
+use super::form::{CURVE_UM, PLACE_SPLINES, Travel, legendre, place_splines};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
 use crate::twin::Response;
 
@@ -50,7 +50,7 @@ pub static KIND: Kind = Kind {
 struct PitchError {
     axis: Axis,
     polynomial_mm: [f64; 4],
-    local_mm: [f64; PLACE_HATS],
+    local_mm: [f64; PLACE_SPLINES],
 }
 
 impl PitchError {
@@ -72,7 +72,7 @@ impl Effect for PitchError {
             let x = travel.share(*here);
             *sum += legendre(2, &self.polynomial_mm, x); // (1)
             if is_local {
-                *sum += place_hats(&self.local_mm, x); // (2)
+                *sum += place_splines(&self.local_mm, x); // (2)
             }
         }
     }

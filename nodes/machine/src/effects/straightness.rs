@@ -6,7 +6,7 @@
 //!
 //! ```text
 //!   E = sum_n p_n P_n(x),   n = 2, 3 and, wider, 4, 5                     (1)
-//!   E += sum_k f_k h_k(x),   hats at every sixteenth of the travel        (2)
+//!   E += sum_k f_k b_k(x),   splines with knots at the sixteenths of the travel        (2)
 //! ```
 //!
 //! (2) is for a guide that is worn or dented in one place.
@@ -21,14 +21,14 @@
 //!
 //! # Agreement
 //! `val_a_guide_bent_to_a_circle`: 3e-7 µm of 6.8 µm. `val_a_slide_on_a_guide_that_is_worn_in_one_place`: of 0.82 µm
-//! P2 to P5 leave 0.50, with hats at the eighths 0.20, at the sixteenths 0.068.
+//! P2 to P5 leave 0.50, with splines at the eighths 0.16, at the sixteenths 0.055.
 //!
 //! # References (from memory)
 //! \[1\] ISO 230-1:2012, 3.4.
 
 use metrology::ErrorComponent;
 
-use super::form::{CURVE_UM, PLACE_HATS, Travel, legendre, place_hats};
+use super::form::{CURVE_UM, PLACE_SPLINES, Travel, legendre, place_splines};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets, lever};
 use crate::twin::Response;
 
@@ -50,7 +50,7 @@ pub static KIND: Kind = Kind {
 struct Straightness {
     component: ErrorComponent,
     polynomial_mm: [f64; 4],
-    local_mm: [f64; PLACE_HATS],
+    local_mm: [f64; PLACE_SPLINES],
 }
 
 impl Straightness {
@@ -69,7 +69,7 @@ impl Effect for Straightness {
         let position = &scene.run.motion.position[self.component.of];
         lever::add(scene, self.component, response, |tick| {
             let x = travel.share(position[tick]);
-            let local_mm = place_hats(&self.local_mm, x); // (2)
+            let local_mm = place_splines(&self.local_mm, x); // (2)
             legendre(2, &self.polynomial_mm, x) + local_mm // (1)
         });
     }

@@ -89,7 +89,7 @@ fn val_a_slide_on_a_guide_that_is_worn_in_one_place() {
     let (_, fine) = fit(&columns, &height);
     let (_, straight) = fit(&columns[..2], &height);
     println!(
-        "worn guide {straight:.2} um: P2 to P5 leave {smooth:.3}, with hats {wide:.3}, to the sixteenth {fine:.3}"
+        "worn guide {straight:.2} um: P2 to P5 leave {smooth:.3}, with splines {wide:.3}, to the sixteenth {fine:.3}"
     );
     assert!(smooth > 0.5 * straight && wide < 0.3 * straight && fine < 0.6 * wide);
 }
