@@ -78,7 +78,7 @@ fn val_lugre_friction_under_a_cascaded_loop() {
     };
     let mut best = (f64::INFINITY, 0.0, 0.0, 0.0);
     for width_ms in (1..20).map(|k| 8.0 * f64::from(k)) {
-        for length_mm in [0.01, 0.03, 0.1, 0.3, 1.0, 100.0] {
+        for length_mm in [0.0003, 0.001, 0.003, 0.01, 0.03, 0.1] {
             let (found, left) = fit(&[column(width_ms, length_mm, "")], &wanted);
             if left < best.0 {
                 best = (left, width_ms, length_mm, found[0]);
@@ -94,6 +94,8 @@ fn val_lugre_friction_under_a_cascaded_loop() {
             "free_0p1mm_um",
             "free_0p3mm_um",
             "free_1mm_um",
+            "free_below_2mm_s_um",
+            "free_below_8mm_s_um",
         ]
         .map(|free| column(best.1, best.2, free)),
     );
@@ -101,19 +103,30 @@ fn val_lugre_friction_under_a_cascaded_loop() {
     let size = rms(wanted.iter().copied());
     let peak = wanted.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
     println!("spike {peak:.2} um, rms {size:.3}; {best:?}; wider form {wide:.3}; tick {TICK_S}");
-    assert!(best.0 < 0.45 * size, "{best:?} of {size}");
-    assert!(wide < 0.36 * size, "{wide} of {size}");
+    assert!(best.0 < 0.3 * size, "{best:?} of {size}");
+    assert!(wide < 0.22 * size, "{wide} of {size}");
 }
 
 #[test]
-fn eq1_a_step_into_a_loop_of_two_equal_poles() {
+fn eq2_a_step_into_a_loop_of_two_equal_poles() {
     let machine = three_axes("[w X' Y' b Z t]");
     let width_s = 0.02;
-    // A triangle: the reversal is at 0.2 s, and the way tells nothing (length 100 mm).
+    // A triangle: the reversal is at 0.2 s, and friction turns over within 0.1 µm.
     let run = run(600, AxisSet::XYZ, |t| {
-        [if t < 0.2 { t } else { 0.4 - t }, 0.0, 0.0, 0.0, 0.0, 0.0]
+        [
+            20.0 * if t < 0.2 { t } else { 0.4 - t },
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        ]
     });
-    let given = [("height_um", 5.0), ("width_ms", 20.0), ("length_mm", 100.0)];
+    let given = [
+        ("height_um", 5.0),
+        ("width_ms", 20.0),
+        ("length_mm", 0.0001),
+    ];
     let response = response_of(&machine, &run, "reversal_spike", "X", &given);
     // w2 e'' + 2 w e' + e = w d', the step d at 0 giving e' = d / w there; its peak d/e is the height.
     let start = 0.005 * std::f64::consts::E / width_s;
