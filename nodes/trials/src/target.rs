@@ -357,9 +357,9 @@ fn of_shrink(sheet: &mut Sheet, known: &[&Verdict], foreign: &[&Verdict]) {
             of(&Verdict::closed_of_oracle),
         );
         sheet.middle(
-            &format!("{arm}: gap after over before, its floor taken out, held out, median, D > 20"),
+            &format!("{arm}: gap after over before, held out, without what a machine that hides nothing leaves, median, D > 20"),
             AtMost(left),
-            of(&|v| v.said.as_ref().and_then(after_over_before)),
+            of(&Verdict::left_of_gap),
         );
     }
     let told = known.iter().chain(foreign).filter_map(|v| {
@@ -372,16 +372,6 @@ fn of_shrink(sheet: &mut Sheet, known: &[&Verdict], foreign: &[&Verdict]) {
         Within(0.9, 0.98),
         told,
     );
-}
-
-/// Root mean squares with what noise alone would leave taken out of both squares: at D = 20 that floor is half of what is
-/// seen before, and no simulator of any quality goes below it. Where no share is told the plain ones.
-fn after_over_before(said: &Said) -> Option<f64> {
-    if let Some([closed, ..]) = said.closed {
-        return Some((1.0 - closed).max(0.0).sqrt());
-    }
-    let [before, after] = said.held_out_um;
-    Some(after? / before?)
 }
 
 /// Squared distance from which a run was to decide.
@@ -415,29 +405,6 @@ mod tests {
         let all = targets(&[]);
         assert!(all.len() >= 28, "{}", all.len());
         assert!(all.iter().all(|target| target.met.is_none()), "{all:#?}");
-    }
-
-    #[test]
-    fn what_is_left_of_a_gap_is_taken_without_its_floor() {
-        let said = |closed| Said {
-            causes: vec![],
-            is_unknown: false,
-            unknown_ratio: 0.5,
-            covariate: String::new(),
-            is_reproduced: true,
-            above_floor: true,
-            gap_um: [1.0, 0.4],
-            held_out_um: [Some(1.0), Some(0.5)],
-            closed,
-            runtime_s: 1.0,
-            next: None,
-        };
-        // G from sqrt(1 - 0.16) to sqrt(0.25 - 0.16).
-        let closed = 1.0 - 0.09 / 0.84;
-        let left = after_over_before(&said(Some([closed, 0.8, 0.95]))).unwrap();
-        assert!((left - (0.09_f64 / 0.84).sqrt()).abs() < 1e-12, "{left}");
-        let plain = after_over_before(&said(None)).unwrap();
-        assert!((plain - 0.5).abs() < 1e-12, "{plain}");
     }
 
     #[test]

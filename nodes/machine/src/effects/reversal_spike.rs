@@ -32,7 +32,7 @@
 //! # Agreement
 //! `eq1_a_step_into_a_answerof_two_equal_poles`: 0.1 % of the height.
 //! `val_lugre_friction_under_a_cascaded_loop`: of a LuGre drive under position and velocity loops, at two feeds
-//! and radii with one height, (2) leaves 26 % of the rms, (3) 19 %.
+//! and radii with one height, (2) leaves 26 % of the rms, (3) 16 %.
 //!
 //! # References (from memory)
 //! \[1\] C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, IEEE Trans. Autom. Control 40(3),
