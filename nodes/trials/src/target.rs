@@ -14,7 +14,7 @@ use crate::effect::Class;
 use crate::proportion::{Proportion, auroc, median};
 use crate::tally::{LARGE_D, SEVERAL_D, SINGLE_D, beyond, has_wrong, is_reproduced};
 use crate::truth::TrueEffect;
-use crate::verdict::{Said, Verdict};
+use crate::verdict::Verdict;
 
 /// One line of the protocol's table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
