@@ -26,7 +26,7 @@ use crate::shrink::{self, Named, Shrunk};
 use crate::split::{self, Split};
 use crate::stack::Stack;
 use crate::unknown::Leftover;
-use crate::{isolability, localise, places, recalibration, unknown, whiteness};
+use crate::{isolability, localise, places, recalibration, share_interval, unknown, whiteness};
 
 /// Fewer held-out runs than this are to be looked at one by one.
 const FEW_HELD_OUT: usize = 6;
@@ -228,6 +228,8 @@ impl<'a> Base<'a> {
                 stack.freedom(),
             ),
             held_out: shrunk.held_out,
+            apart: shrunk.apart,
+            share_intervals: share_interval::of_places(&stack, &slots, &before.families, config),
         };
         Diagnosis {
             report,

@@ -16,8 +16,9 @@
 //! | `temperature_<id>` | T, T2 | even |
 //! | `approach_angle` | harmonics 1 to 4 of the approach | even |
 //! | `feed` | f, f2 of touches | even |
+//! | `stylus` | one column a further stylus, alone and times cos and sin of the approach | even |
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::FRAC_PI_2;
 
 use machine::twin::simulate::plate_axes;
@@ -298,5 +299,42 @@ fn of_touch(samples: &[Sample<'_>]) -> Vec<Basis> {
     let feeds: Vec<f64> = touches.iter().map(|touch| touch.feed_mm_s).collect();
     let mut all = vec![("approach_angle".to_owned(), Parity::Even, waves)];
     all.extend(legendre("feed".to_owned(), &feeds, 2, 0.05));
+    let styli: Vec<(&str, f64)> = samples
+        .iter()
+        .zip(&touches)
+        .map(|((run, ..), t)| (&*run.segment.stylus, t.approach.y.atan2(t.approach.x)))
+        .collect();
+    all.extend(of_stylus(&styli));
     all
+}
+
+/// What each further stylus has of its own, alone and with the approach (rad).
+fn of_stylus(touches: &[(&str, f64)]) -> Option<Basis> {
+    let styli: BTreeSet<&str> = touches.iter().map(|(stylus, _)| *stylus).collect();
+    let shapes: [fn(f64) -> f64; 3] = [|_| 1.0, f64::cos, f64::sin];
+    let column = |own: &str, shape: fn(f64) -> f64| {
+        let value = |(stylus, approach): &(&str, f64)| f64::from(*stylus == own) * shape(*approach);
+        touches.iter().map(value).collect()
+    };
+    let columns: Vec<Vec<f64>> = styli
+        .iter()
+        .skip(1)
+        .flat_map(|own| shapes.map(|shape| column(own, shape)))
+        .collect();
+    (!columns.is_empty()).then(|| ("stylus".to_owned(), Parity::Even, columns))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_stylus_has_columns_of_its_own() {
+        assert!(of_stylus(&[("50", 0.0), ("50", 1.0)]).is_none());
+        let (name, parity, columns) = of_stylus(&[("50", 0.0), ("80", 0.0), ("80", 1.0)]).unwrap();
+        assert_eq!((&*name, parity, columns.len()), ("stylus", Parity::Even, 3));
+        assert_eq!(columns[0], [0.0, 1.0, 1.0]);
+        assert_eq!(columns[1], [0.0, 1.0, 1.0_f64.cos()]);
+        assert_eq!(columns[2], [0.0, 0.0, 1.0_f64.sin()]);
+    }
 }

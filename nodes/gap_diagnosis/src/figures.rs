@@ -21,6 +21,25 @@ pub struct Figures {
     pub isolability: Isolability,
     /// Root mean square of each held-out run.
     pub held_out: Vec<HeldOut>,
+    /// What each of several named effects closes by itself; empty for fewer than two, and where nothing was held out.
+    #[serde(default)]
+    pub apart: Vec<Apart>,
+    /// Intervals of the shares of the report's places, in their order; absent where too few runs were read.
+    #[serde(default)]
+    pub share_intervals: Vec<Option<[f64; 2]>>,
+}
+
+/// One of several named effects by itself, on held-out runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Apart {
+    /// Id of the effect.
+    pub effect: String,
+    /// What it acts on.
+    pub axis: String,
+    /// Root mean square where it alone is added to the simulator.
+    pub rms_um_alone: f64,
+    /// Its share of what all of them close together (Shapley's); absent where that is nothing.
+    pub share: Option<f64>,
 }
 
 /// Standard score of the residual, channel against covariate.

@@ -16,12 +16,14 @@
 //! confidence is worth, `veto` what speaks against naming it, `cause` puts that together and `searched` says how often. `scatter` looks for effects that move no mean, `whiteness` says whether
 //! the search may stop. `families`, `localise` and `places` say where the gap lies, `guard` whether the
 //! noise is that of the repeats, `unknown` what no effect explains, `isolability` what could be told from what. `gap` is how much there was to explain, `split` and
-//! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`. `experiment` knows what could
+//! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`, `apart` what each effect has of that;
+//! `share_interval` says how surely a place's share is known. `experiment` knows what could
 //! be measured next and `next` which of it would decide. `diagnose` puts the questions in their order,
 //! `preflight` some of them before anything is measured; `regression` is what other methods than these would start
 //! from, `problem` the first search as numbers alone, `rule` what of these can be switched off. `stage` is the node's whole computation, `following` its
 //! parameters.
 
+mod apart;
 mod bootstrap;
 mod cause;
 mod challenge;
@@ -63,6 +65,7 @@ mod scatter;
 mod searched;
 mod selection;
 pub mod session;
+mod share_interval;
 mod shrink;
 mod signature;
 mod split;

@@ -12,7 +12,8 @@
 //! A slot is one channel in one direction, n its rows, T_all what its k_all columns tell together. S is what is beyond
 //! noise: a slot that has less than its noise, as one has whose error of form is small, takes nothing from another's.
 //!
-//! A draw of (2) turns the sign of whole runs of z; in a slot with fewer than ten runs, where turning them is no draw,
+//! A draw of (2) turns the sign of whole runs of z, and for families over time or temperature turns each block of a run round
+//! in a circle as well: what goes slowly through a long run keeps its colour and loses its place. In a slot with fewer than ten runs, where turning them is no draw,
 //! it draws U'z from noise of one
 //! instead, scaled by the square root of nu / chi2_nu: the field between runs is known from nu coefficients of few
 //! repeats only. The maximum is over all families, so that p holds however many are looked at.
@@ -139,7 +140,9 @@ fn flipped(stack: &Stack<'_>, slots: &[&Slot], z: &DVector<f64>, config: &GapCon
         .iter()
         .map(|slot| by_run(stack, slot, &rows_of(slot, z)))
         .collect();
+    let over_time: Vec<OverTime> = slots.iter().map(|slot| OverTime::new(slot)).collect();
     let mut random = Pcg64Mcg::seed_from_u64(config.seed);
+    let mut turns = Pcg64Mcg::seed_from_u64(config.seed ^ 0x53);
     (0..config.significance_draws)
         .map(|_| {
             let signs: Vec<f64> = stack
@@ -147,20 +150,71 @@ fn flipped(stack: &Stack<'_>, slots: &[&Slot], z: &DVector<f64>, config: &GapCon
                 .iter()
                 .map(|_| if random.random() { 1.0 } else { -1.0 })
                 .collect();
-            let of_slot = |(slot, parts): (&&Slot, &Vec<DVector<f64>>)| {
+            let mut greatest = f64::NEG_INFINITY;
+            for ((slot, parts), over_time) in slots.iter().zip(&parts).zip(&over_time) {
                 let mut along = DVector::zeros(slot.basis.ncols());
                 for (part, sign) in parts.iter().zip(&signs) {
                     along.axpy(*sign, part, 1.0);
                 }
-                most(slot, &along)
-            };
-            slots
-                .iter()
-                .zip(&parts)
-                .map(of_slot)
-                .fold(f64::NEG_INFINITY, f64::max)
+                over_time.turn(stack, slot, z, &signs, &mut turns, &mut along);
+                greatest = greatest.max(most(slot, &along));
+            }
+            greatest
         })
         .collect()
+}
+
+/// Columns of the families of a slot that go with time.
+struct OverTime {
+    columns: Vec<usize>,
+}
+
+impl OverTime {
+    fn new(slot: &Slot) -> Self {
+        let families = slot.families.iter();
+        let own = families.filter(|family| {
+            family.covariate == "time" || family.covariate.starts_with("temperature_")
+        });
+        Self {
+            columns: own.flat_map(|family| family.columns.clone()).collect(),
+        }
+    }
+
+    /// U'z of these columns where each block of z is turned round by a draw and has the sign of its run.
+    fn turn(
+        &self,
+        stack: &Stack<'_>,
+        slot: &Slot,
+        z: &DVector<f64>,
+        signs: &[f64],
+        random: &mut Pcg64Mcg,
+        along: &mut DVector<f64>,
+    ) {
+        for &column in &self.columns {
+            along[column] = 0.0;
+        }
+        let mut first = 0;
+        for &index in &slot.blocks {
+            let block = &stack.rows.blocks[index];
+            let n = block.rows.len();
+            let by = random.random_range(0..n.max(1));
+            let run = stack.runs.iter().position(|run| *run == block.run);
+            let sign = run.map_or(1.0, |run| signs[run]);
+            let own_z = &z.as_slice()[block.range()];
+            for &column in &self.columns {
+                let own = slot.basis.column(column);
+                along[column] += sign * turned(&own.as_slice()[first..first + n], own_z, by);
+            }
+            first += n;
+        }
+    }
+}
+
+/// Product of a column with rows that are turned round by so many places.
+fn turned(column: &[f64], rows: &[f64], by: usize) -> f64 {
+    let (head, tail) = rows.split_at(by.min(rows.len()));
+    let turned = tail.iter().chain(head);
+    column.iter().zip(turned).map(|(a, b)| a * b).sum()
 }
 
 /// U'z of each run alone.
@@ -297,6 +351,16 @@ impl Told {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_block_that_is_turned_round_keeps_its_rows_and_loses_their_place() {
+        let ramp = [-1.5, -0.5, 0.5, 1.5];
+        assert!((turned(&ramp, &ramp, 0) - 5.0).abs() < 1e-12);
+        // -1.5 * 0.5 - 0.5 * 1.5 - 0.5 * 1.5 - 1.5 * 0.5
+        assert!((turned(&ramp, &ramp, 2) + 3.0).abs() < 1e-12);
+        // What is alike in all of a run is the same wherever the run begins.
+        assert!((turned(&ramp, &[2.0; 4], 3) - turned(&ramp, &[2.0; 4], 0)).abs() < 1e-12);
+    }
 
     /// Four rows; two unit columns at 60 degrees to each other in the first two, and z along the first: it tells 100
     /// together, the second alone a quarter of it.

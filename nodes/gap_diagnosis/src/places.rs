@@ -32,12 +32,15 @@ pub fn places(stack: &Stack<'_>, slots: &[Slot], scores: &[Score], floated: &[f6
             per_condition: per_condition(stack, slot, &fitted(slot, family, floated)),
         }
     };
+    listed(scores).map(place).collect()
+}
+
+/// Scores of the places that are listed.
+pub fn listed(scores: &[Score]) -> impl Iterator<Item = &Score> {
     scores
         .iter()
         .filter(|score| score.p_value <= MOST_P)
         .take(MOST)
-        .map(place)
-        .collect()
 }
 
 fn per_condition(stack: &Stack<'_>, slot: &Slot, told: &[f64]) -> Vec<Condition> {

@@ -10,11 +10,12 @@
 
 use std::collections::BTreeMap;
 
+use crate::apart::{apart, chosen, remembered};
 use crate::closed;
 use crate::config::GapConfig;
 use crate::field::{self, Place};
 use crate::figures::over_session::over_session;
-use crate::figures::{Abscissa, HeldOut, Trace};
+use crate::figures::{Abscissa, Apart, HeldOut, Trace};
 use crate::gap::{self, Size};
 use crate::noise::Noise;
 use crate::report::{BeforeAfter, LeftOut, Shrink};
@@ -42,6 +43,8 @@ pub struct Shrunk {
     pub held_out: Vec<HeldOut>,
     /// Traces of the runs that were judged.
     pub traces: Vec<Trace>,
+    /// What each of several effects closes by itself.
+    pub apart: Vec<Apart>,
 }
 
 /// Most runs and channels of which a trace is given.
@@ -64,18 +67,17 @@ pub fn shrink(
     let [whole, left] = [0, 1].map(|k| gap::together(sizes[k].iter()));
     let is_judged = !split.held_out.is_empty();
     let value = |number: f64| is_judged.then_some(number);
-    let leave_one_out = (0..named.len()).filter(|_| is_judged).map(|out| {
-        let others = named
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| *k != out)
-            .map(|(_, n)| n);
-        let floated = with_effects(stack, others);
-        LeftOut {
-            effect: named[out].effect.clone(),
-            axis: named[out].axis.clone(),
-            rms_um_without: gap::together(size(&floated).iter()).rms_um(),
-        }
+    let every = (1_u32 << named.len()) - 1;
+    let known = [(0, whole.rms_um()), (every, left.rms_um())];
+    let rms_um = remembered(known, |set| {
+        let floated = with_effects(stack, chosen(named, set));
+        gap::together(size(&floated).iter()).rms_um()
+    });
+    let leave_one_out = (0..named.len()).filter(|_| is_judged);
+    let leave_one_out = leave_one_out.map(|out| LeftOut {
+        effect: named[out].effect.clone(),
+        axis: named[out].axis.clone(),
+        rms_um_without: rms_um(every ^ (1 << out)),
     });
     let number = |run: &usize| stack.session.runs[*run].segment.run;
     let shrink = Shrink {
@@ -96,12 +98,13 @@ pub fn shrink(
     };
     Shrunk {
         shrink,
-        held_out: if is_judged {
-            by_run(stack, judged, &sizes)
+        held_out: by_run(stack, if is_judged { judged } else { &[] }, &sizes),
+        traces: traces(stack, noise, judged, &before, &after),
+        apart: if is_judged && named.len() > 1 {
+            apart(named, &rms_um)
         } else {
             vec![]
         },
-        traces: traces(stack, noise, judged, &before, &after),
     }
 }
 

@@ -123,7 +123,7 @@ fn sections(diagnosed: &Diagnosed) -> Vec<Section> {
     let report = &diagnosed.diagnosis.report;
     let all = [
         causes(report),
-        places(report),
+        places(diagnosed),
         gap(report),
         held_out(diagnosed),
         next(report),
@@ -275,13 +275,20 @@ fn alike(cause: &Cause) -> String {
     }
 }
 
-fn places(report: &GapReport) -> Section {
-    let rows = report.r#where.iter().take(MOST_ROWS).map(|place| {
+fn places(diagnosed: &Diagnosed) -> Section {
+    let report = &diagnosed.diagnosis.report;
+    let intervals = &diagnosed.diagnosis.figures.share_intervals;
+    let interval = |place: usize| match intervals.get(place).copied().flatten() {
+        Some([low, high]) => format!(" ({:.0} to {:.0})", 100.0 * low, 100.0 * high),
+        None => String::new(),
+    };
+    let places = report.r#where.iter().take(MOST_ROWS).enumerate();
+    let rows = places.map(|(number, place)| {
         vec![
             place.channel.clone(),
             place.direction.clone(),
             covariate(&place.covariate),
-            format!("{:.0} %", 100.0 * place.share_unique),
+            format!("{:.0} %{}", 100.0 * place.share_unique, interval(number)),
             format!("{:.0} %", 100.0 * place.share_shared),
             format!("{:.3}", place.p_value),
             three(place.z),
@@ -300,7 +307,7 @@ fn places(report: &GapReport) -> Section {
         "Where the gap lies",
         &names,
         rows.collect(),
-        "Alone: share of the structured gap that only this explains; p: chance of so much in noise, over all places that were looked at.",
+        "Alone: share of the structured gap that only this explains, in brackets its 95 % interval over the runs; p: chance of so much in noise, over all places that were looked at.",
     )
 }
 
@@ -361,17 +368,31 @@ fn held_out(diagnosed: &Diagnosed) -> Section {
         runs.collect(),
         "Root mean square of machine minus simulator, set-up floated.",
     );
-    let without = report
-        .shrink
-        .leave_one_out
-        .iter()
-        .map(|out| vec![name(&out.effect, &out.axis), three(out.rms_um_without)]);
+    let apart = &diagnosed.diagnosis.figures.apart;
+    let without = report.shrink.leave_one_out.iter().map(|out| {
+        let own = apart
+            .iter()
+            .find(|own| own.effect == out.effect && own.axis == out.axis);
+        let share = own.and_then(|own| own.share);
+        vec![
+            name(&out.effect, &out.axis),
+            three(out.rms_um_without),
+            own.map_or_else(String::new, |own| three(own.rms_um_alone)),
+            share.map_or_else(String::new, |share| format!("{:.0} %", 100.0 * share)),
+        ]
+    });
     let without: Vec<Vec<String>> = without.collect();
     if !without.is_empty() {
         section.tables.push(Rows {
-            head: head(&["effect taken out again", "rms without it µm"]),
+            head: head(&[
+                "effect",
+                "rms without it µm",
+                "rms with it alone µm",
+                "its share",
+            ]),
             rows: without,
-            note: String::new(),
+            note: "Its share: of the squares that all effects together close; what two close alike counts half for each."
+                .to_owned(),
         });
     }
     section

@@ -55,6 +55,7 @@ pub(super) fn covariate(id: &str) -> String {
         "sense*angle" => "the angle on the circle, its sign with the sense of rotation".to_owned(),
         "approach_angle" => "the direction of approach".to_owned(),
         "feed" => "the feed of the touch".to_owned(),
+        "stylus" => "the stylus".to_owned(),
         other => other.to_owned(),
     }
 }
