@@ -14,7 +14,7 @@
 //! it, `form_doubt` says what a size owes to its form, `confirm` tries it on runs left out and under every
 //! condition, `challenge` against shapes without a physics; `confidence` weighs its rivals, `recalibration` what a
 //! confidence is worth, `veto` what speaks against naming it, `cause` puts that together and `searched` says how often. `scatter` looks for effects that move no mean, `whiteness` says whether
-//! the search may stop. `families`, `localise` and `places` say where the gap lies, `guard` whether the
+//! what is left is white. `families`, `localise` and `places` say where the gap lies, `guard` whether the
 //! noise is that of the repeats, `unknown` what no effect explains, `isolability` what could be told from what. `gap` is how much there was to explain, `split` and
 //! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`, `apart` what each effect has of that;
 //! `share_interval` says how surely a place's share is known. `experiment` knows what could

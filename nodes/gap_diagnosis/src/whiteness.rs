@@ -1,4 +1,4 @@
-//! Whether what is left is white: the stop rule beside the search.
+//! Whether what is left is white: a remark beside the search, which decides nothing.
 //!
 //! # Model
 //!
@@ -8,6 +8,8 @@
 //!
 //! over every block of rows that is long enough, r_k its autocorrelation. Blocks of white noise fail at 1 % one
 //! time in a hundred; a channel is called not white where more fail than noise would in one of a thousand sessions.
+//! The error of form that every simulator is granted (`form_error`) colours rows that have less of it, so that this is said of
+//! machines with nothing hidden as well; whether a search may stop is asked of families and channels (`unknown`).
 //!
 //! # Agreement
 //! `val_statsmodels_acorr_ljungbox`: 1e-5 of Q and p on sixty fixed numbers.
