@@ -18,6 +18,7 @@ mod compensation;
 mod cycle;
 mod error;
 mod feature;
+mod frames;
 mod gap;
 mod geometry;
 mod interface;
@@ -38,6 +39,7 @@ pub use action_types::{
 };
 pub use cdr::{ENCAPSULATION, from_cdr, to_cdr, to_cdr_into};
 pub use error::{Place, WireError};
+pub use frames::transforms;
 pub use interface::{
     Action, Description, FieldParts, Message, Service, TypeParts, description_of, parts_of,
 };

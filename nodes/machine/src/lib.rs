@@ -1,7 +1,8 @@
 //! The forward model of a machine tool, as simulator, compensation and diagnosis share it.
 //!
 //! `file` reads the machine file, which describes a machine as its maker would. `chain` is the order
-//! of its axes from workpiece to tool; `kinematics` follows from it where ball and workpiece are and
+//! of its axes from workpiece to tool; `kinematics` follows from it where ball and workpiece are,
+//! `frames` where each body of the machine is, and
 //! `orientation` which rotary positions point the probe a given way. `cycle` writes the programs
 //! that touch blocks, planes, bores, bosses and spheres, `poses` plans at which rotary poses a sphere tells
 //! most. `export` turns measured errors into the tables that
@@ -17,6 +18,7 @@ pub mod effects;
 pub mod error;
 pub mod export;
 pub mod file;
+pub mod frames;
 pub mod kinematics;
 pub mod orientation;
 pub mod poses;
@@ -27,6 +29,7 @@ pub mod volumetric;
 pub use chain::{Chain, ChainError};
 pub use error::{CycleError, MachineFileError, OrientationError};
 pub use file::MachineFile;
+pub use frames::FrameTree;
 pub use kinematics::{Kinematics, TableSense};
 pub use orientation::Orientation;
 pub use poses::{PoseError, SphereDesign};
