@@ -165,6 +165,18 @@ impl NodeNames {
         self.expand(&self.name)
     }
 
+    /// The name of a frame of this node's machine: the namespace, without the slash that tf allows no frame to begin
+    /// with, and the frame's own name; the machine's own where that is empty.
+    #[must_use]
+    pub fn frame(&self, name: &str) -> String {
+        let machine = self.namespace.trim_matches('/');
+        match (machine, name) {
+            ("", name) => name.to_owned(),
+            (machine, "") => machine.to_owned(),
+            (machine, name) => format!("{machine}/{name}"),
+        }
+    }
+
     fn expand(&self, name: &str) -> String {
         let root = self.namespace.trim_end_matches('/');
         match (name.strip_prefix('~'), name.starts_with('/')) {
@@ -244,6 +256,15 @@ mod tests {
         assert_eq!(node.resolve("~/state").unwrap(), "/cell/bed/state");
         assert_eq!(node.resolve("/tf").unwrap(), "/tf");
         assert_eq!(names(&[]).resolve("axes/state").unwrap(), "/axes/state");
+    }
+
+    #[test]
+    fn frames_have_their_machines_namespace_in_front() {
+        let node = names(&["__ns:=/shop/mill_3"]);
+        assert_eq!(node.frame("base_link"), "shop/mill_3/base_link");
+        assert_eq!(node.frame(""), "shop/mill_3");
+        assert_eq!(names(&[]).frame("base_link"), "base_link");
+        assert_eq!(names(&[]).frame(""), "");
     }
 
     #[test]

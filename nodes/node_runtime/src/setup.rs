@@ -196,6 +196,12 @@ impl Setup {
         &self.names
     }
 
+    /// The name of a frame of this node's machine; see [`NodeNames::frame`].
+    #[must_use]
+    pub fn frame(&self, name: &str) -> String {
+        self.names.frame(name)
+    }
+
     /// Reads the node's configuration out of its parameters.
     ///
     /// # Errors

@@ -180,6 +180,22 @@ where
         self.publish_message(topic, move |output| select(output).map(M::from_inner))
     }
 
+    /// As [`Wiring::publish`], with the name of a frame at `place` of each message.
+    #[must_use]
+    pub fn publish_in<M: Wire>(
+        self,
+        topic: &Topic<M>,
+        frame_id: String,
+        place: fn(&mut M) -> &mut String,
+        select: impl for<'a> Fn(&'a S::Output) -> Option<&'a M::Inner> + Send + 'static,
+    ) -> Self {
+        self.publish_message(topic, move |output| {
+            let mut message = M::from_inner(select(output)?);
+            place(&mut message).clone_from(&frame_id);
+            Some(message)
+        })
+    }
+
     /// Publishes the outputs that `select` picks as one member of a topic family.
     ///
     /// # Errors

@@ -44,9 +44,19 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
     let mut wiring = Wiring::new(setup.name(), parameters, Witnessed { cnc, witness })
         .every(period, || Input::Tick)
         .on(&topics::COMPENSATION, Input::Compensation)
-        .publish(&topics::AXES_STATE, forms::state)
+        .publish_in(
+            &topics::AXES_STATE,
+            setup.frame(""),
+            |message| &mut message.header.frame_id,
+            forms::state,
+        )
         .publish_message(&topics::JOINT_STATES, forms::joints())
-        .publish(&topics::PROBE_TRIGGER, forms::trigger)
+        .publish_in(
+            &topics::PROBE_TRIGGER,
+            setup.frame(machine::frames::MACHINE),
+            |message| &mut message.header.frame_id,
+            forms::trigger,
+        )
         .publish(&topics::GRID_POSITION, forms::grid)
         .publish(&topics::LENGTH_POSITION, forms::length)
         .action_server(

@@ -42,9 +42,19 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     Ok(Wiring::new(setup.name(), parameters, bridge)
         .every(TICK, || LiveInput::Tick)
         .on(&topics::COMPENSATION, LiveInput::Compensation)
-        .publish(&topics::AXES_STATE, forms::state)
+        .publish_in(
+            &topics::AXES_STATE,
+            setup.frame(""),
+            |message| &mut message.header.frame_id,
+            forms::state,
+        )
         .publish_message(&topics::JOINT_STATES, forms::joints)
-        .publish(&topics::PROBE_TRIGGER, forms::trigger)
+        .publish_in(
+            &topics::PROBE_TRIGGER,
+            setup.frame(machine::frames::MACHINE),
+            |message| &mut message.header.frame_id,
+            forms::trigger,
+        )
         .action_server(
             &topics::RUN_PROGRAM,
             forms::run,

@@ -39,7 +39,12 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     // Without an axis in its mapping it may stand beside a controller that tells them.
     if settings.mapping.has_axes() {
         wiring = wiring
-            .publish(&topics::AXES_STATE, forms::state)
+            .publish_in(
+                &topics::AXES_STATE,
+                setup.frame(""),
+                |message| &mut message.header.frame_id,
+                forms::state,
+            )
             .publish_message(&topics::JOINT_STATES, forms::joints);
     }
     for (_, used) in settings.mapping.uses() {

@@ -41,7 +41,12 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         .on(&topics::PROBE_TRIGGER, |_| Input::Touch)
         .on(&topics::THERMAL_UPDATE_REQUEST, Input::UpdateRequest)
         .every(TICK, || Input::Tick)
-        .publish(&topics::TEST_SEGMENT, forms::segment)
+        .publish_in(
+            &topics::TEST_SEGMENT,
+            setup.frame(machine::frames::MACHINE),
+            |message| &mut message.header.frame_id,
+            forms::segment,
+        )
         .publish(&topics::PLAN_STATUS, forms::status)
         .client(&topics::SET_COMPENSATION, forms::switch, forms::switched)
         .action_client(&topics::RUN_PROGRAM, forms::program, forms::program_news)
