@@ -135,6 +135,46 @@ fn of_rqt(text: &str) -> Vec<Shown> {
     quoted.map(by_slashes).collect()
 }
 
+/// Frames that a Foxglove layout's 3D panels name.
+fn frames_of_foxglove(text: &str) -> Vec<String> {
+    let whole: Value = serde_json::from_str(text).unwrap();
+    let panels = whole["configById"].as_object().unwrap();
+    let panels = panels.iter().filter(|(id, _)| id.starts_with("3D!"));
+    let mut named = Vec::new();
+    for (_, panel) in panels {
+        let shown = panel["transforms"].as_object().into_iter().flatten();
+        named.extend(shown.filter_map(|(key, _)| Some(key.strip_prefix("frame:")?.to_owned())));
+        named.extend(panel["followTf"].as_str().map(str::to_owned));
+        let layers = panel["layers"].as_object().into_iter().flatten();
+        let ids = layers.filter_map(|(_, layer)| layer["frameId"].as_str());
+        named.extend(ids.map(str::to_owned));
+    }
+    named
+}
+
+/// What of `named` a machine has no frame of.
+fn unknown_frames(named: &[String], machine: &str) -> Vec<String> {
+    let file = machine::MachineFile::parse(machine, "machine.yaml").unwrap();
+    let tree = machine::FrameTree::new(&file).unwrap();
+    let is_known = |name: &String| {
+        name == machine::frames::BASE || tree.frames().iter().any(|frame| frame.name() == name)
+    };
+    let unknown = named.iter().filter(|name| !is_known(name));
+    unknown
+        .map(|name| format!("{name}: no such frame"))
+        .collect()
+}
+
+#[test]
+fn the_layouts_three_dimensional_panel_names_frames_of_the_cell() {
+    let named = frames_of_foxglove(&tree::text("launch_configs/cell.foxglove.json").unwrap());
+    assert!(named.len() > 10, "{named:?}");
+    let cell = tree::text("launch_configs/short_cell/machine.yaml").unwrap();
+    check(&unknown_frames(&named, &cell));
+    let bad = r#"{"configById": {"3D!a": {"followTf": "bed", "transforms": {"frame:x_slide": {}, "frame:b_rotary": {}}}}}"#;
+    assert_eq!(unknown_frames(&frames_of_foxglove(bad), &cell).len(), 2);
+}
+
 #[test]
 fn arch_layouts_name_only_what_the_wire_has() {
     type Reader = fn(&str) -> Vec<Shown>;

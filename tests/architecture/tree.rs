@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
 /// Crates without clock, file, environment, entropy, log or ROS.
-pub const PURE: [&str; 13] = [
+pub const PURE: [&str; 14] = [
     "metrology",
     "machine",
+    "machine_frames",
     "probe",
     "host_clock",
     "latency_calibrator",

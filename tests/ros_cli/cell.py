@@ -10,6 +10,7 @@ NODES = [
     "axis_compensation",
     "fake_cnc",
     "latency_calibrator",
+    "machine_frames",
     "probe",
     "sequencer",
     "thermal_model",

@@ -20,6 +20,7 @@ pub const NODES: &[(&str, Builder)] = &[
     ("host_clock", host_clock_node::node),
     ("latency_calibrator", latency_calibrator_node::node),
     ("linuxcnc_bridge", linuxcnc_bridge_node::node),
+    ("machine_frames", machine_frames_node::node),
     ("mtconnect_bridge", mtconnect_bridge_node::node),
     ("probe", probe_node::node),
     ("recorder", recorder_node::node),

@@ -48,7 +48,9 @@ struct Showing {
 fn is_frequent(port: &TopicPort) -> bool {
     let qos = port.qos;
     let latched = qos.durability == Durability::TransientLocal;
-    !latched && (qos.reliability == Reliability::BestEffort || qos.depth >= DEEP)
+    // tf is as shallow as everybody's and comes with every joint state.
+    let is_tf = port.topic == topics::TF.name;
+    !latched && (is_tf || qos.reliability == Reliability::BestEffort || qos.depth >= DEEP)
 }
 
 fn clock_port() -> TopicPort {

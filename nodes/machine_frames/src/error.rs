@@ -1,0 +1,27 @@
+//! Parameters and machine files that cannot work.
+
+use machine::ChainError;
+
+/// Why a stage is not built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MachineFramesError {
+    /// A parameter outside its range.
+    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    OutOfRange {
+        /// Parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Least value.
+        least: f64,
+        /// Greatest value.
+        greatest: f64,
+    },
+    /// The machine file's chain cannot be read.
+    #[error("chain: {error}")]
+    Chain {
+        /// Where and why.
+        #[source]
+        error: ChainError,
+    },
+}
