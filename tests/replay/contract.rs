@@ -16,14 +16,6 @@ use crate::rewrite::{Change, Copied, rewrite};
 /// A parameter of the thermal model as it stands in the bag, and another value of it.
 const CHANGED: (&str, &str) = ("validity_min: 40.0", "validity_min: 41.0");
 
-/// Blocks alone.
-const FRAMES_PLAN: &str = "\
-title: frames
-steps:
-  - {do: latency, feature: block_1.z, feeds_mm_min: [60.0, 240.0], repeats: 2}
-  - {do: blocks, cold: true}
-";
-
 /// Exit code and JSON of `abbe check --json`; what was said instead where there is no JSON.
 pub fn check(bag: &Path) -> (i32, Value) {
     let bag = bag.display().to_string();
@@ -42,7 +34,7 @@ fn said(bag: &Path) -> String {
 }
 
 /// A short run of `first_run`, recorded once for all tests.
-fn short_run() -> &'static Path {
+pub fn short_run() -> &'static Path {
     static RUN: OnceLock<(Scenario, PathBuf)> = OnceLock::new();
     let (_, bag) = RUN.get_or_init(|| {
         let scenario = Scenario::copy_of("first_run");
@@ -108,29 +100,6 @@ fn replay_of_a_bag_in_several_files_and_without_what_was_left_out_is_equal() {
         topics.contains(&"/axes/state") && topics.contains(&"/axis_compensation/transition_event")
     );
     assert!(!topics.contains(&"/joint_states"), "{topics:?}");
-}
-
-/// Hours of moving frames follow from what is in the bag; where it stands in the bag, a replay leaves it alone.
-#[test]
-fn frames_are_no_part_of_a_replay_and_fixed_ones_are_in_every_bag() {
-    let topics = |bag: &Path| -> Vec<String> {
-        let bag = recorder::Bag::open(bag).unwrap();
-        let said = bag.topics().iter().filter(|one| one.message_count > 0);
-        said.map(|one| one.topic.clone()).collect()
-    };
-    let short = topics(short_run());
-    assert!(short.contains(&"/tf_static".to_owned()), "{short:?}");
-    assert!(!short.contains(&"/tf".to_owned()), "{short:?}");
-    let scenario = Scenario::copy_of("first_run");
-    scenario.write("plan.yaml", FRAMES_PLAN);
-    scenario.replace("scenario.yaml", "recording: {exclude: [/tf]}", "");
-    let bag = scenario.run().join("bag");
-    assert!(topics(&bag).contains(&"/tf".to_owned()));
-    let (code, outcome) = check(&bag);
-    assert_eq!(code, 0, "{outcome:#}");
-    let compared = outcome["compared"].as_object().unwrap();
-    assert!(compared["/blocks/measurement"]["messages"].as_u64() > Some(0));
-    assert!(!compared.contains_key("/tf") && !compared.contains_key("/tf_static"));
 }
 
 /// Changes the latched position of one touch by one unit in the last place.

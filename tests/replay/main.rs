@@ -6,5 +6,6 @@
 
 mod contract;
 mod equal_bytes;
+mod frames;
 mod host_clocks;
 mod rewrite;
