@@ -45,7 +45,8 @@
 //! | hole in the axis states | readings inside are left out, unless they bear the stamp of a state |
 //! | hole in them while the axes moved, of more than 0.25 s and 20 spacings | the run is left out, counted |
 //! | reading more than 10 m, rad or K from its nominal value | left out, counted |
-//! | value that is no number, count of another zero, sensor that stands while the axes move | left out, counted |
+//! | value that is no number, count of another zero, sensor that stands while it is to change | left out, counted |
+//! | one coordinate of a grid encoder that stands while it is to change | that coordinate is left out, counted |
 //! | time that goes back by less than a second | the sample is left out, counted |
 //! | a clock that jumps back by more | the session's time goes on, the open run is cut, counted |
 //! | segment that the end of the bag cuts | kept up to there, counted |
@@ -68,6 +69,7 @@ mod nominal;
 mod past;
 mod record;
 mod select;
+mod standing;
 mod thermometers;
 mod time;
 mod touching;

@@ -34,6 +34,8 @@ pub enum Reason {
     OtherZero,
     /// A reading that stood while the axes moved.
     Stuck,
+    /// A reading of which one coordinate stood while it was to move, as at the end of a range.
+    StuckInPart,
     /// A grid or length reading with a turned rotary axis.
     RotaryTurned,
     /// A touch of something that the machine file does not have.
@@ -65,6 +67,9 @@ impl Reason {
             Self::Beyond => "readings are more than 10 m or 10 rad from their nominal values",
             Self::OtherZero => "readings belong to another zero",
             Self::Stuck => "readings stood while the axes moved",
+            Self::StuckInPart => {
+                "readings stood in one coordinate that was to move, as at the end of a range; the other one is used"
+            }
             Self::RotaryTurned => "readings were taken with a turned rotary axis",
             Self::UnknownFeature => "touches are of features that the machine file does not have",
             Self::Failed => "segments did not run to their end and are left out",

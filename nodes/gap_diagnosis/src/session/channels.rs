@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 
 use super::account::{Account, Reason};
 use super::record::Record;
+use super::standing::{Standing, both, standing};
 use super::thermometers;
 
 /// Greatest distance between ticks on either side of a reading, s.
@@ -22,8 +23,6 @@ const BOW: f64 = 1e-4;
 const OFF_PARABOLA: f64 = 0.008_02;
 /// Rotary axes beyond this are turned, rad.
 const TURNED_RAD: f64 = 1e-6;
-/// A sensor that does not change over this way stands, mm.
-const STUCK_MM: f64 = 5e-3;
 /// An axis that covers less in what is judged of a run does not move, mm or rad.
 const MOVES: f64 = 1e-2;
 
@@ -109,8 +108,8 @@ impl Scope<'_> {
         let Some(axes) = plate_axes(segment.plane) else {
             return vec![];
         };
-        let (mut first, mut second) = (vec![], vec![]);
-        let mut standing = Standing::default();
+        let mut places = vec![];
+        let (mut read_mm, mut nominal_mm) = ([vec![], vec![]], [vec![], vec![]]);
         for sample in &self.record.grid {
             let kept = if sample.zero_id != segment.zero_id || sample.plane != segment.plane {
                 Err(Reason::OtherZero)
@@ -119,27 +118,33 @@ impl Scope<'_> {
             } else {
                 Err(Reason::NotFinite)
             };
-            let reading = kept.and_then(|place| {
-                let nominal = self.nominal(place, sample.at);
-                standing.check([sample.u_mm, sample.v_mm], &nominal)?;
-                Ok((place, nominal))
-            });
-            match reading {
-                Ok((place, nominal)) => {
-                    for (series, (read_mm, axis)) in [&mut first, &mut second]
-                        .into_iter()
-                        .zip([(sample.u_mm, axes[0]), (sample.v_mm, axes[1])])
-                    {
-                        series.push(Raw {
-                            place,
-                            deviation: read_mm - nominal[axis],
-                        });
+            match kept {
+                Ok(place) => {
+                    let nominal = self.nominal(place, sample.at);
+                    places.push(place);
+                    for (k, read) in [sample.u_mm, sample.v_mm].into_iter().enumerate() {
+                        read_mm[k].push(read);
+                        nominal_mm[k].push(nominal[axes[k]]);
                     }
                 }
                 Err(reason) => account.note(reason),
             }
         }
-        vec![(Channel::GridU, first), (Channel::GridV, second)]
+        let does = [0, 1].map(|k| standing(&read_mm[k], &nominal_mm[k]));
+        let kept = both(&does);
+        for reason in kept.iter().filter_map(|kept| left_out(*kept)) {
+            account.note(reason);
+        }
+        let series = |k: usize| {
+            let all = places.iter().zip(&kept).enumerate();
+            let of_kept = all.filter(|(_, (_, kept))| kept[k]);
+            let raw = of_kept.map(|(at, (place, _))| Raw {
+                place: *place,
+                deviation: read_mm[k][at] - nominal_mm[k][at],
+            });
+            raw.collect()
+        };
+        vec![(Channel::GridU, series(0)), (Channel::GridV, series(1))]
     }
 
     /// A length that is read during a circle is that of a ballbar, from the centre.
@@ -179,8 +184,7 @@ impl Scope<'_> {
         } else {
             1.0
         };
-        let mut series = vec![];
-        let mut standing = Standing::default();
+        let (mut places, mut read_mm, mut along_mm) = (vec![], vec![], vec![]);
         for sample in &self.record.length {
             let kept = if sample.zero_id != self.record.segment.zero_id || sample.axis != axis {
                 Err(Reason::OtherZero)
@@ -189,17 +193,23 @@ impl Scope<'_> {
             } else {
                 Err(Reason::NotFinite)
             };
-            let reading = kept.and_then(|place| {
-                let nominal = self.nominal(place, sample.at);
-                standing.check([sample.displacement_mm, 0.0], &nominal)?;
-                Ok((place, nominal.xyz().dot(&direction)))
-            });
-            match reading {
-                Ok((place, along_mm)) => series.push(Raw {
-                    place,
-                    deviation: sign * (sample.displacement_mm - along_mm),
-                }),
+            match kept {
+                Ok(place) => {
+                    places.push(place);
+                    read_mm.push(sample.displacement_mm);
+                    along_mm.push(self.nominal(place, sample.at).xyz().dot(&direction));
+                }
                 Err(reason) => account.note(reason),
+            }
+        }
+        let mut series = vec![];
+        let does = standing(&read_mm, &along_mm);
+        for (at, (place, does)) in places.into_iter().zip(does).enumerate() {
+            if does == Standing::Stuck {
+                account.note(Reason::Stuck);
+            } else {
+                let deviation = sign * (read_mm[at] - along_mm[at]);
+                series.push(Raw { place, deviation });
             }
         }
         Some((Channel::Length(axis), series))
@@ -350,23 +360,11 @@ fn mean(readings: &[Raw]) -> f64 {
     sum / readings.len().max(1) as f64
 }
 
-/// Notices a sensor that stands while the axes move.
-#[derive(Clone, Copy, Debug, Default)]
-struct Standing {
-    first: Option<([f64; 2], Vector3<f64>)>,
-}
-
-impl Standing {
-    fn check(&mut self, value: [f64; 2], nominal: &PerAxis<f64>) -> Result<(), Reason> {
-        let here = nominal.xyz();
-        match &self.first {
-            Some((seen, since)) if seen.map(f64::to_bits) == value.map(f64::to_bits) => {
-                if (here - since).norm() > STUCK_MM {
-                    return Err(Reason::Stuck);
-                }
-            }
-            _ => self.first = Some((value, here)),
-        }
-        Ok(())
+/// What is said of a reading of two coordinates of which these are kept.
+const fn left_out(kept: [bool; 2]) -> Option<Reason> {
+    match kept {
+        [true, true] => None,
+        [false, false] => Some(Reason::Stuck),
+        _ => Some(Reason::StuckInPart),
     }
 }
