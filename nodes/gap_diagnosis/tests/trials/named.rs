@@ -1,6 +1,6 @@
 //! One effect, or two: named, on their axes, with intervals that hold the truth.
 
-use gap_diagnosis::report::Status;
+use gap_diagnosis::report::{LeftOut, Status};
 
 use crate::plant::{Noise, diagnosed, names, session, soft_play};
 
@@ -54,5 +54,34 @@ fn two_plays_are_named_both() {
         ["backlash X", "backlash Y"],
         "{:#?}",
         diagnosis.report.causes
+    );
+}
+
+#[test]
+fn without_one_of_two_effects_more_of_the_gap_is_left_and_most_without_the_larger() {
+    let (x, y) = (soft_play(0, 3e-3), soft_play(1, 6e-3));
+    let wrong = move |state: &crate::plant::State| [x(state)[0], y(state)[1]];
+    let shrink = diagnosed(&session(8, Noise::default(), &wrong))
+        .report
+        .shrink;
+    let (before_um, after_um) = (shrink.rms_um.before.unwrap(), shrink.rms_um.after.unwrap());
+    let without_um = |axis: &str| {
+        let own = |out: &&LeftOut| out.effect == "backlash" && out.axis == axis;
+        let out = shrink.leave_one_out.iter().find(own);
+        out.unwrap_or_else(|| panic!("{shrink:?}")).rms_um_without
+    };
+    assert_eq!(shrink.leave_one_out.len(), 2, "{shrink:?}");
+    let (small_um, large_um) = (without_um("X"), without_um("Y"));
+    assert!(after_um < 0.6 * small_um, "{shrink:?}");
+    assert!(
+        small_um < 0.7 * large_um && large_um < before_um,
+        "{shrink:?}"
+    );
+    // Half of 6 um either way in one of two channels, what is left in the other.
+    let square = |um: f64| um * um;
+    let wanted_um = (0.5 * square(3.0) + square(after_um)).sqrt();
+    assert!(
+        (large_um - wanted_um).abs() < 0.1 * wanted_um,
+        "{large_um} {wanted_um}"
     );
 }

@@ -19,3 +19,18 @@ fn a_machine_without_a_gap_gets_no_name() {
     assert!(named.is_empty(), "{named:?}");
     assert!(flagged <= 2, "{flagged}");
 }
+
+#[test]
+fn what_circles_cannot_show_is_listed_with_what_it_needs() {
+    let report = diagnosed(&session(1100, Noise::default(), &|_| [0.0; 2])).report;
+    let needs = |id: &str| {
+        let own = report.not_excited.iter().find(|entry| entry.effect == id);
+        own.map(|entry| entry.needs.as_str())
+    };
+    assert_eq!(needs("probe_latency"), Some("touches at two feeds or more"));
+    for seen in ["backlash", "squareness", "servo_lag"] {
+        assert_eq!(needs(seen), None, "{seen}");
+    }
+    let all = report.not_excited.iter();
+    assert!(all.clone().all(|entry| !entry.needs.is_empty()));
+}
