@@ -12,6 +12,7 @@ use crate::config::GapConfig;
 use crate::error::GapError;
 use crate::experiment::Experiment;
 use crate::families::Slot;
+use crate::fewer::{FEWEST_STATIONS, fewer};
 use crate::figures::{Figures, Note};
 use crate::form_error::FormError;
 use crate::gap;
@@ -94,7 +95,7 @@ pub(crate) fn first_stack<R>(
 ) -> Result<R, GapError> {
     let kinds = considered(config)?;
     prepared(machine, session, session, config, |base, _| {
-        let split = split::split(session, config.hold_out);
+        let split = split::split(base.session, config.hold_out);
         let stack = base.stack(&split.fit, base.noise, &FormError::base(config));
         then(&stack, &kinds)
     })
@@ -110,6 +111,20 @@ fn prepared<R>(
 ) -> Result<R, GapError> {
     config.check()?;
     simulate::check(session)?;
+    let of = session.runs.len();
+    let own_noise = std::ptr::eq(session, quiet);
+    let chosen = fewer(session, config);
+    let session = chosen.as_ref().unwrap_or(session);
+    let chosen = if own_noise {
+        None
+    } else {
+        fewer(quiet, config)
+    };
+    let quiet = if own_noise {
+        session
+    } else {
+        chosen.as_ref().unwrap_or(quiet)
+    };
     let twin = Twin::new(machine)?;
     let residual = residuals(machine, &twin, session)?;
     let all = (0..session.runs.len()).collect::<Vec<_>>();
@@ -118,7 +133,7 @@ fn prepared<R>(
     if rows.len == 0 {
         return Err(GapError::NoReadings);
     }
-    let noise = if std::ptr::eq(session, quiet) {
+    let noise = if own_noise {
         noise_of(machine, session, stations, &residual, config)
     } else {
         simulate::check(quiet)?;
@@ -137,7 +152,15 @@ fn prepared<R>(
         residual: &residual,
         listed: listed(machine)?,
     };
-    Ok(then(&base, notes(&rows, &noise)))
+    let mut notes = notes(&rows, &noise);
+    if session.history.temperature_degc.is_empty() && !machine.temperature_sensors.is_empty() {
+        notes.push(Note::NoTemperatures);
+    }
+    if session.runs.len() < of {
+        let runs = session.runs.len();
+        notes.push(Note::FewerRuns { runs, of });
+    }
+    Ok(then(&base, notes))
 }
 
 /// Noise of the repeats of a session.
@@ -359,7 +382,9 @@ fn listed(machine: &MachineFile) -> Result<Vec<Box<dyn Effect>>, GapError> {
 /// Stations a circle or pass, fewer where the session would have too many rows.
 pub(crate) fn stations(session: &Session, runs: &[usize], config: &GapConfig) -> usize {
     let mut stations = config.stations;
-    while stations > 32 && Rows::new(session, runs, stations, |_| true).len > config.most_rows {
+    while stations > FEWEST_STATIONS
+        && Rows::new(session, runs, stations, |_| true).len > config.most_rows
+    {
         stations = stations * 3 / 4;
     }
     stations

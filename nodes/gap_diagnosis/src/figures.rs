@@ -131,6 +131,10 @@ pub enum Note {
     NoRepeats { channel: String },
     /// Readings were left out.
     Dropped { channel: String, readings: usize },
+    /// The machine has thermometers, and none was recorded.
+    NoTemperatures,
+    /// Of a recording with too many runs only some are diagnosed.
+    FewerRuns { runs: usize, of: usize },
     /// The noise of the repeats is not that of the session.
     NotReproduced {
         channel: String,
@@ -195,6 +199,13 @@ impl fmt::Display for Note {
                     "{channel}: {readings} readings left out as outliers or no numbers"
                 )
             }
+            Self::NoTemperatures => f.write_str(
+                "no thermometer was recorded: what goes with a temperature cannot be named, and what goes with time may be heat",
+            ),
+            Self::FewerRuns { runs, of } => write!(
+                f,
+                "{runs} of {of} runs are diagnosed, each condition's spread over the recording: all have too many readings"
+            ),
             Self::NotReproduced {
                 channel,
                 inflation,

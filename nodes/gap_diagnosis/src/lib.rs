@@ -35,6 +35,7 @@ mod diagnose;
 pub mod error;
 pub mod experiment;
 mod families;
+mod fewer;
 mod field;
 pub mod figures;
 pub mod following;
