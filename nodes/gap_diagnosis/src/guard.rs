@@ -3,7 +3,8 @@
 //! # Model
 //!
 //! What the effects found leave, as white as the noise within a run makes it, less the biggest model without a
-//! physics: every family of `families` and every smooth mode of every block, each with a size of its own.
+//! physics: every family of `families`, every smooth mode of every block, each with a size of its own, and lines over a
+//! position (`periods`) that take three tenths of the rest or more.
 //!
 //! ```text
 //!   s2 = median (z_i^2 / 0.4549  n / (n - k) + f_i) / (1 + f_i),   f_i = s_f^2 / s_w^2   (1)
@@ -41,6 +42,7 @@ use crate::figures::Note;
 use crate::form_error::{self, FormError};
 use crate::noise::Noise;
 use crate::nuisance::orthonormal;
+use crate::periods;
 use crate::repeats;
 use crate::rows::{Block, count};
 use crate::stack::Stack;
@@ -252,8 +254,41 @@ fn rough(
         });
         let used = take_out(&mut rest, &slot.rows, columns);
         *terms.entry(slot.key.clone()).or_default() += used;
+        *terms.entry(slot.key.clone()).or_default() +=
+            take_out_lines(stack, slot, &within, &mut rest);
     }
     (white, rest, terms)
+}
+
+/// Most lines of one channel and direction.
+const LINES: usize = 3;
+/// Share of what is left that a line takes which is no noise.
+const OF_LINE: f64 = 0.3;
+
+/// Takes lines over a position that are most of what is left out of it; how many terms they have.
+fn take_out_lines(stack: &Stack<'_>, slot: &Slot, within: &Whitener, rest: &mut [f64]) -> f64 {
+    let mut terms = 0.0;
+    for _ in 0..LINES {
+        let left = DVector::from_column_slice(rest);
+        let Some(line) = periods::strongest(stack, slot, &left, periods::Sought::Positions) else {
+            break;
+        };
+        let square: f64 = slot.rows.iter().map(|place| left[*place].powi(2)).sum();
+        if line.power < OF_LINE * square {
+            break;
+        }
+        let columns = line.waves(stack).map(|wave| {
+            let mut whole = vec![0.0; stack.rows.len];
+            for (place, value) in slot.rows.iter().zip(wave) {
+                whole[*place] = value;
+            }
+            within.apply(&mut whole);
+            DVector::from_iterator(slot.rows.len(), slot.rows.iter().map(|place| whole[*place]))
+        });
+        // And one for the period.
+        terms += 1.0 + take_out(rest, &slot.rows, columns.into_iter());
+    }
+    terms
 }
 
 /// Takes some columns over some rows out of the rest; how many there were.

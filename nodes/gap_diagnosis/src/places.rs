@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::description::fitted;
 use crate::families::Slot;
 use crate::figures::HeatMap;
 use crate::localise::Score;
@@ -9,7 +10,6 @@ use crate::report::{Condition, Place};
 use crate::rows::count;
 use crate::split::title;
 use crate::stack::Stack;
-use crate::unknown::fitted;
 
 /// Most places that are listed.
 const MOST: usize = 12;

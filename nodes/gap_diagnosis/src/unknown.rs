@@ -21,12 +21,12 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
 use crate::config::GapConfig;
-use crate::families::{Family, Parity, Slot};
+use crate::description::describe;
+use crate::families::Slot;
 use crate::localise::{self, Score, noise_maxima};
 use crate::noise::Noise;
-use crate::normal::Normal;
 use crate::report::{Description, Unknown};
-use crate::rows::{count, position, time_s};
+use crate::rows::count;
 use crate::stack::Stack;
 
 /// (1) of a leftover, and what it goes with.
@@ -124,7 +124,7 @@ pub fn unknown(
     let left = &stack.whitened(rest.to_vec());
     let floated = &stack.floated(rest.to_vec());
     let description = match leftover.families.first() {
-        Some(top) if flagged => describe(stack, slots, &leftover.families, top, left, floated),
+        Some(_) if flagged => describe(stack, slots, &leftover.families, left, floated),
         _ => Description::default(),
     };
     Unknown {
@@ -133,194 +133,4 @@ pub fn unknown(
         threshold: leftover.threshold,
         description,
     }
-}
-
-fn describe(
-    stack: &Stack<'_>,
-    slots: &[Slot],
-    scores: &[Score],
-    top: &Score,
-    left: &DVector<f64>,
-    floated: &[f64],
-) -> Description {
-    let slot = &slots[top.slot];
-    let family = &slot.families[top.family];
-    let told = fitted(slot, family, floated);
-    Description {
-        covariate: family.covariate.clone(),
-        parity: parity(slots, scores).to_owned(),
-        period: period(stack, slot, left),
-        feed_exponent: feed_exponent(stack, slot, &told),
-        time_constant_s: (family.covariate == "time")
-            .then(|| time_constant_s(stack, slot, floated))
-            .flatten(),
-    }
-}
-
-/// The parity whose families explain more beyond noise: of shares nothing can be said where the noise is taken with
-/// caution, and two families of one parity may share all of it.
-fn parity(slots: &[Slot], scores: &[Score]) -> &'static str {
-    let best = |wanted: Parity| {
-        let family = |score: &Score| &slots[score.slot].families[score.family];
-        let own = scores.iter().filter(|score| family(score).parity == wanted);
-        own.map(|score| score.square - count(family(score).columns.len()))
-            .fold(0.0, f64::max)
-    };
-    let (odd, even) = (best(Parity::Odd), best(Parity::Even));
-    if odd > 1.5 * even {
-        "odd"
-    } else if even > 1.5 * odd {
-        "even"
-    } else {
-        ""
-    }
-}
-
-/// A family's share of a stack, by plain least squares over the slot's rows.
-pub fn fitted(slot: &Slot, family: &Family, floated: &[f64]) -> Vec<f64> {
-    let y = DVector::from_iterator(
-        slot.rows.len(),
-        slot.rows.iter().map(|place| floated[*place]),
-    );
-    let normal = Normal::new(&family.plain, &y);
-    let sizes = normal
-        .solve(&(0..family.plain.ncols()).collect::<Vec<_>>())
-        .sizes;
-    (&family.plain * DVector::from_vec(sizes))
-        .iter()
-        .copied()
-        .collect()
-}
-
-/// Exponent of the growth of a share with feed, where there are two feeds.
-fn feed_exponent(stack: &Stack<'_>, slot: &Slot, told: &[f64]) -> Option<f64> {
-    let mut by_feed = BTreeMap::<u64, (f64, f64, f64)>::new();
-    let mut first = 0;
-    for index in &slot.blocks {
-        let block = &stack.rows.blocks[*index];
-        let feed = stack.session.runs[block.run].segment.feed_mm_s;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a label"
-        )]
-        let label = (feed.abs() * 100.0) as u64;
-        let sum = by_feed.entry(label).or_insert((feed, 0.0, 0.0));
-        sum.1 += told[first..first + block.rows.len()]
-            .iter()
-            .map(|v| v * v)
-            .sum::<f64>();
-        sum.2 += count(block.rows.len());
-        first += block.rows.len();
-    }
-    let points: Vec<(f64, f64)> = by_feed
-        .into_values()
-        .filter(|(feed, square, _)| *feed > 0.0 && *square > 0.0)
-        .map(|(feed, square, n)| (feed.ln(), 0.5 * (square / n).ln()))
-        .collect();
-    let n = count(points.len());
-    let mean = |f: fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>() / n;
-    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-    let square: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
-    let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / square;
-    (points.len() > 1 && square > 0.03).then_some(slope)
-}
-
-/// Dominant period in position or time, where its line stands out of the leftover.
-fn period(stack: &Stack<'_>, slot: &Slot, left: &DVector<f64>) -> String {
-    let mut best = (0.0, String::new());
-    let candidates = (0..160).map(|k| 0.5 * 1.035_f64.powi(k));
-    let periods: Vec<f64> = candidates.collect();
-    let samples: Vec<_> = slot
-        .blocks
-        .iter()
-        .flat_map(|index| {
-            let block = &stack.rows.blocks[*index];
-            let run = &stack.session.runs[block.run];
-            block
-                .rows
-                .iter()
-                .zip(block.range())
-                .map(move |(row, place)| (run, row, place))
-        })
-        .collect();
-    let axes = stack.twin.machine().axis_set();
-    for axis in axes.iter().filter(|axis| axis.is_linear()) {
-        let at: Vec<f64> = samples
-            .iter()
-            .map(|(run, row, _)| position(run, row, axis))
-            .collect();
-        line(
-            &periods,
-            &at,
-            &samples,
-            left,
-            &format!("mm of {axis}"),
-            &mut best,
-        );
-    }
-    let at: Vec<f64> = samples
-        .iter()
-        .map(|(run, row, _)| time_s(run, row))
-        .collect();
-    let seconds: Vec<f64> = periods.iter().map(|p| p * 0.04).collect();
-    line(&seconds, &at, &samples, left, "s", &mut best);
-    best.1
-}
-
-type Place<'s> = (&'s machine::twin::Run, &'s crate::rows::Row, usize);
-
-/// Strongest line over some periods, kept where it beats the best.
-fn line(
-    periods: &[f64],
-    at: &[f64],
-    samples: &[Place<'_>],
-    left: &DVector<f64>,
-    unit: &str,
-    best: &mut (f64, String),
-) {
-    let extent = at.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-        - at.iter().copied().fold(f64::INFINITY, f64::min);
-    for period in periods.iter().filter(|period| 3.0 * **period < extent) {
-        let turn = std::f64::consts::TAU / period;
-        let (mut c, mut s) = (0.0, 0.0);
-        for (at, (.., place)) in at.iter().zip(samples) {
-            let (sin, cos) = (at * turn).sin_cos();
-            c += left[*place] * cos;
-            s += left[*place] * sin;
-        }
-        let power = (c * c + s * s) / (0.5 * count(at.len()).max(1.0));
-        if power > best.0.max(60.0) {
-            *best = (power, format!("{period:.3} {unit}"));
-        }
-    }
-}
-
-/// Time constant of an exponential rise through the session.
-fn time_constant_s(stack: &Stack<'_>, slot: &Slot, floated: &[f64]) -> Option<f64> {
-    let mut times = Vec::new();
-    for index in &slot.blocks {
-        let block = &stack.rows.blocks[*index];
-        let run = &stack.session.runs[block.run];
-        times.extend(block.rows.iter().map(|row| time_s(run, row)));
-    }
-    let last = times.iter().copied().fold(0.0, f64::max);
-    let y = DVector::from_iterator(
-        slot.rows.len(),
-        slot.rows.iter().map(|place| floated[*place]),
-    );
-    let gain = |tau: f64| {
-        let columns = DMatrix::from_fn(times.len(), 2, |row, k| {
-            if k == 0 {
-                1.0
-            } else {
-                (-times[row] / tau).exp()
-            }
-        });
-        Normal::new(&columns, &y).solve(&[0, 1]).gain
-    };
-    let candidates: Vec<f64> = (0..40).map(|k| last * 0.01 * 1.17_f64.powi(k)).collect();
-    candidates
-        .into_iter()
-        .max_by(|a, b| gain(*a).total_cmp(&gain(*b)))
 }

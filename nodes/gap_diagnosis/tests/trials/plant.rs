@@ -23,6 +23,8 @@ pub struct State {
     pub velocity: [f64; 2],
     /// Way since the axis turned, mm.
     pub way: [f64; 2],
+    /// Time of the session, s.
+    pub time_s: f64,
 }
 
 /// What is wrong: u and v in mm at a state.
@@ -158,6 +160,7 @@ fn circle(
             position: [radius * a.cos(), radius * a.sin()],
             velocity: [-radius * omega * a.sin(), radius * omega * a.cos()],
             way: way(radius, a, omega),
+            time_s: start_s + tick as f64 * TICK_S,
         };
         let truth = wrong(&state);
         let lag = following(&state, omega);
