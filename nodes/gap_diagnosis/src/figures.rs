@@ -186,6 +186,16 @@ fn worse_noise(
     )
 }
 
+const NO_TEMPERATURES: &str = "no thermometer was recorded: what goes with a temperature cannot be named, and what goes \
+    with time may be heat";
+
+fn fewer_runs(f: &mut fmt::Formatter<'_>, runs: usize, of: usize) -> fmt::Result {
+    write!(
+        f,
+        "{runs} of {of} runs are diagnosed, each condition's spread over the recording: all have too many readings"
+    )
+}
+
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -199,13 +209,8 @@ impl fmt::Display for Note {
                     "{channel}: {readings} readings left out as outliers or no numbers"
                 )
             }
-            Self::NoTemperatures => f.write_str(
-                "no thermometer was recorded: what goes with a temperature cannot be named, and what goes with time may be heat",
-            ),
-            Self::FewerRuns { runs, of } => write!(
-                f,
-                "{runs} of {of} runs are diagnosed, each condition's spread over the recording: all have too many readings"
-            ),
+            Self::NoTemperatures => f.write_str(NO_TEMPERATURES),
+            Self::FewerRuns { runs, of } => fewer_runs(f, *runs, *of),
             Self::NotReproduced {
                 channel,
                 inflation,

@@ -24,7 +24,7 @@ fn program() -> Vec<Circle> {
         [
             (50.0, 2000.0, true, repeat),
             (50.0, 2000.0, false, repeat),
-            (other, feed, repeat % 2 == 0, repeat / 3),
+            (other, feed, repeat.is_multiple_of(2), repeat / 3),
         ]
     };
     (0..9).flat_map(of).collect()
