@@ -6,4 +6,5 @@ mod drift;
 mod file;
 mod pose;
 mod rig;
+mod scatter;
 mod touch;

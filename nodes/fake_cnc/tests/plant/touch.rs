@@ -9,15 +9,15 @@ use metrology::{Axis, PerAxis};
 use crate::rig::{Command, PERIOD, PERIOD_S, Servo, machine, perfect, truth};
 
 /// What a touch showed.
-struct Touch {
-    edges: Vec<(Span, ProbeEdge)>,
+pub struct Touch {
+    pub edges: Vec<(Span, ProbeEdge)>,
     contacts: Vec<TrueContact>,
     /// True position of the ball's centre at the closing contact, mm.
     ball_at_contact: Option<nalgebra::Vector3<f64>>,
 }
 
 /// Moves from `from` by `way_mm` along `axis` at `feed_mm_s` (sign with it), and back when `returns`.
-fn touch(
+pub fn touch(
     plant: &mut Plant,
     from: &PerAxis<f64>,
     axis: Axis,
@@ -71,7 +71,7 @@ fn touch(
 }
 
 /// Ball in front of the X face of the first block, whose corner is at (-220, -180, 20).
-fn before_x_face() -> PerAxis<f64> {
+pub fn before_x_face() -> PerAxis<f64> {
     PerAxis([-224.0, -174.0, 14.0, 0.0, 0.0, 0.0])
 }
 

@@ -26,8 +26,8 @@
 //! `val_a_first_order_loop_shrinks_circles_as_its_frequency_response_says`: below 0.001 µm of 4 µm.
 //!
 //! # References
-//! \[1\] Y. Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 5 (contour errors of feed
-//! drives; from memory).
+//! \[1\] Y. Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 6 (design and analysis of CNC systems:
+//! feed drives).
 
 use metrology::Axis;
 

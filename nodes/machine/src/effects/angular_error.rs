@@ -22,8 +22,8 @@
 //! # Agreement
 //! `val_a_table_turned_by_a_rotation_matrix`: 3e-4 µm. `val_the_abbe_offset_makes_the_error`.
 //!
-//! # References (from memory)
-//! \[1\] ISO 230-1:2012, 3.4. \[2\] J. B. Bryan, Precision Engineering 1(3), 1979,
+//! # References
+//! \[1\] ISO 230-1:2012, clause 3.4 (error motions of a linear axis). \[2\] J. B. Bryan, Precision Engineering 1(3), 1979,
 //! doi:10.1016/0141-6359(79)90037-0 (the Abbe principle).
 
 use metrology::ErrorComponent;

@@ -48,8 +48,8 @@
 //! `val_the_wider_form_takes_presliding_friction`: of 4.7 µm a step leaves 2.2, with hats 0.43.
 //! `val_the_wider_form_takes_soft_corners`: of 1.79 µm a step leaves 1.36, with soft corners 0.02.
 //!
-//! # References (from memory)
-//! \[1\] ISO 230-2:2014, 2.10 (reversal error). \[2\] A. Visintin, Differential Models of Hysteresis,
+//! # References
+//! \[1\] ISO 230-2:2014, clause 3 (reversal error). \[2\] A. Visintin, Differential Models of Hysteresis,
 //! Springer 1994, ch. III (play operator).
 
 use std::collections::BTreeSet;

@@ -16,6 +16,8 @@
 //! Stamps of machine and instrument are otherwise on one clock. (1) is exact on the recorded command between
 //! ticks; what the control loop leaves moves with it and is not shifted again.
 //!
+//! No wider form: an offset is one number, and what grows with time is `clock_drift`.
+//!
 //! # Agreement
 //! `val_clock_offset_circle`: 2 ms on a circle of 50 mm at 3 m/min, the circle's own equation shifted, to
 //! 1e-8 µm of 100.

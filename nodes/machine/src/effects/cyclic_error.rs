@@ -25,8 +25,8 @@
 //! # Agreement
 //! `val_a_cross_joint_at_an_angle`: 4e-4 µm of 1.09 µm for a joint at 3 degrees.
 //!
-//! # References (from memory)
-//! \[1\] ISO 230-2:2014, 5.3 (target positions that do not repeat with the period of the screw).
+//! # References
+//! \[1\] ISO 230-2:2014, annex C (periodic positioning error).
 
 use std::f64::consts::TAU;
 

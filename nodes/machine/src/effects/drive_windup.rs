@@ -25,7 +25,8 @@
 //! `val_a_spring_that_drags_its_mass_through_friction`: below 1e-5 µm of 5.56 once it is steady.
 //!
 //! # References
-//! \[1\] Y. Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 5 (from memory).
+//! \[1\] Y. Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 6 (design and analysis of CNC systems:
+//! feed drives).
 
 use metrology::Axis;
 

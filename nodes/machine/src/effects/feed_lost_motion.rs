@@ -23,7 +23,7 @@
 //! # Agreement
 //! `val_a_drive_with_stribeck_friction`: below 1e-10 µm once a drive of second order is steady, at five feeds.
 //!
-//! # References (from memory)
+//! # References
 //! \[1\] B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30(7), 1994,
 //! doi:10.1016/0005-1098(94)90209-7 (friction models, section 2).
 

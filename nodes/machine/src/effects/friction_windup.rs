@@ -21,10 +21,13 @@
 //! The motor's encoder closes the loop; the screw is fixed at one end. `backlash` is the same everywhere on the travel, this
 //! is not: no value of b makes it so.
 //!
+//! No wider form: the stretch of a uniform screw is a straight line from its bearing (Hooke), and the bearing's place and the
+//! way in which the friction turns round are its shapes. What is alike all over the travel has its hats in `backlash`.
+//!
 //! # Agreement
 //! `val_hooke_s_law_of_a_screw`: below 1e-6 µm, at three places.
 //!
-//! # References (from memory)
+//! # References
 //! \[1\] ISO 230-2:2014, clause 3 (reversal value along the axis). \[2\] ISO 3408-4:2006 (axial rigidity of
 //! ball screws).
 

@@ -25,7 +25,7 @@
 //! `val_a_cantilever_integrated`: the powers 3 and 4 are those of a curvature integrated twice.
 //!
 //! # References
-//! \[1\] S. P. Timoshenko, Strength of Materials, part I (deflection of cantilevers; from memory).
+//! \[1\] S. P. Timoshenko, Strength of Materials, part I (deflection of beams: cantilevers).
 
 use metrology::ErrorComponent;
 

@@ -17,11 +17,14 @@
 //! # Holds when
 //! The slide is short against the bow. A straightness and an angular error whose sizes agree so are this.
 //!
+//! No wider form: a bow is known by the one number that sagitta and tilt share. A deviation of any form is `straightness`, a
+//! tilt of any form `angular_error`.
+//!
 //! # Agreement
 //! `val_a_slide_on_an_arc`: 1.3e-4 µm of 8 µm against the rigid motion along an arc.
 //!
-//! # References (from memory)
-//! \[1\] ISO 230-1:2012, 3.4.
+//! # References
+//! \[1\] ISO 230-1:2012, clause 3.4 (straightness and angular error motions of a linear axis).
 
 use metrology::{Axis, ErrorComponent};
 

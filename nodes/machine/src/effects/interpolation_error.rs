@@ -20,7 +20,7 @@
 //! # Agreement
 //! `val_the_arctangent_of_two_unequal_signals`: 3 % of the error, for 2 % of offset and 3 % of inequality.
 //!
-//! # References (from memory)
+//! # References
 //! \[1\] P. L. M. Heydemann, Applied Optics 20(19), 1981, doi:10.1364/AO.20.003382 (errors of quadrature
 //! signals).
 

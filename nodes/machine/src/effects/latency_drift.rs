@@ -20,7 +20,13 @@
 //! The link changes its mode once; two modes in no order are `latency_modes`.
 //!
 //! # Agreement
-//! `val_latency_drift_from_two_calibrations`: two-feed calibrations before and after give T and T + dT.
+//! `val_latency_drift_of_a_link_whose_clock_runs_off`: of a probe whose clock runs off by 1e-6 of the receiver's and is set
+//! once, counted by the microsecond, to that microsecond.
+//!
+//! # References
+//! \[1\] A. V. Ling, N. D. Wilkin, Fast probing considerations for on-machine inspection of parts, NISTIR 1999 (error in
+//! proportion to feed and timing of the trigger). \[2\] WO 2004/057552 A1 (a probe's radio link, whose stations
+//! synchronise their clocks).
 
 use super::coolant::EVENT_GRID_MIN;
 use super::{Effect, Kind, Moment, Parameter, Scene, Targets};

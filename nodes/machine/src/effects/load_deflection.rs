@@ -26,8 +26,8 @@
 //! 4 µm; what is left is (w/w0)2.
 //!
 //! # References
-//! \[1\] Y. Altintas et al., Machine tool feed drives, CIRP Annals 60(2), 2011, 779-796 (compliance of the
-//! structure under inertia; from memory).
+//! \[1\] Y. Altintas, A. Verl, C. Brecher, L. Uriarte, G. Pritschow, Machine tool feed drives, CIRP Annals 60(2), 2011,
+//! 779-796.
 
 use metrology::Axis;
 

@@ -22,7 +22,7 @@
 //! `val_a_screw_of_drifting_lead`: of 1.44 µm with a bump 0.1 m long, (1) leaves 0.44, splines at the
 //! eighths 0.065, at the sixteenths 0.003.
 //!
-//! # References (from memory)
+//! # References
 //! \[1\] ISO 230-2:2014, clause 3 (positioning deviations). \[2\] ISO 3408-3:2006 (travel deviation of
 //! ball screws).
 

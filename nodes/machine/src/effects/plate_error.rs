@@ -26,7 +26,8 @@
 //! machine's with the same.
 //!
 //! # References
-//! \[1\] ISO 230-1:2012, annex on self-calibration of two-dimensional grids by placing them anew (from memory).
+//! \[1\] C. J. Evans, R. J. Hocken, W. T. Estler, Self-calibration: reversal, redundancy, error separation, and "absolute
+//! testing", CIRP Annals 45(2), 1996, 617-634.
 
 use metrology::sample::TestPlane;
 use nalgebra::Vector3;

@@ -24,8 +24,8 @@
 //! `val_probe_latency_two_feeds`: the two-feed rule |Pa - Pb| / |fa - fb| gives T back to 1e-12 s.
 //!
 //! # References
-//! \[1\] A. J. Ling, N. D. Wilkin, Fast probing considerations, NIST 1999 (error in proportion to feed; from
-//! memory).
+//! \[1\] A. V. Ling, N. D. Wilkin, Fast probing considerations for on-machine inspection of parts, NISTIR 1999 (error in
+//! proportion to feed).
 
 use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
 use crate::twin::Response;

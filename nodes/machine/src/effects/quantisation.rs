@@ -14,6 +14,8 @@
 //! Readings move over many steps, so that the rounding is spread evenly; a still reading is rounded to one
 //! and the same step. Linear channels only.
 //!
+//! No wider form: a step is one number, and rounding is spread over it evenly.
+//!
 //! # Agreement
 //! `val_quantisation_ramp`: a ramp over 1000 steps, rounded, scatters by (1) to 0.1 %.
 //!

@@ -34,7 +34,7 @@
 //! `val_lugre_friction_under_a_cascaded_loop`: of a LuGre drive under position and velocity loops, at two feeds
 //! and radii with one height, (2) leaves 26 % of the rms, (3) 16 %.
 //!
-//! # References (from memory)
+//! # References
 //! \[1\] C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, IEEE Trans. Autom. Control 40(3),
 //! 1995, doi:10.1109/9.376053 (the friction of the test).
 

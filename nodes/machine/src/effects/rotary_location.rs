@@ -15,11 +15,14 @@
 //! # Holds when
 //! Angles are small. What changes while the axis turns is `rotary_motion`.
 //!
+//! No wider form: a location is one number for each direction, and what changes over a turn is `rotary_motion`.
+//!
 //! # Agreement
 //! `val_a_table_that_turns_about_another_line`: against rotation matrices 1e-13 µm for 20 µm, 1e-4 µm for 20 µrad.
 //!
-//! # References (from memory)
-//! \[1\] ISO 230-7:2015, clause 3; ISO 230-1:2012, 3.6.
+//! # References
+//! \[1\] ISO 230-7:2015, clause 3 (axis average line). \[2\] ISO 230-1:2012, clause 3 (position and orientation errors of
+//! an axis of rotation).
 
 use metrology::ErrorComponent;
 

@@ -18,8 +18,8 @@
 //! # Agreement
 //! `val_an_eccentric_scale_ring`: 3e-4 µm of 9.4 µm against the geometry of a graduated ring.
 //!
-//! # References (from memory)
-//! \[1\] ISO 230-7:2015, clause 3.
+//! # References
+//! \[1\] ISO 230-7:2015, clause 3 (error motions of an axis of rotation).
 
 use metrology::ErrorComponent;
 

@@ -21,8 +21,8 @@
 //! # Agreement
 //! `val_steel_off_the_reference_temperature_of_iso_1`: 34.5 µm for 300 mm of steel at 30 degC.
 //!
-//! # References (from memory)
-//! \[1\] ISO 230-2:2014, clause 3; ISO 1:2016 (20 degC).
+//! # References
+//! \[1\] ISO 230-2:2014, clause 3 (positioning deviations). \[2\] ISO 1:2022 (reference temperature of 20 °C).
 
 use metrology::Axis;
 

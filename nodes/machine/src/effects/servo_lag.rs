@@ -30,7 +30,7 @@
 //! `val_a_loop_that_lacks_feed_forward`: (1) leaves 1.2 µm at 360 mm/s², (2) below 1e-4 µm.
 //!
 //! # References
-//! \[1\] ISO 230-4:2022, annex B (following errors on circular paths; from memory).
+//! \[1\] ISO 230-4:2022, annex B (what typical errors of a machine do to circular paths).
 
 use metrology::Axis;
 

@@ -16,11 +16,14 @@
 //! # Holds when
 //! Both axes are straight: what bends is `straightness`.
 //!
+//! No wider form: an angle between two lines is one number. What bends is `straightness`, what changes with the arm
+//! `angular_error`.
+//!
 //! # Agreement
 //! `val_axes_turned_by_rotation_matrices`: the second order, 7e-5 µm. `val_a_circle_becomes_an_ellipse_at_45_degrees`.
 //!
-//! # References (from memory)
-//! \[1\] ISO 230-1:2012, 3.6.
+//! # References
+//! \[1\] ISO 230-1:2012, clause 3 (squareness error between axes of linear motion).
 
 use metrology::{Axis, ErrorComponent};
 

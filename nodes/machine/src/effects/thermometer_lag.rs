@@ -9,17 +9,28 @@
 //!   T_m - T = -tau dT_m/dt                                                (2)
 //! ```
 //!
-//! (2) needs only the reading itself, so that the lag is an amplitude.
+//! (2) needs only the reading itself, so that the lag is an amplitude. The wider form has the next order: an element in
+//! a sheath, each with a time constant of its own, whose sum is tau and whose product is q:
+//!
+//! ```text
+//!   T_m - T = -tau dT_m/dt - q d2T_m/dt2                                  (3)
+//! ```
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | tau | `lag_s` | s |
+//! | q | `free_square_s2` | s2 |
 //!
 //! # Holds when
 //! The spacing of the history is short against the changes of temperature. Self-heating is `thermometer_offset`.
 //!
 //! # Agreement
+//! `val_thermometer_lag_of_an_element_in_a_sheath`: of 70 and 20 s, (3) to 2e-3 K.
 //! `val_thermometer_lag_ramp_and_step`: (1) integrated finely for a ramp and an exponential rise, to 3e-5 K of 0.6.
+//!
+//! # References
+//! \[1\] IEC 60751:2008, 6.5.2 (thermal response time). \[2\] F. P. Incropera, D. P. DeWitt, Fundamentals of heat and mass
+//! transfer, chapter 5 (lumped capacitance).
 
 use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
 use crate::twin::{Channel, Response};
@@ -30,13 +41,14 @@ pub static KIND: Kind = Kind {
     title: "lag of a thermometer",
     targets: Targets::Thermometers,
     parameters: &[Parameter::size("lag_s", 600.0, 60.0)],
-    free: &[],
+    free: &[Parameter::amplitude("free_square_s2", 90_000.0, 900.0)],
     moment: Moment::Mean,
     needs: "a temperature that changes and another one to compare it with",
     build: |target, values| {
         Box::new(ThermometerLag {
             sensor: target.thermometer(),
             lag_s: values[0],
+            square_s2: values[1],
         })
     },
 };
@@ -44,6 +56,7 @@ pub static KIND: Kind = Kind {
 struct ThermometerLag {
     sensor: String,
     lag_s: f64,
+    square_s2: f64,
 }
 
 impl Effect for ThermometerLag {
@@ -60,7 +73,9 @@ impl Effect for ThermometerLag {
             if let Some(at_s) = scene.run.time_of(reading) {
                 let at = |t_s: f64| scene.history.at(&reading_k, t_s);
                 let slope = (at(at_s + 0.5 * step_s) - at(at_s - 0.5 * step_s)) / step_s;
-                *sum -= self.lag_s * slope; // (2)
+                let ends = at(at_s + step_s) + at(at_s - step_s);
+                let bend = (ends - 2.0 * at(at_s)) / step_s.powi(2);
+                *sum -= self.lag_s * slope + self.square_s2 * bend; // (2), (3)
             }
         }
     }

@@ -18,11 +18,11 @@
 //! The sensor settled. A current that warms it is part of o.
 //!
 //! # Agreement
-//! `val_thermometer_offset_pt100_class_b`: the limits 0.30 K + 0.005 |t| of IEC 60751 at 0 and 60 °C are met by
-//! an offset and a slope.
+//! `val_thermometer_offset_pt100_read_with_its_leads`: a resistor at the limit of class B, and one with leads of 0.2 ohm, by
+//! the equation of IEC 60751 from 10 to 40 °C: of 0.34 and 0.53 K 1e-4 is left.
 //!
 //! # References
-//! \[1\] IEC 60751:2022, tolerance class B.
+//! \[1\] IEC 60751:2008, 4.1 (resistance by temperature), 5.1 (tolerance classes: 0.30 K + 0.005 |t| of class B).
 
 use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
 use crate::twin::{Channel, Response};

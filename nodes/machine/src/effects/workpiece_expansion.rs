@@ -23,11 +23,12 @@
 //! point that does not move is near the machine's origin; another one is an offset of the set-up.
 //!
 //! # Agreement
-//! `val_workpiece_expansion_gauge_block`: aluminium against steel scales at 25 °C over 300 mm, by hand.
+//! `val_workpiece_expansion_npl_steel_rod`: the worked example \[3\], 500.035 mm at 23.7 °C and 500.013 mm at 20 °C, to its
+//! last digit.
 //!
 //! # References
-//! \[1\] ISO 1:2022 (reference temperature of 20 degC). \[2\] ISO/TR 16015:2003 (nominal differential
-//! expansion).
+//! \[1\] ISO 1:2022 (reference temperature of 20 °C). \[2\] ISO/TR 16015:2003 (nominal differential expansion).
+//! \[3\] National Physical Laboratory, How do I correct lengths to 20 °C? (worked example of a steel rod).
 
 use metrology::Axis;
 

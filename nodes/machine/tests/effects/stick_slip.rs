@@ -46,6 +46,27 @@ fn val_a_block_dragged_by_a_spring() {
 }
 
 #[test]
+fn val_a_block_whose_friction_does_not_know_the_feed() {
+    let machine = three_axes("[w X' Y' b Z t]");
+    let (stick_um, slide_um) = (12.0, 7.0);
+    let given = [
+        ("height_um", 0.0),
+        ("critical_mm_s", 0.2),
+        ("free_even_um", 2.0 * (stick_um - slide_um)),
+    ];
+    for feed_um_s in [40.0, 160.0] {
+        let wanted = variance_um2(500.0, stick_um, slide_um, feed_um_s);
+        let run = run(100, AxisSet::XYZ, |t| {
+            [feed_um_s * 1e-3 * t, 0.0, 0.0, 0.0, 0.0, 0.0]
+        });
+        let response = response_of(&machine, &run, "stick_slip", "X", &given);
+        let found = response.tip_variance_mm2[0][50] * 1e6;
+        println!("{feed_um_s} um/s: {found:.3} um2, block {wanted:.3} um2");
+        assert!((found / wanted - 1.0).abs() < 0.1, "{found} {wanted}");
+    }
+}
+
+#[test]
 fn eq1_an_axis_that_stands_or_runs_fast_does_not_stick() {
     let machine = three_axes("[w X' Y' b Z t]");
     let run = run(100, AxisSet::XYZ, |t| {

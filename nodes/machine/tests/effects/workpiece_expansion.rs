@@ -7,8 +7,24 @@ use crate::scene::bench;
 
 const ID: (&str, &str) = ("workpiece_expansion", "");
 
+/// The worked example of the National Physical Laboratory: a steel rod (11.7e-6 / K) that is measured at 23.7 degC to be
+/// 500.035 mm long has 500.013 mm at 20 degC. It is measured along a scale that does not grow.
 #[test]
-fn val_workpiece_expansion_gauge_block() {
+fn val_workpiece_expansion_npl_steel_rod() {
+    let run = touching(vec![
+        touch(100.0, [-250.0, 0.0, 0.0], Vector3::x(), 2.0),
+        touch(200.0, [250.0, 0.0, 0.0], -Vector3::x(), 2.0),
+    ]);
+    let history = warm(10.0, 60, "air", &|_| 23.7);
+    let given = [("difference_um_per_m_k", 11.7), ("lag_min", 20.0)];
+    let travel = predict(&bench(), &history, &run, ID, &given);
+    let at_20_degc_mm = 500.035 + travel[0] + travel[1];
+    println!("rod: {at_20_degc_mm:.6} mm");
+    assert!((at_20_degc_mm - 500.013).abs() < 5e-4, "{at_20_degc_mm}");
+}
+
+#[test]
+fn eq2_workpiece_expansion_of_aluminium() {
     let machine = bench();
     // 300 mm of aluminium (23.1e-6 / K) against steel scales (11.5e-6 / K), 5 K too warm: 17.4 um too long.
     let run = touching(vec![
