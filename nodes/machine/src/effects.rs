@@ -55,6 +55,7 @@ pub mod straightness;
 pub mod structural_ringing;
 pub mod stylus_jump;
 pub mod thermometer_lag;
+pub mod thermometer_noise;
 pub mod thermometer_offset;
 pub mod vibration_random;
 pub mod workpiece_expansion;
@@ -113,6 +114,7 @@ pub static CATALOGUE: &[&Kind] = &[
     &structural_ringing::KIND,
     &stylus_jump::KIND,
     &thermometer_lag::KIND,
+    &thermometer_noise::KIND,
     &thermometer_offset::KIND,
     &vibration_random::KIND,
     &workpiece_expansion::KIND,

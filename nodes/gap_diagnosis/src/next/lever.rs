@@ -33,7 +33,7 @@ const LEVERS: [(&[&str], &str); 7] = [
         "a thermometer on the part in question, or heating it alone",
     ),
     (
-        &["thermometer_lag", "thermometer_offset"],
+        &["thermometer_lag", "thermometer_offset", "thermometer_noise"],
         "a second thermometer beside it",
     ),
     (

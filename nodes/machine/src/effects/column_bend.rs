@@ -47,7 +47,12 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("y_um_per_k", 100.0, 5.0),
         Parameter::amplitude("z_um_per_k", 100.0, 5.0),
         Parameter::amplitude("tilt_x_urad_per_k", 100.0, 8.0),
-        Parameter::shape("lag_min", [1.0, 480.0], 60.0, &[5.0, 20.0, 60.0, 180.0]),
+        Parameter::shape(
+            "lag_min",
+            [1.0, 480.0],
+            60.0,
+            &[5.0, 20.0, 60.0, 180.0, 360.0],
+        ),
     ],
     free: &[
         Parameter::amplitude("free_x_um_per_k", 100.0, 2.0),

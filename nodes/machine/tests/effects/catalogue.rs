@@ -101,6 +101,27 @@ fn every_effect_has_a_wider_form_or_the_reason_why_none() {
 }
 
 #[test]
+fn the_table_of_known_effects_has_every_file() {
+    let readme = include_str!("../../README.md");
+    let section = readme.split("### The effects of the literature").nth(1);
+    let table = section.and_then(|text| text.split("\n## ").next()).unwrap();
+    let cells: Vec<_> = table
+        .lines()
+        .filter_map(|row| row.split('|').nth(2))
+        .collect();
+    for kind in CATALOGUE {
+        let name = format!("`{}`", kind.id);
+        assert!(cells.iter().any(|cell| cell.contains(&name)), "{name}");
+    }
+    let named = cells
+        .iter()
+        .flat_map(|cell| cell.split('`').skip(1).step_by(2));
+    for name in named {
+        assert!(effects::kind(name).is_some(), "{name}");
+    }
+}
+
+#[test]
 fn every_effect_is_described() {
     for kind in CATALOGUE {
         let id = kind.id;

@@ -54,6 +54,7 @@ mod straightness;
 mod structural_ringing;
 mod stylus_jump;
 mod thermometer_lag;
+mod thermometer_noise;
 mod thermometer_offset;
 mod vibration_random;
 mod workpiece_expansion;

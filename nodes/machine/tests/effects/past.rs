@@ -135,9 +135,19 @@ pub fn scatter(
     (id, on): (&str, &str),
     given: &[(&str, f64)],
 ) -> Vec<f64> {
+    scatter_after(machine, &History::default(), run, (id, on), given)
+}
+
+/// The same after a past.
+pub fn scatter_after(
+    machine: &MachineFile,
+    history: &History,
+    run: &Run,
+    (id, on): (&str, &str),
+    given: &[(&str, f64)],
+) -> Vec<f64> {
     let effect = effect(machine, id, on, given);
-    let history = History::default();
-    with(machine, &history, run, effect.as_ref(), Twin::variance)
+    with(machine, history, run, effect.as_ref(), Twin::variance)
 }
 
 fn with<'a>(
