@@ -342,7 +342,7 @@ fn value(parameter: &Parameter, estimate: &Estimate, place: usize) -> ParameterV
         low,
         high,
         at_bound: estimate.at_bound[place],
-        determined: high - low < WHOLE_RANGE * (parameter.high - parameter.low),
+        determined: Some(high - low < WHOLE_RANGE * (parameter.high - parameter.low)),
     }
 }
 

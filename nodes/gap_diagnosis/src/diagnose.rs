@@ -421,7 +421,7 @@ fn noise_floor(
         channel: channel.to_string(),
         sigma_um: 1e3 * noise.reading_sigma_mm,
         ar: noise.within.coefficients[noise.within.order()].clone(),
-        between_runs_um: 1e3 * noise.between.total_mm(),
+        between_runs_um: Some(1e3 * noise.between.total_mm()),
         repeats: noise.repeats,
         reproduced: guard::reproduces(channel, inflation, config),
     };

@@ -1,6 +1,9 @@
 //! The diagnosis as one object: what `abbe diagnose --json` writes and the node publishes.
 //!
 //! Lengths are µm, as people read them. A number that does not exist is absent (`null`), never zero.
+//!
+//! The form is fixed: a key more would break who reads it by its schema. What the pages tell beside it is kept in the type
+//! and not written; `None` there is a report that was read.
 
 use serde::{Deserialize, Serialize};
 
@@ -69,8 +72,9 @@ pub struct NoiseFloor {
     pub sigma_um: f64,
     /// Coefficients of the autoregression within a run.
     pub ar: Vec<f64>,
-    /// Standard deviation of the smooth deviation between runs, µm.
-    pub between_runs_um: f64,
+    /// Standard deviation of the smooth deviation between runs, µm; for pages, no part of the form.
+    #[serde(default, skip_serializing)]
+    pub between_runs_um: Option<f64>,
     /// Runs that were repeats.
     pub repeats: usize,
     /// Whether the residual's own scatter agrees with what the repeats show.
@@ -190,8 +194,9 @@ pub struct ParameterValue {
     pub high: f64,
     /// Whether it rails at its physical bound.
     pub at_bound: bool,
-    /// Whether the recording tells more of it than its physical range does.
-    pub determined: bool,
+    /// Whether the recording tells more of it than its physical range does; for pages, no part of the form.
+    #[serde(default, skip_serializing)]
+    pub determined: Option<bool>,
 }
 
 /// Something that looks like a cause.

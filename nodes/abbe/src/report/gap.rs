@@ -183,9 +183,9 @@ fn sizes(report: &GapReport) -> Rows {
         let title = name(&cause.effect, &cause.axis);
         let row = |p: &gap_diagnosis::report::ParameterValue| {
             let remark = match (p.determined, p.at_bound) {
-                (false, _) => NOT_DETERMINED,
-                (true, true) => "at its bound",
-                (true, false) => "",
+                (Some(false), _) => NOT_DETERMINED,
+                (_, true) => "at its bound",
+                (_, false) => "",
             };
             vec![
                 title.clone(),
@@ -226,7 +226,7 @@ fn status(status: Status) -> &'static str {
 
 fn values(cause: &Cause) -> String {
     let value = |p: &gap_diagnosis::report::ParameterValue| {
-        if !p.determined {
+        if p.determined == Some(false) {
             return format!("{} {NOT_DETERMINED}", p.name);
         }
         let bound = if p.at_bound { ", at its bound" } else { "" };
@@ -327,7 +327,7 @@ fn gap(report: &GapReport) -> Section {
             three(channel.floor_um),
             if channel.above_floor { "yes" } else { "no" }.to_owned(),
             of(|n| three(n.sigma_um)),
-            of(|n| three(n.between_runs_um)),
+            of(|n| maybe(n.between_runs_um)),
             of(|n| n.repeats.to_string()),
             of(|n| if n.reproduced { "yes" } else { "no" }.to_owned()),
         ]

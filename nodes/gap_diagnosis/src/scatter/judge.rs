@@ -232,7 +232,7 @@ fn sized(
             value,
             low,
             high,
-            determined: high - low < parameter.high - parameter.low,
+            determined: Some(high - low < parameter.high - parameter.low),
             at_bound: fit.sizes[k] >= 1.0 || fit.sizes[k] <= 0.0,
         });
     }
