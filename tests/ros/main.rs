@@ -8,6 +8,7 @@
 
 mod bad_topics;
 mod debian;
+mod gap_follows;
 mod interruptions;
 mod kills;
 mod machine_that_reports;

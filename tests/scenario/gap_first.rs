@@ -1,11 +1,13 @@
 //! What a machine file lacks is named from a run's own bag; written into the file, nothing is left to name.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use abbe_tests::program::{Process, command};
 use abbe_tests::scenario::Scenario;
 use serde_json::Value;
+
+use crate::{page, told};
 
 /// The plant's lost motion on X: its play, and what its screw gives way (165 and 155 N/µm from the bearings to the nut's
 /// ends) to the guides' 30 N from either side.
@@ -45,10 +47,21 @@ fn named_without_its_loop(scenario: &Scenario, run: &Path) {
     assert_eq!([&first["effect"], &first["axis"]], ["backlash", "X"]);
 }
 
+/// Runs it; its folder, and what a person reads of it: on the terminal and on its page, which is legible everywhere.
+fn run_and_read(scenario: &Scenario) -> (PathBuf, [String; 2]) {
+    let ended = scenario.run_to_end(&[]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    let run = scenario.new_run(&[]);
+    let html = std::fs::read_to_string(run.join("report.html")).unwrap();
+    page::is_one_file(&html);
+    page::is_legible_everywhere(&html, "the page of gap_first by Chromium");
+    (run, [ended.said, told::text_of(&html)])
+}
+
 #[test]
 fn scenario_gap_first_names_the_backlash_and_a_run_on_the_new_file_ends_at_the_floor() {
     let scenario = Scenario::copy_of("gap_first");
-    let run = scenario.run();
+    let (run, said) = run_and_read(&scenario);
     let better = scenario.path("better.yaml");
     let mut diagnose = command(0, &["diagnose"]);
     diagnose.arg(run.join("bag"));
@@ -58,11 +71,10 @@ fn scenario_gap_first_names_the_backlash_and_a_run_on_the_new_file_ends_at_the_f
     assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
 
     let report = read(&run.join("gap.json"));
-    let play = named(&report)
-        .into_iter()
-        .find(|c| c["effect"] == "backlash" && c["axis"] == "X")
-        .unwrap_or_else(|| panic!("no backlash X in {:#}", report["causes"]));
-    assert_eq!(play["status"], "named");
+    let play = told::named(&report, "backlash", "X");
+    for text in &said {
+        told::is_told(text, &report, ("backlash", "X"), "backlash X");
+    }
     let width = &play["parameters"][0];
     let (low, high) = (number(&width["low"]), number(&width["high"]));
     assert!(low <= PLAY_UM && PLAY_UM <= high, "{width}");

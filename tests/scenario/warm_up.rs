@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 use abbe_tests::scenario::Scenario;
 use serde_json::Value;
 
+use crate::{page, told};
+
 /// The longest that a run may take on two cores.
 const LIMIT: Duration = Duration::from_secs(60);
 
@@ -18,11 +20,21 @@ fn read(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// Runs a scenario and judges its page; gives the scenario and the folder of its run.
-fn warm_up(name: &str, least_reduction: f64) -> (Scenario, PathBuf) {
+/// A run that was judged.
+struct Ran {
+    /// Its files are gone when this is dropped.
+    _scenario: Scenario,
+    run: PathBuf,
+    said: String,
+}
+
+/// Runs a scenario and judges its page.
+fn warm_up(name: &str, least_reduction: f64) -> Ran {
     let began = Instant::now();
     let scenario = Scenario::copy_of(name);
-    let run = scenario.run();
+    let ended = scenario.run_to_end(&[]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    let run = scenario.new_run(&[]);
     let report = read(&run.join("report.json"));
     let took = began.elapsed();
     let error_s = number(&report, "latency_s") - number(&report, "true_latency_s");
@@ -52,12 +64,17 @@ fn warm_up(name: &str, least_reduction: f64) -> (Scenario, PathBuf) {
     );
     assert!(without_mm / with_mm >= least_reduction);
     assert!(took < LIMIT, "{took:?}");
-    (scenario, run)
+    Ran {
+        _scenario: scenario,
+        run,
+        said: ended.said,
+    }
 }
 
 #[test]
 fn scenario_warm_up_two_blocks_and_what_its_machine_file_lacks() {
-    let (_scenario, run) = warm_up("first_run", 5.0);
+    let ran = warm_up("first_run", 5.0);
+    let run = &ran.run;
     let gap = read(&run.join("gap.json"));
     let report = read(&run.join("report.json"));
     let causes = gap["causes"].as_array().unwrap().iter();
@@ -79,6 +96,15 @@ fn scenario_warm_up_two_blocks_and_what_its_machine_file_lacks() {
     assert!(effects.contains(&"spindle_growth"), "{effects:?}");
     assert!(number(closed, "low") > 0.9, "{closed}");
     assert_eq!(gap["unknown"]["flagged"], false, "{}", gap["unknown"]);
+    let html = std::fs::read_to_string(run.join("report.html")).unwrap();
+    page::is_one_file(&html);
+    let latency = ("probe_latency", "", "latency of the probe signal");
+    let growth = ("spindle_growth", "", "growth of the spindle");
+    for text in [ran.said.clone(), told::text_of(&html)] {
+        for (effect, axis, title) in [latency, growth] {
+            told::is_told(&text, &gap, (effect, axis), title);
+        }
+    }
 }
 
 #[test]

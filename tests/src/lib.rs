@@ -7,6 +7,7 @@
 )]
 #![expect(clippy::print_stderr, reason = "what is not tested is said")]
 
+pub mod chromium;
 pub mod cyclone;
 pub mod fast_dds;
 pub mod graph;
