@@ -8,7 +8,7 @@
 //! | grid u and v | turn of the plate about its normal | set-up and plane |
 //! | radial | centre and radius | run |
 //! | length | offset | zero |
-//! | touch of a sphere | centre and radius | set-up and sphere |
+//! | touch of a sphere | centre in the workpiece frame and radius, at all poses of rotary axes | set-up and sphere |
 //! | touch of a bore or boss | centre and radius | set-up and bore |
 //! | touch of a plane | offset and two tilts | set-up and plane |
 //! | other touches | offset | set-up, feature and approach |
@@ -21,9 +21,10 @@
 
 use std::collections::BTreeMap;
 
+use machine::Kinematics;
 use machine::cycle::FeatureId;
 use machine::twin::simulate::plate_axes;
-use machine::twin::{Channel, Run, Session, Touch};
+use machine::twin::{Channel, Run, Session, Touch, Twin};
 use metrology::Axis;
 use metrology::sample::{TestKind, TestPlane};
 use nalgebra::{DMatrix, DVector};
@@ -54,10 +55,15 @@ struct Group {
 
 impl Nuisance {
     /// Floats of a stack, each made white by `whiten`, orthonormal.
-    pub fn new(session: &Session, rows: &Rows, whiten: impl Fn(&mut [f64])) -> Self {
+    pub fn new(
+        twin: &Twin<'_>,
+        session: &Session,
+        rows: &Rows,
+        whiten: impl Fn(&mut [f64]),
+    ) -> Self {
         let mut columns = BTreeMap::<Key, Vec<f64>>::new();
         for block in &rows.blocks {
-            for (key, values) in floats(session, block) {
+            for (key, values) in floats(twin.kinematics(), session, block) {
                 let column = columns.entry(key).or_insert_with(|| vec![0.0; rows.len]);
                 column[block.range()].copy_from_slice(&values);
             }
@@ -142,7 +148,7 @@ pub fn orthonormal(rows: usize, columns: impl Iterator<Item = DVector<f64>>) -> 
 }
 
 /// Floats of one block with its values of each.
-fn floats(session: &Session, block: &Block) -> Vec<(Key, Vec<f64>)> {
+fn floats(kinematics: &Kinematics, session: &Session, block: &Block) -> Vec<(Key, Vec<f64>)> {
     let run = &session.runs[block.run];
     let segment = &run.segment;
     let n = block.rows.len();
@@ -180,7 +186,7 @@ fn floats(session: &Session, block: &Block) -> Vec<(Key, Vec<f64>)> {
             let group = format!("{} {} {}", block.channel, segment.setup_id, segment.zero_id);
             vec![(key(group, String::new()), vec![1.0; n])]
         }
-        Channel::Touch => touch_floats(session, block),
+        Channel::Touch => touch_floats(kinematics, session, block),
         // What one thermometer shows beyond another at its place is nothing by itself, and its offset an effect.
         Channel::Thermometer(_) => vec![],
         Channel::Motor(_) | Channel::Scale(_) => {
@@ -190,14 +196,14 @@ fn floats(session: &Session, block: &Block) -> Vec<(Key, Vec<f64>)> {
     }
 }
 
-fn touch_floats(session: &Session, block: &Block) -> Vec<(Key, Vec<f64>)> {
+fn touch_floats(kinematics: &Kinematics, session: &Session, block: &Block) -> Vec<(Key, Vec<f64>)> {
     let run = &session.runs[block.run];
     let mut all = BTreeMap::<Key, Vec<f64>>::new();
     for (row, place) in block.rows.iter().zip(0..) {
         let Some(touch) = row.touch.and_then(|touch| run.touches.get(touch)) else {
             continue;
         };
-        let (owner, floats) = surface_floats(run, touch);
+        let (owner, floats) = surface_floats(kinematics, run, touch);
         for (float, value) in floats {
             // One group for the whole set-up: whitening mixes the touches of a run, so that they float together.
             let key = Key {
@@ -212,7 +218,11 @@ fn touch_floats(session: &Session, block: &Block) -> Vec<(Key, Vec<f64>)> {
 }
 
 /// What the place of a touched surface leaves open, by name, and what shares it.
-fn surface_floats(run: &Run, touch: &Touch) -> (String, Vec<(&'static str, f64)>) {
+fn surface_floats(
+    kinematics: &Kinematics,
+    run: &Run,
+    touch: &Touch,
+) -> (String, Vec<(&'static str, f64)>) {
     let a = touch.approach;
     let owner = match FeatureId::parse(&touch.feature_id) {
         Some(FeatureId::Point { artefact, .. }) => artefact.to_owned(),
@@ -220,10 +230,11 @@ fn surface_floats(run: &Run, touch: &Touch) -> (String, Vec<(&'static str, f64)>
     };
     let across = |axis: Axis| touch.position[axis] * (1.0 - a[axis.index()].abs());
     match run.segment.kind {
-        TestKind::Sphere => (
-            owner,
-            vec![("radius", 1.0), ("x", a.x), ("y", a.y), ("z", a.z)],
-        ),
+        TestKind::Sphere | TestKind::Rotary | TestKind::RotaryVerification => {
+            let n = kinematics.direction_in_workpiece(&touch.position, &a);
+            let floats = [("radius", 1.0), ("x", n.x), ("y", n.y), ("z", n.z)];
+            (owner, floats.to_vec())
+        }
         TestKind::Bore => (owner, vec![("radius", 1.0), ("x", a.x), ("y", a.y)]),
         TestKind::Plane => {
             let tilts = [

@@ -68,8 +68,8 @@ impl<'a> Stack<'a> {
             (within, &noise.between)
         };
         let whitener = Whitener::new(session, &rows, of, form);
-        let nuisance = Nuisance::new(session, &rows, |column| whitener.apply(column));
-        let unweighted = Nuisance::new(session, &rows, |_| {});
+        let nuisance = Nuisance::new(twin, session, &rows, |column| whitener.apply(column));
+        let unweighted = Nuisance::new(twin, session, &rows, |_| {});
         let mut raw = vec![0.0; rows.len];
         for &run in runs {
             rows.average(run, &residual[run], &mut raw);
@@ -95,7 +95,7 @@ impl<'a> Stack<'a> {
     /// The same stack where each row is known to scatter by this many times its noise.
     pub fn weighed(&self, spread: &DVector<f64>) -> Self {
         let weight = spread.map(|spread| 1.0 / spread);
-        let nuisance = Nuisance::new(self.session, &self.rows, |column| {
+        let nuisance = Nuisance::new(self.twin, self.session, &self.rows, |column| {
             self.whitener.apply(column);
             scale(column, &weight);
         });

@@ -39,6 +39,12 @@ impl<'a> Twin<'a> {
         self.machine
     }
 
+    /// Where its bodies are at which positions.
+    #[must_use]
+    pub const fn kinematics(&self) -> &Kinematics {
+        &self.kinematics
+    }
+
     /// Response of one run to some effects together.
     #[must_use]
     pub fn respond(&self, session: &Session, run: &Run, effects: &[&dyn Effect]) -> Response {
