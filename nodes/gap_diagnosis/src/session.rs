@@ -18,7 +18,8 @@
 //!   thermometer      d = reading - reading of the first thermometer at its place            (5)
 //! ```
 //!
-//! (4) needs no c: a latched position is where the motor was, compensation included, and so is the
+//! A touch is at the place where the command passed the surface of the machine file, which does not scatter with its
+//! trigger. (4) needs no c: a latched position is where the motor was, compensation included, and so is the
 //! command that an uncompensated machine would have needed. A circle that was measured with the compensation
 //! on therefore shows the same deviations as without it. The zero of (2) and (3) is the mean of the first
 //! run under that count; between runs of one count differences stay.

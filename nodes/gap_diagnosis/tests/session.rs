@@ -402,7 +402,8 @@ fn a_touch_is_measured_from_the_surface_of_the_machine_file() {
     assert!(told.abs() > 1e-3, "{told}");
     assert_eq!(run.motion.sense[Axis::X], [0, 1]);
     assert_eq!(run.motion.velocity[Axis::X], [0.0, 0.0]);
-    assert!((run.motion.position[Axis::X][0] - (-224.995)).abs() < 1e-9);
+    // It began the stand-off before the surface of the machine file, which does not scatter with the trigger.
+    assert!((run.motion.position[Axis::X][0] - (-225.0)).abs() < 1e-9);
 }
 
 #[test]

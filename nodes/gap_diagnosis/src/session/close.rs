@@ -1,8 +1,8 @@
 //! Makes a run of what was recorded of it.
 
 use machine::twin::{Channel, Motion, Reading, Run, Touch};
-use metrology::PerAxis;
 use metrology::sample::{ProbeTrigger, TestSegment};
+use metrology::{Axis, PerAxis};
 
 use super::account::Reason;
 use super::builder::SessionBuilder;
@@ -110,13 +110,14 @@ impl SessionBuilder {
                 continue;
             };
             let tick = nearest(open, trigger).filter(|tick| *tick < motion.len());
+            let tick = tick.map(|tick| at_surface(motion, tick, trigger, deviation));
             touches.push((
                 Touch {
                     time_s: tick.map_or(*time_s, |tick| motion.time_s[tick]),
                     feature_id: trigger.feature_id.clone(),
                     approach: trigger.approach,
                     feed_mm_s: trigger.feed_mm_s,
-                    position: trigger.latched,
+                    position: on_surface(trigger, deviation),
                     tick,
                 },
                 deviation,
@@ -224,6 +225,41 @@ fn nearest(open: &Record, trigger: &ProbeTrigger) -> Option<usize> {
     }
 }
 
+/// Where the axes were when the ball met the surface of the machine file. The place of the latch is further by the touch's
+/// own deviation: a curve over it would explain any scatter of triggers.
+fn on_surface(trigger: &ProbeTrigger, deviation_mm: f64) -> PerAxis<f64> {
+    let mut position = trigger.latched;
+    for axis in Axis::LINEAR {
+        position[axis] -= deviation_mm * trigger.approach[axis.index()];
+    }
+    position
+}
+
+/// Tick at which the command was nearest to that place, on the way on which a touch was latched at another.
+fn at_surface(motion: &Motion, latched: usize, trigger: &ProbeTrigger, deviation_mm: f64) -> usize {
+    let there = on_surface(trigger, deviation_mm);
+    let off_mm = |tick: usize| {
+        let along = Axis::LINEAR.into_iter().map(|axis| {
+            let here = motion.position[axis].get(tick).copied();
+            here.map_or(0.0, |mm| mm - there[axis]) * trigger.approach[axis.index()]
+        });
+        along.sum::<f64>()
+    };
+    let mut tick = latched;
+    loop {
+        let here_mm = off_mm(tick);
+        let next = if here_mm > 0.0 {
+            tick.checked_sub(1)
+        } else {
+            Some(tick + 1).filter(|next| *next < motion.len())
+        };
+        match next {
+            Some(next) if off_mm(next).abs() < here_mm.abs() => tick = next,
+            _ => return tick,
+        }
+    }
+}
+
 /// Whether the axis states tell how the axes went to each touch.
 fn is_followed(open: &Record) -> bool {
     let is_near = |(_, trigger): &(f64, ProbeTrigger)| {
@@ -265,7 +301,8 @@ fn alike(a: &TestSegment, b: &TestSegment) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use metrology::{Axis, AxisSet};
+    use metrology::AxisSet;
+    use metrology::stamp::Stamp;
     use nalgebra::Vector3;
 
     use super::*;
@@ -293,5 +330,31 @@ mod tests {
         assert!((motion.velocity[Axis::X][25] - 8.0).abs() < 1e-9);
         // The stop itself stays what it was.
         assert!(motion.acceleration[Axis::X][26] < -100.0);
+    }
+
+    #[test]
+    fn where_a_touch_met_its_surface_does_not_depend_on_when_its_trigger_came() {
+        let times: Vec<f64> = (0..60).map(|k| 0.004 * f64::from(k)).collect();
+        let mut position = PerAxis::<Vec<f64>>::default();
+        position[Axis::X] = times.iter().map(|t| 8.0 * t.min(0.2)).collect();
+        let motion = Motion::new(times, AxisSet::EMPTY.with(Axis::X), position).expect("a motion");
+        let surface_mm = 1.1;
+        for late_s in [0.0, 0.002, 0.0061, 0.0155] {
+            let mut latched = PerAxis::default();
+            latched[Axis::X] = surface_mm + 8.0 * late_s;
+            let trigger = ProbeTrigger {
+                received_at: Stamp::from_nanos(0),
+                controller_at: Stamp::from_nanos(0),
+                feature_id: String::new(),
+                approach: Vector3::x(),
+                feed_mm_s: 8.0,
+                latched,
+                axes: AxisSet::EMPTY.with(Axis::X),
+                sequence: 0,
+            };
+            let came = motion.position[Axis::X].partition_point(|mm| *mm < latched[Axis::X]);
+            let tick = at_surface(&motion, came, &trigger, 8.0 * late_s);
+            assert_eq!(tick, 34, "{late_s}");
+        }
     }
 }
