@@ -3,6 +3,7 @@
 
 mod cold;
 mod described;
+mod dice;
 mod form;
 mod named;
 mod next;
