@@ -22,7 +22,7 @@ const LOOK_S: f64 = 0.1;
 /// Time in which late stamps go through all that they wander, s.
 const LATE_TURN_S: f64 = 97.0;
 /// Longest programme, s.
-const LIMIT_S: f64 = 3600.0;
+const LIMIT_S: f64 = 4.0 * 3600.0;
 
 /// One sample of a session.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,7 +69,7 @@ pub fn measure(rig: &Rig, take: &mut dyn FnMut(Stamp<Host>, Sample)) -> Result<(
     };
     let plan = Some(rig.plan.clone());
     let mut session = Session {
-        sequencer: Sequencer::new(config, rig.machine.clone(), plan, [].into())?,
+        sequencer: Sequencer::new(config, rig.machine.clone(), plan, rig.programs.clone())?,
         control: Cnc::new(
             &rig.config,
             &rig.control,

@@ -57,6 +57,8 @@ pub struct Rig {
     pub config: ControlConfig,
     /// What is measured.
     pub plan: Plan,
+    /// Programs that the plan runs, by name.
+    pub programs: BTreeMap<String, String>,
     /// What no two runs have in common.
     pub scatter: Scatter,
     /// How much later the grid encoder stamps its readings than it should, s.
@@ -108,6 +110,7 @@ impl Rig {
         machine.check("drawn machine")?;
         Ok(Self {
             plan,
+            programs: BTreeMap::new(),
             control: machine.clone(),
             config,
             scatter: scatter(random, heavier),

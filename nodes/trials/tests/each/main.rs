@@ -1,8 +1,8 @@
 //! Every effect of the catalogue that moves the mean of readings, alone on a recording that shows it.
 //!
-//! Classes that the plant has physics of their own for are judged by blind trials of it (arm `alone`). Here the twin adds
-//! those that no plant of ours has to recorded commands with noise: whether the search finds them among all others, not
-//! whether their formulas are a machine's. Effects that only scatter readings are in
+//! What the plant of `fake_cnc` has physics of its own for is judged out of the plant (`tests/alone`). Here the twin adds every
+//! effect but the classes of blind trials to recorded commands with noise: whether the search finds them among all others,
+//! not whether their formulas are a machine's. Effects that only scatter readings are in
 //! `gap_diagnosis/tests/trials/scatter.rs`.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
