@@ -12,6 +12,8 @@ from desk import Desk
 OURS = "bags/cold_reference"
 LISTENER = "listening"
 RECORDED = "/axes/state"
+# A player has its publishers before it waits; without that what it sends comes before listeners have met them.
+PLAY = ["--rate", "20", "--delay", "3"]
 
 
 def bags(desk: Desk, abbe: str, root: Path, cell: Path) -> None:
@@ -55,7 +57,7 @@ def played(desk: Desk, bag: Path, counts: dict[str, int]) -> None:
     time.sleep(4.0)
     desk.see(
         "our bag is played",
-        ["ros2", "bag", "play", str(bag), "--rate", "20", "--topics", topic, "/thermal/model"],
+        ["ros2", "bag", "play", str(bag), *PLAY, "--topics", topic, "/thermal/model"],
         limit_s=60.0,
     )
     time.sleep(1.0)
@@ -76,7 +78,7 @@ def into_a_node(desk: Desk, abbe: str, bag: Path, root: Path) -> None:
     time.sleep(4.0)
     desk.see(
         "blocks of our bag are played into a node",
-        ["ros2", "bag", "play", str(bag), "--rate", "20", "--topics", "/blocks/measurement"],
+        ["ros2", "bag", "play", str(bag), *PLAY, "--topics", "/blocks/measurement"],
         limit_s=60.0,
     )
     time.sleep(2.0)
