@@ -2,8 +2,12 @@
 
 use abbe_msgs::action::{RunProgram, RunProgramGoal};
 use abbe_msgs::action_msgs::msg::GoalStatus;
+use abbe_msgs::diagnostic_msgs::msg::DiagnosticArray;
 use abbe_msgs::lifecycle_msgs::srv::{GetState, GetStateRequest};
-use abbe_msgs::rcl_interfaces::srv::{GetParameters, GetParametersRequest};
+use abbe_msgs::msg::ProbeLatency;
+use abbe_msgs::rcl_interfaces::srv::{
+    DescribeParameters, DescribeParametersRequest, GetParameters, GetParametersRequest,
+};
 use abbe_msgs::unique_identifier_msgs::msg::UUID;
 use abbe_msgs::{GetResult, GetResultRequest, SendGoal, SendGoalRequest, topics};
 use abbe_tests::fast_dds::FastDds;
@@ -13,6 +17,7 @@ use abbe_tests::said::compensation;
 use abbe_tests::scenario::Scenario;
 
 const GET: &str = "/fake_cnc/get_parameters";
+const DESCRIBE: &str = "/fake_cnc/describe_parameters";
 const STATE: &str = "/fake_cnc/get_state";
 const SEND: &str = "/cnc/run_program/_action/send_goal";
 const RESULT: &str = "/cnc/run_program/_action/get_result";
@@ -98,5 +103,69 @@ fn fast_dds_calls_services_and_an_action_in_its_own_mapping() {
     let result = peer.asked::<GetResult<RunProgram>>(RESULT, 5, &asked);
     assert_eq!(result.status, GoalStatus::STATUS_SUCCEEDED, "{result:?}");
     assert_eq!(result.result.outcome, 0, "{result:?}");
+    node.stop();
+}
+
+#[test]
+fn fast_dds_reads_replies_that_are_longer_than_a_datagram() {
+    let test = "fast_dds reads long replies";
+    let Some((_scenario, node, mut peer)) = machine(test, 9) else {
+        return;
+    };
+    peer.client::<DescribeParameters>(DESCRIBE);
+    let name = "background_rate_hz";
+    let names = |count: usize| DescribeParametersRequest {
+        names: vec![name.to_owned(); count],
+    };
+    // A short one behind a long one waits for it: samples of a writer come in order.
+    for (number, count) in [(1, 1), (2, 1_500), (3, 2), (4, 3_000), (5, 1)] {
+        peer.ask::<DescribeParameters>(DESCRIBE, number, &names(count));
+        let described = peer.reply::<DescribeParameters>(DESCRIBE, number);
+        assert_eq!(described.descriptors.len(), count);
+        assert!(described.descriptors.iter().all(|one| one.name == name));
+    }
+    node.stop();
+}
+
+/// What a node has counted on a topic, as it says on `/diagnostics` every second.
+fn received(peer: &mut FastDds, node: &str, topic: &str) -> u32 {
+    let key = format!("{topic} received");
+    let count = |told: &DiagnosticArray| {
+        let of_node = told.status.iter().filter(|status| status.name == node);
+        let mut values = of_node.flat_map(|status| &status.values);
+        let value = values.find(|value| value.key == key)?;
+        value.value.parse::<u32>().ok()
+    };
+    let told = peer.sample(&topics::DIAGNOSTICS, |told| count(told).is_some());
+    count(&told).unwrap()
+}
+
+#[test]
+fn the_first_sample_of_a_fast_dds_writer_that_was_just_met_is_heard() {
+    let test = "the first sample of fast_dds";
+    let (scenario, domain) = (Scenario::copy_of("short_cell"), domain(8));
+    let Some(mut peer) = FastDds::start(test, domain) else {
+        return;
+    };
+    let file = scenario.argument("probe.yaml");
+    let node = Process::node(domain, "probe", &["--params-file", &file]);
+    peer.read(&topics::DIAGNOSTICS);
+    let before = received(&mut peer, "/probe", "/latency");
+    let latency = ProbeLatency {
+        method: 2,
+        latency_s: 0.0011,
+        standard_uncertainty_s: 1e-5,
+        ..ProbeLatency::default()
+    };
+    const GREETINGS: u32 = 10;
+    for _ in 0..GREETINGS {
+        peer.greet(&topics::LATENCY, &latency);
+    }
+    // What was said before the last of them may still be on its way.
+    for _ in 0..2 {
+        received(&mut peer, "/probe", "/latency");
+    }
+    let after = received(&mut peer, "/probe", "/latency");
+    assert_eq!(after - before, GREETINGS);
     node.stop();
 }

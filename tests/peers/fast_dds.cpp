@@ -5,8 +5,11 @@
 //        writer TOPIC TYPE reliable|best_effort volatile|latched
 //        client REQUESTS TYPE REPLIES TYPE
 //        write TOPIC BYTES
+//        greet TOPIC TYPE reliable|best_effort volatile|latched BYTES
 //        ask REQUESTS NUMBER BYTES
-//   out: matched TOPIC | refused TOPIC | sample TOPIC BYTES | reply REQUESTS NUMBER BYTES
+// `greet` makes a writer that writes as soon as it is matched, and is gone 0.1 s later.
+//
+//   out: matched TOPIC | refused TOPIC | sample TOPIC BYTES | reply REQUESTS NUMBER BYTES | greeted TOPIC
 //
 // Arguments are the domain and, where it is secured, the folder of an enclave.
 
@@ -17,6 +20,7 @@
 #include <mutex>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -206,6 +210,24 @@ class Peer {
     writers_.at(name)->write(&sample);
   }
 
+  // As `ros2 topic pub --once`.
+  void greet(const std::string& name, const std::string& type, bool reliable, bool latched,
+             const std::string& text) {
+    DataWriterQos qos = DATAWRITER_QOS_DEFAULT;
+    set(qos, reliable, latched, 1);
+    auto* writer = publisher_->create_datawriter(topic(name, type), qos);
+    if (writer == nullptr) return say("refused " + name);
+    PublicationMatchedStatus status;
+    do {
+      writer->get_publication_matched_status(status);
+    } while (status.current_count == 0);
+    Raw sample{bytes_of(text)};
+    writer->write(&sample);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    publisher_->delete_datawriter(writer);
+    say("greeted " + name);
+  }
+
   // As rmw_fastrtps_cpp sends a request: related to its reader of replies.
   void ask(const std::string& requests, int64_t number, const std::string& text) {
     Raw sample{bytes_of(text)};
@@ -253,12 +275,16 @@ int main(int count, char** arguments) {
   std::string line;
   while (std::getline(std::cin, line)) {
     std::istringstream words(line);
-    std::string verb, a, b, c, d;
+    std::string verb, a, b, c, d, e;
     words >> verb >> a >> b >> c >> d;
     if (verb == "reader") peer.read(a, b, c == "reliable", d == "latched", "");
     if (verb == "writer") peer.write_to(a, b, c == "reliable", d == "latched");
     if (verb == "client") peer.client(a, b, c, d);
     if (verb == "write") peer.write(a, b);
+    if (verb == "greet") {
+      words >> e;
+      peer.greet(a, b, c == "reliable", d == "latched", e);
+    }
     if (verb == "ask") peer.ask(a, std::stoll(b), c);
   }
   // The participant goes with the process.

@@ -157,6 +157,14 @@ impl FastDds {
         self.say(&format!("write {} {bytes}", dds_topic(topic)));
     }
 
+    /// Writes a message as soon as a writer of its own is met, and takes the writer away 0.1 s later.
+    pub fn greet<M: Message>(&mut self, topic: &Topic<M>, message: &M) {
+        let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
+        let bytes = hexadecimal(&to_cdr(message));
+        self.say(&format!("greet {name} {dds_type} {} {bytes}", quality(topic)));
+        self.wait(&format!("greeted {name}"), |_| true);
+    }
+
     /// The next sample of a topic that `pick` takes.
     ///
     /// # Panics

@@ -5,10 +5,10 @@
 //! endpoints whose samples it decodes itself. What leaves this module is free of DDS types: Zenoh
 //! stands beside it.
 
-use std::net::Ipv4Addr;
-use std::sync::{Mutex, PoisonError};
+use std::net::{Ipv4Addr, UdpSocket};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use abbe_msgs::Qos;
+use abbe_msgs::{Qos, Reliability};
 use anyhow::{Context as _, anyhow};
 use ros2_client::builtin_topics::ros_discovery;
 use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
@@ -21,9 +21,14 @@ use rustdds::{
 use crate::environment::{self, DiscoveryRange, Environment};
 use crate::names::{self, NodeNames};
 use crate::network::{Guid, Remote, Role};
+use first_sample::FirstSamples;
+use reply::LongReplies;
 
 mod endpoint;
+mod first_sample;
 mod policies;
+mod reply;
+mod rtps;
 
 pub(crate) use endpoint::{Reader, Writer};
 
@@ -98,6 +103,24 @@ fn role_of(dds_topic: &str) -> Option<(Role, &str)> {
     rest.starts_with('/').then_some((role, rest))
 }
 
+/// What a node sends past the library.
+struct ByHand {
+    first_samples: FirstSamples,
+    socket: Arc<UdpSocket>,
+}
+
+impl ByHand {
+    fn of(participant: &DomainParticipant) -> std::io::Result<Self> {
+        let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
+        socket.set_nonblocking(true)?;
+        let socket = Arc::new(socket);
+        Ok(Self {
+            first_samples: FirstSamples::of(participant, Arc::clone(&socket)),
+            socket,
+        })
+    }
+}
+
 /// A node's place on the network.
 ///
 /// The participant comes last, so that it is dropped last: an endpoint that outlives it complains.
@@ -108,11 +131,13 @@ pub(crate) struct Participant {
     subscriber: rustdds::Subscriber,
     node: NodeName,
     entities: Mutex<NodeEntitiesInfo>,
+    /// What is sent past the library; nothing where packets are encrypted.
+    by_hand: Option<ByHand>,
     participant: DomainParticipant,
 }
 
 impl Participant {
-    /// Joins the network as `names`; nobody sees the node before [`Self::announce`]. A warning comes
+    /// Joins the network as `names`, inside a runtime; nobody sees the node before [`Self::announce`]. A warning comes
     /// with it where not every node of this computer may be found.
     pub fn join(
         environment: &Environment,
@@ -128,17 +153,22 @@ impl Participant {
             )
         })?;
         let hidden = environment.multicast_warning(&interfaces, participant.participant_id());
+        let is_encrypted = environment.security.is_some() && unsecured.is_none();
         let warnings: Vec<String> = unsecured.into_iter().chain(hidden).collect();
         let warning = (!warnings.is_empty()).then(|| warnings.join("; "));
         let node = NodeName::new(&names.namespace, &names.name)
             .map_err(|error| anyhow!("node {}: {error:?}", names.fully_qualified()))?;
         Ok((
-            Self::of(participant, node).context("ROS graph on DDS")?,
+            Self::of(participant, node, is_encrypted).context("ROS graph on DDS")?,
             warning,
         ))
     }
 
-    fn of(participant: DomainParticipant, node: NodeName) -> anyhow::Result<Self> {
+    fn of(
+        participant: DomainParticipant,
+        node: NodeName,
+        is_encrypted: bool,
+    ) -> anyhow::Result<Self> {
         let default = policies::policies(Qos::RELIABLE, policies::Side::Reader);
         let publisher = participant.create_publisher(&default)?;
         let subscriber = participant.create_subscriber(&default)?;
@@ -155,7 +185,13 @@ impl Participant {
         let graph_reader =
             subscriber.create_simple_datareader_no_key(&topic, Some(policies::graph_reader()))?;
         let entities = Mutex::new(NodeEntitiesInfo::new(node.clone()));
+        let by_hand = if is_encrypted {
+            None
+        } else {
+            Some(ByHand::of(&participant)?)
+        };
         Ok(Self {
+            by_hand,
             participant,
             publisher,
             subscriber,
@@ -191,7 +227,13 @@ impl Participant {
     pub fn server(&self, service: &str, type_name: &str) -> anyhow::Result<(Reader, Writer)> {
         let [(requests, request), (replies, reply)] = service_topics(service, type_name);
         let reader = self.reader_of(&requests, &request, SERVICE_QOS)?;
-        Ok((reader, self.writer_of(&replies, &reply, SERVICE_QOS)?))
+        let writer = self.writer_of(&replies, &reply, SERVICE_QOS)?;
+        let Some(by_hand) = &self.by_hand else {
+            return Ok((reader, writer));
+        };
+        let socket = Arc::clone(&by_hand.socket);
+        let long_replies = LongReplies::new(socket, self.participant.clone(), replies);
+        Ok((reader, writer.with_long_replies(long_replies)))
     }
 
     /// Both ends of a service's client: of replies, of requests.
@@ -215,10 +257,17 @@ impl Participant {
     fn reader_of(&self, dds_topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Reader> {
         let topic = self.topic(dds_topic, dds_type, qos)?;
         let policies = policies::policies(qos, policies::Side::Reader);
-        let reader = self
-            .subscriber
-            .create_simple_datareader_no_key(&topic, Some(policies))
-            .map_err(|error| anyhow!("DDS reader of {dds_topic}: {error}"))?;
+        let make = || {
+            self.subscriber
+                .create_simple_datareader_no_key(&topic, Some(policies))
+        };
+        let made = match &self.by_hand {
+            Some(by_hand) if qos.reliability == Reliability::Reliable => by_hand
+                .first_samples
+                .take_care(make, |reader| reader.guid().to_bytes()),
+            _ => make(),
+        };
+        let reader = made.map_err(|error| anyhow!("DDS reader of {dds_topic}: {error}"))?;
         self.entities().add_reader(Gid::from(reader.guid()));
         Ok(Reader::new(reader))
     }

@@ -139,6 +139,7 @@ pub fn launch(
             bail!("node {name} is there twice in this process: names must be unique");
         }
     }
+    let inside = runtime.enter();
     let joined = nodes
         .into_iter()
         .map(|(setup, mut node)| {
@@ -148,6 +149,7 @@ pub fn launch(
             Ok((setup, node, participant, warning))
         })
         .collect::<anyhow::Result<Vec<_>>>()?;
+    drop(inside);
     runtime.block_on(async { tokio::time::sleep(LOOKING_AROUND).await });
     for (setup, _, participant, _) in &joined {
         if participant.namesake() {

@@ -112,7 +112,7 @@ macro_rules! either {
 }
 
 impl Participant {
-    /// Joins the network as `names`; nobody sees the node before [`Self::announce`]. A warning comes
+    /// Joins the network as `names`, inside a runtime; nobody sees the node before [`Self::announce`]. A warning comes
     /// with it where not everybody may be found.
     pub fn join(
         environment: &Environment,

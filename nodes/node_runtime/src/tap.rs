@@ -159,7 +159,10 @@ impl RawTap {
         mut take: impl FnMut(TapEvent) + Send + 'static,
     ) -> anyhow::Result<Self> {
         let runtime = runtime()?;
-        let (participant, warning) = Participant::join(environment, names)?;
+        let (participant, warning) = {
+            let _inside = runtime.enter();
+            Participant::join(environment, names)?
+        };
         if let Some(warning) = warning {
             tracing::warn!("{warning}");
         }
@@ -375,7 +378,10 @@ impl RawPublisher {
         patience: Duration,
     ) -> anyhow::Result<Self> {
         let runtime = runtime()?;
-        let (mut participant, warning) = Participant::join(environment, names)?;
+        let (mut participant, warning) = {
+            let _inside = runtime.enter();
+            Participant::join(environment, names)?
+        };
         participant.wait_for_room();
         if let Some(warning) = warning {
             tracing::warn!("{warning}");

@@ -1,5 +1,6 @@
 //! Readers and writers of serialised samples: encapsulation header and CDR, in and out.
 
+use std::borrow::Cow;
 use std::convert::Infallible;
 use std::pin::pin;
 use std::sync::Arc;
@@ -11,6 +12,8 @@ use rustdds::no_key::{self, Decode, DefaultDecoder, DeserializerAdapter, Seriali
 use rustdds::rpc::SampleIdentity;
 use rustdds::{GUID, RepresentationIdentifier, SequenceNumber, Timestamp, WriteOptionsBuilder};
 
+use super::reply::LongReplies;
+use super::rtps::Fragmented;
 use crate::network::{Guid, PublishError, RequestIdentity, Sample, check_encapsulation};
 use crate::node::Bytes;
 
@@ -26,6 +29,16 @@ pub(super) struct Raw;
 const ALIGNMENT: usize = 4;
 /// Samples up to this length are never sent in fragments.
 const UNFRAGMENTED_LEN: usize = 1024;
+
+/// A sample, padded to whole words where it does not end with one.
+fn whole_words(sample: &[u8]) -> Cow<'_, [u8]> {
+    let mut sample = Cow::Borrowed(sample);
+    let whole = sample.len().next_multiple_of(ALIGNMENT);
+    if whole > sample.len() {
+        sample.to_mut().resize(whole, 0);
+    }
+    sample
+}
 
 /// Decoder that only puts the header back in front.
 #[derive(Clone)]
@@ -77,11 +90,10 @@ impl SerializerAdapter<Bytes> for Raw {
     }
 
     fn to_bytes(value: &Bytes) -> Result<rustdds::bytes::Bytes, Infallible> {
-        let lacking = value.len().wrapping_neg() % ALIGNMENT;
-        if value.len() > UNFRAGMENTED_LEN && lacking > 0 {
-            let mut padded = value[HEADER_LEN..].to_vec();
-            padded.resize(padded.len() + lacking, 0);
-            return Ok(padded.into());
+        if value.len() > UNFRAGMENTED_LEN
+            && let Cow::Owned(padded) = whole_words(value)
+        {
+            return Ok(rustdds::bytes::Bytes::from(padded).slice(HEADER_LEN..));
         }
         let whole = rustdds::bytes::Bytes::from_owner(Arc::clone(value));
         Ok(whole.slice(HEADER_LEN.min(value.len())..))
@@ -138,11 +150,24 @@ impl Reader {
 /// Writes one topic; writing never waits.
 pub(crate) struct Writer {
     writer: no_key::DataWriter<Bytes, Raw>,
+    /// Of a service's server, where packets are not encrypted.
+    long_replies: Option<LongReplies>,
 }
 
 impl Writer {
     pub(super) fn new(writer: no_key::DataWriter<Bytes, Raw>) -> Self {
-        Self { writer }
+        Self {
+            writer,
+            long_replies: None,
+        }
+    }
+
+    /// Sends long replies by hand too.
+    pub(super) fn with_long_replies(self, long_replies: LongReplies) -> Self {
+        Self {
+            long_replies: Some(long_replies),
+            ..self
+        }
     }
 
     pub fn guid(&self) -> Guid {
@@ -152,6 +177,7 @@ impl Writer {
 
     /// Sends a sample; `source` is its own time where it has one, else the present.
     pub fn publish(&self, bytes: &Bytes, source: Option<Stamp<Host>>) -> Result<(), PublishError> {
+        let source = source.map_or_else(Timestamp::now, timestamp);
         self.send(bytes, source, None).map(drop)
     }
 
@@ -161,23 +187,34 @@ impl Writer {
             writer_guid: GUID::from_bytes(to.writer),
             sequence_number: SequenceNumber::from(to.sequence),
         };
-        self.send(bytes, None, Some(related)).map(drop)
+        let source = Timestamp::now();
+        let sent = self.send(bytes, source, Some(related))?;
+        if let (true, Some(by_hand)) = (bytes.len() > UNFRAGMENTED_LEN, &self.long_replies) {
+            by_hand.send(&Fragmented {
+                writer: sent.writer,
+                sequence: sent.sequence,
+                source_ticks: source.to_ticks(),
+                related: to,
+                payload: &whole_words(bytes),
+            });
+        }
+        Ok(())
     }
 
     /// Sends a request and says under which identity the reply will come.
     pub fn request(&self, bytes: &Bytes) -> Result<RequestIdentity, PublishError> {
-        self.send(bytes, None, None)
+        self.send(bytes, Timestamp::now(), None)
     }
 
     fn send(
         &self,
         bytes: &Bytes,
-        source: Option<Stamp<Host>>,
+        source: Timestamp,
         related: Option<SampleIdentity>,
     ) -> Result<RequestIdentity, PublishError> {
         check_encapsulation(bytes)?;
         let options = WriteOptionsBuilder::new()
-            .source_timestamp(source.map_or_else(Timestamp::now, timestamp))
+            .source_timestamp(source)
             .related_sample_identity_opt(related)
             .build();
         match self.writer.write_with_options(Arc::clone(bytes), options) {

@@ -162,6 +162,26 @@ fn ros2_param_can_list_get_and_describe_but_not_set() {
 }
 
 #[test]
+fn a_reply_that_is_longer_than_a_datagram_arrives() {
+    const LONGEST_DATAGRAM: usize = 65_507;
+    let environment = on_dds(19);
+    let mut puppet = puppet();
+    let description = "How often. ".repeat(LONGEST_DATAGRAM / 10);
+    puppet.parameters[1].description = description.clone();
+    let running = start(&environment, puppet);
+    let mut asker = Asker::new(environment.domain_id);
+    let names = vec!["rate_hz".to_owned()];
+    let described: DescribeParametersResponse = asker.ask(
+        "describe_parameters",
+        "DescribeParameters",
+        DescribeParametersRequest { names },
+    );
+    assert!(format!("{described:?}").contains(&description));
+    drop(asker);
+    running.stop().unwrap();
+}
+
+#[test]
 fn the_start_is_on_parameter_events_and_the_log_on_rosout() {
     let environment = environment(7);
     let (sender, received) = channel();
