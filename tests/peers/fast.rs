@@ -21,6 +21,8 @@ const DESCRIBE: &str = "/fake_cnc/describe_parameters";
 const STATE: &str = "/fake_cnc/get_state";
 const SEND: &str = "/cnc/run_program/_action/send_goal";
 const RESULT: &str = "/cnc/run_program/_action/get_result";
+/// Writers that say one message each.
+const GREETINGS: u32 = 10;
 /// What is asked for on X, m, and what of it must be seen at the motor.
 const ASKED_M: f64 = 20e-6;
 const SEEN_M: f64 = 5e-6;
@@ -157,7 +159,6 @@ fn the_first_sample_of_a_fast_dds_writer_that_was_just_met_is_heard() {
         standard_uncertainty_s: 1e-5,
         ..ProbeLatency::default()
     };
-    const GREETINGS: u32 = 10;
     for _ in 0..GREETINGS {
         peer.greet(&topics::LATENCY, &latency);
     }

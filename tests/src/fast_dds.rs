@@ -161,7 +161,10 @@ impl FastDds {
     pub fn greet<M: Message>(&mut self, topic: &Topic<M>, message: &M) {
         let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
         let bytes = hexadecimal(&to_cdr(message));
-        self.say(&format!("greet {name} {dds_type} {} {bytes}", quality(topic)));
+        self.say(&format!(
+            "greet {name} {dds_type} {} {bytes}",
+            quality(topic)
+        ));
         self.wait(&format!("greeted {name}"), |_| true);
     }
 

@@ -157,7 +157,7 @@ mod tests {
         let reply = Fragmented {
             writer,
             sequence: 0x1_0000_0002,
-            source_ticks: 5 << 32 | 6,
+            source_ticks: (5 << 32) | 6,
             related,
             payload,
         };
@@ -166,7 +166,7 @@ mod tests {
 
     fn number(bytes: &[u8]) -> usize {
         let digits = bytes.iter().rev();
-        digits.fold(0, |sum, byte| sum << 8 | usize::from(*byte))
+        digits.fold(0, |sum, byte| (sum << 8) | usize::from(*byte))
     }
 
     #[test]
