@@ -10,7 +10,8 @@
 //!   ends: quantiles of the draws at Phi(z_0 + (z_0 + z_p) / (1 - a (z_0 + z_p))),  p = 2.5 %, 97.5 %   (3)
 //! ```
 //!
-//! Where all draws lie on one side, or no run matters, (3) is not defined; the plain quantiles stand then.
+//! Where all draws lie on one side, or no run matters, (3) is not defined; the plain quantiles stand then, and NaN where there
+//! is no draw.
 //!
 //! # Agreement
 //! `val_scipy_bootstrap_bca`: 1.5 % of the widths of the intervals of a mean and of a ratio of twelve numbers.
@@ -31,6 +32,9 @@ pub fn bca(value: f64, mut draws: Vec<f64>, without_each: &[f64]) -> [f64; 2] {
 }
 
 fn corrected(value: f64, draws: &[f64], without_each: &[f64], ends: [f64; 2]) -> Option<[f64; 2]> {
+    if draws.is_empty() {
+        return None;
+    }
     let law = Normal::new(0.0, 1.0).ok()?;
     let below = draws.partition_point(|draw| *draw < value);
     let up_to = draws.partition_point(|draw| *draw <= value);
@@ -71,6 +75,11 @@ mod tests {
 
     const X: [f64; 12] = [2.1, 3.4, 1.9, 8.7, 4.4, 2.8, 12.5, 3.3, 5.1, 2.2, 6.0, 1.4];
     const Y: [f64; 12] = [0.2, 0.4, 0.3, 0.5, 1.4, 0.2, 1.1, 0.4, 0.6, 0.3, 0.5, 0.2];
+
+    #[test]
+    fn without_a_draw_there_is_no_interval() {
+        assert!(bca(1.0, vec![], &[]).iter().all(|end| end.is_nan()));
+    }
 
     fn interval(statistic: impl Fn(&[usize]) -> f64) -> [f64; 2] {
         let all: Vec<usize> = (0..12).collect();

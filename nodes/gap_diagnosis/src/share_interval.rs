@@ -111,7 +111,7 @@ fn parts(stack: &Stack<'_>, slot: &Slot) -> Vec<Part> {
     parts
 }
 
-/// (2) of every listed place over what is beyond noise in all slots; none where there is nothing.
+/// (2) of every listed place over what is beyond noise in all slots, as `localise` takes it.
 fn shares(
     slots: &[Slot],
     parts: &[Vec<Part>],
@@ -122,7 +122,8 @@ fn shares(
         .iter()
         .map(|parts| drawn(parts, weights))
         .collect::<Option<_>>()?;
-    let structured: f64 = drawn.iter().map(|drawn| drawn.beyond_noise).sum();
+    let structured = drawn.iter().map(|drawn| drawn.beyond_noise).sum::<f64>();
+    let structured = structured.max(1.0);
     let share = |score: &&Score| {
         let own = slots[score.slot].families[score.family].columns.clone();
         let drawn = &drawn[score.slot];
@@ -130,7 +131,7 @@ fn shares(
         let most = (drawn.all - columns).max(0.0);
         (lost(drawn, &own) - count(own.len())).clamp(0.0, most) / structured
     };
-    (structured > 0.0).then(|| listed.iter().map(share).collect())
+    Some(listed.iter().map(share).collect())
 }
 
 /// (1).
