@@ -10,6 +10,7 @@
 mod bag;
 mod calls;
 mod fast;
+mod foreign;
 mod frames;
 mod latched;
 mod ring;
