@@ -6,6 +6,7 @@ use abbe_tests::scenario::{Scenario, mcap_file};
 
 use crate::contract::check;
 use crate::rewrite::{Change, Copied, rewrite};
+use crate::snapshot::resumes_halfway;
 
 /// A cell in simulated time whose hosts ask each other for the time.
 fn cell() -> Scenario {
@@ -49,6 +50,7 @@ fn replay_computes_the_maps_of_host_clocks_and_notices_answers_that_are_a_micros
     let maps = outcome["compared"]["/host_clock/map"]["messages"].as_u64();
     eprintln!("/host_clock/map: {maps:?} messages");
     assert!(maps.unwrap() > 10);
+    resumes_halfway(&bag);
     let home = tempfile::tempdir().unwrap();
     let change = Change {
         messages: Some(&|messages| later(messages)),

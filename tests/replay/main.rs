@@ -8,4 +8,8 @@ mod contract;
 mod equal_bytes;
 mod frames;
 mod host_clocks;
+mod old_bags;
+mod recorded_output;
 mod rewrite;
+mod snapshot;
+mod wall_clock;

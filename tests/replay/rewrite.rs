@@ -30,6 +30,8 @@ pub struct Change<'c> {
     pub messages: Option<ChangeMessages<'c>>,
     /// A text in an attachment: its name, what stood there, what stands there now.
     pub attachment: Option<(&'c str, &'c str, &'c str)>,
+    /// Topics that are left out, their channels too.
+    pub without: Option<&'c dyn Fn(&str) -> bool>,
     /// Whether the hash beside a changed attachment stays the old one.
     pub keeps_hash: bool,
 }
@@ -54,7 +56,8 @@ pub fn rewrite(from: &Path, to: &Path, change: &Change<'_>) {
         .compression(None)
         .create(BufWriter::new(file))
         .unwrap();
-    let mut contents = read(&bytes, &mut writer);
+    let keeps = |topic: &str| !change.without.is_some_and(|without| without(topic));
+    let mut contents = read(&bytes, &mut writer, &keeps);
     if let Some(change_messages) = change.messages {
         change_messages(&mut contents.messages);
     }
@@ -64,8 +67,8 @@ pub fn rewrite(from: &Path, to: &Path, change: &Change<'_>) {
     contents.write(writer);
 }
 
-/// Everything in a file; its schemas and channels go into the new one at once.
-fn read(bytes: &[u8], writer: &mut Writer) -> Contents {
+/// Everything in a file but what is not kept; its schemas and channels go into the new one at once.
+fn read(bytes: &[u8], writer: &mut Writer, keeps: &dyn Fn(&str) -> bool) -> Contents {
     let mut schemas = BTreeMap::new();
     let mut channels = BTreeMap::new();
     let mut contents = Contents::default();
@@ -75,14 +78,16 @@ fn read(bytes: &[u8], writer: &mut Writer) -> Contents {
                 let id = writer.add_schema(&header.name, &header.encoding, &data);
                 schemas.insert(header.id, id.unwrap());
             }
-            Record::Channel(channel) => {
+            Record::Channel(channel) if keeps(&channel.topic) => {
                 let schema = schemas[&channel.schema_id];
                 let encoding = &channel.message_encoding;
                 let id = writer.add_channel(schema, &channel.topic, encoding, &channel.metadata);
                 channels.insert(channel.id, (id.unwrap(), channel.topic));
             }
             Record::Message { mut header, data } => {
-                let (id, topic) = &channels[&header.channel_id];
+                let Some((id, topic)) = channels.get(&header.channel_id) else {
+                    continue;
+                };
                 header.channel_id = *id;
                 contents.messages.push(Copied {
                     topic: topic.clone(),

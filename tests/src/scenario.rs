@@ -105,10 +105,19 @@ impl Scenario {
     /// When it does not end within two minutes.
     #[must_use]
     pub fn run_to_end(&self, more: &[&str]) -> Ended {
+        self.start(more).ended_within(Duration::from_secs(600))
+    }
+
+    /// Starts `abbe run --no-dds` with more arguments.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn start(&self, more: &[&str]) -> Process {
         let (folder, out) = (self.folder(), self.out());
         let mut command = command(0, &["run", "--no-dds"]);
         command.arg(folder).arg("--runs").arg(out).args(more);
-        Process::start(command).ended_within(Duration::from_secs(600))
+        Process::start(command)
     }
 
     /// Runs it and reads its `report.json`.

@@ -1,5 +1,6 @@
 //! `abbe check BAG`: a bag's results, computed again from its inputs.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -11,7 +12,7 @@ use metrology::stamp::NANOS_PER_S;
 use node_runtime::arguments::Arguments;
 use node_runtime::{Node, Setup};
 use recorder::{Bag, RecordedRun, RunNode, verify_attachments};
-use replayer::{Difference, Discrepancy, Outcome, ReplayError};
+use replayer::{Difference, Discrepancy, NotInBag, Outcome, Relay, ReplayError};
 use serde_json::json;
 
 use crate::node;
@@ -35,6 +36,10 @@ pub struct Check {
     /// Write the outcome as JSON to standard output.
     #[arg(long)]
     json: bool,
+    /// Copy every node's state after so many messages of the bag into fresh nodes, which go on from there: the results
+    /// stay the same where a state is whole. May be given more than once.
+    #[arg(long, value_name = "MESSAGES")]
+    resume_after: Vec<u64>,
 }
 
 impl Check {
@@ -44,7 +49,8 @@ impl Check {
     /// # Errors
     /// When the bag cannot be read or is none of a run in simulated time.
     pub fn execute(self) -> Result<ExitCode> {
-        let outcome = of(&self.bag).with_context(|| format!("bag {}", self.bag.display()))?;
+        let outcome = of(&self.bag, &self.resume_after)
+            .with_context(|| format!("bag {}", self.bag.display()))?;
         if self.json {
             println!("{:#}", as_json(&self.bag, &outcome));
         } else {
@@ -53,16 +59,16 @@ impl Check {
         for loss in &outcome.losses {
             eprintln!("abbe: {loss}");
         }
-        Ok(match (&outcome.first, outcome.losses.is_empty()) {
-            (Some(_), _) => ExitCode::FAILURE,
-            (None, true) => ExitCode::SUCCESS,
-            (None, false) => ExitCode::from(DONE_WITH_LOSS),
+        Ok(match (outcome.is_equal(), outcome.losses.is_empty()) {
+            (false, _) => ExitCode::FAILURE,
+            (true, true) => ExitCode::SUCCESS,
+            (true, false) => ExitCode::from(DONE_WITH_LOSS),
         })
     }
 }
 
-/// Replays the bag with the nodes, parameters and machine file that it carries.
-fn of(path: &Path) -> Result<Outcome> {
+/// Replays the bag with the nodes, parameters and machine file that it carries, in fresh nodes after so many messages.
+fn of(path: &Path, resume_after: &[u64]) -> Result<Outcome> {
     let bag = Bag::open(path)?;
     verify_attachments(&bag)?;
     let run = RecordedRun::of(&bag).ok_or(ReplayError::NoRun)?;
@@ -73,13 +79,24 @@ fn of(path: &Path) -> Result<Outcome> {
     if let Some(machine) = bag.attachment("machine.yaml")? {
         std::fs::write(files.path().join("machine.yaml"), machine.data)?;
     }
-    let nodes = run
-        .nodes
+    let relay = |after_messages: &u64| {
+        Ok(Relay {
+            after_messages: *after_messages,
+            nodes: build_all(&bag, &run, files.path())?,
+        })
+    };
+    let relays = resume_after.iter().map(relay).collect::<Result<_>>()?;
+    let nodes = build_all(&bag, &run, files.path())?;
+    Ok(replayer::check(&bag, &run, nodes, relays)?)
+}
+
+/// The nodes of a run but its sources, as they were at its start.
+fn build_all(bag: &Bag, run: &RecordedRun, files: &Path) -> Result<Vec<Box<dyn Node>>> {
+    run.nodes
         .iter()
         .filter(|node| !SOURCES.contains(&node.executable.as_str()))
-        .map(|node| build(&bag, node, files.path()).with_context(|| format!("node {}", node.name)))
-        .collect::<Result<_>>()?;
-    Ok(replayer::check(&bag, &run, nodes)?)
+        .map(|node| build(bag, node, files).with_context(|| format!("node {}", node.name)))
+        .collect()
 }
 
 /// A node as it ran, with the parameters in the bag.
@@ -131,6 +148,10 @@ fn page(path: &Path, outcome: &Outcome) -> String {
     }
     let compared: u64 = outcome.compared.values().map(|c| c.messages).sum();
     let verdict = match &outcome.first {
+        None if outcome.compared_nothing() => format!(
+            "nothing to compare: the bag has none of the topics that were computed ({})",
+            listed(&outcome.not_in_bag)
+        ),
         None => format!(
             "equal: {compared} messages were computed again byte for byte from {} inputs",
             outcome.inputs
@@ -138,6 +159,11 @@ fn page(path: &Path, outcome: &Outcome) -> String {
         Some(first) => format!("differs; first {}", in_words(first)),
     };
     format!("{}\n\n{table}\n\n{verdict}", path.display())
+}
+
+fn listed(not_in_bag: &BTreeMap<String, NotInBag>) -> String {
+    let topics: Vec<&str> = not_in_bag.keys().map(String::as_str).collect();
+    topics.join(", ")
 }
 
 fn in_words(difference: &Difference) -> String {
@@ -170,9 +196,10 @@ fn as_json(path: &Path, outcome: &Outcome) -> serde_json::Value {
     json!({
         "schema": "abbe.check/1",
         "bag": path.display().to_string(),
-        "equal": outcome.first.is_none(),
+        "equal": outcome.is_equal(),
         "inputs": outcome.inputs,
         "compared": outcome.compared,
+        "not_in_bag": outcome.not_in_bag,
         "first_difference": outcome.first,
         "losses": losses,
     })

@@ -22,8 +22,10 @@ use crate::node::{Bytes, Emission, Event, GoalId, GoalStatus, Node, TopicPort};
 mod compose;
 mod deliver;
 mod replay;
+mod snapshot;
 
 pub use compose::ComposeError;
+pub use snapshot::{Snapshot, SnapshotError};
 
 /// One publication as observers see it.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +58,7 @@ struct Route {
 /// Which node and port answers or asked.
 type End = (usize, usize);
 
+#[derive(Clone)]
 enum Delivery {
     Message {
         node: usize,

@@ -5,6 +5,7 @@
 //! ([`crate::Harness`]). Neither the trait nor its types name DDS, so that a second middleware can
 //! be added beside it.
 
+use std::any::Any;
 use std::sync::Arc;
 
 use abbe_msgs::service_msgs::msg::ServiceEventInfo;
@@ -16,6 +17,9 @@ use crate::parameter::Parameter;
 
 /// Serialised message: encapsulation header and CDR.
 pub type Bytes = Arc<[u8]>;
+
+/// A copy of all that a node holds beside its table; only a node of the same table can tell what it is.
+pub type Saved = Box<dyn Any + Send>;
 
 /// How long winding down may take unless a node says otherwise.
 pub const PATIENCE: Span = Span::from_nanos(5_000_000_000);
@@ -280,6 +284,16 @@ pub trait Node: Send {
     /// The node is put on a live graph: real time passes while it computes. Told once, before any event; a node in the
     /// harness is never told.
     fn goes_live(&mut self) {}
+
+    /// Copies everything that what it will say depends on; `None`: it cannot, or not now.
+    fn save(&self) -> Option<Saved> {
+        None
+    }
+
+    /// Goes on from what a node of the same table saved, whatever happened to it before; false: that is no such copy.
+    fn resume(&mut self, _saved: &Saved) -> bool {
+        false
+    }
 
     /// Handles one event that happened `at`.
     ///

@@ -25,12 +25,14 @@ use metrology::stamp::{Host, Span, Stamp};
 
 use crate::diagnostic::Diagnostic;
 use crate::node::{
-    Bytes, Emission, Event, Node, NodeFault, PATIENCE, Ports, ServiceEvents, ServicePort, TopicPort,
+    Bytes, Emission, Event, Node, NodeFault, PATIENCE, Ports, Saved, ServiceEvents, ServicePort,
+    TopicPort,
 };
 use crate::parameter::Parameter;
 
 mod action;
 mod managed;
+mod snapshot;
 
 pub use action::{ClientSignal, GoalNews, GoalSignal};
 pub use managed::Lifecycle;
@@ -70,6 +72,7 @@ pub struct Wiring<S: Stage> {
     last: bool,
     own_time: bool,
     live: Option<Told<S>>,
+    snapshots: Option<snapshot::Snapshots<S>>,
     outputs: Vec<S::Output>,
 }
 
@@ -119,6 +122,7 @@ where
             last: false,
             own_time: false,
             live: None,
+            snapshots: None,
             outputs: Vec::new(),
         }
     }
@@ -490,6 +494,15 @@ where
         if let Some(told) = &self.live {
             told(&mut self.stage);
         }
+    }
+
+    fn save(&self) -> Option<Saved> {
+        self.snapshots.as_ref()?.save(&self.stage)
+    }
+
+    fn resume(&mut self, saved: &Saved) -> bool {
+        let snapshots = self.snapshots.as_ref();
+        snapshots.is_some_and(|snapshots| snapshots.resume(&mut self.stage, saved))
     }
 
     fn handle(

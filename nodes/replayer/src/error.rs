@@ -1,6 +1,6 @@
 //! Why a bag cannot be replayed or played.
 
-use node_runtime::harness::ComposeError;
+use node_runtime::harness::{ComposeError, SnapshotError};
 
 /// Why a bag cannot be replayed.
 #[derive(Debug, thiserror::Error)]
@@ -27,8 +27,14 @@ pub enum ReplayError {
         recorded: String,
         known: String,
     },
+    #[error(
+        "resumed after {after_messages} messages: the bag has {messages}, so nothing would be resumed"
+    )]
+    ResumedAfterEnd { after_messages: u64, messages: u64 },
     #[error(transparent)]
     Compose(#[from] ComposeError),
+    #[error(transparent)]
+    Snapshot(#[from] SnapshotError),
 }
 
 /// Why a bag cannot be played.

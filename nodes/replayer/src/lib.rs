@@ -15,6 +15,7 @@
 mod difference;
 mod error;
 mod inputs;
+mod listening;
 pub mod pace;
 pub mod playback;
 mod replay;
@@ -22,5 +23,6 @@ mod replay;
 pub use difference::{Difference, Discrepancy};
 pub use error::{PlaybackError, ReplayError};
 pub use inputs::{is_source, sources_first};
+pub use listening::NotInBag;
 pub use playback::{PARAMETERS, Playback, PlaybackConfig};
-pub use replay::{Compared, Outcome, check};
+pub use replay::{Compared, Outcome, Relay, check};

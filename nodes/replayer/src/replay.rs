@@ -1,18 +1,17 @@
 //! Runs a bag's inputs through its nodes and holds what comes out against what was recorded.
 
-use std::cell::RefCell;
 use std::collections::{BTreeMap, VecDeque};
-use std::rc::Rc;
 
+use abbe_msgs::topics::Origin;
 use metrology::stamp::{Host, Stamp};
-use node_runtime::harness::Published;
-use node_runtime::{Bytes, Harness, Node};
+use node_runtime::{Harness, Node};
 use recorder::{Bag, Event, Loss, MessageOrder, Order, RecordedCall, RecordedRun};
 use serde::Serialize;
 
 use crate::difference::{Difference, Discrepancy};
 use crate::error::ReplayError;
 use crate::inputs;
+use crate::listening::{Ear, Listening, NotInBag};
 
 /// Messages of one topic that were held against computed ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -28,12 +27,36 @@ pub struct Compared {
 pub struct Outcome {
     /// By topic.
     pub compared: BTreeMap<String, Compared>,
+    /// What was computed on topics that the bag does not have, by topic.
+    pub not_in_bag: BTreeMap<String, NotInBag>,
     /// The first difference, `None`: the bag was computed again byte for byte.
     pub first: Option<Difference>,
     /// Messages and service calls that were put in.
     pub inputs: u64,
     /// What of the bag could not be read.
     pub losses: Vec<Loss>,
+}
+
+impl Outcome {
+    /// Whether results were computed and the bag had nothing to hold them against.
+    #[must_use]
+    pub fn compared_nothing(&self) -> bool {
+        self.compared.is_empty() && !self.not_in_bag.is_empty() && self.losses.is_empty()
+    }
+
+    /// Whether what the bag has was computed again byte for byte.
+    #[must_use]
+    pub fn is_equal(&self) -> bool {
+        self.first.is_none() && !self.compared_nothing()
+    }
+}
+
+/// Fresh nodes that take a run over in its middle, with the state of those that they follow.
+pub struct Relay {
+    /// Messages of the bag before it.
+    pub after_messages: u64,
+    /// As [`check`] takes them.
+    pub nodes: Vec<Box<dyn Node>>,
 }
 
 /// What is done with a topic of the bag.
@@ -49,32 +72,28 @@ enum Role {
     Aside,
 }
 
-struct Said {
-    route: usize,
-    at: Stamp<Host>,
-    bytes: Bytes,
-}
-
-type SaidQueue = Rc<RefCell<VecDeque<Said>>>;
-
 struct Replay<'b> {
     bag: &'b Bag,
     harness: Harness,
-    said: SaidQueue,
+    listening: Listening,
     roles: Vec<Role>,
+    relays: VecDeque<Relay>,
     stop: Option<Stamp<Host>>,
     outcome: Outcome,
 }
 
 /// Replays a bag on `nodes`, which are all nodes of the run but its sources, with their recorded parameters, in their
-/// recorded order. Nodes that publish nothing that is computed are left out.
+/// recorded order. Nodes that publish nothing that is computed are left out. Each of `relays` takes over when its
+/// turn comes.
 ///
 /// # Errors
-/// When the bag is none of a composed run, or has messages of another version.
+/// When the bag is none of a composed run, or has messages of another version; when a node's state cannot be handed on,
+/// or the bag ends before a relay's turn.
 pub fn check(
     bag: &Bag,
     run: &RecordedRun,
     nodes: Vec<Box<dyn Node>>,
+    mut relays: Vec<Relay>,
 ) -> Result<Outcome, ReplayError> {
     if run.order != MessageOrder::Total {
         return Err(ReplayError::Arrival);
@@ -84,28 +103,33 @@ pub fn check(
             nanos: run.start_time_nanos,
         });
     }
-    let nodes: Vec<_> = nodes
-        .into_iter()
-        .filter(|node| inputs::computes(node.as_ref()))
-        .collect();
-    let computed: Vec<String> = nodes
-        .iter()
-        .flat_map(|node| &node.ports().publications)
-        .map(|port| port.topic.clone())
-        .collect();
+    let nodes = computing(nodes);
+    let ports = nodes.iter().flat_map(|node| &node.ports().publications);
+    let computed: Vec<String> = ports.map(|port| port.topic.clone()).collect();
     let mut harness = Harness::compose(nodes, stamp(run.start_time_nanos))?;
     let roles = roles(bag, &harness, &computed)?;
-    let said = listen(&mut harness, &roles);
+    let listening = Listening::new(ears(&harness, &roles, &computed));
+    listening.attend(&mut harness);
+    relays.sort_by_key(|relay| relay.after_messages);
     let mut replay = Replay {
         bag,
         harness,
-        said,
+        listening,
         roles,
+        relays: relays.into(),
         stop: run.stop_time_nanos.map(stamp),
         outcome: Outcome::default(),
     };
-    replay.run();
-    Ok(replay.outcome)
+    replay.run()?;
+    Ok(replay.summed_up())
+}
+
+/// The nodes that publish what is computed.
+fn computing(nodes: Vec<Box<dyn Node>>) -> Vec<Box<dyn Node>> {
+    let nodes = nodes.into_iter();
+    nodes
+        .filter(|node| inputs::computes(node.as_ref()))
+        .collect()
 }
 
 fn roles(bag: &Bag, harness: &Harness, computed: &[String]) -> Result<Vec<Role>, ReplayError> {
@@ -125,7 +149,7 @@ fn roles(bag: &Bag, harness: &Harness, computed: &[String]) -> Result<Vec<Role>,
             });
         }
         Ok(match entry.origin {
-            abbe_msgs::topics::Origin::Housekeeping => Role::Aside,
+            Origin::Housekeeping => Role::Aside,
             _ if computed.iter().any(|own| own == name) => Role::Result { route },
             _ => Role::Input { route },
         })
@@ -133,26 +157,23 @@ fn roles(bag: &Bag, harness: &Harness, computed: &[String]) -> Result<Vec<Role>,
     bag.topics().iter().map(of).collect()
 }
 
-/// Queues what the nodes say on topics that are compared.
-fn listen(harness: &mut Harness, roles: &[Role]) -> SaidQueue {
-    let mut is_result = vec![false; harness.topics().count()];
+/// What is done with what the nodes say, by topic of the harness.
+fn ears(harness: &Harness, roles: &[Role], computed: &[String]) -> Vec<Ear> {
+    let mut ears: Vec<Ear> = harness
+        .topics()
+        .map(|port| {
+            let is_ours = computed.contains(&port.topic);
+            let entry = inputs::entry_of(&port.topic).filter(|_| is_ours);
+            let is_result = entry.is_some_and(|entry| entry.origin == Origin::Computed);
+            if is_result { Ear::SumUp } else { Ear::Deaf }
+        })
+        .collect();
     for role in roles {
         if let Role::Result { route } = role {
-            is_result[*route] = true;
+            ears[*route] = Ear::Compare;
         }
     }
-    let said = SaidQueue::default();
-    let queue = Rc::clone(&said);
-    harness.observe(Box::new(move |published: Published<'_>| {
-        if is_result[published.topic] {
-            queue.borrow_mut().push_back(Said {
-                route: published.topic,
-                at: published.at,
-                bytes: published.bytes.clone(),
-            });
-        }
-    }));
-    said
+    ears
 }
 
 fn stamp(nanos: u64) -> Stamp<Host> {
@@ -160,10 +181,10 @@ fn stamp(nanos: u64) -> Stamp<Host> {
 }
 
 impl Replay<'_> {
-    fn run(&mut self) {
+    fn run(&mut self) -> Result<(), ReplayError> {
         let mut messages = self.bag.messages(Order::File);
         let mut last = None;
-        let mut calls = RecordedCall::all_of(self.bag).into_iter().peekable();
+        let mut calls: VecDeque<_> = RecordedCall::all_of(self.bag).into();
         let mut read = 0;
         while let Some(event) = messages.next_event() {
             let message = match event {
@@ -173,13 +194,13 @@ impl Replay<'_> {
                     continue;
                 }
             };
-            while let Some(call) = calls.next_if(|call| call.after_messages <= read) {
-                self.arrive(stamp(call.time_nanos), &mut last);
-                let is_request = self.harness.put_request(&call.topic, &call.event);
-                self.outcome.inputs += u64::from(is_request);
-            }
-            read += 1;
             let at = stamp(message.log_time_nanos);
+            // Where messages were taken out of a bag, the count stands too high and the time tells.
+            self.put_calls(&mut calls, &mut last, |call| {
+                call.after_messages <= read || stamp(call.time_nanos) < at
+            });
+            self.hand_over_after(read)?;
+            read += 1;
             self.arrive(at, &mut last);
             let topic = message.topic.index();
             match self.roles[topic] {
@@ -192,10 +213,62 @@ impl Replay<'_> {
             }
         }
         // What a cut file would have gone on with is not known.
-        if let (Some(last), true) = (last, self.outcome.losses.is_empty()) {
-            self.go_on(|due| due <= last);
+        if let (Some(end), true) = (last, self.outcome.losses.is_empty()) {
+            self.put_calls(&mut calls, &mut last, |call| stamp(call.time_nanos) <= end);
+            self.go_on(|due| due <= end);
             self.nothing_is_left();
         }
+        match self.relays.front() {
+            Some(&Relay { after_messages, .. }) => Err(ReplayError::ResumedAfterEnd {
+                after_messages,
+                messages: read,
+            }),
+            None => Ok(()),
+        }
+    }
+
+    /// Puts in the next service calls as long as they are due.
+    fn put_calls(
+        &mut self,
+        calls: &mut VecDeque<RecordedCall>,
+        last: &mut Option<Stamp<Host>>,
+        is_due: impl Fn(&RecordedCall) -> bool,
+    ) {
+        while calls.front().is_some_and(&is_due)
+            && let Some(call) = calls.pop_front()
+        {
+            self.arrive(stamp(call.time_nanos), last);
+            let is_request = self.harness.put_request(&call.topic, &call.event);
+            self.outcome.inputs += u64::from(is_request);
+        }
+    }
+
+    /// Lets fresh nodes in a fresh harness go on from here, where a relay's turn has come.
+    fn hand_over_after(&mut self, read: u64) -> Result<(), ReplayError> {
+        let has_turn = |relay: &Relay| relay.after_messages <= read;
+        while self.relays.front().is_some_and(has_turn)
+            && let Some(relay) = self.relays.pop_front()
+        {
+            let snapshot = self.harness.save()?;
+            let mut fresh = Harness::compose(computing(relay.nodes), Stamp::from_nanos(0))?;
+            fresh.resume(&snapshot)?;
+            self.listening.attend(&mut fresh);
+            self.harness = fresh;
+        }
+        Ok(())
+    }
+
+    fn summed_up(mut self) -> Outcome {
+        for (route, sum) in self.listening.sums() {
+            self.outcome.not_in_bag.insert(self.name_of(route), sum);
+        }
+        self.outcome
+    }
+
+    /// The full name of a topic of the harness.
+    fn name_of(&self, route: usize) -> String {
+        let port = self.harness.topics().nth(route);
+        port.map_or_else(String::new, |port| format!("/{}", port.topic))
     }
 
     /// Lets everything happen that is due before `at`, when time goes on.
@@ -236,15 +309,13 @@ impl Replay<'_> {
 
     /// Lets the nodes go on until they say something on the recorded message's topic, and compares.
     fn compare(&mut self, topic: usize, route: usize, at: Stamp<Host>, recorded: &[u8]) {
-        let of_route = |said: &VecDeque<Said>| said.iter().position(|said| said.route == route);
-        let place = loop {
-            let place = of_route(&self.said.borrow());
-            if place.is_some() || !self.step(&|due| due <= at) {
-                break place;
+        let found = loop {
+            let found = self.listening.take(route);
+            if found.is_some() || !self.step(&|due| due <= at) {
+                break found;
             }
         };
         let info = &self.bag.topics()[topic];
-        let found = place.and_then(|place| Some((place, self.said.borrow_mut().remove(place)?)));
         let discrepancy = match found {
             None => Some(Discrepancy::NotComputed),
             Some((_, said)) if *said.bytes != *recorded => {
@@ -266,12 +337,8 @@ impl Replay<'_> {
 
     /// What was said and not met in the bag before time went on.
     fn nothing_is_left(&mut self) {
-        loop {
-            let Some(said) = self.said.borrow_mut().pop_front() else {
-                return;
-            };
-            let ports = self.harness.topics().nth(said.route);
-            let name = ports.map_or_else(String::new, |port| format!("/{}", port.topic));
+        while let Some(said) = self.listening.take_next() {
+            let name = self.name_of(said.route);
             self.differs(name, said.at, Discrepancy::NotRecorded);
         }
     }

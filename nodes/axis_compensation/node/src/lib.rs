@@ -38,6 +38,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         },
     );
     Ok(Wiring::new(setup.name(), parameters, stage)
+        .saved()
         .on(&topics::AXES_STATE, Input::State)
         .on(&topics::THERMAL_MODEL, |model| {
             Input::Model(Box::new(model))

@@ -21,6 +21,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = GridEncoderStage::new(&config, &machine)?;
     Ok(Wiring::new(setup.name(), parameters, stage)
+        .saved()
         .on(&topics::AXES_STATE, Input::State)
         .on(&topics::GRID_POSITION, Input::Reading)
         .on(&topics::TEST_SEGMENT, Input::Segment)

@@ -20,16 +20,16 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let stage = HostClockStage::new(&config)?;
     let table = Wiring::new(setup.name(), parameters, stage).keeps_own_time();
     if config.is_reference() {
-        let table = table.on(&topics::CLOCK_QUESTION, Input::Question).publish(
-            &topics::CLOCK_ANSWER,
-            |output| match output {
+        return Ok(table
+            .on(&topics::CLOCK_QUESTION, Input::Question)
+            .publish(&topics::CLOCK_ANSWER, |output| match output {
                 Output::Answer(answer) => Some(answer),
                 _ => None,
-            },
-        );
-        return Ok(table.node());
+            })
+            .node());
     }
     Ok(table
+        .saved()
         .on(&topics::CLOCK_ANSWER, Input::Answer)
         .every(config.period(), || Input::Ask)
         .every(TELL, || Input::Tell)

@@ -23,6 +23,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = LatencyCalibratorStage::new(&config, &machine)?;
     Ok(Wiring::new(setup.name(), parameters, stage)
+        .saved()
         .on(&topics::AXES_STATE, Input::State)
         .on(&topics::PROBE_TRIGGER, Input::Trigger)
         .on(&topics::TEST_SEGMENT, Input::Segment)

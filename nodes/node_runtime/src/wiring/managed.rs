@@ -18,7 +18,7 @@ use metrology::stamp::{Host, Span, Stamp};
 
 use super::{Satisfied, Wiring, topic_port};
 use crate::lifecycle::{Ending, State, Transition};
-use crate::node::{Bytes, Emission, Event, Node, NodeFault, Ports, RequestId};
+use crate::node::{Bytes, Emission, Event, Node, NodeFault, Ports, RequestId, Saved};
 use crate::parameter::Parameter;
 
 mod calls;
@@ -85,6 +85,12 @@ pub(super) struct Managed<S: Stage> {
     wiring: Wiring<S>,
     lifecycle: Lifecycle<S>,
     ports: Ports,
+    standing: Standing,
+}
+
+/// What is to be known of a managed node beside its stage.
+#[derive(Clone)]
+struct Standing {
     state: State,
     /// By subscription: what a latched topic said last.
     latched: Vec<VecDeque<Bytes>>,
@@ -117,23 +123,26 @@ where
             .publications
             .push(topic_port::<TransitionEvent>(events, Qos::RELIABLE));
         Self {
-            latched: vec![VecDeque::new(); ports.subscriptions.len()],
+            standing: Standing {
+                state: State::Unconfigured,
+                latched: vec![VecDeque::new(); ports.subscriptions.len()],
+                met: false,
+                since: None,
+                waiting: None,
+                told: false,
+                failed: false,
+                leaving: false,
+            },
             wiring,
             lifecycle,
             ports,
-            state: State::Unconfigured,
-            met: false,
-            since: None,
-            waiting: None,
-            told: false,
-            failed: false,
-            leaving: false,
         }
     }
 
     /// Whether the stage is told of what comes; a node that leaves goes on to its end.
     const fn hears(&self) -> bool {
-        self.leaving || !matches!(self.state, State::Unconfigured | State::Finalized)
+        self.standing.leaving
+            || !matches!(self.standing.state, State::Unconfigured | State::Finalized)
     }
 
     fn keep_latched(&mut self, subscription: usize, bytes: &[u8]) {
@@ -141,7 +150,7 @@ where
             return;
         };
         if port.qos.durability == Durability::TransientLocal {
-            let kept = &mut self.latched[subscription];
+            let kept = &mut self.standing.latched[subscription];
             if kept.len() >= port.qos.depth as usize {
                 kept.pop_front();
             }
@@ -155,7 +164,7 @@ where
             Event::Goal { server, id, .. } => out.push(Emission::RejectGoal { server, id }),
             Event::Request { service, id, .. } => {
                 if let Some((_, reply)) = self.wiring.services.get(service) {
-                    let reason = format!("{} is {}", self.wiring.name, self.state.label());
+                    let reason = format!("{} is {}", self.wiring.name, self.standing.state.label());
                     let bytes = reply(Err(&reason));
                     out.push(Emission::Respond { service, id, bytes });
                 }
@@ -167,9 +176,9 @@ where
     /// The process is to end, which the stage is told in its own words.
     fn leave(&mut self, at: Stamp<Host>, out: &mut Vec<Emission>) -> Result<(), NodeFault> {
         let heard = self.hears();
-        self.leaving = true;
-        self.since = None;
-        let mut steps = Transition::of(self.state);
+        self.standing.leaving = true;
+        self.standing.since = None;
+        let mut steps = Transition::of(self.standing.state);
         if let Some(step) = steps.find(|step| step.goal == State::ShuttingDown) {
             self.take(at, *step, out);
         }
@@ -189,7 +198,7 @@ where
     ) -> Result<(), NodeFault> {
         let before = out.len();
         let result = self.wiring.handle(at, event, out);
-        if self.leaving {
+        if self.standing.leaving {
             let mut said = out[before..].iter();
             if said.any(|emission| matches!(emission, Emission::Stopped)) {
                 self.end(at, Ending::Success, out);
@@ -235,6 +244,19 @@ where
         Node::goes_live(&mut self.wiring);
     }
 
+    fn save(&self) -> Option<Saved> {
+        let stage = self.wiring.save()?;
+        Some(Box::new((stage, self.standing.clone())))
+    }
+
+    fn resume(&mut self, saved: &Saved) -> bool {
+        let Some((stage, standing)) = saved.downcast_ref::<(Saved, Standing)>() else {
+            return false;
+        };
+        self.standing.clone_from(standing);
+        self.wiring.resume(stage)
+    }
+
     fn handle(
         &mut self,
         at: Stamp<Host>,
@@ -244,7 +266,7 @@ where
         if matches!(event, Event::Shutdown) {
             return self.leave(at, out);
         }
-        if !std::mem::replace(&mut self.met, true) {
+        if !std::mem::replace(&mut self.standing.met, true) {
             self.start(at, out);
         }
         if let Event::Message {

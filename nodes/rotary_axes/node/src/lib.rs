@@ -23,6 +23,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = RotaryAxesStage::new(&config, &machine)?;
     Ok(Wiring::new(setup.name(), parameters, stage)
+        .saved()
         .on(&topics::PROBE_FEATURE, Input::Feature)
         .on(&topics::TEST_SEGMENT, Input::Segment)
         .on(&topics::GEOMETRY_MODEL, Input::Linear)

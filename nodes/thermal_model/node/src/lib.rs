@@ -24,6 +24,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = ThermalModelStage::new(config, &machine)?;
     let mut wiring = Wiring::new(setup.name(), parameters, stage)
+        .saved()
         .on(&topics::BLOCKS_MEASUREMENT, Input::Block)
         .on(&topics::TEST_SEGMENT, Input::Segment)
         .every(TICK, || Input::Tick)

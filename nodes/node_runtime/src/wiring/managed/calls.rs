@@ -84,21 +84,21 @@ where
         let answer = match call {
             Call::ChangeState => {
                 let request: ChangeStateRequest = decode(bytes)?;
-                if let Some(step) = Transition::wanted(self.state, &request.transition) {
-                    self.waiting = Some(by);
+                if let Some(step) = Transition::wanted(self.standing.state, &request.transition) {
+                    self.standing.waiting = Some(by);
                     self.begin(at, step, out);
                     return Ok(());
                 }
                 changed(false)
             }
             Call::GetState => encode(&GetStateResponse {
-                current_state: self.state.message(),
+                current_state: self.standing.state.message(),
             }),
             Call::AvailableStates => encode(&GetAvailableStatesResponse {
                 available_states: State::ALL.map(State::message).into(),
             }),
             Call::AvailableTransitions => {
-                let steps = Transition::of(self.state).map(|step| step.description());
+                let steps = Transition::of(self.standing.state).map(|step| step.description());
                 listed(steps.collect())
             }
             Call::TransitionGraph => listed(Transition::ALL.map(Transition::description).into()),

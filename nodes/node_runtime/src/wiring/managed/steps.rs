@@ -31,7 +31,7 @@ where
             return;
         }
         for goal in [State::Configuring, State::Activating] {
-            let mut steps = Transition::of(self.state);
+            let mut steps = Transition::of(self.standing.state);
             if let Some(step) = steps.find(|step| step.goal == goal) {
                 self.begin(at, *step, out);
             }
@@ -39,7 +39,7 @@ where
     }
 
     pub(super) fn take(&mut self, at: Stamp<Host>, step: Transition, out: &mut Vec<Emission>) {
-        self.state = step.goal;
+        self.standing.state = step.goal;
         out.push(Emission::Publish {
             publication: self.ports.publications.len() - 1,
             bytes: encode(&step.event(at)),
@@ -55,7 +55,7 @@ where
             State::CleaningUp => (self.lifecycle.cleanup)(&mut self.wiring.stage),
             State::Activating => self.tell_activity(at, true, out),
             State::Deactivating | State::ShuttingDown if was_active => {
-                self.since = Some(at);
+                self.standing.since = Some(at);
                 match self.tell_activity(at, false, out) {
                     Ok(()) => self.look_whether_at_rest(at, out),
                     Err(reason) => self.err(at, step.label, &reason, out),
@@ -71,23 +71,24 @@ where
                 self.end(at, Ending::Failure, out);
             }
         }
-        if step.goal == State::Configuring && self.state == State::Inactive {
+        if step.goal == State::Configuring && self.standing.state == State::Inactive {
             self.hand_latched(at, out);
         }
     }
 
     /// Ends the step that is under way, and answers who asked for it.
     pub(super) fn end(&mut self, at: Stamp<Host>, ending: Ending, out: &mut Vec<Emission>) {
-        let passed = self.state;
+        let passed = self.standing.state;
         let Some(step) = Transition::end(passed, ending) else {
             return;
         };
         self.take(at, step, out);
-        self.since = None;
+        self.standing.since = None;
         match ending {
             Ending::Success => {
-                if std::mem::take(&mut self.failed) {
-                    let message = format!("{} is {}", self.wiring.name, self.state.label());
+                if std::mem::take(&mut self.standing.failed) {
+                    let message =
+                        format!("{} is {}", self.wiring.name, self.standing.state.label());
                     out.push(condition(Level::Ok, STEP_FAILED, message));
                 }
             }
@@ -95,10 +96,10 @@ where
             Ending::Error => self.put_in_order(at, out),
         }
         // A node that is configured at its start is about to be activated.
-        if passed != State::Configuring && !self.leaving {
+        if passed != State::Configuring && !self.standing.leaving {
             self.tell_state(out);
         }
-        if let Some((service, id)) = self.waiting.take() {
+        if let Some((service, id)) = self.standing.waiting.take() {
             out.push(Emission::Respond {
                 service,
                 id,
@@ -108,18 +109,18 @@ where
     }
 
     fn tell_state(&mut self, out: &mut Vec<Emission>) {
-        let label = self.state.label();
-        if self.state != State::Active {
-            self.told = true;
+        let label = self.standing.state.label();
+        if self.standing.state != State::Active {
+            self.standing.told = true;
             let message = format!("{label}: nothing is done here");
             out.push(condition(Level::Warn, NOT_ACTIVE, message));
-        } else if std::mem::take(&mut self.told) {
+        } else if std::mem::take(&mut self.standing.told) {
             out.push(condition(Level::Ok, NOT_ACTIVE, label.to_owned()));
         }
     }
 
     fn say_failed(&mut self, step: &str, reason: &str, out: &mut Vec<Emission>) {
-        self.failed = true;
+        self.standing.failed = true;
         out.push(condition(
             Level::Error,
             STEP_FAILED,
@@ -158,20 +159,22 @@ where
 
     /// Whether the stage has just said that it is at rest, or has had its time.
     pub(super) fn look_whether_at_rest(&mut self, at: Stamp<Host>, out: &mut Vec<Emission>) {
-        let Some(since) = self.since else { return };
+        let Some(since) = self.standing.since else {
+            return;
+        };
         if self.wiring.outputs.iter().any(&self.lifecycle.at_rest) {
             self.end(at, Ending::Success, out);
         } else if at - since > self.lifecycle.within {
             let within_s = self.lifecycle.within.as_secs_f64();
             let reason = format!("not at rest after {within_s} s");
-            self.err(at, self.state.label(), &reason, out);
+            self.err(at, self.standing.state.label(), &reason, out);
         }
     }
 
     /// What latched topics said while nobody listened.
     fn hand_latched(&mut self, at: Stamp<Host>, out: &mut Vec<Emission>) {
-        for subscription in 0..self.latched.len() {
-            for bytes in self.latched[subscription].clone() {
+        for subscription in 0..self.standing.latched.len() {
+            for bytes in self.standing.latched[subscription].clone() {
                 let event = Event::Message {
                     subscription,
                     bytes: &bytes,

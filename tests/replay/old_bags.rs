@@ -1,0 +1,57 @@
+//! Bags of the tree are of older builds than this one, and are never recorded anew.
+
+use std::path::PathBuf;
+
+use abbe_tests::program::root;
+use sha2::{Digest, Sha256};
+
+use crate::contract::check;
+
+/// Bags of format 1 and the SHA-256 of their `bag_0.mcap`. A line that is here stays as it is.
+const FORMAT_V1: &[(&str, &str)] = &[
+    (
+        "cold_reference",
+        "fe8e36ae63b4a8605567f05b7c55cdcf80b633ee7cc8d1cc0319d239e7fe19a7",
+    ),
+    (
+        "grid_circles",
+        "bac9d621c16b859ef2e7bf4d0bedacb207a791a27159a4cf19c16579f3198dfe",
+    ),
+];
+
+/// The folders in `bags/`.
+pub fn kept() -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(root().join("bags")).unwrap();
+    let mut folders: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    folders.retain(|path| path.is_dir());
+    folders.sort();
+    folders
+}
+
+#[test]
+fn compat_format_v1_replays() {
+    for bag in kept() {
+        let (code, outcome) = check(&bag);
+        assert_eq!(code, 0, "{}: {outcome:#}", bag.display());
+        let compared = outcome["compared"].as_object().unwrap();
+        assert!(!compared.is_empty(), "{}", bag.display());
+    }
+}
+
+#[test]
+fn compat_format_v1_bags_are_never_recorded_anew() {
+    let readme = std::fs::read_to_string(root().join("bags/README.md")).unwrap();
+    for (name, sha256) in FORMAT_V1 {
+        let file = root().join("bags").join(name).join("bag_0.mcap");
+        let digits = Sha256::digest(std::fs::read(file).unwrap());
+        let found: String = digits.iter().map(|byte| format!("{byte:02x}")).collect();
+        assert_eq!(found, *sha256, "bags/{name} is another file");
+        assert!(readme.contains(sha256), "bags/README.md: {name}");
+    }
+    let names: Vec<_> = kept();
+    assert_eq!(
+        names.len(),
+        FORMAT_V1.len(),
+        "a bag without a line here: {names:?}"
+    );
+}

@@ -1,0 +1,68 @@
+//! A replay that fresh nodes take over in its middle.
+
+use std::path::Path;
+
+use recorder::{Bag, Event, Order};
+
+use crate::contract::{changed, check, check_with, short_run};
+use crate::old_bags::kept;
+use crate::rewrite::Change;
+
+/// Messages in a bag.
+fn messages(bag: &Path) -> u64 {
+    let bag = Bag::open(bag).unwrap();
+    let mut messages = bag.messages(Order::File);
+    let mut count = 0;
+    while let Some(event) = messages.next_event() {
+        count += u64::from(matches!(event, Event::Message(_)));
+    }
+    count
+}
+
+/// Holds a bag that fresh nodes take over after these numbers of messages against the whole replay.
+pub fn resumes(bag: &Path, after: &[u64]) {
+    let straight = check(bag);
+    assert_eq!(straight.0, 0, "{:#}", straight.1);
+    let more: Vec<String> = after
+        .iter()
+        .flat_map(|after| ["--resume-after".to_owned(), after.to_string()])
+        .collect();
+    let resumed = check_with(bag, &more);
+    assert!(resumed == straight, "{}: {:#}", bag.display(), resumed.1);
+}
+
+/// Halfway.
+pub fn resumes_halfway(bag: &Path) {
+    resumes(bag, &[messages(bag) / 2]);
+}
+
+#[test]
+fn replay_snapshot_resumes() {
+    resumes_halfway(short_run());
+    for bag in kept() {
+        resumes_halfway(&bag);
+    }
+}
+
+#[test]
+fn replay_snapshot_resumes_wherever_it_is_taken() {
+    // Places that share no period with the machine's messages: also amid the messages of one instant.
+    let all = messages(short_run());
+    let after: Vec<u64> = (0..97).map(|place| place * all / 97).collect();
+    resumes(short_run(), &after);
+}
+
+#[test]
+fn replay_needs_what_was_before_the_middle() {
+    let bag = changed(&Change {
+        messages: Some(&|messages| drop(messages.drain(..messages.len() / 2))),
+        ..Change::default()
+    });
+    let (code, outcome) = check(bag.path());
+    assert_eq!(
+        code, 1,
+        "nodes that had forgotten all said the same: {outcome:#}"
+    );
+    let beyond = ["--resume-after", "100000000"].map(str::to_owned);
+    assert_eq!(check_with(short_run(), &beyond).0, 1);
+}
