@@ -134,10 +134,6 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
         resize(stack, &signatures, &normal, &mut members);
     }
     doubt_forms(stack, &signatures, &mut members);
-    while veto::set_aside_signless(&signatures, &mut members) {
-        resize(stack, &signatures, &normal, &mut members);
-        doubt_forms(stack, &signatures, &mut members);
-    }
     Found {
         signatures,
         normal,

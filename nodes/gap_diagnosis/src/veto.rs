@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use machine::effects::{self, Kind, Parameter, Role};
+use machine::effects::{self, Parameter, Role};
 use machine::twin::Channel;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -248,32 +248,6 @@ fn own_vetoes(
     members.enumerate().map(of).unzip()
 }
 
-/// Sets members aside of whose one size not even the sign is known, once its interval holds what the form leaves open.
-/// Whether there were any.
-pub(crate) fn set_aside_signless(signatures: &Library, members: &mut [Member]) -> bool {
-    let mut any = false;
-    for member in members {
-        let kind = signatures.instances[signatures.forms[member.form].instance].kind;
-        if member.status != Status::Surrogate && is_signless(kind, &member.estimate) {
-            member.status = Status::Surrogate;
-            member.vetoes.push(Veto::NotSure);
-            any = true;
-        }
-    }
-    any
-}
-
-/// Whether an effect has one size, and its interval holds zero. Of several sizes each may be open where they are not together.
-fn is_signless(kind: &Kind, estimate: &Estimate) -> bool {
-    let parameters: Vec<&Parameter> = kind.parameters.iter().chain(kind.free).collect();
-    let is_size = |place: &&usize| parameters[**place].role == Role::Amplitude;
-    let sizes: Vec<&usize> = estimate.active.iter().filter(is_size).collect();
-    match sizes[..] {
-        [place] => estimate.low[*place] <= 0.0 && estimate.high[*place] >= 0.0,
-        _ => false,
-    }
-}
-
 /// Members that hold by themselves and are one cause that every axis shows.
 fn common(signatures: &Library, best: &Best, vetoes: &[Vec<Veto>]) -> BTreeSet<usize> {
     let members: Vec<(usize, &Instance, &Estimate)> = (0..vetoes.len())
@@ -507,24 +481,6 @@ pub fn confusable(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_size_that_may_be_of_either_sign_is_not_sure_and_one_of_several_may() {
-        let kind = |id: &str| effects::kind(id).unwrap();
-        let estimate = |low: f64, high: f64, active: &[usize]| Estimate {
-            values: vec![0.5 * (low + high); 4],
-            active: active.to_vec(),
-            low: vec![low; 4],
-            high: vec![high; 4],
-            at_bound: vec![false; 4],
-            d: 40.0,
-        };
-        let scale = kind("scale_error");
-        assert!(is_signless(scale, &estimate(-6390.0, 8736.0, &[0])));
-        assert!(!is_signless(scale, &estimate(4.0, 9.0, &[0])));
-        let motion = kind("rotary_motion");
-        assert!(!is_signless(motion, &estimate(-1.0, 2.0, &[0, 1])));
-    }
 
     #[test]
     fn each_further_column_must_bring_what_it_costs_in_the_score() {
