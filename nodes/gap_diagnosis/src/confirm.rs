@@ -10,8 +10,8 @@
 //! ```
 //!
 //! It must be above its standard error in all, and above zero in four of five runs that g shows in. The same is done with
-//! whole conditions: every level of a feed, a plane, a stylus and a side of the travel is left out in turn where g shows in it
-//! and elsewhere, and the gain must be above zero in four of five of those levels too. A cause has
+//! whole conditions: every level of a feed, a plane, a stylus and a side of the travel is left out in turn where g shows in it,
+//! and elsewhere apart from the other members, and the gain must be above zero in four of five of those levels too. A cause has
 //! one size under all conditions, a surrogate does not: g is split by condition and the gain of separate
 //! sizes is a score of Wilson and Hilferty's (`localise`):
 //!
@@ -107,11 +107,16 @@ fn levels(stack: &Stack<'_>, columns: &DMatrix<f64>, z: &DVector<f64>) -> Vec<No
 
 /// Whether sizes fitted without a level of a condition explain that level.
 fn holds_between_levels(whole: &Normal, levels: &[Normal], member: usize) -> bool {
-    let all = whole.gram[(member, member)];
     let least = LEAST_D_LEFT_OUT * LEAST_D_LEFT_OUT;
+    let all: Vec<usize> = (0..whole.gram.ncols()).collect();
     let shows = |level: &&Normal| {
-        let own = level.gram[(member, member)];
-        own > least && all - own > least
+        let elsewhere = Normal {
+            gram: &whole.gram - &level.gram,
+            along: &whole.along - &level.along,
+        };
+        // What of it the other members cannot imitate there; nothing where they can.
+        let variance = elsewhere.inverse(&all)[(member, member)];
+        level.gram[(member, member)] > least && variance > 0.0 && variance < 1.0 / least
     };
     let gains: Vec<f64> = levels
         .iter()
@@ -369,6 +374,22 @@ mod tests {
         // Where it does not show elsewhere there is nothing to hold it against.
         let (whole, levels) = two_levels([1.0, 1.0]);
         assert!(holds_between_levels(&levels[0], &levels[..1], 0) && whole.gram[(0, 0)] > 100.0);
+    }
+
+    #[test]
+    fn a_size_that_another_takes_over_elsewhere_is_not_held_against_a_level() {
+        // Two that are told apart in the first level only: elsewhere any share of them explains the same.
+        let level = |cross: f64, along: [f64; 2]| Normal {
+            gram: DMatrix::from_row_slice(2, 2, &[100.0, cross, cross, 100.0]),
+            along: DVector::from_row_slice(&along),
+        };
+        let levels = [level(0.0, [100.0, 100.0]), level(99.9, [150.0, 250.0])];
+        let whole = Normal {
+            gram: &levels[0].gram + &levels[1].gram,
+            along: &levels[0].along + &levels[1].along,
+        };
+        assert!(gain(&whole, &levels[0], 0) < 0.0);
+        assert!(holds_between_levels(&whole, &levels[..1], 0));
     }
 
     #[test]

@@ -207,8 +207,10 @@ fn ten_hours_are_held_in_few_ticks_and_diagnosed_with_bounded_rows() {
     // 64 stations of two channels, a few more where an axis turns.
     assert!((40..=config.most_rows / 128).contains(&runs), "{runs}");
     assert!(used.contains(&1) && used.iter().any(|run| *run + 6 > RUNS as u32));
-    let [play] = &diagnosis.report.causes[..] else {
-        panic!("{:?}", diagnosis.report.causes);
+    let causes = diagnosis.report.causes.iter();
+    let causes: Vec<_> = causes.filter(|c| c.status != Status::Surrogate).collect();
+    let [play] = causes[..] else {
+        panic!("{causes:?}");
     };
     assert_eq!(
         (play.effect.as_str(), play.axis.as_str()),
