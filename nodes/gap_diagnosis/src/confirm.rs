@@ -9,9 +9,7 @@
 //!   gain_g = |z - sum_(h != g) a_h f_h|^2 - |z - sum_h a_h f_h|^2         (1)
 //! ```
 //!
-//! It must be above its standard error in all, and above zero in four of five runs that g shows in. The same is done with
-//! whole conditions: every level of a feed, a plane, a stylus and a side of the travel is left out in turn where g shows in it,
-//! and elsewhere apart from the other members, and the gain must be above zero in four of five of those levels too. A cause has
+//! It must be above its standard error in all, and above zero in four of five runs that g shows in. A cause has
 //! one size under all conditions, a surrogate does not: g is split by condition and the gain of separate
 //! sizes is a score of Wilson and Hilferty's (`localise`):
 //!
@@ -40,12 +38,6 @@ use crate::stack::Stack;
 
 /// A level of a condition needs this D of the effect to say something of its size.
 const LEAST_D: f64 = 3.0;
-/// A level that is left out needs this D, within it and elsewhere: noise turns the gain of 1 in 160 of such.
-const LEAST_D_LEFT_OUT: f64 = 5.0;
-/// Share of folds in which the gain must be above zero.
-const LEAST_SHARE: f64 = 0.8;
-/// Conditions whose levels are left out in turn.
-const LEFT_OUT: [&str; 4] = ["feed", "plane", "stylus", "side of the travel"];
 
 /// Whether (1) confirms each signature.
 pub fn held_out_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<bool> {
@@ -67,7 +59,6 @@ pub fn held_out_gains_of(stack: &Stack<'_>, z: &DVector<f64>, parts: &[DVector<f
         .collect();
     let whole = Normal::new(&columns, z);
     let normals: Vec<Normal> = folds.iter().map(|fold| within(&columns, z, fold)).collect();
-    let levels = levels(stack, &columns, z);
     (0..parts.len())
         .map(|member| {
             let gains: Vec<f64> = normals
@@ -75,70 +66,17 @@ pub fn held_out_gains_of(stack: &Stack<'_>, z: &DVector<f64>, parts: &[DVector<f
                 .filter(|fold| fold.gram[(member, member)] > LEAST_D * LEAST_D)
                 .map(|fold| gain(&whole, fold, member))
                 .collect();
-            is_confirmed(&gains) && holds_between_levels(&whole, &levels, member)
+            is_confirmed(&gains)
         })
         .collect()
 }
 
-/// Columns and rows of each level of each condition.
-fn levels(stack: &Stack<'_>, columns: &DMatrix<f64>, z: &DVector<f64>) -> Vec<Normal> {
-    let conditions = SPLITS.iter().filter(|(name, _)| LEFT_OUT.contains(name));
-    let of_condition = |(_, level): &(&str, Level)| {
-        let mut normals = BTreeMap::<String, Normal>::new();
-        for block in &stack.rows.blocks {
-            let run = &stack.session.runs[block.run];
-            for (place, row) in block.range().zip(&block.rows) {
-                let normal = normals
-                    .entry(level(run, block, row))
-                    .or_insert_with(|| empty(columns.ncols()));
-                let own = columns.row(place).transpose();
-                normal.gram.ger(1.0, &own, &own, 1.0);
-                normal.along.axpy(z[place], &own, 1.0);
-            }
-        }
-        normals
-    };
-    conditions
-        .map(of_condition)
-        .filter(|normals| normals.len() > 1)
-        .flat_map(BTreeMap::into_values)
-        .collect()
-}
-
-/// Whether sizes fitted without a level of a condition explain that level.
-fn holds_between_levels(whole: &Normal, levels: &[Normal], member: usize) -> bool {
-    let least = LEAST_D_LEFT_OUT * LEAST_D_LEFT_OUT;
-    let all: Vec<usize> = (0..whole.gram.ncols()).collect();
-    let shows = |level: &&Normal| {
-        let elsewhere = Normal {
-            gram: &whole.gram - &level.gram,
-            along: &whole.along - &level.along,
-        };
-        // What of it the other members cannot imitate there; nothing where they can.
-        let variance = elsewhere.inverse(&all)[(member, member)];
-        level.gram[(member, member)] > least && variance > 0.0 && variance < 1.0 / least
-    };
-    let gains: Vec<f64> = levels
-        .iter()
-        .filter(shows)
-        .map(|level| gain(whole, level, member))
-        .collect();
-    positive(&gains) >= LEAST_SHARE * count(gains.len())
-}
-
-fn positive(gains: &[f64]) -> f64 {
-    count(gains.iter().filter(|gain| **gain > 0.0).count())
-}
-
-fn empty(n: usize) -> Normal {
-    Normal {
+fn within(columns: &DMatrix<f64>, z: &DVector<f64>, ranges: &[std::ops::Range<usize>]) -> Normal {
+    let n = columns.ncols();
+    let mut sum = Normal {
         gram: DMatrix::zeros(n, n),
         along: DVector::zeros(n),
-    }
-}
-
-fn within(columns: &DMatrix<f64>, z: &DVector<f64>, ranges: &[std::ops::Range<usize>]) -> Normal {
-    let mut sum = empty(columns.ncols());
+    };
     for range in ranges {
         let part = columns.rows(range.start, range.len());
         sum.gram += part.tr_mul(&part);
@@ -176,7 +114,8 @@ fn is_confirmed(gains: &[f64]) -> bool {
     let n = count(gains.len());
     let mean = gains.iter().sum::<f64>() / n;
     let variance = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    mean > (variance / n).sqrt() && positive(gains) >= LEAST_SHARE * n
+    let positive = count(gains.iter().filter(|gain| **gain > 0.0).count());
+    mean > (variance / n).sqrt() && positive >= 0.8 * n
 }
 
 type Level = fn(&Run, &Block, &Row) -> String;
@@ -346,50 +285,6 @@ mod tests {
                 if own { (0.1 * row as f64).sin() } else { 0.0 }
             })
         })
-    }
-
-    /// A signature of unit rows in two levels of 100 rows, and what is read in each.
-    fn two_levels(read: [f64; 2]) -> (Normal, Vec<Normal>) {
-        let level = |read: f64| Normal {
-            gram: DMatrix::from_element(1, 1, 100.0),
-            along: DVector::from_element(1, 100.0 * read),
-        };
-        let levels = read.map(level).to_vec();
-        let whole = Normal {
-            gram: &levels[0].gram + &levels[1].gram,
-            along: &levels[0].along + &levels[1].along,
-        };
-        (whole, levels)
-    }
-
-    #[test]
-    fn eq1_what_one_condition_shows_must_explain_another_that_is_left_out() {
-        let holds = |read| {
-            let (whole, levels) = two_levels(read);
-            holds_between_levels(&whole, &levels, 0)
-        };
-        assert!(holds([1.0, 1.0]) && holds([1.0, 0.7]));
-        // A surrogate that is large in one and nothing, or the reverse, in the other.
-        assert!(!holds([1.0, 0.0]) && !holds([1.0, -0.5]));
-        // Where it does not show elsewhere there is nothing to hold it against.
-        let (whole, levels) = two_levels([1.0, 1.0]);
-        assert!(holds_between_levels(&levels[0], &levels[..1], 0) && whole.gram[(0, 0)] > 100.0);
-    }
-
-    #[test]
-    fn a_size_that_another_takes_over_elsewhere_is_not_held_against_a_level() {
-        // Two that are told apart in the first level only: elsewhere any share of them explains the same.
-        let level = |cross: f64, along: [f64; 2]| Normal {
-            gram: DMatrix::from_row_slice(2, 2, &[100.0, cross, cross, 100.0]),
-            along: DVector::from_row_slice(&along),
-        };
-        let levels = [level(0.0, [100.0, 100.0]), level(99.9, [150.0, 250.0])];
-        let whole = Normal {
-            gram: &levels[0].gram + &levels[1].gram,
-            along: &levels[0].along + &levels[1].along,
-        };
-        assert!(gain(&whole, &levels[0], 0) < 0.0);
-        assert!(holds_between_levels(&whole, &levels[..1], 0));
     }
 
     #[test]

@@ -18,8 +18,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::effects::Moment;
-
 use crate::normal::{Fit, Normal};
 use crate::rows::count;
 use crate::signature::{Form, Library};
@@ -125,8 +123,7 @@ impl<'l> Search<'l> {
     }
 
     /// Whether the free part of every wide form only widens the form: one that is as large as the rest of its
-    /// signature would be another effect under this one's name. Heights of a curve that may have any form are no such part,
-    /// nor is what an effect of scatter has beside an even part, which is in the noise floor and has no signature.
+    /// signature would be another effect under this one's name. Heights of a curve that may have any form are no such part.
     fn keeps_form(&self, set: &[usize], fit: &Fit) -> bool {
         let mut first = 0;
         set.iter().all(|form| {
@@ -147,8 +144,7 @@ impl<'l> Search<'l> {
                     .flat_map(|i| part.iter().map(move |j| of(i, j)))
                     .sum()
             };
-            let is_scatter = kind.moment == Moment::Variance;
-            !entry.wide || is_scatter || square(true) <= MOST_FREE.powi(2) * square(false)
+            !entry.wide || square(true) <= MOST_FREE.powi(2) * square(false)
         })
     }
 
@@ -248,24 +244,13 @@ impl<'l> Search<'l> {
         }
     }
 
-    /// The best set found: of one effect or two the best of all, of more what the beam meets.
+    /// The best set found.
     pub fn run(&mut self, limits: Limits) -> Set {
         let mut beam: Vec<Set> = vec![vec![]];
         let mut best: Set = vec![];
-        let alone = self.beside(&vec![], usize::MAX);
-        for size in 1..=limits.most_effects {
+        for _ in 0..limits.most_effects {
             let mut next = Vec::new();
-            match size {
-                1 => next.clone_from(&alone),
-                // Every effect's best form, beside which every form of every other is gone through.
-                2 => {
-                    for (_, set) in alone.iter().filter(|(score, _)| score.is_finite()) {
-                        next.extend(self.beside(set, 4));
-                    }
-                }
-                _ => {}
-            }
-            for set in beam.iter().filter(|_| size > 1) {
+            for set in &beam {
                 next.extend(self.beside(set, 2 * limits.beam));
             }
             next.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -286,11 +271,10 @@ impl<'l> Search<'l> {
             beam.dedup();
             beam.sort_by(|a, b| self.visited[a].total_cmp(&self.visited[b]));
             let Some(first) = beam.first() else { break };
-            if self.visited[first] < self.visited[&best] - 1e-9 {
-                best.clone_from(first);
-            } else if size > 1 {
+            if self.visited[first] >= self.visited[&best] - 1e-9 {
                 break;
             }
+            best.clone_from(first);
         }
         best
     }
@@ -355,55 +339,6 @@ mod tests {
                 .to_vec(),
             excited: vec![true],
         }
-    }
-
-    /// Columns of one effect each.
-    fn effects(columns: &[DVector<f64>]) -> Library {
-        let form = |k: usize| Form {
-            instance: k,
-            values: vec![0.0; 2],
-            amplitudes: vec![0],
-            columns: vec![k],
-            price: 1,
-            wide: false,
-        };
-        let instance = |_: &DVector<f64>| Instance {
-            kind: effects::kind("scale_error").unwrap(),
-            target: Target::Axis(Axis::X),
-        };
-        Library {
-            instances: columns.iter().map(instance).collect(),
-            forms: (0..columns.len()).map(form).collect(),
-            columns: columns.to_vec(),
-            excited: vec![true; columns.len()],
-        }
-    }
-
-    #[test]
-    fn a_pair_is_found_though_many_others_are_better_alone() {
-        let sparse = |entries: &[(usize, f64)]| {
-            let mut column = DVector::zeros(10);
-            for (row, value) in entries {
-                column[*row] = *value;
-            }
-            column
-        };
-        // Two that explain 10 e0 only together, and seven of which each explains more than either of them.
-        let mut columns: Vec<DVector<f64>> = (0..7)
-            .map(|k| sparse(&[(0, 0.5), (k + 3, 0.75_f64.sqrt())]))
-            .collect();
-        columns.push(sparse(&[(0, 1.0), (1, 2.0)]) * 4.0);
-        columns.push(sparse(&[(0, 1.0), (1, -2.0)]) * 4.0);
-        let library = effects(&columns);
-        let z = sparse(&[(0, 10.0)]);
-        let normal = library.normal(&z);
-        let mut search = Search::new(&library, &normal, z.norm_squared(), 1000.0);
-        let limits = Limits {
-            beam: 5,
-            most_effects: 4,
-            swaps: true,
-        };
-        assert_eq!(search.run(limits), vec![7, 8]);
     }
 
     #[test]
