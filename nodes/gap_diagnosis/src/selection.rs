@@ -18,6 +18,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use machine::effects::Moment;
+
 use crate::normal::{Fit, Normal};
 use crate::rows::count;
 use crate::signature::{Form, Library};
@@ -123,7 +125,8 @@ impl<'l> Search<'l> {
     }
 
     /// Whether the free part of every wide form only widens the form: one that is as large as the rest of its
-    /// signature would be another effect under this one's name. Heights of a curve that may have any form are no such part.
+    /// signature would be another effect under this one's name. Heights of a curve that may have any form are no such part,
+    /// nor is what an effect of scatter has beside an even part, which is in the noise floor and has no signature.
     fn keeps_form(&self, set: &[usize], fit: &Fit) -> bool {
         let mut first = 0;
         set.iter().all(|form| {
@@ -144,7 +147,8 @@ impl<'l> Search<'l> {
                     .flat_map(|i| part.iter().map(move |j| of(i, j)))
                     .sum()
             };
-            !entry.wide || square(true) <= MOST_FREE.powi(2) * square(false)
+            let is_scatter = kind.moment == Moment::Variance;
+            !entry.wide || is_scatter || square(true) <= MOST_FREE.powi(2) * square(false)
         })
     }
 
