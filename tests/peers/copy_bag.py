@@ -5,17 +5,19 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 
 from read_bag import own_typestore
 
 
-def main(source: Path, target: Path) -> int:
+def copy(source: Path, target: Path, mode: CompressionMode = CompressionMode.NONE) -> int:
+    """The messages with their definitions, hashes and qualities of service; no attachment, no record of ours."""
     store = own_typestore(source)
     count = 0
-    with Reader(source) as reader, Writer(
-        target, version=9, storage_plugin=StoragePlugin.MCAP
-    ) as writer:
+    writer = Writer(target, version=9, storage_plugin=StoragePlugin.MCAP)
+    if mode is not CompressionMode.NONE:
+        writer.set_compression(mode, CompressionFormat.ZSTD)
+    with Reader(source) as reader, writer:
         connections = {
             c.id: writer.add_connection(
                 c.topic,
@@ -33,4 +35,4 @@ def main(source: Path, target: Path) -> int:
 
 
 if __name__ == "__main__":
-    print(main(Path(sys.argv[1]), Path(sys.argv[2])))
+    print(copy(Path(sys.argv[1]), Path(sys.argv[2])))

@@ -10,33 +10,13 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer as McapWriter
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionMode
 
-from read_bag import own_typestore
-
-
-def by_rosbags(source: Path, target: Path, mode: CompressionMode) -> None:
-    """The messages with their definitions, hashes and qualities of service; no attachment, no record of ours."""
-    store = own_typestore(source)
-    writer = Writer(target, version=9, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(mode, CompressionFormat.ZSTD)
-    with Reader(source) as reader, writer:
-        connections = {
-            c.id: writer.add_connection(
-                c.topic,
-                c.msgtype,
-                msgdef=c.msgdef.data,
-                rihs01=store.hash_rihs01(c.msgtype),
-                offered_qos_profiles=c.ext.offered_qos_profiles,
-            )
-            for c in reader.connections
-        }
-        for connection, stamp, data in reader.messages():
-            writer.write(connections[connection.id], stamp, data)
+from copy_bag import copy
 
 
 def by_mcap(source: Path, target: Path, compression: CompressionType) -> None:
-    """The same by `mcap`, which knows nothing of ROS."""
+    """The messages with their definitions by `mcap`, which knows nothing of ROS."""
     with (source / "bag_0.mcap").open("rb") as stream, target.open("wb") as out:
         writer = McapWriter(out, chunk_size=64 * 1024, compression=compression)
         writer.start(profile="ros2", library="mcap")
@@ -60,7 +40,7 @@ def by_mcap(source: Path, target: Path, compression: CompressionType) -> None:
 
 def main(source: Path, target: Path) -> None:
     for name, mode in (("none", CompressionMode.NONE), ("zstd", CompressionMode.STORAGE)):
-        by_rosbags(source, target / f"rosbags_{name}", mode)
+        copy(source, target / f"rosbags_{name}", mode)
         print(target / f"rosbags_{name}")
     for name in ("none", "lz4", "zstd"):
         by_mcap(source, target / f"mcap_{name}.mcap", CompressionType[name.upper()])
