@@ -1,23 +1,34 @@
 //! What the recorder's host has of a run.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use abbe_msgs::diagnostic_msgs::msg::DiagnosticArray;
 use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Wire, from_cdr};
 use metrology::Stamp;
-use metrology::stamp::Host;
+use metrology::stamp::{Host, Span};
 use recorder::{Bag, Event, Order};
 
-/// How many messages of a topic there are, and how many numbers of its one writer are missing between the first and the last.
-pub fn missing(bag: &Path, topic: &str) -> (u64, u64) {
-    let numbers = numbers(bag, topic);
-    let (Some(first), Some(last)) = (numbers.iter().min(), numbers.iter().max()) else {
-        return (0, 0);
+/// How long a writer and a reader that have only just heard of each other may need to meet. A reader takes what a writer
+/// sends to others before the writer knows of it, and such a sample is not sent again when it is lost (DDS 1.4, 2.2.3.4: a
+/// volatile reader is owed nothing from before).
+const MEETING: Span = Span::from_nanos(2_000_000_000);
+
+/// How many messages of a topic there are once its writer and the recorder have met, and which numbers are missing from there
+/// to the last.
+pub fn missing(bag: &Path, topic: &str) -> (usize, Vec<u32>) {
+    let all = raw(bag, topic);
+    let Some(met) = all.first().map(|first| first.at + MEETING) else {
+        return (0, vec![]);
     };
-    let all: std::collections::BTreeSet<u32> = numbers.iter().copied().collect();
-    let there = u64::try_from(all.len()).unwrap();
-    (there, u64::from(last - first) + 1 - there)
+    let since = all.iter().filter(|said| said.at >= met);
+    let there: BTreeSet<u32> = since.map(|said| said.sequence).collect();
+    let (Some(first), Some(last)) = (there.first(), there.last()) else {
+        return (0, vec![]);
+    };
+    let missing = (*first..=*last).filter(|number| !there.contains(number));
+    (there.len(), missing.collect())
 }
 
 /// The numbers of a topic's messages, as they came.
@@ -66,20 +77,26 @@ fn raw(bag: &Path, topic: &str) -> Vec<Said> {
     found
 }
 
-/// What every node counted last, by node and counter.
-pub fn counters(bag: &Path) -> std::collections::BTreeMap<(String, String), u64> {
-    let mut last = std::collections::BTreeMap::new();
+/// What every node counted since it had met the others, by node and counter.
+pub fn counters(bag: &Path) -> BTreeMap<(String, String), u64> {
+    let mut counts = BTreeMap::<(String, String), (Stamp<Host>, u64, u64)>::new();
     for said in raw(bag, topics::DIAGNOSTICS.name) {
         let array: DiagnosticArray = from_cdr(&said.bytes).unwrap();
         for status in array.status.into_iter().filter(|s| !s.name.contains(": ")) {
             for value in status.values {
                 if let Ok(count) = value.value.parse() {
-                    last.insert((status.name.clone(), value.key), count);
+                    let key = (status.name.clone(), value.key);
+                    let (begun, met, last) = counts.entry(key).or_insert((said.at, count, count));
+                    if said.at < *begun + MEETING {
+                        *met = count;
+                    }
+                    *last = count;
                 }
             }
         }
     }
-    last
+    let since = |(key, (_, met, last)): (_, (_, u64, u64))| (key, last - met);
+    counts.into_iter().map(since).collect()
 }
 
 /// The value below which a share of the values lies.
