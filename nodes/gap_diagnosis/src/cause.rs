@@ -28,7 +28,7 @@ use crate::selection::{Limits, Search, Set};
 use crate::signature::{Form, Instance, Library};
 use crate::stack::Stack;
 use crate::unknown::{self, Leftover};
-use crate::veto::{self, Veto};
+use crate::veto::{self, Veto, least_d_squared};
 use crate::widening;
 
 /// Everything that the search found.
@@ -189,15 +189,16 @@ fn doubt_forms(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) 
     }
 }
 
-/// Leaves out members that, sized without the surrogates, are below what they cost the search: they were found for
-/// what the surrogates left. Whether there were any.
+/// Leaves out members that, sized without the surrogates, are below what they cost the search or below what is named at
+/// all: they were found for what the surrogates left. Whether there were any.
 fn leave_out_small(stack: &Stack<'_>, signatures: &Library, members: &mut Vec<Member>) -> bool {
     let log_rows = stack.freedom().max(2.0).ln();
     let log_instances = count(signatures.seen().max(2)).ln();
     let before = members.len();
     members.retain(|member| {
         let price = count(signatures.forms[member.form].price) * log_rows + 2.0 * log_instances;
-        member.status == Status::Surrogate || member.estimate.d.powi(2) >= price
+        let least = price.max(least_d_squared(member.estimate.active.len(), log_rows));
+        member.status == Status::Surrogate || member.estimate.d.powi(2) >= least
     });
     members.len() < before
 }

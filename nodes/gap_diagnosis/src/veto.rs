@@ -105,7 +105,7 @@ const LEAST_RATIO: f64 = 2.0;
 const LEAST_D: f64 = 6.5;
 
 /// D^2 below which a member with so many columns is not named, by the logarithm of the rows.
-fn least_d_squared(columns: usize, log_rows: f64) -> f64 {
+pub(crate) fn least_d_squared(columns: usize, log_rows: f64) -> f64 {
     LEAST_D.powi(2) + count(columns.saturating_sub(1)) * log_rows
 }
 
