@@ -44,7 +44,7 @@ use nalgebra::DMatrix;
 
 use crate::config::GapConfig;
 use crate::field::{Mode, Smooth};
-use crate::repeats;
+use crate::repeats::{self, Label};
 use crate::rows::{Block, Rows, count};
 use crate::stack::Stack;
 
@@ -176,9 +176,6 @@ pub fn sharing(session: &Session, rows: &Rows) -> Vec<f64> {
     }
     sharing
 }
-
-/// A touch of one feature, approach and feed.
-pub type Label = (String, [i64; 4]);
 
 /// In how many blocks of a stack each touch is repeated.
 pub fn touched(session: &Session, rows: &Rows) -> BTreeMap<Label, f64> {

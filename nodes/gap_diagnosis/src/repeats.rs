@@ -11,7 +11,7 @@
 //!
 //! With five repeats and more the weights are also orthogonal to time, with nine to its square, with
 //! thirteen to its cube: what drifts through the session is the machine's, not noise. Touches of one
-//! feature at one feed within a run are repeats as well.
+//! feature from one side, at one feed and in one pose of the rotary axes are repeats within a run as well.
 //!
 //! # References
 //! \[1\] ISO 230-2:2014, 4 (repeats of one test).
@@ -19,7 +19,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::twin::{Channel, Run, Session, Touch};
-use metrology::PerAxis;
+use metrology::{Axis, PerAxis};
 use nalgebra::DVector;
 
 use crate::nuisance::orthonormal;
@@ -192,18 +192,32 @@ fn weights(times: &[f64]) -> Vec<DVector<f64>> {
         .collect()
 }
 
-/// Feature, approach and feed of a touch.
-pub fn label(touch: &Touch) -> (String, [i64; 4]) {
+/// What touches that repeat each other have in common.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Label {
+    feature: String,
+    /// Directions in hundredths, the feed in hundredths of mm/s.
+    approach: [i64; 4],
+    /// Of the rotary axes, in hundredths of a radian.
+    pose: Vec<i64>,
+}
+
+/// Feature, approach, feed and pose of a touch.
+pub fn label(touch: &Touch) -> Label {
     #[expect(clippy::cast_possible_truncation, reason = "a label, rounded")]
     let rounded = |value: f64| (value * 100.0).round() as i64;
     let a = touch.approach;
-    let at = [a.x, a.y, a.z, touch.feed_mm_s].map(rounded);
-    (touch.feature_id.clone(), at)
+    let pose = Axis::ROTARY.map(|axis| rounded(touch.position[axis]));
+    Label {
+        feature: touch.feature_id.clone(),
+        approach: [a.x, a.y, a.z, touch.feed_mm_s].map(rounded),
+        pose: pose.to_vec(),
+    }
 }
 
-/// Touches of one feature, approach and feed within a run.
+/// Touches of one feature, approach, feed and pose within a run.
 fn touches_between(run: &Run, place: usize, block: &Block, residual: &[f64]) -> Vec<Contrasts> {
-    let mut same = BTreeMap::<(String, [i64; 4]), Vec<usize>>::new();
+    let mut same = BTreeMap::<Label, Vec<usize>>::new();
     for (index, row) in block.rows.iter().enumerate() {
         if let Some(touch) = row.touch.and_then(|touch| run.touches.get(touch)) {
             same.entry(label(touch)).or_default().push(index);

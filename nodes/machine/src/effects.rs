@@ -43,6 +43,7 @@ pub mod probe_pretravel;
 pub mod probe_repeatability;
 pub mod quantisation;
 pub mod reversal_spike;
+pub mod rotary_backlash;
 pub mod rotary_location;
 pub mod rotary_motion;
 pub mod scale_error;
@@ -102,6 +103,7 @@ pub static CATALOGUE: &[&Kind] = &[
     &probe_repeatability::KIND,
     &quantisation::KIND,
     &reversal_spike::KIND,
+    &rotary_backlash::KIND,
     &rotary_location::KIND,
     &rotary_motion::KIND,
     &scale_error::KIND,

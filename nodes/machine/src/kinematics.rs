@@ -108,6 +108,15 @@ impl Kinematics {
         self.table_sense
     }
 
+    /// +1 where a positive command of a rotary axis turns the tool right-handed, seen from the workpiece, otherwise -1.
+    #[must_use]
+    pub fn tool_sense(&self, axis: Axis) -> f64 {
+        match self.table_sense {
+            TableSense::Table if self.chain.workpiece_side().contains(&axis) => -1.0,
+            TableSense::Table | TableSense::Tool => 1.0,
+        }
+    }
+
     /// Pose of the probe in the workpiece frame, equation (1); positions in mm and rad.
     #[must_use]
     pub fn workpiece_from_probe(&self, positions: &PerAxis<f64>) -> Isometry3<f64> {

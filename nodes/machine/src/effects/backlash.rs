@@ -204,7 +204,7 @@ impl Backlash {
         match (entry, friction) {
             _ if half_mm <= 0.0 => vec![0.0; position.len()],
             (Some(entry), Some(friction)) => self.coasting_mm(scene, entry, friction, half_mm),
-            _ => held_mm(position, half_mm),
+            _ => held(position, half_mm),
         }
     }
 
@@ -242,14 +242,14 @@ impl Backlash {
     }
 }
 
-/// (1): the slide stays where it is left.
-fn held_mm(position: &[f64], half_mm: f64) -> Vec<f64> {
-    let mut lag_mm = 0.0_f64;
+/// (1): what is driven stays where it is left.
+pub(super) fn held(position: &[f64], half: f64) -> Vec<f64> {
+    let mut lag = 0.0_f64;
     let mut last = position.first().copied().unwrap_or(0.0);
     let follow = |here: &f64| {
-        lag_mm = (lag_mm - (here - last)).clamp(-half_mm, half_mm); // (1)
+        lag = (lag - (here - last)).clamp(-half, half); // (1)
         last = *here;
-        lag_mm
+        lag
     };
     position.iter().map(follow).collect()
 }

@@ -1,16 +1,16 @@
-//! Error motion of a rotary axis: radial, axial, tilt or positioning error, once and twice a turn.
+//! Error motion of a rotary axis: radial, axial, tilt or positioning error, once to five times a turn.
 //!
 //! # Model
 //!
 //! ```text
-//!   e(c) = a cos c + b sin c + a2 cos 2c + b2 sin 2c                      (1)
+//!   e(c) = a cos c + b sin c + sum_(k = 2..5) (a_k cos kc + b_k sin kc)   (1)
 //!   E = e times the lever of `volumetric::sensitivity`, (3) there         (2)
 //! ```
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | a, b | `cos_um_urad`, `sin_um_urad`: µm for XC and the like, µrad for AC and the like | µm, µrad |
-//! | a2, b2 | `free_cos2_um_urad`, `free_sin2_um_urad` | µm, µrad |
+//! | a_k, b_k | `free_cos2_um_urad`, `free_sin2_um_urad` to `free_sin5_um_urad` | µm, µrad |
 //!
 //! # Holds when
 //! The error repeats with the turn. A bearing's asynchronous motion does not.
@@ -38,33 +38,45 @@ pub static KIND: Kind = Kind {
     free: &[
         Parameter::amplitude("free_cos2_um_urad", 200.0, 2.0),
         Parameter::amplitude("free_sin2_um_urad", 200.0, 2.0),
+        Parameter::amplitude("free_cos3_um_urad", 200.0, 2.0),
+        Parameter::amplitude("free_sin3_um_urad", 200.0, 2.0),
+        Parameter::amplitude("free_cos4_um_urad", 200.0, 2.0),
+        Parameter::amplitude("free_sin4_um_urad", 200.0, 2.0),
+        Parameter::amplitude("free_cos5_um_urad", 200.0, 2.0),
+        Parameter::amplitude("free_sin5_um_urad", 200.0, 2.0),
     ],
     moment: Moment::Mean,
     needs: "readings at positions of the rotary axis over a turn",
     build: |target, values| {
+        let per_micro = lever::per_micro(target.component());
         Box::new(RotaryMotion {
             component: target.component(),
-            first: [0, 1].map(|k| values[k] * lever::per_micro(target.component())),
-            second: [2, 3].map(|k| values[k] * lever::per_micro(target.component())),
+            waves: std::array::from_fn(|k| [0, 1].map(|part| values[2 * k + part] * per_micro)),
         })
     },
 };
 
+/// Waves a turn.
+const WAVES: usize = 5;
+
 struct RotaryMotion {
     component: ErrorComponent,
-    /// mm or rad.
-    first: [f64; 2],
-    second: [f64; 2],
+    /// Cosine and sine of each, mm or rad.
+    waves: [[f64; 2]; WAVES],
 }
 
 impl Effect for RotaryMotion {
     fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
         let position = &scene.run.motion.position[self.component.of];
-        let ([a, b], [a2, b2]) = (self.first, self.second);
         lever::add(scene, self.component, response, |tick| {
             let (sin, cos) = position[tick].sin_cos();
-            let twice = a2 * (cos * cos - sin * sin) + b2 * 2.0 * sin * cos;
-            a * cos + b * sin + twice // (1)
+            let (mut s, mut c) = (0.0, 1.0);
+            let mut sum = 0.0;
+            for [a, b] in self.waves {
+                (s, c) = (s * cos + c * sin, c * cos - s * sin);
+                sum += a * c + b * s; // (1)
+            }
+            sum
         });
     }
 }

@@ -149,13 +149,28 @@ impl Follower {
     pub(crate) fn new(entry: &AxisEntry, motion: &Motion, axis: Axis) -> Self {
         let (gains, velocity_loop) = Gains::of(entry);
         let first = motion.velocity[axis].first().copied().unwrap_or(0.0);
+        let state = [-gains.left_s() * first, first, 0.0, first, first, 0.0];
+        Self::of(gains, velocity_loop, Driven::from(state))
+    }
+
+    /// At rest, with another share of velocity feed-forward.
+    pub(crate) fn at_rest(entry: &AxisEntry, feedforward: f64) -> Self {
+        let (gains, velocity_loop) = Gains::of(entry);
+        let gains = Gains {
+            feedforward,
+            ..gains
+        };
+        Self::of(gains, velocity_loop, Driven::zeros())
+    }
+
+    fn of(gains: Gains, velocity_loop: Option<&VelocityLoopEntry>, state: Driven) -> Self {
         Self {
             rate: velocity_loop.map(|velocity_loop| gains.rate(velocity_loop)),
             period_s: 0.0,
             kept: 1.0,
             passed: SMatrix::identity(),
             known: BTreeMap::new(),
-            state: Driven::from([-gains.left_s() * first, first, 0.0, first, first, 0.0]),
+            state,
             gains,
         }
     }

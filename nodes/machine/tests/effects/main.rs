@@ -42,6 +42,7 @@ mod probe_pretravel;
 mod probe_repeatability;
 mod quantisation;
 mod reversal_spike;
+mod rotary_backlash;
 mod rotary_location;
 mod rotary_motion;
 mod scale_error;
