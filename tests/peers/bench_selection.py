@@ -23,6 +23,9 @@ class Search:
         self.log_instances = problem["log_instances"]
         self.beam = problem["beam"]
         self.most = problem["most_effects"]
+        self.most_forms = problem["most_forms"]
+        self.most_free = problem["most_free"]
+        self.most_cancelling = problem["most_cancelling"]
         self.instance = np.array([form["instance"] for form in self.forms])
         self.prices = np.array([form["price"] for form in self.forms], dtype=float)
         self.by_width = {}
@@ -61,13 +64,33 @@ class Search:
         for column, size in zip(kept, solution):
             sizes[columns.index(column)] = size
         limits = np.array([limit for form in chosen for limit in self.forms[form]["sizes"]])
-        if np.all((sizes >= limits[:, 0]) & (sizes <= limits[:, 1])):
+        gain = self.along[kept] @ solution
+        is_physical = np.all((sizes >= limits[:, 0]) & (sizes <= limits[:, 1]))
+        if is_physical and self.are_sound(chosen, sizes, gain):
             price = self.prices[list(chosen)].sum() * self.log_rows
-            score = self.square - self.along[kept] @ solution + price + 2.0 * len(chosen) * self.log_instances
+            score = self.square - gain + price + 2.0 * len(chosen) * self.log_instances
         else:
             score = np.inf
         self.visited[chosen] = score
         return score
+
+    def are_sound(self, chosen, sizes, gain):
+        """Whether no wide form is mostly what widens it, and no member cancels another."""
+        first = 0
+        for place in chosen:
+            form = self.forms[place]
+            columns = form["columns"]
+            own = sizes[first : first + len(columns)]
+            first += len(columns)
+            gram = self.gram[np.ix_(columns, columns)]
+            widens = np.array(form["widens"])
+            if widens.any():
+                free, rest = np.where(widens, own, 0.0), np.where(widens, 0.0, own)
+                if free @ gram @ free > self.most_free**2 * (rest @ gram @ rest):
+                    return False
+            if len(chosen) > 1 and own @ gram @ own > self.most_cancelling * gain:
+                return False
+        return True
 
     def gains_beside(self, chosen):
         """What each form takes beside a set, all forms of one width at once."""
@@ -96,15 +119,23 @@ class Search:
     def beside(self, chosen, most):
         taken = {self.instance[form] for form in chosen}
         worth = self.gains_beside(chosen) - self.prices * self.log_rows
-        best = {}
+        open_forms = {}
         for form in np.argsort(-worth, kind="stable"):
             instance = self.instance[form]
-            if instance not in taken and instance not in best:
-                best[instance] = form
-                if len(best) == most:
-                    break
-        sets = [tuple(sorted((*chosen, int(form)))) for form in best.values()]
-        return sorted(((self.score(s), s) for s in sets), key=lambda pair: pair[0])
+            if instance not in taken:
+                open_forms.setdefault(instance, []).append(int(form))
+        sets = [self.best_sound(chosen, forms) for forms in list(open_forms.values())[:most]]
+        return sorted(sets, key=lambda pair: pair[0])
+
+    def best_sound(self, chosen, forms):
+        """The first form of an instance, the best first, that may stand beside a set."""
+        tried = []
+        for form in forms[: self.most_forms]:
+            one = tuple(sorted((*chosen, form)))
+            tried.append((self.score(one), one))
+            if np.isfinite(tried[-1][0]):
+                return tried[-1]
+        return tried[0]
 
     def polished(self, chosen):
         while True:

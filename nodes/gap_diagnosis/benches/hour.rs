@@ -36,6 +36,11 @@ const PLAY_MM: f64 = 4e-3;
 /// Latency of the probe, s.
 const LATENCY_S: f64 = 2e-3;
 const CYCLES: i64 = 16;
+const TOUCHES: u32 = 200;
+/// What it may take: the whole diagnosis, the search, the memory.
+const MOST_S: f64 = 60.0;
+const MOST_SEARCH_S: f64 = 2.0;
+const MOST_MIB: f64 = 1024.0;
 /// Searches of which the mean is taken.
 const SEARCHES: u32 = 20;
 
@@ -198,9 +203,9 @@ impl Hour {
         }
     }
 
-    fn latency(&mut self) {
+    fn latency(&mut self, feeds_mm_s: &[f64]) {
         self.segment(true, TestKind::Latency, 0.0, 0.0, 0.0);
-        for feed_mm_s in [1.0, 4.0, 8.0] {
+        for &feed_mm_s in feeds_mm_s {
             for _ in 0..2 {
                 self.touch(0, Axis::X, feed_mm_s);
             }
@@ -227,8 +232,9 @@ fn searches(posed: &Posed) {
     let (set, score) = found;
     let [columns, forms] = [posed.problem.along.len(), posed.problem.forms.len()];
     println!(
-        "searched {columns} columns in {forms} forms in {:.1} ms",
-        own_s * 1e3
+        "searched {columns} columns in {forms} forms in {:.1} ms ({} of 2 s)",
+        own_s * 1e3,
+        within(own_s, MOST_SEARCH_S)
     );
     let Some(peer) = by_numpy(posed) else { return };
     let other: Vec<usize> = serde_json::from_value(peer["set"].clone()).unwrap();
@@ -247,6 +253,10 @@ fn searches(posed: &Posed) {
         peer_s * 1e3,
         peer_s / own_s
     );
+}
+
+fn within(value: f64, most: f64) -> &'static str {
+    if value <= most { "within" } else { "BEYOND" }
 }
 
 fn by_numpy(posed: &Posed) -> Option<serde_json::Value> {
@@ -291,10 +301,12 @@ fn gathered(machine: &MachineFile) -> Hour {
         hour.circle(radius_mm, feed_mm_s, turn);
         if i64::from(k) < CYCLES * 8 && k.is_multiple_of(8) {
             hour.cycle();
-            hour.latency();
+            hour.latency(&[1.0, 4.0, 8.0]);
         }
         k += 1;
     }
+    hour.latency(&[1.0, 2.0, 4.0, 8.0]);
+    assert_eq!(hour.touches, TOUCHES);
     hour
 }
 
@@ -317,9 +329,15 @@ fn main() {
     );
     println!("gathered in {gathered_s:.1} s, most memory {held_mib:.0?} MiB");
     println!(
-        "diagnosed in {diagnosed_s:.1} s with all simulations, most memory {:.0?} MiB",
-        peak_mib()
+        "diagnosed in {diagnosed_s:.1} s with all simulations ({} 60 s)",
+        within(diagnosed_s, MOST_S)
     );
+    if let Some(most_mib) = peak_mib() {
+        println!(
+            "most memory {most_mib:.0} MiB ({} 1 GiB)",
+            within(most_mib, MOST_MIB)
+        );
+    }
     for cause in &found.report.causes {
         println!(
             "{:?} {} {} D {:.0}",

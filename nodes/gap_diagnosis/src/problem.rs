@@ -17,7 +17,7 @@ use crate::diagnose::first_stack;
 use crate::error::GapError;
 use crate::normal::Normal;
 use crate::rows::count;
-use crate::selection::{Limits, Search, Set};
+use crate::selection::{Limits, MOST_CANCELLING, MOST_FORMS, MOST_FREE, Search, Set};
 use crate::signature::{Instance, Library};
 
 /// One form of an effect among the columns of a [`Problem`].
@@ -31,6 +31,8 @@ pub struct FormOf {
     pub price: usize,
     /// Least and greatest size of each column, in units of what the column was made with.
     pub sizes: Vec<[f64; 2]>,
+    /// Columns that only widen the form; their share of a signature is limited.
+    pub widens: Vec<bool>,
 }
 
 /// A search: (1) is to be least.
@@ -52,6 +54,12 @@ pub struct Problem {
     pub beam: usize,
     /// Most effects in one set.
     pub most_effects: usize,
+    /// Forms of one instance that are tried beside a set.
+    pub most_forms: usize,
+    /// Most that the widening part of a form is of the rest of it.
+    pub most_free: f64,
+    /// Most that a member is of what the whole set explains, in squares.
+    pub most_cancelling: f64,
 }
 
 /// A problem with what solves it here.
@@ -116,11 +124,15 @@ fn problem(signatures: &Library, normal: &Normal, square: f64, config: &GapConfi
                 [if p.low < 0.0 { -most } else { 0.0 }, most]
             })
         });
+        let own = kind.parameters.len();
+        let widens =
+            |place: &usize| form.wide && *place >= own && !kind.free[place - own].is_ordinate;
         FormOf {
             instance: form.instance,
             columns: form.columns.clone(),
             price: form.price,
             sizes: sizes.collect(),
+            widens: form.amplitudes.iter().map(widens).collect(),
         }
     });
     Problem {
@@ -136,5 +148,8 @@ fn problem(signatures: &Library, normal: &Normal, square: f64, config: &GapConfi
         forms: forms.collect(),
         beam: config.beam,
         most_effects: config.most_effects,
+        most_forms: MOST_FORMS,
+        most_free: MOST_FREE,
+        most_cancelling: MOST_CANCELLING,
     }
 }

@@ -25,10 +25,10 @@ use crate::rows::count;
 use crate::signature::{Form, Library};
 
 /// The free part of a wide form is at most this share of the rest of its signature.
-const MOST_FREE: f64 = 0.5;
+pub const MOST_FREE: f64 = 0.5;
 
 /// Forms of one instance that are tried beside a set before it is given up.
-const MOST_FORMS: usize = 16;
+pub const MOST_FORMS: usize = 16;
 
 /// A member whose own signature is this many times what the whole set explains (in squares) only cancels another.
 pub const MOST_CANCELLING: f64 = 2.0;
