@@ -218,6 +218,19 @@ fn off_and_standing(messages: &mut [Copied]) {
     }
 }
 
+/// Where the plate ends for the first coordinate, m: within the second circle.
+const END_M: f64 = 0.065;
+
+/// A first coordinate that stays at the end of its range, while the second one goes on.
+fn saturated(messages: &mut [Copied]) {
+    let readings = messages.iter_mut();
+    for message in readings.filter(|message| is(message, &topics::GRID_POSITION)) {
+        edit(message, |s: &mut GridSample| {
+            s.u_m = s.u_m.clamp(-END_M, END_M);
+        });
+    }
+}
+
 /// Readings of the grid's first coordinate that were left out as outliers.
 fn outliers(found: &Diagnosed) -> usize {
     let mut lines = found.said.lines();
@@ -250,6 +263,14 @@ fn what_is_broken_in_a_bag_is_counted_and_the_play_is_named_all_the_same() {
         "{}",
         outliers(&stood)
     );
+
+    let clamped = recorded.with("saturated", &|messages| saturated(messages));
+    said(&clamped, "readings stood while the axes moved");
+    let named = clamped.report["causes"].as_array().unwrap().iter();
+    let named: Vec<_> = named
+        .filter(|cause| cause["status"] != "surrogate")
+        .collect();
+    assert!(named.iter().all(|cause| cause["axis"] == "X"), "{named:#?}");
 
     let long = recorded.with("ten_hours", &of_ten_hours);
     said(&long, "");
