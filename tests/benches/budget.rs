@@ -1,7 +1,7 @@
 //! The budget of the suite, each figure beside its peer in the same run; see README.md here.
 //!
 //! ```text
-//! cargo bench -p abbe_tests --bench budget [-- [identification|round_trip|pose|recorder|control]... [--seconds N] [--program ABBE]]
+//! cargo bench -p abbe_tests --bench budget [-- [identification|round_trip|pose|recorder|control|hour]... [--seconds N] [--program ABBE]]
 //! ```
 #![expect(
     clippy::disallowed_methods,
@@ -13,20 +13,21 @@
 use std::path::PathBuf;
 use std::process::Command;
 
+mod hour;
 mod identification;
 mod pose;
 mod python;
 mod round_trip;
 
-const PARTS: [&str; 5] = [
+const PARTS: [&str; 6] = [
     "identification",
     "round_trip",
     "pose",
     "recorder",
     "control",
+    "hour",
 ];
-const USAGE: &str =
-    "budget [identification|round_trip|pose|recorder|control]... [--seconds N] [--program ABBE]";
+const USAGE: &str = "budget [identification|round_trip|pose|recorder|control|hour]... [--seconds N] [--program ABBE]";
 
 struct Wanted {
     parts: Vec<String>,
@@ -77,6 +78,10 @@ fn main() {
             "round_trip" => round_trip::run(wanted.seconds, wanted.program.clone()),
             "identification" => identification::run(),
             "pose" => pose::run(),
+            "hour" => {
+                let program = wanted.program.clone();
+                hour::measure(&program.unwrap_or_else(round_trip::built_program));
+            }
             "recorder" => bench_of("recorder", "bag"),
             _ => bench_of("fake_cnc", "servo_period"),
         }

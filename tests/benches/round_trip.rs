@@ -77,7 +77,7 @@ impl Trips {
 }
 
 /// The program `abbe` of this workspace, built as it is now.
-fn built_program() -> PathBuf {
+pub fn built_program() -> PathBuf {
     let output = Command::new(env!("CARGO"))
         .args([
             "build",

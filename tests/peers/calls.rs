@@ -3,8 +3,10 @@
 
 use std::time::Duration;
 
+use abbe_msgs::action::RunProgram;
+use abbe_msgs::action_msgs::msg::GoalStatusArray;
 use abbe_msgs::lifecycle_msgs::msg::TransitionEvent;
-use abbe_msgs::topics;
+use abbe_msgs::{FeedbackMessage, topics};
 use abbe_tests::cyclone::{Cyclone, end, named_end};
 use abbe_tests::program::{Process, command, domain, root};
 use abbe_tests::python::interpreter;
@@ -18,6 +20,8 @@ const LEVEL: &str = "/fake_cnc/set_logger_levels";
 const SEND: &str = "/cnc/run_program/_action/send_goal";
 const CANCEL: &str = "/cnc/run_program/_action/cancel_goal";
 const RESULT: &str = "/cnc/run_program/_action/get_result";
+const FEEDBACK: &str = "/cnc/run_program/_action/feedback";
+const STATUS: &str = "/cnc/run_program/_action/status";
 
 const GET_STATE: &str = "/fake_cnc/get_state";
 const CHANGE_STATE: &str = "/fake_cnc/change_state";
@@ -45,9 +49,12 @@ const STEP: &str = "/replayer/step";
 const FROM_S: &str = "10.5";
 
 /// Statuses of `action_msgs/GoalStatus`.
+const EXECUTING: i64 = 2;
 const SUCCEEDED: i64 = 4;
 const CANCELED: i64 = 5;
 const ABORTED: i64 = 6;
+/// State of `RunProgram`'s feedback.
+const RUNNING: i64 = 1;
 
 #[test]
 fn cyclone_calls_services_and_an_action_in_its_own_mapping() {
@@ -58,11 +65,24 @@ fn cyclone_calls_services_and_an_action_in_its_own_mapping() {
     let file = scenario.argument("fake_cnc.yaml");
     let node = Process::node(domain, "fake_cnc", &["--params-file", &file]);
     let transitions = named_end::<TransitionEvent>(TRANSITIONS, true, false, 10);
-    let heard = [end(&abbe_msgs::topics::ROSOUT), transitions];
+    let heard = [
+        end(&topics::ROSOUT),
+        end(&topics::PARAMETER_EVENTS),
+        transitions,
+        named_end::<FeedbackMessage<RunProgram>>(FEEDBACK, true, false, 10),
+        named_end::<GoalStatusArray>(STATUS, true, true, 1),
+    ];
     let mut cyclone = Cyclone::asking(&python, domain, &CLIENTS, &heard);
     for (service, _) in CLIENTS {
         cyclone.matched_after_s(service);
     }
+    let events = topics::PARAMETER_EVENTS.name;
+    let event = cyclone.sample(events, |event| event["node"] == "/fake_cnc");
+    let new = event["new_parameters"].as_array().unwrap();
+    assert!(
+        new.iter().any(|one| one["name"] == "background_rate_hz"),
+        "{event}"
+    );
     parameters(&mut cyclone);
     log_level(&mut cyclone);
     action(&mut cyclone);
@@ -169,9 +189,23 @@ fn action(cyclone: &mut Cyclone) {
     let result = asked(cyclone, RESULT, 1, &id(7));
     assert_eq!(result["status"], SUCCEEDED, "{result}");
     assert_eq!(result["result"]["outcome"], 0, "{result}");
-    // Ten minutes of motion, called off at once.
+    // Ten minutes of motion, called off once it is seen to run.
     let accepted = asked(cyclone, SEND, 2, &goal(8, "G21 G90\nG1 X102 F10\nM2\n"));
     assert_eq!(accepted["accepted"], true, "{accepted}");
+    let own = json!(vec![8; 16]);
+    let is_at = |status: i64| {
+        let own = own.clone();
+        move |array: &Value| {
+            let all = array["status_list"].as_array().unwrap();
+            all.iter()
+                .any(|one| one["goal_info"]["goal_id"]["uuid"] == own && one["status"] == status)
+        }
+    };
+    cyclone.sample(STATUS, is_at(EXECUTING));
+    for _ in 0..2 {
+        let said = cyclone.sample(FEEDBACK, |said| said["goal_id"]["uuid"] == own);
+        assert_eq!(said["feedback"]["state"], RUNNING, "{said}");
+    }
     let cancel = json!({"goal_info": id(8)});
     let canceling = asked(cyclone, CANCEL, 1, &cancel);
     assert_eq!(canceling["return_code"], 0, "{canceling}");
@@ -179,6 +213,7 @@ fn action(cyclone: &mut Cyclone) {
     assert_eq!(*named, json!(vec![8; 16]), "{canceling}");
     let result = asked(cyclone, RESULT, 2, &id(8));
     assert_eq!(result["status"], CANCELED, "{result}");
+    cyclone.sample(STATUS, is_at(CANCELED));
 }
 
 #[test]

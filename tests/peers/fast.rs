@@ -1,15 +1,19 @@
 //! Topics, services and an action as a node on Fast DDS meets them: the identity of a request is in RTPS.
 
 use abbe_msgs::action::{RunProgram, RunProgramGoal};
-use abbe_msgs::action_msgs::msg::GoalStatus;
+use abbe_msgs::action_msgs::msg::{GoalStatus, GoalStatusArray};
+use abbe_msgs::action_msgs::srv::{CancelGoal, CancelGoalRequest};
 use abbe_msgs::diagnostic_msgs::msg::DiagnosticArray;
 use abbe_msgs::lifecycle_msgs::srv::{GetState, GetStateRequest};
 use abbe_msgs::msg::ProbeLatency;
+use abbe_msgs::rcl_interfaces::msg::ParameterEvent;
 use abbe_msgs::rcl_interfaces::srv::{
     DescribeParameters, DescribeParametersRequest, GetParameters, GetParametersRequest,
 };
 use abbe_msgs::unique_identifier_msgs::msg::UUID;
-use abbe_msgs::{GetResult, GetResultRequest, SendGoal, SendGoalRequest, topics};
+use abbe_msgs::{
+    Durability, FeedbackMessage, GetResult, GetResultRequest, SendGoal, SendGoalRequest, topics,
+};
 use abbe_tests::fast_dds::FastDds;
 use abbe_tests::graph::now;
 use abbe_tests::program::{Process, domain};
@@ -21,6 +25,9 @@ const DESCRIBE: &str = "/fake_cnc/describe_parameters";
 const STATE: &str = "/fake_cnc/get_state";
 const SEND: &str = "/cnc/run_program/_action/send_goal";
 const RESULT: &str = "/cnc/run_program/_action/get_result";
+const CANCEL: &str = "/cnc/run_program/_action/cancel_goal";
+const FEEDBACK: &str = "/cnc/run_program/_action/feedback";
+const STATUS: &str = "/cnc/run_program/_action/status";
 /// Writers that say one message each.
 const GREETINGS: u32 = 10;
 /// What is asked for on X, m, and what of it must be seen at the motor.
@@ -88,14 +95,8 @@ fn fast_dds_calls_services_and_an_action_in_its_own_mapping() {
     );
     let state = peer.asked::<GetState>(STATE, 3, &GetStateRequest::default());
     assert_eq!(state.current_state.label, "active");
-    let goal_id = UUID { uuid: [7; 16] };
-    let goal = SendGoalRequest {
-        goal_id: goal_id.clone(),
-        goal: RunProgramGoal {
-            program: "G21 G90\nG1 X2 F600\nM2\n".to_owned(),
-            name: "peer".to_owned(),
-        },
-    };
+    let goal = goal(7, "G21 G90\nG1 X2 F600\nM2\n");
+    let goal_id = goal.goal_id.clone();
     let accepted = peer.asked::<SendGoal<RunProgram>>(SEND, 4, &goal);
     assert!(accepted.accepted, "{accepted:?}");
     let asked = GetResultRequest {
@@ -105,6 +106,77 @@ fn fast_dds_calls_services_and_an_action_in_its_own_mapping() {
     let result = peer.asked::<GetResult<RunProgram>>(RESULT, 5, &asked);
     assert_eq!(result.status, GoalStatus::STATUS_SUCCEEDED, "{result:?}");
     assert_eq!(result.result.outcome, 0, "{result:?}");
+    node.stop();
+}
+
+fn goal(id: u8, program: &str) -> SendGoalRequest<RunProgram> {
+    SendGoalRequest {
+        goal_id: UUID { uuid: [id; 16] },
+        goal: RunProgramGoal {
+            program: program.to_owned(),
+            name: "peer".to_owned(),
+        },
+    }
+}
+
+#[test]
+fn fast_dds_hears_how_far_a_goal_is_and_calls_it_off() {
+    let test = "fast_dds calls a goal off";
+    let Some((_scenario, node, mut peer)) = machine(test, 5) else {
+        return;
+    };
+    peer.read(&topics::PARAMETER_EVENTS);
+    let own = |event: &ParameterEvent| event.node == "/fake_cnc";
+    let event = peer.sample(&topics::PARAMETER_EVENTS, own);
+    let names: Vec<&str> = event
+        .new_parameters
+        .iter()
+        .map(|p| p.name.as_str())
+        .collect();
+    assert!(names.contains(&"background_rate_hz"), "{names:?}");
+
+    peer.client::<DescribeParameters>(DESCRIBE);
+    let asked = DescribeParametersRequest {
+        names: vec!["background_rate_hz".to_owned()],
+    };
+    let described = peer.asked::<DescribeParameters>(DESCRIBE, 1, &asked);
+    let range = &described.descriptors[0].floating_point_range[0];
+    assert!(range.from_value < range.to_value, "{described:?}");
+
+    peer.client::<SendGoal<RunProgram>>(SEND);
+    peer.client::<GetResult<RunProgram>>(RESULT);
+    peer.client::<CancelGoal>(CANCEL);
+    peer.read_named::<FeedbackMessage<RunProgram>>(FEEDBACK, Durability::Volatile);
+    peer.read_named::<GoalStatusArray>(STATUS, Durability::TransientLocal);
+    // Ten minutes of motion.
+    let goal = goal(8, "G21 G90\nG1 X102 F10\nM2\n");
+    let goal_id = goal.goal_id.clone();
+    let accepted = peer.asked::<SendGoal<RunProgram>>(SEND, 2, &goal);
+    assert!(accepted.accepted, "{accepted:?}");
+    let is_at = |status: i8| {
+        let goal_id = goal_id.clone();
+        move |array: &GoalStatusArray| {
+            let mut all = array.status_list.iter();
+            all.any(|one| one.goal_info.goal_id == goal_id && one.status == status)
+        }
+    };
+    peer.sample_named(STATUS, is_at(GoalStatus::STATUS_EXECUTING));
+    let own = |said: &FeedbackMessage<RunProgram>| said.goal_id == goal_id;
+    let first = peer.sample_named(FEEDBACK, own);
+    let later = peer.sample_named(FEEDBACK, own);
+    assert_eq!(first.feedback.line, later.feedback.line);
+
+    let mut cancel = CancelGoalRequest::default();
+    cancel.goal_info.goal_id = goal_id.clone();
+    let canceling = peer.asked::<CancelGoal>(CANCEL, 3, &cancel);
+    assert_eq!(canceling.return_code, 0, "{canceling:?}");
+    peer.sample_named(STATUS, is_at(GoalStatus::STATUS_CANCELED));
+    let asked = GetResultRequest {
+        goal_id: goal_id.clone(),
+        ..Default::default()
+    };
+    let result = peer.asked::<GetResult<RunProgram>>(RESULT, 4, &asked);
+    assert_eq!(result.status, GoalStatus::STATUS_CANCELED, "{result:?}");
     node.stop();
 }
 

@@ -55,11 +55,14 @@ fn quality<M: Message>(topic: &Topic<M>) -> String {
         Reliability::Reliable => "reliable",
         Reliability::BestEffort => "best_effort",
     };
-    let latched = match topic.qos.durability {
+    format!("{reliable} {}", word(topic.qos.durability))
+}
+
+fn word(durability: Durability) -> &'static str {
+    match durability {
         Durability::TransientLocal => "latched",
         Durability::Volatile => "volatile",
-    };
-    format!("{reliable} {latched}")
+    }
 }
 
 fn dds_topic<M: Message>(topic: &Topic<M>) -> String {
@@ -134,6 +137,22 @@ impl FastDds {
         self.wait(&format!("matched {name}"), |_| true);
     }
 
+    /// Listens to a reliable topic by its absolute name.
+    pub fn read_named<M: Message>(&mut self, name: &str, durability: Durability) {
+        let (name, dds_type) = (names::dds_topic(name), names::dds_type(M::TYPE_NAME));
+        let durability = word(durability);
+        self.say(&format!("reader {name} {dds_type} reliable {durability}"));
+        self.wait(&format!("matched {name}"), |_| true);
+    }
+
+    /// The next sample of a topic by its absolute name that `pick` takes.
+    ///
+    /// # Panics
+    /// As [`Self::sample`].
+    pub fn sample_named<M: Message>(&mut self, name: &str, pick: impl Fn(&M) -> bool) -> M {
+        self.sample_of(&names::dds_topic(name), pick)
+    }
+
     /// Makes a writer of a topic of ours.
     pub fn speak<M: Message>(&mut self, topic: &Topic<M>) {
         let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
@@ -173,7 +192,11 @@ impl FastDds {
     /// # Panics
     /// When there was none in time, or one cannot be decoded.
     pub fn sample<M: Message>(&mut self, topic: &Topic<M>, pick: impl Fn(&M) -> bool) -> M {
-        let start = format!("sample {} ", dds_topic(topic));
+        self.sample_of(&dds_topic(topic), pick)
+    }
+
+    fn sample_of<M: Message>(&mut self, dds_topic: &str, pick: impl Fn(&M) -> bool) -> M {
+        let start = format!("sample {dds_topic} ");
         let read = |line: &str| -> M { from_cdr(&bytes_of(&line[start.len()..])).unwrap() };
         let line = self.wait(&start, |line| pick(&read(line)));
         read(&line)
