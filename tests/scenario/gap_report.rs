@@ -235,6 +235,25 @@ fn what_cannot_be_diagnosed_ends_with_1_and_what_to_record_and_a_wrong_question_
         &diagnose(&bag, &["--machine", other]),
         &["another machine's"],
     );
+    let text = std::fs::read_to_string(&machine).unwrap();
+    scenario.write(
+        "coarse.yaml",
+        &text.replace("lead_mm: 10.0", "lead_mm: 20.0"),
+    );
+    let coarse = scenario.argument("coarse.yaml");
+    cannot(
+        &diagnose(&bag, &["--machine", &coarse]),
+        &["axes.X.lead_mm: 10 in the recording, 20 in the machine file"],
+    );
+    let twice = bag.display().to_string();
+    cannot(
+        &diagnose(&bag, &[&twice, "--machine", &machine]),
+        &["is the same as", "name each recording once"],
+    );
+    cannot(
+        &diagnose(&bag, &["--machine", &machine, "--write-machine", &machine]),
+        &["machine.yaml: is there already"],
+    );
     let nothing = scenario.out().join("nothing");
     cannot(&diagnose(&nothing, &["--machine", &machine]), &["nothing"]);
     let absent = scenario.argument("absent.yaml");

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use gap_diagnosis::{Diagnosis, GapConfig, Rule, diagnose};
 use machine::MachineFile;
@@ -35,7 +35,7 @@ pub struct Diagnose {
     /// Write the page as one HTML file.
     #[arg(long)]
     html: Option<PathBuf>,
-    /// Write the machine file with the named effects added.
+    /// Write the machine file with the named effects added, to a file that is not there yet.
     #[arg(long)]
     write_machine: Option<PathBuf>,
     /// Id of an effect that is not considered; may be given several times.
@@ -71,6 +71,12 @@ impl Diagnose {
             ),
             None => bags::machine_text(&self.bags[0])?,
         };
+        if let Some(path) = self.write_machine.as_ref().filter(|path| path.exists()) {
+            bail!(
+                "--write-machine {}: is there already, and nothing is overwritten: name a new file",
+                path.display()
+            );
+        }
         let config = GapConfig {
             left_out: self.without.clone(),
             ablated: self.ablate.iter().copied().collect(),
@@ -97,6 +103,11 @@ impl Diagnose {
         if let Some(path) = &self.write_machine {
             let new = machine_text::with_effects(&text, &name, &diagnosed.diagnosis.effects)?;
             std::fs::write(path, new).with_context(|| format!("{}", path.display()))?;
+            let added = diagnosed.diagnosis.effects.len();
+            eprintln!(
+                "abbe: {}: the machine file with {added} effects added",
+                path.display()
+            );
         }
         for remark in diagnosed.losses.iter().chain(&diagnosed.remarks) {
             eprintln!("abbe: {remark}");

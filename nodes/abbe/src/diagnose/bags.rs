@@ -8,9 +8,13 @@ use anyhow::{Context, Result, bail};
 use gap_diagnosis::report;
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
+use machine::file::AxisEntry;
 use machine::twin::Session;
 use recorder::{Bag, Event, Order};
 use sha2::{Digest, Sha256};
+
+/// The attachment that holds the machine file of a recording.
+const MACHINE: &str = "machine.yaml";
 
 /// What bags hold, as one session.
 pub struct Recorded {
@@ -34,11 +38,23 @@ impl Recorded {
         let (mut losses, mut hashes, mut ends) = (vec![], vec![], vec![]);
         for path in paths {
             let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
+            if let Some(attachment) = bag.attachment(MACHINE)? {
+                is_of(&attachment.data, machine)
+                    .with_context(|| format!("bag {}", path.display()))?;
+            }
             builder.next_bag();
             losses.extend(
                 messages(&bag, &mut builder).with_context(|| format!("bag {}", path.display()))?,
             );
-            hashes.push(hash(&bag)?);
+            let hash = hash(&bag)?;
+            if let Some(place) = hashes.iter().position(|known| *known == hash) {
+                bail!(
+                    "bag {}: is the same as {}, byte for byte: a copy repeats nothing, name each recording once",
+                    path.display(),
+                    paths[place].display()
+                );
+            }
+            hashes.push(hash);
             builder.end_bag();
             ends.push(builder.runs().len());
         }
@@ -68,13 +84,60 @@ impl Recorded {
     }
 }
 
+/// Lengths and angles of two machine files that differ by less are one.
+const SAME: f64 = 1e-9;
+
+/// Whether a machine file may be that of the machine which another one, of the recording, describes: what is built
+/// into a machine is the same in both. One that cannot be read, as of an older format, tells nothing.
+fn is_of(recorded: &[u8], machine: &MachineFile) -> Result<()> {
+    let parse = |text| MachineFile::parse(text, MACHINE).ok();
+    let Some(recorded) = std::str::from_utf8(recorded).ok().and_then(parse) else {
+        return Ok(());
+    };
+    if recorded.chain != machine.chain {
+        bail!(
+            "chain: {} in the recording, {} in the machine file: it is another machine's",
+            recorded.chain,
+            machine.chain
+        );
+    }
+    for (axis, entry) in &machine.axes {
+        let Some(known) = recorded.axes.get(axis) else {
+            continue;
+        };
+        for ((key, found), (_, wanted)) in built(known).into_iter().zip(built(entry)) {
+            if (found - wanted).abs() > SAME {
+                bail!(
+                    "axes.{axis}.{key}: {found} in the recording, {wanted} in the machine file: it is another machine's"
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What of an axis no adjustment changes.
+fn built(entry: &AxisEntry) -> Vec<(&'static str, f64)> {
+    match entry {
+        AxisEntry::Linear(axis) => vec![
+            ("travel_mm, low", axis.travel_mm[0]),
+            ("travel_mm, high", axis.travel_mm[1]),
+            ("lead_mm", axis.lead_mm),
+        ],
+        AxisEntry::Rotary(axis) => vec![
+            ("travel_deg, low", axis.travel_deg[0]),
+            ("travel_deg, high", axis.travel_deg[1]),
+        ],
+    }
+}
+
 /// The machine file that a bag was recorded with.
 ///
 /// # Errors
 /// When the bag has none.
 pub fn machine_text(path: &Path) -> Result<(String, String)> {
     let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
-    let Some(attachment) = bag.attachment("machine.yaml")? else {
+    let Some(attachment) = bag.attachment(MACHINE)? else {
         bail!(
             "bag {}: holds no machine file: name it with --machine",
             path.display()
