@@ -265,7 +265,10 @@ fn what_is_broken_in_a_bag_is_counted_and_the_play_is_named_all_the_same() {
     );
 
     let clamped = recorded.with("saturated", &|messages| saturated(messages));
-    said(&clamped, "readings stood while the axes moved");
+    said(
+        &clamped,
+        "readings stood in one coordinate that was to move",
+    );
     let named = clamped.report["causes"].as_array().unwrap().iter();
     let named: Vec<_> = named
         .filter(|cause| cause["status"] != "surrogate")

@@ -163,27 +163,30 @@ fn a_scale_that_a_laser_shows_clearly_is_told_with_its_size_and_all_that_make_th
         home.path().join("laser.csv"),
         home.path().join("laser.yaml"),
     );
-    let mut noise = Pcg64Mcg::seed_from_u64(20_261_123);
-    std::fs::write(&csv, laser(&mut noise, 5)).unwrap();
     std::fs::write(
         &map,
         "start_s: 1767600000\nat_mm: {Y: 0.0, Z: 120.0}\ntest:\n  positioning: {axis: X, feed_mm_min: 6000.0, dwell_s: 2.0, overrun_mm: 5.0, run: run, target_mm: target_mm, deviation_um: deviation_um}\n",
     )
     .unwrap();
-    let (report, said) = diagnosed(&shown(&csv), &shown(&map), MACHINE);
-    eprintln!("{said}");
-    assert_eq!(told(&report, "named"), []);
-    let [("backlash", "X", play_um), (scale, _, size)] = told(&report, "set")[..] else {
-        panic!("{:#?}", causes(&report));
-    };
-    holds(play_um, 5.0, 0.6);
-    let mut line = instead(&report, scale);
-    line.push(scale);
-    assert!(
-        line.contains(&"scale_error") && line.contains(&"length_wavelength"),
-        "{line:?}"
-    );
-    eprintln!("{scale} {size:?}");
+    // What makes the same line is better by a hair with one noise or the other: the scale error leads with each.
+    for seed in 20_261_121..20_261_125 {
+        let mut noise = Pcg64Mcg::seed_from_u64(seed);
+        std::fs::write(&csv, laser(&mut noise, 5)).unwrap();
+        let (report, said) = diagnosed(&shown(&csv), &shown(&map), MACHINE);
+        eprintln!("{said}");
+        assert_eq!(told(&report, "named"), []);
+        let [
+            ("backlash", "X", play_um),
+            ("scale_error", "X", scale_um_per_m),
+        ] = told(&report, "set")[..]
+        else {
+            panic!("{:#?}", causes(&report));
+        };
+        holds(play_um, 5.0, 0.6);
+        holds(scale_um_per_m, 12.0, 1.5);
+        let line = instead(&report, "scale_error");
+        assert!(line.contains(&"length_wavelength"), "{line:?}");
+    }
 }
 
 #[test]

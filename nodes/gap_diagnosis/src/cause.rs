@@ -20,6 +20,7 @@ use crate::isolability;
 use crate::lines;
 use crate::noise::Noise;
 use crate::normal::Normal;
+use crate::plain::plainest;
 use crate::refit::{self, Estimate, Refit};
 use crate::report::{Cause, Confusable, Constancy, ParameterValue, Status};
 use crate::rows::count;
@@ -133,6 +134,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     while leave_out_small(stack, &signatures, &mut members) {
         resize(stack, &signatures, &normal, &mut members);
     }
+    members.sort_by_key(|member| member.status == Status::Surrogate);
     doubt_forms(stack, &signatures, &mut members);
     Found {
         signatures,
@@ -189,18 +191,27 @@ fn doubt_forms(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) 
     }
 }
 
-/// Leaves out members that, sized without the surrogates, are below what they cost the search or below what is named at
-/// all: they were found for what the surrogates left. Whether there were any.
+/// Leaves out members that, sized without the surrogates, are below what they cost the search, and names none below what is
+/// named at all: they were found for what the surrogates left. Whether there were any.
 fn leave_out_small(stack: &Stack<'_>, signatures: &Library, members: &mut Vec<Member>) -> bool {
     let log_rows = stack.freedom().max(2.0).ln();
     let log_instances = count(signatures.seen().max(2)).ln();
     let before = members.len();
     members.retain(|member| {
         let price = count(signatures.forms[member.form].price) * log_rows + 2.0 * log_instances;
-        let least = price.max(least_d_squared(member.estimate.active.len(), log_rows));
-        member.status == Status::Surrogate || member.estimate.d.powi(2) >= least
+        member.status == Status::Surrogate || member.estimate.d.powi(2) >= price
     });
-    members.len() < before
+    let mut is_less = members.len() < before;
+    let named = members.iter_mut();
+    for member in named.filter(|member| member.status != Status::Surrogate) {
+        if member.estimate.d.powi(2) < least_d_squared(member.estimate.active.len(), log_rows) {
+            member.status = Status::Surrogate;
+            member.confidence *= 0.5;
+            member.vetoes.push(Veto::NearNoise);
+            is_less = true;
+        }
+    }
+    is_less
 }
 
 fn search(scope: &Scope<'_, '_>, signatures: &Library, normal: &Normal) -> Best {
@@ -212,6 +223,7 @@ fn search(scope: &Scope<'_, '_>, signatures: &Library, normal: &Normal) -> Best 
         swaps: scope.config.applies(Rule::SwapSearch),
     });
     search.alternatives(&set, 8);
+    let set = plainest(signatures, &search.visited, set);
     let sizes = search.fit(&set).sizes;
     let forms: Vec<&Form> = set.iter().map(|form| &signatures.forms[*form]).collect();
     let refit = refit::joint(stack, signatures, &forms, &sizes);

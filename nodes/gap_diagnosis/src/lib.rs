@@ -55,6 +55,7 @@ mod nuisance;
 mod pace;
 mod periods;
 mod places;
+mod plain;
 pub mod preflight;
 pub mod problem;
 mod recalibration;

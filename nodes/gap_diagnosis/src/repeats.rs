@@ -66,13 +66,21 @@ pub fn contrasts(
     all
 }
 
+/// Poses of a rotary axis that differ by less are one.
+const POSE_RAD: f64 = 0.01;
+
 /// Whether two blocks are one test of one channel.
 pub fn is_repeat(session: &Session, a: &Block, b: &Block) -> bool {
     let (one, other) = (&session.runs[a.run], &session.runs[b.run]);
     a.run != b.run && a.channel == b.channel && same_condition(one, other) && {
         let (from, to) = (extent(one, a), extent(other, b));
         one.motion.axes.iter().all(|axis| {
-            let near = |p: f64, q: f64| (p - q).abs() < 0.2 + 0.02 * (from[axis].1 - from[axis].0);
+            let reach = if axis.is_linear() {
+                0.2 + 0.02 * (from[axis].1 - from[axis].0)
+            } else {
+                POSE_RAD
+            };
+            let near = |p: f64, q: f64| (p - q).abs() < reach;
             near(from[axis].0, to[axis].0) && near(from[axis].1, to[axis].1)
         })
     }

@@ -95,6 +95,20 @@ pub struct LinearAxisEntry {
     /// Resolution of the linear scale, where there is one.
     #[serde(default)]
     pub scale_resolution_um: Option<f64>,
+    /// What closes the position loop: `motor`, or `scale` where there is one.
+    #[serde(default)]
+    pub position_feedback: PositionFeedback,
+}
+
+/// The encoder that closes a position loop.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PositionFeedback {
+    /// The motor's: semi-closed.
+    #[default]
+    Motor,
+    /// The linear scale: full-closed.
+    Scale,
 }
 
 /// How a slide slows down by the friction of its guides alone: force over mass, as the drive's commissioning tells them.

@@ -38,7 +38,6 @@ const LEVERS: [(&[&str], &str); 7] = [
     ),
     (
         &[
-            "interpolation_error",
             "plate_error",
             "length_wavelength",
             "length_misalignment",

@@ -11,18 +11,18 @@
 //! |---|---|---|
 //! | c_m, c_t | angle of the motor over its gear, of the table | rad |
 //! | s | 1 where a positive angle turns the tool right-handed as seen from the workpiece, else -1 | 1 |
-//! | w | `width_urad`: the reversal value; negative where an encoder at the table was told too large a play | µrad |
+//! | w | `width_urad`: -B, B the reversal error of [1]; negative where an encoder at the table was told too large a play | µrad |
 //!
 //! # Holds when
 //! The table stays where its drive leaves it: bearings that are clamped or have some friction, no weight that pulls at it.
 //!
-//! No wider form: a play that differs over the turn is an error motion (`rotary_motion`) of each direction.
+//! A run begins in the middle of the play. A play that differs over the turn is not modelled.
 //!
 //! # Agreement
 //! `val_a_gear_that_yields_to_a_dry_bearing`: 2 % of 14 µrad, against a spring and a friction that are stepped finely.
 //!
 //! # References
-//! \[1\] ISO 230-2:2014, 2.12 (reversal error of a position).
+//! \[1\] ISO 230-2:2014, clause 3 (reversal error of a position).
 
 use metrology::{Axis, ErrorComponent};
 

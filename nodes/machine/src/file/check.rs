@@ -6,7 +6,7 @@ use metrology::Axis;
 
 use super::{
     ArtefactEntry, AxisEntry, BlockEntry, GuideFrictionEntry, LinearAxisEntry, MachineFile,
-    RotaryAxisEntry, VelocityLoopEntry, reference,
+    PositionFeedback, RotaryAxisEntry, VelocityLoopEntry, reference,
 };
 use crate::chain::Chain;
 use crate::cycle::artefact_id;
@@ -199,7 +199,15 @@ impl Check<'_> {
 
     fn kind(&self, axis: Axis, entry: &AxisEntry) -> Result<(), MachineFileError> {
         match (axis.is_linear(), entry) {
-            (true, AxisEntry::Linear(_)) | (false, AxisEntry::Rotary(_)) => Ok(()),
+            (true, AxisEntry::Linear(linear)) => {
+                let by_scale = linear.position_feedback == PositionFeedback::Scale;
+                if by_scale && linear.scale_resolution_um.is_none() {
+                    let rule = "has position_feedback: scale, and no scale_resolution_um";
+                    return Err(self.axis(axis, rule));
+                }
+                Ok(())
+            }
+            (false, AxisEntry::Rotary(_)) => Ok(()),
             (true, AxisEntry::Rotary(_)) => Err(self.axis(axis, "X Y Z are linear axes")),
             (false, AxisEntry::Linear(_)) => Err(self.axis(axis, "A B C are rotary axes")),
         }

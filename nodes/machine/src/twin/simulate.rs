@@ -190,7 +190,8 @@ impl<'a> Reader<'a> {
         tip
     }
 
-    /// The position that is latched when a ball meets its surface: the tip's error turned, and the travel.
+    /// The position that is latched when a ball meets its surface: the tip's error turned, what the motors' encoders read
+    /// beyond it, and the travel.
     fn touch(&self, reading: &Reading) -> f64 {
         let Some(touch) = self.run.touches.get(reading.at) else {
             return 0.0;
@@ -203,8 +204,16 @@ impl<'a> Reader<'a> {
             };
             self.tip_at(&there, false)
         });
+        // What the motors' encoders read beyond where they are is latched as well.
+        let read = touch.tick.map_or(0.0, |tick| {
+            let of = |axis: Axis| {
+                let read = self.response.motor_reading[axis].get(tick);
+                read.copied().unwrap_or(0.0) * touch.approach[axis.index()]
+            };
+            Axis::LINEAR.into_iter().map(of).sum()
+        });
         let travel = self.response.travel_mm.get(reading.at);
-        travel.copied().unwrap_or(0.0) - at_contact.dot(&touch.approach)
+        travel.copied().unwrap_or(0.0) + read - at_contact.dot(&touch.approach)
     }
 
     fn variance(&self, reading: &Reading) -> f64 {

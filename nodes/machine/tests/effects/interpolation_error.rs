@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use machine::MachineFile;
-use machine::file::AxisEntry;
+use machine::file::{AxisEntry, PositionFeedback};
 use metrology::{Axis, AxisSet};
 
 use crate::scene::{TICK_S, greatest, response_of, run, three_axes};
@@ -14,12 +14,13 @@ const GAIN_PER_S: f64 = 60.0;
 const FEEDFORWARD: f64 = 0.9;
 
 /// X with an ideal velocity loop.
-fn machine(scale_resolution_um: Option<f64>) -> MachineFile {
+fn machine(position_feedback: PositionFeedback) -> MachineFile {
     let mut machine = three_axes("[w X' Y' b Z t]");
     let Some(AxisEntry::Linear(x)) = machine.axes.get_mut(&Axis::X) else {
         unreachable!("X is linear")
     };
-    x.scale_resolution_um = scale_resolution_um;
+    x.scale_resolution_um = Some(0.1);
+    x.position_feedback = position_feedback;
     x.velocity_loop = None;
     (x.position_gain_per_s, x.velocity_feedforward) = (GAIN_PER_S, FEEDFORWARD);
     machine
@@ -28,7 +29,7 @@ fn machine(scale_resolution_um: Option<f64>) -> MachineFile {
 #[test]
 fn val_the_arctangent_of_two_unequal_signals() {
     let (offset, unequal) = (0.02, 0.03);
-    let mut machine = machine(None);
+    let mut machine = machine(PositionFeedback::Motor);
     if let Some(AxisEntry::Linear(x)) = machine.axes.get_mut(&Axis::X) {
         x.velocity_feedforward = 1.0;
     }
@@ -75,7 +76,7 @@ fn commanded(t: f64) -> [f64; 2] {
 
 #[test]
 fn val_a_loop_that_follows_a_scale_integrated_finely() {
-    let machine = machine(Some(0.1));
+    let machine = machine(PositionFeedback::Scale);
     let amplitude_mm = 0.2e-3;
     let run = run(6000, AxisSet::XYZ, |t| {
         [commanded(t)[0], 0.0, 0.0, 0.0, 0.0, 0.0]

@@ -35,21 +35,32 @@ fn val_an_eccentric_scale_ring() {
 }
 
 #[test]
-fn eq1_twice_a_turn_and_radially() {
+fn eq1_each_wave_a_turn_and_radially() {
     let machine = bench();
     let run = run(700, machine.axis_set(), |t| {
         [0.0, 0.0, 0.0, 0.0, 0.0, 9.0 * t]
     });
-    let given = [
-        ("cos_um_urad", 0.0),
-        ("sin_um_urad", 0.0),
-        ("free_cos2_um_urad", 3.0),
-    ];
-    let response = response_of(&machine, &run, "rotary_motion", "XC", &given);
-    for tick in 0..700 {
-        let angle = run.motion.position[Axis::C][tick];
-        // The error is fixed to the table's frame before it turns, and is seen in the machine frame.
-        let size = tip_mm(&response, tick).norm();
-        assert!((size - 0.003 * (2.0 * angle).cos().abs()).abs() < 1e-12);
+    for wave in 1..=5_u8 {
+        for part in ["cos", "sin"] {
+            let name = match wave {
+                1 => format!("{part}_um_urad"),
+                _ => format!("free_{part}{wave}_um_urad"),
+            };
+            let own = [("cos_um_urad", 0.0), ("sin_um_urad", 0.0)];
+            let mut given: Vec<(&str, f64)> = own.into_iter().filter(|(k, _)| *k != name).collect();
+            given.push((&name, 3.0));
+            let response = response_of(&machine, &run, "rotary_motion", "XC", &given);
+            for tick in 0..700 {
+                let angle = f64::from(wave) * run.motion.position[Axis::C][tick];
+                let share = if part == "cos" {
+                    angle.cos()
+                } else {
+                    angle.sin()
+                };
+                // The error is fixed to the table's frame before it turns, and is seen in the machine frame.
+                let size = tip_mm(&response, tick).norm();
+                assert!((size - 0.003 * share.abs()).abs() < 1e-12, "{name}");
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Effects of the instruments: the clock of the grid encoder, and its plate; a scale that closes the loop.
 
 use fake_cnc::config::FeedbackSource;
-use machine::file::{AxisEntry, MachineFile};
+use machine::file::{AxisEntry, MachineFile, PositionFeedback};
 use metrology::stamp::{NANOS_PER_S, Span};
 use metrology::{Axis, Stamp};
 use trials::Sample;
@@ -49,6 +49,7 @@ fn a_scale_that_divides_its_periods_unevenly_leads_the_slide() {
             unreachable!("X is linear")
         };
         x.scale_resolution_um = Some(0.005);
+        x.position_feedback = PositionFeedback::Scale;
     };
     in_both_files(&mut rig, with_scale);
     rig.config.feedback.insert(Axis::X, FeedbackSource::Scale);
