@@ -71,7 +71,9 @@ impl Diagnose {
             ),
             None => bags::machine_text(&self.bags[0])?,
         };
-        if let Some(path) = self.write_machine.as_ref().filter(|path| path.exists()) {
+        // An empty file is a place that was made for it.
+        let holds = |path: &&PathBuf| std::fs::metadata(path).is_ok_and(|file| file.len() > 0);
+        if let Some(path) = self.write_machine.as_ref().filter(holds) {
             bail!(
                 "--write-machine {}: is there already, and nothing is overwritten: name a new file",
                 path.display()

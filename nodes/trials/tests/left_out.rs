@@ -89,8 +89,3 @@ fn a_straightness_is_not_a_sag_at_the_end_of_what_a_beam_can_do() {
 fn a_scale_is_not_a_draught_that_was_found_for_what_its_surrogates_left() {
     is_unknown(LATER_SEED, 15, "scale_error");
 }
-
-#[test]
-fn a_spike_is_not_a_wind_up_that_is_told_in_a_few_runs_alone() {
-    is_unknown(LATER_SEED, 8, "reversal_spike");
-}

@@ -16,7 +16,9 @@
 //! # Holds when
 //! The table stays where its drive leaves it: bearings that are clamped or have some friction, no weight that pulls at it.
 //!
-//! A run begins in the middle of the play. A play that differs over the turn is not modelled.
+//! A run begins in the middle of the play.
+//!
+//! No wider form: a play is one number, and one that differs over the turn is not modelled.
 //!
 //! # Agreement
 //! `val_a_gear_that_yields_to_a_dry_bearing`: 2 % of 14 µrad, against a spring and a friction that are stepped finely.
