@@ -1,5 +1,6 @@
 //! Fast DDS as the other side: `tests/peers/fast_dds.cpp` on Debian's libfastrtps, driven line by line.
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -22,6 +23,8 @@ pub struct FastDds {
     commands: ChildStdin,
     lines: Receiver<String>,
     kept: Vec<String>,
+    /// How often each thing was told of each topic.
+    heard: BTreeMap<String, usize>,
     _built: TempDir,
 }
 
@@ -121,6 +124,7 @@ impl FastDds {
             child,
             lines,
             kept: vec![],
+            heard: BTreeMap::new(),
             _built: built,
         })
     }
@@ -262,8 +266,14 @@ impl FastDds {
                 .retain(|line| !line.starts_with(start) || !line.starts_with("sample"));
             let left = deadline.saturating_duration_since(Instant::now());
             match self.lines.recv_timeout(left) {
-                Ok(line) => self.kept.push(line),
-                Err(RecvTimeoutError::Timeout) => panic!("{start}: not within {PATIENCE:?}"),
+                Ok(line) => {
+                    let what: Vec<&str> = line.split(' ').take(2).collect();
+                    *self.heard.entry(what.join(" ")).or_default() += 1;
+                    self.kept.push(line);
+                }
+                Err(RecvTimeoutError::Timeout) => {
+                    panic!("{start}: not within {PATIENCE:?}; heard {:#?}", self.heard)
+                }
                 Err(RecvTimeoutError::Disconnected) => panic!("{start}: Fast DDS has ended"),
             }
         }

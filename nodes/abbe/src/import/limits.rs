@@ -46,7 +46,13 @@ fn travel(machine: &MachineFile, axis: Axis) -> Option<Range> {
 pub fn ranges(test: &Test, machine: &MachineFile) -> Vec<Option<Range>> {
     let deviation = Some(Range::new(-DEVIATION_UM, DEVIATION_UM, "µm"));
     match test {
-        Test::Positioning { axis, .. } => vec![None, travel(machine, *axis), deviation],
+        Test::Positioning {
+            axis, direction, ..
+        } => {
+            let direction = direction.iter().map(|_| None);
+            let fixed = [None, travel(machine, *axis), deviation];
+            fixed.into_iter().chain(direction).collect()
+        }
         Test::Circle { .. } => vec![None, None, deviation],
         Test::Log {
             run,

@@ -52,6 +52,9 @@ pub enum Test {
         target_mm: String,
         /// Column of measured minus target, µm.
         deviation_um: String,
+        /// Column of the direction of approach, `up` or `down`, against which the order of the rows is checked.
+        #[serde(default)]
+        direction: Option<String>,
     },
     /// A ballbar's radius round a circle, rows in the order of measurement.
     Circle {
@@ -99,6 +102,14 @@ pub enum Plane {
 }
 
 impl Test {
+    /// The column that tells directions, if there is one.
+    pub fn direction(&self) -> Option<&str> {
+        match self {
+            Self::Positioning { direction, .. } => direction.as_deref(),
+            _ => None,
+        }
+    }
+
     /// Names of the columns that the test needs.
     pub fn columns(&self) -> Vec<&str> {
         match self {
@@ -106,8 +117,13 @@ impl Test {
                 run,
                 target_mm,
                 deviation_um,
+                direction,
                 ..
-            } => vec![run.as_str(), target_mm, deviation_um],
+            } => {
+                let direction = direction.iter().map(String::as_str);
+                let fixed = [run.as_str(), target_mm, deviation_um];
+                fixed.into_iter().chain(direction).collect()
+            }
             Self::Circle {
                 run,
                 angle_deg,

@@ -21,6 +21,8 @@ const SETTLE_S: f64 = 0.4;
 const LONGEST_S: f64 = 86_400.0;
 /// Slowest feed of one, mm/min.
 const SLOWEST_MM_MIN: f64 = 0.01;
+/// Targets nearer than this are one, mm.
+const SAME_MM: f64 = 1e-9;
 /// Share of a turn that a circle runs ahead of its first row.
 const AHEAD_RAD: f64 = std::f64::consts::FRAC_PI_2;
 
@@ -55,6 +57,7 @@ pub fn write(map: &Map, table: &Table, writer: &mut Writer) -> Result<u32> {
         return Ok(n);
     }
     check_time(&map.test, table)?;
+    check_directions(table)?;
     for rows in table.runs() {
         n += 1;
         match &map.test {
@@ -92,6 +95,45 @@ fn check_time(test: &Test, table: &Table) -> Result<()> {
         bail!(
             "{stops} stops, {way_mm} mm of way at feed_mm_min = {feed_mm_min} take {time_s:.0} s: at most {LONGEST_S} s"
         );
+    }
+    Ok(())
+}
+
+/// Where the first target of a run is approached from, as a sign of the way: as it is told, or from the side that the
+/// second one lies away from.
+fn first_way(rows: &[Vec<f64>]) -> f64 {
+    let first_mm = rows[0][1];
+    let told = rows[0].get(3).copied();
+    let mut ways = rows.iter().map(|row| row[1] - first_mm);
+    told.unwrap_or_else(|| ways.find(|way| way.abs() > SAME_MM).unwrap_or(1.0).signum())
+}
+
+/// Refuses rows whose order makes another direction than their column tells.
+fn check_directions(table: &Table) -> Result<()> {
+    for rows in table.runs() {
+        let mut way = first_way(rows);
+        for (k, two) in rows.windows(2).enumerate() {
+            let by_mm = two[1][1] - two[0][1];
+            way = if by_mm.abs() > SAME_MM {
+                by_mm.signum()
+            } else {
+                -way
+            };
+            if two[1].get(3).is_some_and(|told| *told * way < 0.0) {
+                let (word, other) = if way > 0.0 {
+                    ("up", "down")
+                } else {
+                    ("down", "up")
+                };
+                bail!(
+                    "run {}, row {}: target {} mm after {} mm is approached {word}, and its direction says {other}: rows must be in the order of the measurement",
+                    two[1][0],
+                    k + 2,
+                    two[1][1],
+                    two[0][1]
+                );
+            }
+        }
     }
     Ok(())
 }
@@ -139,7 +181,7 @@ fn go(
     writer: &mut Writer,
 ) -> Result<()> {
     let step_mm = feed_mm_s * TICK_S;
-    while (to_mm - position[axis]).abs() > 1e-9 {
+    while (to_mm - position[axis]).abs() > SAME_MM {
         let way_mm = to_mm - position[axis];
         position[axis] = if way_mm.abs() <= step_mm {
             to_mm
@@ -176,13 +218,7 @@ fn positioning(
     test.features = vec![axis.letter().to_owned()];
     test.stations = u32::try_from(rows.len()).unwrap_or(u32::MAX);
     let feed_mm_s = feed_mm_min / 60.0;
-    // The first target is approached from the side that the second lies away from.
-    let first_mm = rows[0][1];
-    let towards = rows
-        .iter()
-        .map(|row| row[1] - first_mm)
-        .find(|way| way.abs() > 1e-9);
-    let before_mm = first_mm - towards.unwrap_or(1.0).signum() * overrun_mm;
+    let before_mm = rows[0][1] - first_way(rows) * overrun_mm;
     if run == 1 {
         position[*axis] = before_mm;
     }
@@ -192,7 +228,7 @@ fn positioning(
     let mut last = before_mm;
     for row in rows {
         let (target_mm, deviation_um) = (row[1], row[2]);
-        if (target_mm - position[*axis]).abs() < 1e-9 {
+        if (target_mm - position[*axis]).abs() < SAME_MM {
             // Measured from the other side: beyond it and back.
             let beyond_mm = target_mm + (target_mm - last).signum() * overrun_mm;
             go(position, *axis, beyond_mm, feed_mm_s, writer)?;
@@ -209,7 +245,14 @@ fn positioning(
         }
     }
     writer.tick(position)?;
-    writer.segment(&test, false)
+    end(&test, writer)
+}
+
+/// Ends a run; what comes next is a tick later.
+fn end(test: &TestSegment, writer: &mut Writer) -> Result<()> {
+    writer.segment(test, false)?;
+    writer.wait(TICK_S);
+    Ok(())
 }
 
 fn circle(
@@ -275,7 +318,7 @@ fn circle(
         }
         writer.length(axes[0], radius_mm + row[2] * 1e-3)?;
     }
-    writer.segment(&test, false)
+    end(&test, writer)
 }
 
 /// Sign of the sense in which angles go round.
@@ -342,6 +385,7 @@ mod tests {
             run: "run".to_owned(),
             target_mm: "target".to_owned(),
             deviation_um: "deviation".to_owned(),
+            direction: None,
         };
         let rows = targets_mm.iter().map(|mm| vec![1.0, *mm, 0.0]).collect();
         check_time(&test, &Table { rows })
@@ -354,6 +398,26 @@ mod tests {
             let error = positioning(&[-far_mm, far_mm]).expect_err("without end");
             assert!(format!("{error}").contains("at most 86400 s"), "{error}");
         }
+    }
+
+    fn directions(rows: &[(f64, f64)]) -> Result<()> {
+        let rows = rows.iter().map(|(mm, way)| vec![1.0, *mm, 0.0, *way]);
+        check_directions(&Table {
+            rows: rows.collect(),
+        })
+    }
+
+    #[test]
+    fn rows_whose_order_is_not_that_of_their_directions_are_refused_with_the_row() {
+        let (up, down) = (1.0, -1.0);
+        assert!(directions(&[(0.0, up), (9.0, up), (9.0, down), (0.0, down)]).is_ok());
+        assert!(directions(&[(0.0, down), (0.0, up), (9.0, up), (9.0, down)]).is_ok());
+        // Sorted by target.
+        let sorted = directions(&[(0.0, down), (0.0, up), (9.0, down), (9.0, up)]);
+        assert_eq!(
+            format!("{}", sorted.expect_err("in another order")),
+            "run 1, row 3: target 9 mm after 0 mm is approached up, and its direction says down: rows must be in the order of the measurement"
+        );
     }
 
     #[test]

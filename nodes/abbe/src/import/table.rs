@@ -40,6 +40,13 @@ impl Table {
             let mut row = vec![];
             for ((place, name), range) in places.iter().zip(&columns).zip(ranges) {
                 let cell = record.get(*place).unwrap_or("");
+                if map.test.direction() == Some(*name) {
+                    let sign = sign(cell).with_context(|| {
+                        format!("line {line}, column \"{name}\": \"{cell}\": must be one of up, +, down, -")
+                    })?;
+                    row.push(sign);
+                    continue;
+                }
                 let number = cell.replace(map.decimal, ".").parse::<f64>();
                 match number {
                     Ok(number) if number.is_finite() => {
@@ -63,6 +70,15 @@ impl Table {
     pub fn runs(&self) -> impl Iterator<Item = &[Vec<f64>]> {
         let number = |row: &Vec<f64>| row.first().map_or(0, |run| run.to_bits());
         self.rows.chunk_by(move |a, b| number(a) == number(b))
+    }
+}
+
+/// Sign of a direction of approach.
+fn sign(cell: &str) -> Option<f64> {
+    match cell.to_lowercase().as_str() {
+        "up" | "+" => Some(1.0),
+        "down" | "-" => Some(-1.0),
+        _ => None,
     }
 }
 
@@ -102,6 +118,28 @@ test:
         assert_eq!(
             format!("{broken:#}"),
             "line 2, column \"r\": \"abc\": must be a number"
+        );
+    }
+
+    #[test]
+    fn a_direction_is_a_word_or_a_sign_and_nothing_else() {
+        let map: Map = serde_saphyr::from_str(
+            "start_s: 1767600000\ntest:\n  positioning: {axis: X, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 5.0, run: n, target_mm: t, deviation_um: d, direction: way}",
+        )
+        .expect("a map");
+        let read = |text: &str| Table::read(text, &map, &[None; 4]);
+        let table = read("way,n,t,d\nup,1,0,2\n-,1,0,3\n").expect("rows");
+        assert_eq!(
+            table.rows,
+            [vec![1.0, 0.0, 2.0, 1.0], vec![1.0, 0.0, 3.0, -1.0]]
+        );
+        let said = format!(
+            "{:#}",
+            read("way,n,t,d\nnorth,1,0,2\n").expect_err("no way")
+        );
+        assert_eq!(
+            said,
+            "line 2, column \"way\": \"north\": must be one of up, +, down, -"
         );
     }
 
