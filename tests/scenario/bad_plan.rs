@@ -41,6 +41,14 @@ fn bad_steps_are_refused_with_their_place_and_values() {
             &["steps[1]", "feeds[0] and feeds[2] are both 60 mm/min"],
         ),
         (latency("60.0", 3), &["steps[1]", "1 feeds"]),
+        (
+            latency("60.0, 240.0", 0),
+            &["steps[1].repeats = 0: must be above 0"],
+        ),
+        (
+            "{do: artefact, id: bore_1, points: 0}".to_owned(),
+            &["steps[1].points = 0: must be above 0"],
+        ),
         (latency("60.0, 30000.0", 3), &["steps[1]", "30000 mm/min"]),
         (
             "{do: scan, axis: X, from_mm: -50.0, to_mm: 50.0, spacing_mm: 10.0, runs: 1, feed_mm_min: 6000.0, overrun_mm: 2.0, at_mm: [0.0, 0.0, 120.0]}".to_owned(),
@@ -98,4 +106,7 @@ fn a_run_with_a_bad_plan_ends_at_once_with_exit_code_1() {
     ] {
         assert!(ended.said.contains(word), "{word}: {}", ended.said);
     }
+    // Nor does a folder of a run stay that was none.
+    let runs = std::fs::read_dir(scenario.out()).unwrap();
+    assert_eq!(runs.count(), 0);
 }

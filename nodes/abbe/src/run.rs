@@ -80,17 +80,31 @@ impl Run {
         let scenario = Scenario::read(&self.scenario)?;
         let interruption = Interruption::listen("the bag is closed, no page is written")?;
         let folder = new_folder(&self.runs, &scenario.name)?;
+        let ended = self.run_into(&folder, &scenario, &interruption);
+        if ended.is_err() {
+            // Where nothing came into it, it tells nothing; one that holds something is not taken away.
+            let _ = std::fs::remove_dir(&folder);
+        }
+        ended
+    }
+
+    fn run_into(
+        &self,
+        folder: &Path,
+        scenario: &Scenario,
+        interruption: &Interruption,
+    ) -> Result<ExitCode> {
         let bag = folder.join("bag");
         let mut outcome = match scenario.file.simulated_start_s {
             Some(start_s) if !self.separate => {
                 let how = composed::How {
                     pace: self.pace,
                     on_dds: !self.no_dds,
-                    interruption: &interruption,
+                    interruption,
                 };
-                composed::run(&scenario, start_s, &bag, how)?
+                composed::run(scenario, start_s, &bag, how)?
             }
-            _ => live::run(&scenario, &bag, self.separate, &interruption)?,
+            _ => live::run(scenario, &bag, self.separate, interruption)?,
         };
         if interruption.is_forced() {
             println!("Bag:  {}", outcome.kept(&bag));
@@ -105,7 +119,7 @@ impl Run {
             report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
         }
         if outcome.failure.is_none() {
-            match self.try_table(&scenario, &folder, &interruption) {
+            match self.try_table(scenario, folder, interruption) {
                 Ok(Some(section)) => report.add("linuxcnc_table", &section),
                 Ok(None) => {}
                 Err(error) => outcome.failure = Some(format!("{error:#}")),
@@ -113,11 +127,11 @@ impl Run {
         }
         if scenario.file.diagnose && outcome.recorded > 0 {
             let machine = scenario.folder.join("machine.yaml");
-            report.join_gap(&diagnose::of_run(&bag, &folder, &machine)?);
+            report.join_gap(&diagnose::of_run(&bag, folder, &machine)?);
         }
         let kept = format!("Bag: {}.", outcome.kept(&bag));
         report.body = maud::html! { (report.body) h2 { "Recording" } p { (kept) } };
-        report.write(&folder)?;
+        report.write(folder)?;
         println!("{}", report.terminal());
         println!("Bag:  {}", outcome.kept(&bag));
         println!("Page: {}", folder.join("report.html").display());

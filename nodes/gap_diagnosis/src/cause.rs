@@ -320,6 +320,27 @@ impl Found {
         })
     }
 
+    /// The members whose values are known only together: no size of theirs is surely something by itself.
+    pub fn only_together(&self) -> impl Iterator<Item = Note> {
+        self.named().filter_map(|member| {
+            let cause = self.cause(member);
+            let instance = self.instance(member);
+            let is_size = |p: &&ParameterValue| {
+                let mut all = instance.kind.parameters.iter().chain(instance.kind.free);
+                all.any(|own| own.name == p.name && own.role == Role::Amplitude)
+            };
+            let holds_nothing = |p: &ParameterValue| p.low <= 0.0 && p.high >= 0.0;
+            let values = &cause.parameters;
+            (values.len() > 1 && values.iter().filter(is_size).all(holds_nothing)).then(|| {
+                Note::OnlyTogether {
+                    effect: instance.name(),
+                    parameters: values.iter().map(|p| p.name.clone()).collect(),
+                    d: cause.d,
+                }
+            })
+        })
+    }
+
     /// The members that others could stand for: they are reported, and not written to a machine file.
     pub fn not_written(&self) -> Vec<Note> {
         let of_sets = self

@@ -322,6 +322,7 @@ fn remarks(stack: &Stack<'_>, split: &Split, found: &Found) -> Vec<Note> {
         of: found.of,
     }));
     notes.extend(found.not_written());
+    notes.extend(found.only_together());
     notes.extend(found.not_named());
     if !found.members.is_empty() && recalibration::PROVENANCE.is_none() {
         notes.push(Note::NotRecalibrated);

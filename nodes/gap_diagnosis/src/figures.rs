@@ -158,6 +158,12 @@ pub enum Note {
     },
     /// An effect was found and is not written to a machine file.
     NotWritten { effect: String, others: Vec<String> },
+    /// Sizes of a named effect of which each alone could be nothing.
+    OnlyTogether {
+        effect: String,
+        parameters: Vec<String>,
+        d: f64,
+    },
     /// Something looks like an effect and is not named, for these reasons.
     OnlyLooksLike { effect: String, why: Vec<Veto> },
     /// No run that can be proposed tells these apart.
@@ -237,6 +243,16 @@ impl fmt::Display for Note {
             } => write!(
                 f,
                 "{channel}: what is left is not white in {blocks} of {of} runs"
+            ),
+            Self::OnlyTogether {
+                effect,
+                parameters,
+                d,
+            } => write!(
+                f,
+                "{effect}: {} stand for each other in this recording, so that the interval of its size holds 0; D {d:.1} is \
+                 that of the effect as a whole",
+                parameters.join(", ")
             ),
             Self::NotWritten { effect, others } => write!(
                 f,

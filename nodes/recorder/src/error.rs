@@ -216,10 +216,12 @@ pub enum RecorderError {
         loss: crate::Loss,
     },
     /// A directory without a single file.
-    #[error("{path} holds no .mcap file")]
+    #[error("{path} holds no .mcap file{}", inside.as_deref().map_or_else(String::new, |bag| format!("; {} does", bag.display())))]
     NoFiles {
         /// The directory.
         path: PathBuf,
+        /// A directory in it that is a recording.
+        inside: Option<PathBuf>,
     },
     /// The worker thread could not be started or did not come back.
     #[error("the thread that writes {path} is gone")]

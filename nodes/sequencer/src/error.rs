@@ -54,6 +54,8 @@ pub enum SequencerError {
     },
     #[error("steps[{step}].repeats = 0: must be above 0")]
     NoRepeats { step: usize },
+    #[error("steps[{step}].points = 0: must be above 0")]
+    NoPoints { step: usize },
     #[error("steps: the plan has none")]
     NoSteps,
 }

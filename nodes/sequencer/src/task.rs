@@ -87,6 +87,9 @@ pub(crate) fn of_step(
     programs: &BTreeMap<String, String>,
 ) -> Result<Task, SequencerError> {
     let order = match step {
+        // Of an action's goal 0 is what it is by default; a plan says what it means.
+        Step::Latency { repeats: 0, .. } => return Err(SequencerError::NoRepeats { step: at }),
+        Step::Artefact { points: 0, .. } => return Err(SequencerError::NoPoints { step: at }),
         Step::Blocks { blocks, cold } => order(CycleKind::Blocks, blocks.clone(), *cold),
         Step::Latency {
             feature,

@@ -48,6 +48,14 @@ impl BagFile {
     }
 }
 
+/// The first directory in another one, by name, that holds a recording.
+fn recording_in(path: &Path) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(path).ok()?.flatten();
+    let folders = entries.map(|entry| entry.path()).filter(|it| it.is_dir());
+    let is_one = |it: &PathBuf| files_of(it).is_ok_and(|(names, _)| !names.is_empty());
+    folders.filter(is_one).min()
+}
+
 /// A recording, open for reading.
 #[derive(Debug)]
 pub struct Bag {
@@ -77,6 +85,7 @@ impl Bag {
         if names.is_empty() && absent.is_empty() {
             return Err(RecorderError::NoFiles {
                 path: path.to_owned(),
+                inside: recording_in(path),
             });
         }
         let mut bag = Self {

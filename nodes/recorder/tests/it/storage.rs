@@ -256,5 +256,20 @@ fn malformed_calls_are_refused_and_harm_nothing() {
     let empty = home.path().join("empty");
     fs::create_dir(&empty).unwrap();
     let empty = Bag::open(empty).unwrap_err();
-    assert!(matches!(empty, RecorderError::NoFiles { .. }));
+    assert!(matches!(empty, RecorderError::NoFiles { inside: None, .. }));
+    // A folder of a run, in which the bag is.
+    let error = Bag::open(home.path()).unwrap_err();
+    let RecorderError::NoFiles {
+        inside: Some(bag), ..
+    } = &error
+    else {
+        panic!("{error}");
+    };
+    assert!(Bag::open(bag).is_ok());
+    assert!(
+        error
+            .to_string()
+            .ends_with(&format!("; {} does", bag.display())),
+        "{error}"
+    );
 }
