@@ -147,7 +147,7 @@ fn fast_dds_hears_how_far_a_goal_is_and_calls_it_off() {
     peer.client::<GetResult<RunProgram>>(RESULT);
     peer.client::<CancelGoal>(CANCEL);
     peer.read_named::<FeedbackMessage<RunProgram>>(FEEDBACK, Durability::Volatile);
-    peer.read_named::<GoalStatusArray>(STATUS, Durability::Volatile);
+    peer.read_named::<GoalStatusArray>(STATUS, Durability::TransientLocal);
     // Ten minutes of motion.
     let goal = goal(8, "G21 G90\nG1 X102 F10\nM2\n");
     let goal_id = goal.goal_id.clone();

@@ -27,6 +27,7 @@ use reply::LongReplies;
 mod endpoint;
 mod first_sample;
 mod policies;
+mod ports;
 mod reply;
 mod rtps;
 
@@ -145,12 +146,13 @@ impl Participant {
     ) -> anyhow::Result<(Self, Option<String>)> {
         let interfaces = environment::interfaces();
         environment.check_interfaces(&interfaces)?;
-        let (builder, unsecured) = secured(builder(environment), environment, names)?;
-        let participant = builder.build().map_err(|error| {
-            anyhow!(
-                "DDS participant in domain {}: {error}",
-                environment.domain_id
-            )
+        let (_, unsecured) = secured(builder(environment), environment, names)?;
+        let participant = ports::with_its_port(|| {
+            let (builder, _) = secured(builder(environment), environment, names)?;
+            let domain = environment.domain_id;
+            builder
+                .build()
+                .map_err(|error| anyhow!("DDS participant in domain {domain}: {error}"))
         })?;
         let hidden = environment.multicast_warning(&interfaces, participant.participant_id());
         let is_encrypted = environment.security.is_some() && unsecured.is_none();

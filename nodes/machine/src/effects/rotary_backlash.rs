@@ -11,7 +11,7 @@
 //! |---|---|---|
 //! | c_m, c_t | angle of the motor over its gear, of the table | rad |
 //! | s | 1 where a positive angle turns the tool right-handed as seen from the workpiece, else -1 | 1 |
-//! | w | `width_urad`: -B, B the reversal error of ISO 230-1; negative where an encoder at the table was told too large a play | µrad |
+//! | w | `width_urad`: -B, B the reversal error of \[1\]; negative where an encoder at the table was told too large a play | µrad |
 //!
 //! # Holds when
 //! The table stays where its drive leaves it: bearings that are clamped or have some friction, no weight that pulls at it.

@@ -7,11 +7,11 @@ use abbe_msgs::diagnostic_msgs::msg::DiagnosticArray;
 use abbe_msgs::std_msgs::msg::{Int64, String as Text};
 use abbe_msgs::{Message, Qos, from_cdr, to_cdr, topics};
 use metrology::stamp::Span;
-use node_runtime::environment::Middleware;
+use node_runtime::environment::{Environment, Middleware};
 use node_runtime::node::Ports;
 use node_runtime::{Emission, Event};
 
-use super::puppet::{Puppet, environment, start, start_with, topic, wait};
+use super::puppet::{Puppet, environment, on_dds, start, start_with, topic, wait};
 
 fn now_nanos() -> i64 {
     i64::try_from(
@@ -95,9 +95,8 @@ fn a_thousand_messages_at_1_khz_all_arrive_in_order() {
     );
 }
 
-#[test]
-fn a_late_joiner_ends_with_what_is_latched() {
-    let environment = environment(1);
+/// Says three states at once, and what somebody hears who joins later.
+fn heard_late(environment: &Environment) -> Vec<i64> {
     let ports = Ports {
         publications: vec![topic::<Int64>("state", Qos::LATCHED)],
         timers: vec![Span::from_nanos(10_000_000)],
@@ -115,18 +114,35 @@ fn a_late_joiner_ends_with_what_is_latched() {
         }
         Ok(())
     });
-    let speaking = start(&environment, speaker);
+    let speaking = start(environment, speaker);
     std::thread::sleep(Duration::from_millis(300));
     let (puppet, received) = listener::<Int64>("late", "state", Qos::LATCHED);
-    let listening = start(&environment, puppet);
+    let listening = start(environment, puppet);
     let mut states = vec![wait(&received, "what is latched", Some).0.data];
     let more = || received.recv_timeout(Duration::from_millis(500)).ok();
     states.extend(std::iter::from_fn(more).map(|(message, _)| message.data));
+    listening.stop().unwrap();
+    speaking.stop().unwrap();
+    states
+}
+
+#[test]
+fn a_late_joiner_ends_with_what_is_latched() {
+    let states = heard_late(&environment(1));
     // RustDDS's writer has not yet dropped what exceeds its depth: older states may come first.
     assert_eq!(states.last(), Some(&3), "{states:?}");
     assert!(states.is_sorted(), "{states:?}");
-    listening.stop().unwrap();
-    speaking.stop().unwrap();
+}
+
+/// As where a participant that takes its two ports one by one is started at the same instant.
+#[test]
+fn what_is_latched_is_heard_where_somebody_has_the_port_of_the_first_participant() {
+    let environment = on_dds(20);
+    let port = 7400 + 250 * environment.domain_id + 11;
+    let somebody = std::net::UdpSocket::bind(("127.0.0.1", port)).unwrap();
+    let states = heard_late(&environment);
+    assert_eq!(states.last(), Some(&3), "{states:?}");
+    drop(somebody);
 }
 
 #[test]

@@ -136,7 +136,7 @@ fn effects(forecast: &Preflight) -> Section {
             "looks like (cosine)",
         ],
         rows.collect(),
-        "Found from: the smallest size that 95 of 100 such recordings would show; told apart from: the smallest that no combination of other effects would imitate.",
+        "Found from: the smallest size that 95 of 100 such recordings would show; told apart from: the smallest that no combination of other effects would imitate (never: some combination does at any size; a diagnosis names what explains with the fewest). Both for the noise below.",
     )
 }
 
