@@ -46,6 +46,7 @@ pub fn fewer(session: &Session, config: &GapConfig) -> Option<Session> {
     (kept.len() < session.runs.len()).then(|| Session {
         history: session.history.clone(),
         runs: kept.iter().map(|run| session.runs[*run].clone()).collect(),
+        first_bag_ends: session.first_bag_ends,
     })
 }
 

@@ -4,7 +4,8 @@
 //!
 //! Runs of one kind and plane under one condition (radius, feed, sense, centre, stylus) go together. The latest
 //! condition is held out, then the next, up to a third of the runs, as long as the runs that are left still have
-//! two levels of every factor that had two: without them no fit could tell a delay from a play. Where no
+//! two levels of every factor that had two: without them no fit could tell a delay from a play. A condition that only a later
+//! bag has is held out where no other can be: it was measured to decide something, which it cannot do held out. Where no
 //! condition can be spared and a test was repeated four times, its last quarter is held out: later, if not other.
 
 use machine::twin::{Run, Session};
@@ -51,11 +52,19 @@ pub fn split(session: &Session, hold_out: bool) -> Split {
             held_out: vec![],
         };
     }
-    let mut held_out = Vec::new();
-    for family in families(session, &used) {
-        held_out.extend(of_family(session, &family));
+    let families = families(session, &used);
+    let held = |additions: bool| {
+        let each = families.iter();
+        let mut held: Vec<usize> = each
+            .flat_map(|family| of_family(session, family, additions))
+            .collect();
+        held.sort_unstable();
+        held
+    };
+    let mut held_out = held(false);
+    if held_out.is_empty() {
+        held_out = held(true);
     }
-    held_out.sort_unstable();
     let fit = used
         .into_iter()
         .filter(|run| !held_out.contains(run))
@@ -81,13 +90,18 @@ fn grouped(runs: &[usize], same: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize
     groups
 }
 
-fn of_family(session: &Session, family: &[usize]) -> Vec<usize> {
+/// What is held out of a family; with or without conditions that only later bags have.
+fn of_family(session: &Session, family: &[usize], additions: bool) -> Vec<usize> {
     let mut conditions = grouped(family, |a, b| {
         same_condition(&session.runs[a], &session.runs[b])
     });
     conditions.sort_by_key(|runs| std::cmp::Reverse(runs.last().copied()));
+    let may_be = |runs: &[usize]| {
+        let is_addition = runs.iter().all(|run| session.is_addition(*run));
+        additions || !is_addition
+    };
     let mut held = Vec::<usize>::new();
-    for condition in &conditions {
+    for condition in conditions.iter().filter(|runs| may_be(runs)) {
         let left: Vec<usize> = family
             .iter()
             .copied()
@@ -98,7 +112,8 @@ fn of_family(session: &Session, family: &[usize]) -> Vec<usize> {
             held.extend(condition);
         }
     }
-    if held.is_empty() && conditions.len() == 1 && family.len() >= 4 {
+    let is_one = conditions.len() == 1 && may_be(family);
+    if held.is_empty() && is_one && family.len() >= 4 {
         held.extend(&family[family.len() - family.len() / 4..]);
     }
     held
@@ -142,4 +157,81 @@ pub fn title(segment: &TestSegment) -> String {
         Sense::CounterClockwise => words.push("ccw".to_owned()),
     }
     words.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use machine::twin::{Channel, Motion, Reading};
+    use metrology::Stamp;
+    use metrology::sample::{TestKind, TestPlane};
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    fn run(number: u32, kind: TestKind, radius_mm: f64, feed_mm_s: f64) -> Run {
+        Run {
+            segment: TestSegment {
+                at: Stamp::from_nanos(0),
+                run: number,
+                begin: true,
+                kind,
+                plane: TestPlane::Xy,
+                centre_mm: Vector3::zeros(),
+                radius_mm,
+                feed_mm_s,
+                sense: Sense::None,
+                repeat: 0,
+                stylus: String::new(),
+                tool_offset_mm: Vector3::zeros(),
+                stations: 0,
+                zero_id: 1,
+                setup_id: 1,
+                cold: false,
+                features: vec![],
+                completed: true,
+            },
+            motion: Motion::default(),
+            touches: vec![],
+            readings: vec![Reading {
+                channel: Channel::GridU,
+                at: 0,
+                fraction: 0.0,
+                deviation: 0.0,
+            }],
+        }
+    }
+
+    /// Circles at three feeds, twice each, and then a circle at a fourth and a line at two.
+    fn session(first_bag_ends: Option<u32>) -> Session {
+        let circle = |n: u32| {
+            let feed = 10.0 * f64::from(1 + n / 2);
+            run(n, TestKind::Circle, 50.0, feed)
+        };
+        let mut runs: Vec<Run> = (0..6).map(circle).collect();
+        runs.push(run(6, TestKind::Circle, 50.0, 90.0));
+        runs.push(run(7, TestKind::Line, 0.0, 20.0));
+        runs.push(run(8, TestKind::Line, 0.0, 20.0));
+        runs.push(run(9, TestKind::Line, 0.0, 20.0));
+        runs.push(run(10, TestKind::Line, 0.0, 20.0));
+        Session {
+            runs,
+            first_bag_ends,
+            ..Session::default()
+        }
+    }
+
+    #[test]
+    fn what_was_measured_in_addition_to_decide_something_is_not_held_out() {
+        assert_eq!(split(&session(None), true).held_out, [6, 10]);
+        let split = split(&session(Some(5)), true);
+        assert_eq!(split.held_out, [4, 5]);
+        assert_eq!(split.fit, [0, 1, 2, 3, 6, 7, 8, 9, 10]);
+    }
+
+    #[test]
+    fn where_nothing_else_can_be_held_out_an_addition_is() {
+        let mut session = session(Some(5));
+        session.runs.drain(..6);
+        assert_eq!(split(&session, true).held_out, [4]);
+    }
 }

@@ -224,7 +224,11 @@ impl GapDiagnosisStage {
         let quiet = if is_repeated(cycle, steadily) {
             let history = session.history.clone();
             let runs = steadily.to_vec();
-            Some(Session { history, runs })
+            Some(Session {
+                history,
+                runs,
+                first_bag_ends: None,
+            })
         } else {
             self.quiet.clone()
         };

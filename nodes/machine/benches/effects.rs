@@ -93,6 +93,7 @@ fn session(machine: &MachineFile) -> Session {
     Session {
         history,
         runs: vec![run],
+        first_bag_ends: None,
     }
 }
 

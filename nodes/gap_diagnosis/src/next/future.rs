@@ -67,7 +67,11 @@ pub fn future(
         }
     }
     (!runs.is_empty()).then_some(Future {
-        session: Session { history, runs },
+        session: Session {
+            history,
+            runs,
+            first_bag_ends: None,
+        },
         minutes: (at_s - end_s) / 60.0,
     })
 }

@@ -72,6 +72,7 @@ pub struct SessionBuilder {
     pub(super) account: Account,
     /// Greatest run, set-up and zero of the bags before this one, and of all.
     base: [u32; 3],
+    first_bag_ends: Option<u32>,
     greatest: [u32; 3],
     other_machine: Option<SessionError>,
     has_commands: bool,
@@ -101,6 +102,7 @@ impl SessionBuilder {
             account: Account::default(),
             base: [0; 3],
             greatest: [0; 3],
+            first_bag_ends: None,
             other_machine: None,
             has_commands: false,
         })
@@ -118,6 +120,9 @@ impl SessionBuilder {
         self.recent.clear();
         self.offset = None;
         self.base = self.greatest;
+        if !self.runs.is_empty() {
+            let _ = self.first_bag_ends.get_or_insert(self.base[0]);
+        }
     }
 
     /// Takes one sample.
@@ -166,6 +171,7 @@ impl SessionBuilder {
         Session {
             history: self.past.history(self.axes),
             runs: self.runs.clone(),
+            first_bag_ends: self.first_bag_ends,
         }
     }
 
@@ -194,6 +200,7 @@ impl SessionBuilder {
         let session = Session {
             history: self.past.history(self.axes),
             runs: self.runs,
+            first_bag_ends: self.first_bag_ends,
         };
         simulate::check(&session)?;
         self.account.runs = session.runs.len();

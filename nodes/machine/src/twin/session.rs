@@ -16,6 +16,18 @@ pub struct Session {
     pub history: History,
     /// The runs, in time.
     pub runs: Vec<Run>,
+    /// Of several bags: number of the last run of the first one. What came later was measured in addition.
+    pub first_bag_ends: Option<u32>,
+}
+
+impl Session {
+    /// Whether a run was measured in addition, in a later bag.
+    #[must_use]
+    pub fn is_addition(&self, run: usize) -> bool {
+        let number = self.runs.get(run).map(|run| run.segment.run);
+        self.first_bag_ends
+            .is_some_and(|end| number.is_some_and(|n| n > end))
+    }
 }
 
 /// One run: what was commanded, and what the instruments read.

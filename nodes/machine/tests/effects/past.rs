@@ -160,6 +160,7 @@ fn with<'a>(
     let session = Session {
         history: history.clone(),
         runs: vec![],
+        first_bag_ends: None,
     };
     ask(&Twin::new(machine).unwrap(), &session, run, &[effect])
 }

@@ -19,6 +19,7 @@ fn val_steel_off_the_reference_temperature_of_iso_1() {
             ..History::default()
         },
         runs: vec![run],
+        first_bag_ends: None,
     };
     let given = [("scale_um_per_m", 0.0), ("free_expansion_um_per_m_k", 11.5)];
     let twin = Twin::new(&machine).unwrap();

@@ -142,6 +142,7 @@ pub fn busy() -> (MachineFile, Session) {
     let session = Session {
         history: history(),
         runs: vec![run],
+        first_bag_ends: None,
     };
     (machine, session)
 }

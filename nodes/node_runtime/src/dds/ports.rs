@@ -6,6 +6,7 @@
 //! Others take the two ports one by one (Fast DDS), so that this happens where both start at once.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::Path;
 
 use anyhow::bail;
 use procfs::process::{FDTarget, Process};
@@ -19,13 +20,17 @@ pub(super) const fn sample_port(domain: u16, participant: u16) -> u16 {
     7400 + 250 * domain + 11 + 2 * participant
 }
 
+/// This thread: it may be in another network than the process' first one, of which `/proc/self/net` tells.
+fn this_thread() -> Option<Process> {
+    let place = std::fs::read_link("/proc/thread-self").ok()?;
+    Process::new_with_root(Path::new("/proc").join(place)).ok()
+}
+
 /// Whether this process listens to a UDP port on all addresses; where the system does not say, it is taken to.
 fn listens(port: u16) -> bool {
     let everywhere = SocketAddr::new(IpAddr::V4(Ipv4Addr::UNSPECIFIED), port);
-    let (Ok(sockets), Ok(own)) = (procfs::net::udp(), Process::myself()) else {
-        return true;
-    };
-    let Ok(descriptors) = own.fd() else {
+    let told = this_thread().and_then(|thread| Some((thread.udp().ok()?, thread.fd().ok()?)));
+    let Some((sockets, descriptors)) = told else {
         return true;
     };
     let own: Vec<u64> = descriptors
