@@ -168,7 +168,7 @@ fn causes(report: &GapReport) -> Section {
         "Causes",
         &names,
         rows.collect(),
-        "D: size over noise, whitened. Below 6.5 nothing is named; in blind trials with other physics nine of ten above 20 are.",
+        "D: size over noise, whitened. Below 6.5 nothing is named; in blind trials with other physics five of six above 20 are.",
     );
     section.tables.push(sizes(report));
     section
