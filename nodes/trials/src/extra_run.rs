@@ -6,7 +6,7 @@
 //! | words | steps |
 //! |---|---|
 //! | `circle XY R50 F3000 and F6000 both senses at middle` | circles on a plate of that plane |
-//! | `line X F1000 and F4000 there and back on the plate`, `… along beam along_x` | lines, moving |
+//! | `line X F1000 and F4000 there and back on the plate`, `… along beam along_x` | lines, moving, both ways in one run |
 //! | `positioning X F2000, 20 stops of 2 s each way …` | lines with stops |
 //! | `steps of 0.4 mm along X with 2 s dwell, there and back` | the same over 8 mm |
 //! | `the same touches at F60, F120 and F480` | touches of every face |
@@ -157,16 +157,22 @@ fn on_plate(
     has_stops: bool,
 ) -> String {
     let [first, _] = plane_axes(TestPlane::from(placement.plane));
-    let angle_deg = if first == axis.index() { 0.0 } else { 90.0 };
+    // There and back in one run, whose ways have their zero in common: the tip of a spike is at the plate's centre.
+    let half_mm = 0.5 * length_mm;
+    let (angle_deg, offset_mm) = if first == axis.index() {
+        (0.0, [half_mm, 0.0])
+    } else {
+        (90.0, [0.0, half_mm])
+    };
     let pace = if has_stops {
-        format!("stations: {STOPS}, dwell_s: {DWELL_S:.1}")
+        format!("stations: {}, dwell_s: {DWELL_S:.1}", 2 * STOPS)
     } else {
         "on_the_fly: true".to_owned()
     };
     format!(
-        "{{do: grid, placement: {}, trajectory: line, angle_deg: {angle_deg:.1}, \
-         length_mm: {length_mm:.1}, feed_mm_min: {feed_mm_min:.1}, sense: both, {pace}}}",
-        placement.id
+        "{{do: grid, placement: {}, trajectory: spike, angle_deg: {angle_deg:.1}, offset_mm: [{:.1}, {:.1}], \
+         length_mm: {length_mm:.1}, feed_mm_min: {feed_mm_min:.1}, {pace}}}",
+        placement.id, offset_mm[0], offset_mm[1]
     )
 }
 
