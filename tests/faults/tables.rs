@@ -11,7 +11,7 @@ fn a_table_with_a_target_beyond_the_travel_is_refused_with_its_place_and_the_lim
     let csv = home.path().join("far.csv");
     std::fs::write(
         &csv,
-        "run;target mm;deviation um\n1;-1e12;0,1\n1;1e12;0,2\n",
+        "run;direction;target mm;deviation um\n1;up;-1e12;0,1\n1;up;1e12;0,2\n",
     )
     .unwrap();
     let mut import = command(0, &["import"]);

@@ -202,6 +202,33 @@ fn fewer_runs(f: &mut fmt::Formatter<'_>, runs: usize, of: usize) -> fmt::Result
     )
 }
 
+fn only_together(
+    f: &mut fmt::Formatter<'_>,
+    effect: &str,
+    parameters: &[String],
+    d: f64,
+) -> fmt::Result {
+    write!(
+        f,
+        "{effect}: {} stand for each other in this recording, so that the interval of its size holds 0; D {d:.1} is \
+         that of the effect as a whole",
+        parameters.join(", ")
+    )
+}
+
+fn no_run_separates(
+    f: &mut fmt::Formatter<'_>,
+    effects: &[String],
+    delta: f64,
+    lever: &str,
+) -> fmt::Result {
+    write!(
+        f,
+        "no run in the library separates {} (squared distance {delta:.1} at most, 9 decides); the lever is {lever}",
+        effects.join(" and ")
+    )
+}
+
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -248,12 +275,7 @@ impl fmt::Display for Note {
                 effect,
                 parameters,
                 d,
-            } => write!(
-                f,
-                "{effect}: {} stand for each other in this recording, so that the interval of its size holds 0; D {d:.1} is \
-                 that of the effect as a whole",
-                parameters.join(", ")
-            ),
+            } => only_together(f, effect, parameters, *d),
             Self::NotWritten { effect, others } => write!(
                 f,
                 "{effect} is not written to a machine file: {} would do as well on this recording",
@@ -267,11 +289,7 @@ impl fmt::Display for Note {
                 effects,
                 delta,
                 lever,
-            } => write!(
-                f,
-                "no run in the library separates {} (squared distance {delta:.1} at most, 9 decides); the lever is {lever}",
-                effects.join(" and ")
-            ),
+            } => no_run_separates(f, effects, *delta, lever),
         }
     }
 }
