@@ -41,14 +41,6 @@ fn bad_steps_are_refused_with_their_place_and_values() {
             &["steps[1]", "feeds[0] and feeds[2] are both 60 mm/min"],
         ),
         (latency("60.0", 3), &["steps[1]", "1 feeds"]),
-        (
-            latency("60.0, 240.0", 0),
-            &["steps[1].repeats = 0: must be above 0"],
-        ),
-        (
-            "{do: artefact, id: bore_1, points: 0}".to_owned(),
-            &["steps[1].points = 0: must be above 0"],
-        ),
         (latency("60.0, 30000.0", 3), &["steps[1]", "30000 mm/min"]),
         (
             "{do: scan, axis: X, from_mm: -50.0, to_mm: 50.0, spacing_mm: 10.0, runs: 1, feed_mm_min: 6000.0, overrun_mm: 2.0, at_mm: [0.0, 0.0, 120.0]}".to_owned(),
@@ -85,6 +77,17 @@ fn bad_steps_are_refused_with_their_place_and_values() {
             words.iter().all(|word| error.contains(word)),
             "{step}: {error}"
         );
+    }
+}
+
+#[test]
+fn a_step_that_touches_nothing_is_refused() {
+    let latency = "{do: latency, feature: block_1.z, feeds_mm_min: [60.0, 240.0], repeats: 0}";
+    let artefact = "{do: artefact, id: bore_1, points: 0}";
+    for (step, key) in [(latency, "repeats"), (artefact, "points")] {
+        let said = refusal(step);
+        let words = format!("steps[1].{key} = 0: must be above 0");
+        assert!(said.contains(&words), "{said}");
     }
 }
 
