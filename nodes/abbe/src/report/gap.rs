@@ -210,7 +210,7 @@ fn sizes(report: &GapReport) -> Rows {
             "",
         ]),
         rows: report.causes.iter().flat_map(of_cause).collect(),
-        note: "From and to: 95 % interval of noise and repeats; in blind trials 89 % of them held. What the instruments themselves are off by \
+        note: "From and to: 95 % interval of noise and repeats; in blind trials 88 % of them held. What the instruments themselves are off by \
                is not in them. Amplitudes of an effect's free form are in the JSON."
             .to_owned(),
     }
