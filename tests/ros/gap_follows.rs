@@ -63,8 +63,7 @@ fn ends(graph: &Graph, began: Instant) -> Vec<(Instant, u32)> {
 #[test]
 fn a_report_follows_each_test_within_seconds_and_new_play_is_told_of_on_diagnostics() {
     let (scenario, bag) = recorded();
-    // It shares its number with players that are refused before they join.
-    let (domain, began) = (domain(2), Instant::now());
+    let (domain, began) = (domain(14), Instant::now());
     let graph = Graph::join(domain);
     let node = follower(&scenario, domain);
     graph.alive(NODE, began);

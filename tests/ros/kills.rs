@@ -292,12 +292,10 @@ fn a_controller_that_dies_under_a_program_fails_the_plan_and_says_so() {
 /// The same when it is there again before its lease is over, and knows nothing of the program.
 #[test]
 fn a_controller_that_comes_back_without_its_program_fails_the_plan_and_says_so() {
-    abbe_tests::namespace::alone("a controller that comes back", || {
-        dies_under_a_program(domain(8), |cell| {
-            let restarted = Instant::now();
-            cell.launch("fake_cnc");
-            cell.graph.next(&topics::AXES_STATE, restarted, |_| true);
-        });
+    dies_under_a_program(domain(13), |cell| {
+        let restarted = Instant::now();
+        cell.launch("fake_cnc");
+        cell.graph.next(&topics::AXES_STATE, restarted, |_| true);
     });
 }
 

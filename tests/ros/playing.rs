@@ -116,7 +116,7 @@ fn what_cannot_be_played_is_refused_with_what_the_bag_holds() {
             "to_s = 4 s is before from_s = 5 s",
         ),
     ] {
-        let mut play = command(domain(2), &["play"]);
+        let mut play = command(domain(16), &["play"]);
         play.arg(&path).args(arguments);
         let ended = Process::start(play).ended_within(END);
         assert_eq!(ended.status.code(), Some(1), "{}", ended.said);

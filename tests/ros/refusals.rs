@@ -15,7 +15,7 @@ fn refused(scenario: &Scenario, node: &str, more: &[&str], words: &[&str]) {
     let file = scenario.argument(&format!("{node}.yaml"));
     let mut arguments = vec!["node", node, "--ros-args", "--params-file", &file];
     arguments.extend(more);
-    let ended = Process::start(command(domain(5), &arguments)).ended_within(PATIENCE);
+    let ended = Process::start(command(domain(15), &arguments)).ended_within(PATIENCE);
     expect(&ended, words);
 }
 
