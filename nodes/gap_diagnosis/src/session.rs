@@ -79,3 +79,4 @@ pub use account::{Account, Reason};
 pub use builder::{Input, SessionBuilder};
 pub use config::SessionConfig;
 pub use error::SessionError;
+pub(crate) use select::HOLDS_FEED_S;

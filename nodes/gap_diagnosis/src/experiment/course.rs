@@ -9,7 +9,8 @@
 //! ```
 //!
 //! A circle begins before its start and ends behind its end by the way that the ramp takes, so that the turn
-//! itself is run at one feed.
+//! itself is run at one feed. Of a line that is read while it moves counts what is at its feed and settled, as it does
+//! of one that was recorded.
 //!
 //! # Holds when
 //! The control holds the feed between ramps; jerk limits round the ramps' corners only.
@@ -24,6 +25,7 @@ use nalgebra::Vector3;
 
 use super::{Pass, PlannedTouch};
 use crate::rows::count;
+use crate::session::HOLDS_FEED_S;
 
 /// Ticks that a pass is simulated with, at most about.
 const TICKS: f64 = 1400.0;
@@ -86,7 +88,7 @@ impl Course {
         }
     }
 
-    /// (1) along a straight line.
+    /// (1) along a straight line, read at its feed or not at all.
     fn go(&mut self, to: Vector3<f64>, feed_mm_s: f64, is_read: bool) {
         let from = self.at.xyz();
         let way = (to - from).norm();
@@ -95,12 +97,15 @@ impl Course {
         }
         let (total_s, place) = ramped(way, feed_mm_s, self.acceleration_mm_s2);
         let n = ticks(total_s, self.step_s);
+        let ramp_s = feed_mm_s / self.acceleration_mm_s2;
+        let at_feed_s = ramp_s + HOLDS_FEED_S..=total_s - ramp_s;
         for k in 1..=n {
-            let here = from + (to - from) * (place(count(k) * self.step_s) / way);
+            let t_s = count(k) * self.step_s;
+            let here = from + (to - from) * (place(t_s) / way);
             for (index, axis) in Axis::LINEAR.into_iter().enumerate() {
                 self.at[axis] = here[index];
             }
-            self.tick(is_read);
+            self.tick(is_read && at_feed_s.contains(&t_s));
         }
     }
 
@@ -142,7 +147,7 @@ impl Course {
             for leg in 1..=legs {
                 let share = f64::from(leg) / f64::from(legs);
                 self.go(from + (to - from) * share, feed_mm_s, stops == 0);
-                self.wait(dwell_s, true);
+                self.wait(dwell_s, stops > 0);
             }
         }
     }
@@ -481,5 +486,21 @@ mod tests {
         let (total_s, place) = ramped(1.0, 50.0, 500.0);
         assert!((total_s - 2.0 * (1.0_f64 / 500.0).sqrt()).abs() < 1e-12);
         assert!((place(0.5 * total_s) - 0.5).abs() < 1e-12);
+    }
+    #[test]
+    fn a_line_is_read_at_its_feed_and_not_where_it_turns() {
+        let axes = AxisSet::EMPTY.with(Axis::X);
+        let mut course = Course::new(0.0, 1e-3, 500.0, PerAxis::default(), axes);
+        let ends = [Vector3::zeros(), Vector3::new(100.0, 0.0, 0.0)];
+        course.there_and_back(ends, 50.0, 0, 0.5);
+        let motion = Motion::new(course.time_s, axes, course.position).expect("a motion");
+        let speed = |tick: &usize| motion.velocity[Axis::X][*tick];
+        let is_at_feed = |tick: &usize| (speed(tick).abs() - 50.0).abs() < 0.5;
+        assert!(course.read.iter().all(is_at_feed));
+        // Each way lasts 2.1 s with two ramps of 0.1 s and what settles behind the first.
+        for sign in [1.0, -1.0] {
+            let way = course.read.iter().filter(|tick| sign * speed(tick) > 0.0);
+            assert!((1840..=1860).contains(&way.count()));
+        }
     }
 }

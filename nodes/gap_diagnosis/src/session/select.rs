@@ -14,7 +14,7 @@ const ON_CIRCLE_MM: f64 = 2e-3;
 /// Share of the feed below which the command is still running in.
 const AT_FEED: f64 = 0.98;
 /// A test keeps its feed for so long where it reaches it at all, s.
-const HOLDS_FEED_S: f64 = 0.05;
+pub(crate) const HOLDS_FEED_S: f64 = 0.05;
 /// A command that changes by less stands, mm or rad.
 const STANDSTILL: f64 = 1e-6;
 /// Ticks further apart than this times the finest spacing are not at the full rate.
@@ -200,7 +200,8 @@ fn between_motions(motion: &Motion, lead_in: usize, counts: &mut [bool]) {
 
 /// From where the path is at the feed of the test for the first time to where it is for the last time: how the machine
 /// comes there and goes away, faster than that, is not what is tested. Where the record of a run holds the end of
-/// the one before, the longer part counts. Of a line only the passes at its feed count, once the loops have settled.
+/// the one before, the longer part counts. Of a straight line only the passes at its feed count, once the loops have
+/// settled: what a jump of the acceleration at its ends leaves is told by how well the loops are known, not by the path.
 /// A test too short to reach its feed counts as a whole.
 fn on_the_way_of_the_test(segment: &TestSegment, motion: &Motion, counts: &mut [bool]) {
     let speeds: Vec<f64> = (0..counts.len()).map(|k| speed(motion, k)).collect();
@@ -227,7 +228,7 @@ fn on_the_way_of_the_test(segment: &TestSegment, motion: &Motion, counts: &mut [
         let first = pass.clone().find(|k| motion.time_s[*k] >= since_s);
         first.unwrap_or(pass.end)..pass.end
     };
-    let judged: Vec<Range<usize>> = if segment.kind == TestKind::Line {
+    let judged: Vec<Range<usize>> = if is_straight(segment.kind) {
         part.iter().map(settled).collect()
     } else {
         let (first, last) = (&part[0], &part[part.len() - 1]);
@@ -236,6 +237,11 @@ fn on_the_way_of_the_test(segment: &TestSegment, motion: &Motion, counts: &mut [
     for (k, counts) in counts.iter_mut().enumerate() {
         *counts &= judged.iter().any(|judged| judged.contains(&k));
     }
+}
+
+const fn is_straight(kind: TestKind) -> bool {
+    use TestKind::{Diagonal, Line, Positioning, Spike};
+    matches!(kind, Line | Spike | Positioning | Diagonal)
 }
 
 fn speed(motion: &Motion, k: usize) -> f64 {
@@ -307,23 +313,29 @@ mod tests {
     }
 
     #[test]
-    fn of_a_line_the_passes_at_its_feed_count_once_they_have_settled() {
-        // 30 mm up, a rest, and down again.
-        let place = |t: f64| 10.0 * (t - 1.0).clamp(0.0, 3.0) - 10.0 * (t - 5.0).clamp(0.0, 3.0);
-        let time_s: Vec<f64> = (0..9000).map(|k| f64::from(k) * 1e-3).collect();
-        let mut position = PerAxis::<Vec<f64>>::default();
-        position[Axis::X] = time_s.iter().map(|t| place(*t)).collect();
-        let motion = Motion::new(time_s, AxisSet::EMPTY.with(Axis::X), position).expect("a motion");
-        let selection = Selection::of(&segment(TestKind::Line, 10.0), &motion, 0, 0.3);
-        let Selection::Motion(counts) = selection else {
-            panic!("a line in motion");
-        };
-        for (k, counts) in counts.iter().enumerate() {
-            let time_s = motion.time_s[k];
-            let is_in = |from: f64| time_s > from + HOLDS_FEED_S + 3e-3 && time_s < from + 2.997;
-            let is_out = |from: f64| time_s < from + HOLDS_FEED_S - 3e-3 || time_s > from + 3.003;
-            assert!(*counts || !(is_in(1.0) || is_in(5.0)), "{time_s}");
-            assert!(!(*counts && is_out(1.0) && is_out(5.0)), "{time_s}");
+    fn of_a_straight_line_the_passes_at_its_feed_count_once_they_have_settled() {
+        use TestKind::{Line, Positioning, Spike};
+        // 30 mm up, a rest or none, and down again.
+        for (kind, back_s) in [(Line, 5.0), (Line, 4.0), (Spike, 4.0), (Positioning, 4.0)] {
+            let up = |t: f64| 10.0 * (t - 1.0).clamp(0.0, 3.0);
+            let place = |t: f64| up(t) - 10.0 * (t - back_s).clamp(0.0, 3.0);
+            let time_s: Vec<f64> = (0..9000).map(|k| f64::from(k) * 1e-3).collect();
+            let mut position = PerAxis::<Vec<f64>>::default();
+            position[Axis::X] = time_s.iter().map(|t| place(*t)).collect();
+            let axes = AxisSet::EMPTY.with(Axis::X);
+            let motion = Motion::new(time_s, axes, position).expect("a motion");
+            let Selection::Motion(counts) = Selection::of(&segment(kind, 10.0), &motion, 0, 0.3)
+            else {
+                panic!("{kind:?} in motion");
+            };
+            for (k, counts) in counts.iter().enumerate() {
+                let time_s = motion.time_s[k];
+                let begun = |from: f64| time_s - from - HOLDS_FEED_S;
+                let is_in = |from: f64| begun(from) > 3e-3 && time_s < from + 2.997;
+                let is_out = |from: f64| begun(from) < -3e-3 || time_s > from + 3.003;
+                assert!(*counts || !(is_in(1.0) || is_in(back_s)), "{time_s}");
+                assert!(!(*counts && is_out(1.0) && is_out(back_s)), "{time_s}");
+            }
         }
     }
 
