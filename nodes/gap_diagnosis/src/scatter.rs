@@ -8,24 +8,27 @@
 //!   E z_i2 = g_c + e_c / m_i + sum_k b_k h_ik,   b = (amplitude / greatest)2        (1)
 //!   h_t = sum_j c_j2 v_(t-j),   z = sum_j c_j y_(t-j) the whitener's filter          (2)
 //!   score = h'(z2 / f - 1) / sqrt(k h'h),   k the variance of z2 / f                  (3)
+//!   D^2 = 2/k_1 sum_i (z_i2/f_i - z_i2/g_i + ln f_i/g_i),   k_1 that of z2 / g, at least 2   (4)
 //! ```
 //!
 //! | symbol | here |
 //! |---|---|
 //! | m_i | readings of row i: white noise of readings is smaller in a mean of more |
 //! | g_c, e_c | free for each channel (g of a path for each run): how noisy an instrument is belongs to the floor |
-//! | f | what g and e alone make of z2; h is over it as well |
+//! | f | what g and e alone make of z2; h is over it as well. In (4) what all but one effect make of it, g what all do |
 //! | v | variance of the row's mean, readings scattering independently |
 //!
 //! The search, its price and its rules are those of the mean (`selection`, `confirm`, `confidence`); one more is
 //! that the effect must beat a scatter of its own for every run. The size is from (1) by iterated weights
-//! 1 / (2 (E z2)2), its interval the greater of model and clusters of runs.
+//! 1 / (2 (E z2)2), its interval the greater of model and clusters of runs. (4) is by how much the effect makes what was read
+//! more likely, as D^2 of an effect of the mean is; the score (3) is short of it where the variance changes manifold.
 //!
 //! # Holds when
 //! Effects that scatter a channel evenly are part of its noise floor, so that they are listed as not shown.
 //!
 //! # References
-//! \[1\] L. G. Godfrey, J. Econometrics 8, 1978 (score test of a variance that goes with covariates).
+//! \[1\] L. G. Godfrey, J. Econometrics 8, 1978 (score test of a variance that goes with covariates). \[2\] P. McCullagh,
+//! J. A. Nelder, Generalized linear models, 2nd ed., Chapman & Hall 1989, chapter 10 (scaled deviance of a variance's model).
 
 use std::collections::BTreeMap;
 

@@ -86,13 +86,27 @@ impl Judge<'_, '_, '_> {
                 status,
                 confidence: recalibrated(config, probability),
                 parameters,
-                d: parts[place].norm(),
+                d: self.distance(&forms, place, &fit),
                 confusable_with: veto::confusable(
                     signatures, normal, &instead, set[place], &of_set,
                 ),
                 constancy,
             });
         }
+    }
+
+    /// (4) of `scatter` of one form among those of a set.
+    fn distance(&self, forms: &[&Form], place: usize, fit: &Fit) -> f64 {
+        let mut others = forms.to_vec();
+        others.remove(place);
+        let without = self.fit(&others).level;
+        let squares = &self.squares.squares;
+        let of = |level: &DVector<f64>| squares.component_div(level);
+        let (with, less) = (of(&fit.level), of(&without));
+        let surprise =
+            less.sum() - with.sum() + without.map(f64::ln).sum() - fit.level.map(f64::ln).sum();
+        let k = with.map(|square| (square - 1.0).powi(2)).mean();
+        (surprise.max(0.0) / (0.5 * k).max(1.0)).sqrt()
     }
 
     /// What each form makes of the squares.

@@ -29,6 +29,7 @@ fn normal(random: &mut Pcg64Mcg) -> f64 {
 fn only(causes: &[Cause], least_d: f64) -> (&Cause, Vec<&str>) {
     let mut kept = causes.iter().filter(|c| c.status != Status::Surrogate);
     let cause = kept.next().expect("a cause");
+    eprintln!("{} {}: D {:.1}", cause.effect, cause.axis, cause.d);
     assert!(kept.next().is_none(), "{causes:#?}");
     assert!(cause.d > least_d, "{cause:#?}");
     let open = cause.confusable_with.iter().filter(|o| !o.excluded);
