@@ -6,9 +6,9 @@
 //! | words | steps |
 //! |---|---|
 //! | `circle XY R50 F3000 and F6000 both senses at middle` | circles on a plate of that plane |
-//! | `line X F1000 and F4000 there and back on the plate`, `… along beam along_x` | lines, moving, both ways in one run |
+//! | `line X F1000 and F4000 there and back on the XY plate`, `… along beam along_x` | lines, moving, both ways in one run |
 //! | `positioning X F2000, 20 stops of 2 s each way …` | lines with stops |
-//! | `steps of 0.4 mm along X with 2 s dwell, there and back` | the same over 8 mm |
+//! | `steps of 0.4 mm along X with 2 s dwell, there and back on the XY plate` | the same over 8 mm |
 //! | `the same touches at F60, F120 and F480` | touches of every face |
 //! | `the session's 9 tests in reverse order` | each condition once, the last first |
 
@@ -127,17 +127,16 @@ fn placement<'m>(machine: &'m MachineFile, plane: &str, words: &str) -> Option<&
     all.iter().find(named).or_else(|| all.iter().find(in_plane))
 }
 
+/// The placement of `… on the XY plate`, where it reads the axis.
 fn placement_along<'m>(
     machine: &'m MachineFile,
     axis: Axis,
     words: &str,
 ) -> Option<&'m GridPlacement> {
-    let all = &machine.grid_encoder.as_ref()?.placements;
-    let named = |placement: &&GridPlacement| words.ends_with(&format!(" at {}", placement.id));
-    let reads = |placement: &&GridPlacement| {
-        plane_axes(TestPlane::from(placement.plane)).contains(&axis.index())
-    };
-    all.iter().find(named).or_else(|| all.iter().find(reads))
+    let (_, plate) = words.split_once(" on the ")?;
+    let found = placement(machine, plate.split(' ').next()?, words)?;
+    let axes = plane_axes(TestPlane::from(found.plane));
+    axes.contains(&axis.index()).then_some(found)
 }
 
 const fn plane_words(plane: TestPlane) -> &'static str {
@@ -235,10 +234,10 @@ mod tests {
         let rig = rig();
         for words in [
             "circle XY R40 F3000 both senses at middle",
-            "line Y F4000 there and back on the plate",
+            "line Y F4000 there and back on the YZ plate",
             "positioning Z F2000, 20 stops of 2 s each way along beam along_z",
             "line X F4000 there and back along beam along_x",
-            "steps of 0.4 mm along X with 2 s dwell, there and back",
+            "steps of 0.4 mm along X with 2 s dwell, there and back on the ZX plate",
             "the same touches at F60, F120 and F480",
         ] {
             let plan = extra_run(&rig.machine, &rig.plan, words).unwrap();
@@ -270,6 +269,7 @@ mod tests {
         let rig = rig();
         for words in [
             "standing still for 10 min on the plate",
+            "line X F1000 and F4000 there and back on the YZ plate",
             "circle XY R40 F3000 both senses before and after 15 min of X to and fro, the other axes idle",
             "the same touches with stylus long",
         ] {

@@ -242,6 +242,38 @@ mod tests {
         }
     }
 
+    /// Two planes read every axis: a line along Y is none that somebody could run unless its plane is told.
+    #[test]
+    fn every_experiment_has_a_title_of_its_own_on_the_plates_that_the_session_had() {
+        let text = include_str!("../../../../launch_configs/volumetric/machine.yaml");
+        let machine = MachineFile::parse(text, "machine").expect("a machine");
+        let frame = Frame {
+            machine: &machine,
+            rest: PerAxis::default(),
+            beside: vec![],
+            tool_offset_mm: Vector3::zeros(),
+            setup: 1,
+            servo_s: 1e-3,
+        };
+        let mut session = Session::default();
+        let of_circles = experiments(&machine, &session)
+            .into_iter()
+            .filter(|experiment| experiment.title.starts_with("circle "));
+        for pass in of_circles.flat_map(|circles| circles.passes) {
+            session.runs.extend(course::run(&frame, &pass, 1, 5.0));
+        }
+        assert!(!session.runs.is_empty());
+        let all = experiments(&machine, &session);
+        let mut titles = std::collections::BTreeSet::new();
+        for experiment in &all {
+            assert!(titles.insert(&experiment.title), "{}", experiment.title);
+        }
+        assert!(
+            titles.iter().any(|title| title.contains("on the YZ plate")),
+            "{titles:#?}"
+        );
+    }
+
     /// Every way that is proposed, with ramps, clearances and corners, as the axes would go it.
     #[test]
     fn prop_every_proposed_way_stays_within_travel_and_feed() {

@@ -8,9 +8,11 @@ use nalgebra::Vector3;
 
 use super::{SAME_PLACE_MIN, Shop};
 use crate::experiment::{Experiment, Pass, circle_words, short};
+use crate::nuisance::plane_name;
 
 /// A place where circles or lines can be read.
 pub(super) struct Stand {
+    /// Placement, where the plane alone does not tell which.
     pub name: String,
     pub instrument: Instrument,
     pub plane: TestPlane,
@@ -42,7 +44,7 @@ impl Shop<'_> {
             match stands.iter_mut().find(known) {
                 Some(stand) => stand.reach_mm = stand.reach_mm.max(segment.radius_mm),
                 None if segment.radius_mm > 0.0 => stands.push(Stand {
-                    name: String::new(),
+                    name: self.one_of_several(segment.plane, segment.centre_mm),
                     instrument,
                     plane: segment.plane,
                     centre: segment.centre_mm,
@@ -54,6 +56,20 @@ impl Shop<'_> {
         }
         self.add_placements(&mut stands);
         stands
+    }
+
+    /// The placement of a centre, where the machine file has another one in its plane.
+    fn one_of_several(&self, plane: TestPlane, centre: Vector3<f64>) -> String {
+        let grid = self.machine.grid_encoder.iter();
+        let mut in_plane = grid
+            .flat_map(|grid| &grid.placements)
+            .filter(|placement| TestPlane::from(placement.plane) == plane);
+        if in_plane.clone().count() < 2 {
+            return String::new();
+        }
+        in_plane
+            .find(|placement| (placement.axes_at_centre_mm() - centre).norm() < 1.0)
+            .map_or_else(String::new, |placement| placement.id.clone())
     }
 
     fn add_placements(&self, stands: &mut Vec<Stand>) {
@@ -163,15 +179,11 @@ impl Shop<'_> {
             .skip(1)
             .map(|feed| format!(" and F{}", short(feed * 60.0)))
             .collect();
-        let name = if stand.name.is_empty() {
-            String::new()
-        } else {
-            format!(" at {}", stand.name)
-        };
         Experiment {
             title: format!(
-                "circle {}{more} both senses{name}",
-                circle_words(stand.plane, radius_mm, first)
+                "circle {}{more} both senses{}",
+                circle_words(stand.plane, radius_mm, first),
+                at_words(stand)
             ),
             passes: passes.collect(),
             setup_min: stand.setup_min,
@@ -189,23 +201,20 @@ impl Shop<'_> {
                 let mut along = Vector3::zeros();
                 along[axis.index()] = 0.9 * stand.reach_mm;
                 let ends = [stand.centre - along, stand.centre + along];
-                let at = if stand.name.is_empty() {
-                    String::new()
-                } else {
-                    format!(" at {}", stand.name)
-                };
+                let place = plate_words(stand);
                 all.extend(self.on(
                     stand.instrument,
                     stand.plane,
                     axis,
                     ends,
                     stand.setup_min,
-                    &format!("on the plate{at}"),
+                    &place,
                 ));
                 let mut small = Vector3::zeros();
                 small[axis.index()] = 4.0;
                 all.push(steps(
                     stand,
+                    &place,
                     axis,
                     [stand.centre - small, stand.centre + small],
                 ));
@@ -277,9 +286,9 @@ impl Shop<'_> {
 }
 
 /// Small steps with a dwell at each: a reversal followed by nothing but time.
-fn steps(stand: &Stand, axis: Axis, [from, to]: [Vector3<f64>; 2]) -> Experiment {
+fn steps(stand: &Stand, place: &str, axis: Axis, [from, to]: [Vector3<f64>; 2]) -> Experiment {
     Experiment {
-        title: format!("steps of 0.4 mm along {axis} with 2 s dwell, there and back"),
+        title: format!("steps of 0.4 mm along {axis} with 2 s dwell, there and back {place}"),
         passes: vec![Pass::Line {
             instrument: stand.instrument,
             plane: stand.plane,
@@ -291,5 +300,22 @@ fn steps(stand: &Stand, axis: Axis, [from, to]: [Vector3<f64>; 2]) -> Experiment
             dwell_s: 2.0,
         }],
         setup_min: stand.setup_min,
+    }
+}
+
+/// `on the XY plate`: two planes read every axis.
+fn plate_words(stand: &Stand) -> String {
+    format!(
+        "on the {} plate{}",
+        plane_name(stand.plane),
+        at_words(stand)
+    )
+}
+
+fn at_words(stand: &Stand) -> String {
+    if stand.name.is_empty() {
+        String::new()
+    } else {
+        format!(" at {}", stand.name)
     }
 }
