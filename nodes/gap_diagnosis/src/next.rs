@@ -7,14 +7,16 @@
 //!
 //! ```text
 //!   S = S_session + S_experiment                                          (1)
-//!   worth = sum (2 Phi(sqrt(Delta(S) - Delta(S_session)) / 2) - 1) / minutes   (2)
+//!   worth = sum w (2 Phi(sqrt(Delta(S) - Delta(S_session)) / 2) - 1) / minutes   (2)
 //! ```
 //!
 //! with Delta of `distance` both ways, the smaller, summed over the pairs of explanations that the experiment
 //! decides ([`DECISION`] or more is added). The experiment of greatest worth is taken, the pairs that it decides are
 //! taken out, and so on: a distance beyond a decision is worth no more minutes. For an effect that fails a check
 //! without a rival, the other explanation is the same signature with a size of its own in the experiment: a cause
-//! has one size everywhere.
+//! has one size everywhere. For one that is only too small to be told from noise it is noise, Delta is what the experiment
+//! adds to D^2, and it decides where D then is three standard deviations above the least D_0 that is named; its chance
+//! in (2) is Phi(D - D_0). w is D of the effect over D_0, at most 1: what hardly matters is asked last.
 //!
 //! # Holds when
 //! The experiment's noise is the session's; an instrument that the session lacks is taken to be as noisy as the
@@ -43,6 +45,7 @@ use crate::report::{NextExperiment, Status};
 use crate::selection::Set;
 use crate::signature::{Form, Library};
 use crate::stack::Stack;
+use crate::veto::{LEAST_D as LEAST_NAMED_D, Veto};
 use crate::whitener::Autoregression;
 use distance::{Explanation, distance};
 
@@ -88,6 +91,10 @@ struct Question {
     is_of_the_best: bool,
     /// The form whose size may be another in the experiment; then `theirs` is `ours`.
     resized: Option<usize>,
+    /// Whether the other explanation is noise.
+    is_noise: bool,
+    /// D of the effect that is not named.
+    d: f64,
 }
 
 /// An experiment with its minutes and the information that it adds.
@@ -171,6 +178,10 @@ fn questions(found: &Found) -> Vec<Question> {
         .iter()
         .filter(|member| member.status != Status::Named)
     {
+        if member.vetoes == [Veto::NearNoise] {
+            all.push(resized(found, member));
+            continue;
+        }
         let is_open = |behind: f64| {
             member.status == Status::Set && behind <= 2.0 * ODDS.ln() || behind < NEAR
         };
@@ -183,7 +194,7 @@ fn questions(found: &Found) -> Vec<Question> {
         }
         for (k, ours) in sets.iter().enumerate() {
             for theirs in &sets[k + 1..] {
-                let Some(question) = between(found, ours, theirs) else {
+                let Some(question) = between(found, member, ours, theirs) else {
                     continue;
                 };
                 if all.len() < MOST_QUESTIONS
@@ -198,7 +209,7 @@ fn questions(found: &Found) -> Vec<Question> {
 }
 
 /// Two sets of which neither holds the other.
-fn between(found: &Found, ours: &Set, theirs: &Set) -> Option<Question> {
+fn between(found: &Found, member: &Member, ours: &Set, theirs: &Set) -> Option<Question> {
     let signatures = &found.signatures;
     let instance = |form: &usize| signatures.forms[*form].instance;
     let only = |one: &Set, other: &Set| -> Vec<usize> {
@@ -231,23 +242,57 @@ fn between(found: &Found, ours: &Set, theirs: &Set) -> Option<Question> {
         theirs: theirs.clone(),
         is_of_the_best: *ours == found.set,
         resized: None,
+        is_noise: false,
+        d: member.estimate.d,
     })
 }
 
 /// A member that fails a check without a rival.
 fn resized(found: &Found, member: &Member) -> Question {
     let instance = found.instance(member);
+    let is_noise = member.vetoes == [Veto::NearNoise];
+    let other = if is_noise {
+        "noise"
+    } else {
+        "what only looks like it here"
+    };
     Question {
-        names: vec![instance.name(), "what only looks like it here".to_owned()],
+        names: vec![instance.name(), other.to_owned()],
         ids: vec![instance.kind.id],
         ours: found.set.clone(),
         theirs: found.set.clone(),
         is_of_the_best: true,
         resized: Some(member.form),
+        is_noise,
+        d: member.estimate.d,
     }
 }
 
 impl Question {
+    /// w of (2).
+    fn weight(&self) -> f64 {
+        (self.d / LEAST_NAMED_D).min(1.0)
+    }
+
+    /// What an experiment has to add for a decision.
+    fn needed(&self) -> f64 {
+        if self.is_noise {
+            (LEAST_NAMED_D + DECISION.sqrt()).powi(2) - self.d.powi(2)
+        } else {
+            DECISION
+        }
+    }
+
+    /// The chance of a decision with what an experiment adds.
+    fn chance(&self, added: f64) -> f64 {
+        let normal = statrs::distribution::Normal::standard();
+        if self.is_noise {
+            normal.cdf((self.d.powi(2) + added).sqrt() - LEAST_NAMED_D)
+        } else {
+            2.0 * normal.cdf(0.5 * added.max(0.0).sqrt()) - 1.0
+        }
+    }
+
     /// Delta on the session alone, and with an experiment.
     fn distances(&self, signatures: &Library, known: &Known, added: &DMatrix<f64>) -> [f64; 2] {
         let ours = known.explanation(signatures, &self.ours);
@@ -267,8 +312,10 @@ impl Question {
                 .copied()
                 .filter(|column| !own.columns.contains(column))
                 .collect();
+            let doubt = if self.is_noise { 0.0 } else { 1.0 } * own.doubt;
             let own = Explanation {
                 sizes: DVector::from_vec(sizes),
+                doubt,
                 ..own
             };
             return [0.0, distance(added, &own, &others)];
@@ -300,20 +347,19 @@ fn answers(
         .collect();
     let mut proposed = Proposed::default();
     let mut open: Vec<usize> = (0..questions.len()).collect();
-    let normal = statrs::distribution::Normal::standard();
-    let chance = |added: f64| 2.0 * normal.cdf(0.5 * added.max(0.0).sqrt()) - 1.0;
     loop {
         let decided = |row: &[[f64; 2]]| -> Vec<usize> {
             open.iter()
                 .copied()
-                .filter(|q| row[*q][1] - row[*q][0] >= DECISION)
+                .filter(|q| row[*q][1] - row[*q][0] >= questions[*q].needed())
                 .collect()
         };
         let worth = |place: usize| -> f64 {
             let row = &table[place];
             let sum: f64 = decided(row)
                 .iter()
-                .map(|q| chance(row[*q][1] - row[*q][0]))
+                .map(|q| (&questions[*q], row[*q][1] - row[*q][0]))
+                .map(|(question, added)| question.weight() * question.chance(added))
                 .sum();
             sum / tried[place].1
         };

@@ -102,7 +102,7 @@ const LEAST_RATIO: f64 = 2.0;
 /// D below which nothing is named. In some 550 blind trials 15 of 19 names below it were wrong, and 27 of 330 above 8: a price that
 /// holds for white noise is too small for the noise of machines, of which only a few repeats tell. It holds for one column;
 /// each further one fits noise as well, and costs what it costs in the score (`least_d_squared`).
-const LEAST_D: f64 = 6.5;
+pub(crate) const LEAST_D: f64 = 6.5;
 
 /// D^2 below which a member with so many columns is not named, by the logarithm of the rows.
 pub(crate) fn least_d_squared(columns: usize, log_rows: f64) -> f64 {

@@ -133,7 +133,7 @@ fn stamps(sender: Sender<(String, i32)>) -> Puppet {
 #[test]
 fn diagnostics_and_log_carry_the_nodes_time_and_not_the_computers() {
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-    let environment = environment(6);
+    let environment = environment(21);
     let (sender, seen) = channel();
     let watching = start(&environment, stamps(sender));
     let simulated = ["--ros-args", "-p", "use_sim_time:=true"];
