@@ -226,6 +226,17 @@ mod tests {
     use machine::twin::{Channel, Run};
     use metrology::PerAxis;
 
+    fn frame(machine: &MachineFile) -> Frame<'_> {
+        Frame {
+            machine,
+            rest: PerAxis::default(),
+            beside: vec![],
+            tool_offset_mm: Vector3::zeros(),
+            setup: 1,
+            servo_s: 1e-3,
+        }
+    }
+
     fn stays_within(machine: &MachineFile, run: &Run, title: &str) {
         for axis in Axis::LINEAR {
             let Some(entry) = machine.linear(axis) else {
@@ -247,14 +258,7 @@ mod tests {
     fn every_experiment_has_a_title_of_its_own_on_the_plates_that_the_session_had() {
         let text = include_str!("../../../../launch_configs/volumetric/machine.yaml");
         let machine = MachineFile::parse(text, "machine").expect("a machine");
-        let frame = Frame {
-            machine: &machine,
-            rest: PerAxis::default(),
-            beside: vec![],
-            tool_offset_mm: Vector3::zeros(),
-            setup: 1,
-            servo_s: 1e-3,
-        };
+        let frame = frame(&machine);
         let mut session = Session::default();
         let of_circles = experiments(&machine, &session)
             .into_iter()
@@ -283,14 +287,7 @@ mod tests {
             include_str!("../../../../launch_configs/volumetric/machine.yaml"),
         ] {
             let machine = MachineFile::parse(text, "machine").expect("a machine");
-            let frame = Frame {
-                machine: &machine,
-                rest: PerAxis::default(),
-                beside: vec![],
-                tool_offset_mm: Vector3::zeros(),
-                setup: 1,
-                servo_s: 1e-3,
-            };
+            let frame = frame(&machine);
             let all = experiments(&machine, &Session::default());
             assert!(all.len() > 8, "{}", all.len());
             let mut circles = 0;
