@@ -481,3 +481,40 @@ fn information(
     let gram = columns.tr_mul(&columns);
     gram.iter().all(|entry| entry.is_finite()).then_some(gram)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn question(d: f64, is_noise: bool) -> Question {
+        Question {
+            names: vec![],
+            ids: vec![],
+            ours: vec![],
+            theirs: vec![],
+            is_of_the_best: true,
+            resized: None,
+            is_noise,
+            d,
+        }
+    }
+
+    #[test]
+    fn what_is_too_small_wants_a_d_that_is_surely_named_and_a_rival_three_standard_deviations() {
+        let small = question(6.1, true);
+        let after = (6.1_f64.powi(2) + small.needed()).sqrt();
+        assert!((after - (LEAST_NAMED_D + 3.0)).abs() < 1e-12, "{after}");
+        // A run that adds what decides between rivals leaves it at an even chance.
+        let even = LEAST_NAMED_D.powi(2) - 6.1_f64.powi(2);
+        assert!((small.chance(even) - 0.5).abs() < 1e-9 && even < DECISION);
+        let rivals = question(40.0, false);
+        assert!((rivals.needed() - DECISION).abs() < 1e-12);
+        assert!((rivals.chance(DECISION) - 0.8664).abs() < 1e-4);
+    }
+
+    #[test]
+    fn what_hardly_matters_weighs_by_its_d() {
+        assert!((question(1.3, false).weight() - 0.2).abs() < 1e-12);
+        assert!((question(84.0, false).weight() - 1.0).abs() < 1e-12);
+    }
+}
