@@ -8,7 +8,8 @@ use nix::sched::{CloneFlags, unshare};
 /// Does `work` in a thread with a network and mounts of its own: plain `lo`, without multicast. Its threads and
 /// processes have the same, and all goes with the last of them.
 ///
-/// Where that is not allowed the test's name and the reason are printed, and `None` is given.
+/// Where that is not allowed the test's name and the reason are printed, and `None` is given. For DDS only: the threads of
+/// Zenoh are the process' own and may listen in another test's network.
 ///
 /// # Panics
 /// When `work` does; when it is not allowed and `CI=true`.

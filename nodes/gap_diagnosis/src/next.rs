@@ -277,7 +277,8 @@ impl Question {
     /// What an experiment has to add for a decision.
     fn needed(&self) -> f64 {
         if self.is_noise {
-            (LEAST_NAMED_D + DECISION.sqrt()).powi(2) - self.d.powi(2)
+            // A form of many columns is held to more than D_0.
+            ((LEAST_NAMED_D + DECISION.sqrt()).powi(2) - self.d.powi(2)).max(DECISION)
         } else {
             DECISION
         }
@@ -507,6 +508,7 @@ mod tests {
         // A run that adds what decides between rivals leaves it at an even chance.
         let even = LEAST_NAMED_D.powi(2) - 6.1_f64.powi(2);
         assert!((small.chance(even) - 0.5).abs() < 1e-9 && even < DECISION);
+        assert!(question(9.6, true).needed() >= DECISION);
         let rivals = question(40.0, false);
         assert!((rivals.needed() - DECISION).abs() < 1e-12);
         assert!((rivals.chance(DECISION) - 0.8664).abs() < 1e-4);
