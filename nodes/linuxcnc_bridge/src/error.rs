@@ -90,6 +90,18 @@ pub enum BridgeError {
         /// End of what it printed.
         last_words: String,
     },
+    /// A LinuxCNC that was killed left a queue of its sampler or streamer, which cannot be removed.
+    #[error(
+        "shared memory {id} of user {owner} is left from a LinuxCNC that was killed, and cannot be removed ({reason}): remove it as that user with `ipcrm -m {id}`"
+    )]
+    QueueLeftBehind {
+        /// The memory's id in the system.
+        id: u64,
+        /// Id of the user who owns it.
+        owner: u16,
+        /// Why it could not be removed.
+        reason: String,
+    },
     /// A file, directory or process could not be used.
     #[error("{action} {path}")]
     Io {

@@ -24,6 +24,7 @@ use crate::error::BridgeError;
 use crate::stage::{IoCommand, IoEvent};
 
 pub mod account;
+mod remains;
 pub mod start;
 
 use account::Account;

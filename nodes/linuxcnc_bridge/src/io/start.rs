@@ -19,6 +19,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
 use super::account::Account;
+use super::remains;
 use crate::config::BridgeConfig;
 use crate::error::BridgeError;
 
@@ -163,7 +164,8 @@ impl Controller {
     /// Starts the INI file `ini` and waits until LinuxCNC listens.
     ///
     /// # Errors
-    /// LinuxCNC is not installed, runs already, ends at once, or does not listen in time.
+    /// LinuxCNC is not installed, runs already, ends at once, or does not listen in time; memory that a
+    /// killed one left cannot be removed.
     #[expect(
         clippy::disallowed_methods,
         reason = "this is the part that waits for processes"
@@ -187,6 +189,7 @@ impl Controller {
         if let Some((process, pid)) = running().into_iter().next() {
             return Err(BridgeError::AlreadyRunning { process, pid });
         }
+        remains::clear()?;
         let account = Account::ordinary(&config.user)?;
         let ini_copy = copy_configuration(ini, &account)?;
         let (guard, guard_stdin, log) = spawn_guard(config, &account, &ini_copy)?;

@@ -4,6 +4,9 @@ use std::process::Command;
 
 use linuxcnc_bridge::BridgeError;
 use linuxcnc_bridge::io::start::Controller;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use procfs::{Current, SharedMemorySegments};
 
 use crate::rig::{Rig, scenario};
 
@@ -84,4 +87,49 @@ fn the_servo_thread_cannot_be_stopped_by_other_processes_where_that_may_be_asked
     let policies = policies("rtapi_app");
     assert!(policies.contains("SCHED_FIFO"), "{policies}");
     assert!(!policies.contains("SCHED_OTHER"), "{policies}");
+}
+
+/// Ends every process of LinuxCNC as the system's memory killer does, without a chance to clean up.
+fn kill_all() {
+    for name in [
+        "linuxcnc",
+        "rtapi_app",
+        "halsampler",
+        "milltask",
+        "linuxcncsvr",
+        "linuxcncrsh",
+    ] {
+        let pids = Command::new("pidof").args(["-x", name]).output().unwrap();
+        for pid in String::from_utf8(pids.stdout).unwrap().split_whitespace() {
+            // It may have followed another one in this moment.
+            let _ = kill(Pid::from_raw(pid.parse().unwrap()), Signal::SIGKILL);
+        }
+    }
+}
+
+/// Sizes of the sampler's queues that are there, bytes.
+fn queues() -> Vec<u64> {
+    let segments = SharedMemorySegments::current().unwrap();
+    let of_sampler = segments
+        .0
+        .iter()
+        .filter(|segment| segment.key == 0x4853_4130);
+    of_sampler.map(|segment| segment.size).collect()
+}
+
+#[test]
+fn after_a_controller_that_was_killed_one_that_records_more_pins_is_started() {
+    let Some(mut rig) = Rig::new("linuxcnc_latency") else {
+        return;
+    };
+    kill_all();
+    rig.end_controller();
+    let left = queues();
+    assert_eq!(left.len(), 1, "nothing was left behind");
+    let wider = scenario("linuxcnc_gap").join("controller/gap.ini");
+    let started = Controller::start(&rig.config, &wider).unwrap();
+    let now = queues();
+    assert!(now.len() == 1 && now[0] > left[0], "{left:?} {now:?}");
+    drop(started);
+    assert_eq!(queues(), []);
 }
