@@ -97,10 +97,17 @@ fn by_slashes(path: &str) -> Shown {
 
 fn of_plotjuggler(text: &str) -> Vec<Shown> {
     let document = roxmltree::Document::parse(text).unwrap();
-    let names = document
-        .descendants()
-        .filter(|element| element.has_tag_name("curve") || element.has_tag_name("topic"));
-    let names = names.filter_map(|element| element.attribute("name"));
+    let named = |tag: &str, attribute: &str| -> Vec<String> {
+        let elements = document.descendants();
+        let elements = elements.filter(|element| element.has_tag_name(tag));
+        let values = elements.filter_map(|element| element.attribute(attribute));
+        values.map(str::to_owned).collect()
+    };
+    let curves = named("curve", "name");
+    // Its plugin for ROS 2 keeps the topics to listen to in one text.
+    let heard = named("selected_topics", "value");
+    let heard = heard.iter().flat_map(|topics| topics.split(';'));
+    let names = curves.iter().map(String::as_str).chain(heard);
     names.map(by_slashes).collect()
 }
 
@@ -189,8 +196,8 @@ fn arch_layouts_name_only_what_the_wire_has() {
         check(&wrong(file, &shown));
     }
     let bad = "<root><curve name=\"/axes/state/comanded[0]\"/><curve name=\"/axes/state/motor\"/>\
-               <curve name=\"/axis/state/motor[0]\"/><topic name=\"/latency\"/></root>";
-    assert_eq!(wrong("a.xml", &of_plotjuggler(bad)).len(), 3);
+               <curve name=\"/axis/state/motor[0]\"/><selected_topics value=\"/latency;/latencies\"/></root>";
+    assert_eq!(wrong("a.xml", &of_plotjuggler(bad)).len(), 4);
     let bad =
         r#"{"a": ["/thermal/model.axes[0].k1_m", "/thermal/model.axes[0].k0_m", "/temperature/"]}"#;
     assert_eq!(wrong("a.json", &of_foxglove(bad)).len(), 2);
