@@ -108,7 +108,7 @@ impl ChunkBuffer {
                 self.in_raw = None;
             }
             b"lz4" => {
-                let decoder = lz4::Decoder::new(data).map_err(|_| failed())?;
+                let decoder = lz4_flex::frame::FrameDecoder::new(data);
                 let whole = read_what_comes(decoder, plain_bytes, &mut self.plain);
                 if frame.is_whole() && !whole {
                     return Err(failed());
