@@ -7,9 +7,13 @@ use abbe_msgs::msg::{AxisDrift, AxisState, ThermalModel};
 use abbe_msgs::topics;
 use abbe_tests::scenario::Scenario;
 
+use abbe_tests::cyclone::{Cyclone, end};
 use abbe_tests::graph::{Graph, Voice, now, port};
 use abbe_tests::hosts::network::Network;
 use abbe_tests::hosts::switch::{Link, Way};
+use abbe_tests::program::Process;
+use abbe_tests::python::interpreter;
+use serde_json::json;
 
 const WAY: Way = Way {
     delay_s: 2.5e-3,
@@ -30,8 +34,14 @@ const RATES: &str = "background_rate_hz: 1000.0\n    compensation_hold_s: 0.2\n 
 const FASTEST_M: f64 = 40e-6 * 0.1 + 1.5e-6;
 /// An offset is as old as the state that it answers; younger than this it is fresh, s.
 const FRESH_S: f64 = 0.05;
+/// Cyclone DDS says of itself that it is gone when it has not been heard for 10 s.
+const CYCLONE_CUT: Duration = Duration::from_secs(16);
+/// Cyclone DDS announces itself every 8 s, and so do we every 10 s.
+const MEETING: Duration = Duration::from_secs(30);
 const CUTS: usize = 10;
 const CUT: Duration = Duration::from_millis(1500);
+/// Participants forget those that they have not heard of for 50 s, five of their announcements.
+const LONG_CUT: Duration = Duration::from_secs(58);
 /// What is wanted after a cut.
 const RECOVERY: Duration = Duration::from_secs(3);
 
@@ -68,6 +78,64 @@ fn tell_drift(voice: &mut Voice) {
     voice.say(0, &model);
 }
 
+/// A controller on one host and what compensates it on another, with a model that says the same everywhere.
+struct Cell<'n> {
+    network: &'n Network,
+    controller: Graph,
+    models: Graph,
+    voice: Voice,
+    nodes: [Process; 2],
+    began: Instant,
+}
+
+impl<'n> Cell<'n> {
+    /// Starts it, and waits for all of the compensation.
+    fn start(network: &'n Network) -> Self {
+        network.links(Link::even(WAY));
+        let scenario = Scenario::copy_of("short_cell");
+        scenario.replace("fake_cnc.yaml", "background_rate_hz: 10.0", RATES);
+        scenario.replace("axis_compensation.yaml", "enabled: false", "enabled: true");
+        for axis in ["X", "Y", "Z"] {
+            let limits = format!("{axis}: {{size_limit_um: 150.0, rate_limit_um_per_s: 20.0");
+            let faster = format!("{axis}: {{size_limit_um: 150.0, rate_limit_um_per_s: 60.0");
+            scenario.replace("axis_compensation.yaml", &limits, &faster);
+        }
+        let file = |node: &str| {
+            let file = scenario.argument(&format!("{node}.yaml"));
+            ["--params-file".to_owned(), file]
+        };
+        let nodes = [
+            network.node("controller", "fake_cnc", &file("fake_cnc")),
+            network.node("models", "axis_compensation", &file("axis_compensation")),
+        ];
+        let controller = network.on("controller", |own| Graph::join_by(own.clone()));
+        let models = network.on("models", |own| Graph::join_by(own.clone()));
+        let mut voice = network.on("models", |_| models.voice(&[port(&topics::THERMAL_MODEL)]));
+        let began = Instant::now();
+        for (graph, node) in [(&controller, "fake_cnc"), (&models, "axis_compensation")] {
+            graph.alive(node, began);
+        }
+        tell_drift(&mut voice);
+        compensated(&controller, began);
+        Self {
+            network,
+            controller,
+            models,
+            voice,
+            nodes,
+            began,
+        }
+    }
+
+    fn stop(self) {
+        self.voice.stop();
+        drop(self.models);
+        for node in self.nodes {
+            node.stop();
+        }
+    }
+}
+
 /// How long after `since` the controller first has all of the compensation.
 fn compensated(controller: &Graph, since: Instant) -> Duration {
     controller.wait("all of the compensation is there", |graph| {
@@ -92,10 +160,11 @@ struct Cut {
     whole_s: f64,
 }
 
-fn cut(network: &Network, controller: &Graph) -> Cut {
+fn cut(cell: &Cell<'_>, lasts: Duration) -> Cut {
+    let (network, controller) = (cell.network, &cell.controller);
     let begins = Instant::now();
     network.cut("models", true);
-    std::thread::sleep(CUT);
+    std::thread::sleep(lasts);
     let back = Instant::now();
     let states = controller.since(&topics::AXES_STATE, begins);
     let left_m = states.last().map_or(f64::NAN, |(_, state)| added_m(state));
@@ -121,41 +190,75 @@ fn cut(network: &Network, controller: &Graph) -> Cut {
     }
 }
 
+/// How long it takes until a peer of the models' host hears the controller, and until the controller hears it, s.
+fn met_in(controller: &Graph, cyclone: &mut Cyclone) -> [f64; 2] {
+    let begins = Instant::now();
+    let (joints, status) = (topics::JOINT_STATES.name, topics::PLAN_STATUS.name);
+    cyclone.samples_within(joints, Duration::ZERO);
+    let (mut hears, mut heard) = (None, None);
+    while begins.elapsed() < MEETING {
+        cyclone.write(status, &json!({}));
+        let came = cyclone.samples_within(joints, Duration::from_millis(200));
+        let after_s = begins.elapsed().as_secs_f64();
+        if !came.is_empty() {
+            hears.get_or_insert(after_s);
+        }
+        if !controller.since(&topics::PLAN_STATUS, begins).is_empty() {
+            heard.get_or_insert(after_s);
+        }
+        if let (Some(hears), Some(heard)) = (hears, heard) {
+            return [hears, heard];
+        }
+    }
+    panic!("within {MEETING:?}: hears {hears:?}, is heard {heard:?}")
+}
+
+#[test]
+fn after_a_cut_longer_than_a_lease_hosts_meet_again() {
+    let Some(python) = interpreter("a long cut with Cyclone DDS") else {
+        return;
+    };
+    let Some(network) = Network::of(&["controller", "models"], 63, 5) else {
+        return;
+    };
+    let cell = Cell::start(&network);
+    let [hears, says] = [end(&topics::JOINT_STATES), end(&topics::PLAN_STATUS)];
+    let mut cyclone = network.on("models", |_| {
+        Cyclone::on_network(&python, 63, &[hears], &[says])
+    });
+    met_in(&cell.controller, &mut cyclone);
+
+    cut(&cell, CYCLONE_CUT);
+    let met = met_in(&cell.controller, &mut cyclone);
+    eprintln!(
+        "a cut of {CYCLONE_CUT:?}: {:.1} s until Cyclone DDS hears the controller again, {:.1} s until it is heard",
+        met[0], met[1]
+    );
+    cyclone.stop();
+
+    let seen = cut(&cell, LONG_CUT);
+    eprintln!(
+        "a cut of {LONG_CUT:?}: first compensation after {:.3} s, fresh after {:.3} s, whole after {:.3} s; left {:.3} um",
+        seen.first_s,
+        seen.fresh_s,
+        seen.whole_s,
+        seen.left_m * 1e6
+    );
+    assert!(seen.left_m.abs() < FADED_M);
+    assert!(seen.fresh_s < RECOVERY.as_secs_f64());
+    assert!(seen.whole_s < RECOVERY.as_secs_f64());
+    cell.stop();
+}
+
 #[test]
 fn a_cut_link_fades_the_compensation_and_it_is_back_within_three_seconds() {
     let Some(network) = Network::of(&["controller", "models"], 62, 4) else {
         return;
     };
-    network.links(Link::even(WAY));
-    let scenario = Scenario::copy_of("short_cell");
-    scenario.replace("fake_cnc.yaml", "background_rate_hz: 10.0", RATES);
-    scenario.replace("axis_compensation.yaml", "enabled: false", "enabled: true");
-    for axis in ["X", "Y", "Z"] {
-        let limits = format!("{axis}: {{size_limit_um: 150.0, rate_limit_um_per_s: 20.0");
-        let faster = format!("{axis}: {{size_limit_um: 150.0, rate_limit_um_per_s: 60.0");
-        scenario.replace("axis_compensation.yaml", &limits, &faster);
-    }
-    let file = |node: &str| {
-        let file = scenario.argument(&format!("{node}.yaml"));
-        ["--params-file".to_owned(), file]
-    };
-    let nodes = [
-        network.node("controller", "fake_cnc", &file("fake_cnc")),
-        network.node("models", "axis_compensation", &file("axis_compensation")),
-    ];
-    let controller = network.on("controller", |own| Graph::join_by(own.clone()));
-    let models = network.on("models", |own| Graph::join_by(own.clone()));
-    let mut voice = network.on("models", |_| models.voice(&[port(&topics::THERMAL_MODEL)]));
-    let began = Instant::now();
-    for (graph, node) in [(&controller, "fake_cnc"), (&models, "axis_compensation")] {
-        graph.alive(node, began);
-    }
-    tell_drift(&mut voice);
-    compensated(&controller, began);
-
+    let cell = Cell::start(&network);
     let cuts: Vec<Cut> = (0..CUTS)
         .map(|_| {
-            let seen = cut(&network, &controller);
+            let seen = cut(&cell, CUT);
             std::thread::sleep(Duration::from_millis(300));
             seen
         })
@@ -178,12 +281,8 @@ fn a_cut_link_fades_the_compensation_and_it_is_back_within_three_seconds() {
     assert!(of(|cut| cut.first_s).1 < RECOVERY.as_secs_f64());
     assert!(of(|cut| cut.fresh_s).1 < RECOVERY.as_secs_f64());
     assert!(of(|cut| cut.whole_s).1 < RECOVERY.as_secs_f64());
-    never_stepped(&controller, began);
-    voice.stop();
-    drop(models);
-    for node in nodes {
-        node.stop();
-    }
+    never_stepped(&cell.controller, cell.began);
+    cell.stop();
 }
 
 /// What the controller adds moves no faster than its own limit, whatever the link does.

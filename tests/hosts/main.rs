@@ -9,5 +9,7 @@
     reason = "programs are run, time passes, and CI is asked"
 )]
 
+mod contours;
 mod cuts;
+mod site;
 mod three_hosts;

@@ -1,10 +1,9 @@
 //! The suite on three hosts whose clocks differ, over links with 5 ms, jitter, loss and reordering.
 
 use std::path::Path;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use abbe_msgs::topics;
-use abbe_tests::program::Process;
 use abbe_tests::scenario::Scenario;
 use metrology::sample::HostClock;
 use metrology::stamp::{Host, Span, Stamp};
@@ -12,6 +11,8 @@ use metrology::stamp::{Host, Span, Stamp};
 use abbe_tests::hosts::bag;
 use abbe_tests::hosts::network::Network;
 use abbe_tests::hosts::switch::{Link, Way};
+
+use crate::site::{ClockError, Site, file_of, parameter};
 
 const HOSTS: [&str; 3] = ["controller", "models", "archive"];
 /// Jitter of a whole way between two hosts, from nothing to this, s.
@@ -31,96 +32,6 @@ const LIMIT_S: f64 = 50e-6 + 0.1 * JITTER_S;
 const WORK: Duration = Duration::from_secs(26);
 /// The clocks are judged by their maps of the end.
 const JUDGED: Span = Span::from_nanos(4_000_000_000);
-
-/// What a host's clock is made to show: the truth that its map is held against.
-#[derive(Clone, Copy)]
-struct ClockError {
-    offset_s: f64,
-    drift: f64,
-    since: Stamp<Host>,
-}
-
-impl ClockError {
-    fn of(offset_s: f64, drift: f64) -> Self {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
-        let seconds = i64::try_from(now.as_secs()).unwrap();
-        Self {
-            offset_s,
-            drift,
-            since: Stamp::from_nanos(seconds * 1_000_000_000),
-        }
-    }
-
-    fn arguments(&self) -> Vec<String> {
-        let values = [
-            ("offset_s", self.offset_s),
-            ("drift_us_per_s", self.drift * 1e6),
-            ("since_s", self.since.as_secs_f64()),
-        ];
-        let set = |(key, value)| ["-p".to_owned(), format!("clock_error.{key}:={value:?}")];
-        values.into_iter().flat_map(set).collect()
-    }
-
-    /// What the true clock is ahead of this one when it shows `own`.
-    fn true_offset_s(&self, own: Stamp<Host>) -> f64 {
-        let shown_s = (own - self.since).as_secs_f64() - self.offset_s;
-        -self.offset_s - self.drift * shown_s / (1.0 + self.drift)
-    }
-}
-
-fn parameter(name: &str, value: &str) -> [String; 2] {
-    ["-p".to_owned(), format!("{name}:={value}")]
-}
-
-/// Nodes of a host and their arguments.
-struct Site<'n> {
-    network: &'n Network,
-    host: &'static str,
-    clock: Option<ClockError>,
-    nodes: Vec<Process>,
-}
-
-impl<'n> Site<'n> {
-    fn new(network: &'n Network, host: &'static str, clock: Option<ClockError>) -> Self {
-        let mut site = Self {
-            network,
-            host,
-            clock,
-            nodes: Vec::new(),
-        };
-        let mut names = parameter("host", host).to_vec();
-        names.extend(parameter("reference", "controller"));
-        names.extend(parameter("period_ms", "20.0"));
-        names.extend(parameter_of_name(host));
-        site.start("host_clock", names);
-        site
-    }
-
-    fn start(&mut self, node: &str, mut arguments: Vec<String>) {
-        if let Some(clock) = self.clock {
-            arguments.extend(clock.arguments());
-            arguments.extend(parameter("clock_host", self.host));
-        }
-        self.nodes
-            .push(self.network.node(self.host, node, &arguments));
-    }
-
-    fn stop(self) {
-        for node in self.nodes {
-            node.stop();
-        }
-    }
-}
-
-/// Every host clock is a node of its own name.
-fn parameter_of_name(host: &str) -> [String; 2] {
-    ["-r".to_owned(), format!("__node:=clock_of_{host}")]
-}
-
-fn file_of(scenario: &Scenario, node: &str) -> Vec<String> {
-    let file = scenario.argument(&format!("{node}.yaml"));
-    vec!["--params-file".to_owned(), file]
-}
 
 #[test]
 fn three_hosts_lose_nothing_at_1_khz_and_their_clocks_are_taken_out() {

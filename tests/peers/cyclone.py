@@ -105,7 +105,7 @@ class Client:
 
 def main(plan: dict) -> None:
     types = Types()
-    domain = Domain(plan["domain"], LOOPBACK)
+    domain = Domain(plan["domain"], "" if plan.get("on_network") else LOOPBACK)
     participant = DomainParticipant(plan["domain"])
     began = time.monotonic()
     lock = threading.Lock()

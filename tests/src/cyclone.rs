@@ -56,6 +56,17 @@ impl Cyclone {
         )
     }
 
+    /// Starts it on every interface, for others than this computer's.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn on_network(python: &PathBuf, domain: u16, readers: &[Value], writers: &[Value]) -> Self {
+        let plan =
+            json!({"domain": domain, "on_network": true, "readers": readers, "writers": writers});
+        Self::start_with(python, &plan)
+    }
+
     /// Starts it with clients of services, each by absolute name and type, `package/srv/Name`.
     ///
     /// # Panics

@@ -21,9 +21,11 @@ use rustdds::{
 use crate::environment::{self, DiscoveryRange, Environment};
 use crate::names::{self, NodeNames};
 use crate::network::{Guid, Remote, Role};
+use absent::Absent;
 use first_sample::FirstSamples;
 use reply::LongReplies;
 
+mod absent;
 mod endpoint;
 mod first_sample;
 mod policies;
@@ -134,6 +136,8 @@ pub(crate) struct Participant {
     entities: Mutex<NodeEntitiesInfo>,
     /// What is sent past the library; nothing where packets are encrypted.
     by_hand: Option<ByHand>,
+    /// Where there may be other hosts.
+    _absent: Option<Absent>,
     participant: DomainParticipant,
 }
 
@@ -155,19 +159,24 @@ impl Participant {
                 .map_err(|error| anyhow!("DDS participant in domain {domain}: {error}"))
         })?;
         let hidden = environment.multicast_warning(&interfaces, participant.participant_id());
+        let absent = (environment.range == DiscoveryRange::Subnet)
+            .then(|| Absent::of(&participant, &interfaces))
+            .transpose()
+            .context("announcements of other hosts")?;
         let is_encrypted = environment.security.is_some() && unsecured.is_none();
         let warnings: Vec<String> = unsecured.into_iter().chain(hidden).collect();
         let warning = (!warnings.is_empty()).then(|| warnings.join("; "));
         let node = NodeName::new(&names.namespace, &names.name)
             .map_err(|error| anyhow!("node {}: {error:?}", names.fully_qualified()))?;
         Ok((
-            Self::of(participant, node, is_encrypted).context("ROS graph on DDS")?,
+            Self::of(participant, absent, node, is_encrypted).context("ROS graph on DDS")?,
             warning,
         ))
     }
 
     fn of(
         participant: DomainParticipant,
+        absent: Option<Absent>,
         node: NodeName,
         is_encrypted: bool,
     ) -> anyhow::Result<Self> {
@@ -194,6 +203,7 @@ impl Participant {
         };
         Ok(Self {
             by_hand,
+            _absent: absent,
             participant,
             publisher,
             subscriber,

@@ -126,6 +126,8 @@ pub struct Interface {
     pub loopback: bool,
     /// Has the MULTICAST flag.
     pub multicast: bool,
+    /// Its addresses.
+    pub addresses: Vec<Ipv4Addr>,
 }
 
 /// RustDDS announces itself to this many participants of a computer where there is no multicast.
@@ -297,6 +299,7 @@ pub fn interfaces() -> Vec<Interface> {
             loopback: interface.is_loopback()
                 && interface.ipv4_addrs().contains(&Ipv4Addr::LOCALHOST),
             multicast: interface.is_multicast(),
+            addresses: interface.ipv4_addrs(),
             name: interface.name,
         })
         .collect()
@@ -321,6 +324,7 @@ mod tests {
             usable,
             loopback: name == "lo",
             multicast,
+            addresses: vec![],
         }
     }
 

@@ -16,19 +16,29 @@ use recorder::{Bag, Event, Order};
 const MEETING: Span = Span::from_nanos(2_000_000_000);
 
 /// How many messages of a topic there are once its writer and the recorder have met, and which numbers are missing from there
-/// to the last.
+/// to the last. What is sent after the meeting has a higher number than all that came until then; of what was sent before
+/// some may still come.
 pub fn missing(bag: &Path, topic: &str) -> (usize, Vec<u32>) {
     let all = raw(bag, topic);
     let Some(met) = all.first().map(|first| first.at + MEETING) else {
         return (0, vec![]);
     };
-    let since = all.iter().filter(|said| said.at >= met);
-    let there: BTreeSet<u32> = since.map(|said| said.sequence).collect();
-    let (Some(first), Some(last)) = (there.first(), there.last()) else {
-        return (0, vec![]);
-    };
-    let missing = (*first..=*last).filter(|number| !there.contains(number));
-    (there.len(), missing.collect())
+    let until_then = all.iter().filter(|said| said.at < met);
+    let first = until_then.map(|said| said.sequence).max().unwrap_or(0) + 1;
+    let there: BTreeSet<u32> = all.iter().map(|said| said.sequence).collect();
+    let last = there.last().copied().unwrap_or(0);
+    let count = there.range(first..).count();
+    let missing: Vec<u32> = (first..=last).filter(|n| !there.contains(n)).collect();
+    if let (Some(gap), Some(begun)) = (missing.first(), all.first().map(|said| said.at)) {
+        for said in all.iter().filter(|said| said.sequence.abs_diff(*gap) < 20) {
+            eprintln!(
+                "{topic} {}: {} s",
+                said.sequence,
+                (said.at - begun).as_secs_f64()
+            );
+        }
+    }
+    (count, missing)
 }
 
 /// The numbers of a topic's messages, as they came.

@@ -174,13 +174,18 @@ impl Network {
 
     /// Starts `abbe node NAME --ros-args …` on a host.
     pub fn node(&self, host: &str, name: &str, ros_args: &[String]) -> Process {
+        let mut words = vec!["node".to_owned(), name.to_owned(), "--ros-args".to_owned()];
+        words.extend_from_slice(ros_args);
+        self.program(host, &abbe().display().to_string(), &words)
+    }
+
+    /// Starts a program that is on the graph on a host.
+    pub fn program(&self, host: &str, program: &str, arguments: &[String]) -> Process {
         let namespace = &self.hosts[self.place(host)].1.0;
         let mut command = Command::new("ip");
         command
-            .args(["netns", "exec", namespace])
-            .arg(abbe())
-            .args(["node", name, "--ros-args"])
-            .args(ros_args)
+            .args(["netns", "exec", namespace, program])
+            .args(arguments)
             .current_dir(root())
             .env("ROS_DOMAIN_ID", self.domain.to_string())
             .env_remove("ROS_AUTOMATIC_DISCOVERY_RANGE")

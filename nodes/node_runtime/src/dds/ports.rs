@@ -15,9 +15,19 @@ use rustdds::DomainParticipant;
 /// Participants that are made before it is given up.
 const MOST_TRIES: usize = 16;
 
+/// The port of a domain where participants announce themselves to all.
+pub(super) const fn announcement_port(domain: u16) -> u16 {
+    7400 + 250 * domain
+}
+
+/// The port for discovery of the `participant`-th participant of a computer, from 0.
+pub(super) const fn discovery_port(domain: u16, participant: u16) -> u16 {
+    announcement_port(domain) + 10 + 2 * participant
+}
+
 /// The port for samples of the `participant`-th participant of a computer, from 0.
 pub(super) const fn sample_port(domain: u16, participant: u16) -> u16 {
-    7400 + 250 * domain + 11 + 2 * participant
+    discovery_port(domain, participant) + 1
 }
 
 /// This thread: it may be in another network than the process' first one, of which `/proc/self/net` tells.
@@ -89,5 +99,7 @@ mod tests {
     fn eq1_ports_are_those_of_the_standard() {
         assert_eq!(sample_port(0, 0), 7411);
         assert_eq!(sample_port(42, 3), 7400 + 42 * 250 + 11 + 6);
+        assert_eq!(announcement_port(42), 7400 + 42 * 250);
+        assert_eq!(discovery_port(42, 3), 7400 + 42 * 250 + 10 + 6);
     }
 }

@@ -1,5 +1,6 @@
-//! What is sent past the DDS library, as RTPS 2.5 has it on the wire: a sample in fragments (8.3.8.3, 9.4.5.4), and a
-//! reader's request for a writer's first sample (8.3.8.1, 9.4.5.2).
+//! What is sent past the DDS library, as RTPS 2.5 has it on the wire: a sample in fragments (8.3.8.3, 9.4.5.4), a
+//! reader's request for a writer's first sample (8.3.8.1, 9.4.5.2), and word that a participant is alive (8.3.8.2, 9.4.5.3).
+//! And what is read past it: who announces itself.
 //!
 //! | part of a fragments' datagram | bytes |
 //! |---|---|
@@ -16,14 +17,28 @@ const FRAGMENT_LEN: usize = 256;
 /// What fits a datagram that no network cuts.
 const FRAGMENTS_PER_DATAGRAM: usize = 5;
 
-const PREFIX_LEN: usize = 12;
+/// Bytes by which a participant is known.
+pub(super) const PREFIX_LEN: usize = 12;
+/// A participant.
+pub(super) type Prefix = [u8; PREFIX_LEN];
+/// Protocol, version, vendor, participant.
+const HEADER_LEN: usize = 20;
 const VERSION: [u8; 2] = [2, 4];
 const ACKNACK: u8 = 0x06;
 const INFO_TS: u8 = 0x09;
+const INFO_SRC: u8 = 0x0c;
 const INFO_DST: u8 = 0x0e;
+const DATA: u8 = 0x15;
 const DATA_FRAG: u8 = 0x16;
 const LITTLE_ENDIAN: u8 = 0x01;
 const INLINE_QOS: u8 = 0x02;
+/// The sample is a key alone: it ends what it is the key of.
+const KEY: u8 = 0x08;
+/// From behind itself to the payload, of a sample without inline quality.
+const OCTETS_TO_PAYLOAD: u16 = 16;
+/// By whom and for whom participants are announced (9.3.1.2).
+const ANNOUNCER: [u8; 4] = [0, 1, 0, 0xc2];
+const LISTENER: [u8; 4] = [0, 1, 0, 0xc7];
 /// From behind itself to the inline quality.
 const OCTETS_TO_INLINE_QOS: u16 = 28;
 /// Every reader that is matched with the writer.
@@ -85,6 +100,61 @@ pub(super) fn asking_for_first(reader: &Guid, writer: &Guid, count: u32) -> Vec<
         datagram.extend(number.to_le_bytes());
     }
     datagram.extend(count.to_le_bytes());
+    end(&mut datagram, begun);
+    datagram
+}
+
+/// Whom a datagram announces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Announcement {
+    /// It is there.
+    Here(Prefix),
+    /// It takes its leave.
+    Gone(Prefix),
+}
+
+/// Whom a datagram announces, where it does.
+pub(super) fn announcement(datagram: &[u8]) -> Option<Announcement> {
+    let (head, mut rest) = datagram.split_at_checked(HEADER_LEN)?;
+    let prefix = head[HEADER_LEN - PREFIX_LEN..].try_into().ok()?;
+    if !head.starts_with(b"RTPS") {
+        return None;
+    }
+    while let Some((&[kind, flags, low, high], body)) = rest.split_first_chunk() {
+        let len = if flags & LITTLE_ENDIAN == 0 {
+            u16::from_be_bytes([low, high])
+        } else {
+            u16::from_le_bytes([low, high])
+        };
+        if kind == DATA && body.get(8..12) == Some(&ANNOUNCER) {
+            let is_end = flags & KEY != 0;
+            return Some(if is_end {
+                Announcement::Gone(prefix)
+            } else {
+                Announcement::Here(prefix)
+            });
+        }
+        // The last one may go without its length.
+        rest = body.get(usize::from(len)..).filter(|_| len > 0)?;
+    }
+    None
+}
+
+/// The datagram by which `own` tells itself that `other` is alive: an announcement of it that has no content.
+pub(super) fn alive(own: &Prefix, other: &Prefix) -> Vec<u8> {
+    let mut datagram = from(own);
+    let begun = begin(&mut datagram, INFO_SRC, LITTLE_ENDIAN);
+    datagram.extend([0; 4]);
+    datagram.extend(VERSION);
+    datagram.extend(&other[..2]);
+    datagram.extend(other);
+    end(&mut datagram, begun);
+    let begun = begin(&mut datagram, DATA, LITTLE_ENDIAN);
+    datagram.extend([0, 0]);
+    datagram.extend(OCTETS_TO_PAYLOAD.to_le_bytes());
+    datagram.extend(LISTENER);
+    datagram.extend(ANNOUNCER);
+    put_halves(&mut datagram, 1);
     end(&mut datagram, begun);
     datagram
 }
@@ -215,5 +285,42 @@ mod tests {
         assert_eq!(datagram[40..48], [7, 7, 7, 7, 9, 9, 9, 9]);
         assert_eq!(datagram[48..56], [0, 0, 0, 0, 1, 0, 0, 0]);
         assert_eq!(datagram[56..], [1, 0, 0, 0, 0, 0, 0, 128, 1, 0, 0, 0]);
+    }
+
+    #[test]
+    fn who_announces_itself_is_read_behind_any_other_submessage() {
+        let mut datagram = from(&[7; PREFIX_LEN]);
+        let begun = begin(&mut datagram, INFO_TS, LITTLE_ENDIAN);
+        datagram.extend([0; 8]);
+        end(&mut datagram, begun);
+        for (flags, said) in [
+            (0x05, Announcement::Here([7; PREFIX_LEN])),
+            (0x09, Announcement::Gone([7; PREFIX_LEN])),
+        ] {
+            let mut datagram = datagram.clone();
+            let begun = begin(&mut datagram, DATA, flags);
+            datagram.extend([0, 0, 16, 0]);
+            datagram.extend(LISTENER);
+            datagram.extend(ANNOUNCER);
+            datagram.extend([0; 8]);
+            end(&mut datagram, begun);
+            assert_eq!(announcement(&datagram), Some(said));
+            for len in 0..44 {
+                assert_eq!(announcement(&datagram[..len]), None);
+            }
+        }
+        assert_eq!(announcement(&asking_for_first(&[7; 16], &[9; 16], 1)), None);
+        assert_eq!(announcement(b"no RTPS, however long it may be"), None);
+    }
+
+    #[test]
+    fn who_is_said_to_be_alive_is_the_source_of_an_empty_announcement() {
+        let datagram = alive(&[7; PREFIX_LEN], &[9; PREFIX_LEN]);
+        assert_eq!(datagram[8..20], [7; 12]);
+        assert_eq!(datagram[20..32], [0x0c, 1, 20, 0, 0, 0, 0, 0, 2, 4, 9, 9]);
+        assert_eq!(datagram[32..44], [9; 12]);
+        assert_eq!(datagram[44..52], [0x15, 1, 20, 0, 0, 0, 16, 0]);
+        assert_eq!(datagram[52..60], [0, 1, 0, 0xc7, 0, 1, 0, 0xc2]);
+        assert_eq!(datagram[60..], [0, 0, 0, 0, 1, 0, 0, 0]);
     }
 }
