@@ -6,6 +6,8 @@
 )]
 #![expect(clippy::print_stderr, reason = "figures that were seen are said")]
 
+mod unasked;
+
 use std::path::Path;
 use std::time::Duration;
 

@@ -35,14 +35,20 @@ pub struct FastDds {
 fn built(test: &str) -> Option<(TempDir, PathBuf)> {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("fast_dds");
+    let libraries = ["-lfastrtps", "-lfastcdr"];
+    compiled(test, "fast_dds.cpp", &program, &libraries).then_some((folder, program))
+}
+
+/// Compiles a file of `tests/peers`, as [`built`].
+fn compiled(test: &str, source: &str, into: &Path, switches: &[&str]) -> bool {
     let compiled = Command::new("g++")
         .args(["-std=c++17", "-O1", "-o"])
-        .arg(&program)
-        .arg(root().join("tests/peers/fast_dds.cpp"))
-        .args(["-lfastrtps", "-lfastcdr"])
+        .arg(into)
+        .arg(root().join("tests/peers").join(source))
+        .args(switches)
         .output();
     let lack = match compiled {
-        Ok(output) if output.status.success() => return Some((folder, program)),
+        Ok(output) if output.status.success() => return true,
         Ok(output) => String::from_utf8_lossy(&output.stderr).into_owned(),
         Err(error) => error.to_string(),
     };
@@ -50,7 +56,7 @@ fn built(test: &str) -> Option<(TempDir, PathBuf)> {
     let reason = format!("g++ with libfastrtps-dev: {first} (tests/run installs them)");
     assert!(std::env::var("CI").as_deref() != Ok("true"), "{reason}");
     eprintln!("NOT TESTED: {test}: {reason}");
-    None
+    false
 }
 
 fn quality<M: Message>(topic: &Topic<M>) -> String {
@@ -89,7 +95,7 @@ impl FastDds {
     /// When it cannot be started.
     #[must_use]
     pub fn start(test: &str, domain: u16) -> Option<Self> {
-        Self::start_with(test, domain, None)
+        Self::start_with(test, domain, None, false)
     }
 
     /// The same with the credentials of an enclave's folder.
@@ -98,12 +104,35 @@ impl FastDds {
     /// As [`Self::start`].
     #[must_use]
     pub fn start_in(test: &str, domain: u16, enclave: &Path) -> Option<Self> {
-        Self::start_with(test, domain, Some(enclave))
+        Self::start_with(test, domain, Some(enclave), false)
     }
 
-    fn start_with(test: &str, domain: u16, enclave: Option<&Path>) -> Option<Self> {
+    /// The same, changed so that it does not ask its permissions before it writes.
+    ///
+    /// # Panics
+    /// As [`Self::start`].
+    #[must_use]
+    pub fn start_unasked(test: &str, domain: u16, enclave: &Path) -> Option<Self> {
+        Self::start_with(test, domain, Some(enclave), true)
+    }
+
+    fn start_with(
+        test: &str,
+        domain: u16,
+        enclave: Option<&Path>,
+        is_unasked: bool,
+    ) -> Option<Self> {
         let (built, program) = built(test)?;
-        let mut child = Command::new(program)
+        let mut command = Command::new(program);
+        if is_unasked {
+            let changed = built.path().join("unasked.so");
+            let switches = ["-shared", "-fPIC"];
+            if !compiled(test, "fast_dds_unasked.cpp", &changed, &switches) {
+                return None;
+            }
+            command.env("LD_PRELOAD", changed);
+        }
+        let mut child = command
             .arg(domain.to_string())
             .args(enclave)
             .stdin(Stdio::piped())
@@ -162,6 +191,19 @@ impl FastDds {
         let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
         self.say(&format!("writer {name} {dds_type} {}", quality(topic)));
         self.wait(&format!("matched {name}"), |_| true);
+    }
+
+    /// Makes a writer of a topic of ours, whether anybody listens to it or not.
+    pub fn speak_to_nobody<M: Message>(&mut self, topic: &Topic<M>) {
+        let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
+        self.say(&format!("writer {name} {dds_type} {}", quality(topic)));
+    }
+
+    /// Whether a writer or reader of a topic of ours was refused so far.
+    #[must_use]
+    pub fn was_refused<M: Message>(&self, topic: &Topic<M>) -> bool {
+        let line = format!("refused {}", dds_topic(topic));
+        self.heard.contains_key(&line)
     }
 
     /// Tries to make a writer of a topic of ours that its permissions do not allow.
