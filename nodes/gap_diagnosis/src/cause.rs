@@ -275,9 +275,13 @@ impl Found {
             axis: instance.target.to_string(),
             status: member.status,
             confidence: member.confidence,
-            parameters: parameters
-                .filter(|(place, _)| member.estimate.active.contains(place))
-                .map(|(place, parameter)| value(parameter, &member.estimate, place))
+            parameters: whole(instance.kind, &member.estimate)
+                .into_iter()
+                .chain(
+                    parameters
+                        .filter(|(place, _)| member.estimate.active.contains(place))
+                        .map(|(place, parameter)| value(parameter, &member.estimate, place)),
+                )
                 .collect(),
             d: member.estimate.d,
             confusable_with: member.confusable.clone(),
@@ -327,7 +331,8 @@ impl Found {
             let instance = self.instance(member);
             let is_size = |p: &&ParameterValue| {
                 let mut all = instance.kind.parameters.iter().chain(instance.kind.free);
-                all.any(|own| own.name == p.name && own.role == Role::Amplitude)
+                let is_own = all.any(|own| own.name == p.name && own.role == Role::Amplitude);
+                is_own || p.name.starts_with(WHOLE)
             };
             let holds_nothing = |p: &ParameterValue| p.low <= 0.0 && p.high >= 0.0;
             let values = &cause.parameters;
@@ -362,6 +367,23 @@ impl Found {
 
 /// Share of its physical range from which an interval says nothing of a parameter.
 const WHOLE_RANGE: f64 = 0.9;
+
+/// How the size of an effect begins whose shares have forms of their own.
+const WHOLE: &str = "whole_";
+
+/// The size of an effect whose shares have forms of their own.
+fn whole(kind: &Kind, estimate: &Estimate) -> Option<ParameterValue> {
+    let [value, low, high] = estimate.whole?;
+    let of = kind.parameters.first()?;
+    Some(ParameterValue {
+        name: format!("{WHOLE}{}", of.name),
+        value,
+        low,
+        high,
+        at_bound: false,
+        determined: Some(high - low < WHOLE_RANGE * (of.high - of.low)),
+    })
+}
 
 /// A parameter as it is reported: of a shape nothing is said beyond its physical range.
 fn value(parameter: &Parameter, estimate: &Estimate, place: usize) -> ParameterValue {

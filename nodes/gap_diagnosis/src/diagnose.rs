@@ -204,6 +204,9 @@ impl<'a> Base<'a> {
     ) -> Diagnosis {
         let split = split::split(self.session, config.hold_out);
         let (searched, mut scattered) = self.explained(&split, kinds, config);
+        if searched.found.leftover.flagged() && scattered.is_named() {
+            scattered.withdraw_but(Some(&self.scattered_within(&searched, kinds, config)));
+        }
         let Searched {
             stack,
             slots,
@@ -215,9 +218,7 @@ impl<'a> Base<'a> {
         let reproduced = guard::judge(&inflation, config, &mut notes);
         if !reproduced {
             found.withdraw();
-        }
-        if !reproduced || found.leftover.flagged() {
-            scattered.withdraw();
+            scattered.withdraw_but(None);
         }
         notes.extend(remarks(&stack, &split, &found));
         let next = next::propose(&self.bench(), &found);

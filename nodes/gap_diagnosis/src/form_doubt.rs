@@ -123,6 +123,7 @@ mod tests {
 
     fn estimate(value: f64, u: f64) -> Estimate {
         Estimate {
+            whole: None,
             values: vec![value],
             active: vec![0],
             low: vec![value - COVERAGE * u],

@@ -112,6 +112,7 @@ mod tests {
         let mut values = vec![0.0; instance.kind.parameters.len() + instance.kind.free.len()];
         values[..sizes.len()].copy_from_slice(sizes);
         Estimate {
+            whole: None,
             low: values.iter().map(|v| v - OF_HALF * u).collect(),
             high: values.iter().map(|v| v + OF_HALF * u).collect(),
             at_bound: vec![false; values.len()],

@@ -37,6 +37,8 @@ pub struct Estimate {
     pub high: Vec<f64>,
     /// Whether a value stands at its physical bound.
     pub at_bound: Vec<bool>,
+    /// The first value with those that are shares of it, and the ends of the interval of their sum; none without shares.
+    pub whole: Option<[f64; 3]>,
     /// Norm of the whitened signature.
     pub d: f64,
 }
@@ -75,6 +77,13 @@ fn parameter(instance: &Instance, place: usize) -> &'static Parameter {
 }
 
 impl Member<'_> {
+    /// Values that are shares of the first one, where that is estimated as well.
+    fn shares(&self) -> impl Iterator<Item = usize> {
+        let has_first = self.active.first() == Some(&0);
+        let active = self.active.iter().copied();
+        active.filter(move |place| has_first && parameter(self.instance, *place).is_share)
+    }
+
     fn signature(&self, stack: &Stack<'_>) -> DVector<f64> {
         stack.signature(&*self.instance.effect(&self.values))
     }
@@ -316,6 +325,48 @@ fn moved<'f>(members: &[Member<'f>], by: &[f64], share: f64) -> Vec<Member<'f>> 
         .collect()
 }
 
+/// Coverage factor of the intervals.
+const COVERAGE: f64 = 1.96;
+
+/// Standard uncertainty of each member's first value with its shares: that of the sum, where it takes the first value's
+/// place among what is estimated.
+fn of_wholes(
+    stack: &Stack<'_>,
+    members: &[Member<'_>],
+    columns: &[DVector<f64>],
+    left: &DVector<f64>,
+) -> Vec<Option<f64>> {
+    let mut first = 0;
+    let firsts: Vec<usize> = members
+        .iter()
+        .map(|member| {
+            let own = first;
+            first += member.active.len();
+            own
+        })
+        .collect();
+    let mut summed = columns.to_vec();
+    for (member, first) in members.iter().zip(&firsts) {
+        for (column, place) in member.active.iter().enumerate() {
+            if member.shares().any(|share| share == *place) {
+                summed[first + column] -= &columns[*first];
+            }
+        }
+    }
+    if members
+        .iter()
+        .all(|member| member.shares().next().is_none())
+    {
+        return vec![None; members.len()];
+    }
+    let doubts = standard_uncertainties(stack, &DMatrix::from_columns(&summed), left);
+    let of = |(member, first): (&Member<'_>, usize)| {
+        member.shares().next()?;
+        doubts.get(first).copied()
+    };
+    members.iter().zip(firsts).map(of).collect()
+}
+
 /// (2) and the intervals.
 fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: Vec<DVector<f64>>) -> Refit {
     let columns = jacobian(stack, members, &parts);
@@ -328,6 +379,7 @@ fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: Vec<DVector<f64>>
     } else {
         standard_uncertainties(stack, &DMatrix::from_columns(&columns), &left)
     };
+    let mut of_whole = of_wholes(stack, members, &columns, &left).into_iter();
     let mut spread = spread.into_iter();
     let estimates = members
         .iter()
@@ -339,13 +391,18 @@ fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: Vec<DVector<f64>>
                 at_bound: vec![false; member.values.len()],
                 values: member.values.clone(),
                 active: member.active.clone(),
+                whole: of_whole.next().flatten().map(|u| {
+                    let shares = member.shares().map(|place| member.values[place]);
+                    let value = member.values[0] + shares.sum::<f64>();
+                    [value, value - COVERAGE * u, value + COVERAGE * u]
+                }),
                 d: part.norm(),
             };
             for (&place, u) in member.active.iter().zip(spread.by_ref()) {
                 let of = parameter(member.instance, place);
                 let value = member.values[place];
-                estimate.low[place] = value - 1.96 * u;
-                estimate.high[place] = value + 1.96 * u;
+                estimate.low[place] = value - COVERAGE * u;
+                estimate.high[place] = value + COVERAGE * u;
                 let near = 1e-6 * (of.high - of.low);
                 estimate.at_bound[place] = value <= of.low + near || value >= of.high - near;
             }

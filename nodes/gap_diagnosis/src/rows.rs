@@ -111,6 +111,42 @@ impl Rows {
     }
 }
 
+/// Variance of the readings of each row of a block about the line through the rows beside it, of one value per reading; none of rows
+/// with one reading.
+pub fn variances_within(block: &Block, per_reading: &[f64]) -> Vec<Option<f64>> {
+    let mean = |values: &mut dyn Iterator<Item = f64>, n: usize| values.sum::<f64>() / count(n);
+    let centre = |row: &Row| {
+        let n = row.readings.len();
+        let place = mean(&mut row.readings.iter().map(|k| count(*k)), n);
+        (
+            place,
+            mean(&mut row.readings.iter().map(|k| per_reading[*k]), n),
+        )
+    };
+    let centres: Vec<(f64, f64)> = block.rows.iter().map(centre).collect();
+    let of_row = |at: usize| {
+        let readings = &block.rows[at].readings;
+        if readings.len() < 2 {
+            return None;
+        }
+        let (before, after) = (
+            centres[at.saturating_sub(1)],
+            centres[(at + 1).min(centres.len() - 1)],
+        );
+        let way = after.0 - before.0;
+        let slope = if way > 0.0 {
+            (after.1 - before.1) / way
+        } else {
+            0.0
+        };
+        let (place, middle) = centres[at];
+        let about = |k: &usize| per_reading[*k] - middle - slope * (count(*k) - place);
+        let squares: f64 = readings.iter().map(|k| about(k).powi(2)).sum();
+        Some(squares / count(readings.len() - 1))
+    };
+    (0..block.rows.len()).map(of_row).collect()
+}
+
 /// A count as a real number.
 #[expect(clippy::cast_precision_loss, reason = "counts are far below 2^52")]
 pub fn count(n: usize) -> f64 {
@@ -297,5 +333,43 @@ pub fn time_s(run: &Run, row: &Row) -> f64 {
         (Some(touch), _) => run.touches[touch].time_s,
         (None, Some(tick)) => run.motion.time_s.get(tick).copied().unwrap_or(0.0),
         (None, None) => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn readings_on_a_line_have_no_variance_within_their_rows() {
+        let row = |first: usize| Row {
+            station: (u32::try_from(first).expect("few"), 0),
+            tick: None,
+            touch: None,
+            readings: (first..first + 5).collect(),
+        };
+        let block = Block {
+            run: 0,
+            channel: Channel::GridU,
+            start: 0,
+            rows: (0..20).step_by(5).map(row).collect(),
+            dropped: 0,
+        };
+        let line: Vec<f64> = (0..20).map(|k| 0.3 * count(k) - 2.0).collect();
+        let within = variances_within(&block, &line);
+        assert!(within.iter().all(|v| v.is_some_and(|v| v < 1e-20)));
+        // One up, one down about the line: 4 of 5 readings off by 1, over 4.
+        let shaken: Vec<f64> = line
+            .iter()
+            .zip([1.0, -1.0, 0.0, 1.0, -1.0].iter().cycle())
+            .map(|(line, off)| line + off)
+            .collect();
+        let within = variances_within(&block, &shaken);
+        assert!(
+            within
+                .iter()
+                .all(|v| v.is_some_and(|v| (v - 1.0).abs() < 1e-12)),
+            "{within:?}"
+        );
     }
 }

@@ -2,54 +2,53 @@
 //!
 //! # Model
 //!
-//! What the effects of the mean leave, squared, against the variance that the twin gives each row:
+//! What the effects of the mean leave, squared, against the variance that the twin gives the readings:
 //!
 //! ```text
-//!   E z_i2 = g_c + e_c / m_i + sum_k b_k h_ik,   b = (amplitude / greatest)2        (1)
-//!   h_t = sum_j c_j2 v_(t-j),   z = sum_j c_j y_(t-j) the whitener's filter          (2)
-//!   score = h'(z2 / f - 1) / sqrt(k h'h),   k the variance of z2 / f                  (3)
-//!   D^2 = 2/k_1 sum_i (z_i2/f_i - z_i2/g_i + ln f_i/g_i),   k_1 that of z2 / g, at least 2   (4)
+//!   E s_i = g_c + sum_k b_k h_ik,   b = (amplitude / greatest)2                      (1)
+//!   score = h'(s / f - 1) / sqrt(k h'h),   k the variance of s / f                   (2)
+//!   D^2 = sum_i 2/k_i (s_i/f_i - s_i/g_i + ln f_i/g_i),   k_i that of s / g          (3)
 //! ```
 //!
 //! | symbol | here |
 //! |---|---|
-//! | m_i | readings of row i: white noise of readings is smaller in a mean of more |
-//! | g_c, e_c | free for each channel (g of a path for each run): how noisy an instrument is belongs to the floor |
-//! | f | what g and e alone make of z2; h is over it as well. In (4) what all but one effect make of it, g what all do |
-//! | v | variance of the row's mean, readings scattering independently |
+//! | s_i | of a touch the square of the whitened row, of a path the mean square of the readings of a row (`squares`) |
+//! | g_c | free for each channel, of a path for each run: how noisy an instrument is belongs to the floor |
+//! | h_ik | variance by the twin, as s is made of readings |
+//! | f | what g alone makes of s; h is over it as well. In (3) what all but one effect make of it, g what all do |
 //!
 //! The search, its price and its rules are those of the mean (`selection`, `confirm`, `confidence`); one more is
 //! that the effect must beat a scatter of its own for every run. The size is from (1) by iterated weights
-//! 1 / (2 (E z2)2), its interval the greater of model and clusters of runs. (4) is by how much the effect makes what was read
-//! more likely, as D^2 of an effect of the mean is; the score (3) is short of it where the variance changes manifold.
+//! 1 / (k (E s)2), its interval the greater of model and clusters of runs. (3) is by how much the effect makes what was read
+//! more likely, as D^2 of an effect of the mean is; the score (2) is short of it where the variance changes manifold.
 //!
 //! # Holds when
-//! Effects that scatter a channel evenly are part of its noise floor, so that they are listed as not shown.
+//! Effects that scatter a channel evenly within every run are part of its noise floor, so that they are listed as not shown.
 //!
 //! # References
 //! \[1\] L. G. Godfrey, J. Econometrics 8, 1978 (score test of a variance that goes with covariates). \[2\] P. McCullagh,
-//! J. A. Nelder, Generalized linear models, 2nd ed., Chapman & Hall 1989, chapter 10 (scaled deviance of a variance's model).
+//! J. A. Nelder, Generalized linear models, 2nd ed., Chapman & Hall 1989, chapters 9 and 10 (quasi-likelihood, a variance's model).
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use machine::effects::{Effect, Kind, Moment, Parameter, Role};
+use machine::effects::{Kind, Moment, Parameter, Role};
 use machine::file::EffectEntry;
-use machine::twin::Channel;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use crate::cause::Scope;
-use crate::field;
 use crate::normal::Normal;
-use crate::nuisance::orthonormal;
 use crate::report::{Cause, Status};
-use crate::rows::{Block, Row, count};
 use crate::rule::Rule;
-use crate::selection::{Limits, Search};
+use crate::selection::{Limits, Search, Set, without};
 use crate::signature::{Form, Instance, Library};
 
 mod judge;
+mod levels;
+mod squares;
 
 use judge::Judge;
+use squares::{Part, Sized, Squares};
 
 /// Effects of scatter that were found.
 pub struct Scattered {
@@ -71,186 +70,246 @@ impl Scattered {
             .any(|cause| cause.status != Status::Surrogate)
     }
 
-    /// Takes the names away.
-    pub fn withdraw(&mut self) {
-        self.entries.clear();
+    /// Takes all names away but of what another search names as well.
+    pub fn withdraw_but(&mut self, other: Option<&Self>) {
+        let stays = |effect: &str, axis: &str| {
+            let all = other.iter().flat_map(|other| &other.causes);
+            all.filter(|cause| cause.status != Status::Surrogate)
+                .any(|cause| cause.effect == effect && cause.axis == axis)
+        };
+        self.entries
+            .retain(|entry| stays(&entry.kind, entry.axis.as_deref().unwrap_or_default()));
         for cause in &mut self.causes {
-            cause.status = Status::Surrogate;
+            if !stays(&cause.effect, &cause.axis) {
+                cause.status = Status::Surrogate;
+            }
         }
     }
 }
 
-/// Squares beyond this many times the middle square of their block count as this.
-const MOST_SQUARE: f64 = 12.0;
-/// Middle of chi-square of one.
-const MIDDLE: f64 = 0.455;
 /// An effect that would stay below this D at its greatest size is not shown.
 const LEAST_D: f64 = 6.0;
 
-/// What the search is made on.
-struct Squares {
-    /// z2, outliers pulled in.
-    squares: DVector<f64>,
-    /// Columns of g and e in (1).
-    levels: DMatrix<f64>,
-    /// What the levels alone make of each square.
-    floor: DVector<f64>,
-    /// Levels over the floor, orthonormal.
-    basis: DMatrix<f64>,
-    /// Root of k.
-    unit: f64,
-    /// Squares over the floor, beside the levels, over the unit.
-    y: DVector<f64>,
-}
+/// Steps of a shape beside the one found, to one less than this many to both sides.
+const STEP: f64 = 1.189_207_115_002_721;
+const FINER: i32 = 4;
+/// How often shapes are sought anew, one after the other.
+const ROUNDS: usize = 3;
 
 /// Searches for effects of scatter in what the effects of the mean leave.
 pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind], left: &DVector<f64>) -> Scattered {
+    find_in(scope, kinds, left, Part::Whole)
+}
+
+/// The same in the scatter of readings within their rows alone.
+pub fn find_within(
+    scope: &Scope<'_, '_>,
+    kinds: &[&'static Kind],
+    left: &DVector<f64>,
+) -> Scattered {
+    find_in(scope, kinds, left, Part::Within)
+}
+
+fn find_in(
+    scope: &Scope<'_, '_>,
+    kinds: &[&'static Kind],
+    left: &DVector<f64>,
+    part: Part,
+) -> Scattered {
     let stack = scope.stack;
-    let squares = Squares::new(scope, left);
+    let squares = Squares::of_readings(scope, left, part);
     let variances = kinds.iter().filter(|kind| kind.moment == Moment::Variance);
     let instances = Instance::all(stack.twin.machine(), variances);
-    let signatures = squares.signatures(scope, instances);
-    let normal = signatures.normal(&squares.y);
-    let seen = signatures
-        .forms
-        .iter()
-        .map(|form| signatures.instances[form.instance].kind.id)
-        .collect();
-    let mut search = Search::new(
-        &signatures,
-        &normal,
-        squares.y.norm_squared(),
-        stack.freedom(),
-    );
-    let set = search.run(Limits {
-        beam: scope.config.beam,
-        most_effects: 3,
-        swaps: scope.config.applies(Rule::SwapSearch),
-    });
-    search.alternatives(&set, 6);
+    let mut bench = Bench::new(scope, squares, instances);
+    let (mut set, mut visited) = bench.search();
+    if !set.is_empty() {
+        let refined = bench.refine(&set);
+        bench.weigh(&refined);
+        (set, visited) = bench.search();
+    }
+    let forms = bench.signatures.forms.iter();
     let mut found = Scattered {
         causes: vec![],
         entries: vec![],
         spread: DVector::from_element(stack.rows.len, 1.0),
-        seen,
+        seen: forms
+            .map(|form| bench.signatures.instances[form.instance].kind.id)
+            .collect(),
     };
     if !set.is_empty() {
         let judge = Judge {
-            scope,
-            squares: &squares,
-            signatures: &signatures,
-            normal: &normal,
-            visited: &search.visited,
+            bench: &bench,
+            left,
+            visited: &visited,
         };
         judge.judge(&set, &mut found);
     }
     found
 }
 
-impl Squares {
-    fn new(scope: &Scope<'_, '_>, left: &DVector<f64>) -> Self {
-        let stack = scope.stack;
-        let mut squares = rough(scope, left);
-        for block in &stack.rows.blocks {
-            let mut own: Vec<f64> = squares
-                .rows(block.start, block.rows.len())
-                .iter()
-                .copied()
-                .collect();
-            let middle = own.len() / 2;
-            own.select_nth_unstable_by(middle, f64::total_cmp);
-            let most = MOST_SQUARE * (own[middle] / MIDDLE).max(1.0);
-            for place in block.range() {
-                squares[place] = squares[place].min(most);
-            }
-        }
-        let levels = levels(scope);
-        let floor = floor(&levels, &squares);
-        let mut over = levels.clone();
-        for mut column in over.column_iter_mut() {
-            column.component_div_assign(&floor);
-        }
-        let basis = orthonormal(over.nrows(), over.column_iter().map(|c| c.into_owned()));
-        let own = squares.component_div(&floor);
-        let beside = &own - &basis * basis.tr_mul(&own);
-        let freedom = (stack.freedom() - count(basis.ncols())).max(1.0);
-        let unit = (beside.norm_squared() / freedom).max(1.0).sqrt();
-        let y = beside / unit;
-        Self {
-            squares,
-            levels,
-            floor,
-            basis,
-            unit,
-            y,
-        }
-    }
+/// Squares with the signatures of effects in them.
+struct Bench<'b, 's, 'a> {
+    scope: &'b Scope<'s, 'a>,
+    squares: Squares,
+    signatures: Library,
+    /// Variance by each column of the signatures, of each square.
+    variances: Vec<DVector<f64>>,
+    normal: Normal,
+}
 
-    /// (2) beside the levels, over the unit.
-    fn column(&self, spread: Vec<f64>) -> DVector<f64> {
-        let column = DVector::from_vec(spread).component_div(&self.floor);
-        (&column - &self.basis * self.basis.tr_mul(&column)) / self.unit
-    }
-
-    fn signatures(&self, scope: &Scope<'_, '_>, instances: Vec<Instance>) -> Library {
-        let mut signatures = Library {
+impl<'b, 's, 'a> Bench<'b, 's, 'a> {
+    fn new(scope: &'b Scope<'s, 'a>, squares: Squares, instances: Vec<Instance>) -> Self {
+        let signatures = Library {
             excited: vec![false; instances.len()],
             instances,
             forms: vec![],
             columns: vec![],
         };
-        for instance in 0..signatures.instances.len() {
-            let kind = signatures.instances[instance].kind;
-            for values in crate::signature::shapes(kind) {
-                for wide in [false, true] {
-                    if !wide || !kind.free.is_empty() {
-                        self.add(scope, &mut signatures, instance, &values, wide);
-                    }
-                }
+        let normal = signatures.normal(&squares.y);
+        let mut bench = Self {
+            scope,
+            squares,
+            signatures,
+            variances: vec![],
+            normal,
+        };
+        for instance in 0..bench.signatures.instances.len() {
+            for values in crate::signature::shapes(bench.signatures.instances[instance].kind) {
+                bench.add_forms(instance, &values);
             }
         }
-        signatures
+        bench.normal = bench.signatures.normal(&bench.squares.y);
+        bench
     }
 
-    fn add(
-        &self,
-        scope: &Scope<'_, '_>,
-        signatures: &mut Library,
-        instance: usize,
-        values: &[f64],
-        wide: bool,
-    ) {
-        let kind = signatures.instances[instance].kind;
-        let shown = if wide {
-            usize::MAX
-        } else {
-            kind.parameters.len()
+    /// The best set, and C of all that were looked at.
+    fn search(&self) -> (Set, BTreeMap<Set, f64>) {
+        let config = self.scope.config;
+        let square = self.squares.y.norm_squared();
+        let freedom = self.scope.stack.freedom();
+        let mut search = Search::new(&self.signatures, &self.normal, square, freedom);
+        let set = search.run(Limits {
+            beam: config.beam,
+            most_effects: 3,
+            swaps: config.applies(Rule::SwapSearch),
+        });
+        search.alternatives(&set, 6);
+        (set, search.visited)
+    }
+
+    /// Lets each square weigh by what a set makes of it: where an effect is strong the score alone would fit it only where
+    /// it is strongest.
+    fn weigh(&mut self, set: &[usize]) {
+        let level = self.fit(set.iter().copied()).level;
+        self.squares.weigh_by(self.scope, &level);
+        let over = |variance: &DVector<f64>| self.squares.column(variance);
+        self.signatures.columns = self.variances.iter().map(over).collect();
+        self.normal = self.signatures.normal(&self.squares.y);
+    }
+
+    /// The set with the shapes, between those that were tried, that make what was read likeliest.
+    fn refine(&mut self, set: &[usize]) -> Set {
+        let mut set = set.to_vec();
+        for _ in 0..ROUNDS {
+            let before = set.clone();
+            for member in 0..set.len() {
+                let form = &self.signatures.forms[set[member]];
+                let (instance, values) = (form.instance, form.values.clone());
+                let kind = self.signatures.instances[instance].kind;
+                for (place, parameter) in parameters(kind).enumerate() {
+                    if is_tried(parameter) {
+                        for finer in beside(parameter, values[place]) {
+                            let mut beside = values.clone();
+                            beside[place] = finer;
+                            self.add_forms(instance, &beside);
+                        }
+                    }
+                }
+                let others = without(&set, set[member]);
+                let own = (0..self.signatures.forms.len())
+                    .filter(|form| self.signatures.forms[*form].instance == instance);
+                let surprise = |form: usize| {
+                    let level = self.fit(others.iter().copied().chain([form])).level;
+                    self.squares.surprise(&level)
+                };
+                let scored = own.map(|form| (surprise(form), form));
+                if let Some((_, best)) = scored.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                    set[member] = best;
+                }
+            }
+            if set == before {
+                break;
+            }
+        }
+        set.sort_unstable();
+        set
+    }
+
+    /// Sizes of some forms.
+    fn fit(&self, forms: impl Iterator<Item = usize>) -> Sized {
+        let columns: Vec<&DVector<f64>> = forms
+            .flat_map(|form| &self.signatures.forms[form].columns)
+            .map(|column| &self.variances[*column])
+            .collect();
+        self.squares.fit(&columns)
+    }
+
+    /// Adds an effect of some shape in the catalogue's form, in the wide one, and in what widens it alone: variances add
+    /// up, so that no part can make up for too much of the other.
+    fn add_forms(&mut self, instance: usize, values: &[f64]) {
+        let mut known = self.signatures.forms.iter();
+        let is_same = |a: &f64, b: &f64| (a - b).abs() <= 1e-9 * b.abs();
+        let is_known = |form: &Form| {
+            form.instance == instance && form.values.iter().zip(values).all(|(a, b)| is_same(a, b))
         };
+        if known.any(is_known) {
+            return;
+        }
+        let kind = self.signatures.instances[instance].kind;
+        let (own, all) = (
+            kind.parameters.len(),
+            kind.parameters.len() + kind.free.len(),
+        );
+        self.add(instance, values, 0..own);
+        if all > own {
+            self.add(instance, values, 0..all);
+            self.add(instance, values, own..all);
+        }
+    }
+
+    fn add(&mut self, instance: usize, values: &[f64], shown: Range<usize>) {
+        let signatures = &mut self.signatures;
+        let kind = signatures.instances[instance].kind;
+        let wide = shown.end > kind.parameters.len();
         let (mut amplitudes, mut columns) = (vec![], vec![]);
-        for (place, parameter) in parameters(kind).take(shown).enumerate() {
-            if parameter.role != Role::Amplitude {
+        for (place, parameter) in parameters(kind).enumerate() {
+            if parameter.role != Role::Amplitude || !shown.contains(&place) {
                 continue;
             }
             let mut on = values.to_vec();
             on[place] = parameter.high;
-            let column = self.column(spread(scope, &*signatures.instances[instance].effect(&on)));
+            let effect = signatures.instances[instance].effect(&on);
+            let variance = self.squares.spread(self.scope, &*effect);
+            let column = self.squares.column(&variance);
             if column.norm().is_finite() && column.norm() > LEAST_D {
                 amplitudes.push(place);
                 columns.push(column);
+                self.variances.push(variance);
             }
         }
         if columns.is_empty() {
             return;
         }
         signatures.excited[instance] = true;
-        let choices = kind
-            .shapes()
-            .filter(|p| p.role.grid().is_some_and(|grid| grid.len() > 1));
+        let free = kind.free.iter().zip(&values[kind.parameters.len()..]);
+        let is_widened = |(p, value): &(&Parameter, &f64)| is_tried(p) && **value != 0.0;
+        let tried = kind.shapes().filter(|shape| is_tried(shape)).count();
+        let choices = tried + free.filter(is_widened).count();
         let first = signatures.columns.len();
         signatures.forms.push(Form {
             instance,
             values: values.to_vec(),
-            price: amplitudes.len() + choices.count(),
+            price: amplitudes.len() + choices,
             columns: (first..first + columns.len()).collect(),
             amplitudes,
             wide,
@@ -259,134 +318,23 @@ impl Squares {
     }
 }
 
-/// E z2 by the levels alone, by iterated weights.
-fn floor(levels: &DMatrix<f64>, squares: &DVector<f64>) -> DVector<f64> {
-    let all: Vec<usize> = (0..levels.ncols()).collect();
-    let mut floor = DVector::from_element(squares.len(), 1.0);
-    for _ in 0..6 {
-        let (weighted, right) = weigh(levels, squares, &floor);
-        let sizes = Normal::new(&weighted, &right).solve(&all).sizes;
-        floor = (levels * DVector::from_vec(sizes)).map(|level| level.max(0.1));
-    }
-    floor
-}
-
 fn parameters(kind: &'static Kind) -> impl Iterator<Item = &'static Parameter> {
     kind.parameters.iter().chain(kind.free)
 }
 
-/// z2 without the smooth modes of each block: what runs differ by smoothly is no scatter, though it would look like
-/// some for its neighbours go together. Each square is over the share that the modes leave of it.
-fn rough(scope: &Scope<'_, '_>, left: &DVector<f64>) -> DVector<f64> {
-    let stack = scope.stack;
-    let mut squares = left.map(|z| z * z);
-    for block in &stack.rows.blocks {
-        let run = &stack.session.runs[block.run];
-        let filter = scope.noise[&block.channel].within(run, block);
-        let (_, mut modes) = field::modes(run, block);
-        for mut column in modes.column_iter_mut() {
-            filter.filter(column.as_mut_slice());
-        }
-        if block.rows.len() < 3 * modes.ncols() {
-            continue;
-        }
-        let basis = orthonormal(
-            block.rows.len(),
-            modes.column_iter().map(|c| c.into_owned()),
-        );
-        let own = left.rows(block.start, block.rows.len());
-        let rest = own - &basis * basis.tr_mul(&own);
-        for (row, place) in block.range().enumerate() {
-            let kept = 1.0 - basis.row(row).norm_squared();
-            squares[place] = rest[row].powi(2) / kept.max(0.1);
-        }
-    }
-    squares
-}
-
-/// Columns of g and e of (1), as the whitener passes them on. A path is thinned to stations, so that its rows are
-/// as noisy as its feed makes them: g is free for each of its runs. Touches have one g for all.
-fn levels(scope: &Scope<'_, '_>) -> DMatrix<f64> {
-    let rows = scope.stack.rows.len;
-    let mut columns = BTreeMap::<(&Channel, Option<usize>), Vec<f64>>::new();
-    for block in &scope.stack.rows.blocks {
-        let even: Vec<f64> = block.rows.iter().map(|_| 1.0).collect();
-        let of_readings: Vec<f64> = block
-            .rows
-            .iter()
-            .map(|row| 1.0 / count(row.readings.len()))
+/// Values of a shape beside one: a little less and more of it; of what widens a form all that may be.
+fn beside(parameter: &Parameter, value: f64) -> Vec<f64> {
+    if parameter.low > 0.0 {
+        let powers = (1 - FINER..FINER).filter(|power| *power != 0);
+        let finer = powers.map(|power| value * STEP.powi(power));
+        return finer
+            .map(|finer| finer.clamp(parameter.low, parameter.high))
             .collect();
-        let own = if block.channel == Channel::Touch {
-            0
-        } else {
-            block.run
-        };
-        for (key, variances) in [(Some(own), even), (None, of_readings)] {
-            let column = columns
-                .entry((&block.channel, key))
-                .or_insert_with(|| vec![0.0; rows]);
-            column[block.range()].copy_from_slice(&passed(scope, block, &variances));
-        }
     }
-    let unit = |column: Vec<f64>| {
-        let column = DVector::from_vec(column);
-        let size = column.norm() / count(rows).sqrt();
-        column / size.max(f64::MIN_POSITIVE)
-    };
-    DMatrix::from_columns(&columns.into_values().map(unit).collect::<Vec<_>>())
+    parameter.role.grid().unwrap_or_default().to_vec()
 }
 
-/// (2) of the rows of a block.
-fn passed(scope: &Scope<'_, '_>, block: &Block, variances: &[f64]) -> Vec<f64> {
-    let run = &scope.stack.session.runs[block.run];
-    let filter = scope.noise[&block.channel].within(run, block);
-    let of_row = |t: usize| {
-        let used = filter.order().min(t);
-        let before = filter.coefficients[used].iter().enumerate();
-        let told: f64 = before
-            .map(|(j, phi)| phi * phi * variances[t - 1 - j])
-            .sum();
-        (variances[t] + told) / filter.variances[used]
-    };
-    (0..variances.len()).map(of_row).collect()
-}
-
-/// (2): what an effect adds to the variance of each whitened row.
-fn spread(scope: &Scope<'_, '_>, effect: &dyn Effect) -> Vec<f64> {
-    let stack = scope.stack;
-    let mut spread = vec![0.0; stack.rows.len];
-    for &run in &stack.runs {
-        let of_readings = stack
-            .twin
-            .variance(stack.session, &stack.session.runs[run], &[effect]);
-        for block in stack.rows.blocks.iter().filter(|block| block.run == run) {
-            let of_row = |row: &Row| {
-                let sum: f64 = row.readings.iter().map(|k| of_readings[*k]).sum();
-                sum / count(row.readings.len()).powi(2)
-            };
-            let rows: Vec<f64> = block.rows.iter().map(of_row).collect();
-            spread[block.range()].copy_from_slice(&passed(scope, block, &rows));
-        }
-    }
-    spread
-}
-
-/// Sizes b of (1) with their standard uncertainties, and E z2.
-struct Fit {
-    sizes: Vec<f64>,
-    doubts: Vec<f64>,
-    level: DVector<f64>,
-}
-
-fn weigh(
-    design: &DMatrix<f64>,
-    squares: &DVector<f64>,
-    level: &DVector<f64>,
-) -> (DMatrix<f64>, DVector<f64>) {
-    let root = level.map(|level| 1.0 / (std::f64::consts::SQRT_2 * level));
-    let mut weighted = design.clone();
-    for mut column in weighted.column_iter_mut() {
-        column.component_mul_assign(&root);
-    }
-    (weighted, squares.component_mul(&root))
+/// Whether a parameter is a shape of which several values are tried.
+fn is_tried(parameter: &Parameter) -> bool {
+    parameter.role.grid().is_some_and(|grid| grid.len() > 1)
 }

@@ -136,6 +136,22 @@ impl<'a> Base<'a> {
         (again, scattered)
     }
 
+    /// Effects of scatter that what the effects of the mean leave unexplained cannot imitate.
+    pub(crate) fn scattered_within(
+        &self,
+        searched: &Searched<'a>,
+        kinds: &[&'static Kind],
+        config: &GapConfig,
+    ) -> Scattered {
+        let scope = Scope {
+            stack: &searched.stack,
+            slots: &searched.slots,
+            noise: &searched.noise,
+            config,
+        };
+        scatter::find_within(&scope, kinds, &searched.found.left)
+    }
+
     fn search(
         &self,
         stack: Stack<'a>,

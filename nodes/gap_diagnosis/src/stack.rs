@@ -20,7 +20,7 @@ use nalgebra::DVector;
 use crate::form_error::FormError;
 use crate::noise::Noise;
 use crate::nuisance::Nuisance;
-use crate::rows::{Block, Rows, count};
+use crate::rows::{Block, Rows, count, variances_within};
 use crate::whitener::Whitener;
 
 /// What the twin predicted for the rows of some runs, by effect and the bits of its values.
@@ -38,6 +38,8 @@ pub struct Stack<'a> {
     pub rows: Rows,
     /// Residual of each row, mm.
     pub raw: Vec<f64>,
+    /// Variance of the readings within each row, mm2; none of rows with one reading.
+    pub within: Rc<[Option<f64>]>,
     /// (1).
     pub z: DVector<f64>,
     whitener: Whitener,
@@ -74,12 +76,15 @@ impl<'a> Stack<'a> {
         for &run in runs {
             rows.average(run, &residual[run], &mut raw);
         }
+        let of_block = |block: &Block| variances_within(block, &residual[block.run]);
+        let within = rows.blocks.iter().flat_map(of_block).collect();
         let mut stack = Self {
             session,
             twin,
             runs: runs.to_vec(),
             rows,
             raw: vec![],
+            within,
             z: DVector::zeros(0),
             whitener,
             weight: None,
@@ -103,6 +108,7 @@ impl<'a> Stack<'a> {
             runs: self.runs.clone(),
             rows: self.rows.clone(),
             raw: self.raw.clone(),
+            within: Rc::clone(&self.within),
             z: DVector::zeros(0),
             whitener: self.whitener.clone(),
             weight: Some(weight),
@@ -166,6 +172,13 @@ impl<'a> Stack<'a> {
         }
         self.nuisance.project(&mut stack);
         DVector::from_vec(stack)
+    }
+
+    /// A whitened stack whose rows have their noise in mm again; what the smooth fields and floats took is not.
+    pub fn unfiltered(&self, left: &DVector<f64>) -> Vec<f64> {
+        let mut rows = left.as_slice().to_vec();
+        self.whitener.unfilter(&mut rows);
+        rows
     }
 
     /// A stack with its set-ups floated by plain least squares, mm.

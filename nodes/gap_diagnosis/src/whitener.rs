@@ -110,16 +110,26 @@ impl Autoregression {
 
     /// (1), in place.
     pub fn filter(&self, rows: &mut [f64]) {
-        let order = self.order();
         for t in (0..rows.len()).rev() {
-            let used = order.min(t);
-            let told: f64 = self.coefficients[used]
-                .iter()
-                .enumerate()
-                .map(|(j, phi)| phi * rows[t - 1 - j])
-                .sum();
-            rows[t] = (rows[t] - told) / self.variances[used].sqrt();
+            let [told, scatter] = self.told(rows, t);
+            rows[t] = (rows[t] - told) / scatter;
         }
+    }
+
+    /// Undoes [`Self::filter`], in place.
+    pub fn unfilter(&self, rows: &mut [f64]) {
+        for t in 0..rows.len() {
+            let [told, scatter] = self.told(rows, t);
+            rows[t] = rows[t] * scatter + told;
+        }
+    }
+
+    /// What the rows before one tell of it, and the standard deviation about that.
+    fn told(&self, rows: &[f64], t: usize) -> [f64; 2] {
+        let used = self.order().min(t);
+        let before = self.coefficients[used].iter().enumerate();
+        let told = before.map(|(j, phi)| phi * rows[t - 1 - j]).sum();
+        [told, self.variances[used].sqrt()]
     }
 }
 
@@ -207,6 +217,13 @@ impl Whitener {
             part.gemv(-1.0, &block.vectors, &along, 1.0);
         }
     }
+
+    /// A whitened stack in mm again, without what the smooth fields took, in place.
+    pub fn unfilter(&self, stack: &mut [f64]) {
+        for block in &self.blocks {
+            block.filter.unfilter(&mut stack[block.range.clone()]);
+        }
+    }
 }
 
 /// Left singular vectors and singular values of a tall matrix, those of size only.
@@ -235,6 +252,19 @@ mod tests {
         let both = Autoregression::white(3.0).with_white(1.0, 3);
         assert!((both.variances[3] - 4.0).abs() < 1e-12);
         assert!(both.coefficients[3].iter().all(|phi| phi.abs() < 1e-12));
+    }
+
+    #[test]
+    fn eq1_is_undone() {
+        let one = Autoregression::levinson(&[2.0, 1.2, 0.9]);
+        let told = [0.4, -1.0, 2.5, 0.1, 0.0, -0.7];
+        let mut rows = told;
+        one.filter(&mut rows);
+        assert!((rows[3] - told[3]).abs() > 0.1);
+        one.unfilter(&mut rows);
+        for (row, told) in rows.iter().zip(told) {
+            assert!((row - told).abs() < 1e-12, "{rows:?}");
+        }
     }
 
     #[test]

@@ -367,7 +367,9 @@ impl Verdict {
     pub fn sized(&self, effect: &TrueEffect) -> Option<(f64, bool)> {
         let name = effect.parameter.as_ref()?;
         let cause = self.named().find(|cause| cause.is(effect))?;
-        let (_, value, low, high) = cause.parameters.iter().find(|(own, ..)| own == name)?;
+        // Where shares of it have forms of their own, the sum is the size.
+        let named = |name: &str| cause.parameters.iter().find(|(own, ..)| own == name);
+        let (_, value, low, high) = named(&format!("whole_{name}")).or_else(|| named(name))?;
         let error = (value - effect.size) / effect.size;
         Some((error, (*low..=*high).contains(&effect.size)))
     }

@@ -1,7 +1,7 @@
 //! The diagnosis of simulator against machine, as a page: three answers first, tables and drawings after.
 
 use anyhow::Result;
-use gap_diagnosis::report::{Cause, GapReport, Status};
+use gap_diagnosis::report::{Cause, GapReport, ParameterValue, Status};
 use maud::html;
 
 use words::{covariate, name};
@@ -18,6 +18,8 @@ mod words;
 
 /// Begin of the names of amplitudes that only widen an effect's form.
 const FREE_FORM: &str = "free_";
+/// How the sum of a size and its shares begins.
+const WHOLE: &str = "whole_";
 /// Most rows of a table on the page.
 const MOST_ROWS: usize = 24;
 
@@ -181,7 +183,7 @@ const NOT_DETERMINED: &str = "not determined by these runs";
 fn sizes(report: &GapReport) -> Rows {
     let of_cause = |cause: &Cause| -> Vec<Vec<String>> {
         let title = name(&cause.effect, &cause.axis);
-        let row = |p: &gap_diagnosis::report::ParameterValue| {
+        let row = |p: &ParameterValue| {
             let remark = match (p.determined, p.at_bound) {
                 (Some(false), _) => NOT_DETERMINED,
                 (_, true) => "at its bound",
@@ -189,16 +191,14 @@ fn sizes(report: &GapReport) -> Rows {
             };
             vec![
                 title.clone(),
-                p.name.clone(),
+                spoken(&p.name),
                 three(p.value),
                 three(p.low),
                 three(p.high),
                 remark.to_owned(),
             ]
         };
-        let shown = cause.parameters.iter();
-        let shown = shown.filter(|p| !p.name.starts_with(FREE_FORM));
-        shown.map(row).collect()
+        told(cause).map(row).collect()
     };
     Rows {
         head: head(&[
@@ -211,7 +211,7 @@ fn sizes(report: &GapReport) -> Rows {
         ]),
         rows: report.causes.iter().flat_map(of_cause).collect(),
         note: "From and to: 95 % interval of noise and repeats; in blind trials 88 % of them held. What the instruments themselves are off by \
-               is not in them. Amplitudes of an effect's free form are in the JSON."
+               is not in them. Amplitudes of an effect's free form are in the JSON; `in all` is with those that are shares of a value."
             .to_owned(),
     }
 }
@@ -225,23 +225,35 @@ fn status(status: Status) -> &'static str {
 }
 
 fn values(cause: &Cause) -> String {
-    let value = |p: &gap_diagnosis::report::ParameterValue| {
+    let value = |p: &ParameterValue| {
         if p.determined == Some(false) {
-            return format!("{} {NOT_DETERMINED}", p.name);
+            return format!("{} {NOT_DETERMINED}", spoken(&p.name));
         }
         let bound = if p.at_bound { ", at its bound" } else { "" };
         format!(
             "{} = {} ({} to {}{bound})",
-            p.name,
+            spoken(&p.name),
             three(p.value),
             three(p.low),
             three(p.high)
         )
     };
-    let shown = cause.parameters.iter();
-    let shown = shown.filter(|p| !p.name.starts_with(FREE_FORM));
-    let all: Vec<String> = shown.map(value).collect();
+    let all: Vec<String> = told(cause).map(value).collect();
     all.join(", ")
+}
+
+/// The parameters that people are told: none of the free form, and where shares of the first have forms of their own,
+/// their sum instead of what is left of it.
+fn told(cause: &Cause) -> impl Iterator<Item = &ParameterValue> {
+    let all = cause.parameters.iter();
+    let whole = all.clone().find_map(|p| p.name.strip_prefix(WHOLE));
+    all.filter(move |p| !p.name.starts_with(FREE_FORM) && whole != Some(&p.name))
+}
+
+/// How people call a parameter.
+fn spoken(name: &str) -> String {
+    name.strip_prefix(WHOLE)
+        .map_or_else(|| name.to_owned(), |of| format!("{of} in all"))
 }
 
 fn constancy(cause: &Cause) -> String {

@@ -6,11 +6,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::effects::Kind;
+use machine::effects::{Effect, Kind, Parameter};
 use nalgebra::{DMatrix, DVector};
 
-use super::{Fit, Scattered, Squares, parameters, spread, weigh};
-use crate::cause::{self, Scope};
+use super::squares::Squares;
+use super::{Bench, STEP, Scattered, is_tried, parameters};
+use crate::cause;
 use crate::confidence::Rivals;
 use crate::confirm;
 use crate::normal::Normal;
@@ -19,37 +20,36 @@ use crate::report::{Cause, Constancy, ParameterValue, Status};
 use crate::rows::count;
 use crate::rule::Rule;
 use crate::selection::Set;
-use crate::signature::{Form, Instance, Library};
+use crate::signature::{Form, Instance};
 use crate::veto;
 
 /// A set that was found, with what it is judged by.
 pub(super) struct Judge<'j, 's, 'a> {
-    pub(super) scope: &'j Scope<'s, 'a>,
-    pub(super) squares: &'j Squares,
-    pub(super) signatures: &'j Library,
-    pub(super) normal: &'j Normal,
+    pub(super) bench: &'j Bench<'j, 's, 'a>,
+    /// What the effects of the mean leave.
+    pub(super) left: &'j DVector<f64>,
     pub(super) visited: &'j BTreeMap<Set, f64>,
 }
 
 impl Judge<'_, '_, '_> {
     /// Judges each member of a set, and adds it to what was found.
     pub(super) fn judge(&self, set: &Set, found: &mut Scattered) {
-        let stack = self.scope.stack;
-        let of = |form: &usize| &self.signatures.forms[*form];
+        let stack = self.bench.scope.stack;
+        let of = |form: &usize| &self.bench.signatures.forms[*form];
         let forms: Vec<&Form> = set.iter().map(of).collect();
         let fit = self.fit(&forms);
-        found.spread = fit.level.map(f64::sqrt);
+        found.spread = self.of_rows(&forms, &fit);
         let parts = self.parts(&forms, &fit);
-        let confirmed = confirm::held_out_gains_of(stack, &self.squares.y, &parts);
-        let config = self.scope.config;
+        let confirmed = confirm::held_out_gains_of(stack, &self.bench.squares.y, &parts);
+        let config = self.bench.scope.config;
         let is_confirmed = |place: usize| confirmed[place] || !config.applies(Rule::HeldOut);
         let beats_runs = self.visited[set] < self.of_runs();
-        let rivals = Rivals::new(self.signatures, self.visited);
+        let rivals = Rivals::new(&self.bench.signatures, self.visited);
         let columns = forms.iter().flat_map(|form| &form.columns);
         let columns: Vec<DVector<f64>> = columns
-            .map(|column| self.signatures.columns[*column].clone())
+            .map(|column| self.bench.signatures.columns[*column].clone())
             .collect();
-        let rest = self.squares.y.clone();
+        let rest = self.bench.squares.y.clone();
         let left = parts.iter().fold(rest, |left, part| left - part);
         let instances: BTreeSet<usize> = forms.iter().map(|form| form.instance).collect();
         let of_set = self.one_of_each(set);
@@ -57,7 +57,7 @@ impl Judge<'_, '_, '_> {
         for (place, form) in forms.iter().enumerate() {
             let own = first..first + form.columns.len();
             first = own.end;
-            let instance = &self.signatures.instances[form.instance];
+            let instance = &self.bench.signatures.instances[form.instance];
             let (parameters, values) = sized(instance.kind, form, &fit, own.clone());
             let constancy = self.constancy(instance, &values, &columns, &left);
             let railed = parameters.iter().any(|p| p.at_bound && p.value > 0.0);
@@ -79,7 +79,7 @@ impl Judge<'_, '_, '_> {
             }
             let instead = rivals.instead_of(&instances, form.instance);
             let probability = rivals.probability(form.instance) * if holds { 1.0 } else { 0.5 };
-            let (signatures, normal) = (self.signatures, self.normal);
+            let (signatures, normal) = (&self.bench.signatures, &self.bench.normal);
             found.causes.push(Cause {
                 effect: instance.kind.id.to_owned(),
                 axis: instance.target.to_string(),
@@ -95,18 +95,40 @@ impl Judge<'_, '_, '_> {
         }
     }
 
-    /// (4) of `scatter` of one form among those of a set.
+    /// (3) of `scatter` of one form among those of a set.
     fn distance(&self, forms: &[&Form], place: usize, fit: &Fit) -> f64 {
         let mut others = forms.to_vec();
         others.remove(place);
         let without = self.fit(&others).level;
-        let squares = &self.squares.squares;
-        let of = |level: &DVector<f64>| squares.component_div(level);
-        let (with, less) = (of(&fit.level), of(&without));
-        let surprise =
-            less.sum() - with.sum() + without.map(f64::ln).sum() - fit.level.map(f64::ln).sum();
-        let k = with.map(|square| (square - 1.0).powi(2)).mean();
-        (surprise.max(0.0) / (0.5 * k).max(1.0)).sqrt()
+        self.bench
+            .squares
+            .distance(self.bench.scope, &without, &fit.level)
+    }
+
+    /// Standard deviation of the rows that the search for effects of the mean is made on, in units of the floor: each
+    /// effect's share of it is open, for readings of a row may go together.
+    fn of_rows(&self, forms: &[&Form], fit: &Fit) -> DVector<f64> {
+        let rows = Squares::of_rows(self.bench.scope, self.left);
+        let mut sizes = fit.sizes.iter();
+        let of_form = |form: &&Form| {
+            let of_size = |(place, size): (&usize, &f64)| {
+                rows.spread(self.bench.scope, &*self.greatest(form, *place)) * *size
+            };
+            let own = form.amplitudes.iter().zip(sizes.by_ref());
+            own.map(of_size).sum::<DVector<f64>>()
+        };
+        let columns: Vec<DVector<f64>> = forms.iter().map(of_form).collect();
+        rows.fit(&columns.iter().collect::<Vec<_>>())
+            .level
+            .map(f64::sqrt)
+    }
+
+    /// The effect of a form at the greatest size of one of its amplitudes.
+    fn greatest(&self, form: &Form, place: usize) -> Box<dyn Effect> {
+        let instance = &self.bench.signatures.instances[form.instance];
+        let mut on = form.values.clone();
+        on[place] = parameters(instance.kind).nth(place).map_or(0.0, |p| p.high);
+        instance.effect(&on)
     }
 
     /// What each form makes of the squares.
@@ -115,8 +137,8 @@ impl Judge<'_, '_, '_> {
         let part = |form: &&Form| {
             let own = form.columns.iter().zip(sizes.by_ref());
             own.fold(
-                DVector::zeros(self.squares.y.len()),
-                |sum, (column, size)| sum + &self.signatures.columns[*column] * *size,
+                DVector::zeros(self.bench.squares.y.len()),
+                |sum, (column, size)| sum + &self.bench.signatures.columns[*column] * *size,
             )
         };
         forms.iter().map(part).collect()
@@ -124,7 +146,7 @@ impl Judge<'_, '_, '_> {
 
     /// One form of each instance that could be seen.
     fn one_of_each(&self, set: &Set) -> Vec<usize> {
-        crate::isolability::forms(self.signatures, self.normal, set)
+        crate::isolability::forms(&self.bench.signatures, &self.bench.normal, set)
     }
 
     fn constancy(
@@ -134,27 +156,30 @@ impl Judge<'_, '_, '_> {
         columns: &[DVector<f64>],
         left: &DVector<f64>,
     ) -> Constancy {
-        let raw = spread(self.scope, &*instance.effect(values));
-        let column = |part: Vec<f64>| self.squares.column(part);
+        let raw = self
+            .bench
+            .squares
+            .spread(self.bench.scope, &*instance.effect(values));
+        let column = |part: Vec<f64>| self.bench.squares.column(&DVector::from_vec(part));
         confirm::constancy_of(
-            self.scope.stack,
-            &raw,
+            self.bench.scope.stack,
+            raw.as_slice(),
             &column,
             columns,
             left,
-            self.scope.config,
+            self.bench.scope.config,
         )
     }
 
     /// C of a scatter of its own for each run.
     fn of_runs(&self) -> f64 {
-        let stack = self.scope.stack;
+        let stack = self.bench.scope.stack;
         let of_run = |run: &usize| {
             let mut own = vec![0.0; stack.rows.len];
             for block in stack.rows.blocks.iter().filter(|block| block.run == *run) {
                 own[block.range()].fill(1.0);
             }
-            self.squares.column(own)
+            self.bench.squares.column(&DVector::from_vec(own))
         };
         let columns: Vec<DVector<f64>> = stack
             .runs
@@ -165,56 +190,36 @@ impl Judge<'_, '_, '_> {
         if columns.is_empty() {
             return f64::INFINITY;
         }
-        let normal = Normal::new(&DMatrix::from_columns(&columns), &self.squares.y);
+        let normal = Normal::new(&DMatrix::from_columns(&columns), &self.bench.squares.y);
         let gain = normal.solve(&(0..columns.len()).collect::<Vec<_>>()).gain;
-        self.squares.y.norm_squared() - gain + count(columns.len()) * stack.freedom().ln()
+        self.bench.squares.y.norm_squared() - gain + count(columns.len()) * stack.freedom().ln()
     }
 
-    /// (1) by iterated weights.
+    /// Sizes of the amplitudes of some forms.
     fn fit(&self, forms: &[&Form]) -> Fit {
-        let stack = self.scope.stack;
-        let mut columns: Vec<DVector<f64>> = self
-            .squares
-            .levels
-            .column_iter()
-            .map(|c| c.into_owned())
+        let columns: Vec<&DVector<f64>> = forms
+            .iter()
+            .flat_map(|form| form.columns.iter())
+            .map(|column| &self.bench.variances[*column])
             .collect();
-        let first = columns.len();
-        for form in forms {
-            let instance = &self.signatures.instances[form.instance];
-            for place in &form.amplitudes {
-                let mut on = form.values.clone();
-                on[*place] = parameters(instance.kind)
-                    .nth(*place)
-                    .map_or(0.0, |p| p.high);
-                columns.push(DVector::from_vec(spread(
-                    self.scope,
-                    &*instance.effect(&on),
-                )));
-            }
-        }
-        let design = DMatrix::from_columns(&columns);
-        let all: Vec<usize> = (0..columns.len()).collect();
-        let squares = &self.squares.squares;
-        let mut level = DVector::from_element(stack.rows.len, 1.0);
-        let mut sizes = vec![0.0; columns.len()];
-        for _ in 0..8 {
-            let (weighted, right) = weigh(&design, squares, &level);
-            sizes = Normal::new(&weighted, &right).solve(&all).sizes;
-            for size in &mut sizes[first..] {
-                *size = size.max(0.0);
-            }
-            level = (&design * DVector::from_vec(sizes.clone())).map(|v| v.max(0.1));
-        }
-        let (weighted, right) = weigh(&design, squares, &level);
-        let left = &right - &weighted * DVector::from_vec(sizes.clone());
-        let doubts = crate::refit::standard_uncertainties(stack, &weighted, &left);
+        let sized = self.bench.squares.fit(&columns);
+        let doubts = self
+            .bench
+            .squares
+            .doubts(self.bench.scope, &columns, &sized);
         Fit {
-            sizes: sizes.split_off(first),
-            doubts: doubts[first..].to_vec(),
-            level,
+            sizes: sized.sizes,
+            doubts,
+            level: sized.level,
         }
     }
+}
+
+/// Sizes b of (1) of `scatter` with their standard uncertainties, and E s.
+struct Fit {
+    sizes: Vec<f64>,
+    doubts: Vec<f64>,
+    level: DVector<f64>,
 }
 
 /// Sizes of some columns with their standard uncertainties.
@@ -250,5 +255,19 @@ fn sized(
             at_bound: fit.sizes[k] >= 1.0 || fit.sizes[k] <= 0.0,
         });
     }
+    listed.extend(parameters(kind).zip(&values).filter_map(tried));
     (listed, values)
+}
+
+/// The value of a shape out of those that are tried, between the ones beside it.
+fn tried((parameter, value): (&Parameter, &f64)) -> Option<ParameterValue> {
+    let is_told = is_tried(parameter) && *value > 0.0;
+    is_told.then(|| ParameterValue {
+        name: parameter.name.to_owned(),
+        value: *value,
+        low: (value / STEP).max(parameter.low),
+        high: (value * STEP).min(parameter.high),
+        at_bound: false,
+        determined: Some(true),
+    })
 }

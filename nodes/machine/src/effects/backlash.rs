@@ -31,7 +31,7 @@
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
-//! | b | `width_um` | µm |
+//! | b | `width_um`; the play in all is b with every s_k | µm |
 //! | c, k | `coulomb_mm_s2`, `viscous_per_s` of the machine file | mm/s², 1/s |
 //! | f_k | `free_0p01mm_um` .. `free_3mm_um` | µm |
 //! | s | `since_reversal` | mm |
@@ -75,10 +75,10 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_0p3mm_um", 30.0, 1.0),
         Parameter::amplitude("free_1mm_um", 30.0, 1.0),
         Parameter::amplitude("free_3mm_um", 30.0, 1.0),
-        Parameter::ordinate("free_soft_3mm_s2_um", 30.0, 1.0),
-        Parameter::ordinate("free_soft_10mm_s2_um", 30.0, 1.0),
-        Parameter::ordinate("free_soft_30mm_s2_um", 30.0, 1.0),
-        Parameter::ordinate("free_soft_100mm_s2_um", 30.0, 1.0),
+        Parameter::share("free_soft_3mm_s2_um", 30.0, 1.0),
+        Parameter::share("free_soft_10mm_s2_um", 30.0, 1.0),
+        Parameter::share("free_soft_30mm_s2_um", 30.0, 1.0),
+        Parameter::share("free_soft_100mm_s2_um", 30.0, 1.0),
     ],
     moment: Moment::Mean,
     needs: "a reversal of the axis",

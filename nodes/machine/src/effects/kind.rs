@@ -129,9 +129,19 @@ pub struct Parameter {
     /// Whether it is a height of a curve that its effect may have any form of: of a wide form such heights are as much
     /// the effect as its own parameters, while others only widen these.
     pub is_ordinate: bool,
+    /// Whether it is a share of its effect's first parameter that takes another form: the size of the effect is the sum.
+    pub is_share: bool,
 }
 
 impl Parameter {
+    /// A share of the effect's size that has a form of its own, at most `limit` in magnitude.
+    #[must_use]
+    pub const fn share(name: &'static str, limit: f64, typical: f64) -> Self {
+        let mut share = Self::ordinate(name, limit, typical);
+        share.is_share = true;
+        share
+    }
+
     /// A height of a curve of any form, of either sign, at most `limit` in magnitude.
     #[must_use]
     pub const fn ordinate(name: &'static str, limit: f64, typical: f64) -> Self {
@@ -150,6 +160,7 @@ impl Parameter {
             high: limit,
             typical,
             is_ordinate: false,
+            is_share: false,
         }
     }
 
@@ -163,6 +174,7 @@ impl Parameter {
             high,
             typical,
             is_ordinate: false,
+            is_share: false,
         }
     }
 
@@ -194,6 +206,7 @@ impl Parameter {
             high,
             typical,
             is_ordinate: false,
+            is_share: false,
         }
     }
 }

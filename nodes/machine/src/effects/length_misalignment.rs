@@ -2,11 +2,12 @@
 //!
 //! # Model
 //!
-//! A length reference is put up anew for every axis. With L the displacement along the axis it was put up for, from the
-//! run's first position, and theta the angle between beam and motion:
+//! A length reference is put up anew for every axis, as well as lets its beam meet the receiver over the whole way L_b
+//! that the machine file has for it: what strays there by s leans by theta = s / L_b, more on a short axis. With L the
+//! displacement along the axis from the run's first position:
 //!
 //! ```text
-//!   d = L (cos theta - 1) = -(theta2 / 2) L                               (1)
+//!   d = L (cos theta - 1) = -L s2 / (2 L_b2)                              (1)
 //!   d += c L2                                                             (2)
 //! ```
 //!
@@ -14,12 +15,13 @@
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
-//! | theta2 / 2 | `cosine_um_per_m`; 0.5 µm/m for 1 mrad | µm/m |
+//! | s2 | `stray_mm2`; 1 mm over a metre is 1 mrad, 0.5 µm/m | mm2 |
+//! | L_b | length of the beam along the axis, without one the travel, of the machine file | mm |
 //! | c | `free_curve_um_per_m2` | µm/m2 |
 //!
 //! # Holds when
-//! The beam still meets the receiver at the end of the travel: at 3 mrad (4.5 µm/m) it is off by twice 3 mm in a metre,
-//! and nobody measures with more. The interferometer measures along its own beam. That it is one axis' alone tells it from
+//! The beam still meets the receiver at the end of the way, 3 mm off at most: 4.5 µm/m over a metre, 50 µm/m over 300 mm.
+//! The interferometer measures along its own beam. That it is one axis' alone tells it from
 //! `length_wavelength`, and that other instruments do not see it from a scale error of the axis. A set-up along a diagonal
 //! is another one, and not modelled.
 //!
@@ -33,9 +35,11 @@
 
 use metrology::Axis;
 use metrology::sample::TestKind;
+use nalgebra::Vector3;
 
 use super::length_wavelength::way_mm;
 use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
+use crate::file::MachineFile;
 use crate::twin::{Channel, Response};
 
 /// Entry of the catalogue.
@@ -43,22 +47,27 @@ pub static KIND: Kind = Kind {
     id: "length_misalignment",
     title: "misalignment of the length reference",
     targets: Targets::LinearAxes,
-    parameters: &[Parameter::size("cosine_um_per_m", 5.0, 0.5)],
+    parameters: &[Parameter::size("stray_mm2", 9.0, 1.0)],
     free: &[Parameter::amplitude("free_curve_um_per_m2", 100.0, 2.0)],
     moment: Moment::Mean,
     needs: "readings of the length reference at two places of the axis, and another instrument's or another axis'",
     build: |target, values| {
         Box::new(LengthMisalignment {
             axis: target.axis(),
-            cosine_per_mm: values[0] * 1e-6,
+            stray_mm2: values[0],
             curve_per_mm2: values[1] * 1e-9,
         })
     },
 };
 
+/// A beam is along an axis where the cosine between them is more than this.
+const LEAST_COSINE: f64 = 0.99;
+/// Way of an axis that the machine file does not have.
+const STATED_MM: f64 = 1000.0;
+
 struct LengthMisalignment {
     axis: Axis,
-    cosine_per_mm: f64,
+    stray_mm2: f64,
     curve_per_mm2: f64,
 }
 
@@ -74,9 +83,24 @@ impl Effect for LengthMisalignment {
         if !is_along {
             return;
         }
+        let cosine_per_mm = 0.5 * self.stray_mm2 / way_of_beam_mm(scene.machine, self.axis).powi(2);
         let ways = way_mm(scene.run);
         for (sum, way_mm) in response.length_reading_mm.iter_mut().zip(ways) {
-            *sum += way_mm * (self.curve_per_mm2 * way_mm - self.cosine_per_mm); // (1), (2)
+            *sum += way_mm * (self.curve_per_mm2 * way_mm - cosine_per_mm); // (1), (2)
         }
     }
+}
+
+/// Length of the beam along an axis, without one its travel.
+fn way_of_beam_mm(machine: &MachineFile, axis: Axis) -> f64 {
+    let beams = machine
+        .length_reference
+        .iter()
+        .flat_map(|length| &length.beams);
+    let along = beams.filter(|beam| beam.direction()[axis.index()].abs() > LEAST_COSINE);
+    let ways = along.map(|beam| (Vector3::from(beam.to_mm) - Vector3::from(beam.from_mm)).norm());
+    let travel = machine
+        .linear(axis)
+        .map_or(STATED_MM, |entry| entry.travel_mm[1] - entry.travel_mm[0]);
+    ways.reduce(f64::max).unwrap_or(travel)
 }

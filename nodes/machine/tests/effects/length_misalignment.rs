@@ -8,6 +8,9 @@ use nalgebra::{Rotation3, Vector3};
 use crate::past::{instants, predict, read, stands};
 use crate::scene::bench;
 
+/// The bench's beam along X.
+const BEAM_MM: f64 = 600.0;
+
 /// A beam from the origin goes out along a direction, is reflected by the three faces of a corner cube and comes back to
 /// the plane that it left: half its way, and where it meets that plane.
 fn returned(beam: Vector3<f64>, corner_mm: Vector3<f64>) -> (f64, Vector3<f64>) {
@@ -49,13 +52,14 @@ fn val_length_misalignment_of_a_returning_beam() {
         let mut run = stands(&instants(2, 1.0), |k| [travel_mm * k as f64, 0.0, 0.0]);
         read(&mut run, &Channel::Length(Axis::X));
         let on = ("length_misalignment", "X");
-        let of = |um_per_m: f64| {
-            let given = [("cosine_um_per_m", um_per_m)];
+        let of = |angle_rad: f64| {
+            let given = [("stray_mm2", (BEAM_MM * angle_rad).powi(2))];
             predict(&bench(), &History::default(), &run, on, &given)[1]
         };
-        println!("dot {dot_mm} mm: {short_mm:.2e} mm, {:.2e} mm", of(ppm));
-        assert!((of(ppm) + error_mm).abs() < 0.6e-5, "{}", of(ppm));
-        assert!((of(0.5e6 * angle_rad.powi(2)) - short_mm).abs() < 1e-9);
+        let of_manual = of((2e-6_f64 * ppm).sqrt());
+        println!("dot {dot_mm} mm: {short_mm:.2e} mm, {of_manual:.2e} mm");
+        assert!((of_manual + error_mm).abs() < 0.6e-5, "{of_manual}");
+        assert!((of(angle_rad) - short_mm).abs() < 1e-9);
     }
 }
 
@@ -66,7 +70,7 @@ fn eq1_length_misalignment_is_the_projection() {
     for angle_rad in [0.5e-3_f64, 1e-3, 3e-3] {
         let mut run = stands(&instants(11, 1.0), |k| [-250.0 + 50.0 * k as f64, 0.0, 0.0]);
         read(&mut run, &Channel::Length(Axis::X));
-        let given = [("cosine_um_per_m", 0.5e6 * angle_rad * angle_rad)];
+        let given = [("stray_mm2", (BEAM_MM * angle_rad).powi(2))];
         let on = ("length_misalignment", "X");
         let seen = predict(&machine, &History::default(), &run, on, &given);
         for (k, seen) in seen.iter().enumerate() {
@@ -83,7 +87,7 @@ fn eq2_a_curved_motion_goes_with_the_square() {
     let machine = bench();
     let mut run = stands(&instants(2, 1.0), |k| [500.0 * k as f64 - 250.0, 0.0, 0.0]);
     read(&mut run, &Channel::Length(Axis::X));
-    let given = [("cosine_um_per_m", 0.0), ("free_curve_um_per_m2", 4.0)];
+    let given = [("stray_mm2", 0.0), ("free_curve_um_per_m2", 4.0)];
     let on = ("length_misalignment", "X");
     let seen = predict(&machine, &History::default(), &run, on, &given);
     assert!((seen[1] - 1e-3).abs() < 1e-12, "{seen:?}");
@@ -94,13 +98,16 @@ fn eq1_the_set_up_of_one_axis_is_not_anothers() {
     let machine = bench();
     let mut run = stands(&instants(2, 1.0), |k| [0.0, 500.0 * k as f64 - 250.0, 0.0]);
     read(&mut run, &Channel::Length(Axis::Y));
-    let given = [("cosine_um_per_m", 4.0)];
+    // The bench has no beam along Y: 3 mm over its travel.
+    let travel_mm = machine.linear(Axis::Y).unwrap().travel_mm;
+    let given = [("stray_mm2", 9.0)];
+    let short_mm = 250.0 * 9.0 * 2.0 / (2.0 * (travel_mm[1] - travel_mm[0]).powi(2));
     let of = |axis| {
         let on = ("length_misalignment", axis);
         predict(&machine, &History::default(), &run, on, &given)[1]
     };
     assert!(
-        (of("Y") + 2e-3).abs() < 1e-12 && of("X").abs() < 1e-15,
+        (of("Y") + short_mm).abs() < 1e-12 && of("X").abs() < 1e-15,
         "{}",
         of("Y")
     );

@@ -79,3 +79,29 @@ fn eq1_an_axis_that_stands_or_runs_fast_does_not_stick() {
         assert!((found - wanted).abs() < 1e-15, "{on} {found}");
     }
 }
+
+#[test]
+fn eq3_an_axis_that_slows_down_slides_on_below_the_critical_feed() {
+    let machine = three_axes("[w X' Y' b Z t]");
+    let given = [
+        ("height_um", 0.0),
+        ("critical_mm_s", 2.0),
+        ("free_even_um", 6.0),
+        ("free_hysteresis", 0.25),
+    ];
+    // 1.8 mm/s and 1.2 mm/s, once gaining and once losing 0.5 mm/s in a second, and at a steady feed.
+    for (feed, gain, jumps) in [
+        (1.8, 0.5, true),
+        (1.8, -0.5, false),
+        (1.2, -0.5, true),
+        (1.8, 0.0, true),
+    ] {
+        let run = run(100, AxisSet::XYZ, |t| {
+            [(feed + 0.5 * gain * t) * t, 0.0, 0.0, 0.0, 0.0, 0.0]
+        });
+        let response = response_of(&machine, &run, "stick_slip", "X", &given);
+        let found = response.tip_variance_mm2[0][5];
+        let wanted = if jumps { 3e-6 } else { 0.0 };
+        assert!((found - wanted).abs() < 1e-15, "{feed} {gain}: {found}");
+    }
+}

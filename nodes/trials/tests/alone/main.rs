@@ -7,12 +7,13 @@
 //! | file | effects |
 //! |---|---|
 //! | `classes` | the fourteen classes of blind trials, as their arm `alone` draws them |
+//! | `angles` | `angular_error` at two heights, which that arm's programme does not measure |
 //! | `probe` | `probe_lobing`, `probe_pretravel`, `latency_drift` |
 //! | `heat` | `spindle_growth`, `column_bend`, `ambient_drift`, `thermometer_offset` |
 //! | `drives` | `acceleration_lag`, `feed_lost_motion` |
-//! | `instruments` | `clock_drift`, `plate_error` |
+//! | `instruments` | `clock_drift`, `plate_error`, `length_misalignment`, `interpolation_error` |
 //! | `rotary` | `rotary_location` |
-//! | `scatter` | `latency_jitter`; `probe_repeatability` and `vibration_random` that are in the noise floor |
+//! | `scatter` | `latency_jitter`, `stick_slip`; `probe_repeatability` and `vibration_random` that are in the noise floor |
 //!
 //! What the plant lacks, or has only together with something else, is in the README.
 
@@ -23,6 +24,7 @@ mod rigs;
 
 mod judge;
 
+mod angles;
 mod classes;
 mod drives;
 mod heat;

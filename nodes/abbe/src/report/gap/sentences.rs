@@ -3,7 +3,7 @@
 use gap_diagnosis::report::{Cause, GapReport, Status};
 
 use super::words::{self, name};
-use super::{FREE_FORM, maybe, three, values};
+use super::{maybe, three, told, values};
 
 /// That a part of the recording could not be read.
 pub(super) fn lost(losses: &[String]) -> Option<String> {
@@ -95,11 +95,7 @@ const MOST_SAID: usize = 2;
 
 /// The sizes of an effect, as many as a sentence can hold; all are in the table.
 fn sizes(cause: &Cause) -> String {
-    let shown = cause
-        .parameters
-        .iter()
-        .filter(|p| !p.name.starts_with(FREE_FORM));
-    let shown = shown.count();
+    let shown = told(cause).count();
     if shown <= MOST_SAID {
         return values(cause);
     }
