@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
 use crate::baseline::Method;
+use crate::calibration::calibration;
 use crate::proportion::Proportion;
 use crate::tally::{LARGE_D, beyond, has_wrong};
 use crate::verdict::Verdict;
@@ -22,6 +23,10 @@ pub struct MethodLine {
     pub wrong: Proportion,
     /// The same, and no unknown flagged.
     pub unflagged: Proportion,
+    /// Expected calibration error of what it named, 1; a method that gives no probabilities is sure of every
+    /// name. None where nothing was named.
+    #[serde(default)]
+    pub calibration_error: Option<f64>,
 }
 
 impl MethodLine {
@@ -38,6 +43,7 @@ impl MethodLine {
             named: Proportion::of(large_pairs.map(|(v, effect)| v.has(effect))),
             wrong: Proportion::of(said.iter().map(|v| has_wrong(v))),
             unflagged: Proportion::of(said.iter().map(|v| has_wrong(v) && !v.is_flagged())),
+            calibration_error: calibration(&said)[0].value,
         }
     }
 }
@@ -90,4 +96,40 @@ pub fn ablations(arm: Arm, verdicts: &[Verdict]) -> Vec<MethodLine> {
         lines.push(MethodLine::of(&format!("without {rule}"), &own));
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use gap_diagnosis::report::Status;
+
+    use super::*;
+    use crate::effect::Class;
+    use crate::sample::{cause, effect, verdict};
+
+    #[test]
+    fn a_rule_is_worth_what_the_same_trials_lose_without_it() {
+        let said = |ablated, confidence, index| {
+            let mut cause = cause("backlash", "X", Status::Named, 4.0);
+            cause.confidence = confidence;
+            let hidden = effect(Class::Backlash, "X", 30.0);
+            let mut verdict = verdict(vec![hidden], vec![cause], false);
+            verdict.ablated = ablated;
+            verdict.truth.index = index;
+            verdict
+        };
+        // The third was not diagnosed without the rule and does not count.
+        let all = [
+            said(None, 0.97, 0),
+            said(Some(Rule::Recalibration), 0.6, 0),
+            said(None, 0.2, 1),
+        ];
+        let lines = ablations(Arm::Catalogue, &all);
+        let told = |line: &MethodLine| (line.method.clone(), line.named.n);
+        let told: Vec<_> = lines.iter().map(told).collect();
+        let expected = ["all rules", "without recalibration"];
+        assert_eq!(told, expected.map(|method| (method.to_owned(), 1)));
+        let errors: Vec<f64> = lines.iter().filter_map(|l| l.calibration_error).collect();
+        assert!((errors[0] - 0.03).abs() < 1e-12, "{errors:?}");
+        assert!((errors[1] - 0.4).abs() < 1e-12, "{errors:?}");
+    }
 }

@@ -7,7 +7,7 @@
 //! catalogue, whose ids it only writes down; `extra_run` is the one that a diagnosis asks for. The *diagnoser* is `abbe diagnose`, a process that is given the bag and
 //! the machine file. The *judge* is `verdict` for one trial, `tally`, `calibration`, `confusion` and `detection` for all of
 //! them, `covariate` knows what a leftover should go with, `target` says which figures are as good as they should be;
-//! `comparison` puts  the methods of `baseline` and diagnoses without one of their rules before the same judge.
+//! `comparison` puts the methods of `baseline` and diagnoses without one of their rules before the same judge.
 //!
 //! `size` says how large a hidden effect is for these measurements: D, the root of its chi-square against the
 //! trial's own scatter, of which the generator, unlike the diagnoser, knows the covariance.
@@ -27,6 +27,8 @@ pub mod measurement;
 mod programme;
 pub mod proportion;
 pub mod rig;
+#[cfg(test)]
+mod sample;
 pub mod scatter;
 mod size;
 pub mod tally;

@@ -151,16 +151,24 @@ pub fn methods(what: &str, lines: &[MethodLine]) -> Rows {
             line.named.to_string(),
             line.wrong.to_string(),
             line.unflagged.to_string(),
+            line.calibration_error
+                .map_or("-".to_owned(), |error| format!("{error:.3}")),
         ]
     });
+    let columns = [
+        what,
+        "exact",
+        "effects named",
+        "a wrong name",
+        "unflagged",
+        "calibration error",
+    ];
     Rows {
-        head: [what, "exact", "effects named", "a wrong name", "unflagged"]
-            .map(str::to_owned)
-            .to_vec(),
+        head: columns.map(str::to_owned).to_vec(),
         rows: rows.collect(),
-        note:
-            "Exact and effects named: of D > 20; unflagged: a wrong name, and no unknown flagged."
-                .to_owned(),
+        note: "Exact and effects named: of D > 20; unflagged: a wrong name, and no unknown flagged; calibration error: \
+               of what is named, where a method without probabilities is sure of every name."
+            .to_owned(),
     }
 }
 
