@@ -19,10 +19,11 @@
 //! ```
 //!
 //! An effect passes where the score stays below `constancy_z` or its sizes differ by less than
-//! `constancy_spread` of the mean.
+//! `constancy_spread` of the mean, or by less than its kind may wander.
 
 use std::collections::BTreeMap;
 
+use machine::effects::Kind;
 use machine::twin::Run;
 use metrology::sample::Sense;
 use nalgebra::{DMatrix, DVector};
@@ -180,7 +181,7 @@ pub fn constancy(
     raw: &[f64],
     jacobian: &[DVector<f64>],
     left: &DVector<f64>,
-    config: &GapConfig,
+    limits: Limits,
 ) -> Constancy {
     constancy_of(
         stack,
@@ -188,8 +189,36 @@ pub fn constancy(
         &|part| stack.whitened(part),
         jacobian,
         left,
-        config,
+        limits,
     )
+}
+
+/// What sizes may differ by.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Standard score.
+    z: f64,
+    /// Share of the mean.
+    spread: f64,
+}
+
+impl Limits {
+    /// For effects of a kind; anything goes where the rule is switched off.
+    pub fn of(config: &GapConfig, kind: &Kind) -> Self {
+        Self {
+            z: config.constancy_z,
+            spread: if config.applies(Rule::Constancy) {
+                config.constancy_spread.max(kind.wanders)
+            } else {
+                f64::INFINITY
+            },
+        }
+    }
+
+    /// Whether sizes with this standard score and spread are one size.
+    fn hold(self, z: f64, spread: f64) -> bool {
+        z < self.z || spread < self.spread
+    }
 }
 
 /// The same with another way from a part of a signature to its column.
@@ -199,7 +228,7 @@ pub fn constancy_of(
     column: &dyn Fn(Vec<f64>) -> DVector<f64>,
     jacobian: &[DVector<f64>],
     left: &DVector<f64>,
-    config: &GapConfig,
+    limits: Limits,
 ) -> Constancy {
     let mut worst = Constancy {
         passed: true,
@@ -225,9 +254,7 @@ pub fn constancy_of(
             worst.worst_z = z;
             worst.split_by = name.to_owned();
         }
-        worst.passed &= z < config.constancy_z
-            || spread < config.constancy_spread
-            || !config.applies(Rule::Constancy);
+        worst.passed &= limits.hold(z, spread);
     }
     worst
 }
@@ -301,6 +328,20 @@ fn split_score(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stamps_may_be_late_by_half_more_or_less_and_a_play_has_one_width() {
+        let mut config = GapConfig::default();
+        let holds = |config: &GapConfig, id: &str, spread: f64| {
+            Limits::of(config, machine::effects::kind(id).unwrap()).hold(6.0, spread)
+        };
+        assert!(holds(&config, "clock_offset", 0.4));
+        assert!(!holds(&config, "clock_offset", 0.6));
+        assert!(holds(&config, "backlash", 0.05));
+        assert!(!holds(&config, "backlash", 0.4));
+        config.ablated = [Rule::Constancy].into();
+        assert!(holds(&config, "backlash", 4.0));
+    }
 
     /// Two levels of 200 rows in which a signature is alike.
     fn levels() -> [DVector<f64>; 2] {

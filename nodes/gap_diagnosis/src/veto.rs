@@ -216,7 +216,8 @@ fn own_vetoes(
         let instance = &signatures.instances[signatures.forms[*form].instance];
         let raw = scope.stack.simulate(&[&*instance.effect(&estimate.values)]);
         let (jacobian, left) = (&best.refit.jacobian, &best.left);
-        let constancy = confirm::constancy(scope.stack, &raw, jacobian, left, scope.config);
+        let limits = confirm::Limits::of(scope.config, instance.kind);
+        let constancy = confirm::constancy(scope.stack, &raw, jacobian, left, limits);
         let mut vetoes = Vec::new();
         if !constancy.passed {
             let split_by = constancy.split_by.clone();

@@ -167,7 +167,7 @@ impl Judge<'_, '_, '_> {
             &column,
             columns,
             left,
-            self.bench.scope.config,
+            confirm::Limits::of(self.bench.scope.config, instance.kind),
         )
     }
 

@@ -45,6 +45,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_square_um", 200.0, 2.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings while the axis accelerates: circles at two feeds or radii",
     build: |target, values| Box::new(AccelerationLag::new(&target, values)),
 };

@@ -45,6 +45,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_air_um_per_k", 50.0, 3.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "measurements along the direction at two times, without a new set-up between them",
     build: |target, values| {
         Box::new(AmbientDrift {

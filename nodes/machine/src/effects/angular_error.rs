@@ -61,6 +61,7 @@ pub static KIND: Kind = Kind {
         Parameter::ordinate("free_15_of_16_urad", 300.0, 3.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "positions over the axis' travel, with two arms",
     build: |target, values| Box::new(AngularError::new(&target, values)),
 };

@@ -81,6 +81,7 @@ pub static KIND: Kind = Kind {
         Parameter::share("free_soft_100mm_s2_um", 30.0, 1.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "a reversal of the axis",
     build: |target, values| Box::new(Backlash::new(&target, values)),
 };

@@ -41,6 +41,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::amplitude("drift_ppm", 500.0, 2.0)],
     free: &[Parameter::amplitude("free_ppm_per_h", 500.0, 2.0)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings of the instrument while axes move, at two times",
     build: |target, values| {
         Box::new(ClockDrift {

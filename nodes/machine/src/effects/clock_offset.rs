@@ -16,7 +16,8 @@
 //! Stamps of machine and instrument are otherwise on one clock. (1) is exact on the recorded command between
 //! ticks; what the control loop leaves moves with it and is not shifted again.
 //!
-//! No wider form: an offset is one number, and what grows with time is `clock_drift`.
+//! No wider form: an offset is one number, and what grows with time is `clock_drift`. The number may wander by half of
+//! itself: an instrument that is asked for its readings in blocks is late by half a block, from nothing to a whole one.
 //!
 //! # Agreement
 //! `val_clock_offset_circle`: 2 ms on a circle of 50 mm at 3 m/min, the circle's own equation shifted, to
@@ -41,6 +42,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::amplitude("offset_ms", 200.0, 1.0)],
     free: &[],
     moment: Moment::Mean,
+    wanders: 0.5,
     needs: "readings of the instrument while axes move",
     build: |target, values| {
         Box::new(ClockOffset {

@@ -60,6 +60,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_tilt_z_urad_per_k", 100.0, 2.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "a thermometer on the column or in the shop whose reading changes",
     build: |_, values| {
         Box::new(ColumnBend {

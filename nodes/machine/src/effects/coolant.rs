@@ -48,6 +48,7 @@ pub static KIND: Kind = Kind {
     ],
     free: &[Parameter::amplitude("free_growth_um_per_m", 100.0, 8.0)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "measurements along the direction before and after the coolant begins to flow",
     build: |target, values| {
         Box::new(Coolant {

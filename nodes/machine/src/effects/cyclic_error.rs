@@ -53,6 +53,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_cos_by_place_um", 20.0, 0.5),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "positions that differ by parts of the lead",
     build: |target, values| Box::new(CyclicError::new(&target, values)),
 };

@@ -42,6 +42,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::amplitude("windup_um", 100.0, 2.0)],
     free: &[Parameter::amplitude("free_by_place_um", 100.0, 1.0)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings while the axis accelerates, and its motor or scale",
     build: |target, values| {
         Box::new(DriveWindup {

@@ -43,6 +43,7 @@ pub static KIND: Kind = Kind {
     ],
     free: &[Parameter::amplitude("free_viscous_um", 60.0, 2.0)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "motion at two feeds, one of them slow, in both senses",
     build: |target, values| {
         Box::new(FeedLostMotion {

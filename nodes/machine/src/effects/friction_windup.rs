@@ -48,6 +48,7 @@ pub static KIND: Kind = Kind {
     ],
     free: &[],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "reversals of the axis at two places",
     build: |target, values| {
         Box::new(FrictionWindup {

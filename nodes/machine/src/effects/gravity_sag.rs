@@ -44,6 +44,7 @@ pub static KIND: Kind = Kind {
     ],
     free: &[Parameter::amplitude("free_from_high_um", 100.0, 5.0)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "vertical readings over the travel of the horizontal axis",
     build: |target, values| {
         Box::new(GravitySag {

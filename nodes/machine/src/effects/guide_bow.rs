@@ -41,6 +41,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::amplitude("sagitta_um", 60.0, 5.0)],
     free: &[],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings across the axis over its travel, with two arms",
     build: |target, values| {
         Box::new(GuideBow {

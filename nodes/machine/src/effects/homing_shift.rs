@@ -43,6 +43,7 @@ pub static KIND: Kind = Kind {
     ],
     free: &[],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "measurements along the axis before and after a reference run, without a new set-up between them",
     build: |target, values| {
         Box::new(HomingShift {

@@ -62,6 +62,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_cos2_um", 5.0, 0.05),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "slow motion or stands that differ by parts of the signal period",
     build: |target, values| {
         Box::new(InterpolationError {

@@ -25,6 +25,8 @@ pub struct Kind {
     pub free: &'static [Parameter],
     /// Whether it moves the mean of readings or only their scatter.
     pub moment: Moment,
+    /// Share by which its size may differ from its mean between conditions by its physics, 1; 0: one size always.
+    pub wanders: f64,
     /// What a recording must contain to show it, in words: "a reversal of the axis".
     pub needs: &'static str,
     /// Makes it; values in the order of `parameters`, then of `free`, in the units of the file.

@@ -43,6 +43,7 @@ pub static KIND: Kind = Kind {
     ],
     free: &[Parameter::amplitude("free_rate_ms_per_h", 20.0, 0.3)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "touches at two feeds or more, at two times",
     build: |_, values| {
         Box::new(LatencyDrift {

@@ -37,6 +37,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::size("jitter_ms", 10.0, 0.1)],
     free: &[],
     moment: Moment::Variance,
+    wanders: 0.0,
     needs: "repeated touches of one surface at two feeds or more",
     build: |_, values| {
         Box::new(LatencyJitter {

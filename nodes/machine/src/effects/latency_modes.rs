@@ -42,6 +42,7 @@ pub static KIND: Kind = Kind {
     ],
     free: &[],
     moment: Moment::Variance,
+    wanders: 0.0,
     needs: "repeated touches of one surface at two feeds or more",
     build: |_, values| {
         Box::new(LatencyModes {

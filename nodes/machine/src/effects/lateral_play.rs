@@ -44,6 +44,7 @@ pub static KIND: Kind = Kind {
     ],
     free: &[],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "a reversal of the axis, read across it",
     build: |target, values| {
         Box::new(LateralPlay {

@@ -50,6 +50,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::size("stray_mm2", 9.0, 1.0)],
     free: &[Parameter::amplitude("free_curve_um_per_m2", 100.0, 2.0)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings of the length reference at two places of the axis, and another instrument's or another axis'",
     build: |target, values| {
         Box::new(LengthMisalignment {

@@ -49,6 +49,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_rate_ppm_per_h", 20.0, 0.5),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings of the length reference at two places",
     build: |_, values| {
         Box::new(LengthWavelength {

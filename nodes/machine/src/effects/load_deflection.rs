@@ -45,6 +45,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_after_um", 100.0, 1.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "an external reference while the axis accelerates",
     build: |target, values| {
         Box::new(LoadDeflection {

@@ -43,6 +43,7 @@ pub static KIND: Kind = Kind {
     ],
     free: CURVE_UM,
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "positions over the axis' travel",
     build: |target, values| Box::new(PitchError::new(&target, values)),
 };

@@ -55,6 +55,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_v_vv_um_per_m", 100.0, 2.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "contours on the grid encoder at two placements",
     build: |_, values| {
         let per_mm = |k: usize| values[k] * 1e-6;

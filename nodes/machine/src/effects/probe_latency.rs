@@ -38,6 +38,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::amplitude("latency_ms", 50.0, 1.0)],
     free: &[Parameter::amplitude("free_square_um", 100.0, 2.0)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "touches at two feeds or more",
     build: |_, values| {
         Box::new(ProbeLatency {

@@ -49,6 +49,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_6_sin_um", 15.0, 0.5),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "touches all round a bore, a boss or a sphere",
     build: |_, values| {
         let pair = |k: usize| [values[k] * 1e-3, values[k + 1] * 1e-3];

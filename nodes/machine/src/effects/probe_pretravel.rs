@@ -58,6 +58,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_slant_um", 50.0, 1.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "touches of known surfaces from both sides, or along the probe's axis and across it",
     build: |_, values| {
         Box::new(ProbePretravel {

@@ -37,6 +37,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::size("sigma_um", 20.0, 0.5)],
     free: &[Parameter::size("free_lateral_um", 20.0, 0.5)],
     moment: Moment::Variance,
+    wanders: 0.0,
     needs: "repeated touches of one surface",
     build: |_, values| {
         Box::new(ProbeRepeatability {

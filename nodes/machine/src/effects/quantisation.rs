@@ -40,6 +40,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::size("step_um", 20.0, 1.0)],
     free: &[],
     moment: Moment::Variance,
+    wanders: 0.0,
     needs: "readings of the instrument while axes move",
     build: |target, values| {
         Box::new(Quantisation {

@@ -78,6 +78,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_below_8mm_s_um", 30.0, 1.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "a reversal of the axis in motion",
     build: |target, values| Box::new(ReversalSpike::new(&target, values)),
 };

@@ -40,6 +40,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::amplitude("width_urad", 500.0, 10.0)],
     free: &[],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings at one position of the rotary axis that is come to from both sides",
     build: |target, values| {
         Box::new(RotaryBacklash {

@@ -37,6 +37,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::amplitude("size_um_urad", 200.0, 15.0)],
     free: &[],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings at two positions of the rotary axis or more",
     build: |target, values| {
         Box::new(RotaryLocation {

@@ -46,6 +46,7 @@ pub static KIND: Kind = Kind {
         Parameter::ordinate("free_sin5_um_urad", 200.0, 2.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings at positions of the rotary axis over a turn",
     build: |target, values| {
         let per_micro = lever::per_micro(target.component());

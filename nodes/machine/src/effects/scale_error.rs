@@ -38,6 +38,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::amplitude("scale_um_per_m", 200.0, 15.0)],
     free: &[Parameter::amplitude("free_expansion_um_per_m_k", 30.0, 5.0)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "positions over the axis' travel",
     build: |target, values| Box::new(ScaleError::new(&target, values)),
 };

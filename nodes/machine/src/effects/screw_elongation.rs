@@ -70,6 +70,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_square_slow_um_per_m", 10_000.0, 10.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "an axis that travels for some minutes and is measured at two places or more",
     build: |target, values| {
         Box::new(ScrewElongation {

@@ -49,6 +49,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_worked_off_ms", 60.0, 0.3),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings while the axis moves, at two speeds or in both senses",
     build: |target, values| Box::new(ServoLag::new(&target, values)),
 };

@@ -51,6 +51,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_y_um", 200.0, 10.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "measurements of Z over some minutes while the spindle warms or cools",
     build: |_, values| {
         Box::new(SpindleGrowth {

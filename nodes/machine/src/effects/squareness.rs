@@ -38,6 +38,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::amplitude("angle_urad", 500.0, 15.0)],
     free: &[],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings across one of the axes over the travel of the other",
     build: |target, values| Box::new(Squareness::new(&target, values)),
 };

@@ -57,6 +57,7 @@ pub static KIND: Kind = Kind {
         ),
     ],
     moment: Moment::Variance,
+    wanders: 0.0,
     needs: "motion of the axis below a few mm/s",
     build: |target, values| {
         Box::new(StickSlip {

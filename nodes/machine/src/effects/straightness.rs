@@ -43,6 +43,7 @@ pub static KIND: Kind = Kind {
     ],
     free: CURVE_UM,
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings across the axis over its travel",
     build: |target, values| Box::new(Straightness::new(&target, values)),
 };

@@ -53,6 +53,7 @@ pub static KIND: Kind = Kind {
     ],
     free: &[],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "readings while the axis starts, stops or changes its acceleration",
     build: |target, values| {
         Box::new(StructuralRinging {

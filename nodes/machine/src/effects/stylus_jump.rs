@@ -47,6 +47,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_z_um", 200.0, 10.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "touches of the same surfaces at two times",
     build: |_, values| {
         Box::new(StylusJump {

@@ -43,6 +43,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::size("lag_s", 600.0, 60.0)],
     free: &[Parameter::amplitude("free_square_s2", 90_000.0, 900.0)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "a temperature that changes and another one to compare it with",
     build: |target, values| {
         Box::new(ThermometerLag {

@@ -41,6 +41,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::size("sigma_k", 2.0, 0.1)],
     free: &[Parameter::size("free_draught_percent", 20.0, 1.0)],
     moment: Moment::Variance,
+    wanders: 0.0,
     needs: "a temperature that another thermometer beside it shows, at two distances from that of the air",
     build: |target, values| {
         Box::new(ThermometerNoise {

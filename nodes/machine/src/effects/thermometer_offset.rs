@@ -35,6 +35,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::amplitude("offset_k", 10.0, 0.3)],
     free: &[Parameter::amplitude("free_slope_percent", 20.0, 1.0)],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "a temperature that is known otherwise",
     build: |target, values| {
         Box::new(ThermometerOffset {

@@ -39,6 +39,7 @@ pub static KIND: Kind = Kind {
     parameters: &[Parameter::size("amplitude_um", 20.0, 0.5)],
     free: &[Parameter::size("free_with_speed_um", 20.0, 0.5)],
     moment: Moment::Variance,
+    wanders: 0.0,
     needs: "readings of a grid encoder or length reference along the direction",
     build: |target, values| {
         Box::new(VibrationRandom {

@@ -50,6 +50,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("free_z_um_per_m_k", 30.0, 4.0),
     ],
     moment: Moment::Mean,
+    wanders: 0.0,
     needs: "touches at two places and a thermometer in the shop that is not at 20 degC",
     build: |_, values| {
         let common = values[0];
