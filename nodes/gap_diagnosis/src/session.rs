@@ -34,6 +34,9 @@
 //! | with stations, positioning, diagonals | the mean of each stop after [`SessionConfig::settle_s`] |
 //! | touches | each touch of a feature that the machine file has, up to 2 s after the end of its segment |
 //!
+//! A run holds what is stamped from its begin to its end, in whatever order topics arrive: up to 2 s apart. A segment
+//! that bears the stamp of another clock begins and ends when its messages come.
+//!
 //! A contour has at most [`SessionConfig::readings_per_run`] readings per channel: means of an odd number of
 //! neighbours, the same number in every repeat. The commanded motion is kept at each of them, at reversals,
 //! starts and stops tick by tick, and at least every 50 ms or 0.5 mm. While a run is open, ticks of axes that stand are
@@ -68,6 +71,7 @@ mod error;
 mod motion;
 mod nominal;
 mod past;
+mod recent;
 mod record;
 mod select;
 mod standing;

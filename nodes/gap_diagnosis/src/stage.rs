@@ -88,6 +88,8 @@ impl Task {
 /// D from which an effect is found in every diagnosis. One nearer to what can be seen at all (about 8) is named in one and
 /// not in the next: that is no change of the machine.
 const LEAST_D: f64 = 10.0;
+/// Where nothing comes for so long, what has ended is whole.
+const SILENCE: Span = Span::from_nanos(1_000_000_000);
 /// Repeats of a test that say what its noise is.
 const REPEATS: usize = 3;
 
@@ -137,6 +139,8 @@ pub struct GapDiagnosisStage {
     machine: MachineFile,
     builder: SessionBuilder,
     last: Option<Stamp<Host>>,
+    /// When the last sample came, until what had ended by then is whole.
+    last_sample: Option<Stamp<Host>>,
     is_due: bool,
     /// Whether diagnoses are given out, and whether one is on its way.
     beside: bool,
@@ -167,6 +171,7 @@ impl GapDiagnosisStage {
             config: config.clone(),
             machine: machine.clone(),
             last: None,
+            last_sample: None,
             is_due: false,
             beside: false,
             is_out: false,
@@ -185,9 +190,22 @@ impl GapDiagnosisStage {
         self.beside = true;
     }
 
-    fn sample(&mut self, sample: session::Input) {
+    fn sample(&mut self, at: Stamp<Host>, sample: session::Input) {
+        self.last_sample = Some(at);
+        self.gather(|builder| builder.take(sample));
+    }
+
+    /// The last run of a recording that is played closes when no more comes.
+    fn settle(&mut self, at: Stamp<Host>) {
+        if self.last_sample.is_some_and(|last| at - last >= SILENCE) {
+            self.last_sample = None;
+            self.gather(SessionBuilder::settle);
+        }
+    }
+
+    fn gather(&mut self, how: impl FnOnce(&mut SessionBuilder)) {
         let closed = self.builder.closed();
-        self.builder.take(sample);
+        how(&mut self.builder);
         if self.builder.closed() > closed {
             self.builder.keep_last(self.config.last_runs);
             self.is_due |= self.builder.runs().len() >= self.config.least_runs;
@@ -398,9 +416,12 @@ impl Stage for GapDiagnosisStage {
         out: &mut Vec<Output>,
     ) -> Result<(), GapError> {
         match input {
-            Input::Sample(sample) => self.sample(sample),
+            Input::Sample(sample) => self.sample(at, sample),
             Input::Found(finding) => self.found(at, *finding, out),
-            Input::Tick => self.look(at, out),
+            Input::Tick => {
+                self.settle(at);
+                self.look(at, out);
+            }
         }
         Ok(())
     }

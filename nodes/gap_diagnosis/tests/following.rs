@@ -146,6 +146,7 @@ impl Machine {
             self.tick(place, [wave(0), wave(2 * HARMONICS)]);
         }
         self.take(Segment(segment(self.run, false)));
+        self.nanos += 1_000_000_000;
         self.step(Input::Tick);
     }
 

@@ -13,11 +13,12 @@ use metrology::stamp::{Host, Stamp};
 use metrology::{Axis, AxisSet};
 
 use super::account::{Account, Reason};
-use super::channels::{Zero, is_test, touches_only};
+use super::channels::{Zero, is_test};
 use super::config::SessionConfig;
 use super::error::SessionError;
 use super::nominal;
 use super::past::Past;
+use super::recent::{LATE_S, Recent};
 use super::record::{Offset, Record, Tick};
 use super::time::{At, SessionTime};
 
@@ -45,9 +46,6 @@ pub enum Input {
 /// How far beyond the travel of the machine file a command may go, share of the travel.
 const BEYOND_TRAVEL: f64 = 0.01;
 
-/// How long touches and measured blocks may come after the end of their run, s.
-const LATE_S: f64 = 2.0;
-
 /// Number of readings that makes one mean, by what repeats have in common.
 type Blocks = Vec<(TestSegment, usize)>;
 
@@ -60,11 +58,10 @@ pub struct SessionBuilder {
     pub(super) axes: AxisSet,
     time: SessionTime,
     past: Past,
-    recent: VecDeque<Tick>,
-    offset: Option<Offset>,
+    recent: Recent,
     open: Option<Record>,
-    /// A run of touches that has ended, with the time of its end: its last touches may still come.
-    ended: Option<(f64, Record)>,
+    /// Runs that have ended, with the time of their end: their last samples may still come.
+    ended: VecDeque<(f64, Record)>,
     pub(super) runs: Vec<Run>,
     pub(super) closed: usize,
     pub(super) zeros: Vec<Zero>,
@@ -91,10 +88,9 @@ impl SessionBuilder {
             machine: machine.clone(),
             config,
             time: SessionTime::default(),
-            recent: VecDeque::new(),
-            offset: None,
+            recent: Recent::default(),
             open: None,
-            ended: None,
+            ended: VecDeque::new(),
             runs: vec![],
             closed: 0,
             zeros: vec![],
@@ -111,14 +107,17 @@ impl SessionBuilder {
     /// A bag ends: what is open is cut there.
     pub fn end_bag(&mut self) {
         self.cut();
-        self.close_ended();
+    }
+
+    /// Nothing comes any more for now: runs that have ended are whole.
+    pub fn settle(&mut self) {
+        self.close_ended(self.ended.len());
     }
 
     /// Another bag begins: its runs, set-ups and zeros are others than those before.
     pub fn next_bag(&mut self) {
         self.end_bag();
         self.recent.clear();
-        self.offset = None;
         self.base = self.greatest;
         if !self.runs.is_empty() {
             let _ = self.first_bag_ends.get_or_insert(self.base[0]);
@@ -134,13 +133,15 @@ impl SessionBuilder {
             Input::Temperature(sample) => self.temperature(&sample),
             Input::Grid(mut sample) => {
                 sample.zero_id = sample.zero_id.saturating_add(self.base[2]);
-                self.open.iter_mut().for_each(|open| open.grid.push(sample));
+                self.recent.grid(sample);
+                let of = self.run_at(sample.at);
+                of.into_iter().for_each(|run| run.grid.push(sample));
             }
             Input::Length(mut sample) => {
                 sample.zero_id = sample.zero_id.saturating_add(self.base[2]);
-                self.open
-                    .iter_mut()
-                    .for_each(|open| open.length.push(sample));
+                self.recent.length(sample);
+                let of = self.run_at(sample.at);
+                of.into_iter().for_each(|run| run.length.push(sample));
             }
             Input::Trigger(trigger) => self.trigger(trigger),
             Input::Block(measurement) => self.block(&measurement),
@@ -212,20 +213,23 @@ impl SessionBuilder {
         match self.time.take(at) {
             At::Time(time_s) => {
                 let is_over = |(ended_s, _): &(f64, Record)| time_s - ended_s > LATE_S;
-                if self.ended.as_ref().is_some_and(is_over) {
-                    self.close_ended();
-                }
+                let over = self.ended.iter().take_while(|run| is_over(run)).count();
+                self.close_ended(over);
                 time_s
             }
             At::Jumped(time_s) => {
                 self.account.note(Reason::ClockJump);
                 self.cut();
-                self.close_ended();
                 self.recent.clear();
-                self.offset = None;
                 time_s
             }
         }
+    }
+
+    /// The run that a sample with this stamp is of.
+    fn run_at(&mut self, at: Stamp<Host>) -> Option<&mut Record> {
+        let ended = self.ended.iter_mut().map(|(_, ended)| ended);
+        ended.chain(&mut self.open).find(|run| run.holds(at))
     }
 
     fn state(&mut self, state: &AxisState) {
@@ -242,8 +246,7 @@ impl SessionBuilder {
             return;
         }
         let time_s = self.session_time(state.received_at);
-        let open = self.open.as_ref();
-        let last = open.map_or(self.recent.back(), |open| open.ticks.last());
+        let last = self.recent.ticks.back();
         // Many states may arrive at one instant: their order is the controller's then.
         let is_later =
             |last: &Tick| (state.received_at, state.controller_at) > (last.at, last.controller_at);
@@ -253,16 +256,11 @@ impl SessionBuilder {
         }
         self.past.axes(time_s, &state.commanded);
         let tick = Tick::new(time_s, state);
-        match &mut self.open {
-            Some(open) if open.ticks.len() < self.config.ticks_per_run => open.push(tick),
-            Some(open) => open.beyond_limit += 1,
-            None => {
-                self.recent.push_back(tick);
-                let oldest_s = time_s - self.config.lead_in_s;
-                while self.recent.front().is_some_and(|t| t.time_s < oldest_s) {
-                    self.recent.pop_front();
-                }
-            }
+        self.recent.tick(tick, self.config.lead_in_s);
+        let most = self.config.ticks_per_run;
+        let ended = self.ended.iter_mut().map(|(_, ended)| ended);
+        for run in ended.chain(&mut self.open) {
+            run.take(tick, most);
         }
     }
 
@@ -282,15 +280,17 @@ impl SessionBuilder {
             at: compensation.at,
             total: compensation.total,
         };
-        let is_late = self.offset.is_some_and(|before| offset.at <= before.at);
+        let before = self.recent.offsets.back();
+        let is_late = before.is_some_and(|before| offset.at <= before.at);
         if is_late {
             self.account.note(Reason::WentBack);
             return;
         }
-        self.offset = Some(offset);
-        self.open
-            .iter_mut()
-            .for_each(|open| open.offsets.push(offset));
+        self.recent.offset(offset);
+        let ended = self.ended.iter_mut().map(|(_, ended)| ended);
+        ended
+            .chain(&mut self.open)
+            .for_each(|run| run.compensated(offset));
     }
 
     fn temperature(&mut self, sample: &TemperatureSample) {
@@ -298,9 +298,10 @@ impl SessionBuilder {
             let time_s = self.session_time(sample.at);
             self.past
                 .temperature(time_s, &sample.sensor, sample.temperature_degc);
-            self.open
-                .iter_mut()
-                .for_each(|open| open.temperatures.push(sample.clone()));
+            self.recent.temperature(sample);
+            let of = self.run_at(sample.at);
+            of.into_iter()
+                .for_each(|run| run.temperatures.push(sample.clone()));
         } else {
             self.account.note(Reason::NotFinite);
         }
@@ -314,8 +315,12 @@ impl SessionBuilder {
             .all(f64::is_finite)
         {
             let time_s = self.session_time(trigger.received_at);
-            let ended = self.ended.as_mut().map(|(_, ended)| ended);
-            if let Some(run) = self.open.as_mut().or(ended) {
+            self.recent.trigger(time_s, &trigger);
+            // A touch may come, and be stamped, after the end of its run.
+            let open = self.open.as_mut();
+            let open = open.filter(|open| open.holds(trigger.received_at));
+            let ended = self.ended.back_mut().map(|(_, ended)| ended);
+            if let Some(run) = open.or(ended) {
                 run.triggers.push((time_s, trigger));
             }
         } else {
@@ -337,8 +342,8 @@ impl SessionBuilder {
                 continue;
             };
             let time_s = self.time.of(face.at);
-            let ended = self.ended.as_mut().map(|(_, ended)| ended);
-            let mut all = self.open.iter_mut().chain(ended);
+            let ended = self.ended.iter_mut().map(|(_, ended)| ended);
+            let mut all = ended.chain(&mut self.open);
             if let Some(run) = all.find(|run| run.segment.run == number) {
                 run.faces.push((time_s, feature, approach, positions));
             }
@@ -357,55 +362,52 @@ impl SessionBuilder {
             *greatest = (*greatest).max(*number);
         }
         if segment.begin {
-            self.cut();
-            self.close_ended();
+            self.cut_at(self.recent.of_this_clock(segment.at));
             self.account.segments += 1;
             if is_test(segment.kind) {
-                let lead_in = self.recent.iter().copied().collect();
-                self.open = Some(Record::new(segment, lead_in, self.offset));
+                let lead_in_s = self.config.lead_in_s;
+                self.open = Some(Record::new(segment, &self.recent, lead_in_s));
             }
-        } else if let Some(open) = self.open.take() {
+        } else if let Some(mut open) = self.open.take() {
             if open.segment.run != segment.run {
                 self.account.note(Reason::NotBegun);
                 self.open = Some(open);
             } else if segment.completed {
-                self.go_on(&open);
-                if touches_only(segment.kind) {
-                    self.ended = Some((self.time.newest_s(), open));
-                } else {
-                    self.close(open);
-                }
+                let at = self.recent.of_this_clock(segment.at);
+                let ended_s = at.map_or(self.time.newest_s(), |at| self.time.of(at));
+                open.end(at.or(self.recent.newest()));
+                self.ended.push_back((ended_s, open));
             } else {
                 self.account.note(Reason::Failed);
-                self.go_on(&open);
             }
         } else if is_test(segment.kind) {
             self.account.note(Reason::NotBegun);
         }
     }
 
-    /// Closes an open run that has no end.
+    /// Closes the first so many runs of those that have ended.
+    fn close_ended(&mut self, many: usize) {
+        for _ in 0..many {
+            if let Some((_, ended)) = self.ended.pop_front() {
+                self.close(ended);
+            }
+        }
+    }
+
+    /// Closes every run, also one that has no end.
     fn cut(&mut self) {
-        if let Some(open) = self.open.take() {
+        self.cut_at(None);
+        self.settle();
+    }
+
+    /// Closes an open run that has no end, with what was taken before the next one.
+    fn cut_at(&mut self, next: Option<Stamp<Host>>) {
+        if let Some(mut open) = self.open.take() {
             self.account.note(Reason::Cut);
-            self.go_on(&open);
+            self.settle();
+            open.end(next);
             self.close(open);
         }
-    }
-
-    /// Closes a run of touches that has ended.
-    fn close_ended(&mut self) {
-        if let Some((_, ended)) = self.ended.take() {
-            self.close(ended);
-        }
-    }
-
-    /// The end of a run is the lead-in of the next.
-    fn go_on(&mut self, open: &Record) {
-        self.recent.clear();
-        let newest_s = open.ticks.last().map_or(0.0, |tick| tick.time_s);
-        let recent = |tick: &&Tick| tick.time_s >= newest_s - self.config.lead_in_s;
-        self.recent.extend(open.ticks.iter().filter(recent));
     }
 }
 

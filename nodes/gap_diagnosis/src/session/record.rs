@@ -1,10 +1,14 @@
 //! What was recorded of one run while it is open.
 
+use std::collections::VecDeque;
+
 use metrology::PerAxis;
 use metrology::sample::{
     AxisState, GridSample, LengthSample, ProbeTrigger, TemperatureSample, TestSegment,
 };
 use metrology::stamp::{Host, Machine, Stamp};
+
+use super::recent::Recent;
 
 /// Positions at one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +54,9 @@ pub(super) struct Offset {
 pub(super) struct Record {
     /// Its begin.
     pub segment: TestSegment,
+    /// First and last stamp of what is of it; without one, what arrives is.
+    from: Option<Stamp<Host>>,
+    to: Option<Stamp<Host>>,
     /// The lead-in and the run.
     pub ticks: Vec<Tick>,
     /// How many of the ticks are lead-in.
@@ -85,23 +92,80 @@ const MOVED: f64 = 1e-2;
 const COMPENSATION_SILENCE_S: f64 = 1.0;
 
 impl Record {
-    pub(super) fn new(segment: TestSegment, lead_in: Vec<Tick>, offset: Option<Offset>) -> Self {
-        Self {
+    /// A run that begins, with what came before and is of it.
+    pub(super) fn new(segment: TestSegment, recent: &Recent, lead_in_s: f64) -> Self {
+        let from = recent.of_this_clock(segment.at);
+        let newest = recent.ticks.back().map(|tick| tick.at);
+        let begins = from.or(newest).unwrap_or_default();
+        let is_in = |at: Stamp<Host>| from.is_some_and(|from| at >= from);
+        let mut record = Self {
             segment,
-            lead_in: lead_in.len(),
-            ticks: lead_in,
-            offsets: offset.into_iter().collect(),
-            grid: vec![],
-            length: vec![],
-            triggers: vec![],
+            from,
+            to: None,
+            ticks: vec![],
+            lead_in: 0,
+            offsets: recent.offsets.iter().copied().collect(),
+            grid: of(&recent.grid, |sample| is_in(sample.at)),
+            length: of(&recent.length, |sample| is_in(sample.at)),
+            triggers: of(&recent.triggers, |(_, touch)| is_in(touch.received_at)),
             faces: vec![],
-            temperatures: vec![],
+            temperatures: of(&recent.temperatures, |sample| is_in(sample.at)),
             beyond_limit: 0,
+        };
+        let is_old = |tick: &&Tick| (begins - tick.at).as_secs_f64() > lead_in_s;
+        for tick in recent.ticks.iter().skip_while(is_old) {
+            if is_in(tick.at) {
+                record.push(*tick);
+            } else {
+                record.ticks.push(*tick);
+                record.lead_in += 1;
+            }
+        }
+        record
+    }
+
+    /// Whether a sample with this stamp is of the run.
+    pub(super) fn holds(&self, at: Stamp<Host>) -> bool {
+        self.from.is_none_or(|from| at >= from) && self.to.is_none_or(|to| at <= to)
+    }
+
+    /// What has a later stamp is not of the run.
+    pub(super) fn end(&mut self, to: Option<Stamp<Host>>) {
+        self.to = to;
+        let Some(to) = to else { return };
+        let run = self.ticks.get(self.lead_in..).unwrap_or(&[]);
+        let within = run.partition_point(|tick| tick.at <= to);
+        self.ticks.truncate(self.lead_in + within);
+        self.offsets.retain(|offset| offset.at <= to);
+        self.grid.retain(|sample| sample.at <= to);
+        self.length.retain(|sample| sample.at <= to);
+        self.temperatures.retain(|sample| sample.at <= to);
+    }
+
+    /// Takes an offset that was added before the end.
+    pub(super) fn compensated(&mut self, offset: Offset) {
+        if self.to.is_none_or(|to| offset.at <= to) {
+            self.offsets.push(offset);
+        }
+    }
+
+    /// Takes a tick where it is of the run or before it.
+    pub(super) fn take(&mut self, tick: Tick, most: usize) {
+        let is_before = self.from.is_some_and(|from| tick.at < from);
+        if is_before && self.ticks.len() == self.lead_in {
+            self.ticks.push(tick);
+            self.lead_in += 1;
+        } else if self.holds(tick.at) {
+            if self.ticks.len() < most {
+                self.push(tick);
+            } else {
+                self.beyond_limit += 1;
+            }
         }
     }
 
     /// Takes a tick; of axes that stand only some are kept, the first and the last always.
-    pub(super) fn push(&mut self, tick: Tick) {
+    fn push(&mut self, tick: Tick) {
         if let [.., before, last] = &mut self.ticks[self.lead_in..]
             && stands(before, last)
             && stands(last, &tick)
@@ -173,6 +237,10 @@ impl Record {
         }
         self.offsets.iter().any(acts) && longest_s > COMPENSATION_SILENCE_S
     }
+}
+
+fn of<T: Clone>(recent: &VecDeque<T>, is_in: impl Fn(&T) -> bool) -> Vec<T> {
+    recent.iter().filter(|one| is_in(one)).cloned().collect()
 }
 
 fn stands(a: &Tick, b: &Tick) -> bool {

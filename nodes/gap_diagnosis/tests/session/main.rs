@@ -12,7 +12,9 @@ use metrology::sample::{
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
 use nalgebra::Vector3;
 
-const MACHINE: &str = include_str!("../../../launch_configs/gap_first/machine.yaml");
+mod order;
+
+const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
 
 fn machine() -> MachineFile {
     MachineFile::parse(MACHINE, "machine.yaml").expect("the scenario's machine file")

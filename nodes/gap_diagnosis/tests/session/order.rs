@@ -1,0 +1,109 @@
+//! Topics that do not arrive in the order of their stamps.
+
+use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
+use machine::twin::{Channel, Session};
+use metrology::sample::{
+    AxisCompensation, AxisState, CompensationState, GridSample, TestKind, TestPlane, TestSegment,
+};
+use metrology::{Axis, AxisSet, PerAxis, Stamp};
+
+use crate::{machine, of, segment};
+
+/// Two circles one after the other with all that is told of them and its stamp, ms.
+fn told() -> Vec<(i64, Input)> {
+    let mut told = vec![];
+    let mut millis = 0;
+    let stamp = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+    for run in 1..=2 {
+        let mut tick = |angle: f64| {
+            let (x, y) = (50.0 * angle.cos(), 50.0 * angle.sin());
+            let mut commanded = PerAxis::default();
+            (commanded[Axis::X], commanded[Axis::Y], commanded[Axis::Z]) = (x, y, 30.0);
+            let mut total = PerAxis::default();
+            total[Axis::X] = 1e-6 * f64::from(millis as i32);
+            let inputs = [
+                Input::Compensation(AxisCompensation {
+                    at: stamp(millis),
+                    axes: AxisSet::XYZ,
+                    total,
+                    thermal: total,
+                    geometric: PerAxis::default(),
+                    positioning: PerAxis::default(),
+                    pulses: PerAxis::default(),
+                    remainder: PerAxis::default(),
+                    state: PerAxis([CompensationState::Active; 6]),
+                }),
+                Input::State(AxisState {
+                    received_at: stamp(millis),
+                    controller_at: Stamp::from_nanos((millis + 7000) * 1_000_000),
+                    axes: AxisSet::XYZ,
+                    commanded,
+                    motor: commanded,
+                    scale: PerAxis([f64::NAN; 6]),
+                    velocity: PerAxis::default(),
+                }),
+                Input::Grid(GridSample {
+                    at: stamp(millis),
+                    plane: TestPlane::Xy,
+                    u_mm: x + total[Axis::X] + 2e-3 * (2.0 * angle).cos(),
+                    v_mm: y,
+                    zero_id: 1,
+                }),
+            ];
+            told.extend(inputs.map(|input| (millis, input)));
+            millis += 2;
+            millis
+        };
+        let begins = (0..3000).map(|_| tick(0.0)).last().expect("a rest");
+        let ends = (0..6284).map(|k| tick(f64::from(k) * 1e-3)).last();
+        let ends = ends.expect("a circle");
+        for (at, begin) in [(begins, true), (ends, false)] {
+            let segment = TestSegment {
+                at: stamp(at),
+                ..segment(run, begin, TestKind::Circle)
+            };
+            told.push((at, Input::Segment(segment)));
+        }
+    }
+    told
+}
+
+/// The session of what is told, each topic so much later than its stamps, ms.
+fn arriving(late: impl Fn(&Input) -> i64) -> Session {
+    let mut told = told();
+    told.sort_by_key(|(millis, input)| millis + late(input));
+    let mut builder = SessionBuilder::new(&machine(), SessionConfig::default()).expect("a machine");
+    for (_, input) in told {
+        builder.take(input);
+    }
+    let (session, account) = builder.finish().expect("a session");
+    assert_eq!(account.left_out.values().sum::<usize>(), 0, "{account:?}");
+    session
+}
+
+#[test]
+fn a_run_is_the_same_in_whatever_order_the_topics_arrive() {
+    let in_time = arriving(|_| 0);
+    assert_eq!(in_time.runs.len(), 2);
+    assert!(of(&in_time, 1, &Channel::GridU).len() > 1200);
+    // The begin behind the first samples or before the last of the rest; the plate before the axes or behind them.
+    for [segment, state, grid, offset] in [
+        [820, 0, 0, 0],
+        [0, 150, 0, 0],
+        [190, 0, 16, 0],
+        [0, 0, 1300, 0],
+        [900, 0, 400, 50],
+        [0, 30, 0, 700],
+    ] {
+        let late = arriving(|input| match input {
+            Input::Segment(_) => segment,
+            Input::State(_) => state,
+            Input::Grid(_) => grid,
+            _ => offset,
+        });
+        assert!(
+            late.runs == in_time.runs,
+            "{segment} {state} {grid} {offset}"
+        );
+    }
+}
