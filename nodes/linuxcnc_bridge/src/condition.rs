@@ -237,6 +237,10 @@ impl Condition {
                 ..
             }
             | Self::UnexpectedLine { .. }
+            | Self::ControllerError {
+                kind: FaultKind::RealtimeDelay,
+                ..
+            }
             | Self::ServoSlip { .. }
             | Self::TouchUnusable { .. }
             | Self::CompensationRefused(_)

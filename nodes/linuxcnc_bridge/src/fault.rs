@@ -16,6 +16,9 @@ pub enum FaultKind {
     FollowingError,
     /// The machine does not know where it is.
     NotHomed,
+    /// The servo thread ran late for the first time since LinuxCNC was started. It says so once and goes on: no program ends
+    /// of it.
+    RealtimeDelay,
     /// The program's text is wrong, or anything else.
     Other,
 }
@@ -31,6 +34,8 @@ pub fn classify(message: &str) -> FaultKind {
         FaultKind::ProbeStuck
     } else if has("following error") {
         FaultKind::FollowingError
+    } else if has("unexpected realtime delay") {
+        FaultKind::RealtimeDelay
     } else if has("homed") || has("homing") {
         FaultKind::NotHomed
     } else if has("limit") {
@@ -63,6 +68,10 @@ mod tests {
             (
                 "Can't issue MDI command when not homed",
                 FaultKind::NotHomed,
+            ),
+            (
+                "Unexpected realtime delay on task 0 with period 1000000",
+                FaultKind::RealtimeDelay,
             ),
             ("Bad character 'o' used", FaultKind::Other),
         ];

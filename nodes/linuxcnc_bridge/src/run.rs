@@ -233,7 +233,10 @@ impl Run {
         if let Some(text) = message
             && self.phase != Phase::Storing
         {
-            self.faults.push((classify(text), text.to_owned()));
+            let kind = classify(text);
+            if kind != FaultKind::RealtimeDelay {
+                self.faults.push((kind, text.to_owned()));
+            }
         }
         let Phase::Ending { questions } = &mut self.phase else {
             return None;

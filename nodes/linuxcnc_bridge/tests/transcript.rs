@@ -9,7 +9,7 @@ use linuxcnc_bridge::run::Outcome;
 use linuxcnc_bridge::stage::{IoCommand, IoEvent};
 use linuxcnc_bridge::{BridgeStage, Input, Output, Settings};
 use metrology::stamp::{Host, Span, Stamp};
-use metrology::{Axis, AxisSet, PerAxis, Stage};
+use metrology::{Axis, AxisSet, PerAxis, Severity, Stage};
 use proptest::prelude::*;
 
 const SECOND: i64 = 1_000_000_000;
@@ -389,6 +389,29 @@ fn a_program_runs_from_its_text_to_its_end() {
     assert_eq!(touch.map(|touch| touch.feature_id).as_deref(), Some("ring"));
     desk.later(0.1);
     assert_eq!(desk.ending(), Some((Outcome::Done, String::new(), 3)));
+}
+
+/// LinuxCNC tells it in the midst of a program, once, and goes on.
+#[test]
+fn a_servo_thread_that_was_late_once_is_warned_of_and_ends_no_program() {
+    let mut desk = Desk::new(Prepare::Observe);
+    desk.make_ready();
+    desk.begin("G21\nG1 X5 F60\nM2\n");
+    let _ = desk.play(|line| match line {
+        "get program_status" => Some("PROGRAM_STATUS RUNNING".into()),
+        "get error" => Some("ERROR Unexpected realtime delay on task 0 with period 1000000".into()),
+        _ => None,
+    });
+    desk.sample(1.00, 0, 2, 2);
+    desk.later(0.1);
+    assert_eq!(desk.ending(), Some((Outcome::Done, String::new(), 2)));
+    let warned = desk.out.iter().any(|output| match output {
+        Output::Condition(condition) => {
+            condition.name() == "controller_error" && condition.severity() == Severity::Warn
+        }
+        _ => false,
+    });
+    assert!(warned);
 }
 
 #[test]

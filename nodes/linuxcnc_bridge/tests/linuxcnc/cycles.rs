@@ -2,7 +2,6 @@
 
 use std::num::NonZeroU32;
 
-use linuxcnc_bridge::run::Outcome;
 use machine::cycle::{Cycle, blocks, latency};
 
 use crate::latency::{on_delay_s, weighted_line};
@@ -12,12 +11,7 @@ const PERIOD_S: f64 = 1e-3;
 
 /// Runs a cycle and gives, for each touch, feed (mm/s) and depth behind the nominal contact (mm).
 fn touch_all(rig: &mut Rig, cycle: &Cycle) -> Vec<(f64, f64)> {
-    rig.triggers.clear();
-    let ending = rig.run(&cycle.program);
-    assert_eq!(
-        (ending.outcome, ending.message.as_str()),
-        (Outcome::Done, "")
-    );
+    rig.touch(&cycle.program);
     assert_eq!(rig.triggers.len(), cycle.touches.len());
     let radius_mm = rig.machine.ball_radius_mm();
     rig.triggers

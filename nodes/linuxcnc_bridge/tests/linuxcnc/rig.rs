@@ -10,12 +10,16 @@ use linuxcnc_bridge::io::account::Account;
 use linuxcnc_bridge::io::start::{Controller, require_installed};
 use linuxcnc_bridge::io::{Address, BridgeIo, host_now};
 use linuxcnc_bridge::live::{LiveBridge, LiveInput};
-use linuxcnc_bridge::run::Ending;
+use linuxcnc_bridge::run::{Ending, Outcome};
 use linuxcnc_bridge::{BridgeConfig, BridgeError, BridgeStage, Output, Settings};
 use machine::file::MachineFile;
 use metrology::Stage;
 use metrology::sample::{AxisState, ProbeTrigger};
 use serde::Deserialize;
+
+/// A known fault of LinuxCNC on a busy computer, and how often a program is tried.
+const QUEUE_FAULT: &str = "Queue is not empty after probing";
+const ATTEMPTS: u32 = 3;
 
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
@@ -213,6 +217,21 @@ impl Rig {
     pub fn run(&mut self, program: &str) -> Ending {
         let goal = self.begin(program);
         self.finish(goal)
+    }
+
+    /// Runs a program of touches to its end. Where LinuxCNC gives it up over its own queue, which is said, it is run again.
+    pub fn touch(&mut self, program: &str) {
+        for _ in 0..ATTEMPTS {
+            self.triggers.clear();
+            let ending = self.run(program);
+            if !ending.message.contains(QUEUE_FAULT) {
+                let ended = (ending.outcome, ending.message.as_str());
+                assert_eq!(ended, (Outcome::Done, ""));
+                return;
+            }
+            println!("{}; once more", ending.message);
+        }
+        panic!("LinuxCNC refused to go on after probing at every attempt");
     }
 
     pub fn halcmd(&self, arguments: &[&str]) -> String {
