@@ -264,7 +264,11 @@ fn around(run: &Run, first: usize, last: usize, stations: usize) -> Option<Vec<S
         let [u, v] = place(tick);
         let angle = (sense * v.atan2(u)).rem_euclid(TAU);
         let cell = whole(angle / TAU * count(stations)) % cells;
-        let quadrant = whole(angle / FRAC_PI_2) % 4;
+        let quadrant = if cells.is_multiple_of(4) {
+            cell / (cells / 4)
+        } else {
+            whole(angle / FRAC_PI_2) % 4
+        };
         let visit = visits.entry((cell, quadrant)).or_default();
         *visit += u32::from(before != Some((cell, quadrant)));
         before = Some((cell, quadrant));

@@ -34,8 +34,9 @@
 //! | with stations, positioning, diagonals | the mean of each stop after [`SessionConfig::settle_s`] |
 //! | touches | each touch of a feature that the machine file has, up to 2 s after the end of its segment |
 //!
-//! A run holds what is stamped from its begin to its end, in whatever order topics arrive: up to 2 s apart. A segment
-//! that bears the stamp of another clock begins and ends when its messages come.
+//! A run holds what is stamped from its begin to its end, in whatever order topics arrive: up to 2 s apart. The clocks of
+//! the hosts must agree (`host_clock`). A segment that is stamped further from the samples begins or ends a run when its message comes; where it
+//! is older than they are that is counted.
 //!
 //! A contour has at most [`SessionConfig::readings_per_run`] readings per channel: means of an odd number of
 //! neighbours, the same number in every repeat. The commanded motion is kept at each of them, at reversals,
@@ -51,7 +52,7 @@
 //! | reading more than 10 m, rad or K from its nominal value | left out, counted |
 //! | value that is no number, count of another zero, sensor that stands while it is to change | left out, counted |
 //! | one coordinate of a grid encoder that stands while it is to change | that coordinate is left out, counted |
-//! | time that goes back by less than a second | the sample is left out, counted |
+//! | time that goes back by less than 2 s | the sample is left out, counted |
 //! | a clock that jumps back by more | the session's time goes on, the open run is cut, counted |
 //! | segment that the end of the bag cuts | kept up to there, counted |
 //! | segment that failed | left out, counted |

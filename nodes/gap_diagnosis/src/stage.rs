@@ -88,8 +88,9 @@ impl Task {
 /// D from which an effect is found in every diagnosis. One nearer to what can be seen at all (about 8) is named in one and
 /// not in the next: that is no change of the machine.
 const LEAST_D: f64 = 10.0;
-/// Where nothing comes for so long, what has ended is whole.
-const SILENCE: Span = Span::from_nanos(1_000_000_000);
+/// Where so many ticks follow one another without a word from the controller, what has ended is whole. They are counted
+/// and not timed, for samples may wait in a process that was stopped for a while.
+const SILENT_TICKS: u32 = 3;
 /// Repeats of a test that say what its noise is.
 const REPEATS: usize = 3;
 
@@ -139,8 +140,8 @@ pub struct GapDiagnosisStage {
     machine: MachineFile,
     builder: SessionBuilder,
     last: Option<Stamp<Host>>,
-    /// When the last sample came, until what had ended by then is whole.
-    last_sample: Option<Stamp<Host>>,
+    /// Ticks since the last word from the controller.
+    silent_ticks: u32,
     is_due: bool,
     /// Whether diagnoses are given out, and whether one is on its way.
     beside: bool,
@@ -171,7 +172,7 @@ impl GapDiagnosisStage {
             config: config.clone(),
             machine: machine.clone(),
             last: None,
-            last_sample: None,
+            silent_ticks: 0,
             is_due: false,
             beside: false,
             is_out: false,
@@ -190,15 +191,18 @@ impl GapDiagnosisStage {
         self.beside = true;
     }
 
-    fn sample(&mut self, at: Stamp<Host>, sample: session::Input) {
-        self.last_sample = Some(at);
+    fn sample(&mut self, sample: session::Input) {
+        use session::Input::{Segment, State, Trigger};
+        if matches!(sample, State(_) | Trigger(_) | Segment(_)) {
+            self.silent_ticks = 0;
+        }
         self.gather(|builder| builder.take(sample));
     }
 
     /// The last run of a recording that is played closes when no more comes.
-    fn settle(&mut self, at: Stamp<Host>) {
-        if self.last_sample.is_some_and(|last| at - last >= SILENCE) {
-            self.last_sample = None;
+    fn settle(&mut self) {
+        self.silent_ticks = self.silent_ticks.saturating_add(1);
+        if self.silent_ticks == SILENT_TICKS {
             self.gather(SessionBuilder::settle);
         }
     }
@@ -416,10 +420,10 @@ impl Stage for GapDiagnosisStage {
         out: &mut Vec<Output>,
     ) -> Result<(), GapError> {
         match input {
-            Input::Sample(sample) => self.sample(at, sample),
+            Input::Sample(sample) => self.sample(sample),
             Input::Found(finding) => self.found(at, *finding, out),
             Input::Tick => {
-                self.settle(at);
+                self.settle();
                 self.look(at, out);
             }
         }

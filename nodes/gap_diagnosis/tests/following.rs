@@ -146,7 +146,10 @@ impl Machine {
             self.tick(place, [wave(0), wave(2 * HARMONICS)]);
         }
         self.take(Segment(segment(self.run, false)));
-        self.nanos += 1_000_000_000;
+        // The machine rests until the run is whole.
+        for _ in 0..2_100_000_000 / TICK_NANOS {
+            self.tick([RADIUS_MM, 0.0], [0.0; 2]);
+        }
         self.step(Input::Tick);
     }
 

@@ -22,7 +22,7 @@ pub enum Reason {
     NotFinite,
     /// A sample older than one before it.
     WentBack,
-    /// The recording's clock jumped back by more than a second, or ahead by more than a week.
+    /// The recording's clock jumped back by more than two seconds, or ahead by more than a week.
     ClockJump,
     /// A reading between two axis states that lie too far apart.
     InGap,
@@ -46,6 +46,8 @@ pub enum Reason {
     Cut,
     /// An end without a begin.
     NotBegun,
+    /// A segment that came long after its stamp.
+    SegmentLate,
     /// Ticks beyond what a run may hold.
     TooLong,
     /// A run during which the compensation's messages broke off; its last value was held.
@@ -75,6 +77,9 @@ impl Reason {
             Self::Failed => "segments did not run to their end and are left out",
             Self::Cut => "segments were cut; they are used up to there",
             Self::NotBegun => "segments ended whose begin was not recorded",
+            Self::SegmentLate => {
+                "segments came more than 2 s after their stamp, or bear that of another clock; they begin and end when they came"
+            }
             Self::TooLong => "ticks were beyond what one run may hold",
             Self::CompensationHeld => {
                 "runs had a hole in the compensation; its last value was held"

@@ -13,7 +13,7 @@ use metrology::stamp::{Host, Stamp};
 use metrology::{Axis, AxisSet};
 
 use super::account::{Account, Reason};
-use super::channels::{Zero, is_test};
+use super::channels::{Zero, is_test, touches_only};
 use super::config::SessionConfig;
 use super::error::SessionError;
 use super::nominal;
@@ -46,6 +46,9 @@ pub enum Input {
 /// How far beyond the travel of the machine file a command may go, share of the travel.
 const BEYOND_TRAVEL: f64 = 0.01;
 
+/// Most runs that have ended and are not closed yet.
+const MOST_ENDED: usize = 4;
+
 /// Number of readings that makes one mean, by what repeats have in common.
 type Blocks = Vec<(TestSegment, usize)>;
 
@@ -62,6 +65,8 @@ pub struct SessionBuilder {
     open: Option<Record>,
     /// Runs that have ended, with the time of their end: their last samples may still come.
     ended: VecDeque<(f64, Record)>,
+    /// Whether the last segment was the end of a run of touches: one may come, and be stamped, after it.
+    awaits_touches: bool,
     pub(super) runs: Vec<Run>,
     pub(super) closed: usize,
     pub(super) zeros: Vec<Zero>,
@@ -91,6 +96,7 @@ impl SessionBuilder {
             recent: Recent::default(),
             open: None,
             ended: VecDeque::new(),
+            awaits_touches: false,
             runs: vec![],
             closed: 0,
             zeros: vec![],
@@ -316,12 +322,12 @@ impl SessionBuilder {
         {
             let time_s = self.session_time(trigger.received_at);
             self.recent.trigger(time_s, &trigger);
-            // A touch may come, and be stamped, after the end of its run.
-            let open = self.open.as_mut();
-            let open = open.filter(|open| open.holds(trigger.received_at));
-            let ended = self.ended.back_mut().map(|(_, ended)| ended);
-            if let Some(run) = open.or(ended) {
+            if let Some(run) = self.run_at(trigger.received_at) {
                 run.triggers.push((time_s, trigger));
+            } else if self.awaits_touches
+                && let Some((_, ended)) = self.ended.back_mut()
+            {
+                ended.triggers.push((time_s, trigger));
             }
         } else {
             self.account.note(Reason::NotFinite);
@@ -361,9 +367,17 @@ impl SessionBuilder {
             *number = number.saturating_add(base);
             *greatest = (*greatest).max(*number);
         }
+        if self.recent.is_late(segment.at) && is_test(segment.kind) {
+            self.account.note(Reason::SegmentLate);
+        }
+        self.awaits_touches = false;
+        let at = self.recent.of_this_clock(segment.at);
         if segment.begin {
-            self.cut_at(self.recent.of_this_clock(segment.at));
+            self.cut_at(at);
             self.account.segments += 1;
+            for (at, (_, ended)) in at.iter().zip(self.ended.back_mut()) {
+                ended.give_up(*at);
+            }
             if is_test(segment.kind) {
                 let lead_in_s = self.config.lead_in_s;
                 self.open = Some(Record::new(segment, &self.recent, lead_in_s));
@@ -373,7 +387,8 @@ impl SessionBuilder {
                 self.account.note(Reason::NotBegun);
                 self.open = Some(open);
             } else if segment.completed {
-                let at = self.recent.of_this_clock(segment.at);
+                self.awaits_touches = touches_only(segment.kind);
+                self.close_ended(self.ended.len().saturating_sub(MOST_ENDED - 1));
                 let ended_s = at.map_or(self.time.newest_s(), |at| self.time.of(at));
                 open.end(at.or(self.recent.newest()));
                 self.ended.push_back((ended_s, open));

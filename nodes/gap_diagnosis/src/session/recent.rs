@@ -20,7 +20,7 @@ pub(super) struct Recent {
     pub temperatures: VecDeque<TemperatureSample>,
     /// With their session time.
     pub triggers: VecDeque<(f64, ProbeTrigger)>,
-    /// The stamp of the newest sample.
+    /// The newest stamp of those that tell whether the clock jumped: of axes, thermometers and touches.
     newest: Option<Stamp<Host>>,
 }
 
@@ -30,17 +30,25 @@ impl Recent {
         *self = Self::default();
     }
 
-    /// The stamp of the newest sample.
+    /// The newest stamp.
     pub(super) const fn newest(&self) -> Option<Stamp<Host>> {
         self.newest
     }
 
     /// The stamp of a segment where it is of the samples' clock: not further from the newest than a message may be late.
     pub(super) fn of_this_clock(&self, at: Stamp<Host>) -> Option<Stamp<Host>> {
-        let apart = |newest: Stamp<Host>| (at - newest).as_secs_f64().abs();
-        self.newest
-            .is_some_and(|newest| apart(newest) <= LATE_S)
-            .then_some(at)
+        let ahead_s = self.ahead_s(at)?;
+        (ahead_s.abs() <= LATE_S).then_some(at)
+    }
+
+    /// Whether a stamp is older than any message may be.
+    pub(super) fn is_late(&self, at: Stamp<Host>) -> bool {
+        self.ahead_s(at).is_some_and(|ahead_s| ahead_s < -LATE_S)
+    }
+
+    /// How far a stamp is ahead of the newest sample.
+    fn ahead_s(&self, at: Stamp<Host>) -> Option<f64> {
+        self.newest.map(|newest| (at - newest).as_secs_f64())
     }
 
     pub(super) fn tick(&mut self, tick: Tick, lead_in_s: f64) {
@@ -62,29 +70,26 @@ impl Recent {
     }
 
     pub(super) fn grid(&mut self, sample: GridSample) {
-        self.came(sample.at);
-        keep(&mut self.grid, sample, sample.at, |s| s.at);
+        keep(&mut self.grid, sample, self.newest, |s| s.at);
     }
 
     pub(super) fn length(&mut self, sample: LengthSample) {
-        self.came(sample.at);
-        keep(&mut self.length, sample, sample.at, |s| s.at);
+        keep(&mut self.length, sample, self.newest, |s| s.at);
     }
 
     pub(super) fn temperature(&mut self, sample: &TemperatureSample) {
         self.came(sample.at);
-        keep(&mut self.temperatures, sample.clone(), sample.at, |s| s.at);
+        keep(&mut self.temperatures, sample.clone(), self.newest, |s| {
+            s.at
+        });
     }
 
     pub(super) fn trigger(&mut self, time_s: f64, trigger: &ProbeTrigger) {
-        let at = trigger.received_at;
-        self.came(at);
-        keep(
-            &mut self.triggers,
-            (time_s, trigger.clone()),
-            at,
-            |(_, t)| t.received_at,
-        );
+        self.came(trigger.received_at);
+        let touch = (time_s, trigger.clone());
+        keep(&mut self.triggers, touch, self.newest, |(_, t)| {
+            t.received_at
+        });
     }
 
     fn came(&mut self, at: Stamp<Host>) {
@@ -96,10 +101,14 @@ fn oldest(newest: Stamp<Host>) -> Stamp<Host> {
     newest - Span::from_secs_f64(LATE_S)
 }
 
-fn keep<T>(held: &mut VecDeque<T>, one: T, at: Stamp<Host>, of: fn(&T) -> Stamp<Host>) {
-    held.push_back(one);
-    let oldest = oldest(at);
+/// Holds one where it is near the newest stamp: one far from it, as of a clock that was set, would stay for good.
+fn keep<T>(held: &mut VecDeque<T>, one: T, newest: Option<Stamp<Host>>, of: fn(&T) -> Stamp<Host>) {
+    let Some(newest) = newest else { return };
+    let oldest = oldest(newest);
     while held.front().is_some_and(|first| of(first) < oldest) {
         held.pop_front();
+    }
+    if (of(&one) - newest).as_secs_f64().abs() <= LATE_S {
+        held.push_back(one);
     }
 }

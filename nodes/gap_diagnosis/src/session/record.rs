@@ -40,6 +40,19 @@ impl Tick {
     }
 }
 
+impl Tick {
+    /// The same at another instant, of axes that stand.
+    fn moved_to(self, at: Stamp<Host>) -> Self {
+        let early = self.at - at;
+        Self {
+            at,
+            controller_at: self.controller_at - early,
+            time_s: self.time_s - early.as_secs_f64(),
+            ..self
+        }
+    }
+}
+
 /// Offsets from one instant on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Offset {
@@ -134,12 +147,25 @@ impl Record {
         self.to = to;
         let Some(to) = to else { return };
         let run = self.ticks.get(self.lead_in..).unwrap_or(&[]);
-        let within = run.partition_point(|tick| tick.at <= to);
-        self.ticks.truncate(self.lead_in + within);
+        let within = self.lead_in + run.partition_point(|tick| tick.at <= to);
+        let next = self.ticks.get(within).copied();
+        self.ticks.truncate(within);
+        // Of axes that stand the last tick was held only.
+        if let (Some(last), Some(next)) = (self.ticks.last(), next)
+            && stands(last, &next)
+            && last.at < to
+        {
+            self.ticks.push(next.moved_to(to));
+        }
         self.offsets.retain(|offset| offset.at <= to);
         self.grid.retain(|sample| sample.at <= to);
         self.length.retain(|sample| sample.at <= to);
         self.temperatures.retain(|sample| sample.at <= to);
+    }
+
+    /// Gives up the touches from an instant on: they are of the run that began then.
+    pub(super) fn give_up(&mut self, from: Stamp<Host>) {
+        self.triggers.retain(|(_, touch)| touch.received_at < from);
     }
 
     /// Takes an offset that was added before the end.
@@ -235,7 +261,7 @@ impl Record {
             longest_s = longest_s.max((at - before).as_secs_f64());
             before = at;
         }
-        self.offsets.iter().any(acts) && longest_s > COMPENSATION_SILENCE_S
+        self.offsets.iter().filter(|o| o.at < end).any(acts) && longest_s > COMPENSATION_SILENCE_S
     }
 }
 

@@ -2,8 +2,8 @@
 
 use metrology::stamp::{Host, Span, Stamp};
 
-/// A sample this much older than the newest one is late; an older one means that the clock jumped.
-const LATE: Span = Span::from_nanos(1_000_000_000);
+use super::recent::LATE_S;
+
 /// A sample this much newer than the newest one means that the clock jumped: no session rests longer, and what is held of
 /// its past grows with it.
 const LONGEST_REST: Span = Span::from_nanos(7 * 86_400 * 1_000_000_000);
@@ -50,7 +50,9 @@ impl SessionTime {
             at
         });
         let mut shifted = at + self.shift;
-        let jumped = self.newest - shifted > LATE || shifted - self.newest > LONGEST_REST;
+        // A sample that is a little older than the newest one is late; an older one means that the clock jumped.
+        let late_s = (self.newest - shifted).as_secs_f64();
+        let jumped = late_s > LATE_S || shifted - self.newest > LONGEST_REST;
         if jumped {
             self.shift = self.newest + PAUSE - at;
             shifted = at + self.shift;

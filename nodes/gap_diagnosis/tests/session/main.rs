@@ -118,8 +118,7 @@ impl Rig {
         for _ in 0..6000 {
             self.tick(50.0, 0.0);
         }
-        self.builder
-            .take(Input::Segment(segment(run, true, TestKind::Circle)));
+        self.segment(run, true);
         let ticks = TAU * 50.0 / 0.025 * share;
         let mut k = 0.0;
         while k < ticks {
@@ -130,8 +129,14 @@ impl Rig {
     }
 
     fn end(&mut self, run: u32) {
-        self.builder
-            .take(Input::Segment(segment(run, false, TestKind::Circle)));
+        self.segment(run, false);
+    }
+
+    fn segment(&mut self, run: u32, begin: bool) {
+        self.builder.take(Input::Segment(TestSegment {
+            at: Stamp::from_nanos(self.millis * 1_000_000),
+            ..segment(run, begin, TestKind::Circle)
+        }));
     }
 }
 

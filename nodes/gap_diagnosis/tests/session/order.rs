@@ -1,13 +1,23 @@
 //! Topics that do not arrive in the order of their stamps.
 
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
-use machine::twin::{Channel, Session};
+use machine::twin::{Channel, Run, Session};
 use metrology::sample::{
-    AxisCompensation, AxisState, CompensationState, GridSample, TestKind, TestPlane, TestSegment,
+    AxisCompensation, AxisState, CompensationState, GridSample, TemperatureSample, TestKind,
+    TestPlane, TestSegment,
 };
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
 
-use crate::{machine, of, segment};
+use crate::{Rig, machine, of, segment, touch};
+
+fn temperature(millis: i64) -> Input {
+    Input::Temperature(TemperatureSample {
+        at: Stamp::from_nanos(millis * 1_000_000),
+        sensor: "bed".to_owned(),
+        temperature_degc: 20.0,
+        variance_k2: 0.0,
+    })
+}
 
 /// Two circles one after the other with all that is told of them and its stamp, ms.
 fn told() -> Vec<(i64, Input)> {
@@ -51,6 +61,9 @@ fn told() -> Vec<(i64, Input)> {
                 }),
             ];
             told.extend(inputs.map(|input| (millis, input)));
+            if millis % 500 == 0 {
+                told.push((millis, temperature(millis)));
+            }
             millis += 2;
             millis
         };
@@ -87,23 +100,96 @@ fn a_run_is_the_same_in_whatever_order_the_topics_arrive() {
     assert_eq!(in_time.runs.len(), 2);
     assert!(of(&in_time, 1, &Channel::GridU).len() > 1200);
     // The begin behind the first samples or before the last of the rest; the plate before the axes or behind them.
-    for [segment, state, grid, offset] in [
-        [820, 0, 0, 0],
-        [0, 150, 0, 0],
-        [190, 0, 16, 0],
-        [0, 0, 1300, 0],
-        [900, 0, 400, 50],
-        [0, 30, 0, 700],
+    for [segment, state, grid, offset, degc] in [
+        [820, 0, 0, 0, 0],
+        [0, 150, 0, 0, 0],
+        [190, 0, 16, 0, 0],
+        [0, 0, 1300, 0, 0],
+        [900, 0, 400, 50, 0],
+        [0, 30, 0, 700, 0],
+        [0, 0, 0, 0, 1500],
+        [1200, 1300, 0, 1300, 0],
     ] {
         let late = arriving(|input| match input {
             Input::Segment(_) => segment,
             Input::State(_) => state,
             Input::Grid(_) => grid,
+            Input::Temperature(_) => degc,
             _ => offset,
         });
         assert!(
             late.runs == in_time.runs,
-            "{segment} {state} {grid} {offset}"
+            "{segment} {state} {grid} {offset} {degc}"
         );
     }
+}
+
+/// A circle and a run of two touches behind it, in the order of arrival.
+fn circle_and_touches(arriving: &[(i64, &str)]) -> Vec<(u32, usize)> {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.circle(1, 1.0);
+    let ended = rig.millis;
+    let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+    let segment = |run: u32, begin: bool, kind: TestKind, millis: i64| TestSegment {
+        at: at(millis),
+        ..segment(run, begin, kind)
+    };
+    for (millis, what) in arriving {
+        let millis = ended + millis;
+        rig.builder.take(match *what {
+            "end of the circle" => Input::Segment(segment(1, false, TestKind::Circle, millis)),
+            "begin" => Input::Segment(segment(2, true, TestKind::Latency, millis)),
+            "end" => Input::Segment(segment(2, false, TestKind::Latency, millis)),
+            "production" => Input::Segment(segment(3, true, TestKind::Production, millis)),
+            _ => Input::Trigger(touch(millis, "block_1.x")),
+        });
+    }
+    let (session, _) = rig.builder.finish().expect("a session");
+    let touches = |run: &Run| (run.segment.run, run.touches.len());
+    session.runs.iter().map(touches).collect()
+}
+
+#[test]
+fn a_touch_is_of_the_run_in_which_it_is_stamped_and_of_no_other() {
+    let end = (0, "end of the circle");
+    let (begin, ended) = ((100, "begin"), (900, "end"));
+    let (one, other) = ((300, "touch"), (600, "touch"));
+    for arriving in [
+        [end, begin, one, other, ended],
+        // The begin behind the first touch, the end before the last.
+        [end, one, begin, other, ended],
+        [end, begin, one, ended, other],
+        [one, end, begin, ended, other],
+    ] {
+        let found = circle_and_touches(&arriving);
+        assert_eq!(found, [(1, 0), (2, 2)], "{arriving:?}");
+    }
+    // What is made after a test is none of its touches.
+    let found = circle_and_touches(&[end, (100, "production"), one, other]);
+    assert_eq!(found, [(1, 0)]);
+}
+
+#[test]
+fn readings_with_the_stamp_of_another_clock_are_of_no_run_and_hold_nobody_up() {
+    let stray = |millis: i64| {
+        Input::Grid(GridSample {
+            at: Stamp::from_nanos(millis * 1_000_000),
+            plane: TestPlane::Xy,
+            u_mm: 7.0,
+            v_mm: 7.0,
+            zero_id: 1,
+        })
+    };
+    let in_time = arriving(|_| 0);
+    let mut builder = SessionBuilder::new(&machine(), SessionConfig::default()).expect("a machine");
+    let mut told = told();
+    told.sort_by_key(|(millis, _)| *millis);
+    for (millis, input) in told {
+        if matches!(input, Input::Segment(_)) {
+            builder.take(stray(millis + 3_600_000));
+        }
+        builder.take(input);
+    }
+    let (session, _) = builder.finish().expect("a session");
+    assert!(session.runs == in_time.runs);
 }
