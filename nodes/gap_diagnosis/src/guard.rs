@@ -44,7 +44,7 @@ use crate::noise::Noise;
 use crate::nuisance::orthonormal;
 use crate::periods;
 use crate::repeats;
-use crate::rows::{Block, Row, Station, count};
+use crate::rows::{Block, count};
 use crate::stack::Stack;
 use crate::whitener::Whitener;
 
@@ -362,10 +362,17 @@ fn shared_by_repeats(
 
 /// Places in the stack of the stations that two blocks both have.
 fn same_stations(one: &Block, other: &Block) -> Vec<(usize, usize)> {
-    let stations = other.rows.iter().map(|row| row.station);
-    let there: BTreeMap<Station, usize> = stations.zip(other.range()).collect();
-    let both = |(row, here): (&Row, usize)| Some((here, *there.get(&row.station)?));
-    one.rows.iter().zip(one.range()).filter_map(both).collect()
+    let mut pairs = Vec::new();
+    let mut at = other.rows.iter().zip(other.range()).peekable();
+    for (row, here) in one.rows.iter().zip(one.range()) {
+        while at.next_if(|(next, _)| next.station < row.station).is_some() {}
+        if let Some((next, there)) = at.peek()
+            && next.station == row.station
+        {
+            pairs.push((here, *there));
+        }
+    }
+    pairs
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@
 //! # References
 //! \[1\] ISO 230-2:2014, 4 (repeats of one test).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use machine::twin::{Channel, Run, Session, Touch};
 use metrology::{Axis, PerAxis};
@@ -141,21 +141,21 @@ fn runs_between(
     if blocks.len() < 2 {
         return None;
     }
-    // By station, for a repeat may have begun elsewhere.
-    let of = |block: &Block| -> BTreeMap<Station, usize> {
-        let stations = block.rows.iter().map(|row| row.station);
-        stations.zip(0..).collect()
-    };
-    let all: Vec<BTreeMap<Station, usize>> = blocks.iter().map(|block| of(block)).collect();
-    let station = |row: &usize| blocks[0].rows[*row].station;
-    let is_shared = |row: &usize| all.iter().all(|one| one.contains_key(&station(row)));
-    let rows: Vec<usize> = (0..blocks[0].rows.len()).filter(is_shared).collect();
-    if rows.is_empty() || 2 * rows.len() < blocks[0].rows.len() {
+    let stations =
+        |block: &Block| -> BTreeSet<Station> { block.rows.iter().map(|row| row.station).collect() };
+    let mut shared = stations(blocks[0]);
+    for block in &blocks[1..] {
+        shared = &shared & &stations(block);
+    }
+    if shared.is_empty() || 2 * shared.len() < blocks[0].rows.len() {
         return None;
     }
-    let place =
-        |one: &BTreeMap<Station, usize>| rows.iter().map(|row| one[&station(row)]).collect();
-    let places: Vec<Vec<usize>> = all.iter().map(place).collect();
+    let of = |block: &Block| -> Vec<usize> {
+        (0..block.rows.len())
+            .filter(|k| shared.contains(&block.rows[*k].station))
+            .collect()
+    };
+    let places: Vec<Vec<usize>> = blocks.iter().map(|block| of(block)).collect();
     let times: Vec<f64> = blocks
         .iter()
         .map(|block| time_s(&session.runs[block.run], &block.rows[0]))
@@ -163,7 +163,7 @@ fn runs_between(
     let values = weights(&times)
         .iter()
         .map(|weight| {
-            (0..rows.len())
+            (0..shared.len())
                 .map(|row| {
                     let part = |i: usize| weight[i] * residual[blocks[i].start + places[i][row]];
                     (0..blocks.len()).map(part).sum()
@@ -177,7 +177,7 @@ fn runs_between(
     };
     Some(Contrasts {
         blocks: group.to_vec(),
-        rows,
+        rows: places[0].clone(),
         values,
         one_zero: blocks.iter().all(|block| zero(block) == zero(blocks[0])),
     })

@@ -10,17 +10,14 @@
 //!   y_i = 1/m sum_k y_k,   A_i = 1/m sum_k A_k,   k in station i          (1)
 //! ```
 //!
-//! Stations of a circle are places, not counted from the first reading, so that a repeat whose beginning was not
-//! recorded has its rows where the others have theirs. A touch is a row of its own. A single reading that stands off both
-//! its neighbours by far more than they differ elsewhere is an outlier and left out; readings that are no numbers as well;
-//! both are counted.
+//! A touch is a row of its own. A single reading that stands off both its neighbours by far more than they
+//! differ elsewhere is an outlier and left out; readings that are no numbers as well; both are counted.
 //!
 //! # Holds when
 //! Within a station an effect changes little, or its mean is all that is wanted of it.
 
 use std::collections::BTreeMap;
 
-use machine::twin::simulate::plate_axes;
 use machine::twin::{Channel, Run, Session};
 use metrology::Axis;
 use metrology::sample::TestKind;
@@ -231,95 +228,51 @@ struct Path {
 
 impl Path {
     fn new(run: &Run, first: usize, last: usize, stations: usize) -> Self {
-        let around = around(run, first, last, stations);
-        let stations = around.unwrap_or_else(|| along(run, first, last, stations));
-        Self { first, stations }
+        let motion = &run.motion;
+        let mut way = 0.0;
+        let mut ways = vec![0.0];
+        let mut turns = vec![0_u32];
+        for tick in first + 1..=last {
+            let mut squared = 0.0;
+            let mut turned = 0;
+            for axis in motion.axes.iter() {
+                let weight = if axis.is_linear() { 1.0 } else { ROTARY_ARM_MM };
+                let position = &motion.position[axis];
+                squared += ((position[tick] - position[tick - 1]) * weight).powi(2);
+                turned |= u32::from(motion.sense[axis][tick] != motion.sense[axis][tick - 1]);
+            }
+            way += squared.sqrt();
+            ways.push(way);
+            turns.push(turns[turns.len() - 1] + turned);
+        }
+        let length = if way < STANDING_MM {
+            for (place, tick) in ways.iter_mut().zip(first..) {
+                *place = motion.time_s[tick] - motion.time_s[first];
+            }
+            ways[ways.len() - 1] / count(stations)
+        } else {
+            station_mm(run, way, turns[turns.len() - 1], stations)
+        };
+        let station = |place: f64| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a place is positive and a path has below 2^32 stations"
+            )]
+            let at = (place / length.max(f64::MIN_POSITIVE) + 1e-6) as u32;
+            at
+        };
+        let stations = ways.iter().zip(&turns).map(|(w, t)| (station(*w), *t));
+        Self {
+            first,
+            stations: stations.collect(),
+        }
     }
 
     fn station(&self, tick: usize) -> Station {
         let at = tick.saturating_sub(self.first).min(self.stations.len() - 1);
         self.stations[at]
     }
-}
-
-/// Stations of each tick around the centre of a circle, cut at its quadrants, between which an axis turns round. They are
-/// places: what comes by again is the next visit.
-fn around(run: &Run, first: usize, last: usize, stations: usize) -> Option<Vec<Station>> {
-    use std::f64::consts::{FRAC_PI_2, TAU};
-    let segment = &run.segment;
-    let is_circle = segment.kind == TestKind::Circle && segment.radius_mm > 0.0;
-    let axes = plate_axes(segment.plane).filter(|_| is_circle)?;
-    let place = |tick: usize| {
-        axes.map(|axis| run.motion.position[axis][tick] - segment.centre_mm[axis.index()])
-    };
-    let turned = |tick: usize| {
-        let ([u, v], [x, y]) = (place(tick - 1), place(tick));
-        (u * y - v * x).atan2(u * x + v * y)
-    };
-    let sense = (first + 1..=last).map(turned).sum::<f64>().signum();
-    let cells = u32::try_from(stations).unwrap_or(u32::MAX);
-    let mut visits = BTreeMap::<Station, u32>::new();
-    let mut before = None;
-    let station = |tick: usize| {
-        let [u, v] = place(tick);
-        let angle = (sense * v.atan2(u)).rem_euclid(TAU);
-        let cell = whole(angle / TAU * count(stations)) % cells;
-        let quadrant = if cells.is_multiple_of(4) {
-            cell / (cells / 4)
-        } else {
-            whole(angle / FRAC_PI_2) % 4
-        };
-        let visit = visits.entry((cell, quadrant)).or_default();
-        *visit += u32::from(before != Some((cell, quadrant)));
-        before = Some((cell, quadrant));
-        (
-            cell.saturating_add(cells.saturating_mul(*visit - 1)),
-            quadrant,
-        )
-    };
-    Some((first..=last).map(station).collect())
-}
-
-/// Stations of each tick along the way from the first.
-fn along(run: &Run, first: usize, last: usize, stations: usize) -> Vec<Station> {
-    let motion = &run.motion;
-    let mut way = 0.0;
-    let mut ways = vec![0.0];
-    let mut turns = vec![0_u32];
-    for tick in first + 1..=last {
-        let mut squared = 0.0;
-        let mut turned = 0;
-        for axis in motion.axes.iter() {
-            let weight = if axis.is_linear() { 1.0 } else { ROTARY_ARM_MM };
-            let position = &motion.position[axis];
-            squared += ((position[tick] - position[tick - 1]) * weight).powi(2);
-            turned |= u32::from(motion.sense[axis][tick] != motion.sense[axis][tick - 1]);
-        }
-        way += squared.sqrt();
-        ways.push(way);
-        turns.push(turns[turns.len() - 1] + turned);
-    }
-    let length = if way < STANDING_MM {
-        for (place, tick) in ways.iter_mut().zip(first..) {
-            *place = motion.time_s[tick] - motion.time_s[first];
-        }
-        ways[ways.len() - 1] / count(stations)
-    } else {
-        station_mm(run, way, turns[turns.len() - 1], stations)
-    };
-    let places = ways.iter().zip(&turns);
-    let station = |way: f64| whole(way / length.max(f64::MIN_POSITIVE));
-    places.map(|(way, turns)| (station(*way), *turns)).collect()
-}
-
-/// Number of the station that a place, in stations, lies in.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a place is positive and a path has below 2^32 stations"
-)]
-fn whole(place: f64) -> u32 {
-    (place + 1e-6) as u32
 }
 
 /// Arm at which a turn of a rotary axis counts as way.
@@ -385,95 +338,7 @@ pub fn time_s(run: &Run, row: &Row) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use machine::twin::Motion;
-    use metrology::sample::{Sense, TestPlane, TestSegment};
-    use metrology::{AxisSet, PerAxis, Stamp};
-    use nalgebra::Vector3;
-
     use super::*;
-
-    /// Readings 4 ms apart on a turn from an angle on, at 0.8 rad/s, from some time on.
-    fn turn(begins_rad: f64, sense: f64, from_s: f64) -> Run {
-        let centre_mm = Vector3::new(20.0, -10.0, 0.0);
-        let first = (from_s / 0.004).round();
-        let time_s: Vec<f64> = (0..1960)
-            .map(|k| 0.004 * f64::from(k))
-            .skip_while(|time_s| *time_s < 0.004 * (first - 0.5))
-            .collect();
-        let angle = |time_s: &f64| begins_rad + sense * 0.8 * time_s;
-        let mut position = PerAxis::<Vec<f64>>::default();
-        position[Axis::X] = time_s
-            .iter()
-            .map(|t| 20.0 + 50.0 * angle(t).cos())
-            .collect();
-        position[Axis::Y] = time_s
-            .iter()
-            .map(|t| 50.0 * angle(t).sin() - 10.0)
-            .collect();
-        let axes = AxisSet::EMPTY.with(Axis::X).with(Axis::Y);
-        let reading = |at: usize| machine::twin::Reading {
-            channel: Channel::GridU,
-            at,
-            fraction: 0.0,
-            deviation: 0.0,
-        };
-        Run {
-            readings: (0..time_s.len()).map(reading).collect(),
-            motion: Motion::new(time_s, axes, position).expect("a motion"),
-            touches: vec![],
-            segment: TestSegment {
-                at: Stamp::from_nanos(0),
-                run: 1,
-                begin: true,
-                kind: TestKind::Circle,
-                plane: TestPlane::Xy,
-                centre_mm,
-                radius_mm: 50.0,
-                feed_mm_s: 40.0,
-                sense: Sense::CounterClockwise,
-                repeat: 0,
-                stylus: String::new(),
-                tool_offset_mm: Vector3::zeros(),
-                stations: 0,
-                zero_id: 0,
-                setup_id: 0,
-                cold: false,
-                features: vec![],
-                completed: true,
-            },
-        }
-    }
-
-    #[test]
-    fn a_circle_whose_beginning_is_missing_has_its_rows_where_the_whole_one_has_them() {
-        for (quarter, sense) in [(0.0, 1.0), (1.0, -1.0), (2.0, 1.0), (3.0, -1.0)] {
-            let begins_rad = quarter * std::f64::consts::FRAC_PI_2;
-            let rows = |from_s: f64| {
-                let run = turn(begins_rad, sense, from_s);
-                let all: Vec<usize> = (0..run.readings.len()).collect();
-                let rows = path_rows(&run, &all, 120);
-                let place = |row: &Row| {
-                    let at = |k: &usize| run.motion.time_s[*k];
-                    let mean_s =
-                        row.readings.iter().map(at).sum::<f64>() / count(row.readings.len());
-                    (row.station, (mean_s * 1e6).round())
-                };
-                rows.iter().map(place).collect::<Vec<(Station, f64)>>()
-            };
-            let whole = rows(0.0);
-            assert!((120..=126).contains(&whole.len()), "{}", whole.len());
-            for from_s in [0.012, 0.19, 0.82, 3.1] {
-                let part = rows(from_s);
-                let missing = count(whole.len() - part.len());
-                let wanted = from_s * 0.8 / std::f64::consts::TAU * 120.0;
-                assert!((missing - wanted).abs() <= 3.0, "{missing} {wanted}");
-                // Of the first station some readings are missing.
-                for row in part.iter().skip(1) {
-                    assert!(whole.contains(row), "{from_s} {row:?}");
-                }
-            }
-        }
-    }
 
     #[test]
     fn readings_on_a_line_have_no_variance_within_their_rows() {
