@@ -9,7 +9,8 @@
 //! then are repeats enough, the noise from before is kept. Until there are enough of any, all runs are diagnosed by
 //! their own repeats.
 //!
-//! An effect is told of when it is named and stands well above what can be seen. A rest that no effect explains is vaguer: it is told of when a whole cycle
+//! An effect is told of when it is named and stands well above what can be seen; one that sets in at an instant only where
+//! runs from before say what noise is: else a few runs after any change of the machine look like one. A rest that no effect explains is vaguer: it is told of when a whole cycle
 //! later it is still there.
 //!
 //! A diagnosis takes a second or two. In simulated time it is made at once, so that equal samples give equal reports.
@@ -88,6 +89,8 @@ impl Task {
 /// D from which an effect is found in every diagnosis. One nearer to what can be seen at all (about 8) is named in one and
 /// not in the next: that is no change of the machine.
 const LEAST_D: f64 = 10.0;
+/// Parameter of an effect that sets in at an instant.
+const INSTANT: &str = "at_min";
 /// Where so many ticks follow one another without a word from the controller, what has ended is whole. They are counted
 /// and not timed, for samples may wait in a process that was stopped for a while.
 const SILENT_TICKS: u32 = 3;
@@ -271,7 +274,8 @@ impl GapDiagnosisStage {
         match finding.outcome {
             Ok(report) => {
                 let named = self.named.clone();
-                self.tell(at, finding.runs, &report, out);
+                let is_known = finding.quiet.is_some();
+                self.tell(at, finding.runs, is_known, &report, out);
                 self.look_at_rest(finding.closed, &report, out);
                 if named != self.named {
                     // Those that were looked at may be of before and after.
@@ -290,7 +294,15 @@ impl GapDiagnosisStage {
         }
     }
 
-    fn tell(&mut self, at: Stamp<Host>, runs: Vec<u32>, report: &GapReport, out: &mut Vec<Output>) {
+    /// What is sure and new; `is_known` where runs from before say what noise is.
+    fn tell(
+        &mut self,
+        at: Stamp<Host>,
+        runs: Vec<u32>,
+        is_known: bool,
+        report: &GapReport,
+        out: &mut Vec<Output>,
+    ) {
         out.push(Output::Report(Box::new(summary(at, runs, report))));
         let mut named = BTreeSet::new();
         let least_confidence = self.config.least_confidence;
@@ -298,6 +310,7 @@ impl GapDiagnosisStage {
             cause.status == Status::Named
                 && cause.confidence >= least_confidence
                 && cause.d >= LEAST_D
+                && (is_known || cause.parameters.iter().all(|p| p.name != INSTANT))
         };
         let sure = report.causes.iter().filter(is_sure);
         for cause in sure {

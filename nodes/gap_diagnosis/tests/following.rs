@@ -7,7 +7,7 @@ use gap_diagnosis::stage::{GapDiagnosisStage, Input, Output};
 use gap_diagnosis::{GapDiagnosisConfig, session};
 use machine::MachineFile;
 use metrology::sample::{
-    AxisState, GapSummary, GridSample, Sense, TestKind, TestPlane, TestSegment,
+    AxisState, GapCause, GapStatus, GapSummary, GridSample, Sense, TestKind, TestPlane, TestSegment,
 };
 use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
 use nalgebra::Vector3;
@@ -32,6 +32,8 @@ struct Machine {
     run: u32,
     noise: Pcg64Mcg,
     play_mm: f64,
+    /// How far the slide of X stands off since a return to its reference.
+    shift_mm: f64,
     /// How far the slide of X is off the motor.
     lag_mm: f64,
     x_mm: f64,
@@ -49,6 +51,7 @@ impl Machine {
             run: 0,
             noise: Pcg64Mcg::seed_from_u64(20_261_121),
             play_mm: 0.0,
+            shift_mm: 0.0,
             lag_mm: 0.0,
             x_mm: 0.0,
             told: vec![],
@@ -90,7 +93,7 @@ impl Machine {
         self.take(Grid(GridSample {
             at,
             plane: TestPlane::Xy,
-            u_mm: x + self.lag_mm + deviation_mm[0] + noise[0],
+            u_mm: x + self.lag_mm + self.shift_mm + deviation_mm[0] + noise[0],
             v_mm: y + deviation_mm[1] + noise[1],
             zero_id: 1,
         }));
@@ -288,4 +291,67 @@ fn while_a_diagnosis_is_made_beside_samples_are_taken_and_none_is_begun() {
     });
     // Nothing has been repeated three times before the last cycle yet.
     assert_eq!(runs, Some((1..=2 * CYCLE_RUNS).collect()));
+}
+
+impl Machine {
+    /// A diagnosis that was given out comes back.
+    fn come_back(&mut self) {
+        let is_due = |output: &Output| matches!(output, Output::Due(_));
+        if let Some(due) = self.told.iter().position(is_due)
+            && let Output::Due(task) = self.told.remove(due)
+        {
+            self.step(Input::Found(Box::new(task.run())));
+            self.step(Input::Tick);
+        }
+    }
+}
+
+/// A busy computer makes diagnoses when it can: each is of the runs that were there when the one before came back.
+#[test]
+fn play_that_sets_in_is_the_first_that_is_told_of_whichever_runs_are_diagnosed() {
+    for back_after in [&[6, 7, 8, 9, 10, 11][..], &[7, 9, 11], &[8, 10], &[8]] {
+        let mut machine = Machine::new(GapDiagnosisConfig {
+            cycle_runs: 6,
+            least_runs: 6,
+            least_period_s: 0.0,
+            ..config()
+        });
+        machine.stage.go_beside();
+        for run in 1..=12 {
+            machine.play_mm = if run > 6 { 5.6e-3 } else { 0.0 };
+            let is_second = (run - 1) / 3 % 2 == 1;
+            machine.circle(40.0, SENSES[usize::from(is_second)]);
+            if back_after.contains(&run) {
+                machine.come_back();
+            }
+        }
+        machine.come_back();
+        machine.come_back();
+        assert_eq!(machine.last_report().runs.last(), Some(&12));
+        let told = machine.new_effects();
+        assert_eq!(told, ["backlash X"], "{back_after:?}");
+    }
+}
+
+/// A few runs after any change of a machine may look like a step.
+#[test]
+fn what_sets_in_at_an_instant_is_told_of_only_where_runs_before_it_say_what_noise_is() {
+    for (cycle_runs, news) in [(12, &[][..]), (6, &["homing_shift X"])] {
+        let mut machine = Machine::new(GapDiagnosisConfig {
+            cycle_runs,
+            least_runs: 6,
+            least_period_s: 0.0,
+            ..config()
+        });
+        let mut is_named = false;
+        for run in 1..=12 {
+            machine.shift_mm = if run > 6 { -5e-3 } else { 0.0 };
+            let is_second = (run - 1) / 3 % 2 == 1;
+            machine.circle(40.0, SENSES[usize::from(is_second)]);
+            let named = |c: &GapCause| c.effect == "homing_shift" && c.status == GapStatus::Named;
+            is_named |= run >= 6 && machine.last_report().causes.iter().any(named);
+        }
+        assert!(is_named);
+        assert_eq!(machine.new_effects(), news, "{cycle_runs}");
+    }
 }
