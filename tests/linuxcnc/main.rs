@@ -18,6 +18,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Wire, from_cdr};
+use linuxcnc_bridge::fault::QUEUE_FAULT;
 use metrology::Axis;
 use metrology::sample::{ProbedPoint, Rejection, TestKind, TestSegment};
 use recorder::{Bag, Event, Order};
@@ -62,7 +63,6 @@ struct Finished {
 /// LinuxCNC's interpreter sometimes finds its own queue not empty after a touch when the computer is
 /// busy, and gives the program up. That is said, and the scenario is run again this often.
 const ATTEMPTS: u32 = 3;
-const QUEUE_FAULT: &str = "Queue is not empty after probing";
 
 /// One run; `None` where LinuxCNC gave the program up as above.
 fn attempted(program: &Path, scenario: &str, out: &Path) -> Option<String> {

@@ -35,8 +35,8 @@
 //! | touches | each touch of a feature that the machine file has, up to 2 s after the end of its segment |
 //!
 //! A run holds what is stamped from its begin to its end, in whatever order topics arrive: up to 2 s apart. The clocks of
-//! the hosts must agree (`host_clock`). A segment that is stamped further from the samples begins or ends a run when its message comes; where it
-//! is older than they are that is counted.
+//! the hosts must agree (`host_clock`). A segment that is stamped further from the samples begins or ends a run when its
+//! message comes; where it is older than they are that is counted.
 //!
 //! A contour has at most [`SessionConfig::readings_per_run`] readings per channel: means of an odd number of
 //! neighbours, the same number in every repeat. The commanded motion is kept at each of them, at reversals,

@@ -23,6 +23,9 @@ pub enum FaultKind {
     Other,
 }
 
+/// What LinuxCNC says where it gives up a program over its own queue, on a busy computer; it may be run again.
+pub const QUEUE_FAULT: &str = "Queue is not empty after probing";
+
 /// Classifies one message.
 #[must_use]
 pub fn classify(message: &str) -> FaultKind {

@@ -232,10 +232,15 @@ impl SessionBuilder {
         }
     }
 
+    /// Runs that are not closed, in their order.
+    fn records(&mut self) -> impl Iterator<Item = &mut Record> {
+        let ended = self.ended.iter_mut().map(|(_, ended)| ended);
+        ended.chain(&mut self.open)
+    }
+
     /// The run that a sample with this stamp is of.
     fn run_at(&mut self, at: Stamp<Host>) -> Option<&mut Record> {
-        let ended = self.ended.iter_mut().map(|(_, ended)| ended);
-        ended.chain(&mut self.open).find(|run| run.holds(at))
+        self.records().find(|run| run.holds(at))
     }
 
     fn state(&mut self, state: &AxisState) {
@@ -264,10 +269,7 @@ impl SessionBuilder {
         let tick = Tick::new(time_s, state);
         self.recent.tick(tick, self.config.lead_in_s);
         let most = self.config.ticks_per_run;
-        let ended = self.ended.iter_mut().map(|(_, ended)| ended);
-        for run in ended.chain(&mut self.open) {
-            run.take(tick, most);
-        }
+        self.records().for_each(|run| run.take(tick, most));
     }
 
     fn is_another_machine(&mut self, state: &AxisState) -> bool {
@@ -293,10 +295,7 @@ impl SessionBuilder {
             return;
         }
         self.recent.offset(offset);
-        let ended = self.ended.iter_mut().map(|(_, ended)| ended);
-        ended
-            .chain(&mut self.open)
-            .for_each(|run| run.compensated(offset));
+        self.records().for_each(|run| run.compensated(offset));
     }
 
     fn temperature(&mut self, sample: &TemperatureSample) {
@@ -348,9 +347,7 @@ impl SessionBuilder {
                 continue;
             };
             let time_s = self.time.of(face.at);
-            let ended = self.ended.iter_mut().map(|(_, ended)| ended);
-            let mut all = ended.chain(&mut self.open);
-            if let Some(run) = all.find(|run| run.segment.run == number) {
+            if let Some(run) = self.records().find(|run| run.segment.run == number) {
                 run.faces.push((time_s, feature, approach, positions));
             }
         }

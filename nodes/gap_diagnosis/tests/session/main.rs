@@ -9,7 +9,7 @@ use metrology::sample::{
     AxisCompensation, AxisState, BlockMeasurement, CompensationState, FacePosition, GridSample,
     LatencyShare, ProbeTrigger, Sense, TemperatureSample, TestKind, TestPlane, TestSegment,
 };
-use metrology::{Axis, AxisSet, PerAxis, Stamp};
+use metrology::{Axis, AxisSet, Host, PerAxis, Stamp};
 use nalgebra::Vector3;
 
 mod order;
@@ -41,6 +41,37 @@ fn segment(run: u32, begin: bool, kind: TestKind) -> TestSegment {
         features: vec!["middle".to_owned()],
         completed: true,
     }
+}
+
+fn state(
+    received_at: Stamp<Host>,
+    controller_nanos: i64,
+    commanded: PerAxis<f64>,
+    motor: PerAxis<f64>,
+) -> Input {
+    Input::State(AxisState {
+        received_at,
+        controller_at: Stamp::from_nanos(controller_nanos),
+        axes: AxisSet::XYZ,
+        commanded,
+        motor,
+        scale: PerAxis([f64::NAN; 6]),
+        velocity: PerAxis::default(),
+    })
+}
+
+fn compensation(at: Stamp<Host>, total: PerAxis<f64>) -> Input {
+    Input::Compensation(AxisCompensation {
+        at,
+        axes: AxisSet::XYZ,
+        total,
+        thermal: total,
+        geometric: PerAxis::default(),
+        positioning: PerAxis::default(),
+        pulses: PerAxis::default(),
+        remainder: PerAxis::default(),
+        state: PerAxis([CompensationState::Active; 6]),
+    })
 }
 
 /// A recording in ticks of a millisecond, on a controller whose clock is 7 s ahead.
@@ -76,15 +107,9 @@ impl Rig {
         (commanded[Axis::X], commanded[Axis::Y], commanded[Axis::Z]) = (x, y, 30.0);
         let mut motor = commanded;
         motor[Axis::X] += self.compensation_mm + 1e-3;
-        self.builder.take(Input::State(AxisState {
-            received_at: at,
-            controller_at: Stamp::from_nanos(controller_millis * 1_000_000),
-            axes: AxisSet::XYZ,
-            commanded,
-            motor,
-            scale: PerAxis([f64::NAN; 6]),
-            velocity: PerAxis::default(),
-        }));
+        let controller_nanos = controller_millis * 1_000_000;
+        self.builder
+            .take(state(at, controller_nanos, commanded, motor));
         let error_mm = (self.error_mm)(y.atan2(x));
         self.builder.take(Input::Grid(GridSample {
             at,
@@ -100,17 +125,8 @@ impl Rig {
         self.compensation_mm = x_mm;
         let mut total = PerAxis::default();
         total[Axis::X] = x_mm;
-        self.builder.take(Input::Compensation(AxisCompensation {
-            at: Stamp::from_nanos(self.millis * 1_000_000),
-            axes: AxisSet::XYZ,
-            total,
-            thermal: total,
-            geometric: PerAxis::default(),
-            positioning: PerAxis::default(),
-            pulses: PerAxis::default(),
-            remainder: PerAxis::default(),
-            state: PerAxis([CompensationState::Active; 6]),
-        }));
+        let at = Stamp::from_nanos(self.millis * 1_000_000);
+        self.builder.take(compensation(at, total));
     }
 
     /// A rest of 6 s at the start of the circle, then once round.
@@ -338,15 +354,8 @@ fn readings_between_the_states_of_a_fast_circle_are_compared_with_the_path() {
         let mut commanded = PerAxis::default();
         let [x, y] = place(time_s);
         (commanded[Axis::X], commanded[Axis::Y], commanded[Axis::Z]) = (x, y, 30.0);
-        builder.take(Input::State(AxisState {
-            received_at: stamp(time_s),
-            controller_at: Stamp::from_nanos(stamp(time_s).nanos()),
-            axes: AxisSet::XYZ,
-            commanded,
-            motor: commanded,
-            scale: PerAxis([f64::NAN; 6]),
-            velocity: PerAxis::default(),
-        }));
+        let at = stamp(time_s);
+        builder.take(state(at, at.nanos(), commanded, commanded));
         let [u_mm, v_mm] = place(time_s + late_s);
         builder.take(Input::Grid(GridSample {
             at: stamp(time_s + late_s),

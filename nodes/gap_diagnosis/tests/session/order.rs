@@ -2,13 +2,10 @@
 
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::twin::{Channel, Run, Session};
-use metrology::sample::{
-    AxisCompensation, AxisState, CompensationState, GridSample, TemperatureSample, TestKind,
-    TestPlane, TestSegment,
-};
-use metrology::{Axis, AxisSet, PerAxis, Stamp};
+use metrology::sample::{GridSample, TemperatureSample, TestKind, TestPlane, TestSegment};
+use metrology::{Axis, PerAxis, Stamp};
 
-use crate::{Rig, machine, of, segment, touch};
+use crate::{Rig, compensation, machine, of, segment, state, touch};
 
 fn temperature(millis: i64) -> Input {
     Input::Temperature(TemperatureSample {
@@ -32,26 +29,13 @@ fn told() -> Vec<(i64, Input)> {
             let mut total = PerAxis::default();
             total[Axis::X] = 1e-6 * f64::from(millis as i32);
             let inputs = [
-                Input::Compensation(AxisCompensation {
-                    at: stamp(millis),
-                    axes: AxisSet::XYZ,
-                    total,
-                    thermal: total,
-                    geometric: PerAxis::default(),
-                    positioning: PerAxis::default(),
-                    pulses: PerAxis::default(),
-                    remainder: PerAxis::default(),
-                    state: PerAxis([CompensationState::Active; 6]),
-                }),
-                Input::State(AxisState {
-                    received_at: stamp(millis),
-                    controller_at: Stamp::from_nanos((millis + 7000) * 1_000_000),
-                    axes: AxisSet::XYZ,
+                compensation(stamp(millis), total),
+                state(
+                    stamp(millis),
+                    (millis + 7000) * 1_000_000,
                     commanded,
-                    motor: commanded,
-                    scale: PerAxis([f64::NAN; 6]),
-                    velocity: PerAxis::default(),
-                }),
+                    commanded,
+                ),
                 Input::Grid(GridSample {
                     at: stamp(millis),
                     plane: TestPlane::Xy,

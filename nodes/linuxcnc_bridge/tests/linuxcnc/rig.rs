@@ -6,6 +6,7 @@ use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use linuxcnc_bridge::condition::Condition;
+use linuxcnc_bridge::fault::QUEUE_FAULT;
 use linuxcnc_bridge::io::account::Account;
 use linuxcnc_bridge::io::start::{Controller, require_installed};
 use linuxcnc_bridge::io::{Address, BridgeIo, host_now};
@@ -17,8 +18,7 @@ use metrology::Stage;
 use metrology::sample::{AxisState, ProbeTrigger};
 use serde::Deserialize;
 
-/// A known fault of LinuxCNC on a busy computer, and how often a program is tried.
-const QUEUE_FAULT: &str = "Queue is not empty after probing";
+/// How often a program of touches is tried.
 const ATTEMPTS: u32 = 3;
 
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
