@@ -16,7 +16,7 @@ use std::mem::discriminant;
 use machine::volumetric::PoseRefusal;
 use metrology::drift::{DriftRefusal, Extrapolate, drift_at};
 use metrology::sample::ThermalModel;
-use metrology::{Host, Stamp};
+use metrology::{Axis, Host, Stamp};
 use nalgebra::Vector3;
 
 use crate::positioning::refusal::PositioningRefusal;
@@ -33,6 +33,13 @@ pub struct Parts {
 }
 
 impl Parts {
+    /// Whether each of them is a number.
+    pub fn are_finite(&self) -> bool {
+        [self.thermal, self.geometric, self.positioning]
+            .iter()
+            .all(|part| part.is_finite())
+    }
+
     /// Their sum, mm: (1).
     #[must_use]
     pub fn sum(&self) -> f64 {
@@ -62,6 +69,12 @@ pub enum PartRefusal {
         /// What the dual loop said.
         source: PositioningRefusal,
     },
+    /// The parts give no number.
+    #[error("the parts give an offset of axis {axis} that is not a finite number")]
+    NotFinite {
+        /// The axis.
+        axis: Axis,
+    },
 }
 
 impl PartRefusal {
@@ -78,6 +91,7 @@ impl PartRefusal {
             (Self::Geometric { source: one }, Self::Geometric { source: two }) => {
                 discriminant(one) == discriminant(two)
             }
+            (Self::NotFinite { .. }, Self::NotFinite { .. }) => true,
             _ => false,
         }
     }

@@ -333,11 +333,15 @@ impl AxisCompensationStage {
             Err(DriftRefusal::NotModelled { .. }) if speaks => 0.0,
             thermal => thermal?,
         };
-        Ok(Parts {
+        let parts = Parts {
             thermal,
             geometric: geometric.unwrap_or_default(),
             positioning: positioning.unwrap_or_default(),
-        })
+        };
+        match parts.are_finite() {
+            true => Ok(parts),
+            false => Err(PartRefusal::NotFinite { axis }),
+        }
     }
 
     fn wanted(&self, axis: Axis, thermal: Option<&Drifts>) -> (Parts, Wanted) {

@@ -270,6 +270,24 @@ fn a_position_that_is_none_is_held_and_a_missing_axis_too() {
 }
 
 #[test]
+fn an_offset_that_is_no_number_is_refused_and_the_last_one_held() {
+    let mut scene = Scene::new("linear", GEOMETRY);
+    scene.offer(GeometrySource::Linear, 1, vec![constant("EXX", 0.010)]);
+    scene.offer(GeometrySource::Rotary, 1, vec![line("ECC", 1e-6, 6.3)]);
+    scene.run(2.0, [0.0; 6]);
+    scene.assert_total(Axis::X, -0.010);
+    // Continued so far, ECC is a turn of 1e294 rad.
+    scene.run(0.1, [0.0, 0.0, 0.0, 0.0, 0.0, 1e300]);
+    assert!(scene.said("offset of axis X that is not a finite number"));
+    let last = scene.last.unwrap();
+    assert_eq!(last.state[Axis::X], CompensationState::Holding);
+    assert!(last.geometric[Axis::X].is_finite());
+    scene.assert_total(Axis::X, -0.010);
+    scene.run(4.0, [0.0, 0.0, 0.0, 0.0, 0.0, 1e300]);
+    scene.assert_total(Axis::X, 0.0);
+}
+
+#[test]
 fn without_the_parameters_a_model_is_not_used_and_that_is_said() {
     let mut scene = Scene::new("linear", "");
     scene.offer(GeometrySource::Linear, 1, vec![constant("EXX", 0.010)]);

@@ -121,7 +121,8 @@ impl GeometryGate {
         passage
     }
 
-    /// Greatest difference of the tip's errors at the poses, mm; infinite where one of them has no answer.
+    /// Greatest difference of the tip's errors at the poses, mm; infinite where one of them has no answer, or one that is no
+    /// number.
     fn change_mm(&self, old: &GeometryModel, new: &GeometryModel) -> f64 {
         let model = |one| {
             let model = VolumetricModel::new(&self.kinematics, one);
@@ -138,6 +139,13 @@ impl GeometryGate {
             .map(|at| match (error(&before, at), error(&after, at)) {
                 (Ok(before_mm), Ok(after_mm)) => (after_mm - before_mm).norm(),
                 _ => f64::INFINITY,
+            })
+            .map(|change_mm| {
+                if change_mm.is_nan() {
+                    f64::INFINITY
+                } else {
+                    change_mm
+                }
             })
             .fold(0.0, f64::max)
     }
@@ -286,6 +294,22 @@ mod tests {
             component: "EXX".parse().unwrap(),
         });
         assert_eq!(twice, GeometryPassage::Refused { cause });
+    }
+
+    #[test]
+    fn a_model_whose_errors_are_no_numbers_never_takes_the_place_of_a_good_one() {
+        let mut gate = gate();
+        let (exx, ecy) = (("EXX", 0.010), ("ECY", 1e200));
+        let with = |sequence, (name, value)| model(sequence, CHAIN, name, value);
+        gate.offer(GeometrySource::Linear, with(1, exx));
+        for sequence in [2, 3] {
+            let passage = gate.offer(GeometrySource::Linear, with(sequence, ecy));
+            let GeometryPassage::Quarantined { change_mm, .. } = passage else {
+                panic!("{passage:?}");
+            };
+            assert!(change_mm.is_infinite(), "{change_mm}");
+        }
+        assert_eq!(exx_in_use(&gate), Some(0.010));
     }
 
     #[test]
