@@ -6,9 +6,11 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
-use abbe_tests::program::{abbe, root};
+use abbe_tests::program::{Process, abbe, command, domain, root};
+use nix::sys::signal::Signal;
 
 fn folder() -> PathBuf {
     root().join("nodes/abbe/debian")
@@ -88,6 +90,50 @@ fn a_node_is_started_with_its_scenarios_parameters_and_nothing_else() {
         assert_eq!(refused.status.code(), Some(code), "{wrong}");
         assert!(said(&refused).contains(word), "{}", said(&refused));
     }
+}
+
+/// A recorder that systemd starts again, after a crash or at the next boot, begins a bag of its own.
+#[test]
+fn a_recorder_that_is_started_again_leaves_the_bags_of_earlier_starts_alone() {
+    let state = tempfile::tempdir().unwrap();
+    let bag = |start: u32| {
+        let folder = state.path().join("three_hosts_bag");
+        folder.join(format!("three_hosts_bag_{start}"))
+    };
+    for start in 0..3 {
+        let mut unit = Command::new(folder().join("start-node"));
+        let like = command(domain(18), &[]);
+        for (name, value) in like.get_envs() {
+            match value {
+                Some(value) => unit.env(name, value),
+                None => unit.env_remove(name),
+            };
+        }
+        unit.arg("three_hosts:recorder")
+            .env("ABBE_SCENARIOS", root().join("launch_configs"))
+            .env("ABBE_PROGRAM", abbe())
+            .current_dir(state.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let recorder = Process::start(unit);
+        let deadline = Instant::now() + Duration::from_secs(30);
+        let begun = bag(start).join("metadata.yaml");
+        while !begun.exists() {
+            assert!(
+                Instant::now() < deadline,
+                "{} is not there",
+                begun.display()
+            );
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        recorder.signal(Signal::SIGKILL);
+        let ended = recorder.ended_within(Duration::from_secs(5));
+        assert_eq!(ended.status.code(), None, "{}", ended.said);
+    }
+    for start in 0..3 {
+        assert!(recorder::Bag::open(&bag(start)).is_ok(), "{start}");
+    }
+    assert!(!bag(3).exists());
 }
 
 #[test]

@@ -11,6 +11,8 @@ use node_runtime::environment::Environment;
 use node_runtime::{Interruption, Setup};
 use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RingConfig};
 
+use crate::usage::refused;
+
 /// Compression inside the bag's chunks.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Compression {
@@ -32,7 +34,7 @@ pub struct Record {
     #[arg(long, default_value_t = 0)]
     max_file_bytes: u64,
     /// A new file is begun when this one spans so much time, s; 0: one file.
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     max_file_s: f64,
     /// Absolute names of topics that are left out, `*` stands for any run of characters.
     #[arg(long, num_args = 1..)]
@@ -41,7 +43,7 @@ pub struct Record {
     #[arg(long)]
     machine: Option<PathBuf>,
     /// Keep the last seconds in memory, and save them when `recorder/save` is called.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     ring: Option<f64>,
     /// Most bytes that the ring keeps.
     #[arg(long, default_value_t = 256 << 20, requires = "ring")]
@@ -66,45 +68,20 @@ impl Record {
     /// Records until SIGINT or SIGTERM; exit code 3 when the bag lost something.
     ///
     /// # Errors
-    /// When the bag cannot be begun, or there is no network.
+    /// When a number is out of its range (exit code 2), the bag cannot be begun, or there is no network.
     pub fn execute(self) -> Result<ExitCode> {
         let interruption = Interruption::listen("the bag is being closed")?;
-        let bag = self.output.to_str().context("--output: must be UTF-8")?;
+        let config = self.config()?;
         let machine = self.machine.as_ref().map(|path| {
             let text = std::fs::read_to_string(path);
             text.with_context(|| format!("--machine {}", path.display()))
         });
         let machine = machine.transpose()?;
-        let ring = self.ring.map(|window_s| RingConfig {
-            window_s,
-            limit_bytes: self.ring_bytes,
-            save_on_error: self.save_on_error,
-        });
-        let config = NodeConfig {
-            bag: bag.to_owned(),
-            exclude: self.exclude,
-            machine_file: String::new(),
-            ring,
-            topics: if self.topics.is_empty() {
-                vec!["*".to_owned()]
-            } else {
-                self.topics
-            },
-            writing: RecorderConfig {
-                compression: match self.compression {
-                    Compression::None => ChunkCompression::None,
-                    Compression::Lz4 => ChunkCompression::Lz4,
-                    Compression::Zstd => ChunkCompression::Zstd,
-                },
-                max_file_bytes: self.max_file_bytes,
-                max_file_s: self.max_file_s,
-                ..RecorderConfig::default()
-            },
-        };
-        if ring.is_some() {
+        if config.ring.is_some() {
             return keep(&config, machine, &interruption);
         }
         let capture = recorder_node::record(&config, machine, NAME)?;
+        let bag = &config.bag;
         eprintln!("Recording into {bag}; Ctrl-C ends it.");
         while !interruption.wait(A_WHILE) {}
         let captured = capture.finish()?;
@@ -121,6 +98,42 @@ impl Record {
             ExitCode::SUCCESS
         } else {
             ExitCode::from(DONE_WITH_LOSS)
+        })
+    }
+
+    /// The recorder's parameters, each in its range.
+    fn config(&self) -> Result<NodeConfig> {
+        let bag = self.output.to_str().context("--output: must be UTF-8")?;
+        let ring = self.ring.map(|window_s| RingConfig {
+            window_s,
+            limit_bytes: self.ring_bytes,
+            save_on_error: self.save_on_error,
+        });
+        let writing = RecorderConfig {
+            compression: match self.compression {
+                Compression::None => ChunkCompression::None,
+                Compression::Lz4 => ChunkCompression::Lz4,
+                Compression::Zstd => ChunkCompression::Zstd,
+            },
+            max_file_bytes: self.max_file_bytes,
+            max_file_s: self.max_file_s,
+            ..RecorderConfig::default()
+        };
+        let ranges = ring.map_or(Ok(()), |ring| ring.checked());
+        let ranges = ranges.and_then(|()| writing.checked());
+        ranges.map_err(|error| refused("record", error))?;
+        Ok(NodeConfig {
+            bag: bag.to_owned(),
+            bag_per_start: false,
+            exclude: self.exclude.clone(),
+            machine_file: String::new(),
+            ring,
+            topics: if self.topics.is_empty() {
+                vec!["*".to_owned()]
+            } else {
+                self.topics.clone()
+            },
+            writing,
         })
     }
 }

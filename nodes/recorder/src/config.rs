@@ -88,9 +88,12 @@ impl Default for RecorderConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NodeConfig {
-    /// Folder of the bag, or with `ring` of the bags that are saved, relative to where the program was started; it must
-    /// not exist.
+    /// Folder of the bag, which must not exist, or with `ring` or `bag_per_start` of the bags, relative to where the
+    /// program was started.
     pub bag: String,
+    /// Each start makes a bag of its own below the folder `bag`, numbered, and leaves those of earlier starts alone.
+    #[serde(default)]
+    pub bag_per_start: bool,
     /// Absolute names of topics; `*` stands for any run of characters.
     #[serde(default = "every_topic")]
     pub topics: Vec<String>,
@@ -173,7 +176,11 @@ const fn number(
 pub const PARAMETERS: &[ParameterDoc] = &[
     text(
         "bag",
-        "Folder of the bag, or with ring of the bags that are saved, relative to where the program was started; it must not exist.",
+        "Folder of the bag, which must not exist, or with ring or bag_per_start of the bags, relative to where the program was started.",
+    ),
+    text(
+        "bag_per_start",
+        "Each start makes a bag of its own below the folder bag, numbered, and leaves those of earlier starts alone; with ring they always are.",
     ),
     text(
         "topics",

@@ -1,13 +1,13 @@
 //! From parameters to a bag that is being written.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use node_runtime::HostTime;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::Selection;
-use recorder::{Directory, NodeConfig, Recorder, Recording, RunContext};
+use recorder::{Directory, NodeConfig, Recorder, RecorderError, Recording, RunContext};
 
 use crate::capture::Capture;
 
@@ -22,6 +22,45 @@ pub(crate) fn context(machine_file: Option<String>) -> RunContext {
         machine_file,
         ..RunContext::default()
     }
+}
+
+/// Most bags of one folder.
+const MOST_BAGS: u32 = 10_000;
+
+/// Makes the first folder `NAME_0`, `NAME_1`, … below `folder` that is not there yet, counted from `next`; bags of
+/// earlier runs stay.
+pub(crate) fn free_folder(
+    folder: &Path,
+    name: &str,
+    next: &mut u32,
+) -> Result<(PathBuf, Directory), RecorderError> {
+    loop {
+        let path = folder.join(format!("{name}_{next}"));
+        match Directory::create(&path) {
+            Ok(directory) => return Ok((path, directory)),
+            Err(RecorderError::Exists { .. }) if *next < MOST_BAGS => *next += 1,
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+/// The last part of the parameter `bag`.
+pub(crate) fn name_of(folder: &Path) -> Result<String> {
+    let name = folder.file_name().with_context(|| {
+        let shown = folder.display();
+        format!("bag = \"{shown}\": must be a folder's name")
+    })?;
+    Ok(name.to_string_lossy().into_owned())
+}
+
+/// The folder of one bag.
+fn begin(config: &NodeConfig) -> Result<(PathBuf, Directory)> {
+    let folder = Path::new(&config.bag);
+    let name = name_of(folder)?;
+    if config.bag_per_start {
+        return Ok(free_folder(folder, &name, &mut 0)?);
+    }
+    Ok((folder.to_owned(), Directory::create(folder)?))
 }
 
 /// Records the network into a new bag; `machine` is the text of the machine file, `name` the listener's own name on
@@ -40,13 +79,9 @@ pub(crate) fn record_by(
     name: &str,
     time: HostTime,
 ) -> Result<Capture> {
-    let path = Path::new(&config.bag);
-    let file = path
-        .file_name()
-        .with_context(|| format!("bag = \"{}\": must be a folder's name", config.bag))?;
-    let directory = Directory::create(path)?;
-    let mut recording =
-        Recording::begin(directory, &file.to_string_lossy(), config.writing.clone())?;
+    let (path, directory) = begin(config)?;
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut recording = Recording::begin(directory, &file, config.writing.clone())?;
     if machine.is_some() {
         recording.add_context(&context(machine))?;
     }

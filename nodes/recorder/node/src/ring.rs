@@ -8,20 +8,18 @@ use std::thread::JoinHandle;
 
 use abbe_msgs::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus};
 use abbe_msgs::{Message as _, from_cdr};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use node_runtime::HostTime;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::{RawTap, Selection, TapEvent, Tapped};
 use recorder::{
-    Directory, RecorderConfig, RecorderError, RecordingSummary, Ring, RingConfig, RingSink,
-    RingStats, RunContext, Snapshot,
+    RecorderConfig, RecorderError, RecordingSummary, Ring, RingConfig, RingSink, RingStats,
+    RunContext, Snapshot,
 };
 
+use crate::begin::{free_folder, name_of};
 use crate::capture::{Scribe, Store, Troubles};
-
-/// Most bags of one folder.
-const MOST_SAVES: u32 = 10_000;
 
 /// Notices errors that begin on `/diagnostics`.
 #[derive(Default)]
@@ -83,10 +81,7 @@ impl RingCapture {
         time: HostTime,
     ) -> Result<Self> {
         writing.checked()?;
-        let name = folder.file_name().with_context(|| {
-            let shown = folder.display();
-            format!("bag = \"{shown}\": must be a folder's name")
-        })?;
+        let name = name_of(folder)?;
         let sink = RingSink::new(Ring::new(config)?);
         let troubles = Arc::<Troubles>::default();
         let alarmed = Arc::<AtomicBool>::default();
@@ -107,7 +102,7 @@ impl RingCapture {
             troubles,
             alarmed,
             folder: folder.to_owned(),
-            name: name.to_string_lossy().into_owned(),
+            name,
             next: 0,
             writing,
             context,
@@ -133,7 +128,7 @@ impl RingCapture {
     /// # Errors
     /// When no folder can be made for it.
     pub fn save(&mut self) -> Result<(PathBuf, usize), RecorderError> {
-        let (path, directory) = self.free_folder()?;
+        let (path, directory) = free_folder(&self.folder, &self.name, &mut self.next)?;
         let snapshot = self.sink.snapshot();
         let messages = snapshot.len();
         let (writing, context) = (self.writing.clone(), self.context.clone());
@@ -142,18 +137,6 @@ impl RingCapture {
         let write = move || Snapshot::write(&snapshot, directory, &name, &writing, &context);
         self.saving.push((path.clone(), std::thread::spawn(write)));
         Ok((path, messages))
-    }
-
-    /// The first folder that is not there yet; bags of an earlier run stay.
-    fn free_folder(&mut self) -> Result<(PathBuf, Directory), RecorderError> {
-        loop {
-            let path = self.folder.join(format!("{}_{}", self.name, self.next));
-            match Directory::create(&path) {
-                Ok(directory) => return Ok((path, directory)),
-                Err(RecorderError::Exists { .. }) if self.next < MOST_SAVES => self.next += 1,
-                Err(error) => return Err(error),
-            }
-        }
     }
 
     /// Saves that have ended since the last call; `wait`: all of them.
