@@ -1,5 +1,7 @@
 //! Folder = crate = node; every node has the same files; files are small and named after ideas.
 
+use std::path::Path;
+
 use crate::check;
 use crate::packages::{self, Package, Target};
 use crate::source::sources;
@@ -164,4 +166,44 @@ fn arch_modules_are_named_after_ideas() {
     assert!(empty_name("nodes/probe/src/utils/a.rs").is_some());
     assert!(empty_name("nodes/probe/src/queue/mod.rs").is_some());
     assert!(empty_name("msgs/src/action_types.rs").is_none());
+}
+
+/// What colcon would find in the folder of a Cargo.toml beside the packages that are meant for it.
+fn crawled(manifest: &str, has: &dyn Fn(&str) -> bool) -> Option<String> {
+    // The root's own is that of the workspace, which is no package.
+    let folder = manifest.strip_suffix("/Cargo.toml")?;
+    let holds = |folder: &Path, file: &str| folder.join(file).to_str().is_some_and(has);
+    let mut above = Path::new(folder).ancestors();
+    let is_passed_over = above.any(|folder| holds(folder, "COLCON_IGNORE"));
+    let is_meant = holds(Path::new(folder), "package.xml");
+    (is_meant == is_passed_over).then(|| {
+        let wrong = if is_meant {
+            "a package.xml that colcon passes over: no COLCON_IGNORE may stand here or above"
+        } else {
+            "colcon takes it for a package: COLCON_IGNORE is missing"
+        };
+        format!("{folder}: {wrong}")
+    })
+}
+
+#[test]
+fn arch_colcon_finds_its_packages_and_no_other_crate() {
+    let all = tree::paths("");
+    let manifests = all.iter().filter(|path| path.ends_with("Cargo.toml"));
+    let found = manifests.filter_map(|manifest| crawled(manifest, &tree::has));
+    check(&found.collect::<Vec<_>>());
+    let packages = all.iter().filter(|path| path.ends_with("package.xml"));
+    assert_eq!(
+        packages.collect::<Vec<_>>(),
+        ["msgs/package.xml", "nodes/abbe/package.xml"]
+    );
+    let node = "nodes/probe/node/Cargo.toml";
+    assert_eq!(
+        crawled(node, &|_| false).unwrap(),
+        "nodes/probe/node: colcon takes it for a package: COLCON_IGNORE is missing"
+    );
+    assert!(crawled(node, &|path| path == "nodes/probe/COLCON_IGNORE").is_none());
+    assert!(crawled("msgs/Cargo.toml", &|path| path == "msgs/package.xml").is_none());
+    let hidden = crawled("msgs/Cargo.toml", &|path| path != "msgs/COLCON_IGNORE");
+    assert!(hidden.unwrap().starts_with("msgs: a package.xml"));
 }

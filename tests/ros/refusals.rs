@@ -1,4 +1,4 @@
-//! Starts that cannot go well: an error with place, value and limit, and exit code 1.
+//! Starts that cannot go well: an error with place, value and limit, and exit code 1; 2 where the command line is wrong.
 
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -159,6 +159,60 @@ fn a_second_node_of_the_same_name_does_not_start_and_the_first_goes_on() {
     let asked = Instant::now();
     first.stop();
     eprintln!("SIGINT to exit: {:?}", asked.elapsed());
+}
+
+/// What is wrong with a number of the command line needs no bag, file or network to be seen.
+#[test]
+fn numbers_out_of_range_on_the_command_line_are_usage_and_nothing_is_begun() {
+    let record = ["record", "-o", "bag"];
+    let export = ["export", "bag", "--format", "fanuc"];
+    for (verb, more, words) in [
+        (
+            &record[..],
+            &["--max-file-s", "nan"][..],
+            "= NaN s: must be above 0",
+        ),
+        (&record, &["--max-file-s", "-1"], "= -1 s: must be above 0"),
+        (
+            &record,
+            &["--ring", "0"],
+            "ring.window_s = 0 s: must be above 0",
+        ),
+        (
+            &record,
+            &["--ring", "60", "--ring-bytes", "1"],
+            "ring.limit_bytes = 1: must lie between 1024",
+        ),
+        (&["trials"], &["--n", "0"], "0 is not in 1.."),
+        (
+            &["preflight", "plan.yaml"],
+            &["--station-uncertainty-um", "nan"],
+            "--station-uncertainty-um NaN: must be finite and above 0",
+        ),
+        (&["run", "cell"], &["--pace", "-1"], "--pace -1: must be 0"),
+        (&export, &["--spacing-mm", "0"], "a finite number above 0"),
+        (
+            &export,
+            &["--magnification", "101"],
+            "101 is not in 1..=100",
+        ),
+        (
+            &export,
+            &["--reference-number", "X=4.5"],
+            "must be a whole number",
+        ),
+        (&export, &["--reference", "X=inf"], "must be finite"),
+    ] {
+        let home = tempfile::tempdir().unwrap();
+        let mut command = command(domain(15), verb);
+        command.args(more).current_dir(home.path());
+        let ended = Process::start(command).ended_within(PATIENCE);
+        assert_eq!(ended.status.code(), Some(2), "{more:?}: {}", ended.said);
+        assert!(ended.said.contains(words), "{more:?}: {}", ended.said);
+        assert!(ended.said.contains("try '--help'"), "{}", ended.said);
+        let left = std::fs::read_dir(home.path()).unwrap().count();
+        assert_eq!(left, 0, "{verb:?} {more:?}");
+    }
 }
 
 /// In a network namespace of its own, where even `lo` is down. Without the right to make one

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -11,6 +12,7 @@ from desk import Desk
 
 BUILD_LIMIT_S = 900.0
 COMMENT = re.compile(r"\s*#.*$")
+PACKAGES = ["abbe", "abbe_msgs"]
 
 
 def sourced(desk: Desk, setup: Path) -> dict[str, str]:
@@ -27,13 +29,29 @@ def sourced(desk: Desk, setup: Path) -> dict[str, str]:
     return dict(pairs)
 
 
+def has_colcon(desk: Desk) -> bool:
+    return shutil.which("colcon", path=desk.env.get("PATH")) is not None
+
+
+def packages(desk: Desk, root: Path) -> None:
+    """What colcon finds in the repository, with or without its extension for cargo."""
+    if not has_colcon(desk):
+        desk.lack("packages that colcon finds", "no colcon on PATH")
+        return
+    words = ["colcon", "--log-base", os.devnull, "list", "--names-only", "--base-paths", str(root)]
+    code, said = desk.run(words, 60.0)
+    found = sorted(said.split())
+    right = code == 0 and found == PACKAGES
+    desk.judge("colcon finds two packages", " ".join(PACKAGES), right, " ".join(found), said)
+
+
 def messages(desk: Desk, msgs: Path) -> bool:
     """Makes the types known to `ros2`; whether they are."""
     code, said = desk.run(["ros2", "pkg", "prefix", "abbe_msgs"], 20.0)
     if code == 0:
         desk.lack("colcon build of abbe_msgs", f"it is in {said.strip()} already: that one is used")
         return True
-    if shutil.which("colcon", path=desk.env.get("PATH")) is None:
+    if not has_colcon(desk):
         desk.lack("colcon build of abbe_msgs", "no colcon on PATH")
         return False
     base = desk.folder / "messages"

@@ -32,8 +32,8 @@ def parameters(desk: Desk) -> None:
         [*param, "describe", "/fake_cnc", "background_rate_hz"],
         r"Type: double",
         r"Description: Rate of axis states otherwise",
-        r"Read only: true",
-        rf"Constraints:(.*\n)*? *{FROZEN}|{FROZEN}",
+        r"Constraints:\n +Read only: true\n +Min value: 0\.0\n +Max value: 20000\.0$",
+        rf"Additional constraints: {FROZEN}",
     )
     setting = [*param, "set", "/probe"]
     for name, value, reason in [

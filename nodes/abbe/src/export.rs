@@ -17,6 +17,7 @@ use metrology::{Axis, AxisSet, PerAxis};
 use recorder::Bag;
 
 use crate::evaluate::Tests;
+use crate::usage::{USAGE, above_zero};
 
 mod found;
 
@@ -37,9 +38,6 @@ enum Format {
     Csv,
 }
 
-/// Exit code for arguments that cannot be understood.
-const USAGE: u8 = 2;
-
 /// Every format with what it is, a line each.
 fn formats() -> String {
     let line = |format: &Format| {
@@ -55,24 +53,27 @@ fn formats() -> String {
     lines.join("\n")
 }
 
-/// `AXIS=NUMBER`.
-#[derive(Clone, Copy, Debug)]
-struct OfAxis {
-    axis: Axis,
-    value: f64,
+/// `AXIS=NUMBER`; `kind` says what is taken as a number.
+fn of_axis<N: FromStr>(text: &str, kind: &str) -> Result<(Axis, N), String> {
+    let (axis, number) = text.split_once('=').ok_or("must be AXIS=NUMBER")?;
+    let axis = axis.parse::<Axis>().map_err(|error| error.to_string())?;
+    let number = number.parse();
+    Ok((axis, number.map_err(|_| format!("must be {kind}"))?))
 }
 
-impl FromStr for OfAxis {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (axis, value) = text.split_once('=').ok_or("must be AXIS=NUMBER")?;
-        let axis = axis.parse::<Axis>().map_err(|error| error.to_string())?;
-        let value = value
-            .parse()
-            .map_err(|_| format!("{value}: not a number"))?;
-        Ok(Self { axis, value })
+/// A position of an axis, mm or deg.
+fn position(text: &str) -> Result<(Axis, f64), String> {
+    let (axis, value) = of_axis::<f64>(text, "a number")?;
+    if value.is_finite() {
+        Ok((axis, value))
+    } else {
+        Err("must be finite".to_owned())
     }
+}
+
+/// The number of a point of an axis.
+fn point_number(text: &str) -> Result<(Axis, u32), String> {
+    of_axis(text, "a whole number, 0 or above")
 }
 
 /// Arguments of `abbe export`.
@@ -90,14 +91,14 @@ pub struct Export {
     #[arg(long, default_value = "export")]
     out: PathBuf,
     /// Spacing of the points of linear axes, mm.
-    #[arg(long, default_value_t = 20.0)]
+    #[arg(long, default_value_t = 20.0, allow_negative_numbers = true, value_parser = above_zero)]
     spacing_mm: f64,
     /// Spacing of the points of rotary axes, deg.
-    #[arg(long, default_value_t = 15.0)]
+    #[arg(long, default_value_t = 15.0, allow_negative_numbers = true, value_parser = above_zero)]
     spacing_deg: f64,
     /// Reference point of an axis such as X=-300, mm or deg; others: 0.
-    #[arg(long)]
-    reference: Vec<OfAxis>,
+    #[arg(long, value_parser = position)]
+    reference: Vec<(Axis, f64)>,
     /// Keep the error at the reference point instead of counting from it.
     #[arg(long)]
     absolute: bool,
@@ -124,10 +125,10 @@ struct SetUp {
     #[arg(long, default_value_t = 8)]
     max_tables: usize,
     /// SINUMERIK: greatest sum of cross-axis compensations (MD32720), mm.
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = above_zero)]
     max_sum_mm: f64,
     /// SINUMERIK: greatest slope of the temperature compensation, mm/mm.
-    #[arg(long, default_value_t = 1e-3)]
+    #[arg(long, default_value_t = 1e-3, allow_negative_numbers = true, value_parser = above_zero)]
     max_slope: f64,
     /// SINUMERIK: positioning as two cross-axis tables, one for each direction.
     #[arg(long)]
@@ -136,16 +137,16 @@ struct SetUp {
     #[arg(long)]
     leave_out_other_axes: bool,
     /// FANUC: number of an axis' reference point such as X=40 (parameter 3620); others: 100 times the axis' place, and 100.
-    #[arg(long)]
-    reference_number: Vec<OfAxis>,
+    #[arg(long, value_parser = point_number)]
+    reference_number: Vec<(Axis, u32)>,
     /// FANUC: detection unit, um or 0.001 deg.
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = above_zero)]
     detection_unit: f64,
     /// FANUC: magnification (parameter 3623).
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100))]
     magnification: u32,
     /// FANUC: greatest size of one value, pulses.
-    #[arg(long, default_value_t = 7)]
+    #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..))]
     max_pulses: u32,
     /// FANUC: greatest number of a point.
     #[arg(long, default_value_t = 1023)]
@@ -198,13 +199,8 @@ impl SetUp {
 
     fn fanuc(&self) -> Fanuc {
         let mut reference_number = PerAxis::from_fn(|axis| 100 * axis.index() as u32 + 100);
-        for of in &self.reference_number {
-            // A number that is none becomes one that no control has, which the export refuses by name.
-            reference_number[of.axis] = if of.value >= 0.0 && of.value.fract().abs() < 1e-9 {
-                of.value as u32
-            } else {
-                u32::MAX
-            };
+        for (axis, number) in &self.reference_number {
+            reference_number[*axis] = *number;
         }
         Fanuc {
             reference_number,
@@ -276,8 +272,8 @@ impl Export {
 
     fn wanted(&self) -> Wanted {
         let mut reference = PerAxis::default();
-        for of in &self.reference {
-            reference[of.axis] = inner(of.axis, of.value);
+        for (axis, value) in &self.reference {
+            reference[*axis] = inner(*axis, *value);
         }
         Wanted {
             axes: self.axes(),
@@ -487,7 +483,18 @@ mod tests {
             &["--format", "csv", "--axis", "Q"],
             &["--format", "csv", "--reference", "X"],
             &["--format", "csv", "--reference", "X=here"],
+            &["--format", "csv", "--reference", "X=nan"],
             &["--format", "linuxcnc", "--file-type", "2"],
+            &["--format", "csv", "--spacing-mm", "0"],
+            &["--format", "csv", "--spacing-mm", "-20"],
+            &["--format", "csv", "--spacing-deg", "inf"],
+            &["--format", "sinumerik", "--max-sum-mm", "nan"],
+            &["--format", "sinumerik", "--max-slope", "-1e-3"],
+            &["--format", "fanuc", "--detection-unit", "0"],
+            &["--format", "fanuc", "--magnification", "101"],
+            &["--format", "fanuc", "--max-pulses", "0"],
+            &["--format", "fanuc", "--reference-number", "X=4.5"],
+            &["--format", "fanuc", "--reference-number", "X=-1"],
         ] {
             let line = ["export", "bag"].iter().chain(wrong);
             let refused = CommandLine::try_parse_from(line).err().unwrap();

@@ -32,6 +32,7 @@ mod run;
 mod scenario;
 mod trials;
 mod truth;
+mod usage;
 
 /// Measures a CNC machine, models its errors, compensates its axes and records every run.
 #[derive(Parser)]
@@ -93,8 +94,16 @@ fn main() -> ExitCode {
         Verb::InstallRos(install) => install.execute(),
         Verb::Keystore(keystore) => keystore.execute(),
     };
-    outcome.unwrap_or_else(|error| {
-        eprintln!("abbe: {}", complaint::in_words(&error));
-        ExitCode::FAILURE
-    })
+    outcome.unwrap_or_else(|error| failed(&error))
+}
+
+/// Says why the verb failed; the exit code tells what is a matter of the arguments from the rest.
+fn failed(error: &anyhow::Error) -> ExitCode {
+    if let Some(refusal) = error.downcast_ref::<clap::Error>() {
+        // Where nobody reads standard error, the exit code alone tells it.
+        let _ = refusal.print();
+        return ExitCode::from(usage::USAGE);
+    }
+    eprintln!("abbe: {}", complaint::in_words(error));
+    ExitCode::FAILURE
 }

@@ -13,6 +13,8 @@ use node_runtime::{Interruption, Setup};
 use replayer::PlaybackConfig;
 use replayer_node::{Desk, Played};
 
+use crate::usage::refused;
+
 /// Arguments of `abbe play`.
 #[derive(Args)]
 pub struct Play {
@@ -28,7 +30,7 @@ pub struct Play {
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     from: f64,
     /// Leave out what comes after, s from the bag's first message.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     to: Option<f64>,
     /// Begin again at the end, until Ctrl-C.
     #[arg(long = "loop")]
@@ -37,7 +39,7 @@ pub struct Play {
     #[arg(long)]
     paused: bool,
     /// Time for subscribers to find the topics before the first message, s.
-    #[arg(long, default_value_t = 0.5)]
+    #[arg(long, default_value_t = 0.5, allow_negative_numbers = true)]
     delay: f64,
     /// Do not publish `/clock`; one that was recorded is played as it is.
     #[arg(long)]
@@ -58,7 +60,7 @@ impl Play {
     /// Plays to the end or to SIGINT; exit code 3 when something was lost.
     ///
     /// # Errors
-    /// When the bag cannot be opened, holds nothing of what is asked for, or there is no network.
+    /// When a number is out of its range (exit code 2), the bag cannot be opened, holds nothing of what is asked for, or there is no network.
     pub fn execute(self) -> Result<ExitCode> {
         let interruption = Interruption::listen("what was sent is being acknowledged")?;
         let bag = self.bag.to_str().context("BAG: must be UTF-8")?;
@@ -77,8 +79,10 @@ impl Play {
             },
             ..PlaybackConfig::whole(bag.to_owned())
         };
-        config.checked()?;
-        let setup = Setup::new(NAME, &Arguments::parse(self.ros.clone())?)?;
+        config.checked().map_err(|error| refused("play", error))?;
+        let rules = Arguments::parse(self.ros.clone());
+        let rules = rules.map_err(|error| refused("play", error))?;
+        let setup = Setup::new(NAME, &rules)?;
         let (node, desk) = replayer_node::play(&setup, &config)?;
         let mut running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
         eprintln!("Playing {bag}; Ctrl-C ends it.");

@@ -27,6 +27,7 @@ use wanted::Proposal;
 use crate::report::gap::planned;
 use crate::report::section::Section;
 use crate::report::{self, Report};
+use crate::usage::refused;
 
 /// Arguments of `abbe preflight`.
 #[derive(Args)]
@@ -66,11 +67,12 @@ impl Preflight {
     /// Tells rank, what is determined and what to add, and what a diagnosis would find.
     ///
     /// # Errors
-    /// When plan, machine or a wanted name cannot be used.
+    /// When plan, machine, a wanted name or a number (exit code 2) cannot be used.
     pub fn execute(self) -> Result<ExitCode> {
         let u_um = self.station_uncertainty_um;
         if !(u_um.is_finite() && u_um > 0.0) {
-            bail!("--station-uncertainty-um {u_um}: must be finite and above 0");
+            let reason = format!("--station-uncertainty-um {u_um}: must be finite and above 0");
+            return Err(refused("preflight", reason));
         }
         let plan = Planned::read(&self.what, self.machine.as_deref())?;
         let geometry = self.geometry(&plan, u_um * 1e-3)?;

@@ -15,6 +15,7 @@ use crate::report::Report;
 use crate::report::section::Section;
 use crate::report_bag;
 use crate::scenario::{ReportKind, Scenario};
+use crate::usage::refused;
 
 mod bag;
 mod composed;
@@ -40,7 +41,7 @@ pub struct Run {
     #[arg(long)]
     no_dds: bool,
     /// Go no faster than this many times real time (0: as fast as it can).
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pace: f64,
     /// Run every node as a process of its own, on DDS and in real time.
     #[arg(long)]
@@ -75,7 +76,8 @@ impl Run {
     /// When the scenario cannot be read, a node not built, or the bag not written.
     pub fn execute(self) -> Result<ExitCode> {
         if !(self.pace.is_finite() && self.pace >= 0.0) {
-            bail!("--pace {}: must be 0 or a finite number above", self.pace);
+            let reason = format!("--pace {}: must be 0 or a finite number above", self.pace);
+            return Err(refused("run", reason));
         }
         let scenario = Scenario::read(&self.scenario)?;
         let interruption = Interruption::listen("the bag is closed, no page is written")?;

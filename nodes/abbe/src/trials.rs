@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::Args;
 use gap_diagnosis::Rule;
 use sha2::{Digest, Sha256};
@@ -40,7 +40,7 @@ pub struct Trials {
     #[arg(long, value_delimiter = ',', default_value = "i")]
     arm: Vec<Arm>,
     /// Trials in each arm.
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..))]
     n: u64,
     /// Seed of the series.
     #[arg(long, conflicts_with = "final_series")]
@@ -91,9 +91,6 @@ impl Trials {
     /// # Errors
     /// When a trial cannot be made or a file not written.
     pub fn execute(self) -> Result<ExitCode> {
-        if self.n == 0 {
-            bail!("--n 0: must be 1 or more");
-        }
         let seed = match (self.final_series, self.seed) {
             (true, _) => {
                 // What is in the journal was made by this commit already.

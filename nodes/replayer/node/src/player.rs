@@ -10,11 +10,11 @@ use abbe_msgs::rosgraph_msgs::msg::Clock;
 use abbe_msgs::to_cdr;
 use anyhow::{Context, Result, anyhow};
 use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
-use node_runtime::RawPublisher;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
+use node_runtime::{Bytes, RawPublisher};
 use recorder::{Bag, Event, MessageRef, Order};
-use replayer::PlaybackConfig;
+use replayer::{Playback, PlaybackConfig};
 
 use crate::contents::Contents;
 use crate::desk::{Desk, Next};
@@ -63,19 +63,8 @@ impl Player {
         let contents = Contents::of(&bag, config, &playback)?;
         let publisher =
             RawPublisher::of_found(environment, names, &contents.offered, QUEUE_LEN, PATIENCE)?;
-        let desk = Arc::new(Desk::new(contents.from, playback.rate, config.start_paused));
-        let mut playing = Playing {
-            bag: Arc::new(bag),
-            contents,
-            desk: Arc::clone(&desk),
-            publisher,
-            settles: playback.rate.is_none(),
-            repeat: config.repeat,
-            latched: Latched::default(),
-            told: None,
-            told_at: None,
-            played: Played::default(),
-        };
+        let mut playing = Playing::new(bag, contents, publisher, config, &playback);
+        let desk = Arc::clone(&playing.desk);
         let delay = Duration::from_nanos(u64::try_from(playback.delay.nanos()).unwrap_or(0));
         let thread = std::thread::Builder::new()
             .name("player".to_owned())
@@ -103,11 +92,31 @@ impl Player {
     }
 }
 
-struct Playing {
+/// What speaks on the topics of a bag.
+trait Voice {
+    /// Says `data` on the topic at `place`.
+    fn say(&mut self, place: usize, data: Bytes);
+
+    /// Waits until what was said has been acknowledged; false when that took too long.
+    fn settle(&self) -> bool;
+}
+
+impl Voice for RawPublisher {
+    fn say(&mut self, place: usize, data: Bytes) {
+        // What found no room in time is in its report at the end.
+        self.publish(place, None, data);
+    }
+
+    fn settle(&self) -> bool {
+        self.settle(PATIENCE)
+    }
+}
+
+struct Playing<V> {
     bag: Arc<Bag>,
     contents: Contents,
     desk: Arc<Desk>,
-    publisher: RawPublisher,
+    voice: V,
     settles: bool,
     repeat: bool,
     /// What still holds of the time before the first one that is played.
@@ -124,7 +133,29 @@ enum Goes {
     Out,
 }
 
-impl Playing {
+impl<V: Voice> Playing<V> {
+    fn new(
+        bag: Bag,
+        contents: Contents,
+        voice: V,
+        config: &PlaybackConfig,
+        playback: &Playback,
+    ) -> Self {
+        let desk = Desk::new(contents.from, playback.rate, config.start_paused);
+        Self {
+            bag: Arc::new(bag),
+            contents,
+            desk: Arc::new(desk),
+            voice,
+            settles: playback.rate.is_none(),
+            repeat: config.repeat,
+            latched: Latched::default(),
+            told: None,
+            told_at: None,
+            played: Played::default(),
+        }
+    }
+
     fn run(&mut self, delay: Duration) {
         std::thread::park_timeout(delay);
         let mut rounds = 0_u32;
@@ -192,7 +223,7 @@ impl Playing {
     }
 
     fn send(&mut self, place: usize, data: Box<[u8]>) {
-        self.publisher.publish(place, None, data.into());
+        self.voice.say(place, data.into());
         self.played.messages += 1;
         if self.settles && self.played.messages.is_multiple_of(ON_THE_WAY) {
             self.settle();
@@ -200,7 +231,7 @@ impl Playing {
     }
 
     fn settle(&mut self) {
-        if !self.publisher.settle(PATIENCE) {
+        if !self.voice.settle() {
             self.played.lost += 1;
         }
     }
@@ -225,15 +256,167 @@ impl Playing {
             sec: i32::try_from(at.nanos().div_euclid(NANOS_PER_S)).unwrap_or(i32::MAX),
             nanosec: u32::try_from(at.nanos().rem_euclid(NANOS_PER_S)).unwrap_or(0),
         };
-        self.publisher
-            .publish(place, None, to_cdr(&Clock { clock }).into());
+        self.voice.say(place, to_cdr(&Clock { clock }).into());
     }
+}
 
+impl Playing<RawPublisher> {
     fn finish(self) {
-        let ended = self.publisher.stop().map(|report| Played {
+        let ended = self.voice.stop().map(|report| Played {
             lost: self.played.lost + report.dropped + report.refused,
             ..self.played
         });
         self.desk.end(ended.map_err(|error| format!("{error:#}")));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use abbe_msgs::from_cdr;
+    use recorder::{
+        Channel, ChannelId, Directory, Durability, MessageStamp, QosProfile, RecorderConfig,
+        Recording, Reliability, qos_to_yaml,
+    };
+
+    use super::*;
+
+    /// Log time of the bag's first message, ns.
+    const FIRST: i64 = 1_700_000_000 * NANOS_PER_S;
+    /// The window that is played: 2 s to 3 s behind the first message, ns.
+    const FROM: i64 = 2 * NANOS_PER_S;
+    const TO: i64 = 3 * NANOS_PER_S;
+    /// Topics with their durability and depth; the last one is not picked.
+    const TOPICS: [(&str, Durability, u64); 4] = [
+        ("/state", Durability::Volatile, 10),
+        ("/model", Durability::TransientLocal, 2),
+        ("/map", Durability::TransientLocal, 1),
+        ("/other", Durability::TransientLocal, 1),
+    ];
+    /// Topic, log time behind the first message, ns, and what is said.
+    const MESSAGES: [(&str, i64, u8); 17] = [
+        ("/other", 0, 0),
+        ("/map", FROM / 4, 1),
+        ("/model", FROM / 4, 2),
+        ("/state", FROM / 2, 3),
+        ("/model", FROM / 2, 4),
+        ("/model", FROM - 2, 5),
+        ("/map", FROM - 1, 6),
+        ("/state", FROM - 1, 7),
+        ("/state", FROM, 8),
+        ("/model", FROM + 1, 9),
+        ("/other", FROM + 2, 10),
+        ("/state", TO - 1, 11),
+        ("/map", TO, 12),
+        ("/state", TO, 13),
+        ("/state", TO + 1, 14),
+        ("/map", TO + 1, 15),
+        ("/other", 2 * TO, 16),
+    ];
+    /// What a late subscriber is owed of the time before the window.
+    const OWED: [u8; 3] = [4, 5, 6];
+
+    /// A bag of [`MESSAGES`].
+    fn bag(folder: &Path) -> Bag {
+        let path = folder.join("bag");
+        let directory = Directory::create(&path).unwrap();
+        let mut recording = Recording::begin(directory, "bag", RecorderConfig::default()).unwrap();
+        let mut channel = |(topic, durability, depth): (&str, Durability, u64)| {
+            let qos = QosProfile::keep_last(depth, Reliability::Reliable, durability);
+            let channel = Channel {
+                topic: topic.to_owned(),
+                type_name: "std_msgs/msg/String".to_owned(),
+                type_hash: String::new(),
+                definition: String::new(),
+                qos_yaml: qos_to_yaml(&[qos]).unwrap(),
+            };
+            recording.add_channel(&channel).unwrap()
+        };
+        let ids: Vec<ChannelId> = TOPICS.into_iter().map(&mut channel).collect();
+        for (topic, behind, says) in MESSAGES {
+            let place = TOPICS.iter().position(|(name, ..)| *name == topic).unwrap();
+            let stamp = MessageStamp {
+                log_time_nanos: FIRST + behind,
+                publish_time_nanos: FIRST + behind,
+                sequence: 0,
+            };
+            recording.write(ids[place], stamp, &[says]).unwrap();
+        }
+        recording.finish().unwrap();
+        Bag::open(&path).unwrap()
+    }
+
+    /// A voice that nobody hears: what it said.
+    #[derive(Default)]
+    struct Said(Vec<(usize, Bytes)>);
+
+    impl Voice for Said {
+        fn say(&mut self, place: usize, data: Bytes) {
+            self.0.push((place, data));
+        }
+
+        fn settle(&self) -> bool {
+            true
+        }
+    }
+
+    /// What is said of the messages, and the times that `/clock` tells, ns behind the first message.
+    fn played(window_s: (f64, Option<f64>), rate: f64) -> (Vec<u8>, Vec<i64>) {
+        let home = tempfile::tempdir().unwrap();
+        let bag = bag(home.path());
+        let config = PlaybackConfig {
+            topics: vec!["/state".to_owned(), "/m*".to_owned()],
+            rate,
+            from_s: window_s.0,
+            to_s: window_s.1,
+            ..PlaybackConfig::whole(String::new())
+        };
+        let playback = config.checked().unwrap();
+        let contents = Contents::of(&bag, &config, &playback).unwrap();
+        let mut playing = Playing::new(bag, contents, Said::default(), &config, &playback);
+        playing.run(Duration::ZERO);
+        let clock = playing.contents.clock.unwrap();
+        let (mut said, mut times) = (Vec::new(), Vec::new());
+        for (place, data) in &playing.voice.0 {
+            if *place == clock {
+                let Clock { clock } = from_cdr(data).unwrap();
+                let nanos = i64::from(clock.sec) * NANOS_PER_S + i64::from(clock.nanosec);
+                times.push(nanos - FIRST);
+                continue;
+            }
+            let message = MESSAGES.iter().find(|(_, _, says)| [*says] == **data);
+            let topic = message.unwrap().0;
+            assert_eq!(playing.contents.offered[*place].name, topic);
+            said.push(data[0]);
+        }
+        assert_eq!(playing.played.messages, said.len() as u64);
+        assert_eq!((playing.played.lost, playing.played.losses.len()), (0, 0));
+        (said, times)
+    }
+
+    #[test]
+    fn a_window_holds_the_messages_of_both_its_edges_behind_what_is_owed() {
+        for rate in [0.0, 50.0] {
+            let (said, times) = played((2.0, Some(3.0)), rate);
+            assert_eq!(said, [&OWED[..], &[8, 9, 11, 12, 13]].concat(), "{rate}");
+            assert_eq!(times[0], FROM, "{rate}");
+            assert!(times.iter().all(|at| (FROM..=TO).contains(at)), "{times:?}");
+        }
+        let (said, times) = played((2.0, Some(2.0)), 0.0);
+        assert_eq!(said, [&OWED[..], &[8]].concat());
+        assert_eq!(times, [FROM]);
+    }
+
+    #[test]
+    fn a_window_without_a_message_holds_what_is_owed() {
+        let (said, times) = played((2.5, Some(2.75)), 0.0);
+        assert_eq!(said, [5, 6, 9]);
+        assert!(times.is_empty(), "{times:?}");
+    }
+
+    #[test]
+    fn a_window_that_is_open_holds_every_message_that_is_picked() {
+        let picked = MESSAGES.iter().filter(|(topic, ..)| *topic != "/other");
+        let picked: Vec<u8> = picked.map(|(_, _, says)| *says).collect();
+        assert_eq!(played((0.0, None), 0.0).0, picked);
     }
 }

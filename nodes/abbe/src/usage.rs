@@ -1,0 +1,58 @@
+//! Arguments that can be read and cannot be used: said as clap says it, with exit code 2.
+
+use std::fmt::Display;
+
+use clap::CommandFactory;
+use clap::error::ErrorKind;
+
+/// Exit code for arguments that cannot be understood or used.
+pub const USAGE: u8 = 2;
+
+/// Why the arguments of `verb` cannot be used, as an error with which the program ends with [`USAGE`].
+pub fn refused(verb: &str, reason: impl Display) -> anyhow::Error {
+    let mut program = crate::Arguments::command();
+    program.build();
+    let error = match program.find_subcommand_mut(verb) {
+        Some(command) => command.error(ErrorKind::ValueValidation, reason),
+        None => program.error(ErrorKind::ValueValidation, reason),
+    };
+    error.into()
+}
+
+/// A finite number above 0.
+///
+/// # Errors
+/// Says what is wanted.
+pub fn above_zero(text: &str) -> Result<f64, &'static str> {
+    let number = text.parse().ok();
+    number
+        .filter(|number: &f64| number.is_finite() && *number > 0.0)
+        .ok_or("must be a finite number above 0")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_shows_the_reason_and_how_the_verb_is_used() {
+        let error = refused("play", "rate = -2: must be 0 to 1000");
+        let error: clap::Error = error.downcast().unwrap();
+        assert_eq!(error.exit_code(), i32::from(USAGE));
+        let said = error.to_string();
+        assert!(
+            said.starts_with("error: rate = -2: must be 0 to 1000\n"),
+            "{said}"
+        );
+        assert!(said.contains("Usage: abbe play [OPTIONS] <BAG>"), "{said}");
+        assert!(said.contains("try '--help'"), "{said}");
+    }
+
+    #[test]
+    fn numbers_that_are_none_or_not_above_zero_are_refused() {
+        assert!(above_zero("0.5").is_ok_and(|number| (number - 0.5).abs() < 1e-12));
+        for text in ["0", "-0.0", "-1", "nan", "inf", "1e400", "wide", ""] {
+            assert!(above_zero(text).is_err(), "{text}");
+        }
+    }
+}
