@@ -12,15 +12,26 @@ use abbe_tests::scenario::Scenario;
 use nix::sys::signal::Signal;
 
 /// Nodes of the cell beside its recorder.
-pub const NODES: [&str; 6] = [
+pub const NODES: [&str; 10] = [
     "fake_cnc",
     "probe",
     "latency_calibrator",
     "thermal_model",
     "axis_compensation",
     "sequencer",
+    "machine_frames",
+    "grid_encoder",
+    "gap_diagnosis",
+    "host_clock",
 ];
 pub const RECORDER: &str = "recorder";
+
+/// Nodes of the cell that its scenario does not have, and what they are told.
+const MORE: [(&str, &str); 3] = [
+    ("grid_encoder", "machine_file: machine.yaml"),
+    ("gap_diagnosis", "machine_file: machine.yaml"),
+    ("host_clock", "host: models, reference: controller"),
+];
 
 /// Drift that the model of these cells has everywhere, m.
 pub const DRIFT_M: f64 = 20e-6;
@@ -55,6 +66,10 @@ fn scenario(works: bool) -> Scenario {
         "background_rate_hz: 250.0\n    compensation_rate_limit_um_s: 25.0",
     );
     scenario.replace("axis_compensation.yaml", "enabled: false", "enabled: true");
+    for (node, parameter) in MORE {
+        let text = format!("/**:\n  ros__parameters: {{{parameter}}}\n");
+        scenario.write(&format!("{node}.yaml"), &text);
+    }
     scenario
 }
 
