@@ -8,4 +8,5 @@
 
 mod blind;
 mod floor;
+mod page;
 mod series;

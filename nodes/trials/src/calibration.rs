@@ -19,10 +19,14 @@ const CONFIDENCE_BINS: usize = 10;
 /// One bin of the reliability diagram.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reliability {
+    /// Ends of the bin.
+    pub bin: [f64; 2],
     /// Mean confidence of the named causes in it.
     pub confidence: f64,
     /// How many of them were right.
     pub right: Proportion,
+    /// Its 95 % interval.
+    pub interval: [f64; 2],
 }
 
 /// Every named cause as (confidence, whether it is right).
@@ -46,16 +50,12 @@ pub(crate) fn calibration(own: &[&Verdict]) -> [Figure; 2] {
         bin.right.n as f64 * (bin.confidence - share).abs()
     });
     [
-        Figure {
-            what: "expected calibration error of named causes".to_owned(),
-            value: of(apart.sum()),
+        Figure::new(
+            "expected calibration error of named causes",
+            of(apart.sum()),
             n,
-        },
-        Figure {
-            what: "Brier score of named causes".to_owned(),
-            value: of(brier),
-            n,
-        },
+        ),
+        Figure::new("Brier score of named causes", of(brier), n),
     ]
 }
 
@@ -65,10 +65,15 @@ pub(crate) fn reliability(own: &[&Verdict]) -> Vec<Reliability> {
         let place = (confidence * CONFIDENCE_BINS as f64) as usize;
         bins[place.min(CONFIDENCE_BINS - 1)].push((confidence, right));
     }
-    let full = bins.into_iter().filter(|bin| !bin.is_empty());
-    full.map(|bin| Reliability {
-        confidence: bin.iter().map(|(c, _)| c).sum::<f64>() / bin.len() as f64,
-        right: Proportion::of(bin.iter().map(|(_, right)| *right)),
+    let full = bins.iter().enumerate().filter(|(_, bin)| !bin.is_empty());
+    full.map(|(place, bin)| {
+        let right = Proportion::of(bin.iter().map(|(_, right)| *right));
+        Reliability {
+            bin: [place, place + 1].map(|edge| edge as f64 / CONFIDENCE_BINS as f64),
+            confidence: bin.iter().map(|(c, _)| c).sum::<f64>() / bin.len() as f64,
+            right,
+            interval: right.wilson(),
+        }
     })
     .collect()
 }

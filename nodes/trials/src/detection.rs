@@ -11,12 +11,17 @@
 //! that separate cleanly have an answer too.
 //!
 //! # Holds when
-//! There are names and misses; (2) outside the D that were tried is none.
+//! There are trials of D above 0: (1) is 0 at D = 0, where no reading shows anything, so that these say nothing of a and
+//! b. (2) is told within the D that were tried; outside them, on which side it lies.
 //!
 //! # Agreement
 //! `eq2_is_found_again_where_names_follow_the_model`: within 8 % for 4000 trials.
 
-use crate::proportion::median;
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::proportion::{Proportion, median};
 
 /// Slope b that is expected: from one half to 95 % within a factor 2 of D.
 const SLOPE: f64 = 4.0;
@@ -25,13 +30,110 @@ const STEPS: usize = 60;
 /// ln 19.
 const LOG_ODDS: f64 = 2.944_438_979_166_44;
 
-/// (2) of trials: D, and whether it was named; none where it is beyond them.
-#[must_use]
-pub fn d95(trials: &[(f64, bool)]) -> Option<f64> {
-    let named = trials.iter().filter(|(_, named)| *named).count();
-    if named == 0 || named == trials.len() {
-        return None;
+/// Where a detection limit lies.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Limit {
+    /// At this D.
+    At(f64),
+    /// Below the least D that was tried.
+    Below(f64),
+    /// Beyond the largest D that was tried.
+    Beyond(f64),
+    /// Between these two, where it is of several of which some are known on one side only.
+    Between(f64, f64),
+}
+
+impl Limit {
+    /// The D itself, where it is known.
+    #[must_use]
+    pub fn value(self) -> Option<f64> {
+        match self {
+            Self::At(d) => Some(d),
+            _ => None,
+        }
     }
+
+    /// Least and largest D that it can have.
+    #[must_use]
+    pub fn ends(self) -> [f64; 2] {
+        match self {
+            Self::At(d) => [d, d],
+            Self::Below(d) => [0.0, d],
+            Self::Beyond(d) => [d, f64::INFINITY],
+            Self::Between(low, high) => [low, high],
+        }
+    }
+
+    fn within([low, high]: [f64; 2]) -> Self {
+        match (low > 0.0, high.is_finite()) {
+            (_, false) => Self::Beyond(low),
+            (false, true) => Self::Below(high),
+            (true, true) if high > low => Self::Between(low, high),
+            (true, true) => Self::At(high),
+        }
+    }
+
+    /// What `whole` makes of several: it must grow with each of them.
+    fn of(all: &[Self], whole: impl Fn(Vec<f64>) -> Option<f64>) -> Option<Self> {
+        let end = |place: usize| whole(all.iter().map(|limit| limit.ends()[place]).collect());
+        Some(Self::within([end(0)?, end(1)?]))
+    }
+
+    /// The middle one; none of nothing.
+    #[must_use]
+    pub fn middle(all: &[Self]) -> Option<Self> {
+        Self::of(all, median)
+    }
+
+    /// The largest; none of nothing.
+    #[must_use]
+    pub fn largest(all: &[Self]) -> Option<Self> {
+        Self::of(all, |ends| ends.into_iter().reduce(f64::max))
+    }
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::At(d) => write!(f, "{d:.3}"),
+            Self::Below(d) => write!(f, "< {d:.3}"),
+            Self::Beyond(d) => write!(f, "> {d:.3}"),
+            Self::Between(low, high) => write!(f, "{low:.3} to {high:.3}"),
+        }
+    }
+}
+
+/// (2) of trials: D, and whether it was named; none without trials.
+#[must_use]
+pub fn d95(trials: &[(f64, bool)]) -> Option<Limit> {
+    let seen: Vec<(f64, bool)> = trials.iter().copied().filter(|(d, _)| *d > 0.0).collect();
+    let least = seen.iter().map(|(d, _)| *d).reduce(f64::min)?;
+    let most = seen.iter().map(|(d, _)| *d).reduce(f64::max)?;
+    if seen.iter().all(|(_, named)| *named) {
+        return Some(Limit::Below(least));
+    }
+    if !seen.iter().any(|(_, named)| *named) {
+        return Some(Limit::Beyond(most));
+    }
+    let [a, b] = match fit(&seen)? {
+        [a, b] if b > 0.0 => [a, b],
+        // Nothing grows rarer with its size: all are named alike.
+        _ => {
+            let share = Proportion::of(seen.iter().map(|(_, named)| *named)).share()?;
+            [(share / (1.0 - share)).ln(), 0.0]
+        }
+    };
+    let is_reached = |d: f64| a + b * d.ln() >= LOG_ODDS;
+    Some(match (is_reached(least), is_reached(most)) {
+        (_, false) => Limit::Beyond(most),
+        (true, true) => Limit::Below(least),
+        (false, true) => Limit::At(((LOG_ODDS - a) / b).exp()),
+    })
+}
+
+/// a and b of (1).
+fn fit(trials: &[(f64, bool)]) -> Option<[f64; 2]> {
     let middle = median(trials.iter().map(|(d, _)| d.ln()).collect())?;
     let (mut a, mut b) = (0.0_f64, SLOPE);
     for _ in 0..STEPS {
@@ -61,9 +163,7 @@ pub fn d95(trials: &[(f64, bool)]) -> Option<f64> {
         a += shorter * step[0];
         b += shorter * step[1];
     }
-    let found = ((LOG_ODDS - a) / b + middle).exp();
-    let most = trials.iter().fold(0.0_f64, |most, (d, _)| most.max(*d));
-    (b > 0.0 && found.is_finite() && found <= most).then_some(found)
+    Some([a - b * middle, b])
 }
 
 #[cfg(test)]
@@ -73,28 +173,70 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn eq2_is_found_again_where_names_follow_the_model() {
+    /// D from 2 to 200, named as (1) says.
+    fn drawn(wanted: f64) -> Vec<(f64, bool)> {
         let mut random = Pcg64Mcg::seed_from_u64(2);
-        let wanted = 7.5_f64;
-        let trials: Vec<(f64, bool)> = (0..4000)
-            .map(|_| {
-                let d = 2.0 * 100.0_f64.powf(random.random());
-                let odds = 5.0 * (d / wanted).ln() + LOG_ODDS;
-                let named = random.random::<f64>() < 1.0 / (1.0 + (-odds).exp());
-                (d, named)
-            })
-            .collect();
-        let found = d95(&trials).unwrap();
-        assert!((found / wanted - 1.0).abs() < 0.08, "{found}");
+        let trial = |_| {
+            let d = 2.0 * 100.0_f64.powf(random.random());
+            let odds = 5.0 * (d / wanted).ln() + LOG_ODDS;
+            (d, random.random::<f64>() < 1.0 / (1.0 + (-odds).exp()))
+        };
+        (0..4000).map(trial).collect()
     }
 
     #[test]
-    fn trials_that_separate_cleanly_have_it_between_and_those_that_never_named_have_none() {
+    fn eq2_is_found_again_where_names_follow_the_model() {
+        let found = d95(&drawn(7.5)).unwrap().value().unwrap();
+        assert!((found / 7.5 - 1.0).abs() < 0.08, "{found}");
+    }
+
+    #[test]
+    fn eq1_learns_nothing_where_nothing_can_be_seen() {
+        let mut trials = drawn(7.5);
+        let before = d95(&trials);
+        trials.extend([(0.0, false); 40]);
+        assert_eq!(d95(&trials), before);
+        assert_eq!(d95(&[(0.0, false); 40]), None);
+    }
+
+    #[test]
+    fn trials_that_separate_cleanly_have_it_between() {
         let clean: Vec<(f64, bool)> = (1..40).map(|d| (f64::from(d), d > 9)).collect();
-        let found = d95(&clean).unwrap();
+        let found = d95(&clean).unwrap().value().unwrap();
         assert!((9.0..20.0).contains(&found), "{found}");
-        let never: Vec<(f64, bool)> = (1..40).map(|d| (f64::from(d), false)).collect();
-        assert_eq!(d95(&never), None);
+    }
+
+    #[test]
+    fn what_is_never_or_always_named_has_it_outside_of_what_was_tried() {
+        let trials = |named: fn(u8) -> bool| -> Vec<(f64, bool)> {
+            (20..60).map(|d| (f64::from(d), named(d))).collect()
+        };
+        assert_eq!(d95(&trials(|_| false)), Some(Limit::Beyond(59.0)));
+        assert_eq!(d95(&trials(|_| true)), Some(Limit::Below(20.0)));
+        // Half of them at every D, and one of forty missed.
+        assert_eq!(d95(&trials(|d| d % 2 > 0)), Some(Limit::Beyond(59.0)));
+        assert_eq!(d95(&trials(|d| d != 58)), Some(Limit::Below(20.0)));
+        assert_eq!(d95(&[]), None);
+    }
+
+    #[test]
+    fn several_are_no_better_known_than_those_that_decide() {
+        let told = |all: &[Limit]| {
+            let both = [Limit::middle(all), Limit::largest(all)];
+            both.map(|limit| limit.unwrap().to_string())
+        };
+        let (at, beyond, below) = (Limit::At, Limit::Beyond, Limit::Below);
+        assert_eq!(told(&[at(5.0), at(9.0), at(7.0)]), ["7.000", "9.000"]);
+        // One beyond 200 moves no middle; two of three are it.
+        assert_eq!(
+            told(&[at(5.0), beyond(200.0), at(7.0)]),
+            ["7.000", "> 200.000"]
+        );
+        let most = told(&[at(5.0), beyond(200.0), beyond(150.0)]);
+        assert_eq!(most, ["> 150.000", "> 200.000"]);
+        let open = told(&[below(20.0), at(10.0), at(30.0), at(15.0)]);
+        assert_eq!(open, ["12.500 to 17.500", "30.000"]);
+        assert_eq!(told(&[below(20.0)]), ["< 20.000", "< 20.000"]);
+        assert_eq!(Limit::middle(&[]), None);
     }
 }

@@ -106,6 +106,16 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
     }
 }
 
+/// The value below which a share of all lies, between its two neighbours in proportion; none of nothing.
+#[must_use]
+pub fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let place = share.clamp(0.0, 1.0) * values.len().checked_sub(1)? as f64;
+    let below = values.get(place.floor() as usize)?;
+    let above = values.get(place.ceil() as usize)?;
+    Some(below + place.fract() * (above - below))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,5 +149,15 @@ mod tests {
         assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
         assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median(vec![]), None);
+    }
+
+    #[test]
+    fn a_quantile_lies_between_its_neighbours() {
+        let values = || (0..=10).rev().map(f64::from).collect::<Vec<f64>>();
+        for (share, wanted) in [(0.0, 0.0), (0.5, 5.0), (0.95, 9.5), (1.0, 10.0)] {
+            let found = quantile(values(), share).unwrap();
+            assert!((found - wanted).abs() < 1e-12, "{share}: {found}");
+        }
+        assert_eq!(quantile(vec![], 0.5), None);
     }
 }

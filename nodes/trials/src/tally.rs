@@ -5,13 +5,18 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
-use crate::calibration::{Reliability, calibration, reliability};
+use crate::calibration::{Reliability, reliability};
 use crate::comparison::{MethodLine, methods};
-use crate::confusion::{Predicted, agreement, observed, predicted};
-use crate::effect::Class;
-use crate::proportion::{Proportion, auroc, median};
+use crate::confusion::{Pair, Predicted, agreement, pairs, predicted};
+use crate::proportion::{Proportion, auroc};
 use crate::truth::TrueEffect;
 use crate::verdict::Verdict;
+
+mod classes;
+mod figures;
+
+pub use classes::ClassLine;
+pub use figures::Figure;
 
 /// Edges of the bins of D.
 pub const D_EDGES: [f64; 4] = [5.0, 10.0, 20.0, 50.0];
@@ -35,32 +40,6 @@ pub struct Rate {
     pub interval: [f64; 2],
 }
 
-/// One number with what it is of.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Figure {
-    /// What it is.
-    pub what: String,
-    /// It; none where there is nothing to take it of.
-    pub value: Option<f64>,
-    /// Of how many.
-    pub n: usize,
-}
-
-/// A class with how often it was found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ClassLine {
-    /// The class.
-    pub class: Class,
-    /// Named with its axis, by bin of D.
-    pub named: [Proportion; D_BINS],
-    /// Least and greatest D that its physical range allowed.
-    pub d_range: [f64; 2],
-    /// Shown as a surrogate with its axis, over all D.
-    pub surrogate: Proportion,
-    /// What else was named in those trials that hide it alone, the most frequent first.
-    pub taken_for: Vec<(String, usize)>,
-}
-
 /// The table of one arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
@@ -74,8 +53,8 @@ pub struct Tally {
     pub figures: Vec<Figure>,
     /// By class.
     pub classes: Vec<ClassLine>,
-    /// Who was named for whom: hidden class, named class, times; trials with one effect only.
-    pub confusion: Vec<(String, String, usize)>,
+    /// Who was taken for whom, beside who was predicted to look like whom.
+    pub confusion: Vec<Pair>,
     /// What each hidden class was predicted to look like.
     pub predicted: Vec<Predicted>,
     /// How often one got the name of another class: with a predicted double, and without.
@@ -113,9 +92,9 @@ impl Tally {
             arm,
             trials: own.len(),
             rates: rates(arm, &own),
-            figures: figures(&own),
-            classes: classes(&own),
-            confusion: observed(&own),
+            figures: figures::of(&own),
+            classes: classes::of(arm, &own),
+            confusion: pairs(&own),
             predicted: predicted(&own),
             agreement: agreement(&own),
             methods: methods(arm, &own),
@@ -142,11 +121,11 @@ pub fn unknown_auroc(verdicts: &[Verdict], least_d: f64) -> Figure {
             .collect()
     };
     let (positive, negative) = (scores(Arm::LeftOut), scores(Arm::Catalogue));
-    Figure {
-        what: format!("AUROC of unknown, D > {least_d}"),
-        value: auroc(&positive, &negative),
-        n: positive.len() + negative.len(),
-    }
+    Figure::new(
+        &format!("AUROC of unknown, D > {least_d}"),
+        auroc(&positive, &negative),
+        positive.len() + negative.len(),
+    )
 }
 
 fn rates(arm: Arm, own: &[&Verdict]) -> Vec<Rate> {
@@ -272,117 +251,6 @@ impl Rates {
     }
 }
 
-fn figures(own: &[&Verdict]) -> Vec<Figure> {
-    let mut figures = Vec::new();
-    let mut add = |what: &str, values: Vec<f64>| {
-        figures.push(Figure {
-            what: what.to_owned(),
-            n: values.len(),
-            value: median(values),
-        });
-    };
-    let pairs = || {
-        own.iter()
-            .flat_map(|v| v.truth.effects.iter().map(move |e| (v, e)))
-    };
-    let sized = || pairs().filter_map(|(v, e)| Some((e, v.sized(e)?)));
-    let scaled = sized()
-        .filter(|(e, _)| e.d > LARGE_D)
-        .map(|(e, (error, _))| error.abs() * e.d);
-    add(
-        "median relative error of a parameter times D, D > 20",
-        scaled.collect(),
-    );
-    let covered: Vec<bool> = sized().map(|(_, (_, covered))| covered).collect();
-    let said = || {
-        own.iter()
-            .filter_map(|v| v.said.as_ref().map(|said| (*v, said)))
-    };
-    let hidden = || said().filter(|(v, _)| v.least_d().is_some_and(|d| d > LARGE_D));
-    add(
-        "median gap closed on held-out runs, D > 20",
-        hidden()
-            .filter_map(|(_, said)| Some(said.closed?[0]))
-            .collect(),
-    );
-    add(
-        "median rms after over before on held-out runs, D > 20",
-        hidden()
-            .filter_map(|(_, said)| Some(said.held_out_um[1]? / said.held_out_um[0]?))
-            .collect(),
-    );
-    add(
-        "median gap closed over that of an oracle, D > 20",
-        hidden().filter_map(|(v, _)| v.closed_of_oracle()).collect(),
-    );
-    figures.extend(times(own));
-    let count = Proportion::of(covered.into_iter());
-    figures.push(Figure {
-        what: "share of 95 % intervals that hold the parameter".to_owned(),
-        value: count.share(),
-        n: count.n,
-    });
-    figures.extend(calibration(own));
-    figures
-}
-
-/// Times of diagnoses, and of making their trials.
-fn times(own: &[&Verdict]) -> [Figure; 3] {
-    let middle = |what: &str, values: Vec<f64>| Figure {
-        what: what.to_owned(),
-        n: values.len(),
-        value: median(values),
-    };
-    let said = own.iter().filter_map(|v| Some(v.said.as_ref()?.runtime_s));
-    [
-        middle("median time of a diagnosis, s", said.collect()),
-        middle(
-            "median time of a diagnosis with its program and bag, s",
-            own.iter().map(|v| v.diagnosis_s).collect(),
-        ),
-        middle(
-            "median time of making a trial, s",
-            own.iter().map(|v| v.making_s).collect(),
-        ),
-    ]
-}
-
-fn classes(own: &[&Verdict]) -> Vec<ClassLine> {
-    let line = |class: Class| {
-        let pairs = || {
-            let said = own.iter().filter(|v| v.said.is_some());
-            let all = said.flat_map(|v| v.truth.effects.iter().map(move |e| (*v, e)));
-            all.filter(move |(_, effect)| effect.class == class)
-        };
-        let mut named = [Proportion::default(); D_BINS];
-        for (verdict, effect) in pairs() {
-            let own = &mut named[bin(effect.d)];
-            own.k += usize::from(verdict.has(effect));
-            own.n += 1;
-        }
-        let alone = pairs().filter(|(v, _)| v.truth.effects.len() == 1);
-        let others = alone.flat_map(|(v, _)| v.wrong().map(name).collect::<Vec<_>>());
-        ClassLine {
-            class,
-            named,
-            d_range: pairs().fold([f64::INFINITY, 0.0], |[low, high], (_, effect)| {
-                [effect.d.min(low), effect.d.max(high)]
-            }),
-            surrogate: Proportion::of(
-                pairs()
-                    .map(|(v, e)| v.shows(e))
-                    .collect::<Vec<_>>()
-                    .into_iter(),
-            ),
-            taken_for: most_frequent(others),
-        }
-    };
-    let lines = Class::ALL.into_iter().map(line);
-    lines
-        .filter(|line| line.named.iter().any(|bin| bin.n > 0))
-        .collect()
-}
-
 fn name(cause: &crate::verdict::SaidCause) -> String {
     format!("{} {}", cause.effect, cause.axis).trim().to_owned()
 }
@@ -409,6 +277,7 @@ mod tests {
     use gap_diagnosis::report::Status;
 
     use super::*;
+    use crate::effect::Class;
     use crate::sample::{cause, effect, verdict};
 
     #[test]
@@ -450,8 +319,9 @@ mod tests {
         assert_eq!(tally.classes[0].surrogate, Proportion { k: 1, n: 3 });
         assert_eq!(tally.classes[0].taken_for, [("backlash Y".to_owned(), 1)]);
         assert_eq!(tally.false_names, [("backlash Y".to_owned(), 1)]);
-        let surrogate = ("backlash".to_owned(), "(backlash)".to_owned(), 1);
-        assert!(tally.confusion.contains(&surrogate));
+        let own = |said: &str| tally.confusion.iter().find(|pair| pair.said == said);
+        let shown = own("(backlash)").unwrap();
+        assert_eq!(shown.observed, Proportion { k: 1, n: 3 });
         assert_eq!(tally.reliability.len(), 1);
         assert_eq!(tally.reliability[0].right, Proportion { k: 1, n: 2 });
     }

@@ -9,7 +9,7 @@ use crate::arm::Arm;
 use crate::calibration::calibration;
 use crate::confusion::ISOLABLE;
 use crate::covariate;
-use crate::detection::d95;
+use crate::detection::{Limit, d95};
 use crate::effect::Class;
 use crate::proportion::{Proportion, auroc, median};
 use crate::tally::{LARGE_D, SEVERAL_D, SINGLE_D, beyond, has_wrong, is_reproduced};
@@ -29,6 +29,9 @@ pub struct Target {
     pub interval: Option<[f64; 2]>,
     /// The figure; none where nothing was measured.
     pub value: Option<f64>,
+    /// Where the figure lies, if it is a detection limit: the trials may bound it on one side only.
+    #[serde(default)]
+    pub limit: Option<Limit>,
     /// Of how many.
     pub n: usize,
     /// Whether it is where it should be.
@@ -70,6 +73,9 @@ impl Bound {
     }
 }
 
+/// Time that a diagnosis should not take longer than, s.
+pub(crate) const LONGEST_S: f64 = 60.0;
+
 /// The table as it fills.
 struct Sheet(Vec<Target>);
 
@@ -83,6 +89,7 @@ impl Sheet {
             count: Some(count),
             interval: value.map(|_| count.wilson()),
             value,
+            limit: None,
             n: count.n,
             met: value.map(|value| bound.holds(value)),
         });
@@ -95,9 +102,19 @@ impl Sheet {
             count: None,
             interval: None,
             value,
+            limit: None,
             n,
             met: value.map(|value| bound.holds(value)),
         });
+    }
+
+    /// A detection limit, which is where it should be if all of where it may lie is.
+    fn limit(&mut self, metric: &str, most: f64, limit: Option<Limit>, n: usize) {
+        self.figure(metric, AtMost(most), limit.and_then(Limit::value), n);
+        if let Some(target) = self.0.last_mut() {
+            target.limit = limit;
+            target.met = limit.map(|limit| limit.ends()[1] <= most);
+        }
     }
 
     fn middle(&mut self, metric: &str, bound: Bound, values: Vec<f64>) {
@@ -116,6 +133,7 @@ pub fn targets(verdicts: &[Verdict]) -> Vec<Target> {
     let mut sheet = Sheet(vec![]);
     of_nulls(&mut sheet, &of(Arm::Null), &of(Arm::HeavyNull));
     let (known, foreign) = (of(Arm::Catalogue), of(Arm::Foreign));
+    of_limits(&mut sheet, &known);
     of_known(&mut sheet, &known);
     of_foreign(&mut sheet, &foreign);
     of_left_out(&mut sheet, &of(Arm::LeftOut), &known);
@@ -128,7 +146,7 @@ pub fn targets(verdicts: &[Verdict]) -> Vec<Target> {
     let times = times.filter_map(|v| Some(v.said.as_ref()?.runtime_s));
     sheet.middle(
         "time of a diagnosis with all its simulations, median, s",
-        AtMost(60.0),
+        AtMost(LONGEST_S),
         times.collect(),
     );
     sheet.0
@@ -162,7 +180,9 @@ fn of_nulls(sheet: &mut Sheet, null: &[&Verdict], heavy: &[&Verdict]) {
 }
 
 /// Every hidden effect with its verdict.
-fn pairs<'v>(own: &[&'v Verdict]) -> impl Iterator<Item = (&'v Verdict, &'v TrueEffect)> {
+pub(crate) fn pairs<'v>(
+    own: &[&'v Verdict],
+) -> impl Iterator<Item = (&'v Verdict, &'v TrueEffect)> {
     let all: Vec<(&Verdict, &TrueEffect)> = own
         .iter()
         .flat_map(|v| v.truth.effects.iter().map(move |e| (*v, e)))
@@ -170,40 +190,45 @@ fn pairs<'v>(own: &[&'v Verdict]) -> impl Iterator<Item = (&'v Verdict, &'v True
     all.into_iter()
 }
 
-/// Least trials of a class, and least of either answer, that a detection limit is taken of.
-const FEWEST: [usize; 2] = [12, 2];
+/// Least trials that a detection limit is taken of.
+const FEWEST: usize = 12;
 
-fn of_known(sheet: &mut Sheet, known: &[&Verdict]) {
-    let limit = |class: Option<Class>| -> Option<f64> {
-        let own = pairs(known).filter(|(_, e)| class.is_none_or(|class| e.class == class));
-        let trials: Vec<(f64, bool)> = own.map(|(v, e)| (e.d, v.has(e))).collect();
-        let named = trials.iter().filter(|(_, named)| *named).count();
-        let enough = trials.len() >= FEWEST[0] && named.min(trials.len() - named) >= FEWEST[1];
-        enough.then(|| d95(&trials)).flatten()
-    };
-    let by_class: Vec<f64> = Class::ALL
+/// The detection limit of a class, or of all together; none of too few trials.
+pub(crate) fn limit(own: &[&Verdict], class: Option<Class>) -> Option<Limit> {
+    let own = pairs(own).filter(|(_, e)| class.is_none_or(|class| e.class == class));
+    let trials: Vec<(f64, bool)> = own.map(|(v, e)| (e.d, v.has(e))).collect();
+    if trials.len() < FEWEST {
+        return None;
+    }
+    d95(&trials)
+}
+
+fn of_limits(sheet: &mut Sheet, known: &[&Verdict]) {
+    let by_class = Class::ALL
         .into_iter()
-        .filter_map(|c| limit(Some(c)))
-        .collect();
-    let worst = by_class.iter().copied().reduce(f64::max);
-    let classes = by_class.len();
-    sheet.figure(
+        .map(|class| limit(known, Some(class)));
+    let by_class: Vec<Limit> = by_class.flatten().collect();
+    sheet.limit(
         "i: D named in 95 %, all classes together",
-        AtMost(8.0),
-        limit(None),
+        8.0,
+        limit(known, None),
         known.len(),
     );
-    sheet.middle(
-        "i: D named in 95 %, median of the classes that have one",
-        AtMost(8.0),
-        by_class,
+    sheet.limit(
+        "i: D named in 95 %, median of the classes",
+        8.0,
+        Limit::middle(&by_class),
+        by_class.len(),
     );
-    sheet.figure(
-        "i: D named in 95 %, worst of these",
-        AtMost(10.0),
-        worst,
-        classes,
+    sheet.limit(
+        "i: D named in 95 %, worst class",
+        10.0,
+        Limit::largest(&by_class),
+        by_class.len(),
     );
+}
+
+fn of_known(sheet: &mut Sheet, known: &[&Verdict]) {
     let with = |least: usize, most: usize| -> Vec<&Verdict> {
         let fits = |v: &&&Verdict| (least..=most).contains(&v.truth.effects.len());
         known.iter().filter(fits).copied().collect()
@@ -398,13 +423,41 @@ fn of_two_rounds(sheet: &mut Sheet, own: &[&Verdict]) {
 
 #[cfg(test)]
 mod tests {
+    use gap_diagnosis::report::Status;
+
     use super::*;
+    use crate::sample::{cause, effect, verdict};
+    use crate::verdict::SaidCause;
 
     #[test]
     fn without_trials_nothing_is_met_and_nothing_missed() {
         let all = targets(&[]);
         assert!(all.len() >= 28, "{}", all.len());
         assert!(all.iter().all(|target| target.met.is_none()), "{all:#?}");
+    }
+
+    #[test]
+    fn a_limit_beyond_what_was_tried_is_missed_and_one_of_too_few_trials_not_measured() {
+        let trials = |n: usize, of: fn(f64) -> Vec<SaidCause>| -> Vec<Verdict> {
+            let trial = |index: usize| {
+                let d = 2.0 + index as f64;
+                verdict(vec![effect(Class::Backlash, "X", d)], of(d), false)
+            };
+            (0..n).map(trial).collect()
+        };
+        let told = |verdicts: &[Verdict]| -> Vec<(Option<String>, Option<bool>)> {
+            let all = targets(verdicts);
+            let limits = all.iter().filter(|target| target.metric.contains("95 %, "));
+            let told = limits.map(|target| (target.limit.map(|l| l.to_string()), target.met));
+            told.collect()
+        };
+        let never = told(&trials(40, |_| vec![]));
+        assert_eq!(never, vec![(Some("> 41.000".to_owned()), Some(false)); 3]);
+        let always = told(&trials(40, |_| {
+            vec![cause("backlash", "X", Status::Named, 4.0)]
+        }));
+        assert_eq!(always, vec![(Some("< 2.000".to_owned()), Some(true)); 3]);
+        assert_eq!(told(&trials(5, |_| vec![])), vec![(None, None); 3]);
     }
 
     #[test]

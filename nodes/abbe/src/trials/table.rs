@@ -15,7 +15,9 @@ use crate::report::Report;
 use crate::report::section::{Rows, Section};
 
 mod arm;
+mod confusion;
 mod protocol;
+mod reliability;
 
 /// Trials of an arm below which a table says that it is a small run.
 const SMALL: usize = 500;
@@ -79,7 +81,8 @@ impl Table {
     /// # Errors
     /// When a diagram cannot be drawn.
     pub fn terminal(&self) -> Result<String> {
-        let parts: Vec<String> = self.sections()?.iter().map(Section::terminal).collect();
+        let parts = self.parts()?.into_iter().map(Part::in_text);
+        let parts: Vec<String> = parts.map(|section| section.terminal()).collect();
         Ok(format!(
             "{}\n\n{}",
             self.lines().join("\n"),
@@ -100,7 +103,7 @@ impl Table {
     /// # Errors
     /// When a diagram cannot be drawn.
     pub fn html(&self) -> Result<String> {
-        let (lines, sections) = (self.lines(), self.sections()?);
+        let (lines, parts) = (self.lines(), self.parts()?);
         let report = Report {
             title: TITLE.to_owned(),
             lines: vec![],
@@ -108,7 +111,10 @@ impl Table {
             body: html! {
                 h1 { (TITLE) }
                 @for line in &lines { p { (line) } }
-                @for section in &sections { (section.html()) }
+                @for part in &parts {
+                    (part.section.html())
+                    @if let Some(tally) = part.confused { (confusion::matrix(tally)) }
+                }
             },
             figures: serde_json::Value::Null,
         };
@@ -124,7 +130,7 @@ impl Table {
         for line in self.lines() {
             let _ = writeln!(text, "{line}\n");
         }
-        for section in self.sections()? {
+        for section in self.parts()?.into_iter().map(Part::in_text) {
             let _ = writeln!(text, "## {}\n", section.title);
             for line in &section.lines {
                 let _ = writeln!(text, "{line}\n");
@@ -163,20 +169,44 @@ impl Table {
         lines
     }
 
-    fn sections(&self) -> Result<Vec<Section>> {
-        let mut sections = vec![protocol::section(&self.targets)];
+    fn parts(&self) -> Result<Vec<Part<'_>>> {
+        let mut parts = vec![Part::plain(protocol::section(&self.targets))];
         for tally in &self.arms {
-            sections.push(arm::section(tally)?);
+            parts.push(Part {
+                section: arm::section(tally)?,
+                confused: (!tally.confusion.is_empty()).then_some(tally),
+            });
         }
         if !self.unknown.is_empty() {
             let mut section = Section::new("Unknown or known");
             section.tables.push(arm::figures(&self.unknown));
-            sections.push(section);
+            parts.push(Part::plain(section));
         }
-        for (arm, lines) in &self.ablations {
-            sections.push(protocol::ablated(*arm, lines));
+        let ablations = self.ablations.iter();
+        parts.extend(ablations.map(|(arm, lines)| Part::plain(protocol::ablated(*arm, lines))));
+        Ok(parts)
+    }
+}
+
+/// A section, and the arm of which it tells who was taken for whom.
+struct Part<'t> {
+    section: Section,
+    confused: Option<&'t Tally>,
+}
+
+impl Part<'_> {
+    fn plain(section: Section) -> Self {
+        Self {
+            section,
+            confused: None,
         }
-        Ok(sections)
+    }
+
+    /// For where there are only characters.
+    fn in_text(self) -> Section {
+        let mut section = self.section;
+        section.tables.extend(self.confused.map(confusion::pairs));
+        section
     }
 }
 

@@ -1,20 +1,15 @@
-//! One arm of the table: rates, figures, classes, who was taken for whom, other methods.
-
-use std::collections::BTreeSet;
+//! One arm of the table: rates, figures, classes, other methods, what was named falsely and how surely.
 
 use anyhow::Result;
 use trials::Tally;
 use trials::comparison::MethodLine;
-use trials::confusion::ALIKE;
-use trials::tally::{D_BINS, Figure, bin_name};
+use trials::proportion::Proportion;
+use trials::tally::{ClassLine, D_BINS, Figure, bin_name};
 
-use crate::report::plot::{self, Plot, Trace};
-use crate::report::section::{Drawing, Rows, Section};
+use super::reliability;
+use crate::report::section::{Rows, Section, head};
 
-/// Most names in one cell.
-const MOST_NAMES: usize = 5;
-
-/// Everything of an arm.
+/// Everything of an arm but who was taken for whom.
 ///
 /// # Errors
 /// When the diagram cannot be drawn.
@@ -38,13 +33,8 @@ pub fn section(tally: &Tally) -> Result<Section> {
     });
     section.tables.push(figures(&tally.figures));
     if !tally.classes.is_empty() {
+        section.tables.push(by_size(tally));
         section.tables.push(classes(tally));
-    }
-    if !tally.confusion.is_empty() {
-        section.tables.push(confusion(tally));
-    }
-    if !tally.predicted.is_empty() {
-        section.tables.push(predicted(tally));
     }
     if !tally.methods.is_empty() {
         section
@@ -65,81 +55,10 @@ pub fn section(tally: &Tally) -> Result<Section> {
         });
     }
     if !tally.reliability.is_empty() {
-        let rows = tally
-            .reliability
-            .iter()
-            .map(|bin| vec![format!("{:.2}", bin.confidence), bin.right.to_string()]);
-        section.tables.push(Rows {
-            head: ["mean confidence", "right"].map(str::to_owned).to_vec(),
-            rows: rows.collect(),
-            note: "Confidence beside precision of what is named.".to_owned(),
-        });
-        section.drawings.push(reliability(tally)?);
+        section.tables.push(reliability::rows(tally));
+        section.drawings.push(reliability::drawing(tally)?);
     }
     Ok(section)
-}
-
-/// Precision over confidence, beside what it should be.
-fn reliability(tally: &Tally) -> Result<Drawing> {
-    let bins = || tally.reliability.iter();
-    let right = bins().filter_map(|bin| Some((bin.confidence, bin.right.share()?)));
-    let end = |place: usize| bins().map(move |bin| (bin.confidence, bin.right.wilson()[place]));
-    let trace = |name: &str, points: Vec<(f64, f64)>, marks: bool| Trace {
-        name: name.to_owned(),
-        points,
-        marks,
-    };
-    let svg = plot::svg(&Plot {
-        x: "confidence".to_owned(),
-        y: "share right".to_owned(),
-        traces: vec![
-            trace("as said", vec![(0.0, 0.0), (1.0, 1.0)], false),
-            trace("named causes", right.collect(), true),
-            trace("95 %, lower end", end(0).collect(), true),
-            trace("95 %, upper end", end(1).collect(), true),
-        ],
-    })?;
-    Ok(Drawing {
-        svg,
-        caption: format!(
-            "Reliability, arm {}: how often names were right, by the confidence they were given.",
-            tally.arm
-        ),
-    })
-}
-
-/// Who was predicted to look like whom.
-fn predicted(tally: &Tally) -> Rows {
-    let rows = tally.predicted.iter().map(|line| {
-        let near: Vec<String> = line
-            .cos
-            .iter()
-            .take(MOST_NAMES)
-            .map(|(name, cos)| format!("{name} {cos:.2}"))
-            .collect();
-        vec![
-            line.class.id().to_owned(),
-            format!("{:.2}", line.sin_alone),
-            near.join(", "),
-            line.n.to_string(),
-        ]
-    });
-    let [with, without] = tally.agreement;
-    Rows {
-        head: [
-            "hidden",
-            "sin alone",
-            "predicted to look like, cosine",
-            "of",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
-        rows: rows.collect(),
-        note: format!(
-            "Medians over trials, from signatures alone. One effect hidden, another class named: {with} where some \
-             class was predicted to look like it (cosine {ALIKE} and more), {without} where none was."
-        ),
-    }
 }
 
 /// Methods side by side.
@@ -176,9 +95,11 @@ pub fn methods(what: &str, lines: &[MethodLine]) -> Rows {
 pub fn figures(all: &[Figure]) -> Rows {
     let with = all.iter().filter(|figure| figure.n > 0);
     let rows = with.map(|figure| {
-        let value = figure
-            .value
-            .map_or("-".to_owned(), |value| format!("{value:.3}"));
+        let value = match figure.value {
+            None => "-".to_owned(),
+            Some(count) if figure.is_count => format!("{count:.0}"),
+            Some(value) => format!("{value:.3}"),
+        };
         vec![figure.what.clone(), value, figure.n.to_string()]
     });
     Rows {
@@ -188,57 +109,89 @@ pub fn figures(all: &[Figure]) -> Rows {
     }
 }
 
-fn classes(tally: &Tally) -> Rows {
-    let mut head = vec!["class".to_owned()];
-    head.extend((0..D_BINS).map(bin_name));
-    head.extend(["D reached", "surrogate", "taken for"].map(str::to_owned));
+/// Classes by D.
+fn by_size(tally: &Tally) -> Rows {
+    let mut columns = vec!["class".to_owned()];
+    columns.extend((0..D_BINS).map(bin_name));
+    let has_limits = tally.classes.iter().any(|line| line.limit.is_some());
+    let limit_of = |line: &ClassLine| {
+        let told = line.limit.map_or_else(String::new, |d| d.to_string());
+        has_limits.then_some(told)
+    };
+    columns.extend(has_limits.then(|| "95 % from D".to_owned()));
     let rows = tally.classes.iter().map(|line| {
         let mut row = vec![line.class.id().to_owned()];
-        row.extend(line.named.iter().map(|bin| match bin.n {
-            0 => String::new(),
-            n => format!("{}/{n}", bin.k),
-        }));
-        let [low, high] = line.d_range;
-        row.push(format!("{low:.0} to {high:.0}"));
-        row.push(format!("{}/{}", line.surrogate.k, line.surrogate.n));
-        row.push(names(&line.taken_for));
+        row.extend(line.named.iter().map(share));
+        row.extend(limit_of(line));
         row
     });
     Rows {
-        head,
+        head: columns,
         rows: rows.collect(),
-        note: "Named with class and axis, by D; taken for: what was named besides or instead where nothing else was hidden.".to_owned(),
+        note: "Named with class and axis, by D, with Wilson's 95 % interval; 95 % from D: where it is named nineteen times \
+               of twenty."
+            .to_owned(),
     }
+}
+
+/// What else is known of the classes.
+fn classes(tally: &Tally) -> Rows {
+    let rows = tally.classes.iter().map(|line| {
+        let [low, high] = line.d_range;
+        let own = tally.predicted.iter().find(|own| own.class == line.class);
+        vec![
+            line.class.id().to_owned(),
+            format!("{low:.0} to {high:.0}"),
+            share(&line.surrogate),
+            own.map_or_else(String::new, |own| {
+                format!("{:.2} of {}", own.sin_alone, own.n)
+            }),
+            names(&line.taken_for),
+        ]
+    });
+    Rows {
+        head: head(&["class", "D reached", "surrogate", "sin alone", "taken for"]),
+        rows: rows.collect(),
+        note: "Surrogate: shown as one, with class and axis; sin alone: part of its signature that no other class can \
+               imitate, median of so many; taken for: what was named besides or instead where nothing else was hidden."
+            .to_owned(),
+    }
+}
+
+/// How many of how many, with the 95 % interval of their share; nothing of none.
+fn share(count: &Proportion) -> String {
+    if count.n == 0 {
+        return String::new();
+    }
+    let [low, high] = count.wilson().map(|share| 100.0 * share);
+    format!("{}/{} ({low:.0} to {high:.0} %)", count.k, count.n)
 }
 
 fn names(all: &[(String, usize)]) -> String {
-    let mut told: Vec<String> = all
-        .iter()
-        .take(MOST_NAMES)
-        .map(|(name, n)| format!("{name} {n}"))
-        .collect();
-    if all.len() > MOST_NAMES {
-        told.push("...".to_owned());
-    }
+    let told: Vec<String> = all.iter().map(|(name, n)| format!("{name} {n}")).collect();
     told.join(", ")
 }
 
-fn confusion(tally: &Tally) -> Rows {
-    let hidden: BTreeSet<&str> = tally.confusion.iter().map(|(h, ..)| h.as_str()).collect();
-    let rows = hidden.into_iter().map(|class| {
-        let own = tally
-            .confusion
-            .iter()
-            .filter(|(hidden, ..)| hidden == class);
-        let mut said: Vec<(String, usize)> = own.map(|(_, said, n)| (said.clone(), *n)).collect();
-        said.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-        let told: Vec<String> = said.iter().map(|(name, n)| format!("{name} {n}")).collect();
-        vec![class.to_owned(), told.join(", ")]
-    });
-    Rows {
-        head: ["one effect hidden", "said"].map(str::to_owned).to_vec(),
-        rows: rows.collect(),
-        note: "Classes whatever the axis; in brackets: shown as a surrogate, nothing named."
-            .to_owned(),
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_is_told_with_its_interval_and_nothing_of_none() {
+        assert_eq!(share(&Proportion { k: 17, n: 24 }), "17/24 (51 to 85 %)");
+        assert_eq!(share(&Proportion { k: 5, n: 5 }), "5/5 (57 to 100 %)");
+        assert_eq!(share(&Proportion::default()), "");
+    }
+
+    #[test]
+    fn how_many_are_told_without_decimals() {
+        let count = Figure {
+            is_count: true,
+            ..Figure::new("longer", Some(3.0), 40)
+        };
+        let all = [count, Figure::new("median", Some(2.5), 40)];
+        let rows = figures(&all).rows;
+        assert_eq!(rows[0], ["longer", "3", "40"]);
+        assert_eq!(rows[1], ["median", "2.500", "40"]);
     }
 }
