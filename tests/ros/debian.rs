@@ -131,7 +131,7 @@ fn a_recorder_that_is_started_again_leaves_the_bags_of_earlier_starts_alone() {
         assert_eq!(ended.status.code(), None, "{}", ended.said);
     }
     for start in 0..3 {
-        assert!(recorder::Bag::open(&bag(start)).is_ok(), "{start}");
+        assert!(recorder::Bag::open(bag(start)).is_ok(), "{start}");
     }
     assert!(!bag(3).exists());
 }
