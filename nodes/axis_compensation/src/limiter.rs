@@ -38,7 +38,7 @@
 //! between its bounds.
 //!
 //! # Agreement
-//! `prop_no_sequence_of_targets_and_steps_breaks_a_limit` here and `tests/props.rs` for the whole
+//! `prop_no_sequence_of_targets_and_steps_breaks_a_limit` here and `tests/props` for the whole
 //! stage: no violation above 1e-9 of a limit.
 
 /// Limits of one axis.
