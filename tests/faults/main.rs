@@ -7,9 +7,12 @@
 )]
 #![expect(clippy::print_stderr, reason = "figures that were seen are said")]
 
+mod bag_of_steps;
+mod clock_steps;
 mod crowd;
 mod disk;
 mod messages;
 mod offsets;
 mod said;
+mod stepped_cell;
 mod tables;

@@ -43,7 +43,7 @@ fn keep_saying(time: Duration, mut form: impl FnMut(u64)) {
 
 /// Checks that no offset changes faster than its limit; gives the largest change from one message to the next, m, and
 /// how many there were. Messages that come at once after a silence were made during it.
-fn steps(graph: &Graph, since: Instant) -> (f64, usize) {
+pub fn steps(graph: &Graph, since: Instant) -> (f64, usize) {
     let all = graph.since(&topics::COMPENSATION, since);
     let mut worst_m = 0.0_f64;
     for (place, pair) in all.windows(2).enumerate() {

@@ -27,6 +27,8 @@ pub enum Diagnostic {
     FaultCleared,
     #[error("time went back by {by_s} s: nothing is simulated until it has passed again")]
     TimeWentBack { by_s: f64 },
+    #[error("time went back by {by_s} s: the controller's own clock goes on")]
+    TimeSetBack { by_s: f64 },
     #[error("time jumped by {by_s} s, limit {limit_s} s: skipped")]
     TimeJumped { by_s: f64, limit_s: f64 },
     #[error("time passes as it should again")]
@@ -47,7 +49,10 @@ impl Diagnostic {
             Self::FollowingError { .. } | Self::ProbeInMotion { .. } | Self::FaultCleared => {
                 "motion_fault"
             }
-            Self::TimeWentBack { .. } | Self::TimeJumped { .. } | Self::TimePasses => "time",
+            Self::TimeWentBack { .. }
+            | Self::TimeSetBack { .. }
+            | Self::TimeJumped { .. }
+            | Self::TimePasses => "time",
             Self::NothingToCancel { .. } => "cancel",
         }
     }
@@ -60,7 +65,9 @@ impl Diagnostic {
             | Self::FaultCleared
             | Self::TimePasses
             | Self::NothingToCancel { .. } => Severity::Info,
-            Self::CompensationStale { .. } | Self::TimeJumped { .. } => Severity::Warn,
+            Self::CompensationStale { .. } | Self::TimeJumped { .. } | Self::TimeSetBack { .. } => {
+                Severity::Warn
+            }
             Self::CompensationNotFinite { .. }
             | Self::CompensationTooLarge { .. }
             | Self::FollowingError { .. }
@@ -79,7 +86,8 @@ mod tests {
         let wrong = [
             Diagnostic::CompensationStale { silent_periods: 1 },
             Diagnostic::ProbeInMotion { line: 1 },
-            Diagnostic::TimeWentBack { by_s: 1.0 },
+            Diagnostic::TimeWentBack { by_s: 0.05 },
+            Diagnostic::TimeSetBack { by_s: 1.0 },
         ];
         let well = [
             Diagnostic::CompensationFollowed,

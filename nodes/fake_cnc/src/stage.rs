@@ -4,6 +4,7 @@ use machine::MachineFile;
 use metrology::sample::{
     AxisCompensation, AxisState, GridSample, LengthSample, ProbeTrigger, TemperatureSample,
 };
+use metrology::stamp::Span;
 use metrology::{Host, Stage, Stamp};
 
 use crate::clock::Clocks;
@@ -15,6 +16,9 @@ use crate::hardware::Hardware;
 use crate::outcome::{Outcome, ProgramState};
 use crate::plant::Plant;
 use crate::touching::Latched;
+
+/// A clock that goes back by less is waited for: messages that tell the time may overtake each other. By more, it was set.
+const DISORDER: Span = Span::from_nanos(100_000_000);
 
 /// What the control is told.
 #[expect(
@@ -241,9 +245,7 @@ impl<H: Hardware> Cnc<H> {
 
     fn pass_time(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
         if let Some(last) = self.last_tick.filter(|last| at < *last) {
-            let by_s = (last - at).as_secs_f64();
-            self.time_disturbed = true;
-            out.push(Output::Diagnostic(Diagnostic::TimeWentBack { by_s }));
+            self.time_went_back(at, last - at, out);
             return;
         }
         self.last_tick = Some(at);
@@ -267,6 +269,19 @@ impl<H: Hardware> Cnc<H> {
         while let Some(end) = self.clocks.host_ahead(1).filter(|end| *end <= at) {
             self.period(end, out);
         }
+    }
+
+    /// A control has a clock of its own, which goes on where the host's was set back.
+    fn time_went_back(&mut self, at: Stamp<Host>, by: Span, out: &mut Vec<Output>) {
+        let by_s = by.as_secs_f64();
+        self.time_disturbed = true;
+        out.push(Output::Diagnostic(if by > DISORDER {
+            self.clocks.anchor(at);
+            self.last_tick = Some(at);
+            Diagnostic::TimeSetBack { by_s }
+        } else {
+            Diagnostic::TimeWentBack { by_s }
+        }));
     }
 
     /// One servo period that ends at host time `end`.

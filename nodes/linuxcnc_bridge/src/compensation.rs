@@ -146,6 +146,10 @@ impl CompensationPath {
 
     /// Commands for HAL that are due, one a line; `None` when there are none.
     pub fn due(&mut self, at: Stamp<Host>) -> Option<String> {
+        // A host clock that went back must not make the heartbeat wait.
+        for stamp in [&mut self.received, &mut self.passed_at, &mut self.beat_at] {
+            *stamp = stamp.map(|stamp| stamp.min(at));
+        }
         if self.freshness(at) != Some(Freshness::Fresh) {
             return None;
         }
@@ -182,5 +186,77 @@ impl CompensationPath {
                 .expect("writing to a String cannot fail");
         }
         (!lines.is_empty()).then_some(lines)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use metrology::AxisSet;
+    use metrology::sample::CompensationState;
+
+    use super::*;
+    use crate::config::Prepare;
+
+    fn path() -> CompensationPath {
+        let second = Span::from_secs_f64(1.0);
+        CompensationPath::new(&Settings {
+            joints: vec![Axis::X],
+            scales: vec![],
+            axes: AxisSet::XYZ,
+            servo_period: Span::from_secs_f64(1e-3),
+            prepare: Prepare::Observe,
+            connect_password: String::new(),
+            enable_password: String::new(),
+            poll_period: second,
+            reply_timeout: second,
+            reconnect_period: second,
+            homing_timeout: second,
+            compensation_limit: PerAxis([0.2; 6]),
+            compensation_stale_after: second,
+        })
+    }
+
+    fn offsets(at: Stamp<Host>) -> AxisCompensation {
+        AxisCompensation {
+            at,
+            axes: AxisSet::XYZ,
+            total: PerAxis([0.01; 6]),
+            thermal: PerAxis::default(),
+            geometric: PerAxis::default(),
+            positioning: PerAxis::default(),
+            pulses: PerAxis::default(),
+            remainder: PerAxis::default(),
+            state: PerAxis([CompensationState::Active; 6]),
+        }
+    }
+
+    /// Heartbeats in the next 3 s, with offsets for the first of them.
+    fn beats(path: &mut CompensationPath, from: Stamp<Host>) -> usize {
+        let commands = (0..300).filter_map(|tick| {
+            let at = from + Span::from_nanos(tick * 10_000_000);
+            if tick < 100 {
+                path.receive(at, &offsets(at)).unwrap();
+            }
+            path.due(at)
+        });
+        commands
+            .filter(|lines| lines.contains("abbe-heartbeat"))
+            .count()
+    }
+
+    #[test]
+    fn the_heart_beats_on_under_a_clock_that_is_set_back_and_stops_in_time() {
+        let mut path = path();
+        let now = Stamp::from_nanos(1_700_000_000_000_000_000);
+        assert!((19..=21).contains(&beats(&mut path, now)));
+        let hour = Span::from_secs_f64(3600.0);
+        assert!((19..=21).contains(&beats(&mut path, now - hour)));
+        // Offsets break off, and the clock is set back once more.
+        path.receive(now, &offsets(now)).unwrap();
+        let silent = (0..300).filter_map(|tick| {
+            let at = now - hour + Span::from_nanos(tick * 10_000_000);
+            path.due(at)
+        });
+        assert!(silent.count() <= 11);
     }
 }

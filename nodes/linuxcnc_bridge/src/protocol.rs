@@ -200,6 +200,13 @@ impl Client {
         }
     }
 
+    /// What waits for an answer was asked by then.
+    pub fn asked_by(&mut self, at: Stamp<Host>) {
+        if let Some((_, asked_at)) = &mut self.waiting {
+            *asked_at = (*asked_at).min(at);
+        }
+    }
+
     /// Reports an answer that is overdue; the request is dropped.
     pub fn expire(&mut self, at: Stamp<Host>) -> Option<Signal> {
         let (_, asked_at) = self.waiting.as_ref()?;

@@ -116,8 +116,24 @@ impl Session {
         conditions.push(Condition::Disconnected(reason));
     }
 
+    /// A host clock that went back makes nothing wait longer than it would have.
+    fn wait_no_longer(&mut self, at: Stamp<Host>) {
+        self.client.asked_by(at);
+        let next_poll_at = at + self.settings.poll_period;
+        self.poll_at = self.poll_at.map(|poll_at| poll_at.min(next_poll_at));
+        match &mut self.link {
+            Link::Down { retry_at } => {
+                let next_try_at = at + self.settings.reconnect_period;
+                *retry_at = retry_at.map(|retry_at| retry_at.min(next_try_at));
+            }
+            Link::Homing { since } => *since = (*since).min(at),
+            _ => {}
+        }
+    }
+
     /// Time has passed: connect, look at the controller's state, notice what is overdue.
     pub fn tick(&mut self, at: Stamp<Host>, conditions: &mut Vec<Condition>) -> Option<Want> {
+        self.wait_no_longer(at);
         if let Some(Signal::TimedOut(request)) = self.client.expire(at) {
             let limit_s = self.settings.reply_timeout.as_secs_f64();
             let silent = Lost::Silent {

@@ -363,6 +363,13 @@ impl BridgeStage {
     fn tick(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
         let want = self.session.tick(at, &mut self.conditions);
         self.want(want, out);
+        match &mut self.sampling {
+            Sampling::Off { retry_at } => {
+                let next_try_at = at + self.settings.reconnect_period;
+                *retry_at = retry_at.map(|retry_at| retry_at.min(next_try_at));
+            }
+            Sampling::Started { at: last } | Sampling::Flowing { last } => *last = (*last).min(at),
+        }
         match self.sampling {
             Sampling::Off { retry_at }
                 if self.session.is_up() && retry_at.is_none_or(|retry_at| at >= retry_at) =>

@@ -521,6 +521,20 @@ fn lost_records_are_counted_and_silence_restarts_the_sampler() {
 }
 
 #[test]
+fn under_a_clock_that_is_set_back_the_controller_is_looked_at_and_silence_is_noticed() {
+    let mut desk = Desk::new(Prepare::Observe);
+    desk.make_ready();
+    desk.now_s -= 3600.0;
+    desk.tell(Input::Tick);
+    desk.sent();
+    desk.now_s += 0.1;
+    desk.tell(Input::Tick);
+    assert!(desk.sent().contains(&"get estop".to_owned()));
+    desk.later(2.5);
+    assert!(desk.out.contains(&Output::Io(IoCommand::StartSampler)));
+}
+
+#[test]
 fn a_controller_that_loads_another_program_is_not_told_to_run_it() {
     let mut desk = Desk::new(Prepare::Observe);
     desk.make_ready();

@@ -117,7 +117,9 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
                 level => level,
             });
     // RustDDS complains of multicast groups when it leaves a loopback that has none.
-    let quiet = "rustdds=error,rustdds::network::udp_listener=off,ros2_client=error,zenoh=error";
+    // And, once a clock was set back, of each sample of best effort: that is a condition of the node's.
+    let silent = "rustdds::network::udp_listener=off,rustdds::structure::dds_cache=off";
+    let quiet = format!("rustdds=error,{silent},ros2_client=error,zenoh=error");
     // Where DDS is secured it complains of every message of whoever is not.
     let secured = environment.security.as_ref();
     let strangers = secured.map_or("", |_| ",rustdds::rtps::message_receiver=off");

@@ -200,6 +200,15 @@ impl Participant {
         matches!(self, Self::Dds(_))
     }
 
+    /// What is not heard once the clock was set back, until it shows again what it showed before.
+    pub fn unheard_after_set_back(&self) -> Option<&'static str> {
+        match self {
+            Self::Dds(_) => Some("samples of best effort and nodes that are new"),
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(_) => None,
+        }
+    }
+
     /// Shows the node with all its endpoints on the ROS graph.
     pub fn announce(&self) -> anyhow::Result<()> {
         either!(Self, self, participant => participant.announce())

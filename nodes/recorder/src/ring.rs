@@ -3,7 +3,8 @@
 //! What is older than the window leaves; so does the oldest when the bytes have reached their limit, and then the ring
 //! reaches less far back than it should, which is counted. Of a latched topic the last messages stay, as many as its
 //! depth, however old: a late joiner would get them too. So a bag that is saved has everything that was said within
-//! the window, and what held when it began; the latter stand at its begin, with their own publish times.
+//! the window, and what held when it began; the latter stand at its begin, with their own publish times. Where the clock
+//! is set back the window goes on: by how much it was is no part of it.
 //!
 //! Taking a snapshot copies no bytes and takes microseconds; writing it is the caller's, in its own time.
 
@@ -23,6 +24,8 @@ use crate::shelf::Shelf;
 struct Kept {
     channel: ChannelId,
     stamp: MessageStamp,
+    /// Log time that had passed when it came, ns: steps of the clock backwards are left out.
+    passed_nanos: i64,
     data: Arc<[u8]>,
 }
 
@@ -66,9 +69,15 @@ pub struct Ring {
     limit_bytes: u64,
     topics: Vec<KeptTopic>,
     messages: VecDeque<Kept>,
-    newest_nanos: i64,
+    /// Log time of the newest message since the clock was set back, ns.
+    newest_nanos: Option<i64>,
+    /// Log time that has passed, ns.
+    passed_nanos: i64,
     stats: RingStats,
 }
+
+/// A log time that goes back by more was set back, ns: by less, messages of several topics overtake each other.
+const SET_BACK_NANOS: i64 = 100_000_000;
 
 impl Ring {
     /// An empty ring.
@@ -82,7 +91,8 @@ impl Ring {
             limit_bytes: config.limit_bytes,
             topics: Vec::new(),
             messages: VecDeque::new(),
-            newest_nanos: i64::MIN,
+            newest_nanos: None,
+            passed_nanos: 0,
             stats: RingStats::default(),
         })
     }
@@ -125,9 +135,9 @@ impl Ring {
         let message = Kept {
             channel,
             stamp,
+            passed_nanos: self.pass(stamp.log_time_nanos),
             data: Arc::from(data),
         };
-        self.newest_nanos = self.newest_nanos.max(stamp.log_time_nanos);
         self.stats.bytes_kept += message.bytes();
         self.messages.push_back(message);
         self.let_go();
@@ -136,10 +146,21 @@ impl Ring {
         Pushed::Queued
     }
 
+    /// What has passed when a message comes.
+    fn pass(&mut self, log_time_nanos: i64) -> i64 {
+        let newest_nanos = self.newest_nanos.unwrap_or(log_time_nanos);
+        let on_nanos = log_time_nanos.saturating_sub(newest_nanos);
+        if on_nanos >= 0 || on_nanos < -SET_BACK_NANOS {
+            self.newest_nanos = Some(log_time_nanos);
+        }
+        self.passed_nanos = self.passed_nanos.saturating_add(on_nanos.max(0));
+        self.passed_nanos
+    }
+
     fn let_go(&mut self) {
-        let begin_nanos = self.newest_nanos.saturating_sub(self.window_nanos);
+        let begin_nanos = self.passed_nanos.saturating_sub(self.window_nanos);
         while let Some(oldest) = self.messages.front() {
-            let is_old = oldest.stamp.log_time_nanos < begin_nanos;
+            let is_old = oldest.passed_nanos < begin_nanos;
             let is_crowded = self.stats.bytes_kept > self.limit_bytes;
             if !is_old && !is_crowded {
                 return;
@@ -168,8 +189,7 @@ impl Ring {
     #[must_use]
     pub fn stats(&self) -> RingStats {
         let oldest = self.messages.front();
-        let reach_nanos =
-            oldest.map_or(0, |oldest| self.newest_nanos - oldest.stamp.log_time_nanos);
+        let reach_nanos = oldest.map_or(0, |oldest| self.passed_nanos - oldest.passed_nanos);
         let before: usize = self.topics.iter().map(|topic| topic.before.len()).sum();
         RingStats {
             messages_kept: (self.messages.len() + before) as u64,
@@ -182,7 +202,7 @@ impl Ring {
     #[must_use]
     pub fn snapshot(&self) -> Snapshot {
         let oldest = self.messages.iter().map(|kept| kept.stamp.log_time_nanos);
-        let begin_nanos = oldest.min().unwrap_or(self.newest_nanos);
+        let begin_nanos = oldest.min().or(self.newest_nanos).unwrap_or(0);
         let mut messages = Vec::with_capacity(self.messages.len());
         for topic in &self.topics {
             messages.extend(topic.before.iter().cloned().map(|mut kept| {

@@ -26,10 +26,9 @@ pub(crate) fn joints() -> impl Fn(&Output) -> Option<JointState> + Send + 'stati
     let last: Cell<Option<Stamp<Host>>> = Cell::new(None);
     move |output| {
         let state = state(output)?;
-        if last
-            .get()
-            .is_some_and(|last| state.received_at - last < JOINT_PERIOD)
-        {
+        let since = last.get().map(|last| state.received_at - last);
+        // Before the last one: the clock was set back.
+        if since.is_some_and(|since| since.nanos() >= 0 && since < JOINT_PERIOD) {
             return None;
         }
         last.set(Some(state.received_at));

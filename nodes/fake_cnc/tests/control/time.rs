@@ -21,6 +21,29 @@ fn time_that_goes_back_moves_nothing_and_is_told() {
 }
 
 #[test]
+fn under_a_clock_that_is_set_back_the_control_goes_on_by_its_own() {
+    let mut shop = shop(Bench::open());
+    shop.request("F6000 G1 X100\nM2");
+    shop.pass_ms(300);
+    let (before, said) = (shop.states().len(), shop.out.len());
+    shop.now = Stamp::from_nanos(shop.now.nanos() - 3_600_000 * MS);
+    shop.tell(Input::Tick);
+    let [Output::Diagnostic(Diagnostic::TimeSetBack { by_s })] = shop.out[said..] else {
+        panic!("{:?}", &shop.out[said..]);
+    };
+    assert!((by_s - 3600.0).abs() < 1e-9);
+    shop.pass_ms(10);
+    let states = shop.states();
+    assert_eq!(states.len(), before + 10);
+    let (last, next) = (states[before - 1], states[before]);
+    assert_eq!((next.controller_at - last.controller_at).nanos(), MS);
+    assert!(next.commanded[Axis::X] > last.commanded[Axis::X]);
+    assert_eq!(next.received_at.nanos(), shop.now.nanos() - 9 * MS);
+    assert_eq!(shop.diagnostics().last(), Some(&Diagnostic::TimePasses));
+    assert_eq!(shop.finish().0, Outcome::Done);
+}
+
+#[test]
 fn a_jump_of_time_is_skipped_and_told() {
     let mut shop = shop(Bench::open());
     shop.pass_ms(10);

@@ -14,6 +14,7 @@ use rustdds::{GUID, RepresentationIdentifier, SequenceNumber, Timestamp, WriteOp
 
 use super::reply::LongReplies;
 use super::rtps::Fragmented;
+use crate::clock::host_now;
 use crate::network::{Guid, PublishError, RequestIdentity, Sample, check_encapsulation};
 use crate::node::Bytes;
 
@@ -106,6 +107,12 @@ fn stamp(time: Timestamp) -> Stamp<Host> {
     Stamp::from_nanos(i64::try_from(nanos).unwrap_or(i64::MAX))
 }
 
+/// When a sample came, if it is read `now`. RustDDS finds samples by their time and lets it never go back: where the clock was
+/// set back, it stands still in the future until that has come.
+fn received(instant: Timestamp, now: Stamp<Host>) -> Stamp<Host> {
+    stamp(instant).min(now)
+}
+
 fn timestamp(at: Stamp<Host>) -> Timestamp {
     let ticks = (i128::from(at.nanos()) << 32) / i128::from(NANOS_PER_S);
     u64::try_from(ticks).map_or(Timestamp::INVALID, Timestamp::from_ticks)
@@ -136,7 +143,7 @@ impl Reader {
                 writer: change.writer_guid().to_bytes(),
                 sequence: i64::from(change.sequence_number),
                 source: change.source_timestamp().map(stamp),
-                received: stamp(change.receive_instant),
+                received: received(change.receive_instant, host_now()),
                 related: change.related_sample_identity().map(identity),
                 bytes: change.into_value(),
             }),
@@ -232,6 +239,8 @@ impl Writer {
 
 #[cfg(test)]
 mod tests {
+    use metrology::stamp::Span;
+
     use super::*;
 
     #[test]
@@ -245,6 +254,15 @@ mod tests {
                 back.nanos()
             );
         }
+    }
+
+    #[test]
+    fn nothing_was_received_later_than_it_is_read() {
+        let now = Stamp::from_nanos(1_763_000_000_000_000_000);
+        let minute = Span::from_secs_f64(60.0);
+        let before = now + Span::from_secs_f64(-0.25);
+        assert_eq!(received(timestamp(before), now), before);
+        assert_eq!(received(timestamp(now + minute), now), now);
     }
 
     #[test]

@@ -245,12 +245,20 @@ impl Owner {
         };
         let (at, set_back) = self.event_time.of(now, arrived);
         if let Some(back) = set_back {
-            let back_s = back.as_secs_f64();
-            let message = format!("clock went back {back_s} s");
-            let diagnostic = Diagnostic::new(Level::Warn, "clock_stepped_back", message);
-            self.notice(diagnostic.with("step_s", -back_s));
+            self.tell_set_back(back.as_secs_f64());
         }
         at
+    }
+
+    fn tell_set_back(&mut self, back_s: f64) {
+        let mut message = format!("clock went back {back_s} s");
+        if let Some(unheard) = self.participant.unheard_after_set_back() {
+            message += ": until that has passed again, ";
+            message += unheard;
+            message += " are not heard";
+        }
+        let diagnostic = Diagnostic::new(Level::Warn, "clock_stepped_back", message);
+        self.notice(diagnostic.with("step_s", -back_s));
     }
 
     fn notice(&mut self, diagnostic: Diagnostic) {

@@ -95,6 +95,26 @@ fn all_of_the_window_is_saved_and_before_it_what_held_when_it_began() {
 }
 
 #[test]
+fn where_the_clock_is_set_back_the_window_goes_on() {
+    const BACK_NANOS: i64 = 3_600_000_000_000;
+    let mut ring = ring(2.0, 64 << 20);
+    fill(&mut ring, 0..5_000);
+    let ids: Vec<_> = sample::channels()
+        .iter()
+        .map(|channel| ring.add_channel(channel).unwrap())
+        .collect();
+    for n in 5_000..10_000 {
+        let mut message = message(n);
+        message.stamp.log_time_nanos -= BACK_NANOS;
+        ring.push(ids[message.channel], message.stamp, &message.data);
+        let stats = ring.stats();
+        assert!((1.9..=2.0).contains(&stats.reach_s), "{stats:?}");
+        assert_eq!(stats.messages_crowded_out, 0);
+        assert!((1_990..=2_010).contains(&stats.messages_kept), "{stats:?}");
+    }
+}
+
+#[test]
 fn the_limit_holds_whatever_comes_and_says_how_far_back_it_reaches() {
     const LIMIT_BYTES: u64 = 256 << 10;
     let mut ring = ring(3_600.0, LIMIT_BYTES);
