@@ -36,7 +36,8 @@ const DEVELOPMENT_SEED: u64 = 1;
 #[derive(Args)]
 pub struct Trials {
     /// Arms, by number: i catalogue, ii a class left out, iii different physics, iv null, v null with worse noise,
-    /// vi confusable pairs, vii the same with one more run of the diagnosis' choice; alone: each class in turn, large enough to be named.
+    /// vi confusable pairs, vii the same with one more run of the diagnosis' choice; alone: each class in turn, large enough to be named;
+    /// limit: each class in turn, about as small as can be named; own, own-left-out: classes with programmes of their own.
     #[arg(long, value_delimiter = ',', default_value = "i")]
     arm: Vec<Arm>,
     /// Trials in each arm.

@@ -59,7 +59,7 @@ impl Default for GapConfig {
             bootstrap_draws: 2000,
             seed: 20_260_101,
             most_inflation: 1.2,
-            most_inflation_of_two: 1.08,
+            most_inflation_of_two: 1.05,
             form_error_um: 0.2,
             form_error_share: 0.05,
             constancy_z: 4.0,

@@ -30,20 +30,22 @@ pub struct Provenance {
     pub arm: &'static str,
 }
 
-/// Points of f: probability, share of right names; both rise. Of names with a p of 0.2 to 0.5 2 of 6 were right, to 0.8 2
-/// of 5, to 0.95 9 of 13, to 0.999 24 of 29, to 0.99995 7 of 8, beyond 119 of 119, which is taken for 120 of 121.
+/// Points of f: probability, share of right names; both rise. Of names with a p of 0.2 to 0.5 3 of 5 were right, to 0.8 15
+/// of 22, to 0.95 31 of 35, to 0.99 82 of 90, to 0.999999 83 of 92, which together with those before is 165 of 182,
+/// beyond 670 of 673.
 pub const TABLE: &[[f64; 2]] = &[
     [0.0, 0.0],
-    [0.35, 0.33],
-    [0.65, 0.4],
-    [0.9, 0.7],
-    [0.98, 0.83],
-    [0.9998, 0.88],
-    [1.0, 0.99],
+    [0.4, 0.6],
+    [0.65, 0.68],
+    [0.91, 0.89],
+    [0.98, 0.905],
+    [0.999_99, 0.908],
+    [0.999_999, 0.97],
+    [1.0, 0.9955],
 ];
-/// Trials behind [`TABLE`]: 90 of arm i and 100 of arm iii, seed 1.
+/// Trials behind [`TABLE`]: 500 of arm i and 500 of arm iii that were judged by commit 7f82715, and judge nothing later.
 pub const PROVENANCE: Option<Provenance> = Some(Provenance {
-    trials: 190,
+    trials: 1000,
     arm: "i, iii",
 });
 
@@ -88,7 +90,7 @@ mod tests {
     #[test]
     fn a_diagnosis_without_this_rule_tells_the_probability_itself() {
         let mut config = GapConfig::default();
-        assert!(recalibrated(&config, 0.97) < 0.9);
+        assert!(recalibrated(&config, 0.97) < 0.91);
         config.ablated = [Rule::Recalibration].into();
         assert!((recalibrated(&config, 0.97) - 0.97).abs() < 1e-12);
     }

@@ -27,11 +27,18 @@ pub enum Arm {
     Alone,
     /// As `Confusable`; the diagnosis is given one more run, the first that it asks for.
     TwoRounds,
+    /// One effect of a class, every class and every axis in turn, as small as can just be named or smaller, whether or not
+    /// a machine's physics has it as small.
+    Limit,
+    /// One effect of a class that has a programme of its own, every such class and every axis in turn, or none.
+    Own,
+    /// One effect of such a class, which the diagnosis is told to leave out.
+    OwnLeftOut,
 }
 
 impl Arm {
     /// Every arm, in order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 11] = [
         Self::Catalogue,
         Self::LeftOut,
         Self::Foreign,
@@ -40,12 +47,27 @@ impl Arm {
         Self::Confusable,
         Self::Alone,
         Self::TwoRounds,
+        Self::Limit,
+        Self::Own,
+        Self::OwnLeftOut,
     ];
 
-    /// Its number in the protocol; `alone` has none.
+    /// Its number in the protocol; the others go by their names.
     #[must_use]
     pub const fn numeral(self) -> &'static str {
-        ["i", "ii", "iii", "iv", "v", "vi", "alone", "vii"][self as usize]
+        [
+            "i",
+            "ii",
+            "iii",
+            "iv",
+            "v",
+            "vi",
+            "alone",
+            "vii",
+            "limit",
+            "own",
+            "own-left-out",
+        ][self as usize]
     }
 
     /// In words.
@@ -60,7 +82,16 @@ impl Arm {
             "confusable pairs",
             "each class alone",
             "confusable pairs, with one more run of the diagnosis' choice",
+            "each class alone, about as small as can be named",
+            "classes with programmes of their own",
+            "classes with programmes of their own, left out",
         ][self as usize]
+    }
+
+    /// Whether the diagnosis is told to leave out the class that is hidden.
+    #[must_use]
+    pub const fn leaves_out(self) -> bool {
+        matches!(self, Self::LeftOut | Self::OwnLeftOut)
     }
 
     /// Whether its machines have nothing to be named.

@@ -90,7 +90,7 @@ pub fn pairs(own: &[&Verdict]) -> Vec<Pair> {
         });
         all
     };
-    Class::ALL.into_iter().flat_map(of).collect()
+    Class::every().flat_map(of).collect()
 }
 
 /// Of every class that is hidden alone: in how many trials, and what was said how often.
@@ -159,7 +159,7 @@ pub fn predicted(own: &[&Verdict]) -> Vec<Predicted> {
             cos,
         })
     };
-    Class::ALL.into_iter().filter_map(line).collect()
+    Class::every().filter_map(line).collect()
 }
 
 /// How often a hidden effect, alone in its machine, got the name of another class: where some class was predicted to

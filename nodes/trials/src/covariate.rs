@@ -10,6 +10,13 @@
 //! | `length_wavelength` | any position |
 //! | `screw_elongation` | time, a temperature, or the position of its axis |
 //! | `drive_windup` | acceleration, which on a circle is position and angle |
+//! | `plate_error` | any position, or the angle |
+//! | `clock_drift` | any velocity, the sense of rotation with the angle, or time |
+//! | `probe_lobing`, `probe_pretravel` | the angle of the approach, or the stylus |
+//! | `latency_jitter` | the feed of the touches |
+//! | `interpolation_error` | the position of its axis, or the angle |
+//! | `rotary_location`, `rotary_motion`, `rotary_backlash` | the position of its axis, or the angle of the approach |
+//! | `spindle_growth`, `column_bend`, `ambient_drift` | time, or a temperature |
 
 use crate::effect::Class;
 use crate::truth::TrueEffect;
@@ -34,6 +41,21 @@ pub fn is_right(effect: &TrueEffect, covariate: &str) -> bool {
         Class::ClockOffset => covariate.starts_with("velocity_") || covariate == "sense*angle",
         Class::ProbeLatency => covariate == "feed",
         Class::LengthWavelength => covariate.starts_with("position_"),
+        Class::PlateError => covariate.starts_with("position_") || covariate == "angle",
+        Class::ClockDrift => {
+            covariate.starts_with("velocity_") || ["sense*angle", "time"].contains(&covariate)
+        }
+        Class::ProbeLobing | Class::ProbePretravel => {
+            ["approach_angle", "stylus"].contains(&covariate)
+        }
+        Class::LatencyJitter => covariate == "feed",
+        Class::InterpolationError => of_axis("position") || covariate == "angle",
+        Class::RotaryLocation | Class::RotaryMotion | Class::RotaryBacklash => {
+            of_axis("position") || covariate == "approach_angle"
+        }
+        Class::SpindleGrowth | Class::ColumnBend | Class::AmbientDrift => {
+            covariate == "time" || covariate.starts_with("temperature_")
+        }
         Class::ScrewElongation => {
             covariate == "time" || covariate.starts_with("temperature_") || of_axis("position")
         }

@@ -29,6 +29,8 @@
 //! friction alone would not cross three quarters; the slide would hang on a soft spring, which is another effect.
 //!
 //! The tool of a machine whose effects are foreign shakes besides, at a frequency that wanders.
+//!
+//! Classes that the common programme does not show are in `own`, each with its programme.
 
 use fake_cnc::plant::{GuideFormEntry, LeadCycleEntry};
 use metrology::Axis;
@@ -56,11 +58,25 @@ pub enum Class {
     LengthWavelength,
     ScrewElongation,
     DriveWindup,
+    PlateError,
+    ClockDrift,
+    ProbeLobing,
+    ProbePretravel,
+    LatencyJitter,
+    InterpolationError,
+    RotaryLocation,
+    RotaryMotion,
+    RotaryBacklash,
+    SpindleGrowth,
+    ColumnBend,
+    AmbientDrift,
 }
 
 use Class::{
-    AngularError, Backlash, ClockOffset, CyclicError, DriveWindup, LengthWavelength, PitchError,
-    ProbeLatency, ReversalSpike, ScaleError, ScrewElongation, ServoLag, Squareness, Straightness,
+    AmbientDrift, AngularError, Backlash, ClockDrift, ClockOffset, ColumnBend, CyclicError,
+    DriveWindup, InterpolationError, LatencyJitter, LengthWavelength, PitchError, PlateError,
+    ProbeLatency, ProbeLobing, ProbePretravel, ReversalSpike, RotaryBacklash, RotaryLocation,
+    RotaryMotion, ScaleError, ScrewElongation, ServoLag, SpindleGrowth, Squareness, Straightness,
 };
 
 /// An effect that is hidden.
@@ -81,7 +97,7 @@ pub struct Hidden {
 const AXES: &[&str] = &["X", "Y", "Z"];
 
 impl Class {
-    /// Every class, in order.
+    /// Every class that the common programme shows, in order.
     pub const ALL: [Self; 14] = [
         Backlash,
         ScaleError,
@@ -98,6 +114,27 @@ impl Class {
         ScrewElongation,
         DriveWindup,
     ];
+
+    /// Classes that have a programme of their own, in order.
+    pub const OWN: [Self; 12] = [
+        PlateError,
+        ClockDrift,
+        ProbeLobing,
+        ProbePretravel,
+        LatencyJitter,
+        InterpolationError,
+        RotaryLocation,
+        RotaryMotion,
+        RotaryBacklash,
+        SpindleGrowth,
+        ColumnBend,
+        AmbientDrift,
+    ];
+
+    /// Every class, whatever shows it.
+    pub fn every() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().chain(Self::OWN)
+    }
 
     /// Classes with a double, and what looks like them.
     pub const CONFUSABLE: [(Self, &'static str); 7] = [
@@ -128,6 +165,18 @@ impl Class {
             "length_wavelength",
             "screw_elongation",
             "drive_windup",
+            "plate_error",
+            "clock_drift",
+            "probe_lobing",
+            "probe_pretravel",
+            "latency_jitter",
+            "interpolation_error",
+            "rotary_location",
+            "rotary_motion",
+            "rotary_backlash",
+            "spindle_growth",
+            "column_bend",
+            "ambient_drift",
         ][self as usize]
     }
 
@@ -138,8 +187,14 @@ impl Class {
             Squareness => &["XY", "XZ", "YZ"],
             Straightness => &["YX", "ZX", "XY", "ZY", "XZ", "YZ"],
             AngularError => &["AX", "BX", "CX", "AY", "BY", "CY", "AZ", "BZ"],
-            ProbeLatency | LengthWavelength => &[""],
-            ClockOffset => &["grid"],
+            ProbeLatency | LengthWavelength | PlateError | ProbeLobing | ProbePretravel
+            | LatencyJitter | SpindleGrowth | ColumnBend => &[""],
+            ClockOffset | ClockDrift => &["grid"],
+            InterpolationError => &["X", "Y"],
+            RotaryLocation => &["X0C", "Y0C", "Y0A", "Z0A"],
+            RotaryMotion => &["CC", "AA"],
+            RotaryBacklash => &["C", "A"],
+            AmbientDrift => &["Y"],
             _ => AXES,
         }
     }
@@ -162,6 +217,16 @@ impl Class {
             LengthWavelength => ([0.5, 40.0], "ppm"),
             ScrewElongation => ([0.05, 8.0], "N m"),
             DriveWindup => ([0.2, 12.0], "µm at 1 m/s2"),
+            PlateError => ([1.0, 60.0], "µm/m"),
+            ClockDrift => ([0.1, 50.0], "ppm"),
+            ProbeLobing | ProbePretravel => ([0.1, 8.0], "N"),
+            LatencyJitter => ([0.01, 0.5], "ms"),
+            InterpolationError => ([0.02, 0.5], "µm"),
+            RotaryLocation => ([1.0, 50.0], "µm"),
+            RotaryMotion => ([1.0, 200.0], "µrad"),
+            RotaryBacklash => ([0.5, 30.0], "arcsec"),
+            SpindleGrowth => ([0.05, 5.0], "W at 1000 /min"),
+            ColumnBend | AmbientDrift => ([10.0, 2000.0], "W"),
         }
     }
 
@@ -177,6 +242,9 @@ impl Class {
                 | AngularError
                 | ClockOffset
                 | LengthWavelength
+                | PlateError
+                | ClockDrift
+                | RotaryLocation
         )
     }
 
@@ -192,6 +260,9 @@ impl Class {
             ClockOffset => Some("offset_ms"),
             LengthWavelength => Some("scale_ppm"),
             DriveWindup => Some("windup_um"),
+            ClockDrift => Some("drift_ppm"),
+            LatencyJitter => Some("jitter_ms"),
+            RotaryLocation => Some("size_um_urad"),
             _ => None,
         }
     }
@@ -211,6 +282,8 @@ impl Hidden {
             ScaleError if self.is_foreign => Some("pitch_error"),
             Squareness if self.is_foreign => Some("straightness"),
             ClockOffset if self.is_foreign => Some("clock_drift"),
+            // The seat of a probe whose stylus bends lobes as well.
+            ProbePretravel => Some("probe_lobing"),
             _ => None,
         }
     }
@@ -249,6 +322,9 @@ impl Hidden {
                 }
                 Some(())
             }
+            PlateError | ClockDrift | ProbeLobing | ProbePretravel | LatencyJitter
+            | InterpolationError | RotaryLocation | RotaryMotion | RotaryBacklash
+            | SpindleGrowth | ColumnBend | AmbientDrift => self.in_own(rig),
         };
         done.ok_or(TrialError::Impossible {
             effect: self.class.id(),
@@ -258,7 +334,7 @@ impl Hidden {
     }
 
     /// The axis that moves: the last letter.
-    fn moving(&self) -> Option<Axis> {
+    pub(crate) fn moving(&self) -> Option<Axis> {
         self.axis
             .get(self.axis.len().checked_sub(1)?..)?
             .parse()

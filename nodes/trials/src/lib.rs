@@ -1,7 +1,7 @@
 //! Blind trials of the diagnosis: machines whose hidden effect it is not told, and the judge of what it says.
 //!
 //! Three programs share nothing but a bag. The *generator* is here: `arm` says what kind of trials there are, `rig`
-//! draws a machine with its plant, `commissioning` measures what its maker knows of its loops, `programme` is what is measured, `effect` what is hidden in the plant,
+//! draws a machine with its plant, `own` gives it a programme of its own for classes that the common one does not show, `commissioning` measures what its maker knows of its loops, `programme` is what is measured, `effect` what is hidden in the plant,
 //! `scatter` what no two runs have in common, `trial` puts them together and `measurement` runs the plan on
 //! `fake_cnc`'s plant in simulated time. Its physics is the plant's own: nothing here calls the simulator or its
 //! catalogue, whose ids it only writes down; `extra_run` is the one that a diagnosis asks for. The *diagnoser* is `abbe diagnose`, a process that is given the bag and
@@ -24,6 +24,7 @@ pub mod effect;
 pub mod error;
 mod extra_run;
 pub mod measurement;
+mod own;
 mod programme;
 pub mod proportion;
 pub mod rig;

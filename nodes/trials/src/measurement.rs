@@ -204,9 +204,11 @@ impl Session<'_> {
         let [u, v] = plane_axes(sample.plane);
         sample.u_mm += self.scattering.reading_mm(u, &place_mm);
         sample.v_mm += self.scattering.reading_mm(v, &place_mm);
-        let turns = (self.now - self.began).as_secs_f64() / LATE_TURN_S;
+        let since_s = (self.now - self.began).as_secs_f64();
+        let turns = since_s / LATE_TURN_S;
         let wander = self.rig.grid_late_wander * (std::f64::consts::TAU * turns).sin();
-        sample.at += Span::from_secs_f64(self.rig.grid_late_s * (1.0 + wander));
+        let late_s = self.rig.grid_late_s * (1.0 + wander) + self.rig.grid_fast * since_s;
+        sample.at += Span::from_secs_f64(late_s);
         (self.take)(recorded_at, Sample::Grid(sample));
     }
 

@@ -65,6 +65,8 @@ pub struct Rig {
     pub grid_late_s: f64,
     /// How much of that wanders, as a share, from minute to minute.
     pub grid_late_wander: f64,
+    /// How fast the grid encoder's clock is that was set when the session began, as a share.
+    pub grid_fast: f64,
     /// When the session begins, s since the epoch.
     pub start_s: i64,
     /// Whether the motors' encoders are recorded; otherwise their positions are those that were commanded.
@@ -118,6 +120,7 @@ impl Rig {
             plant,
             grid_late_s: 0.0,
             grid_late_wander: 0.0,
+            grid_fast: 0.0,
             start_s: START_S,
             has_motors: random.random(),
         })

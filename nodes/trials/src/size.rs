@@ -323,7 +323,7 @@ fn gain(
         return None;
     }
     let variance_mm2 = if with.is_touch {
-        TOUCH_MM.powi(2) + TOUCHES_ALIKE * FORM_MM.powi(2)
+        TOUCH_VARIANCE_MM2
     } else {
         let memory = (1.0 + scatter.ar) / (1.0 - scatter.ar);
         (scatter.white_mm.powi(2) * memory + shaking_mm2) / rows.mean_of
@@ -351,6 +351,8 @@ fn gain(
 
 /// Touches of one face at one feed in a run (`programme`).
 const TOUCHES_ALIKE: f64 = 2.0;
+/// Variance of a touch, mm².
+pub(crate) const TOUCH_VARIANCE_MM2: f64 = TOUCH_MM * TOUCH_MM + TOUCHES_ALIKE * FORM_MM * FORM_MM;
 /// Middle square of a normal number of variance 1.
 const MIDDLE_SQUARE: f64 = 0.454_936;
 

@@ -148,7 +148,7 @@ fn rates(arm: Arm, own: &[&Verdict]) -> Vec<Rate> {
     rates.add("unknown flagged", &said, Verdict::is_flagged);
     if arm.is_null() {
         rates.add("nothing named", &said, Verdict::is_exact);
-    } else if arm == Arm::LeftOut {
+    } else if arm.leaves_out() {
         let large = beyond(&said, LARGE_D);
         rates.add(
             &format!("unknown flagged, D > {LARGE_D}"),

@@ -133,7 +133,7 @@ pub fn targets(verdicts: &[Verdict]) -> Vec<Target> {
     let mut sheet = Sheet(vec![]);
     of_nulls(&mut sheet, &of(Arm::Null), &of(Arm::HeavyNull));
     let (known, foreign) = (of(Arm::Catalogue), of(Arm::Foreign));
-    of_limits(&mut sheet, &known);
+    of_limits(&mut sheet, &of(Arm::Limit), &known);
     of_known(&mut sheet, &known);
     of_foreign(&mut sheet, &foreign);
     of_left_out(&mut sheet, &of(Arm::LeftOut), &known);
@@ -203,29 +203,22 @@ pub(crate) fn limit(own: &[&Verdict], class: Option<Class>) -> Option<Limit> {
     d95(&trials)
 }
 
-fn of_limits(sheet: &mut Sheet, known: &[&Verdict]) {
-    let by_class = Class::ALL
-        .into_iter()
-        .map(|class| limit(known, Some(class)));
+/// Of the arm that is made for it; of the catalogue's, whose least physical sizes are large for some classes, without it.
+fn of_limits(sheet: &mut Sheet, small: &[&Verdict], known: &[&Verdict]) {
+    let (arm, own) = if small.is_empty() {
+        (Arm::Catalogue, known)
+    } else {
+        (Arm::Limit, small)
+    };
+    let by_class = Class::every().map(|class| limit(own, Some(class)));
     let by_class: Vec<Limit> = by_class.flatten().collect();
-    sheet.limit(
-        "i: D named in 95 %, all classes together",
-        8.0,
-        limit(known, None),
-        known.len(),
-    );
-    sheet.limit(
-        "i: D named in 95 %, median of the classes",
-        8.0,
-        Limit::middle(&by_class),
-        by_class.len(),
-    );
-    sheet.limit(
-        "i: D named in 95 %, worst class",
-        10.0,
-        Limit::largest(&by_class),
-        by_class.len(),
-    );
+    let (whole, n) = (limit(own, None), by_class.len());
+    let metric = |of: &str| format!("{arm}: D named in 95 %, {of}");
+    sheet.limit(&metric("all classes together"), 8.0, whole, own.len());
+    let middle = Limit::middle(&by_class);
+    sheet.limit(&metric("median of the classes"), 8.0, middle, n);
+    let largest = Limit::largest(&by_class);
+    sheet.limit(&metric("worst class"), 10.0, largest, n);
 }
 
 fn of_known(sheet: &mut Sheet, known: &[&Verdict]) {
@@ -458,6 +451,33 @@ mod tests {
         }));
         assert_eq!(always, vec![(Some("< 2.000".to_owned()), Some(true)); 3]);
         assert_eq!(told(&trials(5, |_| vec![])), vec![(None, None); 3]);
+    }
+
+    #[test]
+    fn the_limit_is_that_of_its_own_arm_where_it_has_trials() {
+        let named = |d: f64| match d < 6.0 {
+            true => vec![],
+            false => vec![cause("backlash", "X", Status::Named, 4.0)],
+        };
+        let mut all = vec![];
+        for index in 0..40 {
+            let d = 2.0 + f64::from(index);
+            let play = || vec![effect(Class::Backlash, "X", d)];
+            all.push(verdict(play(), vec![], false));
+            let mut own = verdict(play(), named(d), false);
+            own.truth.arm = Arm::Limit;
+            all.push(own);
+        }
+        let told = targets(&all);
+        for target in told.iter().filter(|target| target.limit.is_some()) {
+            assert!(target.metric.starts_with("limit: "), "{target:?}");
+            let at = target.value.unwrap();
+            assert!((5.0..12.0).contains(&at), "{at}");
+        }
+        assert_eq!(
+            told.iter().filter(|target| target.limit.is_some()).count(),
+            3
+        );
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //!
 //! Every trial follows from (seed, arm, number) alone. Sizes are drawn as D, log-uniform from 2 to 200: the programme is
 //! run on the plant without the effect and with it at a middle size, and the size is scaled until D is what was drawn
-//! or the end of its physical range is reached.
+//! or the end of its physical range is reached. Where the least D that can be named is sought, the range has no least size:
+//! sharp effects have a D of 10 and more at theirs.
 
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
@@ -14,6 +15,7 @@ use crate::commissioning::Commissioning;
 use crate::effect::{Class, Hidden};
 use crate::error::TrialError;
 use crate::measurement::measure;
+use crate::own;
 use crate::rig::{Rig, STATE_RATE_HZ};
 use crate::size::Deviations;
 use crate::truth::{TrueEffect, Truth};
@@ -22,6 +24,10 @@ use crate::truth::{TrueEffect, Truth};
 const D: [f64; 2] = [2.0, 200.0];
 /// Range of D of effects that should be named in any case.
 const LARGE_D: [f64; 2] = [20.0, 200.0];
+/// Range of D about what can just be named.
+const SMALL_D: [f64; 2] = [2.0, 40.0];
+/// How near D is to what was drawn where that takes several steps, as a logarithm.
+const NEAR_D: f64 = 0.3;
 /// Shares of machines with none, one and two effects; the rest has three.
 const HOW_MANY: [f64; 3] = [0.2, 0.4, 0.25];
 
@@ -48,17 +54,29 @@ impl Trial {
         if arm == Arm::Foreign {
             rig.shake(&mut random);
         }
-        let bare = commissioned(&mut rig)?;
+        let own = wanted.first().filter(|_| has_own_programmes(arm));
+        if let Some((hidden, _)) = own {
+            own::prepare(&mut random, hidden, &mut rig)?;
+        }
+        let bare = match own {
+            Some((hidden, _)) if !own::is_common(hidden.class) => deviations(&rig)?,
+            _ => commissioned(&mut rig)?,
+        };
+        let wanted = if hides_nothing(arm, index) {
+            vec![]
+        } else {
+            wanted
+        };
         let mut effects = Vec::new();
         for (hidden, d) in wanted {
-            let (sized, true_d) = scaled(&rig, &bare, hidden, d)?;
+            let (sized, true_d) = scaled(&rig, &bare, hidden, d, arm)?;
             effects.push((sized, true_d));
         }
         let unspoilt = rig.clone();
         for (hidden, _) in &effects {
             hidden.hide(&mut rig)?;
         }
-        let left_out = effects.first().filter(|_| arm == Arm::LeftOut);
+        let left_out = effects.first().filter(|_| arm.leaves_out());
         let truth = Truth {
             arm,
             index,
@@ -98,33 +116,59 @@ fn stream(arm: Arm, seed: u64, index: u64) -> Pcg64Mcg {
 fn wanted(random: &mut Pcg64Mcg, arm: Arm, index: u64) -> Vec<(Hidden, f64)> {
     let count = match arm {
         Arm::Null | Arm::HeavyNull => 0,
-        Arm::LeftOut | Arm::Confusable | Arm::TwoRounds | Arm::Alone => 1,
         Arm::Catalogue | Arm::Foreign => how_many(random),
+        _ => 1,
     };
     let mut effects = Vec::<(Hidden, f64)>::new();
     while effects.len() < count {
         let class = match arm {
             // Every class equally often.
-            Arm::LeftOut | Arm::Alone => Class::ALL[(index % Class::ALL.len() as u64) as usize],
+            Arm::LeftOut | Arm::Alone | Arm::Limit => in_turn(&Class::ALL, index),
+            Arm::Own | Arm::OwnLeftOut => in_turn(&Class::OWN, index),
             Arm::Confusable | Arm::TwoRounds => {
                 Class::CONFUSABLE[(index % Class::CONFUSABLE.len() as u64) as usize].0
             }
             _ => *Class::ALL.choose(random).unwrap_or(&Class::Backlash),
         };
         let mut hidden = draw(random, class, arm == Arm::Foreign);
-        if arm == Arm::Alone {
-            let round = (index / Class::ALL.len() as u64) as usize;
+        let classes = match arm {
+            Arm::Alone | Arm::Limit => Some(Class::ALL.len()),
+            Arm::Own => Some(Class::OWN.len()),
+            _ => None,
+        };
+        if let Some(classes) = classes {
+            let round = (index / classes as u64) as usize;
             hidden.axis = class.axes()[round % class.axes().len()];
         }
         let is_new =
             |(other, _): &(Hidden, f64)| other.class != hidden.class || other.axis != hidden.axis;
         if effects.iter().all(is_new) {
-            let range = if arm == Arm::Alone { LARGE_D } else { D };
-            let d = log_uniform(random, range);
+            let d = log_uniform(random, range_of(arm));
             effects.push((hidden, d));
         }
     }
     effects
+}
+
+fn in_turn(classes: &[Class], index: u64) -> Class {
+    classes[(index % classes.len() as u64) as usize]
+}
+
+const fn has_own_programmes(arm: Arm) -> bool {
+    matches!(arm, Arm::Own | Arm::OwnLeftOut)
+}
+
+/// One of four machines with a programme of its own.
+const fn hides_nothing(arm: Arm, index: u64) -> bool {
+    matches!(arm, Arm::Own) && (index / Class::OWN.len() as u64) % 4 == 3
+}
+
+const fn range_of(arm: Arm) -> [f64; 2] {
+    match arm {
+        Arm::Alone => LARGE_D,
+        Arm::Limit => SMALL_D,
+        _ => D,
+    }
 }
 
 fn how_many(random: &mut Pcg64Mcg) -> usize {
@@ -161,19 +205,30 @@ fn scaled(
     bare: &Deviations,
     hidden: Hidden,
     wanted: f64,
+    arm: Arm,
 ) -> Result<(Hidden, f64), TrialError> {
     let d_of = |hidden: &Hidden| -> Result<f64, TrialError> {
+        if hidden.class == Class::LatencyJitter {
+            return Ok(own::jitter_d(hidden.size));
+        }
         let mut with = rig.clone();
         hidden.hide(&mut with)?;
         Ok(deviations(&with)?.d_against(bare, &rig.scatter, rig.shaking_mm2()))
     };
-    let middle_d = d_of(&hidden)?;
     let ([low, high], _) = hidden.class.sizes();
-    let factor = wanted / middle_d.max(1e-6);
-    let size = (hidden.size.abs() * factor).max(low).min(high);
-    let sized = hidden.sized(size.copysign(hidden.size));
-    let d = d_of(&sized)?;
-    Ok((sized, d))
+    let low = if arm == Arm::Limit { 0.0 } else { low };
+    let mut found = (hidden, d_of(&hidden)?);
+    // D grows with the size, if not always in proportion to it.
+    for _ in 0..if has_own_programmes(arm) { 2 } else { 1 } {
+        let (sized, d) = found;
+        let size = (sized.size.abs() * wanted / d.max(1e-6)).max(low).min(high);
+        let sized = sized.sized(size.copysign(hidden.size));
+        found = (sized, d_of(&sized)?);
+        if (found.1 / wanted).ln().abs() < NEAR_D {
+            break;
+        }
+    }
+    Ok(found)
 }
 
 /// The same machine and programme with the touches at the end: when a touch comes depends on what is hidden, and would
@@ -244,6 +299,17 @@ mod tests {
             small > 2.0 && (large / small - 2.0).abs() < 0.1,
             "{small} {large}"
         );
+    }
+
+    #[test]
+    fn about_the_limit_sharp_effects_are_smaller_than_machines_have_them() {
+        let trial = Trial::draw(Arm::Limit, 3, 0).unwrap();
+        let [play] = &trial.truth.effects[..] else {
+            panic!("{:?}", trial.truth.effects);
+        };
+        assert_eq!(play.class, Class::Backlash);
+        let ([least, _], _) = Class::Backlash.sizes();
+        assert!(play.size < least && play.d < 20.0, "{play:?}");
     }
 
     #[test]

@@ -42,7 +42,10 @@ pub struct Which<'w> {
 impl Which<'_> {
     /// Whether what is left on held-out runs is compared with a machine that hides nothing.
     fn has_oracle(&self) -> bool {
-        matches!(self.arm, Arm::Catalogue | Arm::Foreign | Arm::Alone)
+        matches!(
+            self.arm,
+            Arm::Catalogue | Arm::Foreign | Arm::Alone | Arm::Own
+        )
     }
 
     /// Whether its interval of the gap closed is judged on later runs.

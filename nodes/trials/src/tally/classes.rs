@@ -49,7 +49,7 @@ pub fn of(arm: Arm, own: &[&Verdict]) -> Vec<ClassLine> {
         let others = alone.flat_map(|(v, _)| v.wrong().map(name).collect::<Vec<_>>());
         let shown: Vec<bool> = pairs().map(|(v, e)| v.shows(e)).collect();
         let surrogate = Proportion::of(shown.into_iter());
-        let limit = (arm != Arm::LeftOut).then(|| limit(own, Some(class)));
+        let limit = (!arm.leaves_out()).then(|| limit(own, Some(class)));
         ClassLine {
             class,
             named,
@@ -63,7 +63,7 @@ pub fn of(arm: Arm, own: &[&Verdict]) -> Vec<ClassLine> {
             taken_for: most_frequent(others),
         }
     };
-    let lines = Class::ALL.into_iter().map(line);
+    let lines = Class::every().map(line);
     lines
         .filter(|line| line.named.iter().any(|bin| bin.n > 0))
         .collect()

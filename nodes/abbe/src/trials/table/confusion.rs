@@ -94,7 +94,7 @@ fn columns(all: &[Pair]) -> Vec<&str> {
         let there = names.iter().copied().filter(|name| said.remove(name));
         there.collect()
     };
-    let mut columns = take(&Class::ALL.map(Class::id));
+    let mut columns = take(&Class::every().map(Class::id).collect::<Vec<_>>());
     let last = take(&[UNKNOWN, NOTHING]);
     columns.extend(said);
     columns.extend(last);
