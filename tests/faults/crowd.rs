@@ -1,6 +1,5 @@
 //! More participants on one computer than announce themselves to each other without multicast.
 
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 use abbe_msgs::topics;
@@ -101,8 +100,7 @@ fn beyond_twelve_participants_on_a_plain_loopback_the_start_says_why_they_do_not
 #[test]
 fn beyond_twelve_participants_meet_where_the_loopback_has_multicast() {
     namespace::alone("fourteen participants on lo with multicast", || {
-        let cure = ["link", "set", "lo", "multicast", "on"];
-        assert!(Command::new("ip").args(cure).status().unwrap().success());
+        namespace::multicast_on_loopback();
         let domain = domain(8);
         let mut crowd = Crowd::of(domain);
         for _ in 0..MEET {

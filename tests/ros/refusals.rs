@@ -170,7 +170,7 @@ fn numbers_out_of_range_on_the_command_line_are_usage_and_nothing_is_begun() {
         (
             &record[..],
             &["--max-file-s", "nan"][..],
-            "= NaN s: must be above 0",
+            "= NaN s: must lie between",
         ),
         (&record, &["--max-file-s", "-1"], "= -1 s: must be above 0"),
         (
@@ -182,6 +182,16 @@ fn numbers_out_of_range_on_the_command_line_are_usage_and_nothing_is_begun() {
             &record,
             &["--ring", "60", "--ring-bytes", "1"],
             "ring.limit_bytes = 1: must lie between 1024",
+        ),
+        (
+            &record,
+            &["--ring", "0.0005"],
+            "ring.window_s = 0.0005 s: must lie between 0.001 s and 604800 s",
+        ),
+        (
+            &["diagnose", "bag"],
+            &["--without", "backlesh"],
+            "the catalogue has no such effect, but",
         ),
         (&["trials"], &["--n", "0"], "0 is not in 1.."),
         (

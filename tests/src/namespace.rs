@@ -40,6 +40,14 @@ fn enter() -> Result<(), String> {
     run("ip", &["link", "set", "lo", "up"])
 }
 
+/// Lets `lo` carry multicast: without it only the first twelve participants of a computer find each other.
+///
+/// # Panics
+/// When that is not allowed.
+pub fn multicast_on_loopback() {
+    run("ip", &["link", "set", "lo", "multicast", "on"]).unwrap();
+}
+
 /// Mounts a file system of so many KiB in memory; it goes with the namespace.
 ///
 /// # Panics

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use gap_diagnosis::{Diagnosis, GapConfig, Rule, diagnose};
 use machine::MachineFile;
+use machine::effects::CATALOGUE;
 use sha2::{Digest, Sha256};
 
 use crate::report::{Report, gap};
@@ -39,7 +40,7 @@ pub struct Diagnose {
     #[arg(long)]
     write_machine: Option<PathBuf>,
     /// Id of an effect that is not considered; may be given several times.
-    #[arg(long, value_name = "EFFECT")]
+    #[arg(long, value_name = "EFFECT", value_parser = effect)]
     without: Vec<String>,
     /// Rule that is switched off, to see what it is worth: constancy, free_shapes, swap_search, held_out,
     /// recalibration; may be given several times.
@@ -120,6 +121,18 @@ impl Diagnose {
             ExitCode::from(DONE_WITH_LOSS)
         })
     }
+}
+
+/// The id of an effect of the catalogue.
+fn effect(text: &str) -> Result<String, String> {
+    if CATALOGUE.iter().any(|kind| kind.id == text) {
+        return Ok(text.to_owned());
+    }
+    let ids: Vec<&str> = CATALOGUE.iter().map(|kind| kind.id).collect();
+    Err(format!(
+        "the catalogue has no such effect, but {}",
+        ids.join(", ")
+    ))
 }
 
 fn listed(paths: &[PathBuf]) -> String {

@@ -135,7 +135,11 @@ impl RingConfig {
     /// # Errors
     /// A value out of its range, with the range.
     pub fn checked(&self) -> Result<(), RecorderError> {
-        check_period("ring.window_s", self.window_s, LONGEST_SPAN_S)?;
+        check_period(
+            "ring.window_s",
+            self.window_s,
+            [SHORTEST_RING_S, LONGEST_SPAN_S],
+        )?;
         check_size("ring.limit_bytes", self.limit_bytes, LARGEST_RING_BYTES)
     }
 
@@ -197,7 +201,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
     number(
         "ring.window_s",
         "s",
-        (1e-3, 604_800.0),
+        (SHORTEST_RING_S, LONGEST_SPAN_S),
         "Keep so much in memory, and write it when asked; without ring everything is written.",
     ),
     number(
@@ -223,13 +227,13 @@ pub const PARAMETERS: &[ParameterDoc] = &[
     number(
         "writing.flush_period_s",
         "s",
-        (1e-9, 3600.0),
+        (SHORTEST_PERIOD_S, LONGEST_PERIOD_S),
         "A chunk is written when its messages span this much log time, or when nothing came for so long.",
     ),
     number(
         "writing.metadata_period_s",
         "s",
-        (1e-9, 3600.0),
+        (SHORTEST_PERIOD_S, LONGEST_PERIOD_S),
         "metadata.yaml is refreshed when this much log time has passed.",
     ),
     number(
@@ -260,6 +264,10 @@ pub const PARAMETERS: &[ParameterDoc] = &[
 const SMALLEST_BYTES: u64 = 1024;
 /// Largest chunk: a reader holds a whole chunk in memory.
 const LARGEST_CHUNK_BYTES: u64 = 64 << 20;
+/// Shortest period, s: log times are whole nanoseconds.
+const SHORTEST_PERIOD_S: f64 = 1e-9;
+/// Shortest ring, s.
+const SHORTEST_RING_S: f64 = 1e-3;
 /// Longest period, s: an hour of loss is no longer a recording.
 const LONGEST_PERIOD_S: f64 = 3600.0;
 /// Longest file and ring, s: a week.
@@ -267,14 +275,19 @@ const LONGEST_SPAN_S: f64 = 604_800.0;
 /// Largest ring: 64 GiB.
 const LARGEST_RING_BYTES: u64 = 64 << 30;
 
-fn check_period(key: &'static str, value_s: f64, limit_s: f64) -> Result<(), RecorderError> {
-    if value_s > 0.0 && value_s <= limit_s {
+fn check_period(
+    key: &'static str,
+    value_s: f64,
+    [least_s, most_s]: [f64; 2],
+) -> Result<(), RecorderError> {
+    if (least_s..=most_s).contains(&value_s) {
         return Ok(());
     }
     Err(RecorderError::PeriodOutOfRange {
         key,
         value_s,
-        limit_s,
+        least_s,
+        most_s,
     })
 }
 
@@ -300,14 +313,12 @@ impl RecorderConfig {
     /// # Errors
     /// A value out of its range, with the range.
     pub fn checked(&self) -> Result<(), RecorderError> {
-        check_period("flush_period_s", self.flush_period_s, LONGEST_PERIOD_S)?;
-        check_period(
-            "metadata_period_s",
-            self.metadata_period_s,
-            LONGEST_PERIOD_S,
-        )?;
+        let period_s = [SHORTEST_PERIOD_S, LONGEST_PERIOD_S];
+        check_period("flush_period_s", self.flush_period_s, period_s)?;
+        check_period("metadata_period_s", self.metadata_period_s, period_s)?;
         if self.max_file_s.to_bits() != 0 {
-            check_period("max_file_s", self.max_file_s, LONGEST_SPAN_S)?;
+            let span_s = [SHORTEST_PERIOD_S, LONGEST_SPAN_S];
+            check_period("max_file_s", self.max_file_s, span_s)?;
         }
         check_size(
             "chunk_size_bytes",

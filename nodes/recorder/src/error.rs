@@ -134,14 +134,16 @@ pub enum RecorderError {
         time_nanos: i64,
     },
     /// A period that is not a time.
-    #[error("{key} = {value_s} s: must be above 0 and at most {limit_s} s")]
+    #[error("{key} = {value_s} s: must lie between {least_s} s and {most_s} s")]
     PeriodOutOfRange {
         /// The parameter.
         key: &'static str,
         /// Its value, s.
         value_s: f64,
-        /// Its limit, s.
-        limit_s: f64,
+        /// The least that it can be, s.
+        least_s: f64,
+        /// The most, s.
+        most_s: f64,
     },
     /// A size out of its range.
     #[error("{key} = {value_bytes}: must lie between {smallest_bytes} and {largest_bytes}")]

@@ -150,7 +150,7 @@ impl Ring {
     fn pass(&mut self, log_time_nanos: i64) -> i64 {
         let newest_nanos = self.newest_nanos.unwrap_or(log_time_nanos);
         let on_nanos = log_time_nanos.saturating_sub(newest_nanos);
-        if on_nanos >= 0 || on_nanos < -SET_BACK_NANOS {
+        if !(-SET_BACK_NANOS..0).contains(&on_nanos) {
             self.newest_nanos = Some(log_time_nanos);
         }
         self.passed_nanos = self.passed_nanos.saturating_add(on_nanos.max(0));
