@@ -172,11 +172,11 @@ fn numbers_out_of_range_on_the_command_line_are_usage_and_nothing_is_begun() {
             &["--max-file-s", "nan"][..],
             "= NaN s: must lie between",
         ),
-        (&record, &["--max-file-s", "-1"], "= -1 s: must be above 0"),
+        (&record, &["--max-file-s", "-1"], "= -1 s: must lie between"),
         (
             &record,
             &["--ring", "0"],
-            "ring.window_s = 0 s: must be above 0",
+            "ring.window_s = 0 s: must lie between",
         ),
         (
             &record,
