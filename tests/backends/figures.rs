@@ -17,8 +17,12 @@ pub struct Window {
 }
 
 impl Window {
-    fn holds(&self, at: Stamp<Host>) -> bool {
+    pub fn holds(&self, at: Stamp<Host>) -> bool {
         (self.from..self.until).contains(&at.nanos())
+    }
+
+    pub fn lasted_s(&self) -> f64 {
+        (Stamp::<Host>::from_nanos(self.until) - Stamp::from_nanos(self.from)).as_secs_f64()
     }
 }
 
@@ -71,6 +75,16 @@ struct Delays {
     most: f64,
 }
 
+/// What became of states that were said while a link was cut.
+#[derive(Clone, Copy, Debug)]
+pub struct After {
+    /// From the link's return to the first sample that is fresh; `None`: there was none.
+    pub recovery_s: Option<f64>,
+    /// Recorded afterwards, and missing.
+    pub kept: u64,
+    pub missed: u64,
+}
+
 #[derive(Debug)]
 pub struct Figures {
     free: Delays,
@@ -78,18 +92,14 @@ pub struct Figures {
     /// Samples and missing numbers while the links were free or lossy.
     sent: u64,
     lost: u64,
-    /// From the cut link's return to the first sample that is fresh; `None`: there was none.
-    recovery_s: Option<f64>,
-    /// Of what was said while the link was cut: recorded afterwards, and missing.
-    kept: u64,
-    missed: u64,
+    after: After,
     used: Use,
 }
 
 /// A sample younger than this is fresh, s.
 const FRESH_S: f64 = 0.1;
 
-struct State {
+pub struct State {
     came: Stamp<Host>,
     sent: Stamp<Host>,
     number: u32,
@@ -102,7 +112,7 @@ impl State {
 }
 
 /// Each state of the axes with its number, as it came.
-fn states(bag: &Path) -> Vec<State> {
+pub fn states(bag: &Path) -> Vec<State> {
     let numbers = bag::numbers(bag, topics::AXES_STATE.name);
     let messages = bag::messages(bag, &topics::AXES_STATE);
     let both = messages.into_iter().zip(numbers);
@@ -142,44 +152,53 @@ fn counted(states: &[State], window: Window) -> (u64, u64) {
     (there, u64::from(last - first) + 1 - there)
 }
 
+/// What became of states that were said in `cut`.
+pub fn after(states: &[State], cut: Window) -> After {
+    let back = Stamp::<Host>::from_nanos(cut.until);
+    let fresh = states
+        .iter()
+        .find(|state| state.came > back && state.sent > back && state.delay_s() < FRESH_S);
+    let said_from = |until| {
+        let late = Window {
+            from: cut.from,
+            until,
+        };
+        let came = states.iter().filter(|state| late.holds(state.sent)).count();
+        u64::try_from(came).unwrap()
+    };
+    let Some(fresh) = fresh else {
+        return After {
+            recovery_s: None,
+            kept: said_from(cut.until),
+            missed: 0,
+        };
+    };
+    // Every number from the last before the cut to the first fresh one was said at 1 kHz.
+    let before = states.iter().filter(|state| state.sent.nanos() < cut.from);
+    let last = before.map(|state| state.number).max().unwrap();
+    let kept = said_from(fresh.sent.nanos());
+    After {
+        recovery_s: Some((fresh.came - back).as_secs_f64()),
+        kept,
+        missed: u64::from(fresh.number - last - 1).saturating_sub(kept),
+    }
+}
+
 impl Figures {
-    pub fn of(bag: &Path, windows: [Window; 4], used: Use) -> Self {
-        let [free, lossy, cut, after] = windows;
+    pub fn of(bag: &Path, windows: [Window; 3], used: Use) -> Self {
+        let [free, lossy, cut] = windows;
         let states = states(bag);
         let calm = Window {
             from: free.from,
             until: lossy.until,
         };
         let (sent, lost) = counted(&states, calm);
-        let back = Stamp::<Host>::from_nanos(after.from);
-        let fresh = states
-            .iter()
-            .find(|state| state.came > back && state.sent > back && state.delay_s() < FRESH_S);
-        let in_cut = states.iter().filter(|state| cut.holds(state.sent)).count();
-        let (kept, missed) = match fresh {
-            // Every number from the last before the cut to the first fresh one was said at 1 kHz.
-            Some(fresh) => {
-                let before = states.iter().filter(|state| state.sent.nanos() < cut.from);
-                let last = before.map(|state| state.number).max().unwrap();
-                let between = u64::from(fresh.number - last - 1);
-                let late = Window {
-                    from: cut.from,
-                    until: fresh.sent.nanos(),
-                };
-                let came = states.iter().filter(|state| late.holds(state.sent)).count();
-                let came = u64::try_from(came).unwrap();
-                (came, between.saturating_sub(came))
-            }
-            None => (u64::try_from(in_cut).unwrap(), 0),
-        };
         Self {
             free: delays(&states, free),
             lossy: delays(&states, lossy),
             sent,
             lost,
-            recovery_s: fresh.map(|state| (state.came - back).as_secs_f64()),
-            kept,
-            missed,
+            after: after(&states, cut),
             used,
         }
     }
@@ -197,12 +216,15 @@ impl Figures {
             self.sent + self.lost,
             self.lost
         );
-        match self.recovery_s {
+        match self.after.recovery_s {
             Some(recovery_s) => eprintln!(
                 "  after the cut: fresh again after {recovery_s:.2} s; of what was said meanwhile {} came late, {} are missing",
-                self.kept, self.missed
+                self.after.kept, self.after.missed
             ),
-            None => eprintln!("  after the cut: not fresh again, {} came late", self.kept),
+            None => eprintln!(
+                "  after the cut: not fresh again, {} came late",
+                self.after.kept
+            ),
         }
         eprintln!(
             "  five processes: {:.0} MiB resident, {:.0} % of a core",
@@ -211,10 +233,13 @@ impl Figures {
         );
     }
 
-    /// Whether nothing was lost, and the cut was over in time.
+    /// Whether nothing was lost, then or while the link was cut for less than a deep topic keeps, and the cut was over in time.
     pub fn is_well(&self, recovery_s: f64) -> bool {
-        let is_whole = self.lost == 0 && self.sent > 5_000;
-        let is_back = self.recovery_s.is_some_and(|seen_s| seen_s < recovery_s);
+        let is_whole = self.lost + self.after.missed == 0 && self.sent > 5_000;
+        let is_back = self
+            .after
+            .recovery_s
+            .is_some_and(|seen_s| seen_s < recovery_s);
         if !is_whole || !is_back {
             eprintln!("NOT AS WANTED: nothing lost, fresh within {recovery_s} s: {self:?}");
         }

@@ -3,11 +3,11 @@
 use std::time::{Duration, Instant};
 
 use abbe_msgs::builtin_interfaces::msg::Time;
-use abbe_msgs::msg::{AxisDrift, AxisState, ThermalModel};
+use abbe_msgs::msg::AxisState;
 use abbe_msgs::topics;
-use abbe_tests::scenario::Scenario;
 
 use abbe_tests::cyclone::{Cyclone, end};
+use abbe_tests::drift::{self, COMPENSATED_M, FADED_M, FRESH_S};
 use abbe_tests::graph::{Graph, Voice, now, port};
 use abbe_tests::hosts::network::Network;
 use abbe_tests::hosts::switch::{Link, Way};
@@ -21,19 +21,8 @@ const WAY: Way = Way {
     loss: 0.0,
     reorder: 0.0,
 };
-/// Drift that the model of this test has everywhere, m.
-const DRIFT_M: f64 = 20e-6;
-/// What is left of it when it has faded, m: friction holds the motors so far from where they should be.
-const FADED_M: f64 = 1.5e-6;
-/// What counts as compensated again, m.
-const COMPENSATED_M: f64 = 19e-6;
-/// The controller follows and fades at 40 um/s: 0.5 s for all of it.
-const RATES: &str = "background_rate_hz: 1000.0\n    compensation_hold_s: 0.2\n    compensation_fade_um_s: 40.0\n    \
-                     compensation_rate_limit_um_s: 40.0";
 /// Fastest motion of an offset, and creep by friction, in 0.1 s, m.
 const FASTEST_M: f64 = 40e-6 * 0.1 + 1.5e-6;
-/// An offset is as old as the state that it answers; younger than this it is fresh, s.
-const FRESH_S: f64 = 0.05;
 /// Cyclone DDS says of itself that it is gone when it has not been heard for 10 s.
 const CYCLONE_CUT: Duration = Duration::from_secs(16);
 /// Cyclone DDS announces itself every 8 s, and so do we every 10 s.
@@ -54,30 +43,6 @@ fn added_m(state: &AxisState) -> f64 {
     state.motor[0] - state.commanded[0]
 }
 
-fn tell_drift(voice: &mut Voice) {
-    let mut model = ThermalModel {
-        n_blocks: 2,
-        lack_of_fit_p: 1.0,
-        sequence: 1,
-        ..ThermalModel::default()
-    };
-    let mut until = now();
-    until.sec += 1800;
-    (model.header.stamp, model.valid_from, model.valid_until) = (now(), now(), until);
-    model.axes = ["X", "Y", "Z"]
-        .map(|axis| AxisDrift {
-            axis: axis.to_owned(),
-            k0_m: DRIFT_M,
-            covariance: std::array::from_fn(|entry| if entry == 0 { 1e-14 } else { 0.0 }),
-            span_m: [-0.3, 0.3],
-            offset_identifiable: true,
-            slope_identifiable: true,
-            ..AxisDrift::default()
-        })
-        .into();
-    voice.say(0, &model);
-}
-
 /// A controller on one host and what compensates it on another, with a model that says the same everywhere.
 struct Cell<'n> {
     network: &'n Network,
@@ -92,14 +57,7 @@ impl<'n> Cell<'n> {
     /// Starts it, and waits for all of the compensation.
     fn start(network: &'n Network) -> Self {
         network.links(Link::even(WAY));
-        let scenario = Scenario::copy_of("short_cell");
-        scenario.replace("fake_cnc.yaml", "background_rate_hz: 10.0", RATES);
-        scenario.replace("axis_compensation.yaml", "enabled: false", "enabled: true");
-        for axis in ["X", "Y", "Z"] {
-            let limits = format!("{axis}: {{size_limit_um: 150.0, rate_limit_um_per_s: 20.0");
-            let faster = format!("{axis}: {{size_limit_um: 150.0, rate_limit_um_per_s: 60.0");
-            scenario.replace("axis_compensation.yaml", &limits, &faster);
-        }
+        let scenario = drift::scenario();
         let file = |node: &str| {
             let file = scenario.argument(&format!("{node}.yaml"));
             ["--params-file".to_owned(), file]
@@ -115,7 +73,7 @@ impl<'n> Cell<'n> {
         for (graph, node) in [(&controller, "fake_cnc"), (&models, "axis_compensation")] {
             graph.alive(node, began);
         }
-        tell_drift(&mut voice);
+        voice.say(0, &drift::model(&now()));
         compensated(&controller, began);
         Self {
             network,

@@ -1,6 +1,6 @@
 """PyPI eclipse-zenoh as the other side of a graph over Zenoh, and as its router.
 
-    zenoh_peer.py router ENDPOINT [ROUTER...]      until standard input ends
+    zenoh_peer.py router FILE ENDPOINT [ROUTER...] by a configuration, until standard input ends
     zenoh_peer.py meet ENDPOINT DOMAIN             meets a fake_cnc, says as JSON what it saw
 
 Keys, tokens and attachments are written here from the design of rmw_zenoh, type hashes are those of
@@ -25,23 +25,22 @@ SENDER = bytes(range(100, 116))
 CDR = bytes([0, 1, 0, 0])
 
 
-def config(mode: str, listen: list[str], connect: list[str]) -> zenoh.Config:
+def config(listen: list[str], connect: list[str]) -> zenoh.Config:
     made = zenoh.Config()
-    made.insert_json5("mode", json.dumps(mode))
+    made.insert_json5("mode", json.dumps("peer"))
     made.insert_json5("listen/endpoints", json.dumps(listen))
     made.insert_json5("connect/endpoints", json.dumps(connect))
     made.insert_json5("connect/exit_on_failure", "false")
-    retry = {"period_init_ms": 1000, "period_max_ms": 1000, "period_increase_factor": 1}
-    made.insert_json5("connect/retry", json.dumps(retry))
     made.insert_json5("scouting/multicast/enabled", "false")
-    made.insert_json5("transport/link/tx/lease", "5000")
-    made.insert_json5("transport/unicast/open_timeout", "2000")
     made.insert_json5("timestamping/enabled", "true")
     return made
 
 
-def route(endpoint: str, others: list[str]) -> None:
-    with zenoh.open(config("router", [endpoint], others)):
+def route(file: str, endpoint: str, others: list[str]) -> None:
+    made = zenoh.Config.from_file(file)
+    made.insert_json5("listen/endpoints", json.dumps([endpoint]))
+    made.insert_json5("connect/endpoints", json.dumps(others))
+    with zenoh.open(made):
         print("listening", flush=True)
         sys.stdin.read()
 
@@ -74,7 +73,7 @@ class Desk:
     """A session in a domain."""
 
     def __init__(self, endpoint: str, domain: int) -> None:
-        self.session = zenoh.open(config("peer", ["tcp/127.0.0.1:0"], [endpoint]))
+        self.session = zenoh.open(config(["tcp/127.0.0.1:0"], [endpoint]))
         self.domain = domain
         self.types = types()
 
@@ -202,8 +201,8 @@ def meet(endpoint: str, domain: int) -> None:
 
 if __name__ == "__main__":
     match sys.argv[1:]:
-        case ["router", endpoint, *others]:
-            route(endpoint, others)
+        case ["router", file, endpoint, *others]:
+            route(file, endpoint, others)
         case ["meet", endpoint, domain]:
             meet(endpoint, int(domain))
         case _:

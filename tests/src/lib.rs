@@ -9,6 +9,7 @@
 
 pub mod chromium;
 pub mod cyclone;
+pub mod drift;
 pub mod fast_dds;
 pub mod graph;
 pub mod hosts;

@@ -9,6 +9,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 
 use node_runtime::environment::{DiscoveryRange, Environment, Middleware};
 
+use crate::program::root;
 use crate::python::script;
 
 /// Where a domain's router listens on this computer; below the ports that are given out.
@@ -67,7 +68,16 @@ pub fn put_on_it(command: &mut Command, domain: u16) {
     }
 }
 
-/// A router of Zenoh's own: a Python process that ends with it.
+/// How a router is configured that we give to users.
+const ROUTER: &str = "launch_configs/three_hosts/zenoh_router.json5";
+
+/// What BACKENDS.md tells users to start one with: closing a dead link holds a thread of the two for 10 s.
+const RUNTIME: (&str, &str) = (
+    "ZENOH_RUNTIME",
+    "(rx: (worker_threads: 8), net: (worker_threads: 4))",
+);
+
+/// A router of Zenoh's own by [`ROUTER`]: a Python process that ends with it.
 pub struct Router {
     child: Child,
     _open: Option<ChildStdin>,
@@ -94,7 +104,10 @@ impl Router {
             None => plain,
         };
         let mut child = command
-            .args(["router", endpoint])
+            .env(RUNTIME.0, RUNTIME.1)
+            .arg("router")
+            .arg(root().join(ROUTER))
+            .arg(endpoint)
             .args(connect)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

@@ -1,9 +1,9 @@
 //! Readers and writers of serialised samples: encapsulation header and CDR, in and out.
 //!
 //! A reliable writer numbers its samples and keeps the last ones, as many as its topic is deep; a reliable
-//! reader asks for those that it missed, whether they were dropped on the way or said while a link was cut.
-//! A latched reader asks for them at its start. All this is Zenoh's "advanced" publisher and subscriber: other
-//! subscribers of the key see plain samples.
+//! reader asks for those that it missed, whether they were dropped on the way or said while a link was cut
+//! ([`Recovery`]). A latched reader asks for them at its start. Writers and latched readers are Zenoh's "advanced"
+//! publishers and subscribers: other subscribers of the key see plain samples.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -26,7 +26,9 @@ use zenoh_ext::{
 };
 
 use super::attachment::Attachment;
+use super::order;
 use super::query::{Answers, Asking};
+use super::recovery::Recovery;
 use super::token;
 use crate::clock;
 use crate::network::{Guid, PublishError, RequestIdentity, Sample, check_encapsulation};
@@ -35,7 +37,8 @@ use crate::node::Bytes;
 /// A reader holds at least so many samples.
 const READER_FLOOR: u32 = 64;
 
-/// How often a writer that has something new says up to which number, so that the last ones are missed too.
+/// How often a writer says up to which number it has spoken, so that the last ones are missed too. Zenoh's other
+/// way, to say it only after something new, waits for full links: a router whose one link was cut stood for 5 s.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
 /// A tap asks for its topics' history up to this depth.
@@ -67,19 +70,14 @@ impl Queue {
         self.arrived.notify_one();
     }
 
+    /// Lets the reader look whether something is to be asked for.
+    pub fn wake(&self) {
+        self.arrived.notify_one();
+    }
+
     fn pop(&self) -> Option<Result<Sample, String>> {
         let mut samples = self.samples.lock().unwrap_or_else(PoisonError::into_inner);
         samples.pop_front()
-    }
-
-    async fn next(&self) -> Result<Sample, String> {
-        loop {
-            let arrived = self.arrived.notified();
-            if let Some(sample) = self.pop() {
-                return sample;
-            }
-            arrived.await;
-        }
     }
 }
 
@@ -110,7 +108,8 @@ pub(super) enum Source {
     Plain {
         _subscriber: Subscriber<()>,
     },
-    Recovering {
+    Recovering(Recovery),
+    Latched {
         _subscriber: AdvancedSubscriber<()>,
     },
     Questions {
@@ -123,24 +122,42 @@ pub(super) enum Source {
 /// Reads one topic, or the requests or replies of one service.
 pub(crate) struct Reader {
     queue: Arc<Queue>,
-    _source: Source,
+    source: Source,
 }
 
 impl Reader {
     pub(super) fn new(queue: Arc<Queue>, source: Source) -> Self {
-        Self {
-            queue,
-            _source: source,
-        }
+        Self { queue, source }
     }
 
     pub async fn next(&self) -> Result<Sample, String> {
-        self.queue.next().await
+        loop {
+            let arrived = self.queue.arrived.notified();
+            let mut has_gap = false;
+            if let Source::Recovering(recovery) = &self.source {
+                recovery.look();
+                has_gap = recovery.has_gap();
+            }
+            if let Some(sample) = self.queue.pop() {
+                return sample;
+            }
+            if has_gap {
+                // Nobody may have an answer yet, and nothing more come by itself.
+                let _ = tokio::time::timeout(order::AGAIN, arrived).await;
+            } else {
+                arrived.await;
+            }
+        }
     }
 }
 
 pub(super) fn subscriber(session: &Session, key: String, qos: Qos) -> ::zenoh::Result<Reader> {
     let queue = Queue::new(qos.depth);
+    let is_latched = qos.durability == Durability::TransientLocal;
+    if qos.reliability == Reliability::Reliable && !is_latched {
+        let recovery = Recovery::start(session, key, qos.depth, &queue)?;
+        return Ok(Reader::new(queue, Source::Recovering(recovery)));
+    }
     let into = Arc::clone(&queue);
     let take = move |sample: sample::Sample| {
         if sample.kind() == SampleKind::Put {
@@ -149,21 +166,17 @@ pub(super) fn subscriber(session: &Session, key: String, qos: Qos) -> ::zenoh::R
         }
     };
     let plain = session.declare_subscriber(key).callback(take);
-    let is_latched = qos.durability == Durability::TransientLocal;
-    let source = if qos.reliability == Reliability::BestEffort && !is_latched {
+    let source = if is_latched {
+        let depth = usize::try_from(qos.depth.min(MOST_HISTORY)).unwrap_or(usize::MAX);
+        let history = HistoryConfig::default().detect_late_publishers();
+        let recovering = plain.recovery(RecoveryConfig::default().heartbeat());
+        Source::Latched {
+            _subscriber: recovering.history(history.max_samples(depth)).wait()?,
+        }
+    } else {
         Source::Plain {
             _subscriber: plain.wait()?,
         }
-    } else {
-        let recovering = plain.recovery(RecoveryConfig::default().heartbeat());
-        let _subscriber = if is_latched {
-            let depth = usize::try_from(qos.depth.min(MOST_HISTORY)).unwrap_or(usize::MAX);
-            let history = HistoryConfig::default().detect_late_publishers();
-            recovering.history(history.max_samples(depth)).wait()?
-        } else {
-            recovering.wait()?
-        };
-        Source::Recovering { _subscriber }
     };
     Ok(Reader::new(queue, source))
 }
@@ -210,7 +223,7 @@ pub(super) fn publisher(
     let way = if is_reliable || is_latched {
         let depth = usize::try_from(qos.depth.max(1)).unwrap_or(usize::MAX);
         let keeping = plain.cache(CacheConfig::default().max_samples(depth));
-        let numbering = MissDetectionConfig::default().sporadic_heartbeat(HEARTBEAT);
+        let numbering = MissDetectionConfig::default().heartbeat(HEARTBEAT);
         let numbered = keeping.sample_miss_detection(numbering);
         Way::Keeping(numbered.publisher_detection().wait()?)
     } else {

@@ -6,24 +6,24 @@ use anyhow::{Context as _, anyhow};
 use crate::environment::ZenohSettings;
 
 /// What differs from Zenoh's own defaults. A peer, known to this computer only; the router of this
-/// computer tells peers of each other and carries what goes to other hosts. After a link broke it is
-/// tried again every second.
+/// computer tells peers of each other and carries what goes to other hosts. Links that broke are given up and
+/// tried again as in `launch_configs/three_hosts/zenoh_router.json5`.
 const OWN: [(&str, &str); 10] = [
     ("mode", r#""peer""#),
     ("connect/endpoints", r#"["tcp/localhost:7447"]"#),
     ("connect/exit_on_failure", "false"),
     (
         "connect/retry",
-        "{period_init_ms: 1000, period_max_ms: 1000, period_increase_factor: 1}",
+        "{period_init_ms: 250, period_max_ms: 250, period_increase_factor: 1}",
     ),
     ("listen/endpoints", r#"["tcp/localhost:0"]"#),
     ("scouting/multicast/enabled", "false"),
     ("scouting/gossip/enabled", "true"),
     ("timestamping/enabled", "true"),
     // An attempt that a dead link swallows is given up, ms: TCP itself would ask more and more seldom.
-    ("transport/unicast/open_timeout", "2000"),
+    ("transport/unicast/open_timeout", "1000"),
     // A link that is silent for so long is given up, ms.
-    ("transport/link/tx/lease", "5000"),
+    ("transport/link/tx/lease", "4000"),
 ];
 
 fn set(config: &mut Config, key: &str, value: &str) -> anyhow::Result<()> {
