@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use abbe_msgs::msg::{AxisDrift, ThermalModel};
 use abbe_msgs::topics;
+use abbe_tests::drift;
 use abbe_tests::graph::{Graph, Voice, now, port};
 use abbe_tests::program::Process;
 use abbe_tests::scenario::Scenario;
@@ -33,8 +33,6 @@ const MORE: [(&str, &str); 3] = [
     ("host_clock", "host: models, reference: controller"),
 ];
 
-/// Drift that the model of these cells has everywhere, m.
-pub const DRIFT_M: f64 = 20e-6;
 /// Rate at which fake_cnc follows a compensation at most, here, m/s.
 pub const RATE_LIMIT_M_S: f64 = 25e-6;
 
@@ -73,37 +71,12 @@ fn scenario(works: bool) -> Scenario {
     scenario
 }
 
-/// A model whose drift is the same everywhere.
-fn drifted() -> ThermalModel {
-    let mut model = ThermalModel {
-        n_blocks: 2,
-        lack_of_fit_p: 1.0,
-        sequence: 1,
-        ..ThermalModel::default()
-    };
-    let mut until = now();
-    until.sec += 1800;
-    (model.header.stamp, model.valid_from, model.valid_until) = (now(), now(), until);
-    model.axes = ["X", "Y", "Z"]
-        .map(|axis| AxisDrift {
-            axis: axis.to_owned(),
-            k0_m: DRIFT_M,
-            covariance: std::array::from_fn(|entry| if entry == 0 { 1e-14 } else { 0.0 }),
-            span_m: [-0.3, 0.3],
-            offset_identifiable: true,
-            slope_identifiable: true,
-            ..AxisDrift::default()
-        })
-        .into();
-    model
-}
-
 impl Cell {
     /// Launches every process, and does not wait for any.
     pub fn launch_all(works: bool, domain: u16) -> Self {
         let graph = Graph::join(domain);
         let mut voice = graph.voice(&[port(&topics::THERMAL_MODEL)]);
-        voice.say(0, &drifted());
+        voice.say(0, &drift::model(&now()));
         let mut cell = Self {
             scenario: scenario(works),
             domain,
@@ -174,7 +147,7 @@ impl Cell {
     pub fn compensated(&self, since: Instant) {
         self.graph.next(&topics::COMPENSATION, since, |message| {
             let mut totals = message.total.iter();
-            totals.all(|total| (total - DRIFT_M).abs() < 0.2e-6)
+            totals.all(|total| (total - drift::DRIFT_M).abs() < 0.2e-6)
         });
     }
 

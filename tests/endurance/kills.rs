@@ -6,13 +6,14 @@ use std::time::{Duration, Instant};
 
 use abbe_msgs::msg::{AxisCompensation, AxisState, PlanStatus};
 use abbe_msgs::topics;
+use abbe_tests::drift::DRIFT_M;
 use abbe_tests::graph::Graph;
 use abbe_tests::namespace;
 use abbe_tests::program::domain;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use crate::cell::{Cell, DRIFT_M, NODES, RATE_LIMIT_M_S, RECORDER};
+use crate::cell::{Cell, NODES, RATE_LIMIT_M_S, RECORDER};
 use crate::recorded::{self, End};
 
 /// Nodes start, meet and work within this time, and are killed anywhere in it, s.

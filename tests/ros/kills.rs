@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use abbe_msgs::msg::{AxisDrift, AxisState, ThermalModel};
+use abbe_msgs::msg::AxisState;
 use abbe_msgs::topics;
+use abbe_tests::drift::{self, DRIFT_M};
 use abbe_tests::program::{Process, domain};
 use abbe_tests::scenario::Scenario;
 use metrology::sample::PlanState;
@@ -24,8 +25,6 @@ const NODES: [&str; 6] = [
     "sequencer",
 ];
 
-/// Drift that the model of this test has everywhere, m.
-const DRIFT_M: f64 = 20e-6;
 /// Rate at which fake_cnc follows a compensation at most, here, m/s.
 const RATE_LIMIT_M_S: f64 = 25e-6;
 /// Friction lets the motors creep behind by less than this, m.
@@ -123,27 +122,7 @@ fn quiet_cell() -> Scenario {
 }
 
 fn tell_drift(voice: &mut Voice) {
-    let mut model = ThermalModel {
-        n_blocks: 2,
-        lack_of_fit_p: 1.0,
-        sequence: 1,
-        ..ThermalModel::default()
-    };
-    let mut until = now();
-    until.sec += 1800;
-    (model.header.stamp, model.valid_from, model.valid_until) = (now(), now(), until);
-    model.axes = ["X", "Y", "Z"]
-        .map(|axis| AxisDrift {
-            axis: axis.to_owned(),
-            k0_m: DRIFT_M,
-            covariance: std::array::from_fn(|entry| if entry == 0 { 1e-14 } else { 0.0 }),
-            span_m: [-0.3, 0.3],
-            offset_identifiable: true,
-            slope_identifiable: true,
-            ..AxisDrift::default()
-        })
-        .into();
-    voice.say(0, &model);
+    voice.say(0, &drift::model(&now()));
 }
 
 fn recorder(domain: u16, bag: &Path) -> Process {

@@ -6,7 +6,7 @@ use abbe_msgs::msg::{AxisDrift, ThermalModel};
 use crate::scenario::Scenario;
 
 /// The drift, m.
-const DRIFT_M: f64 = 20e-6;
+pub const DRIFT_M: f64 = 20e-6;
 /// What is left of it when it has faded, m: friction holds the motors so far from where they should be.
 pub const FADED_M: f64 = 1.5e-6;
 /// What counts as compensated again, m.
