@@ -77,7 +77,7 @@ const RUNTIME: (&str, &str) = (
     "(rx: (worker_threads: 8), net: (worker_threads: 4))",
 );
 
-/// A router of Zenoh's own by [`ROUTER`]: a Python process that ends with it.
+/// A router of Zenoh's own by the configuration that is shipped: a Python process that ends with it.
 pub struct Router {
     child: Child,
     _open: Option<ChildStdin>,
