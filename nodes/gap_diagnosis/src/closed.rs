@@ -9,8 +9,15 @@
 //!
 //! with w and b what noise within and between runs adds (`gap`). The interval draws whole runs with replacement, the
 //! same before and after (`bootstrap`), and with them how well a few repeats know the floor: f = nu / chi2(nu), drawn for
-//! each channel and either part with its degrees of freedom nu. A gap after that is smaller than its floor counts as it
-//! is while the interval is made, or gaps that are closed whole would be closed without any doubt; told is at most one.
+//! each channel and either part with its degrees of freedom nu. What is told is at most one. Where less is left than the
+//! floor, the floor was taken with more caution than these runs need (`noise`): the interval is then made with
+//!
+//! ```text
+//!   floor2 c,   c = min(1, sum rms2_after / sum floor2)                   (3)
+//! ```
+//!
+//! so that what is left is the middle of the draws. With the floor as it is, every draw would be closed whole, and
+//! what is not known of the noise would be no doubt.
 //!
 //! The interval is absent where the gap before cannot be told from none, and where fewer than [`LEAST_RUNS`] runs were judged:
 //! what one or two runs have alike says nothing of others.
@@ -84,13 +91,15 @@ fn interval(runs: &[Sums], freedom: &[[f64; 2]], config: &GapConfig) -> Option<I
     if runs.len() < LEAST_RUNS {
         return None;
     }
-    let known = vec![[1.0; 2]; freedom.len()];
+    let told = share(runs.iter(), &vec![[1.0; 2]; freedom.len()])?;
+    let caution = caution(runs);
+    let known = vec![[caution; 2]; freedom.len()];
     let value = share(runs.iter(), &known)?;
     let mut random = Pcg64Mcg::seed_from_u64(config.seed ^ 0x7);
     let draw = |_| {
         let factors: Vec<[f64; 2]> = freedom
             .iter()
-            .map(|pair| pair.map(|nu| factor(nu, &mut random)))
+            .map(|pair| pair.map(|nu| caution * factor(nu, &mut random)))
             .collect();
         let drawn = (0..runs.len()).map(|_| &runs[random.random_range(0..runs.len())]);
         share(drawn, &factors)
@@ -107,10 +116,17 @@ fn interval(runs: &[Sums], freedom: &[[f64; 2]], config: &GapConfig) -> Option<I
         .collect();
     let [low, high] = bootstrap::bca(value, draws, &without_each);
     Some(Interval {
-        value: value.min(1.0),
-        low: low.min(value).min(1.0),
-        high: high.max(value).min(1.0),
+        value: told.min(1.0),
+        low: low.min(told).min(1.0),
+        high: high.max(told).min(1.0),
     })
+}
+
+/// (3).
+fn caution(runs: &[Sums]) -> f64 {
+    let sum = |of: &dyn Fn(&Sum) -> f64| runs.iter().flatten().map(of).sum::<f64>();
+    let floor = sum(&|sum| sum.floor[0] + sum.floor[1]);
+    (sum(&|sum| sum.after) / floor.max(f64::MIN_POSITIVE)).min(1.0)
 }
 
 /// What a variance that is known with some degrees of freedom may be, over what it was found to be.
@@ -152,6 +168,14 @@ mod tests {
         assert!((found.value - 1.0).abs() < 1e-12, "{found:?}");
         assert!(found.low < 0.97 && found.low > 0.8, "{found:?}");
         assert!((found.high - 1.0).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn eq3_where_less_is_left_than_a_cautious_floor_what_is_not_known_of_noise_stays_a_doubt() {
+        let runs = runs([0.35, 0.6, 0.4, 0.55, 0.45, 0.5]);
+        let found = interval(&runs, &[[200.0, 12.0]], &GapConfig::default()).unwrap();
+        assert!((found.value - 1.0).abs() < 1e-12, "{found:?}");
+        assert!(found.low < 0.99 && found.low > 0.85, "{found:?}");
     }
 
     #[test]
