@@ -187,12 +187,13 @@ fn noise_of(
 }
 
 impl<'a> Base<'a> {
-    fn bench(&self) -> Bench<'_> {
+    fn bench(&self, config: &GapConfig) -> Bench<'_> {
         Bench {
             machine: self.machine,
             session: self.session,
             twin: self.twin,
             noise: self.noise,
+            form: FormError::base(config),
         }
     }
 
@@ -221,7 +222,7 @@ impl<'a> Base<'a> {
             scattered.withdraw_but(None);
         }
         notes.extend(remarks(&stack, &split, &found));
-        let next = next::propose(&self.bench(), &found);
+        let next = next::propose(&self.bench(config), &found);
         notes.extend(next.notes);
         let all = self.stack(&split.all(), self.noise, &FormError::base(config));
         let shrunk = self.shrunk(&all, &split, &found, before.flagged(), config);

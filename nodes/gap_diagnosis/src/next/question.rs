@@ -1,0 +1,285 @@
+//! What a search left open: two explanations of one effect, and what would decide between them.
+
+use nalgebra::DMatrix;
+use statrs::distribution::ContinuousCDF;
+
+use super::distance::distance;
+use super::known::Known;
+use crate::cause::{Found, Member};
+use crate::confidence::ODDS;
+use crate::report::Status;
+use crate::selection::Set;
+use crate::signature::Library;
+use crate::veto::{LEAST_D as LEAST_NAMED_D, Veto};
+
+/// Squared distance that decides: three standard deviations.
+pub const DECISION: f64 = 9.0;
+/// Most questions that an experiment is sought for.
+const MOST_QUESTIONS: usize = 10;
+/// A rival within this of the best set still asks for an experiment where its member fails a check.
+const NEAR: f64 = 30.0;
+
+/// Two explanations of what was found.
+pub struct Question {
+    /// What is to be told apart, in words.
+    pub names: Vec<String>,
+    /// Ids of the effects in question.
+    pub ids: Vec<&'static str>,
+    /// One explanation, as forms of the library.
+    pub ours: Vec<usize>,
+    /// The other one.
+    pub theirs: Vec<usize>,
+    /// Whether one of the two is the best set.
+    pub is_of_the_best: bool,
+    /// The form whose size may be another in the experiment; then `theirs` is `ours`.
+    resized: Option<usize>,
+    /// Whether the other explanation is noise.
+    is_noise: bool,
+    /// The form of the effect where it is too small besides, and the set that it is sized in.
+    pub too_small: Option<(usize, Set)>,
+    /// D of the effect that is not named.
+    d: f64,
+}
+
+/// What an experiment would tell of a question.
+#[derive(Clone, Copy, Debug)]
+pub struct Answer {
+    /// Delta on the session alone, and with the experiment.
+    pub distances: [f64; 2],
+    /// What is added to D^2 of an effect that is too small besides.
+    lift: Option<f64>,
+}
+
+impl Answer {
+    /// What the experiment adds to Delta.
+    pub fn added(&self) -> f64 {
+        self.distances[1] - self.distances[0]
+    }
+}
+
+/// Everything that the search left open.
+pub fn questions(found: &Found) -> Vec<Question> {
+    let mut all = Vec::<Question>::new();
+    for member in found
+        .members
+        .iter()
+        .filter(|member| member.status != Status::Named)
+    {
+        if member.vetoes == [Veto::NearNoise] {
+            all.push(resized(found, member));
+            continue;
+        }
+        let is_open = |behind: f64| {
+            member.status == Status::Set && behind <= 2.0 * ODDS.ln() || behind < NEAR
+        };
+        let near = member.rivals.iter().filter(|(_, behind)| is_open(*behind));
+        let sets: Vec<&Set> = std::iter::once(&found.set)
+            .chain(near.map(|(set, _)| set))
+            .collect();
+        if sets.len() < 2 {
+            all.push(resized(found, member));
+        }
+        for (k, ours) in sets.iter().enumerate() {
+            for theirs in &sets[k + 1..] {
+                let Some(question) = between(found, member, ours, theirs) else {
+                    continue;
+                };
+                if all.len() < MOST_QUESTIONS
+                    && all.iter().all(|other| other.names != question.names)
+                {
+                    all.push(question);
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Two sets of which neither holds the other.
+fn between(found: &Found, member: &Member, ours: &Set, theirs: &Set) -> Option<Question> {
+    let signatures = &found.signatures;
+    let instance = |form: &usize| signatures.forms[*form].instance;
+    let only = |one: &Set, other: &Set| -> Vec<usize> {
+        let missing = |form: &usize| other.iter().all(|o| instance(o) != instance(form));
+        one.iter()
+            .copied()
+            .filter(missing)
+            .map(|form| instance(&form))
+            .collect()
+    };
+    let sides = [only(ours, theirs), only(theirs, ours)];
+    if sides.iter().any(Vec::is_empty) {
+        return None;
+    }
+    let name = |side: &Vec<usize>| {
+        let names: Vec<String> = side
+            .iter()
+            .map(|k| signatures.instances[*k].name())
+            .collect();
+        names.join(" with ")
+    };
+    Some(Question {
+        names: sides.iter().map(name).collect(),
+        ids: sides
+            .iter()
+            .flatten()
+            .map(|k| signatures.instances[*k].kind.id)
+            .collect(),
+        ours: ours.clone(),
+        theirs: theirs.clone(),
+        is_of_the_best: *ours == found.set,
+        resized: None,
+        is_noise: false,
+        too_small: too_small(found, member),
+        d: member.estimate.d,
+    })
+}
+
+/// A member that fails a check without a rival.
+fn resized(found: &Found, member: &Member) -> Question {
+    let instance = found.instance(member);
+    let is_noise = member.vetoes == [Veto::NearNoise];
+    let other = if is_noise {
+        "noise"
+    } else {
+        "what only looks like it here"
+    };
+    Question {
+        names: vec![instance.name(), other.to_owned()],
+        ids: vec![instance.kind.id],
+        ours: found.set.clone(),
+        theirs: found.set.clone(),
+        is_of_the_best: true,
+        resized: Some(member.form),
+        is_noise,
+        too_small: too_small(found, member).filter(|_| !is_noise),
+        d: member.estimate.d,
+    }
+}
+
+/// The form of a member near noise, and the set that it is sized in.
+fn too_small(found: &Found, member: &Member) -> Option<(usize, Set)> {
+    let is_near = member.vetoes.contains(&Veto::NearNoise);
+    is_near.then(|| (member.form, found.set.clone()))
+}
+impl Question {
+    /// w of `next`, (2).
+    pub fn weight(&self) -> f64 {
+        (self.d / LEAST_NAMED_D).min(1.0)
+    }
+
+    /// What an experiment has to add for a decision.
+    fn needed(&self) -> f64 {
+        if self.is_noise {
+            self.needed_lift()
+        } else {
+            DECISION
+        }
+    }
+
+    /// What has to be added to D^2 of an effect that is too small.
+    fn needed_lift(&self) -> f64 {
+        // A form of many columns is held to more than D_0.
+        ((LEAST_NAMED_D + DECISION.sqrt()).powi(2) - self.d.powi(2)).max(DECISION)
+    }
+
+    /// Whether the experiment decides.
+    pub fn is_decided(&self, answer: &Answer) -> bool {
+        let is_raised = |lift: f64| lift >= self.needed_lift();
+        answer.added() >= self.needed() && answer.lift.is_none_or(is_raised)
+    }
+
+    /// The chance of a decision with what an experiment adds.
+    pub fn chance(&self, answer: &Answer) -> f64 {
+        let normal = statrs::distribution::Normal::standard();
+        let is_named = |lift: f64| normal.cdf((self.d.powi(2) + lift).sqrt() - LEAST_NAMED_D);
+        if self.is_noise {
+            return is_named(answer.added());
+        }
+        let between = 2.0 * normal.cdf(0.5 * answer.added().max(0.0).sqrt()) - 1.0;
+        between * answer.lift.map_or(1.0, is_named)
+    }
+
+    /// Of an experiment, by what it adds to the information.
+    pub fn answer(&self, signatures: &Library, known: &Known, added: &DMatrix<f64>) -> Answer {
+        let raised = |(form, set): &(usize, Set)| known.of_one(signatures, set, *form, added, 0.0);
+        Answer {
+            distances: self.distances(signatures, known, added),
+            lift: self.too_small.as_ref().map(raised),
+        }
+    }
+
+    /// Delta on the session alone, and with an experiment.
+    fn distances(&self, signatures: &Library, known: &Known, added: &DMatrix<f64>) -> [f64; 2] {
+        if let Some(form) = self.resized {
+            let doubt = if self.is_noise { 0.0 } else { 1.0 };
+            let alone = known.of_one(signatures, &self.ours, form, added, doubt);
+            return [0.0, alone];
+        }
+        let ours = known.explanation(signatures, &self.ours);
+        let theirs = known.explanation(signatures, &self.theirs);
+        let both = |information: &DMatrix<f64>| {
+            let there = distance(information, &ours, &theirs.columns);
+            there.min(distance(information, &theirs, &ours.columns))
+        };
+        [both(&known.gram), both(&(&known.gram + added))]
+    }
+}
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn question(d: f64, is_noise: bool) -> Question {
+        Question {
+            names: vec![],
+            ids: vec![],
+            ours: vec![],
+            theirs: vec![],
+            is_of_the_best: true,
+            resized: None,
+            is_noise,
+            too_small: None,
+            d,
+        }
+    }
+
+    fn answer(added: f64, lift: Option<f64>) -> Answer {
+        Answer {
+            distances: [0.0, added],
+            lift,
+        }
+    }
+
+    #[test]
+    fn what_is_too_small_wants_a_d_that_is_surely_named_and_a_rival_three_standard_deviations() {
+        let small = question(6.1, true);
+        let after = (6.1_f64.powi(2) + small.needed()).sqrt();
+        assert!((after - (LEAST_NAMED_D + 3.0)).abs() < 1e-12, "{after}");
+        // A run that adds what decides between rivals leaves it at an even chance.
+        let even = LEAST_NAMED_D.powi(2) - 6.1_f64.powi(2);
+        let chance = small.chance(&answer(even, None));
+        assert!((chance - 0.5).abs() < 1e-9 && even < DECISION);
+        assert!(question(9.6, true).needed() >= DECISION);
+        let rivals = question(40.0, false);
+        assert!((rivals.needed() - DECISION).abs() < 1e-12);
+        let chance = rivals.chance(&answer(DECISION, None));
+        assert!((chance - 0.8664).abs() < 1e-4);
+    }
+
+    #[test]
+    fn what_has_rivals_and_is_too_small_wants_a_run_that_does_both() {
+        let small = question(5.8, false);
+        let enough = small.needed_lift();
+        assert!(!small.is_decided(&answer(400.0, Some(0.0))));
+        assert!(!small.is_decided(&answer(0.0, Some(enough))));
+        assert!(small.is_decided(&answer(DECISION, Some(enough))));
+        let both = small.chance(&answer(400.0, Some(enough)));
+        assert!(both > 0.99 && small.chance(&answer(400.0, Some(0.0))) < 0.25);
+    }
+
+    #[test]
+    fn what_hardly_matters_weighs_by_its_d() {
+        assert!((question(1.3, false).weight() - 0.2).abs() < 1e-12);
+        assert!((question(84.0, false).weight() - 1.0).abs() < 1e-12);
+    }
+}
