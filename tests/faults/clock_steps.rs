@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use abbe_msgs::msg::{AxisCompensation, AxisState, BlockMeasurement, PlanStatus};
 use abbe_msgs::topics;
+use abbe_tests::computer_clock::Faketime;
 use abbe_tests::graph::{Graph, Voice, port};
 use abbe_tests::namespace;
 use abbe_tests::program::domain;
@@ -12,7 +13,7 @@ use abbe_tests::program::domain;
 use crate::bag_of_steps;
 use crate::offsets::steps;
 use crate::said::model;
-use crate::stepped_cell::{Cell, library, seconds};
+use crate::stepped_cell::{Cell, seconds};
 
 /// Drift of every axis, m.
 const DRIFT_M: f64 = 20e-6;
@@ -135,11 +136,11 @@ fn plan_goes_on(graph: &Graph, began: Instant) {
 #[test]
 fn a_cell_whose_clock_is_set_forward_and_back_keeps_its_offsets_and_says_so() {
     let test = "a cell whose computer's clock is set";
-    let Some(library) = library(test) else {
+    let Some(faketime) = Faketime::found(test) else {
         return;
     };
     namespace::alone(test, || {
-        let mut cell = Cell::new(&library, domain(9));
+        let mut cell = Cell::new(&faketime, domain(9));
         let mut voice = cell.graph.voice(&[port(&topics::BLOCKS_MEASUREMENT)]);
         let began = Instant::now();
         let nodes = [
@@ -234,11 +235,11 @@ const HOLD: &str = "hold_s: 4.0";
 #[test]
 fn under_a_clock_that_is_set_back_before_its_model_the_offset_fades_and_comes_back_with_the_next() {
     let test = "a cell whose model lies in the future";
-    let Some(library) = library(test) else {
+    let Some(faketime) = Faketime::found(test) else {
         return;
     };
     namespace::alone(test, || {
-        let mut cell = Cell::new(&library, domain(10));
+        let mut cell = Cell::new(&faketime, domain(10));
         cell.scenario
             .replace("axis_compensation.yaml", "hold_s: 60.0", HOLD);
         // A control that leaves out what its host's clock leaves out.

@@ -1,17 +1,13 @@
 //! A cell of separate processes whose computer's clock the test sets.
-//!
-//! Debian's `libfaketime` stands between each process and its realtime clock, and adds what a file says that all of
-//! them read at every look at the clock: they see a step at once, as processes of one computer do. Their monotonic
-//! clocks go on, and so do both clocks of the test.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 use abbe_msgs::builtin_interfaces::msg::Time;
 use abbe_msgs::diagnostic_msgs::msg::DiagnosticStatus;
 use abbe_msgs::topics;
+use abbe_tests::computer_clock::{Faketime, SetClock};
 use abbe_tests::graph::{Graph, now};
 use abbe_tests::namespace;
 use abbe_tests::program::{Process, command};
@@ -29,61 +25,10 @@ const LOOK_S: f64 = 5.0;
 /// How old what a node says of the time may be when it is heard, s.
 const DELAY_S: f64 = 5.0;
 
-/// The library that puts another clock under a process.
-///
-/// Where there is none the test's name and the reason are printed, and `None` tells the test to end; with `CI=true`
-/// that is a failure.
-pub fn library(test: &str) -> Option<PathBuf> {
-    let folders = std::fs::read_dir("/usr/lib").unwrap();
-    let mut paths = folders.map(|entry| entry.unwrap().path().join("faketime/libfaketimeMT.so.1"));
-    let found = paths.find(|path| path.is_file());
-    if found.is_none() {
-        let reason = "libfaketime is not installed (tests/run installs it)";
-        assert!(std::env::var("CI").as_deref() != Ok("true"), "{reason}");
-        eprintln!("NOT TESTED: {test}: {reason}");
-    }
-    found
-}
-
-/// The clock of a computer that the test sets.
-struct ComputerClock {
-    library: PathBuf,
-    file: PathBuf,
-    ahead_s: i64,
-}
-
-impl ComputerClock {
-    fn new(library: &Path, file: PathBuf) -> Self {
-        let mut clock = Self {
-            library: library.to_owned(),
-            file,
-            ahead_s: 0,
-        };
-        clock.set(0);
-        clock
-    }
-
-    /// Sets it this far ahead of the test's.
-    fn set(&mut self, ahead_s: i64) {
-        let next = self.file.with_extension("next");
-        std::fs::write(&next, format!("{ahead_s:+}\n")).unwrap();
-        std::fs::rename(&next, &self.file).unwrap();
-        self.ahead_s = ahead_s;
-    }
-
-    fn put_under(&self, command: &mut Command) {
-        command
-            .env("LD_PRELOAD", &self.library)
-            .env("FAKETIME_TIMESTAMP_FILE", &self.file)
-            .env("FAKETIME_NO_CACHE", "1")
-            .env("FAKETIME_DONT_FAKE_MONOTONIC", "1");
-    }
-}
-
 pub struct Cell {
     /// They end before their clock does.
     nodes: BTreeMap<&'static str, Process>,
-    clock: ComputerClock,
+    clock: SetClock,
     pub scenario: Scenario,
     pub graph: Graph,
     domain: u16,
@@ -105,11 +50,11 @@ fn scenario() -> Scenario {
 
 impl Cell {
     /// A cell that is not launched yet, in a network and with mounts of its own.
-    pub fn new(library: &Path, domain: u16) -> Self {
+    pub fn new(faketime: &Faketime, domain: u16) -> Self {
         // What the library shares between a process and its children stays with this cell.
         namespace::small_disk(Path::new("/dev/shm"), 1024);
         let scenario = scenario();
-        let clock = ComputerClock::new(library, scenario.path("clock"));
+        let clock = SetClock::new(faketime, scenario.path("clock"));
         Self {
             nodes: BTreeMap::new(),
             clock,
@@ -146,13 +91,13 @@ impl Cell {
     /// Sets the computer's clock by so much, s; when that was.
     pub fn step_clock(&mut self, by_s: i64) -> Instant {
         let at = Instant::now();
-        self.clock.set(self.clock.ahead_s + by_s);
+        self.clock.set(self.clock.ahead_s() + by_s);
         at
     }
 
     /// What the computer's clock shows.
     pub fn now(&self) -> Time {
-        later(&now(), self.clock.ahead_s * 1_000_000_000)
+        later(&now(), self.clock.ahead_s() * 1_000_000_000)
     }
 
     /// What it showed at an instant after which it was not set, s.

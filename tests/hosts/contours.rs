@@ -4,16 +4,16 @@ use std::path::Path;
 use std::time::Duration;
 
 use abbe_msgs::topics;
+use abbe_tests::computer_clock::ClockError;
 use abbe_tests::hosts::bag;
 use abbe_tests::hosts::network::Network;
+use abbe_tests::hosts::site::{Site, file_of, parameter};
 use abbe_tests::hosts::switch::{Link, Way};
 use abbe_tests::scenario::Scenario;
 use metrology::Axis;
 use metrology::sample::{AxisState, GridSample};
 use metrology::stamp::{Host, Stamp};
 use nalgebra::{DMatrix, DVector};
-
-use crate::site::{ClockError, Site, file_of, parameter};
 
 /// Jitter of a whole way between two hosts, from nothing to this, s.
 const JITTER_S: f64 = 1e-3;

@@ -11,5 +11,4 @@
 
 mod contours;
 mod cuts;
-mod site;
 mod three_hosts;

@@ -1,18 +1,17 @@
-//! The suite on three hosts whose clocks differ, over links with 5 ms, jitter, loss and reordering.
+//! The suite on three hosts whose computers' clocks differ, over links with 5 ms, jitter, loss and reordering.
 
 use std::path::Path;
 use std::time::Duration;
 
 use abbe_msgs::topics;
 use abbe_tests::scenario::Scenario;
-use metrology::sample::HostClock;
 use metrology::stamp::{Host, Span, Stamp};
 
-use abbe_tests::hosts::bag;
+use abbe_tests::computer_clock::{ClockError, Faketime};
 use abbe_tests::hosts::network::Network;
+use abbe_tests::hosts::site::{Site, file_of, parameter};
 use abbe_tests::hosts::switch::{Link, Way};
-
-use crate::site::{ClockError, Site, file_of, parameter};
+use abbe_tests::hosts::{bag, clocks};
 
 const HOSTS: [&str; 3] = ["controller", "models", "archive"];
 /// Jitter of a whole way between two hosts, from nothing to this, s.
@@ -35,9 +34,15 @@ const JUDGED: Span = Span::from_nanos(4_000_000_000);
 
 #[test]
 fn three_hosts_lose_nothing_at_1_khz_and_their_clocks_are_taken_out() {
-    let Some(network) = Network::of(&HOSTS, 61, 20_261_121) else {
+    let Some(faketime) = Faketime::found("three hosts whose computers' clocks differ") else {
         return;
     };
+    let Some(mut network) = Network::of(&HOSTS, 61, 20_261_121) else {
+        return;
+    };
+    let errors = [ClockError::of(0.35, 40e-6), ClockError::of(-1.2, -25e-6)];
+    network.computer_clock("models", errors[0], &faketime);
+    network.computer_clock("archive", errors[1], &faketime);
     network.links(Link::even(HALF_WAY));
     let mut slower = Link::even(HALF_WAY);
     slower.up.delay_s += UNEQUAL_S;
@@ -45,11 +50,10 @@ fn three_hosts_lose_nothing_at_1_khz_and_their_clocks_are_taken_out() {
     let scenario = Scenario::copy_of("short_cell");
     let often = "background_rate_hz: 1000.0";
     scenario.replace("fake_cnc.yaml", "background_rate_hz: 10.0", often);
-    let clocks = [ClockError::of(0.35, 40e-6), ClockError::of(-1.2, -25e-6)];
     let into = scenario.path("bag");
 
-    let mut archive = Site::new(&network, "archive", Some(clocks[1]));
-    let mut models = Site::new(&network, "models", Some(clocks[0]));
+    let mut archive = Site::new(&network, "archive", None);
+    let mut models = Site::new(&network, "models", None);
     let mut controller = Site::new(&network, "controller", None);
     archive.start(
         "recorder",
@@ -66,8 +70,9 @@ fn three_hosts_lose_nothing_at_1_khz_and_their_clocks_are_taken_out() {
 
     eprintln!("switch: {:?}", network.counts());
     nothing_is_lost(&into);
-    clock_is_found(&into, "models", clocks[0], 0.0);
-    clock_is_found(&into, "archive", clocks[1], UNEQUAL_S / 2.0);
+    let within = (LIMIT_S, JUDGED);
+    clocks::is_found(&into, "models", errors[0], 0.0, within);
+    clocks::is_found(&into, "archive", errors[1], UNEQUAL_S / 2.0, within);
     let states = bag::messages(&into, &topics::AXES_STATE);
     let stamped = states.iter().map(|(at, state)| (*at, state.received_at));
     delays_are_those_of_the_links("axes/state, controller to archive", stamped.collect());
@@ -98,43 +103,6 @@ fn nothing_is_lost(bag: &Path) {
         }
     }
     assert!(reliable >= 6, "{reliable} counters of reliable topics");
-}
-
-fn clock_is_found(bag: &Path, host: &str, truth: ClockError, unequal_s: f64) {
-    let maps: Vec<HostClock> = bag::messages(bag, &topics::HOST_CLOCK)
-        .into_iter()
-        .map(|(_, clock)| clock)
-        .filter(|clock| clock.host == host)
-        .collect();
-    let last = maps.last().unwrap_or_else(|| panic!("no map of {host}"));
-    let from = last.map.at() - JUDGED;
-    let (mut worst_s, mut worst_drift) = (0.0_f64, 0.0_f64);
-    for clock in maps.iter().filter(|clock| clock.map.at() >= from) {
-        let at = clock.map.at();
-        let off_s = clock.map.offset(at).as_secs_f64() - truth.true_offset_s(at) - unequal_s;
-        worst_s = worst_s.max(off_s.abs());
-        let true_drift = -truth.drift / (1.0 + truth.drift);
-        worst_drift = worst_drift.max((clock.map.drift() - true_drift).abs());
-        assert!(
-            (off_s + unequal_s).abs() <= clock.bound_s,
-            "{host}: beyond its bound"
-        );
-    }
-    eprintln!(
-        "{host}: {} maps, the last of {} exchanges over {:.1} s: offset off by {:.1} us at most beside {:.0} us of unequal ways, \
-         drift by {:.2} us/s; u {:.1} us, bound {:.0} us, least round trip {:.2} ms",
-        maps.len(),
-        last.n,
-        last.span_s,
-        worst_s * 1e6,
-        unequal_s * 1e6,
-        worst_drift * 1e6,
-        last.standard_uncertainty_s * 1e6,
-        last.bound_s * 1e6,
-        last.least_round_trip_s * 1e3
-    );
-    assert!(worst_s <= LIMIT_S, "{host}: {worst_s} s");
-    assert!(worst_drift <= 15e-6, "{host}: {worst_drift}");
 }
 
 /// A message's stamp is by the clock of its node's host, its arrival by the archive's, which is 1.2 s behind.

@@ -37,6 +37,8 @@ def config(listen: list[str], connect: list[str]) -> zenoh.Config:
 
 
 def route(file: str, endpoint: str, others: list[str]) -> None:
+    # As rmw_zenohd does.
+    zenoh.init_log_from_env_or("error")
     made = zenoh.Config.from_file(file)
     made.insert_json5("listen/endpoints", json.dumps([endpoint]))
     made.insert_json5("connect/endpoints", json.dumps(others))

@@ -5,5 +5,7 @@
 //! `CI=true`.
 
 pub mod bag;
+pub mod clocks;
 pub mod network;
+pub mod site;
 pub mod switch;

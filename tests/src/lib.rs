@@ -8,6 +8,7 @@
 #![expect(clippy::print_stderr, reason = "what is not tested is said")]
 
 pub mod chromium;
+pub mod computer_clock;
 pub mod cyclone;
 pub mod drift;
 pub mod fast_dds;

@@ -6,6 +6,7 @@
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};
+use std::thread::JoinHandle;
 
 use node_runtime::environment::{DiscoveryRange, Environment, Middleware};
 
@@ -80,7 +81,9 @@ const RUNTIME: (&str, &str) = (
 /// A router of Zenoh's own by the configuration that is shipped: a Python process that ends with it.
 pub struct Router {
     child: Child,
-    _open: Option<ChildStdin>,
+    open: Option<ChildStdin>,
+    /// What it complained of, once it has ended.
+    said: Option<JoinHandle<Vec<String>>>,
 }
 
 impl Router {
@@ -113,12 +116,31 @@ impl Router {
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
-        let mut said = String::new();
+        let open = child.stdin.take();
+        let mut first = String::new();
         let mut output = BufReader::new(child.stdout.take().unwrap());
-        output.read_line(&mut said).unwrap();
-        assert_eq!(said.trim(), "listening", "router at {endpoint}");
-        let _open = child.stdin.take();
-        Self { child, _open }
+        output.read_line(&mut first).unwrap();
+        assert_eq!(first.trim(), "listening", "router at {endpoint}");
+        // A router whose complaints nobody reads stands still once the pipe is full.
+        let said = std::thread::spawn(|| output.lines().map_while(Result::ok).collect());
+        Self {
+            child,
+            open,
+            said: Some(said),
+        }
+    }
+
+    /// Ends it; each line of what it complained of.
+    ///
+    /// # Panics
+    /// When it cannot be waited for.
+    #[must_use]
+    pub fn stop(mut self) -> Vec<String> {
+        drop(self.open.take());
+        self.child.wait().unwrap();
+        let said = self.said.take();
+        said.map(|thread| thread.join().unwrap())
+            .unwrap_or_default()
     }
 }
 
@@ -126,6 +148,10 @@ impl Drop for Router {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+        let said = self.said.take().and_then(|thread| thread.join().ok());
+        if std::thread::panicking() {
+            eprintln!("{}", said.unwrap_or_default().join("\n"));
+        }
     }
 }
 

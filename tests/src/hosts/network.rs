@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::computer_clock::{ClockError, Faketime};
 use crate::program::{Process, abbe, root};
 use crate::zenoh::Router;
 use nix::sched::{CloneFlags, setns};
@@ -20,6 +21,10 @@ static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 /// A host's interface to the switch.
 const INTERFACE: &str = "link0";
+
+/// Lets what libfaketime shares between a process and its children, by the process' number, stay with the process: the
+/// variables come before the program.
+const UNDER_CLOCK: &str = r#"mount -t tmpfs -o size=64m tmpfs /dev/shm && exec env "$@""#;
 
 /// A network namespace that is removed with it.
 struct Namespace(String);
@@ -79,6 +84,8 @@ pub struct Network {
     /// Before the namespaces, so that its taps are closed first.
     switch: Switch,
     hosts: Vec<(String, Namespace)>,
+    /// Computer clocks that are wrong, each with its host's place.
+    clocks: Vec<(usize, ClockError, Faketime)>,
     domain: u16,
     /// A router on each host, where nodes speak Zenoh.
     routers: Vec<Router>,
@@ -115,6 +122,7 @@ impl Network {
         Ok(Self {
             switch: Switch::start(taps, seed),
             hosts,
+            clocks: Vec::new(),
             domain,
             routers: Vec::new(),
             _turn: turn,
@@ -125,12 +133,47 @@ impl Network {
     /// host alone, and the routers with each other.
     pub fn over_zenoh(&mut self, python: &PathBuf) {
         let port = |place: usize| format!("tcp/10.77.0.{}:7447", place + 1);
-        for (place, (_, namespace)) in self.hosts.iter().enumerate() {
-            let inside = ["ip", "netns", "exec", &namespace.0];
+        for place in 0..self.hosts.len() {
+            let inside = self.inside(place);
+            let inside: Vec<&str> = inside.iter().map(String::as_str).collect();
             let earlier: Vec<String> = (0..place).map(port).collect();
             let router = Router::start(python, &inside, "tcp/[::]:7447", &earlier);
             self.routers.push(router);
         }
+    }
+
+    /// Ends the routers, when the nodes have ended; each host with the lines that its router complained in.
+    pub fn end_routers(&mut self) -> Vec<(String, Vec<String>)> {
+        let hosts = self.hosts.iter().map(|(name, _)| name.clone());
+        let said = self.routers.drain(..).map(Router::stop);
+        hosts.zip(said).collect()
+    }
+
+    /// Makes the clock of a host's computer wrong, for its router and programs that are started from now on.
+    pub fn computer_clock(&mut self, host: &str, error: ClockError, faketime: &Faketime) {
+        let place = self.place(host);
+        self.clocks.push((place, error, faketime.clone()));
+    }
+
+    /// Whether a host's computer clock is wrong.
+    #[must_use]
+    pub fn has_wrong_clock(&self, host: &str) -> bool {
+        let place = self.place(host);
+        self.clocks.iter().any(|(of, ..)| *of == place)
+    }
+
+    /// What stands before a program that is started now on a host.
+    fn inside(&self, place: usize) -> Vec<String> {
+        let namespace = &self.hosts[place].1.0;
+        let mut words = ["ip", "netns", "exec", namespace]
+            .map(str::to_owned)
+            .to_vec();
+        if let Some((_, error, faketime)) = self.clocks.iter().find(|(of, ..)| *of == place) {
+            words.extend(["sh", "-c", UNDER_CLOCK, "sh"].map(str::to_owned));
+            let variables = error.variables(faketime).into_iter();
+            words.extend(variables.map(|(name, value)| format!("{name}={value}")));
+        }
+        words
     }
 
     fn place(&self, host: &str) -> usize {
@@ -181,10 +224,11 @@ impl Network {
 
     /// Starts a program that is on the graph on a host.
     pub fn program(&self, host: &str, program: &str, arguments: &[String]) -> Process {
-        let namespace = &self.hosts[self.place(host)].1.0;
-        let mut command = Command::new("ip");
+        let inside = self.inside(self.place(host));
+        let mut command = Command::new(&inside[0]);
         command
-            .args(["netns", "exec", namespace, program])
+            .args(&inside[1..])
+            .arg(program)
             .args(arguments)
             .current_dir(root())
             .env("ROS_DOMAIN_ID", self.domain.to_string())
