@@ -47,7 +47,7 @@ const BEFORE_NANOS: i64 = 500_000_000;
 
 /// What a cut was like, s after the links' return.
 #[derive(Clone, Copy, Debug)]
-struct Cut {
+pub struct Cut {
     lasted_s: f64,
     /// Least that the controller added before the links were back, m.
     left_m: f64,
@@ -98,7 +98,7 @@ pub fn are_over_within(recovery_s: f64, python: &PathBuf) -> Option<bool> {
     for node in nodes.into_iter().rev() {
         node.stop();
     }
-    let seen = cuts(&bags[0].1, &bags[1].1, &windows);
+    let seen = seen(&bags[0].1, &bags[1].1, &windows);
     Some(judge(&seen, recovery_s))
 }
 
@@ -107,7 +107,8 @@ fn added_m(state: &AxisState) -> f64 {
     (state.motor[Axis::X] - state.commanded[Axis::X]) * 1e-3
 }
 
-fn cuts(controller: &Path, archive: &Path, windows: &[(Window, Window)]) -> Vec<Cut> {
+/// What cuts were like, by the bags of both hosts; each cut with the time after it.
+pub fn seen(controller: &Path, archive: &Path, windows: &[(Window, Window)]) -> Vec<Cut> {
     let of_machine = bag::messages(controller, &topics::AXES_STATE);
     let offsets = bag::messages(controller, &topics::COMPENSATION);
     let archived = states(archive);
@@ -146,7 +147,7 @@ fn cuts(controller: &Path, archive: &Path, windows: &[(Window, Window)]) -> Vec<
 }
 
 /// Tells what each cut was like, and whether it was as wanted.
-fn judge(cuts: &[Cut], recovery_s: f64) -> bool {
+pub fn judge(cuts: &[Cut], recovery_s: f64) -> bool {
     let words = |value: Option<f64>| value.map_or("never".to_owned(), |s| format!("{s:.2} s"));
     let mut is_well = true;
     for seen in cuts {
