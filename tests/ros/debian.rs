@@ -47,13 +47,13 @@ fn the_units_start_with_a_program_and_folders_that_are_there() {
         return;
     }
     let home = tempfile::tempdir().unwrap();
-    for unit in ["abbe@.service", "abbe-node@.service"] {
+    for unit in ["abbe@.service", "abbe-node@.service", "abbe-router.service"] {
         let text = fs::read_to_string(folder().join(unit)).unwrap();
-        let start = folder().join("start-node");
+        let scripts = folder().display().to_string();
         let here = text
             .replace("/usr/bin/abbe", &abbe().display().to_string())
-            .replace("/usr/lib/abbe/start-node", &start.display().to_string());
-        assert_ne!(here, text, "{unit} starts neither of the two");
+            .replace("/usr/lib/abbe", &scripts);
+        assert_ne!(here, text, "{unit} starts neither of them");
         let instance = unit.replace("@.", "@short_cell.");
         let path = home.path().join(&instance);
         fs::write(home.path().join(unit), &here).unwrap();
@@ -88,6 +88,38 @@ fn a_node_is_started_with_its_scenarios_parameters_and_nothing_else() {
     ] {
         let refused = start_node(&scenarios, &echo, wrong);
         assert_eq!(refused.status.code(), Some(code), "{wrong}");
+        assert!(said(&refused).contains(word), "{}", said(&refused));
+    }
+}
+
+fn start_router(configuration: &Path, program: &Path) -> Output {
+    Command::new(folder().join("start-router"))
+        .env("ABBE_ROUTER_CONFIGURATION", configuration)
+        .env("ABBE_ROUTER", program)
+        .env_remove("ZENOH_RUNTIME")
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn a_router_is_started_by_its_configuration_or_what_lacks_is_said() {
+    let home = tempfile::tempdir().unwrap();
+    let echo = home.path().join("zenohd");
+    fs::write(&echo, "#!/bin/sh\necho \"$ZENOH_RUNTIME $@\"\n").unwrap();
+    fs::set_permissions(&echo, fs::Permissions::from_mode(0o755)).unwrap();
+    let shipped = root().join("launch_configs/three_hosts/zenoh_router.json5");
+    let started = start_router(&shipped, &echo);
+    let threads = "(rx: (worker_threads: 8), net: (worker_threads: 4))";
+    let expected = format!("{threads} --config {}\n", shipped.display());
+    assert_eq!(said(&started), expected);
+    let nowhere = home.path().join("nowhere");
+    // Exit codes by which systemd knows that it need not try again.
+    for (configuration, program, code, word) in [
+        (&nowhere, &echo, 6, "nowhere cannot be read"),
+        (&shipped, &nowhere, 5, "cargo install zenohd"),
+    ] {
+        let refused = start_router(configuration, program);
+        assert_eq!(refused.status.code(), Some(code), "{}", said(&refused));
         assert!(said(&refused).contains(word), "{}", said(&refused));
     }
 }
@@ -167,9 +199,12 @@ fn the_package_holds_program_units_and_scenarios() {
     };
     holds("-rwxr-xr-x", "./usr/bin/abbe");
     holds("-rwxr-xr-x", "./usr/lib/abbe/start-node");
+    holds("-rwxr-xr-x", "./usr/lib/abbe/start-router");
     holds("-rw-r--r--", "./usr/lib/systemd/system/abbe@.service");
     holds("-rw-r--r--", "./usr/lib/systemd/system/abbe-node@.service");
+    holds("-rw-r--r--", "./usr/lib/systemd/system/abbe-router.service");
     holds("-rw-r--r--", "./etc/default/abbe");
+    holds("-rw-r--r--", "./etc/abbe/zenoh_router.json5");
     let scenarios = "./usr/share/abbe/launch_configs";
     holds(
         "-rw-r--r--",
