@@ -26,8 +26,9 @@ const WAY: Way = Way {
     loss: 0.0,
     reorder: 0.0,
 };
-/// What a host's clock may be off by: 50 us, and a tenth of the jitter.
-const LIMIT_S: f64 = 50e-6 + 0.1e-3;
+/// What a host's clock may be off by, s: a tenth of the way. Routers hold questions up as they do samples, unlike each way on a
+/// busy computer; how well clocks can be found is judged over DDS (tests/hosts).
+const LIMIT_S: f64 = 0.5e-3;
 /// The clocks are judged by their maps of the end.
 const JUDGED: Span = Span::from_nanos(4_000_000_000);
 /// Until everybody has met and the controller has all of the compensation.
