@@ -4,16 +4,14 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::{Arc, Mutex};
 
-use abbe_msgs::lifecycle_msgs::msg::{Transition, TransitionEvent};
-use abbe_msgs::lifecycle_msgs::srv::{ChangeState, ChangeStateRequest, ChangeStateResponse};
-use abbe_msgs::{SERVICE_EVENT_SUFFIX, Service as _, Wire, from_cdr, msg, to_cdr, topics};
+use abbe_msgs::lifecycle_msgs::msg::TransitionEvent;
+use abbe_msgs::{SERVICE_EVENT_SUFFIX, Wire, from_cdr, msg, to_cdr, topics};
+use abbe_tests::operator::Operator;
 use abbe_tests::scenario::Scenario;
 use metrology::sample::{AxisDrift, ThermalModel};
 use metrology::stamp::{Host, Span, Stamp};
 use metrology::{Axis, PerAxis};
-use node_runtime::node::{Ports, ServiceEvents, ServicePort};
-use node_runtime::parameter::Parameter;
-use node_runtime::{Emission, Event, Harness, Node, NodeFault};
+use node_runtime::{Harness, Node};
 
 use crate::cell;
 
@@ -28,93 +26,6 @@ const CONTROL_STEP_MM: f64 = 0.1 * 1e-3 + 1e-12;
 
 fn after(seconds: f64) -> Stamp<Host> {
     Stamp::from_nanos(START_S * 1_000_000_000) + Span::from_secs_f64(seconds)
-}
-
-/// Somebody who asks for steps at their times, and writes down the answers.
-struct Operator {
-    ports: Ports,
-    plan: Vec<(f64, &'static str)>,
-    asked: usize,
-    answers: Answers,
-}
-
-/// When an answer came, to what, and what it says.
-type Answers = Arc<Mutex<Vec<(f64, &'static str, bool)>>>;
-
-impl Operator {
-    fn of(node: &str, plan: &[(f64, &'static str)]) -> (Box<dyn Node>, Answers) {
-        let answers = Answers::default();
-        let client = ServicePort {
-            service: format!("{node}/change_state"),
-            type_name: ChangeState::TYPE_NAME,
-            events: ServiceEvents::of::<ChangeState>(),
-        };
-        let operator = Self {
-            ports: Ports {
-                clients: vec![client],
-                timers: vec![Span::from_nanos(7_700_000)],
-                ..Ports::default()
-            },
-            plan: plan.to_vec(),
-            asked: 0,
-            answers: Arc::clone(&answers),
-        };
-        (Box::new(operator), answers)
-    }
-}
-
-impl Node for Operator {
-    fn name(&self) -> &str {
-        "operator"
-    }
-
-    fn ports(&self) -> &Ports {
-        &self.ports
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &[]
-    }
-
-    fn handle(
-        &mut self,
-        at: Stamp<Host>,
-        event: Event<'_>,
-        out: &mut Vec<Emission>,
-    ) -> Result<(), NodeFault> {
-        match event {
-            Event::Timer { .. } => {
-                let due = self.plan.get(self.asked);
-                if let Some((_, label)) = due.filter(|(when_s, _)| at >= after(*when_s)) {
-                    let transition = Transition {
-                        label: (*label).to_owned(),
-                        ..Transition::default()
-                    };
-                    let bytes = to_cdr(&ChangeStateRequest { transition }).into();
-                    let id = self.asked as u64;
-                    out.push(Emission::Call {
-                        client: 0,
-                        id,
-                        bytes,
-                    });
-                    self.asked += 1;
-                }
-            }
-            Event::Response {
-                id,
-                bytes: Some(bytes),
-                ..
-            } => {
-                let answer: ChangeStateResponse = from_cdr(bytes).unwrap();
-                let at_s = (at - after(0.0)).as_secs_f64();
-                let (_, label) = self.plan[usize::try_from(id).unwrap()];
-                let mut answers = self.answers.lock().unwrap();
-                answers.push((at_s, label, answer.success));
-            }
-            _ => {}
-        }
-        Ok(())
-    }
 }
 
 fn model() -> Vec<u8> {
@@ -222,7 +133,7 @@ struct Steered {
 impl Steered {
     fn run(scenario: &Scenario, node: &str, plan: &[(f64, &'static str)], until_s: f64) -> Self {
         let (cnc, in_effect) = machine(scenario);
-        let (operator, answers) = Operator::of(node, plan);
+        let (operator, answers) = Operator::of(after(0.0), node, plan);
         let compensation = cell::build(scenario, NODE).unwrap();
         let nodes = vec![cnc, operator, compensation];
         let mut harness = Harness::compose(nodes, after(0.0)).unwrap();

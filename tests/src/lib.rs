@@ -15,6 +15,7 @@ pub mod fast_dds;
 pub mod graph;
 pub mod hosts;
 pub mod namespace;
+pub mod operator;
 pub mod program;
 pub mod python;
 pub mod said;
