@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use abbe_msgs::msg::ProbeTrigger;
-use abbe_msgs::{from_cdr, to_cdr};
+use abbe_msgs::{Message, from_cdr, to_cdr};
 use abbe_tests::program::{Process, command};
 use abbe_tests::scenario::{SHORT_PLAN, Scenario, mcap_file};
 use serde_json::Value;
@@ -38,23 +38,75 @@ pub fn said(bag: &Path) -> String {
     ended.said
 }
 
-/// A short run of `first_run`, recorded once for all tests.
-pub fn short_run() -> &'static Path {
-    static RUN: OnceLock<(Scenario, PathBuf)> = OnceLock::new();
-    let (_, bag) = RUN.get_or_init(|| {
-        let scenario = Scenario::copy_of("first_run");
-        scenario.write("plan.yaml", SHORT_PLAN);
+/// A scenario and the bag of its run.
+pub type Run = (Scenario, PathBuf);
+
+/// The bag of a scenario that is run once for all tests.
+pub fn recorded(run: &'static OnceLock<Run>, scenario: fn() -> Scenario) -> &'static Path {
+    let (_, bag) = run.get_or_init(|| {
+        let scenario = scenario();
         let bag = scenario.run().join("bag");
         (scenario, bag)
     });
     bag
 }
 
+/// A short run of `first_run`.
+pub fn short_run() -> &'static Path {
+    static RUN: OnceLock<Run> = OnceLock::new();
+    recorded(&RUN, || {
+        let scenario = Scenario::copy_of("first_run");
+        scenario.write("plan.yaml", SHORT_PLAN);
+        scenario
+    })
+}
+
 /// A changed copy of the short run.
 pub fn changed(change: &Change<'_>) -> TempDir {
+    changed_of(short_run(), change)
+}
+
+/// A changed copy of a bag of one file.
+pub fn changed_of(bag: &Path, change: &Change<'_>) -> TempDir {
     let home = tempfile::tempdir().unwrap();
-    rewrite(&mcap_file(short_run()), home.path(), change);
+    rewrite(&mcap_file(bag), home.path(), change);
     home
+}
+
+/// A copy of a bag in which message `nth` of `topic`, counted from 0, is changed.
+pub fn with_another(bag: &Path, (topic, nth): (&str, usize), change: fn(&mut Vec<u8>)) -> TempDir {
+    let change = |messages: &mut Vec<Copied>| {
+        let mut of_topic = messages.iter_mut().filter(|m| m.topic == topic);
+        change(&mut of_topic.nth(nth).unwrap().data);
+    };
+    changed_of(
+        bag,
+        &Change {
+            messages: Some(&change),
+            ..Change::default()
+        },
+    )
+}
+
+/// Decodes a message, changes it and encodes it again.
+pub fn edited<M: Message>(data: &mut Vec<u8>, edit: impl FnOnce(&mut M)) {
+    let mut message: M = from_cdr(data).unwrap();
+    edit(&mut message);
+    *data = to_cdr(&message);
+}
+
+/// Latched positions of a touch, changed by one unit in the last place.
+pub fn touch_by_one_ulp(data: &mut Vec<u8>) {
+    edited(data, |touch: &mut ProbeTrigger| {
+        for latched in &mut touch.latched {
+            *latched = latched.next_up();
+        }
+    });
+}
+
+/// Messages of a topic that were compared, or that differ, in what [`check`] says.
+pub fn count(outcome: &Value, topic: &str, key: &str) -> u64 {
+    outcome["compared"][topic][key].as_u64().unwrap_or(0)
 }
 
 #[test]
@@ -103,23 +155,9 @@ fn replay_of_a_bag_in_several_files_and_without_what_was_left_out_is_equal() {
     assert!(!topics.contains(&"/joint_states"), "{topics:?}");
 }
 
-/// Changes the latched position of one touch by one unit in the last place.
-fn one_ulp(messages: &mut [Copied]) {
-    let touch = messages.iter_mut().find(|m| m.topic == "/probe/trigger");
-    let touch = touch.unwrap();
-    let mut trigger: ProbeTrigger = from_cdr(&touch.data).unwrap();
-    for latched in &mut trigger.latched {
-        *latched = latched.next_up();
-    }
-    touch.data = to_cdr(&trigger);
-}
-
 #[test]
 fn replay_notices_one_ulp_of_an_input() {
-    let bag = changed(&Change {
-        messages: Some(&|messages| one_ulp(messages)),
-        ..Change::default()
-    });
+    let bag = with_another(short_run(), ("/probe/trigger", 0), touch_by_one_ulp);
     let (code, outcome) = check(bag.path());
     assert_eq!(code, 1, "{outcome:#}");
     let first = &outcome["first_difference"];

@@ -1,11 +1,14 @@
 //! What a host's clock is, is computed from the recorded answers.
 
+use std::path::Path;
+use std::sync::OnceLock;
+
 use abbe_msgs::msg::ClockAnswer;
 use abbe_msgs::{from_cdr, to_cdr};
-use abbe_tests::scenario::{Scenario, mcap_file};
+use abbe_tests::scenario::Scenario;
 
-use crate::contract::check;
-use crate::rewrite::{Change, Copied, rewrite};
+use crate::contract::{Run, changed_of, check, count, recorded};
+use crate::rewrite::{Change, Copied};
 use crate::snapshot::resumes_halfway;
 
 /// A cell in simulated time whose hosts ask each other for the time.
@@ -23,6 +26,12 @@ fn cell() -> Scenario {
     let launch = "cold_reference.launch.xml";
     scenario.replace(launch, "</launch>", &format!("{nodes}</launch>"));
     scenario
+}
+
+/// The bag of its run.
+pub fn run() -> &'static Path {
+    static RUN: OnceLock<Run> = OnceLock::new();
+    recorded(&RUN, cell)
 }
 
 /// The answers of a time pass for later by a microsecond.
@@ -43,20 +52,17 @@ fn later(messages: &mut [Copied]) {
 
 #[test]
 fn replay_computes_the_maps_of_host_clocks_and_notices_answers_that_are_a_microsecond_later() {
-    let scenario = cell();
-    let bag = scenario.run().join("bag");
-    let (code, outcome) = check(&bag);
+    let (code, outcome) = check(run());
     assert_eq!(code, 0, "{outcome:#}");
-    let maps = outcome["compared"]["/host_clock/map"]["messages"].as_u64();
-    eprintln!("/host_clock/map: {maps:?} messages");
-    assert!(maps.unwrap() > 10);
-    resumes_halfway(&bag);
-    let home = tempfile::tempdir().unwrap();
+    let maps = count(&outcome, "/host_clock/map", "messages");
+    eprintln!("/host_clock/map: {maps} messages");
+    assert!(maps > 10);
+    resumes_halfway(run());
     let change = Change {
         messages: Some(&|messages| later(messages)),
         ..Change::default()
     };
-    rewrite(&mcap_file(&bag), home.path(), &change);
+    let home = changed_of(run(), &change);
     let (code, outcome) = check(home.path());
     assert_eq!(code, 1, "{outcome:#}");
     assert_eq!(outcome["first_difference"]["topic"], "/host_clock/map");

@@ -4,12 +4,18 @@
 #![expect(clippy::disallowed_methods, reason = "tests read files")]
 #![expect(clippy::print_stderr, reason = "figures that were seen are said")]
 
+mod computed;
 mod contract;
 mod equal_bytes;
 mod frames;
 mod host_clocks;
+mod kept;
+mod lifecycle;
 mod old_bags;
+mod positioning;
 mod recorded_output;
 mod rewrite;
+mod rotary;
 mod snapshot;
+mod update_requests;
 mod wall_clock;

@@ -14,8 +14,24 @@ const FORMAT_V1: &[(&str, &str)] = &[
         "fe8e36ae63b4a8605567f05b7c55cdcf80b633ee7cc8d1cc0319d239e7fe19a7",
     ),
     (
+        "dual_loop",
+        "d4b812ea6cd7dcac3836d55b13cea92df456691c39dc4d05de30e91d9119d7ae",
+    ),
+    (
         "grid_circles",
         "bac9d621c16b859ef2e7bf4d0bedacb207a791a27159a4cf19c16579f3198dfe",
+    ),
+    (
+        "host_clocks",
+        "1d0410e62c31ff9dcb5fab91dd19d56d37e74021f6d34fdc6bfb212be41aa259",
+    ),
+    (
+        "lifecycle",
+        "d3098feb781d474ae3e18a49f1c92e605d0a37a04c80faa72c6ecfa1f0f4d51b",
+    ),
+    (
+        "rotary_sphere",
+        "2b5c6a716b7af07ae482bb655fb5a96eedca9990277c5d4213857af336d08ac0",
     ),
 ];
 

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
-use crate::contract::{changed, check, said, short_run};
+use crate::contract::{changed, changed_of, check, said, short_run};
 use crate::rewrite::{Change, Copied};
 
 fn is_computed(topic: &str) -> bool {
@@ -20,14 +20,22 @@ fn is_computed(topic: &str) -> bool {
 
 /// The short run without any result.
 pub fn stripped() -> TempDir {
-    changed(&Change {
-        without: Some(&is_computed),
-        ..Change::default()
-    })
+    stripped_of(short_run(), &is_computed)
+}
+
+/// A bag without the topics that are results.
+pub fn stripped_of(bag: &Path, is_result: &dyn Fn(&str) -> bool) -> TempDir {
+    changed_of(
+        bag,
+        &Change {
+            without: Some(is_result),
+            ..Change::default()
+        },
+    )
 }
 
 /// Number and SHA-256 of the recorded results, by topic, as `abbe check` sums up what a bag does not have.
-fn sums(bag: &Path) -> Value {
+pub fn sums(bag: &Path, is_result: &dyn Fn(&str) -> bool) -> Value {
     let bag = Bag::open(bag).unwrap();
     let mut sums = BTreeMap::<String, (u64, Sha256)>::new();
     let mut messages = bag.messages(Order::File);
@@ -36,7 +44,7 @@ fn sums(bag: &Path) -> Value {
             panic!("{event:?}")
         };
         let topic = &bag.topic(message.topic).topic;
-        if is_computed(topic) {
+        if is_result(topic) {
             let (count, sum) = sums.entry(topic.clone()).or_default();
             *count += 1;
             sum.update(message.log_time_nanos.to_le_bytes());
@@ -58,7 +66,7 @@ fn replay_recorded_output_is_not_read() {
     let kept = Bag::open(bag.path()).unwrap();
     assert!(!kept.topics().iter().any(|info| is_computed(&info.topic)));
     let (code, outcome) = check(bag.path());
-    let expected = sums(short_run());
+    let expected = sums(short_run(), &is_computed);
     assert!(expected.as_object().unwrap().len() >= 5, "{expected:#}");
     assert_eq!(outcome["not_in_bag"], expected, "{outcome:#}");
     // Nothing was held against anything, so nothing is said to be equal.

@@ -32,6 +32,8 @@ pub struct Change<'c> {
     pub attachment: Option<(&'c str, &'c str, &'c str)>,
     /// Topics that are left out, their channels too.
     pub without: Option<&'c dyn Fn(&str) -> bool>,
+    /// Place of a service call that is left out, among all.
+    pub without_call: Option<usize>,
     /// Whether the hash beside a changed attachment stays the old one.
     pub keeps_hash: bool,
 }
@@ -63,6 +65,9 @@ pub fn rewrite(from: &Path, to: &Path, change: &Change<'_>) {
     }
     if let Some((name, old, new)) = change.attachment {
         contents.replace(name, (old, new), change.keeps_hash);
+    }
+    if let Some(nth) = change.without_call {
+        contents.remove_call(nth);
     }
     contents.write(writer);
 }
@@ -119,6 +124,13 @@ impl Contents {
             let hashes = records.find(|record| record.name == "abbe.attachments");
             hashes.unwrap().metadata.insert(name.to_owned(), hash);
         }
+    }
+
+    fn remove_call(&mut self, nth: usize) {
+        let records = self.metadata.iter().enumerate();
+        let mut calls = records.filter(|(_, record)| record.name == "abbe.call");
+        let (place, _) = calls.nth(nth).unwrap();
+        self.metadata.remove(place);
     }
 
     fn write(self, mut writer: Writer) {

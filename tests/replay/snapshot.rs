@@ -31,6 +31,13 @@ pub fn resumes(bag: &Path, after: &[u64]) {
     assert!(resumed == straight, "{}: {:#}", bag.display(), resumed.1);
 }
 
+/// At so many places that share no period with the machine's messages: also amid the messages of one instant.
+pub fn resumes_at(bag: &Path, places: u64) {
+    let all = messages(bag);
+    let after: Vec<u64> = (0..places).map(|place| place * all / places).collect();
+    resumes(bag, &after);
+}
+
 /// Halfway.
 pub fn resumes_halfway(bag: &Path) {
     resumes(bag, &[messages(bag) / 2]);
@@ -46,10 +53,7 @@ fn replay_snapshot_resumes() {
 
 #[test]
 fn replay_snapshot_resumes_wherever_it_is_taken() {
-    // Places that share no period with the machine's messages: also amid the messages of one instant.
-    let all = messages(short_run());
-    let after: Vec<u64> = (0..97).map(|place| place * all / 97).collect();
-    resumes(short_run(), &after);
+    resumes_at(short_run(), 97);
 }
 
 #[test]

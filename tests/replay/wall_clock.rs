@@ -31,7 +31,7 @@ fn replay_ignores_wall_clock() {
 
 /// What `abbe check --json` of a bag without results says, which has the SHA-256 of all that was computed; it stands for
 /// `stands` and runs for `runs` in turn, at most `times`. Also says how often it stood.
-fn replayed(bag: &Path, (stands, runs): (Duration, Duration), times: u32) -> (String, u32) {
+pub fn replayed(bag: &Path, (stands, runs): (Duration, Duration), times: u32) -> (String, u32) {
     let mut checking = command(0, &["check", "--json"]);
     checking.arg(bag).stderr(Stdio::null());
     let mut checking = Process::start(checking);
