@@ -227,7 +227,7 @@ fn cyclone_pauses_steps_and_resumes_a_bag_that_is_played() {
     // From behind the only latency on: it is latched, and comes first.
     play.arg(&bag)
         .args(["--topics", "/latency", "/probe/point", "--paused"])
-        .args(["--from", FROM_S, "--rate", "1000", "--delay", "0"]);
+        .args(["--from", FROM_S, "--rate", "2", "--delay", "0"]);
     let playing = Process::start(play);
     let clients = [PAUSE, RESUME, STEP].map(|service| (service, "std_srvs/srv/Trigger"));
     let (latency, point) = (&topics::LATENCY, &topics::PROBE_POINT);
@@ -251,6 +251,17 @@ fn cyclone_pauses_steps_and_resumes_a_bag_that_is_played() {
     assert!(said.starts_with("playing at "), "{said}");
     let second = cyclone.sample(point.name, |_| true);
     assert_ne!(first["header"], second["header"]);
+    let said = told(asked(&mut cyclone, PAUSE, 3, &nothing));
+    assert!(said.starts_with("paused at "), "{said}");
+    let again = asked(&mut cyclone, PAUSE, 4, &nothing);
+    assert_eq!(again["success"], false, "{again}");
+    assert_eq!(again["message"], "it is paused already");
+    // What was on its way has come by then; two more touches would have, were it not paused.
+    cyclone.samples_within(point.name, still);
+    let stood = cyclone.samples_within(point.name, 3 * still);
+    assert!(stood.is_empty(), "{stood:?}");
+    told(asked(&mut cyclone, RESUME, 5, &nothing));
+    cyclone.sample(point.name, |_| true);
     cyclone.stop();
     let ended = playing.ended_within(Duration::from_secs(30));
     assert_eq!(ended.status.code(), Some(0), "{}", ended.said);

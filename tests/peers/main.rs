@@ -14,5 +14,6 @@ mod foreign;
 mod frames;
 mod latched;
 mod ring;
+mod slow;
 mod wire;
 mod zenoh;

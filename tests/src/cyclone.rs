@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 
 use abbe_msgs::topics::Topic;
 use abbe_msgs::{Durability, Message, Reliability};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use serde_json::{Value, json};
 
 use crate::python::script;
@@ -201,6 +203,18 @@ impl Cyclone {
                 Err(RecvTimeoutError::Disconnected) => panic!("the peer ended"),
             }
         }
+    }
+
+    /// Sends it a signal, e.g. to let it stand for a while.
+    ///
+    /// # Panics
+    /// When it is gone.
+    pub fn signal(&self, signal: Signal) {
+        kill(
+            Pid::from_raw(i32::try_from(self.child.id()).unwrap()),
+            signal,
+        )
+        .unwrap();
     }
 
     /// Lets everything written arrive, and ends it.
