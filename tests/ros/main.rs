@@ -13,4 +13,5 @@ mod interruptions;
 mod kills;
 mod machine_that_reports;
 mod playing;
+mod recording;
 mod refusals;
