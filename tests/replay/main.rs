@@ -12,6 +12,7 @@ mod host_clocks;
 mod kept;
 mod lifecycle;
 mod old_bags;
+mod other_recorders;
 mod positioning;
 mod recorded_output;
 mod rewrite;
