@@ -10,6 +10,9 @@ A client is {"service", "type"}, as rmw_cyclonedds_cpp maps services onto topics
 "number", "request"} asks; the event `reply` has service, number and message. `matched` names the
 service when both of its topics have the server. The end of standard input ends the program, after
 everything written was acknowledged.
+
+A server is {"service", "type"} too. The event `request` has the service, the request's number and its
+message; the command {"service", "number", "response"} answers it.
 """
 
 from __future__ import annotations
@@ -67,6 +70,15 @@ def said(value):
     return value
 
 
+def calls() -> Qos:
+    """Of requests and replies."""
+    return Qos(
+        Policy.History.KeepAll,
+        Policy.Durability.Volatile,
+        Policy.Reliability.Reliable(duration(seconds=1)),
+    )
+
+
 class Client:
     """Asks a service; every client of the participant has a number of its own."""
 
@@ -74,17 +86,12 @@ class Client:
         self.types = types
         self.request_type = f"{ros_type}_Request"
         self.number = number << 32 | 0xABBE
-        quality = Qos(
-            Policy.History.KeepAll,
-            Policy.Durability.Volatile,
-            Policy.Reliability.Reliable(duration(seconds=1)),
-        )
         request = types.of_call(self.request_type)
         reply = types.of_call(f"{ros_type}_Response")
         requests = Topic(participant, f"rq{service}Request", request)
         replies = Topic(participant, f"rr{service}Reply", reply)
-        self.writer = DataWriter(participant, requests, quality)
-        self.reader = DataReader(participant, replies, quality)
+        self.writer = DataWriter(participant, requests, calls())
+        self.reader = DataReader(participant, replies, calls())
 
     def is_matched(self) -> bool:
         both = self.writer.get_matched_subscriptions(), self.reader.get_matched_publications()
@@ -101,6 +108,37 @@ class Client:
                 message = plain(sample)
                 del message["client"]
                 yield message.pop("number"), message
+
+
+class Server:
+    """Is asked: what stands in front of a request stands in front of its answer."""
+
+    def __init__(self, participant, types: Types, service: str, ros_type: str) -> None:
+        self.types = types
+        self.response_type = f"{ros_type}_Response"
+        self.asked: list[tuple[int, int]] = []
+        request = types.of_call(f"{ros_type}_Request")
+        reply = types.of_call(self.response_type)
+        replies = Topic(participant, f"rr{service}Reply", reply)
+        requests = Topic(participant, f"rq{service}Request", request)
+        self.writer = DataWriter(participant, replies, calls())
+        self.reader = DataReader(participant, requests, calls())
+
+    def is_matched(self) -> bool:
+        both = self.writer.get_matched_subscriptions(), self.reader.get_matched_publications()
+        return all(both)
+
+    def requests(self):
+        """Numbers, in the order of their coming, and contents."""
+        for sample in self.reader.take(64):
+            if sample.sample_info.valid_data:
+                message = plain(sample)
+                self.asked.append((message.pop("client"), message.pop("number")))
+                yield len(self.asked), message
+
+    def answer(self, place: int, values: dict) -> None:
+        client, number = self.asked[place - 1]
+        self.writer.write(self.types.build_call(self.response_type, client, number, values))
 
 
 def main(plan: dict) -> None:
@@ -131,11 +169,18 @@ def main(plan: dict) -> None:
         end["service"]: Client(participant, types, end["service"], end["type"], place)
         for place, end in enumerate(plan.get("clients", []), 1)
     }
+    servers = {
+        end["service"]: Server(participant, types, end["service"], end["type"])
+        for end in plan.get("servers", [])
+    }
     ended = threading.Event()
 
     def obey() -> None:
         for line in sys.stdin:
             command = json.loads(line)
+            if "response" in command:
+                servers[command["service"]].answer(command["number"], command["response"])
+                continue
             if "service" in command:
                 clients[command["service"]].ask(command["number"], command["request"])
                 continue
@@ -145,7 +190,7 @@ def main(plan: dict) -> None:
 
     threading.Thread(target=obey, daemon=True).start()
     unmatched = {**readers, **writers}
-    unmet = dict(clients)
+    unmet = {**clients, **servers}
     while not ended.is_set():
         for topic, end in list(unmatched.items()):
             matched = (
@@ -167,6 +212,9 @@ def main(plan: dict) -> None:
         for service, client in clients.items():
             for number, message in client.replies():
                 tell("reply", service, number=number, message=message)
+        for service, server in servers.items():
+            for number, message in server.requests():
+                tell("request", service, number=number, message=message)
         time.sleep(0.002)
     for writer in writers.values():
         writer.wait_for_acks(duration(seconds=2))

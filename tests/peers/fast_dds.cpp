@@ -7,9 +7,12 @@
 //        write TOPIC BYTES
 //        greet TOPIC TYPE reliable|best_effort volatile|latched BYTES
 //        ask REQUESTS NUMBER BYTES
+//        server REQUESTS TYPE REPLIES TYPE
+//        answer REQUESTS NUMBER BYTES
 // `greet` makes a writer that writes as soon as it is matched, and is gone 0.1 s later.
 //
-//   out: matched TOPIC | refused TOPIC | sample TOPIC BYTES | reply REQUESTS NUMBER BYTES | greeted TOPIC
+//   out: matched TOPIC | refused TOPIC | sample TOPIC BYTES | reply REQUESTS NUMBER BYTES | greeted TOPIC |
+//        request REQUESTS NUMBER BYTES
 //
 // Arguments are the domain and, where it is secured, the folder of an enclave.
 
@@ -38,7 +41,9 @@
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 
 using namespace eprosima::fastdds::dds;
+using eprosima::fastrtps::rtps::GUID_t;
 using eprosima::fastrtps::rtps::InstanceHandle_t;
+using eprosima::fastrtps::rtps::SampleIdentity;
 using eprosima::fastrtps::rtps::SerializedPayload_t;
 using eprosima::fastrtps::rtps::WriteParams;
 
@@ -133,6 +138,38 @@ class Hearing : public DataReaderListener {
   std::string topic_, requests_;
 };
 
+// Tells requests, and keeps to whom each is answered: to its writer, or, as rmw_fastrtps_cpp does, to the reader of
+// replies that it names.
+class Serving : public DataReaderListener {
+ public:
+  explicit Serving(std::string requests) : requests_(requests) {}
+  void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override {
+    if (status.current_count_change > 0) say("matched " + requests_);
+  }
+  void on_data_available(DataReader* reader) override {
+    Raw sample;
+    SampleInfo info;
+    while (reader->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
+      if (!info.valid_data) continue;
+      SampleIdentity asked = info.sample_identity;
+      const auto& reader_of_replies = info.related_sample_identity.writer_guid();
+      if (reader_of_replies != GUID_t::unknown()) asked.writer_guid() = reader_of_replies;
+      std::lock_guard<std::mutex> alone(mutex);
+      asked_.push_back(asked);
+      say("request " + requests_ + " " + std::to_string(asked_.size()) + " " + hexadecimal(sample.bytes));
+    }
+  }
+  SampleIdentity asked(size_t number) {
+    std::lock_guard<std::mutex> alone(mutex);
+    return asked_.at(number - 1);
+  }
+
+ private:
+  std::mutex mutex;
+  std::string requests_;
+  std::vector<SampleIdentity> asked_;
+};
+
 class Speaking : public DataWriterListener {
  public:
   explicit Speaking(std::string topic) : topic_(topic) {}
@@ -185,9 +222,7 @@ class Peer {
     DataReaderQos qos = DATAREADER_QOS_DEFAULT;
     set(qos, reliable, latched, 1000);
     auto* hearing = new Hearing(name, requests);
-    auto* reader = subscriber_->create_datareader(topic(name, type), qos, hearing);
-    if (reader == nullptr) throw std::runtime_error("no reader of " + name);
-    readers_[name] = reader;
+    hear(name, type, qos, hearing);
     return hearing;
   }
 
@@ -203,6 +238,24 @@ class Peer {
               const std::string& reply) {
     clients_[requests] = {replies, read(replies, reply, true, false, requests)};
     write_to(requests, request, true, false);
+  }
+
+  void server(const std::string& requests, const std::string& request, const std::string& replies,
+              const std::string& reply) {
+    DataReaderQos qos = DATAREADER_QOS_DEFAULT;
+    set(qos, true, false, 1000);
+    auto* serving = new Serving(requests);
+    servers_[requests] = {replies, serving};
+    write_to(replies, reply, true, false);
+    hear(requests, request, qos, serving);
+  }
+
+  void answer(const std::string& requests, size_t number, const std::string& text) {
+    Raw sample{bytes_of(text)};
+    auto& [replies, serving] = servers_.at(requests);
+    WriteParams parameters;
+    parameters.related_sample_identity(serving->asked(number));
+    writers_.at(replies)->write(&sample, parameters);
   }
 
   void write(const std::string& name, const std::string& text) {
@@ -250,6 +303,13 @@ class Peer {
     qos.data_sharing().off();
   }
 
+  void hear(const std::string& name, const std::string& type, const DataReaderQos& qos,
+            DataReaderListener* listener) {
+    auto* reader = subscriber_->create_datareader(topic(name, type), qos, listener);
+    if (reader == nullptr) throw std::runtime_error("no reader of " + name);
+    readers_[name] = reader;
+  }
+
   Topic* topic(const std::string& name, const std::string& type) {
     auto*& known = topics_[name];
     if (known == nullptr) {
@@ -268,6 +328,7 @@ class Peer {
   std::map<std::string, DataReader*> readers_;
   std::map<std::string, DataWriter*> writers_;
   std::map<std::string, std::pair<std::string, Hearing*>> clients_;
+  std::map<std::string, std::pair<std::string, Serving*>> servers_;
 };
 
 int main(int count, char** arguments) {
@@ -286,6 +347,8 @@ int main(int count, char** arguments) {
       peer.greet(a, b, c == "reliable", d == "latched", e);
     }
     if (verb == "ask") peer.ask(a, std::stoll(b), c);
+    if (verb == "server") peer.server(a, b, c, d);
+    if (verb == "answer") peer.answer(a, std::stoul(b), c);
   }
   // The participant goes with the process.
   std::_Exit(0);

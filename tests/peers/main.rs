@@ -14,6 +14,7 @@ mod foreign;
 mod frames;
 mod latched;
 mod ring;
+mod served;
 mod slow;
 mod wire;
 mod zenoh;

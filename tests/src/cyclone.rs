@@ -88,7 +88,12 @@ impl Cyclone {
         Self::start_with(python, &plan)
     }
 
-    fn start_with(python: &PathBuf, plan: &Value) -> Self {
+    /// Starts it with a plan as `tests/peers/cyclone.py` reads it.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn start_with(python: &PathBuf, plan: &Value) -> Self {
         let mut child = script(python, "cyclone.py")
             .arg(plan.to_string())
             .env_remove("CYCLONEDDS_URI")
@@ -130,6 +135,23 @@ impl Cyclone {
     /// When there was none within 10 s.
     pub fn reply(&mut self, service: &str, number: i64) -> Value {
         self.wait("reply", service, |event| event["number"] == number)["message"].take()
+    }
+
+    /// The next request to a service of the peer, and its number.
+    ///
+    /// # Panics
+    /// When there was none within 10 s.
+    pub fn request(&mut self, service: &str) -> (u64, Value) {
+        let mut event = self.wait("request", service, |_| true);
+        (event["number"].as_u64().unwrap(), event["message"].take())
+    }
+
+    /// Answers it; fields that are not given are zero.
+    ///
+    /// # Panics
+    /// When the peer is gone.
+    pub fn answer(&mut self, service: &str, number: u64, response: &Value) {
+        self.command(&json!({"service": service, "number": number, "response": response}));
     }
 
     fn command(&mut self, line: &Value) {

@@ -279,6 +279,57 @@ impl FastDds {
         from_cdr(&bytes_of(&line[start.len()..])).unwrap()
     }
 
+    /// Makes a server of a service, by its absolute name.
+    pub fn server<V: Service>(&mut self, service: &str) {
+        let (requests, replies) = (
+            names::dds_request_topic(service),
+            names::dds_reply_topic(service),
+        );
+        let request = names::dds_type(&format!("{}_Request", V::TYPE_NAME));
+        let reply = names::dds_type(&format!("{}_Response", V::TYPE_NAME));
+        self.say(&format!("server {requests} {request} {replies} {reply}"));
+    }
+
+    /// The next request to a service of the peer, and its number.
+    ///
+    /// # Panics
+    /// When there was none in time, or it cannot be decoded.
+    pub fn request<V: Service>(&mut self, service: &str) -> (u64, V::Request) {
+        let start = format!("request {} ", names::dds_request_topic(service));
+        let line = self.wait(&start, |_| true);
+        let (number, bytes) = line[start.len()..].split_once(' ').unwrap();
+        (number.parse().unwrap(), from_cdr(&bytes_of(bytes)).unwrap())
+    }
+
+    /// Answers it.
+    pub fn answer<V: Service>(&mut self, service: &str, number: u64, response: &V::Response) {
+        let requests = names::dds_request_topic(service);
+        let bytes = hexadecimal(&to_cdr(response));
+        self.say(&format!("answer {requests} {number} {bytes}"));
+    }
+
+    /// Makes a writer of a reliable topic by its absolute name.
+    pub fn speak_named<M: Message>(&mut self, name: &str, durability: Durability) {
+        let (name, dds_type) = (names::dds_topic(name), names::dds_type(M::TYPE_NAME));
+        let durability = word(durability);
+        self.say(&format!("writer {name} {dds_type} reliable {durability}"));
+    }
+
+    /// Waits until somebody is met on a topic by its absolute name.
+    ///
+    /// # Panics
+    /// When nobody is in time.
+    pub fn matched(&mut self, name: &str) {
+        let name = names::dds_topic(name);
+        self.wait(&format!("matched {name}"), |_| true);
+    }
+
+    /// Writes bytes on such a topic.
+    pub fn write_named(&mut self, name: &str, bytes: &[u8]) {
+        let bytes = hexadecimal(bytes);
+        self.say(&format!("write {} {bytes}", names::dds_topic(name)));
+    }
+
     /// Asks and waits for the answer.
     ///
     /// # Panics
