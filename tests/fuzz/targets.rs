@@ -9,6 +9,7 @@ use metrology::stamp::{Host, Span};
 use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
 use mtconnect_bridge::config::{AgentConfig, Source};
 use mtconnect_bridge::mapping::{MapFile, Mapping};
+use node_runtime::live::strangers;
 use recorder::{Bag, Event, Order, Reflector};
 
 use crate::import;
@@ -18,7 +19,7 @@ use crate::messages;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// Every target.
-pub const TARGETS: [Target; 10] = [
+pub const TARGETS: [Target; 14] = [
     ("cdr", cdr),
     ("definition", definition),
     ("mcap", mcap),
@@ -29,6 +30,10 @@ pub const TARGETS: [Target; 10] = [
     ("shdr", shdr),
     ("agent", agent),
     ("mapping", mapping),
+    ("rtps", rtps),
+    ("token", token),
+    ("attachment", attachment),
+    ("call", call),
 ];
 
 /// Ends a piece of what comes over a wire in several pieces.
@@ -264,4 +269,24 @@ pub fn mapping(data: &[u8]) {
         let proposed = mtconnect_bridge::proposal::propose(&items);
         let _ = mtconnect_bridge::proposal::text_of(&proposed);
     }
+}
+
+/// A datagram that somebody sends to where participants announce themselves.
+pub fn rtps(data: &[u8]) {
+    strangers::datagram(data);
+}
+
+/// The text as what somebody calls a topic, and as a key of Zenoh's graph.
+pub fn token(data: &[u8]) {
+    strangers::name(&String::from_utf8_lossy(data));
+}
+
+/// The bytes as what stands beside a sample on Zenoh.
+pub fn attachment(data: &[u8]) {
+    strangers::attachment(data);
+}
+
+/// The bytes as a request to a node and as the answer to one of its own.
+pub fn call(data: &[u8]) {
+    strangers::call(data);
 }

@@ -96,7 +96,7 @@ pub(crate) fn is_cyclone(guid: &Guid) -> bool {
 }
 
 /// What a DDS topic carries and its name in ROS; `None` for what is not of ROS.
-fn role_of(dds_topic: &str) -> Option<(Role, &str)> {
+pub(crate) fn role_of(dds_topic: &str) -> Option<(Role, &str)> {
     let (role, rest) = match dds_topic.split_at_checked(2)? {
         ("rt", rest) => (Role::Message, rest),
         ("rq", rest) => (Role::Request, rest.strip_suffix("Request")?),
@@ -372,6 +372,11 @@ impl Participant {
         let all = self.participant.discovered_readers();
         all.into_iter().filter_map(describe).collect()
     }
+}
+
+/// Whether a datagram announces a participant, or that it takes its leave.
+pub(crate) fn is_announcement(datagram: &[u8]) -> bool {
+    rtps::announcement(datagram).is_some()
 }
 
 /// DDS topic and type of requests and of replies.

@@ -30,6 +30,8 @@ mod owner;
 mod parameters;
 mod related;
 mod service;
+#[doc(hidden)]
+pub mod strangers;
 mod timers;
 mod type_description;
 

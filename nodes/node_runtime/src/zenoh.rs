@@ -35,6 +35,17 @@ use token::{End, Kind, NodeId};
 /// Requests and replies.
 const SERVICE_QOS: Qos = Qos::RELIABLE;
 
+/// Whether somebody's key is that of an end or a node of ROS, or of a writer's heartbeat.
+pub(crate) fn is_read(key: &str) -> bool {
+    token::parse(key).is_some() || recovery::writer_of(key).is_some()
+}
+
+/// Whether bytes are what is attached to a sample.
+pub(crate) fn is_attachment(bytes: &[u8]) -> bool {
+    let read = attachment::Attachment::read(bytes);
+    read.is_some_and(|attachment| attachment.bytes() == bytes)
+}
+
 /// Tokens that wait for the node's announcement, and those that everybody sees.
 #[derive(Default)]
 struct Tokens {

@@ -84,7 +84,7 @@ impl Writers {
 }
 
 /// Whose heartbeat it is: `…/@adv/pub/<session>/<number>/…`.
-fn writer_of(key: &str) -> Option<EntityGlobalId> {
+pub(super) fn writer_of(key: &str) -> Option<EntityGlobalId> {
     let (_, after) = key.split_once("/@adv/pub/")?;
     let mut words = after.split('/');
     let session = ZenohId::from_str(words.next()?).ok()?;
