@@ -7,12 +7,12 @@ use std::time::{Duration, Instant};
 use abbe_msgs::topics;
 use abbe_tests::drift;
 use abbe_tests::graph::{Graph, Voice, now, port};
-use abbe_tests::program::Process;
+use abbe_tests::program::{Process, root};
 use abbe_tests::scenario::Scenario;
 use nix::sys::signal::Signal;
 
 /// Nodes of the cell beside its recorder.
-pub const NODES: [&str; 10] = [
+pub const NODES: [&str; 13] = [
     "fake_cnc",
     "probe",
     "latency_calibrator",
@@ -23,15 +23,34 @@ pub const NODES: [&str; 10] = [
     "grid_encoder",
     "gap_diagnosis",
     "host_clock",
+    "rotary_axes",
+    "mtconnect_bridge",
+    "replayer",
 ];
 pub const RECORDER: &str = "recorder";
 
 /// Nodes of the cell that its scenario does not have, and what they are told.
-const MORE: [(&str, &str); 3] = [
+const MORE: [(&str, &str); 6] = [
     ("grid_encoder", "machine_file: machine.yaml"),
     ("gap_diagnosis", "machine_file: machine.yaml"),
     ("host_clock", "host: models, reference: controller"),
+    ("rotary_axes", "machine_file: five_axis.yaml"),
+    (
+        "mtconnect_bridge",
+        "source: log, log_file: shift.shdr, map_file: map.yaml",
+    ),
+    (
+        "replayer",
+        "bag: bags/grid_circles, topics: [/grid/position], repeat: true, clock: false",
+    ),
 ];
+
+/// The load that a machine reports, by the name of its topic and as `mtconnect_bridge` maps it.
+const REPORTED: &str = "spindle_load";
+const MAP: &str = "values:\n  Sload: {is: load, name: spindle_load, unit: PERCENT}\n";
+/// Between two lines of its log, ms, and how many there are: enough for the longest round.
+const LOG_PERIOD_MS: u32 = 100;
+const LOG_LINES: u32 = 3_000;
 
 /// Rate at which fake_cnc follows a compensation at most, here, m/s.
 pub const RATE_LIMIT_M_S: f64 = 25e-6;
@@ -68,7 +87,22 @@ fn scenario(works: bool) -> Scenario {
         let text = format!("/**:\n  ros__parameters: {{{parameter}}}\n");
         scenario.write(&format!("{node}.yaml"), &text);
     }
+    let five_axis = root().join("launch_configs/five_axis/machine.yaml");
+    let five_axis = std::fs::read_to_string(five_axis).unwrap();
+    scenario.write("five_axis.yaml", &five_axis);
+    scenario.write("map.yaml", MAP);
+    scenario.write("shift.shdr", &log());
     scenario
+}
+
+/// Lines of an adapter, of another day: the bridge tells them from its start on.
+fn log() -> String {
+    let line = |number: u32| {
+        let (s, ms) = (number * LOG_PERIOD_MS / 1000, number * LOG_PERIOD_MS % 1000);
+        let (minute, second, load) = (s / 60, s % 60, 20 + number % 7);
+        format!("2016-11-29T11:{minute:02}:{second:02}.{ms:03}Z|Sload|{load}\n")
+    };
+    (0..LOG_LINES).map(line).collect()
 }
 
 impl Cell {
@@ -142,6 +176,14 @@ impl Cell {
                 self.graph.next(&topics::COMPENSATION, since, |_| true);
             }
         }
+    }
+
+    /// What the machine reports is heard since `since`.
+    pub fn reported(&self, since: Instant) {
+        self.graph.wait("what the machine reports", |graph| {
+            let told = graph.member_since(&topics::MACHINE, REPORTED, since);
+            (!told.is_empty()).then_some(())
+        });
     }
 
     pub fn compensated(&self, since: Instant) {

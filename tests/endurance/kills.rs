@@ -51,10 +51,17 @@ fn draw(seed: u64) -> Draw {
     }
 }
 
-/// Runs rounds with the seeds from `first` on; true when all passed.
-pub fn run(rounds: u64, first: u64) -> bool {
+/// Runs rounds with the seeds from `first` on, where `victims` are named with those that draw one of them; true when all passed.
+pub fn run(rounds: u64, first: u64, victims: &[&str]) -> bool {
+    let known = |victim: &&str| NODES.contains(victim) || *victim == RECORDER;
+    assert!(
+        victims.iter().all(known),
+        "not all of {victims:?} are nodes of the cell"
+    );
+    let is_wanted = |seed: &u64| victims.is_empty() || victims.contains(&draw(*seed).victim);
     let mut failed = Vec::new();
-    for seed in first..first + rounds {
+    let seeds = (first..).filter(is_wanted);
+    for seed in seeds.take(usize::try_from(rounds).unwrap()) {
         let began = Instant::now();
         let Some(outcome) = namespace::alone("kills", || {
             // The recorder's tap is the thirteenth participant.
@@ -179,6 +186,10 @@ fn joined_again(cell: &mut Cell, draw: &Draw, before: &Before, restarted: Instan
             let running = PlanStatus::STATE_RUNNING;
             let is_told = |status: &PlanStatus| status.state == running;
             cell.graph.next(&topics::PLAN_STATUS, restarted, is_told);
+        }
+        "mtconnect_bridge" => cell.reported(restarted),
+        "replayer" => {
+            cell.graph.next(&topics::GRID_POSITION, restarted, |_| true);
         }
         _ => {}
     }

@@ -1,5 +1,5 @@
 //! What takes long: nodes killed at random times, bags cut at random bytes, days of simulated time. Without arguments a short run of each;
-//! `cargo test --release --test endurance -- kills 100 [FIRST_SEED]`, `… -- cuts 1000 [SEED]` and `… -- soak 24` run as long as they are told.
+//! `cargo test --release --test endurance -- kills 100 [FIRST_SEED [VICTIM,…]]`, `… -- cuts 1000 [SEED]` and `… -- soak 24` run as long as they are told.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 #![expect(
     clippy::disallowed_methods,
@@ -26,8 +26,14 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let passed = match words.as_slice() {
-        ["kills", rounds] => kills::run(rounds.parse().unwrap(), 1),
-        ["kills", rounds, first] => kills::run(rounds.parse().unwrap(), first.parse().unwrap()),
+        ["kills", rounds] => kills::run(rounds.parse().unwrap(), 1, &[]),
+        ["kills", rounds, first] => {
+            kills::run(rounds.parse().unwrap(), first.parse().unwrap(), &[])
+        }
+        ["kills", rounds, first, victims] => {
+            let victims: Vec<&str> = victims.split(',').collect();
+            kills::run(rounds.parse().unwrap(), first.parse().unwrap(), &victims)
+        }
         ["cuts", cuts] => cuts::run(cuts.parse().unwrap(), 1),
         ["cuts", cuts, seed] => cuts::run(cuts.parse().unwrap(), seed.parse().unwrap()),
         ["soak", hours] => soak::run(hours.parse().unwrap()),
@@ -39,7 +45,7 @@ fn main() -> ExitCode {
         ["--list"] => true,
         _ => {
             let (rounds, first) = SHORT_KILLS;
-            let kills = kills::run(rounds, first);
+            let kills = kills::run(rounds, first, &[]);
             let (cuts, seed) = SHORT_CUTS;
             let cuts = cuts::run(cuts, seed);
             soak::run(SHORT_SOAK_H) && cuts && kills

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use abbe_msgs::diagnostic_msgs::msg::DiagnosticStatus;
-use abbe_msgs::topics::{self, Topic};
+use abbe_msgs::topics::{self, Topic, TopicFamily};
 use abbe_msgs::{Message, Wire, from_cdr, to_cdr};
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
@@ -77,7 +77,25 @@ impl Graph {
     /// When one cannot be decoded.
     #[must_use]
     pub fn since<M: Message>(&self, topic: &Topic<M>, since: Instant) -> Vec<(Instant, M)> {
-        let name = format!("/{}", topic.name.trim_start_matches('/'));
+        self.named_since(topic.name, since)
+    }
+
+    /// The same of one topic of a family.
+    ///
+    /// # Panics
+    /// As [`Self::since`], or when no topic can have such a name.
+    #[must_use]
+    pub fn member_since<M: Message>(
+        &self,
+        family: &TopicFamily<M>,
+        member: &str,
+        since: Instant,
+    ) -> Vec<(Instant, M)> {
+        self.named_since(&family.of(member).unwrap(), since)
+    }
+
+    fn named_since<M: Message>(&self, name: &str, since: Instant) -> Vec<(Instant, M)> {
+        let name = format!("/{}", name.trim_start_matches('/'));
         let heard = self.heard.lock().unwrap();
         let of_topic = heard
             .samples
@@ -273,6 +291,14 @@ impl Voice {
     /// When they find no room within 100 ms.
     pub fn bytes(&mut self, place: usize, bytes: &[u8]) {
         assert!(self.0.publish(place, None, Arc::from(bytes)));
+    }
+
+    /// Waits until everybody has what was said.
+    ///
+    /// # Panics
+    /// When somebody has not within 10 s.
+    pub fn settle(&self) {
+        assert!(self.0.settle(Duration::from_secs(10)));
     }
 
     /// Leaves.
