@@ -1,7 +1,7 @@
 //! The budget of the suite, each figure beside its peer in the same run; see README.md here.
 //!
 //! ```text
-//! cargo bench -p abbe_tests --bench budget [-- [identification|round_trip|pose|recorder|control|hour]... [--seconds N] [--program ABBE]]
+//! cargo bench -p abbe_tests --bench budget [-- [identification|round_trip|pose|recorder|control|hour|cell]... [--seconds N] [--program ABBE]]
 //! ```
 #![expect(
     clippy::disallowed_methods,
@@ -19,15 +19,16 @@ mod pose;
 mod python;
 mod round_trip;
 
-const PARTS: [&str; 6] = [
+const PARTS: [&str; 7] = [
     "identification",
     "round_trip",
     "pose",
     "recorder",
     "control",
     "hour",
+    "cell",
 ];
-const USAGE: &str = "budget [identification|round_trip|pose|recorder|control|hour]... [--seconds N] [--program ABBE]";
+const USAGE: &str = "budget [identification|round_trip|pose|recorder|control|hour|cell]... [--seconds N] [--program ABBE]";
 
 struct Wanted {
     parts: Vec<String>,
@@ -78,9 +79,14 @@ fn main() {
             "round_trip" => round_trip::run(wanted.seconds, wanted.program.clone()),
             "identification" => identification::run(),
             "pose" => pose::run(),
-            "hour" => {
+            "hour" | "cell" => {
                 let program = wanted.program.clone();
-                hour::measure(&program.unwrap_or_else(round_trip::built_program));
+                let measure = if part == "cell" {
+                    hour::cell
+                } else {
+                    hour::check
+                };
+                measure(&program.unwrap_or_else(round_trip::built_program));
             }
             "recorder" => bench_of("recorder", "bag"),
             _ => bench_of("fake_cnc", "servo_period"),
