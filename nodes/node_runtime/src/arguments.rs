@@ -17,6 +17,50 @@ pub struct Arguments {
     pub log_levels: Vec<(Option<String>, String)>,
     /// `--enclave NAME`: where the credentials of DDS Security are.
     pub enclave: Option<String>,
+    /// `--enable-…-logs` and `--disable-…-logs`.
+    pub log_outputs: LogOutputs,
+}
+
+/// Where log lines go; of what is told twice the last holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LogOutputs {
+    /// To `/rosout`; without it a node does not publish there at all.
+    pub rosout: bool,
+    /// To the console.
+    pub stdout: bool,
+    /// To a file of a logging library. There is none here: nothing follows from it.
+    pub external_lib: bool,
+}
+
+impl Default for LogOutputs {
+    fn default() -> Self {
+        Self {
+            rosout: true,
+            stdout: true,
+            external_lib: true,
+        }
+    }
+}
+
+impl LogOutputs {
+    /// Takes one of `rcl`'s switches; whether it is one.
+    fn take(&mut self, argument: &str) -> bool {
+        let (is_wanted, output) = if let Some(output) = argument.strip_prefix("--enable-") {
+            (true, output)
+        } else if let Some(output) = argument.strip_prefix("--disable-") {
+            (false, output)
+        } else {
+            return false;
+        };
+        let told = match output {
+            "rosout-logs" => &mut self.rosout,
+            "stdout-logs" => &mut self.stdout,
+            "external-lib-logs" => &mut self.external_lib,
+            _ => return false,
+        };
+        *told = is_wanted;
+        true
+    }
 }
 
 /// One `--params-file` or `-p`.
@@ -47,7 +91,8 @@ pub enum UsageError {
     /// Inside of `--ros-args`, but none of them.
     #[error(
         "ROS argument `{argument}` is unknown: -r|--remap FROM:=TO, -p|--param NAME:=VALUE, \
-         --params-file FILE, --log-level [NAME:=]LEVEL, -e|--enclave NAME"
+         --params-file FILE, --log-level [NAME:=]LEVEL, -e|--enclave NAME, \
+         --enable-OUTPUT-logs, --disable-OUTPUT-logs with rosout, stdout or external-lib"
     )]
     UnknownRosArgument {
         /// As given.
@@ -119,6 +164,9 @@ impl Arguments {
         argument: String,
         rest: &mut impl Iterator<Item = String>,
     ) -> Result<(), UsageError> {
+        if self.log_outputs.take(&argument) {
+            return Ok(());
+        }
         let take: fn(&mut Self, String) -> Result<(), UsageError> = match argument.as_str() {
             "-r" | "--remap" => Self::remap,
             "-p" | "--param" => Self::parameter,
@@ -233,6 +281,29 @@ mod tests {
     }
 
     #[test]
+    fn switches_of_log_outputs_take_no_value_and_the_last_one_holds() {
+        let untold = parse(&[]).unwrap().log_outputs;
+        assert!(untold.rosout && untold.stdout && untold.external_lib);
+        let told = parse(&[
+            "--ros-args",
+            "--disable-rosout-logs",
+            "--disable-external-lib-logs",
+            "--disable-stdout-logs",
+            "-r",
+            "__ns:=/cell",
+            "--enable-stdout-logs",
+        ])
+        .unwrap();
+        let outputs = LogOutputs {
+            rosout: false,
+            stdout: true,
+            external_lib: false,
+        };
+        assert_eq!(told.log_outputs, outputs);
+        assert_eq!(told.remaps.len(), 1);
+    }
+
+    #[test]
     fn what_is_not_known_is_refused_by_name() {
         for (arguments, named) in [
             (&["--fast"][..], "--fast"),
@@ -242,6 +313,8 @@ mod tests {
             (&["--ros-args", "-p", "rate:=[1"], "rate:=[1"),
             (&["--ros-args", "-r", "a b:=c"], "a b:=c"),
             (&["--ros-args", "--log-level", "loud"], "loud"),
+            (&["--ros-args", "--disable-logs"], "--disable-logs"),
+            (&["--disable-rosout-logs"], "--disable-rosout-logs"),
             (&["--ros-args", "--enclave", "/../keys"], "/../keys"),
             (&["--ros-args", "--", "x"], "`x`"),
         ] {

@@ -5,11 +5,12 @@
 //! at `warn` they flood.
 //!
 //! One filter stands before both. A node for which a level was chosen (`--log-level NAME:=LEVEL`, or
-//! its service) has that one for its lines; all else goes by the program's.
+//! its service) has that one for its lines; all else goes by the program's. A node that was told
+//! `--disable-stdout-logs` or `--disable-rosout-logs` is silent there.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
-use std::fmt::{self, Write as _};
+use std::fmt::{Debug, Write as _};
 use std::io::IsTerminal as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
@@ -17,6 +18,8 @@ use abbe_msgs::rcl_interfaces::msg::Log;
 use abbe_msgs::to_cdr;
 use tracing::field::{Field, Visit};
 use tracing::{Event, Level, Subscriber};
+use tracing_subscriber::fmt::format::{self, Format};
+use tracing_subscriber::fmt::{self, FmtContext, FormatEvent, FormatFields};
 use tracing_subscriber::layer::{Context, SubscriberExt as _};
 use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::util::SubscriberInitExt as _;
@@ -36,11 +39,27 @@ pub(crate) use levels::Severity;
 #[derive(Clone)]
 struct Speaker {
     name: String,
-    writer: Weak<Writer>,
+    /// None: its lines are not wanted on `/rosout`.
+    writer: Option<Weak<Writer>>,
     /// The node's time, as `rclcpp` stamps its lines with.
     clock: Clock,
     /// From where on its lines are said, where that was chosen.
     chosen: Option<Severity>,
+    is_on_console: bool,
+}
+
+/// How a node's lines are said.
+pub(crate) struct Speech<'a> {
+    /// The node's full name.
+    pub node: &'a str,
+    /// They go out there as long as it lives.
+    pub rosout: Option<&'a Arc<Writer>>,
+    /// What they are stamped by.
+    pub clock: &'a Clock,
+    /// From where on they are said, where that was chosen.
+    pub chosen: Option<Severity>,
+    /// Whether they are for the console too.
+    pub is_on_console: bool,
 }
 
 /// Speakers by the spans of their nodes; a span is unique where a name need not be.
@@ -60,15 +79,15 @@ pub(crate) fn logger(node: &str) -> String {
     node.trim_start_matches('/').replace('/', ".")
 }
 
-/// Lets what is logged in the present span out on `/rosout` as node `name`, as long as the writer lives,
-/// with stamps of the node's own `clock`, from `chosen` on.
-pub(crate) fn open(name: &str, writer: &Arc<Writer>, clock: &Clock, chosen: Option<Severity>) {
+/// Lets what is logged in the present span out as told.
+pub(crate) fn open(speech: &Speech<'_>) {
     if let Some(id) = tracing::Span::current().id() {
         let speaker = Speaker {
-            name: logger(name),
-            chosen,
-            writer: Arc::downgrade(writer),
-            clock: clock.clone(),
+            name: logger(speech.node),
+            chosen: speech.chosen,
+            writer: speech.rosout.map(Arc::downgrade),
+            clock: speech.clock.clone(),
+            is_on_console: speech.is_on_console,
         };
         speakers().insert(id.into_u64(), speaker);
         levels::changed();
@@ -129,16 +148,53 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
         .as_deref()
         .and_then(|directives| EnvFilter::try_new(directives).ok())
         .unwrap_or_else(|| EnvFilter::new(default));
-    let console = tracing_subscriber::fmt::layer()
+    // Before its node speaks the lines of a program are those of all its nodes.
+    let mut outputs = arguments.iter().map(|arguments| arguments.log_outputs);
+    let is_wanted = arguments.is_empty() || outputs.any(|outputs| outputs.stdout);
+    let console = fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
-        .with_target(false);
+        .event_format(Console {
+            is_wanted,
+            line: fmt::format().with_target(false),
+        });
     // A program that composes nodes may have a subscriber of its own: its lines are its affair then.
     let _ = tracing_subscriber::registry()
         .with(Levels::above(filter))
         .with(console)
         .with(Rosout)
         .try_init();
+}
+
+/// Lines on the console, but those of nodes that are silent there.
+struct Console {
+    /// Whether any line is wanted there.
+    is_wanted: bool,
+    line: Format,
+}
+
+impl<S, N> FormatEvent<S, N> for Console
+where
+    S: Subscriber + for<'lookup> LookupSpan<'lookup>,
+    N: for<'writer> FormatFields<'writer> + 'static,
+{
+    fn format_event(
+        &self,
+        context: &FmtContext<'_, S, N>,
+        writer: format::Writer<'_>,
+        event: &Event<'_>,
+    ) -> std::fmt::Result {
+        let mut spans = context.event_scope().into_iter().flatten();
+        let is_silent = spans.any(|span| {
+            let id = span.id().into_u64();
+            let speakers = speakers();
+            speakers.get(&id).is_some_and(|node| !node.is_on_console)
+        });
+        if !self.is_wanted || is_silent {
+            return Ok(());
+        }
+        self.line.format_event(context, writer, event)
+    }
 }
 
 struct Rosout;
@@ -159,7 +215,7 @@ impl Visit for Fields {
         }
     }
 
-    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+    fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
         self.record_str(field, &format!("{value:?}"));
     }
 }
@@ -178,7 +234,7 @@ where
         let Some(speaker) = speaker else {
             return;
         };
-        let Some(writer) = speaker.writer.upgrade() else {
+        let Some(writer) = speaker.writer.and_then(|writer| writer.upgrade()) else {
             return;
         };
         if IS_SPEAKING.replace(true) {

@@ -13,7 +13,7 @@ use metrology::ParameterDoc;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::arguments::{Arguments, ParameterSource};
+use crate::arguments::{Arguments, LogOutputs, ParameterSource};
 use crate::clock::HostTime;
 use crate::log::{self, Severity};
 use crate::names::{NameError, NodeNames};
@@ -87,6 +87,7 @@ pub struct Setup {
     origins: BTreeMap<String, Origin>,
     every: OfEveryNode,
     log_level: Option<Severity>,
+    log_outputs: LogOutputs,
     /// Where the parameters go when nothing but these is asked for.
     asked: Option<Arc<OnceLock<Vec<Parameter>>>>,
 }
@@ -109,6 +110,7 @@ impl Setup {
             origins: BTreeMap::new(),
             every: OfEveryNode::default(),
             log_level: None,
+            log_outputs: arguments.log_outputs,
             asked: None,
         };
         let logger = log::logger(&setup.names.fully_qualified());
@@ -182,6 +184,11 @@ impl Setup {
     /// From where on the node's lines are said, where its logger is named on the command line.
     pub(crate) const fn log_level(&self) -> Option<Severity> {
         self.log_level
+    }
+
+    /// Where the node's lines go.
+    pub(crate) const fn log_outputs(&self) -> LogOutputs {
+        self.log_outputs
     }
 
     /// The parameters as given, without those of every node.

@@ -226,6 +226,13 @@ impl Assembly {
         self.readers.host_clock(&topic, reader);
         Ok(())
     }
+
+    /// What the node's lines go out by, where they are wanted on `/rosout`.
+    fn rosout(&mut self, setup: &Setup) -> anyhow::Result<Option<Arc<Writer>>> {
+        let is_wanted = setup.log_outputs().rosout;
+        let writer = is_wanted.then(|| self.standard(&topics::ROSOUT));
+        Ok(writer.transpose()?.map(Arc::new))
+    }
 }
 
 fn goal_service_type(service: GoalService, action_type: &str) -> String {
@@ -253,7 +260,7 @@ pub(super) fn assemble(
     };
     let publications = assembly.publications(&ports)?;
     let diagnostics = assembly.standard(&topics::DIAGNOSTICS)?;
-    let rosout = Arc::new(assembly.standard(&topics::ROSOUT)?);
+    let rosout = assembly.rosout(setup)?;
     let parameter_events = assembly.standard(&topics::PARAMETER_EVENTS)?;
     assembly.services(&ports)?;
     let actions = assembly.action_servers(&ports.action_servers)?;
@@ -262,13 +269,13 @@ pub(super) fn assemble(
     let clock = Clock::new(setup.use_sim_time(), setup.host_time());
     let timers = assembly.timers(&clock, &ports, sender)?;
     let relation = related::Related::of(setup, &clock, node.keeps_own_time());
-    if relation.listens() {
-        assembly.host_clock()?;
-    }
+    let host_clock = relation.listens().then(|| assembly.host_clock());
+    host_clock.transpose()?;
     assembly.participant.announce()?;
     let name = setup.names().fully_qualified();
     Ok(Owner {
         log_level: setup.log_level(),
+        is_on_console: setup.log_outputs().stdout,
         board: Board::new(&name),
         name,
         parameters: with_runtime_parameters(node.parameters(), setup),

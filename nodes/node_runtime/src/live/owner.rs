@@ -109,9 +109,11 @@ pub(super) struct Owner {
     pub actions: Vec<ActionEnd>,
     pub used_actions: Vec<UsedAction>,
     pub diagnostics: Writer,
-    pub rosout: Arc<Writer>,
+    /// None: its lines are not wanted there.
+    pub rosout: Option<Arc<Writer>>,
     pub parameter_events: Writer,
     pub log_level: Option<Severity>,
+    pub is_on_console: bool,
     pub board: Board,
     pub emissions: Vec<Emission>,
     pub event_time: EventTime,
@@ -151,7 +153,13 @@ fn now() -> Instant {
 impl Owner {
     /// Drives the node until `stop` says so, then winds it down.
     pub async fn run(mut self, mut stop: watch::Receiver<Stop>) {
-        log::open(&self.name, &self.rosout, &self.clock, self.log_level);
+        log::open(&log::Speech {
+            node: &self.name,
+            rosout: self.rosout.as_ref(),
+            clock: &self.clock,
+            chosen: self.log_level,
+            is_on_console: self.is_on_console,
+        });
         for action in &self.actions {
             let _ = action.status.publish(&action.server.status(), None);
         }
@@ -391,7 +399,8 @@ impl Owner {
             ..
         } = self;
         readers.stop().await;
-        let mut writers: Vec<&Writer> = vec![&diagnostics, &rosout, &parameter_events];
+        let mut writers: Vec<&Writer> = vec![&diagnostics, &parameter_events];
+        writers.extend(rosout.as_deref());
         writers.extend(publications.iter().map(|publication| &publication.writer));
         writers.extend(servers.iter().map(|(_, server)| &server.writer));
         writers.extend(clients.iter().map(|(_, client)| &client.writer));

@@ -1,12 +1,15 @@
 //! Nodes as programs: arguments, parameters, signals, exit codes.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use abbe_msgs::diagnostic_msgs::msg::DiagnosticArray;
+use abbe_msgs::rcl_interfaces::msg::Log;
 use abbe_msgs::std_msgs::msg::Int64;
-use abbe_msgs::{Qos, from_cdr, to_cdr};
+use abbe_msgs::{Qos, from_cdr, to_cdr, topics};
 use metrology::stamp::Span;
 use node_runtime::environment::Environment;
 use node_runtime::node::Ports;
@@ -228,6 +231,78 @@ fn bad_arguments_and_parameters_are_refused_with_their_names() {
         .unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&output.stderr).contains("ROS_DOMAIN_ID=many"));
+}
+
+/// Hands on whose line it hears, and who tells of itself on `/diagnostics`.
+fn listener(environment: &Environment) -> (Running, Receiver<(&'static str, String)>) {
+    let (sender, heard) = channel();
+    let (lines, tellers) = (&topics::ROSOUT, &topics::DIAGNOSTICS);
+    let ports = Ports {
+        subscriptions: vec![
+            topic::<Log>(lines.name, lines.qos),
+            topic::<DiagnosticArray>(tellers.name, tellers.qos),
+        ],
+        ..Ports::default()
+    };
+    let puppet = Puppet::new("listener", ports, move |_, event, _| {
+        let Event::Message {
+            subscription,
+            bytes,
+            ..
+        } = event
+        else {
+            return Ok(());
+        };
+        if subscription == 0 {
+            let line: Log = from_cdr(bytes).unwrap();
+            let _ = sender.send(("rosout", line.name));
+        } else {
+            let told: DiagnosticArray = from_cdr(bytes).unwrap();
+            for status in told.status {
+                let name = status.name.trim_start_matches('/').to_owned();
+                let _ = sender.send(("diagnostics", name));
+            }
+        }
+        Ok(())
+    });
+    (start(environment, puppet), heard)
+}
+
+#[test]
+fn a_program_is_silent_on_the_console_or_on_rosout_where_it_is_told_to_be() {
+    let environment = environment(22);
+    let (listening, heard) = listener(&environment);
+    let silences = [
+        ("open", "--enable-rosout-logs", true, true),
+        ("hidden", "--disable-rosout-logs", false, true),
+        ("mute", "--disable-stdout-logs", true, false),
+        ("plain", "--disable-external-lib-logs", true, true),
+    ];
+    let programs = silences.map(|(name, switch, ..)| {
+        let name = format!("__node:={name}");
+        Process::start(&environment, &["--ros-args", "-r", &name, switch])
+    });
+    let (mut on_rosout, mut met) = (BTreeSet::new(), BTreeMap::<String, usize>::new());
+    // Each tells of itself three times, by when every latched line has come.
+    wait(&heard, "all programs", |(topic, name): (&str, String)| {
+        if topic == "rosout" {
+            on_rosout.insert(name);
+        } else {
+            *met.entry(name).or_default() += 1;
+        }
+        let often = |name: &str| met.get(name).is_some_and(|times| *times >= 3);
+        silences.iter().all(|(name, ..)| often(name)).then_some(())
+    });
+    for ((name, switch, rosout, console), program) in silences.into_iter().zip(programs) {
+        program.signal("-INT");
+        let output = program.output();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        assert_eq!(on_rosout.contains(name), rosout, "{switch}: {on_rosout:?}");
+        assert_eq!(said.contains("started"), console, "{switch}: {said}");
+        assert_eq!(said.is_empty(), !console, "{switch}: {said}");
+    }
+    listening.stop().unwrap();
 }
 
 #[test]
