@@ -24,6 +24,8 @@ use metrology::sample::{ProbedPoint, Rejection, TestKind, TestSegment};
 use recorder::{Bag, Event, Order};
 use serde_json::Value;
 
+mod killed;
+
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 /// Free of everybody else's traffic.

@@ -43,6 +43,8 @@ if exec 3<>"/dev/tcp/$2/$3"; then
 fi
 wait
 "#;
+/// What the guard is called.
+const GUARD_NAME: &str = "abbe-linuxcnc-guard";
 /// LinuxCNC that starts while the last one's real-time part is still being unloaded ends at once: so often,
 /// and after such a pause, it is started again.
 const START_ATTEMPTS: u32 = 3;
@@ -135,6 +137,30 @@ fn running() -> Vec<(String, i32)> {
     found
 }
 
+/// Whether a guard is there; without one who holds the lock it is that of a process that was killed.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the system's list of processes is read here"
+)]
+fn is_guarded() -> bool {
+    let mut processes = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    processes.any(|entry| {
+        // What is no process has no command line.
+        let command = std::fs::read(entry.path().join("cmdline")).unwrap_or_default();
+        let mut words = command.split(|byte| *byte == 0);
+        words.any(|word| word == GUARD_NAME.as_bytes())
+    })
+}
+
+/// Waits while the LinuxCNC of a process that was killed is being ended by its guard.
+#[expect(clippy::disallowed_methods, reason = "a process outside is waited for")]
+fn wait_for_orphan() {
+    let deadline = Instant::now() + END_LIMIT;
+    while is_guarded() && Instant::now() < deadline {
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
 /// Gives LinuxCNC's real-time part the priority that it has only under a real-time kernel by itself.
 ///
 /// Without it any process may stop the servo thread between taking a command and telling of it, and
@@ -186,6 +212,7 @@ impl Controller {
 
     fn start_once(config: &BridgeConfig, ini: &Path) -> Result<Self, BridgeError> {
         let lock = lock()?;
+        wait_for_orphan();
         if let Some((process, pid)) = running().into_iter().next() {
             return Err(BridgeError::AlreadyRunning { process, pid });
         }
@@ -345,7 +372,7 @@ fn spawn_guard(
     let mut command = Command::new("bash");
     account.apply(&mut command);
     command
-        .args(["-c", GUARD, "abbe-linuxcnc-guard"])
+        .args(["-c", GUARD, GUARD_NAME])
         .arg(ini)
         .args([&connection.host, &connection.port.to_string()])
         .args([&connection.connect_password, &connection.enable_password])
