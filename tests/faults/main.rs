@@ -16,3 +16,5 @@ mod offsets;
 mod said;
 mod stepped_cell;
 mod tables;
+mod told_badly;
+mod twins;

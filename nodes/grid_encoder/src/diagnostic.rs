@@ -58,6 +58,8 @@ pub enum Diagnostic {
     Refused { run: u32, refusal: Refusal },
     #[error("run {run}: {n} readings are not finite and left out")]
     LeftOut { run: u32, n: usize },
+    #[error("run {run}: {n} readings were told before, or a later one before them; left out")]
+    ToldBefore { run: u32, n: usize },
     #[error(
         "run {run}: {points} points of {readings} readings, {outliers} outliers set aside, standard uncertainty {standard_uncertainty_um:.4} µm"
     )]

@@ -224,6 +224,10 @@ impl GridEncoderStage {
         self.waiting.clear();
         let run = open.begin.run;
         let refusals = self.take_in(&open, out);
+        let n = open.collector.n_told_before();
+        if n > 0 {
+            out.push(Output::Diagnostic(Diagnostic::ToldBefore { run, n }));
+        }
         if refusals.is_empty() {
             self.fit(at, out);
         }

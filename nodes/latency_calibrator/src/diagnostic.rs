@@ -72,6 +72,12 @@ pub enum Refusal {
         /// Why.
         fault: TouchFault,
     },
+    /// A touch was told again, or after a later one.
+    #[error("touch {sequence} was told before, or a later one before it; not used")]
+    ToldBefore {
+        /// Number of the touch.
+        sequence: u32,
+    },
     /// All touches came at one feed.
     #[error(
         "{feature}: feeds at contact from {least_mm_s:.4} to {greatest_mm_s:.4} mm/s are within {share} of each other: latency needs different feeds"

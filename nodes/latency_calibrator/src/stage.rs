@@ -5,7 +5,7 @@
 
 use machine::file::Latch;
 use machine::{Kinematics, MachineFile};
-use metrology::sample::{AxisState, ProbeLatency, ProbeTrigger, TestKind, TestSegment};
+use metrology::sample::{AxisState, NewTouches, ProbeLatency, ProbeTrigger, TestKind, TestSegment};
 use metrology::{Axis, AxisSet, Host, Machine, Stage, Stamp};
 
 use crate::config::LatencyCalibratorConfig;
@@ -59,6 +59,7 @@ pub struct LatencyCalibratorStage {
     noise: TouchNoise,
     log: MotionLog,
     run: Option<Run>,
+    touches: NewTouches,
 }
 
 /// An open or ending latency run.
@@ -112,6 +113,7 @@ impl LatencyCalibratorStage {
             },
             log: MotionLog::new(config.log_samples),
             run: None,
+            touches: NewTouches::default(),
             config: config.clone(),
         })
     }
@@ -156,7 +158,12 @@ impl LatencyCalibratorStage {
         }
     }
 
-    fn take_trigger(&mut self, trigger: ProbeTrigger) -> Result<(), LatencyCalibratorError> {
+    fn take_trigger(
+        &mut self,
+        at: Stamp<Host>,
+        trigger: ProbeTrigger,
+        out: &mut Vec<Output>,
+    ) -> Result<(), LatencyCalibratorError> {
         self.check_axes("trigger", trigger.axes)?;
         let length = trigger.approach.norm();
         if (length - 1.0).abs() > UNIT_ROUNDING {
@@ -164,6 +171,12 @@ impl LatencyCalibratorStage {
                 sequence: trigger.sequence,
                 length,
             });
+        }
+        if !self.touches.is_new(at, &trigger) {
+            out.push(Output::Refused(Refusal::ToldBefore {
+                sequence: trigger.sequence,
+            }));
+            return Ok(());
         }
         if let Some(run) = &mut self.run {
             let finite = trigger.approach.iter().all(|c| c.is_finite())
@@ -348,7 +361,7 @@ impl Stage for LatencyCalibratorStage {
     ) -> Result<(), LatencyCalibratorError> {
         match input {
             Input::State(state) => self.take_state(&state, out)?,
-            Input::Trigger(trigger) => self.take_trigger(trigger)?,
+            Input::Trigger(trigger) => self.take_trigger(at, trigger, out)?,
             Input::Segment(segment) => self.take_segment(at, segment, out),
             Input::Tick => {}
         }

@@ -35,6 +35,8 @@ struct Rig {
     ramp: Option<(f64, f64)>,
     /// Share of the positions that are published.
     publishes: bool,
+    /// Whether each touch is told twice.
+    tells_again: bool,
 }
 
 impl Rig {
@@ -52,6 +54,7 @@ impl Rig {
             rotary: PerAxis::default(),
             ramp: None,
             publishes: true,
+            tells_again: false,
         }
     }
 
@@ -141,7 +144,9 @@ impl Rig {
         let mut sent = false;
         while self.now_ns < latch_ns.max(contact_ns) + 4_000_000 {
             if !sent && self.now_ns >= latch_ns {
-                self.send(Input::Trigger(trigger.clone()));
+                for _ in 0..=u32::from(self.tells_again) {
+                    self.send(Input::Trigger(trigger.clone()));
+                }
                 sent = true;
             }
             if self.publishes {
@@ -551,4 +556,20 @@ fn snapshot_then_resume_equals_straight_run() {
     let mut resumed = Rig::new(8_370_000);
     (resumed.stage, resumed.now_ns, resumed.sequence) = (stage, now_ns, sequence);
     assert_eq!(format!("{straight:?}"), format!("{:?}", rest(&mut resumed)));
+}
+
+#[test]
+fn a_touch_that_is_told_again_changes_neither_the_latency_nor_its_uncertainty() {
+    let run = |again: bool| {
+        let mut rig = Rig::new(4_000_000);
+        rig.scatter_mm = 0.0005;
+        rig.tells_again = again;
+        rig.run(&FEEDS_MM_S, 4);
+        rig
+    };
+    let (once, again) = (run(false), run(true));
+    assert_eq!(once.latency(), again.latency());
+    let told_before = |refusal: &&Refusal| matches!(refusal, Refusal::ToldBefore { .. });
+    assert_eq!(again.refusals().iter().filter(told_before).count(), 20);
+    assert_eq!(once.refusals().iter().filter(told_before).count(), 0);
 }

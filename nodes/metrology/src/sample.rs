@@ -36,4 +36,6 @@ pub use report::{MachineValue, Quantity, Verdict};
 pub use segment::{Sense, TestKind, TestPlane, TestSegment};
 pub use sensor::{GridSample, LengthSample, TemperatureSample};
 pub use thermal::{AxisDrift, DriftGrowth, ThermalModel, UpdateReason, UpdateRequest};
-pub use touch::{Correction, LatencyMethod, ProbeLatency, ProbeTrigger, ProbedPoint, Rejection};
+pub use touch::{
+    Correction, LatencyMethod, NewTouches, ProbeLatency, ProbeTrigger, ProbedPoint, Rejection,
+};

@@ -39,6 +39,12 @@ pub enum Diagnostic {
         /// Next number that arrived.
         before: u32,
     },
+    /// A touch was told again, or after a later one.
+    #[error("touch {sequence} was told before, or a later one before it; not used")]
+    ToldBefore {
+        /// Number of the touch.
+        sequence: u32,
+    },
     /// A touch was corrected with feed times latency, since the queue had no answer.
     #[error("touch {sequence} corrected with feed times latency: {miss}")]
     CorrectedByFeed {
@@ -56,6 +62,12 @@ pub enum Diagnostic {
         latency_s: f64,
         /// Standard uncertainty, s.
         standard_uncertainty_s: f64,
+    },
+    /// A latency was calibrated before the one in use.
+    #[error("a latency that was calibrated {by_s:.1} s before the one in use is not used")]
+    LatencyOlder {
+        /// How long before, s.
+        by_s: f64,
     },
     /// A face of a block was not measured.
     #[error(

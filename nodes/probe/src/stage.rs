@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use machine::file::Latch;
 use machine::{Kinematics, MachineFile};
 use metrology::sample::{
-    AxisState, BlockMeasurement, Correction, ProbeLatency, ProbeTrigger, ProbedFeature,
+    AxisState, BlockMeasurement, Correction, NewTouches, ProbeLatency, ProbeTrigger, ProbedFeature,
     ProbedPoint, Rejection, TestKind, TestSegment,
 };
 use metrology::stamp::Span;
@@ -66,9 +66,12 @@ pub struct ProbeStage {
     hold: Span,
     allow_feed_correction: bool,
     latency: Option<LatencyInUse>,
+    /// When the latency in use was calibrated, where it was.
+    calibrated_at: Option<Stamp<Host>>,
     waiting: VecDeque<Waiting>,
     run: Option<Run>,
     last_sequence: Option<u32>,
+    touches: NewTouches,
 }
 
 /// An event that waits, and since when.
@@ -116,9 +119,11 @@ impl ProbeStage {
             hold: config.hold(),
             allow_feed_correction: config.allow_feed_correction,
             latency: config.given_latency(file)?.map(LatencyInUse::from),
+            calibrated_at: None,
             waiting: VecDeque::with_capacity(64),
             run: None,
             last_sequence: None,
+            touches: NewTouches::default(),
             file: file.clone(),
         })
     }
@@ -136,6 +141,8 @@ impl ProbeStage {
             }
             Stored::WentBack { from } => {
                 let waiting = self.distrust_waiting();
+                // Touches of the new time line come before those of the old one.
+                self.touches = NewTouches::default();
                 out.push(Output::Diagnostic(Diagnostic::ClockWentBack {
                     from,
                     to: state.controller_at,
@@ -176,6 +183,12 @@ impl ProbeStage {
                 length,
             });
         }
+        if !self.touches.is_new(at, &trigger) {
+            out.push(Output::Diagnostic(Diagnostic::ToldBefore {
+                sequence: trigger.sequence,
+            }));
+            return Ok(());
+        }
         if let Some(after) = self.last_sequence
             && trigger.sequence > after.saturating_add(1)
         {
@@ -200,6 +213,26 @@ impl ProbeStage {
         };
         self.waiting.insert(place, waiting);
         Ok(())
+    }
+
+    fn take_latency(&mut self, at: Stamp<Host>, latency: &ProbeLatency, out: &mut Vec<Output>) {
+        // One of the future is of before the host's clock was set back.
+        let in_use = self.calibrated_at.filter(|in_use| *in_use <= at);
+        if let Some(in_use) = in_use
+            && latency.at < in_use
+        {
+            out.push(Output::Diagnostic(Diagnostic::LatencyOlder {
+                by_s: (in_use - latency.at).as_secs_f64(),
+            }));
+            return;
+        }
+        match LatencyInUse::from_calibration(latency) {
+            Ok(usable) => {
+                self.latency = Some(usable);
+                self.calibrated_at = Some(latency.at);
+            }
+            Err(diagnostic) => out.push(Output::Diagnostic(diagnostic)),
+        }
     }
 
     fn take_segment(&mut self, at: Stamp<Host>, segment: TestSegment) {
@@ -403,10 +436,7 @@ impl Stage for ProbeStage {
         match input {
             Input::State(state) => self.take_state(&state, out)?,
             Input::Trigger(trigger) => self.take_trigger(at, trigger, out)?,
-            Input::Latency(latency) => match LatencyInUse::from_calibration(&latency) {
-                Ok(latency) => self.latency = Some(latency),
-                Err(diagnostic) => out.push(Output::Diagnostic(diagnostic)),
-            },
+            Input::Latency(latency) => self.take_latency(at, &latency, out),
             Input::Segment(segment) => self.take_segment(at, segment),
             Input::Tick => {}
         }

@@ -134,6 +134,24 @@ pub enum Diagnostic {
         /// Sphere.
         sphere: String,
     },
+    /// A sphere that was told again.
+    #[error("run {run}: sphere {sphere} was told before; not used")]
+    ToldBefore {
+        /// Run.
+        run: u32,
+        /// Sphere.
+        sphere: String,
+    },
+    /// A sphere that was found before its run began.
+    #[error("run {run}: sphere {sphere} was found {before_s:.1} s before the run began; not used")]
+    OfAnotherTime {
+        /// Run.
+        run: u32,
+        /// Sphere.
+        sphere: String,
+        /// How long before, s.
+        before_s: f64,
+    },
     /// A centre, covariance or pose that is none.
     #[error("run {run}: centre, covariance or pose of sphere {sphere} is not usable; not used")]
     NotFinite {
@@ -230,9 +248,11 @@ impl Diagnostic {
             | Self::LowMerit { .. }
             | Self::Doubtful { .. }
             | Self::LackOfFit { .. }
-            | Self::VisitMissing { .. } => Severity::Warn,
+            | Self::VisitMissing { .. }
+            | Self::ToldBefore { .. } => Severity::Warn,
             Self::OtherSphere { .. }
             | Self::UnknownSphere { .. }
+            | Self::OfAnotherTime { .. }
             | Self::NotFinite { .. }
             | Self::OutsideTravel { .. }
             | Self::NotEstimated { .. }
@@ -257,6 +277,8 @@ impl Diagnostic {
             Self::VisitMissing { .. } => "visit_missing",
             Self::OtherSphere { .. } => "other_sphere",
             Self::UnknownSphere { .. } => "unknown_sphere",
+            Self::ToldBefore { .. } => "told_before",
+            Self::OfAnotherTime { .. } => "of_another_time",
             Self::NotFinite { .. } => "not_finite",
             Self::OutsideTravel { .. } => "outside_travel",
             Self::NotEstimated { .. } => "not_estimated",

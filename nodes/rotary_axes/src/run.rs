@@ -2,6 +2,7 @@
 
 use machine::{MachineFile, SphereDesign};
 use metrology::sample::{ProbedFeature, TestSegment};
+use metrology::stamp::Span;
 use metrology::{Host, Stamp};
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,6 +14,8 @@ use crate::visit::SphereVisit;
 pub(crate) struct Run {
     pub(crate) begin: TestSegment,
     pub(crate) visits: Vec<SphereVisit>,
+    /// Spheres that were told: when and where each was found.
+    pub(crate) told: Vec<(Stamp<Host>, Vector3<f64>)>,
     /// When its end was told, and whether it was completed.
     pub(crate) end: Option<(Stamp<Host>, bool)>,
 }
@@ -30,6 +33,17 @@ impl Run {
         pose_repeatability_mm: f64,
     ) -> Result<SphereVisit, Diagnostic> {
         let (run, sphere) = (self.number(), feature.feature_id.clone());
+        if self.told.contains(&(feature.at, feature.centre_mm)) {
+            return Err(Diagnostic::ToldBefore { run, sphere });
+        }
+        if feature.at + LATE < self.begin.at {
+            let before_s = (self.begin.at - feature.at).as_secs_f64();
+            return Err(Diagnostic::OfAnotherTime {
+                run,
+                sphere,
+                before_s,
+            });
+        }
         if !self.begin.features.is_empty() && !self.begin.features.contains(&sphere) {
             return Err(Diagnostic::OtherSphere { run, sphere });
         }
@@ -135,5 +149,7 @@ impl Run {
     }
 }
 
+/// How far the clocks of hosts may be apart.
+const LATE: Span = Span::from_nanos(2_000_000_000);
 /// How far a servo may stand beyond the end of the travel, deg.
 const BESIDE_DEG: f64 = 0.01;

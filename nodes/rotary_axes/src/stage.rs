@@ -111,6 +111,7 @@ impl RotaryAxesStage {
             self.runs.push_back(Run {
                 begin: segment,
                 visits: Vec::new(),
+                told: Vec::new(),
                 end: None,
             });
         } else if let Some(run) = self.runs.iter_mut().find(|run| run.number() == number) {
@@ -147,7 +148,10 @@ impl RotaryAxesStage {
             return Ok(());
         }
         match run.visit(feature, machine, self.pose_repeatability_mm) {
-            Ok(visit) => run.visits.push(visit),
+            Ok(visit) => {
+                run.visits.push(visit);
+                run.told.push((feature.at, feature.centre_mm));
+            }
             Err(diagnostic) => out.push(say(diagnostic)),
         }
         Ok(())

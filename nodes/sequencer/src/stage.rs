@@ -5,7 +5,9 @@ use std::convert::Infallible;
 
 use machine::MachineFile;
 use metrology::Stage;
-use metrology::sample::{CycleOrder, PlanState, PlanStatus, TestSegment, UpdateRequest};
+use metrology::sample::{
+    CycleOrder, NewTouches, PlanState, PlanStatus, ProbeTrigger, TestSegment, UpdateRequest,
+};
 use metrology::stamp::{Host, Span, Stamp};
 
 use crate::config::Config;
@@ -33,7 +35,7 @@ pub enum Input {
     /// The program ended; `None`: the controller vanished.
     ProgramEnd { id: u64, end: Option<ProgramEnd> },
     /// A touch was made.
-    Touch,
+    Touch(ProbeTrigger),
     /// The thermal model asks for a block cycle.
     UpdateRequest(UpdateRequest),
     /// The compensation was switched, or refused to be; `None`: nobody answered.
@@ -100,6 +102,8 @@ pub enum Output {
     CycleEnded(CycleOutcome),
     /// What is being done.
     Status(PlanStatus),
+    /// A touch was told again, or after a later one: it does not count.
+    ToldBefore { sequence: u32 },
     /// A program did not run to its end.
     ProgramFailed {
         name: String,
@@ -140,6 +144,7 @@ pub struct Sequencer {
     next_run: u32,
     next_id: u64,
     block_cycles: u32,
+    touches: NewTouches,
 }
 
 impl Sequencer {
@@ -178,6 +183,7 @@ impl Sequencer {
             next_run: 1,
             next_id: 1,
             block_cycles: 0,
+            touches: NewTouches::default(),
         })
     }
 
@@ -517,7 +523,7 @@ impl Stage for Sequencer {
                     self.ended(end.unwrap_or_else(lost), out);
                 }
             }
-            Input::Touch => self.touched(out),
+            Input::Touch(trigger) => self.touched(&trigger, out),
             Input::UpdateRequest(_) => self.update_wanted = true,
             Input::CompensationAnswer { id, answer } => self.switched(id, answer, out),
             Input::Tick => self.tick(out),

@@ -221,8 +221,8 @@ impl Session<'_> {
         for axis in metrology::Axis::LINEAR {
             trigger.latched[axis] += along_mm * trigger.approach[axis.index()];
         }
-        (self.take)(trigger.received_at, Sample::Trigger(trigger));
-        self.ask(ToSequencer::Touch)
+        (self.take)(trigger.received_at, Sample::Trigger(trigger.clone()));
+        self.ask(ToSequencer::Touch(trigger))
     }
 }
 

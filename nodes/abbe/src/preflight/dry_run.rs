@@ -113,8 +113,8 @@ impl Rehearsal {
             Said::Length(sample) => return self.recorded.take(Input::Length(sample)),
             Said::Temperature(sample) => return self.recorded.take(Input::Temperature(sample)),
             Said::Trigger(trigger) => {
-                self.recorded.take(Input::Trigger(trigger));
-                sequencer::Input::Touch
+                self.recorded.take(Input::Trigger(trigger.clone()));
+                sequencer::Input::Touch(trigger)
             }
             Said::Accepted { goal } => sequencer::Input::ProgramAnswer {
                 id: goal,
@@ -171,6 +171,7 @@ impl Rehearsal {
             | Told::CycleRejected { .. }
             | Told::CycleProgress { .. }
             | Told::CycleEnded(_)
+            | Told::ToldBefore { .. }
             | Told::ProgramFailed { .. } => {}
         }
     }

@@ -22,6 +22,8 @@ pub enum Reason {
     NotFinite,
     /// A sample older than one before it.
     WentBack,
+    /// A touch that was told again, or after a later one.
+    ToldBefore,
     /// The recording's clock jumped back by more than two seconds, or ahead by more than a week.
     ClockJump,
     /// A reading between two axis states that lie too far apart.
@@ -61,6 +63,7 @@ impl Reason {
         match self {
             Self::NotFinite => "samples were no numbers",
             Self::WentBack => "samples were older than one before them",
+            Self::ToldBefore => "touches were told before, or a later one before them",
             Self::ClockJump => "times the clock jumped back, or ahead by more than a week",
             Self::InGap => "readings lie in holes of the axis states",
             Self::HoleInMotion => {

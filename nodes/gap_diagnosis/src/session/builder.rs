@@ -6,8 +6,8 @@ use machine::file::AxisEntry;
 use machine::twin::{Run, Session, simulate};
 use machine::{Kinematics, MachineFile};
 use metrology::sample::{
-    AxisCompensation, AxisState, BlockMeasurement, GridSample, LengthSample, ProbeTrigger,
-    TemperatureSample, TestSegment,
+    AxisCompensation, AxisState, BlockMeasurement, GridSample, LengthSample, NewTouches,
+    ProbeTrigger, TemperatureSample, TestSegment,
 };
 use metrology::stamp::{Host, Stamp};
 use metrology::{Axis, AxisSet};
@@ -67,6 +67,7 @@ pub struct SessionBuilder {
     ended: VecDeque<(f64, Record)>,
     /// Whether the last segment was the end of a run of touches: one may come, and be stamped, after it.
     awaits_touches: bool,
+    touches: NewTouches,
     pub(super) runs: Vec<Run>,
     pub(super) closed: usize,
     pub(super) zeros: Vec<Zero>,
@@ -97,6 +98,7 @@ impl SessionBuilder {
             open: None,
             ended: VecDeque::new(),
             awaits_touches: false,
+            touches: NewTouches::default(),
             runs: vec![],
             closed: 0,
             zeros: vec![],
@@ -124,6 +126,7 @@ impl SessionBuilder {
     pub fn next_bag(&mut self) {
         self.end_bag();
         self.recent.clear();
+        self.touches = NewTouches::default();
         self.base = self.greatest;
         if !self.runs.is_empty() {
             let _ = self.first_bag_ends.get_or_insert(self.base[0]);
@@ -314,6 +317,10 @@ impl SessionBuilder {
 
     fn trigger(&mut self, trigger: ProbeTrigger) {
         self.has_commands = true;
+        if !self.touches.is_later(&trigger) {
+            self.account.note(Reason::ToldBefore);
+            return;
+        }
         let positions = self.axes.iter().map(|axis| trigger.latched[axis]);
         if positions
             .chain(trigger.approach.iter().copied())

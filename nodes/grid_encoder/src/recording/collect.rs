@@ -49,6 +49,9 @@ pub struct Collector {
     other_plane: bool,
     n_not_finite: usize,
     n_beyond_limit: usize,
+    /// The newest reading: when it was read, and what.
+    newest: Option<(Stamp<Host>, [f64; 2])>,
+    n_told_before: usize,
 }
 
 impl Collector {
@@ -64,6 +67,8 @@ impl Collector {
             other_plane: false,
             n_not_finite: 0,
             n_beyond_limit: 0,
+            newest: None,
+            n_told_before: 0,
         }
     }
 
@@ -76,9 +81,29 @@ impl Collector {
         } else if !(sample.u_mm.is_finite() && sample.v_mm.is_finite()) {
             self.n_not_finite += 1;
         } else {
-            return true;
+            return self.is_new(sample);
         }
         false
+    }
+
+    /// Whether a reading is neither told again nor older than one before it.
+    fn is_new(&mut self, sample: &GridSample) -> bool {
+        let told = (sample.at, [sample.u_mm, sample.v_mm]);
+        let is_new = self
+            .newest
+            .is_none_or(|newest| told.0 > newest.0 || (told.0 == newest.0 && told != newest));
+        if is_new {
+            self.newest = Some(told);
+        } else {
+            self.n_told_before += 1;
+        }
+        is_new
+    }
+
+    /// Readings that were told again, or after a later one.
+    #[must_use]
+    pub fn n_told_before(&self) -> usize {
+        self.n_told_before
     }
 
     /// Adds a pair; one with a number that is not finite is counted instead.

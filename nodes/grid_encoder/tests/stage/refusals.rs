@@ -223,3 +223,29 @@ fn a_machine_without_a_grid_encoder_or_a_sample_without_an_axis_is_refused() {
         GridEncoderError::NoGridEncoder
     );
 }
+
+#[test]
+fn readings_that_are_told_again_or_out_of_order_count_once_and_are_said() {
+    let recorded = |again: bool| {
+        let mut rig = Rig::new(|u, v| [1e-5 * u, -2e-5 * v]);
+        rig.tells_again = again;
+        for (run, motion) in [
+            (1, Motion::stops(50.0, 24)),
+            (2, Motion::moving(50.0, Sense::Clockwise)),
+        ] {
+            rig.record(run, &motion);
+        }
+        rig
+    };
+    let (once, again) = (recorded(false), recorded(true));
+    assert_eq!(once.models().len(), 2);
+    // What is not known is NaN, which equals nothing.
+    let models = |rig: &Rig| format!("{:?}", rig.models());
+    assert_eq!(models(&once), models(&again));
+    let told_before = |rig: &Rig| {
+        let all = rig.diagnostics().into_iter();
+        all.filter(|told| matches!(told, Diagnostic::ToldBefore { .. }))
+            .count()
+    };
+    assert_eq!((told_before(&once), told_before(&again)), (0, 2));
+}

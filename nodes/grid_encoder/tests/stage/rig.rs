@@ -89,6 +89,8 @@ pub struct Rig {
     pub completed: bool,
     /// Readings for which this holds are changed to that: (time in the run, s) → reading.
     pub spoil: fn(f64, GridSample) -> Option<GridSample>,
+    /// Whether each reading is told twice, and once more after the next one.
+    pub tells_again: bool,
     error_mm: fn(f64, f64) -> [f64; 2],
     rng: Pcg64Mcg,
 }
@@ -115,6 +117,7 @@ impl Rig {
             setup_id: 1,
             completed: true,
             spoil: |_, sample| Some(sample),
+            tells_again: false,
             error_mm,
             rng: Pcg64Mcg::seed_from_u64(3),
         }
@@ -193,6 +196,7 @@ impl Rig {
     pub fn record(&mut self, run: u32, motion: &Motion) {
         self.segment(run, true, motion);
         let begin_ns = self.now_ns;
+        let mut before = None;
         let ticks = (motion.duration_s() * 1e9) as i64 / TICK_NS;
         for tick in 0..ticks {
             let t_s = (tick * TICK_NS) as f64 / 1e9;
@@ -209,6 +213,11 @@ impl Rig {
                 };
                 if let Some(sample) = (self.spoil)(t_s, sample) {
                     self.send(Input::Reading(sample));
+                    if self.tells_again {
+                        let before = before.replace(sample).unwrap_or(sample);
+                        self.send(Input::Reading(sample));
+                        self.send(Input::Reading(before));
+                    }
                 }
             }
         }

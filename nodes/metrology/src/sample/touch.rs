@@ -1,9 +1,11 @@
 //! A touch of the probe, before and after correction, and the latency that corrects it.
 
+use std::cmp::Ordering;
+
 use nalgebra::Vector3;
 
 use crate::axis::{AxisSet, PerAxis};
-use crate::stamp::{Host, Machine, Stamp};
+use crate::stamp::{Host, Machine, Span, Stamp};
 
 /// A touch as the controller reports it, uncorrected.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +26,47 @@ pub struct ProbeTrigger {
     pub latched: PerAxis<f64>,
     /// Counts touches since the controller started.
     pub sequence: u32,
+}
+
+/// Which touches are new, where a topic may tell one twice, late or out of order.
+///
+/// A touch is new when it comes after the last new one by its receipt, by the controller's stamp or by its number, or is
+/// another one of the same instant. A controller that was started anew, or a clock that was set back, takes back one or two
+/// of the three, never all.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NewTouches {
+    last: Option<ProbeTrigger>,
+}
+
+/// Receipts so far in the future are those of a time line that was left: a bag that is played again.
+const AHEAD: Span = Span::from_nanos(1_000_000_000);
+
+impl NewTouches {
+    /// Whether a touch that comes `at` an instant is new; it is the last one then.
+    pub fn is_new(&mut self, at: Stamp<Host>, trigger: &ProbeTrigger) -> bool {
+        let is_left = |last: &ProbeTrigger| last.received_at - at > AHEAD;
+        if self.last.as_ref().is_some_and(is_left) {
+            self.last = None;
+        }
+        self.is_later(trigger)
+    }
+
+    /// The same of touches whose time line is never left.
+    pub fn is_later(&mut self, trigger: &ProbeTrigger) -> bool {
+        let is_new = self.last.as_ref().is_none_or(|last| {
+            let order = [
+                trigger.received_at.cmp(&last.received_at),
+                trigger.controller_at.cmp(&last.controller_at),
+                trigger.sequence.cmp(&last.sequence),
+            ];
+            let at_once = order == [Ordering::Equal; 3] && trigger != last;
+            at_once || order.contains(&Ordering::Greater)
+        });
+        if is_new {
+            self.last = Some(trigger.clone());
+        }
+        is_new
+    }
 }
 
 /// Why a touch was not used.
@@ -128,4 +171,55 @@ pub struct ProbeLatency {
     pub lack_of_fit_p: f64,
     /// Whether the signed estimate was below zero.
     pub negative: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(seconds: i64) -> Stamp<Host> {
+        Stamp::from_nanos(seconds * 1_000_000_000)
+    }
+
+    /// A touch by its receipt and the controller's stamp, s, and its number.
+    fn touch(received: i64, controller: i64, sequence: u32) -> ProbeTrigger {
+        ProbeTrigger {
+            received_at: at(received),
+            controller_at: Stamp::from_nanos(controller * 1_000_000_000),
+            feature_id: "block_1.z".to_owned(),
+            approach: -Vector3::z(),
+            feed_mm_s: 2.0,
+            axes: AxisSet::XYZ,
+            latched: PerAxis::default(),
+            sequence,
+        }
+    }
+
+    #[test]
+    fn a_touch_counts_once_however_often_and_late_it_is_told() {
+        let mut touches = NewTouches::default();
+        let told = [
+            (touch(10, 100, 1), true),
+            (touch(10, 100, 1), false),
+            (touch(20, 110, 2), true),
+            (touch(10, 100, 1), false),
+            (touch(30, 120, 3), true),
+        ];
+        for (touch, is_new) in told {
+            assert_eq!(touches.is_new(at(31), &touch), is_new, "{touch:?}");
+        }
+    }
+
+    #[test]
+    fn a_controller_that_starts_anew_and_clocks_that_are_set_back_are_no_repetition() {
+        let mut touches = NewTouches::default();
+        assert!(touches.is_new(at(10), &touch(10, 100, 7)));
+        assert!(touches.is_new(at(20), &touch(20, 1, 1)), "started anew");
+        assert!(
+            touches.is_new(at(15), &touch(15, 6, 2)),
+            "its host set back"
+        );
+        assert!(touches.is_new(at(3), &touch(3, 1, 1)), "a bag played again");
+        assert!(!touches.is_new(at(3), &touch(3, 1, 1)));
+    }
 }

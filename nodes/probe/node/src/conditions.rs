@@ -13,8 +13,10 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
             (Level::Error, format!("position_not_finite/{axis}"))
         }
         Condition::TriggersLost { .. } => (Level::Error, "triggers_lost".to_owned()),
+        Condition::ToldBefore { .. } => (Level::Warn, "told_before".to_owned()),
         Condition::CorrectedByFeed { .. } => (Level::Warn, "corrected_by_feed".to_owned()),
         Condition::LatencyRefused { .. } => (Level::Error, "latency_refused".to_owned()),
+        Condition::LatencyOlder { .. } => (Level::Warn, "latency_older".to_owned()),
         Condition::FaceMissing { block, axis, .. } => {
             (Level::Error, format!("face_missing/{block}.{axis}"))
         }

@@ -267,3 +267,47 @@ fn broken_contracts_are_refused_and_change_nothing() {
         ProbeError::UncertaintyMissing { latency_ms: 5.0 }
     );
 }
+
+#[test]
+fn a_touch_that_is_told_again_or_after_a_later_one_is_none() {
+    let mut rig = Rig::new(&known_latency());
+    let surface = Vector3::new(0.0, 0.0, 10.0);
+    let touch = |rig: &mut Rig| rig.touch_ball("top.1", surface, -Vector3::z(), 2.0);
+    let first = touch(&mut rig);
+    rig.send(Input::Trigger(first.clone()));
+    touch(&mut rig);
+    rig.send(Input::Trigger(first));
+    touch(&mut rig);
+    rig.settle();
+    let sequences: Vec<u32> = rig.points().iter().map(|point| point.sequence).collect();
+    assert_eq!(sequences, [1, 2, 3]);
+    let told_before = Diagnostic::ToldBefore { sequence: 1 }.to_string();
+    assert_eq!(rig.diagnostics(), [told_before.clone(), told_before]);
+}
+
+#[test]
+fn a_latency_of_before_the_one_in_use_is_refused_unless_the_clock_was_set_back() {
+    let calibrated_at = |seconds: i64, latency_s: f64| {
+        let Input::Latency(mut latency) = calibrated(latency_s, 25e-6) else {
+            panic!("no latency")
+        };
+        latency.at = Stamp::from_nanos(seconds * 1_000_000_000);
+        Input::Latency(latency)
+    };
+    let applied_s = |rig: &mut Rig| {
+        rig.out.clear();
+        rig.touch("top.1", Vector3::new(0.0, 0.0, 10.0), -Vector3::z(), 2.0);
+        rig.only_point().applied_latency_s
+    };
+    let mut rig = Rig::new(&ProbeConfig::default());
+    rig.now_ns = 7_200_000_000_000;
+    rig.send(calibrated_at(7_000, LATENCY_S));
+    rig.send(calibrated_at(3_400, LATENCY_S + 1e-3));
+    let older = Diagnostic::LatencyOlder { by_s: 3_600.0 };
+    assert_eq!(rig.diagnostics(), [older.to_string()]);
+    assert!((applied_s(&mut rig) - LATENCY_S).abs() < 1e-12);
+    // Set back by an hour, in which the latency is calibrated anew.
+    rig.now_ns = 3_700_000_000_000;
+    rig.send(calibrated_at(3_650, LATENCY_S + 1e-4));
+    assert!((applied_s(&mut rig) - LATENCY_S - 1e-4).abs() < 1e-12);
+}

@@ -18,6 +18,8 @@ pub struct Rig {
     now_ns: i64,
     run: u32,
     setup_id: u32,
+    /// Whether each sphere is told twice.
+    tells_again: bool,
     pub out: Vec<Output>,
 }
 
@@ -28,6 +30,7 @@ impl Rig {
             now_ns: 1_000_000_000,
             run: 0,
             setup_id: 1,
+            tells_again: false,
             out: Vec::new(),
         }
     }
@@ -96,7 +99,9 @@ impl Rig {
             let seen = visit("ball", &BALL_MM, wrong, pose, (0.0005, &mut rng));
             let mut feature = self.feature("ball", pose, seen.centre_mm);
             if change(k, &mut feature) {
-                self.send(Input::Feature(feature));
+                for _ in 0..=u32::from(self.tells_again) {
+                    self.send(Input::Feature(feature.clone()));
+                }
             }
         }
         self.segment(kind, false, true, "ball");
@@ -334,4 +339,48 @@ fn another_set_up_begins_anew() {
     rig.test(TestKind::Rotary, &wrong, &poses, |_, _| true);
     assert_eq!(rig.models().len(), 2);
     assert_eq!(rig.models()[1].n_samples, 12);
+}
+
+/// In words: what is not known is NaN, which equals nothing.
+fn models_of(rig: &Rig) -> String {
+    format!("{:?}", rig.models())
+}
+
+#[test]
+fn a_sphere_that_is_told_again_counts_once() {
+    let told = |again: bool| {
+        let mut rig = Rig::new();
+        rig.tells_again = again;
+        rig.test(
+            TestKind::Rotary,
+            &Wrong::drawn(3),
+            &good_poses(12),
+            |_, _| true,
+        );
+        rig
+    };
+    let (once, again) = (told(false), told(true));
+    assert_eq!(models_of(&once), models_of(&again));
+    assert_eq!(once.models().len(), 1);
+    again.expect(&["told_before: run 1: sphere ball"]);
+}
+
+#[test]
+fn a_sphere_of_an_hour_ago_is_none_of_a_run_of_the_same_number() {
+    let told = |stale: bool| {
+        let mut rig = Rig::new();
+        rig.now_ns += 4_000_000_000_000;
+        let (wrong, poses) = (Wrong::drawn(3), good_poses(12));
+        rig.test(TestKind::Rotary, &wrong, &poses, |k, feature| {
+            if stale && k == 11 {
+                feature.at = Stamp::from_nanos(feature.at.nanos() - 3_600_000_000_000);
+                feature.centre_mm.x += 0.1;
+            }
+            stale || k < 11
+        });
+        rig
+    };
+    let (without, stale) = (told(false), told(true));
+    assert_eq!(models_of(&without), models_of(&stale));
+    stale.expect(&["of_another_time: run 1: sphere ball", "3360.0 s before"]);
 }

@@ -125,6 +125,11 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
             Diagnostic::new(Level::Warn, "program_failed", format!("{name}: {message}"))
                 .with("run", run),
         ),
+        Output::ToldBefore { sequence } => {
+            let message =
+                format!("touch {sequence} was told before, or a later one before it; not counted");
+            Some(Diagnostic::new(Level::Warn, "told_before", message))
+        }
         Output::CycleRejected { reason, .. } => Some(Diagnostic::new(
             Level::Warn,
             "cycle_rejected",

@@ -38,7 +38,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     };
     let stage = Sequencer::new(config, machine, plan, programs).context("plan")?;
     Ok(Wiring::new(setup.name(), parameters, stage)
-        .on(&topics::PROBE_TRIGGER, |_| Input::Touch)
+        .on(&topics::PROBE_TRIGGER, Input::Touch)
         .on(&topics::THERMAL_UPDATE_REQUEST, Input::UpdateRequest)
         .every(TICK, || Input::Tick)
         .publish_in(

@@ -1,5 +1,6 @@
 //! How a program's end is judged: also one that ran to its end has failed when touches were lost.
 
+use metrology::sample::ProbeTrigger;
 use metrology::stamp::Span;
 
 use super::{CANCELED, CycleOutcome, Output, ProgramEnd, Sequencer};
@@ -24,7 +25,12 @@ impl Sequencer {
     }
 
     /// A touch has come.
-    pub(super) fn touched(&mut self, out: &mut Vec<Output>) {
+    pub(super) fn touched(&mut self, trigger: &ProbeTrigger, out: &mut Vec<Output>) {
+        if !self.touches.is_new(self.now, trigger) {
+            let sequence = trigger.sequence;
+            out.push(Output::ToldBefore { sequence });
+            return;
+        }
         let Some(job) = &mut self.job else { return };
         job.touches += 1;
         let (touches, planned) = (job.touches, job.task.planned);

@@ -1,5 +1,7 @@
 use super::*;
 use metrology::sample::{CycleKind, TestKind, UpdateReason};
+use metrology::{AxisSet, PerAxis};
+use nalgebra::Vector3;
 
 mod measuring;
 
@@ -47,9 +49,24 @@ fn done() -> Option<ProgramEnd> {
     })
 }
 
+/// A touch by its number.
+fn trigger(sequence: u32) -> ProbeTrigger {
+    ProbeTrigger {
+        received_at: at(f64::from(sequence)),
+        controller_at: Stamp::from_nanos(i64::from(sequence)),
+        feature_id: "block_1.z".to_owned(),
+        approach: -Vector3::z(),
+        feed_mm_s: 2.0,
+        axes: AxisSet::XYZ,
+        latched: PerAxis::default(),
+        sequence,
+    }
+}
+
+/// Touches from number 1 on.
 fn touch(sequencer: &mut Sequencer, seconds_s: f64, touches: u32) {
-    for _ in 0..touches {
-        give(sequencer, seconds_s, Input::Touch);
+    for number in 1..=touches {
+        give(sequencer, seconds_s, Input::Touch(trigger(number)));
     }
 }
 
@@ -253,7 +270,7 @@ fn a_goal_is_run_when_nothing_else_is_and_refused_while_the_plan_runs() {
     let started = give(&mut idle, 0.0, Input::Cycle(goal));
     assert_eq!(started[0], Output::CycleAccepted(9));
     let (program, _) = sent(&started).unwrap();
-    let touched = give(&mut idle, 1.0, Input::Touch);
+    let touched = give(&mut idle, 1.0, Input::Touch(trigger(1)));
     assert_eq!(
         touched,
         [Output::CycleProgress {
@@ -331,7 +348,7 @@ fn touches_count_and_are_awaited_also_when_the_clock_is_set_back() {
     let (mut sequencer, id) = block_touches();
     touch(&mut sequencer, 10.0, 5);
     give(&mut sequencer, 60.0, Input::ProgramEnd { id, end: done() });
-    let judged = give(&mut sequencer, 30.0, Input::Touch);
+    let judged = give(&mut sequencer, 30.0, Input::Touch(trigger(6)));
     assert_eq!(segments(&judged)[0], (TestKind::Block, false, true));
 }
 
@@ -375,7 +392,7 @@ fn a_touch_that_comes_after_the_end_still_counts() {
     let (mut sequencer, id) = block_touches();
     touch(&mut sequencer, 10.0, 5);
     give(&mut sequencer, 60.0, Input::ProgramEnd { id, end: done() });
-    let late = give(&mut sequencer, 60.2, Input::Touch);
+    let late = give(&mut sequencer, 60.2, Input::Touch(trigger(6)));
     assert_eq!(
         segments(&late),
         [
@@ -383,4 +400,92 @@ fn a_touch_that_comes_after_the_end_still_counts() {
             (TestKind::Production, true, false)
         ]
     );
+}
+
+#[test]
+fn a_touch_that_is_told_again_does_not_stand_for_one_that_was_lost() {
+    let (mut sequencer, id) = block_touches();
+    touch(&mut sequencer, 10.0, 5);
+    for number in [5, 2] {
+        let told = give(&mut sequencer, 11.0, Input::Touch(trigger(number)));
+        assert_eq!(told, [Output::ToldBefore { sequence: number }]);
+    }
+    give(&mut sequencer, 60.0, Input::ProgramEnd { id, end: done() });
+    let judged = give(&mut sequencer, 61.0, Input::Tick);
+    assert_eq!(segments(&judged), [(TestKind::Block, false, false)]);
+}
+
+#[test]
+fn numbers_that_are_none_change_nothing() {
+    let mut sequencer = sequencer(vec![produce(10.0)]);
+    give(&mut sequencer, 0.0, Input::Tick);
+    let (id, _) = sent(&give(&mut sequencer, 1.0, Input::Tick)).unwrap();
+    for progress in [f64::NAN, f64::INFINITY, -1.0] {
+        let told = give(&mut sequencer, 2.0, Input::ProgramProgress { id, progress });
+        assert_eq!(told, []);
+    }
+    let mut senseless = trigger(1);
+    (senseless.feed_mm_s, senseless.approach) = (f64::NAN, Vector3::repeat(f64::NAN));
+    assert_eq!(give(&mut sequencer, 3.0, Input::Touch(senseless)), []);
+    let request = UpdateRequest {
+        at: at(3.0),
+        reason: UpdateReason::Period,
+        elapsed_s: f64::NAN,
+    };
+    give(&mut sequencer, 3.0, Input::UpdateRequest(request));
+    let between = give(&mut sequencer, 4.0, Input::ProgramEnd { id, end: done() });
+    let (blocks, _) = sent(&between).unwrap();
+    let status = between.iter().find_map(|output| match output {
+        Output::Status(status) => Some(status.progress),
+        _ => None,
+    });
+    assert!(status.is_some_and(f64::is_finite), "{status:?}");
+    touch(&mut sequencer, 5.0, 7);
+    let id = blocks;
+    let next = give(&mut sequencer, 9.0, Input::ProgramEnd { id, end: done() });
+    assert_eq!(segments(&next)[0], (TestKind::Block, false, true));
+}
+
+#[test]
+fn a_cycle_of_numbers_that_are_none_is_refused_with_the_number() {
+    let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
+    let mut idle = Sequencer::new(Config::default(), machine, None, BTreeMap::new()).unwrap();
+    for feed_mm_min in [f64::NAN, f64::INFINITY, -120.0] {
+        let order = CycleOrder {
+            kind: CycleKind::Latency,
+            features: vec!["block_1.z".to_owned()],
+            feeds_mm_min: vec![120.0, feed_mm_min],
+            points: 0,
+            repeats: 1,
+            cold: false,
+        };
+        let answer = give(&mut idle, 0.0, Input::Cycle(CycleGoal { id: 9, order }));
+        let Output::CycleRejected { id: 9, reason } = &answer[0] else {
+            panic!("{answer:?}");
+        };
+        assert!(reason.contains(&feed_mm_min.to_string()), "{reason}");
+    }
+}
+
+#[test]
+fn plans_of_numbers_that_are_none_are_refused() {
+    let machine = || MachineFile::parse(MACHINE, "machine.yaml").unwrap();
+    for number in [f64::NAN, f64::INFINITY] {
+        let wait = Step::Wait { seconds: number };
+        let latency = Step::Latency {
+            feature: "block_1.z".to_owned(),
+            feeds_mm_min: vec![120.0, number],
+            repeats: 2,
+        };
+        for step in [produce(number), wait, latency] {
+            let plan = Plan {
+                title: String::new(),
+                steps: vec![step],
+            };
+            let programs = BTreeMap::from([("part.ngc".to_owned(), String::new())]);
+            let refused = Sequencer::new(Config::default(), machine(), Some(plan), programs);
+            let refused = refused.err().unwrap().to_string();
+            assert!(refused.contains(&number.to_string()), "{refused}");
+        }
+    }
 }
