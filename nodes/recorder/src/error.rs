@@ -13,6 +13,14 @@ pub enum RecorderError {
         /// The directory.
         path: PathBuf,
     },
+    /// What rosbag2 writes besides MCAP with compressed chunks.
+    #[error("{path}: {what}, which is not read: `ros2 bag convert` makes MCAP of it")]
+    NotRead {
+        /// The file or directory.
+        path: PathBuf,
+        /// What it is.
+        what: &'static str,
+    },
     /// A path has no last part to name the files by.
     #[error("{path} has no name to call a recording by")]
     NoName {

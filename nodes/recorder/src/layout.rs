@@ -211,6 +211,24 @@ pub(crate) fn file_names_of(text: &str) -> Option<Vec<String>> {
     Some(names.iter().filter_map(last_part).collect())
 }
 
+/// How rosbag2 has compressed what it wrote (`file`, `message`), by `metadata.yaml` of any version; none where MCAP's own
+/// chunks are all the compression that there is.
+pub(crate) fn compression_of(text: &str) -> Option<String> {
+    #[derive(Deserialize)]
+    struct Mode {
+        #[serde(default)]
+        compression_mode: String,
+    }
+    #[derive(Deserialize)]
+    struct Root {
+        rosbag2_bagfile_information: Mode,
+    }
+    let root: Root = serde_saphyr::from_str(text).ok()?;
+    let mode = root.rosbag2_bagfile_information.compression_mode;
+    let mode = mode.to_lowercase();
+    (!mode.is_empty() && mode != "none").then_some(mode)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

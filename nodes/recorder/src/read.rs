@@ -9,6 +9,7 @@
 mod bag;
 mod chunk;
 mod file_order;
+mod foreign;
 mod framing;
 mod index;
 mod time_order;

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use mcap::records::{Record, op};
 
 use super::file_order::FileOrder;
+use super::foreign;
 use super::index::{FileIndex, parse};
 use super::time_order::TimeOrder;
 use super::walk::Walker;
@@ -70,7 +71,7 @@ impl Bag {
     /// [`Bag::messages`].
     ///
     /// # Errors
-    /// The path cannot be opened, or the directory holds no `.mcap` file.
+    /// The path cannot be opened, the directory holds no `.mcap` file, or rosbag2 has compressed what is there by itself.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref();
         let failed = |path: &Path, source| RecorderError::Open {
@@ -88,6 +89,7 @@ impl Bag {
                 inside: recording_in(path),
             });
         }
+        foreign::refuse(path, &names)?;
         let mut bag = Self {
             path: path.to_owned(),
             files: Vec::new(),

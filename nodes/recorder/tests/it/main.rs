@@ -7,6 +7,7 @@
 )]
 
 mod damage;
+mod foreign;
 #[cfg(feature = "peers")]
 mod peers;
 mod queue;
