@@ -16,6 +16,7 @@ use replayer::{Difference, Discrepancy, NotInBag, Outcome, Relay, ReplayError};
 use serde_json::json;
 
 use crate::node;
+use crate::tell::tell;
 
 /// Exit code for a bag of which a part was lost and the rest is equal.
 const DONE_WITH_LOSS: u8 = 3;
@@ -52,9 +53,9 @@ impl Check {
         let outcome = of(&self.bag, &self.resume_after)
             .with_context(|| format!("bag {}", self.bag.display()))?;
         if self.json {
-            println!("{:#}", as_json(&self.bag, &outcome));
+            tell!("{:#}", as_json(&self.bag, &outcome));
         } else {
-            println!("{}", page(&self.bag, &outcome));
+            tell!("{}", page(&self.bag, &outcome));
         }
         for loss in &outcome.losses {
             eprintln!("abbe: {loss}");

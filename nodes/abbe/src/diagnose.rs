@@ -12,6 +12,7 @@ use machine::effects::CATALOGUE;
 use sha2::{Digest, Sha256};
 
 use crate::report::{Report, gap};
+use crate::tell::tell;
 
 pub mod bags;
 mod machine_text;
@@ -91,9 +92,9 @@ impl Diagnose {
         let json = serde_json::to_string_pretty(&diagnosed.diagnosis.report)?;
         let on_terminal = self.json.as_deref() == Some(Path::new("-"));
         if on_terminal {
-            println!("{json}");
+            tell!("{json}");
         } else {
-            println!("{}", page.terminal());
+            tell!("{}", page.terminal());
         }
         for (path, contents) in [
             (self.json.as_ref().filter(|_| !on_terminal), &json),

@@ -17,6 +17,7 @@ use metrology::{Axis, AxisSet, PerAxis};
 use recorder::Bag;
 
 use crate::evaluate::Tests;
+use crate::tell::tell;
 use crate::usage::{USAGE, above_zero};
 
 mod found;
@@ -238,7 +239,7 @@ impl Export {
         }
         let selected = select(&measured, &self.wanted(), &self.set_up.control(format));
         for left in &selected.left_out {
-            println!("left out: {}: {}", left.what, left.why);
+            tell!("left out: {}: {}", left.what, left.why);
         }
         if selected.files.is_empty() {
             let bag = self.bag.display();
@@ -293,11 +294,11 @@ impl Export {
         std::fs::create_dir_all(&self.out).with_context(|| self.out.display().to_string())?;
         for file in &selected.files {
             create(&self.out.join(&file.name), &file.text)?;
-            println!("wrote {}", self.out.join(&file.name).display());
+            tell!("wrote {}", self.out.join(&file.name).display());
         }
         let notes = notes(&selected.files);
         create(&self.out.join(NOTES), &notes)?;
-        println!(
+        tell!(
             "wrote {}: read it before loading anything",
             self.out.join(NOTES).display()
         );

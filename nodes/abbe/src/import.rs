@@ -22,6 +22,8 @@ use map::Map;
 use table::Table;
 use writer::Writer;
 
+use crate::tell::tell;
+
 /// Arguments of `abbe import`.
 #[derive(Args)]
 pub struct Import {
@@ -64,7 +66,7 @@ impl Import {
             }
         };
         let messages = writer.finish()?;
-        println!(
+        tell!(
             "{}: {runs} runs, {messages} messages",
             self.output.display()
         );

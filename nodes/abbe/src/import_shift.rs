@@ -13,6 +13,8 @@ use mtconnect_bridge::observation::read_stamp;
 use mtconnect_bridge::shift::{self, ShiftOrder};
 use serde::Deserialize;
 
+use crate::tell::tell;
+
 /// Arguments of `abbe import-shift`.
 #[derive(Args)]
 pub struct ImportShift {
@@ -118,7 +120,7 @@ impl ImportShift {
             let path = self.output.join(format!("shift_{n:02}.ngc"));
             std::fs::write(&path, program).with_context(|| place(&path))?;
         }
-        println!("{}: {} programs", self.output.display(), programs.len());
+        tell!("{}: {} programs", self.output.display(), programs.len());
         Ok(ExitCode::SUCCESS)
     }
 }

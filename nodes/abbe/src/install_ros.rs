@@ -11,6 +11,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
+use crate::tell::tell;
 use crate::{launch, node};
 
 /// Arguments of `abbe install-ros`.
@@ -52,18 +53,18 @@ impl InstallRos {
             copy_folder(scenario, &to)?;
         }
         setup(&prefix)?;
-        println!(
+        tell!(
             "{} nodes and {} scenarios are in {}",
             node::NODES.len(),
             scenarios.len(),
             prefix.display()
         );
-        println!("  . {}/local_setup.sh", prefix.display());
-        println!("  ros2 run abbe probe --ros-args --params-file probe.yaml");
+        tell!("  . {}/local_setup.sh", prefix.display());
+        tell!("  ros2 run abbe probe --ros-args --params-file probe.yaml");
         if let Some(first) = scenarios.first() {
             let file = launch::find(first)?;
             let file = file.file_name().unwrap_or_default();
-            println!("  ros2 launch abbe {}", file.to_string_lossy());
+            tell!("  ros2 launch abbe {}", file.to_string_lossy());
         }
         Ok(ExitCode::SUCCESS)
     }

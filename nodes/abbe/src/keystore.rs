@@ -18,6 +18,8 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Args;
 
+use crate::tell::tell;
+
 #[cfg(feature = "security")]
 mod authority;
 #[cfg(feature = "security")]
@@ -73,7 +75,7 @@ impl Keystore {
         let authority = Authority::open_or_make(&self.folder, &validity)?;
         for enclave in &wanted {
             let folder = authority.enclave(enclave, &validity)?;
-            println!(
+            tell!(
                 "{:32} writes {:3} topics, reads {:3}: {}",
                 enclave.name,
                 enclave.access.publish.len(),
@@ -81,12 +83,12 @@ impl Keystore {
                 folder.display()
             );
         }
-        println!(
+        tell!(
             "Valid until {}. The nodes use it with\n  export ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce ROS_SECURITY_KEYSTORE={}",
             validity.until.format("%Y-%m-%d"),
             std::fs::canonicalize(&self.folder)?.display()
         );
-        println!("and `ros2` besides with ROS_SECURITY_ENCLAVE_OVERRIDE=/operator (or /viewer).");
+        tell!("and `ros2` besides with ROS_SECURITY_ENCLAVE_OVERRIDE=/operator (or /viewer).");
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -3,7 +3,6 @@
     clippy::disallowed_methods,
     reason = "the command line reads files, clocks and the environment for everybody else"
 )]
-#![expect(clippy::print_stdout, reason = "results go to standard output")]
 
 use std::process::ExitCode;
 
@@ -30,6 +29,7 @@ mod report;
 mod report_bag;
 mod run;
 mod scenario;
+mod tell;
 mod trials;
 mod truth;
 mod usage;

@@ -13,6 +13,7 @@ use node_runtime::{Interruption, Setup};
 use replayer::PlaybackConfig;
 use replayer_node::{Desk, Played};
 
+use crate::tell::tell;
 use crate::usage::refused;
 
 /// Arguments of `abbe play`.
@@ -108,7 +109,7 @@ fn ended(desk: &Desk, bag: &str) -> Result<ExitCode> {
     for loss in &played.losses {
         eprintln!("abbe: {loss}");
     }
-    println!("{bag}: {} messages, {} lost", played.messages, played.lost);
+    tell!("{bag}: {} messages, {} lost", played.messages, played.lost);
     Ok(if played.lost == 0 && played.losses.is_empty() {
         ExitCode::SUCCESS
     } else {

@@ -27,6 +27,7 @@ use wanted::Proposal;
 use crate::report::gap::planned;
 use crate::report::section::Section;
 use crate::report::{self, Report};
+use crate::tell::tell;
 use crate::usage::refused;
 
 /// Arguments of `abbe preflight`.
@@ -105,12 +106,12 @@ impl Preflight {
             let mut figures = geometry.figures();
             figures["plan"] = plan.plan.title.clone().into();
             figures["gap"] = page.figures.clone();
-            println!("{}", serde_json::to_string_pretty(&figures)?);
+            tell!("{}", serde_json::to_string_pretty(&figures)?);
         } else {
             for section in geometry.sections() {
-                println!("{}", section.terminal());
+                tell!("{}", section.terminal());
             }
-            println!("{}", page.terminal());
+            tell!("{}", page.terminal());
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -11,6 +11,7 @@ use node_runtime::environment::Environment;
 use node_runtime::{Interruption, Setup};
 use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RingConfig};
 
+use crate::tell::tell;
 use crate::usage::refused;
 
 /// Compression inside the bag's chunks.
@@ -89,7 +90,7 @@ impl Record {
             eprintln!("abbe: {word}");
         }
         let lost = captured.stats.messages_lost + captured.lost_on_network;
-        println!(
+        tell!(
             "{bag}: {} messages, {lost} lost",
             captured.stats.messages_written
         );

@@ -13,6 +13,7 @@ use crate::evaluate::budget::Budget;
 use crate::evaluate::limits::Limits;
 use crate::report::section::Section;
 use crate::report::{self, Report};
+use crate::tell::tell;
 
 /// Arguments of `abbe report`.
 #[derive(Args)]
@@ -53,9 +54,9 @@ impl ReportBag {
         let title = format!("Tests in {}", self.bag.display());
         let report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&report.figures)?);
+            tell!("{}", serde_json::to_string_pretty(&report.figures)?);
         } else {
-            println!("{}", report.terminal());
+            tell!("{}", report.terminal());
         }
         if let Some(out) = &self.out {
             std::fs::create_dir_all(out).with_context(|| format!("folder {}", out.display()))?;

@@ -15,6 +15,7 @@ use crate::report::Report;
 use crate::report::section::Section;
 use crate::report_bag;
 use crate::scenario::{ReportKind, Scenario};
+use crate::tell::tell;
 use crate::usage::refused;
 
 mod bag;
@@ -109,7 +110,7 @@ impl Run {
             _ => live::run(scenario, &bag, self.separate, interruption)?,
         };
         if interruption.is_forced() {
-            println!("Bag:  {}", outcome.kept(&bag));
+            tell!("Bag:  {}", outcome.kept(&bag));
             eprintln!("abbe: the end was forced: no page was written");
             return Ok(ExitCode::FAILURE);
         }
@@ -134,9 +135,9 @@ impl Run {
         let kept = format!("Bag: {}.", outcome.kept(&bag));
         report.body = maud::html! { (report.body) h2 { "Recording" } p { (kept) } };
         report.write(folder)?;
-        println!("{}", report.terminal());
-        println!("Bag:  {}", outcome.kept(&bag));
-        println!("Page: {}", folder.join("report.html").display());
+        tell!("{}", report.terminal());
+        tell!("Bag:  {}", outcome.kept(&bag));
+        tell!("Page: {}", folder.join("report.html").display());
         Ok(outcome.end())
     }
 

@@ -29,6 +29,8 @@ use journal::Journal;
 use series::Series;
 use trial::How;
 
+use crate::tell::tell;
+
 /// Seed of the trials that the diagnosis is developed with; those of `--final` are others.
 const DEVELOPMENT_SEED: u64 = 1;
 
@@ -134,7 +136,7 @@ impl Trials {
     }
 
     fn publish(&self, table: &table::Table) -> Result<()> {
-        println!("{}", table.terminal()?);
+        tell!("{}", table.terminal()?);
         for (path, contents) in [
             (&self.json, table.json()?),
             (&self.html, table.html()?),
