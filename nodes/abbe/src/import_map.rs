@@ -8,6 +8,8 @@ use clap::Args;
 use mtconnect_bridge::document::{self, Answer};
 use mtconnect_bridge::{io, proposal};
 
+use crate::tell::tell;
+
 /// Arguments of `abbe import-map`.
 #[derive(Args)]
 pub struct ImportMap {
@@ -32,7 +34,8 @@ impl ImportMap {
             bail!("{}: no answer to `probe`", self.source);
         };
         let map = proposal::propose(&items);
-        print!("{}", proposal::text_of(&map).context("mapping")?);
+        let text = proposal::text_of(&map).context("mapping")?;
+        tell!("{}", text.trim_end_matches('\n'));
         eprintln!(
             "{}: {} of {} data items have a meaning here; names and units are to be gone over",
             self.source,

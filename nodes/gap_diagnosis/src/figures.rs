@@ -172,6 +172,13 @@ pub enum Note {
         delta: f64,
         lever: String,
     },
+    /// No run makes an effect large enough to be named: its D, the most that it would be, and what it has to be.
+    NoRunRaises {
+        effect: String,
+        d: f64,
+        most_d: f64,
+        wanted_d: f64,
+    },
 }
 
 fn worse_noise(
@@ -290,6 +297,16 @@ impl fmt::Display for Note {
                 delta,
                 lever,
             } => no_run_separates(f, effects, *delta, lever),
+            Self::NoRunRaises {
+                effect,
+                d,
+                most_d,
+                wanted_d,
+            } => write!(
+                f,
+                "no run in the library makes {effect} large enough to be named: D is {d:.1}, would be {most_d:.1} at most, \
+                 and is surely named from {wanted_d:.1}"
+            ),
         }
     }
 }

@@ -157,15 +157,10 @@ fn answers(
         proposed.add(questions, &now, &table[best], &tried[best]);
         open.retain(|q| !now.contains(q));
     }
-    let most = |q: usize| table.iter().map(|row| row[q].added()).fold(0.0, f64::max);
     proposed.notes = open
         .into_iter()
         .filter(|q| questions[*q].is_of_the_best)
-        .map(|q| Note::NoRunSeparates {
-            effects: questions[q].names.clone(),
-            delta: most(q),
-            lever: lever::lever(&questions[q].ids),
-        })
+        .map(|q| questions[q].unanswered(table.iter().map(|row| &row[q])))
         .collect();
     proposed
 }

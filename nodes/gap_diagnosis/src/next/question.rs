@@ -5,8 +5,10 @@ use statrs::distribution::ContinuousCDF;
 
 use super::distance::distance;
 use super::known::Known;
+use super::lever;
 use crate::cause::{Found, Member};
 use crate::confidence::ODDS;
+use crate::figures::Note;
 use crate::report::Status;
 use crate::selection::Set;
 use crate::signature::Library;
@@ -14,6 +16,9 @@ use crate::veto::{LEAST_D as LEAST_NAMED_D, Veto};
 
 /// Squared distance that decides: three standard deviations.
 pub const DECISION: f64 = 9.0;
+/// D from which an effect is surely named: three standard deviations above the least. A form of many columns is held to
+/// more than that least one.
+const SURELY_NAMED_D: f64 = LEAST_NAMED_D + 3.0;
 /// Most questions that an experiment is sought for.
 const MOST_QUESTIONS: usize = 10;
 /// A rival within this of the best set still asks for an experiment where its member fails a check.
@@ -37,7 +42,9 @@ pub struct Question {
     is_noise: bool,
     /// The form of the effect where it is too small besides, and the set that it is sized in.
     pub too_small: Option<(usize, Set)>,
-    /// D of the effect that is not named.
+    /// The effect that is not named.
+    effect: String,
+    /// Its D.
     d: f64,
 }
 
@@ -131,6 +138,7 @@ fn between(found: &Found, member: &Member, ours: &Set, theirs: &Set) -> Option<Q
         resized: None,
         is_noise: false,
         too_small: too_small(found, member),
+        effect: found.instance(member).name(),
         d: member.estimate.d,
     })
 }
@@ -153,6 +161,7 @@ fn resized(found: &Found, member: &Member) -> Question {
         resized: Some(member.form),
         is_noise,
         too_small: too_small(found, member).filter(|_| !is_noise),
+        effect: instance.name(),
         d: member.estimate.d,
     }
 }
@@ -179,8 +188,28 @@ impl Question {
 
     /// What has to be added to D^2 of an effect that is too small.
     fn needed_lift(&self) -> f64 {
-        // A form of many columns is held to more than D_0.
-        ((LEAST_NAMED_D + DECISION.sqrt()).powi(2) - self.d.powi(2)).max(DECISION)
+        (SURELY_NAMED_D.powi(2) - self.d.powi(2)).max(DECISION)
+    }
+
+    /// What is told where none of some experiments decides.
+    pub fn unanswered<'a>(&self, answers: impl Iterator<Item = &'a Answer> + Clone) -> Note {
+        let greatest = |of: &dyn Fn(&Answer) -> f64| answers.clone().map(of).fold(0.0, f64::max);
+        let delta = greatest(&Answer::added);
+        let is_only_small = self.is_noise || (self.too_small.is_some() && delta >= self.needed());
+        if !is_only_small {
+            return Note::NoRunSeparates {
+                effects: self.names.clone(),
+                delta,
+                lever: lever::lever(&self.ids),
+            };
+        }
+        let lift = greatest(&|answer| answer.lift.unwrap_or_else(|| answer.added()));
+        Note::NoRunRaises {
+            effect: self.effect.clone(),
+            d: self.d,
+            most_d: self.d.hypot(lift.max(0.0).sqrt()),
+            wanted_d: SURELY_NAMED_D,
+        }
     }
 
     /// Whether the experiment decides.
@@ -239,6 +268,7 @@ mod tests {
             resized: None,
             is_noise,
             too_small: None,
+            effect: "backlash Z".to_owned(),
             d,
         }
     }
@@ -281,5 +311,23 @@ mod tests {
     fn what_hardly_matters_weighs_by_its_d() {
         assert!((question(1.3, false).weight() - 0.2).abs() < 1e-12);
         assert!((question(84.0, false).weight() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn where_a_run_separates_and_none_raises_enough_that_is_what_is_told() {
+        let small = Question {
+            too_small: Some((0, vec![0])),
+            ..question(6.0, false)
+        };
+        let told = small.unanswered([answer(400.0, Some(13.0)), answer(2.0, Some(0.0))].iter());
+        let wanted = Note::NoRunRaises {
+            effect: "backlash Z".to_owned(),
+            d: 6.0,
+            most_d: 7.0,
+            wanted_d: SURELY_NAMED_D,
+        };
+        assert_eq!(told, wanted);
+        let alike = small.unanswered([answer(2.0, Some(90.0))].iter());
+        assert!(matches!(alike, Note::NoRunSeparates { .. }), "{alike}");
     }
 }

@@ -101,7 +101,7 @@ fn squareness_and_lag_look_alike_in_one_sense_and_the_proposed_run_tells_them_ap
 }
 
 #[test]
-fn where_every_effect_stands_alone_nothing_is_proposed() {
+fn where_every_effect_stands_alone_nothing_is_proposed_and_else_a_run_or_why_there_is_none() {
     let diagnosis = diagnosed(&crate::plant::session(
         1,
         Noise::default(),
@@ -113,7 +113,11 @@ fn where_every_effect_stands_alone_nothing_is_proposed() {
         .causes
         .iter()
         .any(|cause| cause.status != Status::Named);
-    assert_eq!(diagnosis.report.next_experiments.is_empty(), !open);
+    let is_told =
+        |note: &Note| matches!(note, Note::NoRunSeparates { .. } | Note::NoRunRaises { .. });
+    let why_none = diagnosis.notes.iter().any(is_told);
+    let is_proposed = !diagnosis.report.next_experiments.is_empty();
+    assert_eq!(is_proposed || why_none, open, "{}", told(&diagnosis));
     assert!(
         !diagnosis
             .notes
