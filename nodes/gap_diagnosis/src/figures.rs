@@ -223,17 +223,30 @@ fn only_together(
     )
 }
 
-fn no_run_separates(
-    f: &mut fmt::Formatter<'_>,
-    effects: &[String],
-    delta: f64,
-    lever: &str,
-) -> fmt::Result {
-    write!(
-        f,
-        "no run in the library separates {} (squared distance {delta:.1} at most, 9 decides); the lever is {lever}",
-        effects.join(" and ")
-    )
+/// Why nothing is proposed.
+fn no_run(f: &mut fmt::Formatter<'_>, note: &Note) -> fmt::Result {
+    match note {
+        Note::NoRunSeparates {
+            effects,
+            delta,
+            lever,
+        } => write!(
+            f,
+            "no run in the library separates {} (squared distance {delta:.1} at most, 9 decides); the lever is {lever}",
+            effects.join(" and ")
+        ),
+        Note::NoRunRaises {
+            effect,
+            d,
+            most_d,
+            wanted_d,
+        } => write!(
+            f,
+            "no run in the library makes {effect} large enough to be named: D is {d:.1}, would be {most_d:.1} at most, \
+             and is surely named from {wanted_d:.1}"
+        ),
+        _ => Ok(()),
+    }
 }
 
 impl fmt::Display for Note {
@@ -292,21 +305,7 @@ impl fmt::Display for Note {
                 let why: Vec<String> = why.iter().map(Veto::to_string).collect();
                 write!(f, "{effect} is not named: {}", why.join("; "))
             }
-            Self::NoRunSeparates {
-                effects,
-                delta,
-                lever,
-            } => no_run_separates(f, effects, *delta, lever),
-            Self::NoRunRaises {
-                effect,
-                d,
-                most_d,
-                wanted_d,
-            } => write!(
-                f,
-                "no run in the library makes {effect} large enough to be named: D is {d:.1}, would be {most_d:.1} at most, \
-                 and is surely named from {wanted_d:.1}"
-            ),
+            Self::NoRunSeparates { .. } | Self::NoRunRaises { .. } => no_run(f, self),
         }
     }
 }
