@@ -223,30 +223,45 @@ fn only_together(
     )
 }
 
-/// Why nothing is proposed.
-fn no_run(f: &mut fmt::Formatter<'_>, note: &Note) -> fmt::Result {
-    match note {
-        Note::NoRunSeparates {
-            effects,
-            delta,
-            lever,
-        } => write!(
-            f,
-            "no run in the library separates {} (squared distance {delta:.1} at most, 9 decides); the lever is {lever}",
-            effects.join(" and ")
-        ),
-        Note::NoRunRaises {
-            effect,
-            d,
-            most_d,
-            wanted_d,
-        } => write!(
-            f,
-            "no run in the library makes {effect} large enough to be named: D is {d:.1}, would be {most_d:.1} at most, \
-             and is surely named from {wanted_d:.1}"
-        ),
-        _ => Ok(()),
-    }
+fn dropped(f: &mut fmt::Formatter<'_>, channel: &str, readings: usize) -> fmt::Result {
+    write!(
+        f,
+        "{channel}: {readings} readings left out as outliers or no numbers"
+    )
+}
+
+fn not_white(f: &mut fmt::Formatter<'_>, channel: &str, blocks: usize, of: usize) -> fmt::Result {
+    write!(
+        f,
+        "{channel}: what is left is not white in {blocks} of {of} runs"
+    )
+}
+
+/// Why nothing is proposed for effects that look alike.
+fn no_run_separates(
+    f: &mut fmt::Formatter<'_>,
+    effects: &[String],
+    delta: f64,
+    lever: impl fmt::Display,
+) -> fmt::Result {
+    write!(
+        f,
+        "no run in the library separates {} (squared distance {delta:.1} at most, 9 decides); the lever is {lever}",
+        effects.join(" and ")
+    )
+}
+
+/// Why nothing is proposed for an effect that is too small: its D, the most that a run would give, the least that is named.
+fn no_run_raises(
+    f: &mut fmt::Formatter<'_>,
+    effect: &str,
+    [d, most_d, wanted_d]: [f64; 3],
+) -> fmt::Result {
+    write!(
+        f,
+        "no run in the library makes {effect} large enough to be named: D is {d:.1}, would be {most_d:.1} at most, \
+         and is surely named from {wanted_d:.1}"
+    )
 }
 
 impl fmt::Display for Note {
@@ -256,12 +271,7 @@ impl fmt::Display for Note {
                 f,
                 "{channel}: left out, no test was repeated on it; run one of its tests three times"
             ),
-            Self::Dropped { channel, readings } => {
-                write!(
-                    f,
-                    "{channel}: {readings} readings left out as outliers or no numbers"
-                )
-            }
+            Self::Dropped { channel, readings } => dropped(f, channel, *readings),
             Self::NoTemperatures => f.write_str(NO_TEMPERATURES),
             Self::FewerRuns { runs, of } => fewer_runs(f, *runs, *of),
             Self::NotReproduced {
@@ -287,10 +297,7 @@ impl fmt::Display for Note {
                 channel,
                 blocks,
                 of,
-            } => write!(
-                f,
-                "{channel}: what is left is not white in {blocks} of {of} runs"
-            ),
+            } => not_white(f, channel, *blocks, *of),
             Self::OnlyTogether {
                 effect,
                 parameters,
@@ -305,7 +312,17 @@ impl fmt::Display for Note {
                 let why: Vec<String> = why.iter().map(Veto::to_string).collect();
                 write!(f, "{effect} is not named: {}", why.join("; "))
             }
-            Self::NoRunSeparates { .. } | Self::NoRunRaises { .. } => no_run(f, self),
+            Self::NoRunSeparates {
+                effects,
+                delta,
+                lever,
+            } => no_run_separates(f, effects, *delta, lever),
+            Self::NoRunRaises {
+                effect,
+                d,
+                most_d,
+                wanted_d,
+            } => no_run_raises(f, effect, [*d, *most_d, *wanted_d]),
         }
     }
 }
