@@ -22,7 +22,8 @@
 //!   V += n f^2,   v += n (f/2)^2                                                          (4)
 //! ```
 //!
-//! A touch has f for its feature and feed instead. Only that is counted which the test is made of: a circle while the
+//! A touch has f for its feature and feed instead, and where an axis stands all readings are one row: they have one error of
+//! form, however long it stands. Only that is counted which the test is made of: a circle while the
 //! command is on it at its feed, a position once the axis has stood for [`SETTLES_S`]. While an axis runs in, an effect of
 //! the drive may be ten times what it is on the circle, and no evaluation looks there.
 //!
@@ -34,13 +35,9 @@
 //!
 //! A row is the mean of m readings at one place; rows of one direction that are d_ij apart go together by (3), which is
 //! what waves of every direction and of lengths from 80 to 800 mm make on average. Which waves a machine has nobody who
-//! measures it can know. N holds what every
-//! set-up leaves open, once for all of its runs: zeros, the turn of the plate, the place of a touched face. A delay turns
-//! the plate one way in one sense of rotation and the other way in the other, so that its size is seen in both together
-//! and in neither alone. Motor encoders are left out: what they show is seen by the instruments too.
-//!
-//! # Agreement
-//! `eq3_is_the_covariance_of_many_drawn_waves`: 0.02 of 1.
+//! measures it can know. N holds what every set-up leaves open, once for all of its runs: zeros, the turn of the plate,
+//! the place of a touched face. A delay turns the plate one way in one sense of rotation and the other way in the other,
+//! so that its size is seen in both together and in neither alone. Motor encoders are left out: what they show is seen by the instruments too.
 
 use std::collections::BTreeMap;
 
@@ -51,8 +48,11 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::measurement::{Sample, plane_axes};
 use crate::proportion::median;
-use crate::rig::WAVE_MM;
 use crate::scatter::Scatter;
+
+use waves::Waves;
+
+mod waves;
 
 /// Rows that a run's readings are thinned to.
 const ROWS: usize = 120;
@@ -82,6 +82,8 @@ struct Reading {
     /// 0, 1, 2 for X, Y, Z.
     direction: usize,
     place_mm: Vector3<f64>,
+    /// Since when the axes stood; none while they move.
+    stands_since: Option<Stamp<Host>>,
 }
 
 /// What repeats of a test have in common.
@@ -156,6 +158,7 @@ impl Deviations {
                             deviation_mm: read_mm - here_mm[direction],
                             direction,
                             place_mm: here_mm,
+                            stands_since: self.stands_since,
                         },
                     );
                 }
@@ -171,6 +174,7 @@ impl Deviations {
                         deviation_mm: sample.displacement_mm - here_mm[direction],
                         direction,
                         place_mm: here_mm,
+                        stands_since: self.stands_since,
                     },
                 );
             }
@@ -210,6 +214,7 @@ impl Deviations {
             deviation_mm: place_mm.dot(&trigger.approach),
             direction: along.map_or(0, Axis::index),
             place_mm,
+            stands_since: None,
         };
         self.push(&trigger.feature_id, Floats::Zero, true, reading);
     }
@@ -322,20 +327,17 @@ fn gain(
     if rows.signature.is_empty() {
         return None;
     }
-    let variance_mm2 = if with.is_touch {
-        TOUCH_VARIANCE_MM2
-    } else {
-        let memory = (1.0 + scatter.ar) / (1.0 - scatter.ar);
-        (scatter.white_mm.powi(2) * memory + shaking_mm2) / rows.mean_of
-            + INSTRUMENT_MM.powi(2)
-            + repeats * (ROUGH * FORM_MM).powi(2)
-    };
-    let chatter_mm2 = if with.is_touch {
-        0.0
-    } else {
-        chatter_mm2(&rows.signature)
-    };
-    let all_mm2 = variance_mm2 + chatter_mm2;
+    let memory = (1.0 + scatter.ar) / (1.0 - scatter.ar);
+    let reading_mm2 = scatter.white_mm.powi(2) * memory + shaking_mm2;
+    let row_mm2 = INSTRUMENT_MM.powi(2) + repeats * (ROUGH * FORM_MM).powi(2);
+    // Of each row: everything, and what of it is chatter.
+    let variances_mm2 = rows.mean_of.map(|readings| {
+        if with.is_touch {
+            return (TOUCH_VARIANCE_MM2, 0.0);
+        }
+        let chatter_mm2 = rows.chatter_mm2 / readings;
+        (reading_mm2 / readings + row_mm2 + chatter_mm2, chatter_mm2)
+    });
     // (4): the place of a touched face floats, and what is smooth hardly varies over it.
     let form_mm2 = if with.is_touch {
         0.0
@@ -344,8 +346,8 @@ fn gain(
     };
     let smooth_mm2 = scatter.between_runs_mm.powi(2) + form_mm2;
     Some(Gain {
-        products: rows.products(all_mm2, smooth_mm2, waves),
-        of_chatter: rows.signature.len() as f64 * chatter_mm2 / all_mm2,
+        products: rows.products(&variances_mm2.map(|(all, _)| all), smooth_mm2, waves),
+        of_chatter: variances_mm2.iter().map(|(all, of)| of / all).sum(),
     })
 }
 
@@ -374,8 +376,10 @@ struct Rows {
     places_mm: Vec<Vector3<f64>>,
     /// Rows of each direction.
     directions: Vec<std::ops::Range<usize>>,
-    /// Readings that make a row.
-    mean_of: f64,
+    /// Readings of each row.
+    mean_of: DVector<f64>,
+    /// Variance of one reading that its neighbours do not share, mm².
+    chatter_mm2: f64,
 }
 
 impl Rows {
@@ -385,17 +389,19 @@ impl Rows {
             Floats::Zero => both.first().map(|(r, _)| r.direction).into_iter().collect(),
         };
         let per_direction = both.len() / directions.len().max(1);
-        let mean_of = (per_direction / ROWS).max(1);
-        let (mut values, mut places_mm) = (Vec::new(), Vec::new());
-        let mut ranges = Vec::new();
+        let least = (per_direction / ROWS).max(1);
+        let (mut values, mut places_mm, mut mean_of) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut ranges, mut parts) = (Vec::new(), Vec::new());
         for direction in &directions {
             let first = values.len();
             let along = both.iter().filter(|(r, _)| r.direction == *direction);
-            for part in along.collect::<Vec<_>>().chunks(mean_of) {
-                let count = part.len() as f64;
-                values.push(part.iter().map(|(_, value)| value).sum::<f64>() / count);
-                let places = part.iter().map(|(reading, _)| reading.place_mm);
-                places_mm.push(places.sum::<Vector3<f64>>() / count);
+            let along: Vec<(Reading, f64)> = along.copied().collect();
+            parts.extend(along.chunks(least).map(mean));
+            for row in rows_of(&along, least) {
+                let places = row.iter().map(|(reading, _)| reading.place_mm);
+                places_mm.push(places.sum::<Vector3<f64>>() / row.len() as f64);
+                mean_of.push(row.len() as f64);
+                values.push(mean(row));
             }
             ranges.push(first..values.len());
         }
@@ -414,12 +420,18 @@ impl Rows {
             floats: columns,
             places_mm,
             directions: ranges,
-            mean_of: mean_of as f64,
+            mean_of: DVector::from_vec(mean_of),
+            chatter_mm2: chatter_mm2(&DVector::from_vec(parts)) * least as f64,
         }
     }
 
     /// a' C^-1 b of the signature and the floats, with (2).
-    fn products(&self, variance_mm2: f64, smooth_mm2: f64, waves: &Waves) -> DMatrix<f64> {
+    fn products(
+        &self,
+        variances_mm2: &DVector<f64>,
+        smooth_mm2: f64,
+        waves: &Waves,
+    ) -> DMatrix<f64> {
         let mut sides = self.floats.clone().insert_column(0, 0.0);
         sides.set_column(0, &self.signature);
         let count = sides.ncols();
@@ -429,7 +441,7 @@ impl Rows {
             // The factor reads the lower half only.
             let mut covariance = DMatrix::zeros(n, n);
             for j in 0..n {
-                covariance[(j, j)] = variance_mm2 + smooth_mm2;
+                covariance[(j, j)] = variances_mm2[range.start + j] + smooth_mm2;
                 for i in j + 1..n {
                     let (a, b) = (range.start + i, range.start + j);
                     let apart_mm = (self.places_mm[a] - self.places_mm[b]).norm();
@@ -445,57 +457,25 @@ impl Rows {
     }
 }
 
-/// Lengths that (3) is averaged over, evenly in their logarithm.
-const LENGTHS: u32 = 24;
-
-/// (3) at whole multiples of [`Waves::STEP_MM`], and linear between them: within 1e-5 of 1.
-struct Waves {
-    alike: Vec<f64>,
-}
-
-impl Waves {
-    const STEP_MM: f64 = 0.25;
-    /// Longer than any travel's diagonal, in steps.
-    const STEPS: u32 = 8000;
-
-    fn alike(&self, apart_mm: f64) -> f64 {
-        let place = apart_mm / Self::STEP_MM;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a distance of less than two metres"
-        )]
-        let below = place as usize;
-        match self.alike.get(below..below + 2) {
-            Some(&[before, after]) => before + (after - before) * (place - below as f64),
-            _ => alike(apart_mm),
+/// Readings that make a row each: at least so many, and all that an axis gave where it stood.
+fn rows_of(along: &[(Reading, f64)], least: usize) -> Vec<&[(Reading, f64)]> {
+    let since = |k: usize| along[k].0.stands_since;
+    let moves = |k: usize| since(k).is_none() || since(k) != since(k - 1);
+    let (mut rows, mut first) = (Vec::new(), 0);
+    for k in 1..along.len() {
+        if k - first >= least && moves(k) {
+            rows.push(&along[first..k]);
+            first = k;
         }
     }
-}
-
-impl Default for Waves {
-    fn default() -> Self {
-        let at = |step: u32| alike(f64::from(step) * Self::STEP_MM);
-        Self {
-            alike: (0..Self::STEPS).map(at).collect(),
-        }
+    if first < along.len() {
+        rows.push(&along[first..]);
     }
+    rows
 }
 
-/// (3).
-fn alike(apart_mm: f64) -> f64 {
-    let [shortest, longest] = WAVE_MM;
-    let of_length = |k: u32| {
-        let share = (f64::from(k) + 0.5) / f64::from(LENGTHS);
-        let phase =
-            std::f64::consts::TAU * apart_mm / (shortest * (longest / shortest).powf(share));
-        if phase < 1e-6 {
-            1.0
-        } else {
-            phase.sin() / phase
-        }
-    };
-    (0..LENGTHS).map(of_length).sum::<f64>() / f64::from(LENGTHS)
+fn mean(row: &[(Reading, f64)]) -> f64 {
+    row.iter().map(|(_, value)| value).sum::<f64>() / row.len() as f64
 }
 
 #[cfg(test)]
@@ -507,27 +487,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn eq3_is_the_covariance_of_many_drawn_waves() {
-        let mut rng = Pcg64Mcg::seed_from_u64(11);
-        let apart = Vector3::new(30.0, -20.0, 45.0);
-        let count = 200_000;
-        let mut sum = 0.0;
-        for _ in 0..count {
-            let length = WAVE_MM[0] * (WAVE_MM[1] / WAVE_MM[0]).powf(rng.random::<f64>());
-            let direction = Vector3::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
-            sum += (direction.normalize().dot(&apart) * std::f64::consts::TAU / length).cos();
-        }
-        let drawn = sum / f64::from(count);
-        assert!((drawn - alike(apart.norm())).abs() < 0.02, "{drawn}");
-        assert!((alike(0.0) - 1.0).abs() < 1e-12);
-        let waves = Waves::default();
-        for apart_mm in [0.0, 0.1, 33.33, 80.0, 611.7, 1999.9, 2500.0] {
-            let off = waves.alike(apart_mm) - alike(apart_mm);
-            assert!(off.abs() < 1e-5, "{apart_mm}: {off}");
-        }
-    }
-
-    #[test]
     fn eq1_a_float_that_turns_round_between_two_runs_is_no_float() {
         let gain = |runs: &[f64]| {
             let each = runs.iter().map(|run| {
@@ -537,11 +496,13 @@ mod tests {
                         deviation_mm: 0.0,
                         direction: 0,
                         place_mm: Vector3::new(place, 0.0, 0.0),
+                        stands_since: None,
                     };
                     (reading, run * 1e-3)
                 };
                 let both: Vec<_> = (0..40).map(reading).collect();
-                Rows::of(&both, &Floats::Zero).products(1e-8, 0.0, &Waves::default())
+                let rows = Rows::of(&both, &Floats::Zero);
+                rows.products(&rows.mean_of.map(|_| 1e-8), 0.0, &Waves::default())
             });
             let products = each.fold(DMatrix::zeros(3, 3), |sum, part| sum + part);
             let gain = Gain {
@@ -553,6 +514,31 @@ mod tests {
         assert!(gain(&[1.0, 1.0]) < 1e-3);
         let apart = gain(&[1.0, -1.0]);
         assert!((apart / (80.0 * 1e-6 / 1e-8) - 1.0).abs() < 1e-6, "{apart}");
+    }
+
+    #[test]
+    fn an_axis_that_stands_gives_one_row_a_stop_and_one_that_moves_rows_of_some_readings() {
+        let at = |place: f64, stop: Option<u32>| Reading {
+            deviation_mm: 0.0,
+            direction: 0,
+            place_mm: Vector3::new(place, 0.0, 0.0),
+            stands_since: stop.map(|stop| Stamp::from_nanos(i64::from(stop))),
+        };
+        // The last target is come to twice, once from either side.
+        let there = |k: u32| f64::from((k / 27).min(17 - k / 27));
+        let stops: Vec<_> = (0..486)
+            .map(|k| (at(there(k), Some(k / 27)), 1e-3))
+            .collect();
+        let rows = Rows::of(&stops, &Floats::Zero);
+        assert_eq!(rows.signature.len(), 18);
+        assert!(
+            rows.mean_of
+                .iter()
+                .take(17)
+                .all(|readings| *readings == 27.0)
+        );
+        let way: Vec<_> = (0..480).map(|k| (at(f64::from(k), None), 1e-3)).collect();
+        assert_eq!(Rows::of(&way, &Floats::Zero).signature.len(), 120);
     }
 
     #[test]
