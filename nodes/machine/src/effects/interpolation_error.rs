@@ -90,12 +90,21 @@ struct InterpolationError {
 impl InterpolationError {
     /// (1).
     fn read_mm(&self, position_mm: f64) -> f64 {
-        let (sin, cos) = (self.rad_per_mm * position_mm).sin_cos();
+        self.read_at_mm((self.rad_per_mm * position_mm).sin_cos())
+    }
+
+    /// (1) at the sine and cosine of t.
+    fn read_at_mm(&self, (sin, cos): (f64, f64)) -> f64 {
         self.first_mm[0] * sin
             + self.first_mm[1] * cos
             + self.second_mm[0] * 2.0 * sin * cos
             + self.second_mm[1] * (1.0 - 2.0 * sin * sin)
     }
+}
+
+/// Sine and cosine of an angle turned by another one.
+const fn turned_by((sin, cos): (f64, f64), (by_sin, by_cos): (f64, f64)) -> (f64, f64) {
+    (sin * by_cos + cos * by_sin, cos * by_cos - sin * by_sin)
 }
 
 /// A loop whose command is an error that is read.
@@ -159,11 +168,13 @@ impl Effect for InterpolationError {
                 if steps > MOST_STEPS {
                     misled.to(0.0, step_s);
                 } else {
+                    let mut at = (self.rad_per_mm * before_mm).sin_cos();
+                    let turn = (self.rad_per_mm * way_mm / steps).sin_cos();
                     let mut k = 0.0;
                     while k < steps {
                         k += 1.0;
-                        let here_mm = before_mm + way_mm * k / steps;
-                        misled.to(-self.read_mm(here_mm), step_s / steps);
+                        at = turned_by(at, turn);
+                        misled.to(-self.read_at_mm(at), step_s / steps);
                     }
                 }
                 before_mm += way_mm;
