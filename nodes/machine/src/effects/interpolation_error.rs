@@ -36,11 +36,12 @@
 use std::f64::consts::TAU;
 
 use metrology::Axis;
+use nalgebra::Complex;
 
 use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
 use crate::file::{AxisEntry, PositionFeedback};
 use crate::twin::Response;
-use crate::twin::following::{Follower, within};
+use crate::twin::following::{Follower, Wave, within};
 
 /// Entry of the catalogue.
 pub static KIND: Kind = Kind {
@@ -74,11 +75,11 @@ pub static KIND: Kind = Kind {
     },
 };
 
-/// What passes of a signal period in one step of the loop, rad.
+/// What passes of a signal period between two ticks where the command may as well go evenly, rad.
 const STEP_RAD: f64 = 0.4;
 
-/// Steps between two ticks; where there are more, the loop follows nothing.
-const MOST_STEPS: f64 = 480.0;
+/// Above this, thirty periods, the loop follows nothing, rad.
+const MOST_RAD: f64 = 192.0;
 
 struct InterpolationError {
     axis: Axis,
@@ -90,21 +91,25 @@ struct InterpolationError {
 impl InterpolationError {
     /// (1).
     fn read_mm(&self, position_mm: f64) -> f64 {
-        self.read_at_mm((self.rad_per_mm * position_mm).sin_cos())
-    }
-
-    /// (1) at the sine and cosine of t.
-    fn read_at_mm(&self, (sin, cos): (f64, f64)) -> f64 {
+        let (sin, cos) = (self.rad_per_mm * position_mm).sin_cos();
         self.first_mm[0] * sin
             + self.first_mm[1] * cos
             + self.second_mm[0] * 2.0 * sin * cos
             + self.second_mm[1] * (1.0 - 2.0 * sin * sin)
     }
-}
 
-/// Sine and cosine of an angle turned by another one.
-const fn turned_by((sin, cos): (f64, f64), (by_sin, by_cos): (f64, f64)) -> (f64, f64) {
-    (sin * by_cos + cos * by_sin, cos * by_cos - sin * by_sin)
+    /// -E from a position on, the phase t going on by so many rad/s.
+    fn waves(&self, from_mm: f64, per_s: f64) -> [Wave; 2] {
+        let phase = Complex::cis(self.rad_per_mm * from_mm);
+        let wave = |[of_sin, of_cos]: [f64; 2], at: Complex<f64>, per_s| Wave {
+            at: at * Complex::new(-of_cos, of_sin),
+            per_s,
+        };
+        [
+            wave(self.first_mm, phase, per_s),
+            wave(self.second_mm, phase * phase, 2.0 * per_s),
+        ]
+    }
 }
 
 /// A loop whose command is an error that is read.
@@ -118,6 +123,18 @@ impl Misled {
     fn to(&mut self, command_mm: f64, step_s: f64) {
         let velocity = (command_mm - self.command_mm) / step_s;
         self.follower.advance(velocity, 0.0, step_s);
+        self.command_mm = command_mm;
+    }
+
+    /// The command goes to another place on waves; those of no size are none.
+    fn by_waves(&mut self, waves: &[Wave; 2], command_mm: f64, step_s: f64) {
+        let has_size = |wave: &Wave| wave.at.norm_sqr() > 0.0;
+        let of_size = match waves.each_ref().map(has_size) {
+            [true, true] => &waves[..],
+            [true, false] => &waves[..1],
+            [false, _] => &waves[1..],
+        };
+        self.follower.advance_by_waves(of_size, step_s);
         self.command_mm = command_mm;
     }
 
@@ -162,20 +179,16 @@ impl Effect for InterpolationError {
                 let (begin, change) = within(motion, axis, tick, step_s);
                 nominal.advance(begin, change, step_s);
                 let way_mm = position + nominal.error() - before_mm;
-                let turned = (way_mm * self.rad_per_mm / STEP_RAD).abs().ceil();
+                let turned_rad = (way_mm * self.rad_per_mm).abs();
+                let to_mm = -self.read_mm(before_mm + way_mm);
                 // An ideal velocity loop follows its encoder at any speed.
-                let steps = if is_rigid { 1.0 } else { turned.max(1.0) };
-                if steps > MOST_STEPS {
+                if is_rigid || turned_rad <= STEP_RAD {
+                    misled.to(to_mm, step_s);
+                } else if turned_rad > MOST_RAD {
                     misled.to(0.0, step_s);
                 } else {
-                    let mut at = (self.rad_per_mm * before_mm).sin_cos();
-                    let turn = (self.rad_per_mm * way_mm / steps).sin_cos();
-                    let mut k = 0.0;
-                    while k < steps {
-                        k += 1.0;
-                        at = turned_by(at, turn);
-                        misled.to(-self.read_at_mm(at), step_s / steps);
-                    }
+                    let per_s = way_mm * self.rad_per_mm / step_s;
+                    misled.by_waves(&self.waves(before_mm, per_s), to_mm, step_s);
                 }
                 before_mm += way_mm;
             }

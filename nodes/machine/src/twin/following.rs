@@ -58,6 +58,10 @@ use super::response::Response;
 use crate::effects::{Effect, Scene};
 use crate::file::{AxisEntry, VelocityLoopEntry};
 
+pub(crate) use waves::Wave;
+
+mod waves;
+
 /// The nominal following errors of all axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Following;
@@ -135,6 +139,8 @@ pub(crate) struct Follower {
     gains: Gains,
     /// Rates of change of the state around a velocity loop.
     rate: Option<SMatrix<f64, STATES, STATES>>,
+    /// The velocity loop; none where it is ideal.
+    inner: Option<waves::Inner>,
     period_s: f64,
     /// Share of an error that a period leaves, around an ideal velocity loop.
     kept: f64,
@@ -166,6 +172,7 @@ impl Follower {
     fn of(gains: Gains, velocity_loop: Option<&VelocityLoopEntry>, state: Driven) -> Self {
         Self {
             rate: velocity_loop.map(|velocity_loop| gains.rate(velocity_loop)),
+            inner: velocity_loop.map(waves::Inner::of),
             period_s: 0.0,
             kept: 1.0,
             passed: SMatrix::identity(),
