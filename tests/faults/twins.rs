@@ -202,10 +202,11 @@ impl Twins {
         assert_eq!(good.len(), n, "{topic}");
     }
 
-    /// The second one has said a condition; the first one has not.
+    /// The second one has said a condition; the first one, which told its conditions since, has not.
     pub fn only_bad_says(&self, node: &str, condition: &str, words: &[&str], since: Instant) {
         let [good, bad] = TWINS.map(|namespace| format!("{namespace}/{node}"));
         self.graph.condition(&bad, condition, words, since);
+        self.graph.alive(&good, Instant::now());
         let said = self.graph.hears_condition(&good, condition, words, since);
         assert!(said.is_none(), "{said:?}");
     }

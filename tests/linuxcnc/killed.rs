@@ -27,6 +27,8 @@ const RATE_MM_S: f64 = 0.02;
 const LOOK_S: f64 = 0.1;
 /// The heartbeat is missed after 2 s.
 const MISSED: Duration = Duration::from_secs(2);
+/// How long before the kill the last heartbeat may have been.
+const SLACK: Duration = Duration::from_millis(500);
 const NONE_MM: f64 = 0.5e-3;
 /// LinuxCNC, a bridge and its positions.
 const START: Duration = Duration::from_secs(90);
@@ -155,7 +157,11 @@ fn fades(controller: &Controller, killed: Instant) {
         took.as_secs_f64()
     );
     let fading = Duration::from_secs_f64(OFFSET_MM / RATE_MM_S);
-    assert!(took > fading, "{took:?}");
+    let held = MISSED.checked_sub(SLACK).unwrap();
+    assert!(
+        took > held + fading,
+        "{took:?}: it stays while the heartbeat may come"
+    );
     assert!(
         took < MISSED + 2 * fading + Duration::from_secs(2),
         "{took:?}"

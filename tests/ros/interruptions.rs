@@ -1,5 +1,6 @@
 //! Runs and recordings that are called off, and a run that is killed over its nodes.
 
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use abbe_msgs::topics;
@@ -16,13 +17,18 @@ const FIRST_POINT: Duration = Duration::from_secs(60);
 const END: Duration = Duration::from_secs(30);
 
 fn started(scenario: &Scenario, domain: u16, more: &[&str]) -> (Graph, Process) {
+    heard(scenario, domain, more, Stdio::piped())
+}
+
+/// The same, its standard error somewhere else.
+fn heard(scenario: &Scenario, domain: u16, more: &[&str], stderr: Stdio) -> (Graph, Process) {
     let graph = Graph::join(domain);
     let mut command = command(domain, &["run"]);
     command
         .arg(scenario.folder())
         .arg("--runs")
         .arg(scenario.out());
-    command.args(more);
+    command.args(more).stderr(stderr);
     let began = Instant::now();
     let run = Process::start(command);
     graph.wait_longer(FIRST_POINT, "a probed point", |graph| {
@@ -47,17 +53,26 @@ fn whole(bag: &Bag) -> Vec<(String, u64)> {
     counts.into_iter().collect()
 }
 
+/// A pipe whose reader has left, as `tee` does at the Ctrl-C that ends the run.
+fn left() -> Stdio {
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    writer.into()
+}
+
 #[test]
 fn an_interrupted_run_closes_its_bag_and_writes_its_page() {
-    for more in [&[][..], &["--separate"]] {
+    for (more, is_heard) in [(&[][..], true), (&["--separate"], true), (&[], false)] {
         let scenario = Scenario::copy_of("short_cell");
-        let (graph, run) = started(&scenario, domain(9), more);
+        let stderr = if is_heard { Stdio::piped() } else { left() };
+        let (graph, run) = heard(&scenario, domain(9), more, stderr);
         let asked = Instant::now();
         run.signal(Signal::SIGINT);
         let ended = run.ended_within(END);
         eprintln!("{more:?}: SIGINT to exit: {:?}", asked.elapsed());
         assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
-        assert!(ended.said.contains("it was interrupted"), "{}", ended.said);
+        let is_told = ended.said.contains("it was interrupted");
+        assert_eq!(is_told, is_heard, "{}", ended.said);
         let folder = scenario.new_run(&[]);
         assert!(folder.join("report.html").is_file());
         let bag = Bag::open(folder.join("bag")).unwrap();

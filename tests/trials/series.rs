@@ -76,6 +76,42 @@ fn a_series_goes_on_behind_its_last_line_and_repeats_itself() {
     assert_eq!(timeless(&again[0]), timeless(&first[0]));
 }
 
+#[test]
+fn a_series_whose_d_was_of_another_measure_is_neither_gone_on_with_nor_tabulated_beside_it() {
+    let folder = folder();
+    let arguments = ["--arm", "iv", "--seed", "78", "--in-process", "--n", "1"];
+    run(folder.path(), &arguments);
+    let path = folder.path().join("out/journal.jsonl");
+    let own = std::fs::read_to_string(&path).unwrap();
+    // As a journal of before: without the word.
+    let before = own.replace(r#","measure":2"#, "");
+    assert_ne!(before, own);
+    std::fs::write(&path, &before).unwrap();
+    for more in [&["--n", "2"][..], &["--tabulate"]] {
+        let arguments = [&arguments[..5], more].concat();
+        std::fs::write(
+            &path,
+            if more.len() > 1 {
+                before.clone()
+            } else {
+                before.clone() + &own
+            },
+        )
+        .unwrap();
+        let ended = Process::start(series(folder.path(), &arguments))
+            .ended_within(Duration::from_secs(300));
+        assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+        assert!(
+            ended.said.contains("of the measures 1 and 2"),
+            "{}",
+            ended.said
+        );
+    }
+    std::fs::write(&path, &before).unwrap();
+    let (table, _) = run(folder.path(), &[&arguments[..], &["--tabulate"]].concat());
+    assert_eq!(table["trials"], 1);
+}
+
 /// Lines of a journal that is still written: whole ones alone.
 fn lines(folder: &Path) -> usize {
     let text = std::fs::read_to_string(folder.join("out/journal.jsonl")).unwrap_or_default();

@@ -10,6 +10,7 @@ use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use metrology::stamp::NANOS_PER_S;
 use node_runtime::arguments::Arguments;
+use node_runtime::complain;
 use node_runtime::{Node, Setup};
 use recorder::{Bag, RecordedRun, RunNode, verify_attachments};
 use replayer::{Difference, Discrepancy, NotInBag, Outcome, Relay, ReplayError};
@@ -58,7 +59,7 @@ impl Check {
             tell!("{}", page(&self.bag, &outcome));
         }
         for loss in &outcome.losses {
-            eprintln!("abbe: {loss}");
+            complain!("abbe: {loss}");
         }
         Ok(match (outcome.is_equal(), outcome.losses.is_empty()) {
             (false, _) => ExitCode::FAILURE,

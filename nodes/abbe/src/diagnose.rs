@@ -1,5 +1,7 @@
 //! `abbe diagnose BAG...`: where simulator and machine differ, which effect causes it, how far it shrinks.
 
+use node_runtime::complain;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -108,13 +110,13 @@ impl Diagnose {
             let new = machine_text::with_effects(&text, &name, &diagnosed.diagnosis.effects)?;
             std::fs::write(path, new).with_context(|| format!("{}", path.display()))?;
             let added = diagnosed.diagnosis.effects.len();
-            eprintln!(
+            complain!(
                 "abbe: {}: the machine file with {added} effects added",
                 path.display()
             );
         }
         for remark in diagnosed.losses.iter().chain(&diagnosed.remarks) {
-            eprintln!("abbe: {remark}");
+            complain!("abbe: {remark}");
         }
         Ok(if diagnosed.losses.is_empty() {
             ExitCode::SUCCESS

@@ -1,5 +1,7 @@
 //! `abbe export BAG --format CONTROL`: what a bag knew last of a machine's errors, as tables for a control.
 
+use node_runtime::complain;
+
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -225,7 +227,7 @@ impl Export {
     /// The bag cannot be read, or a file cannot be written.
     pub fn execute(self) -> Result<ExitCode> {
         let Some(format) = self.format else {
-            eprintln!("abbe: --format is missing; the formats are:\n{}", formats());
+            complain!("abbe: --format is missing; the formats are:\n{}", formats());
             return Ok(ExitCode::from(USAGE));
         };
         let Found {
@@ -243,18 +245,18 @@ impl Export {
         }
         if selected.files.is_empty() {
             let bag = self.bag.display();
-            eprintln!("abbe: {bag}: nothing to export; looked for");
+            complain!("abbe: {bag}: nothing to export; looked for");
             for line in looked_for(&measured, topics, self.axes()) {
-                eprintln!("  {line}");
+                complain!("  {line}");
             }
             for loss in &losses {
-                eprintln!("abbe: what was looked for may have been in what was lost: {loss}");
+                complain!("abbe: what was looked for may have been in what was lost: {loss}");
             }
             return Ok(ExitCode::FAILURE);
         }
         self.write(&selected)?;
         for loss in &losses {
-            eprintln!("abbe: the bag has lost something, a later table may be missing: {loss}");
+            complain!("abbe: the bag has lost something, a later table may be missing: {loss}");
         }
         Ok(if losses.is_empty() {
             ExitCode::SUCCESS

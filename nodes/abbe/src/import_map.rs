@@ -1,5 +1,7 @@
 //! `abbe import-map SOURCE`: what an MTConnect agent has, as a mapping for `mtconnect_bridge` to go over by hand.
 
+use node_runtime::complain;
+
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -36,7 +38,7 @@ impl ImportMap {
         let map = proposal::propose(&items);
         let text = proposal::text_of(&map).context("mapping")?;
         tell!("{}", text.trim_end_matches('\n'));
-        eprintln!(
+        complain!(
             "{}: {} of {} data items have a meaning here; names and units are to be gone over",
             self.source,
             map.values.len(),

@@ -1,4 +1,5 @@
 //! The command line of Abbe: one verb a file.
+#![cfg_attr(not(test), warn(clippy::print_stderr))]
 #![expect(
     clippy::disallowed_methods,
     reason = "the command line reads files, clocks and the environment for everybody else"
@@ -7,6 +8,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use node_runtime::complain;
 use node_runtime::complaint;
 
 mod check;
@@ -104,6 +106,6 @@ fn failed(error: &anyhow::Error) -> ExitCode {
         let _ = refusal.print();
         return ExitCode::from(usage::USAGE);
     }
-    eprintln!("abbe: {}", complaint::in_words(error));
+    complain!("abbe: {}", complaint::in_words(error));
     ExitCode::FAILURE
 }

@@ -8,6 +8,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use node_runtime::arguments::Arguments;
+use node_runtime::complain;
 use node_runtime::environment::Environment;
 use node_runtime::{Interruption, Setup};
 use replayer::PlaybackConfig;
@@ -86,7 +87,7 @@ impl Play {
         let setup = Setup::new(NAME, &rules)?;
         let (node, desk) = replayer_node::play(&setup, &config)?;
         let mut running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
-        eprintln!("Playing {bag}; Ctrl-C ends it.");
+        complain!("Playing {bag}; Ctrl-C ends it.");
         let mut shown = Shown::new();
         while desk.progress().over.is_none() && !interruption.wait(LOOK) {
             if let Some(error) = running.ended() {
@@ -107,7 +108,7 @@ fn ended(desk: &Desk, bag: &str) -> Result<ExitCode> {
         None => bail!("{bag}: the player has left without a word"),
     };
     for loss in &played.losses {
-        eprintln!("abbe: {loss}");
+        complain!("abbe: {loss}");
     }
     tell!("{bag}: {} messages, {} lost", played.messages, played.lost);
     Ok(if played.lost == 0 && played.losses.is_empty() {

@@ -1,5 +1,7 @@
 //! The live display of a run: a bar on a terminal, a line per step elsewhere.
 
+use node_runtime::complain;
+
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
@@ -34,7 +36,7 @@ impl Progress {
             bar
         });
         if bar.is_none() {
-            eprintln!("{title}");
+            complain!("{title}");
         }
         Self {
             bar,
@@ -85,7 +87,7 @@ impl Progress {
             } else {
                 String::new()
             };
-            eprintln!("{line}{numbers}");
+            complain!("{line}{numbers}");
         }
         self.said = evidence.begun.len();
     }

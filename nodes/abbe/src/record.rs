@@ -7,6 +7,7 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use node_runtime::arguments::Arguments;
+use node_runtime::complain;
 use node_runtime::environment::Environment;
 use node_runtime::{Interruption, Setup};
 use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RingConfig};
@@ -83,11 +84,11 @@ impl Record {
         }
         let capture = recorder_node::record(&config, machine, NAME)?;
         let bag = &config.bag;
-        eprintln!("Recording into {bag}; Ctrl-C ends it.");
+        complain!("Recording into {bag}; Ctrl-C ends it.");
         while !interruption.wait(A_WHILE) {}
         let captured = capture.finish()?;
         for word in &captured.unrecorded {
-            eprintln!("abbe: {word}");
+            complain!("abbe: {word}");
         }
         let lost = captured.stats.messages_lost + captured.lost_on_network;
         tell!(
@@ -149,7 +150,7 @@ fn keep(
     let node = recorder_node::listen(&setup, config, machine)?;
     let running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
     let words = "ros2 service call /recorder/save std_srvs/srv/Trigger";
-    eprintln!(
+    complain!(
         "Keeping what is said; `{words}` saves it below {}; Ctrl-C ends it.",
         config.bag
     );

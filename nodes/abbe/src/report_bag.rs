@@ -1,5 +1,7 @@
 //! `abbe report BAG`: the tests of a bag, evaluated.
 
+use node_runtime::complain;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -45,11 +47,11 @@ impl ReportBag {
     pub fn execute(self) -> Result<ExitCode> {
         let budget = self.budget.as_deref().map(read_budget).transpose()?;
         let limits = self.limits.as_deref().map(read_limits).transpose()?;
-        eprintln!("Evaluating the tests of {}", self.bag.display());
+        complain!("Evaluating the tests of {}", self.bag.display());
         let bag = Bag::open(&self.bag)?;
         let tests = Tests::of(&bag).with_context(|| format!("bag {}", self.bag.display()))?;
         for loss in &tests.losses {
-            eprintln!("abbe: {loss}");
+            complain!("abbe: {loss}");
         }
         let title = format!("Tests in {}", self.bag.display());
         let report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use node_runtime::Interruption;
+use node_runtime::complain;
 use recorder::Bag;
 
 use crate::diagnose;
@@ -111,13 +112,13 @@ impl Run {
         };
         if interruption.is_forced() {
             tell!("Bag:  {}", outcome.kept(&bag));
-            eprintln!("abbe: the end was forced: no page was written");
+            complain!("abbe: the end was forced: no page was written");
             return Ok(ExitCode::FAILURE);
         }
         let title = format!("{}: {}", scenario.name, scenario.file.title);
         let mut report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
         if scenario.file.report == ReportKind::Tests && outcome.recorded > 0 {
-            eprintln!("Evaluating the tests of {}", bag.display());
+            complain!("Evaluating the tests of {}", bag.display());
             let tests = Tests::of(&Bag::open(&bag)?)?;
             report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
         }
@@ -172,15 +173,15 @@ impl Outcome {
     fn end(self) -> ExitCode {
         let shortcomings = shortcomings::of(&self.evidence, self.lost);
         if !shortcomings.is_empty() {
-            eprintln!("abbe: what did not go as told:");
+            complain!("abbe: what did not go as told:");
         }
         for line in &shortcomings {
-            eprintln!("abbe:   {line}");
+            complain!("abbe:   {line}");
         }
         match self.failure {
             None => ExitCode::SUCCESS,
             Some(reason) => {
-                eprintln!("abbe: the plan failed: {reason}");
+                complain!("abbe: the plan failed: {reason}");
                 ExitCode::FAILURE
             }
         }

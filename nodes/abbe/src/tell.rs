@@ -3,6 +3,8 @@
 //! Whoever reads them may leave before the end (`abbe report BAG | head`): what is left is then not wanted, which is no
 //! failure. Any other failure to write is one, and ends the program with 1: a page that is half told is none.
 
+use node_runtime::complain;
+
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write};
 
@@ -17,7 +19,7 @@ pub(crate) use tell;
 /// Writes a line to standard output.
 pub(crate) fn line(text: Arguments<'_>) {
     if let Err(error) = to(&mut std::io::stdout().lock(), text) {
-        eprintln!("abbe: standard output: {error}");
+        complain!("abbe: standard output: {error}");
         std::process::exit(1);
     }
 }

@@ -9,10 +9,11 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use gap_diagnosis::Rule;
 use sha2::{Digest, Sha256};
+use trials::truth::MEASURE;
 use trials::{Arm, Verdict};
 
 mod blind;
@@ -107,6 +108,9 @@ impl Trials {
         std::fs::create_dir_all(&self.out).with_context(|| format!("{}", self.out.display()))?;
         let mut journal = Journal::open(&self.out.join("journal.jsonl"))?;
         let arms: BTreeSet<Arm> = self.arm.iter().copied().collect();
+        let made_now = (!self.tabulate).then_some(MEASURE);
+        one_measure(journal.verdicts(), seed, made_now)
+            .with_context(|| format!("{}", self.out.join("journal.jsonl").display()))?;
         if !self.tabulate {
             let how = How {
                 in_process: self.in_process,
@@ -148,6 +152,23 @@ impl Trials {
         }
         Ok(())
     }
+}
+
+/// Refuses trials of one series whose D are of different measures, `made_now` among them.
+fn one_measure(verdicts: &[Verdict], seed: u64, made_now: Option<u32>) -> Result<()> {
+    let own = verdicts.iter().map(|verdict| &verdict.truth);
+    let own = own.filter(|truth| truth.seed == seed);
+    let known = own.map(|truth| truth.measure).chain(made_now);
+    let measures: BTreeSet<u32> = known.collect();
+    if measures.len() > 1 {
+        let all: Vec<String> = measures.iter().map(u32::to_string).collect();
+        bail!(
+            "seed {seed}: D of its trials are of the measures {}, which one table cannot have; {}",
+            all.join(" and "),
+            "go on with the program that began the series, or begin another (--out, --seed)"
+        );
+    }
+    Ok(())
 }
 
 /// A seed that follows from a commit and from nothing else.

@@ -48,6 +48,8 @@ pub struct Found {
     pub forms: Vec<usize>,
     /// The best set, places among the forms.
     pub set: Set,
+    /// Rows less floats of what was fitted.
+    pub freedom: f64,
 }
 
 /// One effect of the best set.
@@ -144,6 +146,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
         leftover: best.leftover,
         forms,
         set: best.set,
+        freedom: stack.freedom(),
     }
 }
 

@@ -8,7 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::veto::Veto;
 
+mod no_run;
 pub(crate) mod over_session;
+
+pub use no_run::NoRun;
 
 /// Everything that is drawn.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -166,19 +169,8 @@ pub enum Note {
     },
     /// Something looks like an effect and is not named, for these reasons.
     OnlyLooksLike { effect: String, why: Vec<Veto> },
-    /// No run that can be proposed tells these apart.
-    NoRunSeparates {
-        effects: Vec<String>,
-        delta: f64,
-        lever: String,
-    },
-    /// No run makes an effect large enough to be named: its D, the most that it would be, and what it has to be.
-    NoRunRaises {
-        effect: String,
-        d: f64,
-        most_d: f64,
-        wanted_d: f64,
-    },
+    /// Of what is left open nothing is proposed.
+    NoRun(NoRun),
 }
 
 fn worse_noise(
@@ -237,33 +229,6 @@ fn not_white(f: &mut fmt::Formatter<'_>, channel: &str, blocks: usize, of: usize
     )
 }
 
-/// Why nothing is proposed for effects that look alike.
-fn no_run_separates(
-    f: &mut fmt::Formatter<'_>,
-    effects: &[String],
-    delta: f64,
-    lever: impl fmt::Display,
-) -> fmt::Result {
-    write!(
-        f,
-        "no run in the library separates {} (squared distance {delta:.1} at most, 9 decides); the lever is {lever}",
-        effects.join(" and ")
-    )
-}
-
-/// Why nothing is proposed for an effect that is too small: its D, the most that a run would give, the least that is named.
-fn no_run_raises(
-    f: &mut fmt::Formatter<'_>,
-    effect: &str,
-    [d, most_d, wanted_d]: [f64; 3],
-) -> fmt::Result {
-    write!(
-        f,
-        "no run in the library makes {effect} large enough to be named: D is {d:.1}, would be {most_d:.1} at most, \
-         and is surely named from {wanted_d:.1}"
-    )
-}
-
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -312,17 +277,7 @@ impl fmt::Display for Note {
                 let why: Vec<String> = why.iter().map(Veto::to_string).collect();
                 write!(f, "{effect} is not named: {}", why.join("; "))
             }
-            Self::NoRunSeparates {
-                effects,
-                delta,
-                lever,
-            } => no_run_separates(f, effects, *delta, lever),
-            Self::NoRunRaises {
-                effect,
-                d,
-                most_d,
-                wanted_d,
-            } => no_run_raises(f, effect, [*d, *most_d, *wanted_d]),
+            Self::NoRun(none) => none.fmt(f),
         }
     }
 }

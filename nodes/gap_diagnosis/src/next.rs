@@ -15,13 +15,14 @@
 //! taken out, and so on: a distance beyond a decision is worth no more minutes. For an effect that fails a check
 //! without a rival, the other explanation is the same signature with a size of its own in the experiment: a cause
 //! has one size everywhere. For one that is only too small to be told from noise it is noise, Delta is what the experiment
-//! adds to D^2, and it decides where D then is three standard deviations above the least D_0 that is named; its chance
-//! in (2) is Phi(D - D_0). What has rivals and is too small besides is not named by losing its rivals: an experiment
+//! adds to D^2, and it decides where D then is three standard deviations above the least D_0 at which a form of so many
+//! columns is named; its chance in (2) is Phi(D - D_0). What has rivals and is too small besides is not named by losing its rivals: an experiment
 //! decides of it where it does both, and its chance is the product. w is D of the effect over D_0, at most 1: what hardly
 //! matters is asked last.
 //!
 //! # Holds when
-//! The experiment's noise is the session's, and the simulator is off in form there as in the session; an instrument that
+//! The experiment's noise is the session's, and the simulator is off in form there by as much as in the session, but otherwise:
+//! of a condition that the session has, which shares its error of form, more is expected than a repeat brings. An instrument that
 //! the session lacks is taken to be as noisy as the noisiest that it has. Thermometers stay at their last reading.
 
 mod distance;
@@ -160,7 +161,11 @@ fn answers(
     proposed.notes = open
         .into_iter()
         .filter(|q| questions[*q].is_of_the_best)
-        .map(|q| questions[q].unanswered(table.iter().map(|row| &row[q])))
+        .map(|q| {
+            let titles = tried.iter().map(|(experiment, ..)| &*experiment.title);
+            let runs: Vec<(&str, Answer)> = titles.zip(table.iter().map(|row| row[q])).collect();
+            Note::NoRun(questions[q].unanswered(&runs))
+        })
         .collect();
     proposed
 }

@@ -92,6 +92,7 @@ pub enum UsageError {
     #[error(
         "ROS argument `{argument}` is unknown: -r|--remap FROM:=TO, -p|--param NAME:=VALUE, \
          --params-file FILE, --log-level [NAME:=]LEVEL, -e|--enclave NAME, \
+         --log-config-file FILE, --log-file-name NAME (without effect), \
          --enable-OUTPUT-logs, --disable-OUTPUT-logs with rosout, stdout or external-lib"
     )]
     UnknownRosArgument {
@@ -176,6 +177,8 @@ impl Arguments {
             },
             "--log-level" => Self::log_level,
             "-e" | "--enclave" => Self::enclave,
+            // Of the file of a logging library, which is not written here.
+            "--log-config-file" | "--log-file-name" => |_, _| Ok(()),
             _ => return Err(UsageError::UnknownRosArgument { argument }),
         };
         match rest.next() {
@@ -289,8 +292,12 @@ mod tests {
             "--disable-rosout-logs",
             "--disable-external-lib-logs",
             "--disable-stdout-logs",
+            "--log-config-file",
+            "logging.yaml",
             "-r",
             "__ns:=/cell",
+            "--log-file-name",
+            "cell",
             "--enable-stdout-logs",
         ])
         .unwrap();
@@ -309,6 +316,7 @@ mod tests {
             (&["--fast"][..], "--fast"),
             (&["--ros-args", "--fast"], "--fast"),
             (&["--ros-args", "-p"], "-p"),
+            (&["--ros-args", "--log-config-file"], "--log-config-file"),
             (&["--ros-args", "-p", "rate"], "rate"),
             (&["--ros-args", "-p", "rate:=[1"], "rate:=[1"),
             (&["--ros-args", "-r", "a b:=c"], "a b:=c"),

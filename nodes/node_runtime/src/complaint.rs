@@ -5,6 +5,23 @@
 //! said already is left out. The reader of YAML draws the place that it complains of over several lines,
 //! with its reason once more; that becomes one line.
 
+use std::fmt::Arguments;
+use std::io::Write;
+
+/// A line on standard error, as `eprintln!` takes it, but [`line`].
+#[macro_export]
+macro_rules! complain {
+    ($($text:tt)*) => {
+        $crate::complaint::line(format_args!($($text)*))
+    };
+}
+
+/// Writes a line to standard error. Where nobody reads it any more (`2>&1 | head`, or `tee` that Ctrl-C has ended first), what
+/// is being done goes on: a machine is wound down the same.
+pub fn line(text: Arguments<'_>) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
 /// The whole chain of `error` in one text.
 #[must_use]
 pub fn in_words(error: &anyhow::Error) -> String {

@@ -1,5 +1,7 @@
 //! SIGINT and SIGTERM: the first asks for an end in good order, a second SIGINT for one at once.
 
+use crate::complain;
+
 use std::process;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -76,11 +78,11 @@ impl Interruption {
                     break;
                 }
             }
-            eprintln!("second SIGINT: ending at once; {to_keep}");
             told.ask(Asked::AtOnce);
+            complain!("second SIGINT: ending at once; {to_keep}");
             tokio::time::sleep(LAST_PATIENCE).await;
             let patience_s = LAST_PATIENCE.as_secs();
-            eprintln!("not ended within {patience_s} s of the second SIGINT: left as it is");
+            complain!("not ended within {patience_s} s of the second SIGINT: left as it is");
             process::exit(LEFT);
         };
         std::thread::Builder::new()

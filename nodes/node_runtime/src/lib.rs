@@ -5,6 +5,7 @@
 //! ROS graph, with real clocks. The [`Harness`] wires many nodes to each other directly, in one total
 //! order and simulated time; a scenario in one process and a replay both use it, so that equal inputs
 //! give equal bytes.
+#![cfg_attr(not(test), warn(clippy::print_stderr))]
 
 pub mod access;
 pub mod arguments;

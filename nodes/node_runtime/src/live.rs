@@ -11,6 +11,7 @@ use tokio::task::JoinSet;
 use tracing::Instrument as _;
 
 use crate::arguments::Arguments;
+use crate::complain;
 use crate::complaint;
 use crate::environment::Environment;
 use crate::interruption::Interruption;
@@ -84,7 +85,7 @@ pub fn run_composed(compositions: Vec<Composition>) -> ExitCode {
 }
 
 fn fail(error: &anyhow::Error) -> ExitCode {
-    eprintln!("error: {}", complaint::in_words(error));
+    complain!("error: {}", complaint::in_words(error));
     if error.is::<crate::arguments::UsageError>() {
         ExitCode::from(USAGE)
     } else {

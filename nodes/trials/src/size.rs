@@ -7,13 +7,14 @@
 //!
 //! ```text
 //!   D^2 = sum over set-ups of  S_ss - S_sN S_NN^-1 S_Ns,   S_ab = sum over runs of a' C^-1 b   (1)
-//!   C = v I + V K,   v = sigma^2 (1 + phi) / ((1 - phi) m) + q^2                          (2)
+//!   C = v I + V K,   v = sigma^2/m [(1 + phi)/(1 - phi) - 2 phi (1 - phi^m)/(m (1 - phi)^2)] + q^2   (2)
 //!   K_ij = mean over wave lengths of sin(k d_ij) / (k d_ij),   k = 2 pi / length            (3)
 //! ```
 //!
 //! The plant is not the same to the last digit either: loops chatter within a step of their encoders, differently once
-//! anything has changed. That part c^2 of the difference is taken from neighbouring rows, added to v, and its
-//! expectation, c^2/v for each row, taken from D^2.
+//! anything has changed. That part c^2 of the difference is taken from neighbouring readings of one motion or one stop, added
+//! to v, and its expectation, c^2/v for each row, taken from D^2. How an axis comes to rest differently from stop to stop
+//! stays in s: some D of 1 that is no effect's.
 //!
 //! What the simulator itself is off by belongs to the noise as well, whatever is averaged: a smooth error of form along
 //! the waves and a rough one from row to row, of which the n repeats of a test see the same draw:
@@ -327,8 +328,6 @@ fn gain(
     if rows.signature.is_empty() {
         return None;
     }
-    let memory = (1.0 + scatter.ar) / (1.0 - scatter.ar);
-    let reading_mm2 = scatter.white_mm.powi(2) * memory + shaking_mm2;
     let row_mm2 = INSTRUMENT_MM.powi(2) + repeats * (ROUGH * FORM_MM).powi(2);
     // Of each row: everything, and what of it is chatter.
     let variances_mm2 = rows.mean_of.map(|readings| {
@@ -336,7 +335,9 @@ fn gain(
             return (TOUCH_VARIANCE_MM2, 0.0);
         }
         let chatter_mm2 = rows.chatter_mm2 / readings;
-        (reading_mm2 / readings + row_mm2 + chatter_mm2, chatter_mm2)
+        let reading_mm2 =
+            shaking_mm2 / readings + of_mean_mm2(scatter.white_mm, scatter.ar, readings);
+        (reading_mm2 + row_mm2 + chatter_mm2, chatter_mm2)
     });
     // (4): the place of a touched face floats, and what is smooth hardly varies over it.
     let form_mm2 = if with.is_touch {
@@ -351,6 +352,13 @@ fn gain(
     })
 }
 
+/// First term of v in (2).
+fn of_mean_mm2(white_mm: f64, ar: f64, readings: f64) -> f64 {
+    let left = 1.0 - ar;
+    let ends = 2.0 * ar * (1.0 - ar.powf(readings)) / (readings * left * left);
+    white_mm.powi(2) / readings * ((1.0 + ar) / left - ends)
+}
+
 /// Touches of one face at one feed in a run (`programme`).
 const TOUCHES_ALIKE: f64 = 2.0;
 /// Variance of a touch, mm².
@@ -358,13 +366,11 @@ pub(crate) const TOUCH_VARIANCE_MM2: f64 = TOUCH_MM * TOUCH_MM + TOUCHES_ALIKE *
 /// Middle square of a normal number of variance 1.
 const MIDDLE_SQUARE: f64 = 0.454_936;
 
-/// Variance of a row that its neighbours do not share, mm2, from second differences (six times it): slopes have none,
-/// and steps of a signature are too few to matter.
-fn chatter_mm2(signature: &DVector<f64>) -> f64 {
-    let squares = signature
-        .as_slice()
-        .windows(3)
-        .map(|rows| (rows[0] - 2.0 * rows[1] + rows[2]).powi(2));
+/// Variance of a mean that its neighbours do not share, mm2, from second differences (six times it) within motions or stops:
+/// slopes have none, and steps of a signature while the axes move are too few to matter.
+fn chatter_mm2<'m>(parts: impl Iterator<Item = &'m Vec<f64>>) -> f64 {
+    let squares = parts.flat_map(|part| part.windows(3));
+    let squares = squares.map(|rows| (rows[0] - 2.0 * rows[1] + rows[2]).powi(2));
     median(squares.collect()).map_or(0.0, |middle| middle / (6.0 * MIDDLE_SQUARE))
 }
 
@@ -396,7 +402,8 @@ impl Rows {
             let first = values.len();
             let along = both.iter().filter(|(r, _)| r.direction == *direction);
             let along: Vec<(Reading, f64)> = along.copied().collect();
-            parts.extend(along.chunks(least).map(mean));
+            let stretches = along.chunk_by(|a, b| a.0.stands_since == b.0.stands_since);
+            parts.extend(stretches.map(|part| part.chunks(least).map(mean).collect()));
             for row in rows_of(&along, least) {
                 let places = row.iter().map(|(reading, _)| reading.place_mm);
                 places_mm.push(places.sum::<Vector3<f64>>() / row.len() as f64);
@@ -421,7 +428,7 @@ impl Rows {
             places_mm,
             directions: ranges,
             mean_of: DVector::from_vec(mean_of),
-            chatter_mm2: chatter_mm2(&DVector::from_vec(parts)) * least as f64,
+            chatter_mm2: chatter_mm2(parts.iter()) * least as f64,
         }
     }
 
@@ -535,25 +542,38 @@ mod tests {
             rows.mean_of
                 .iter()
                 .take(17)
-                .all(|readings| *readings == 27.0)
+                .all(|readings| (readings - 27.0).abs() < 1e-9)
         );
         let way: Vec<_> = (0..480).map(|k| (at(f64::from(k), None), 1e-3)).collect();
         assert_eq!(Rows::of(&way, &Floats::Zero).signature.len(), 120);
     }
 
     #[test]
-    fn rows_that_differ_from_their_neighbours_are_chatter_and_a_step_is_not() {
-        let step = DVector::from_fn(100, |row, _| {
-            let slope = row as f64 * 1e-5;
-            if row < 37 { slope } else { slope + 3e-3 }
-        });
-        assert!(chatter_mm2(&step).abs() < 1e-18);
+    fn means_that_differ_from_their_neighbours_are_chatter_and_a_step_is_not() {
+        let row = |row: u32| f64::from(row) * 1e-5 + if row < 37 { 0.0 } else { 3e-3 };
+        let step: Vec<f64> = (0..100).map(row).collect();
+        assert!(chatter_mm2([&step].into_iter()).abs() < 1e-18);
+        // A staircase of stops with a few means each.
+        let stairs: Vec<Vec<f64>> = step.iter().map(|value| vec![*value; 4]).collect();
+        assert!(chatter_mm2(stairs.iter()).abs() < 1e-18);
         let mut rng = Pcg64Mcg::seed_from_u64(7);
-        let spread = DVector::from_fn(20_000, |_, _| {
-            let normal: f64 = rng.sample(StandardNormal);
-            0.3 * normal
-        });
-        let ratio = chatter_mm2(&spread) / 0.09;
+        let draw = || 0.3 * rng.sample::<f64, _>(StandardNormal);
+        let spread: Vec<f64> = std::iter::repeat_with(draw).take(20_000).collect();
+        let ratio = chatter_mm2([&spread].into_iter()) / 0.09;
         assert!((0.95..1.05).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn eq2_the_mean_of_readings_with_memory_is_the_sum_of_their_covariances() {
+        for (ar, readings) in [(0.0_f64, 9), (0.45, 27), (0.9, 9), (0.9, 27)] {
+            let pairs =
+                (0..readings).flat_map(|i: i32| (0..readings).map(move |k| ar.powi((i - k).abs())));
+            let wanted = pairs.sum::<f64>() / f64::from(readings * readings);
+            let found = of_mean_mm2(1.0, ar, f64::from(readings));
+            assert!(
+                (found / wanted - 1.0).abs() < 1e-12,
+                "{ar} {readings}: {found} {wanted}"
+            );
+        }
     }
 }

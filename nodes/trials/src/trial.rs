@@ -18,7 +18,7 @@ use crate::measurement::measure;
 use crate::own;
 use crate::rig::{Rig, STATE_RATE_HZ};
 use crate::size::Deviations;
-use crate::truth::{TrueEffect, Truth};
+use crate::truth::{MEASURE, TrueEffect, Truth};
 
 /// Range of D.
 const D: [f64; 2] = [2.0, 200.0];
@@ -91,6 +91,7 @@ impl Trial {
             has_outliers: rig.scatter.outliers > 0.0,
             has_motors: rig.has_motors,
             bare_um: None,
+            measure: MEASURE,
         };
         Ok(Self {
             rig,

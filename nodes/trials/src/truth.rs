@@ -31,6 +31,17 @@ pub struct Truth {
     /// machine with the same scatter and nothing hidden, µm.
     #[serde(default)]
     pub bare_um: Option<f64>,
+    /// Which measure its D have; trials of different ones are not of one series.
+    #[serde(default = "first_measure")]
+    pub measure: u32,
+}
+
+/// The measure of D of this program (`size`): 2, as a stop of a positioning run is one row. By 1 it was as many as it had
+/// readings.
+pub const MEASURE: u32 = 2;
+
+const fn first_measure() -> u32 {
+    1
 }
 
 /// One hidden effect.

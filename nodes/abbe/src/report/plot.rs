@@ -66,6 +66,56 @@ pub fn svg(plot: &Plot) -> Result<String> {
     ))
 }
 
+/// Width of the legend, as a share of the plot's.
+const LEGEND_WIDTH: f64 = 0.25;
+/// Height of a line of the legend, as a share of the plot's.
+const LEGEND_LINE: f64 = 0.08;
+/// Places between two points of a line that are looked at.
+const BETWEEN: u32 = 8;
+
+/// The corner in which the fewest points of the traces lie under the legend.
+fn emptiest_corner(plot: &Plot, x: (f64, f64), y: (f64, f64)) -> SeriesLabelPosition {
+    let share = |at: f64, (low, high): (f64, f64)| (at - low) / (high - low);
+    let height = LEGEND_LINE * (plot.traces.len() as f64 + 0.5);
+    let places = || plot.traces.iter().flat_map(places);
+    let under = |(is_left, is_upper): (bool, bool)| {
+        let covered = |(at_x, at_y): &(f64, f64)| {
+            let (from_left, from_below) = (share(*at_x, x), share(*at_y, y));
+            let across = if is_left { from_left } else { 1.0 - from_left };
+            let down = if is_upper {
+                1.0 - from_below
+            } else {
+                from_below
+            };
+            across < LEGEND_WIDTH && down < height
+        };
+        places().filter(covered).count()
+    };
+    let corners = [
+        ((true, true), SeriesLabelPosition::UpperLeft),
+        ((false, true), SeriesLabelPosition::UpperRight),
+        ((false, false), SeriesLabelPosition::LowerRight),
+        ((true, false), SeriesLabelPosition::LowerLeft),
+    ];
+    let emptiest = corners.into_iter().min_by_key(|(corner, _)| under(*corner));
+    emptiest.map_or(SeriesLabelPosition::UpperLeft, |(_, position)| position)
+}
+
+/// Places that a trace covers.
+fn places(trace: &Trace) -> Vec<(f64, f64)> {
+    let mut all = trace.points.clone();
+    if !trace.marks {
+        for pair in trace.points.windows(2) {
+            let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
+            all.extend((1..BETWEEN).map(|k| {
+                let share = f64::from(k) / f64::from(BETWEEN);
+                (x0 + share * (x1 - x0), y0 + share * (y1 - y0))
+            }));
+        }
+    }
+    all
+}
+
 fn draw(plot: &Plot, text: &mut String) -> Result<(), Box<dyn std::error::Error>> {
     let (x0, x1) = range(
         plot.traces
@@ -111,7 +161,7 @@ fn draw(plot: &Plot, text: &mut String) -> Result<(), Box<dyn std::error::Error>
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
+        .position(emptiest_corner(plot, (x0, x1), (y0, y1)))
         .label_font(font())
         .border_style(INK.mix(0.0))
         .draw()?;
@@ -119,4 +169,35 @@ fn draw(plot: &Plot, text: &mut String) -> Result<(), Box<dyn std::error::Error>
     root.present()?;
     drop(root);
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plot(points: Vec<(f64, f64)>) -> Plot {
+        let trace = |name: &str| Trace {
+            name: name.to_owned(),
+            points: points.clone(),
+            marks: false,
+        };
+        Plot {
+            x: "t / h".to_owned(),
+            y: "drift / µm".to_owned(),
+            traces: vec![trace("block_1"), trace("block_2")],
+        }
+    }
+
+    #[test]
+    fn the_legend_stands_where_no_line_goes() {
+        let unit = (0.0, 1.0);
+        let corner = |points| emptiest_corner(&plot(points), unit, unit);
+        let rising = corner(vec![(0.0, 0.0), (1.0, 1.0)]);
+        assert!(matches!(rising, SeriesLabelPosition::UpperLeft));
+        let falling = corner(vec![(0.0, 1.0), (1.0, 0.0)]);
+        assert!(matches!(falling, SeriesLabelPosition::UpperRight));
+        // Across the whole top, and down on the right: no point of it lies in a corner but its ends.
+        let over = corner(vec![(0.0, 0.9), (1.0, 0.9), (1.0, 0.0)]);
+        assert!(matches!(over, SeriesLabelPosition::LowerLeft));
+    }
 }

@@ -9,6 +9,7 @@ use anyhow::{Context, Result, bail};
 use metrology::sample::PlanState;
 use metrology::stamp::{Host, Stamp};
 use node_runtime::arguments::Arguments;
+use node_runtime::complain;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::{Selection, TapEvent};
@@ -71,7 +72,7 @@ pub fn run(
     let stopped = cast.stop(interruption);
     let captured = capture.finish()?;
     for word in capture_words(&captured) {
-        eprintln!("abbe: {word}");
+        complain!("abbe: {word}");
     }
     let failure = failure
         .or_else(|| stopped.err().map(|error| format!("{error:#}")))
@@ -211,7 +212,7 @@ fn play(
     let limit = Duration::from_secs_f64(scenario.file.limit_min * 60.0);
     let failure = loop {
         if interruption.wait(LOOK) {
-            eprintln!("abbe: interrupted: the nodes wind down; a second Ctrl-C ends at once");
+            complain!("abbe: interrupted: the nodes wind down; a second Ctrl-C ends at once");
             break Some(INTERRUPTED.to_owned());
         }
         let elapsed = began.elapsed();

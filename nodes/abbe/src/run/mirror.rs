@@ -15,6 +15,7 @@ use abbe_msgs::rosgraph_msgs::msg::Clock;
 use abbe_msgs::{Durability, Message, Reliability, to_cdr, topics};
 use anyhow::{Context, Result};
 use metrology::stamp::{Host, NANOS_PER_S, Stamp};
+use node_runtime::complain;
 use node_runtime::environment::Environment;
 use node_runtime::harness::Published;
 use node_runtime::names::NodeNames;
@@ -79,7 +80,7 @@ impl Mirror {
         let publisher = match started {
             Ok(publisher) => publisher,
             Err(error) => {
-                eprintln!("abbe: nothing is shown on DDS: {error:#}");
+                complain!("abbe: nothing is shown on DDS: {error:#}");
                 return Ok(None);
             }
         };
@@ -108,7 +109,7 @@ impl Mirror {
         let report = shown.publisher.stop()?;
         let missed = shown.left_out + report.dropped + report.refused;
         if missed > 0 {
-            eprintln!(
+            complain!(
                 "abbe: {} of {} messages were shown on DDS; the bag has all",
                 shown.offered - missed,
                 shown.offered

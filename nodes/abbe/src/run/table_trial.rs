@@ -9,6 +9,7 @@ use anyhow::{Context, Result, bail};
 use machine::export::AxisErrors;
 use machine::export::linuxcnc::{FileType, compensation_file};
 use node_runtime::Interruption;
+use node_runtime::complain;
 use recorder::Bag;
 
 use super::live;
@@ -77,7 +78,7 @@ impl TableTrial<'_> {
         std::fs::write(&loaded, file.text).with_context(|| loaded.display().to_string())?;
         let copied = Scenario::read(&folder)?;
         let bag = folder.join("bag");
-        eprintln!("Running again, {name}: {}", loaded.display());
+        complain!("Running again, {name}: {}", loaded.display());
         let outcome = live::run(&copied, &bag, self.separate, self.interruption)?;
         if let Some(reason) = outcome.failure {
             bail!("run {name}: {reason}");

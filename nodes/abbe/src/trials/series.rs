@@ -1,5 +1,7 @@
 //! A series of trials of one arm, several at a time.
 
+use node_runtime::complain;
+
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
@@ -100,7 +102,7 @@ fn bar(arm: Arm, trials: usize) -> ProgressBar {
 /// A line above the bar; a plain line where there is no terminal.
 fn tell(bar: &ProgressBar, line: &str) {
     if bar.is_hidden() {
-        eprintln!("{line}");
+        complain!("{line}");
     } else {
         bar.println(line);
     }

@@ -8,17 +8,16 @@ use super::known::Known;
 use super::lever;
 use crate::cause::{Found, Member};
 use crate::confidence::ODDS;
-use crate::figures::Note;
+use crate::figures::NoRun;
 use crate::report::Status;
 use crate::selection::Set;
 use crate::signature::Library;
-use crate::veto::{LEAST_D as LEAST_NAMED_D, Veto};
+use crate::veto::{Veto, least_d_squared};
 
 /// Squared distance that decides: three standard deviations.
 pub const DECISION: f64 = 9.0;
-/// D from which an effect is surely named: three standard deviations above the least. A form of many columns is held to
-/// more than that least one.
-const SURELY_NAMED_D: f64 = LEAST_NAMED_D + 3.0;
+/// An effect is surely named where its D is so many standard deviations above the least that is named.
+const SURELY: f64 = 3.0;
 /// Most questions that an experiment is sought for.
 const MOST_QUESTIONS: usize = 10;
 /// A rival within this of the best set still asks for an experiment where its member fails a check.
@@ -46,6 +45,8 @@ pub struct Question {
     effect: String,
     /// Its D.
     d: f64,
+    /// The least D at which it is named: a form of many columns is held to more.
+    least_d: f64,
 }
 
 /// What an experiment would tell of a question.
@@ -91,10 +92,11 @@ pub fn questions(found: &Found) -> Vec<Question> {
                 let Some(question) = between(found, member, ours, theirs) else {
                     continue;
                 };
-                if all.len() < MOST_QUESTIONS
-                    && all.iter().all(|other| other.names != question.names)
-                {
-                    all.push(question);
+                let is_full = all.len() >= MOST_QUESTIONS;
+                match all.iter_mut().find(|other| other.names == question.names) {
+                    Some(known) => known.also_of(question),
+                    None if is_full => {}
+                    None => all.push(question),
                 }
             }
         }
@@ -140,6 +142,7 @@ fn between(found: &Found, member: &Member, ours: &Set, theirs: &Set) -> Option<Q
         too_small: too_small(found, member),
         effect: found.instance(member).name(),
         d: member.estimate.d,
+        least_d: least_d(found, member),
     })
 }
 
@@ -163,7 +166,14 @@ fn resized(found: &Found, member: &Member) -> Question {
         too_small: too_small(found, member).filter(|_| !is_noise),
         effect: instance.name(),
         d: member.estimate.d,
+        least_d: least_d(found, member),
     }
+}
+
+/// The least D at which a member is named.
+fn least_d(found: &Found, member: &Member) -> f64 {
+    let log_rows = found.freedom.max(2.0).ln();
+    least_d_squared(member.estimate.active.len(), log_rows).sqrt()
 }
 
 /// The form of a member near noise, and the set that it is sized in.
@@ -174,7 +184,15 @@ fn too_small(found: &Found, member: &Member) -> Option<(usize, Set)> {
 impl Question {
     /// w of `next`, (2).
     pub fn weight(&self) -> f64 {
-        (self.d / LEAST_NAMED_D).min(1.0)
+        (self.d / self.least_d).min(1.0)
+    }
+
+    /// The same question, asked of another effect: what is the smaller of the two has to become large enough.
+    fn also_of(&mut self, other: Self) {
+        let is_smaller = other.d / other.least_d < self.d / self.least_d;
+        if other.too_small.is_some() && (self.too_small.is_none() || is_smaller) {
+            *self = other;
+        }
     }
 
     /// What an experiment has to add for a decision.
@@ -188,27 +206,42 @@ impl Question {
 
     /// What has to be added to D^2 of an effect that is too small.
     fn needed_lift(&self) -> f64 {
-        (SURELY_NAMED_D.powi(2) - self.d.powi(2)).max(DECISION)
+        ((self.least_d + SURELY).powi(2) - self.d.powi(2)).max(DECISION)
     }
 
-    /// What is told where none of some experiments decides.
-    pub fn unanswered<'a>(&self, answers: impl Iterator<Item = &'a Answer> + Clone) -> Note {
-        let greatest = |of: &dyn Fn(&Answer) -> f64| answers.clone().map(of).fold(0.0, f64::max);
-        let delta = greatest(&Answer::added);
+    /// D from which it is surely named, and that a run must make it in any case.
+    fn wanted_d(&self) -> f64 {
+        self.d.hypot(self.needed_lift().sqrt())
+    }
+
+    /// What is told where none of some experiments, by their titles, decides.
+    pub fn unanswered(&self, runs: &[(&str, Answer)]) -> NoRun {
+        let lift_of = |answer: &Answer| answer.lift.unwrap_or_else(|| answer.added());
+        let (separates, delta) = greatest(runs, Answer::added);
+        let (raises, lift) = greatest(runs, lift_of);
         let is_only_small = self.is_noise || (self.too_small.is_some() && delta >= self.needed());
         if !is_only_small {
-            return Note::NoRunSeparates {
+            return NoRun::Separates {
                 effects: self.names.clone(),
                 delta,
                 lever: lever::lever(&self.ids),
             };
         }
-        let lift = greatest(&|answer| answer.lift.unwrap_or_else(|| answer.added()));
-        Note::NoRunRaises {
-            effect: self.effect.clone(),
-            d: self.d,
-            most_d: self.d.hypot(lift.max(0.0).sqrt()),
-            wanted_d: SURELY_NAMED_D,
+        let (effect, d, wanted_d) = (self.effect.clone(), self.d, self.wanted_d());
+        if lift >= self.needed_lift() {
+            return NoRun::DoesBoth {
+                effect,
+                d,
+                wanted_d,
+                separates: separates.to_owned(),
+                raises: raises.to_owned(),
+            };
+        }
+        NoRun::Raises {
+            effect,
+            d,
+            most_d: d.hypot(lift.sqrt()),
+            wanted_d,
         }
     }
 
@@ -221,7 +254,7 @@ impl Question {
     /// The chance of a decision with what an experiment adds.
     pub fn chance(&self, answer: &Answer) -> f64 {
         let normal = statrs::distribution::Normal::standard();
-        let is_named = |lift: f64| normal.cdf((self.d.powi(2) + lift).sqrt() - LEAST_NAMED_D);
+        let is_named = |lift: f64| normal.cdf((self.d.powi(2) + lift).sqrt() - self.least_d);
         if self.is_noise {
             return is_named(answer.added());
         }
@@ -254,9 +287,20 @@ impl Question {
         [both(&known.gram), both(&(&known.gram + added))]
     }
 }
+
+/// The run that gives most of something, by its title, and how much; nothing below zero.
+fn greatest<'t>(runs: &[(&'t str, Answer)], of: impl Fn(&Answer) -> f64) -> (&'t str, f64) {
+    let all = runs.iter().map(|(title, answer)| (*title, of(answer)));
+    all.fold(
+        ("", 0.0),
+        |best, one| if one.1 > best.1 { one } else { best },
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::veto::LEAST_D;
 
     fn question(d: f64, is_noise: bool) -> Question {
         Question {
@@ -270,6 +314,7 @@ mod tests {
             too_small: None,
             effect: "backlash Z".to_owned(),
             d,
+            least_d: LEAST_D,
         }
     }
 
@@ -284,9 +329,9 @@ mod tests {
     fn what_is_too_small_wants_a_d_that_is_surely_named_and_a_rival_three_standard_deviations() {
         let small = question(6.1, true);
         let after = (6.1_f64.powi(2) + small.needed()).sqrt();
-        assert!((after - (LEAST_NAMED_D + 3.0)).abs() < 1e-12, "{after}");
+        assert!((after - (LEAST_D + 3.0)).abs() < 1e-12, "{after}");
         // A run that adds what decides between rivals leaves it at an even chance.
-        let even = LEAST_NAMED_D.powi(2) - 6.1_f64.powi(2);
+        let even = LEAST_D.powi(2) - 6.1_f64.powi(2);
         let chance = small.chance(&answer(even, None));
         assert!((chance - 0.5).abs() < 1e-9 && even < DECISION);
         assert!(question(9.6, true).needed() >= DECISION);
@@ -319,15 +364,61 @@ mod tests {
             too_small: Some((0, vec![0])),
             ..question(6.0, false)
         };
-        let told = small.unanswered([answer(400.0, Some(13.0)), answer(2.0, Some(0.0))].iter());
-        let wanted = Note::NoRunRaises {
+        let runs = |all: &[Answer]| -> Vec<(&str, Answer)> {
+            ["a", "b"].into_iter().zip(all.iter().copied()).collect()
+        };
+        let told = small.unanswered(&runs(&[answer(400.0, Some(13.0)), answer(2.0, Some(0.0))]));
+        let wanted = NoRun::Raises {
             effect: "backlash Z".to_owned(),
             d: 6.0,
             most_d: 7.0,
-            wanted_d: SURELY_NAMED_D,
+            wanted_d: 9.5,
         };
         assert_eq!(told, wanted);
-        let alike = small.unanswered([answer(2.0, Some(90.0))].iter());
-        assert!(matches!(alike, Note::NoRunSeparates { .. }), "{alike}");
+        let alike = small.unanswered(&runs(&[answer(2.0, Some(90.0))]));
+        assert!(matches!(alike, NoRun::Separates { .. }), "{alike}");
+        let each = small.unanswered(&runs(&[answer(400.0, Some(13.0)), answer(2.0, Some(90.0))]));
+        let both = NoRun::DoesBoth {
+            effect: "backlash Z".to_owned(),
+            d: 6.0,
+            wanted_d: 9.5,
+            separates: "a".to_owned(),
+            raises: "b".to_owned(),
+        };
+        assert_eq!(each, both);
+    }
+
+    #[test]
+    fn of_two_effects_with_one_question_the_smaller_has_to_become_large_enough() {
+        let small = |d| Question {
+            too_small: Some((0, vec![0])),
+            ..question(d, false)
+        };
+        let mut large = question(9.0, false);
+        large.also_of(small(5.0));
+        assert!(large.too_small.is_some() && large.needed_lift() > DECISION);
+        large.also_of(small(6.0));
+        assert!((large.d - 5.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_said_to_be_wanted_is_more_than_what_a_run_would_make_it() {
+        for (d, least_d) in [(9.3, LEAST_D), (6.0, LEAST_D), (8.9, 8.5)] {
+            let small = Question {
+                least_d,
+                ..question(d, true)
+            };
+            let told = small.unanswered(&[("a", answer(small.needed() - 0.1, None))]);
+            let NoRun::Raises {
+                most_d, wanted_d, ..
+            } = told
+            else {
+                panic!("{told}");
+            };
+            assert!(
+                most_d < wanted_d && wanted_d >= least_d + SURELY,
+                "{d}: {most_d} {wanted_d}"
+            );
+        }
     }
 }

@@ -113,8 +113,7 @@ fn where_every_effect_stands_alone_nothing_is_proposed_and_else_a_run_or_why_the
         .causes
         .iter()
         .any(|cause| cause.status != Status::Named);
-    let is_told =
-        |note: &Note| matches!(note, Note::NoRunSeparates { .. } | Note::NoRunRaises { .. });
+    let is_told = |note: &Note| matches!(note, Note::NoRun(_));
     let why_none = diagnosis.notes.iter().any(is_told);
     let is_proposed = !diagnosis.report.next_experiments.is_empty();
     assert_eq!(is_proposed || why_none, open, "{}", told(&diagnosis));

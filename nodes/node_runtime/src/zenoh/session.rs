@@ -11,7 +11,7 @@ use anyhow::anyhow;
 
 use super::graph::Graph;
 use super::{settings, token};
-use crate::environment::{Environment, ZenohSettings};
+use crate::environment::{DiscoveryRange, Environment, ZenohSettings};
 
 /// Between looks for a router.
 const LOOK: Duration = Duration::from_secs(1);
@@ -40,6 +40,12 @@ impl Shared {
         let known = open.iter().find(|(known, _)| known == environment);
         if let Some(shared) = known.and_then(|(_, shared)| shared.upgrade()) {
             return Ok((shared, None));
+        }
+        if environment.range == DiscoveryRange::Localhost {
+            tracing::info!(
+                "that only this computer is meant (ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE) is said to DDS alone: \
+                 Zenoh reaches as far as its router listens and connects"
+            );
         }
         let shared = Arc::new(Self::open(environment)?);
         open.push((environment.clone(), Arc::downgrade(&shared)));

@@ -8,6 +8,7 @@ use anyhow::{Context, Result};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use node_runtime::Interruption;
+use node_runtime::complain;
 
 use crate::launch::LaunchNode;
 
@@ -72,7 +73,7 @@ impl Processes {
             if let Ok(Some(status)) = process.child.try_wait() {
                 process.ended = true;
                 let word = format!("node {} ended: {}", process.name, in_words(status));
-                eprintln!("abbe: {word}");
+                complain!("abbe: {word}");
                 if process.is_needed() && reason.is_none() {
                     reason = Some(word);
                 }
@@ -133,11 +134,11 @@ impl Process {
             Ok(Some(status)) => {
                 self.ended = true;
                 if !status.success() {
-                    eprintln!("abbe: node {} stopped: {}", self.name, in_words(status));
+                    complain!("abbe: node {} stopped: {}", self.name, in_words(status));
                 }
             }
             _ if late => {
-                eprintln!("abbe: node {} did not stop in time: killed", self.name);
+                complain!("abbe: node {} did not stop in time: killed", self.name);
                 // It may have ended in this moment.
                 let _ = self.child.kill();
                 let _ = self.child.wait();
