@@ -8,7 +8,7 @@
 use std::fmt::Arguments;
 use std::io::Write;
 
-/// A line on standard error, as `eprintln!` takes it, but [`line`].
+/// A line on standard error, as `eprintln!` takes it, written by [`line()`].
 #[macro_export]
 macro_rules! complain {
     ($($text:tt)*) => {
