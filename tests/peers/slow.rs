@@ -69,7 +69,7 @@ fn a_bag_as_fast_as_subscribers_acknowledge_waits_for_one_that_stands_and_loses_
     let Some(python) = interpreter("a player waits for a subscriber that stands") else {
         return;
     };
-    let (domain, states, sent) = (domain(15), &topics::AXES_STATE, sent());
+    let (domain, states, sent) = (domain(18), &topics::AXES_STATE, sent());
     let mut play = command(domain, &["play", "--rate", "0", "--paused", "--delay", "0"]);
     play.arg(root().join("bags/cold_reference"));
     play.args(["--topics", "/axes/state"]);
@@ -113,7 +113,7 @@ fn a_bag_as_fast_as_subscribers_acknowledge_waits_for_one_that_stands_and_loses_
 
 #[test]
 fn a_bag_as_fast_as_subscribers_acknowledge_ends_at_once_where_there_are_none() {
-    let mut play = command(domain(16), &["play", "--rate", "0", "--delay", "0"]);
+    let mut play = command(domain(19), &["play", "--rate", "0", "--delay", "0"]);
     play.arg(root().join("bags/cold_reference"));
     let began = Instant::now();
     let ended = Process::start(play).ended_within(Duration::from_secs(60));
