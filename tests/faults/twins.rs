@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use abbe_msgs::builtin_interfaces::msg::Time;
 use abbe_msgs::msg::{
-    AxisState, GridSample, ProbeLatency, ProbeTrigger, ProbedFeature, TestSegment,
+    AxisState, GridSample, ProbeLatency, ProbeTrigger, ProbedFeature, ProbedPoint, TestSegment,
 };
 use abbe_msgs::rosgraph_msgs::msg::Clock;
 use abbe_msgs::topics::{self, Entry};
@@ -151,6 +151,7 @@ impl Twins {
     /// Tells both what the bag holds; of each message `worse` says what the second one is told besides.
     pub fn play(&mut self, bag: &Bag, mut worse: impl FnMut(&'static str, &[u8]) -> Vec<Vec<u8>>) {
         self.meet(bag);
+        let mut held = Held::default();
         let mut events = bag.messages(Order::LogTime);
         while let Some(event) = events.next_event() {
             let Event::Message(message) = event else {
@@ -168,14 +169,43 @@ impl Twins {
             for twin in 0..TWINS.len() {
                 self.tell(twin, topic, message.data);
             }
-            for bytes in worse(topic, message.data) {
+            let besides = worse(topic, message.data);
+            if topic == topics::LATENCY.name {
+                held = Held::new(besides);
+                continue;
+            }
+            for bytes in besides {
                 self.tell(BAD, topic, &bytes);
             }
+            if topic == topics::PROBE_TRIGGER.name && held.is_due() {
+                self.wait_for_a_point_with_latency();
+                for bytes in std::mem::take(&mut held.besides) {
+                    self.tell(BAD, topics::LATENCY.name, &bytes);
+                }
+            }
         }
+        assert!(
+            held.besides.is_empty(),
+            "too few touches came after the latency"
+        );
         for _ in 0..AFTER_S {
             self.tell_time(self.now + 1_000_000_000);
         }
         self.voice.settle();
+    }
+
+    /// Until the second one has used the latency that it was told: its topic keeps the last message alone.
+    fn wait_for_a_point_with_latency(&self) {
+        let name = format!("/{}/{}", TWINS[BAD], topics::PROBE_POINT.name);
+        self.graph
+            .wait_longer(COMPUTING, "a point with a latency", |graph| {
+                let all = graph.bytes_of(&name);
+                let has_latency = |bytes: &Vec<u8>| {
+                    let point: ProbedPoint = from_cdr(bytes).unwrap();
+                    point.applied_latency_s.is_finite()
+                };
+                all.iter().any(has_latency).then_some(())
+            });
     }
 
     /// What both said on a topic, `n` messages, is the same but for what `own` takes out of each.
@@ -220,6 +250,28 @@ impl Twins {
         for (_, process) in self.nodes {
             process.stop();
         }
+    }
+}
+
+/// What is told besides of a topic that keeps its last message alone, until the one before has been used.
+#[derive(Default)]
+struct Held {
+    besides: Vec<Vec<u8>>,
+    touches: usize,
+}
+
+impl Held {
+    fn new(besides: Vec<Vec<u8>>) -> Self {
+        Self {
+            besides,
+            touches: 0,
+        }
+    }
+
+    /// With the second touch: all that the first one's point needs was told.
+    fn is_due(&mut self) -> bool {
+        self.touches += 1;
+        self.touches >= 2 && !self.besides.is_empty()
     }
 }
 

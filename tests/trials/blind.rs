@@ -1,5 +1,6 @@
 //! The diagnosis of a trial sees the bag and the machine file, and nothing else.
 
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -66,6 +67,39 @@ fn the_seal_is_told_before_the_verdict_and_its_answer_does_not_need_it() {
         .unwrap();
     assert!(output.status.success());
     assert_eq!(timeless(&output.stdout), timeless(&sealed));
+}
+
+/// As of a root's own clone: others may not pass its folder.
+#[test]
+fn a_program_that_only_root_may_reach_is_handed_to_nobody_and_a_folder_of_trials_is_named() {
+    if !nix::unistd::geteuid().is_root() {
+        return;
+    }
+    let (closed, open) = (tempfile::tempdir().unwrap(), folder());
+    let mode = std::fs::Permissions::from_mode(0o700);
+    std::fs::set_permissions(closed.path(), mode).unwrap();
+    let program = closed.path().join("abbe");
+    std::fs::copy(abbe(), &program).unwrap();
+    let trials = |out: &Path| {
+        let mut command = Command::new(&program);
+        command.args([
+            "trials", "--arm", "iv", "--n", "1", "--seed", "5", "--jobs", "1",
+        ]);
+        let out = command.arg("--out").arg(out.join("out")).output().unwrap();
+        (
+            out.status.code(),
+            String::from_utf8_lossy(&out.stderr).into_owned(),
+        )
+    };
+    let (code, said) = trials(open.path());
+    assert_eq!(code, Some(0), "{said}");
+    let (code, said) = trials(closed.path());
+    assert_eq!(code, Some(1), "{said}");
+    let name = closed.path().display().to_string();
+    assert!(
+        said.contains(&format!("only the owner may pass {name}")),
+        "{said}"
+    );
 }
 
 #[test]

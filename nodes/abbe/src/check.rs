@@ -154,6 +154,9 @@ fn page(path: &Path, outcome: &Outcome) -> String {
             "nothing to compare: the bag has none of the topics that were computed ({})",
             listed(&outcome.not_in_bag)
         ),
+        None if compared == 0 => "nothing to compare: no node of this run computes anything from what was recorded (controllers, \
+             sequencer and recorder are not computed again)"
+            .to_owned(),
         None => format!(
             "equal: {compared} messages were computed again byte for byte from {} inputs",
             outcome.inputs

@@ -1,13 +1,15 @@
 //! The diagnosis of one trial: as a process that sees bags and the machine file, or within this one.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::os::fd::AsRawFd;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use gap_diagnosis::regression::{Regression, regression};
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use gap_diagnosis::{GapConfig, GapReport, Rule, diagnose};
@@ -58,13 +60,45 @@ impl Question<'_> {
     }
 }
 
+/// The first folder on the way to a place that others than its owner's group may not pass.
+fn closed_to_others(place: &Path) -> Result<Option<PathBuf>> {
+    let whole = place
+        .canonicalize()
+        .with_context(|| format!("{}", place.display()))?;
+    let mut all: Vec<&Path> = whole.ancestors().collect();
+    all.reverse();
+    for on_the_way in all {
+        let known = std::fs::metadata(on_the_way);
+        let known = known.with_context(|| format!("{}", on_the_way.display()))?;
+        if known.permissions().mode() & 0o001 == 0 {
+            return Ok(Some(on_the_way.to_owned()));
+        }
+    }
+    Ok(None)
+}
+
 /// Runs `abbe diagnose` on bags in its own folder.
 ///
 /// # Errors
 /// When the process cannot be started, or says what is no report.
 pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Result<Diagnosed> {
+    let is_root = nix::unistd::geteuid().is_root();
+    if is_root && let Some(closed) = closed_to_others(folder)? {
+        bail!(
+            "{}: the diagnosis runs as nobody where this program runs as root, and only the owner may pass {} (chmod o+x): \
+             another --out does, or another user",
+            folder.display(),
+            closed.display()
+        );
+    }
     let program = std::env::current_exe().context("path of this program")?;
-    let mut command = Command::new(program);
+    // Whoever may not pass a folder on the way to it is handed the program itself.
+    let handed = match closed_to_others(&program)? {
+        Some(_) if is_root => Some(File::open(&program).context("this program")?),
+        _ => None,
+    };
+    let of_handed = |file: &File| PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
+    let mut command = Command::new(handed.as_ref().map_or(program, of_handed));
     command
         .arg("diagnose")
         .args(bags)
@@ -85,7 +119,7 @@ pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Resu
     if let Some(rule) = question.ablated {
         command.args(["--ablate", rule.id()]);
     }
-    if nix::unistd::geteuid().is_root() {
+    if is_root {
         command.uid(NOBODY).gid(NOBODY);
     }
     let output = command.output().context("abbe diagnose")?;
