@@ -93,10 +93,9 @@ fn truths(scenario: &Scenario, bag: &Bag) -> BTreeMap<String, Means> {
     let plant_file = PlantFile::from_yaml(&text("plant.yaml")).unwrap();
     let states: Vec<AxisState> = all(bag, &topics::AXES_STATE);
     let segments = all(bag, &topics::TEST_SEGMENT);
-    let of_kind = |kind: TestKind| kind == TestKind::Diagonal;
     let runs = tests(&segments)
         .into_iter()
-        .filter(|(begin, _)| of_kind(begin.kind));
+        .filter(|(begin, _)| begin.kind == TestKind::Diagonal);
     let mut wanted = runs.flat_map(|run| {
         let found = stops(&states, run, REST_S);
         found

@@ -73,6 +73,7 @@ fn the_seal_is_told_before_the_verdict_and_its_answer_does_not_need_it() {
 #[test]
 fn a_program_that_only_root_may_reach_is_handed_to_nobody_and_a_folder_of_trials_is_named() {
     if !nix::unistd::geteuid().is_root() {
+        eprintln!("not root: the diagnosis runs as this user, to whom nothing needs to be handed");
         return;
     }
     let (closed, open) = (tempfile::tempdir().unwrap(), folder());

@@ -196,7 +196,7 @@ mod tests {
         assert!(matches!(rising, SeriesLabelPosition::UpperLeft));
         let falling = corner(vec![(0.0, 1.0), (1.0, 0.0)]);
         assert!(matches!(falling, SeriesLabelPosition::UpperRight));
-        // Across the whole top, and down on the right: no point of it lies in a corner but its ends.
+        // Across the whole top, and down on the right.
         let over = corner(vec![(0.0, 0.9), (1.0, 0.9), (1.0, 0.0)]);
         assert!(matches!(over, SeriesLabelPosition::LowerLeft));
     }

@@ -60,7 +60,7 @@ impl Question<'_> {
     }
 }
 
-/// The first folder on the way to a place that others than its owner's group may not pass.
+/// The first folder on the way to a place that not everybody may pass.
 fn closed_to_others(place: &Path) -> Result<Option<PathBuf>> {
     let whole = place
         .canonicalize()
@@ -93,10 +93,9 @@ pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Resu
     }
     let program = std::env::current_exe().context("path of this program")?;
     // Whoever may not pass a folder on the way to it is handed the program itself.
-    let handed = match closed_to_others(&program)? {
-        Some(_) if is_root => Some(File::open(&program).context("this program")?),
-        _ => None,
-    };
+    let is_handed = is_root && closed_to_others(&program)?.is_some();
+    let handed = is_handed.then(|| File::open(&program)).transpose();
+    let handed = handed.context("this program")?;
     let of_handed = |file: &File| PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
     let mut command = Command::new(handed.as_ref().map_or(program, of_handed));
     command

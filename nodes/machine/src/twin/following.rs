@@ -58,6 +58,7 @@ use super::response::Response;
 use crate::effects::{Effect, Scene};
 use crate::file::{AxisEntry, VelocityLoopEntry};
 
+use waves::Inner;
 pub(crate) use waves::Wave;
 
 mod waves;
@@ -140,7 +141,7 @@ pub(crate) struct Follower {
     /// Rates of change of the state around a velocity loop.
     rate: Option<SMatrix<f64, STATES, STATES>>,
     /// The velocity loop; none where it is ideal.
-    inner: Option<waves::Inner>,
+    inner: Option<Inner>,
     period_s: f64,
     /// Share of an error that a period leaves, around an ideal velocity loop.
     kept: f64,
@@ -170,9 +171,10 @@ impl Follower {
     }
 
     fn of(gains: Gains, velocity_loop: Option<&VelocityLoopEntry>, state: Driven) -> Self {
+        let inner = velocity_loop.map(Inner::of);
         Self {
-            rate: velocity_loop.map(|velocity_loop| gains.rate(velocity_loop)),
-            inner: velocity_loop.map(waves::Inner::of),
+            rate: inner.as_ref().map(|inner| gains.rate(inner)),
+            inner,
             period_s: 0.0,
             kept: 1.0,
             passed: SMatrix::identity(),
@@ -228,16 +230,15 @@ impl Follower {
 
 impl Gains {
     /// Rates of change of the state, the acceleration of the command held.
-    fn rate(&self, velocity_loop: &VelocityLoopEntry) -> SMatrix<f64, STATES, STATES> {
-        let frequency = std::f64::consts::TAU * velocity_loop.frequency_hz;
-        let filter_s = velocity_loop.filter_ms * 1e-3;
+    fn rate(&self, inner: &Inner) -> SMatrix<f64, STATES, STATES> {
+        let filter_s = inner.filter_s;
         let fed_back = if filter_s > 0.0 { FILTERED } else { VELOCITY };
         let mut rate = SMatrix::zeros();
         rate[(ERROR, VELOCITY)] = 1.0; // (3)
         rate[(ERROR, COMMAND)] = -1.0;
         let parts = [
-            (VELOCITY, 2.0 * velocity_loop.damping * frequency),
-            (INTEGRAL, frequency * frequency),
+            (VELOCITY, inner.proportional_per_s),
+            (INTEGRAL, inner.integral_per_s2),
         ];
         for (row, gain) in parts {
             rate[(row, ERROR)] -= gain * self.position_per_s; // (4)

@@ -34,9 +34,9 @@ pub(crate) struct Wave {
 /// A velocity loop: 2 d w, w^2 and t.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Inner {
-    proportional_per_s: f64,
-    integral_per_s2: f64,
-    filter_s: f64,
+    pub(super) proportional_per_s: f64,
+    pub(super) integral_per_s2: f64,
+    pub(super) filter_s: f64,
 }
 
 impl Inner {
