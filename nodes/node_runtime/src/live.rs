@@ -30,6 +30,7 @@ mod logger_levels;
 mod owner;
 mod parameters;
 mod related;
+mod requests;
 mod service;
 #[doc(hidden)]
 pub mod strangers;

@@ -207,9 +207,9 @@ impl Owner {
     fn wake(&self) -> Instant {
         let mut wake = self.next_second;
         let clients = || self.clients.iter().map(|(_, client)| client);
-        if clients().any(Client::is_waiting) {
+        if clients().any(|client| client.requests.is_waiting()) {
             wake = wake.min(self.next_service);
-        } else if clients().any(Client::has_asked) {
+        } else if clients().any(|client| client.requests.has_asked()) {
             wake = wake.min(now() + LIMIT_POLL);
         }
         if !self.hearing.early.is_empty() {
@@ -304,7 +304,7 @@ impl Owner {
         if self
             .clients
             .iter()
-            .any(|(_, client)| client.is_waiting() || client.has_asked())
+            .any(|(_, client)| client.requests.is_waiting() || client.requests.has_asked())
             && now >= self.next_service
         {
             self.next_service = now + SERVER_POLL;
@@ -334,7 +334,7 @@ impl Owner {
         self.tell_relation();
         self.look_for_servers(now);
         for place in 0..self.clients.len() {
-            for token in self.clients[place].1.abandoned() {
+            for token in self.clients[place].1.requests.abandoned() {
                 self.replied(place, token, None);
             }
         }

@@ -6,13 +6,13 @@
 //! bytes keep the alignment of what follows, so that they are put on and taken off without a look
 //! at the types. Zenoh names a request beside its payload and needs none of this.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use tokio::time::Instant;
 
+use super::requests::Requests;
 use crate::dds::is_cyclone;
-use crate::network::{Guid, PublishError, Remote, RequestIdentity, Role, Sample, Writer};
+use crate::network::{PublishError, Remote, RequestIdentity, Role, Sample, Writer};
 use crate::node::Bytes;
 
 const HEADER_LEN: usize = 4;
@@ -100,69 +100,22 @@ impl Server {
     }
 }
 
-struct Waiting {
-    token: u64,
-    bytes: Bytes,
-    deadline: Option<Instant>,
-}
-
-/// A request that is open.
-struct Asked {
-    token: u64,
-    deadline: Option<Instant>,
-    /// The servers that were there: one that was started since never got it.
-    of: BTreeSet<Guid>,
-}
-
 /// The asking side. Requests wait until a server is there and has had time to find us too.
 pub(super) struct Client {
     pub name: String,
     pub writer: Writer,
-    queue: VecDeque<Waiting>,
-    asked: BTreeMap<RequestIdentity, Asked>,
-    /// The readers of servers, and since when each has been seen. Besides the one that answers there may be one that was
-    /// killed and whose lease is not over.
-    servers: BTreeMap<Guid, Instant>,
+    pub requests: Requests,
     cyclone_requests: i64,
 }
-
-/// A server that sees us later than we see it would answer into the void.
-const SETTLING: std::time::Duration = std::time::Duration::from_millis(100);
 
 impl Client {
     pub fn new(name: String, writer: Writer) -> Self {
         Self {
             name,
             writer,
-            queue: VecDeque::new(),
-            asked: BTreeMap::new(),
-            servers: BTreeMap::new(),
+            requests: Requests::default(),
             cyclone_requests: 0,
         }
-    }
-
-    /// Asks under `token`, until `deadline` if there is one.
-    pub fn ask(&mut self, token: u64, bytes: Bytes, deadline: Option<Instant>) {
-        self.queue.push_back(Waiting {
-            token,
-            bytes,
-            deadline,
-        });
-    }
-
-    /// Whether requests wait for their server.
-    pub fn is_waiting(&self) -> bool {
-        !self.queue.is_empty()
-    }
-
-    /// Whether requests are open.
-    pub fn has_asked(&self) -> bool {
-        !self.asked.is_empty()
-    }
-
-    /// The token of the request that a reply answers, once.
-    pub fn answered(&mut self, identity: RequestIdentity) -> Option<u64> {
-        self.asked.remove(&identity).map(|asked| asked.token)
     }
 
     /// Looks whether a server is there, among everybody's writers and readers.
@@ -173,76 +126,26 @@ impl Client {
         let found = readers
             .iter()
             .filter(|reader| replies && reader.is_of(Role::Request, &self.name));
-        let since = |guid: Guid| self.servers.get(&guid).copied().unwrap_or(now);
-        self.servers = found
-            .map(|reader| (reader.guid, since(reader.guid)))
-            .collect();
+        self.requests
+            .servers_are(found.map(|reader| reader.guid), now);
     }
 
     /// Sends what waits, if a server is there.
     pub fn send(&mut self, now: Instant) -> Result<(), PublishError> {
-        let newest = self.servers.iter().max_by_key(|(_, since)| **since);
-        let Some((server, since)) = newest.map(|(server, since)| (*server, *since)) else {
-            return Ok(());
-        };
-        if now.duration_since(since) < SETTLING {
-            return Ok(());
-        }
-        while let Some(waiting) = self.queue.pop_front() {
+        while let Some((server, bytes)) = self.requests.next_to_send(now) {
             let identity = if self.writer.meets_cyclone(&server) {
                 self.cyclone_requests += 1;
                 let mut front = [0; CYCLONE_LEN];
                 front[..8].copy_from_slice(&self.writer.guid()[8..]);
                 front[8..].copy_from_slice(&self.cyclone_requests.to_le_bytes());
-                self.writer
-                    .publish(&put_front(&front, &waiting.bytes), None)?;
+                self.writer.publish(&put_front(&front, &bytes), None)?;
                 cyclone_identity(front)
             } else {
-                self.writer.request(&waiting.bytes)?
+                self.writer.request(&bytes)?
             };
-            let asked = Asked {
-                token: waiting.token,
-                deadline: waiting.deadline,
-                of: self.servers.keys().copied().collect(),
-            };
-            self.asked.insert(identity, asked);
+            self.requests.sent(identity);
         }
         Ok(())
-    }
-
-    /// Tokens of the requests whose time is over.
-    pub fn expired(&mut self, now: Instant) -> Vec<u64> {
-        let over = |deadline: Option<Instant>| deadline.is_some_and(|deadline| deadline <= now);
-        let mut tokens = Vec::new();
-        self.queue.retain(|waiting| {
-            let expired = over(waiting.deadline);
-            if expired {
-                tokens.push(waiting.token);
-            }
-            !expired
-        });
-        self.asked.retain(|_, asked| {
-            let expired = over(asked.deadline);
-            if expired {
-                tokens.push(asked.token);
-            }
-            !expired
-        });
-        tokens
-    }
-
-    /// Forgets open requests whose servers have all gone, also where another one is there by now; gives their tokens.
-    pub fn abandoned(&mut self) -> Vec<u64> {
-        let servers = &self.servers;
-        let mut tokens = Vec::new();
-        self.asked.retain(|_, asked| {
-            let is_there = asked.of.iter().any(|server| servers.contains_key(server));
-            if !is_there {
-                tokens.push(asked.token);
-            }
-            is_there
-        });
-        tokens
     }
 }
 
@@ -257,6 +160,7 @@ mod tests {
 
     use super::*;
     use crate::dds::CYCLONE_VENDOR;
+    use crate::network::Guid;
 
     fn sample(writer: Guid, related: Option<RequestIdentity>, bytes: &[u8]) -> Sample {
         let received = Stamp::from_nanos(0);

@@ -1,16 +1,12 @@
 //! Carrying out what the node says.
 
-use std::time::Duration;
-
 use uuid::Uuid;
 
 use super::{ClientUse, Owner, now};
 use crate::clock;
 use crate::diagnostic::{Diagnostic, Level};
+use crate::live::requests::Limits;
 use crate::node::{Bytes, Emission, GoalId, GoalStatus, RequestId};
-
-/// How long a service or an action server may take to answer.
-const ANSWER_LIMIT: Duration = Duration::from_secs(5);
 
 impl Owner {
     pub(super) fn carry(&mut self, emission: Emission) {
@@ -36,11 +32,11 @@ impl Owner {
             Emission::SendGoal { client, id, bytes } => {
                 let goal = *Uuid::new_v4().as_bytes();
                 let ask = self.used_actions[client].client.send(id, goal, &bytes);
-                self.ask(client, ask, Some(now() + ANSWER_LIMIT));
+                self.ask(client, ask, Limits::at_once(now()));
             }
             Emission::CancelGoal { client, id } => {
                 if let Some(ask) = self.used_actions[client].client.cancel(id) {
-                    self.ask(client, ask, Some(now() + ANSWER_LIMIT));
+                    self.ask(client, ask, Limits::at_once(now()));
                 }
             }
             Emission::Diagnostic(diagnostic) => self.board.report(diagnostic, now()),
@@ -64,7 +60,7 @@ impl Owner {
         let is_wanted =
             |used: &ClientUse| matches!(used, ClientUse::Service(place) if *place == client);
         if let Some((_, end)) = self.clients.iter_mut().find(|(used, _)| is_wanted(used)) {
-            end.ask(id, bytes, Some(now() + ANSWER_LIMIT));
+            end.requests.ask(id, bytes, Limits::at_once(now()));
         }
     }
 

@@ -6,11 +6,12 @@ use metrology::Stamp;
 use metrology::stamp::Host;
 use tokio::time::Instant;
 
-use super::{ClientUse, Owner, Reply, ServerUse, Timers};
+use super::{ClientUse, Owner, Reply, ServerUse, Timers, now};
 use crate::diagnostic::{Diagnostic, Level};
 use crate::live::action_client::{Ask, News};
 use crate::live::action_server::{Answer, GoalService};
 use crate::live::incoming::{After, Incoming};
+use crate::live::requests::Limits;
 use crate::live::service::ReplyTo;
 use crate::live::timers::SimulatedTimers;
 use crate::live::type_description;
@@ -51,7 +52,7 @@ impl Owner {
                 identity,
                 bytes,
             } => {
-                if let Some(token) = self.clients[client].1.answered(identity) {
+                if let Some(token) = self.clients[client].1.requests.answered(identity) {
                     self.replied(client, token, Some(&bytes));
                 }
             }
@@ -283,7 +284,7 @@ impl Owner {
                 let used = &mut self.used_actions[action];
                 let (news, ask) = used.client.replied(service, token, bytes);
                 if let Some(ask) = ask {
-                    self.ask(action, ask, None);
+                    self.ask(action, ask, Limits::at_the_end(now()));
                 }
                 if let Some(news) = news {
                     self.tell(action, &news);
@@ -328,9 +329,10 @@ impl Owner {
         }
     }
 
-    pub(super) fn ask(&mut self, action: usize, ask: Ask, deadline: Option<Instant>) {
+    pub(super) fn ask(&mut self, action: usize, ask: Ask, limits: Limits) {
         let place = self.used_actions[action].first_client + place_of(ask.service);
-        self.clients[place].1.ask(ask.token, ask.bytes, deadline);
+        let requests = &mut self.clients[place].1.requests;
+        requests.ask(ask.token, ask.bytes, limits);
     }
 
     /// Looks for servers.
@@ -346,7 +348,11 @@ impl Owner {
 
     /// Sends what waits for a server, and gives up what has waited too long.
     pub(super) fn serve_clients(&mut self, now: Instant) {
-        if self.clients.iter().any(|(_, client)| client.is_waiting()) {
+        if self
+            .clients
+            .iter()
+            .any(|(_, client)| client.requests.is_waiting())
+        {
             self.look_for_servers(now);
         }
         for place in 0..self.clients.len() {
@@ -355,7 +361,7 @@ impl Owner {
                 let name = client.name.clone();
                 self.unsent(&name, &error);
             }
-            for token in self.clients[place].1.expired(now) {
+            for token in self.clients[place].1.requests.expired(now) {
                 self.replied(place, token, None);
             }
         }
