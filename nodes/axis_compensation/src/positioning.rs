@@ -78,3 +78,4 @@ pub mod loop_stability;
 pub mod offset;
 pub mod refresh;
 pub mod refusal;
+mod steady;

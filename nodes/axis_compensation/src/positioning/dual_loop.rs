@@ -114,9 +114,10 @@ impl DualLoop {
             believed_fm,
             pulse_fm,
         )
-        .with_ends_following(config.ends_follow);
+        .with_ends_following(config.ends_follow)
+        .with_settling(config.settle_s);
         if let Some(known) = &known {
-            refresh.begin(known.table.n_points());
+            refresh.begin(&known.table);
         }
         Ok(Self {
             axis,
@@ -366,7 +367,7 @@ impl DualLoop {
                 } else {
                     Diagnostic::LeadSeen { axis, lead_mm }
                 });
-                self.refresh.begin(table.n_points());
+                self.refresh.begin(&table);
                 self.known = Some(Known {
                     table,
                     runs,

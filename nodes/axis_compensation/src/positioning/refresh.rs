@@ -16,21 +16,25 @@
 //!
 //! The command passes x_j between two states; xs − xm is taken straight between them. Only a pass below
 //! the feed limit counts, with states less than 1 mm apart: faster, the time between the two readings of
-//! one state and the axis' elastic wind-up would be learned as deviation. What differs from the table
-//! by more than `believed` (a chip, a scale that lost counts) is refused and said.
+//! one state and the axis' elastic wind-up would be learned as deviation. So would they where the speed changes: it must have
+//! been one for `settle_s` ([`super::steady`]), as where the axis turns at a point it is not. What differs from the table by
+//! more than `believed` (a chip, a scale that lost counts) is refused and said.
 //!
 //! With tables apart, a pass upwards refreshes the table of upwards. Together, each pass refreshes the one
 //! there is, which then trembles by ω/(2 − ω) of half the lost motion as directions alternate.
 //!
 //! Work seldom reaches both ends. Points that are never passed would stay as they were learned while the screw beside them
-//! grows: with `ends_follow` they move as the outermost point that was passed,
+//! grows: with `ends_follow` they move as the outermost point of the work does,
 //!
 //! ```text
-//!   Δ(i) ← Δ(i) + change of Δ(m) in (1)   for all i beyond m,  m the outermost point passed n > (2 − ω)/ω times     (5)
+//!   Δ(i) ← Δ0(i) + Δ(m) − Δ0(m)   at each pass of m, for all i beyond it, with Δ0 as it was learned          (5)
+//!   of the work:  p(j) > (2 − ω)/ω  and  10 p(j) ≥ greatest p                                                (6)
+//!   m:  of the work, and no i beyond it is, nor was passed half as often
 //! ```
 //!
-//! a choice of ours, and an extrapolation: right for what grows or shifts as a whole. What m takes in its first n passes is its
-//! own: readings of a moving axis differ a little from those at its dwells, by which the table was learned.
+//! where a point was passed p times. A choice of ours, and an extrapolation: right for what grows or shifts as a whole. The few
+//! passes of its own that a point beyond m has are thereby left out; a point becomes one of the work once it is passed a tenth
+//! as often as the one that is passed most.
 //!
 //! # Agreement
 //! `val_ewma_remembers_2_minus_w_over_w_passes`: 5.667 to 1e-9. `val_ewma_noise_gain`: variance ratio of 4,000
@@ -40,11 +44,14 @@
 //! The form of the mean is DERIVED, see `positioning`; its moments are those of S. W. Roberts'
 //! geometric moving average.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use super::deviation_table::DeviationTable;
 use super::direction::Direction;
 use super::offset::share_fm;
+use super::steady::Steady;
 use crate::femtometre::FM_PER_MM;
 
 /// Whether both directions of motion share a table.
@@ -96,8 +103,11 @@ pub struct Refresh {
     believed_fm: i64,
     pulse_fm: i64,
     ends_follow: bool,
+    steady: Steady,
     /// How often each point was passed, up and down.
     passes: [Vec<u32>; 2],
+    /// The table as it began, up and down, fm.
+    learned_fm: [Vec<i64>; 2],
     before: Option<ScaleReading>,
 }
 
@@ -118,7 +128,9 @@ impl Refresh {
             believed_fm,
             pulse_fm,
             ends_follow: false,
+            steady: Steady::new(0.0, pulse_fm),
             passes: [Vec::new(), Vec::new()],
+            learned_fm: [Vec::new(), Vec::new()],
             before: None,
         }
     }
@@ -130,15 +142,29 @@ impl Refresh {
         self
     }
 
+    /// The same, whose passes count once the speed was one for `settle_s`.
+    #[must_use]
+    pub fn with_settling(mut self, settle_s: f64) -> Self {
+        self.steady = Steady::new(settle_s, self.pulse_fm);
+        self
+    }
+
     /// The next state does not follow the last one.
     pub fn forget(&mut self) {
         self.before = None;
+        self.steady.forget();
     }
 
-    /// A table of so many points begins, none of which was passed yet.
-    pub fn begin(&mut self, n_points: usize) {
-        self.before = None;
-        self.passes = [vec![0; n_points], vec![0; n_points]];
+    /// A table begins, none of whose points was passed yet.
+    pub fn begin(&mut self, table: &DeviationTable) {
+        self.forget();
+        self.passes = [(); 2].map(|()| vec![0; table.n_points()]);
+        self.learned_fm = [Direction::Up, Direction::Down].map(|direction| {
+            let points = 0..table.n_points();
+            points
+                .filter_map(|point| table.point_fm(point, direction))
+                .collect()
+        });
     }
 
     /// One state, `dt_s` after the one before; (1) for each point passed in between.
@@ -157,7 +183,8 @@ impl Refresh {
         // A command at the limit itself advances by a rounding more in every second tick.
         let limit_mm = self.feed_limit_mm_s * dt_s + self.pulse_fm as f64 / FM_PER_MM;
         let is_slow = step_mm <= PASS_STEP_MM && step_mm <= limit_mm;
-        if step_fm == 0 || self.weight <= 0.0 || !is_slow {
+        let is_steady = self.steady.advance(step_fm, dt_s);
+        if step_fm == 0 || self.weight <= 0.0 || !is_slow || !is_steady {
             return refreshed;
         }
         let direction = if step_fm > 0 {
@@ -201,47 +228,62 @@ impl Refresh {
             return Err(change_fm);
         }
         let moved_fm = share_fm(self.weight, change_fm);
-        let (least, greatest) = self.beyond(point, direction, table.n_points());
-        for place in least..greatest {
-            let tables = match self.directions {
-                Directions::Apart => &[direction][..],
-                Directions::Together => &[Direction::Up, Direction::Down],
-            };
-            for &of in tables {
-                if let Some(before_fm) = table.point_fm(place, of) {
-                    table.replace(place, of, before_fm + moved_fm);
+        let apart = [direction];
+        let tables = match self.directions {
+            Directions::Apart => &apart[..],
+            Directions::Together => &[Direction::Up, Direction::Down],
+        };
+        for &of in tables {
+            let now_fm = table.point_fm(point, of).unwrap_or_default();
+            table.replace(point, of, now_fm + moved_fm);
+        }
+        if let Some(count) = self.passes[tables[0] as usize].get_mut(point) {
+            *count = count.saturating_add(1);
+        }
+        if self.ends_follow {
+            for beyond in [0..point, point + 1..table.n_points()] {
+                if self.is_outermost(point, &beyond, tables[0]) {
+                    self.carry_along(table, point, beyond, tables);
                 }
             }
         }
         Ok(())
     }
 
-    /// The point and those that follow it by (5), from the first to one behind the last.
-    fn beyond(&mut self, point: usize, direction: Direction, n_points: usize) -> (usize, usize) {
-        let table = match self.directions {
-            Directions::Apart => direction as usize,
-            Directions::Together => 0,
+    /// (6).
+    fn is_outermost(&self, point: usize, beyond: &Range<usize>, table: Direction) -> bool {
+        let passes = &self.passes[table as usize];
+        let (Some(&own), Some(others)) = (passes.get(point), passes.get(beyond.clone())) else {
+            return false;
         };
-        let passes = &mut self.passes[table];
-        let Some(count) = passes.get_mut(point) else {
-            return (point, point + 1);
+        let most = passes.iter().copied().max().unwrap_or_default();
+        let is_of_the_work = |count: u32| {
+            f64::from(count) * self.weight > 2.0 - self.weight && count.saturating_mul(10) >= most
         };
-        *count = count.saturating_add(1);
-        let is_settled = |count: &u32| f64::from(*count) * self.weight > 2.0 - self.weight;
-        if !self.ends_follow || !is_settled(&passes[point]) {
-            return (point, point + 1);
+        let is_left_aside = |count: &u32| !is_of_the_work(*count) && count.saturating_mul(2) < own;
+        is_of_the_work(own) && others.iter().all(is_left_aside)
+    }
+
+    /// (5).
+    fn carry_along(
+        &self,
+        table: &mut DeviationTable,
+        point: usize,
+        beyond: Range<usize>,
+        tables: &[Direction],
+    ) {
+        for &of in tables {
+            let learned_fm = &self.learned_fm[of as usize];
+            let (Some(now_fm), Some(then_fm)) = (table.point_fm(point, of), learned_fm.get(point))
+            else {
+                continue;
+            };
+            for place in beyond.clone() {
+                if let Some(own_fm) = learned_fm.get(place) {
+                    table.replace(place, of, own_fm + now_fm - then_fm);
+                }
+            }
         }
-        let from = if passes[..point].iter().any(is_settled) {
-            point
-        } else {
-            0
-        };
-        let to = if passes[point + 1..].iter().any(is_settled) {
-            point + 1
-        } else {
-            n_points
-        };
-        (from, to)
     }
 }
 

@@ -55,38 +55,102 @@ fn eq1_takes_the_deviation_where_the_command_passes_the_point() {
     assert_eq!(table.point_fm(2, Direction::Down), Some(0));
 }
 
-#[test]
-fn eq5_points_beyond_those_that_are_passed_move_with_the_outermost() {
-    let mut table = table(5);
-    let mut refresh = refresh(0.3, Directions::Apart).with_ends_following(true);
-    refresh.begin(5);
-    // Work goes to and fro between 15 and 35 mm; `grown_um` is what the screw has grown.
-    let mut work = |grown_um: f64| {
-        for _ in 0..60 {
-            for (before_mm, deviation_um) in [(19.99, 4.0), (29.99, 6.0)] {
-                refresh.forget();
-                for commanded_mm in [before_mm, before_mm + 0.02] {
-                    let state = at(commanded_mm, deviation_um + grown_um);
-                    refresh.observe(&mut table, state, 1e-3);
-                }
-            }
-        }
-        let um = |fm: i64| fm as f64 / UM as f64;
-        let up_um = |point| um(table.point_fm(point, Direction::Up).unwrap());
-        assert_eq!(table.point_fm(4, Direction::Down), Some(0));
-        [0, 1, 2, 3, 4].map(up_um)
-    };
-    let (cold_um, warm_um) = (work(0.0), work(10.0));
-    // What five passes leave of what is measured.
-    let left = 0.7_f64.powi(5);
-    assert!((cold_um[0] - 4.0 * left).abs() < 1e-6, "{cold_um:?}");
-    assert!((cold_um[4] - 6.0 * left).abs() < 1e-6, "{cold_um:?}");
-    for (cold_um, warm_um) in cold_um.iter().zip(warm_um) {
-        assert!(
-            (warm_um - cold_um - 10.0).abs() < 1e-6,
-            "{cold_um} {warm_um}"
-        );
+/// One pass upwards of the point at `mm` that measures `deviation_um`.
+fn pass_up(refresh: &mut Refresh, table: &mut DeviationTable, mm: f64, deviation_um: f64) {
+    refresh.forget();
+    for commanded_mm in [mm - 0.01, mm + 0.01] {
+        refresh.observe(table, at(commanded_mm, deviation_um), 1e-3);
     }
+}
+
+fn up_um(table: &DeviationTable) -> Vec<f64> {
+    let points = 0..table.n_points();
+    let up = points.map(|point| table.point_fm(point, Direction::Up).unwrap());
+    up.map(|fm| fm as f64 / UM as f64).collect()
+}
+
+/// A learned table with a shape of its own at its ends.
+fn shaped() -> DeviationTable {
+    let learned_mm = [-2e-3, 1e-3, 4e-3, 6e-3, 5e-3];
+    let x_mm: Vec<_> = (0..5).map(|j| 10.0 * f64::from(j)).collect();
+    DeviationTable::new(Axis::X, &x_mm, &learned_mm, &[0.0; 5]).unwrap()
+}
+
+/// Warming up from the first pass on: what the outermost point takes before it counts as one of the work is the ends' as well.
+#[test]
+fn eq5_ends_keep_their_shape_while_the_screw_grows() {
+    let mut table = shaped();
+    let mut refresh = refresh(0.3, Directions::Apart).with_ends_following(true);
+    refresh.begin(&table);
+    for cycle in 1..=60_i32 {
+        // Grows by 2 µm from one cycle to the next, to 24 µm; work goes to and fro between 5 and 35 mm.
+        let grown_um = 2.0 * f64::from(cycle.min(12));
+        for (mm, learned_um) in [(10.0, 1.0), (20.0, 4.0), (30.0, 6.0)] {
+            pass_up(&mut refresh, &mut table, mm, learned_um + grown_um);
+        }
+        // Each point of the work holds what (1) says, whatever the others took.
+        let of_work_um = up_um(&table)[1..4].to_vec();
+        let steps_um = [of_work_um[1] - of_work_um[0], of_work_um[2] - of_work_um[1]];
+        for (step_um, learned_um) in steps_um.into_iter().zip([3.0, 2.0]) {
+            assert!(
+                (step_um - learned_um).abs() < 1e-6,
+                "cycle {cycle}: {of_work_um:?}"
+            );
+        }
+        if cycle > 6 {
+            let all_um = up_um(&table);
+            let ends_um = [all_um[0] - all_um[1], all_um[4] - all_um[3]];
+            assert!((ends_um[0] + 3.0).abs() < 1e-6, "cycle {cycle}: {all_um:?}");
+            assert!((ends_um[1] + 1.0).abs() < 1e-6, "cycle {cycle}: {all_um:?}");
+        }
+    }
+    assert!((up_um(&table)[4] - 29.0).abs() < 1e-3);
+    assert_eq!(table.point_fm(4, Direction::Down), Some(0));
+}
+
+/// A visit of the end now and then does not make it one of the work; work that reaches it does.
+#[test]
+fn eq6_a_point_that_is_seldom_passed_follows_still() {
+    let mut table = shaped();
+    let mut refresh = refresh(0.3, Directions::Apart).with_ends_following(true);
+    refresh.begin(&table);
+    for cycle in 0..200_i32 {
+        let grown_um = 0.1 * f64::from(cycle);
+        for (mm, learned_um) in [(10.0, 1.0), (20.0, 4.0), (30.0, 6.0)] {
+            pass_up(&mut refresh, &mut table, mm, learned_um + grown_um);
+        }
+        if cycle % 20 == 0 {
+            pass_up(&mut refresh, &mut table, 40.0, 5.0 + grown_um);
+        }
+    }
+    // Behind by the lag (4) of the work, not by what grew since its last visit.
+    let all_um = up_um(&table);
+    assert!((all_um[4] - all_um[3] + 1.0).abs() < 1e-6, "{all_um:?}");
+    for _ in 0..40 {
+        pass_up(&mut refresh, &mut table, 40.0, 50.0);
+    }
+    pass_up(&mut refresh, &mut table, 30.0, 6.0);
+    assert!(
+        (up_um(&table)[4] - 50.0).abs() < 0.01,
+        "{:?}",
+        up_um(&table)
+    );
+}
+
+/// 650 kg on 165 N/µm lag by 12 µm while they slow down at 3 m/s² into the point where the axis turns.
+#[test]
+fn where_the_speed_changes_nothing_is_learned() {
+    let mut table = table(5);
+    let mut refresh = refresh(0.3, Directions::Apart).with_settling(0.05);
+    refresh.begin(&table);
+    let n_points: u32 = (0..=45)
+        .map(|tick| {
+            let left_s = 1e-3 * f64::from(40_i32 - tick).max(0.0);
+            let state = at(20.0 - 0.5 * 3000.0 * left_s * left_s, -12.0);
+            refresh.observe(&mut table, state, 1e-3).n_points
+        })
+        .sum();
+    assert_eq!((n_points, table.point_fm(2, Direction::Up)), (0, Some(0)));
 }
 
 #[test]
