@@ -3,12 +3,12 @@
 use node_runtime::complain;
 
 use std::fs::File;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use clap::{Args, ValueEnum};
 use machine::export::fanuc::Record;
 use machine::export::linuxcnc::FileType;
@@ -23,8 +23,10 @@ use crate::tell::tell;
 use crate::usage::{USAGE, above_zero};
 
 mod found;
+mod origin;
 
 use found::{Found, looked_for, read, tables_of_stops};
+use origin::{Counting, Which};
 
 /// Controls that tables are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -105,6 +107,9 @@ pub struct Export {
     /// Keep the error at the reference point instead of counting from it.
     #[arg(long)]
     absolute: bool,
+    /// Which table of an axis that was refreshed while it worked.
+    #[arg(long, value_enum, default_value_t)]
+    table: Which,
     /// Where no positioning run gave a table, make one of the stops of a verification along one axis, as its scale or the control read them.
     #[arg(long)]
     stops: bool,
@@ -234,12 +239,14 @@ impl Export {
             mut measured,
             losses,
             topics,
-        } = read(&self.bag)?;
+            origin,
+        } = read(&self.bag, self.table)?;
         if self.stops {
             let tests = Tests::of(&Bag::open(&self.bag)?)?;
             tables_of_stops(&tests.stops, &mut measured);
         }
-        let selected = select(&measured, &self.wanted(), &self.set_up.control(format));
+        let wanted = self.wanted();
+        let selected = select(&measured, &wanted, &self.set_up.control(format));
         for left in &selected.left_out {
             tell!("left out: {}: {}", left.what, left.why);
         }
@@ -254,7 +261,17 @@ impl Export {
             }
             return Ok(ExitCode::FAILURE);
         }
-        self.write(&selected)?;
+        let counting = Counting {
+            which: self.table,
+            axes: wanted.axes,
+            reference: wanted.reference,
+            relative_to_reference: wanted.relative_to_reference,
+        };
+        let of_what = origin.lines(&self.bag, &measured, &counting);
+        for line in &of_what[1..] {
+            tell!("{line}");
+        }
+        self.write(&selected, &of_what)?;
         for loss in &losses {
             complain!("abbe: the bag has lost something, a later table may be missing: {loss}");
         }
@@ -292,13 +309,13 @@ impl Export {
         }
     }
 
-    fn write(&self, selected: &Selected) -> Result<()> {
+    fn write(&self, selected: &Selected, of_what: &[String]) -> Result<()> {
         std::fs::create_dir_all(&self.out).with_context(|| self.out.display().to_string())?;
         for file in &selected.files {
             create(&self.out.join(&file.name), &file.text)?;
             tell!("wrote {}", self.out.join(&file.name).display());
         }
-        let notes = notes(&selected.files);
+        let notes = notes(of_what, &selected.files);
         create(&self.out.join(NOTES), &notes)?;
         tell!(
             "wrote {}: read it before loading anything",
@@ -311,8 +328,9 @@ impl Export {
 /// Beside the files, since not every format has comments.
 const NOTES: &str = "READ_ME_FIRST.txt";
 
-fn notes(files: &[ExportFile]) -> String {
-    let mut text = String::new();
+fn notes(of_what: &[String], files: &[ExportFile]) -> String {
+    let mut text: String = of_what.iter().map(|line| format!("{line}\n")).collect();
+    text.push('\n');
     for file in files {
         text.push_str(&format!("{}\n", file.name));
         for note in &file.notes {
@@ -323,7 +341,13 @@ fn notes(files: &[ExportFile]) -> String {
 }
 
 fn create(path: &Path, text: &str) -> Result<()> {
-    let mut file = File::create_new(path).with_context(|| path.display().to_string())?;
+    let mut file = File::create_new(path).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => anyhow!(
+            "{}: there already, and not overwritten: name another folder with --out",
+            path.display()
+        ),
+        _ => anyhow!("{}: {error}", path.display()),
+    })?;
     file.write_all(text.as_bytes())
         .with_context(|| path.display().to_string())
 }
@@ -426,9 +450,30 @@ mod tests {
         assert_eq!(x.lines().next(), Some("-100.000000 0.030000 0.030000"));
         assert!(out.join("y.comp").is_file() && !out.join("z.comp").exists());
         let notes = std::fs::read_to_string(out.join(NOTES)).unwrap();
-        assert!(notes.starts_with("x.comp\n  - LinuxCNC screw compensation of axis X"));
+        assert!(notes.starts_with("made of the bag "), "{notes}");
+        assert!(notes.contains("the last of 2 tables"), "{notes}");
+        assert!(notes.contains("\nx.comp\n  - LinuxCNC screw compensation of axis X"));
+        let first = folder.path().join("first");
+        let options = [
+            "--format",
+            "linuxcnc",
+            "--file-type",
+            "1",
+            "--table",
+            "first",
+        ];
+        execute(&bag, &first, &options).unwrap();
+        let x_first = std::fs::read_to_string(first.join("x.comp")).unwrap();
+        assert_eq!(
+            x_first.lines().next(),
+            Some("-100.000000 0.010000 0.010000")
+        );
         let again = execute(&bag, &out, &["--format", "linuxcnc"]).unwrap_err();
-        assert!(format!("{again:#}").contains("x.comp"), "{again:#}");
+        let again = format!("{again:#}");
+        assert!(
+            again.contains("x.comp") && again.contains("--out"),
+            "{again}"
+        );
     }
 
     #[test]
@@ -447,7 +492,7 @@ mod tests {
     fn nothing_to_export_names_each_source_and_why_it_gave_none() {
         let folder = tempfile::tempdir().unwrap();
         let bag = bag(folder.path(), &[table(Axis::X, 1e-4)], false);
-        let found = read(&bag).unwrap();
+        let found = read(&bag, Which::Last).unwrap();
         assert_eq!(found.topics, [Some(1), None, None]);
         let lines = looked_for(&found.measured, found.topics, AxisSet::EMPTY.with(Axis::Z));
         assert!(lines[0].contains("positioning/table"), "{lines:?}");

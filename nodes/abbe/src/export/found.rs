@@ -10,6 +10,7 @@ use metrology::sample::PositioningTable;
 use metrology::{Axis, AxisSet, PerAxis};
 use recorder::{Bag, Event, Order};
 
+use super::origin::{Origin, Said, Which};
 use crate::evaluate::stops::Stops;
 
 /// What a bag has for an export.
@@ -21,6 +22,8 @@ pub(super) struct Found {
     pub losses: Vec<String>,
     /// Messages on each of [`SOURCES`]; `None`: the bag has no such topic.
     pub topics: [Option<u64>; 3],
+    /// Where the tables come from.
+    pub origin: Origin,
 }
 
 /// Topics that tables are made of, and who publishes them when.
@@ -44,8 +47,8 @@ fn is(name: &str, topic: &str) -> bool {
     name == topic || name.ends_with(&format!("/{topic}"))
 }
 
-/// The last that a bag says of a machine's errors.
-pub(super) fn read(path: &Path) -> Result<Found> {
+/// What a bag says of a machine's errors: the first or the last table of each axis, and the last models.
+pub(super) fn read(path: &Path, which: Which) -> Result<Found> {
     let bag = Bag::open(path)?;
     let mut found = Found::default();
     for info in bag.topics() {
@@ -66,10 +69,19 @@ pub(super) fn read(path: &Path) -> Result<Found> {
             }
         };
         let name = bag.topic(message.topic).topic.as_str();
+        found
+            .origin
+            .began_nanos
+            .get_or_insert(message.log_time_nanos);
         if is(name, topics::POSITIONING_TABLE.name) {
             let table = decode(&topics::POSITIONING_TABLE, message.data)?;
             let axis = table.axis;
-            measured.tables[axis] = Some(table);
+            let said = Said::new(&table, message.log_time_nanos);
+            found.origin.tables[axis].get_or_insert_default().add(said);
+            let known = &mut measured.tables[axis];
+            if known.is_none() || which == Which::Last {
+                *known = Some(table);
+            }
         } else if is(name, topics::THERMAL_MODEL.name) {
             measured.thermal = Some(decode(&topics::THERMAL_MODEL, message.data)?);
         } else if is(name, topics::GEOMETRY_MODEL.name) {
