@@ -3,6 +3,7 @@
 //!
 //! Time is the bag's, and stands until everybody has what was told: nothing depends on how busy the computer is.
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use abbe_msgs::builtin_interfaces::msg::Time;
@@ -39,6 +40,8 @@ pub struct Twins {
     topics: Vec<&'static str>,
     nodes: Vec<(&'static str, Process)>,
     now: i64,
+    /// How often each topic of each twin was told something.
+    told: BTreeMap<String, u64>,
 }
 
 fn entry(topic: &str) -> &'static Entry {
@@ -93,6 +96,7 @@ impl Twins {
             topics: topics.to_vec(),
             nodes: processes,
             now: 0,
+            told: BTreeMap::new(),
         }
     }
 
@@ -104,6 +108,8 @@ impl Twins {
     }
 
     fn tell(&mut self, twin: usize, topic: &str, bytes: &[u8]) {
+        let name = format!("/{}/{topic}", TWINS[twin]);
+        *self.told.entry(name).or_default() += 1;
         let place = self.topics.iter().position(|known| *known == topic);
         let place = 1 + twin * self.topics.len() + place.unwrap();
         self.voice.bytes(place, bytes);
@@ -130,14 +136,11 @@ impl Twins {
                 self.tell(twin, topic, &first);
             }
             std::thread::sleep(Duration::from_millis(200));
-            let told = self.graph.since(&topics::DIAGNOSTICS, since);
+            let received = self.received(since);
             let heard = |namespace: &str| {
-                let key = format!("/{namespace}/{topic} received");
-                let mut values = told.iter().flat_map(|(_, array)| &array.status);
-                values.any(|status| {
-                    let mut counts = status.values.iter();
-                    counts.any(|value| value.key == key && value.value != "0")
-                })
+                let name = format!("/{namespace}/{topic}");
+                let counts = received.iter().filter(|((_, of), _)| *of == name);
+                counts.map(|(_, count)| count).any(|count| *count > 0)
             };
             if TWINS.into_iter().all(heard) {
                 break;
@@ -148,9 +151,50 @@ impl Twins {
         std::thread::sleep(Duration::from_millis(500));
     }
 
+    /// How many messages each node has taken of each topic, as it told last since `since`.
+    fn received(&self, since: Instant) -> BTreeMap<(String, String), u64> {
+        let told = self.graph.since(&topics::DIAGNOSTICS, since);
+        let statuses = told.iter().flat_map(|(_, array)| &array.status);
+        let counts = statuses.flat_map(|status| {
+            status.values.iter().filter_map(|value| {
+                let topic = value.key.strip_suffix(" received")?;
+                let count = value.value.parse().ok()?;
+                Some(((status.name.clone(), topic.to_owned()), count))
+            })
+        });
+        counts.collect()
+    }
+
+    /// The same once every node has told.
+    fn received_by_all(&self) -> BTreeMap<(String, String), u64> {
+        let since = Instant::now();
+        for (node, _) in &self.nodes {
+            for namespace in TWINS {
+                self.graph.alive(&format!("{namespace}/{node}"), since);
+            }
+        }
+        self.received(since)
+    }
+
+    /// Until every node has taken what it was told since `before`: what has arrived waits with it, topic by topic, and the
+    /// time must not run ahead of that.
+    fn all_is_taken(&self, before: &BTreeMap<(String, String), u64>) {
+        self.graph
+            .wait_longer(COMPUTING, "everything is taken", |_| {
+                let now = self.received_by_all();
+                let is_taken = |(key, count): (&(String, String), &u64)| {
+                    let told = self.told.get(&key.1).copied().unwrap_or_default();
+                    now.get(key).is_some_and(|now| *now >= count + told)
+                };
+                before.iter().all(is_taken).then_some(())
+            });
+    }
+
     /// Tells both what the bag holds; of each message `worse` says what the second one is told besides.
     pub fn play(&mut self, bag: &Bag, mut worse: impl FnMut(&'static str, &[u8]) -> Vec<Vec<u8>>) {
         self.meet(bag);
+        let before = self.received_by_all();
+        self.told.clear();
         let mut held = Held::default();
         let mut events = bag.messages(Order::LogTime);
         while let Some(event) = events.next_event() {
@@ -188,6 +232,7 @@ impl Twins {
             held.besides.is_empty(),
             "too few touches came after the latency"
         );
+        self.all_is_taken(&before);
         for _ in 0..AFTER_S {
             self.tell_time(self.now + 1_000_000_000);
         }

@@ -35,6 +35,7 @@ pub mod equations;
 pub mod error;
 pub mod geometry;
 pub mod identify;
+mod open;
 pub mod preflight;
 pub mod published;
 pub mod recording;

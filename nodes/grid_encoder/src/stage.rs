@@ -1,7 +1,7 @@
 //! The grid encoder's whole computation: positions, readings and segments in, geometry models out.
 //!
-//! Between begin and end of a segment of its kinds, readings are paired with positions; `hold_ms` after the
-//! end the recording is reduced and, with those before it, fitted. So the model grows with every
+//! Between begin and end of a segment of its kinds, by their stamps, readings are paired with positions: topics
+//! arrive in any order, so the readings before a begin are kept for a while. `hold_ms` after the end the recording is reduced and, with those before it, fitted. So the model grows with every
 //! recording, and more of its coefficients become estimable. A recording made anew in the same place replaces
 //! the older one only by its number in the list: repeats tell what noise is, and the oldest leave at
 //! `recordings_limit`.
@@ -18,10 +18,11 @@ use crate::diagnostic::{Diagnostic, Refusal};
 use crate::error::GridEncoderError;
 use crate::geometry::geometry_model;
 use crate::identify::{Disturbed, GROUPS, Identification, identify};
-use crate::recording::{Collector, GridPoint, Place, Recording, reduce_moving, reduce_stationwise};
+use crate::open::Open;
+use crate::recording::{GridPoint, Place, Recording, reduce_moving, reduce_stationwise};
 
-/// Readings that may wait for positions.
-const WAITING: usize = 10_000;
+/// Readings that are kept in case their segment's begin is still on its way.
+const EARLY: usize = 1_000;
 /// Ratio of singular values below which the rank is a matter of opinion.
 const CLEAR_GAP: f64 = 30.0;
 
@@ -61,23 +62,15 @@ pub struct GridEncoderStage {
     resolution_mm: f64,
     plate_radius_mm: f64,
     log: AxisLog,
-    waiting: VecDeque<GridSample>,
+    /// The last readings that no segment has asked for yet.
+    early: VecDeque<GridSample>,
+    /// Ended, and the next one has begun, but its last readings or positions may still be on their way.
+    ending: Option<Open>,
     open: Option<Open>,
     recordings: Vec<Recording>,
     /// How great disturbances were in the last fit: where the next begins.
     disturbances: Option<[f64; GROUPS]>,
     sequence: u32,
-}
-
-/// A recording under way.
-#[derive(Clone, Debug)]
-struct Open {
-    begin: TestSegment,
-    collector: Collector,
-    /// Readings whose positions the log no longer held.
-    n_unpaired: usize,
-    /// When the end was told, and what it said.
-    end: Option<(Stamp<Host>, TestSegment)>,
 }
 
 impl GridEncoderStage {
@@ -100,7 +93,8 @@ impl GridEncoderStage {
             resolution_mm: plate.resolution_um / 1e3,
             plate_radius_mm: plate.radius_mm,
             log: AxisLog::new(config.log_samples, config.positions),
-            waiting: VecDeque::new(),
+            early: VecDeque::with_capacity(EARLY),
+            ending: None,
             open: None,
             recordings: Vec::new(),
             disturbances: None,
@@ -127,45 +121,26 @@ impl GridEncoderStage {
         if !self.log.push(state) {
             let by_s = newest.map_or(0.0, |newest| (newest - state.received_at).as_secs_f64());
             out.push(Output::Diagnostic(Diagnostic::ClockWentBack { by_s }));
-            self.waiting.clear();
-            self.open = None;
+            self.early.clear();
+            (self.ending, self.open) = (None, None);
         }
         self.pair_waiting();
         Ok(())
     }
 
     fn take_reading(&mut self, sample: GridSample) {
-        let Some(open) = &mut self.open else { return };
-        let within = sample.at >= open.begin.at
-            && open.end.as_ref().is_none_or(|(_, end)| sample.at <= end.at);
-        if !within || !open.collector.accepts(&sample) {
+        let all = [self.ending.as_mut(), self.open.as_mut()];
+        if all.into_iter().flatten().any(|open| open.take(&sample)) {
+            self.pair_waiting();
             return;
         }
-        if self.waiting.len() == WAITING {
-            self.waiting.pop_front();
-            open.n_unpaired += 1;
-        }
-        self.waiting.push_back(sample);
-        self.pair_waiting();
+        keep(&mut self.early, sample);
     }
 
-    /// Pairs every reading that the log has reached.
     fn pair_waiting(&mut self) {
-        let Some(open) = &mut self.open else {
-            self.waiting.clear();
-            return;
-        };
-        let Some(newest) = self.log.newest() else {
-            return;
-        };
-        while let Some(sample) = self.waiting.front()
-            && sample.at <= newest
-        {
-            match self.log.pair(sample) {
-                Some(pair) => open.collector.push(pair),
-                None => open.n_unpaired += 1,
-            }
-            self.waiting.pop_front();
+        let all = [self.ending.as_mut(), self.open.as_mut()];
+        for open in all.into_iter().flatten() {
+            open.pair_waiting(&self.log);
         }
     }
 
@@ -175,53 +150,69 @@ impl GridEncoderStage {
         }
         let refused = |run, refusal| Output::Diagnostic(Diagnostic::Refused { run, refusal });
         if segment.begin {
-            self.close(at, true, out);
+            self.make_room(at, out);
             if let Some(open) = self.open.take() {
                 let next = segment.run;
                 out.push(refused(open.begin.run, Refusal::NotEnded { next }));
             }
-            self.waiting.clear();
             if segment.plane == TestPlane::None {
                 out.push(refused(segment.run, Refusal::NoPlane));
                 return;
             }
-            self.open = Some(Open {
-                collector: Collector::new(
-                    segment.plane,
-                    segment.zero_id,
-                    self.config.readings_limit,
-                ),
-                begin: segment,
-                n_unpaired: 0,
-                end: None,
-            });
+            self.open = Some(Open::new(segment, self.config.readings_limit));
+            while let Some(sample) = self.early.pop_front() {
+                self.take_reading(sample);
+            }
         } else if let Some(open) = &mut self.open
             && open.begin.run == segment.run
         {
-            open.end = Some((at, segment));
+            let early = &mut self.early;
+            open.end(at, segment, |sample| keep(early, sample));
         } else {
             out.push(refused(segment.run, Refusal::NotBegun));
         }
     }
 
-    /// Takes in a recording whose positions have all come, or which waited long enough.
-    fn close(&mut self, at: Stamp<Host>, at_once: bool, out: &mut Vec<Output>) {
-        let Some((told_at, end)) = self.open.as_mut().and_then(|open| open.end.as_mut()) else {
-            return;
-        };
-        *told_at = (*told_at).min(at); // host time went back: the wait begins anew
-        let waited = at - *told_at >= self.config.hold();
-        let reached = self.log.newest().is_some_and(|newest| newest > end.at) && waited;
-        if !(reached || waited || at_once) {
-            return;
+    /// The next recording begins: one that has ended is taken in, or goes on waiting for what is still on its way.
+    fn make_room(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        if let Some(ending) = self.ending.take() {
+            self.close(at, ending, out);
         }
-        self.pair_waiting();
-        let Some(open) = self.open.take() else { return };
-        if open.n_unpaired + self.waiting.len() > 0 {
-            let n = open.n_unpaired + self.waiting.len();
+        if let Some(ended) = self.open.take_if(|open| open.end.is_some()) {
+            if ended.is_whole(&self.log) {
+                self.close(at, ended, out);
+            } else {
+                self.ending = Some(ended);
+            }
+        }
+    }
+
+    /// Takes in what is whole, or has waited long enough.
+    fn close_what_is_due(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        let hold = self.config.hold();
+        let has_waited = |open: &mut Open| {
+            open.end.as_mut().is_some_and(|(told_at, _)| {
+                *told_at = (*told_at).min(at); // host time went back: the wait begins anew
+                at - *told_at >= hold
+            })
+        };
+        let log = &self.log;
+        let ending = self
+            .ending
+            .take_if(|open| open.is_whole(log) || has_waited(open));
+        let open = self.open.take_if(has_waited);
+        for due in [ending, open].into_iter().flatten() {
+            self.close(at, due, out);
+        }
+    }
+
+    /// Takes in a recording.
+    fn close(&mut self, at: Stamp<Host>, mut open: Open, out: &mut Vec<Output>) {
+        open.pair_waiting(&self.log);
+        let n = open.n_unpaired();
+        if n > 0 {
             out.push(Output::Diagnostic(Diagnostic::Unpaired { n }));
         }
-        self.waiting.clear();
         let run = open.begin.run;
         let refusals = self.take_in(&open, out);
         let n = open.collector.n_told_before();
@@ -400,6 +391,14 @@ impl GridEncoderStage {
     }
 }
 
+/// For the next segment, should it have begun before this reading.
+fn keep(early: &mut VecDeque<GridSample>, sample: GridSample) {
+    if early.len() == EARLY {
+        early.pop_front();
+    }
+    early.push_back(sample);
+}
+
 impl Stage for GridEncoderStage {
     type Input = Input;
     type Output = Output;
@@ -417,7 +416,7 @@ impl Stage for GridEncoderStage {
             Input::Segment(segment) => self.take_segment(at, segment, out),
             Input::Tick => {}
         }
-        self.close(at, false, out);
+        self.close_what_is_due(at, out);
         Ok(())
     }
 }

@@ -100,6 +100,24 @@ impl Collector {
         is_new
     }
 
+    /// Takes out the readings after `end`.
+    pub fn end(&mut self, end: Stamp<Host>, beyond: &mut impl FnMut(GridSample)) {
+        let (plane, zero_id) = (self.plane, self.zero_id);
+        self.pairs.retain(|pair| {
+            let [u_mm, v_mm] = pair.reading_mm;
+            if pair.at > end {
+                beyond(GridSample {
+                    at: pair.at,
+                    plane,
+                    u_mm,
+                    v_mm,
+                    zero_id,
+                });
+            }
+            pair.at <= end
+        });
+    }
+
     /// Readings that were told again, or after a later one.
     #[must_use]
     pub fn n_told_before(&self) -> usize {

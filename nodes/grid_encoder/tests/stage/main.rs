@@ -121,6 +121,57 @@ fn a_plate_that_lies_askew_changes_nothing() {
     );
 }
 
+/// Topics arrive in any order.
+#[test]
+fn readings_that_come_before_the_begin_of_their_segment_count() {
+    let recorded = |begins_late_ticks| {
+        let mut rig = Rig::new(machine_error_mm);
+        rig.begins_late_ticks = begins_late_ticks;
+        for run in 1..=2 {
+            rig.record(run, &Motion::moving(50.0, Sense::CounterClockwise));
+        }
+        assert_eq!(rig.models().len(), 2);
+        // What is not known is NaN, which equals nothing.
+        format!("{:?}", rig.models())
+    };
+    assert_eq!(recorded(0), recorded(40));
+}
+
+#[test]
+fn readings_after_the_end_do_not_count_although_they_come_before_it() {
+    let recorded = |ends_late_ticks| {
+        let mut rig = Rig::new(machine_error_mm);
+        rig.ends_late_ticks = ends_late_ticks;
+        rig.record(1, &Motion::moving(50.0, Sense::CounterClockwise));
+        assert_eq!(rig.models().len(), 1);
+        format!("{:?}", rig.models()[0].curves)
+    };
+    assert_eq!(recorded(0), recorded(40));
+}
+
+/// Nor is a recording over for readings that are on their way when the next one begins.
+#[test]
+fn readings_that_come_after_the_begin_of_the_next_segment_count() {
+    let recorded = |lag_ticks| {
+        let mut rig = Rig::new(machine_error_mm);
+        rig.lag_ticks = lag_ticks;
+        for (run, pauses) in [(1, false), (2, true)] {
+            rig.pauses = pauses;
+            rig.record(run, &Motion::moving(50.0, Sense::CounterClockwise));
+        }
+        let recordings = rig.out.iter().filter_map(|output| match output {
+            grid_encoder::Output::Recording(recording) => {
+                Some((recording.run, recording.points.clone()))
+            }
+            _ => None,
+        });
+        recordings.collect::<Vec<_>>()
+    };
+    let (at_once, late) = (recorded(0), recorded(20));
+    assert_eq!((at_once.len(), late.len()), (2, 2));
+    assert_eq!(at_once[0], late[0]);
+}
+
 #[test]
 fn equal_events_give_equal_outputs() {
     let run = || {

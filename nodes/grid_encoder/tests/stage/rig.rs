@@ -1,5 +1,7 @@
 //! A machine that moves a head over a plate, with errors by a formula of the test.
 
+use std::collections::VecDeque;
+
 use grid_encoder::diagnostic::{Diagnostic, Refusal};
 use grid_encoder::identify::Identification;
 use grid_encoder::{GridEncoderConfig, GridEncoderStage, Input, Output};
@@ -91,6 +93,15 @@ pub struct Rig {
     pub spoil: fn(f64, GridSample) -> Option<GridSample>,
     /// Whether each reading is told twice, and once more after the next one.
     pub tells_again: bool,
+    /// How many positions later than they were read readings arrive, and those that are on their way.
+    pub lag_ticks: usize,
+    on_their_way: VecDeque<Option<GridSample>>,
+    /// How many positions the end of a segment is late.
+    pub ends_late_ticks: i64,
+    /// Whether the next recording begins some time after the one before.
+    pub pauses: bool,
+    /// After how many positions the begin of a segment arrives.
+    pub begins_late_ticks: i64,
     error_mm: fn(f64, f64) -> [f64; 2],
     rng: Pcg64Mcg,
 }
@@ -118,6 +129,11 @@ impl Rig {
             completed: true,
             spoil: |_, sample| Some(sample),
             tells_again: false,
+            lag_ticks: 0,
+            on_their_way: VecDeque::new(),
+            ends_late_ticks: 0,
+            pauses: true,
+            begins_late_ticks: 0,
             error_mm,
             rng: Pcg64Mcg::seed_from_u64(3),
         }
@@ -129,8 +145,12 @@ impl Rig {
     }
 
     pub fn segment(&mut self, run: u32, begin: bool, motion: &Motion) {
+        self.segment_of(self.now_ns, run, begin, motion);
+    }
+
+    fn segment_of(&mut self, at_ns: i64, run: u32, begin: bool, motion: &Motion) {
         let segment = TestSegment {
-            at: Stamp::from_nanos(self.now_ns),
+            at: Stamp::from_nanos(at_ns),
             run,
             begin,
             kind: TestKind::Circle,
@@ -194,38 +214,50 @@ impl Rig {
 
     /// A whole recording: positions every 2 ms, readings every 6 ms.
     pub fn record(&mut self, run: u32, motion: &Motion) {
-        self.segment(run, true, motion);
         let begin_ns = self.now_ns;
         let mut before = None;
         let ticks = (motion.duration_s() * 1e9) as i64 / TICK_NS;
-        for tick in 0..ticks {
+        for tick in 0..ticks + self.ends_late_ticks {
             let t_s = (tick * TICK_NS) as f64 / 1e9;
             self.now_ns = begin_ns + tick * TICK_NS;
+            if tick == self.begins_late_ticks {
+                self.segment_of(begin_ns, run, true, motion);
+            }
             self.state(motion, t_s);
-            if tick % 3 == 0 && tick > 0 {
-                let [u_mm, v_mm] = self.reading(motion, t_s - 0.0007);
-                let sample = GridSample {
-                    at: Stamp::from_nanos(self.now_ns - 700_000),
-                    plane: motion.plane,
-                    u_mm,
-                    v_mm,
-                    zero_id: self.zero_id,
+            let reads = tick % 3 == 0 && tick > 0;
+            let sample = reads.then(|| self.sample(motion, t_s)).flatten();
+            self.on_their_way.push_back(sample);
+            while self.on_their_way.len() > self.lag_ticks {
+                let Some(sample) = self.on_their_way.pop_front().flatten() else {
+                    continue;
                 };
-                if let Some(sample) = (self.spoil)(t_s, sample) {
+                self.send(Input::Reading(sample));
+                if self.tells_again {
+                    let before = before.replace(sample).unwrap_or(sample);
                     self.send(Input::Reading(sample));
-                    if self.tells_again {
-                        let before = before.replace(sample).unwrap_or(sample);
-                        self.send(Input::Reading(sample));
-                        self.send(Input::Reading(before));
-                    }
+                    self.send(Input::Reading(before));
                 }
             }
         }
-        self.segment(run, false, motion);
-        for _ in 0..10 {
+        let end_ns = begin_ns + (ticks - 1) * TICK_NS;
+        self.segment_of(end_ns, run, false, motion);
+        for _ in 0..if self.pauses { 10 } else { 0 } {
             self.now_ns += 50_000_000;
             self.send(Input::Tick);
         }
+    }
+
+    /// What the grid reads at a tick.
+    fn sample(&mut self, motion: &Motion, t_s: f64) -> Option<GridSample> {
+        let [u_mm, v_mm] = self.reading(motion, t_s - 0.0007);
+        let sample = GridSample {
+            at: Stamp::from_nanos(self.now_ns - 700_000),
+            plane: motion.plane,
+            u_mm,
+            v_mm,
+            zero_id: self.zero_id,
+        };
+        (self.spoil)(t_s, sample)
     }
 
     pub fn state(&mut self, motion: &Motion, t_s: f64) {
