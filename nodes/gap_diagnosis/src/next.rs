@@ -6,7 +6,7 @@
 //! simulated as `experiment` describes it, a set-up of its own, so that what it adds to the information adds up:
 //!
 //! ```text
-//!   S = S_session + S_experiment                                          (1)
+//!   S = S_session + S_experiment   (`information`)                        (1)
 //!   worth = sum w (2 Phi(sqrt(Delta(S) - Delta(S_session)) / 2) - 1) / minutes   (2)
 //! ```
 //!
@@ -21,12 +21,12 @@
 //! matters is asked last.
 //!
 //! # Holds when
-//! The experiment's noise is the session's, and the simulator is off in form there by as much as in the session, but otherwise:
-//! of a condition that the session has, which shares its error of form, more is expected than a repeat brings. An instrument that
-//! the session lacks is taken to be as noisy as the noisiest that it has. Thermometers stay at their last reading.
+//! The experiment's noise is the session's, and the simulator is off in form there by as much as in the session: in a condition
+//! that the session has as it is there (`information`), elsewhere otherwise. An instrument that the session lacks is taken to be as noisy as the noisiest that it has. Thermometers stay at their last reading.
 
 mod distance;
 mod future;
+mod information;
 mod known;
 mod lever;
 mod question;
@@ -34,7 +34,6 @@ mod question;
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
-use machine::effects::Role;
 use machine::twin::{Channel, Session, Twin};
 use nalgebra::DMatrix;
 
@@ -45,13 +44,9 @@ use crate::form_error::FormError;
 use crate::noise::Noise;
 use crate::report::NextExperiment;
 use crate::signature::{Form, Library};
-use crate::stack::Stack;
 use crate::whitener::Autoregression;
 use known::Known;
 use question::{Answer, Question, questions};
-
-/// Stations of a pass: enough for what the run-to-run field leaves.
-const STATIONS: usize = 120;
 
 /// What experiments are simulated with.
 pub struct Bench<'b> {
@@ -111,7 +106,7 @@ pub fn propose(bench: &Bench<'_>, found: &Found) -> Proposed {
         .into_iter()
         .filter_map(|experiment| {
             let future = future::future(bench, &experiment, &noise)?;
-            let added = information(bench, &future.session, &noise, signatures, &forms)?;
+            let added = information::added(bench, &future.session, &noise, signatures, &forms)?;
             Some((experiment, future.minutes, added))
         })
         .collect();
@@ -221,51 +216,4 @@ impl Bench<'_> {
         }
         all
     }
-}
-
-/// What an experiment would tell of some forms' columns.
-fn information(
-    bench: &Bench<'_>,
-    future: &Session,
-    noise: &BTreeMap<Channel, Noise>,
-    signatures: &Library,
-    forms: &[&Form],
-) -> Option<DMatrix<f64>> {
-    let runs: Vec<usize> = (0..future.runs.len()).collect();
-    let nothing: Vec<Vec<f64>> = future
-        .runs
-        .iter()
-        .map(|run| vec![0.0; run.readings.len()])
-        .collect();
-    let stack = Stack::new(
-        future,
-        bench.twin,
-        &runs,
-        STATIONS,
-        noise,
-        &bench.form,
-        &nothing,
-    );
-    let mut columns = Vec::new();
-    for form in forms {
-        let instance = &signatures.instances[form.instance];
-        for place in &form.amplitudes {
-            let parameter = instance
-                .kind
-                .parameters
-                .iter()
-                .chain(instance.kind.free)
-                .nth(*place)?;
-            debug_assert_eq!(parameter.role, Role::Amplitude);
-            let mut values = form.values.clone();
-            values[*place] = parameter.typical;
-            columns.push(stack.signature(&*instance.effect(&values)));
-        }
-    }
-    if stack.rows.len == 0 || columns.is_empty() {
-        return None;
-    }
-    let columns = DMatrix::from_columns(&columns);
-    let gram = columns.tr_mul(&columns);
-    gram.iter().all(|entry| entry.is_finite()).then_some(gram)
 }

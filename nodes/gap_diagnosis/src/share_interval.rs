@@ -6,8 +6,11 @@
 //!
 //! ```text
 //!   G = sum_run w U_run' U_run,   a = sum_run w U_run' z_run,   x = G^-1 a                     (1)
-//!   T_all = a' x,   T_all - T_others = x_F' ((G^-1)_FF)^-1 x_F                                 (2)
+//!   T_all = a' x,   T_all - T_others = x_F' ((G^-1)_FF)^-1 x_F,   T_F = a_F' (G_FF)^-1 a_F     (2)
 //! ```
+//!
+//! What only a place explains is no more than what it explains by itself, T_F: columns that oppose each other lose more
+//! together than either tells.
 //!
 //! The interval is that of `bootstrap`.
 
@@ -40,6 +43,8 @@ struct Part {
 
 /// One slot under some weights.
 struct Drawn {
+    gram: DMatrix<f64>,
+    along: DVector<f64>,
     factor: Cholesky<f64, Dyn>,
     sizes: DVector<f64>,
     all: f64,
@@ -129,7 +134,8 @@ fn shares(
         let drawn = &drawn[score.slot];
         let columns = count(drawn.sizes.len());
         let most = (drawn.all - columns).max(0.0);
-        (lost(drawn, &own) - count(own.len())).clamp(0.0, most) / structured
+        let whole = (told(drawn, &own) - count(own.len())).clamp(0.0, most);
+        (lost(drawn, &own) - count(own.len())).clamp(0.0, whole) / structured
     };
     Some(listed.iter().map(share).collect())
 }
@@ -153,18 +159,28 @@ fn drawn(parts: &[Part], weights: &[f64]) -> Option<Drawn> {
     for place in 0..k {
         gram[(place, place)] += ridge;
     }
-    let factor = Cholesky::new(gram)?;
+    let factor = Cholesky::new(gram.clone())?;
     let sizes = factor.solve(&along);
     let all = along.dot(&sizes);
     let columns = count(k);
     let told = (all - columns).max(0.0);
     let beyond_noise = told + (square - all - (rows - columns).max(0.0)).max(0.0);
     Some(Drawn {
+        gram,
+        along,
         factor,
         sizes,
         all,
         beyond_noise,
     })
+}
+
+/// What some columns tell by themselves.
+fn told(drawn: &Drawn, own: &std::ops::Range<usize>) -> f64 {
+    let (start, n) = (own.start, own.len());
+    let gram = drawn.gram.view((start, start), (n, n)).into_owned();
+    let along = drawn.along.rows(start, n).into_owned();
+    Cholesky::new(gram).map_or(0.0, |factor| along.dot(&factor.solve(&along)))
 }
 
 /// What is lost without some columns.
@@ -213,6 +229,8 @@ mod tests {
                 (lost(&drawn, &own) - wanted).abs() < 1e-6 * whole,
                 "{wanted}"
             );
+            let alone = normal.solve(&own.clone().collect::<Vec<_>>()).gain;
+            assert!((told(&drawn, &own) - alone).abs() < 1e-6 * whole, "{alone}");
         }
     }
 }
