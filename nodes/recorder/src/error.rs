@@ -21,6 +21,12 @@ pub enum RecorderError {
         /// What it is.
         what: &'static str,
     },
+    /// A file neither begins nor ends as an MCAP file does.
+    #[error("{path} is no MCAP file")]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+    },
     /// A path has no last part to name the files by.
     #[error("{path} has no name to call a recording by")]
     NoName {

@@ -5,7 +5,7 @@
 )]
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::error::RecorderError;
@@ -27,6 +27,12 @@ pub(super) fn refuse(folder: &Path, files: &[PathBuf]) -> Result<(), RecorderErr
             return Err(RecorderError::NotRead { path, what });
         }
     }
+    // Where one file of several is such it is damaged, and told with what else is missing.
+    if let [only] = files
+        && is_no_mcap(only).unwrap_or(false)
+    {
+        return Err(RecorderError::NotMcap { path: only.clone() });
+    }
     let metadata = match files {
         [only] if folder == only => only.with_file_name(METADATA_FILE),
         _ => folder.join(METADATA_FILE),
@@ -47,6 +53,16 @@ pub(super) fn refuse(folder: &Path, files: &[PathBuf]) -> Result<(), RecorderErr
     }
 }
 
+/// Whether a file that is long enough neither begins nor ends as MCAP does.
+fn is_no_mcap(path: &Path) -> Option<bool> {
+    let mut file = File::open(path).ok()?;
+    let (mut first, mut last) = ([0; mcap::MAGIC.len()], [0; mcap::MAGIC.len()]);
+    file.read_exact(&mut first).ok()?;
+    file.seek(SeekFrom::End(-(last.len() as i64))).ok()?;
+    file.read_exact(&mut last).ok()?;
+    Some(first != mcap::MAGIC && last != mcap::MAGIC)
+}
+
 fn kind_of(path: &Path) -> Option<&'static str> {
     let mut start = Vec::new();
     let file = File::open(path).ok()?;
@@ -59,5 +75,36 @@ fn kind_of(path: &Path) -> Option<&'static str> {
         Some("is an SQLite database")
     } else {
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(files: &[(&str, &[u8])]) -> Option<String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        for (name, bytes) in files {
+            std::fs::write(path(name), bytes).unwrap();
+        }
+        let files: Vec<PathBuf> = files.iter().map(|(name, _)| path(name)).collect();
+        refuse(folder.path(), &files).err().map(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_file_that_is_no_bag_is_refused_and_one_that_was_cut_or_damaged_is_not() {
+        let none = refusal(&[("letter.mcap", b"Dear all, here is it.")]).unwrap();
+        assert!(
+            none.contains("letter.mcap") && none.contains("no MCAP file"),
+            "{none}"
+        );
+        // A recorder that was killed at once leaves nothing, or half of the first bytes.
+        assert_eq!(refusal(&[("bag_0.mcap", b"")]), None);
+        assert_eq!(refusal(&[("bag_0.mcap", &mcap::MAGIC[..5])]), None);
+        assert_eq!(
+            refusal(&[("bag_0.mcap", mcap::MAGIC), ("bag_1.mcap", &[0; 64])]),
+            None
+        );
     }
 }
