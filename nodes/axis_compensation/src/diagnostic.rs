@@ -61,7 +61,9 @@ pub enum Diagnostic {
     #[error("thermal model {sequence} is {by_s} s older than the one in use and is not taken")]
     ModelOlder { sequence: u32, by_s: f64 },
     #[error(
-        "axis {axis}: drift used at {position_mm:.3} mm, outside the blocks' span {lower_mm:.3} to {upper_mm:.3} mm, with an expanded uncertainty of {expanded_uncertainty_mm:.6} mm, up to {greatest_mm:.6} mm at the travel's corners"
+        "axis {axis}: drift used at {position_mm:.3} mm, outside the blocks' span {lower_mm:.3} to {upper_mm:.3} mm, with an expanded uncertainty of {:.1} µm, up to {:.1} µm at the travel's corners",
+        expanded_uncertainty_mm * 1e3,
+        greatest_mm * 1e3
     )]
     BeyondSpan {
         axis: Axis,

@@ -172,7 +172,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "positioning.X.settle_s",
         "s",
         config::SETTLE_S,
-        "what is left out of a dwell at its begin",
+        "what is left out of a dwell at its begin, and of a motion after a change of speed until a pass counts",
     ),
     row(
         "positioning.X.dwell_s",
