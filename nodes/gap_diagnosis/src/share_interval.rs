@@ -5,16 +5,21 @@
 //! The share that only a place explains (`localise`, 4), of runs that count w times each:
 //!
 //! ```text
-//!   G = sum_run w U_run' U_run,   a = sum_run w U_run' z_run,   x = G^-1 a                     (1)
-//!   T_all = a' x,   T_all - T_others = x_F' ((G^-1)_FF)^-1 x_F,   T_F = a_F' (G_FF)^-1 a_F     (2)
+//!   G = sum_run w U_run' U_run,   a = sum_run w U_run' z_run                                   (1)
 //! ```
+//!
+//! solved as `localise` solves them, columns that others span left out alike: a ridge instead would take what noise there is in
+//! them for something that a place explains.
 //!
 //! What only a place explains is no more than what it explains by itself, T_F: columns that oppose each other lose more
 //! together than either tells.
 //!
-//! The interval is that of `bootstrap`.
+//! The interval is that of `bootstrap`. Of few runs a draw lacks some, and what goes with time is told from the rest by fewer: where
+//! no draw has as small a share as all runs together, or none as great, they tell nothing of its doubt, and there is no interval.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -22,6 +27,7 @@ use crate::bootstrap;
 use crate::config::GapConfig;
 use crate::families::Slot;
 use crate::localise::Score;
+use crate::normal::Normal;
 use crate::places;
 use crate::rows::count;
 use crate::stack::Stack;
@@ -30,8 +36,6 @@ use crate::stack::Stack;
 const LEAST_RUNS: usize = 5;
 /// Draws.
 const DRAWS: usize = 200;
-/// What is added to a diagonal, as a share of its greatest entry: families may span the same.
-const RIDGE: f64 = 1e-9;
 
 /// One run in one slot.
 struct Part {
@@ -43,15 +47,12 @@ struct Part {
 
 /// One slot under some weights.
 struct Drawn {
-    gram: DMatrix<f64>,
-    along: DVector<f64>,
-    factor: Cholesky<f64, Dyn>,
-    sizes: DVector<f64>,
+    normal: Normal,
     all: f64,
     beyond_noise: f64,
 }
 
-/// Interval of each place that the report lists; none where too few runs were read.
+/// Interval of each place that the report lists; none where too few runs were read, or draws of them do not hold the share.
 pub fn of_places(
     stack: &Stack<'_>,
     slots: &[Slot],
@@ -85,7 +86,7 @@ pub fn of_places(
     let of = |(place, score): (usize, &&Score)| {
         let column = |of: &[Vec<f64>]| of.iter().map(|shares| shares[place]).collect::<Vec<_>>();
         let [low, high] = bootstrap::bca(score.unique, column(&draws), &column(&without_each));
-        (low.is_finite() && high.is_finite()).then_some([low, high])
+        (low <= score.unique && score.unique <= high).then_some([low, high])
     };
     listed.iter().enumerate().map(of).collect()
 }
@@ -132,7 +133,7 @@ fn shares(
     let share = |score: &&Score| {
         let own = slots[score.slot].families[score.family].columns.clone();
         let drawn = &drawn[score.slot];
-        let columns = count(drawn.sizes.len());
+        let columns = count(drawn.normal.along.len());
         let most = (drawn.all - columns).max(0.0);
         let whole = (told(drawn, &own) - count(own.len())).clamp(0.0, most);
         (lost(drawn, &own) - count(own.len())).clamp(0.0, whole) / structured
@@ -155,44 +156,30 @@ fn drawn(parts: &[Part], weights: &[f64]) -> Option<Drawn> {
         square += weight * part.square;
         rows += weight * part.rows;
     }
-    let ridge = RIDGE * gram.diagonal().iter().copied().fold(1.0, f64::max);
-    for place in 0..k {
-        gram[(place, place)] += ridge;
-    }
-    let factor = Cholesky::new(gram.clone())?;
-    let sizes = factor.solve(&along);
-    let all = along.dot(&sizes);
+    let normal = Normal { gram, along };
+    let every: Vec<usize> = (0..k).collect();
+    let all = normal.solve(&every).gain;
     let columns = count(k);
     let told = (all - columns).max(0.0);
     let beyond_noise = told + (square - all - (rows - columns).max(0.0)).max(0.0);
     Some(Drawn {
-        gram,
-        along,
-        factor,
-        sizes,
+        normal,
         all,
         beyond_noise,
     })
 }
 
 /// What some columns tell by themselves.
-fn told(drawn: &Drawn, own: &std::ops::Range<usize>) -> f64 {
-    let (start, n) = (own.start, own.len());
-    let gram = drawn.gram.view((start, start), (n, n)).into_owned();
-    let along = drawn.along.rows(start, n).into_owned();
-    Cholesky::new(gram).map_or(0.0, |factor| along.dot(&factor.solve(&along)))
+fn told(drawn: &Drawn, own: &Range<usize>) -> f64 {
+    let own: Vec<usize> = own.clone().collect();
+    drawn.normal.solve(&own).gain
 }
 
 /// What is lost without some columns.
-fn lost(drawn: &Drawn, own: &std::ops::Range<usize>) -> f64 {
-    let (k, q) = (drawn.sizes.len(), own.len());
-    let mut units = DMatrix::zeros(k, q);
-    for (column, row) in own.clone().enumerate() {
-        units[(row, column)] = 1.0;
-    }
-    let inverse = drawn.factor.solve(&units).rows(own.start, q).into_owned();
-    let sizes = drawn.sizes.rows(own.start, q).into_owned();
-    Cholesky::new(inverse).map_or(0.0, |factor| sizes.dot(&factor.solve(&sizes)))
+fn lost(drawn: &Drawn, own: &Range<usize>) -> f64 {
+    let columns = 0..drawn.normal.along.len();
+    let others: Vec<usize> = columns.filter(|k| !own.contains(k)).collect();
+    drawn.all - drawn.normal.solve(&others).gain
 }
 
 #[cfg(test)]
@@ -214,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn eq2_what_is_lost_is_what_a_fit_without_these_columns_lacks() {
+    fn eq1_what_is_lost_is_what_a_fit_without_these_columns_lacks() {
         let parts = [part(1), part(2), part(5)];
         let drawn = drawn(&parts, &[1.0, 2.0, 0.0]).unwrap();
         let normal = crate::normal::Normal {
@@ -232,5 +219,21 @@ mod tests {
             let alone = normal.solve(&own.clone().collect::<Vec<_>>()).gain;
             assert!((told(&drawn, &own) - alone).abs() < 1e-6 * whole, "{alone}");
         }
+    }
+
+    /// Time in a run that goes once round is the angle but for a ten-thousandth.
+    #[test]
+    fn what_others_span_explains_nothing_alone_although_noise_lies_in_what_they_lack() {
+        let basis = DMatrix::from_fn(6, 2, |row, k| if row < 5 { 1.0 } else { 1e-4 * count(k) });
+        let z = DVector::from_column_slice(&[20.0, 20.0, 20.0, 20.0, 20.0, 5.0]);
+        let part = Part {
+            gram: basis.tr_mul(&basis),
+            along: basis.tr_mul(&z),
+            square: z.norm_squared(),
+            rows: 6.0,
+        };
+        let drawn = drawn(&[part], &[1.0]).unwrap();
+        assert!((drawn.all - 2000.0).abs() < 1e-6, "{}", drawn.all);
+        assert!(lost(&drawn, &(1..2)).abs() < 1e-6);
     }
 }

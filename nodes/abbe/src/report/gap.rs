@@ -319,7 +319,7 @@ fn places(diagnosed: &Diagnosed) -> Section {
         "Where the gap lies",
         &names,
         rows.collect(),
-        "Alone: share of the structured gap that only this explains, in brackets its 95 % interval over the runs; p: chance of so much in noise, over all places that were looked at.",
+        "Alone: share of the structured gap that only this explains, in brackets its 95 % interval over the runs, where these are enough to tell one; p: chance of so much in noise, over all places that were looked at.",
     )
 }
 

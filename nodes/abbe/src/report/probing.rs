@@ -8,6 +8,10 @@ use metrology::sample::{
     BlockMeasurement, FeatureKind, ProbedFeature, ProbedPoint, Rejection, TestSegment,
 };
 
+use serde::Serialize;
+use serde_json::{Value, json};
+use statrs::statistics::Statistics;
+
 use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head, um};
 
@@ -45,36 +49,53 @@ fn repeatability(touches: &[(TestSegment, ProbedPoint)]) -> Option<Section> {
                 .push(along_mm);
         }
     }
-    let rows: Vec<Vec<String>> = groups
+    let spreads: Vec<Spread> = groups
         .into_iter()
         .filter(|(_, values)| values.len() >= LEAST_TOUCHES)
-        .map(|((run, feature, feed), values)| {
-            let n = values.len() as f64;
-            let mean = values.iter().sum::<f64>() / n;
-            let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
-            let (least, greatest) = values
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, g), v| {
-                    (l.min(*v), g.max(*v))
-                });
-            vec![
-                format!("{feature}, run {run}"),
-                feed.to_string(),
-                values.len().to_string(),
-                um(greatest - least),
-                um((squares / (n - 1.0)).sqrt()),
-            ]
+        .map(|((run, feature, feed_mm_min), values)| Spread {
+            test: format!("{feature}, run {run}"),
+            feed_mm_min,
+            touches: values.len(),
+            range_mm: range(values.iter().copied()),
+            standard_deviation_mm: values.iter().std_dev(),
         })
         .collect();
-    (!rows.is_empty()).then(|| {
+    (!spreads.is_empty()).then(|| {
         let mut section = Section::new("Repeatability of touches, ISO 230-10");
+        let row = |spread: &Spread| {
+            vec![
+                spread.test.clone(),
+                spread.feed_mm_min.to_string(),
+                spread.touches.to_string(),
+                um(spread.range_mm),
+                um(spread.standard_deviation_mm),
+            ]
+        };
         section.tables.push(Rows {
             head: head(&["feature", "feed / mm/min", "touches", "range / µm", "s / µm"]),
-            rows,
+            rows: spreads.iter().map(row).collect(),
             note: format!("Single-point repeatability along the approach; fewer than {LEAST_TOUCHES} touches are not shown."),
         });
+        section.figures = json!({ "test": section.title, "iso230_10_repeatability": spreads });
         section
     })
+}
+
+/// Spread of the touches of one feature in one run.
+#[derive(Serialize)]
+struct Spread {
+    test: String,
+    feed_mm_min: i64,
+    touches: usize,
+    range_mm: f64,
+    standard_deviation_mm: f64,
+}
+
+/// Greatest minus least.
+fn range(values: impl Iterator<Item = f64>) -> f64 {
+    let ends = (f64::INFINITY, f64::NEG_INFINITY);
+    let (least, greatest) = values.fold(ends, |(l, g), v| (l.min(v), g.max(v)));
+    greatest - least
 }
 
 fn shapes(features: &[ProbedFeature]) -> Option<Section> {
@@ -103,6 +124,17 @@ fn shapes(features: &[ProbedFeature]) -> Option<Section> {
         .collect();
     (!rows.is_empty()).then(|| {
         let mut section = Section::new("Shapes, ISO 230-10");
+        let shape = |feature: &ProbedFeature| {
+            json!({
+                "feature": feature.feature_id,
+                "run": feature.run,
+                "points": feature.n,
+                "form_mm": feature.form_mm,
+                "radius_mm": (!feature.radius_mm.is_nan()).then_some(feature.radius_mm),
+            })
+        };
+        let shapes: Vec<Value> = features.iter().map(shape).collect();
+        section.figures = json!({ "test": section.title, "iso230_10_shapes": shapes });
         section.tables.push(Rows {
             head: head(&["feature", "kind", "points", "form / µm", "radius / mm"]),
             rows,
@@ -133,29 +165,49 @@ fn faces(blocks: &[BlockMeasurement]) -> Series {
     series
 }
 
+/// How the readings of one face drift.
+#[derive(Serialize)]
+struct FaceDrift {
+    face: String,
+    recorded_h: f64,
+    after_1_h_mm: Option<f64>,
+    range_mm: f64,
+}
+
+impl FaceDrift {
+    /// Of readings in time: s since the first of all, mm.
+    fn new(face: String, values: &[(f64, f64)]) -> Self {
+        let cold_mm = values.first().map_or(0.0, |(_, position_mm)| *position_mm);
+        let after = values.iter().find(|(time_s, _)| *time_s >= AN_HOUR_S);
+        Self {
+            face,
+            recorded_h: values.last().map_or(0.0, |(time_s, _)| time_s / 3600.0),
+            after_1_h_mm: after.map(|(_, position_mm)| position_mm - cold_mm),
+            range_mm: range(values.iter().map(|(_, position_mm)| *position_mm)),
+        }
+    }
+}
+
 fn drift(blocks: &[BlockMeasurement]) -> Result<Option<Section>> {
     let series = faces(blocks);
     if series.is_empty() {
         return Ok(None);
     }
     let mut section = Section::new("Drift of the readings, after ISO 230-3");
-    let mut rows = Vec::new();
-    for ((block, axis), values) in &series {
-        let cold_mm = values[0].1;
-        let after = values.iter().find(|(time_s, _)| *time_s >= AN_HOUR_S);
-        let drifts = || values.iter().map(|(_, position_mm)| position_mm - cold_mm);
-        let (least, greatest) =
-            drifts().fold((0.0, 0.0), |(l, g), d| (f64::min(l, d), f64::max(g, d)));
-        rows.push(vec![
-            format!("{block} {axis}"),
-            format!("{:.2}", values.last().map_or(0.0, |v| v.0) / 3600.0),
-            after.map_or_else(
-                || "—".to_owned(),
-                |(_, position_mm)| um(position_mm - cold_mm),
-            ),
-            um(greatest - least),
-        ]);
-    }
+    let drifts: Vec<FaceDrift> = series
+        .iter()
+        .map(|((block, axis), values)| FaceDrift::new(format!("{block} {axis}"), values))
+        .collect();
+    let row = |drift: &FaceDrift| {
+        vec![
+            drift.face.clone(),
+            format!("{:.2}", drift.recorded_h),
+            drift.after_1_h_mm.map_or_else(|| "—".to_owned(), um),
+            um(drift.range_mm),
+        ]
+    };
+    let rows = drifts.iter().map(row).collect();
+    section.figures = json!({ "test": section.title, "iso230_3": drifts });
     section.tables.push(Rows {
         head: head(&["face", "recorded / h", "after 1 h / µm", "range / µm"]),
         rows,
@@ -186,4 +238,25 @@ fn drift(blocks: &[BlockMeasurement]) -> Result<Option<Section>> {
         }
     }
     Ok(Some(section))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drift_is_told_after_an_hour_and_over_all() {
+        let values = [
+            (0.0, 10.0),
+            (1800.0, 9.999),
+            (3700.0, 10.004),
+            (7200.0, 10.002),
+        ];
+        let drift = FaceDrift::new("block_1 X".to_owned(), &values);
+        assert!((drift.recorded_h - 2.0).abs() < 1e-12);
+        assert!((drift.after_1_h_mm.unwrap() - 0.004).abs() < 1e-12);
+        assert!((drift.range_mm - 0.005).abs() < 1e-12);
+        let short = FaceDrift::new("block_1 X".to_owned(), &values[..2]);
+        assert_eq!(short.after_1_h_mm, None);
+    }
 }
