@@ -22,7 +22,7 @@ use crate::open::Open;
 use crate::recording::{GridPoint, Place, Recording, reduce_moving, reduce_stationwise};
 
 /// Readings that are kept in case their segment's begin is still on its way.
-const EARLY: usize = 1_000;
+const EARLY: usize = 10_000;
 /// Ratio of singular values below which the rank is a matter of opinion.
 const CLEAR_GAP: f64 = 30.0;
 

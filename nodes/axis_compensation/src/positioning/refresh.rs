@@ -23,18 +23,18 @@
 //! With tables apart, a pass upwards refreshes the table of upwards. Together, each pass refreshes the one
 //! there is, which then trembles by ω/(2 − ω) of half the lost motion as directions alternate.
 //!
-//! Work seldom reaches both ends. Points that are never passed would stay as they were learned while the screw beside them
-//! grows: with `ends_follow` they move as the outermost point of the work does,
+//! Work seldom passes every point: it turns before the ends, and goes fast between holes. Points that are never passed would
+//! stay as they were learned while the screw beside them grows. With `ends_follow` they take their share of each change of Δ(m)
+//! in (1), with k the next point beyond them that was passed within [`MEASURED_S`],
 //!
 //! ```text
-//!   Δ(i) ← Δ0(i) + Δ(m) − Δ0(m)   at each pass of m, for all i beyond it, with Δ0 as it was learned          (5)
-//!   of the work:  p(j) > (2 − ω)/ω  and  10 p(j) ≥ greatest p                                                (6)
-//!   m:  of the work, and no i beyond it is, nor was passed half as often
+//!   Δ(i) ← Δ(i) + change of Δ(m)                                  where there is no such k                  (5)
+//!   Δ(i) ← Δ(i) + change of Δ(m) [x(k) − x(i)]/[x(k) − x(m)]      between m and k                           (6)
 //! ```
 //!
-//! where a point was passed p times. A choice of ours, and an extrapolation: right for what grows or shifts as a whole. The few
-//! passes of its own that a point beyond m has are thereby left out; a point becomes one of the work once it is passed a tenth
-//! as often as the one that is passed most.
+//! for all i that were not passed within that time, on both sides of m. So ends keep the difference that was learned to the
+//! outermost point that is passed, gaps are bridged straight, and where every point is passed there is (1) alone. A choice of
+//! ours: right for what grows or shifts as a whole. Of tables apart one that nothing has measured follows the other.
 //!
 //! # Agreement
 //! `val_ewma_remembers_2_minus_w_over_w_passes`: 5.667 to 1e-9. `val_ewma_noise_gain`: variance ratio of 4,000
@@ -43,8 +43,6 @@
 //! # References
 //! The form of the mean is DERIVED, see `positioning`; its moments are those of S. W. Roberts'
 //! geometric moving average.
-
-use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
@@ -63,6 +61,9 @@ pub enum Directions {
     /// One table each: lost motion is compensated at each reversal.
     Apart,
 }
+
+/// For how long a pass counts for its point, s: shorter than what a screw takes to warm up, longer than a part.
+pub const MEASURED_S: f64 = 1800.0;
 
 /// Greatest distance between the two states about a pass, mm.
 pub const PASS_STEP_MM: f64 = 1.0;
@@ -104,10 +105,10 @@ pub struct Refresh {
     pulse_fm: i64,
     ends_follow: bool,
     steady: Steady,
-    /// How often each point was passed, up and down.
-    passes: [Vec<u32>; 2],
-    /// The table as it began, up and down, fm.
-    learned_fm: [Vec<i64>; 2],
+    /// Time of the states so far, s.
+    time_s: f64,
+    /// When each point was passed last, up and down, s.
+    passed_s: [Vec<f64>; 2],
     before: Option<ScaleReading>,
 }
 
@@ -129,13 +130,13 @@ impl Refresh {
             pulse_fm,
             ends_follow: false,
             steady: Steady::new(0.0, pulse_fm),
-            passes: [Vec::new(), Vec::new()],
-            learned_fm: [Vec::new(), Vec::new()],
+            time_s: 0.0,
+            passed_s: [Vec::new(), Vec::new()],
             before: None,
         }
     }
 
-    /// The same, with (5) or without.
+    /// The same, with (5) and (6) or without.
     #[must_use]
     pub fn with_ends_following(mut self, ends_follow: bool) -> Self {
         self.ends_follow = ends_follow;
@@ -158,13 +159,7 @@ impl Refresh {
     /// A table begins, none of whose points was passed yet.
     pub fn begin(&mut self, table: &DeviationTable) {
         self.forget();
-        self.passes = [(); 2].map(|()| vec![0; table.n_points()]);
-        self.learned_fm = [Direction::Up, Direction::Down].map(|direction| {
-            let points = 0..table.n_points();
-            points
-                .filter_map(|point| table.point_fm(point, direction))
-                .collect()
-        });
+        self.passed_s = [(); 2].map(|()| vec![f64::NEG_INFINITY; table.n_points()]);
     }
 
     /// One state, `dt_s` after the one before; (1) for each point passed in between.
@@ -175,6 +170,7 @@ impl Refresh {
         dt_s: f64,
     ) -> Refreshed {
         let mut refreshed = Refreshed::default();
+        self.time_s += dt_s;
         let Some(before) = self.before.replace(now) else {
             return refreshed;
         };
@@ -228,62 +224,73 @@ impl Refresh {
             return Err(change_fm);
         }
         let moved_fm = share_fm(self.weight, change_fm);
-        let apart = [direction];
-        let tables = match self.directions {
-            Directions::Apart => &apart[..],
-            Directions::Together => &[Direction::Up, Direction::Down],
+        let measured = match self.directions {
+            Directions::Apart => direction,
+            Directions::Together => Direction::Up,
         };
-        for &of in tables {
-            let now_fm = table.point_fm(point, of).unwrap_or_default();
-            table.replace(point, of, now_fm + moved_fm);
+        if let Some(passed_s) = self.passed_s[measured as usize].get_mut(point) {
+            *passed_s = self.time_s;
         }
-        if let Some(count) = self.passes[tables[0] as usize].get_mut(point) {
-            *count = count.saturating_add(1);
-        }
-        if self.ends_follow {
-            for beyond in [0..point, point + 1..table.n_points()] {
-                if self.is_outermost(point, &beyond, tables[0]) {
-                    self.carry_along(table, point, beyond, tables);
-                }
+        for of in [Direction::Up, Direction::Down] {
+            if of == measured || self.moves_along(of) {
+                self.spread(table, (point, measured), of, moved_fm);
             }
         }
         Ok(())
     }
 
-    /// (6).
-    fn is_outermost(&self, point: usize, beyond: &Range<usize>, table: Direction) -> bool {
-        let passes = &self.passes[table as usize];
-        let (Some(&own), Some(others)) = (passes.get(point), passes.get(beyond.clone())) else {
-            return false;
-        };
-        let most = passes.iter().copied().max().unwrap_or_default();
-        let is_of_the_work = |count: u32| {
-            f64::from(count) * self.weight > 2.0 - self.weight && count.saturating_mul(10) >= most
-        };
-        let is_left_aside = |count: &u32| !is_of_the_work(*count) && count.saturating_mul(2) < own;
-        is_of_the_work(own) && others.iter().all(is_left_aside)
+    /// Whether a table takes what the other one measures.
+    fn moves_along(&self, of: Direction) -> bool {
+        let points = 0..self.passed_s[of as usize].len();
+        let mut fresh = points.filter(|point| self.is_fresh(*point, of));
+        self.directions == Directions::Together || (self.ends_follow && fresh.next().is_none())
     }
 
-    /// (5).
-    fn carry_along(
+    fn is_fresh(&self, point: usize, of: Direction) -> bool {
+        let passed_s = self.passed_s[of as usize].get(point);
+        passed_s.is_some_and(|passed_s| self.time_s - passed_s <= MEASURED_S)
+    }
+
+    /// The point's change, and (5) and (6) of the others.
+    fn spread(
         &self,
         table: &mut DeviationTable,
-        point: usize,
-        beyond: Range<usize>,
-        tables: &[Direction],
+        (point, measured): (usize, Direction),
+        of: Direction,
+        moved_fm: i64,
     ) {
-        for &of in tables {
-            let learned_fm = &self.learned_fm[of as usize];
-            let (Some(now_fm), Some(then_fm)) = (table.point_fm(point, of), learned_fm.get(point))
-            else {
-                continue;
-            };
-            for place in beyond.clone() {
-                if let Some(own_fm) = learned_fm.get(place) {
-                    table.replace(place, of, own_fm + now_fm - then_fm);
-                }
-            }
+        add(table, point, of, moved_fm);
+        if !self.ends_follow {
+            return;
         }
+        let n = table.n_points();
+        let next = (point + 1..n).find(|place| self.is_fresh(*place, measured));
+        for place in point + 1..next.unwrap_or(n) {
+            let share = next.map_or(1.0, |next| share_of(table, [point, place, next]));
+            add(table, place, of, share_fm(share, moved_fm));
+        }
+        let next = (0..point)
+            .rev()
+            .find(|place| self.is_fresh(*place, measured));
+        for place in next.map_or(0, |next| next + 1)..point {
+            let share = next.map_or(1.0, |next| share_of(table, [point, place, next]));
+            add(table, place, of, share_fm(share, moved_fm));
+        }
+    }
+}
+
+/// (6): how near i is to m, of the way from m to k.
+fn share_of(table: &DeviationTable, [m, i, k]: [usize; 3]) -> f64 {
+    let way_fm = |from: usize, to: usize| {
+        let ends = table.position_fm(from).zip(table.position_fm(to));
+        ends.map_or(0, |(from, to)| to - from) as f64
+    };
+    way_fm(i, k) / way_fm(m, k)
+}
+
+fn add(table: &mut DeviationTable, point: usize, of: Direction, moved_fm: i64) {
+    if let Some(now_fm) = table.point_fm(point, of) {
+        table.replace(point, of, now_fm + moved_fm);
     }
 }
 

@@ -3,6 +3,8 @@
 //! A recording is refused by name where what it would give is no recording of one thing: two zeros in
 //! it, readings of another plane, too few points, a hole, the head off its plate, the program broken off.
 
+use std::collections::VecDeque;
+
 use metrology::sample::{GridSample, TestPlane};
 use metrology::stamp::{Host, Span, Stamp};
 use metrology::{Axis, PerAxis};
@@ -10,6 +12,9 @@ use nalgebra::Vector3;
 
 use super::place::in_plane;
 use crate::diagnostic::Refusal;
+
+/// Readings that are kept in case they belong to the next recording.
+const KEPT: usize = 1_000;
 
 /// One reading with the positions of the axes at its instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,8 +50,12 @@ pub struct Collector {
     zero_id: u32,
     limit: usize,
     pairs: Vec<Pair>,
-    other_zero: Option<u32>,
-    other_plane: bool,
+    /// The first reading under another zero, and which.
+    other_zero: Option<(Stamp<Host>, u32)>,
+    /// The first reading in another plane.
+    other_plane: Option<Stamp<Host>>,
+    /// The last of both: they may be the next recording's.
+    foreign: VecDeque<GridSample>,
     n_not_finite: usize,
     n_beyond_limit: usize,
     /// The newest reading: when it was read, and what.
@@ -64,7 +73,8 @@ impl Collector {
             limit,
             pairs: Vec::new(),
             other_zero: None,
-            other_plane: false,
+            other_plane: None,
+            foreign: VecDeque::new(),
             n_not_finite: 0,
             n_beyond_limit: 0,
             newest: None,
@@ -75,15 +85,24 @@ impl Collector {
     /// Whether a reading belongs here; what is wrong with it is remembered.
     pub fn accepts(&mut self, sample: &GridSample) -> bool {
         if sample.plane != self.plane {
-            self.other_plane = true;
+            self.other_plane.get_or_insert(sample.at);
+            self.keep_foreign(sample);
         } else if sample.zero_id != self.zero_id {
-            self.other_zero = Some(sample.zero_id);
+            self.other_zero.get_or_insert((sample.at, sample.zero_id));
+            self.keep_foreign(sample);
         } else if !(sample.u_mm.is_finite() && sample.v_mm.is_finite()) {
             self.n_not_finite += 1;
         } else {
             return self.is_new(sample);
         }
         false
+    }
+
+    fn keep_foreign(&mut self, sample: &GridSample) {
+        if self.foreign.len() == KEPT {
+            self.foreign.pop_front();
+        }
+        self.foreign.push_back(*sample);
     }
 
     /// Whether a reading is neither told again nor older than one before it.
@@ -116,6 +135,11 @@ impl Collector {
             }
             pair.at <= end
         });
+        for sample in self.foreign.drain(..).filter(|sample| sample.at > end) {
+            beyond(sample);
+        }
+        self.other_zero = self.other_zero.filter(|(at, _)| *at <= end);
+        self.other_plane = self.other_plane.filter(|at| *at <= end);
     }
 
     /// Readings that were told again, or after a later one.
@@ -155,13 +179,13 @@ impl Collector {
     #[must_use]
     pub fn refusals(&self, gap_limit: Span, plate_radius_mm: f64) -> Vec<Refusal> {
         let mut refusals = Vec::new();
-        if let Some(found) = self.other_zero {
+        if let Some((_, found)) = self.other_zero {
             refusals.push(Refusal::MixedZeroIds {
                 expected: self.zero_id,
                 found,
             });
         }
-        if self.other_plane {
+        if self.other_plane.is_some() {
             refusals.push(Refusal::WrongPlane {
                 expected: self.plane,
             });

@@ -149,6 +149,23 @@ fn readings_after_the_end_do_not_count_although_they_come_before_it() {
     assert_eq!(recorded(0), recorded(40));
 }
 
+/// The grid is zeroed anew for the next recording while the end of this one is still on its way.
+#[test]
+fn readings_under_the_next_zero_do_not_spoil_a_recording_whose_end_is_late() {
+    let mut rig = Rig::new(machine_error_mm);
+    rig.ends_late_ticks = 40;
+    rig.spoil = |t_s, mut sample| {
+        // Beyond the end of a circle of 50 mm at 25 mm/s.
+        if t_s > 4.0 * std::f64::consts::PI {
+            sample.zero_id += 1;
+        }
+        Some(sample)
+    };
+    let motion = Motion::moving(50.0, Sense::CounterClockwise);
+    rig.record(1, &motion);
+    assert_eq!(rig.models().len(), 1, "{:?}", rig.diagnostics());
+}
+
 /// Nor is a recording over for readings that are on their way when the next one begins.
 #[test]
 fn readings_that_come_after_the_begin_of_the_next_segment_count() {

@@ -13,37 +13,29 @@ const SETTLING: Duration = Duration::from_millis(100);
 /// After which a request counts as unanswered.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Until when a request waits.
-#[derive(Clone, Copy)]
-pub(super) struct Limits {
-    /// For a server to send it to: one that was killed is waited for no longer than that.
-    pub sent_by: Instant,
-    /// For the answer; `None`: as long as one of the servers that got it is there.
-    pub answered_by: Option<Instant>,
+/// When the answer to a request is due.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Due {
+    /// Soon after it was sent.
+    AtOnce,
+    /// When a goal has ended: as long as one of the servers that got the request is there.
+    AtTheEnd,
 }
 
-impl Limits {
-    /// Of a request that is answered at once.
-    pub fn at_once(now: Instant) -> Self {
-        Self {
-            sent_by: now + PATIENCE,
-            answered_by: Some(now + PATIENCE),
-        }
-    }
-
-    /// Of a request that is answered when a goal has ended.
-    pub fn at_the_end(now: Instant) -> Self {
-        Self {
-            sent_by: now + PATIENCE,
-            answered_by: None,
-        }
-    }
+/// A request that nobody answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Unanswered {
+    pub token: u64,
+    /// Whether it went out: then a server may have got it.
+    pub was_sent: bool,
 }
 
 struct Waiting {
     token: u64,
     bytes: Bytes,
-    limits: Limits,
+    due: Due,
+    /// A server that was killed is waited for no longer than that.
+    sent_by: Instant,
 }
 
 /// A request that is open.
@@ -66,11 +58,12 @@ pub(super) struct Requests {
 
 impl Requests {
     /// Asks under `token`.
-    pub fn ask(&mut self, token: u64, bytes: Bytes, limits: Limits) {
+    pub fn ask(&mut self, token: u64, bytes: Bytes, due: Due, now: Instant) {
         self.queue.push_back(Waiting {
             token,
             bytes,
-            limits,
+            due,
+            sent_by: now + PATIENCE,
         });
     }
 
@@ -101,15 +94,20 @@ impl Requests {
     }
 
     /// The request that was due has gone out as `identity`.
-    pub fn sent(&mut self, identity: RequestIdentity) {
-        if let Some(Waiting { token, limits, .. }) = self.queue.pop_front() {
+    pub fn sent(&mut self, identity: RequestIdentity, now: Instant) {
+        if let Some(Waiting { token, due, .. }) = self.queue.pop_front() {
             let asked = Asked {
                 token,
-                answered_by: limits.answered_by,
+                answered_by: (due == Due::AtOnce).then(|| now + PATIENCE),
                 of: self.servers.keys().copied().collect(),
             };
             self.asked.insert(identity, asked);
         }
+    }
+
+    /// The request that was due cannot be sent; its token.
+    pub fn failed(&mut self) -> Option<u64> {
+        self.queue.pop_front().map(|waiting| waiting.token)
     }
 
     /// The token of the request that a reply answers, once.
@@ -117,29 +115,25 @@ impl Requests {
         self.asked.remove(&identity).map(|asked| asked.token)
     }
 
-    /// Tokens of the requests whose time is over.
-    pub fn expired(&mut self, now: Instant) -> Vec<u64> {
-        let over = |limit: Option<Instant>| limit.is_some_and(|limit| limit <= now);
-        let mut tokens = Vec::new();
+    /// The requests whose time is over.
+    pub fn expired(&mut self, now: Instant) -> Vec<Unanswered> {
+        let mut all = Vec::new();
+        let mut give_up = |token, was_sent| all.push(Unanswered { token, was_sent });
         self.queue.retain(|waiting| {
-            let Limits {
-                sent_by,
-                answered_by,
-            } = waiting.limits;
-            let expired = sent_by <= now || over(answered_by);
-            if expired {
-                tokens.push(waiting.token);
+            let is_over = waiting.sent_by <= now;
+            if is_over {
+                give_up(waiting.token, false);
             }
-            !expired
+            !is_over
         });
         self.asked.retain(|_, asked| {
-            let expired = over(asked.answered_by);
-            if expired {
-                tokens.push(asked.token);
+            let is_over = asked.answered_by.is_some_and(|limit| limit <= now);
+            if is_over {
+                give_up(asked.token, true);
             }
-            !expired
+            !is_over
         });
-        tokens
+        all
     }
 
     /// Forgets open requests whose servers have all gone, also where another one is there by now; gives their tokens.
@@ -171,14 +165,14 @@ mod tests {
 
     fn send(requests: &mut Requests, now: Instant) -> Option<Guid> {
         let (server, _) = requests.next_to_send(now)?;
-        requests.sent(NUMBER);
+        requests.sent(NUMBER, now);
         Some(server)
     }
 
     #[test]
     fn a_request_waits_for_a_server_that_has_seen_us_and_is_answered_once() {
         let (mut requests, now) = (Requests::default(), Instant::now());
-        requests.ask(7, shared(&[1]), Limits::at_once(now));
+        requests.ask(7, shared(&[1]), Due::AtOnce, now);
         assert_eq!(send(&mut requests, now), None);
         requests.servers_are([SERVER].into_iter(), now);
         assert_eq!(send(&mut requests, now), None, "it may not see us yet");
@@ -193,18 +187,49 @@ mod tests {
     fn a_request_whose_server_died_before_it_was_sent_is_given_up() {
         let (mut requests, now) = (Requests::default(), Instant::now());
         requests.servers_are([SERVER].into_iter(), now);
-        requests.ask(7, shared(&[1]), Limits::at_the_end(now));
+        requests.ask(7, shared(&[1]), Due::AtTheEnd, now);
         requests.servers_are(std::iter::empty(), now);
         assert!(requests.expired(now + PATIENCE / 2).is_empty());
-        assert_eq!(requests.expired(now + PATIENCE), [7]);
+        let given_up = Unanswered {
+            token: 7,
+            was_sent: false,
+        };
+        assert_eq!(requests.expired(now + PATIENCE), [given_up]);
         assert!(!requests.is_waiting());
+    }
+
+    #[test]
+    fn a_request_that_was_sent_late_has_all_its_time_for_the_answer() {
+        let (mut requests, now) = (Requests::default(), Instant::now());
+        requests.ask(7, shared(&[1]), Due::AtOnce, now);
+        let late = now + PATIENCE - SETTLING;
+        requests.servers_are([SERVER].into_iter(), late - SETTLING);
+        assert_eq!(send(&mut requests, late), Some(SERVER));
+        assert!(requests.expired(now + PATIENCE).is_empty());
+        let given_up = Unanswered {
+            token: 7,
+            was_sent: true,
+        };
+        assert_eq!(requests.expired(late + PATIENCE), [given_up]);
+    }
+
+    #[test]
+    fn a_request_that_cannot_be_sent_makes_way_for_the_next() {
+        let (mut requests, now) = (Requests::default(), Instant::now());
+        requests.servers_are([SERVER].into_iter(), now);
+        for token in [7, 8] {
+            requests.ask(token, shared(&[1]), Due::AtOnce, now);
+        }
+        assert_eq!(requests.failed(), Some(7));
+        assert_eq!(send(&mut requests, now + SETTLING), Some(SERVER));
+        assert_eq!(requests.answered(NUMBER), Some(8));
     }
 
     #[test]
     fn an_answer_without_a_limit_is_waited_for_while_a_server_is_there_that_got_the_request() {
         let (mut requests, now) = (Requests::default(), Instant::now());
         requests.servers_are([SERVER].into_iter(), now);
-        requests.ask(7, shared(&[1]), Limits::at_the_end(now));
+        requests.ask(7, shared(&[1]), Due::AtTheEnd, now);
         assert_eq!(send(&mut requests, now + SETTLING), Some(SERVER));
         assert!(requests.expired(now + Duration::from_secs(3600)).is_empty());
         assert!(requests.abandoned().is_empty());

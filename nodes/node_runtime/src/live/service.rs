@@ -12,7 +12,7 @@ use tokio::time::Instant;
 
 use super::requests::Requests;
 use crate::dds::is_cyclone;
-use crate::network::{PublishError, Remote, RequestIdentity, Role, Sample, Writer};
+use crate::network::{Guid, PublishError, Remote, RequestIdentity, Role, Sample, Writer};
 use crate::node::Bytes;
 
 const HEADER_LEN: usize = 4;
@@ -130,22 +130,27 @@ impl Client {
             .servers_are(found.map(|reader| reader.guid), now);
     }
 
-    /// Sends what waits, if a server is there.
-    pub fn send(&mut self, now: Instant) -> Result<(), PublishError> {
+    /// Sends what waits, if a server is there; with an error comes the token of the request that it is about.
+    pub fn send(&mut self, now: Instant) -> Result<(), (Option<u64>, PublishError)> {
         while let Some((server, bytes)) = self.requests.next_to_send(now) {
-            let identity = if self.writer.meets_cyclone(&server) {
-                self.cyclone_requests += 1;
-                let mut front = [0; CYCLONE_LEN];
-                front[..8].copy_from_slice(&self.writer.guid()[8..]);
-                front[8..].copy_from_slice(&self.cyclone_requests.to_le_bytes());
-                self.writer.publish(&put_front(&front, &bytes), None)?;
-                cyclone_identity(front)
-            } else {
-                self.writer.request(&bytes)?
-            };
-            self.requests.sent(identity);
+            match self.publish(&server, &bytes) {
+                Ok(identity) => self.requests.sent(identity, now),
+                Err(error) => return Err((self.requests.failed(), error)),
+            }
         }
         Ok(())
+    }
+
+    fn publish(&mut self, server: &Guid, bytes: &Bytes) -> Result<RequestIdentity, PublishError> {
+        if !self.writer.meets_cyclone(server) {
+            return self.writer.request(bytes);
+        }
+        self.cyclone_requests += 1;
+        let mut front = [0; CYCLONE_LEN];
+        front[..8].copy_from_slice(&self.writer.guid()[8..]);
+        front[8..].copy_from_slice(&self.cyclone_requests.to_le_bytes());
+        self.writer.publish(&put_front(&front, bytes), None)?;
+        Ok(cyclone_identity(front))
     }
 }
 
@@ -160,7 +165,6 @@ mod tests {
 
     use super::*;
     use crate::dds::CYCLONE_VENDOR;
-    use crate::network::Guid;
 
     fn sample(writer: Guid, related: Option<RequestIdentity>, bytes: &[u8]) -> Sample {
         let received = Stamp::from_nanos(0);

@@ -5,7 +5,7 @@ use uuid::Uuid;
 use super::{ClientUse, Owner, now};
 use crate::clock;
 use crate::diagnostic::{Diagnostic, Level};
-use crate::live::requests::Limits;
+use crate::live::requests::Due;
 use crate::node::{Bytes, Emission, GoalId, GoalStatus, RequestId};
 
 impl Owner {
@@ -32,11 +32,11 @@ impl Owner {
             Emission::SendGoal { client, id, bytes } => {
                 let goal = *Uuid::new_v4().as_bytes();
                 let ask = self.used_actions[client].client.send(id, goal, &bytes);
-                self.ask(client, ask, Limits::at_once(now()));
+                self.ask(client, ask, Due::AtOnce);
             }
             Emission::CancelGoal { client, id } => {
                 if let Some(ask) = self.used_actions[client].client.cancel(id) {
-                    self.ask(client, ask, Limits::at_once(now()));
+                    self.ask(client, ask, Due::AtOnce);
                 }
             }
             Emission::Diagnostic(diagnostic) => self.board.report(diagnostic, now()),
@@ -60,7 +60,7 @@ impl Owner {
         let is_wanted =
             |used: &ClientUse| matches!(used, ClientUse::Service(place) if *place == client);
         if let Some((_, end)) = self.clients.iter_mut().find(|(used, _)| is_wanted(used)) {
-            end.requests.ask(id, bytes, Limits::at_once(now()));
+            end.requests.ask(id, bytes, Due::AtOnce, now());
         }
     }
 

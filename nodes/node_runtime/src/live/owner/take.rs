@@ -11,7 +11,7 @@ use crate::diagnostic::{Diagnostic, Level};
 use crate::live::action_client::{Ask, News};
 use crate::live::action_server::{Answer, GoalService};
 use crate::live::incoming::{After, Incoming};
-use crate::live::requests::Limits;
+use crate::live::requests::{Due, Unanswered};
 use crate::live::service::ReplyTo;
 use crate::live::timers::SimulatedTimers;
 use crate::live::type_description;
@@ -284,7 +284,7 @@ impl Owner {
                 let used = &mut self.used_actions[action];
                 let (news, ask) = used.client.replied(service, token, bytes);
                 if let Some(ask) = ask {
-                    self.ask(action, ask, Limits::at_the_end(now()));
+                    self.ask(action, ask, Due::AtTheEnd);
                 }
                 if let Some(news) = news {
                     self.tell(action, &news);
@@ -329,10 +329,10 @@ impl Owner {
         }
     }
 
-    pub(super) fn ask(&mut self, action: usize, ask: Ask, limits: Limits) {
+    pub(super) fn ask(&mut self, action: usize, ask: Ask, due: Due) {
         let place = self.used_actions[action].first_client + place_of(ask.service);
         let requests = &mut self.clients[place].1.requests;
-        requests.ask(ask.token, ask.bytes, limits);
+        requests.ask(ask.token, ask.bytes, due, now());
     }
 
     /// Looks for servers.
@@ -356,15 +356,35 @@ impl Owner {
             self.look_for_servers(now);
         }
         for place in 0..self.clients.len() {
-            let client = &mut self.clients[place].1;
-            if let Err(error) = client.send(now) {
-                let name = client.name.clone();
-                self.unsent(&name, &error);
+            // Before anything is sent: what is given up must not go out with it.
+            for unanswered in self.clients[place].1.requests.expired(now) {
+                self.given_up(place, unanswered);
             }
-            for token in self.clients[place].1.requests.expired(now) {
-                self.replied(place, token, None);
+            while let Err((token, error)) = self.clients[place].1.send(now) {
+                let name = self.clients[place].1.name.clone();
+                self.unsent(&name, &error);
+                if let Some(token) = token {
+                    self.replied(place, token, None);
+                }
             }
         }
+    }
+
+    /// A request has found no answer in its time. A goal that a server may have taken meanwhile is called off: nobody would
+    /// hear of its end.
+    fn given_up(&mut self, place: usize, Unanswered { token, was_sent }: Unanswered) {
+        if let ClientUse::Action(action, service) = self.clients[place].0 {
+            let may_run = match service {
+                GoalService::SendGoal => was_sent,
+                GoalService::GetResult => true,
+                GoalService::CancelGoal => false,
+            };
+            let cancel = self.used_actions[action].client.cancel(token);
+            if let Some(cancel) = cancel.filter(|_| may_run) {
+                self.ask(action, cancel, Due::AtOnce);
+            }
+        }
+        self.replied(place, token, None);
     }
 }
 
