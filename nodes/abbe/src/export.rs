@@ -239,11 +239,11 @@ impl Export {
             mut measured,
             losses,
             topics,
-            origin,
+            mut origin,
         } = read(&self.bag, self.table)?;
         if self.stops {
             let tests = Tests::of(&Bag::open(&self.bag)?)?;
-            tables_of_stops(&tests.stops, &mut measured);
+            origin.of_stops = tables_of_stops(&tests.stops, &mut measured);
         }
         let wanted = self.wanted();
         let selected = select(&measured, &wanted, &self.set_up.control(format));
@@ -273,7 +273,7 @@ impl Export {
         }
         self.write(&selected, &of_what)?;
         for loss in &losses {
-            complain!("abbe: the bag has lost something, a later table may be missing: {loss}");
+            complain!("abbe: the bag has lost something, a table may be missing: {loss}");
         }
         Ok(if losses.is_empty() {
             ExitCode::SUCCESS

@@ -188,7 +188,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
     ),
     word(
         "positioning.X.ends_follow",
-        "whether points beyond those that are passed again and again while the machine works move with the outermost one that is",
+        "whether points that are not passed while the machine works move with those beside them that are",
     ),
     row(
         "positioning.X.loop_cycle_s",

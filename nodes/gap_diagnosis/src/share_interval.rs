@@ -14,8 +14,9 @@
 //! What only a place explains is no more than what it explains by itself, T_F: columns that oppose each other lose more
 //! together than either tells.
 //!
-//! The interval is that of `bootstrap`. Of few runs a draw lacks some, and what goes with time is told from the rest by fewer: where
-//! no draw has as small a share as all runs together, or none as great, they tell nothing of its doubt, and there is no interval.
+//! The interval is that of `bootstrap`. Of few runs a draw lacks some, and what goes with time is told from the rest by fewer, so
+//! that most draws have a greater share than all runs together: where the interval does not hold the share it is not told. Those
+//! that are told are therefore no unselected 95 %.
 
 use std::ops::Range;
 
@@ -117,7 +118,7 @@ fn parts(stack: &Stack<'_>, slot: &Slot) -> Vec<Part> {
     parts
 }
 
-/// (2) of every listed place over what is beyond noise in all slots, as `localise` takes it.
+/// The share of every listed place over what is beyond noise in all slots, as `localise` takes it.
 fn shares(
     slots: &[Slot],
     parts: &[Vec<Part>],

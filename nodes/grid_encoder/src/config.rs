@@ -77,7 +77,7 @@ pub struct GridEncoderConfig {
     pub plate_squareness_urad: f64,
     /// Lack of fit is reported below this p value.
     pub lack_of_fit_limit: f64,
-    /// How long the end of a recording waits for its last positions.
+    /// How long the end of a recording waits for its last readings and positions, unless the next one begins and all have come.
     pub hold_ms: f64,
     /// Positions that wait for readings.
     pub log_samples: usize,
@@ -319,7 +319,7 @@ pub const PARAMETERS: [ParameterDoc; 29] = [
     ranged(
         "hold_ms",
         "ms",
-        "How long the end of a recording waits for its last positions.",
+        "How long the end of a recording waits for its last readings and positions, unless the next one begins and all have come.",
         0.0,
         1e4,
     ),

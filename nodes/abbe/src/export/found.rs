@@ -83,23 +83,32 @@ pub(super) fn read(path: &Path, which: Which) -> Result<Found> {
                 *known = Some(table);
             }
         } else if is(name, topics::THERMAL_MODEL.name) {
+            found.origin.add_model(1, message.log_time_nanos);
             measured.thermal = Some(decode(&topics::THERMAL_MODEL, message.data)?);
         } else if is(name, topics::GEOMETRY_MODEL.name) {
+            found.origin.add_model(0, message.log_time_nanos);
             measured.geometry = Some(decode(&topics::GEOMETRY_MODEL, message.data)?);
         }
     }
     Ok(found)
 }
 
-/// A table for each axis that has none and stood at stops with nothing added to its commands; the last such run counts.
-pub(super) fn tables_of_stops(stops: &[Stops], measured: &mut Measured) {
+/// A table for each axis that has none and stood at stops with nothing added to its commands; the last such run counts. The axes
+/// that got one.
+pub(super) fn tables_of_stops(stops: &[Stops], measured: &mut Measured) -> AxisSet {
     let mut tables = PerAxis::<Option<PositioningTable>>::default();
     for stops in stops.iter().filter(|stops| !stops.compensated) {
         tables[stops.axis] = Some(stops.table(1, 1.0));
     }
-    for (known, table) in measured.tables.0.iter_mut().zip(tables.0) {
-        *known = known.take().or(table);
+    let mut of_stops = AxisSet::EMPTY;
+    for axis in Axis::ALL {
+        let known = &mut measured.tables[axis];
+        if known.is_none() && tables[axis].is_some() {
+            *known = tables[axis].take();
+            of_stops = of_stops.with(axis);
+        }
     }
+    of_stops
 }
 
 /// Each source of tables with why it gave none.
@@ -181,7 +190,8 @@ mod tests {
             stops(Axis::X, 3e-4, true),
             stops(Axis::Y, 9e-5, false),
         ];
-        tables_of_stops(&seen, &mut measured);
+        let of_stops = tables_of_stops(&seen, &mut measured);
+        assert_eq!(of_stops, AxisSet::EMPTY.with(Axis::X));
         let x = measured.tables[Axis::X].as_ref().unwrap();
         assert_eq!(x.position.len(), 10);
         assert!((x.deviation_up[9] - 0.027).abs() < 1e-15);

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 use machine::export::selection::Measured;
 use metrology::sample::PositioningTable;
-use metrology::{Axis, AxisSet, PerAxis};
+use metrology::{Axis, AxisSet, ErrorComponent, PerAxis};
 
 /// Which table of an axis is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -77,6 +77,10 @@ pub(super) struct Origin {
     pub began_nanos: Option<u64>,
     /// By axis.
     pub tables: PerAxis<Option<Tables>>,
+    /// Models of the geometry and of the thermal drift: how many, and the log time of the last, ns.
+    pub models: [Option<(u64, u64)>; 2],
+    /// Axes whose table was made of the stops of a verification.
+    pub of_stops: AxisSet,
 }
 
 /// What is counted from.
@@ -100,14 +104,42 @@ impl Origin {
     pub fn lines(&self, bag: &Path, measured: &Measured, counting: &Counting) -> Vec<String> {
         let mut lines = vec![format!("made of the bag {}", bag.display())];
         for axis in counting.axes.iter() {
-            if let (Some(_), Some(tables)) = (&measured.tables[axis], &self.tables[axis]) {
+            let own = ErrorComponent::motion(axis, axis);
+            let mut curves = measured.geometry.iter().flat_map(|model| &model.curves);
+            let is_fitted = curves.any(|curve| curve.component == own);
+            if self.of_stops.contains(axis) {
+                lines.push(format!(
+                    "positioning of {axis}: of the last verification along it with nothing added to its commands (--stops), one run"
+                ));
+            } else if let Some(tables) = &self.tables[axis] {
                 lines.extend(self.of_table(axis, tables, counting.which));
+            } else if is_fitted {
+                lines.push(format!(
+                    "positioning of {axis}: E{axis}{axis} of the geometric errors"
+                ));
+            } else {
+                continue;
             }
-            if measured.tables[axis].is_some() {
-                lines.push(zero(axis, counting));
-            }
+            lines.push(zero(axis, counting));
+        }
+        let names = ["geometric errors", "thermal drift"];
+        for (name, (n, nanos)) in names
+            .iter()
+            .zip(self.models)
+            .filter_map(|(name, model)| Some((name, model?)))
+        {
+            let when = self.since_began(nanos);
+            lines.push(format!(
+                "{name}: the last of {n} models of the bag, from {when} after its first message"
+            ));
         }
         lines
+    }
+
+    /// A model was published.
+    pub fn add_model(&mut self, place: usize, log_time_nanos: u64) {
+        let (n, at) = self.models[place].get_or_insert_default();
+        (*n, *at) = (*n + 1, log_time_nanos);
     }
 
     fn of_table(&self, axis: Axis, tables: &Tables, which: Which) -> Option<String> {
@@ -186,6 +218,8 @@ mod tests {
             began_nanos: Some(1_000_000_000),
             ..Origin::default()
         };
+        origin.add_model(1, 2_000_000_000);
+        origin.add_model(1, 3_000_000_000);
         let mut tables = Tables::default();
         for (s, end_mm) in [(61, 0.004), (4_000, 0.017)] {
             tables.add(Said::new(&table(end_mm), s * 1_000_000_000));
@@ -215,6 +249,7 @@ mod tests {
             "00:01:00 h",
             "by +13.0 um at 80.000 mm",
             "counted from the error at 0 mm",
+            "thermal drift: the last of 2 models of the bag, from 00:00:02 h",
         ] {
             assert!(last.contains(word), "{word}: {last}");
         }

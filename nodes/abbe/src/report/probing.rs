@@ -98,16 +98,19 @@ fn range(values: impl Iterator<Item = f64>) -> f64 {
     greatest - least
 }
 
+fn kind(feature: &ProbedFeature) -> &'static str {
+    match feature.kind {
+        FeatureKind::Plane => "plane",
+        FeatureKind::Bore => "bore",
+        FeatureKind::Boss => "boss",
+        FeatureKind::Sphere => "sphere",
+    }
+}
+
 fn shapes(features: &[ProbedFeature]) -> Option<Section> {
     let rows: Vec<Vec<String>> = features
         .iter()
         .map(|feature| {
-            let kind = match feature.kind {
-                FeatureKind::Plane => "plane",
-                FeatureKind::Bore => "bore",
-                FeatureKind::Boss => "boss",
-                FeatureKind::Sphere => "sphere",
-            };
             let radius = if feature.radius_mm.is_nan() {
                 "—".to_owned()
             } else {
@@ -115,7 +118,7 @@ fn shapes(features: &[ProbedFeature]) -> Option<Section> {
             };
             vec![
                 format!("{}, run {}", feature.feature_id, feature.run),
-                kind.to_owned(),
+                kind(feature).to_owned(),
                 feature.n.to_string(),
                 um(feature.form_mm),
                 radius,
@@ -128,6 +131,7 @@ fn shapes(features: &[ProbedFeature]) -> Option<Section> {
             json!({
                 "feature": feature.feature_id,
                 "run": feature.run,
+                "kind": kind(feature),
                 "points": feature.n,
                 "form_mm": feature.form_mm,
                 "radius_mm": (!feature.radius_mm.is_nan()).then_some(feature.radius_mm),
