@@ -19,8 +19,8 @@ fn scenario() -> Scenario {
         let kept = root().join("bags/dual_loop").join(file);
         scenario.write(file, &std::fs::read_to_string(kept).unwrap());
     }
-    let dwell = "ends_follow: true, settle_s: 0.04, dwell_s: 0.04";
-    scenario.replace("axis_compensation.yaml", "ends_follow: true", dwell);
+    let dwell = "unpassed_follow: true, settle_s: 0.04, dwell_s: 0.04";
+    scenario.replace("axis_compensation.yaml", "unpassed_follow: true", dwell);
     scenario
 }
 

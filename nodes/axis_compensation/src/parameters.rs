@@ -172,7 +172,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "positioning.X.settle_s",
         "s",
         config::SETTLE_S,
-        "what is left out of a dwell at its begin, and of a motion after a change of speed until a pass counts",
+        "what is left out of a dwell at its begin",
     ),
     row(
         "positioning.X.dwell_s",
@@ -186,9 +186,19 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         config::FEED_MM_MIN,
         "greatest feed at which is measured while the machine works",
     ),
+    row(
+        "positioning.X.steady_s",
+        "s",
+        config::STEADY_S,
+        "for how long the speed must have been one before a pass counts, 0: any below the feed limit",
+    ),
+    word(
+        "positioning.X.unpassed_follow",
+        "whether points that are not passed while the machine works move with those beside them that are",
+    ),
     word(
         "positioning.X.ends_follow",
-        "whether points that are not passed while the machine works move with those beside them that are",
+        "the rule of before unpassed_follow: whether the ends move with the outermost point from its sixth pass on",
     ),
     row(
         "positioning.X.loop_cycle_s",
@@ -236,6 +246,8 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         config::FEED_MM_MIN,
         "as for X",
     ),
+    row("positioning.Y.steady_s", "s", config::STEADY_S, "as for X"),
+    word("positioning.Y.unpassed_follow", "as for X"),
     word("positioning.Y.ends_follow", "as for X"),
     row(
         "positioning.Y.loop_cycle_s",
@@ -271,6 +283,8 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         config::FEED_MM_MIN,
         "as for X",
     ),
+    row("positioning.Z.steady_s", "s", config::STEADY_S, "as for X"),
+    word("positioning.Z.unpassed_follow", "as for X"),
     word("positioning.Z.ends_follow", "as for X"),
     row(
         "positioning.Z.loop_cycle_s",

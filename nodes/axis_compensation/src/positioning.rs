@@ -73,6 +73,7 @@ pub mod deviation_table;
 pub mod direction;
 pub mod dual_loop;
 pub mod dwell;
+mod ends;
 pub mod learning;
 pub mod loop_stability;
 pub mod offset;

@@ -96,8 +96,12 @@ impl Open {
         }
     }
 
-    /// Whether readings and positions have both come beyond the end.
-    pub fn is_whole(&self, log: &AxisLog) -> bool {
-        self.is_read_beyond && log.newest().is_some_and(|newest| self.is_past(newest))
+    /// Whether nothing more can come: a reading after the end has, or the next one will be after it; and all have their positions.
+    pub fn is_whole(&self) -> bool {
+        let is_next_beyond = match self.collector.pairs() {
+            [.., before, last] => self.is_past(last.at + (last.at - before.at)),
+            _ => false,
+        };
+        self.waiting.is_empty() && (self.is_read_beyond || is_next_beyond)
     }
 }

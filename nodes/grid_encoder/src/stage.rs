@@ -179,7 +179,7 @@ impl GridEncoderStage {
             self.close(at, ending, out);
         }
         if let Some(ended) = self.open.take_if(|open| open.end.is_some()) {
-            if ended.is_whole(&self.log) {
+            if ended.is_whole() {
                 self.close(at, ended, out);
             } else {
                 self.ending = Some(ended);
@@ -196,10 +196,9 @@ impl GridEncoderStage {
                 at - *told_at >= hold
             })
         };
-        let log = &self.log;
         let ending = self
             .ending
-            .take_if(|open| open.is_whole(log) || has_waited(open));
+            .take_if(|open| open.is_whole() || has_waited(open));
         let open = self.open.take_if(has_waited);
         for due in [ending, open].into_iter().flatten() {
             self.close(at, due, out);

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::deviation_table::{DeviationTable, SPACING_MM};
 use super::loop_stability;
 use super::offset::Reading;
-use super::refresh::Directions;
+use super::refresh::{Directions, Unpassed};
 use super::refusal::PositioningRefusal;
 use crate::error::AxisCompensationError;
 
@@ -37,7 +37,13 @@ pub struct PositioningConfig {
     /// Greatest feed at which is measured while the machine works.
     #[serde(default = "default_measuring_feed_limit_mm_min")]
     pub measuring_feed_limit_mm_min: f64,
-    /// Whether points beyond those that are passed move with the outermost one that is.
+    /// For how long the speed must have been one before a pass counts; 0: any pass below the feed limit.
+    #[serde(default)]
+    pub steady_s: f64,
+    /// Whether points that are not passed move with those beside them that are.
+    #[serde(default)]
+    pub unpassed_follow: bool,
+    /// The rule of before that: whether ends move with the outermost point from its sixth pass on.
     #[serde(default)]
     pub ends_follow: bool,
     /// Cycle of the measured loop of `weighted_increments`.
@@ -89,6 +95,8 @@ pub const RUNS: (f64, f64) = (10.0, 20.0);
 pub const MEASURED_LIMIT_UM: (f64, f64) = (0.1, 5000.0);
 /// Limits of the time left out of a dwell, s.
 pub const SETTLE_S: (f64, f64) = (0.0, 60.0);
+/// Limits of the time at one speed, s.
+pub const STEADY_S: (f64, f64) = (0.0, 10.0);
 /// Limits of the time averaged, s.
 pub const DWELL_S: (f64, f64) = (0.01, 600.0);
 /// Limits of the feed limit, mm/min.
@@ -99,6 +107,16 @@ pub const CYCLE_S: (f64, f64) = (0.001, 60.0);
 pub const DELAY_CYCLES: (f64, f64) = (0.0, 100.0);
 
 impl PositioningConfig {
+    /// What becomes of points that are not passed.
+    #[must_use]
+    pub fn unpassed(&self) -> Unpassed {
+        match (self.unpassed_follow, self.ends_follow) {
+            (true, _) => Unpassed::Follow,
+            (false, true) => Unpassed::EndsFollow,
+            (false, false) => Unpassed::Stay,
+        }
+    }
+
     /// Checks every number, the loop and the start table.
     ///
     /// # Errors
@@ -115,6 +133,7 @@ impl PositioningConfig {
             ("runs", f64::from(self.runs), RUNS, ""),
             ("settle_s", self.settle_s, SETTLE_S, "s"),
             ("dwell_s", self.dwell_s, DWELL_S, "s"),
+            ("steady_s", self.steady_s, STEADY_S, "s"),
             (
                 "measuring_feed_limit_mm_min",
                 self.measuring_feed_limit_mm_min,

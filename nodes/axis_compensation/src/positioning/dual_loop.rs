@@ -114,8 +114,8 @@ impl DualLoop {
             believed_fm,
             pulse_fm,
         )
-        .with_ends_following(config.ends_follow)
-        .with_settling(config.settle_s);
+        .with_unpassed(config.unpassed())
+        .with_steadiness(config.steady_s);
         if let Some(known) = &known {
             refresh.begin(&known.table);
         }

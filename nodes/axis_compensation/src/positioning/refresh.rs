@@ -17,14 +17,14 @@
 //! The command passes x_j between two states; xs − xm is taken straight between them. Only a pass below
 //! the feed limit counts, with states less than 1 mm apart: faster, the time between the two readings of
 //! one state and the axis' elastic wind-up would be learned as deviation. So would they where the speed changes: it must have
-//! been one for `settle_s` ([`super::steady`]), as where the axis turns at a point it is not. What differs from the table by
+//! been one for `steady_s` ([`super::steady`]), as where the axis turns at a point it is not. What differs from the table by
 //! more than `believed` (a chip, a scale that lost counts) is refused and said.
 //!
 //! With tables apart, a pass upwards refreshes the table of upwards. Together, each pass refreshes the one
 //! there is, which then trembles by ω/(2 − ω) of half the lost motion as directions alternate.
 //!
 //! Work seldom passes every point: it turns before the ends, and goes fast between holes. Points that are never passed would
-//! stay as they were learned while the screw beside them grows. With `ends_follow` they take their share of each change of Δ(m)
+//! stay as they were learned while the screw beside them grows. With `unpassed_follow` they take their share of each change of Δ(m)
 //! in (1), with k the next point beyond them that was passed within [`MEASURED_S`],
 //!
 //! ```text
@@ -48,6 +48,7 @@ use serde::{Deserialize, Serialize};
 
 use super::deviation_table::DeviationTable;
 use super::direction::Direction;
+use super::ends::Ends;
 use super::offset::share_fm;
 use super::steady::Steady;
 use crate::femtometre::FM_PER_MM;
@@ -95,6 +96,18 @@ pub struct Refreshed {
     pub doubted: Option<Doubted>,
 }
 
+/// What becomes of points that are not passed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Unpassed {
+    /// They stay.
+    #[default]
+    Stay,
+    /// The ends alone, by the rule of [`super::ends`].
+    EndsFollow,
+    /// (5) and (6).
+    Follow,
+}
+
 /// Refreshes one table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refresh {
@@ -103,7 +116,8 @@ pub struct Refresh {
     feed_limit_mm_s: f64,
     believed_fm: i64,
     pulse_fm: i64,
-    ends_follow: bool,
+    unpassed: Unpassed,
+    ends: Ends,
     steady: Steady,
     /// Time of the states so far, s.
     time_s: f64,
@@ -128,7 +142,8 @@ impl Refresh {
             feed_limit_mm_s,
             believed_fm,
             pulse_fm,
-            ends_follow: false,
+            unpassed: Unpassed::Stay,
+            ends: Ends::default(),
             steady: Steady::new(0.0, pulse_fm),
             time_s: 0.0,
             passed_s: [Vec::new(), Vec::new()],
@@ -136,17 +151,17 @@ impl Refresh {
         }
     }
 
-    /// The same, with (5) and (6) or without.
+    /// The same, with another rule for points that are not passed.
     #[must_use]
-    pub fn with_ends_following(mut self, ends_follow: bool) -> Self {
-        self.ends_follow = ends_follow;
+    pub fn with_unpassed(mut self, unpassed: Unpassed) -> Self {
+        self.unpassed = unpassed;
         self
     }
 
-    /// The same, whose passes count once the speed was one for `settle_s`.
+    /// The same, whose passes count once the speed was one for `steady_s`.
     #[must_use]
-    pub fn with_settling(mut self, settle_s: f64) -> Self {
-        self.steady = Steady::new(settle_s, self.pulse_fm);
+    pub fn with_steadiness(mut self, steady_s: f64) -> Self {
+        self.steady = Steady::new(steady_s, self.pulse_fm);
         self
     }
 
@@ -159,6 +174,7 @@ impl Refresh {
     /// A table begins, none of whose points was passed yet.
     pub fn begin(&mut self, table: &DeviationTable) {
         self.forget();
+        self.ends = Ends::new(table.n_points());
         self.passed_s = [(); 2].map(|()| vec![f64::NEG_INFINITY; table.n_points()]);
     }
 
@@ -231,6 +247,17 @@ impl Refresh {
         if let Some(passed_s) = self.passed_s[measured as usize].get_mut(point) {
             *passed_s = self.time_s;
         }
+        if self.unpassed == Unpassed::EndsFollow {
+            let following = self.ends.pass(point, measured as usize, self.weight);
+            for of in [Direction::Up, Direction::Down] {
+                if of == measured || self.directions == Directions::Together {
+                    following
+                        .clone()
+                        .for_each(|place| add(table, place, of, moved_fm));
+                }
+            }
+            return Ok(());
+        }
         for of in [Direction::Up, Direction::Down] {
             if of == measured || self.moves_along(of) {
                 self.spread(table, (point, measured), of, moved_fm);
@@ -243,7 +270,8 @@ impl Refresh {
     fn moves_along(&self, of: Direction) -> bool {
         let points = 0..self.passed_s[of as usize].len();
         let mut fresh = points.filter(|point| self.is_fresh(*point, of));
-        self.directions == Directions::Together || (self.ends_follow && fresh.next().is_none())
+        self.directions == Directions::Together
+            || (self.unpassed == Unpassed::Follow && fresh.next().is_none())
     }
 
     fn is_fresh(&self, point: usize, of: Direction) -> bool {
@@ -260,7 +288,7 @@ impl Refresh {
         moved_fm: i64,
     ) {
         add(table, point, of, moved_fm);
-        if !self.ends_follow {
+        if self.unpassed != Unpassed::Follow {
             return;
         }
         let n = table.n_points();

@@ -90,7 +90,7 @@ fn inner(grown_um: f64) -> [(f64, f64); 3] {
 }
 
 fn following(table: &DeviationTable) -> Refresh {
-    let mut refresh = refresh(0.3, Directions::Apart).with_ends_following(true);
+    let mut refresh = refresh(0.3, Directions::Apart).with_unpassed(Unpassed::Follow);
     refresh.begin(table);
     refresh
 }
@@ -164,7 +164,7 @@ fn eq5_a_point_that_was_passed_half_an_hour_ago_follows() {
 fn where_the_speed_changes_nothing_is_learned_and_at_one_speed_it_is() {
     let learned = |braked: bool| {
         let mut table = table(5);
-        let mut refresh = refresh(0.3, Directions::Apart).with_settling(0.05);
+        let mut refresh = refresh(0.3, Directions::Apart).with_steadiness(0.05);
         refresh.begin(&table);
         let brake_ticks = if braked { 8 } else { 0 };
         let n_points: u32 = (-200..=4_i32)
