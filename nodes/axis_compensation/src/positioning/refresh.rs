@@ -17,7 +17,7 @@
 //! The command passes x_j between two states; xs − xm is taken straight between them. Only a pass below
 //! the feed limit counts, with states less than 1 mm apart: faster, the time between the two readings of
 //! one state and the axis' elastic wind-up would be learned as deviation. So would they where the speed changes: it must have
-//! been one for `steady_s` ([`super::steady`]), as where the axis turns at a point it is not. What differs from the table by
+//! been one for `steady_s` (`steady`), as where the axis turns at a point it is not. What differs from the table by
 //! more than `believed` (a chip, a scale that lost counts) is refused and said.
 //!
 //! With tables apart, a pass upwards refreshes the table of upwards. Together, each pass refreshes the one
@@ -102,7 +102,7 @@ pub enum Unpassed {
     /// They stay.
     #[default]
     Stay,
-    /// The ends alone, by the rule of [`super::ends`].
+    /// The ends alone, by the rule of before (`ends`).
     EndsFollow,
     /// (5) and (6).
     Follow,
