@@ -44,8 +44,11 @@ pub fn added(
     both.runs.extend(future.runs.iter().cloned());
     let of = |runs: &[usize]| gram(bench, &both, runs, noise, signatures, forms);
     let all: Vec<usize> = (0..both.runs.len()).collect();
-    // Nothing that the experiment itself reads: it adds nothing.
-    of(&all[n..])?;
+    // An experiment of which nothing would be read adds nothing.
+    let alone = of(&all[n..])?;
+    if n == 0 {
+        return Some(alone);
+    }
     let whole = of(&all)?;
     Some(match of(&all[..n]) {
         Some(known) => whole - known,
