@@ -27,6 +27,13 @@ fn launched(xml: &str) -> Vec<(String, Vec<String>)> {
         .collect()
 }
 
+/// Launch files of a scenario itself, without those of single hosts below it.
+fn launch_files(scenario: &str) -> impl Iterator<Item = tree::File> {
+    let folder = format!("{FOLDER}/{scenario}");
+    let files = tree::files(&folder, ".launch.xml").into_iter();
+    files.filter(move |file| !file.path[folder.len() + 1..].contains('/'))
+}
+
 fn incomplete(scenario: &str, xml: &[String], has: &dyn Fn(&str) -> bool) -> Vec<String> {
     let place = format!("{FOLDER}/{scenario}");
     let mut found = Vec::new();
@@ -55,8 +62,7 @@ fn arch_every_scenario_is_whole() {
     assert!(!scenarios.is_empty());
     let mut found = Vec::new();
     for scenario in scenarios {
-        let files = tree::files(&format!("{FOLDER}/{scenario}"), ".launch.xml");
-        let xml: Vec<String> = files.into_iter().map(|file| file.text).collect();
+        let xml: Vec<String> = launch_files(&scenario).map(|file| file.text).collect();
         found.extend(incomplete(&scenario, &xml, &tree::has));
     }
     check(&found);
@@ -260,4 +266,56 @@ fn arch_every_bag_is_listed_with_its_making() {
     let bad = [("bags/a/a_0.mcap".to_owned(), 2 << 20)];
     assert_eq!(unlisted("", &bad).len(), 2);
     assert_eq!(unlisted("`a/a_0.mcap`", &bad).len(), 1);
+}
+
+/// What the launch file of a host has: executables with their parameter file, and whatever names another host.
+fn of_host(host: &str, text: &dyn Fn(&str) -> Option<String>) -> (Vec<String>, Vec<String>) {
+    let path = format!("{FOLDER}/three_hosts/hosts/three_hosts_{host}.launch.xml");
+    let (mut nodes, mut found) = (Vec::new(), Vec::new());
+    for (exec, files) in launched(&text(&path).unwrap_or_default()) {
+        for file in files.iter().map(|file| file.trim_start_matches("../")) {
+            nodes.push(format!("{exec} {file}"));
+            let yaml = text(&format!("{FOLDER}/three_hosts/{file}"));
+            let yaml = yaml.unwrap_or_default();
+            let mut said = yaml.lines().filter_map(|line| {
+                let (key, value) = line.trim().split_once(": ")?;
+                ["host", "clock_host"].contains(&key).then_some(value)
+            });
+            match said.next() {
+                Some(named) if named == host => {}
+                None if host == "controller" => {}
+                named => found.push(format!("{path}: {file}: host {named:?}")),
+            }
+        }
+    }
+    (nodes, found)
+}
+
+#[test]
+fn arch_the_hosts_of_a_cell_launch_together_what_the_cell_launches_and_an_archive() {
+    let (mut nodes, mut found) = (Vec::new(), Vec::new());
+    for host in ["controller", "models", "archive"] {
+        let (of_host, wrong) = of_host(host, &tree::text);
+        nodes.extend(of_host);
+        found.extend(wrong);
+    }
+    check(&found);
+    let cell = launch_files("three_hosts").next().unwrap().text;
+    let whole = launched(&cell).into_iter();
+    let mut expected: Vec<String> = whole
+        .flat_map(|(exec, files)| files.into_iter().map(move |file| format!("{exec} {file}")))
+        .chain(["host_clock clock_of_archive.yaml", "recorder recorder.yaml"].map(str::to_owned))
+        .collect();
+    nodes.sort();
+    expected.sort();
+    assert_eq!(nodes, expected);
+    let wrong = of_host("models", &|path| {
+        Some(if path.ends_with(".xml") {
+            "<launch><node exec='probe'><param from='$(dirname)/../probe.yaml'/></node></launch>"
+                .to_owned()
+        } else {
+            "    clock_host: archive\n".to_owned()
+        })
+    });
+    assert_eq!(wrong.1.len(), 1);
 }

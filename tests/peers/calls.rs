@@ -6,7 +6,8 @@ use std::time::Duration;
 use abbe_msgs::action::RunProgram;
 use abbe_msgs::action_msgs::msg::GoalStatusArray;
 use abbe_msgs::lifecycle_msgs::msg::TransitionEvent;
-use abbe_msgs::{FeedbackMessage, topics};
+use abbe_msgs::msg::AxisState;
+use abbe_msgs::{FeedbackMessage, Message as _, topics};
 use abbe_tests::cyclone::{Cyclone, end, named_end};
 use abbe_tests::program::{Process, command, domain, root};
 use abbe_tests::python::interpreter;
@@ -16,6 +17,9 @@ use serde_json::{Value, json};
 const GET: &str = "/fake_cnc/get_parameters";
 const SET: &str = "/fake_cnc/set_parameters";
 const DESCRIBE: &str = "/fake_cnc/describe_parameters";
+const TYPES: &str = "/fake_cnc/get_parameter_types";
+const SET_ALL: &str = "/fake_cnc/set_parameters_atomically";
+const DESCRIPTION: &str = "/fake_cnc/get_type_description";
 const LEVEL: &str = "/fake_cnc/set_logger_levels";
 const SEND: &str = "/cnc/run_program/_action/send_goal";
 const CANCEL: &str = "/cnc/run_program/_action/cancel_goal";
@@ -28,10 +32,16 @@ const CHANGE_STATE: &str = "/fake_cnc/change_state";
 const GRAPH: &str = "/fake_cnc/get_transition_graph";
 const TRANSITIONS: &str = "fake_cnc/transition_event";
 
-const CLIENTS: [(&str, &str); 10] = [
+const CLIENTS: [(&str, &str); 13] = [
     (GET, "rcl_interfaces/srv/GetParameters"),
     (SET, "rcl_interfaces/srv/SetParameters"),
     (DESCRIBE, "rcl_interfaces/srv/DescribeParameters"),
+    (TYPES, "rcl_interfaces/srv/GetParameterTypes"),
+    (SET_ALL, "rcl_interfaces/srv/SetParametersAtomically"),
+    (
+        DESCRIPTION,
+        "type_description_interfaces/srv/GetTypeDescription",
+    ),
     (LEVEL, "rcl_interfaces/srv/SetLoggerLevels"),
     (GET_STATE, "lifecycle_msgs/srv/GetState"),
     (CHANGE_STATE, "lifecycle_msgs/srv/ChangeState"),
@@ -84,6 +94,7 @@ fn cyclone_calls_services_and_an_action_in_its_own_mapping() {
         "{event}"
     );
     parameters(&mut cyclone);
+    type_description(&mut cyclone);
     log_level(&mut cyclone);
     action(&mut cyclone);
     lifecycle(&mut cyclone);
@@ -119,6 +130,45 @@ fn parameters(cyclone: &mut Cyclone) {
         let said = refused["reason"].as_str().unwrap();
         assert!(said.contains(reason), "{said}");
     }
+    let refused = asked(cyclone, SET_ALL, 1, &set(20.0))["result"].take();
+    assert_eq!(refused["successful"], false, "{refused}");
+    assert!(
+        refused["reason"].as_str().unwrap().contains("frozen"),
+        "{refused}"
+    );
+    let types = asked(cyclone, TYPES, 1, &names);
+    assert_eq!(types["types"], json!([3, 0]), "{types}");
+}
+
+/// As a recorder asks for what it does not know.
+fn type_description(cyclone: &mut Cyclone) {
+    let request = json!({
+        "type_name": AxisState::TYPE_NAME,
+        "type_hash": AxisState::TYPE_HASH,
+        "include_type_sources": true,
+    });
+    let told = asked(cyclone, DESCRIPTION, 1, &request);
+    assert_eq!(told["successful"], true, "{told}");
+    let whole = &told["type_description"]["type_description"];
+    assert_eq!(whole["type_name"], AxisState::TYPE_NAME, "{told}");
+    let fields = whole["fields"].as_array().unwrap().iter();
+    let names: Vec<&str> = fields.filter_map(|field| field["name"].as_str()).collect();
+    assert!(
+        names.contains(&"commanded") && names.contains(&"motor"),
+        "{names:?}"
+    );
+    let parts = told["type_description"]["referenced_type_descriptions"].as_array();
+    let is_header = |part: &&Value| part["type_name"] == "std_msgs/msg/Header";
+    assert_eq!(parts.unwrap().iter().filter(is_header).count(), 1, "{told}");
+    let sources = told["type_sources"].as_array().unwrap();
+    let of_file = |source: &&Value| {
+        let text = source["raw_file_contents"].as_str().unwrap_or_default();
+        source["type_name"] == AxisState::TYPE_NAME && text.contains("commanded")
+    };
+    assert_eq!(sources.iter().filter(of_file).count(), 1, "{sources:?}");
+    let unknown = json!({"type_name": "strange_msgs/msg/Bar"});
+    let refused = asked(cyclone, DESCRIPTION, 2, &unknown);
+    assert_eq!(refused["successful"], false, "{refused}");
 }
 
 fn log_level(cyclone: &mut Cyclone) {
@@ -226,7 +276,13 @@ fn cyclone_pauses_steps_and_resumes_a_bag_that_is_played() {
     let mut play = command(domain, &["play"]);
     // From behind the only latency on: it is latched, and comes first.
     play.arg(&bag)
-        .args(["--topics", "/latency", "/probe/point", "--paused"])
+        .args([
+            "--topics",
+            "/latency",
+            "--topics",
+            "/probe/point",
+            "--paused",
+        ])
         .args(["--from", FROM_S, "--rate", "2", "--delay", "0"]);
     let playing = Process::start(play);
     let clients = [PAUSE, RESUME, STEP].map(|service| (service, "std_srvs/srv/Trigger"));

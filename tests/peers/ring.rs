@@ -52,7 +52,7 @@ fn the_last_seconds_are_saved_when_asked_for_and_when_an_error_begins() {
     let folder = home.path().join("kept");
     let mut record = command(domain, &["record", "--ring", "2", "--save-on-error"]);
     record.arg("-o").arg(&folder);
-    record.args(["--exclude", "/rosout", "/joint_*"]);
+    record.args(["--exclude", "/rosout", "--exclude", "/joint_*"]);
     let recorder = Process::start(record);
     let (latency, diagnostics) = (&topics::LATENCY, &topics::DIAGNOSTICS);
     let writers = [end(latency), end(diagnostics), end(&topics::JOINT_STATES)];

@@ -10,7 +10,7 @@ use abbe_tests::python::{interpreter, script, succeeded};
 use abbe_tests::scenario::Scenario;
 use abbe_tests::zenoh::{Router, built_in, endpoint, through};
 use recorder::{Bag, Event, Order};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// Real time of the short cell's plan, with its start and its page.
 const CELL: Duration = Duration::from_secs(150);
@@ -65,6 +65,7 @@ fn python_hears_asks_and_is_recorded_over_zenoh() {
 
     ends_are_told_as_rmw_zenoh_cpp_tells_them(&seen);
     what_is_said_arrives(&seen);
+    what_is_asked_is_done(&seen);
     let recorded = counts(&into);
     let of = |topic: &str| recorded.iter().find(|(name, ..)| name == topic).unwrap();
     assert_eq!(of("/from_python").1, "strange_msgs/msg/Bar");
@@ -121,6 +122,28 @@ fn what_is_said_arrives(seen: &Value) {
     eprintln!(
         "axes/state at 500 Hz, Rust to Python: p50, p99 us: {}",
         states["delay_us"]
+    );
+}
+
+fn what_is_asked_is_done(seen: &Value) {
+    let values = &seen["values"];
+    assert_eq!(
+        (&values["kind"], &values["rate_hz"]),
+        (&json!(3), &json!(500.0))
+    );
+    assert_eq!(values["set"], false);
+    let reason = values["reason"].as_str().unwrap();
+    assert!(reason.contains("frozen"), "{reason}");
+    let called_off = &seen["called_off"];
+    assert!(called_off["feedback"].as_u64().unwrap() > 0, "{called_off}");
+    // No error; canceled.
+    assert_eq!(
+        (&called_off["cancel"], &called_off["status"]),
+        (&json!(0), &json!(5))
+    );
+    assert_eq!(
+        seen["managed"],
+        json!([[true, "inactive"], [true, "active"]])
     );
 }
 

@@ -57,6 +57,12 @@ def read(attached) -> tuple[int, int, str]:
     return number, nanos, attached[17:].hex()
 
 
+def text(value: str) -> bytes:
+    """A string as CDR has it, filled up to four bytes."""
+    raw = value.encode() + b"\0"
+    return struct.pack("<I", len(raw)) + raw + bytes(-len(raw) % 4)
+
+
 def types():
     store = get_typestore(Stores.ROS2_JAZZY)
     found = {}
@@ -115,6 +121,19 @@ class Desk:
             "frame": last.header.frame_id,
             "motor": list(last.motor),
         }
+
+    def heard_by(self, token: str, seconds: float, during) -> list[bytes]:
+        """What a publisher said while something was done, and for some time after."""
+        *_, topic, ros_type, digest, _qos = token.split("/")
+        payloads = []
+        subscriber = self.session.declare_subscriber(
+            f"{self.domain}{topic.replace('%', '/')}/{ros_type}/{digest}",
+            lambda sample: payloads.append(sample.payload.to_bytes()),
+        )
+        during()
+        time.sleep(seconds)
+        subscriber.undeclare()
+        return payloads
 
     def latched(self, topic: str, ros_type: str) -> int:
         """How many samples who comes late gets."""
@@ -175,6 +194,52 @@ def one(tokens: list[str], kind: str, name: str) -> str:
     return found[0]
 
 
+def parameters(desk: Desk, tokens: list[str]) -> dict:
+    """The rate that the node has, and why it cannot be set."""
+    name = "background_rate_hz"
+    names = struct.pack("<I", 1) + text(name)
+    values = desk.ask(one(tokens, "SS", "/fake_cnc/get_parameters"), 2, names)
+    kind, rate_hz = values[8], struct.unpack_from("<d", values, 4 + 16)[0]
+    # Name; type, bool, int64 and double at their places; an empty string and five empty lists.
+    request = struct.pack("<I", 1) + struct.pack("<I", len(name) + 1) + name.encode() + b"\0"
+    request += bytes([3, 0])
+    request += bytes(-len(request) % 8) + bytes(8) + struct.pack("<d", 20.0)
+    request += text("") + bytes(20)
+    answer = desk.ask(one(tokens, "SS", "/fake_cnc/set_parameters"), 3, request)
+    length = struct.unpack_from("<I", answer, 12)[0]
+    reason = answer[16 : 16 + length - 1].decode()
+    return {"kind": kind, "rate_hz": rate_hz, "set": answer[8] == 1, "reason": reason}
+
+
+def called_off(desk: Desk, tokens: list[str]) -> dict:
+    """A goal of ten minutes: what it says on its way, that it is called off, and its end."""
+    goal = bytes(range(16, 32))
+
+    def send() -> None:
+        program = text("G21 G90\nG1 X102 F10\nM2\n") + text("peer")
+        sent = desk.ask(one(tokens, "SS", "/cnc/run_program/_action/send_goal"), 4, goal + program)
+        assert sent[4] == 1, "the goal was refused"
+
+    feedback = desk.heard_by(one(tokens, "MP", "/cnc/run_program/_action/feedback"), 2.0, send)
+    own = [payload for payload in feedback if payload[4:20] == goal]
+    cancel = one(tokens, "SS", "/cnc/run_program/_action/cancel_goal")
+    answer = desk.ask(cancel, 5, goal + bytes(8))
+    result = desk.ask(one(tokens, "SS", "/cnc/run_program/_action/get_result"), 6, goal, 30.0)
+    return {"feedback": len(own), "cancel": answer[4], "status": result[4]}
+
+
+def managed(desk: Desk, tokens: list[str]) -> list:
+    """Deactivated and activated again, with the state after each."""
+    seen = []
+    for number, step in enumerate([4, 3]):
+        change = bytes([step, 0, 0, 0]) + text("")
+        done = desk.ask(one(tokens, "SS", "/fake_cnc/change_state"), 7 + 2 * number, change)
+        state = desk.ask(one(tokens, "SS", "/fake_cnc/get_state"), 8 + 2 * number, b"\0")
+        length = struct.unpack_from("<I", state, 8)[0]
+        seen.append([done[4] == 1, state[12 : 12 + length - 1].decode()])
+    return seen
+
+
 def meet(endpoint: str, domain: int) -> None:
     desk = Desk(endpoint, domain)
     tokens = desk.tokens("%fake_cnc%get_type_description")
@@ -195,6 +260,9 @@ def meet(endpoint: str, domain: int) -> None:
     seen["accepted"] = answer[4] == 1
     result = desk.ask(one(tokens, "SS", "/cnc/run_program/_action/get_result"), 1, GOAL, 30.0)
     seen["status"] = result[4]
+    seen["values"] = parameters(desk, tokens)
+    seen["called_off"] = called_off(desk, tokens)
+    seen["managed"] = managed(desk, tokens)
     numbers = [CDR + struct.pack("<q", number) for number in range(100)]
     desk.say("/from_python", "strange_msgs/msg/Bar", "RIHS01_" + "7" * 64, numbers)
     print(json.dumps(seen), flush=True)

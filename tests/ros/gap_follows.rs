@@ -48,8 +48,14 @@ fn follower(scenario: &Scenario, domain: u16) -> Process {
 fn machine(bag: &Path, domain: u16) -> Process {
     let mut play = command(domain, &["play"]);
     play.arg(bag).args(["--rate", RATE, "--delay", "2"]);
-    play.args(["--topics", "/axes/state", "/grid/position", "/test/segment"]);
-    play.arg("/temperature/*");
+    for topic in [
+        "/axes/state",
+        "/grid/position",
+        "/test/segment",
+        "/temperature/*",
+    ] {
+        play.args(["--topics", topic]);
+    }
     Process::start(play)
 }
 

@@ -70,7 +70,7 @@ fn an_interrupted_run_closes_its_bag_and_writes_its_page() {
         run.signal(Signal::SIGINT);
         let ended = run.ended_within(END);
         eprintln!("{more:?}: SIGINT to exit: {:?}", asked.elapsed());
-        assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+        assert_eq!(ended.status.code(), Some(130), "{}", ended.said);
         let is_told = ended.said.contains("it was interrupted");
         assert_eq!(is_told, is_heard, "{}", ended.said);
         let folder = scenario.new_run(&[]);
@@ -193,7 +193,7 @@ fn a_simulated_run_that_is_interrupted_closes_its_bag_and_names_the_steps_that_w
     std::thread::sleep(Duration::from_secs(6));
     run.signal(Signal::SIGINT);
     let ended = run.ended_within(END);
-    assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+    assert_eq!(ended.status.code(), Some(130), "{}", ended.said);
     assert!(ended.said.contains("it was interrupted"), "{}", ended.said);
     let skipped = "were skipped: the run ended in step";
     assert!(ended.said.contains(skipped), "{}", ended.said);

@@ -274,3 +274,17 @@ fn over_dds_no_node_starts_without_a_network_interface() {
         expect(&Process::start(command).ended_within(PATIENCE), words);
     }
 }
+
+#[test]
+fn a_run_in_real_time_does_not_pretend_to_stay_off_the_network() {
+    for (name, more) in [("short_cell", &[][..]), ("first_run", &["--separate"])] {
+        let scenario = Scenario::copy_of(name);
+        let mut run = command(domain(15), &["run", "--no-dds"]);
+        run.arg(scenario.folder()).args(more);
+        run.arg("--runs").arg(scenario.out());
+        let ended = Process::start(run).ended_within(PATIENCE);
+        assert_eq!(ended.status.code(), Some(2), "{}", ended.said);
+        assert!(ended.said.contains("--no-dds: "), "{}", ended.said);
+        assert!(!scenario.out().exists(), "{name}: a run was begun");
+    }
+}

@@ -6,6 +6,7 @@
 )]
 #![expect(clippy::print_stderr, reason = "figures that were seen are said")]
 
+mod intruder;
 mod unasked;
 
 use std::path::Path;
@@ -235,7 +236,13 @@ fn a_bag_is_played_with_credentials_for_it_and_not_without() {
         let mut play = command(domain, &["play"]);
         // Topics that ask for acknowledgement; at this rate others are lost on any network.
         play.arg(&bag).args(["--rate", "0", "--delay", "8"]);
-        play.args(["--no-clock", "--topics", "/axes/state", "/compensation"]);
+        play.args([
+            "--no-clock",
+            "--topics",
+            "/axes/state",
+            "--topics",
+            "/compensation",
+        ]);
         enforce(&mut play, &keys);
         Process::start(play).ended_within(Duration::from_secs(120))
     };

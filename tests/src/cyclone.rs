@@ -187,16 +187,9 @@ impl Cyclone {
 
     /// Every sample of `topic` that came and comes within `time`.
     pub fn samples_within(&mut self, topic: &str, time: Duration) -> Vec<Value> {
-        let deadline = Instant::now() + time;
-        while let Ok(event) = self
-            .events
-            .recv_timeout(deadline.saturating_duration_since(Instant::now()))
-        {
-            self.kept.push_back(event);
-        }
         let topic = absolute(topic);
         let (mut wanted, mut kept) = (Vec::new(), VecDeque::new());
-        for mut event in self.kept.drain(..) {
+        for mut event in self.events_within(time) {
             if event["event"] == "sample" && event["topic"] == topic.as_str() {
                 wanted.push(event["message"].take());
             } else {
@@ -205,6 +198,18 @@ impl Cyclone {
         }
         self.kept = kept;
         wanted
+    }
+
+    /// Every event that came and comes within `time`, whatever it is.
+    pub fn events_within(&mut self, time: Duration) -> Vec<Value> {
+        let deadline = Instant::now() + time;
+        while let Ok(event) = self
+            .events
+            .recv_timeout(deadline.saturating_duration_since(Instant::now()))
+        {
+            self.kept.push_back(event);
+        }
+        self.kept.drain(..).collect()
     }
 
     fn wait(&mut self, kind: &str, topic: &str, pick: impl Fn(&Value) -> bool) -> Value {

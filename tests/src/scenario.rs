@@ -87,7 +87,7 @@ impl Scenario {
         self.write(file, &format!("{text}{more}"));
     }
 
-    /// Runs it with `abbe run --no-dds`; the run's folder.
+    /// Runs it, off the network where its time is simulated; the run's folder.
     ///
     /// # Panics
     /// When it does not end with exit code 0 within two minutes.
@@ -99,7 +99,7 @@ impl Scenario {
         self.new_run(&known)
     }
 
-    /// Runs it with `abbe run --no-dds` and more arguments.
+    /// Runs it with more arguments, off the network where its time is simulated.
     ///
     /// # Panics
     /// When it does not end within two minutes.
@@ -108,14 +108,18 @@ impl Scenario {
         self.start(more).ended_within(Duration::from_secs(600))
     }
 
-    /// Starts `abbe run --no-dds` with more arguments.
+    /// Starts it with more arguments, off the network where its time is simulated.
     ///
     /// # Panics
     /// When it cannot be started.
     #[must_use]
     pub fn start(&self, more: &[&str]) -> Process {
         let (folder, out) = (self.folder(), self.out());
-        let mut command = command(0, &["run", "--no-dds"]);
+        let text = std::fs::read_to_string(self.path("scenario.yaml")).unwrap_or_default();
+        let mut command = command(0, &["run"]);
+        if text.contains("simulated_start_s:") && !more.contains(&"--separate") {
+            command.arg("--no-dds");
+        }
         command.arg(folder).arg("--runs").arg(out).args(more);
         Process::start(command)
     }

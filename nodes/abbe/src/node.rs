@@ -95,12 +95,19 @@ mod tests {
     /// Every node of every scenario: executable and setup.
     fn launched() -> Vec<(String, Setup)> {
         let home = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../launch_configs");
-        let folders = std::fs::read_dir(home)
+        let folders = std::fs::read_dir(&home)
             .unwrap()
             .map(|entry| entry.unwrap().path());
-        let nodes = folders
+        let scenarios = folders
             .filter(|folder| folder.is_dir())
-            .flat_map(|folder| launch::read(&launch::find(&folder).unwrap()).unwrap());
+            .map(|folder| launch::find(&folder).unwrap());
+        let hosts = ["controller", "models", "archive"]
+            .map(|host| home.join(format!("three_hosts/hosts/three_hosts_{host}.launch.xml")));
+        let nodes = scenarios
+            .chain(hosts)
+            .flat_map(|file| launch::read(&file).unwrap())
+            // Built, it begins its bag.
+            .filter(|node| node.exec != "recorder");
         nodes
             .map(|node| {
                 let arguments = Arguments::parse(node.ros_args()).unwrap();

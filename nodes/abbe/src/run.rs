@@ -39,7 +39,7 @@ pub struct Run {
     /// Was the name of `--runs`.
     #[arg(long, hide = true, value_parser = renamed)]
     out: Option<String>,
-    /// Stay off the network: nothing is published on DDS.
+    /// Stay off the network: nothing is published on DDS. Only in simulated time, for in real time the nodes meet there.
     #[arg(long)]
     no_dds: bool,
     /// Go no faster than this many times real time (0: as fast as it can).
@@ -58,6 +58,8 @@ fn renamed(_: &str) -> Result<String, &'static str> {
 
 /// Why a plan that was called off did not run to its end.
 const INTERRUPTED: &str = "it was interrupted";
+/// Exit code of a plan that was called off and ended in good order: what shells give a program that Ctrl-C ended.
+const CALLED_OFF: u8 = 130;
 
 /// What a runner leaves behind.
 pub struct Outcome {
@@ -72,7 +74,7 @@ pub struct Outcome {
 }
 
 impl Run {
-    /// Runs the scenario; exit code 1 when its plan failed.
+    /// Runs the scenario; exit code 1 when its plan failed, 130 when it was called off.
     ///
     /// # Errors
     /// When the scenario cannot be read, a node not built, or the bag not written.
@@ -82,6 +84,10 @@ impl Run {
             return Err(refused("run", reason));
         }
         let scenario = Scenario::read(&self.scenario)?;
+        if self.no_dds && !self.is_composed(&scenario) {
+            let reason = "--no-dds: the nodes of a run in real time meet on the network; only a scenario with simulated_start_s can do without, and not with --separate";
+            return Err(refused("run", reason));
+        }
         let interruption = Interruption::listen("the bag is closed, no page is written")?;
         let folder = new_folder(&self.runs, &scenario.name)?;
         let ended = self.run_into(&folder, &scenario, &interruption);
@@ -92,6 +98,11 @@ impl Run {
         ended
     }
 
+    /// Whether it runs in simulated time, within one process.
+    fn is_composed(&self, scenario: &Scenario) -> bool {
+        scenario.file.simulated_start_s.is_some() && !self.separate
+    }
+
     fn run_into(
         &self,
         folder: &Path,
@@ -100,7 +111,7 @@ impl Run {
     ) -> Result<ExitCode> {
         let bag = folder.join("bag");
         let mut outcome = match scenario.file.simulated_start_s {
-            Some(start_s) if !self.separate => {
+            Some(start_s) if self.is_composed(scenario) => {
                 let how = composed::How {
                     pace: self.pace,
                     on_dds: !self.no_dds,
@@ -180,6 +191,10 @@ impl Outcome {
         }
         match self.failure {
             None => ExitCode::SUCCESS,
+            Some(reason) if reason == INTERRUPTED => {
+                complain!("abbe: the plan did not run to its end: {reason}");
+                ExitCode::from(CALLED_OFF)
+            }
             Some(reason) => {
                 complain!("abbe: the plan failed: {reason}");
                 ExitCode::FAILURE

@@ -164,7 +164,8 @@ impl Participant {
             .transpose()
             .context("announcements of other hosts")?;
         let is_encrypted = environment.security.is_some() && unsecured.is_none();
-        let warnings: Vec<String> = unsecured.into_iter().chain(hidden).collect();
+        let peers = environment.peers_warning();
+        let warnings: Vec<String> = unsecured.into_iter().chain(hidden).chain(peers).collect();
         let warning = (!warnings.is_empty()).then(|| warnings.join("; "));
         let node = NodeName::new(&names.namespace, &names.name)
             .map_err(|error| anyhow!("node {}: {error:?}", names.fully_qualified()))?;

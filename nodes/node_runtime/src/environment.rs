@@ -66,6 +66,8 @@ pub struct Environment {
     pub security: Option<Security>,
     /// How far discovery goes.
     pub range: DiscoveryRange,
+    /// `ROS_STATIC_PEERS`, which no node of ours follows.
+    pub static_peers: Option<String>,
     /// `RUST_LOG`.
     pub log_filter: Option<String>,
 }
@@ -208,6 +210,7 @@ impl Environment {
             domain_id,
             security,
             range,
+            static_peers: set("ROS_STATIC_PEERS"),
             log_filter: set("RUST_LOG"),
         })
     }
@@ -235,6 +238,16 @@ impl Environment {
             }
             _ => Ok(()),
         }
+    }
+
+    /// What to warn of where hosts are named that are to be found without multicast.
+    #[must_use]
+    pub fn peers_warning(&self) -> Option<String> {
+        let peers = self.static_peers.as_ref()?;
+        Some(format!(
+            "ROS_STATIC_PEERS={peers} is not followed: over DDS hosts are found by multicast alone; \
+             where the network carries none, use Zenoh (RMW_IMPLEMENTATION=rmw_zenoh_cpp)"
+        ))
     }
 
     /// What to warn of when this is the `participant`-th participant of the computer, from 0.
@@ -342,6 +355,19 @@ mod tests {
         );
         let only = read(&[("ROS_LOCALHOST_ONLY", "1")]).unwrap();
         assert_eq!(only.range, DiscoveryRange::Localhost);
+    }
+
+    #[test]
+    fn peers_that_nobody_follows_are_told() {
+        let environment = read(&[("ROS_STATIC_PEERS", "10.0.0.7")]).unwrap();
+        let warning = environment.peers_warning().unwrap();
+        assert!(
+            warning.contains("ROS_STATIC_PEERS=10.0.0.7 is not followed"),
+            "{warning}"
+        );
+        assert_eq!(read(&[]).unwrap().peers_warning(), None);
+        let unset = read(&[("ROS_STATIC_PEERS", "")]).unwrap();
+        assert_eq!(unset.peers_warning(), None);
     }
 
     #[test]

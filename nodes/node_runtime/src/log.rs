@@ -137,7 +137,8 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
             });
     // RustDDS complains of multicast groups when it leaves a loopback that has none.
     // And, once a clock was set back, of each sample of best effort: that is a condition of the node's.
-    let silent = "rustdds::network::udp_listener=off,rustdds::structure::dds_cache=off";
+    // And, when a node ends, of every end that its busy event loop is not told of: the participant is gone a moment later.
+    let silent = "rustdds::network::udp_listener=off,rustdds::structure::dds_cache=off,rustdds::dds::pubsub=off";
     let quiet = format!("rustdds=error,{silent},ros2_client=error,zenoh=error");
     // Where DDS is secured it complains of every message of whoever is not.
     let secured = environment.security.as_ref();

@@ -1,4 +1,4 @@
-//! The live runner on real DDS: loopback only, each test in a domain of its own.
+//! The live runner on real DDS, or over Zenoh by `RMW_IMPLEMENTATION`: loopback only, each test in a domain of its own.
 #![expect(
     clippy::disallowed_methods,
     reason = "tests wait, look at clocks and write files"

@@ -110,7 +110,7 @@ impl Mirror {
         let missed = shown.left_out + report.dropped + report.refused;
         if missed > 0 {
             complain!(
-                "abbe: {} of {} messages were shown on DDS; the bag has all",
+                "abbe: {} of {} messages, the clock among them, were shown on DDS; the bag has every one of the topics that it records",
                 shown.offered - missed,
                 shown.offered
             );
