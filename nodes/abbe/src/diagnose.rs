@@ -156,7 +156,8 @@ pub fn of(
     let began = Instant::now();
     let machine = MachineFile::parse(machine_text, name)?;
     let recorded = Recorded::read(paths, &machine)?;
-    let mut diagnosis = diagnose(&machine, &recorded.session, config)?;
+    let mut diagnosis = diagnose(&machine, &recorded.session, config)
+        .map_err(|error| bags::not_whole(error.into(), &recorded.losses))?;
     diagnosis.report.inputs.bags = recorded.bags;
     diagnosis.report.inputs.machine_sha256 = format!("{:x}", Sha256::digest(machine_text));
     diagnosis.report.runtime_s = began.elapsed().as_secs_f64();

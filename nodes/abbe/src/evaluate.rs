@@ -30,7 +30,7 @@ const NOTHING_MM: f64 = 1e-7;
 /// The tests of a bag, and what was computed from them while it was recorded.
 #[derive(Debug, Default)]
 pub struct Tests {
-    /// Circles over a grid encoder.
+    /// Circles over a grid encoder, or with a ballbar.
     pub circles: Vec<CircleRecording>,
     /// The first circle with stops, for the published separation.
     pub station_circle: Option<StationCircle>,
@@ -135,7 +135,9 @@ impl Collected {
             }
         } else if is(name, &topics::LENGTH_POSITION) {
             if self.segment.is_some() {
-                self.linear.length(&read(&topics::LENGTH_POSITION, bytes)?);
+                let sample = read(&topics::LENGTH_POSITION, bytes)?;
+                self.circles.length(&sample);
+                self.linear.length(&sample);
             }
         } else if is(name, &topics::COMPENSATION) {
             if self.segment.is_some() {

@@ -6,27 +6,27 @@ use std::fs::File;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::str::FromStr;
 
 use anyhow::{Context, Result, anyhow};
 use clap::{Args, ValueEnum};
-use machine::export::fanuc::Record;
-use machine::export::linuxcnc::FileType;
-use machine::export::selection::{Control, Fanuc, Selected, Sinumerik, Wanted, select};
-use machine::export::sinumerik::OtherAxes;
+use machine::export::selection::{Selected, Wanted, select};
 use machine::export::{ExportFile, Unestimable};
 use metrology::{Axis, AxisSet, PerAxis};
 use recorder::Bag;
 
 use crate::evaluate::Tests;
 use crate::tell::tell;
-use crate::usage::{USAGE, above_zero};
+use crate::usage::{USAGE, above_zero, refused};
 
+mod counting;
 mod found;
 mod origin;
+mod set_up;
 
+use counting::Counting;
 use found::{Found, looked_for, read, tables_of_stops};
-use origin::{Counting, Which};
+use origin::Which;
+use set_up::{SetUp, inner, of_axis};
 
 /// Controls that tables are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -58,14 +58,6 @@ fn formats() -> String {
     lines.join("\n")
 }
 
-/// `AXIS=NUMBER`; `kind` says what is taken as a number.
-fn of_axis<N: FromStr>(text: &str, kind: &str) -> Result<(Axis, N), String> {
-    let (axis, number) = text.split_once('=').ok_or("must be AXIS=NUMBER")?;
-    let axis = axis.parse::<Axis>().map_err(|error| error.to_string())?;
-    let number = number.parse();
-    Ok((axis, number.map_err(|_| format!("must be {kind}"))?))
-}
-
 /// A position of an axis, mm or deg.
 fn position(text: &str) -> Result<(Axis, f64), String> {
     let (axis, value) = of_axis::<f64>(text, "a number")?;
@@ -74,11 +66,6 @@ fn position(text: &str) -> Result<(Axis, f64), String> {
     } else {
         Err("must be finite".to_owned())
     }
-}
-
-/// The number of a point of an axis.
-fn point_number(text: &str) -> Result<(Axis, u32), String> {
-    of_axis(text, "a whole number, 0 or above")
 }
 
 /// Arguments of `abbe export`.
@@ -120,116 +107,11 @@ pub struct Export {
     set_up: SetUp,
 }
 
-/// Numbers of the control's set-up.
-#[derive(Args)]
-struct SetUp {
-    /// LinuxCNC: `COMP_FILE_TYPE`.
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
-    file_type: u8,
-    /// SINUMERIK: points of a table (MD38000, MD18342).
-    #[arg(long, default_value_t = 200)]
-    max_points: usize,
-    /// SINUMERIK: cross-axis tables.
-    #[arg(long, default_value_t = 8)]
-    max_tables: usize,
-    /// SINUMERIK: greatest sum of cross-axis compensations (MD32720), mm.
-    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = above_zero)]
-    max_sum_mm: f64,
-    /// SINUMERIK: greatest slope of the temperature compensation, mm/mm.
-    #[arg(long, default_value_t = 1e-3, allow_negative_numbers = true, value_parser = above_zero)]
-    max_slope: f64,
-    /// SINUMERIK: positioning as two cross-axis tables, one for each direction.
-    #[arg(long)]
-    each_direction: bool,
-    /// SINUMERIK: leave out drift that depends on other axes instead of refusing the axis.
-    #[arg(long)]
-    leave_out_other_axes: bool,
-    /// FANUC: number of an axis' reference point such as X=40 (parameter 3620); others: 100 times the axis' place, and 100.
-    #[arg(long, value_parser = point_number)]
-    reference_number: Vec<(Axis, u32)>,
-    /// FANUC: detection unit, um or 0.001 deg.
-    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = above_zero)]
-    detection_unit: f64,
-    /// FANUC: magnification (parameter 3623).
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100))]
-    magnification: u32,
-    /// FANUC: greatest size of one value, pulses.
-    #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..))]
-    max_pulses: u32,
-    /// FANUC: greatest number of a point.
-    #[arg(long, default_value_t = 1023)]
-    max_number: u32,
-    /// FANUC: mark pitch data with Q0 as series 30i and later do.
-    #[arg(long)]
-    marked: bool,
-}
-
-/// mm as they are, degrees as rad.
-fn inner(axis: Axis, value: f64) -> f64 {
-    if axis.is_linear() {
-        value
-    } else {
-        value.to_radians()
-    }
-}
-
-/// A fraction of a millimetre or of a degree.
-const THOUSANDTH: f64 = 1e-3;
-
-impl SetUp {
-    fn control(&self, format: Format) -> Control {
-        match format {
-            Format::Linuxcnc if self.file_type == 0 => Control::LinuxCnc(FileType::ActualPosition),
-            Format::Linuxcnc => Control::LinuxCnc(FileType::Offset),
-            Format::Sinumerik => Control::Sinumerik(self.sinumerik()),
-            Format::Heidenhain => Control::Heidenhain,
-            Format::Fanuc => Control::Fanuc(self.fanuc()),
-            Format::Csv => Control::Csv,
-        }
-    }
-
-    fn sinumerik(&self) -> Sinumerik {
-        Sinumerik {
-            names: PerAxis::from_fn(|axis| format!("{axis}1")),
-            max_points: self.max_points,
-            max_tables: self.max_tables,
-            max_cross_points: self.max_points,
-            max_sum: self.max_sum_mm,
-            max_slope: self.max_slope,
-            for_each_direction: self.each_direction,
-            other_axes: if self.leave_out_other_axes {
-                OtherAxes::LeaveOut
-            } else {
-                OtherAxes::Refuse
-            },
-        }
-    }
-
-    fn fanuc(&self) -> Fanuc {
-        let mut reference_number = PerAxis::from_fn(|axis| 100 * axis.index() as u32 + 100);
-        for (axis, number) in &self.reference_number {
-            reference_number[*axis] = *number;
-        }
-        Fanuc {
-            reference_number,
-            detection_unit: PerAxis::from_fn(|axis| inner(axis, self.detection_unit * THOUSANDTH)),
-            magnification: self.magnification,
-            max_pulses: self.max_pulses,
-            max_number: self.max_number,
-            record: if self.marked {
-                Record::Marked
-            } else {
-                Record::Plain
-            },
-        }
-    }
-}
-
 impl Export {
     /// Exit code 0: every file is written; 1: there was nothing to write, or it failed; 3: written, but the bag has lost something.
     ///
     /// # Errors
-    /// The bag cannot be read, or a file cannot be written.
+    /// The bag cannot be read, a file cannot be written, or a named reference point is beyond the errors (exit code 2).
     pub fn execute(self) -> Result<ExitCode> {
         let Some(format) = self.format else {
             complain!("abbe: --format is missing; the formats are:\n{}", formats());
@@ -247,8 +129,13 @@ impl Export {
         }
         let wanted = self.wanted();
         let selected = select(&measured, &wanted, &self.set_up.control(format));
-        for left in &selected.left_out {
-            tell!("left out: {}: {}", left.what, left.why);
+        let left_out: Vec<String> = selected
+            .left_out
+            .iter()
+            .map(|left| format!("left out: {}: {}", left.what, left.why))
+            .collect();
+        for line in &left_out {
+            tell!("{line}");
         }
         if selected.files.is_empty() {
             let bag = self.bag.display();
@@ -263,14 +150,19 @@ impl Export {
         }
         let counting = Counting {
             which: self.table,
-            axes: wanted.axes,
+            spans: selected.positioning,
             reference: wanted.reference,
+            named: self.reference.iter().map(|(axis, _)| *axis).collect(),
             relative_to_reference: wanted.relative_to_reference,
         };
-        let of_what = origin.lines(&self.bag, &measured, &counting);
+        counting
+            .check()
+            .map_err(|reason| refused("export", reason))?;
+        let mut of_what = origin.lines(&self.bag, &counting);
         for line in &of_what[1..] {
             tell!("{line}");
         }
+        of_what.extend(left_out);
         self.write(&selected, &of_what)?;
         for loss in &losses {
             complain!("abbe: the bag has lost something, a table may be missing: {loss}");
@@ -474,6 +366,33 @@ mod tests {
             again.contains("x.comp") && again.contains("--out"),
             "{again}"
         );
+    }
+
+    #[test]
+    fn what_is_in_no_file_is_told_as_left_out_and_by_no_other_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut short = table(Axis::Z, 0.0);
+        for values in [
+            &mut short.position,
+            &mut short.deviation_up,
+            &mut short.deviation_down,
+        ] {
+            values.truncate(1);
+        }
+        let bag = bag(folder.path(), &[table(Axis::X, 1e-4), short], false);
+        let out = folder.path().join("out");
+        execute(&bag, &out, &["--format", "csv"]).unwrap();
+        let notes = std::fs::read_to_string(out.join(NOTES)).unwrap();
+        let left_out = "left out: positioning of Z: axis Z: 1 points";
+        assert!(notes.contains(left_out), "{notes}");
+        assert_eq!(notes.matches("of Z").count(), 1, "{notes}");
+        let far = execute(
+            &bag,
+            &folder.path().join("far"),
+            &["--format", "csv", "--reference", "X=9999"],
+        );
+        assert!(far.unwrap_err().is::<clap::Error>());
+        assert!(!folder.path().join("far").exists());
     }
 
     #[test]

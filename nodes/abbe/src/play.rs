@@ -15,7 +15,7 @@ use replayer::PlaybackConfig;
 use replayer_node::{Desk, Played};
 
 use crate::tell::tell;
-use crate::usage::refused;
+use crate::usage::{refused, topics};
 
 /// Arguments of `abbe play`.
 #[derive(Args)]
@@ -25,8 +25,8 @@ pub struct Play {
     /// Time of the bag over time; 0: as fast as subscribers acknowledge.
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     rate: f64,
-    /// Absolute names of topics, `*` stands for any run of characters; none: every topic.
-    #[arg(long, num_args = 1..)]
+    /// Absolute name of topics, `*` stands for any run of characters; may be given several times; none: every topic.
+    #[arg(long, value_name = "TOPIC", value_parser = topics)]
     topics: Vec<String>,
     /// Leave out what comes before, s from the bag's first message; of latched topics the last ones are sent first.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
@@ -146,5 +146,26 @@ impl Shown {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct CommandLine {
+        #[command(flatten)]
+        play: Play,
+    }
+
+    #[test]
+    fn an_option_takes_one_topic_and_the_argument_behind_it_is_the_bag() {
+        let line = ["play", "--topics", "/a", "bag", "--topics", "/b/*"];
+        let play = CommandLine::parse_from(line).play;
+        assert_eq!(play.topics, ["/a", "/b/*"]);
+        assert_eq!(play.bag, PathBuf::from("bag"));
     }
 }

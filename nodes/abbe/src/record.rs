@@ -13,7 +13,7 @@ use node_runtime::{Interruption, Setup};
 use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RingConfig};
 
 use crate::tell::tell;
-use crate::usage::refused;
+use crate::usage::{refused, topics};
 
 /// Compression inside the bag's chunks.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -38,8 +38,8 @@ pub struct Record {
     /// A new file is begun when this one spans so much time, s; 0: one file.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     max_file_s: f64,
-    /// Absolute names of topics that are left out, `*` stands for any run of characters.
-    #[arg(long, num_args = 1..)]
+    /// Absolute name of topics that are left out, `*` stands for any run of characters; may be given several times.
+    #[arg(long, value_name = "TOPIC", value_parser = topics)]
     exclude: Vec<String>,
     /// Machine file that goes into every bag.
     #[arg(long)]
@@ -54,6 +54,7 @@ pub struct Record {
     #[arg(long, requires = "ring")]
     save_on_error: bool,
     /// Absolute names of topics, `*` stands for any run of characters; none: every topic.
+    #[arg(value_parser = topics)]
     topics: Vec<String>,
 }
 
@@ -156,4 +157,47 @@ fn keep(
     );
     running.until(interruption)?;
     Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct CommandLine {
+        #[command(flatten)]
+        record: Record,
+    }
+
+    #[test]
+    fn an_option_takes_one_topic_and_the_arguments_behind_it_are_topics_to_record() {
+        let line = [
+            "record",
+            "-o",
+            "bag",
+            "--exclude",
+            "/a",
+            "/b",
+            "--exclude",
+            "/c*",
+            "*",
+        ];
+        let record = CommandLine::parse_from(line).record;
+        assert_eq!(record.exclude, ["/a", "/c*"]);
+        assert_eq!(record.topics, ["/b", "*"]);
+    }
+
+    #[test]
+    fn a_relative_name_is_a_matter_of_usage() {
+        for wrong in [&["axes/state"][..], &["--exclude", "rosout"]] {
+            let line = ["record", "-o", "bag"].iter().chain(wrong);
+            let refused = CommandLine::try_parse_from(line).err().unwrap();
+            assert_eq!(refused.exit_code(), 2);
+            let said = refused.to_string();
+            assert!(said.contains(wrong[wrong.len() - 1]), "{said}");
+            assert!(said.contains("must begin with /"), "{said}");
+        }
+    }
 }

@@ -22,10 +22,12 @@ use crate::tell::tell;
 pub struct ReportBag {
     /// Folder of the bag.
     bag: PathBuf,
-    /// What is not known about the measurements; without it no uncertainty is stated.
+    /// What is not known about the measurements: the expanded uncertainties of ISO 230-2, -4 and -6 come from it and are not
+    /// stated without it. What fits say of themselves (geometric errors, causes of circles) is stated in any case.
     #[arg(long)]
     budget: Option<PathBuf>,
-    /// Limits of figures, which are then judged by ISO 14253-1; an example stands in launch_configs/README.md.
+    /// Limits of figures, which are then judged by ISO 14253-1 with the uncertainties of --budget, which it needs; an example
+    /// is launch_configs/dual_loop/limits.yaml.
     #[arg(long, requires = "budget")]
     limits: Option<PathBuf>,
     /// Folder to write `report.html` and `report.json` into; without it the terminal alone.
@@ -177,7 +179,7 @@ fn uncertainty(stated: bool) -> serde_json::Value {
     } else {
         serde_json::json!({
             "stated": false,
-            "reason": "no budget was given (--budget): expanded uncertainties are null",
+            "reason": "no budget was given (--budget): the expanded uncertainties of ISO 230-2, -4 and -6 are null; standard uncertainties are those of fits, which need none",
         })
     }
 }
@@ -282,5 +284,7 @@ mod tests {
         assert_eq!(report.figures["uncertainty"]["stated"], false);
         let reason = report.figures["uncertainty"]["reason"].as_str().unwrap();
         assert!(reason.contains("--budget"), "{reason}");
+        assert!(reason.contains("ISO 230-2, -4 and -6"), "{reason}");
+        assert!(reason.contains("those of fits"), "{reason}");
     }
 }

@@ -35,6 +35,20 @@ pub struct ScenarioFile {
     pub recording: RecordingFile,
 }
 
+/// Longest time that can be given to a plan, min: two years.
+const LONGEST_MIN: f64 = 1e6;
+
+impl ScenarioFile {
+    /// Refuses a value that is out of its range.
+    fn check(&self) -> Result<()> {
+        let limit_min = self.limit_min;
+        if !(limit_min > 0.0 && limit_min <= LONGEST_MIN) {
+            bail!("limit_min = {limit_min}: must be above 0 and at most {LONGEST_MIN}");
+        }
+        Ok(())
+    }
+}
+
 /// How a run's bag is written; what is not said is as everywhere.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -121,6 +135,8 @@ impl Scenario {
             let reason = complaint::of_yaml(&error, &text);
             anyhow!("scenario file {}: {reason}", path.display())
         })?;
+        file.check()
+            .with_context(|| format!("scenario file {}", path.display()))?;
         let nodes = launch::read(&launch::find(folder)?)?;
         Ok(Self {
             folder: folder.to_owned(),
@@ -167,6 +183,9 @@ fn no_scenario(folder: &Path) -> String {
         .parent()
         .filter(|parent| !parent.as_os_str().is_empty());
     let beside = parent.unwrap_or(Path::new(".")).to_owned();
+    if folder.is_file() && beside.join(SCENARIO_FILE).is_file() {
+        return format!("{what}: give {}", beside.display());
+    }
     let homes = [
         folder.to_owned(),
         beside.clone(),
@@ -235,8 +254,25 @@ mod tests {
             let error = Scenario::read(&wrong).unwrap_err().to_string();
             assert!(error.contains(&wrong.display().to_string()), "{error}");
             assert!(error.contains(word), "{error}");
-            let is_file = wrong.ends_with(SCENARIO_FILE);
-            assert!(error.ends_with(&near) || is_file, "{error}");
+            let end = if wrong.ends_with(SCENARIO_FILE) {
+                format!("give {}", configs.join("a").display())
+            } else {
+                near.clone()
+            };
+            assert!(error.ends_with(&end), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_limit_that_no_run_can_keep_is_refused_with_file_key_value_and_limit() {
+        let home = tempfile::tempdir().unwrap();
+        for value in ["-1", "0", ".nan", ".inf"] {
+            let text = format!("title: a\nreport: blocks\nlimit_min: {value}\n");
+            std::fs::write(home.path().join(SCENARIO_FILE), text).unwrap();
+            let error = format!("{:#}", Scenario::read(home.path()).unwrap_err());
+            for word in [SCENARIO_FILE, "limit_min = ", "above 0 and at most 1000000"] {
+                assert!(error.contains(word), "{value}: {error}");
+            }
         }
     }
 }

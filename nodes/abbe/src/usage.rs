@@ -30,6 +30,20 @@ pub fn above_zero(text: &str) -> Result<f64, &'static str> {
         .ok_or("must be a finite number above 0")
 }
 
+/// The absolute name of a topic, or a pattern of such names: any other would be that of no topic.
+///
+/// # Errors
+/// Says what is wanted.
+pub fn topics(text: &str) -> Result<String, &'static str> {
+    if text.starts_with(['/', '*']) {
+        Ok(text.to_owned())
+    } else {
+        Err(
+            "names of topics are absolute: must begin with / (or with *, which stands for any run of characters)",
+        )
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -46,6 +60,16 @@ mod tests {
         );
         assert!(said.contains("Usage: abbe play [OPTIONS] <BAG>"), "{said}");
         assert!(said.contains("try '--help'"), "{said}");
+    }
+
+    #[test]
+    fn a_name_that_no_topic_can_have_is_refused() {
+        for text in ["/axes/state", "*", "*state", "/axes/*"] {
+            assert_eq!(topics(text).as_deref(), Ok(text));
+        }
+        for text in ["axes/state", "axes/*", ""] {
+            assert!(topics(text).is_err(), "{text}");
+        }
     }
 
     #[test]

@@ -241,20 +241,25 @@ impl Settings {
         let linear = config.start_mm.iter().map(|entry| ("start_mm", entry));
         let rotary = config.start_deg.iter().map(|entry| ("start_deg", entry));
         for (name, (&axis, &value)) in linear.chain(rotary) {
-            let position = if axis.is_linear() {
-                value
+            let is_of_kind = axis.is_linear() == (name == "start_mm");
+            if !is_of_kind || !self.envelope.axes.contains(axis) {
+                return Err(CncError::StartOfNoAxis { name, axis, value });
+            }
+            let (position, as_given): (f64, fn(f64) -> f64) = if axis.is_linear() {
+                (value, |mm| mm)
             } else {
-                value.to_radians()
+                (value.to_radians(), f64::to_degrees)
             };
             let [least, greatest] = self.envelope.travel[axis];
-            require(
-                name,
-                value,
-                axis.is_linear() == (name == "start_mm")
-                    && self.envelope.axes.contains(axis)
-                    && (least..=greatest).contains(&position),
-                "of an axis of this kind that the machine has, and within its travel",
-            )?;
+            if !(least..=greatest).contains(&position) {
+                return Err(CncError::StartOutsideTravel {
+                    name,
+                    axis,
+                    value,
+                    least: as_given(least),
+                    greatest: as_given(greatest),
+                });
+            }
             self.start[axis] = position;
         }
         Ok(())

@@ -27,6 +27,30 @@ pub enum CncError {
         /// The rule, with its unit.
         rule: &'static str,
     },
+    /// A start that no axis can have.
+    #[error("{name}.{axis} = {value}: must be within the travel of {axis}, {least} to {greatest}")]
+    StartOutsideTravel {
+        /// Name of the parameter, which has the unit.
+        name: &'static str,
+        /// The axis.
+        axis: Axis,
+        /// The value given.
+        value: f64,
+        /// Least position of the machine file.
+        least: f64,
+        /// Greatest position of the machine file.
+        greatest: f64,
+    },
+    /// A start of an axis that is none of this kind.
+    #[error("{name}.{axis} = {value}: must be of an axis of this kind that the machine has")]
+    StartOfNoAxis {
+        /// Name of the parameter.
+        name: &'static str,
+        /// The axis.
+        axis: Axis,
+        /// The value given.
+        value: f64,
+    },
     /// A value of the machine file that a control cannot work with.
     #[error("axes.{axis}.{name} = {value}: must be {rule}")]
     MachineAxis {

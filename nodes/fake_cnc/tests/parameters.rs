@@ -62,7 +62,13 @@ fn values_out_of_range_and_unknown_keys_are_refused_by_name() {
     );
     let mut config = Config::default();
     config.start_mm.insert(metrology::Axis::X, 500.0);
-    assert!(refusal(&config).starts_with("start_mm = 500: must be"));
+    assert_eq!(
+        refusal(&config),
+        "start_mm.X = 500: must be within the travel of X, -320 to 320"
+    );
+    let mut config = Config::default();
+    config.start_mm.insert(metrology::Axis::A, 1.0);
+    assert!(refusal(&config).starts_with("start_mm.A = 1: must be of an axis of this kind"));
     let mut config = Config::default();
     let scale = fake_cnc::config::FeedbackSource::Scale;
     config.feedback.insert(metrology::Axis::Z, scale);

@@ -22,7 +22,7 @@ pub enum RecorderError {
         what: &'static str,
     },
     /// A file neither begins nor ends as an MCAP file does.
-    #[error("{path} is no MCAP file")]
+    #[error("{path} is no bag: it is no MCAP file")]
     NotMcap {
         /// The file.
         path: PathBuf,

@@ -4,11 +4,13 @@ use fake_cnc::{CncError, PlantError};
 use machine::MachineFileError;
 use sequencer::SequencerError;
 
+use crate::arm::Arm;
+
 /// A trial that cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum TrialError {
     /// There is no such arm.
-    #[error("arm \"{name}\": must be one of i ii iii iv v vi vii alone")]
+    #[error("arm \"{name}\": must be one of {}", Arm::ALL.map(Arm::numeral).join(" "))]
     UnknownArm {
         /// The text that was read.
         name: String,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Wire, from_cdr};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use gap_diagnosis::report;
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
@@ -58,7 +58,9 @@ impl Recorded {
             builder.end_bag();
             ends.push(builder.runs().len());
         }
-        let (session, account) = builder.finish()?;
+        let (session, account) = builder
+            .finish()
+            .map_err(|error| not_whole(error.into(), &losses))?;
         let mut from = 0;
         let bags = paths
             .iter()
@@ -82,6 +84,14 @@ impl Recorded {
             losses,
         })
     }
+}
+
+/// What bags lack may have been in what was lost of them, which is said first.
+pub fn not_whole(lacking: anyhow::Error, losses: &[String]) -> anyhow::Error {
+    if losses.is_empty() {
+        return lacking;
+    }
+    lacking.context(format!("a part was lost: {}", losses.join("; ")))
 }
 
 /// Lengths and angles of two machine files that differ by less are one.
@@ -138,14 +148,25 @@ fn built(entry: &AxisEntry) -> Vec<(&'static str, f64)> {
 pub fn machine_text(path: &Path) -> Result<(String, String)> {
     let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
     let Some(attachment) = bag.attachment(MACHINE)? else {
-        bail!(
-            "bag {}: holds no machine file: name it with --machine",
-            path.display()
-        );
+        let none = anyhow!("holds no machine file: name it with --machine");
+        let none = not_whole(none, &losses(&bag));
+        return Err(none.context(format!("bag {}", path.display())));
     };
     let name = format!("machine.yaml of {}", path.display());
     let text = String::from_utf8(attachment.data).with_context(|| name.clone())?;
     Ok((name, text))
+}
+
+/// What of a bag cannot be read, in words.
+fn losses(bag: &Bag) -> Vec<String> {
+    let mut losses = vec![];
+    let mut messages = bag.messages(Order::LogTime);
+    while let Some(event) = messages.next_event() {
+        if let Event::Loss(loss) = event {
+            losses.push(loss.to_string());
+        }
+    }
+    losses
 }
 
 fn hash(bag: &Bag) -> Result<String> {
@@ -212,4 +233,28 @@ fn input(name: &str, bytes: &[u8]) -> Result<Option<Input>> {
     } else {
         return Ok(None);
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    #[test]
+    fn a_bag_that_was_cut_is_told_as_such_before_what_it_lacks() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bag.mcap");
+        let mut file = std::fs::File::create(&path).unwrap();
+        // The first bytes of a file, and of a header that ends too early.
+        file.write_all(b"\x89MCAP0\r\n\x01\x40\0\0\0\0\0\0\0ros2")
+            .unwrap();
+        let lacking = format!("{:#}", machine_text(&path).unwrap_err());
+        let (cut, lacks) = (
+            lacking.find("a part was lost: "),
+            lacking.find("holds no machine file"),
+        );
+        assert!(cut.is_some() && cut < lacks, "{lacking}");
+        assert!(lacking.contains("cuts a record"), "{lacking}");
+    }
 }

@@ -4,10 +4,11 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, anyhow, bail};
 use metrology::iso230::budget::{DeviceUncertainty, Expansion};
 use metrology::iso230::circular::CircularBudget;
 use metrology::iso230::positioning::budget::PositioningBudget;
+use node_runtime::complaint;
 use serde::Deserialize;
 
 /// Uncertainty of a measuring device, as its certificate states it.
@@ -78,8 +79,9 @@ impl Budget {
     /// With key and value where one is missing, unknown or no number above zero where it must be.
     pub fn read(text: &str, place: &Path) -> Result<Self> {
         let place = place.display();
-        let budget: Self =
-            serde_saphyr::from_str(text).with_context(|| format!("budget file {place}"))?;
+        let budget: Self = serde_saphyr::from_str(text).map_err(|error| {
+            anyhow!("budget file {place}: {}", complaint::of_yaml(&error, text))
+        })?;
         for (key, device) in [
             ("grid_encoder", &budget.grid_encoder),
             ("length_reference", &budget.length_reference),

@@ -1,11 +1,16 @@
-//! Circles over the plate of a grid encoder: the readings while the command was on the circle.
+//! Circles over the plate of a grid encoder, or with a ballbar: the readings while the command was on the circle.
 //!
 //! The grid counts from where it was zeroed. A recording is shifted by the mean of commanded minus read
 //! place, which takes the centre offset of the setting-up out; what is left of it the evaluations fit.
 //! Run-in and run-out are left out: there the command is not at its feed.
+//!
+//! A length that is read during a circle is that of a ballbar, from the centre: it lies at the angle of the command, and
+//! counts from the centre of its mount, for nothing tells where that is. Where the plate was read too, the plate counts.
 
 use metrology::Axis;
-use metrology::sample::{AxisState, GridSample, Sense, TestKind, TestPlane, TestSegment};
+use metrology::sample::{
+    AxisState, GridSample, LengthSample, Sense, TestKind, TestPlane, TestSegment,
+};
 use metrology::stamp::{Host, Stamp};
 
 /// The command is on the circle when it is this close to it, mm.
@@ -31,6 +36,17 @@ pub struct CircleRecording {
     pub points: Vec<CirclePoint>,
     /// Whether anything was added to the commands.
     pub compensated: bool,
+    /// What measured.
+    pub instrument: Instrument,
+}
+
+/// What reads a circle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instrument {
+    /// Both coordinates.
+    GridEncoder,
+    /// The radius alone.
+    Ballbar,
 }
 
 /// Letters of the axes along u and v.
@@ -57,8 +73,10 @@ struct Current {
     segment: TestSegment,
     axes: [Axis; 2],
     tick: Option<Tick>,
-    /// Readings with the command of their tick.
+    /// Readings of the plate with the command of their tick.
     pairs: Vec<(CirclePoint, [f64; 2])>,
+    /// Readings of a ballbar.
+    radial: Vec<CirclePoint>,
     began: Option<Stamp<Host>>,
     compensated: bool,
 }
@@ -82,6 +100,7 @@ impl Circles {
                 axes,
                 tick: None,
                 pairs: Vec::new(),
+                radial: Vec::new(),
                 began: None,
                 compensated: false,
             });
@@ -125,26 +144,35 @@ impl Circles {
         });
     }
 
-    /// One reading.
+    /// One reading of the plate.
     pub fn grid(&mut self, sample: &GridSample) {
         let Some(current) = &mut self.current else {
             return;
         };
-        let (Some(tick), true) = (current.tick, sample.plane == current.segment.plane) else {
-            return;
-        };
-        let [u, v] = tick.place_mm;
-        let on_circle = (u.hypot(v) - current.segment.radius_mm).abs() < ON_CIRCLE_MM;
-        let at_feed = tick.speed_mm_s >= AT_FEED * current.segment.feed_mm_s;
-        if !(on_circle && at_feed && sample.zero_id == current.segment.zero_id) {
+        if sample.plane != current.segment.plane || sample.zero_id != current.segment.zero_id {
             return;
         }
-        let began = *current.began.get_or_insert(sample.at);
-        let point = CirclePoint {
-            at_mm: [sample.u_mm, sample.v_mm],
-            time_s: (sample.at - began).as_secs_f64(),
+        if let Some(tick) = current.counting() {
+            let time_s = current.time_s(sample.at);
+            let at_mm = [sample.u_mm, sample.v_mm];
+            let point = CirclePoint { at_mm, time_s };
+            current.pairs.push((point, tick.place_mm));
+        }
+    }
+
+    /// One reading of a length: of a ballbar.
+    pub fn length(&mut self, sample: &LengthSample) {
+        let Some(current) = &mut self.current else {
+            return;
         };
-        current.pairs.push((point, tick.place_mm));
+        if let Some(tick) = current.counting()
+            && sample.displacement_mm.is_finite()
+        {
+            let time_s = current.time_s(sample.at);
+            let [u, v] = tick.place_mm;
+            let at_mm = [u, v].map(|along| along / u.hypot(v) * sample.displacement_mm);
+            current.radial.push(CirclePoint { at_mm, time_s });
+        }
     }
 
     /// The circles, in the order of the recording.
@@ -155,7 +183,29 @@ impl Circles {
 }
 
 impl Current {
+    /// The command, where a reading counts: on the circle at its feed.
+    fn counting(&self) -> Option<Tick> {
+        self.tick.filter(|tick| {
+            let [u, v] = tick.place_mm;
+            (u.hypot(v) - self.segment.radius_mm).abs() < ON_CIRCLE_MM
+                && tick.speed_mm_s >= AT_FEED * self.segment.feed_mm_s
+        })
+    }
+
+    /// Time since the first reading that counts, s.
+    fn time_s(&mut self, at: Stamp<Host>) -> f64 {
+        (at - *self.began.get_or_insert(at)).as_secs_f64()
+    }
+
     fn finished(self) -> CircleRecording {
+        if self.pairs.is_empty() && !self.radial.is_empty() {
+            return CircleRecording {
+                segment: self.segment,
+                points: self.radial,
+                compensated: self.compensated,
+                instrument: Instrument::Ballbar,
+            };
+        }
         let n = self.pairs.len().max(1) as f64;
         let shift_mm: [f64; 2] = [0, 1].map(|idx| {
             let differences = self
@@ -172,6 +222,7 @@ impl Current {
             segment: self.segment,
             points: self.pairs.into_iter().map(shifted).collect(),
             compensated: self.compensated,
+            instrument: Instrument::GridEncoder,
         }
     }
 }
@@ -205,8 +256,10 @@ mod tests {
         }
     }
 
-    /// A circle at 50 mm/s in ticks of 10 ms, run in along a radius; the plate lies 3 mm off.
-    fn recorded(zero_id: u32) -> Vec<CircleRecording> {
+    /// A circle at 50 mm/s in ticks of 10 ms, run in along a radius; the plate lies 3 mm off. Without a number of its zero
+    /// it is read by a ballbar.
+    fn recorded(zero_id: impl Into<Option<u32>>) -> Vec<CircleRecording> {
+        let zero_id = zero_id.into();
         let mut circles = Circles::default();
         circles.segment(&segment(true));
         let place = |tick: i64| {
@@ -235,13 +288,21 @@ mod tests {
             });
             // An oval of 2 µm, on a plate that was zeroed 3 mm beside the centre.
             let stretch = 1.0 + 4e-5;
-            circles.grid(&GridSample {
-                at,
-                plane: TestPlane::Yz,
-                u_mm: u * stretch + 3.0,
-                v_mm: v - 1.0,
-                zero_id,
-            });
+            match zero_id {
+                Some(zero_id) => circles.grid(&GridSample {
+                    at,
+                    plane: TestPlane::Yz,
+                    u_mm: u * stretch + 3.0,
+                    v_mm: v - 1.0,
+                    zero_id,
+                }),
+                None => circles.length(&LengthSample {
+                    at,
+                    axis: Axis::Y,
+                    displacement_mm: (u * stretch).hypot(v),
+                    zero_id: 1,
+                }),
+            }
         }
         circles.segment(&segment(false));
         circles.recordings()
@@ -249,15 +310,21 @@ mod tests {
 
     #[test]
     fn readings_on_the_circle_at_feed_are_kept_about_the_nominal_centre() {
-        let recordings = recorded(7);
-        assert_eq!(recordings.len(), 1);
-        let points = &recordings[0].points;
-        assert!((620..=630).contains(&points.len()), "{}", points.len());
-        let radial = points.iter().map(|p| p.at_mm[0].hypot(p.at_mm[1]) - 50.0);
-        let (least, greatest) = radial.fold((1.0_f64, -1.0_f64), |(l, g), r| (l.min(r), g.max(r)));
-        assert!((greatest - 0.002).abs() < 2e-5, "{greatest}");
-        assert!(least.abs() < 2e-5, "{least}");
-        assert!(!recordings[0].compensated);
+        for (recordings, instrument) in [
+            (recorded(7), Instrument::GridEncoder),
+            (recorded(None), Instrument::Ballbar),
+        ] {
+            assert_eq!(recordings.len(), 1);
+            assert_eq!(recordings[0].instrument, instrument);
+            let points = &recordings[0].points;
+            assert!((620..=630).contains(&points.len()), "{}", points.len());
+            let radial = points.iter().map(|p| p.at_mm[0].hypot(p.at_mm[1]) - 50.0);
+            let (least, greatest) =
+                radial.fold((1.0_f64, -1.0_f64), |(l, g), r| (l.min(r), g.max(r)));
+            assert!((greatest - 0.002).abs() < 2e-5, "{greatest}");
+            assert!(least.abs() < 2e-5, "{least}");
+            assert!(!recordings[0].compensated);
+        }
     }
 
     #[test]

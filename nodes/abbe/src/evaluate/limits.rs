@@ -12,9 +12,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use metrology::iso230::ExpandedLength;
 use metrology::iso230::conformance::{Decision, Policy, Specification, Verdict, decide};
+use node_runtime::complaint;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -43,8 +44,9 @@ impl Limits {
     /// With the key where one is missing or unknown, or where there is no limit at all.
     pub fn read(text: &str, place: &Path) -> Result<Self> {
         let place = place.display();
-        let limits: Self =
-            serde_saphyr::from_str(text).with_context(|| format!("limits file {place}"))?;
+        let limits: Self = serde_saphyr::from_str(text).map_err(|error| {
+            anyhow!("limits file {place}: {}", complaint::of_yaml(&error, text))
+        })?;
         if limits.limits.is_empty() {
             bail!("limits file {place}: limits: must name one figure at least");
         }
@@ -224,6 +226,9 @@ mod tests {
         let said =
             refused("rule: simple\nlimits:\n  iso230_2.accuracy: {lower_um: 3.0, upper_um: 2.0}\n");
         assert!(said.starts_with("limits.iso230_2.accuracy: "), "{said}");
+        let said = refused("rule: simple\nlimits:\n  iso230_2.accuracy: {upper_um: lots}\n");
+        let line = "in `iso230_2.accuracy: {upper_um: lots}`";
+        assert!(said.ends_with(line), "{said}");
         let said = refused("rule: simple\nlimits: {}\n");
         assert!(said.contains("must name one figure at least"), "{said}");
         let said = refused(

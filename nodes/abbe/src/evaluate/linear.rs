@@ -13,7 +13,7 @@ use metrology::stamp::{Host, Span, Stamp};
 use nalgebra::Vector3;
 
 /// Rest after which readings count.
-const SETTLE: Span = Span::from_nanos(300_000_000);
+pub const SETTLE: Span = Span::from_nanos(300_000_000);
 /// Positions closer than this are one place, mm.
 const SAME_MM: f64 = 1e-6;
 
@@ -49,6 +49,8 @@ pub struct LinearTest {
     pub down_mm: Vec<Vec<f64>>,
     /// Whether anything was added to the commands while it ran.
     pub compensated: bool,
+    /// The longest rest between the first and the last one of a run; none: nothing rested.
+    pub longest_rest: Option<Span>,
 }
 
 /// One rest of the command.
@@ -58,6 +60,7 @@ struct Stop {
     /// Where the command was one state before it rested here.
     from_mm: Vector3<f64>,
     since: Stamp<Host>,
+    until: Stamp<Host>,
     sum_mm: f64,
     scale_sum_mm: Vector3<f64>,
     n: u32,
@@ -77,6 +80,24 @@ struct Reading {
 #[derive(Clone, Debug, Default)]
 struct Run {
     stops: Vec<Reading>,
+    /// Where and how long the command rested, of rests of two states or more.
+    rests: Vec<(Vector3<f64>, Span)>,
+}
+
+impl Run {
+    fn add(&mut self, stop: Stop) {
+        if stop.until > stop.since {
+            self.rests.push((stop.place_mm, stop.until - stop.since));
+        }
+        self.stops.extend(stop.read());
+    }
+
+    /// Before the first way and behind the last one the machine may stand for any time.
+    fn longest_rest(&self) -> Option<Span> {
+        let within = self.rests.len().saturating_sub(1);
+        let rests = self.rests.get(1..within)?.iter();
+        rests.map(|(_, rest)| *rest).max()
+    }
 }
 
 /// Collects the runs of a recording.
@@ -96,7 +117,7 @@ impl LinearRuns {
             && segment.completed
             && segment.run == begin.run
         {
-            run.stops.extend(stop.and_then(Stop::read));
+            stop.into_iter().for_each(|stop| run.add(stop));
             self.done.push((begin, run, compensated));
         }
     }
@@ -116,6 +137,7 @@ impl LinearRuns {
         let place_mm = state.commanded.xyz();
         match stop {
             Some(at) if (at.place_mm - place_mm).amax() < SAME_MM => {
+                at.until = state.received_at;
                 if state.received_at - at.since >= SETTLE
                     && state.scale.xyz().iter().any(|s| s.is_finite())
                 {
@@ -125,11 +147,12 @@ impl LinearRuns {
             }
             _ => {
                 let from_mm = stop.map_or(place_mm, |before| before.place_mm);
-                run.stops.extend(stop.take().and_then(Stop::read));
+                stop.take().into_iter().for_each(|stop| run.add(stop));
                 *stop = Some(Stop {
                     place_mm,
                     from_mm,
                     since: state.received_at,
+                    until: state.received_at,
                     sum_mm: 0.0,
                     scale_sum_mm: Vector3::zeros(),
                     n: 0,
@@ -200,7 +223,9 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
     } else {
         Reference::Scale
     };
-    let direction = direction(axis, stops().map(|stop| &stop.place_mm))?;
+    let rests = group.iter().flat_map(|(_, run, _)| &run.rests);
+    let direction = direction(axis, stops().map(|stop| &stop.place_mm))
+        .or_else(|| direction(axis, rests.map(|(place_mm, _)| place_mm)))?;
     let runs: Vec<Visits> = group
         .iter()
         .map(|(_, run, _)| visits(run, axis, &direction, reference))
@@ -227,6 +252,10 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
         up_mm,
         down_mm,
         compensated: group.iter().any(|(.., compensated)| *compensated),
+        longest_rest: group
+            .iter()
+            .filter_map(|(_, run, _)| run.longest_rest())
+            .max(),
     })
 }
 
@@ -421,6 +450,33 @@ mod tests {
                     "{test:?}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn stops_shorter_than_the_settling_are_told_with_how_long_they_were() {
+        for (kind, features) in [
+            (TestKind::Positioning, &["X"][..]),
+            (TestKind::Diagonal, &["diagonal"]),
+        ] {
+            let mut machine = Machine::new();
+            let begin = segment(1, 0, true, kind, features);
+            machine.runs.segment(&begin);
+            // It stands for a second before and behind, and for 0.2 s at each stop.
+            let home_mm = machine.place_mm;
+            for _ in 0..100 {
+                machine.tick(home_mm, Some(0.0));
+            }
+            for x_mm in [10.0, 20.0, 35.0, 20.0, 10.0] {
+                machine.go(Vector3::new(x_mm, 0.0, 0.0), 20, |_, _| 0.0);
+            }
+            machine.go(home_mm, 100, |_, _| 0.0);
+            let end = segment(1, 0, false, kind, features);
+            machine.runs.segment(&end);
+            let tests = machine.runs.tests();
+            assert_eq!(tests[0].targets_mm, [0.0; 0], "{kind:?}");
+            let rest_s = tests[0].longest_rest.unwrap().as_secs_f64();
+            assert!((rest_s - 0.19).abs() < 1e-9, "{kind:?}: {rest_s}");
         }
     }
 

@@ -1,11 +1,12 @@
-//! Which of the bag's tables were written, of when, and what they count from.
+//! Which of the bag's tables were written, and of when.
 
 use std::path::Path;
 
 use clap::ValueEnum;
-use machine::export::selection::Measured;
 use metrology::sample::PositioningTable;
-use metrology::{Axis, AxisSet, ErrorComponent, PerAxis};
+use metrology::{Axis, AxisSet, PerAxis};
+
+use super::counting::Counting;
 
 /// Which table of an axis is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -83,16 +84,6 @@ pub(super) struct Origin {
     pub of_stops: AxisSet,
 }
 
-/// What is counted from.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Counting {
-    pub which: Which,
-    pub axes: AxisSet,
-    /// Where the control's reference point of each axis lies, mm or rad.
-    pub reference: PerAxis<f64>,
-    pub relative_to_reference: bool,
-}
-
 impl Origin {
     fn since_began(&self, nanos: u64) -> String {
         let began_nanos = self.began_nanos.unwrap_or(nanos);
@@ -101,26 +92,21 @@ impl Origin {
     }
 
     /// In words, a line each.
-    pub fn lines(&self, bag: &Path, measured: &Measured, counting: &Counting) -> Vec<String> {
+    pub fn lines(&self, bag: &Path, counting: &Counting) -> Vec<String> {
         let mut lines = vec![format!("made of the bag {}", bag.display())];
-        for axis in counting.axes.iter() {
-            let own = ErrorComponent::motion(axis, axis);
-            let mut curves = measured.geometry.iter().flat_map(|model| &model.curves);
-            let is_fitted = curves.any(|curve| curve.component == own);
+        for (axis, span) in counting.written() {
             if self.of_stops.contains(axis) {
                 lines.push(format!(
                     "positioning of {axis}: of the last verification along it with nothing added to its commands (--stops), one run"
                 ));
             } else if let Some(tables) = &self.tables[axis] {
                 lines.extend(self.of_table(axis, tables, counting.which));
-            } else if is_fitted {
+            } else {
                 lines.push(format!(
                     "positioning of {axis}: E{axis}{axis} of the geometric errors"
                 ));
-            } else {
-                continue;
             }
-            lines.push(zero(axis, counting));
+            lines.push(counting.zero(axis, span));
         }
         let names = ["geometric errors", "thermal drift"];
         for (name, (n, nanos)) in names
@@ -175,26 +161,9 @@ impl Origin {
     }
 }
 
-fn zero(axis: Axis, counting: &Counting) -> String {
-    if !counting.relative_to_reference {
-        return format!(
-            "errors of {axis} as they were measured (--absolute): at the reference point there may be one"
-        );
-    }
-    let at = counting.reference[axis];
-    let (at, unit) = if axis.is_linear() {
-        (at, "mm")
-    } else {
-        (at.to_degrees(), "deg")
-    };
-    format!(
-        "errors of {axis} counted from the error at {at} {unit}, which a control puts right when it is referenced there \
-         (--reference {axis}=..., --absolute)"
-    )
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::counting::tests::of_x;
     use super::*;
     use metrology::Stamp;
 
@@ -225,17 +194,17 @@ mod tests {
             tables.add(Said::new(&table(end_mm), s * 1_000_000_000));
         }
         origin.tables[Axis::X] = Some(tables);
-        let mut measured = Measured::default();
-        measured.tables[Axis::X] = Some(table(0.017));
-        let counting = Counting {
-            which,
-            axes: AxisSet::EMPTY.with(Axis::X),
-            reference: PerAxis::default(),
-            relative_to_reference,
-        };
-        origin
-            .lines(Path::new("runs/a/bag"), &measured, &counting)
-            .join("\n")
+        let mut counting = of_x();
+        (counting.which, counting.relative_to_reference) = (which, relative_to_reference);
+        origin.lines(Path::new("runs/a/bag"), &counting).join("\n")
+    }
+
+    #[test]
+    fn an_axis_whose_positioning_is_in_no_file_is_not_told() {
+        let mut counting = of_x();
+        counting.spans = PerAxis::default();
+        let lines = Origin::default().lines(Path::new("bag"), &counting);
+        assert_eq!(lines, ["made of the bag bag"]);
     }
 
     #[test]

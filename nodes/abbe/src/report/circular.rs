@@ -12,12 +12,16 @@ use super::positioning::figure;
 use super::section::{Drawing, Rows, Section, head, rounded, um};
 use super::trace;
 use crate::evaluate::budget::Budget;
-use crate::evaluate::circles::{CircleRecording, plane_axes};
+use crate::evaluate::circles::{CircleRecording, Instrument, plane_axes};
 
 /// Coverage factor of what is printed.
 const COVERAGE: f64 = 2.0;
 /// Probability above which a row may be chance.
 const BY_CHANCE: f64 = 0.01;
+
+/// What a ballbar cannot tell.
+const BY_BALLBAR: &str =
+    "Read by a ballbar, radially alone: F and D count from the centre of its mount.";
 
 /// One part for each circle (both senses together), then one for the breakdown.
 ///
@@ -45,7 +49,7 @@ fn groups(circles: &[CircleRecording]) -> Vec<Vec<&CircleRecording>> {
                 && (a.centre_mm - b.centre_mm).norm() < 1e-6
                 && (a.radius_mm - b.radius_mm).abs() < 1e-6
                 && (a.feed_mm_s - b.feed_mm_s).abs() < 1e-6
-                && first.compensated == circle.compensated
+                && (first.compensated, first.instrument) == (circle.compensated, circle.instrument)
                 && group.iter().all(|other| other.segment.sense != b.sense)
         };
         match groups.iter_mut().find(fits) {
@@ -77,6 +81,9 @@ fn section(group: &[&CircleRecording], budget: Option<&Budget>) -> Result<Sectio
         segment.centre_mm.y,
         segment.centre_mm.z
     ));
+    if group[0].instrument == Instrument::Ballbar {
+        section.lines.push(BY_BALLBAR.to_owned());
+    }
     let of = |sense| {
         let found = group.iter().find(|circle| circle.segment.sense == sense);
         found.map(|circle| {

@@ -11,7 +11,7 @@ use metrology::sample::TestKind;
 use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head, um};
 use crate::evaluate::budget::Budget;
-use crate::evaluate::linear::{LinearTest, Reference};
+use crate::evaluate::linear::{LinearTest, Reference, SETTLE};
 
 /// A figure and, where a budget was given, its expanded uncertainty.
 pub fn figure(value: &ExpandedLength, stated: bool) -> String {
@@ -70,9 +70,24 @@ fn section(test: &LinearTest, budget: Option<&Budget>) -> Result<Section> {
     let used = budget.copied().unwrap_or(Budget::nothing()).positioning();
     match positioning::evaluate(&runs(test), &used) {
         Ok(result) => fill(&mut section, test, &result, budget.is_some())?,
-        Err(error) => section.lines.push(format!("Not evaluated: {error}.")),
+        Err(error) => {
+            let why = too_short(test).unwrap_or_else(|| error.to_string());
+            section.lines.push(format!("Not evaluated: {why}."));
+        }
     }
     Ok(section)
+}
+
+/// Why a test has no target, where its stops were too short for one.
+fn too_short(test: &LinearTest) -> Option<String> {
+    let longest = test.longest_rest?;
+    (test.targets_mm.is_empty() && longest < SETTLE).then(|| {
+        format!(
+            "the command rested for {:.2} s at most, and readings of a stop count from {:.1} s on",
+            longest.as_secs_f64(),
+            SETTLE.as_secs_f64()
+        )
+    })
 }
 
 fn fill(
@@ -252,7 +267,9 @@ fn diagonals(tests: &[LinearTest], budget: Option<&Budget>) -> Vec<Section> {
     let mut sections = Vec::new();
     for compensated in [false, true] {
         let mut first: Vec<DiagonalRuns> = Vec::new();
-        for test in tests.iter().filter(|test| test.compensated == compensated) {
+        let evaluable =
+            |test: &&LinearTest| test.compensated == compensated && !test.targets_mm.is_empty();
+        for test in tests.iter().filter(evaluable) {
             if let Some((diagonal, is_upwards)) = space_diagonal(test)
                 && first.iter().all(|known| known.diagonal != diagonal)
             {
@@ -323,6 +340,7 @@ fn of_diagonals(result: &DiagonalsResult, stated: bool) -> Rows {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metrology::stamp::Span;
     use nalgebra::Vector3;
 
     fn test(direction: [f64; 3]) -> LinearTest {
@@ -337,7 +355,22 @@ mod tests {
             up_mm: vec![vec![0.0, 0.001, 0.003]],
             down_mm: vec![vec![0.002, 0.003, 0.005]],
             compensated: false,
+            longest_rest: None,
         }
+    }
+
+    #[test]
+    fn stops_that_were_too_short_are_told_with_their_dwell_and_the_limit() {
+        let mut short = test([1.0, 0.0, 0.0]);
+        short.longest_rest = Some(Span::from_nanos(200_000_000));
+        short.targets_mm.clear();
+        (short.up_mm, short.down_mm) = (vec![vec![]], vec![vec![]]);
+        let section = &sections(&[short.clone()], None).unwrap()[0];
+        let words =
+            "the command rested for 0.20 s at most, and readings of a stop count from 0.3 s on";
+        assert!(section.lines[0].contains(words), "{:?}", section.lines);
+        short.longest_rest = Some(SETTLE);
+        assert_eq!(too_short(&short), None);
     }
 
     #[test]

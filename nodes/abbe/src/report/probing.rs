@@ -4,19 +4,16 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use metrology::Axis;
-use metrology::sample::{
-    BlockMeasurement, FeatureKind, ProbedFeature, ProbedPoint, Rejection, TestSegment,
-};
+use metrology::sample::{BlockMeasurement, FeatureKind, ProbedFeature, ProbedPoint, TestSegment};
 
 use serde::Serialize;
 use serde_json::{Value, json};
-use statrs::statistics::Statistics;
 
 use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head, um};
 
-/// Fewest touches of one place whose spread says anything.
-const LEAST_TOUCHES: usize = 5;
+mod repeatability;
+
 /// Drift is told after this time, s: the hour of ISO 230-3.
 const AN_HOUR_S: f64 = 3600.0;
 
@@ -30,65 +27,10 @@ pub fn sections(
     blocks: &[BlockMeasurement],
 ) -> Result<Vec<Section>> {
     let mut sections = Vec::new();
-    sections.extend(repeatability(touches));
+    sections.extend(repeatability::section(touches));
     sections.extend(shapes(features));
     sections.extend(drift(blocks)?);
     Ok(sections)
-}
-
-/// Spread of touches of one feature at one feed within one run.
-fn repeatability(touches: &[(TestSegment, ProbedPoint)]) -> Option<Section> {
-    let mut groups: BTreeMap<(u32, String, i64), Vec<f64>> = BTreeMap::new();
-    for (segment, point) in touches {
-        if point.rejection == Rejection::None {
-            let feed = (point.feed_mm_s * 60.0).round() as i64;
-            let along_mm = point.point_in_machine_mm.dot(&point.approach);
-            groups
-                .entry((segment.run, point.feature_id.clone(), feed))
-                .or_default()
-                .push(along_mm);
-        }
-    }
-    let spreads: Vec<Spread> = groups
-        .into_iter()
-        .filter(|(_, values)| values.len() >= LEAST_TOUCHES)
-        .map(|((run, feature, feed_mm_min), values)| Spread {
-            test: format!("{feature}, run {run}"),
-            feed_mm_min,
-            touches: values.len(),
-            range_mm: range(values.iter().copied()),
-            standard_deviation_mm: values.iter().std_dev(),
-        })
-        .collect();
-    (!spreads.is_empty()).then(|| {
-        let mut section = Section::new("Repeatability of touches, ISO 230-10");
-        let row = |spread: &Spread| {
-            vec![
-                spread.test.clone(),
-                spread.feed_mm_min.to_string(),
-                spread.touches.to_string(),
-                um(spread.range_mm),
-                um(spread.standard_deviation_mm),
-            ]
-        };
-        section.tables.push(Rows {
-            head: head(&["feature", "feed / mm/min", "touches", "range / µm", "s / µm"]),
-            rows: spreads.iter().map(row).collect(),
-            note: format!("Single-point repeatability along the approach; fewer than {LEAST_TOUCHES} touches are not shown."),
-        });
-        section.figures = json!({ "test": section.title, "iso230_10_repeatability": spreads });
-        section
-    })
-}
-
-/// Spread of the touches of one feature in one run.
-#[derive(Serialize)]
-struct Spread {
-    test: String,
-    feed_mm_min: i64,
-    touches: usize,
-    range_mm: f64,
-    standard_deviation_mm: f64,
 }
 
 /// Greatest minus least.

@@ -3,12 +3,13 @@
 use abbe_msgs::topics;
 use anyhow::{Context, Result};
 use fake_cnc::config::PARAMETERS;
-use fake_cnc::{Cnc, Config, Input, Output, Plant, PlantFile};
+use fake_cnc::{Cnc, Config, Input, Output, Plant};
 use machine::MachineFile;
 use metrology::stamp::Span;
 use node_runtime::{Lifecycle, Node, Setup, Wiring};
 
 mod forms;
+mod plant_file;
 mod witness;
 
 pub use witness::Witness;
@@ -30,13 +31,16 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
     let config: Config = setup.config()?;
     let parameters = setup.resolved(&config, PARAMETERS)?;
     let (path, text) = setup.file_text("machine_file")?;
-    let machine = MachineFile::parse(&text, &path.display().to_string())?;
+    let of_machine = path.display().to_string();
+    let machine = MachineFile::parse(&text, &of_machine)?;
     let (path, text) = setup.file_text("plant_file")?;
     let truth =
-        PlantFile::from_yaml(&text).with_context(|| format!("plant file {}", path.display()))?;
+        plant_file::read(&text).with_context(|| format!("plant file {}", path.display()))?;
     let plant =
         Plant::new(&machine, &truth).with_context(|| format!("plant file {}", path.display()))?;
-    let cnc = Cnc::new(&config, &machine, plant)?.inactive();
+    let cnc = Cnc::new(&config, &machine, plant)
+        .with_context(|| format!("with the machine file {of_machine}"))?
+        .inactive();
     let period = Span::from_secs_f64(machine.control.servo_period_ms / 1e3);
     let within = Span::from_secs_f64(config.rest_s());
     let at_rest = |output: &Output| *output == Output::AtRest;

@@ -2,6 +2,7 @@
 
 use metrology::{Axis, ErrorComponent};
 
+use super::grid::SAME;
 use crate::volumetric::VolumetricError;
 
 /// Errors that a control cannot be given.
@@ -82,7 +83,7 @@ pub enum ExportError {
         first: f64,
     },
     /// A spacing that is no spacing.
-    #[error("axis {axis}: spacing {spacing}: must be a finite number above 0 (mm, rad)")]
+    #[error("axis {axis}: spacing {spacing}: must be a finite number above {least:e} (mm, rad)", least = SAME)]
     Spacing {
         /// The axis.
         axis: Axis,

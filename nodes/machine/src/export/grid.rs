@@ -154,8 +154,8 @@ mod tests {
             [
                 "axis X: point at 150: travel is [-100, 100] (mm, rad)",
                 "axis X: start[0] = NaN: must be finite",
-                "axis X: spacing inf: must be a finite number above 0 (mm, rad)",
-                "axis X: spacing -1: must be a finite number above 0 (mm, rad)",
+                "axis X: spacing inf: must be a finite number above 1e-7 (mm, rad)",
+                "axis X: spacing -1: must be a finite number above 1e-7 (mm, rad)",
                 "axis X: 1 points: at least 2 are needed",
                 "axis X: 0 points: at least 2 are needed",
                 "axis X: start[0] = NaN: must be finite",

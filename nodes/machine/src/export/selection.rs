@@ -93,6 +93,8 @@ pub struct Selected {
     pub files: Vec<ExportFile>,
     /// What was measured and is in none.
     pub left_out: Vec<LeftOut>,
+    /// First and last recorded position of each axis whose positioning is in a file, mm or rad.
+    pub positioning: PerAxis<Option<(f64, f64)>>,
 }
 
 impl Selected {
@@ -106,6 +108,14 @@ impl Selected {
             Ok(file) => self.files.push(file),
             Err(error) => self.leave_out(what, error),
         }
+    }
+
+    /// A file that has the positioning of an axis, with or without more.
+    fn take_positioning(&mut self, own: &AxisErrors, file: Result<ExportFile, ExportError>) {
+        if file.is_ok() {
+            self.positioning[own.axis()] = Some(own.span());
+        }
+        self.take(&format!("positioning of {}", own.axis()), file);
     }
 }
 

@@ -221,6 +221,8 @@ fn an_axis_that_cannot_be_made_does_not_stop_the_others() {
         ["AX_EEC_Y1.INI", "AX_EEC_Z1.INI"],
         "X is not zero at its reference"
     );
+    let positioning = Axis::LINEAR.map(|axis| selected.positioning[axis].is_some());
+    assert_eq!(positioning, [false, true, true]);
     let one = Wanted {
         axes: AxisSet::EMPTY.with(Axis::Y),
         ..wanted()

@@ -53,14 +53,27 @@ pub(super) fn refuse(folder: &Path, files: &[PathBuf]) -> Result<(), RecorderErr
     }
 }
 
-/// Whether a file that is long enough neither begins nor ends as MCAP does.
+/// Whether a file neither begins nor ends as MCAP does, as far as it goes. One without a byte is a bag that a recorder
+/// could not begin if it is called so.
 fn is_no_mcap(path: &Path) -> Option<bool> {
     let mut file = File::open(path).ok()?;
-    let (mut first, mut last) = ([0; mcap::MAGIC.len()], [0; mcap::MAGIC.len()]);
-    file.read_exact(&mut first).ok()?;
-    file.seek(SeekFrom::End(-(last.len() as i64))).ok()?;
-    file.read_exact(&mut last).ok()?;
-    Some(first != mcap::MAGIC && last != mcap::MAGIC)
+    let mut first = Vec::new();
+    file.by_ref()
+        .take(mcap::MAGIC.len() as u64)
+        .read_to_end(&mut first)
+        .ok()?;
+    if first.is_empty() {
+        return Some(path.extension().is_none_or(|extension| extension != "mcap"));
+    }
+    if mcap::MAGIC.starts_with(&first) {
+        return Some(false);
+    }
+    let mut last = [0; mcap::MAGIC.len()];
+    let ends_as_one = first.len() == last.len()
+        && file.seek(SeekFrom::End(-(last.len() as i64))).is_ok()
+        && file.read_exact(&mut last).is_ok()
+        && last == mcap::MAGIC;
+    Some(!ends_as_one)
 }
 
 fn kind_of(path: &Path) -> Option<&'static str> {
@@ -94,11 +107,14 @@ mod tests {
 
     #[test]
     fn a_file_that_is_no_bag_is_refused_and_one_that_was_cut_or_damaged_is_not() {
-        let none = refusal(&[("letter.mcap", b"Dear all, here is it.")]).unwrap();
-        assert!(
-            none.contains("letter.mcap") && none.contains("no MCAP file"),
-            "{none}"
-        );
+        for (name, bytes) in [
+            ("letter.mcap", &b"Dear all, here is it."[..]),
+            ("short.mcap", b"hi"),
+            ("empty.txt", b""),
+        ] {
+            let none = refusal(&[(name, bytes)]).unwrap();
+            assert!(none.contains(&format!("{name} is no bag")), "{none}");
+        }
         // A recorder that was killed at once leaves nothing, or half of the first bytes.
         assert_eq!(refusal(&[("bag_0.mcap", b"")]), None);
         assert_eq!(refusal(&[("bag_0.mcap", &mcap::MAGIC[..5])]), None);

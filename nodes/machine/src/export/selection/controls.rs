@@ -90,7 +90,7 @@ pub(super) fn write(
         Control::LinuxCnc(file_type) => {
             for own in &errors.positioning {
                 let file = linuxcnc::compensation_file(own, *file_type);
-                selected.take(&positioning_of(own), file);
+                selected.take_positioning(own, file);
             }
         }
         Control::Sinumerik(set_up) => sinumerik(errors, wanted, set_up, selected),
@@ -102,7 +102,7 @@ pub(super) fn write(
         Control::Fanuc(set_up) => {
             for own in &errors.positioning {
                 let file = fanuc_file(own, wanted, set_up);
-                selected.take(&positioning_of(own), file);
+                selected.take_positioning(own, file);
             }
         }
         Control::Csv => {
@@ -110,14 +110,13 @@ pub(super) fn write(
                 selected
                     .files
                     .push(csv::table(&errors.positioning, &errors.cross));
+                for own in &errors.positioning {
+                    selected.positioning[own.axis()] = Some(own.span());
+                }
             }
         }
     }
     say_what_has_no_place(errors, measured, wanted, control, selected);
-}
-
-fn positioning_of(errors: &AxisErrors) -> String {
-    format!("positioning of {}", errors.axis())
 }
 
 fn say_what_has_no_place(
@@ -216,7 +215,7 @@ fn sinumerik(errors: &Errors, wanted: &Wanted, set_up: &Sinumerik, selected: &mu
             let file = encoder_table(&own.mean(), &encoder);
             file.map(|file| for_both(own, "MD32450 $MA_BACKLASH", file))
         };
-        selected.take(&positioning_of(own), file);
+        selected.take_positioning(own, file);
     }
     for cross in &errors.cross {
         if cross.direction().is_linear() {
@@ -274,5 +273,5 @@ fn heidenhain_axis(errors: &Errors, axis: Axis, wanted: &Wanted, selected: &mut 
             .collect::<Result<_, _>>()?;
         heidenhain::compensation_table(&format!("{axis}_AXIS"), &own, &others)
     });
-    selected.take(&positioning_of(own), file);
+    selected.take_positioning(own, file);
 }
