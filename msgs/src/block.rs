@@ -67,7 +67,7 @@ impl Wire for BlockMeasurement {
         }
         Ok(Inner {
             at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
-            block_id: self.block_id.clone(),
+            block_id: read.name("block_id", &self.block_id)?,
             faces,
             cold: self.cold,
             run: self.run,

@@ -20,7 +20,7 @@ impl Wire for ClockQuestion {
         let read = Reader::of::<Self>();
         Ok(sample::ClockQuestion {
             asked_at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
-            host: self.host.clone(),
+            host: read.name("host", &self.host)?,
             sequence: self.sequence,
         })
     }
@@ -43,8 +43,8 @@ impl Wire for ClockAnswer {
         Ok(sample::ClockAnswer {
             answered_at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
             received_at: read.stamp("received", Place::Whole, &self.received)?,
-            reference: self.reference.clone(),
-            host: self.host.clone(),
+            reference: read.name("reference", &self.reference)?,
+            host: read.name("host", &self.host)?,
             sequence: self.sequence,
             asked_at: read.stamp("asked", Place::Whole, &self.asked)?,
         })
@@ -79,8 +79,8 @@ impl Wire for HostClock {
         let at = read.stamp("at", Place::Whole, &self.at)?;
         let there = read.stamp("there", Place::Whole, &self.there)?;
         Ok(sample::HostClock {
-            host: self.host.clone(),
-            reference: self.reference.clone(),
+            host: read.name("host", &self.host)?,
+            reference: read.name("reference", &self.reference)?,
             map: ClockMap::new(at, there, read.finite("drift", self.drift)?),
             standard_uncertainty_s: read
                 .finite("standard_uncertainty_s", self.standard_uncertainty_s)?,

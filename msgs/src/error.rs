@@ -3,6 +3,7 @@
 use std::fmt;
 
 use metrology::Axis;
+use metrology::number::number;
 
 /// Where in a field a value stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +22,47 @@ impl fmt::Display for Place {
             Self::Whole => Ok(()),
             Self::Axis(axis) => write!(f, "[{axis}]"),
             Self::Entry(idx) => write!(f, "[{idx}]"),
+        }
+    }
+}
+
+/// Why a message cannot be used, as it is counted: one of few, whatever the message's values are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Defect {
+    /// The bytes are no plain CDR.
+    Encoding,
+    /// They are not those of this type: they end early, go on after the end, or hold a bad boolean or text.
+    Malformed,
+    /// NaN or an infinity where a number is needed.
+    NotFinite,
+    /// An instant that no clock of Abbe shows.
+    Stamp,
+    /// A value, a length or a name that may not stand there, or two that contradict each other.
+    OutOfRange,
+}
+
+impl Defect {
+    /// The defect for machines, snake case.
+    #[must_use]
+    pub const fn id(self) -> &'static str {
+        match self {
+            Self::Encoding => "encoding",
+            Self::Malformed => "malformed",
+            Self::NotFinite => "not_finite",
+            Self::Stamp => "stamp",
+            Self::OutOfRange => "out_of_range",
+        }
+    }
+
+    /// The defect for people.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Encoding => "no plain CDR",
+            Self::Malformed => "malformed",
+            Self::NotFinite => "not finite",
+            Self::Stamp => "stamp out of range",
+            Self::OutOfRange => "value out of range",
         }
     }
 }
@@ -92,6 +134,20 @@ pub enum WireError {
         /// Entries there must be.
         needed: usize,
     },
+    /// More entries, or a longer text, than anybody means.
+    #[error("{message}: {field}: {n} {what}: at most {greatest}")]
+    TooMany {
+        /// Type name of the message.
+        message: &'static str,
+        /// Field.
+        field: &'static str,
+        /// How many there are.
+        n: usize,
+        /// Of what.
+        what: &'static str,
+        /// How many there may be.
+        greatest: usize,
+    },
     /// A name that is no error component.
     #[error("{message}: component \"{name}\": must be an ISO 230-1 name such as EXX or EC0Y")]
     UnknownComponent {
@@ -151,7 +207,7 @@ pub enum WireError {
         greatest: u8,
     },
     /// NaN or infinite where the message gives that no meaning.
-    #[error("{message}: {field}{place}: {value}: must be {allowed}")]
+    #[error("{message}: {field}{place}: {value}: must be {allowed}", value = number(*value))]
     NotFinite {
         /// Type name of the message.
         message: &'static str,
@@ -163,6 +219,30 @@ pub enum WireError {
         value: f64,
         /// What may stand there.
         allowed: &'static str,
+    },
+    /// A finite number that no machine has.
+    #[error("{message}: {field}{place}: {value}: at most {greatest} in magnitude", value = number(*value), greatest = number(*greatest))]
+    TooLarge {
+        /// Type name of the message.
+        message: &'static str,
+        /// Field.
+        field: &'static str,
+        /// Where in the field.
+        place: Place,
+        /// What stands there, in the field's unit.
+        value: f64,
+        /// The limit.
+        greatest: f64,
+    },
+    /// A number that the quantity of its field never has.
+    #[error("{message}: {field}: {source}")]
+    Quantity {
+        /// Type name of the message.
+        message: &'static str,
+        /// Field.
+        field: &'static str,
+        /// Value and range.
+        source: metrology::BoundError,
     },
     /// Two fields of one message that cannot both be true.
     #[error("{message}: {field} is {value} but {other} is {other_value}")]
@@ -180,7 +260,7 @@ pub enum WireError {
     },
     /// An instant that no clock of Abbe shows.
     #[error(
-        "{message}: {field}{place}: stamp {sec} s {nanosec} ns: must be 0 to 2147483647 s and below 1000000000 ns"
+        "{message}: {field}{place}: stamp {sec} s {nanosec} ns: must be 0 to 4294967295 s (1970 to 2106) and below 1000000000 ns"
     )]
     StampOutOfRange {
         /// Type name of the message.
@@ -190,7 +270,7 @@ pub enum WireError {
         /// Where in the field.
         place: Place,
         /// Seconds.
-        sec: i32,
+        sec: u32,
         /// Nanoseconds.
         nanosec: u32,
     },
@@ -204,4 +284,18 @@ pub enum WireError {
         /// What was given.
         name: String,
     },
+}
+
+impl WireError {
+    /// Why the message cannot be used, as it is counted.
+    #[must_use]
+    pub const fn defect(&self) -> Defect {
+        match self {
+            Self::NoHeader { .. } | Self::UnknownEncapsulation { .. } => Defect::Encoding,
+            Self::Malformed { .. } | Self::TooLong { .. } => Defect::Malformed,
+            Self::NotFinite { .. } => Defect::NotFinite,
+            Self::StampOutOfRange { .. } => Defect::Stamp,
+            _ => Defect::OutOfRange,
+        }
+    }
 }

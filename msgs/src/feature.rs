@@ -67,7 +67,7 @@ impl Wire for ProbedFeature {
         )?;
         Ok(Inner {
             at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
-            feature_id: self.feature_id.clone(),
+            feature_id: read.name("feature_id", &self.feature_id)?,
             kind: read.variant("kind", Place::Whole, self.kind, &KINDS, kind_code)?,
             centre_mm: read.point_mm("centre", &self.centre, Allowed::Finite)?,
             centre_covariance_mm2,

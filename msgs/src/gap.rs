@@ -4,7 +4,7 @@ use metrology::sample::{self, GapStatus};
 
 use crate::msg::{GapCause, GapParameter, GapReport};
 use crate::wire::{Allowed, Reader, metres, millimetres, time};
-use crate::{Place, Wire, WireError};
+use crate::{Place, Wire, WireError, bounds};
 
 const STATES: [GapStatus; 3] = [GapStatus::Named, GapStatus::Surrogate, GapStatus::Set];
 
@@ -49,6 +49,7 @@ impl Wire for GapCause {
 
     fn to_inner(&self) -> Result<Self::Inner, WireError> {
         let read = Reader::of::<Self>();
+        read.at_most("parameters", self.parameters.len(), bounds::CAUSES)?;
         let parameters = self.parameters.iter().map(Wire::to_inner);
         Ok(sample::GapCause {
             effect: self.effect.clone(),
@@ -85,6 +86,9 @@ impl Wire for GapReport {
     fn to_inner(&self) -> Result<Self::Inner, WireError> {
         let read = Reader::of::<Self>();
         let or_nan = |field, value| read.number(field, Place::Whole, value, Allowed::OrNan);
+        read.at_most("causes", self.causes.len(), bounds::CAUSES)?;
+        read.at_most("runs", self.runs.len(), bounds::RUNS)?;
+        read.at_most("held_out_runs", self.held_out_runs.len(), bounds::RUNS)?;
         let causes = self.causes.iter().map(Wire::to_inner);
         Ok(sample::GapSummary {
             at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,

@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 
 use crate::msg::{ErrorCurve, EstimableCombination, GeometryModel, PositioningTable};
 use crate::wire::{Allowed, Reader, metres, millimetres, time};
-use crate::{Message, Place, Wire, WireError};
+use crate::{Message, Place, Wire, WireError, bounds};
 
 pub(crate) const FORMS: [CurveForm; 3] =
     [CurveForm::Constant, CurveForm::Polynomial, CurveForm::Table];
@@ -80,6 +80,7 @@ impl Wire for ErrorCurve {
         ];
     }
 
+    #[expect(clippy::too_many_lines, reason = "one arm or field after another")]
     fn to_inner(&self) -> Result<Self::Inner, WireError> {
         let read = Reader::of::<Self>();
         let component: ErrorComponent =
@@ -98,6 +99,15 @@ impl Wire for ErrorCurve {
             CurveForm::Table => (0, len),
         };
         read.length("power", self.power.len(), powers)?;
+        if let Some(power) = self.power.iter().find(|power| **power > bounds::POWER) {
+            return Err(WireError::UnknownValue {
+                message: Self::TYPE_NAME,
+                field: "power",
+                place: Place::Whole,
+                value: *power,
+                greatest: bounds::POWER,
+            });
+        }
         read.length("position", self.position.len(), knots)?;
         read.length("standard_uncertainty", self.standard_uncertainty.len(), len)?;
         read.length("estimable", self.estimable.len(), len)?;
@@ -174,6 +184,18 @@ impl Wire for GeometryModel {
 
     fn to_inner(&self) -> Result<Self::Inner, WireError> {
         let read = Reader::of::<Self>();
+        read.at_most("curves", self.curves.len(), bounds::CURVES)?;
+        let coefficients = self.curves.iter().map(|curve| curve.coefficient.len());
+        let n_coefficients = coefficients.fold(0, usize::saturating_add);
+        read.at_most("coefficient", n_coefficients, bounds::COEFFICIENTS)?;
+        let combinations = self.combinations.iter();
+        let n_weights = combinations.fold(0, |n: usize, one| n.saturating_add(one.weight.len()));
+        read.at_most(
+            "combinations",
+            self.combinations.len(),
+            bounds::COMBINATIONS,
+        )?;
+        read.at_most("weight", n_weights, bounds::WEIGHTS)?;
         let curves: Vec<_> = self
             .curves
             .iter()
@@ -191,7 +213,7 @@ impl Wire for GeometryModel {
         let combinations = self.combinations.iter();
         Ok(sample::GeometryModel {
             at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
-            chain: self.chain.clone(),
+            chain: read.name("chain", &self.chain)?,
             curves,
             covariance,
             combinations: combinations
@@ -264,6 +286,7 @@ impl Wire for PositioningTable {
         let read = Reader::of::<Self>();
         let axis = read.axis("axis", 0, &self.axis)?;
         let len = self.position.len();
+        read.at_most("position", len, bounds::TABLE_POINTS)?;
         read.length("deviation_up", self.deviation_up.len(), len)?;
         read.length("deviation_down", self.deviation_down.len(), len)?;
         let from_wire = |field, values: &[f64]| -> Result<Vec<f64>, WireError> {

@@ -12,6 +12,7 @@
 
 mod action_types;
 mod block;
+mod bounds;
 mod cdr;
 mod clock;
 mod compensation;
@@ -38,7 +39,7 @@ pub use action_types::{
     SendGoalResponse,
 };
 pub use cdr::{ENCAPSULATION, from_cdr, to_cdr, to_cdr_into};
-pub use error::{Place, WireError};
+pub use error::{Defect, Place, WireError};
 pub use frames::transforms;
 pub use interface::{
     Action, Description, FieldParts, Message, Service, TypeParts, description_of, parts_of,
@@ -46,6 +47,6 @@ pub use interface::{
 pub use motion::joint_state;
 pub use qos::{Durability, Qos, Reliability};
 pub use service_event::{SERVICE_EVENT_SUFFIX, ServiceEvent};
-pub use wire::Wire;
+pub use wire::{Wire, instant, time};
 
 include!(concat!(env!("OUT_DIR"), "/interfaces.rs"));

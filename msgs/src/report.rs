@@ -4,7 +4,7 @@ use metrology::sample::{MachineValue as Inner, Quantity, Verdict};
 
 use crate::msg::MachineValue;
 use crate::wire::{Reader, metres, time};
-use crate::{Place, Wire, WireError};
+use crate::{Place, Wire, WireError, bounds};
 
 const VERDICTS: [Verdict; 3] = [Verdict::Good, Verdict::Impossible, Verdict::Unconfirmed];
 
@@ -58,7 +58,7 @@ impl Wire for MachineValue {
         Ok(Inner {
             received_at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
             machine_at: read.stamp("machine_stamp", Place::Whole, &self.machine_stamp)?,
-            name: self.header.frame_id.clone(),
+            name: read.name("header.frame_id", &self.header.frame_id)?,
             quantity,
             verdict: read.variant(
                 "verdict",
@@ -72,7 +72,7 @@ impl Wire for MachineValue {
                 quantity if quantity.is_number() => read.finite("value", self.value)?,
                 _ => f64::NAN,
             },
-            text: self.text.clone(),
+            text: read.text("text", &self.text, bounds::SENTENCE_BYTES)?,
         })
     }
 }

@@ -114,13 +114,13 @@ impl Wire for TestSegment {
             feed_mm_s: read.length_mm("feed_m_s", self.feed_m_s)?,
             sense: read.variant("sense", Place::Whole, self.sense, &SENSES, sense_code)?,
             repeat: self.repeat,
-            stylus: self.stylus.clone(),
+            stylus: read.name("stylus", &self.stylus)?,
             tool_offset_mm: read.lengths_mm("tool_offset", &self.tool_offset)?,
             stations: self.stations,
             zero_id: self.zero_id,
             setup_id: self.setup_id,
             cold: self.cold,
-            features: self.features.clone(),
+            features: read.names("features", &self.features)?,
             completed: self.completed,
         })
     }

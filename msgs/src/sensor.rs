@@ -2,7 +2,7 @@
 
 use metrology::sample;
 
-use crate::msg::{GridSample, LengthSample};
+use crate::msg::{AngleSample, GridSample, LengthSample};
 use crate::segment::{PLANES, plane_code};
 use crate::sensor_msgs::msg::Temperature;
 use crate::wire::{Reader, metres, time};
@@ -22,8 +22,8 @@ impl Wire for Temperature {
         let read = Reader::of::<Self>();
         Ok(sample::TemperatureSample {
             at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
-            sensor: self.header.frame_id.clone(),
-            temperature_degc: read.finite("temperature", self.temperature)?,
+            sensor: read.name("header.frame_id", &self.header.frame_id)?,
+            temperature_degc: read.temperature_degc("temperature", self.temperature)?,
             variance_k2: read.finite("variance", self.variance)?,
         })
     }
@@ -47,6 +47,28 @@ impl Wire for GridSample {
             plane: read.variant("plane", Place::Whole, self.plane, &PLANES, plane_code)?,
             u_mm: read.length_mm("u_m", self.u_m)?,
             v_mm: read.length_mm("v_m", self.v_m)?,
+            zero_id: self.zero_id,
+        })
+    }
+}
+
+impl Wire for AngleSample {
+    type Inner = sample::AngleSample;
+
+    fn set_from_inner(&mut self, inner: &Self::Inner) {
+        self.header.stamp = time(inner.at);
+        self.axis.clear();
+        self.axis.push_str(inner.axis.letter());
+        self.angle_rad = inner.angle_rad;
+        self.zero_id = inner.zero_id;
+    }
+
+    fn to_inner(&self) -> Result<Self::Inner, WireError> {
+        let read = Reader::of::<Self>();
+        Ok(sample::AngleSample {
+            at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
+            axis: read.rotary_axis("axis", 0, &self.axis)?,
+            angle_rad: read.finite("angle_rad", self.angle_rad)?,
             zero_id: self.zero_id,
         })
     }

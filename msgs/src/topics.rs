@@ -7,10 +7,10 @@ use std::marker::PhantomData;
 use crate::action::{RunCycle, RunProgram};
 use crate::diagnostic_msgs::msg::DiagnosticArray;
 use crate::msg::{
-    AxisCompensation, AxisState, BlockMeasurement, ClockAnswer, ClockQuestion, GapReport,
-    GeometryModel, GridSample, HostClock, LengthSample, MachineValue, PlanStatus, PositioningTable,
-    ProbeLatency, ProbeTrigger, ProbedFeature, ProbedPoint, TestSegment, ThermalModel,
-    ThermalUpdateRequest,
+    AngleSample, AxisCompensation, AxisState, BlockMeasurement, ClockAnswer, ClockQuestion,
+    GapReport, GeometryModel, GridSample, HostClock, LengthSample, MachineValue, PlanStatus,
+    PositioningTable, ProbeLatency, ProbeTrigger, ProbedFeature, ProbedPoint, TestSegment,
+    ThermalModel, ThermalUpdateRequest,
 };
 use crate::qos::{Durability, Qos, Reliability};
 use crate::rcl_interfaces::msg::{Log, ParameterEvent};
@@ -190,6 +190,8 @@ topics! {
     GRID_POSITION: GridSample = "grid/position", Qos::RELIABLE_DEEP, Raw;
     /// Readings of the length reference.
     LENGTH_POSITION: LengthSample = "length/position", Qos::RELIABLE_DEEP, Raw;
+    /// Readings of the angular reference of a rotary axis.
+    ANGLE_POSITION: AngleSample = "angle/position", Qos::RELIABLE_DEEP, Raw;
     /// Geometric errors of the linear axes.
     GEOMETRY_MODEL: GeometryModel = "geometry/model", Qos::LATCHED, Computed;
     /// Geometric errors of the rotary axes.
@@ -260,6 +262,30 @@ pub const MACHINE: TopicFamily<MachineValue> = TopicFamily {
 /// Switches the compensation on or off.
 pub const SET_COMPENSATION: ServiceName<SetBool> = ServiceName {
     name: "axis_compensation/enable",
+    service: PhantomData,
+};
+
+/// Holds the program that a control runs: its axes come to rest.
+pub const PAUSE_PROGRAM: ServiceName<Trigger> = ServiceName {
+    name: "cnc/pause",
+    service: PhantomData,
+};
+
+/// Lets a program that waits go on.
+pub const RESUME_PROGRAM: ServiceName<Trigger> = ServiceName {
+    name: "cnc/resume",
+    service: PhantomData,
+};
+
+/// Lets a program that waits go on for one block.
+pub const STEP_PROGRAM: ServiceName<Trigger> = ServiceName {
+    name: "cnc/step",
+    service: PhantomData,
+};
+
+/// Homes every axis of a control anew, once no compensation is in effect.
+pub const HOME: ServiceName<Trigger> = ServiceName {
+    name: "cnc/home",
     service: PhantomData,
 };
 

@@ -7,7 +7,7 @@ use crate::msg::{ProbeLatency, ProbeTrigger, ProbedPoint};
 use crate::wire::{
     Allowed, Reader, metres, millimetres, point, ratios, set_letters, set_positions, time,
 };
-use crate::{Place, Wire, WireError};
+use crate::{Place, Wire, WireError, bounds};
 
 impl Wire for ProbeTrigger {
     type Inner = sample::ProbeTrigger;
@@ -29,7 +29,7 @@ impl Wire for ProbeTrigger {
         Ok(sample::ProbeTrigger {
             received_at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
             controller_at: read.stamp("controller_stamp", Place::Whole, &self.controller_stamp)?,
-            feature_id: self.feature_id.clone(),
+            feature_id: read.name("feature_id", &self.feature_id)?,
             approach: read.ratios("approach", &self.approach, Allowed::Finite)?,
             feed_mm_s: read.length_mm("feed_m_s", self.feed_m_s)?,
             axes: letters.set(),
@@ -117,7 +117,7 @@ impl Wire for ProbedPoint {
         let contact = &self.axes_at_contact;
         Ok(sample::ProbedPoint {
             received_at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
-            feature_id: self.feature_id.clone(),
+            feature_id: read.name("feature_id", &self.feature_id)?,
             axes_at_contact: read.positions("axes_at_contact", &letters, contact, 0.0, allowed)?,
             axes: letters.set(),
             point_in_machine_mm: read.point_mm("point", &self.point, allowed)?,
@@ -181,6 +181,7 @@ impl Wire for ProbeLatency {
     fn to_inner(&self) -> Result<Self::Inner, WireError> {
         let read = Reader::of::<Self>();
         let or_nan = |field, value| read.number(field, Place::Whole, value, Allowed::OrNan);
+        read.at_most("feeds_m_s", self.feeds_m_s.len(), bounds::TOUCHES)?;
         let feeds_mm_s = (self.feeds_m_s.iter().enumerate())
             .map(|(idx, feed)| {
                 read.number("feeds_m_s", Place::Entry(idx), *feed, Allowed::Finite)

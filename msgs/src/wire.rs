@@ -3,31 +3,36 @@
 //! ```text
 //!   length on the wire [m] = length inside [mm] / 1000        (1)
 //!   length inside [mm]     = length on the wire [m] * 1000    (2)
+//!   sec on the wire [s]    = whole seconds modulo 2^32, as i32  (3)
 //! ```
 //!
 //! Angles, ratios, times and temperatures have one unit on both sides. (2) after (1) gives the
 //! length back within one unit in the last place, and every further turn gives the same bits; a
 //! value that must be the same live and in replay is therefore taken through [`Wire::as_received`].
 //!
-//! A NaN or an infinity is refused unless the field's comment in the `.msg` file gives it a meaning.
-//! Stamps are instants from 0 to 2^31 s of their clock. One outside has no wire form: it is written
-//! as (-1 s, 2^32 - 1 ns), DDS's invalid time, which [`Wire::to_inner`] refuses like every stamp out
-//! of range.
+//! A NaN or an infinity is refused unless the field's comment in the `.msg` file gives it a meaning. A finite number above
+//! 1e18 is refused too: no machine has it, and products of what is below stay finite.
+//! Stamps are instants from 0 to 2^32 s of their clock, 1970 to 2106. `builtin_interfaces/Time` has `int32 sec`;
+//! (3) reads and writes its bits as those of an unsigned number, so a negative `sec` is an instant of 2038 to 2106.
+//! A stamp outside has no wire form: it is written as (-1 s, 2^32 - 1 ns), DDS's invalid time, which
+//! [`Wire::to_inner`] refuses for its nanoseconds.
 //!
 //! # Agreement
 //! `prop_eq2_gives_a_length_back_within_one_ulp_and_then_the_same_bits`: 30,000 lengths of 1e-15 mm
 //! to 1e9 mm.
 //!
 //! # References
-//! REP 103 for the units of the wire; OMG DDS 1.4, 2.3.2 for the invalid time.
+//! REP 103 for the units of the wire; OMG DDS 1.4, 2.3.2 for the invalid time; `rclcpp/src/rclcpp/time.cpp`,
+//! `convert_rcl_time_to_sec_nanos`, for (3).
 
+use metrology::bound::TEMPERATURE;
 use metrology::stamp::NANOS_PER_S;
 use metrology::{Axis, AxisSet, Clock, PerAxis, Stamp};
 use nalgebra::Vector3;
 
 use crate::builtin_interfaces::msg::Time;
 use crate::geometry_msgs::msg::{Point, Vector3 as WireVector};
-use crate::{Message, Place, WireError};
+use crate::{Message, Place, WireError, bounds};
 
 /// A message with an inner form in millimetres.
 pub trait Wire: Message {
@@ -70,6 +75,10 @@ pub trait Wire: Message {
 
 const MM_PER_M: f64 = 1000.0;
 
+/// Greatest magnitude of a finite number on the wire, in the unit of its field: 100 light years of length, more than the
+/// age of the universe in seconds. The tenth power of a million times that is still finite.
+pub(crate) const GREATEST_NUMBER: f64 = 1e18;
+
 /// (1)
 pub(crate) fn metres(length_mm: f64) -> f64 {
     length_mm / MM_PER_M
@@ -80,19 +89,34 @@ pub(crate) fn millimetres(length_m: f64) -> f64 {
     length_m * MM_PER_M
 }
 
+/// No instant: its nanoseconds are beyond a second.
 const INVALID_TIME: Time = Time {
     sec: -1,
     nanosec: u32::MAX,
 };
 
 /// The wire form of an instant, or the invalid time where there is none.
-pub(crate) fn time<C: Clock>(stamp: Stamp<C>) -> Time {
-    let sec = i32::try_from(stamp.nanos().div_euclid(NANOS_PER_S));
+///
+/// (3): `sec` is the bit pattern of an unsigned number, so that 2038 to 2106 are carried; `rclcpp` writes the same.
+#[must_use]
+pub fn time<C: Clock>(stamp: Stamp<C>) -> Time {
+    let sec = u32::try_from(stamp.nanos().div_euclid(NANOS_PER_S));
     let nanosec = u32::try_from(stamp.nanos().rem_euclid(NANOS_PER_S));
     match (sec, nanosec) {
-        (Ok(sec @ 0..), Ok(nanosec)) => Time { sec, nanosec },
+        (Ok(sec), Ok(nanosec)) => Time {
+            sec: sec.cast_signed(),
+            nanosec,
+        },
         _ => INVALID_TIME,
     }
+}
+
+/// The instant of a wire form by (3); `None`: its nanoseconds are beyond a second.
+#[must_use]
+pub fn instant<C: Clock>(time: &Time) -> Option<Stamp<C>> {
+    let nanosec = i64::from(time.nanosec);
+    let sec = i64::from(time.sec.cast_unsigned());
+    (nanosec < NANOS_PER_S).then(|| Stamp::from_nanos(sec * NANOS_PER_S + nanosec))
 }
 
 pub(crate) fn point(place_mm: &Vector3<f64>) -> Point {
@@ -160,6 +184,10 @@ impl Allowed {
         }
     }
 
+    const fn is_unused(self) -> bool {
+        matches!(self, Self::Anything)
+    }
+
     const fn words(self) -> &'static str {
         match self {
             Self::Finite => "a finite number",
@@ -206,6 +234,15 @@ impl Reader {
         value: f64,
         allowed: Allowed,
     ) -> Result<f64, WireError> {
+        if !value.is_infinite() && value.abs() > GREATEST_NUMBER && !allowed.is_unused() {
+            return Err(WireError::TooLarge {
+                message: self.message,
+                field,
+                place,
+                value,
+                greatest: GREATEST_NUMBER,
+            });
+        }
         if allowed.takes(value) {
             return Ok(value);
         }
@@ -220,6 +257,79 @@ impl Reader {
 
     pub(crate) fn finite(self, field: &'static str, value: f64) -> Result<f64, WireError> {
         self.number(field, Place::Whole, value, Allowed::Finite)
+    }
+
+    /// A temperature that a thermometer of a machine can read.
+    pub(crate) fn temperature_degc(
+        self,
+        field: &'static str,
+        value: f64,
+    ) -> Result<f64, WireError> {
+        let value = self.finite(field, value)?;
+        let place = || "temperature".to_owned();
+        match TEMPERATURE.check(place, value) {
+            Ok(()) => Ok(value),
+            Err(source) => Err(WireError::Quantity {
+                message: self.message,
+                field,
+                source,
+            }),
+        }
+    }
+
+    /// A list that is not longer than anybody means.
+    pub(crate) fn at_most(
+        self,
+        field: &'static str,
+        n: usize,
+        greatest: usize,
+    ) -> Result<(), WireError> {
+        self.amount(field, n, "entries", greatest)
+    }
+
+    /// A name: of a feature, a sensor, a host.
+    pub(crate) fn name(self, field: &'static str, text: &str) -> Result<String, WireError> {
+        self.text(field, text, bounds::NAME_BYTES)
+    }
+
+    /// A text of at most so many bytes.
+    pub(crate) fn text(
+        self,
+        field: &'static str,
+        text: &str,
+        greatest: usize,
+    ) -> Result<String, WireError> {
+        self.amount(field, text.len(), "bytes of text", greatest)?;
+        Ok(text.to_owned())
+    }
+
+    /// A list of names.
+    pub(crate) fn names(
+        self,
+        field: &'static str,
+        names: &[String],
+    ) -> Result<Vec<String>, WireError> {
+        self.at_most(field, names.len(), bounds::NAMES)?;
+        names.iter().map(|name| self.name(field, name)).collect()
+    }
+
+    fn amount(
+        self,
+        field: &'static str,
+        n: usize,
+        what: &'static str,
+        greatest: usize,
+    ) -> Result<(), WireError> {
+        if n <= greatest {
+            return Ok(());
+        }
+        Err(WireError::TooMany {
+            message: self.message,
+            field,
+            n,
+            what,
+            greatest,
+        })
     }
 
     /// (2) of a finite length.
@@ -273,19 +383,13 @@ impl Reader {
         place: Place,
         time: &Time,
     ) -> Result<Stamp<C>, WireError> {
-        let nanosec = i64::from(time.nanosec);
-        if time.sec < 0 || nanosec >= NANOS_PER_S {
-            return Err(WireError::StampOutOfRange {
-                message: self.message,
-                field,
-                place,
-                sec: time.sec,
-                nanosec: time.nanosec,
-            });
-        }
-        Ok(Stamp::from_nanos(
-            i64::from(time.sec) * NANOS_PER_S + nanosec,
-        ))
+        instant(time).ok_or(WireError::StampOutOfRange {
+            message: self.message,
+            field,
+            place,
+            sec: time.sec.cast_unsigned(),
+            nanosec: time.nanosec,
+        })
     }
 
     pub(crate) fn letters(
@@ -339,6 +443,16 @@ impl Reader {
         name: &str,
     ) -> Result<Axis, WireError> {
         self.letter(field, idx, name, &Axis::LINEAR, "X Y Z")
+    }
+
+    /// A rotary axis.
+    pub(crate) fn rotary_axis(
+        self,
+        field: &'static str,
+        idx: usize,
+        name: &str,
+    ) -> Result<Axis, WireError> {
+        self.letter(field, idx, name, &Axis::ROTARY, "A B C")
     }
 
     /// Any axis.

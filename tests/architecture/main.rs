@@ -11,6 +11,7 @@ mod dependencies;
 mod documents;
 mod folders;
 mod layouts;
+mod messages;
 mod names;
 mod packages;
 mod parameters;

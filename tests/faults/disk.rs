@@ -108,18 +108,84 @@ fn abbe_record_on_a_full_disk_ends_with_the_reason_and_exit_code_1() {
     });
 }
 
+/// Counts that the output reports for a bag: its messages, and those lost.
+fn told_of_bag(said: &str) -> (u64, u64) {
+    let line = said.lines().find(|line| line.starts_with("Bag:  "));
+    let line = line.unwrap_or_else(|| panic!("{said}"));
+    let counts = line.rsplit('(').next().unwrap();
+    (
+        number_before(&format!(" {counts}"), " messages"),
+        number_before(counts, " lost"),
+    )
+}
+
 #[test]
-fn a_scenario_whose_disk_fills_ends_with_the_reason_and_its_bag_is_read() {
+fn a_scenario_whose_disk_fills_is_called_off_and_tells_its_page_and_what_is_lost() {
     namespace::alone("a scenario on a full disk", || {
-        let scenario = Scenario::copy_of("cold_reference");
-        namespace::small_disk(&scenario.out(), DISK_KIB / 2);
-        let ended = scenario.run_to_end(&[]);
+        for (name, kib) in [
+            ("cold_reference", DISK_KIB / 2),
+            ("first_run", 8 * DISK_KIB),
+        ] {
+            let scenario = Scenario::copy_of(name);
+            namespace::small_disk(&scenario.out(), kib);
+            let began = Instant::now();
+            let ended = scenario.run_to_end(&[]);
+            let took = began.elapsed();
+            eprintln!("{took:?}: {}", ended.said.trim());
+            assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+            for word in [
+                "bag_0.mcap",
+                "no space",
+                "called off",
+                "abbe: what did not go as told",
+            ] {
+                assert!(ended.said.contains(word), "{word}: {}", ended.said);
+            }
+            let (messages, losses) = content(&scenario.new_run(&[]).join("bag"));
+            assert!(messages > 100 && losses.len() == 1, "{messages} {losses:?}");
+            let (told, lost) = told_of_bag(&ended.said);
+            assert_eq!(told, messages, "{}", ended.said);
+            // The reason has the same numbers, at the end as well.
+            let words = format!("{messages} messages are written, {lost} messages are lost");
+            assert!(ended.said.contains(&words), "{words}: {}", ended.said);
+            assert!(lost > 0, "{}", ended.said);
+            // Nothing half written stands beside the bag.
+            let left = std::fs::read_dir(scenario.new_run(&[])).unwrap();
+            let names = left.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+            let names: Vec<String> = names.collect();
+            assert!(names.iter().all(|name| !name.contains(".new")), "{names:?}");
+            // What is left is reported as not whole.
+            let bag = scenario.new_run(&[]).join("bag").display().to_string();
+            let report = Process::start(command(0, &["report", &bag]));
+            let report = report.ended_within(Duration::from_secs(60));
+            assert_eq!(report.status.code(), Some(3), "{}", report.said);
+            assert!(report.said.contains("NOT WHOLE"), "{}", report.said);
+        }
+    });
+}
+
+#[test]
+fn a_run_in_real_time_whose_disk_fills_says_so_on_diagnostics_and_winds_down() {
+    namespace::alone("a run in real time on a full disk", || {
+        namespace::multicast_on_loopback();
+        let (scenario, domain) = (standing_machine(), domain(7));
+        namespace::small_disk(&scenario.out(), DISK_KIB);
+        let graph = Graph::join(domain);
+        let began = Instant::now();
+        let (folder, out) = (scenario.folder(), scenario.out());
+        let [folder, out] = [folder, out].map(|path| path.display().to_string());
+        let run = Process::start(command(domain, &["run", &folder, "--runs", &out]));
+        let patience = Duration::from_secs(60);
+        let words = ["no space", "bag_0.mcap", "called off"];
+        graph.condition_within(patience, "abbe_run", "recording", &words, began);
+        let ended = run.ended_within(Duration::from_secs(40));
         eprintln!("{}", ended.said.trim());
         assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
-        for word in ["bag_0.mcap", "no space"] {
-            assert!(ended.said.contains(word), "{word}: {}", ended.said);
-        }
         let (messages, losses) = content(&scenario.new_run(&[]).join("bag"));
         assert!(messages > 100 && losses.len() == 1, "{messages} {losses:?}");
+        assert_eq!(told_of_bag(&ended.said).0, messages, "{}", ended.said);
+        for word in ["called off", "no space", "messages are lost"] {
+            assert!(ended.said.contains(word), "{word}: {}", ended.said);
+        }
     });
 }

@@ -221,15 +221,12 @@ fn faulty_offsets(graph: &Graph, voice: &mut Voice, other: &mut Voice) {
         voice.bytes(0, &bytes);
         voice.bytes(0, &bytes);
     });
+    // Words that only this value brings: the condition before may still stand.
     for (bad, condition, words) in [
-        (f64::NAN, "input_refused", ["compensation", "total"]),
-        (
-            f64::NEG_INFINITY,
-            "input_refused",
-            ["compensation", "total"],
-        ),
-        (0.1, "compensation_input", ["limit", "X"]),
-        (-1e300, "compensation_input", ["limit", "X"]),
+        (f64::NAN, "input_refused", ["total[X]", "NaN"]),
+        (f64::NEG_INFINITY, "input_refused", ["total[X]", "-inf"]),
+        (0.1, "compensation_input", ["axis X is 100 mm", "limit"]),
+        (-1e300, "input_refused", ["total[X]", "in magnitude"]),
     ] {
         let since = Instant::now();
         keep_saying(FAULT / 3, |beat| {

@@ -43,6 +43,7 @@ decoders![
     abbe_msgs::action::RunProgramFeedback,
     abbe_msgs::action::RunProgramGoal,
     abbe_msgs::action::RunProgramResult,
+    abbe_msgs::msg::AngleSample,
     abbe_msgs::msg::AxisCompensation,
     abbe_msgs::msg::AxisDrift,
     abbe_msgs::msg::AxisState,
@@ -163,6 +164,7 @@ decoders![
 ];
 
 with_inner![
+    msg::AngleSample,
     msg::AxisCompensation,
     msg::AxisState,
     msg::BlockMeasurement,

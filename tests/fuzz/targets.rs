@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use fake_cnc::rs274::{self, Envelope};
+use fake_cnc::rs274::registers::WorkSystem;
+use fake_cnc::rs274::{self, Envelope, Registers};
 use linuxcnc_bridge::config::{ConnectionConfig, Prepare};
 use machine::MachineFile;
 use metrology::stamp::{Host, Span};
@@ -93,15 +94,25 @@ fn read_bag(path: &Path, data: &[u8]) {
     let _ = recorder::dump_json(&bag, &mut std::io::sink());
 }
 
-/// The text as a program for a five-axis machine.
+/// The text as a program for a five-axis machine, just switched on and after a job.
 pub fn gcode(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
     let axes = [Axis::X, Axis::Y, Axis::Z, Axis::A, Axis::C];
     let envelope = Envelope {
         axes: axes.into_iter().collect(),
         travel: PerAxis::from_fn(|_| [-2000.0, 2000.0]),
+        speed: PerAxis::from_fn(|_| 300.0),
+        spindle_limit_rpm: Some(12_000.0),
+        tool_lengths_mm: vec![80.0],
     };
-    let _ = rs274::read(&text, &envelope, &PerAxis::default());
+    let start = PerAxis::default();
+    let _ = rs274::read(&text, &envelope, &start);
+    let mut used = Registers::default();
+    used.systems[0] = WorkSystem {
+        origin: PerAxis::from_fn(|_| 3.0),
+        rotation_deg: 30.0,
+    };
+    let _ = rs274::read_in(&text, &envelope, &start, &used);
 }
 
 /// The text as a machine file; one that is taken is used.
@@ -122,7 +133,7 @@ const MAPS: [&str; 3] = [
 ];
 
 /// The machine that the tables of the maps are of.
-const MEASURED: &str = include_str!("../../launch_configs/gap_first/machine.yaml");
+const MEASURED: &str = include_str!("../../launch_configs/first_run/machine.yaml");
 
 /// A byte for the kind of measurement, then its table.
 pub fn csv_import(data: &[u8]) {
@@ -134,10 +145,14 @@ pub fn csv_import(data: &[u8]) {
     let machine = MachineFile::parse(MEASURED, "machine.yaml").expect("the machine of a scenario");
     import::limits::check(&map, &machine).expect("the examples are of this machine");
     let ranges = import::limits::ranges(&map.test, &machine);
-    let text = String::from_utf8_lossy(text);
-    if let Ok(table) = import::table::Table::read(&text, &map, &ranges) {
+    let text = metrology::text::decode(text, metrology::text::Comments::Csv);
+    let sheet = text.map(|text| import::sheet::Sheet::of_text(&text, map.separator));
+    if let Ok(Ok(sheet)) = sheet
+        && let Ok(table) = import::table::Table::of(&sheet, &map, &ranges)
+        && let Ok(runs) = import::runs::of(&map.test, &table)
+    {
         let mut writer = import::writer::Writer::default();
-        let _ = import::motion::write(&map, &table, &mut writer);
+        let _ = import::motion::write(&map, &runs, &mut writer);
     }
 }
 
@@ -194,22 +209,26 @@ const MAP: &str = "values:
   avail: {is: ignored}
 ";
 
-fn bridge(source: Source) -> mtconnect_bridge::BridgeStage {
+fn bridge_settings(source: Source) -> mtconnect_bridge::Settings {
     let config = mtconnect_bridge::BridgeConfig {
         source,
         host: "mill".to_owned(),
         port: 7878,
-        log_file: None,
+        log_file: (source == Source::Log).then(String::new),
+        log_longest_pause_s: mtconnect_bridge::BridgeConfig::default_longest_pause_s(),
         map_file: String::new(),
         connection: mtconnect_bridge::config::ConnectionConfig::default(),
         agent: AgentConfig::default(),
     };
     let map = MapFile::from_yaml(MAP).expect("the map above");
-    let settings = mtconnect_bridge::Settings::new(&config, &map).expect("the settings above");
-    mtconnect_bridge::BridgeStage::new(&settings)
+    mtconnect_bridge::Settings::new(&config, &map).expect("the settings above")
 }
 
-/// What an adapter says, in pieces.
+fn bridge(source: Source) -> mtconnect_bridge::BridgeStage {
+    mtconnect_bridge::BridgeStage::new(&bridge_settings(source))
+}
+
+/// The bytes of an adapter, in pieces; and the same as a log, whose every line is replayed in the end.
 pub fn shdr(data: &[u8]) {
     use mtconnect_bridge::Input;
     use mtconnect_bridge::stage::IoEvent;
@@ -226,6 +245,23 @@ pub fn shdr(data: &[u8]) {
         tell(at, Input::Tick);
     }
     tell(1_000, Input::Shutdown);
+    shdr_log(data);
+}
+
+fn shdr_log(data: &[u8]) {
+    use mtconnect_bridge::condition::Condition;
+    use mtconnect_bridge::{Input, Output};
+    let settings = bridge_settings(Source::Log);
+    let mut stage = mtconnect_bridge::BridgeStage::of_log(&settings, data);
+    let mut out = Vec::new();
+    // No pause is longer than the longest, so a lifetime is enough for any log; many lines take several ticks.
+    let Ok(()) = stage.step(instant(0), Input::Tick, &mut out);
+    for _ in 0..=data.len() / 10_000 {
+        let Ok(()) = stage.step(Stamp::from_nanos(i64::MAX), Input::Tick, &mut out);
+    }
+    let Ok(()) = stage.step(Stamp::from_nanos(i64::MAX), Input::Shutdown, &mut out);
+    let is_left = |output: &Output| matches!(output, Output::Condition(Condition::LogLeft { .. }));
+    assert!(!out.iter().any(is_left), "lines that were not replayed");
 }
 
 /// What an agent says: its answers to `probe` and `current`, then a stream in pieces.
@@ -263,9 +299,10 @@ pub fn mapping(data: &[u8]) {
     if let Ok(file) = MapFile::from_yaml(&text) {
         let _ = Mapping::new(&file);
     }
-    if let Ok(mtconnect_bridge::document::Answer::Devices { items, .. }) =
+    if let Ok(mtconnect_bridge::document::Answer::Devices { devices, items, .. }) =
         mtconnect_bridge::document::read(data)
     {
+        let items = mtconnect_bridge::proposal::of_device(&devices, &items, None).unwrap_or(items);
         let proposed = mtconnect_bridge::proposal::propose(&items);
         let _ = mtconnect_bridge::proposal::text_of(&proposed);
     }

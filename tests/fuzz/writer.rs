@@ -44,6 +44,10 @@ impl Writer {
         self.write()
     }
 
+    pub fn angle(&mut self, _: Axis, _: f64) -> Result<()> {
+        self.write()
+    }
+
     pub fn temperature(&mut self, _: &str, _: f64) -> Result<()> {
         self.write()
     }

@@ -70,7 +70,8 @@ const ATTEMPTS: u32 = 3;
 fn attempted(program: &Path, scenario: &str, out: &Path) -> Option<String> {
     let output = Command::new(program)
         .current_dir(root())
-        .args(["run", &format!("launch_configs/{scenario}"), "--runs"])
+        .args(["run", "--full", &format!("launch_configs/{scenario}")])
+        .arg("--runs")
         .arg(out)
         .env("ROS_DOMAIN_ID", DOMAIN)
         .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")

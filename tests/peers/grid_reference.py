@@ -1,6 +1,6 @@
 """Reference numbers of a rank-deficient grid identification, from numpy alone.
 
-    grid_reference.py > nodes/grid_encoder/tests/numpy/radial_five_centres.txt
+    grid_reference.py > nodes/grid_encoder/tests/it/numpy/radial_five_centres.txt
 
 Radial deviations on five circles of radius 50 mm about (0, 0), (+-150, 0), (0, +-150), each with a free
 centre, of a machine [w X' Y' b Z t] with the errors

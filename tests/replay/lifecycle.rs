@@ -91,6 +91,8 @@ fn parameters(node: &dyn Node) -> String {
                 Value::Integer(value) => (*value).into(),
                 Value::Double(value) => (*value).into(),
                 Value::String(value) => value.as_str().into(),
+                // An empty list has no type of its own.
+                Value::StringArray(values) if values.is_empty() => serde_json::json!([]),
                 other => panic!("{}: {other:?}", parameter.name),
             };
             (parameter.name.as_str(), value)

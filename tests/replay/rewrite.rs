@@ -23,6 +23,21 @@ pub struct Copied {
 /// Changes the messages, all in the order of recording.
 pub type ChangeMessages<'c> = &'c dyn Fn(&mut Vec<Copied>);
 
+/// What a bag says of a topic's messages.
+pub struct Described {
+    /// `package/msg/Name`.
+    pub type_name: String,
+    /// Text of the definition.
+    pub definition: Vec<u8>,
+    /// Encoding of the messages.
+    pub message_encoding: String,
+    /// The type's hash.
+    pub type_hash: String,
+}
+
+/// Changes the description of a topic's messages.
+pub type Describe<'c> = &'c dyn Fn(&str, &mut Described);
+
 /// What is changed.
 #[derive(Default)]
 pub struct Change<'c> {
@@ -32,6 +47,8 @@ pub struct Change<'c> {
     pub attachment: Option<(&'c str, &'c str, &'c str)>,
     /// Topics that are left out, their channels too.
     pub without: Option<&'c dyn Fn(&str) -> bool>,
+    /// The descriptions of topics' types.
+    pub describe: Option<Describe<'c>>,
     /// Place of a service call that is left out, among all.
     pub without_call: Option<usize>,
     /// Whether the hash beside a changed attachment stays the old one.
@@ -59,7 +76,7 @@ pub fn rewrite(from: &Path, to: &Path, change: &Change<'_>) {
         .create(BufWriter::new(file))
         .unwrap();
     let keeps = |topic: &str| !change.without.is_some_and(|without| without(topic));
-    let mut contents = read(&bytes, &mut writer, &keeps);
+    let mut contents = read(&bytes, &mut writer, &keeps, change.describe);
     if let Some(change_messages) = change.messages {
         change_messages(&mut contents.messages);
     }
@@ -73,20 +90,43 @@ pub fn rewrite(from: &Path, to: &Path, change: &Change<'_>) {
 }
 
 /// Everything in a file but what is not kept; its schemas and channels go into the new one at once.
-fn read(bytes: &[u8], writer: &mut Writer, keeps: &dyn Fn(&str) -> bool) -> Contents {
+fn read(
+    bytes: &[u8],
+    writer: &mut Writer,
+    keeps: &dyn Fn(&str) -> bool,
+    describe: Option<Describe<'_>>,
+) -> Contents {
     let mut schemas = BTreeMap::new();
     let mut channels = BTreeMap::new();
     let mut contents = Contents::default();
     for record in mcap::read::ChunkFlattener::new(bytes).unwrap() {
         match record.unwrap() {
             Record::Schema { header, data } => {
-                let id = writer.add_schema(&header.name, &header.encoding, &data);
-                schemas.insert(header.id, id.unwrap());
+                schemas.insert(header.id, (header, data.into_owned()));
             }
-            Record::Channel(channel) if keeps(&channel.topic) => {
-                let schema = schemas[&channel.schema_id];
-                let encoding = &channel.message_encoding;
-                let id = writer.add_channel(schema, &channel.topic, encoding, &channel.metadata);
+            Record::Channel(mut channel) if keeps(&channel.topic) => {
+                let (schema, definition) = &schemas[&channel.schema_id];
+                let hash = channel.metadata.remove("topic_type_hash");
+                let mut described = Described {
+                    type_name: schema.name.clone(),
+                    definition: definition.clone(),
+                    message_encoding: channel.message_encoding,
+                    type_hash: hash.unwrap_or_default(),
+                };
+                if let Some(describe) = describe {
+                    describe(&channel.topic, &mut described);
+                }
+                let Described {
+                    type_name,
+                    definition,
+                    message_encoding,
+                    type_hash,
+                } = described;
+                let hash = ("topic_type_hash".to_owned(), type_hash);
+                channel.metadata.extend([hash]);
+                let schema = writer.add_schema(&type_name, &schema.encoding, &definition);
+                let (topic, metadata) = (&channel.topic, &channel.metadata);
+                let id = writer.add_channel(schema.unwrap(), topic, &message_encoding, metadata);
                 channels.insert(channel.id, (id.unwrap(), channel.topic));
             }
             Record::Message { mut header, data } => {

@@ -167,8 +167,8 @@ fn what_cannot_be_played_is_refused_with_the_reason() {
             2,
             "to_s = 4 s is before from_s = 5 s",
         ),
-        (&["--to", "-1"], 2, "to_s = -1: must be 0 to 1000000000"),
-        (&["--delay", "inf"], 2, "delay_s = inf: must be 0 to 60"),
+        (&["--to", "-1"], 2, "to_s = -1 s: must be 0 to 9000000000 s"),
+        (&["--delay", "inf"], 2, "delay_s = inf s: must be 0 to 60 s"),
         (&["--", "--ros-args", "-r"], 2, "`-r` needs a value"),
         // The arguments are right, and the bag is not one for them.
         (&["--topics", "/nobody"], 1, "no message of [\"/nobody\"]"),
@@ -200,8 +200,16 @@ fn a_bag_that_is_looped_begins_again_in_its_order_until_it_is_stopped() {
     play.args(["--delay", "2", "--topics", &topic]);
     let mut play = Process::start(play);
     let rounds = 3 * sent.len();
-    graph.wait_longer(END, "three rounds of touches", |graph| {
-        (graph.bytes_of(&topic).len() >= rounds).then_some(())
+    // Clocks are best effort: a busy computer loses some.
+    let goes_back = |graph: &Graph| {
+        let clocks = graph.since(&topics::CLOCK, began).into_iter();
+        let times: Vec<_> = clocks
+            .map(|(_, m)| (m.clock.sec, m.clock.nanosec))
+            .collect();
+        times.windows(2).filter(|pair| pair[1] < pair[0]).count()
+    };
+    graph.wait_longer(END, "three rounds of touches and of the clock", |graph| {
+        (graph.bytes_of(&topic).len() >= rounds && goes_back(graph) >= 2).then_some(())
     });
     assert!(play.is_running(), "a loop has no end");
     play.stop();
@@ -210,11 +218,4 @@ fn a_bag_that_is_looped_begins_again_in_its_order_until_it_is_stopped() {
     let differs = heard.iter().zip(again).position(|(h, s)| !is_whole(h, s));
     eprintln!("{} touches, {} in the bag", heard.len(), sent.len());
     assert_eq!(differs, None);
-    let clocks = graph.since(&topics::CLOCK, began);
-    let times: Vec<_> = clocks
-        .iter()
-        .map(|(_, m)| (m.clock.sec, m.clock.nanosec))
-        .collect();
-    let back = times.windows(2).filter(|pair| pair[1] < pair[0]).count();
-    assert!(back >= 2, "the bag's time went back {back} times");
 }

@@ -53,7 +53,11 @@ fn bad_parameters_are_refused_with_file_key_and_value() {
         (
             "hold_s: 60.0",
             "hold_s: .nan",
-            &["axis_compensation.yaml", "line 12", "hold_s: .nan"],
+            &[
+                "axis_compensation.yaml",
+                "axis_compensation.yaml:12:13",
+                "hold_s = .nan",
+            ],
         ),
         (
             "hold_s: 60.0",

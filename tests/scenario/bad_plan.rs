@@ -1,5 +1,8 @@
 //! Plans that cannot work are refused whole, with step and values, before anything moves.
 
+use std::time::{Duration, Instant};
+
+use abbe_tests::program::{Process, command};
 use abbe_tests::scenario::Scenario;
 
 use crate::cell::build;
@@ -26,15 +29,15 @@ fn bad_steps_are_refused_with_their_place_and_values() {
     for (step, words) in [
         (
             latency("0.0, 240.0", 3),
-            &["steps[1]", "feeds[0] = 0 mm/min"][..],
+            &["steps[1]", "feeds_mm_min[0] = 0 mm/min"][..],
         ),
         (
             latency("120.0, -60.0", 3),
-            &["steps[1]", "feeds[1] = -60 mm/min"],
+            &["steps[1]", "feeds_mm_min[1] = -60 mm/min"],
         ),
         (
             latency(".nan, 240.0", 3),
-            &["plan.yaml", "line 4, column 54", ".nan"],
+            &["plan.yaml", "plan.yaml:4:54", ".nan"],
         ),
         (
             latency("60.0, 240.0, 60.0", 3),
@@ -64,7 +67,7 @@ fn bad_steps_are_refused_with_their_place_and_values() {
         ),
         (
             "{do: wait, seconds: .nan}".to_owned(),
-            &["plan.yaml", "line 4", ".nan"],
+            &["plan.yaml:4:25", ".nan"],
         ),
         (
             "{do: wait, minutes: 1.0}".to_owned(),
@@ -112,4 +115,38 @@ fn a_run_with_a_bad_plan_ends_at_once_with_exit_code_1() {
     // Nor does a folder of a run stay that was none.
     let runs = std::fs::read_dir(scenario.out()).unwrap();
     assert_eq!(runs.count(), 0);
+}
+
+/// Running such a plan or looking at it before takes as long as reading it.
+const AT_ONCE: Duration = Duration::from_secs(10);
+
+#[test]
+fn counts_beyond_their_bound_end_run_and_preflight_at_once_with_line_key_value_and_bound() {
+    let grid = "{do: grid, placement: table, trajectory: circle, radius_mm: 100.0, feed_mm_min: 3000.0, on_the_fly: true, repeats: 4000000000}";
+    let latency =
+        "{do: latency, feature: block_1.z, feeds_mm_min: [120.0, 360.0], repeats: 100000000}";
+    let positioning = "{do: positioning, axis: X, targets_mm: [0.0, 50.0, 100.0], runs: 1000000000, dwell_s: 1.0, feed_mm_min: 2000.0, overrun_mm: 5.0, at_mm: [0.0, 0.0, 200.0]}";
+    for (step, words) in [
+        (grid, "steps[0].repeats = 4000000000: at most 10000"),
+        (latency, "steps[0].repeats = 100000000: at most 10000"),
+        (positioning, "steps[0].runs = 1000000000: at most 10000"),
+    ] {
+        let scenario = Scenario::copy_of("cold_reference");
+        scenario.write("plan.yaml", &format!("title: t\nsteps:\n  - {step}\n"));
+        let folder = scenario.folder().display().to_string();
+        let preflight = Process::start(command(0, &["preflight", &folder]));
+        for process in [scenario.start(&[]), preflight] {
+            let since = Instant::now();
+            let ended = process.ended_within(AT_ONCE);
+            assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+            let column = |place: &str| place.bytes().all(|byte| byte.is_ascii_digit());
+            let placed = ended.said.lines().any(|line| {
+                let (_, place) = line.split_once("plan.yaml:3:").unwrap_or_default();
+                let at = place.split_once(": ");
+                at.is_some_and(|(place, rest)| column(place) && rest.starts_with(words))
+            });
+            assert!(placed, "{words}: {}", ended.said);
+            eprintln!("{words}: {:?}", since.elapsed());
+        }
+    }
 }

@@ -93,10 +93,14 @@ fn check(at: &str, schema: &Value, value: &Value, found: &mut Vec<String>) {
             }
             "properties" => {
                 let properties = rule.as_object().unwrap();
+                let required = schema.get("required").and_then(Value::as_array);
+                let must_be =
+                    |key: &str| required.is_some_and(|keys| keys.iter().any(|k| k == key));
                 for (key, of_key) in properties {
                     match value.get(key) {
                         Some(inner) => check(&format!("{at}.{key}"), of_key, inner, found),
-                        None => found.push(format!("{at}: no {key}")),
+                        None if must_be(key) => found.push(format!("{at}: no {key}")),
+                        None => {}
                     }
                 }
                 let keys = value.as_object().into_iter().flatten();
@@ -150,12 +154,66 @@ fn by_a_validator(report: &Path, wrong: &Value) {
     assert_eq!(found.len(), 3, "{found:?}");
 }
 
+/// The terminal has the checks of the backlash with the figures of the report.
+fn is_explained(report: &Value, said: &str) {
+    let causes = report["causes"].as_array().unwrap();
+    let own = |cause: &&Value| cause["effect"] == "backlash" && cause["axis"] == "X";
+    let cause = causes
+        .iter()
+        .find(own)
+        .unwrap_or_else(|| panic!("{causes:#?}"));
+    let why = cause["why"].as_array().unwrap();
+    let noise = why.iter().find(|check| check["check"] == "above_noise");
+    let noise = noise.unwrap_or_else(|| panic!("{why:#?}"));
+    assert_eq!(noise["value"], cause["D"]);
+    let own = said
+        .lines()
+        .skip_while(|line| !line.contains("check of backlash X"));
+    let lines = own.map(|line| line.split_whitespace().collect());
+    let lines: Vec<Vec<&str>> = lines.collect();
+    let line = lines
+        .iter()
+        .find(|line| line.starts_with(&["size", "over", "noise,", "D"]));
+    let line = line.unwrap_or_else(|| panic!("{said}"));
+    assert_eq!(line[5..7], ["at", "least"], "{line:?}");
+    let printed = |place: usize| -> f64 { line[place].parse().unwrap() };
+    for (place, key) in [(4, "value"), (7, "limit")] {
+        let whole = noise[key].as_f64().unwrap();
+        assert!((printed(place) / whole - 1.0).abs() < 0.005, "{line:?}");
+    }
+    let verdict = if noise["verdict"] == "passed" {
+        "passed"
+    } else {
+        "FAILED"
+    };
+    assert_eq!(line.last(), Some(&verdict));
+    if cause["status"] == "named" {
+        assert!(
+            said.contains("backlash X, named: it passes all of"),
+            "{said}"
+        );
+    }
+}
+
 fn loss_is_said_first(said: &str) {
     for word in ["bag_0.mcap", "messages were read before"] {
         assert!(said.contains(word), "{word}: {said}");
     }
     let place = |word: &str| said.find(word).unwrap_or(usize::MAX);
     assert!(place("Lost:") < place("Where:"), "{said}");
+}
+
+fn is_whole_page(html: &Path) {
+    let page = std::fs::read_to_string(html).unwrap();
+    for word in [
+        "<svg",
+        "<details><summary>backlash X",
+        "What can be told from what",
+        "prefers-color-scheme",
+    ] {
+        assert!(page.contains(word), "{word}");
+    }
+    page::is_one_file(&page);
 }
 
 #[test]
@@ -176,6 +234,7 @@ fn a_real_report_obeys_its_schema_and_a_cut_bag_is_read_up_to_the_cut_with_exit_
             &html.display().to_string(),
             "--write-machine",
             &written.display().to_string(),
+            "--explain",
         ],
     );
     assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
@@ -184,6 +243,7 @@ fn a_real_report_obeys_its_schema_and_a_cut_bag_is_read_up_to_the_cut_with_exit_
     }
     let whole = json(&report);
     assert_eq!(against_schema(&whole), Vec::<String>::new());
+    is_explained(&whole, &ended.said);
     assert_eq!(whole["inputs"]["bags"][0]["runs"], 12);
     let mut wrong = whole.clone();
     wrong["causes"] = Value::String("none".to_owned());
@@ -191,11 +251,7 @@ fn a_real_report_obeys_its_schema_and_a_cut_bag_is_read_up_to_the_cut_with_exit_
     wrong["score"] = Value::from(1);
     assert_eq!(against_schema(&wrong).len(), 3, "a wrong report is noticed");
     by_a_validator(&report, &wrong);
-    let page = std::fs::read_to_string(&html).unwrap();
-    for word in ["<svg", "What can be told from what", "prefers-color-scheme"] {
-        assert!(page.contains(word), "{word}");
-    }
-    page::is_one_file(&page);
+    is_whole_page(&html);
     assert!(written.is_file());
 
     let file = mcap_file(&bag);

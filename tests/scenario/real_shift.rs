@@ -106,6 +106,70 @@ fn val_nist_the_programs_of_the_shift_have_its_turns_and_travels() {
     }
 }
 
+/// How `import-shift` of a log with a mapping ends, what it says, and how many programs it writes.
+fn imported(log: &str, map: &str) -> (Option<i32>, String, usize) {
+    let home = tempfile::tempdir().unwrap();
+    let place = |name: &str| home.path().join(name);
+    std::fs::write(place("log.shdr"), log).unwrap();
+    std::fs::write(place("map.yaml"), map).unwrap();
+    let folder = root().join("launch_configs/real_shift");
+    let ended = command(0, &["import-shift", "--map"])
+        .arg(place("map.yaml"))
+        .arg("--order")
+        .arg(folder.join("order.yaml"))
+        .arg("--machine")
+        .arg(folder.join("machine.yaml"))
+        .arg("-o")
+        .arg(place("out"))
+        .arg(place("log.shdr"))
+        .output()
+        .unwrap();
+    let programs = std::fs::read_dir(place("out")).map_or(0, Iterator::count);
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    (ended.status.code(), said, programs)
+}
+
+/// The order is of 2016-11-29 from 11:15 to 15:15: four hours are 16 programs of 900 s.
+#[test]
+fn a_log_that_lacks_the_shift_or_a_part_of_it_is_no_standing_machine() {
+    let map = read(&root().join(DATA).join("mazak01_map.yaml"));
+    let whole = "2016-11-29T11:00:00Z|Srpm|600\n2016-11-29T13:00:00Z|Srpm|1200\n2016-11-29T16:00:00Z|Srpm|0\n";
+    assert_eq!(imported(whole, &map), (Some(0), String::new(), 16));
+    let none = [
+        (String::new(), "no line with a value has a date"),
+        ("hello\n".to_owned(), "1 lines without a bar"),
+        (
+            whole.replace("2016", "2026"),
+            "it reaches from 2026-11-29T11:00:00Z to 2026-11-29T16:00:00Z: correct from and to in the order",
+        ),
+    ];
+    for (log, words) in none {
+        let (code, said, programs) = imported(&log, &map);
+        assert_eq!((code, programs), (Some(1), 0), "{said}");
+        assert!(said.contains(words), "{said}");
+    }
+    let half = "of 2016-11-29T11:15:00Z to 2016-11-29T15:15:00Z, the log tells of 2016-11-29T11:15:00Z to 2016-11-29T13:00:00Z";
+    let leap = "the machine's clock leaps from 2016-11-29T13:00:00Z to 2016-12-01T16:00:00Z";
+    for (log, words) in [
+        (whole.replace("2016-11-29T16:00:00Z|Srpm|0\n", ""), half),
+        (
+            whole.replace("29T16", "31T16").replace("11-31", "12-01"),
+            leap,
+        ),
+    ] {
+        let (code, said, programs) = imported(&log, &map);
+        assert_eq!((code, programs), (Some(3), 16), "{said}");
+        assert!(said.contains(words), "{said}");
+    }
+    let (code, said, programs) = imported(whole, "values: {}\n");
+    assert_eq!((code, programs), (Some(1), 0));
+    assert!(
+        said.contains("map.yaml: the mapping has no spindle speed \"spindle_speed\"")
+            && !said.contains("log.shdr"),
+        "{said}"
+    );
+}
+
 /// Of the log that stands beside: `awk -F'|' '$2=="Stemp" && $3+0>0' shift.shdr | wc -l` and the same with `$3=="0"`.
 #[test]
 fn scenario_a_real_shift_is_compensated_and_its_log_stands_beside_it() {

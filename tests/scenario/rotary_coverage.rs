@@ -2,13 +2,14 @@
 //! linear axes, error motions and probe are not perfect either and whose physics is its own.
 
 use fake_cnc::{Plant, PlantFile};
-use machine::poses::{ReachLimits, calibration_poses};
+use machine::poses::{ReachLimits, calibration_poses, verification_poses};
 use machine::{MachineFile, SphereDesign};
 use metrology::{Axis, PerAxis};
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use rotary_axes::verification::{Verification, verify};
 use rotary_axes::{
     Allowance, EstimateRules, Known, RotaryAxesConfig, RotaryEstimate, SphereVisit, estimate,
 };
@@ -135,6 +136,27 @@ fn standardised(found: &RotaryEstimate, truth: &[(&str, f64)]) -> Vec<[f64; 2]> 
     truth.iter().map(of).collect()
 }
 
+/// What verifications at other poses leave is what they expect: neither more nor much less, and more than the noise.
+fn judge_verifications(all: &[Verification]) {
+    let sum = |of: fn(&Verification) -> f64| all.iter().map(|one| of(one).powi(2)).sum::<f64>();
+    let left = sum(|one| one.rms_after_mm);
+    let (allowed, noise) = (sum(|one| one.allowed_mm), sum(|one| one.expected_mm));
+    let beyond = |p: f64| {
+        let n = all.iter().filter(|one| one.judged.p < p).count();
+        n as f64 / all.len() as f64
+    };
+    eprintln!(
+        "verifications: rms left over rms expected {:.2}, over the noise alone {:.2}; p below 0.05 in {:.3}, below 0.01 in {:.3} of them",
+        (left / allowed).sqrt(),
+        (left / noise).sqrt(),
+        beyond(0.05),
+        beyond(0.01)
+    );
+    assert!((0.6..=1.15).contains(&(left / allowed).sqrt()));
+    assert!((left / noise).sqrt() > 1.5, "the allowances do nothing");
+    assert!(beyond(0.05) <= 0.12 && beyond(0.01) <= 0.05);
+}
+
 #[test]
 fn coverage_of_95_percent_intervals_over_machines_of_the_plant() {
     let machine = MachineFile::parse(&text("machine.yaml"), "machine.yaml").unwrap();
@@ -147,7 +169,10 @@ fn coverage_of_95_percent_intervals_over_machines_of_the_plant() {
     let poses = spheres
         .each_ref()
         .map(|(name, _)| calibration_poses(&machine, name, 16, &ReachLimits::default()).unwrap());
+    let others =
+        verification_poses(&machine, "high", 8, &poses[0], &ReachLimits::default()).unwrap();
     let mut all: Vec<Vec<[f64; 2]>> = Vec::new();
+    let mut verified: Vec<Verification> = Vec::new();
     for seed in 0..MACHINES {
         let mut drawn = Drawn::new(seed, &machine, &allowance);
         let mut visits = Vec::new();
@@ -161,11 +186,14 @@ fn coverage_of_95_percent_intervals_over_machines_of_the_plant() {
             linear: None,
         };
         let found = estimate(&design, &visits, &spheres, &RULES).unwrap();
-        all.push(standardised(
-            &found.with_common(&design, known),
-            &drawn.truth,
-        ));
+        let found = found.with_common(&design, known);
+        all.push(standardised(&found, &drawn.truth));
+        let (name, place) = &spheres[0];
+        let high = |pose| drawn.visit(&design, (name, place), pose);
+        let visits: Vec<SphereVisit> = others.iter().map(high).collect();
+        verified.push(verify(&design, &found, known, &visits, &spheres[..1], true).unwrap());
     }
+    judge_verifications(&verified);
     for (at, (name, _)) in Drawn::new(0, &machine, &allowance).truth.iter().enumerate() {
         let rms = |k: usize| {
             (all.iter().map(|one| one[at][k].powi(2)).sum::<f64>() / MACHINES as f64).sqrt()

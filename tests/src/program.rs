@@ -1,13 +1,17 @@
 //! The built command line, and nodes as processes of it.
 
+use std::collections::BTreeMap;
+use std::fs::{self, File};
 use std::io::Read;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Mutex;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
-use nix::unistd::Pid;
+use nix::unistd::{Pid, getuid};
 
 /// The root of the workspace.
 #[must_use]
@@ -33,18 +37,53 @@ pub fn abbe() -> PathBuf {
     program
 }
 
-/// A domain for one test, `0` to `19`; other processes of these tests get others, and so do the
-/// tests of `node_runtime`. From domain 102 on DDS's ports are those that Linux gives out to anybody.
+/// Domains that these tests share out. The tests of `node_runtime` have those below; from domain 102 on DDS's ports are
+/// those that Linux gives out to anybody.
+const DOMAINS: RangeInclusive<u16> = 40..=101;
+
+/// Domains of this process by the number of their test, each with the file whose lock keeps other processes off it.
+static TAKEN: Mutex<BTreeMap<u16, (u16, File)>> = Mutex::new(BTreeMap::new());
+
+/// The domain of one test of this program, `0` to `19`. No other process has it while this one lives.
+///
+/// # Panics
+/// When every domain is taken.
 #[must_use]
 pub fn domain(test: u16) -> u16 {
     assert!(test < 20, "a test's number is 0 to 19");
-    let process = u16::try_from(std::process::id() % 3).unwrap();
-    40 + process * 20 + test
+    let mut taken = TAKEN.lock().unwrap();
+    if let Some((domain, _)) = taken.get(&test) {
+        return *domain;
+    }
+    let folder = std::env::temp_dir().join(format!("abbe_test_domains_{}", getuid()));
+    fs::create_dir_all(&folder).unwrap();
+    let free = DOMAINS.into_iter().find_map(|domain| {
+        let lock = File::create(folder.join(domain.to_string())).unwrap();
+        lock.try_lock().is_ok().then_some((domain, lock))
+    });
+    let (domain, lock) =
+        free.expect("no domain is free: other test programs hold all of 40 to 101");
+    taken.insert(test, (domain, lock));
+    domain
 }
 
-/// `abbe` with `arguments`, on loopback and in a domain.
+/// Verbs that print a short text, unless they are asked for all of it.
+const SHORT: [&str; 4] = ["run", "report", "diagnose", "preflight"];
+
+/// `abbe` with `arguments`, on loopback and in a domain; it prints all that it has to say.
 #[must_use]
 pub fn command(domain: u16, arguments: &[&str]) -> Command {
+    match arguments {
+        [verb, rest @ ..] if SHORT.contains(verb) => {
+            as_given(domain, &[&[*verb, "--full"][..], rest].concat())
+        }
+        _ => as_given(domain, arguments),
+    }
+}
+
+/// `abbe` with these arguments and no other, on loopback and in a domain.
+#[must_use]
+pub fn as_given(domain: u16, arguments: &[&str]) -> Command {
     let mut command = Command::new(abbe());
     command
         .args(arguments)

@@ -4,23 +4,21 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use metrology::stamp::NANOS_PER_S;
+use metrology::text::{self, Comments};
 use node_runtime::arguments::Arguments;
-use node_runtime::complain;
 use node_runtime::{Node, Setup};
 use recorder::{Bag, RecordedRun, RunNode, verify_attachments};
-use replayer::{Difference, Discrepancy, NotInBag, Outcome, Relay, ReplayError};
+use replayer::{Difference, Discrepancy, Doubtful, NotInBag, Outcome, Relay, ReplayError};
 use serde_json::json;
 
+use crate::loss;
 use crate::node;
 use crate::tell::tell;
-
-/// Exit code for a bag of which a part was lost and the rest is equal.
-const DONE_WITH_LOSS: u8 = 3;
 
 /// Nodes whose messages are what a replay puts in.
 const SOURCES: [&str; 4] = [
@@ -45,8 +43,8 @@ pub struct Check {
 }
 
 impl Check {
-    /// Recomputes and compares. Exit code 1 when anything differs, 3 when a part of the bag was lost and the rest is
-    /// equal.
+    /// Recomputes and compares. Exit code 1 when anything differs, 3 when a part of the bag was lost or left out, or its
+    /// log times leap, and nothing differs before that.
     ///
     /// # Errors
     /// When the bag cannot be read or is none of a run in simulated time.
@@ -58,13 +56,11 @@ impl Check {
         } else {
             tell!("{}", page(&self.bag, &outcome));
         }
-        for loss in &outcome.losses {
-            complain!("abbe: {loss}");
-        }
-        Ok(match (outcome.is_equal(), outcome.losses.is_empty()) {
-            (false, _) => ExitCode::FAILURE,
-            (true, true) => ExitCode::SUCCESS,
-            (true, false) => ExitCode::from(DONE_WITH_LOSS),
+        loss::complain_of(&outcome.reading);
+        Ok(if outcome.is_equal() {
+            loss::exit_code(outcome.reading.is_whole() && outcome.reading.leaps.is_none())
+        } else {
+            ExitCode::FAILURE
         })
     }
 }
@@ -107,7 +103,8 @@ fn build(bag: &Bag, ran: &RunNode, files: &Path) -> Result<Box<dyn Node>> {
     let Some(parameters) = bag.attachment(&name)? else {
         bail!("the bag has no attachment {name}");
     };
-    let text = String::from_utf8(parameters.data).with_context(|| format!("attachment {name}"))?;
+    let text = text::decode(&parameters.data, Comments::Yaml)
+        .map_err(|wrong| anyhow!("attachment {name}:{wrong}"))?;
     let file = files.join(format!("{}.yaml", ran.name));
     std::fs::write(&file, parameter_file(&text))?;
     let words = [
@@ -149,21 +146,29 @@ fn page(path: &Path, outcome: &Outcome) -> String {
         ]);
     }
     let compared: u64 = outcome.compared.values().map(|c| c.messages).sum();
-    let verdict = match &outcome.first {
-        None if outcome.compared_nothing() => format!(
+    let verdict = match (&outcome.first, &outcome.doubtful) {
+        (None, _) if outcome.compared_nothing() => format!(
             "nothing to compare: the bag has none of the topics that were computed ({})",
             listed(&outcome.not_in_bag)
         ),
-        None if compared == 0 => "nothing to compare: no node of this run computes anything from what was recorded (controllers, \
+        (None, None) if compared == 0 => "nothing to compare: no node of this run computes anything from what was recorded (controllers, \
              sequencer and recorder are not computed again)"
             .to_owned(),
-        None => format!(
+        (None, Some(Doubtful { messages, first })) => format!(
+            "equal up to the first input that was lost or left out, or the first leap of the log times; {messages} messages behind it differ, which may come of that; first {}",
+            in_words(first)
+        ),
+        (None, None) => format!(
             "equal: {compared} messages were computed again byte for byte from {} inputs",
             outcome.inputs
         ),
-        Some(first) => format!("differs; first {}", in_words(first)),
+        (Some(first), _) => format!("differs; first {}", in_words(first)),
     };
-    format!("{}\n\n{table}\n\n{verdict}", path.display())
+    let skipped = match outcome.reading.leaps.line() {
+        Some(line) => format!("\n{line}: no timer ran through a leap"),
+        None => String::new(),
+    };
+    format!("{}\n\n{table}\n\n{verdict}{skipped}", path.display())
 }
 
 fn listed(not_in_bag: &BTreeMap<String, NotInBag>) -> String {
@@ -197,16 +202,21 @@ fn in_words(difference: &Difference) -> String {
 }
 
 fn as_json(path: &Path, outcome: &Outcome) -> serde_json::Value {
-    let losses: Vec<String> = outcome.losses.iter().map(ToString::to_string).collect();
+    let losses = outcome.reading.losses.iter();
+    let losses: Vec<String> = losses.map(ToString::to_string).collect();
     json!({
         "schema": "abbe.check/1",
         "bag": path.display().to_string(),
-        "equal": outcome.is_equal(),
+        "equal": outcome.is_equal() && outcome.doubtful.is_none(),
         "inputs": outcome.inputs,
         "compared": outcome.compared,
         "not_in_bag": outcome.not_in_bag,
         "first_difference": outcome.first,
+        "doubtful": outcome.doubtful,
         "losses": losses,
+        "loss": loss::as_json(&outcome.reading),
+        "leaps": loss::leaps_as_json(&outcome.reading.leaps),
+        "account": loss::account_as_json(&outcome.reading.account),
     })
 }
 

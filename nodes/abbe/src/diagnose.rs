@@ -1,6 +1,7 @@
 //! `abbe diagnose BAG...`: where simulator and machine differ, which effect causes it, how far it shrinks.
 
 use node_runtime::complain;
+use node_runtime::text_file;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -11,18 +12,22 @@ use clap::Args;
 use gap_diagnosis::{Diagnosis, GapConfig, Rule, diagnose};
 use machine::MachineFile;
 use machine::effects::CATALOGUE;
+use recorder::Bag;
+use replayer::Reading;
 use sha2::{Digest, Sha256};
 
-use crate::report::{Report, gap};
+use crate::evaluate::test_conditions::TestConditions;
+use crate::loss;
+use crate::machine_defaults;
+use crate::report::terminal::Room;
+use crate::report::{Report, gap, test_conditions};
 use crate::tell::tell;
+use crate::whole_file;
 
 pub mod bags;
 mod machine_text;
 
 use bags::Recorded;
-
-/// Exit code for a diagnosis of bags of which a part was lost.
-const DONE_WITH_LOSS: u8 = 3;
 
 /// Arguments of `abbe diagnose`.
 #[derive(Args)]
@@ -45,6 +50,12 @@ pub struct Diagnose {
     /// Id of an effect that is not considered; may be given several times.
     #[arg(long, value_name = "EFFECT", value_parser = effect)]
     without: Vec<String>,
+    /// Print why each cause has its status: every check with value, limit and verdict.
+    #[arg(long)]
+    explain: bool,
+    /// Print every table and remark, instead of the answer and three tables in at most 40 lines; `--explain` does too.
+    #[arg(long)]
+    full: bool,
     /// Rule that is switched off, to see what it is worth: constancy, free_shapes, swap_search, held_out,
     /// recalibration; may be given several times.
     #[arg(long, value_name = "RULE")]
@@ -57,12 +68,36 @@ pub struct Diagnosed {
     pub diagnosis: Diagnosis,
     /// What was left out, in words.
     pub remarks: Vec<String>,
-    /// Parts of the bags that could not be read, in words.
-    pub losses: Vec<String>,
+    /// What of each bag was read, lost and left out.
+    pub readings: Vec<Reading>,
+    /// Defaults of the machine file that the diagnosis uses, as `axes.X.lead_mm = 10.0`.
+    pub defaults: Vec<String>,
+}
+
+impl Diagnosed {
+    /// What was lost or left out, in words.
+    pub fn losses(&self) -> Vec<String> {
+        bags::lines(&self.readings)
+    }
+
+    /// The report as JSON. What was lost or left out is a key of its own, where there is any, and so are defaults in use.
+    ///
+    /// # Errors
+    /// When a number has no place in JSON.
+    pub fn json(&self) -> Result<serde_json::Value> {
+        let mut report = serde_json::to_value(&self.diagnosis.report)?;
+        if self.readings.iter().any(|reading| !reading.is_whole()) {
+            report["loss"] = self.readings.iter().map(loss::as_json).collect();
+        }
+        if !self.defaults.is_empty() {
+            report["machine_defaults"] = self.defaults.as_slice().into();
+        }
+        Ok(report)
+    }
 }
 
 impl Diagnose {
-    /// Diagnoses; exit code 3 when a part of a bag was lost.
+    /// Diagnoses; exit code 3 when a part of a bag was lost or left out.
     ///
     /// # Errors
     /// When a bag or the machine file cannot be read, nothing was repeated, or the bag is another machine's.
@@ -70,8 +105,7 @@ impl Diagnose {
         let (name, text) = match &self.machine {
             Some(path) => (
                 path.display().to_string(),
-                std::fs::read_to_string(path)
-                    .with_context(|| format!("machine file {}", path.display()))?,
+                text_file::yaml(path).context("machine file")?,
             ),
             None => bags::machine_text(&self.bags[0])?,
         };
@@ -90,39 +124,41 @@ impl Diagnose {
         };
         let diagnosed = of(&self.bags, &name, &text, &config)?;
         let title = format!("Simulator against machine: {}", listed(&self.bags));
-        let page = gap::page(&title, &diagnosed)?;
-        let json = serde_json::to_string_pretty(&diagnosed.diagnosis.report)?;
+        let mut page = gap::page(&title, &diagnosed, self.explain)?;
+        for path in &self.bags {
+            let seen = TestConditions::of(&Bag::open(path)?);
+            page.add_conditions(&test_conditions::of(&seen, None, None));
+        }
+        let json = serde_json::to_string_pretty(&diagnosed.json()?)?;
         let on_terminal = self.json.as_deref() == Some(Path::new("-"));
         if on_terminal {
             tell!("{json}");
-        } else {
+        } else if self.full || self.explain {
             tell!("{}", page.terminal());
+        } else {
+            tell!("{}", page.short(&Room::with_page(self.html.as_deref())));
         }
         for (path, contents) in [
             (self.json.as_ref().filter(|_| !on_terminal), &json),
             (self.html.as_ref(), &page.html()),
         ] {
             if let Some(path) = path {
-                std::fs::write(path, contents).with_context(|| format!("{}", path.display()))?;
+                whole_file::write(path, contents)?;
             }
         }
         if let Some(path) = &self.write_machine {
             let new = machine_text::with_effects(&text, &name, &diagnosed.diagnosis.effects)?;
-            std::fs::write(path, new).with_context(|| format!("{}", path.display()))?;
+            whole_file::write(path, &new)?;
             let added = diagnosed.diagnosis.effects.len();
             complain!(
                 "abbe: {}: the machine file with {added} effects added",
                 path.display()
             );
         }
-        for remark in diagnosed.losses.iter().chain(&diagnosed.remarks) {
+        for remark in diagnosed.losses().iter().chain(&diagnosed.remarks) {
             complain!("abbe: {remark}");
         }
-        Ok(if diagnosed.losses.is_empty() {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::from(DONE_WITH_LOSS)
-        })
+        Ok(loss::exit_code(diagnosed.losses().is_empty()))
     }
 }
 
@@ -155,33 +191,38 @@ pub fn of(
 ) -> Result<Diagnosed> {
     let began = Instant::now();
     let machine = MachineFile::parse(machine_text, name)?;
+    let left_out = machine_defaults::of(&machine, machine_text);
     let recorded = Recorded::read(paths, &machine)?;
     let mut diagnosis = diagnose(&machine, &recorded.session, config)
-        .map_err(|error| bags::not_whole(error.into(), &recorded.losses))?;
+        .map_err(|error| bags::not_whole(error.into(), &bags::lines(&recorded.readings)))?;
     diagnosis.report.inputs.bags = recorded.bags;
     diagnosis.report.inputs.machine_sha256 = format!("{:x}", Sha256::digest(machine_text));
     diagnosis.report.runtime_s = began.elapsed().as_secs_f64();
+    let (session, report) = (&recorded.session, &diagnosis.report);
+    let defaults = machine_defaults::of_diagnosis(&machine, &left_out, session, report);
+    let leaps = recorded.readings.iter().filter_map(|it| it.leaps.line());
+    let remarks = recorded.remarks.into_iter().chain(leaps).collect();
     Ok(Diagnosed {
         diagnosis,
-        remarks: recorded.remarks,
-        losses: recorded.losses,
+        remarks,
+        readings: recorded.readings,
+        defaults,
     })
 }
 
-/// The diagnosis of a run's own bag as a part of its page; without one, why.
+/// The diagnosis of a run's own bag as a part of its page, for `explain` as [`gap::page`] has it; without one, why.
 ///
 /// # Errors
 /// When a plot cannot be drawn or the report not written.
-pub fn of_run(bag: &Path, folder: &Path, machine: &Path) -> Result<Report> {
-    let text = std::fs::read_to_string(machine)
-        .with_context(|| format!("machine file {}", machine.display()))?;
+pub fn of_run(bag: &Path, folder: &Path, machine: &Path, explain: bool) -> Result<Report> {
+    let text = text_file::yaml(machine).context("machine file")?;
     let name = machine.display().to_string();
     match of(&[bag.to_owned()], &name, &text, &GapConfig::default()) {
         Ok(diagnosed) => {
-            let json = serde_json::to_string_pretty(&diagnosed.diagnosis.report)?;
+            let json = serde_json::to_string_pretty(&diagnosed.json()?)?;
             let path = folder.join("gap.json");
-            std::fs::write(&path, json).with_context(|| format!("{}", path.display()))?;
-            gap::page("Simulator against machine", &diagnosed)
+            whole_file::write(&path, &json)?;
+            gap::page("Simulator against machine", &diagnosed, explain)
         }
         Err(error) => Ok(gap::without(
             "Simulator against machine",

@@ -2,27 +2,55 @@
 //!
 //! A bag is read once, in the order of time; what is kept is no more than the readings of its tests.
 
-use abbe_msgs::topics::{self, Topic};
-use abbe_msgs::{Message, Wire, from_cdr};
-use anyhow::Result;
+use abbe_msgs::topics;
 use machine::MachineFile;
 use metrology::sample::{
     AxisCompensation, BlockMeasurement, GeometryModel, PositioningTable, ProbedFeature,
     ProbedPoint, TestSegment,
 };
-use recorder::{Bag, Event, Loss, Order};
+use recorder::{Bag, Order};
+use replayer::{Reading, Taken, reading};
 
+pub mod angular;
+mod belonging;
 pub mod budget;
 pub mod circles;
+pub mod correction;
+pub mod drift;
 pub mod limits;
 pub mod linear;
 pub mod stationwise;
 pub mod stops;
+pub mod test_conditions;
 
+use crate::machine_defaults;
+use angular::{RotaryRuns, RotaryTest};
+use belonging::Belonging;
+pub use belonging::BrokenOff;
 use circles::{CircleRecording, Circles};
+use drift::{Drift, Drifts};
 use linear::{LinearRuns, LinearTest};
 use stationwise::{StationCircle, Stationwise};
 use stops::{StopRuns, Stops};
+use test_conditions::TestConditions;
+
+/// Topics that evaluations read.
+const WANTED: [&str; 14] = [
+    topics::AXES_STATE.name,
+    topics::GRID_POSITION.name,
+    topics::LENGTH_POSITION.name,
+    topics::COMPENSATION.name,
+    topics::TEST_SEGMENT.name,
+    topics::PROBE_POINT.name,
+    topics::PROBE_FEATURE.name,
+    topics::BLOCKS_MEASUREMENT.name,
+    topics::GEOMETRY_MODEL.name,
+    topics::GEOMETRY_ROTARY.name,
+    topics::POSITIONING_TABLE.name,
+    topics::ANGLE_POSITION.name,
+    topics::TEMPERATURE.base,
+    topics::MACHINE.base,
+];
 
 /// Offsets below this are none, mm.
 const NOTHING_MM: f64 = 1e-7;
@@ -32,10 +60,14 @@ const NOTHING_MM: f64 = 1e-7;
 pub struct Tests {
     /// Circles over a grid encoder, or with a ballbar.
     pub circles: Vec<CircleRecording>,
-    /// The first circle with stops, for the published separation.
-    pub station_circle: Option<StationCircle>,
+    /// The circles with stops, for the published separation.
+    pub station_circles: Vec<StationCircle>,
     /// Positioning runs and diagonals.
     pub linear: Vec<LinearTest>,
+    /// Positioning runs of rotary axes.
+    pub rotary_positioning: Vec<RotaryTest>,
+    /// Displacements and temperatures over hours.
+    pub drift: Drift,
     /// Stops of verifications along one axis.
     pub stops: Vec<Stops>,
     /// Touches that were used, each with the test it belongs to.
@@ -50,8 +82,16 @@ pub struct Tests {
     pub rotary: Option<GeometryModel>,
     /// The last positioning table of each axis.
     pub tables: Vec<PositioningTable>,
-    /// What of the bag could not be read.
-    pub losses: Vec<Loss>,
+    /// Runs that the machine did not complete: nothing of them is evaluated.
+    pub broken_off: Vec<BrokenOff>,
+    /// Under which conditions the tests ran.
+    pub conditions: TestConditions,
+    /// The machine file of the bag, where it can be read.
+    pub machine: Option<MachineFile>,
+    /// What that file leaves to defaults, as [`machine_defaults::of`] writes it.
+    pub left_out: Vec<String>,
+    /// What of the bag was read, lost and left out.
+    pub reading: Reading,
 }
 
 /// Everything that collects while a bag is read.
@@ -61,100 +101,104 @@ struct Collected {
     circles: Circles,
     stationwise: Stationwise,
     linear: LinearRuns,
+    angular: RotaryRuns,
+    drifts: Drifts,
     stops: StopRuns,
+    belonging: Belonging,
     segment: Option<TestSegment>,
 }
 
 impl Tests {
-    /// Reads a bag.
-    ///
-    /// # Errors
-    /// When a message of a known topic cannot be decoded.
-    pub fn of(bag: &Bag) -> Result<Self> {
-        let machine = machine_file(bag);
+    /// Reads a bag; what cannot be used is left out and counted.
+    pub fn of(bag: &Bag) -> Self {
+        let (machine, left_out) = machine_file(bag).unzip();
         let mut collected = Collected {
             stationwise: Stationwise::new(machine.as_ref()),
             ..Collected::default()
         };
-        let mut messages = bag.messages(Order::LogTime);
-        let names: Vec<String> = bag
-            .topics()
-            .iter()
-            .map(|info| info.topic.trim_start_matches('/').to_owned())
-            .collect();
-        while let Some(event) = messages.next_event() {
-            match event {
-                Event::Message(message) => {
-                    let name = names.get(message.topic.index()).map_or("", String::as_str);
-                    collected.message(name, message.data)?;
-                }
-                Event::Loss(loss) => collected.tests.losses.push(loss),
-            }
-        }
+        let reading = reading::read(bag, Order::LogTime, &WANTED, |mut taken| {
+            collected.message(&mut taken);
+        });
         let mut tests = collected.tests;
+        tests.reading = reading;
+        tests.broken_off = collected.belonging.finish(&mut tests.reading.account);
         tests.circles = collected.circles.recordings();
-        tests.station_circle = collected.stationwise.circle();
+        tests.station_circles = collected.stationwise.circles();
         tests.linear = collected.linear.tests();
+        tests.rotary_positioning = collected.angular.tests();
+        tests.drift = collected.drifts.drift();
         tests.stops = collected.stops.stops();
-        Ok(tests)
+        tests.machine = machine;
+        tests.left_out = left_out.unwrap_or_default();
+        tests
     }
 }
 
-/// The machine file that a bag holds, where it can be read.
-fn machine_file(bag: &Bag) -> Option<MachineFile> {
+/// The machine file that a bag holds, where it can be read, and what it leaves to defaults.
+fn machine_file(bag: &Bag) -> Option<(MachineFile, Vec<String>)> {
     let attached = bag.attachment("machine.yaml").ok().flatten()?;
     let text = String::from_utf8(attached.data).ok()?;
-    MachineFile::parse(&text, "machine.yaml of the bag").ok()
-}
-
-/// Whether `name` is `topic`, in whatever namespace.
-fn is<M: Message>(name: &str, topic: &Topic<M>) -> bool {
-    name.strip_suffix(topic.name)
-        .is_some_and(|space| space.is_empty() || space.ends_with('/'))
-}
-
-fn read<M: Message + Wire>(_: &Topic<M>, bytes: &[u8]) -> Result<M::Inner> {
-    Ok(from_cdr::<M>(bytes)?.into_inner()?)
+    let machine = MachineFile::parse(&text, "machine.yaml of the bag").ok()?;
+    let left_out = machine_defaults::of(&machine, &text);
+    Some((machine, left_out))
 }
 
 impl Collected {
-    fn message(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
-        if is(name, &topics::AXES_STATE) {
-            if self.segment.is_some() || self.stationwise.listens() {
-                let state = read(&topics::AXES_STATE, bytes)?;
+    fn message(&mut self, taken: &mut Taken<'_>) {
+        let is_under_way = self.segment.is_some();
+        self.tests.conditions.message(taken);
+        if taken.is(&topics::AXES_STATE) {
+            let is_needed = is_under_way || self.stationwise.listens();
+            let state = is_needed.then(|| taken.of(&topics::AXES_STATE)).flatten();
+            if let Some(state) = state {
+                self.belonging.axes(&state, taken);
                 self.circles.axes(&state);
                 self.linear.axes(&state);
+                self.angular.axes(&state);
+                self.drifts.axes(&state);
                 self.stops.axes(&state);
                 self.stationwise.axes(state);
             }
-        } else if is(name, &topics::GRID_POSITION) {
-            if self.segment.is_some() {
-                let sample = read(&topics::GRID_POSITION, bytes)?;
+        } else if taken.is(&topics::TEST_SEGMENT) {
+            let segment = taken.of(&topics::TEST_SEGMENT);
+            if let Some(segment) = segment.filter(|it| self.belonging.segment(it, taken)) {
+                self.test(segment);
+            }
+        } else if taken.is(&topics::GRID_POSITION) && is_under_way {
+            let sample = taken.of(&topics::GRID_POSITION);
+            if let Some(sample) = sample.filter(|it| self.belonging.grid(it, taken)) {
                 self.circles.grid(&sample);
                 self.stationwise.grid(sample);
             }
-        } else if is(name, &topics::LENGTH_POSITION) {
-            if self.segment.is_some() {
-                let sample = read(&topics::LENGTH_POSITION, bytes)?;
+        } else if taken.is(&topics::LENGTH_POSITION) && is_under_way {
+            let sample = taken.of(&topics::LENGTH_POSITION);
+            if let Some(sample) = sample.filter(|it| self.belonging.length(it, taken)) {
                 self.circles.length(&sample);
                 self.linear.length(&sample);
+                self.drifts.length(&sample);
             }
-        } else if is(name, &topics::COMPENSATION) {
-            if self.segment.is_some() {
-                self.compensation(&read(&topics::COMPENSATION, bytes)?);
+        } else if taken.is(&topics::ANGLE_POSITION) && is_under_way {
+            let sample = taken.of(&topics::ANGLE_POSITION);
+            if let Some(sample) = sample.filter(|it| self.belonging.angle(it, taken)) {
+                self.angular.angle(&sample);
             }
-        } else if is(name, &topics::TEST_SEGMENT) {
-            self.test(read(&topics::TEST_SEGMENT, bytes)?);
+        } else if taken.is(&topics::COMPENSATION) && is_under_way {
+            if let Some(offsets) = taken.of(&topics::COMPENSATION) {
+                self.belonging.hold(taken);
+                self.compensation(&offsets);
+            }
         } else {
-            self.result(name, bytes)?;
+            self.result(taken);
         }
-        Ok(())
     }
 
     fn test(&mut self, segment: TestSegment) {
+        self.tests.conditions.segment(&segment);
         self.circles.segment(&segment);
         self.stationwise.segment(&segment);
         self.linear.segment(&segment);
+        self.angular.segment(&segment);
+        self.drifts.segment(&segment);
         self.stops.segment(&segment);
         self.segment = segment.begin.then_some(segment);
     }
@@ -170,27 +214,37 @@ impl Collected {
         self.stops.compensation(acts);
     }
 
-    fn result(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+    fn result(&mut self, taken: &mut Taken<'_>) {
         let tests = &mut self.tests;
-        if is(name, &topics::PROBE_POINT) {
-            let point = read(&topics::PROBE_POINT, bytes)?;
+        if taken.is_named(topics::TEMPERATURE.base) {
+            let sample = taken.of_member(&topics::TEMPERATURE);
+            let sensor = topics::TEMPERATURE.member_of(taken.topic());
+            if let Some((mut sample, sensor)) = sample.zip(sensor) {
+                sensor.clone_into(&mut sample.sensor);
+                self.drifts.temperature(&sample);
+            }
+        } else if taken.is_named(topics::MACHINE.base) {
+            let value = taken.of_member(&topics::MACHINE);
+            value.iter().for_each(|value| self.drifts.value(value));
+        } else if taken.is(&topics::PROBE_POINT) {
+            let point = taken.of(&topics::PROBE_POINT);
             let segment = self.segment.clone();
-            tests
-                .touches
-                .extend(segment.map(|segment| (segment, point)));
-        } else if is(name, &topics::PROBE_FEATURE) {
-            tests.features.push(read(&topics::PROBE_FEATURE, bytes)?);
-        } else if is(name, &topics::BLOCKS_MEASUREMENT) {
-            tests.blocks.push(read(&topics::BLOCKS_MEASUREMENT, bytes)?);
-        } else if is(name, &topics::GEOMETRY_MODEL) {
-            tests.geometry = Some(read(&topics::GEOMETRY_MODEL, bytes)?);
-        } else if is(name, &topics::GEOMETRY_ROTARY) {
-            tests.rotary = Some(read(&topics::GEOMETRY_ROTARY, bytes)?);
-        } else if is(name, &topics::POSITIONING_TABLE) {
-            let table = read(&topics::POSITIONING_TABLE, bytes)?;
+            tests.touches.extend(segment.zip(point));
+        } else if taken.is(&topics::PROBE_FEATURE) {
+            tests.features.extend(taken.of(&topics::PROBE_FEATURE));
+        } else if taken.is(&topics::BLOCKS_MEASUREMENT) {
+            tests.blocks.extend(taken.of(&topics::BLOCKS_MEASUREMENT));
+        } else if taken.is(&topics::GEOMETRY_MODEL) {
+            let model = taken.of(&topics::GEOMETRY_MODEL);
+            tests.geometry = model.or(tests.geometry.take());
+        } else if taken.is(&topics::GEOMETRY_ROTARY) {
+            let model = taken.of(&topics::GEOMETRY_ROTARY);
+            tests.rotary = model.or(tests.rotary.take());
+        } else if taken.is(&topics::POSITIONING_TABLE)
+            && let Some(table) = taken.of(&topics::POSITIONING_TABLE)
+        {
             tests.tables.retain(|known| known.axis != table.axis);
             tests.tables.push(table);
         }
-        Ok(())
     }
 }

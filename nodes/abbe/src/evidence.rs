@@ -1,8 +1,8 @@
 //! What a run leaves behind for its report: decoded messages of a few topics, and the truth where a scenario may see it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use abbe_msgs::{Message, Wire, from_cdr, topics};
+use abbe_msgs::{Defect, Message, Wire, WireError, from_cdr, topics};
 use metrology::sample::{
     AxisCompensation, BlockMeasurement, GeometryModel, PlanStatus, ProbeLatency, ProbedPoint,
     TestKind, TestSegment, ThermalModel,
@@ -10,6 +10,10 @@ use metrology::sample::{
 use metrology::stamp::{Host, Stamp};
 use nalgebra::Vector3;
 use node_runtime::{Diagnostic, Level};
+
+mod start_up;
+
+use start_up::StartUp;
 
 /// One pose of a verification: the machine stood still there.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +44,8 @@ pub struct Condition {
     pub node: String,
     /// What.
     pub diagnostic: Diagnostic,
+    /// Whether it came while the node was starting.
+    pub is_of_start: bool,
 }
 
 /// How well each way of predicting the drift did at one update.
@@ -56,6 +62,12 @@ const PREDICTION_KEY: &str = "hold_um";
 
 /// What the calibration of the rotary axes says when all is well.
 const JUDGEMENTS: [&str; 2] = ["calibrated", "verified"];
+
+/// How the sequencer says which angles point the probe along a direction.
+const PROBE_AXIS: &str = "probe_axis";
+
+/// The condition of a controller whose program does not go on by itself.
+const PROGRAM_WAITS: &str = "program_waits";
 
 /// Everything that a report is written from.
 #[derive(Debug, Default)]
@@ -74,6 +86,8 @@ pub struct Evidence {
     pub rotary_models: Vec<GeometryModel>,
     /// What the calibration of the rotary axes said of itself and of its verifications.
     pub judgements: Vec<Condition>,
+    /// How directions of the probe's axis were taken.
+    pub pointings: Vec<Diagnostic>,
     /// Last word of the sequencer.
     pub status: Option<PlanStatus>,
     /// Its first word on each step, in order.
@@ -86,12 +100,25 @@ pub struct Evidence {
     pub conditions: Vec<Condition>,
     /// Node and name of conditions that were `Ok` again when last heard of.
     pub over: BTreeSet<(String, String)>,
+    /// The start of each node.
+    pub start_up: StartUp,
     /// Verifications with the plant's truth.
     pub verifications: Vec<Verification>,
     /// The plant's latency, s.
     pub true_latency_s: Option<f64>,
-    /// Messages that could not be decoded, by topic.
-    pub undecoded: Vec<String>,
+    /// Messages that could not be used, by topic and reason.
+    pub undecoded: BTreeMap<(String, Defect), Undecoded>,
+}
+
+/// Messages of one topic that could not be used for one reason.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Undecoded {
+    /// How many.
+    pub messages: u64,
+    /// When the first of them came.
+    pub first: Stamp<Host>,
+    /// What is wrong with the first of them.
+    pub what: String,
 }
 
 impl Evidence {
@@ -111,37 +138,55 @@ impl Evidence {
     }
 
     /// Takes one publication of `topic`.
-    pub fn message(&mut self, topic: &str, bytes: &[u8]) {
+    pub fn message(&mut self, topic: &str, at: Stamp<Host>, bytes: &[u8]) {
         if topic == topics::LATENCY.name {
-            let taken = self.decode(&topics::LATENCY, bytes);
+            let taken = self.decode(&topics::LATENCY, (at, bytes));
             self.latencies.extend(taken);
         } else if topic == topics::PROBE_POINT.name {
             let run = self.current_run();
-            let taken = self.decode(&topics::PROBE_POINT, bytes);
+            let taken = self.decode(&topics::PROBE_POINT, (at, bytes));
+            if taken.is_some() {
+                self.start_up.work();
+            }
             self.points.extend(taken.map(|point| (run, point)));
         } else if topic == topics::BLOCKS_MEASUREMENT.name {
-            let taken = self.decode(&topics::BLOCKS_MEASUREMENT, bytes);
+            let taken = self.decode(&topics::BLOCKS_MEASUREMENT, (at, bytes));
             self.blocks.extend(taken);
         } else if topic == topics::THERMAL_MODEL.name {
-            let taken = self.decode(&topics::THERMAL_MODEL, bytes);
+            let taken = self.decode(&topics::THERMAL_MODEL, (at, bytes));
             self.models.extend(taken);
         } else if topic == topics::GEOMETRY_ROTARY.name {
-            let taken = self.decode(&topics::GEOMETRY_ROTARY, bytes);
+            let taken = self.decode(&topics::GEOMETRY_ROTARY, (at, bytes));
             self.rotary_models.extend(taken);
         } else if topic == topics::COMPENSATION.name {
-            self.compensation = self.decode(&topics::COMPENSATION, bytes);
+            let taken = self.decode(&topics::COMPENSATION, (at, bytes));
+            self.compensation = taken.or(self.compensation.take());
         } else if topic == topics::PLAN_STATUS.name {
-            let status = self.decode(&topics::PLAN_STATUS, bytes);
-            self.plan(status);
+            let status = self.decode(&topics::PLAN_STATUS, (at, bytes));
+            status.into_iter().for_each(|status| self.plan(status));
         } else if topic == topics::TEST_SEGMENT.name {
-            let taken = self.decode(&topics::TEST_SEGMENT, bytes);
+            let taken = self.decode(&topics::TEST_SEGMENT, (at, bytes));
             taken.into_iter().for_each(|segment| self.segment(segment));
         }
     }
 
+    /// What a program was waiting for when last heard of, behind a colon; empty where none waits.
+    pub fn waiting_for(&self) -> String {
+        let waits = { self.conditions.iter().rev() }.find(|condition| {
+            let name = condition.diagnostic.name.to_string();
+            name == PROGRAM_WAITS && !self.over.contains(&(condition.node.clone(), name))
+        });
+        waits.map_or_else(String::new, |condition| {
+            let message = &condition.diagnostic.message;
+            format!(": {}: {message}", condition.node)
+        })
+    }
+
     /// Takes one condition.
     pub fn condition(&mut self, at: Stamp<Host>, node: &str, diagnostic: &Diagnostic) {
-        let key = (node.to_owned(), diagnostic.name.to_string());
+        let (level, name) = (diagnostic.level, diagnostic.name.as_ref());
+        let is_of_start = self.start_up.hear(at, node, name, level);
+        let key = (node.to_owned(), name.to_owned());
         if diagnostic.level == Level::Ok {
             self.over.insert(key);
         } else {
@@ -157,12 +202,15 @@ impl Evidence {
                 at,
                 residuals_um: diagnostic.values,
             });
+        } else if name == PROBE_AXIS {
+            self.pointings.push(diagnostic.clone());
         } else if JUDGEMENTS.contains(&diagnostic.name.as_ref()) {
             let (node, diagnostic) = (node.to_owned(), diagnostic.clone());
             self.judgements.push(Condition {
                 at,
                 node,
                 diagnostic,
+                is_of_start,
             });
         } else if diagnostic.level != Level::Ok {
             let (node, diagnostic) = (node.to_owned(), diagnostic.clone());
@@ -170,13 +218,13 @@ impl Evidence {
                 at,
                 node,
                 diagnostic,
+                is_of_start,
             });
         }
     }
 
-    fn plan(&mut self, status: Option<PlanStatus>) {
-        if let Some(status) = &status
-            && !status.activity.is_empty()
+    fn plan(&mut self, status: PlanStatus) {
+        if !status.activity.is_empty()
             && self
                 .begun
                 .last()
@@ -184,7 +232,7 @@ impl Evidence {
         {
             self.begun.push(status.clone());
         }
-        self.status = status;
+        self.status = Some(status);
     }
 
     /// The run that is under way; 0: none.
@@ -196,6 +244,11 @@ impl Evidence {
     }
 
     fn segment(&mut self, segment: TestSegment) {
+        if segment.begin {
+            self.start_up.propose(segment.at);
+        } else {
+            self.start_up.work();
+        }
         if segment.begin && segment.kind == TestKind::Verification {
             let label = segment.features.first().cloned().unwrap_or_default();
             self.verifications.push(Verification {
@@ -224,12 +277,57 @@ impl Evidence {
     fn decode<M: Message + Wire>(
         &mut self,
         topic: &topics::Topic<M>,
-        bytes: &[u8],
+        (at, bytes): (Stamp<Host>, &[u8]),
     ) -> Option<M::Inner> {
         let decoded = from_cdr::<M>(bytes).and_then(M::into_inner);
         if let Err(error) = &decoded {
-            self.undecoded.push(format!("{}: {error}", topic.name));
+            self.cannot_use(topic.name, at, error);
         }
         decoded.ok()
+    }
+
+    /// A sentence for each topic and reason of messages that could not be used.
+    pub fn not_used(&self) -> impl Iterator<Item = String> {
+        self.undecoded.iter().map(|((topic, defect), it)| {
+            let (n, first_s, what) = (it.messages, it.first.as_secs_f64(), &it.what);
+            let reason = defect.words();
+            format!(
+                "{topic}: {n} messages could not be used, {reason}: {what} (the first came at {first_s:.3} s)"
+            )
+        })
+    }
+
+    /// Counts a message that cannot be used.
+    pub fn cannot_use(&mut self, topic: &str, at: Stamp<Host>, error: &WireError) {
+        let key = (topic.to_owned(), error.defect());
+        let known = self.undecoded.entry(key).or_insert_with(|| Undecoded {
+            messages: 0,
+            first: at,
+            what: error.to_string(),
+        });
+        known.messages += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_program_waits_for_is_named_until_it_goes_on() {
+        let mut evidence = Evidence::default();
+        let at = Stamp::from_nanos(0);
+        let tell = |evidence: &mut Evidence, level, name: &'static str, message: &str| {
+            let diagnostic = Diagnostic::new(level, name, message.to_owned());
+            evidence.condition(at, "linuxcnc_bridge", &diagnostic);
+        };
+        assert_eq!(evidence.waiting_for(), "");
+        let paused = "the program is paused at line 3 (M0)";
+        tell(&mut evidence, Level::Warn, PROGRAM_WAITS, paused);
+        tell(&mut evidence, Level::Warn, "homing", "not homed");
+        let expected = format!(": linuxcnc_bridge: {paused}");
+        assert_eq!(evidence.waiting_for(), expected);
+        tell(&mut evidence, Level::Ok, PROGRAM_WAITS, "it goes on");
+        assert_eq!(evidence.waiting_for(), "");
     }
 }

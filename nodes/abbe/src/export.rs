@@ -15,18 +15,21 @@ use metrology::{Axis, AxisSet, PerAxis};
 use recorder::Bag;
 
 use crate::evaluate::Tests;
+use crate::loss;
 use crate::tell::tell;
 use crate::usage::{USAGE, above_zero, refused};
 
 mod counting;
+mod effect;
 mod found;
 mod origin;
+mod references;
 mod set_up;
 
 use counting::Counting;
 use found::{Found, looked_for, read, tables_of_stops};
-use origin::Which;
-use set_up::{SetUp, inner, of_axis};
+use origin::{Origin, THERMAL, Which};
+use set_up::{SetUp, inner, of_axis, once_and_exported};
 
 /// Controls that tables are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -39,9 +42,16 @@ enum Format {
     Heidenhain,
     /// FANUC: stored pitch error compensation, whole pulses.
     Fanuc,
-    /// A plain table of errors and compensations, for other programs and for people.
+    /// A plain table of everything that is known, for other programs and for people.
     Csv,
+    /// Rexroth IndraMotion MTX: refused, no documentation of its tables was found; take csv.
+    Mtx,
 }
+
+/// Why nothing is written for Rexroth IndraMotion MTX.
+const NO_MTX: &str = "--format mtx is not written: of the manuals of Rexroth IndraMotion MTX only title pages and tables of contents were found \
+     (functional description DOK-MTX***-NC*FUNC, R911320243), none that gives the format, the unit or the sign of its axis correction. \
+     Take --format csv, which has every error and compensation, and enter them by the manual of your control";
 
 /// Every format with what it is, a line each.
 fn formats() -> String {
@@ -58,6 +68,20 @@ fn formats() -> String {
     lines.join("\n")
 }
 
+impl Format {
+    /// As the command line has it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Linuxcnc => "linuxcnc",
+            Self::Sinumerik => "sinumerik",
+            Self::Heidenhain => "heidenhain",
+            Self::Fanuc => "fanuc",
+            Self::Csv => "csv",
+            Self::Mtx => "mtx",
+        }
+    }
+}
+
 /// A position of an axis, mm or deg.
 fn position(text: &str) -> Result<(Axis, f64), String> {
     let (axis, value) = of_axis::<f64>(text, "a number")?;
@@ -69,7 +93,7 @@ fn position(text: &str) -> Result<(Axis, f64), String> {
 }
 
 /// Arguments of `abbe export`.
-#[derive(Args)]
+#[derive(Clone, Args)]
 pub struct Export {
     /// Folder of the bag, or one of its files.
     bag: PathBuf,
@@ -82,21 +106,21 @@ pub struct Export {
     /// Folder to write the files into; existing files are not overwritten.
     #[arg(long, default_value = "export")]
     out: PathBuf,
-    /// Spacing of the points of linear axes, mm.
-    #[arg(long, default_value_t = 20.0, allow_negative_numbers = true, value_parser = above_zero)]
-    spacing_mm: f64,
-    /// Spacing of the points of rotary axes, deg.
-    #[arg(long, default_value_t = 15.0, allow_negative_numbers = true, value_parser = above_zero)]
-    spacing_deg: f64,
+    /// Spacing of the points of linear axes, mm; without it 20.
+    #[arg(long, allow_negative_numbers = true, value_parser = above_zero)]
+    spacing_mm: Option<f64>,
+    /// Spacing of the points of rotary axes, deg; without it 15.
+    #[arg(long, allow_negative_numbers = true, value_parser = above_zero)]
+    spacing_deg: Option<f64>,
     /// Reference point of an axis such as X=-300, mm or deg; others: 0.
     #[arg(long, value_parser = position)]
     reference: Vec<(Axis, f64)>,
     /// Keep the error at the reference point instead of counting from it.
     #[arg(long)]
     absolute: bool,
-    /// Which table of an axis that was refreshed while it worked.
-    #[arg(long, value_enum, default_value_t)]
-    table: Which,
+    /// Which table of an axis that was refreshed while it worked; without it the last.
+    #[arg(long, value_enum)]
+    table: Option<Which>,
     /// Where no positioning run gave a table, make one of the stops of a verification along one axis, as its scale or the control read them.
     #[arg(long)]
     stops: bool,
@@ -108,27 +132,39 @@ pub struct Export {
 }
 
 impl Export {
-    /// Exit code 0: every file is written; 1: there was nothing to write, or it failed; 3: written, but the bag has lost something.
+    /// Exit code 0: every file is written; 1: there was nothing to write, or it failed; 3: written, but a part of the bag was lost or left out.
     ///
     /// # Errors
     /// The bag cannot be read, a file cannot be written, or a named reference point is beyond the errors (exit code 2).
+    #[expect(clippy::too_many_lines, reason = "one case after another")]
     pub fn execute(self) -> Result<ExitCode> {
         let Some(format) = self.format else {
             complain!("abbe: --format is missing; the formats are:\n{}", formats());
             return Ok(ExitCode::from(USAGE));
         };
+        self.check(format)
+            .map_err(|reason| refused("export", reason))?;
+        let bag = Bag::open(&self.bag)?;
         let Found {
             mut measured,
-            losses,
+            reading,
             topics,
             mut origin,
-        } = read(&self.bag, self.table)?;
-        if self.stops {
-            let tests = Tests::of(&Bag::open(&self.bag)?)?;
-            origin.of_stops = tables_of_stops(&tests.stops, &mut measured);
+        } = read(&bag, self.table.unwrap_or_default());
+        let mut losses = reading.lines();
+        if self.stops || references::are_in(&bag) {
+            let tests = Tests::of(&bag);
+            let more = tests.reading.lines().into_iter();
+            losses.extend(more.filter(|line| !reading.lines().contains(line)));
+            origin.of_references = references::tables(&tests, &mut measured);
+            if self.stops {
+                origin.of_stops = tables_of_stops(&tests.stops, &mut measured);
+            }
         }
         let wanted = self.wanted();
         let selected = select(&measured, &wanted, &self.set_up.control(format));
+        let mut without_effect = self.without_effect(format, &origin);
+        without_effect.extend(effect::without_effect(&self, format, &measured, &selected));
         let left_out: Vec<String> = selected
             .left_out
             .iter()
@@ -137,6 +173,9 @@ impl Export {
         for line in &left_out {
             tell!("{line}");
         }
+        if let Some(leaps) = reading.leaps.line() {
+            complain!("abbe: {leaps}");
+        }
         if selected.files.is_empty() {
             let bag = self.bag.display();
             complain!("abbe: {bag}: nothing to export; looked for");
@@ -144,12 +183,19 @@ impl Export {
                 complain!("  {line}");
             }
             for loss in &losses {
-                complain!("abbe: what was looked for may have been in what was lost: {loss}");
+                complain!(
+                    "abbe: what was looked for may have been in what was lost or left out: {loss}"
+                );
             }
             return Ok(ExitCode::FAILURE);
         }
+        self.check_written(&selected)
+            .map_err(|reason| refused("export", reason))?;
+        for line in &without_effect {
+            complain!("abbe: {line}");
+        }
         let counting = Counting {
-            which: self.table,
+            which: self.table.unwrap_or_default(),
             spans: selected.positioning,
             reference: wanted.reference,
             named: self.reference.iter().map(|(axis, _)| *axis).collect(),
@@ -163,15 +209,84 @@ impl Export {
             tell!("{line}");
         }
         of_what.extend(left_out);
+        let not_whole = losses.iter();
+        of_what.extend(not_whole.map(|loss| format!("not read whole: {loss}")));
         self.write(&selected, &of_what)?;
         for loss in &losses {
-            complain!("abbe: the bag has lost something, a table may be missing: {loss}");
+            complain!(
+                "abbe: the bag was not read whole, a table may be missing or an older one: {loss}"
+            );
         }
-        Ok(if losses.is_empty() {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::from(3)
-        })
+        Ok(loss::exit_code(losses.is_empty()))
+    }
+
+    /// Refuses options that can do nothing, whatever the bag holds.
+    fn check(&self, format: Format) -> Result<(), String> {
+        if format == Format::Mtx {
+            return Err(NO_MTX.to_owned());
+        }
+        once_and_exported("--axis", &self.axis, self.axes())?;
+        let named: Vec<Axis> = self.reference.iter().map(|(axis, _)| *axis).collect();
+        once_and_exported("--reference", &named, self.axes())?;
+        self.set_up.check(format, self.axes())?;
+        let has = |is_linear: bool| self.axes().iter().any(|axis| axis.is_linear() == is_linear);
+        if self.spacing_mm.is_some() && !has(true) {
+            return Err(
+                "--spacing-mm does nothing: no linear axis is among those of --axis".to_owned(),
+            );
+        }
+        if self.spacing_deg.is_some() && !has(false) {
+            return Err(
+                "--spacing-deg does nothing: no rotary axis is among those of --axis".to_owned(),
+            );
+        }
+        let counts_from_zero =
+            matches!(format, Format::Linuxcnc | Format::Heidenhain | Format::Csv);
+        if let Some(axis) = named.first().filter(|_| self.absolute && counts_from_zero) {
+            return Err(format!(
+                "--reference {axis} does nothing with --absolute: a table for {} has no reference point of its own",
+                format.name()
+            ));
+        }
+        match self.set_up.control(format).without_sign() {
+            Some(why) => Err(why.to_string()),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses options for an axis of which no file was made.
+    fn check_written(&self, selected: &Selected) -> Result<(), String> {
+        let named = self.reference.iter().map(|(axis, _)| *axis);
+        match named
+            .into_iter()
+            .find(|axis| selected.positioning[*axis].is_none())
+        {
+            Some(axis) => Err(format!(
+                "--reference {axis} does nothing: the positioning of {axis} is in no file (see what was left out)"
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// Options without effect on what this bag holds.
+    fn without_effect(&self, format: Format, origin: &Origin) -> Vec<String> {
+        let mut lines = vec![];
+        let has_drift = origin.models[THERMAL].is_some();
+        if format == Format::Sinumerik && self.set_up.sign().is_some() && !has_drift {
+            lines.push(
+                "--sign has no effect: the bag holds no thermal drift, and the signs of the other tables are in the control's manual".to_owned(),
+            );
+        }
+        let has_tables = Axis::ALL.iter().any(|axis| origin.tables[*axis].is_some());
+        if self.table.is_some() && !has_tables {
+            lines.push("--table has no effect: the bag holds no positioning table".to_owned());
+        }
+        if self.stops && origin.of_stops.is_empty() {
+            lines.push(
+                "--stops has no effect: no verification along one axis, or every axis has a table of its own".to_owned(),
+            );
+        }
+        lines
     }
 
     fn axes(&self) -> AxisSet {
@@ -189,8 +304,8 @@ impl Export {
         }
         Wanted {
             axes: self.axes(),
-            spacing_mm: self.spacing_mm,
-            spacing_rad: self.spacing_deg.to_radians(),
+            spacing_mm: self.spacing_mm.unwrap_or(SPACING_MM),
+            spacing_rad: self.spacing_deg.unwrap_or(SPACING_DEG).to_radians(),
             reference,
             relative_to_reference: !self.absolute,
             unestimable: if self.accept_unestimable {
@@ -217,6 +332,10 @@ impl Export {
     }
 }
 
+/// Default spacing of the points.
+const SPACING_MM: f64 = 20.0;
+const SPACING_DEG: f64 = 15.0;
+
 /// Beside the files, since not every format has comments.
 const NOTES: &str = "READ_ME_FIRST.txt";
 
@@ -240,232 +359,13 @@ fn create(path: &Path, text: &str) -> Result<()> {
         ),
         _ => anyhow!("{}: {error}", path.display()),
     })?;
-    file.write_all(text.as_bytes())
-        .with_context(|| path.display().to_string())
+    let written = file.write_all(text.as_bytes());
+    if written.is_err() {
+        // Half a table must not be loaded, nor stand in the way of the next export.
+        let _ = std::fs::remove_file(path);
+    }
+    written.with_context(|| path.display().to_string())
 }
 
 #[cfg(test)]
-mod tests {
-    use abbe_msgs::{Wire, topics};
-    use clap::Parser;
-    use metrology::sample::PositioningTable;
-    use metrology::stamp::Stamp;
-    use recorder::{Channel, Directory, MessageStamp, RecorderConfig, Recording};
-
-    use super::*;
-
-    #[derive(Parser)]
-    struct CommandLine {
-        #[command(flatten)]
-        export: Export,
-    }
-
-    fn table(axis: Axis, slope: f64) -> PositioningTable {
-        let position: Vec<f64> = (0..=10).map(|k| f64::from(k) * 20.0 - 100.0).collect();
-        let deviation: Vec<f64> = position.iter().map(|p| slope * p).collect();
-        PositioningTable {
-            at: Stamp::from_nanos(1),
-            axis,
-            position,
-            deviation_up: deviation.clone(),
-            deviation_down: deviation,
-            n_runs: 10,
-            weight: 0.2,
-            sequence: 1,
-        }
-    }
-
-    /// A bag with these tables in order, and its last chunk cut off where asked for.
-    fn bag(folder: &Path, tables: &[PositioningTable], cut: bool) -> PathBuf {
-        let path = folder.join("bag");
-        let directory = Directory::create(&path).unwrap();
-        let mut recording = Recording::begin(directory, "bag", RecorderConfig::default()).unwrap();
-        let channel = Channel {
-            topic: format!("/mill/{}", topics::POSITIONING_TABLE.name),
-            type_name: "abbe_msgs/msg/PositioningTable".to_owned(),
-            type_hash: String::new(),
-            definition: String::new(),
-            qos_yaml: String::new(),
-        };
-        let id = recording.add_channel(&channel).unwrap();
-        for (k, table) in tables.iter().enumerate() {
-            let message = abbe_msgs::msg::PositioningTable::from_inner(table);
-            let nanos = k as i64 + 1;
-            let stamp = MessageStamp {
-                log_time_nanos: nanos,
-                publish_time_nanos: nanos,
-                sequence: 0,
-            };
-            recording
-                .write(id, stamp, &abbe_msgs::to_cdr(&message))
-                .unwrap();
-            recording.flush().unwrap();
-        }
-        recording.finish().unwrap();
-        if cut {
-            let file = path.join("bag_0.mcap");
-            let bytes = std::fs::read(&file).unwrap();
-            std::fs::write(&file, &bytes[..bytes.len() - 40]).unwrap();
-        }
-        path
-    }
-
-    fn execute(bag: &Path, out: &Path, more: &[&str]) -> Result<ExitCode> {
-        let line = [
-            "export",
-            bag.to_str().unwrap(),
-            "--out",
-            out.to_str().unwrap(),
-        ];
-        CommandLine::parse_from(line.iter().chain(more))
-            .export
-            .execute()
-    }
-
-    fn code(result: Result<ExitCode>) -> String {
-        format!("{:?}", result.unwrap())
-    }
-
-    #[test]
-    fn the_last_table_of_each_axis_is_written_and_nothing_is_overwritten() {
-        let folder = tempfile::tempdir().unwrap();
-        let tables = [
-            table(Axis::X, 1e-4),
-            table(Axis::Y, 2e-4),
-            table(Axis::X, 3e-4),
-        ];
-        let bag = bag(folder.path(), &tables, false);
-        let out = folder.path().join("out");
-        let done = execute(&bag, &out, &["--format", "linuxcnc", "--file-type", "1"]);
-        assert_eq!(code(done), format!("{:?}", ExitCode::SUCCESS));
-        let x = std::fs::read_to_string(out.join("x.comp")).unwrap();
-        assert_eq!(x.lines().next(), Some("-100.000000 0.030000 0.030000"));
-        assert!(out.join("y.comp").is_file() && !out.join("z.comp").exists());
-        let notes = std::fs::read_to_string(out.join(NOTES)).unwrap();
-        assert!(notes.starts_with("made of the bag "), "{notes}");
-        assert!(notes.contains("the last of 2 tables"), "{notes}");
-        assert!(notes.contains("\nx.comp\n  - LinuxCNC screw compensation of axis X"));
-        let first = folder.path().join("first");
-        let options = [
-            "--format",
-            "linuxcnc",
-            "--file-type",
-            "1",
-            "--table",
-            "first",
-        ];
-        execute(&bag, &first, &options).unwrap();
-        let x_first = std::fs::read_to_string(first.join("x.comp")).unwrap();
-        assert_eq!(
-            x_first.lines().next(),
-            Some("-100.000000 0.010000 0.010000")
-        );
-        let again = execute(&bag, &out, &["--format", "linuxcnc"]).unwrap_err();
-        let again = format!("{again:#}");
-        assert!(
-            again.contains("x.comp") && again.contains("--out"),
-            "{again}"
-        );
-    }
-
-    #[test]
-    fn what_is_in_no_file_is_told_as_left_out_and_by_no_other_line() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut short = table(Axis::Z, 0.0);
-        for values in [
-            &mut short.position,
-            &mut short.deviation_up,
-            &mut short.deviation_down,
-        ] {
-            values.truncate(1);
-        }
-        let bag = bag(folder.path(), &[table(Axis::X, 1e-4), short], false);
-        let out = folder.path().join("out");
-        execute(&bag, &out, &["--format", "csv"]).unwrap();
-        let notes = std::fs::read_to_string(out.join(NOTES)).unwrap();
-        let left_out = "left out: positioning of Z: axis Z: 1 points";
-        assert!(notes.contains(left_out), "{notes}");
-        assert_eq!(notes.matches("of Z").count(), 1, "{notes}");
-        let far = execute(
-            &bag,
-            &folder.path().join("far"),
-            &["--format", "csv", "--reference", "X=9999"],
-        );
-        assert!(far.unwrap_err().is::<clap::Error>());
-        assert!(!folder.path().join("far").exists());
-    }
-
-    #[test]
-    fn a_bag_without_errors_of_the_wanted_axis_is_said_and_fails() {
-        let folder = tempfile::tempdir().unwrap();
-        let bag = bag(folder.path(), &[table(Axis::X, 1e-4)], false);
-        let out = folder.path().join("out");
-        let nothing = execute(&bag, &out, &["--format", "csv", "--axis", "Z"]);
-        assert_eq!(code(nothing), format!("{:?}", ExitCode::FAILURE));
-        assert!(!out.exists());
-        let absent = execute(&folder.path().join("nowhere"), &out, &["--format", "csv"]);
-        assert!(absent.is_err());
-    }
-
-    #[test]
-    fn nothing_to_export_names_each_source_and_why_it_gave_none() {
-        let folder = tempfile::tempdir().unwrap();
-        let bag = bag(folder.path(), &[table(Axis::X, 1e-4)], false);
-        let found = read(&bag, Which::Last).unwrap();
-        assert_eq!(found.topics, [Some(1), None, None]);
-        let lines = looked_for(&found.measured, found.topics, AxisSet::EMPTY.with(Axis::Z));
-        assert!(lines[0].contains("positioning/table"), "{lines:?}");
-        assert!(lines[0].contains("it is about X"), "{lines:?}");
-        for line in &lines[1..3] {
-            assert!(line.contains("the bag has no such topic"), "{lines:?}");
-        }
-        assert_eq!(lines[3], "for axes Z");
-    }
-
-    #[test]
-    fn without_a_format_all_of_them_are_named_and_nothing_is_read() {
-        let line = ["export", "no_such_bag"];
-        let done = CommandLine::parse_from(line).export.execute();
-        assert_eq!(code(done), format!("{:?}", ExitCode::from(USAGE)));
-        let said = formats();
-        for name in ["linuxcnc", "sinumerik", "heidenhain", "fanuc", "csv"] {
-            assert!(said.contains(&format!("  {name} ")), "{said}");
-        }
-    }
-
-    #[test]
-    fn a_bag_that_was_cut_is_exported_with_a_code_of_its_own() {
-        let folder = tempfile::tempdir().unwrap();
-        let bag = bag(folder.path(), &[table(Axis::X, 1e-4)], true);
-        let out = folder.path().join("out");
-        let done = execute(&bag, &out, &["--format", "csv"]);
-        assert_eq!(code(done), format!("{:?}", ExitCode::from(3)));
-        assert!(out.join("errors.csv").is_file());
-    }
-
-    #[test]
-    fn an_argument_that_is_none_is_a_matter_of_usage() {
-        for wrong in [
-            &["--format", "okuma"][..],
-            &["--format", "csv", "--axis", "Q"],
-            &["--format", "csv", "--reference", "X"],
-            &["--format", "csv", "--reference", "X=here"],
-            &["--format", "csv", "--reference", "X=nan"],
-            &["--format", "linuxcnc", "--file-type", "2"],
-            &["--format", "csv", "--spacing-mm", "0"],
-            &["--format", "csv", "--spacing-mm", "-20"],
-            &["--format", "csv", "--spacing-deg", "inf"],
-            &["--format", "sinumerik", "--max-sum-mm", "nan"],
-            &["--format", "sinumerik", "--max-slope", "-1e-3"],
-            &["--format", "fanuc", "--detection-unit", "0"],
-            &["--format", "fanuc", "--magnification", "101"],
-            &["--format", "fanuc", "--max-pulses", "0"],
-            &["--format", "fanuc", "--reference-number", "X=4.5"],
-            &["--format", "fanuc", "--reference-number", "X=-1"],
-        ] {
-            let line = ["export", "bag"].iter().chain(wrong);
-            let refused = CommandLine::try_parse_from(line).err().unwrap();
-            assert_eq!(refused.exit_code(), 2, "{wrong:?}");
-        }
-    }
-}
+mod tests;

@@ -8,17 +8,33 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use machine::MachineFile;
+use metrology::yaml;
+use node_runtime::complain;
+use node_runtime::text_file;
 
-mod limits;
-mod map;
+mod angles;
+mod file;
+pub(crate) mod limits;
+pub(crate) mod map;
+mod map_schema;
 mod motion;
+mod passes;
+pub(crate) mod propose;
+mod recognise;
+mod runs;
+mod same;
+mod sheet;
 mod table;
+mod times;
+mod units;
 mod writer;
 
-use map::Map;
+use file::Form;
+use map::{Map, What};
+use runs::Runs;
 use table::Table;
 use writer::Writer;
 
@@ -27,53 +43,183 @@ use crate::tell::tell;
 /// Arguments of `abbe import`.
 #[derive(Args)]
 pub struct Import {
-    /// Table of readings.
+    /// Table of readings: text, or a worksheet (xlsx).
     csv: PathBuf,
     /// Which column is what, and how the machine moved.
-    #[arg(long)]
-    map: PathBuf,
+    #[arg(long, required_unless_present = "propose")]
+    map: Option<PathBuf>,
     /// Machine file of the machine that was measured.
-    #[arg(long)]
-    machine: PathBuf,
+    #[arg(long, required_unless_present = "propose")]
+    machine: Option<PathBuf>,
     /// Folder of the bag.
-    #[arg(short, long)]
-    output: PathBuf,
+    #[arg(short, long, required_unless_present = "propose")]
+    output: Option<PathBuf>,
+    /// Print a map with what was recognised in the table and what is missing; nothing is written.
+    #[arg(long, conflicts_with_all = ["map", "machine", "output"])]
+    propose: bool,
+}
+
+#[cfg(test)]
+impl Import {
+    /// The arguments as they are given.
+    pub const fn of(csv: PathBuf, map: PathBuf, machine: PathBuf, output: PathBuf) -> Self {
+        Self {
+            csv,
+            map: Some(map),
+            machine: Some(machine),
+            output: Some(output),
+            propose: false,
+        }
+    }
+}
+
+/// A text with the name of its file, which messages quote.
+pub(crate) struct Named {
+    pub place: String,
+    pub text: String,
+}
+
+impl Named {
+    /// Reads a file of YAML.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn read(path: &Path, what: &'static str) -> Result<Self> {
+        Ok(Self {
+            place: path.display().to_string(),
+            text: text_file::yaml(path).context(what)?,
+        })
+    }
+}
+
+/// What was written into a bag.
+pub(crate) struct Imported {
+    n_runs: u32,
+    n_messages: u64,
+    n_rows: usize,
+    /// What a reader should know: rows and columns that were left out, and what the runs were made of.
+    pub notes: Vec<String>,
 }
 
 impl Import {
-    /// Writes the bag.
+    /// Writes the bag, or prints a proposal.
     ///
     /// # Errors
     /// When a file cannot be read, a column is missing, a cell is no number, or the bag not written.
     pub fn execute(self) -> Result<ExitCode> {
-        let map: Map = serde_saphyr::from_str(&text(&self.map)?)
-            .with_context(|| format!("map {}", self.map.display()))?;
-        let machine_text = text(&self.machine)?;
-        let machine = MachineFile::parse(&machine_text, &self.machine.display().to_string())?;
-        limits::check(&map, &machine).with_context(|| format!("map {}", self.map.display()))?;
-        let ranges = limits::ranges(&map.test, &machine);
-        let table = Table::read(&text(&self.csv)?, &map, &ranges)
-            .with_context(|| format!("table {}", self.csv.display()))?;
-        let mut writer = Writer::begin(&self.output, &machine, machine_text, map.start_s)?;
-        let runs = match motion::write(&map, &table, &mut writer) {
-            Ok(runs) => runs,
-            Err(error) => {
-                drop(writer);
-                // What was begun is no bag, and would stand in the way of the next attempt.
-                std::fs::remove_dir_all(&self.output)
-                    .with_context(|| format!("{}", self.output.display()))?;
-                return Err(error.context(format!("table {}", self.csv.display())));
-            }
+        let (Some(map), Some(machine), Some(output)) = (&self.map, &self.machine, &self.output)
+        else {
+            return self.propose();
         };
-        let messages = writer.finish()?;
+        let map = Named::read(map, "map")?;
+        let machine = Named::read(machine, "machine file")?;
+        let imported = import(&self.csv, &map, machine, output)?;
         tell!(
-            "{}: {runs} runs, {messages} messages",
-            self.output.display()
+            "{}: {} runs, {} messages",
+            output.display(),
+            imported.n_runs,
+            imported.n_messages
         );
+        if !imported.notes.is_empty() {
+            let (csv, used) = (self.csv.display(), imported.n_rows);
+            complain!("abbe: {csv}: {used} rows used; besides");
+            for note in &imported.notes {
+                complain!("  {note}");
+            }
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn propose(&self) -> Result<ExitCode> {
+        let in_table = || format!("table {}", self.csv.display());
+        let proposal = propose::of(&self.csv).with_context(in_table)?;
+        tell!("{}", proposal.map.trim_end_matches('\n'));
+        for line in &proposal.recognised {
+            complain!("{line}");
+        }
+        for line in &proposal.needed {
+            complain!("needed: {line}");
+        }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-fn text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))
+/// Writes the bag of a table.
+///
+/// # Errors
+/// As [`Import::execute`].
+pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -> Result<Imported> {
+    let in_map = |error: &dyn std::fmt::Display| {
+        let said = yaml::placed(&named.place, &named.text, &error.to_string());
+        anyhow!("map {said}")
+    };
+    let map: Map = yaml::read_letters(&named.text).map_err(|error| in_map(&error))?;
+    let machine_text = machine.text;
+    let machine = MachineFile::parse(&machine_text, &machine.place)?;
+    limits::check(&map, &machine).map_err(|error| in_map(&error))?;
+    let ranges = limits::ranges(&map.test, &machine);
+    let in_table = || format!("table {}", csv.display());
+    let form = Form {
+        separator: map.separator,
+        decimal: map.decimal,
+        sheet: map.sheet.as_deref(),
+    };
+    let sheet = file::read(csv, form).with_context(in_table)?;
+    let table = Table::of(&sheet, &map, &ranges).with_context(in_table)?;
+    angles::check(&map, &table).with_context(in_table)?;
+    let mut runs = runs::of(&map.test, &table).with_context(in_table)?;
+    if let map::Test::Positioning {
+        axis, overrun_mm, ..
+    } = &map.test
+    {
+        let travel = limits::targets(&machine, *axis);
+        let beyond = runs::check_travel(&runs, travel.as_ref(), (*axis, *overrun_mm));
+        runs.remarks.extend(beyond.with_context(in_table)?);
+    }
+    let stated = map.resolution();
+    let stated = stated.map(|(key, value)| format!("{key}: {value:?}\n"));
+    let of_machine = (&machine, machine_text);
+    let mut writer = Writer::begin(output, of_machine, map.start_s, stated)?;
+    let n_runs = match motion::write(&map, &runs, &mut writer) {
+        Ok(n_runs) => n_runs,
+        Err(error) => {
+            drop(writer);
+            // What was begun is no bag, and would stand in the way of the next attempt.
+            std::fs::remove_dir_all(output).with_context(|| format!("{}", output.display()))?;
+            return Err(error.context(in_table()));
+        }
+    };
+    let n_messages = writer.finish()?;
+    let mut notes = doubts(&map, &runs);
+    notes.extend(table.left_out);
+    let n_rows = runs.runs.iter().map(Vec::len).sum();
+    notes.extend(runs.remarks);
+    Ok(Imported {
+        n_runs,
+        n_messages,
+        n_rows,
+        notes,
+    })
+}
+
+/// Asks about deviations that cannot be in the unit that they were read in.
+fn doubts(map: &Map, runs: &Runs) -> Vec<String> {
+    let map::Test::Positioning { axis, .. } = &map.test else {
+        return vec![];
+    };
+    let columns = map.test.columns();
+    let read = { columns.iter() }.find(|column| matches!(column.what, What::Deviation(_)));
+    let [_, unit] = map::units(*axis).of_cells;
+    let likely = if axis.is_linear() { "mm" } else { "deg" };
+    let numbers = runs.runs.iter().flatten().map(|row| row.cells[2]);
+    let numbers: Vec<f64> = numbers.filter(|number| number.is_finite()).collect();
+    let name = read.map(|column| column.name);
+    let small = name.and_then(|name| propose::doubt(&numbers, name, [unit.name(), likely]));
+    let targets = runs.runs.iter().flatten().map(|row| row.cells[1]);
+    let targets: Vec<f64> = targets.filter(|_| axis.is_linear()).collect();
+    let target = columns
+        .iter()
+        .find(|column| matches!(column.what, What::Place(_)));
+    let near = target.and_then(|target| propose::doubt_of_targets(&targets, target.name));
+    small.into_iter().chain(near).collect()
 }

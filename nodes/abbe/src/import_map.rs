@@ -1,7 +1,5 @@
 //! `abbe import-map SOURCE`: what an MTConnect agent has, as a mapping for `mtconnect_bridge` to go over by hand.
 
-use node_runtime::complain;
-
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -9,6 +7,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use mtconnect_bridge::document::{self, Answer};
 use mtconnect_bridge::{io, proposal};
+use node_runtime::{complain, text_file};
 
 use crate::tell::tell;
 
@@ -17,32 +16,37 @@ use crate::tell::tell;
 pub struct ImportMap {
     /// The agent's answer to `probe`: `http://host:port/probe`, or a file that holds it.
     source: String,
+    /// Device among those of the agent: its name; needed where there are several.
+    #[arg(long)]
+    device: Option<String>,
 }
 
 impl ImportMap {
     /// Prints the mapping.
     ///
     /// # Errors
-    /// When nobody answers, the file cannot be read, or the answer is none to `probe`.
+    /// When nobody answers, the file cannot be read, the answer is not one to `probe`, or it has several devices.
     pub fn execute(self) -> Result<ExitCode> {
         let text = if self.source.starts_with("http://") {
             io::http::fetch(&self.source)?
         } else {
-            let path = Path::new(&self.source);
-            std::fs::read(path).with_context(|| format!("probe {}", path.display()))?
+            text_file::bytes(Path::new(&self.source)).context("probe")?
         };
         let answer = document::read(&text).with_context(|| format!("probe {}", self.source))?;
-        let Answer::Devices { items, .. } = answer else {
+        let Answer::Devices { devices, items, .. } = answer else {
             bail!("{}: no answer to `probe`", self.source);
         };
-        let map = proposal::propose(&items);
-        let text = proposal::text_of(&map).context("mapping")?;
+        let items = proposal::of_device(&devices, &items, self.device.as_deref())
+            .with_context(|| format!("probe {}", self.source))?;
+        let proposal = proposal::propose(&items);
+        let text = proposal::text_of(&proposal).context("mapping")?;
         tell!("{}", text.trim_end_matches('\n'));
+        let (ignored, left_out) = (proposal.ignored.len(), proposal.left_out.len());
         complain!(
-            "{}: {} of {} data items have a meaning here; names and units are to be gone over",
+            "{}: {} of {} data items have a meaning here, {ignored} are ignored and {left_out} left out (listed at the end); names and units are to be gone over",
             self.source,
-            map.values.len(),
-            items.len()
+            proposal.map.values.len() - ignored,
+            items.len(),
         );
         Ok(ExitCode::SUCCESS)
     }

@@ -3,16 +3,22 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
 use machine::MachineFile;
 use metrology::stamp::{Machine, Stamp};
-use metrology::{Axis, PerAxis};
+use metrology::{Axis, PerAxis, yaml};
+use mtconnect_bridge::BridgeError;
+use mtconnect_bridge::condition::words;
 use mtconnect_bridge::mapping::{MapFile, Mapping};
 use mtconnect_bridge::observation::read_stamp;
-use mtconnect_bridge::shift::{self, ShiftOrder};
+use mtconnect_bridge::shift::{self, Shift, ShiftOrder};
+use node_runtime::text_file;
 use serde::Deserialize;
 
+use node_runtime::complain;
+
+use crate::loss;
 use crate::tell::tell;
 
 /// Arguments of `abbe import-shift`.
@@ -37,7 +43,7 @@ pub struct ImportShift {
 /// The order, as a person writes it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct OrderFile {
+pub struct OrderFile {
     /// First line of every program.
     title: String,
     from: String,
@@ -51,8 +57,8 @@ struct OrderFile {
     clear_mm: f64,
 }
 
-fn text(path: &PathBuf) -> Result<String> {
-    std::fs::read_to_string(path).with_context(|| path.display().to_string())
+fn text(path: &std::path::Path) -> Result<String> {
+    Ok(text_file::yaml(path)?)
 }
 
 fn stamp(key: &str, text: &str) -> Result<Stamp<Machine>> {
@@ -60,14 +66,18 @@ fn stamp(key: &str, text: &str) -> Result<Stamp<Machine>> {
 }
 
 impl OrderFile {
-    fn checked(&self, machine: &MachineFile) -> Result<ShiftOrder> {
+    /// The order, checked against the machine.
+    ///
+    /// # Errors
+    /// With the key, its value and its limits.
+    pub fn checked(&self, machine: &MachineFile) -> Result<ShiftOrder> {
         let (from, to) = (stamp("from", &self.from)?, stamp("to", &self.to)?);
         ensure!(from < to, "to: must be after from");
         let times = [("bin_s", self.bin_s), ("slice_s", self.slice_s)];
         for (key, time_s) in times {
             ensure!(
                 (1.0..=86_400.0).contains(&time_s),
-                "{key} = {time_s}: must be from 1 to 86400"
+                "{key} = {time_s} s: must be from 1 to 86400 s"
             );
         }
         let windows = [self.x_mm, self.y_mm, self.z_mm];
@@ -107,20 +117,70 @@ impl ImportShift {
     pub fn execute(self) -> Result<ExitCode> {
         let place = |path: &PathBuf| path.display().to_string();
         let machine = MachineFile::parse(&text(&self.machine)?, &place(&self.machine))?;
-        let file: OrderFile =
-            serde_saphyr::from_str(&text(&self.order)?).with_context(|| place(&self.order))?;
-        let order = file.checked(&machine).with_context(|| place(&self.order))?;
-        let map = MapFile::from_yaml(&text(&self.map)?).with_context(|| place(&self.map))?;
-        let mapping = Mapping::new(&map).with_context(|| place(&self.map))?;
-        let log = text(&self.log)?;
-        let bins = shift::bins(log.lines(), &mapping, &order).with_context(|| place(&self.log))?;
-        let programs = shift::programs(&bins, &file.title, &order)?;
+        let order_text = text(&self.order)?;
+        let in_order = |error: &dyn std::fmt::Display| {
+            let message = error.to_string();
+            anyhow!(
+                "order {}",
+                yaml::placed(&place(&self.order), &order_text, &message)
+            )
+        };
+        let file: OrderFile = yaml::read_letters(&order_text).map_err(|error| in_order(&error))?;
+        let order = file
+            .checked(&machine)
+            .map_err(|error| in_order(&format!("{error:#}")))?;
+        let map_text = text(&self.map)?;
+        let in_map = |error: &dyn std::fmt::Display| {
+            anyhow!(
+                "map {}",
+                yaml::placed(&place(&self.map), &map_text, &error.to_string())
+            )
+        };
+        let map = MapFile::from_yaml(&map_text).map_err(|error| in_map(&error))?;
+        let mapping = Mapping::new(&map).map_err(|error| in_map(&error))?;
+        let log = text_file::bytes(&self.log).context("log")?;
+        let shift = shift::bins(&log, &mapping, &order).map_err(|error| match error {
+            BridgeError::NoSpindle { .. } => in_map(&error),
+            other => anyhow::Error::from(other).context(place(&self.log)),
+        })?;
+        let programs = shift::programs(&shift.bins, &file.title, &order)?;
         std::fs::create_dir_all(&self.output).with_context(|| place(&self.output))?;
         for (n, program) in programs.iter().enumerate() {
             let path = self.output.join(format!("shift_{n:02}.ngc"));
             std::fs::write(&path, program).with_context(|| place(&path))?;
         }
         tell!("{}: {} programs", self.output.display(), programs.len());
-        Ok(ExitCode::SUCCESS)
+        self.account(&shift, &order);
+        Ok(loss::exit_code(shift.is_whole))
     }
+
+    /// What of the log is not in the programs, where there is something.
+    fn account(&self, shift: &Shift, order: &ShiftOrder) {
+        if shift.is_whole {
+            return;
+        }
+        let log = self.log.display();
+        let covered: Vec<String> = shift.covered.iter().map(between).collect();
+        complain!(
+            "{log}: of {}, the log tells of {}",
+            between(&(order.from, order.to)),
+            covered.join(", ")
+        );
+        for leap in shift.leaps.iter().take(LEAPS_SHOWN) {
+            let (from, to) = (words(leap.from), words(leap.to));
+            complain!("{log}: the machine's clock leaps from {from} to {to}");
+        }
+        let more = shift.leaps.len().saturating_sub(LEAPS_SHOWN);
+        if more > 0 {
+            complain!("{log}: and {more} more leaps");
+        }
+        complain!("{log}: {}", shift.account);
+    }
+}
+
+/// Leaps that are named at most.
+const LEAPS_SHOWN: usize = 10;
+
+fn between((first, last): &(Stamp<Machine>, Stamp<Machine>)) -> String {
+    format!("{} to {}", words(*first), words(*last))
 }

@@ -10,6 +10,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use node_runtime::text_file::{self, Comments};
 
 use crate::tell::tell;
 use crate::{launch, node};
@@ -108,7 +109,7 @@ fn setup(prefix: &Path) -> Result<()> {
         bail!("prefix {shown}: a quote in its name cannot stand in local_setup.sh");
     }
     let text = SETUP.replace("@PREFIX@", &shown);
-    if fs::read_to_string(&path).is_ok_and(|present| present != text) {
+    if text_file::read(&path, Comments::None).is_ok_and(|present| present != text) {
         return Ok(());
     }
     put(&path, text.as_bytes(), READABLE)
@@ -126,7 +127,7 @@ fn copy_folder(from: &Path, to: &Path) -> Result<()> {
                 .with_context(place)?
                 .permissions()
                 .mode();
-            put(&target, &fs::read(&path).with_context(place)?, mode & 0o777)?;
+            put(&target, &text_file::bytes(&path)?, mode & 0o777)?;
         }
     }
     Ok(())

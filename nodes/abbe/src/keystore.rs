@@ -18,6 +18,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Args;
 
+#[cfg(feature = "security")]
 use crate::tell::tell;
 
 #[cfg(feature = "security")]

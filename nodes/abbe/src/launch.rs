@@ -6,7 +6,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
+use mtconnect_bridge::xml;
+use node_runtime::text_file::{self, Comments};
 
 /// One node of a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -90,14 +92,14 @@ pub fn find(folder: &Path) -> Result<PathBuf> {
 /// # Errors
 /// With line and column, when the file is not a launch file or uses what this reader does not know.
 pub fn read(path: &Path) -> Result<Vec<LaunchNode>> {
-    let text =
-        std::fs::read_to_string(path).with_context(|| format!("launch file {}", path.display()))?;
+    let text = text_file::read(path, Comments::Xml).context("launch file")?;
     let folder = path.parent().unwrap_or_else(|| Path::new("."));
     parse(&text, folder).with_context(|| format!("launch file {}", path.display()))
 }
 
 fn parse(text: &str, folder: &Path) -> Result<Vec<LaunchNode>> {
-    let document = roxmltree::Document::parse(text)?;
+    let document =
+        roxmltree::Document::parse(text).map_err(|wrong| anyhow!(xml::in_own_words(&wrong)))?;
     let root = document.root_element();
     if root.tag_name().name() != "launch" {
         bail!(
@@ -199,6 +201,42 @@ fn substitute(text: &str, folder: &Path) -> Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_text_that_is_no_xml_is_refused_in_own_words_with_its_place() {
+        let long = format!("<launch>&{};</launch>", "x".repeat(300));
+        for (text, words) in [
+            (
+                "<!DOCTYPE launch><launch/>",
+                "a document type (`<!DOCTYPE`) is not read: remove it",
+            ),
+            ("", "no element stands there"),
+            ("<launch><node>", "the text ends inside of an element"),
+            (
+                "<launch>\n  <node></launch>",
+                "2:9: </launch> closes <node>",
+            ),
+            (
+                "<launch a='1' a='2'/>",
+                "the attribute a stands there twice",
+            ),
+            (
+                "<launch>&abbe;</launch>",
+                "&abbe; is not defined: write &amp; for an ampersand",
+            ),
+            (
+                "<launch>a & b</launch>",
+                "an ampersand begins no reference, or one to a letter that may not stand in XML: write &amp;",
+            ),
+            ("<x:launch/>", "the prefix x is not declared"),
+            ("<launch <", "check tags, quotes and brackets"),
+            (long.as_str(), "…; is not defined"),
+        ] {
+            let shown = format!("{:#}", parse(text, Path::new(".")).unwrap_err());
+            assert!(shown.contains(words), "{text}: {shown}");
+            assert!(shown.len() < 160, "{shown}");
+        }
+    }
 
     #[test]
     fn a_node_with_files_and_parameters_becomes_ros_arguments() {

@@ -11,7 +11,9 @@ use clap::{Parser, Subcommand};
 use node_runtime::complain;
 use node_runtime::complaint;
 
+mod alarm;
 mod check;
+mod completions;
 mod diagnose;
 mod evaluate;
 mod evidence;
@@ -22,6 +24,10 @@ mod import_shift;
 mod install_ros;
 mod keystore;
 mod launch;
+mod loss;
+mod machine_defaults;
+mod man;
+mod new_machine;
 mod node;
 mod play;
 mod preflight;
@@ -31,10 +37,15 @@ mod report;
 mod report_bag;
 mod run;
 mod scenario;
+mod schema;
 mod tell;
 mod trials;
 mod truth;
 mod usage;
+mod validate;
+mod whole_file;
+#[cfg(test)]
+mod wrong_files;
 
 /// Measures a CNC machine, models its errors, compensates its axes and records every run.
 #[derive(Parser)]
@@ -56,6 +67,12 @@ enum Verb {
     Diagnose(diagnose::Diagnose),
     /// Tell what a plan's recordings will determine, before they are made, and what to add.
     Preflight(preflight::Preflight),
+    /// Check scenarios and single files, and print every mistake with its place; nothing is run.
+    Validate(validate::Validate),
+    /// Print the JSON Schema of a file that people write, for editors.
+    Schema(schema::Schema),
+    /// Write a commented machine file to begin with.
+    NewMachine(new_machine::NewMachine),
     /// Judge the diagnosis on machines whose hidden effect it is not told.
     Trials(trials::Trials),
     /// Record topics of the ROS graph into a bag.
@@ -76,6 +93,10 @@ enum Verb {
     InstallRos(install_ros::InstallRos),
     /// Make credentials of DDS Security for the nodes of scenarios.
     Keystore(keystore::Keystore),
+    /// Print what a shell completes.
+    Completions(completions::Completions),
+    /// Write the manual pages.
+    Man(man::Man),
 }
 
 fn main() -> ExitCode {
@@ -92,9 +113,14 @@ fn main() -> ExitCode {
         Verb::ImportMap(import) => import.execute(),
         Verb::ImportShift(import) => import.execute(),
         Verb::Export(export) => export.execute(),
-        Verb::Node(node) => return node.execute(),
+        Verb::Node(node) => node.execute(),
         Verb::InstallRos(install) => install.execute(),
         Verb::Keystore(keystore) => keystore.execute(),
+        Verb::Validate(validate) => validate.execute(),
+        Verb::NewMachine(new) => new.execute(),
+        Verb::Schema(schema) => schema.execute(),
+        Verb::Completions(completions) => completions.execute(),
+        Verb::Man(man) => man.execute(),
     };
     outcome.unwrap_or_else(|error| failed(&error))
 }

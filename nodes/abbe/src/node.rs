@@ -8,6 +8,11 @@ use clap::builder::PossibleValuesParser;
 use nix::sys::signal::{Signal, raise};
 use node_runtime::{Composition, Node, Setup};
 
+use crate::tell::tell;
+use crate::usage;
+
+mod parameters;
+
 /// What builds a node from its setup.
 pub type Builder = fn(&Setup) -> Result<Box<dyn Node>>;
 
@@ -49,31 +54,50 @@ pub fn names() -> String {
 
 /// Arguments of `abbe node`.
 #[derive(Args)]
+#[command(disable_help_flag = true)]
 pub struct NodeVerb {
     /// Stop when standard input ends: for whoever starts nodes and may be killed.
     #[arg(long)]
     while_input_is_open: bool,
+    /// Print help; after the name of a node, its parameters.
+    #[arg(short, long)]
+    help: bool,
     /// Which node.
-    #[arg(value_parser = PossibleValuesParser::new(NODES.iter().map(|(name, _)| *name)))]
-    name: String,
-    /// Arguments as of any ROS 2 node: `--ros-args -r … -p … --params-file …`.
+    #[arg(required_unless_present = "help", value_parser = PossibleValuesParser::new(NODES.iter().map(|(name, _)| *name)))]
+    name: Option<String>,
+    /// Arguments as of any ROS 2 node: `--ros-args -r … -p … --params-file …`; `--help` lists the node's parameters.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<String>,
 }
 
 impl NodeVerb {
-    /// Runs the node until it is told to stop.
-    pub fn execute(self) -> ExitCode {
-        let build = builder(&self.name).expect("the argument is one of NODES");
+    /// Runs the node until it is stopped, or prints its parameters.
+    ///
+    /// # Errors
+    /// When its table of parameters cannot be printed.
+    pub fn execute(self) -> Result<ExitCode> {
+        let Some(name) = self.name else {
+            tell!("{}", usage::help_of("node").trim_end());
+            return Ok(ExitCode::SUCCESS);
+        };
+        let build = builder(&name).expect("the argument is one of NODES");
+        if self.help || self.arguments.first().is_some_and(|word| is_help(word)) {
+            tell!("{}", parameters::help(&name, build)?.trim_end());
+            return Ok(ExitCode::SUCCESS);
+        }
         if self.while_input_is_open {
             std::thread::spawn(stop_at_end_of_input);
         }
-        node_runtime::run_composed(vec![Composition {
-            name: self.name,
+        Ok(node_runtime::run_composed(vec![Composition {
+            name,
             arguments: self.arguments,
             build: Box::new(build),
-        }])
+        }]))
     }
+}
+
+fn is_help(word: &str) -> bool {
+    matches!(word, "-h" | "--help")
 }
 
 /// Waits for the end of standard input, then asks this process to stop as a terminal would.

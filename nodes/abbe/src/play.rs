@@ -10,10 +10,13 @@ use clap::Args;
 use node_runtime::arguments::Arguments;
 use node_runtime::complain;
 use node_runtime::environment::Environment;
+use node_runtime::tap::Selection;
 use node_runtime::{Interruption, Setup};
+use recorder::Bag;
 use replayer::PlaybackConfig;
 use replayer_node::{Desk, Played};
 
+use crate::loss;
 use crate::tell::tell;
 use crate::usage::{refused, topics};
 
@@ -22,7 +25,7 @@ use crate::usage::{refused, topics};
 pub struct Play {
     /// Folder of the bag, or one .mcap file.
     bag: PathBuf,
-    /// Time of the bag over time; 0: as fast as subscribers acknowledge.
+    /// Time of the bag over time, 0.001 to 1000; 0: as fast as subscribers acknowledge.
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     rate: f64,
     /// Absolute name of topics, `*` stands for any run of characters; may be given several times; none: every topic.
@@ -55,9 +58,6 @@ pub struct Play {
 pub const NAME: &str = "replayer";
 /// Between two looks at how far it is.
 const LOOK: Duration = Duration::from_millis(100);
-/// Exit code for a bag that could not be read whole, or messages that did not arrive.
-const DONE_WITH_LOSS: u8 = 3;
-
 impl Play {
     /// Plays to the end or to SIGINT; exit code 3 when something was lost.
     ///
@@ -85,6 +85,15 @@ impl Play {
         let rules = Arguments::parse(self.ros.clone());
         let rules = rules.map_err(|error| refused("play", error))?;
         let setup = Setup::new(NAME, &rules)?;
+        if let Some((name, _)) = setup.tree().leaves().first() {
+            let reason = format!(
+                "parameter `{name}`: does nothing here, the options of `abbe play` say how a bag is played"
+            );
+            return Err(refused("play", reason));
+        }
+        for line in self.without_effect()? {
+            complain!("abbe: {line}");
+        }
         let (node, desk) = replayer_node::play(&setup, &config)?;
         let mut running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
         complain!("Playing {bag}; Ctrl-C ends it.");
@@ -101,6 +110,27 @@ impl Play {
     }
 }
 
+impl Play {
+    /// Names of topics that no topic of the bag has.
+    fn without_effect(&self) -> Result<Vec<String>> {
+        if self.topics.is_empty() {
+            return Ok(vec![]);
+        }
+        let bag = Bag::open(&self.bag)?;
+        let fits = |pattern: &String| {
+            let selection = Selection::Matching(vec![pattern.clone()]);
+            bag.topics()
+                .iter()
+                .any(|topic| selection.takes(&topic.topic))
+        };
+        let unfit = self.topics.iter().filter(|pattern| !fits(pattern));
+        let line = |pattern: &String| {
+            format!("--topics {pattern} has no effect: the bag has no such topic")
+        };
+        Ok(unfit.map(line).collect())
+    }
+}
+
 fn ended(desk: &Desk, bag: &str) -> Result<ExitCode> {
     let played: Played = match desk.progress().over {
         Some(Ok(played)) => played,
@@ -111,16 +141,15 @@ fn ended(desk: &Desk, bag: &str) -> Result<ExitCode> {
         complain!("abbe: {loss}");
     }
     tell!("{bag}: {} messages, {} lost", played.messages, played.lost);
-    Ok(if played.lost == 0 && played.losses.is_empty() {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(DONE_WITH_LOSS)
-    })
+    let is_whole = played.lost == 0 && played.losses.is_empty();
+    Ok(loss::exit_code(is_whole))
 }
 
 /// The line on a terminal.
 struct Shown {
     bar: Option<indicatif::ProgressBar>,
+    /// Number of pauses printed so far.
+    pauses: usize,
 }
 
 impl Shown {
@@ -128,14 +157,25 @@ impl Shown {
         let terminal = std::io::stderr().is_terminal();
         Self {
             bar: terminal.then(indicatif::ProgressBar::new_spinner),
+            pauses: 0,
         }
     }
 
     fn show(&mut self, desk: &Desk) {
+        let progress = desk.progress();
+        if let Some((begun, pause)) = progress.pause
+            && begun > self.pauses
+        {
+            self.pauses = begun;
+            let word = || complain!("abbe: {pause}");
+            match &self.bar {
+                Some(bar) => bar.suspend(word),
+                None => word(),
+            }
+        }
         let Some(bar) = &self.bar else {
             return;
         };
-        let progress = desk.progress();
         let state = if progress.paused { "paused at" } else { "at" };
         let at_s = progress.at.as_secs_f64();
         bar.set_message(format!("{state} {at_s:.3} s, {} messages", progress.sent));

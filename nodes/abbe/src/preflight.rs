@@ -10,6 +10,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use gap_diagnosis::GapConfig;
 use gap_diagnosis::preflight::preflight;
+use metrology::number::number;
 use nalgebra::Vector3;
 
 mod dry_run;
@@ -17,6 +18,7 @@ mod floors;
 mod ideal;
 mod outcome;
 mod programme;
+mod size;
 mod wanted;
 
 use floors::FloorArgument;
@@ -26,9 +28,10 @@ use wanted::Proposal;
 
 use crate::report::gap::planned;
 use crate::report::section::Section;
+use crate::report::terminal::{self, Part, Room};
 use crate::report::{self, Report};
 use crate::tell::tell;
-use crate::usage::refused;
+use crate::usage::{GREATEST_NUMBER, refused};
 
 /// Arguments of `abbe preflight`.
 #[derive(Args)]
@@ -62,6 +65,9 @@ pub struct Preflight {
     /// The figures as JSON instead of text.
     #[arg(long)]
     json: bool,
+    /// Print every table, instead of the answer and three tables in at most 40 lines.
+    #[arg(long)]
+    full: bool,
 }
 
 impl Preflight {
@@ -71,11 +77,24 @@ impl Preflight {
     /// When plan, machine, a wanted name or a number (exit code 2) cannot be used.
     pub fn execute(self) -> Result<ExitCode> {
         let u_um = self.station_uncertainty_um;
-        if !(u_um.is_finite() && u_um > 0.0) {
-            let reason = format!("--station-uncertainty-um {u_um}: must be finite and above 0");
+        if !(u_um > 0.0 && u_um <= GREATEST_NUMBER) {
+            let reason = format!(
+                "--station-uncertainty-um {}: must be finite and above 0, at most {} µm",
+                number(u_um),
+                number(GREATEST_NUMBER)
+            );
             return Err(refused("preflight", reason));
         }
+        if let Some(name) = self.head_offset.first().filter(|_| self.want.is_empty()) {
+            let reason = format!(
+                "--head-offset {},{},{} does nothing without --want: it is an offset to try for a component that is wanted",
+                name.x, name.y, name.z
+            );
+            return Err(refused("preflight", reason));
+        }
+        floors::check(&self.floor).map_err(|reason| refused("preflight", reason))?;
         let plan = Planned::read(&self.what, self.machine.as_deref())?;
+        size::check(&plan.plan, &plan.programs, &plan.machine)?;
         let geometry = self.geometry(&plan, u_um * 1e-3)?;
         let run = dry_run::dry_run(
             &plan.plan,
@@ -97,21 +116,26 @@ impl Preflight {
             let html = report::html(&title, &body);
             std::fs::write(path, html).with_context(|| format!("{}", path.display()))?;
         }
-        self.tell(&plan, &geometry, &page)
+        self.tell(&plan, &geometry, page)
     }
 
     /// Text or JSON on standard output.
-    fn tell(&self, plan: &Planned, geometry: &Geometry, page: &Report) -> Result<ExitCode> {
+    fn tell(&self, plan: &Planned, geometry: &Geometry, page: Report) -> Result<ExitCode> {
         if self.json {
             let mut figures = geometry.figures();
             figures["plan"] = plan.plan.title.clone().into();
-            figures["gap"] = page.figures.clone();
+            figures["gap"] = page.figures;
             tell!("{}", serde_json::to_string_pretty(&figures)?);
-        } else {
+        } else if self.full {
             for section in geometry.sections() {
                 tell!("{}", section.terminal());
             }
             tell!("{}", page.terminal());
+        } else {
+            let sections = geometry.sections();
+            let parts: Vec<Part> = sections.iter().map(Part::of).chain(page.parts).collect();
+            let room = Room::with_page(self.html.as_deref());
+            tell!("{}", terminal::short(&page.lines, &parts, &room));
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -172,9 +196,11 @@ fn offset(text: &str) -> Result<Vector3<f64>, String> {
         })
         .collect::<Result<_, String>>()?;
     match numbers.as_slice() {
-        [x, y, z] if numbers.iter().all(|n| n.is_finite()) => Ok(Vector3::new(*x, *y, *z)),
+        [x, y, z] if numbers.iter().all(|n| n.abs() <= GREATEST_NUMBER) => {
+            Ok(Vector3::new(*x, *y, *z))
+        }
         _ => Err(format!(
-            "\"{text}\": three finite numbers X,Y,Z in mm are needed"
+            "\"{text}\": three finite numbers X,Y,Z in mm are needed, each at most 1e12"
         )),
     }
 }

@@ -4,14 +4,19 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+use machine::MachineFile;
 use node_runtime::arguments::Arguments;
 use node_runtime::complain;
 use node_runtime::environment::Environment;
+use node_runtime::text_file;
 use node_runtime::{Interruption, Setup};
-use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RingConfig};
+use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RecorderError, RingConfig};
+use recorder_node::Capture;
 
+use crate::alarm::Alarm;
+use crate::loss;
 use crate::tell::tell;
 use crate::usage::{refused, topics};
 
@@ -62,10 +67,8 @@ pub struct Record {
 const NAME: &str = "abbe_record";
 /// The name of a recorder that keeps, before which its services stand.
 const KEEPER: &str = "recorder";
-/// Between two looks at whether it is over; a signal wakes it at once.
-const A_WHILE: Duration = Duration::from_secs(60);
-/// Exit code for a bag that has not all that was said.
-const DONE_WITH_LOSS: u8 = 3;
+/// Between two looks at whether it is over or the disk is full; a signal wakes it at once.
+const LOOK: Duration = Duration::from_millis(500);
 
 impl Record {
     /// Records until SIGINT or SIGTERM; exit code 3 when the bag lost something.
@@ -76,8 +79,10 @@ impl Record {
         let interruption = Interruption::listen("the bag is being closed")?;
         let config = self.config()?;
         let machine = self.machine.as_ref().map(|path| {
-            let text = std::fs::read_to_string(path);
-            text.with_context(|| format!("--machine {}", path.display()))
+            let text = text_file::yaml(path).context("--machine")?;
+            // A bag with a text that is no machine file is refused by every verb that reads it.
+            MachineFile::parse(&text, &path.display().to_string())?;
+            anyhow::Ok(text)
         });
         let machine = machine.transpose()?;
         if config.ring.is_some() {
@@ -86,8 +91,9 @@ impl Record {
         let capture = recorder_node::record(&config, machine, NAME)?;
         let bag = &config.bag;
         complain!("Recording into {bag}; Ctrl-C ends it.");
-        while !interruption.wait(A_WHILE) {}
+        let alarm = watch(&capture, &interruption)?;
         let captured = capture.finish()?;
+        alarm.into_iter().for_each(Alarm::end);
         for word in &captured.unrecorded {
             complain!("abbe: {word}");
         }
@@ -96,12 +102,18 @@ impl Record {
             "{bag}: {} messages, {lost} lost",
             captured.stats.messages_written
         );
-        captured.bag?;
-        Ok(if lost == 0 {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::from(DONE_WITH_LOSS)
-        })
+        let mut is_whole = lost == 0;
+        match captured.bag {
+            Err(error @ RecorderError::Undescribed { .. }) => {
+                complain!("abbe: {error}");
+                is_whole = false;
+            }
+            bag => drop(bag?),
+        }
+        match node_runtime::deafness() {
+            Some(reason) => bail!("the recording has ended: {reason}"),
+            None => Ok(loss::exit_code(is_whole)),
+        }
     }
 
     /// The recorder's parameters, each in its range.
@@ -139,6 +151,27 @@ impl Record {
             writing,
         })
     }
+}
+
+/// Waits for the end. A recording that cannot go on ends by itself, and an alarm reports it on the graph too where the
+/// process can still speak.
+fn watch(capture: &Capture, interruption: &Interruption) -> Result<Option<Alarm>> {
+    let mut trouble = None;
+    while !interruption.wait(LOOK) {
+        let stats = capture.stats();
+        if node_runtime::deafness().is_some() {
+            break;
+        }
+        if let Some(reason) = stats.failure {
+            let reason = format!("the recording ends, since it cannot be written: {reason}");
+            return Ok(Some(Alarm::raise(&Environment::read()?, NAME, &reason)));
+        }
+        if trouble.is_none() && stats.trouble.is_some() {
+            trouble = stats.trouble;
+            trouble.iter().for_each(|word| complain!("abbe: {word}"));
+        }
+    }
+    Ok(None)
 }
 
 /// Keeps the last minutes as the node `recorder`, whose services save them.

@@ -5,24 +5,34 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use maud::Markup;
 
+use terminal::{Part, Room};
+
 use crate::evidence::Evidence;
 use crate::scenario::ReportKind;
+use crate::whole_file;
 
+pub mod angular;
 mod blocks;
 pub mod circular;
 mod conditions;
+pub mod drift;
 mod feeds;
 pub mod gap;
 pub mod geometry;
 mod latency;
+pub mod lines;
 mod page;
+pub mod periodic;
 pub mod plot;
+mod pointed;
 pub mod positioning;
 pub mod probing;
 pub mod published;
 mod rotary;
 pub mod section;
 pub mod stops;
+pub mod terminal;
+pub mod test_conditions;
 mod thermal;
 mod tool_error;
 mod trace;
@@ -39,8 +49,8 @@ pub struct Report {
     pub title: String,
     /// What it found, a sentence each.
     pub lines: Vec<String>,
-    /// Tables for a terminal.
-    pub text: String,
+    /// Its text for a terminal, part by part.
+    pub parts: Vec<Part>,
     /// The page's body.
     pub body: Markup,
     /// The figures of the sentences, for machines; lengths in mm, times in s.
@@ -68,7 +78,7 @@ impl Report {
         Self {
             title: title.to_owned(),
             lines: Vec::new(),
-            text: seen.map_or_else(String::new, section::Section::terminal),
+            parts: seen.map(Part::of).into_iter().collect(),
             body: maud::html! {
                 h1 { (title) }
                 @if let Some(section) = seen { (section.html()) }
@@ -84,40 +94,71 @@ impl Report {
     /// This report with the tests of its bag behind it.
     pub fn join(&mut self, tests: Self) {
         self.lines.extend(tests.lines);
-        self.text.push('\n');
-        self.text.push_str(&tests.text);
+        self.parts.push(Part::plain("\n"));
+        self.parts.extend(tests.parts);
         self.body = maud::html! { (self.body) (tests.body) };
-        for key in ["tests", "loss", "uncertainty"] {
+        for key in [
+            "conditions",
+            "machine_defaults",
+            "tests",
+            "loss",
+            "account",
+            "uncertainty",
+        ] {
             self.figures[key] = tests.figures[key].clone();
         }
     }
 
-    /// The report as it stands on a terminal.
+    /// All of the report as it stands on a terminal.
     pub fn terminal(&self) -> String {
-        let mut text = format!("{}\n\n", self.title);
-        for line in &self.lines {
-            text.push_str(line);
-            text.push('\n');
-        }
-        text.push('\n');
-        text.push_str(&self.text);
-        text
+        format!("{}{}", self.head(), terminal::whole(&self.parts))
+    }
+
+    /// The report in a few lines: the answer, and the tables that matter.
+    pub fn short(&self, room: &Room<'_>) -> String {
+        terminal::short(&self.lines, &self.parts, room)
+    }
+
+    /// What [`Self::terminal`] has before its parts.
+    fn head(&self) -> String {
+        let lines = self.lines.iter().map(|line| format!("{line}\n"));
+        format!("{}\n\n{}\n", self.title, lines.collect::<String>())
     }
 
     /// This report with another section behind it; its figures as `key`.
     pub fn add(&mut self, key: &str, section: &section::Section) {
-        self.text.push('\n');
-        self.text.push_str(&section.terminal());
+        self.parts.push(Part::plain("\n"));
+        self.parts.push(Part::of(section));
         self.body = maud::html! { (self.body) (section.html()) };
         self.figures[key] = section.figures.clone();
     }
 
+    /// This report with the conditions of its tests behind it.
+    pub fn add_conditions(&mut self, conditions: &test_conditions::Conditions) {
+        let text = format!("\n{}", conditions.terminal());
+        self.parts.push(Part::plain(text));
+        self.body = maud::html! { (self.body) (conditions.section.html()) };
+        self.figures["conditions"] = conditions.section.figures.clone();
+    }
+
     /// This report with the diagnosis of its bag behind it.
-    pub fn join_gap(&mut self, gap: &Self) {
-        self.text.push_str("\n\n");
-        self.text.push_str(&gap.terminal());
+    pub fn join_gap(&mut self, gap: Self) {
+        let head = format!("\n\n{}", gap.head());
+        self.parts.push(Part::answers(head, gap.lines));
+        self.parts.extend(gap.parts);
         self.body = maud::html! { (self.body) (gap.body) };
-        self.figures["gap"] = gap.figures.clone();
+        self.figures["gap"] = gap.figures;
+    }
+
+    /// This report with what was recognised in its table at its beginning; the lines as `table`.
+    pub fn begin_with_table(&mut self, lines: &[String]) {
+        self.lines.splice(0..0, lines.iter().cloned());
+        self.body = maud::html! {
+            (self.body)
+            h2 { "The table" }
+            ul { @for line in lines { li { (line) } } }
+        };
+        self.figures["table"] = serde_json::json!(lines);
     }
 
     /// The page as one HTML text.
@@ -134,7 +175,7 @@ impl Report {
         let figures = serde_json::to_string_pretty(&self.figures)?;
         for (name, text) in [("report.html", html), ("report.json", figures)] {
             let path = folder.join(name);
-            std::fs::write(&path, text).with_context(|| format!("report {}", path.display()))?;
+            whole_file::write(&path, &text).context("report")?;
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! `abbe report BAG`: the tests of a bag, evaluated.
 
 use node_runtime::complain;
+use node_runtime::text_file;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -8,20 +9,28 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::Args;
 use maud::html;
-use recorder::{Bag, Loss};
+use recorder::Bag;
 
-use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
 use crate::evaluate::limits::Limits;
+use crate::evaluate::{BrokenOff, Tests};
+use crate::loss;
+use crate::machine_defaults;
 use crate::report::section::Section;
+use crate::report::terminal::{self, Part, Room};
 use crate::report::{self, Report};
 use crate::tell::tell;
+
+mod from_table;
 
 /// Arguments of `abbe report`.
 #[derive(Args)]
 pub struct ReportBag {
-    /// Folder of the bag.
+    /// Folder of the bag, or a table (csv, tsv, txt, dat, xlsx), which is then imported by what is recognised in it.
     bag: PathBuf,
+    /// Which column of the table is what, as `abbe import` takes it.
+    #[arg(long)]
+    map: Option<PathBuf>,
     /// What is not known about the measurements: the expanded uncertainties of ISO 230-2, -4 and -6 come from it and are not
     /// stated without it. What fits say of themselves (geometric errors, causes of circles) is stated in any case.
     #[arg(long)]
@@ -36,13 +45,13 @@ pub struct ReportBag {
     /// The figures as JSON instead of text.
     #[arg(long)]
     json: bool,
+    /// Print every table and remark, instead of the answer and three tables in at most 40 lines.
+    #[arg(long)]
+    full: bool,
 }
 
-/// Exit code for a bag that was read with loss.
-const DONE_WITH_LOSS: u8 = 3;
-
 impl ReportBag {
-    /// Evaluates the bag; exit code 3 when a part of it was lost.
+    /// Evaluates the bag; exit code 3 when a part of it was lost or left out.
     ///
     /// # Errors
     /// When bag or budget cannot be read, or the page not written.
@@ -50,39 +59,46 @@ impl ReportBag {
         let budget = self.budget.as_deref().map(read_budget).transpose()?;
         let limits = self.limits.as_deref().map(read_limits).transpose()?;
         complain!("Evaluating the tests of {}", self.bag.display());
-        let bag = Bag::open(&self.bag)?;
-        let tests = Tests::of(&bag).with_context(|| format!("bag {}", self.bag.display()))?;
-        for loss in &tests.losses {
-            complain!("abbe: {loss}");
+        let table = from_table::of(&self.bag, self.map.as_deref())?;
+        let bag = Bag::open(table.as_ref().map_or(&self.bag, |table| &table.bag))?;
+        let mut tests = Tests::of(&bag);
+        if table.is_some() {
+            // Nothing is known of the machine.
+            tests.machine = None;
+            tests.left_out.clear();
+        }
+        loss::complain_of(&tests.reading);
+        for run in &tests.broken_off {
+            complain!("abbe: {run}");
         }
         let title = format!("Tests in {}", self.bag.display());
-        let report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;
+        let mut report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;
+        if let Some(table) = &table {
+            report.begin_with_table(&table.lines);
+        }
+        let page = self.out.as_ref().map(|out| out.join("report.html"));
         if self.json {
             tell!("{}", serde_json::to_string_pretty(&report.figures)?);
-        } else {
+        } else if self.full {
             tell!("{}", report.terminal());
+        } else {
+            tell!("{}", report.short(&Room::with_page(page.as_deref())));
         }
         if let Some(out) = &self.out {
             std::fs::create_dir_all(out).with_context(|| format!("folder {}", out.display()))?;
             report.write(out)?;
         }
-        Ok(if tests.losses.is_empty() {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::from(DONE_WITH_LOSS)
-        })
+        Ok(loss::exit_code(tests.reading.is_whole()))
     }
 }
 
 fn read_budget(path: &Path) -> Result<Budget> {
-    let text =
-        std::fs::read_to_string(path).with_context(|| format!("budget file {}", path.display()))?;
+    let text = text_file::yaml(path).context("budget file")?;
     Budget::read(&text, path)
 }
 
 fn read_limits(path: &Path) -> Result<Limits> {
-    let text =
-        std::fs::read_to_string(path).with_context(|| format!("limits file {}", path.display()))?;
+    let text = text_file::yaml(path).context("limits file")?;
     Limits::read(&text, path)
 }
 
@@ -101,8 +117,12 @@ fn judged_page(
     budget: Option<&Budget>,
     limits: Option<&Limits>,
 ) -> Result<Report> {
+    let conditions = report::test_conditions::of(&tests.conditions, budget, Some(tests));
+    let defaults = machine_defaults::of_tests(tests);
+    let defaults_line = machine_defaults::in_words(&defaults);
     let mut sections = sections(tests, budget)?;
-    let mut lines = losses_in_words(&tests.losses);
+    let mut lines = loss::in_words(&tests.reading);
+    lines.extend(tests.broken_off.iter().map(ToString::to_string));
     if sections.is_empty() {
         lines.push("The bag holds no test that can be evaluated.".to_owned());
     }
@@ -119,58 +139,37 @@ fn judged_page(
     sections.extend(judged);
     Ok(Report {
         title: title.to_owned(),
-        text: sections
-            .iter()
-            .map(Section::terminal)
-            .collect::<Vec<_>>()
-            .join("\n"),
+        parts: terminal::apart(
+            std::iter::once(Part::plain(conditions.terminal()))
+                .chain(sections.iter().map(Part::of)),
+        ),
         body: html! {
             @if !title.is_empty() { h1 { (title) } }
-            @for line in &lines { p.bad[!tests.losses.is_empty()] { (line) } }
+            @for line in &lines { p.bad[!tests.reading.is_whole()] { (line) } }
+            @if let Some(line) = &defaults_line { p { (line) } }
+            (conditions.section.html())
             @for section in &sections { (section.html()) }
         },
         figures: serde_json::json!({
             "title": title,
-            "loss": losses(&tests.losses),
+            "loss": loss::as_json(&tests.reading),
+            "leaps": loss::leaps_as_json(&tests.reading.leaps),
+            "account": loss::account_as_json(&tests.reading.account),
             "uncertainty": uncertainty(budget.is_some()),
+            "conditions": conditions.section.figures,
+            "machine_defaults": defaults,
+            "not_completed": not_completed(&tests.broken_off),
             "tests": figures,
             "conformance": conformance,
         }),
-        lines,
+        lines: lines.into_iter().chain(defaults_line).collect(),
     })
 }
 
-/// The head of a page whose bag is not whole.
-fn losses_in_words(losses: &[Loss]) -> Vec<String> {
-    let Some(last) = losses.last() else {
-        return Vec::new();
-    };
-    let n = last.messages_read;
-    let mut lines = vec![format!(
-        "NOT WHOLE: a part of this bag was lost. Everything below comes from what could be read, {n} messages before the last gap; a test that was cut off is missing or has fewer readings."
-    )];
-    lines.extend(losses.iter().map(|loss| format!("Lost: {loss}.")));
-    lines
-}
-
-/// The same for machines; null: the bag is whole.
-fn losses(losses: &[Loss]) -> serde_json::Value {
-    let places: Vec<serde_json::Value> = losses
-        .iter()
-        .map(|loss| {
-            serde_json::json!({
-                "file": loss.file.display().to_string(),
-                "at_byte": loss.at_byte,
-                "reason": loss.reason.to_string(),
-                "messages_read_before": loss.messages_read,
-            })
-        })
-        .collect();
-    if places.is_empty() {
-        serde_json::Value::Null
-    } else {
-        serde_json::json!({ "places": places })
-    }
+/// The runs that the machine did not complete, for machines.
+fn not_completed(runs: &[BrokenOff]) -> serde_json::Value {
+    let row = |it: &BrokenOff| serde_json::json!({ "run": it.run, "test": it.test, "reason": BrokenOff::REASON });
+    runs.iter().map(row).collect()
 }
 
 fn uncertainty(stated: bool) -> serde_json::Value {
@@ -185,7 +184,7 @@ fn uncertainty(stated: bool) -> serde_json::Value {
 }
 
 /// Figures that had no budget to be computed from have no expanded uncertainty, not one of zero.
-fn unstate(figures: &mut serde_json::Value) {
+pub fn unstate(figures: &mut serde_json::Value) {
     match figures {
         serde_json::Value::Object(entries) => {
             for (key, value) in entries {
@@ -202,34 +201,45 @@ fn unstate(figures: &mut serde_json::Value) {
 }
 
 fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> {
-    let mut sections = report::positioning::sections(&tests.linear, budget)?;
+    let mut sections = report::positioning::sections(tests, budget)?;
+    sections.extend(report::periodic::section(tests, budget));
+    sections.extend(report::angular::sections(tests, budget)?);
     sections.extend(report::stops::section(&tests.stops));
     sections.extend(report::geometry::tables(&tests.tables));
-    sections.extend(report::circular::sections(&tests.circles, budget)?);
-    if let Some(circle) = &tests.station_circle {
+    sections.extend(report::circular::sections(
+        &tests.circles,
+        budget,
+        &tests.conditions,
+    )?);
+    for circle in &tests.station_circles {
         sections.extend(report::published::sections(circle, tests.geometry.as_ref()));
     }
     for (name, model) in [
         ("Geometric errors of the linear axes", &tests.geometry),
         ("Geometric errors of the rotary axes", &tests.rotary),
     ] {
-        sections.extend(
-            model
-                .as_ref()
-                .map(|model| report::geometry::section(name, model)),
-        );
+        sections.extend(model.as_ref().map(|model| {
+            let mut section = report::geometry::section(name, model);
+            report::lines::state(&mut section, tests, model);
+            section
+        }));
     }
-    sections.extend(report::probing::sections(
-        &tests.touches,
-        &tests.features,
+    sections.extend(report::probing::sections(tests, budget));
+    sections.extend(report::drift::sections(
         &tests.blocks,
+        &tests.drift,
+        budget,
     )?);
     Ok(sections)
 }
 
 #[cfg(test)]
+mod tables;
+
+#[cfg(test)]
 mod tests {
-    use recorder::LossReason;
+    use recorder::{Loss, LossReason};
+    use replayer::Reading;
 
     use super::*;
 
@@ -248,7 +258,10 @@ mod tests {
     #[test]
     fn a_bag_that_was_cut_is_marked_at_the_head_of_every_form() {
         let tests = Tests {
-            losses: vec![cut()],
+            reading: Reading {
+                losses: vec![cut()],
+                ..Reading::default()
+            },
             ..Tests::default()
         };
         let report = page("Tests in bag", &tests, None).unwrap();

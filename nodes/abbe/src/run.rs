@@ -1,5 +1,6 @@
 //! `abbe run SCENARIO`: its nodes, its plan, a bag and a page at the end.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -11,11 +12,15 @@ use recorder::Bag;
 
 use crate::diagnose;
 use crate::evaluate::Tests;
+use crate::evaluate::test_conditions::TestConditions;
 use crate::evidence::Evidence;
+use crate::loss;
 use crate::report::Report;
 use crate::report::section::Section;
+use crate::report::terminal::{MOST_LINES, Room};
+use crate::report::test_conditions;
 use crate::report_bag;
-use crate::scenario::{ReportKind, Scenario};
+use crate::scenario::{ReportKind, Scenario, places};
 use crate::tell::tell;
 use crate::usage::refused;
 
@@ -31,8 +36,12 @@ use table_trial::TableTrial;
 /// Arguments of `abbe run`.
 #[derive(Args)]
 pub struct Run {
-    /// Folder of the scenario, e.g. `launch_configs/first_run`.
-    scenario: PathBuf,
+    /// Name of a scenario, such as `first_run`, or its folder; `--list` lists those that are found by name.
+    #[arg(required_unless_present = "list")]
+    scenario: Option<PathBuf>,
+    /// List the scenarios that are found by name, each with its title.
+    #[arg(long, conflicts_with = "scenario")]
+    list: bool,
     /// Folder in which runs are kept, each in a new one of its own.
     #[arg(long, default_value = "runs")]
     runs: PathBuf,
@@ -48,6 +57,12 @@ pub struct Run {
     /// Run every node as a process of its own, on DDS and in real time.
     #[arg(long)]
     separate: bool,
+    /// Print why each cause of a diagnosis has its status: every check with value, limit and verdict.
+    #[arg(long)]
+    explain: bool,
+    /// Print every table and remark, instead of the answer and three tables in at most 40 lines; `--explain` does too.
+    #[arg(long)]
+    full: bool,
 }
 
 fn renamed(_: &str) -> Result<String, &'static str> {
@@ -58,8 +73,34 @@ fn renamed(_: &str) -> Result<String, &'static str> {
 
 /// Why a plan that was called off did not run to its end.
 const INTERRUPTED: &str = "it was interrupted";
+/// How many times real time a run may be held to: slower than a thousandth nobody waits, and faster none is.
+const PACES: RangeInclusive<f64> = 1e-3..=1e6;
+/// Why a plan was called off whose recording failed; the reason follows.
+const NOT_RECORDED: &str = "called off, since the bag cannot be written any more";
 /// Exit code of a plan that was called off and ended in good order: what shells give a program that Ctrl-C ended.
 const CALLED_OFF: u8 = 130;
+
+/// Prints the scenarios that are found by name.
+fn list() -> Result<ExitCode> {
+    let homes = places::list()?;
+    if homes.is_empty() {
+        bail!(
+            "no scenario is found by name: change to a folder with launch_configs, or give the path of a scenario"
+        );
+    }
+    for (n, (home, scenarios)) in homes.iter().enumerate() {
+        if n > 0 {
+            tell!("");
+        }
+        tell!("{}", home.display());
+        let width = scenarios.iter().map(|one| one.name.chars().count()).max();
+        let width = width.unwrap_or_default();
+        for one in scenarios {
+            tell!("  {:width$}  {}", one.name, one.title);
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
 
 /// What a runner leaves behind.
 pub struct Outcome {
@@ -71,6 +112,8 @@ pub struct Outcome {
     pub recorded: u64,
     /// Messages lost on their way to the bag.
     pub lost: u64,
+    /// What is wrong with the bag although every message is in it.
+    pub trouble: Option<String>,
 }
 
 impl Run {
@@ -79,14 +122,33 @@ impl Run {
     /// # Errors
     /// When the scenario cannot be read, a node not built, or the bag not written.
     pub fn execute(self) -> Result<ExitCode> {
-        if !(self.pace.is_finite() && self.pace >= 0.0) {
-            let reason = format!("--pace {}: must be 0 or a finite number above", self.pace);
+        let Some(given) = self.scenario.as_deref().filter(|_| !self.list) else {
+            return list();
+        };
+        if self.pace != 0.0 && !PACES.contains(&self.pace) {
+            let reason = format!(
+                "--pace {}: must be 0 or a finite number above, from {} to {}",
+                self.pace,
+                PACES.start(),
+                PACES.end()
+            );
             return Err(refused("run", reason));
         }
-        let scenario = Scenario::read(&self.scenario)?;
+        let scenario = Scenario::read(&places::find(given)?)?;
         if self.no_dds && !self.is_composed(&scenario) {
             let reason = "--no-dds: the nodes of a run in real time meet on the network; only a scenario with simulated_start_s can do without, and not with --separate";
             return Err(refused("run", reason));
+        }
+        if self.explain && !scenario.file.diagnose {
+            let reason = "--explain: does nothing for a scenario without `diagnose: true`; `abbe diagnose BAG --explain` explains any bag";
+            return Err(refused("run", reason));
+        }
+        if self.pace > 0.0 && !self.is_composed(&scenario) {
+            let reason = "--pace: does nothing for a run in real time; only a scenario with simulated_start_s has a pace, and not with --separate";
+            return Err(refused("run", reason));
+        }
+        for line in scenario.without_effect()? {
+            complain!("abbe: {line}");
         }
         let interruption = Interruption::listen("the bag is closed, no page is written")?;
         let folder = new_folder(&self.runs, &scenario.name)?;
@@ -130,8 +192,12 @@ impl Run {
         let mut report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
         if scenario.file.report == ReportKind::Tests && outcome.recorded > 0 {
             complain!("Evaluating the tests of {}", bag.display());
-            let tests = Tests::of(&Bag::open(&bag)?)?;
+            let tests = Tests::of(&Bag::open(&bag)?);
             report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
+        } else if outcome.recorded > 0 {
+            let seen = TestConditions::of(&Bag::open(&bag)?);
+            let budget = scenario.budget()?;
+            report.add_conditions(&test_conditions::of(&seen, budget.as_ref(), None));
         }
         if outcome.failure.is_none() {
             match self.try_table(scenario, folder, interruption) {
@@ -142,15 +208,43 @@ impl Run {
         }
         if scenario.file.diagnose && outcome.recorded > 0 {
             let machine = scenario.folder.join("machine.yaml");
-            report.join_gap(&diagnose::of_run(&bag, folder, &machine)?);
+            match diagnose::of_run(&bag, folder, &machine, self.explain) {
+                Ok(gap) => report.join_gap(gap),
+                Err(error) => outcome.fail(format!("{error:#}")),
+            }
         }
         let kept = format!("Bag: {}.", outcome.kept(&bag));
         report.body = maud::html! { (report.body) h2 { "Recording" } p { (kept) } };
-        report.write(folder)?;
-        tell!("{}", report.terminal());
-        tell!("Bag:  {}", outcome.kept(&bag));
-        tell!("Page: {}", folder.join("report.html").display());
+        let page = match report.write(folder) {
+            Ok(()) => Some(folder.join("report.html")),
+            Err(error) => {
+                outcome.fail(format!(
+                    "no page was written, what it says is above: {error:#}"
+                ));
+                None
+            }
+        };
+        self.tell(&report, &outcome, &bag, page.as_deref());
         Ok(outcome.end())
+    }
+
+    /// The report on the terminal; without a page the whole of it, for then it stands nowhere else.
+    fn tell(&self, report: &Report, outcome: &Outcome, bag: &Path, page: Option<&Path>) {
+        let kept = format!("Bag:  {}", outcome.kept(bag));
+        let Some(page) = page.filter(|_| !self.full && !self.explain) else {
+            tell!("{}", report.terminal());
+            tell!("{kept}");
+            if let Some(page) = page {
+                tell!("Page: {}", page.display());
+            }
+            return;
+        };
+        let room = Room {
+            lines: MOST_LINES.saturating_sub(outcome.lines_at_end()),
+            tail: &[kept],
+            page: Some(page),
+        };
+        tell!("{}", report.short(&room));
     }
 
     fn try_table(
@@ -180,9 +274,34 @@ impl Outcome {
         format!("{} ({recorded} messages, {lost} lost)", bag.display())
     }
 
+    /// Notes why the run failed; the first reason stays the first.
+    fn fail(&mut self, reason: String) {
+        self.failure = Some(match self.failure.take() {
+            None => reason,
+            Some(first) => format!("{first}; {reason}"),
+        });
+    }
+
+    /// What did not work, a line each.
+    fn shortcomings(&self) -> Vec<String> {
+        let mut shortcomings = shortcomings::of(&self.evidence, self.lost);
+        shortcomings.extend(
+            self.trouble
+                .iter()
+                .map(|trouble| format!("the bag: {trouble}")),
+        );
+        shortcomings
+    }
+
+    /// Lines that [`Self::end`] prints.
+    fn lines_at_end(&self) -> usize {
+        let n = self.shortcomings().len();
+        n + usize::from(n > 0) + usize::from(self.failure.is_some())
+    }
+
     /// Says what did not work; the exit code.
     fn end(self) -> ExitCode {
-        let shortcomings = shortcomings::of(&self.evidence, self.lost);
+        let shortcomings = self.shortcomings();
         if !shortcomings.is_empty() {
             complain!("abbe: what did not go as told:");
         }
@@ -190,8 +309,9 @@ impl Outcome {
             complain!("abbe:   {line}");
         }
         match self.failure {
-            None => ExitCode::SUCCESS,
-            Some(reason) if reason == INTERRUPTED => {
+            None => loss::exit_code(self.trouble.is_none()),
+            // Also where the table's own run was.
+            Some(reason) if reason.ends_with(INTERRUPTED) => {
                 complain!("abbe: the plan did not run to its end: {reason}");
                 ExitCode::from(CALLED_OFF)
             }

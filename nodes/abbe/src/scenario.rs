@@ -3,16 +3,22 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
-use metrology::Axis;
-use node_runtime::complaint;
+use metrology::number::number;
+use metrology::{Axis, Host, epoch, yaml};
+use node_runtime::text_file;
 use recorder::ChunkCompression;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::evaluate::budget::Budget;
 use crate::launch::{self, LaunchNode};
+use crate::usage::topics;
+
+pub mod places;
+mod without_effect;
 
 /// `scenario.yaml` beside the launch file.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScenarioFile {
     /// One line for displays and reports.
@@ -37,20 +43,49 @@ pub struct ScenarioFile {
 
 /// Longest time that can be given to a plan, min: two years.
 const LONGEST_MIN: f64 = 1e6;
+/// Simulated time that a run takes beyond its limit to wind down and to be evaluated, and a clock's offset, s.
+const AFTER_PLAN_S: i64 = 86_400;
 
 impl ScenarioFile {
+    /// Reads and checks the file `path`.
+    ///
+    /// # Errors
+    /// With file, line, key and value.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = text_file::yaml(path).context("scenario file")?;
+        let shown = path.display().to_string();
+        let wrong =
+            |message: &str| anyhow!("scenario file {}", yaml::placed(&shown, &text, message));
+        let file: Self = yaml::read_letters(&text).map_err(|error| wrong(&error.to_string()))?;
+        file.check().map_err(|error| wrong(&error.to_string()))?;
+        Ok(file)
+    }
+
     /// Refuses a value that is out of its range.
     fn check(&self) -> Result<()> {
         let limit_min = self.limit_min;
         if !(limit_min > 0.0 && limit_min <= LONGEST_MIN) {
-            bail!("limit_min = {limit_min}: must be above 0 and at most {LONGEST_MIN}");
+            bail!(
+                "limit_min = {} min: must be above 0 and at most {LONGEST_MIN} min",
+                number(limit_min)
+            );
+        }
+        for (k, pattern) in self.recording.exclude.iter().enumerate() {
+            if let Err(rule) = topics(pattern) {
+                bail!("recording.exclude[{k}] = \"{pattern}\": {rule}");
+            }
+        }
+        if let Some(start_s) = self.simulated_start_s {
+            let room_s = (limit_min * 60.0).ceil() as i64 + AFTER_PLAN_S;
+            epoch::whole_seconds::<Host>(start_s, room_s)
+                .map_err(|error| anyhow!("simulated_start_s = {error}"))?;
         }
         Ok(())
     }
 }
 
-/// How a run's bag is written; what is not said is as everywhere.
-#[derive(Clone, Debug, Default, Deserialize)]
+/// How a run's bag is written; keys that are absent have the general defaults.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordingFile {
     /// Inside the chunks.
@@ -64,7 +99,7 @@ pub struct RecordingFile {
 }
 
 /// A screw-compensation file that is tried on the control that it is made for.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinuxcncTable {
     /// The axis.
@@ -74,7 +109,7 @@ pub struct LinuxcncTable {
 }
 
 /// Which page a run ends with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ReportKind {
     /// Latency, drift at the blocks, tool error against the truth.
@@ -111,11 +146,10 @@ impl Scenario {
     /// When it cannot be read.
     pub fn budget(&self) -> Result<Option<Budget>> {
         let path = self.folder.join("budget.yaml");
-        if !path.is_file() {
+        if !path.exists() {
             return Ok(None);
         }
-        let text = std::fs::read_to_string(&path)
-            .with_context(|| format!("budget file {}", path.display()))?;
+        let text = text_file::yaml(&path).context("budget file")?;
         Budget::read(&text, &path).map(Some)
     }
 
@@ -126,17 +160,10 @@ impl Scenario {
     pub fn read(folder: &Path) -> Result<Self> {
         let name = name_of(folder)?;
         let path = folder.join(SCENARIO_FILE);
-        if !path.is_file() {
+        if !path.exists() {
             bail!("{}", no_scenario(folder));
         }
-        let text = std::fs::read_to_string(&path)
-            .with_context(|| format!("scenario file {}", path.display()))?;
-        let file: ScenarioFile = serde_saphyr::from_str(&text).map_err(|error| {
-            let reason = complaint::of_yaml(&error, &text);
-            anyhow!("scenario file {}: {reason}", path.display())
-        })?;
-        file.check()
-            .with_context(|| format!("scenario file {}", path.display()))?;
+        let file = ScenarioFile::read(&path)?;
         let nodes = launch::read(&launch::find(folder)?)?;
         Ok(Self {
             folder: folder.to_owned(),
@@ -163,7 +190,8 @@ fn name_of(folder: &Path) -> Result<String> {
     Ok(name.to_string_lossy().into_owned())
 }
 
-const SCENARIO_FILE: &str = "scenario.yaml";
+/// The file that makes a folder a scenario.
+pub const SCENARIO_FILE: &str = "scenario.yaml";
 /// Where a clone of the tree has its scenarios.
 const USUAL_HOME: &str = "launch_configs";
 
@@ -270,7 +298,11 @@ mod tests {
             let text = format!("title: a\nreport: blocks\nlimit_min: {value}\n");
             std::fs::write(home.path().join(SCENARIO_FILE), text).unwrap();
             let error = format!("{:#}", Scenario::read(home.path()).unwrap_err());
-            for word in [SCENARIO_FILE, "limit_min = ", "above 0 and at most 1000000"] {
+            for word in [
+                SCENARIO_FILE,
+                "limit_min = ",
+                "above 0 and at most 1000000 min",
+            ] {
                 assert!(error.contains(word), "{value}: {error}");
             }
         }

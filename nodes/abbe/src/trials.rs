@@ -31,6 +31,7 @@ use series::Series;
 use trial::How;
 
 use crate::tell::tell;
+use crate::usage::{JOBS, TRIALS};
 
 /// Seed of the trials that the diagnosis is developed with; those of `--final` are others.
 const DEVELOPMENT_SEED: u64 = 1;
@@ -44,7 +45,7 @@ pub struct Trials {
     #[arg(long, value_delimiter = ',', default_value = "i")]
     arm: Vec<Arm>,
     /// Trials in each arm.
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(TRIALS))]
     n: u64,
     /// Seed of the series.
     #[arg(long, conflicts_with = "final_series")]
@@ -54,26 +55,31 @@ pub struct Trials {
     #[arg(long = "final")]
     final_series: bool,
     /// Trials at a time; 0: as many as there are cores.
-    #[arg(long, default_value_t = 0)]
-    jobs: usize,
+    #[arg(long, default_value_t = 0, conflicts_with = "tabulate", value_parser = clap::value_parser!(u64).range(JOBS))]
+    jobs: u64,
     /// Folder of the journal and of the trials under way.
     #[arg(long, default_value = "runs/trials")]
     out: PathBuf,
     /// Folder of the sealed truths; beside `--out` where it is not named.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["in_process", "tabulate"])]
     sealed: Option<PathBuf>,
     /// Diagnose within this process, without bag and seal: for development, never for a published table.
     #[arg(long)]
     in_process: bool,
     /// Switch a rule of the diagnosis off, in a diagnosis of its own beside the whole one: constancy, free_shapes,
     /// swap_search, held_out, recalibration.
-    #[arg(long, value_delimiter = ',', value_name = "RULE")]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "RULE",
+        conflicts_with = "tabulate"
+    )]
     ablate: Vec<Rule>,
     /// Put other methods before the same judge, and predict who looks like whom.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "tabulate")]
     baselines: bool,
     /// Keep bags and reports.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["in_process", "tabulate"])]
     keep: bool,
     /// Make no trials: tabulate the journal.
     #[arg(long)]
@@ -123,7 +129,7 @@ impl Trials {
                 seed,
                 n: self.n,
                 ablated: &blind::once(&self.ablate),
-                jobs: self.jobs,
+                jobs: usize::try_from(self.jobs).expect("at most the bound of the argument"),
                 how: &how,
             };
             for arm in &arms {

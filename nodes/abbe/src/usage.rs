@@ -1,9 +1,17 @@
 //! Arguments that can be read and cannot be used: said as clap says it, with exit code 2.
 
 use std::fmt::Display;
+use std::ops::RangeInclusive;
 
 use clap::CommandFactory;
 use clap::error::ErrorKind;
+
+/// Trials of one arm: a week of every core at a second each, and each leaves a line in the journal.
+pub const TRIALS: RangeInclusive<u64> = 1..=1_000_000;
+/// Trials at a time: each is a process, of which a computer takes some hundreds.
+pub const JOBS: RangeInclusive<u64> = 0..=256;
+/// Magnitude of any number that has a unit: products of a few of them stay finite.
+pub const GREATEST_NUMBER: f64 = 1e12;
 
 /// Exit code for arguments that cannot be understood or used.
 pub const USAGE: u8 = 2;
@@ -19,15 +27,23 @@ pub fn refused(verb: &str, reason: impl Display) -> anyhow::Error {
     error.into()
 }
 
-/// A finite number above 0.
+/// The help of a verb, as clap words it.
+pub fn help_of(verb: &str) -> String {
+    let mut program = crate::Arguments::command();
+    program.build();
+    let command = program.find_subcommand_mut(verb);
+    command.map_or_else(String::new, |command| command.render_help().to_string())
+}
+
+/// A finite number above 0 and at most [`GREATEST_NUMBER`].
 ///
 /// # Errors
 /// Says what is wanted.
 pub fn above_zero(text: &str) -> Result<f64, &'static str> {
     let number = text.parse().ok();
     number
-        .filter(|number: &f64| number.is_finite() && *number > 0.0)
-        .ok_or("must be a finite number above 0")
+        .filter(|number: &f64| *number > 0.0 && *number <= GREATEST_NUMBER)
+        .ok_or("must be a finite number above 0, at most 1e12")
 }
 
 /// The absolute name of a topic, or a pattern of such names: any other would be that of no topic.
@@ -75,7 +91,7 @@ mod tests {
     #[test]
     fn numbers_that_are_none_or_not_above_zero_are_refused() {
         assert!(above_zero("0.5").is_ok_and(|number| (number - 0.5).abs() < 1e-12));
-        for text in ["0", "-0.0", "-1", "nan", "inf", "1e400", "wide", ""] {
+        for text in ["0", "-0.0", "-1", "nan", "inf", "1e400", "1e13", "wide", ""] {
             assert!(above_zero(text).is_err(), "{text}");
         }
     }

@@ -2,6 +2,7 @@
 
 use machine::volumetric::VolumetricError;
 use metrology::Axis;
+use metrology::number::number;
 use metrology::sample::CompensationState;
 
 use crate::geometric::GeometrySource;
@@ -26,8 +27,7 @@ pub enum Diagnostic {
         cause: Option<PartRefusal>,
     },
     #[error(
-        "axis {axis}: wanted offset {wanted_mm:.6} mm exceeds {limit_mm} mm, the last one inside is kept"
-    )]
+        "axis {axis}: wanted offset {wanted_mm:.6} mm exceeds {limit_mm} mm, the last one inside is kept", limit_mm = number(*limit_mm))]
     SizeExceeded {
         axis: Axis,
         wanted_mm: f64,
@@ -56,12 +56,12 @@ pub enum Diagnostic {
     ModelDoubtful { sequence: u32 },
     #[error("thermal model {sequence} is used without objection")]
     ModelAccepted { sequence: u32 },
-    #[error("thermal model {sequence} expired {late_s} s ago and is not taken")]
+    #[error("thermal model {sequence} expired {late_s} s ago and is not taken", late_s = number(*late_s))]
     ModelExpired { sequence: u32, late_s: f64 },
-    #[error("thermal model {sequence} is {by_s} s older than the one in use and is not taken")]
+    #[error("thermal model {sequence} is {by_s} s older than the one in use and is not taken", by_s = number(*by_s))]
     ModelOlder { sequence: u32, by_s: f64 },
     #[error(
-        "axis {axis}: drift used at {position_mm:.3} mm, outside the blocks' span {lower_mm:.3} to {upper_mm:.3} mm, with an expanded uncertainty of {:.1} µm, up to {:.1} µm at the travel's corners",
+        "axis {axis}: drift used at {position_mm:.3} mm, so far outside the blocks' span {lower_mm:.3} to {upper_mm:.3} mm that the extrapolation outweighs the uncertainty at the block: expanded uncertainty {:.1} µm, up to {:.1} µm at the travel's corners",
         expanded_uncertainty_mm * 1e3,
         greatest_mm * 1e3
     )]
@@ -86,8 +86,7 @@ pub enum Diagnostic {
         sequence: u32,
     },
     #[error(
-        "{model} {sequence} changes the tip's error by {change_mm:.6} mm, {limit_mm} mm are allowed; kept back"
-    )]
+        "{model} {sequence} changes the tip's error by {change_mm:.6} mm, {limit_mm} mm are allowed; kept back", limit_mm = number(*limit_mm))]
     GeometryQuarantined {
         model: GeometrySource,
         sequence: u32,
@@ -122,18 +121,16 @@ pub enum Diagnostic {
         runs: u32,
     },
     #[error(
-        "axis {axis}: the points lie whole leads of {lead_mm} mm apart and cannot see the screw's cyclic error"
-    )]
+        "axis {axis}: the points lie whole leads of {lead_mm} mm apart and cannot see the screw's cyclic error", lead_mm = number(*lead_mm))]
     LeadHidden { axis: Axis, lead_mm: f64 },
-    #[error("axis {axis}: the points see the cyclic error of a lead of {lead_mm} mm")]
+    #[error("axis {axis}: the points see the cyclic error of a lead of {lead_mm} mm", lead_mm = number(*lead_mm))]
     LeadSeen { axis: Axis, lead_mm: f64 },
     #[error("axis {axis}: the scale says nothing")]
     ScaleMissing { axis: Axis },
     #[error("axis {axis}: the scale speaks again")]
     ScaleBack { axis: Axis },
     #[error(
-        "axis {axis}: {change_mm:.6} mm measured beside what is known at {position_mm:.3} mm, above {limit_mm} mm nothing is believed"
-    )]
+        "axis {axis}: {change_mm:.6} mm measured beside what is known at {position_mm:.3} mm, above {limit_mm} mm nothing is believed", limit_mm = number(*limit_mm))]
     MeasurementDoubted {
         axis: Axis,
         position_mm: f64,
@@ -146,7 +143,7 @@ pub enum Diagnostic {
     StatesStale { silence_s: f64 },
     #[error("gap of {gap_s:.3} s between axis states, offsets stood meanwhile")]
     Gap { gap_s: f64 },
-    #[error("controller clock went back by {by_s} s, one servo period is assumed")]
+    #[error("controller clock went back by {by_s} s, one servo period is assumed", by_s = number(*by_s))]
     ClockWentBack { by_s: f64 },
     #[error("compensation enabled: {enabled}")]
     Enabled { enabled: bool },

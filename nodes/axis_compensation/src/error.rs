@@ -2,6 +2,7 @@
 
 use machine::ChainError;
 use metrology::Axis;
+use metrology::number::number;
 
 use crate::positioning::refusal::PositioningRefusal;
 
@@ -9,7 +10,7 @@ use crate::positioning::refusal::PositioningRefusal;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum AxisCompensationError {
     /// A parameter is outside its limits.
-    #[error("{key} = {value} {unit}: must be from {lower} to {upper} {unit}")]
+    #[error("{key} = {value} {unit}: must be from {lower} to {upper} {unit}", value = number(*value), lower = number(*lower), upper = number(*upper))]
     ParameterOutOfRange {
         /// The parameter.
         key: &'static str,
@@ -23,7 +24,7 @@ pub enum AxisCompensationError {
         unit: &'static str,
     },
     /// A limit of one axis is outside its limits.
-    #[error("axes.{axis}.{key} = {value} {unit}: must be from {lower} to {upper} {unit}")]
+    #[error("axes.{axis}.{key} = {value} {unit}: must be from {lower} to {upper} {unit}", value = number(*value), lower = number(*lower), upper = number(*upper))]
     LimitOutOfRange {
         /// The axis.
         axis: Axis,
@@ -48,7 +49,7 @@ pub enum AxisCompensationError {
         axis: Axis,
     },
     /// A parameter of an axis' positioning part is outside its limits.
-    #[error("positioning.{axis}.{key} = {value} {unit}: must be from {lower} to {upper} {unit}")]
+    #[error("positioning.{axis}.{key} = {value} {unit}: must be from {lower} to {upper} {unit}", value = number(*value), lower = number(*lower), upper = number(*upper))]
     PositioningOutOfRange {
         /// The axis.
         axis: Axis,

@@ -160,7 +160,11 @@ impl ModelGate {
             let late_s = (now - model.valid_until).as_secs_f64();
             return Passage::Expired { late_s };
         }
-        let in_order = self.current.as_ref().filter(|current| current.at <= now);
+        // One of the future, or of touches that are yet to be made, shuts no other out.
+        let is_past = |current: &&ThermalModel| {
+            current.at <= now && current.measured_at().is_none_or(|at| at <= now)
+        };
+        let in_order = self.current.as_ref().filter(is_past);
         if let Some(by_s) = in_order.and_then(|current| older_by_s(&model, current)) {
             return Passage::Older { by_s };
         }
@@ -455,6 +459,14 @@ mod tests {
         // A clock set back by half an hour makes the one in use a model of the future.
         let set_back = gate.offer(at(1500), model(3, 1400, 1400, 0.010));
         assert_eq!(set_back, Passage::Accepted);
+    }
+
+    #[test]
+    fn a_model_of_touches_that_are_yet_to_be_made_shuts_no_later_one_out() {
+        let gate = &mut gate_with(Extrapolate::Linear);
+        gate.offer(at(1000), model(1, 1000, 900_000, 0.010));
+        let later = gate.offer(at(1100), model(2, 1090, 1090, 0.010));
+        assert!(!matches!(later, Passage::Older { .. }), "{later:?}");
     }
 
     #[test]

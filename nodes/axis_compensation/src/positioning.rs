@@ -50,7 +50,8 @@
 //! DERIVED, in two readings. Both fit "weight of the theoretical compensation" and "pre-compensation":
 //! in (5) ω weighs the table against what is measured at once; in (4) the table alone compensates and ω
 //! is the weight of a new measurement in it, which makes good the promise that a machine that changes
-//! with time stays corrected. (4) has no loop over the scale that could become unstable, (5) has.
+//! with time stays corrected. Of the granted CN 1258431 C only the beginning of the description could be read (the state of the
+//! art and its aim), not its steps (4) and on: nothing there decides between the two. (4) has no loop over the scale that could become unstable, (5) has.
 //!
 //! # Holds when
 //! Command and scale share their zero. The table is looked up at the command, not at the motor: the

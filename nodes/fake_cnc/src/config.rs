@@ -14,6 +14,9 @@ use crate::path::AxisLimits;
 use crate::rs274::Envelope;
 use crate::servo::Gains;
 
+/// Tools that the table may have.
+const TOOLS: usize = 1000;
+
 /// Operational parameters; none of them is physics, so each has a default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -64,6 +67,14 @@ pub struct Config {
     pub longest_catch_up_s: f64,
     /// Whether the node configures and activates itself at its start.
     pub autostart: bool,
+    /// Time that homing takes, at the start and when it is asked for, s; 0: the axes know their zeros.
+    pub homing_s: f64,
+    /// Whether M1 waits.
+    pub optional_stop: bool,
+    /// Whether every block waits for the next to be asked for.
+    pub single_block: bool,
+    /// Lengths of tools H1, H2 ..., mm.
+    pub tool_lengths_mm: Vec<f64>,
     /// What closes the position loop of each linear axis, by letter; others: the motor.
     pub feedback: BTreeMap<Axis, FeedbackSource>,
     /// Positions of linear axes at the start, by letter; others start at 0.
@@ -98,6 +109,10 @@ impl Default for Config {
             clock_drift_ppm: 0.0,
             longest_catch_up_s: 60.0,
             autostart: true,
+            homing_s: 0.0,
+            optional_stop: false,
+            single_block: false,
+            tool_lengths_mm: Vec::new(),
             feedback: BTreeMap::new(),
             start_mm: BTreeMap::new(),
             start_deg: BTreeMap::new(),
@@ -144,6 +159,9 @@ pub struct Settings {
     pub(crate) touch_margin: u64,
     pub(crate) settle: u64,
     pub(crate) compensation_hold: u64,
+    pub(crate) homing: u64,
+    pub(crate) optional_stop: bool,
+    pub(crate) single_block: bool,
     pub(crate) clock_offset: Span,
     pub(crate) clock_drift: f64,
     pub(crate) longest_catch_up: Span,
@@ -204,6 +222,7 @@ impl Settings {
         self.limits.speed[axis] = numbers.speed;
         self.limits.acceleration[axis] = numbers.acceleration;
         self.envelope.travel[axis] = numbers.travel;
+        self.envelope.speed[axis] = numbers.speed;
         self.gains[axis] = Gains {
             position_per_s: numbers.position_gain_per_s,
             feedforward: numbers.feedforward,
@@ -311,7 +330,12 @@ impl Config {
             ("clock_offset_s", self.clock_offset_s),
             ("clock_drift_ppm", self.clock_drift_ppm),
             ("longest_catch_up_s", self.longest_catch_up_s),
+            ("homing_s", self.homing_s),
         ];
+        let lengths = self.tool_lengths_mm.iter();
+        let numbers = numbers
+            .into_iter()
+            .chain(lengths.map(|length_mm| ("tool_lengths_mm", *length_mm)));
         for (name, value) in numbers {
             let range = PARAMETERS
                 .iter()
@@ -327,6 +351,12 @@ impl Config {
                     greatest,
                 });
             }
+        }
+        if self.tool_lengths_mm.len() > TOOLS {
+            return Err(CncError::TooManyTools {
+                count: self.tool_lengths_mm.len(),
+                limit: TOOLS,
+            });
         }
         Ok(())
     }
@@ -347,6 +377,9 @@ impl Config {
             envelope: Envelope {
                 axes: metrology::AxisSet::EMPTY,
                 travel: PerAxis::default(),
+                speed: PerAxis::default(),
+                spindle_limit_rpm: machine.spindle.map(|spindle| spindle.max_speed_rpm),
+                tool_lengths_mm: self.tool_lengths_mm.clone(),
             },
             gains: PerAxis::default(),
             feedback: PerAxis::default(),
@@ -360,6 +393,9 @@ impl Config {
             touch_margin: periods(self.touch_margin_s, period_s),
             settle: periods(self.settle_s, period_s),
             compensation_hold: periods(self.compensation_hold_s, period_s),
+            homing: periods(self.homing_s, period_s),
+            optional_stop: self.optional_stop,
+            single_block: self.single_block,
             clock_offset: Span::from_secs_f64(self.clock_offset_s),
             clock_drift: self.clock_drift_ppm * 1e-6,
             longest_catch_up: Span::from_secs_f64(self.longest_catch_up_s),

@@ -12,8 +12,15 @@
 //! down along its path. On a following error the position loops open and the velocity loops brake to
 //! rest; the command is then put where the axes stand. A fault does not latch: the next program runs.
 //! Every end stops the spindle, as M2 does.
+//!
+//! # State between programs
+//! Changes of [`Registers`] are steps of a program, so an end at any line leaves the state of that line.
+//! M2 then resets what LinuxCNC resets. A program in machine coordinates leaves the state that it found.
 
+mod homing;
 mod phase;
+mod verification;
+mod waiting;
 
 use metrology::stamp::Span;
 use metrology::{Axis, Machine, PerAxis, Stamp};
@@ -25,11 +32,13 @@ use crate::hardware::Hardware;
 use crate::lookahead::{Chain, Command};
 use crate::offset::OffsetInput;
 use crate::outcome::{Ending, ProgramState};
+use crate::path::Segment;
 use crate::plant::Feedback;
-use crate::rs274::program::Program;
-use crate::rs274::{self};
+use crate::rs274::program::{Action, FirstMotion, Program};
+use crate::rs274::{self, Registers};
 use crate::servo::Servo;
 use crate::touching::{Approach, Latched};
+use homing::Homing;
 use phase::Phase;
 
 /// What happened in a period.
@@ -49,6 +58,12 @@ struct Run {
     goal: u64,
     program: Program,
     next: usize,
+    /// Steps whose changes are in the registers.
+    changed: usize,
+    /// What is still to be verified.
+    first_motion: Option<FirstMotion>,
+    /// Line of the block that was begun last; 0 where the next may begin.
+    block: u32,
 }
 
 /// The control of one machine.
@@ -66,6 +81,16 @@ pub struct Control<H> {
     approach: Approach,
     spindle_rpm: f64,
     full_left: u64,
+    registers: Registers,
+    homing: Homing,
+    /// What a feed hold left of a motion, with its step.
+    rest: Option<(Segment, usize)>,
+    hold_wanted: bool,
+    step_wanted: bool,
+    /// Whether the wait of the program was reported.
+    waits: bool,
+    /// Whether the probe may still lean on what it touched.
+    leans: bool,
 }
 
 impl<H: Hardware> Control<H> {
@@ -91,8 +116,20 @@ impl<H: Hardware> Control<H> {
             approach: Approach::default(),
             spindle_rpm: 0.0,
             full_left: 0,
+            registers: Registers::default(),
+            homing: Homing::begin(settings.homing),
+            rest: None,
+            hold_wanted: false,
+            step_wanted: false,
+            waits: false,
+            leans: false,
             settings,
         }
+    }
+
+    /// The modal state, as programs leave it to each other.
+    pub const fn registers(&self) -> &Registers {
+        &self.registers
     }
 
     /// Its settings.
@@ -145,7 +182,10 @@ impl<H: Hardware> Control<H> {
         let Some(run) = &self.run else {
             return (0, 0.0);
         };
-        let along = matches!(self.phase, Phase::Following | Phase::Stopping { .. });
+        let along = matches!(
+            self.phase,
+            Phase::Following | Phase::Pausing | Phase::Stopping { .. }
+        );
         let step = match self.chain.tag().filter(|_| along) {
             Some(step) => step,
             None => run.next.saturating_sub(1),
@@ -179,7 +219,8 @@ impl<H: Hardware> Control<H> {
     /// # Errors
     /// What the program asks that this control could not do; nothing has moved.
     pub fn start(&mut self, goal: u64, text: &str) -> Result<(), ProgramError> {
-        let program = rs274::read(text, &self.settings.envelope, &self.command.position)?;
+        let start = &self.command.position;
+        let program = rs274::read_in(text, &self.settings.envelope, start, &self.registers)?;
         for (name, at) in &program.devices {
             if !self.hardware.has_device(name) {
                 return Err(ProgramError::CommentValue {
@@ -190,11 +231,15 @@ impl<H: Hardware> Control<H> {
                 });
             }
         }
+        self.leans = self.hardware.probe_closed();
         self.chain.reserve(program.longest_chain().max(1));
         self.run = Some(Run {
             goal,
+            first_motion: program.first_motion,
             program,
             next: 0,
+            changed: 0,
+            block: 0,
         });
         self.phase = Phase::Settling { left: 0 };
         Ok(())
@@ -218,10 +263,12 @@ impl<H: Hardware> Control<H> {
             Some(command) => self.command = command,
             None => self.command.velocity = PerAxis::default(),
         }
+        self.go_on_homing(events);
         if let Some(stale) = self.offset.advance() {
             events.push(Event::Noted(stale));
         }
         self.watch_following(events);
+        self.verify_first_motion();
         self.next_phase(events);
         if self.wants_full_rate() {
             self.full_left = self.settings.touch_margin.max(1);
@@ -276,16 +323,34 @@ impl<H: Hardware> Control<H> {
                 latched.feature = touch.feature;
                 events.push(Event::Touched(latched));
                 self.chain.stop();
+                self.leans = true;
                 self.phase = Phase::Touched;
             }
-            Phase::Following if edge.closed => {
+            _ if edge.closed && self.phase.is_watched(self.leans) => {
                 let line = self.progress().0;
-                let diagnostic = Diagnostic::ProbeInMotion { line };
+                let diagnostic = Diagnostic::ProbeTripped {
+                    line,
+                    place: self.place(),
+                };
                 events.push(Event::Noted(diagnostic.clone()));
                 self.stop(Ending::Fault { line, diagnostic });
             }
             _ => {}
         }
+    }
+
+    /// Where the axes are, as a person writes it: machine coordinates, mm and deg.
+    fn place(&self) -> String {
+        let axes = self.settings.limits.axes.iter();
+        let each = axes.map(|axis| {
+            let motor = self.feedback.motor[axis];
+            if axis.is_linear() {
+                format!("{axis}{motor:.3}")
+            } else {
+                format!("{axis}{:.3}", motor.to_degrees())
+            }
+        });
+        each.collect::<Vec<_>>().join(" ")
     }
 
     fn watch_following(&mut self, events: &mut Vec<Event>) {
@@ -311,7 +376,21 @@ impl<H: Hardware> Control<H> {
         }
     }
 
+    /// Puts the changes of the steps before `end` into the registers.
+    fn change_up_to(&mut self, end: usize) {
+        let Some(run) = &mut self.run else {
+            return;
+        };
+        for step in run.program.steps.iter().take(end).skip(run.changed) {
+            if let Action::Set(change) = &step.action {
+                self.registers.apply(change);
+            }
+        }
+        run.changed = run.changed.max(end);
+    }
+
     fn stop(&mut self, ending: Ending) {
+        self.rest = None;
         self.chain.stop();
         self.phase = Phase::Stopping { ending };
     }
@@ -319,7 +398,7 @@ impl<H: Hardware> Control<H> {
     fn wants_full_rate(&self) -> bool {
         match self.phase {
             Phase::Leading { .. } | Phase::Touching { .. } | Phase::Touched => true,
-            Phase::Following | Phase::Stopping { .. } => self
+            Phase::Following | Phase::Pausing | Phase::Stopping { .. } => self
                 .run
                 .as_ref()
                 .zip(self.chain.tag())

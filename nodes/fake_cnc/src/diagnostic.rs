@@ -1,8 +1,11 @@
 //! Conditions that the control reports without being asked.
 
 use metrology::Axis;
+use metrology::number::{along, number};
 
 pub use metrology::Severity;
+
+use crate::rs274::program::Wait;
 
 /// Something worth telling; lengths mm, angles rad.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -11,25 +14,47 @@ pub use metrology::Severity;
     reason = "the sentence of each variant is its documentation"
 )]
 pub enum Diagnostic {
-    #[error("compensation of axis {axis} is {value}: refused")]
+    #[error("compensation of axis {axis} is {value}: refused", value = number(*value))]
     CompensationNotFinite { axis: Axis, value: f64 },
-    #[error("compensation of axis {axis} is {value}, limit {limit}: refused")]
+    #[error(
+        "compensation of axis {axis} is {}, limit {}: refused",
+        along(*axis, *value), along(*axis, *limit)
+    )]
     CompensationTooLarge { axis: Axis, value: f64, limit: f64 },
     #[error("no compensation for {silent_periods} servo periods: fading")]
     CompensationStale { silent_periods: u64 },
     #[error("compensation is followed again")]
     CompensationFollowed,
-    #[error("axis {axis} follows with an error of {error}, limit {limit}: stopped")]
+    #[error(
+        "axis {axis} follows with an error of {}, limit {}: stopped",
+        along(*axis, *error), along(*axis, *limit)
+    )]
     FollowingError { axis: Axis, error: f64, limit: f64 },
-    #[error("probe closed in a motion that is no touch, line {line}: stopped")]
-    ProbeInMotion { line: u32 },
+    #[error(
+        "probe closed in a motion that is no touch, or between touches, line {line}, at {place} (machine coordinates, mm and deg): stopped; move away from the surface, and look at what the probe met"
+    )]
+    ProbeTripped { line: u32, place: String },
+    #[error("program waits at line {line} ({why}): resume it, or cancel it")]
+    Waiting { line: u32, why: Wait },
+    #[error("the program no longer waits")]
+    WaitsNoLonger,
+    #[error("compensation is held back at zero until every axis is homed")]
+    CompensationHeldBack,
+    #[error("every axis is homed: compensation is followed")]
+    CompensationReleased,
     #[error("a new program runs after the fault")]
     FaultCleared,
-    #[error("time went back by {by_s} s: nothing is simulated until it has passed again")]
+    #[error(
+        "time went back by {by_s} s: nothing is simulated until it has passed again",
+        by_s = number(*by_s)
+    )]
     TimeWentBack { by_s: f64 },
-    #[error("time went back by {by_s} s: the controller's own clock goes on")]
+    #[error("time went back by {by_s} s: the controller's own clock goes on", by_s = number(*by_s))]
     TimeSetBack { by_s: f64 },
-    #[error("time jumped by {by_s} s, limit {limit_s} s: skipped")]
+    #[error(
+        "time jumped by {by_s} s, limit {limit_s} s: skipped",
+        by_s = number(*by_s), limit_s = number(*limit_s)
+    )]
     TimeJumped { by_s: f64, limit_s: f64 },
     #[error("time passes as it should again")]
     TimePasses,
@@ -46,9 +71,11 @@ impl Diagnostic {
             | Self::CompensationTooLarge { .. }
             | Self::CompensationStale { .. }
             | Self::CompensationFollowed => "compensation_input",
-            Self::FollowingError { .. } | Self::ProbeInMotion { .. } | Self::FaultCleared => {
+            Self::FollowingError { .. } | Self::ProbeTripped { .. } | Self::FaultCleared => {
                 "motion_fault"
             }
+            Self::Waiting { .. } | Self::WaitsNoLonger => "program_waits",
+            Self::CompensationHeldBack | Self::CompensationReleased => "compensation_held_back",
             Self::TimeWentBack { .. }
             | Self::TimeSetBack { .. }
             | Self::TimeJumped { .. }
@@ -62,16 +89,20 @@ impl Diagnostic {
     pub const fn severity(&self) -> Severity {
         match self {
             Self::CompensationFollowed
+            | Self::CompensationReleased
+            | Self::WaitsNoLonger
             | Self::FaultCleared
             | Self::TimePasses
             | Self::NothingToCancel { .. } => Severity::Info,
-            Self::CompensationStale { .. } | Self::TimeJumped { .. } | Self::TimeSetBack { .. } => {
-                Severity::Warn
-            }
+            Self::CompensationStale { .. }
+            | Self::CompensationHeldBack
+            | Self::Waiting { .. }
+            | Self::TimeJumped { .. }
+            | Self::TimeSetBack { .. } => Severity::Warn,
             Self::CompensationNotFinite { .. }
             | Self::CompensationTooLarge { .. }
             | Self::FollowingError { .. }
-            | Self::ProbeInMotion { .. }
+            | Self::ProbeTripped { .. }
             | Self::TimeWentBack { .. } => Severity::Error,
         }
     }
@@ -85,14 +116,23 @@ mod tests {
     fn every_condition_that_can_go_wrong_can_be_told_well_again() {
         let wrong = [
             Diagnostic::CompensationStale { silent_periods: 1 },
-            Diagnostic::ProbeInMotion { line: 1 },
+            Diagnostic::ProbeTripped {
+                line: 1,
+                place: String::new(),
+            },
             Diagnostic::TimeWentBack { by_s: 0.05 },
-            Diagnostic::TimeSetBack { by_s: 1.0 },
+            Diagnostic::Waiting {
+                line: 1,
+                why: Wait::Stop,
+            },
+            Diagnostic::CompensationHeldBack,
         ];
         let well = [
             Diagnostic::CompensationFollowed,
             Diagnostic::FaultCleared,
             Diagnostic::TimePasses,
+            Diagnostic::WaitsNoLonger,
+            Diagnostic::CompensationReleased,
         ];
         for (wrong, well) in wrong.iter().zip(&well) {
             assert_eq!(wrong.name(), well.name());

@@ -102,6 +102,8 @@ pub struct Chain {
     planned: Vec<Planned>,
     index: usize,
     progress: Progress,
+    /// Where in its piece it came to rest ahead of plan.
+    rested_at: Option<f64>,
 }
 
 /// Command at one instant.
@@ -121,6 +123,7 @@ impl Chain {
             planned: Vec::with_capacity(capacity),
             index: 0,
             progress: Progress::Done,
+            rested_at: None,
         }
     }
 
@@ -135,6 +138,15 @@ impl Chain {
         self.planned.clear();
         self.index = 0;
         self.progress = Progress::Done;
+        self.rested_at = None;
+    }
+
+    /// What is left of the piece in which it came to rest ahead of plan, with its tag; `None` at the end of a piece.
+    #[must_use]
+    pub fn rest(&self, limits: &AxisLimits) -> Option<(Segment, usize)> {
+        let planned = self.planned.get(self.index)?;
+        let rest = planned.segment.rest(self.rested_at?, limits)?;
+        Some((rest, planned.tag))
     }
 
     /// Appends a piece; `tag` is given back while it is executed.
@@ -184,6 +196,13 @@ impl Chain {
     #[must_use]
     pub fn done(&self) -> bool {
         self.progress == Progress::Done
+    }
+
+    /// Whether it has come to rest where its last piece ends, or has no piece.
+    #[must_use]
+    pub fn at_end(&self) -> bool {
+        let is_last = self.index + 1 >= self.planned.len();
+        self.done() && is_last && self.rested_at.is_none()
     }
 
     /// Tag of the piece that is being executed.
@@ -239,6 +258,7 @@ impl Chain {
             if end < segment.length {
                 if time_s < left_s {
                     self.progress = Progress::Done;
+                    self.rested_at = Some(end);
                     return at_rest(segment.position(end));
                 }
                 speed -= a * time_s;

@@ -7,12 +7,13 @@
 //!   o ← o - sign(o) min(|o|, ȯ_fade T)       after `compensation_hold_s` without one     (2)
 //! ```
 //!
-//! o* is the last accepted offset. Until it is stale it is held. Because (1) holds for the first
+//! o* is the last accepted offset. Until it is stale it is held. Before every axis is homed, o* counts as zero and
+//! what is applied fades by (2): the machine's zero must not have an offset in it. Because (1) holds for the first
 //! message as for any other, a compensation that starts, stops, restarts or jumps moves the axis at
 //! ȯ_max and no faster.
 
 use metrology::sample::AxisCompensation;
-use metrology::{AxisSet, PerAxis};
+use metrology::{AxisSet, GateNews, HomedGate, PerAxis};
 
 use crate::config::OffsetLimits;
 use crate::diagnostic::Diagnostic;
@@ -29,12 +30,17 @@ pub struct OffsetInput {
     stale: bool,
     resting: bool,
     complained: bool,
+    gate: HomedGate,
+    /// Whether it was reported that offsets are held back.
+    told_held: bool,
 }
 
 impl OffsetInput {
-    /// Nothing applied; `hold` is in servo periods.
+    /// Nothing applied, and nothing held back; `hold` is in servo periods.
     #[must_use]
     pub fn new(axes: AxisSet, limits: PerAxis<OffsetLimits>, hold: u64) -> Self {
+        let mut gate = HomedGate::default();
+        gate.step(true, false);
         Self {
             axes,
             limits,
@@ -45,7 +51,23 @@ impl OffsetInput {
             stale: true,
             resting: true,
             complained: false,
+            gate,
+            told_held: false,
         }
+    }
+
+    /// Holds every offset back at zero, or lets it take effect again; tells each change once to who sends offsets.
+    pub fn hold_back(&mut self, is_held: bool) -> Option<Diagnostic> {
+        if self.gate.is_open() == is_held {
+            self.resting = false;
+        }
+        let news = self.gate.step(!is_held, !self.stale);
+        if news == Some(GateNews::HeldBack) {
+            return (!std::mem::replace(&mut self.told_held, true))
+                .then_some(Diagnostic::CompensationHeldBack);
+        }
+        let is_over = !is_held && std::mem::take(&mut self.told_held);
+        is_over.then_some(Diagnostic::CompensationReleased)
     }
 
     /// Offsets in effect, mm or rad.
@@ -113,14 +135,16 @@ impl OffsetInput {
         let mut moved = false;
         for axis in self.axes.iter() {
             let limits = &self.limits[axis];
-            let step = if self.stale {
+            let is_held = !self.gate.is_open();
+            let step = if self.stale || is_held {
                 limits.fade_step
             } else {
                 limits.step
             };
-            let gap = self.wanted[axis] - self.applied[axis];
+            let wanted = if is_held { 0.0 } else { self.wanted[axis] };
+            let gap = wanted - self.applied[axis];
             if gap.abs() <= step {
-                self.applied[axis] = self.wanted[axis];
+                self.applied[axis] = wanted;
             } else {
                 self.applied[axis] += step.copysign(gap);
             }
@@ -223,11 +247,54 @@ mod tests {
         assert!(input.applied()[Axis::X].abs() <= 0.0);
     }
 
+    #[test]
+    fn what_is_held_back_fades_to_zero_and_rises_again_without_a_step() {
+        let mut input = input();
+        assert_eq!(input.receive(&message(0.001)), None);
+        (0..20).for_each(|_| assert_eq!(input.advance(), None));
+        assert_eq!(
+            input.hold_back(true),
+            Some(Diagnostic::CompensationHeldBack)
+        );
+        let mut last = input.applied()[Axis::X];
+        for _ in 0..400 {
+            assert_eq!(input.receive(&message(0.001)), None);
+            assert_eq!(input.hold_back(true), None);
+            input.advance();
+            let now = input.applied()[Axis::X];
+            assert!((0.0..=LIMITS.fade_step + 1e-15).contains(&(last - now)));
+            last = now;
+        }
+        assert!(last.abs() <= 0.0);
+        assert_eq!(
+            input.hold_back(false),
+            Some(Diagnostic::CompensationReleased)
+        );
+        for _ in 0..20 {
+            input.advance();
+            let now = input.applied()[Axis::X];
+            assert!(now - last <= LIMITS.step + 1e-15);
+            last = now;
+        }
+        assert!((last - 0.001).abs() < 1e-15);
+        // A stream that ends while it is held back leaves no condition behind.
+        assert!(input.hold_back(true).is_some());
+        (0..400).for_each(|_| {
+            input.advance();
+            assert_eq!(input.hold_back(true), None);
+        });
+        assert_eq!(
+            input.hold_back(false),
+            Some(Diagnostic::CompensationReleased)
+        );
+    }
+
     #[derive(Clone, Debug)]
     enum Event {
         Told(f64),
         Passed(u32),
         Released,
+        HeldBack(bool),
     }
 
     fn event() -> impl Strategy<Value = Event> {
@@ -241,6 +308,7 @@ mod tests {
             10 => value.prop_map(Event::Told),
             5 => (1..300_u32).prop_map(Event::Passed),
             1 => Just(Event::Released),
+            1 => any::<bool>().prop_map(Event::HeldBack),
         ]
     }
 
@@ -259,6 +327,10 @@ mod tests {
                     }
                     Event::Released => {
                         input.release();
+                        1
+                    }
+                    Event::HeldBack(is_held) => {
+                        input.hold_back(is_held);
                         1
                     }
                     Event::Passed(periods) => periods,
@@ -286,7 +358,7 @@ mod tests {
         let large = input.receive(&message(0.7)).unwrap();
         assert_eq!(
             large.to_string(),
-            "compensation of axis X is 0.7, limit 0.5: refused"
+            "compensation of axis X is 0.7 mm, limit 0.5 mm: refused"
         );
         assert_eq!((input.wanted, input.silent), before);
     }

@@ -1,5 +1,8 @@
 //! How a program ends.
 
+use metrology::Axis;
+use metrology::number::number;
+
 use crate::diagnostic::Diagnostic;
 
 /// Kind of an end, as the action reports it.
@@ -53,6 +56,18 @@ pub enum Ending {
         feature: String,
         state: &'static str,
     },
+    #[error(
+        "line {line}: after the first motion the text says {axis} = {wanted} {unit}, the machine is at {found} {unit}: the program's coordinates are not the machine's; look at the control's offsets",
+        wanted = number(*wanted),
+        found = number(*found)
+    )]
+    FrameDiffers {
+        line: u32,
+        axis: Axis,
+        wanted: f64,
+        found: f64,
+        unit: &'static str,
+    },
     #[error("line {line}: cancelled")]
     Cancelled { line: u32 },
     #[error("line {line}: {diagnostic}")]
@@ -67,6 +82,7 @@ impl Ending {
             Self::Done => None,
             Self::Missed { line, .. }
             | Self::Stuck { line, .. }
+            | Self::FrameDiffers { line, .. }
             | Self::Cancelled { line }
             | Self::Fault { line, .. } => Some(*line),
         }
@@ -79,6 +95,7 @@ impl Ending {
             Self::Done => Outcome::Done,
             Self::Missed { .. } => Outcome::ProbeMissed,
             Self::Stuck { .. } => Outcome::ProbeStuck,
+            Self::FrameDiffers { .. } => Outcome::Refused,
             Self::Cancelled { .. } => Outcome::Stopped,
             Self::Fault { .. } => Outcome::Fault,
         }

@@ -128,6 +128,23 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "autostart",
         "Whether the node configures and activates itself at its start; otherwise somebody does so (`ros2 lifecycle set`).",
     ),
+    number(
+        "homing_s",
+        "s",
+        "Time that homing takes, at the start and when it is asked for; 0: the axes know their zeros.",
+        (0.0, 3600.0),
+    ),
+    text("optional_stop", "Whether M1 waits."),
+    text(
+        "single_block",
+        "Whether every block waits for the next to be asked for.",
+    ),
+    number(
+        "tool_lengths_mm",
+        "mm",
+        "Lengths of tools H1, H2 and so on, for G43.",
+        (-1000.0, 1000.0),
+    ),
     feedback("feedback.X"),
     feedback("feedback.Y"),
     feedback("feedback.Z"),

@@ -22,6 +22,9 @@
 //! the window of a second difference of commands; with (3) to (5) that difference never exceeds
 //! A_i T² (`prop_commands_never_exceed_the_limits_of_an_axis`).
 //!
+//! An arc across a plane that is turned about Z is a curve of the turned axes: (1) to (4) hold along them, with the
+//! smaller limits of X and Y over √2 each, so that either of the machine's axes keeps its own.
+//!
 //! Feed: F is along X Y Z when any of them moves and rotary axes follow in the same time; with
 //! rotary axes alone it is along them, in deg/min (RS274/NGC 2.1.2.5).
 
@@ -65,7 +68,11 @@ pub struct Segment {
     end: PerAxis<f64>,
     slope: PerAxis<f64>,
     circle: Option<Circle>,
+    /// Cosine and sine of the angle by which slope and circle are turned about Z.
+    turn: Option<[f64; 2]>,
     along_linear: bool,
+    /// Length that is done already, mm (rad).
+    done: f64,
     /// Length, mm (rad for rotary axes alone).
     pub length: f64,
     /// Greatest speed by feed, axes and curvature, mm/s (rad/s).
@@ -77,11 +84,34 @@ pub struct Segment {
 /// Where `motion` leads from `from`.
 #[must_use]
 pub fn target(motion: &Motion, from: &PerAxis<f64>) -> PerAxis<f64> {
-    PerAxis::from_fn(|axis| match motion.aim[axis] {
+    let mut target = PerAxis::from_fn(|axis| match motion.aim[axis] {
         Aim::Keep => from[axis],
         Aim::At(value) => value,
         Aim::By(step) => from[axis] + step,
-    })
+    });
+    if let Some(slide) = motion.slide {
+        let [x, y] = slide.end_mm([from[Axis::X], from[Axis::Y]]);
+        (target[Axis::X], target[Axis::Y]) = (x, y);
+    }
+    target
+}
+
+/// X and Y turned about Z by the angle of which these are cosine and sine.
+fn turned(mut of: PerAxis<f64>, [cos, sin]: [f64; 2]) -> PerAxis<f64> {
+    let (x, y) = (of[Axis::X], of[Axis::Y]);
+    of[Axis::X] = x * cos - y * sin;
+    of[Axis::Y] = x * sin + y * cos;
+    of
+}
+
+/// Limits along axes that are turned about Z.
+fn turned_limits(limits: &AxisLimits) -> AxisLimits {
+    let mut turned = *limits;
+    for of in [&mut turned.speed, &mut turned.acceleration] {
+        let each = of[Axis::X].min(of[Axis::Y]) * std::f64::consts::FRAC_1_SQRT_2;
+        (of[Axis::X], of[Axis::Y]) = (each, each);
+    }
+    turned
 }
 
 impl Segment {
@@ -89,15 +119,18 @@ impl Segment {
     #[must_use]
     pub fn new(motion: &Motion, from: &PerAxis<f64>, limits: &AxisLimits) -> Option<Self> {
         let end = target(motion, from);
+        let mut delta = PerAxis::from_fn(|axis| end[axis] - from[axis]);
+        let turn = motion.arc.and_then(|arc| arc.turn);
+        if let Some([cos, sin]) = turn {
+            delta = turned(delta, [cos, -sin]);
+        }
         let circle = motion.arc.map(|arc| {
             let [first, second, _] = arc.plane.axes();
-            let span = [first, second].map(|axis| end[axis] - from[axis]);
             Circle {
                 axes: [first, second],
-                sweep: Sweep::new(&arc, span),
+                sweep: Sweep::new(&arc, [first, second].map(|axis| delta[axis])),
             }
         });
-        let mut delta = PerAxis::from_fn(|axis| end[axis] - from[axis]);
         let mut arc_mm = 0.0;
         if let Some(Circle { axes, sweep }) = circle {
             arc_mm = (sweep.radius_mm + 0.5 * sweep.widening_mm) * sweep.swept_rad.abs();
@@ -117,13 +150,35 @@ impl Segment {
             end,
             slope: PerAxis::from_fn(|axis| delta[axis] / length),
             circle,
+            turn,
             along_linear,
+            done: 0.0,
             length,
             speed_limit: length / limits.period_s,
             acceleration_limit: f64::INFINITY,
         };
-        segment.limit(motion.feed, limits);
+        if turn.is_some() {
+            segment.limit(motion.feed, &turned_limits(limits));
+        } else {
+            segment.limit(motion.feed, limits);
+        }
         Some(segment)
+    }
+
+    /// What is left of it after `s`; `None` where that is nothing.
+    #[must_use]
+    pub fn rest(&self, s: f64, limits: &AxisLimits) -> Option<Self> {
+        let length = self.length - s;
+        if length <= SHORTEST {
+            return None;
+        }
+        Some(Self {
+            start: self.position(s),
+            done: self.done + s,
+            length,
+            speed_limit: self.speed_limit.min(length / limits.period_s),
+            ..*self
+        })
     }
 
     fn limit(&mut self, feed: Feed, limits: &AxisLimits) {
@@ -183,16 +238,54 @@ impl Segment {
         if s >= self.length {
             return self.end;
         }
+        let Some(turn) = self.turn else {
+            return self.unturned_position(s);
+        };
+        let way = turned(self.way(s), turn);
+        PerAxis::from_fn(|axis| self.start[axis] + way[axis])
+    }
+
+    fn unturned_position(&self, s: f64) -> PerAxis<f64> {
         let mut position = self.start;
         for (value, slope) in position.0.iter_mut().zip(&self.slope.0) {
             *value += slope * s;
         }
-        if let Some(Circle { axes, sweep }) = &self.circle {
-            let point = sweep.point(s / self.length);
-            position[axes[0]] = self.start[axes[0]] + point[0];
-            position[axes[1]] = self.start[axes[1]] + point[1];
+        if let Some(Circle { axes, .. }) = &self.circle {
+            let point = self.point(s);
+            for (axis, value) in axes.iter().zip(point) {
+                position[*axis] = self.start[*axis] + value;
+            }
         }
         position
+    }
+
+    /// Way from the start along the turned axes, at distance `s`.
+    fn way(&self, s: f64) -> PerAxis<f64> {
+        let mut way = PerAxis::from_fn(|axis| self.slope[axis] * s);
+        if let Some(Circle { axes, .. }) = &self.circle {
+            for (axis, value) in axes.iter().zip(self.point(s)) {
+                way[*axis] = value;
+            }
+        }
+        way
+    }
+
+    /// Point of the circle at distance `s`, from the start.
+    fn point(&self, s: f64) -> [f64; 2] {
+        let Some(Circle { sweep, .. }) = &self.circle else {
+            return [0.0; 2];
+        };
+        let point = sweep.point(self.share(s));
+        if self.done <= 0.0 {
+            return point;
+        }
+        let begun = sweep.point(self.share(0.0));
+        [point[0] - begun[0], point[1] - begun[1]]
+    }
+
+    /// Share of the whole way at distance `s`.
+    fn share(&self, s: f64) -> f64 {
+        (self.done + s) / (self.done + self.length)
     }
 
     /// Change of the positions with distance, at distance `s`.
@@ -200,15 +293,15 @@ impl Segment {
     pub fn tangent(&self, s: f64) -> PerAxis<f64> {
         let mut tangent = self.slope;
         if let Some(Circle { axes, sweep }) = &self.circle {
-            let share = s / self.length;
+            let (share, whole) = (self.share(s), self.done + self.length);
             let (sin, cos) = (sweep.from_rad + share * sweep.swept_rad).sin_cos();
-            let turning = sweep.swept_rad / self.length;
-            let widening = sweep.widening_mm / self.length;
+            let turning = sweep.swept_rad / whole;
+            let widening = sweep.widening_mm / whole;
             let radius = sweep.radius_mm + share * sweep.widening_mm;
             tangent[axes[0]] = widening * cos - radius * turning * sin;
             tangent[axes[1]] = widening * sin + radius * turning * cos;
         }
-        tangent
+        self.turn.map_or(tangent, |turn| turned(tangent, turn))
     }
 
     /// Greatest speed at which the corner from this piece to `next` may be passed, by (5).

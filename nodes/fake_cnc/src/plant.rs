@@ -51,6 +51,7 @@ mod measuring;
 
 mod error;
 mod file;
+mod limits;
 mod noise;
 
 pub use error::PlantError;
@@ -135,6 +136,7 @@ impl Plant {
     /// # Errors
     /// When a value is out of range or the two files do not fit each other.
     pub fn new(machine: &MachineFile, truth: &PlantFile) -> Result<Self, PlantError> {
+        limits::check(truth)?;
         let heat = Heat::new(machine, truth)?;
         let contact = Contact::new(machine, truth)?;
         let tool_length_mm = machine

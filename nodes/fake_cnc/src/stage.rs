@@ -15,6 +15,7 @@ use crate::error::CncError;
 use crate::hardware::Hardware;
 use crate::outcome::{Outcome, ProgramState};
 use crate::plant::Plant;
+use crate::rs274::Registers;
 use crate::touching::Latched;
 
 /// A clock that goes back by less is waited for: messages that tell the time may overtake each other. By more, it was set.
@@ -45,6 +46,14 @@ pub enum Input {
     Compensation(AxisCompensation),
     /// The control may act, or is to come to rest and say when it has.
     Active(bool),
+    /// Hold the program on its way.
+    Pause,
+    /// Let a program that waits go on.
+    Resume,
+    /// Let a program that waits go on for one block.
+    StepBlock,
+    /// Home every axis anew.
+    Home,
     /// Time has come this far: simulate the servo periods that fit.
     Tick,
 }
@@ -98,6 +107,8 @@ pub enum Output {
     },
     /// A condition worth telling.
     Diagnostic(Diagnostic),
+    /// The answer to [`Input::Pause`], [`Input::Resume`], [`Input::StepBlock`] and [`Input::Home`]: done, or why not.
+    Answer(Result<(), &'static str>),
     /// After [`Input::Active`] with false: no program is on its way, and no offset is in effect.
     AtRest,
 }
@@ -171,6 +182,11 @@ impl<H: Hardware> Cnc<H> {
         self.control.hardware()
     }
 
+    /// The machine, to set up what a test lets it do.
+    pub const fn hardware_mut(&mut self) -> &mut H {
+        self.control.hardware_mut()
+    }
+
     /// Whether no program is on its way.
     pub fn idle(&self) -> bool {
         self.control.goal().is_none()
@@ -186,11 +202,24 @@ impl<H: Hardware> Cnc<H> {
         self.control.offset()
     }
 
+    /// The modal state, as programs leave it to each other.
+    pub const fn registers(&self) -> &Registers {
+        self.control.registers()
+    }
+
+    /// Whether every axis is homed.
+    pub const fn is_homed(&self) -> bool {
+        self.control.is_homed()
+    }
+
     fn run_program(&mut self, goal: u64, text: &str, out: &mut Vec<Output>) {
         let refused = match self.control.goal() {
             Some(other) => Some(format!("program {other} is running")),
             None if self.activity != Activity::Active => {
                 Some("the control is not active".to_owned())
+            }
+            None if !self.control.is_homed() => {
+                Some("the axes are not homed: wait until they are".to_owned())
             }
             None => None,
         };
@@ -220,6 +249,22 @@ impl<H: Hardware> Cnc<H> {
         } else {
             out.push(Output::Diagnostic(Diagnostic::NothingToCancel { goal }));
         }
+    }
+
+    /// Does what somebody asks of the control, and answers.
+    fn serve(&mut self, input: &Input, out: &mut Vec<Output>) {
+        let answer = match input {
+            Input::Pause => self.control.pause(&mut self.events),
+            Input::Resume => self.control.resume(false, &mut self.events),
+            Input::StepBlock => self.control.resume(true, &mut self.events),
+            _ => self.control.home(),
+        };
+        for event in self.events.drain(..) {
+            if let Event::Noted(diagnostic) = event {
+                out.push(Output::Diagnostic(diagnostic));
+            }
+        }
+        out.push(Output::Answer(answer));
     }
 
     fn act(&mut self, active: bool, out: &mut Vec<Output>) {
@@ -424,6 +469,9 @@ impl<H: Hardware> Stage for Cnc<H> {
             Input::RunProgram { goal, text, .. } => self.run_program(goal, &text, out),
             Input::CancelProgram { goal } => self.cancel(goal, out),
             Input::Active(active) => self.act(active, out),
+            Input::Pause | Input::Resume | Input::StepBlock | Input::Home => {
+                self.serve(&input, out);
+            }
             Input::Compensation(_) if self.activity != Activity::Active => {}
             Input::Compensation(message) => {
                 let told = self.control.offset_mut().receive(&message);

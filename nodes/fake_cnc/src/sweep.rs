@@ -119,6 +119,7 @@ mod tests {
             clockwise,
             centre_from_start_mm: centre,
             turns,
+            turn: None,
         }
     }
 

@@ -12,11 +12,13 @@ use machine::file::EffectEntry;
 use machine::twin::Channel;
 use nalgebra::DVector;
 
+use crate::aside;
 use crate::config::GapConfig;
 use crate::families::Slot;
 use crate::figures::Note;
 use crate::form_doubt;
 use crate::isolability;
+use crate::judgement::{self, Check, CheckId};
 use crate::lines;
 use crate::noise::Noise;
 use crate::normal::Normal;
@@ -28,8 +30,10 @@ use crate::rule::Rule;
 use crate::selection::{Limits, Search, Set};
 use crate::signature::{Form, Instance, Library};
 use crate::stack::Stack;
+use crate::thermal;
 use crate::unknown::{self, Leftover};
-use crate::veto::{self, Veto, least_d_squared};
+use crate::unrepeated;
+use crate::veto::{self, Veto};
 use crate::widening;
 
 /// Everything that the search found.
@@ -50,6 +54,8 @@ pub struct Found {
     pub set: Set,
     /// Rows less floats of what was fitted.
     pub freedom: f64,
+    /// Which thermometers the logs go with.
+    pub thermometers: Vec<Note>,
 }
 
 /// One effect of the best set.
@@ -59,18 +65,37 @@ pub struct Member {
     pub form: usize,
     /// Its values.
     pub estimate: Estimate,
-    /// How sure.
-    pub status: Status,
     /// Probability.
     pub confidence: f64,
     /// What looks like it.
     pub confusable: Vec<Confusable>,
     /// Whether it has one size.
     pub constancy: Constancy,
-    /// What speaks against it; a surrogate has one at least.
-    pub vetoes: Vec<Veto>,
+    /// What its status follows from.
+    pub checks: Vec<Check>,
     /// The best sets that do without it, and by how much worse each is.
     pub rivals: Vec<(Set, f64)>,
+}
+
+impl Member {
+    /// How sure.
+    pub fn status(&self) -> Status {
+        judgement::status(&self.checks)
+    }
+
+    /// What speaks against it; a surrogate has one at least.
+    pub fn vetoes(&self) -> Vec<Veto> {
+        judgement::vetoes(&self.checks, &self.constancy)
+    }
+
+    /// Adds a check, or puts it in the place of an earlier one of the same rule.
+    fn put(&mut self, check: Check) {
+        let mut own = self.checks.iter_mut();
+        match own.find(|own| own.check == check.check) {
+            Some(own) => *own = check,
+            None => self.checks.push(check),
+        }
+    }
 }
 
 /// What a search is made with.
@@ -113,7 +138,9 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let instances = Instance::all(stack.twin.machine(), means);
     let mut signatures = Library::new(stack, instances);
     lines::add(stack, scope.slots, &mut signatures);
+    widening::widen_curves(stack, &mut signatures);
     let mut normal = signatures.normal(&stack.z);
+    signatures.aside = aside::set_aside(stack, &signatures, &normal);
     let mut best = search(scope, &signatures, &normal);
     let is_closed = !best.leftover.flagged();
     if !best.set.is_empty() && scope.config.applies(Rule::FreeShapes) {
@@ -136,8 +163,15 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     while leave_out_small(stack, &signatures, &mut members) {
         resize(stack, &signatures, &normal, &mut members);
     }
-    members.sort_by_key(|member| member.status == Status::Surrogate);
+    if unrepeated::is_assumed(scope.noise) {
+        for member in &mut members {
+            member.confidence *= unrepeated::CONFIDENCE;
+        }
+    }
+    members.sort_by_key(|member| member.status() == Status::Surrogate);
     doubt_forms(stack, &signatures, &mut members);
+    check_sizes(&signatures, &mut members);
+    resize(stack, &signatures, &normal, &mut members);
     Found {
         signatures,
         normal,
@@ -147,6 +181,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
         forms,
         set: best.set,
         freedom: stack.freedom(),
+        thermometers: thermal::notes(stack),
     }
 }
 
@@ -154,14 +189,14 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
 fn resize(stack: &Stack<'_>, signatures: &Library, normal: &Normal, members: &mut [Member]) {
     if members
         .iter()
-        .all(|member| member.status != Status::Surrogate)
+        .all(|member| member.status() != Status::Surrogate)
     {
         return;
     }
     let named = || {
         members
             .iter()
-            .filter(|member| member.status != Status::Surrogate)
+            .filter(|member| member.status() != Status::Surrogate)
     };
     let forms: Vec<&Form> = named()
         .map(|member| &signatures.forms[member.form])
@@ -170,7 +205,7 @@ fn resize(stack: &Stack<'_>, signatures: &Library, normal: &Normal, members: &mu
     let refit = refit::joint(stack, signatures, &forms, &normal.solve(&columns).sizes);
     let kept = members
         .iter_mut()
-        .filter(|member| member.status != Status::Surrogate);
+        .filter(|member| member.status() != Status::Surrogate);
     for (member, estimate) in kept.zip(refit.estimates) {
         member.estimate = estimate;
     }
@@ -178,7 +213,7 @@ fn resize(stack: &Stack<'_>, signatures: &Library, normal: &Normal, members: &mu
 
 /// Widens the intervals of what is named by what the sizes owe to their forms.
 fn doubt_forms(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) {
-    let kept = || (0..members.len()).filter(|place| members[*place].status != Status::Surrogate);
+    let kept = || (0..members.len()).filter(|place| members[*place].status() != Status::Surrogate);
     let places: Vec<usize> = kept().collect();
     let forms: Vec<&Form> = places
         .iter()
@@ -194,6 +229,28 @@ fn doubt_forms(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) 
     }
 }
 
+/// Checks that the size of a member with one size is known better than from its physical range alone; several sizes may be known by their sum.
+fn check_sizes(signatures: &Library, members: &mut [Member]) {
+    for member in members.iter_mut() {
+        let kind = signatures.instances[signatures.forms[member.form].instance].kind;
+        let estimate = &member.estimate;
+        let spans: Vec<f64> = kind
+            .parameters
+            .iter()
+            .enumerate()
+            .filter_map(|(place, p)| {
+                let is_size = p.role == Role::Amplitude && estimate.active.contains(&place);
+                let span = (estimate.high[place] - estimate.low[place]) / (p.high - p.low);
+                is_size.then_some(span)
+            })
+            .collect();
+        if let [span] = spans[..] {
+            let check = Check::new(CheckId::Determined, span < WHOLE_RANGE);
+            member.put(check.with(span, WHOLE_RANGE));
+        }
+    }
+}
+
 /// Leaves out members that, sized without the surrogates, are below what they cost the search, and names none below what is
 /// named at all: they were found for what the surrogates left. Whether there were any.
 fn leave_out_small(stack: &Stack<'_>, signatures: &Library, members: &mut Vec<Member>) -> bool {
@@ -202,17 +259,17 @@ fn leave_out_small(stack: &Stack<'_>, signatures: &Library, members: &mut Vec<Me
     let before = members.len();
     members.retain(|member| {
         let price = count(signatures.forms[member.form].price) * log_rows + 2.0 * log_instances;
-        member.status == Status::Surrogate || member.estimate.d.powi(2) >= price
+        member.status() == Status::Surrogate || member.estimate.d.powi(2) >= price
     });
     let mut is_less = members.len() < before;
     let named = members.iter_mut();
-    for member in named.filter(|member| member.status != Status::Surrogate) {
-        if member.estimate.d.powi(2) < least_d_squared(member.estimate.active.len(), log_rows) {
-            member.status = Status::Surrogate;
+    for member in named.filter(|member| member.status() != Status::Surrogate) {
+        let check = veto::above_noise(&member.estimate, log_rows);
+        if check.has_failed() {
             member.confidence *= 0.5;
-            member.vetoes.push(Veto::NearNoise);
             is_less = true;
         }
+        member.put(check);
     }
     is_less
 }
@@ -249,11 +306,27 @@ fn search(scope: &Scope<'_, '_>, signatures: &Library, normal: &Normal) -> Best 
 }
 
 impl Found {
-    /// Takes the names away where the noise is not that of the repeats.
-    pub fn withdraw(&mut self) {
+    /// Adds a check that is the same for every member.
+    pub fn add_check(&mut self, check: &Check) {
         for member in &mut self.members {
-            member.status = Status::Surrogate;
-            member.vetoes.push(Veto::NoiseFloor);
+            member.put(check.clone());
+        }
+    }
+
+    /// Adds a check of one named member; where it fails the others are sized without it.
+    pub fn check_named(&mut self, stack: &Stack<'_>, named: usize, check: Check) {
+        let has_failed = check.has_failed();
+        let mut kept = self.members.iter_mut();
+        if let Some(member) = kept
+            .by_ref()
+            .filter(|member| member.status() != Status::Surrogate)
+            .nth(named)
+        {
+            member.confidence *= if has_failed { 0.5 } else { 1.0 };
+            member.put(check);
+        }
+        if has_failed {
+            resize(stack, &self.signatures, &self.normal, &mut self.members);
         }
     }
 
@@ -276,7 +349,7 @@ impl Found {
         Cause {
             effect: instance.kind.id.to_owned(),
             axis: instance.target.to_string(),
-            status: member.status,
+            status: member.status(),
             confidence: member.confidence,
             parameters: whole(instance.kind, &member.estimate)
                 .into_iter()
@@ -289,6 +362,7 @@ impl Found {
             d: member.estimate.d,
             confusable_with: member.confusable.clone(),
             constancy: member.constancy.clone(),
+            why: member.checks.clone(),
         }
     }
 
@@ -301,7 +375,7 @@ impl Found {
     pub fn named(&self) -> impl Iterator<Item = &Member> {
         self.members
             .iter()
-            .filter(|member| member.status != Status::Surrogate)
+            .filter(|member| member.status() != Status::Surrogate)
     }
 
     /// The members that stand alone as entries of a machine file.
@@ -309,7 +383,7 @@ impl Found {
         let alone = self
             .members
             .iter()
-            .filter(|member| member.status == Status::Named);
+            .filter(|member| member.status() == Status::Named);
         alone
             .map(|member| entry(self.instance(member), &member.estimate.values))
             .collect()
@@ -317,13 +391,11 @@ impl Found {
 
     /// The members that are only shown, and why.
     pub fn not_named(&self) -> impl Iterator<Item = Note> {
-        let shown = self
-            .members
-            .iter()
-            .filter(|member| !member.vetoes.is_empty());
-        shown.map(|member| Note::OnlyLooksLike {
+        let with_vetoes = self.members.iter().map(|member| (member, member.vetoes()));
+        let shown = with_vetoes.filter(|(_, vetoes)| !vetoes.is_empty());
+        shown.map(|(member, why)| Note::OnlyLooksLike {
             effect: self.instance(member).name(),
-            why: member.vetoes.clone(),
+            why,
         })
     }
 
@@ -354,7 +426,7 @@ impl Found {
         let of_sets = self
             .members
             .iter()
-            .filter(|member| member.status == Status::Set);
+            .filter(|member| member.status() == Status::Set);
         let note = |member: &Member| {
             let open = member.confusable.iter().filter(|other| !other.excluded);
             Note::NotWritten {

@@ -20,6 +20,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::families::Slot;
+use crate::judgement::{Check, CheckId};
 use crate::normal::Normal;
 use crate::nuisance::orthonormal;
 use crate::rows::count;
@@ -38,15 +39,15 @@ pub struct Cost {
     pub log_instances: f64,
 }
 
-/// Whether some family is worth more than a member; `left` is what all members leave, `part` the member's own
+/// Whether no family is worth more than a member; `left` is what all members leave, `part` the member's own
 /// signature, `others` the derivatives of the other members.
-pub fn is_beaten(
+pub fn check(
     slots: &[Slot],
     left: &DVector<f64>,
     part: &DVector<f64>,
     others: &[DVector<f64>],
     member: Cost,
-) -> bool {
+) -> Check {
     let basis = orthonormal(left.len(), others.iter().cloned());
     let beside =
         |column: DVector<f64>| -> DVector<f64> { &column - &basis * basis.tr_mul(&column) };
@@ -55,8 +56,8 @@ pub fn is_beaten(
     let families: usize = slots.iter().map(|slot| slot.families.len()).sum();
     let choice = 2.0 * count(families.max(2)).ln();
     let own = gain - count(member.price) * member.log_rows - 2.0 * member.log_instances;
-    slots.iter().any(|slot| {
-        slot.families.iter().any(|family| {
+    let worths = slots.iter().flat_map(|slot| {
+        slot.families.iter().map(|family| {
             let whole = |column: usize| {
                 let mut whole = DVector::zeros(rest.len());
                 for (row, place) in slot.rows.iter().enumerate() {
@@ -69,9 +70,12 @@ pub fn is_beaten(
             let gain = Normal::new(&DMatrix::from_columns(&columns), &rest)
                 .solve(&all)
                 .gain;
-            gain - count(all.len()) * member.log_rows - choice > own + 2.0 * ODDS.ln()
+            gain - count(all.len()) * member.log_rows - choice
         })
-    })
+    });
+    let limit = 2.0 * ODDS.ln();
+    let best = worths.fold(f64::NEG_INFINITY, f64::max);
+    Check::new(CheckId::BeatsShapes, best <= own + limit).with(best - own, limit)
 }
 
 #[cfg(test)]
@@ -112,15 +116,12 @@ mod tests {
         };
         let [line, bend] = [line, bend].map(|v| &v * (10.0 / v.norm()));
         let nothing = DVector::zeros(rows);
-        assert!(is_beaten(&slots, &bend, &line, &[], cost));
-        assert!(!is_beaten(&slots, &nothing, &line, &[], cost));
+        let is_beaten = |left: &DVector<f64>, part: &DVector<f64>, others: &[DVector<f64>]| {
+            check(&slots, left, part, others, cost).has_failed()
+        };
+        assert!(is_beaten(&bend, &line, &[]));
+        assert!(!is_beaten(&nothing, &line, &[]));
         // What another member explains is no merit of the family.
-        assert!(!is_beaten(
-            &slots,
-            &bend,
-            &line,
-            std::slice::from_ref(&bend),
-            cost
-        ));
+        assert!(!is_beaten(&bend, &line, std::slice::from_ref(&bend)));
     }
 }

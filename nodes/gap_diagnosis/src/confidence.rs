@@ -14,6 +14,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::judgement::{Check, CheckId};
 use crate::selection::Set;
 use crate::signature::Library;
 
@@ -52,11 +53,43 @@ impl Rivals {
 
     /// Whether a set without this member, and with nothing in its place, is worse by the odds that exclude a rival. A
     /// member that is barely worth its price is what chance brings.
-    pub fn is_needed(&self, best: &BTreeSet<usize>, instance: usize) -> bool {
+    fn is_needed(&self, best: &BTreeSet<usize>, instance: usize) -> bool {
         let mut without = best.clone();
         without.remove(&instance);
         let less = self.sets.get(&without);
         less.is_none_or(|score| *score > self.best + 2.0 * ODDS.ln())
+    }
+
+    /// By how much a set without this member, and with nothing in its place, is worse; infinite where none was visited.
+    fn loss_without(&self, best: &BTreeSet<usize>, instance: usize) -> f64 {
+        let mut without = best.clone();
+        without.remove(&instance);
+        let less = self.sets.get(&without).copied();
+        less.unwrap_or(f64::INFINITY) - self.best
+    }
+
+    /// By how much the best set without an instance is worse, whatever stands in its place; infinite where none was visited.
+    fn loss_with_rival(&self, instance: usize) -> f64 {
+        let others = self.sets.iter().filter(|(set, _)| !set.contains(&instance));
+        let least = others
+            .map(|(_, score)| *score)
+            .fold(f64::INFINITY, f64::min);
+        least - self.best
+    }
+
+    /// The checks that (2) and [`Self::is_needed`] are; of a member that another effect was set aside for (2) does not hold.
+    pub fn checks(&self, best: &BTreeSet<usize>, instance: usize, is_shared: bool) -> [Check; 2] {
+        let limit = 2.0 * ODDS.ln();
+        let loss = if is_shared {
+            0.0
+        } else {
+            self.loss_with_rival(instance)
+        };
+        [
+            Check::new(CheckId::Needed, self.is_needed(best, instance))
+                .with(self.loss_without(best, instance), limit),
+            Check::new(CheckId::NoRival, !is_shared && self.is_alone(instance)).with(loss, limit),
+        ]
     }
 
     /// Instances that stand in sets nearly as good that do without this one, and not in the best set itself.
@@ -70,7 +103,7 @@ impl Rivals {
     }
 
     /// Whether (2) holds.
-    pub fn is_alone(&self, instance: usize) -> bool {
+    fn is_alone(&self, instance: usize) -> bool {
         let near = |score: &f64| *score <= self.best + 2.0 * ODDS.ln();
         self.sets
             .iter()

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use crate::error::GapError;
+use crate::judgement::Check;
 use crate::rule::Rule;
 
 /// Settings of a diagnosis. The defaults are those that the trials were judged with.
@@ -76,6 +77,14 @@ impl GapConfig {
     #[must_use]
     pub fn applies(&self, rule: Rule) -> bool {
         !self.ablated.contains(&rule)
+    }
+
+    /// The checks of a rule, as not tried where it is off.
+    pub(crate) fn tried(&self, rule: Rule, checks: Vec<Check>) -> Vec<Check> {
+        if self.applies(rule) {
+            return checks;
+        }
+        checks.into_iter().map(Check::not_tried).collect()
     }
 
     /// Refuses settings that mean nothing.

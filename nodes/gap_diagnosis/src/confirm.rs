@@ -30,6 +30,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::config::GapConfig;
 use crate::field;
+use crate::judgement::{Check, CheckId, Verdict};
 use crate::localise::wilson_hilferty;
 use crate::normal::Normal;
 use crate::nuisance::plane_name;
@@ -41,13 +42,17 @@ use crate::stack::Stack;
 /// A level of a condition needs this D of the effect to say something of its size.
 const LEAST_D: f64 = 3.0;
 
-/// Whether (1) confirms each signature.
-pub fn held_out_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<bool> {
+/// The checks of (1) of each signature.
+pub fn held_out_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<Vec<Check>> {
     held_out_gains_of(stack, &stack.z, parts)
 }
 
 /// The same on other numbers of the stack's rows.
-pub fn held_out_gains_of(stack: &Stack<'_>, z: &DVector<f64>, parts: &[DVector<f64>]) -> Vec<bool> {
+pub fn held_out_gains_of(
+    stack: &Stack<'_>,
+    z: &DVector<f64>,
+    parts: &[DVector<f64>],
+) -> Vec<Vec<Check>> {
     let Some(columns) = (!parts.is_empty()).then(|| DMatrix::from_columns(parts)) else {
         return vec![];
     };
@@ -69,7 +74,7 @@ pub fn held_out_gains_of(stack: &Stack<'_>, z: &DVector<f64>, parts: &[DVector<f
                 .filter(shows)
                 .map(|fold| gain(&whole, fold, member))
                 .collect();
-            holds(&gains)
+            checks(&gains)
         })
         .collect()
 }
@@ -124,24 +129,35 @@ fn gain(whole: &Normal, fold: &Normal, member: usize) -> Gain {
 }
 
 /// Whether the runs confirm a member: those that tell of it, or all where fewer than two do.
-fn holds(gains: &[Gain]) -> bool {
+fn checks(gains: &[Gain]) -> Vec<Check> {
     let of = |all: bool| -> Vec<f64> {
         let counted = gains.iter().filter(|one| all || one.tells);
         counted.map(|one| one.gain).collect()
     };
     let telling = of(false);
-    is_confirmed(&if telling.len() < 2 { of(true) } else { telling })
+    checks_of(&if telling.len() < 2 { of(true) } else { telling })
 }
 
-fn is_confirmed(gains: &[f64]) -> bool {
+/// Gain over its standard error, and share of the runs with a gain, that confirm a member.
+const LEAST_GAIN: f64 = 1.0;
+const LEAST_SHARE: f64 = 0.8;
+
+fn checks_of(gains: &[f64]) -> Vec<Check> {
     if gains.len() < 2 {
-        return true;
+        let alone = Check::new(CheckId::HeldOutGain, true);
+        let name = "gain on runs left out, where two or more runs show it";
+        return vec![alone.named(name.to_owned()).not_tried()];
     }
     let n = count(gains.len());
     let mean = gains.iter().sum::<f64>() / n;
     let variance = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0);
     let positive = count(gains.iter().filter(|gain| **gain > 0.0).count());
-    mean > (variance / n).sqrt() && positive >= 0.8 * n
+    let error = (variance / n).sqrt();
+    vec![
+        Check::new(CheckId::HeldOutGain, mean > LEAST_GAIN * error).with(mean / error, LEAST_GAIN),
+        Check::new(CheckId::HeldOutShare, positive >= LEAST_SHARE * n)
+            .with(positive / n, LEAST_SHARE),
+    ]
 }
 
 type Level = fn(&Run, &Block, &Row) -> String;
@@ -182,7 +198,7 @@ pub fn constancy(
     jacobian: &[DVector<f64>],
     left: &DVector<f64>,
     limits: Limits,
-) -> Constancy {
+) -> (Constancy, Check) {
     constancy_of(
         stack,
         raw,
@@ -229,12 +245,13 @@ pub fn constancy_of(
     jacobian: &[DVector<f64>],
     left: &DVector<f64>,
     limits: Limits,
-) -> Constancy {
+) -> (Constancy, Check) {
     let mut worst = Constancy {
         passed: true,
         worst_z: 0.0,
         split_by: String::new(),
     };
+    let mut decisive = Decisive::default();
     let halves =
         |run: &Run, _: &Block, row: &Row| (time_s(run, row) > middle_time(stack)).to_string();
     let times = ("time", split(stack, raw, column, halves));
@@ -255,8 +272,50 @@ pub fn constancy_of(
             worst.split_by = name.to_owned();
         }
         worst.passed &= limits.hold(z, spread);
+        decisive.take(limits, name, z, spread);
     }
-    worst
+    let check = decisive.check(limits, worst.passed);
+    (worst, check)
+}
+
+/// The split that comes nearest to two sizes, by the nearer of its two limits.
+#[derive(Default)]
+struct Decisive {
+    /// Value over limit, with the check as it would pass.
+    nearest: Option<(f64, Check)>,
+}
+
+impl Decisive {
+    fn take(&mut self, limits: Limits, split_by: &str, z: f64, spread: f64) {
+        let check = |name: &str, value: f64, limit: f64| {
+            let check = Check::new(CheckId::OneSize, true).with(value, limit);
+            (value / limit, check.named(format!("{name} by {split_by}")))
+        };
+        let score = check("standard score of different sizes", z, limits.z);
+        let spread = check("spread of sizes over their mean", spread, limits.spread);
+        let nearer = if spread.0 < score.0 { spread } else { score };
+        if self
+            .nearest
+            .as_ref()
+            .is_none_or(|(known, _)| nearer.0 > *known)
+        {
+            self.nearest = Some(nearer);
+        }
+    }
+
+    fn check(self, limits: Limits, passed: bool) -> Check {
+        let untried = Check::new(CheckId::OneSize, true);
+        match self.nearest {
+            None => untried.not_tried(),
+            // The rule is switched off.
+            Some(_) if limits.spread.is_infinite() => untried.not_tried(),
+            Some((_, check)) if passed => check,
+            Some((_, check)) => Check {
+                verdict: Verdict::Failed,
+                ..check
+            },
+        }
+    }
 }
 
 fn middle_time(stack: &Stack<'_>) -> f64 {
@@ -374,6 +433,10 @@ mod tests {
 
     fn sum_of(sizes: [f64; 2]) -> impl Fn(&DMatrix<f64>) -> DVector<f64> {
         move |columns| columns * DVector::from_row_slice(&sizes)
+    }
+
+    fn holds(gains: &[Gain]) -> bool {
+        !checks(gains).iter().any(Check::has_failed)
     }
 
     #[test]

@@ -17,6 +17,7 @@ use crate::figures::{Figures, Note};
 use crate::form_error::FormError;
 use crate::gap;
 use crate::guard;
+use crate::judgement::{Check, CheckId};
 use crate::next::{self, Bench};
 use crate::noise::{self, Noise, Readings};
 use crate::regression::Regression;
@@ -31,6 +32,9 @@ use crate::{isolability, localise, places, recalibration, share_interval, unknow
 
 /// Fewer held-out runs than this are to be looked at one by one.
 const FEW_HELD_OUT: usize = 6;
+
+/// What the rms of the held-out runs may be with an effect over what it is without: noise alone changes it by this much.
+const MOST_RATIO: f64 = 1.02;
 
 /// A diagnosis: the report, what is drawn beside it, and what `--write-machine` adds.
 #[derive(Clone, Debug)]
@@ -206,7 +210,7 @@ impl<'a> Base<'a> {
         let split = split::split(self.session, config.hold_out);
         let (searched, mut scattered) = self.explained(&split, kinds, config);
         if searched.found.leftover.flagged() && scattered.is_named() {
-            scattered.withdraw_but(Some(&self.scattered_within(&searched, kinds, config)));
+            scattered.check_within(&self.scattered_within(&searched, kinds, config));
         }
         let Searched {
             stack,
@@ -216,20 +220,20 @@ impl<'a> Base<'a> {
             inflation,
             ..
         } = searched;
-        let reproduced = guard::judge(&inflation, config, &mut notes);
-        if !reproduced {
-            found.withdraw();
-            scattered.withdraw_but(None);
-        }
+        let noise_check = guard::judge(&inflation, config, &mut notes);
+        found.add_check(&noise_check);
+        scattered.add_check(&noise_check);
+        let reproduced = !noise_check.has_failed();
         notes.extend(remarks(&stack, &split, &found));
         let next = next::propose(&self.bench(config), &found);
         notes.extend(next.notes);
         let all = self.stack(&split.all(), self.noise, &FormError::base(config));
-        let shrunk = self.shrunk(&all, &split, &found, before.flagged(), config);
+        let shrunk = self.confirmed(&all, &stack, &split, &mut found, before.flagged(), config);
         let sizes = gap::by_block(&all, self.noise, &all.floated(all.raw.clone()), &all.runs);
         let floated = stack.floated(stack.raw.clone());
         let (rest, beside) = self.beside_named(&stack, &slots, &found, config);
         let flagged = reproduced && before.flagged() && beside.flagged();
+        let effects = [found.entries(), scattered.entries()].concat();
         let report = GapReport {
             schema: SCHEMA.to_owned(),
             inputs: Inputs::default(),
@@ -260,7 +264,7 @@ impl<'a> Base<'a> {
             report,
             figures,
             notes,
-            effects: [found.entries(), scattered.entries].concat(),
+            effects,
             experiments: next.experiments,
         }
     }
@@ -277,6 +281,36 @@ impl<'a> Base<'a> {
         let white = stack.whitened(rest.clone());
         let leftover = unknown::leftover(stack, slots, self.noise, &white, &[], config);
         (rest, leftover)
+    }
+
+    /// How far the gap shrinks with what is named, after what makes the held-out runs worse has been withdrawn, the worst first.
+    fn confirmed(
+        &self,
+        all: &Stack<'_>,
+        fitted: &Stack<'_>,
+        split: &Split,
+        found: &mut Found,
+        has_gap: bool,
+        config: &GapConfig,
+    ) -> Shrunk {
+        loop {
+            let shrunk = self.shrunk(all, split, found, has_gap, config);
+            let ratios = shrunk.held_out_ratios();
+            let worst = ratios.iter().copied().enumerate();
+            let worst = worst.max_by(|a, b| a.1.total_cmp(&b.1));
+            let check = |ratio: f64| {
+                Check::new(CheckId::HeldOutRms, ratio <= MOST_RATIO).with(ratio, MOST_RATIO)
+            };
+            match worst.filter(|(_, ratio)| *ratio > MOST_RATIO) {
+                Some((named, ratio)) => found.check_named(fitted, named, check(ratio)),
+                None => {
+                    for (named, ratio) in ratios.into_iter().enumerate() {
+                        found.check_named(fitted, named, check(ratio));
+                    }
+                    return shrunk;
+                }
+            }
+        }
     }
 
     fn shrunk(

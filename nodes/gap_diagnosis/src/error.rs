@@ -1,5 +1,7 @@
 //! Why a session cannot be diagnosed, and what to record instead.
 
+use metrology::number::{number, quantity};
+
 /// A session, a machine file or a setting that no diagnosis can be made of.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message names each field")]
@@ -22,14 +24,14 @@ pub enum GapError {
         high: usize,
     },
     /// A setting that is no number or too small.
-    #[error("{key} = {value}: must be {low} or above")]
+    #[error("{key} = {value}: must be {low} or above", value = quantity(key, *value), low = quantity(key, *low))]
     Setting {
         key: &'static str,
         value: f64,
         low: f64,
     },
     /// A parameter of the node outside its range.
-    #[error("{name} = {value}: must be within {low} and {high}")]
+    #[error("{name} = {value}: must be within {low} and {high}", value = quantity(name, *value), low = number(*low), high = quantity(name, *high))]
     Parameter {
         name: &'static str,
         value: f64,

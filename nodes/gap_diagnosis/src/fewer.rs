@@ -13,12 +13,15 @@
 //! in their order, so that the first and the last stay, and what changes through the recording is still seen. What the
 //! machine did in between stays as well: its history is the whole recording's.
 //!
+//! One log by itself is cut into parts (`log`), each of which has few rows.
+//!
 //! # Holds when
 //! Conditions are few against runs: each keeps three runs.
 
 use machine::twin::Session;
 
 use crate::config::GapConfig;
+use crate::log;
 use crate::repeats::same_condition;
 use crate::rows::Rows;
 
@@ -29,8 +32,11 @@ const STATIONS: usize = 64;
 /// Runs that each condition keeps.
 const KEPT: usize = 3;
 
-/// The session with fewer runs, where all of them would have too many rows.
+/// The session with fewer runs, where all of them would have too many rows; one log in parts.
 pub fn fewer(session: &Session, config: &GapConfig) -> Option<Session> {
+    if let Some(parts) = log::in_parts(session) {
+        return Some(parts);
+    }
     let all: Vec<usize> = (0..session.runs.len()).collect();
     let rows = |stations: usize| Rows::new(session, &all, stations, |_| true).len;
     let fewest = rows(FEWEST_STATIONS.min(config.stations));

@@ -6,6 +6,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::thermal::{GoesWith, ThermalFit};
 use crate::veto::Veto;
 
 mod no_run;
@@ -136,6 +137,25 @@ pub enum Note {
     Dropped { channel: String, readings: usize },
     /// The machine has thermometers, and none was recorded.
     NoTemperatures,
+    /// Nothing was repeated: the noise of a log is that of its neighbouring readings.
+    NoiseWithin {
+        channel: String,
+        sigma_um: f64,
+        between_um: f64,
+        /// Whether nothing at all was repeated.
+        lowers: bool,
+    },
+    /// One log by itself was cut into parts.
+    InParts { parts: usize, minutes: f64 },
+    /// A log goes with thermometers: how much they explain of runs that they were not fitted to.
+    GoesWith { channel: String, found: ThermalFit },
+    /// A thermometer was silent for longer than usual: the longest time, the runs before and after it, and how often besides.
+    Unread {
+        thermometer: String,
+        hours: f64,
+        runs: [u32; 2],
+        more: usize,
+    },
     /// Of a recording with too many runs only some are diagnosed.
     FewerRuns { runs: usize, of: usize },
     /// The noise of the repeats is not that of the session.
@@ -191,6 +211,95 @@ fn worse_noise(
     )
 }
 
+fn unread(
+    f: &mut fmt::Formatter<'_>,
+    thermometer: &str,
+    hours: f64,
+    [before, after]: [u32; 2],
+    more: usize,
+) -> fmt::Result {
+    let place = if before == after {
+        format!("in run {before}")
+    } else {
+        format!("between run {before} and run {after}")
+    };
+    let besides = match more {
+        0 => String::new(),
+        1 => ", and once more for less".to_owned(),
+        times => format!(", and {times} times more for as long or less"),
+    };
+    write!(
+        f,
+        "thermometer {thermometer} was not read for {hours:.1} h {place}{besides}: its temperature is taken to go evenly \
+         there; what lags it by less than a fifth of a pause of the whole recording is taken to be settled at its end"
+    )
+}
+
+fn no_repeats(f: &mut fmt::Formatter<'_>, channel: &str) -> fmt::Result {
+    write!(
+        f,
+        "{channel}: left out, no test was repeated on it; run one of its tests three times"
+    )
+}
+
+fn by_thermometers(f: &mut fmt::Formatter<'_>, channel: &str, found: &ThermalFit) -> fmt::Result {
+    let term = |one: &GoesWith| {
+        let lag = if one.lag_min > 0.0 {
+            format!("lagged by {:.1} min", one.lag_min)
+        } else {
+            "without a lag".to_owned()
+        };
+        format!("{} {lag}, {:.2} µm/K", one.thermometer, one.um_per_k)
+    };
+    let percent = |share: f64| 100.0 * share.max(0.0);
+    let terms: Vec<String> = found.by.iter().map(term).collect();
+    let alone = found.alone.iter();
+    let alone = alone.map(|(id, share)| format!("{id} {:.1} %", percent(*share)));
+    let alone: Vec<String> = alone.collect();
+    write!(
+        f,
+        "{channel} goes with {}: on runs left out one by one that explains {:.1} % (the best alone: {})",
+        terms.join(", and with "),
+        percent(found.share),
+        alone.join(", ")
+    )
+}
+
+fn noise_within(
+    f: &mut fmt::Formatter<'_>,
+    channel: &str,
+    [sigma_um, between_um]: [f64; 2],
+    lowers: bool,
+) -> fmt::Result {
+    let then = if lowers {
+        ", and confidences are lower"
+    } else {
+        ""
+    };
+    write!(
+        f,
+        "{channel}: no test was repeated on it, so its noise is that of neighbouring readings, {sigma_um:.2} µm; by how \
+         much a second run would differ is not known, {between_um} µm is taken{then}: log the same again, three times in all"
+    )
+}
+
+fn in_parts(f: &mut fmt::Formatter<'_>, parts: usize, minutes: f64) -> fmt::Result {
+    write!(
+        f,
+        "one log: it is divided into {parts} runs of {minutes:.1} min, its parts, of which the last third is held out"
+    )
+}
+
+fn few_runs(f: &mut fmt::Formatter<'_>, runs: usize) -> fmt::Result {
+    write!(
+        f,
+        "{runs} runs are too few to flip signs; significance is from a parametric bootstrap"
+    )
+}
+
+const NOTHING_HELD_OUT: &str =
+    "nothing could be held out: record each test at a second radius, feed or place";
+
 const NO_TEMPERATURES: &str = "no thermometer was recorded: what goes with a temperature cannot be named, and what goes \
     with time may be heat";
 
@@ -232,25 +341,31 @@ fn not_white(f: &mut fmt::Formatter<'_>, channel: &str, blocks: usize, of: usize
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoRepeats { channel } => write!(
-                f,
-                "{channel}: left out, no test was repeated on it; run one of its tests three times"
-            ),
+            Self::NoRepeats { channel } => no_repeats(f, channel),
             Self::Dropped { channel, readings } => dropped(f, channel, *readings),
             Self::NoTemperatures => f.write_str(NO_TEMPERATURES),
+            Self::NoiseWithin {
+                channel,
+                sigma_um,
+                between_um,
+                lowers,
+            } => noise_within(f, channel, [*sigma_um, *between_um], *lowers),
+            Self::GoesWith { channel, found } => by_thermometers(f, channel, found),
+            Self::InParts { parts, minutes } => in_parts(f, *parts, *minutes),
+            Self::Unread {
+                thermometer,
+                hours,
+                runs,
+                more,
+            } => unread(f, thermometer, *hours, *runs, *more),
             Self::FewerRuns { runs, of } => fewer_runs(f, *runs, *of),
             Self::NotReproduced {
                 channel,
                 inflation,
                 withdraws,
             } => worse_noise(f, channel, *inflation, *withdraws),
-            Self::FewRuns { runs } => write!(
-                f,
-                "{runs} runs are too few to flip signs; significance is from a parametric bootstrap"
-            ),
-            Self::NothingHeldOut => f.write_str(
-                "nothing could be held out: record each test at a second radius, feed or place",
-            ),
+            Self::FewRuns { runs } => few_runs(f, *runs),
+            Self::NothingHeldOut => f.write_str(NOTHING_HELD_OUT),
             Self::FewHeldOut { runs } => write!(
                 f,
                 "{runs} runs were held out: an interval of so few is rough, look at each"

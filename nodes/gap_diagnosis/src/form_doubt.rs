@@ -18,6 +18,7 @@
 //! \[1\] J. A. Hausman, Econometrica 46, 1978 (the variance of a difference of two estimates, one efficient).
 
 use machine::effects::Role;
+use nalgebra::DVector;
 
 use crate::refit::{self, Estimate};
 use crate::signature::{Form, Library};
@@ -25,6 +26,8 @@ use crate::stack::Stack;
 
 /// Coverage factor of the intervals.
 const COVERAGE: f64 = 1.96;
+/// Squared cosine from which a free amplitude is the form over again.
+const MOST_ALIKE: f64 = 0.98;
 
 /// (1) for every form of a set that has a wider one.
 pub fn widen(stack: &Stack<'_>, signatures: &Library, forms: &[&Form], estimates: &mut [Estimate]) {
@@ -81,10 +84,23 @@ fn wider(stack: &Stack<'_>, signatures: &Library, form: &Form, estimate: &Estima
             values[place] = 0.0;
         }
     }
-    let shows = |place: &usize, typical: f64| {
+    let signature = |place: usize, typical: f64| {
         let mut on = values.clone();
-        on[*place] = typical;
-        stack.signature(&*instance.effect(&on)).norm() > 1e-3
+        on[place] = typical;
+        stack.signature(&*instance.effect(&on))
+    };
+    let own: Vec<DVector<f64>> = parameters()
+        .filter(|(place, _)| form.amplitudes.contains(place))
+        .map(|(place, p)| signature(place, p.typical))
+        .collect();
+    // What is the catalogue's own form over again widens nothing: between the two any share would do.
+    let shows = |place: &usize, typical: f64| {
+        let column = signature(*place, typical);
+        let is_other = |own: &DVector<f64>| {
+            let square = own.norm_squared() * column.norm_squared();
+            own.dot(&column).powi(2) < MOST_ALIKE * square
+        };
+        column.norm() > 1e-3 && own.iter().all(is_other)
     };
     let amplitudes = parameters()
         .filter(|(place, p)| {

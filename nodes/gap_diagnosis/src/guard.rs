@@ -40,6 +40,7 @@ use crate::families::Slot;
 use crate::field::{self, Smooth};
 use crate::figures::Note;
 use crate::form_error::{self, FormError};
+use crate::judgement::{Check, CheckId};
 use crate::noise::Noise;
 use crate::nuisance::orthonormal;
 use crate::periods;
@@ -143,17 +144,16 @@ fn middle(values: impl Iterator<Item = f64>) -> f64 {
     *all.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Whether the noise of the repeats is the session's: the middle channel's. A channel whose noise is worse is said.
+/// Checks that the noise of the repeats is the session's: the middle channel's. A channel whose noise is worse gets a note.
 pub fn judge(
     inflation: &BTreeMap<Channel, f64>,
     config: &GapConfig,
     notes: &mut Vec<Note>,
-) -> bool {
+) -> Check {
     let mut all: Vec<f64> = inflation.values().copied().collect();
     all.sort_by(f64::total_cmp);
-    let is_reproduced = all
-        .get(all.len() / 2)
-        .is_none_or(|middle| *middle <= config.most_inflation);
+    let middle = all.get(all.len() / 2).copied();
+    let is_reproduced = middle.is_none_or(|middle| middle <= config.most_inflation);
     for channel in inflation.keys() {
         if let Some(inflation) = excess(channel, inflation, config) {
             notes.push(Note::NotReproduced {
@@ -163,7 +163,11 @@ pub fn judge(
             });
         }
     }
-    is_reproduced
+    let check = Check::new(CheckId::NoiseFloor, is_reproduced);
+    match middle {
+        Some(middle) => check.with(middle, config.most_inflation),
+        None => check.not_tried(),
+    }
 }
 
 /// Whether a channel's noise is that of the repeats.
@@ -390,7 +394,7 @@ mod tests {
             let channels = [Channel::GridU, Channel::GridV, Channel::Touch];
             let inflation = channels.into_iter().zip(ratios).collect();
             let mut notes = vec![];
-            let is_reproduced = judge(&inflation, &config, &mut notes);
+            let is_reproduced = !judge(&inflation, &config, &mut notes).has_failed();
             let words: Vec<String> = notes.iter().map(ToString::to_string).collect();
             (is_reproduced, words.join("; "))
         };

@@ -17,7 +17,7 @@
 //! The catalogue's own common causes (a wavelength, a clock) were searched as well: they take the place of the three
 //! where they can, for one size costs less than three.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use machine::effects::Role;
 
@@ -26,8 +26,8 @@ use crate::signature::Instance;
 
 /// Ends of the names of parameters that tell a relative length or a delay.
 const OF_A_UNIT: [&str; 2] = ["_um_per_m", "_ms"];
-/// Members of one kind from which they are one cause.
-const LEAST_ALIKE: usize = 3;
+/// Members of one kind beyond which they are one cause.
+pub const MOST_ALIKE: usize = 2;
 /// Standard uncertainties of a difference within which sizes agree.
 const AGREE: f64 = 2.0;
 /// A size that is less sure, by its standard uncertainty over it, agrees with too much.
@@ -50,14 +50,14 @@ impl Size {
     }
 }
 
-/// Places of the members that are one cause, (1).
-pub fn in_common(members: &[(usize, &Instance, &Estimate)]) -> BTreeSet<usize> {
+/// Of each member that has a size of a unit, how many of one kind have that size, by (1): more than [`MOST_ALIKE`] are one cause.
+pub fn alike(members: &[(usize, &Instance, &Estimate)]) -> BTreeMap<usize, usize> {
     let sizes: Vec<Size> = members
         .iter()
         .enumerate()
         .flat_map(|(member, (_, instance, estimate))| sizes(member, instance, estimate))
         .collect();
-    let mut found = BTreeSet::new();
+    let mut found = BTreeMap::new();
     for size in &sizes {
         let alike: BTreeSet<usize> = sizes
             .iter()
@@ -68,8 +68,10 @@ pub fn in_common(members: &[(usize, &Instance, &Estimate)]) -> BTreeSet<usize> {
         let of_kind = alike
             .iter()
             .filter(|member| members[**member].1.kind.id == kind);
-        if of_kind.count() >= LEAST_ALIKE {
-            found.extend(alike.iter().map(|member| members[*member].0));
+        let n = of_kind.count();
+        for member in &alike {
+            let most = found.entry(members[*member].0).or_insert(n);
+            *most = n.max(*most);
         }
     }
     found
@@ -144,7 +146,9 @@ mod tests {
             .enumerate()
             .map(|(place, (own, estimate))| (10 + place, own, estimate))
             .collect();
-        in_common(&members)
+        let alike = alike(&members).into_iter();
+        let in_common = alike.filter(|(_, n)| *n > MOST_ALIKE);
+        in_common.map(|(place, _)| place).collect()
     }
 
     #[test]

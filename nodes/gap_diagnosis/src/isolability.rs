@@ -121,9 +121,7 @@ fn sin_alone(signatures: &Library, normal: &Normal, forms: &[usize], form: usize
         .collect();
     let own = signatures.forms[form].columns[0];
     let square = normal.gram[(own, own)];
-    let along = Normal {
-        gram: normal.gram.clone(),
-        along: normal.gram.column(own).into_owned(),
-    };
-    (1.0 - along.solve(&others).gain / square).max(0.0).sqrt()
+    (1.0 - normal.explained_square(own, &others) / square)
+        .max(0.0)
+        .sqrt()
 }

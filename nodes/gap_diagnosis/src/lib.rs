@@ -6,24 +6,25 @@
 //! `report` is the answer, in the form that people's programs read; `figures` is what pages draw beside it.
 //!
 //! `session` makes a session of recorded samples. `rows` thins readings to stations; `repeats` finds what was
-//! measured twice, `field`, `pace` and `noise` make the noise floor of it, `form_error`
+//! measured twice, `log` knows runs that stand and are read over time, `field`, `pace` and `noise` make the noise floor of it, `form_error`
 //! adds what every simulator is off by; `whitener` makes every row's noise one,
 //! `nuisance` takes out what set-ups leave open, `stack` keeps both. `signature` asks the twin what each effect of
 //! the catalogue would look like, `normal` and `selection` find the set that explains the residual, `widening` gives
 //! its effects forms of their own, `refit` sizes
 //! it, `form_doubt` says what a size owes to its form, `confirm` tries it on runs left out and under every
 //! condition, `challenge` against shapes without a physics; `confidence` weighs its rivals, `recalibration` what a
-//! confidence is worth, `veto` what speaks against naming it, `cause` puts that together and `searched` says how often. `scatter` looks for effects that move no mean, `whiteness` says whether
+//! confidence is worth, `veto` what speaks against naming it, `judgement` decides its status from these checks, `cause` puts that together and `searched` says how often. `scatter` looks for effects that move no mean, `whiteness` says whether
 //! what is left is white. `families`, `localise` and `places` say where the gap lies, `guard` whether the
 //! noise is that of the repeats, `unknown` what no effect explains, `isolability` what could be told from what. `gap` is how much there was to explain, `split` and
 //! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`, `apart` what each effect has of that;
-//! `share_interval` says how surely a place's share is known. `experiment` knows what could
+//! `share_interval` is the interval of a place's share, `unread` the pauses of thermometers; `unrepeated` is the noise floor of a log made once, `thermal` finds the thermometers that a log goes with. `experiment` knows what could
 //! be measured next and `next` which of it would decide. `diagnose` puts the questions in their order,
 //! `preflight` some of them before anything is measured; `regression` is what other methods than these would start
 //! from, `problem` the first search as numbers alone, `rule` what of these can be switched off. `stage` is the node's whole computation, `following` its
 //! parameters.
 
 mod apart;
+mod aside;
 mod bootstrap;
 mod cause;
 mod challenge;
@@ -46,8 +47,10 @@ mod gap;
 mod guard;
 mod in_common;
 mod isolability;
+pub mod judgement;
 mod lines;
 mod localise;
+mod log;
 mod next;
 mod noise;
 mod normal;
@@ -63,6 +66,7 @@ mod refit;
 pub mod regression;
 mod repeats;
 pub mod report;
+mod resolved;
 mod rows;
 pub mod rule;
 mod scatter;
@@ -75,7 +79,10 @@ mod signature;
 mod split;
 mod stack;
 pub mod stage;
+mod thermal;
 mod unknown;
+mod unread;
+mod unrepeated;
 mod veto;
 mod whitener;
 mod whiteness;
@@ -90,4 +97,5 @@ pub use following::{GapDiagnosisConfig, PARAMETERS};
 pub use report::GapReport;
 pub use rule::Rule;
 pub use stage::{GapDiagnosisStage, Input, Output};
+pub use thermal::{GoesWith, ThermalFit};
 pub use veto::Veto;

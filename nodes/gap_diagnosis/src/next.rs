@@ -44,6 +44,8 @@ use crate::form_error::FormError;
 use crate::noise::Noise;
 use crate::report::NextExperiment;
 use crate::signature::{Form, Library};
+use crate::unread;
+use crate::unrepeated;
 use crate::whitener::Autoregression;
 use known::Known;
 use question::{Answer, Question, questions};
@@ -69,14 +71,24 @@ pub struct Proposed {
     pub entries: Vec<NextExperiment>,
     /// The same as experiments, in the same order.
     pub experiments: Vec<Experiment>,
-    /// Where nothing helps.
+    /// Where nothing helps, and what the recording lacked.
     pub notes: Vec<Note>,
 }
 /// An experiment with its minutes and the information that it adds.
 type Tried = (Experiment, f64, DMatrix<f64>);
 
-/// Experiments for everything that the search left open.
+/// Experiments for everything that the search left open, and what the recording itself lacked.
 pub fn propose(bench: &Bench<'_>, found: &Found) -> Proposed {
+    let mut proposed = experiments(bench, found);
+    proposed.notes.extend(found.thermometers.iter().cloned());
+    proposed
+        .notes
+        .extend(unrepeated::notes(bench.session, bench.noise));
+    proposed.notes.extend(unread::notes(bench.session));
+    proposed
+}
+
+fn experiments(bench: &Bench<'_>, found: &Found) -> Proposed {
     let questions = questions(found);
     if questions.is_empty() {
         return Proposed::default();

@@ -20,7 +20,8 @@
 //! nothing at all) have the noise of its resolution r, white: v = r2 / 12 \[3\].
 //!
 //! # Holds when
-//! All runs of a channel have the noise that its repeats have, at their own pace (`pace`).
+//! All runs of a channel have the noise that its repeats have, at their own pace (`pace`). Where nothing was repeated
+//! `unrepeated` has the noise of logs.
 //!
 //! # References
 //! \[1\] G. Schwarz, Ann. Stat. 6, 1978 (BIC). \[2\] H. D. Patterson, R. Thompson, Biometrika 58, 1971
@@ -36,9 +37,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::config::GapConfig;
 use crate::field::{self, Mode, Smooth};
+use crate::log::LONG_S;
 use crate::pace::{self, Pace, Repeated};
 use crate::repeats::{self, Contrasts};
 use crate::rows::{Block, Rows, count};
+use crate::unrepeated;
 use crate::whitener::Autoregression;
 
 /// Noise of one channel.
@@ -109,22 +112,28 @@ pub struct Readings<'r> {
     pub residual: &'r [Vec<f64>],
 }
 
-/// Noise of every channel that was repeated; `raw` is the residual of each row.
+/// Noise of every channel that was repeated, and of the logs of the others (of long logs, where anything was repeated); `raw`
+/// is the residual of each row.
 pub fn noise(readings: Readings<'_>, raw: &[f64], config: &GapConfig) -> BTreeMap<Channel, Noise> {
-    repeats::contrasts(readings.session, readings.rows, raw)
-        .into_iter()
-        .filter_map(|(channel, groups)| {
-            let found = of_channel(readings, &groups, config)?;
-            Some((channel, found))
-        })
-        .collect()
+    let repeated: BTreeMap<Channel, Noise> =
+        repeats::contrasts(readings.session, readings.rows, raw)
+            .into_iter()
+            .filter_map(|(channel, groups)| {
+                let found = of_channel(readings, &groups, config)?;
+                Some((channel, found))
+            })
+            .collect();
+    let least_s = if repeated.is_empty() { 0.0 } else { LONG_S };
+    let mut all = unrepeated::noise(readings, raw, least_s);
+    all.extend(repeated);
+    all
 }
 
 /// Share of the posterior of a variance within runs below what is used.
 const CAUTION_WITHIN: f64 = 0.9;
 
 /// How much greater a variance that is known from so many rows may well be.
-fn doubt(freedom: f64) -> f64 {
+pub fn doubt(freedom: f64) -> f64 {
     let law = ChiSquared::new(freedom.max(1.0)).ok();
     law.map_or(1.0, |law| {
         freedom.max(1.0) / law.inverse_cdf(1.0 - CAUTION_WITHIN)
@@ -298,7 +307,7 @@ impl Difference {
 }
 
 /// Resolution of an encoder, mm (rad for a rotary axis); zero where the machine file has none.
-fn resolution_mm(machine: &MachineFile, channel: &Channel) -> f64 {
+pub fn resolution_mm(machine: &MachineFile, channel: &Channel) -> f64 {
     let (axis, is_scale) = match channel {
         Channel::Motor(axis) => (axis, false),
         Channel::Scale(axis) => (axis, true),

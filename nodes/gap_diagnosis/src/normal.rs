@@ -80,6 +80,13 @@ impl Normal {
         }
     }
 
+    /// The part of the square of a column that some others explain.
+    pub fn explained_square(&self, column: usize, by: &[usize]) -> f64 {
+        let factor = self.factor(by);
+        let half = factor.forward(|i| self.gram[(by[i], column)]);
+        half.iter().map(|v| v * v).sum()
+    }
+
     /// Inverse of the Gram matrix of some columns; dropped ones have none.
     pub fn inverse(&self, columns: &[usize]) -> DMatrix<f64> {
         let factor = self.factor(columns);

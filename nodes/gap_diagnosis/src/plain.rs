@@ -88,6 +88,8 @@ mod tests {
             wide,
         };
         Library {
+            curves: Default::default(),
+            aside: Default::default(),
             instances: ["guide_bow", "backlash", "scale_error"]
                 .map(instance)
                 .to_vec(),

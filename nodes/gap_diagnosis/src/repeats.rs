@@ -13,6 +13,9 @@
 //! thirteen to its cube: what drifts through the session is the machine's, not noise. Touches of one
 //! feature from one side, at one feed and in one pose of the rotary axes are repeats within a run as well.
 //!
+//! Rows of tests in motion are one where they are of one station of the path; those of a log where they are of one time
+//! since its begin (`log`).
+//!
 //! # References
 //! \[1\] ISO 230-2:2014, 4 (repeats of one test).
 
@@ -22,6 +25,7 @@ use machine::twin::{Channel, Run, Session, Touch};
 use metrology::{Axis, PerAxis};
 use nalgebra::DVector;
 
+use crate::log;
 use crate::nuisance::orthonormal;
 use crate::rows::{Block, Row, Rows, Station, count, position, time_s};
 
@@ -72,7 +76,8 @@ const POSE_RAD: f64 = 0.01;
 /// Whether two blocks are one test of one channel.
 pub fn is_repeat(session: &Session, a: &Block, b: &Block) -> bool {
     let (one, other) = (&session.runs[a.run], &session.runs[b.run]);
-    a.run != b.run && a.channel == b.channel && same_condition(one, other) && {
+    let is_same = a.channel == b.channel && same_condition(one, other);
+    a.run != b.run && is_same && log::heats_alike(session, a, b) && {
         let (from, to) = (extent(one, a), extent(other, b));
         one.motion.axes.iter().all(|axis| {
             let reach = if axis.is_linear() {
@@ -141,6 +146,9 @@ fn runs_between(
     if blocks.len() < 2 {
         return None;
     }
+    if log::is_log(&session.runs[blocks[0].run]) {
+        return log_between(session, group, blocks, residual);
+    }
     let stations =
         |block: &Block| -> BTreeSet<Station> { block.rows.iter().map(|row| row.station).collect() };
     let mut shared = stations(blocks[0]);
@@ -171,15 +179,70 @@ fn runs_between(
                 .collect()
         })
         .collect();
-    let zero = |block: &Block| {
-        let segment = &session.runs[block.run].segment;
-        (segment.zero_id, segment.setup_id)
-    };
     Some(Contrasts {
         blocks: group.to_vec(),
         rows: places[0].clone(),
         values,
-        one_zero: blocks.iter().all(|block| zero(block) == zero(blocks[0])),
+        one_zero: have_one_zero(session, blocks),
+    })
+}
+
+fn have_one_zero(session: &Session, blocks: &[&Block]) -> bool {
+    let zero = |block: &Block| {
+        let segment = &session.runs[block.run].segment;
+        (segment.zero_id, segment.setup_id)
+    };
+    blocks.iter().all(|block| zero(block) == zero(blocks[0]))
+}
+
+/// Differences of logs, at the times since their begin of the rows of one of them. What lies between two rows is taken from
+/// both, (1 - f) y_a + f y_b, which has c = (1 - f)^2 + f^2 of the variance of a row; the sum (1) is brought back to that of
+/// one.
+fn log_between(
+    session: &Session,
+    group: &[usize],
+    blocks: &[&Block],
+    residual: &[f64],
+) -> Option<Contrasts> {
+    let kept = log::long_enough(session, blocks);
+    let logs: Vec<&Block> = kept.iter().map(|k| blocks[*k]).collect();
+    let first = logs.first()?;
+    let since_s: Vec<Vec<f64>> = logs
+        .iter()
+        .map(|block| log::since_s(session, block))
+        .collect();
+    let at = |row: usize| -> Option<Vec<log::Between>> {
+        let all = since_s
+            .iter()
+            .map(|times| log::between(times, since_s[0][row]));
+        all.collect()
+    };
+    let shared = (0..first.rows.len()).filter_map(|row| Some((row, at(row)?)));
+    let (rows, places): (Vec<usize>, Vec<Vec<log::Between>>) = shared.unzip();
+    if logs.len() < 2 || 2 * rows.len() < first.rows.len() {
+        return None;
+    }
+    let begins_s: Vec<f64> = logs
+        .iter()
+        .map(|block| time_s(&session.runs[block.run], &block.rows[0]))
+        .collect();
+    let of_row = |weight: &DVector<f64>, places: &Vec<log::Between>| {
+        let (mut sum, mut variance) = (0.0, 0.0);
+        for ((block, place), weight) in logs.iter().zip(places).zip(weight.iter()) {
+            sum += weight * place.value(&residual[block.range()]);
+            variance += weight * weight * place.variance();
+        }
+        sum / variance.sqrt()
+    };
+    let values = weights(&begins_s)
+        .iter()
+        .map(|weight| places.iter().map(|row| of_row(weight, row)).collect())
+        .collect();
+    Some(Contrasts {
+        blocks: kept.iter().map(|k| group[*k]).collect(),
+        rows,
+        values,
+        one_zero: have_one_zero(session, &logs),
     })
 }
 

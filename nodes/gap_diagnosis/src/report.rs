@@ -2,10 +2,12 @@
 //!
 //! Lengths are µm, as people read them. A number that does not exist is absent (`null`), never zero.
 //!
-//! The form is fixed: a key more would break who reads it by its schema. What the pages tell beside it is kept in the type
-//! and not written; `None` there is a report that was read.
+//! Keys keep their name and meaning. A key that was added later (`why`) is optional, so that older reports are read. Figures for
+//! pages alone are kept in the type and not written; `None` there is a report that was read.
 
 use serde::{Deserialize, Serialize};
+
+pub use crate::judgement::{Check, CheckId, Side, Verdict};
 
 /// Name and version of this form.
 pub const SCHEMA: &str = "abbe.gap/1";
@@ -178,6 +180,9 @@ pub struct Cause {
     pub confusable_with: Vec<Confusable>,
     /// Whether it has one size under all conditions.
     pub constancy: Constancy,
+    /// The checks that its status follows from; empty in a report of a version without them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub why: Vec<Check>,
 }
 
 /// A parameter with its 95 % interval.

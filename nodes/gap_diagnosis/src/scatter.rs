@@ -37,6 +37,7 @@ use machine::file::EffectEntry;
 use nalgebra::DVector;
 
 use crate::cause::Scope;
+use crate::judgement::{self, Check, CheckId};
 use crate::normal::Normal;
 use crate::report::{Cause, Status};
 use crate::rule::Rule;
@@ -54,8 +55,8 @@ use squares::{Part, Sized, Squares};
 pub struct Scattered {
     /// As the report has them.
     pub causes: Vec<Cause>,
-    /// What is named, as a machine file lists it.
-    pub entries: Vec<EffectEntry>,
+    /// Each of them as a machine file lists it.
+    entries: Vec<EffectEntry>,
     /// Standard deviation of each row with them, in units of the floor.
     pub spread: DVector<f64>,
     /// Kinds of which an instance could have been seen.
@@ -70,21 +71,36 @@ impl Scattered {
             .any(|cause| cause.status != Status::Surrogate)
     }
 
-    /// Takes all names away but of what another search names as well.
-    pub fn withdraw_but(&mut self, other: Option<&Self>) {
-        let stays = |effect: &str, axis: &str| {
-            let all = other.iter().flat_map(|other| &other.causes);
-            all.filter(|cause| cause.status != Status::Surrogate)
-                .any(|cause| cause.effect == effect && cause.axis == axis)
-        };
-        self.entries
-            .retain(|entry| stays(&entry.kind, entry.axis.as_deref().unwrap_or_default()));
+    /// What is named, as a machine file lists it.
+    pub fn entries(&self) -> Vec<EffectEntry> {
+        let all = self.causes.iter().zip(&self.entries);
+        let named = all.filter(|(cause, _)| cause.status == Status::Named);
+        named.map(|(_, entry)| entry.clone()).collect()
+    }
+
+    /// Checks that each effect is found by a search within the stations alone as well.
+    pub fn check_within(&mut self, other: &Self) {
         for cause in &mut self.causes {
-            if !stays(&cause.effect, &cause.axis) {
-                cause.status = Status::Surrogate;
-            }
+            let mut all = other.causes.iter();
+            let is_found = all.any(|other| {
+                let is_same = other.effect == cause.effect && other.axis == cause.axis;
+                is_same && other.status != Status::Surrogate
+            });
+            add(cause, Check::new(CheckId::WithinStations, is_found));
         }
     }
+
+    /// Adds a check that is the same for every effect.
+    pub fn add_check(&mut self, check: &Check) {
+        for cause in &mut self.causes {
+            add(cause, check.clone());
+        }
+    }
+}
+
+fn add(cause: &mut Cause, check: Check) {
+    cause.why.push(check);
+    cause.status = judgement::status(&cause.why);
 }
 
 /// An effect that would stay below this D at its greatest size is not shown.
@@ -160,6 +176,8 @@ struct Bench<'b, 's, 'a> {
 impl<'b, 's, 'a> Bench<'b, 's, 'a> {
     fn new(scope: &'b Scope<'s, 'a>, squares: Squares, instances: Vec<Instance>) -> Self {
         let signatures = Library {
+            curves: Default::default(),
+            aside: Default::default(),
             excited: vec![false; instances.len()],
             instances,
             forms: vec![],

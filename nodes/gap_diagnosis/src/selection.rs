@@ -30,6 +30,13 @@ pub const MOST_FREE: f64 = 0.5;
 /// Forms of one instance that are tried beside a set before it is given up.
 pub const MOST_FORMS: usize = 16;
 
+/// Effects that are curves along an axis.
+const CURVES: [&str; 2] = ["pitch_error", "straightness"];
+
+/// Greatest height of a curve over the travel that was not read at targets along the axis, µm: over a small part of a travel, as
+/// in a bore, a curve of hundreds of micrometres is as good as any other slope.
+const MOST_OF_TRAVEL_UM: f64 = 90.0;
+
 /// A member whose own signature is this many times what the whole set explains (in squares) only cancels another.
 pub const MOST_CANCELLING: f64 = 2.0;
 
@@ -166,6 +173,13 @@ impl<'l> Search<'l> {
                 parameter(*place).is_some_and(|p| {
                     let value = size * p.typical;
                     let most = 1.5 * p.low.abs().max(p.high.abs());
+                    let is_far =
+                        CURVES.contains(&kind.id) && !self.signatures.curves.contains(instance);
+                    let most = if is_far {
+                        most.min(MOST_OF_TRAVEL_UM)
+                    } else {
+                        most
+                    };
                     value.abs() <= most && (p.low < 0.0 || value >= 0.0)
                 })
             })
@@ -179,7 +193,10 @@ impl<'l> Search<'l> {
             .map(|form| self.signatures.forms[*form].instance)
             .collect();
         let open: Vec<usize> = (0..self.signatures.forms.len())
-            .filter(|form| !taken.contains(&self.signatures.forms[*form].instance))
+            .filter(|form| {
+                let instance = self.signatures.forms[*form].instance;
+                !taken.contains(&instance) && !self.signatures.aside.contains_key(&instance)
+            })
             .collect();
         let columns = self.columns(set);
         let groups = open
@@ -333,6 +350,8 @@ mod tests {
             wide,
         };
         Library {
+            curves: Default::default(),
+            aside: Default::default(),
             instances: vec![Instance {
                 kind: effects::kind("backlash").unwrap(),
                 target: Target::Axis(Axis::X),

@@ -47,6 +47,22 @@ pub struct Shrunk {
     pub apart: Vec<Apart>,
 }
 
+impl Shrunk {
+    /// Rms of the held-out runs with all that is named over what it is without each; none where nothing was held out.
+    pub fn held_out_ratios(&self) -> Vec<f64> {
+        let after = self.shrink.rms_um.after;
+        let out = self.shrink.leave_one_out.iter();
+        let ratio = |out: &LeftOut| after.map_or(1.0, |after| after / out.rms_um_without);
+        // Of runs that show nothing at all both are nothing.
+        out.map(|out| {
+            Some(ratio(out))
+                .filter(|ratio| ratio.is_finite())
+                .unwrap_or(1.0)
+        })
+        .collect()
+    }
+}
+
 /// Most runs and channels of which a trace is given.
 const MOST_TRACES: usize = 40;
 

@@ -16,11 +16,14 @@
 //! # Holds when
 //! The response is proportional to each amplitude; the joint refit checks it and corrects where it is not.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use machine::MachineFile;
 use machine::effects::{Effect, Kind, Role, Target};
 use nalgebra::{DMatrix, DVector};
 
 use crate::normal::Normal;
+use crate::resolved;
 use crate::stack::Stack;
 
 /// One effect on one target.
@@ -89,6 +92,10 @@ pub struct Library {
     pub columns: Vec<DVector<f64>>,
     /// Whether an instance could be seen at all.
     pub excited: Vec<bool>,
+    /// Curves along axes that were read at targets only.
+    pub curves: BTreeSet<usize>,
+    /// Instances that are not searched, each with those that explain it (`aside`).
+    pub aside: BTreeMap<usize, Vec<usize>>,
 }
 
 /// Most grid points of an instance.
@@ -104,6 +111,8 @@ impl Library {
             instances,
             forms: vec![],
             columns: vec![],
+            curves: BTreeSet::new(),
+            aside: BTreeMap::new(),
         };
         for instance in 0..signatures.instances.len() {
             for values in shapes(signatures.instances[instance].kind) {
@@ -113,7 +122,8 @@ impl Library {
         signatures
     }
 
-    /// Adds one form and says its place; a form that stays below [`LEAST_D`] at its greatest size is left out.
+    /// Adds one form and gives its place; a form that stays below [`LEAST_D`] at its greatest size is left out, and one of a
+    /// period that the recording does not resolve.
     pub fn add(
         &mut self,
         stack: &Stack<'_>,
@@ -121,6 +131,9 @@ impl Library {
         values: Vec<f64>,
         wide: bool,
     ) -> Option<usize> {
+        if !resolved::shows(stack, &self.instances[instance], &values) {
+            return None;
+        }
         let kind = self.instances[instance].kind;
         let parameters = || kind.parameters.iter().chain(kind.free).enumerate();
         let shown = if wide {
@@ -185,6 +198,14 @@ impl Library {
     /// Number of instances that could be seen.
     pub fn seen(&self) -> usize {
         self.excited.iter().filter(|seen| **seen).count()
+    }
+
+    /// Instances that were set aside for one that explains them.
+    pub fn set_aside_for(&self, instance: usize) -> impl Iterator<Item = usize> {
+        let aside = self.aside.iter();
+        aside
+            .filter(move |(_, by)| by.contains(&instance))
+            .map(|(aside, _)| *aside)
     }
 
     /// Gram matrix of all columns.

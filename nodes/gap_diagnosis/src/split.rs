@@ -6,11 +6,13 @@
 //! condition is held out, then the next, up to a third of the runs, as long as the runs that are left still have
 //! two levels of every factor that had two: without them no fit could tell a delay from a play. A condition that only a later
 //! bag has is held out where no other can be: it was measured to decide something, which it cannot do held out. Where no
-//! condition can be spared and a test was repeated four times, its last quarter is held out: later, if not other.
+//! condition can be spared and a test was repeated four times, its last quarter is held out: later, if not other. Of one
+//! log that was cut into parts (`log`) the last third is held out.
 
 use machine::twin::{Run, Session};
 use metrology::sample::{Sense, TestSegment};
 
+use crate::log;
 use crate::nuisance::plane_name;
 use crate::repeats::same_condition;
 
@@ -75,7 +77,8 @@ pub fn split(session: &Session, hold_out: bool) -> Split {
 fn families(session: &Session, used: &[usize]) -> Vec<Vec<usize>> {
     grouped(used, |a, b| {
         let (a, b) = (&session.runs[a].segment, &session.runs[b].segment);
-        a.kind == b.kind && a.plane == b.plane && a.features == b.features
+        let are_parts = log::part(a).is_some() && log::part(b).is_some();
+        a.kind == b.kind && a.plane == b.plane && (are_parts || a.features == b.features)
     })
 }
 
@@ -151,6 +154,7 @@ pub fn title(segment: &TestSegment) -> String {
     if segment.feed_mm_s > 0.0 {
         words.push(format!("F{:.0}", segment.feed_mm_s * 60.0));
     }
+    words.extend(log::part(segment).map(str::to_owned));
     match segment.sense {
         Sense::None => {}
         Sense::Clockwise => words.push("cw".to_owned()),

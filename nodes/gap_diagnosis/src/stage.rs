@@ -31,7 +31,7 @@ use crate::error::GapError;
 use crate::following::GapDiagnosisConfig;
 use crate::repeats::same_condition;
 use crate::report::{Cause, GapReport, Status};
-use crate::session::{self, SessionBuilder, SessionConfig};
+use crate::session::{self, SessionBuilder, SessionConfig, SessionError};
 
 /// What the node is told.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,6 +131,8 @@ pub enum Output {
     },
     /// No diagnosis can be made of the last runs, and why.
     NotYet(GapError),
+    /// An axis state was of another machine: it is left out. Reported with the first of them.
+    OtherMachine(SessionError),
     /// Samples that could not be used since the start, in words.
     LeftOut(Vec<String>),
 }
@@ -160,6 +162,8 @@ pub struct GapDiagnosisStage {
     rest_since: Option<usize>,
     had_rest: bool,
     remarks: Vec<String>,
+    has_begun_anew: bool,
+    has_met_another: bool,
 }
 
 impl GapDiagnosisStage {
@@ -186,6 +190,8 @@ impl GapDiagnosisStage {
             rest_since: None,
             had_rest: false,
             remarks: vec![],
+            has_begun_anew: false,
+            has_met_another: false,
         })
     }
 
@@ -202,6 +208,12 @@ impl GapDiagnosisStage {
         self.gather(|builder| builder.take(sample));
     }
 
+    fn first_of_another(&mut self) -> Option<Output> {
+        let error = self.builder.other_machine()?;
+        let is_first = !std::mem::replace(&mut self.has_met_another, true);
+        is_first.then(|| Output::OtherMachine(error.clone()))
+    }
+
     /// The last run of a recording that is played closes when no more comes.
     fn settle(&mut self) {
         self.silent_ticks = self.silent_ticks.saturating_add(1);
@@ -211,11 +223,26 @@ impl GapDiagnosisStage {
     }
 
     fn gather(&mut self, how: impl FnOnce(&mut SessionBuilder)) {
+        if self.builder.is_over() {
+            self.begin_anew();
+        }
         let closed = self.builder.closed();
         how(&mut self.builder);
         if self.builder.closed() > closed {
             self.builder.keep_last(self.config.last_runs);
             self.is_due |= self.builder.runs().len() >= self.config.least_runs;
+        }
+    }
+
+    /// A session that became longer than what is held of its past ends, and another one begins with what comes next.
+    fn begin_anew(&mut self) {
+        // The same machine was taken at the start.
+        if let Ok(builder) = SessionBuilder::new(&self.machine, SessionConfig::default()) {
+            self.builder = builder;
+            self.steady_from = 0;
+            self.quiet = None;
+            self.rest_since = None;
+            self.has_begun_anew = true;
         }
     }
 
@@ -287,6 +314,10 @@ impl GapDiagnosisStage {
             }
             Err(error) => out.push(Output::NotYet(error)),
         }
+        self.tell_left_out(out);
+    }
+
+    fn tell_left_out(&mut self, out: &mut Vec<Output>) {
         let remarks: Vec<String> = self.builder.account().remarks().collect();
         if remarks != self.remarks {
             self.remarks.clone_from(&remarks);
@@ -433,11 +464,19 @@ impl Stage for GapDiagnosisStage {
         out: &mut Vec<Output>,
     ) -> Result<(), GapError> {
         match input {
-            Input::Sample(sample) => self.sample(sample),
+            Input::Sample(sample) => {
+                self.sample(sample);
+                out.extend(self.first_of_another());
+                if std::mem::take(&mut self.has_begun_anew) {
+                    let remark = "the session was longer than 31 days: it begins anew, without its runs so far";
+                    out.push(Output::LeftOut(vec![remark.to_owned()]));
+                }
+            }
             Input::Found(finding) => self.found(at, *finding, out),
             Input::Tick => {
                 self.settle();
                 self.look(at, out);
+                self.tell_left_out(out);
             }
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! Why a member of the best set is named, or only shown.
 //!
-//! A member is named where nothing of [`Veto`] speaks against it. What does not hold by itself (one size under all
+//! A member is named where nothing of [`Veto`] speaks against it (`judgement`). What does not hold by itself (one size under all
 //! conditions, off its bounds, above the form error, sure) is set aside before the others are judged, so that a
 //! look-alike in the set does not take a cause's gain from it.
 
@@ -20,8 +20,9 @@ use crate::confirm;
 use crate::field;
 use crate::form_error::FormError;
 use crate::guard;
-use crate::in_common::in_common;
+use crate::in_common::{self, alike};
 use crate::isolability;
+use crate::judgement::{self, Check, CheckId};
 use crate::normal::Normal;
 use crate::nuisance::orthonormal;
 use crate::recalibration::recalibrated;
@@ -64,6 +65,10 @@ pub enum Veto {
     NotNeeded,
     /// It does not hold on runs left out.
     HeldOut,
+    /// With it the held-out runs are predicted worse than without it.
+    WorseHeldOut,
+    /// Its size is not determined.
+    NotDetermined,
     /// It explains less than twice what stays unexplained.
     SmallBesideLeft,
     /// The noise is not that of the repeats.
@@ -89,6 +94,8 @@ impl fmt::Display for Veto {
             Self::Shape => f.write_str("a shape without a physics fits better in its place"),
             Self::NotNeeded => f.write_str("without it the rest explains nearly as much"),
             Self::HeldOut => f.write_str("it does not hold on runs left out"),
+            Self::WorseHeldOut => f.write_str("the held-out runs come out worse with it"),
+            Self::NotDetermined => f.write_str("the recording does not determine its size"),
             Self::SmallBesideLeft => f.write_str("much more than it explains stays unexplained"),
             Self::NoiseFloor => f.write_str("the noise is not that of the repeats"),
         }
@@ -119,30 +126,26 @@ pub(crate) fn judged(
     is_closed: bool,
 ) -> Vec<Member> {
     let rivals = Rivals::new(signatures, &best.visited);
-    let (constancies, vetoes) = vetoes(scope, signatures, best, &rivals, is_closed);
+    let (constancies, checks) = checks(scope, signatures, best, &rivals, is_closed);
     let [before, after] = [scope.stack.z.norm_squared(), best.left.norm_squared()];
     let flagged = best.leftover.flagged();
     let adequacy = adequacy(flagged, before, after, scope.stack.freedom());
     let instances = best.instances(signatures);
-    let judged = constancies.into_iter().zip(vetoes);
-    let member = |((place, form), (constancy, vetoes)): ((usize, &usize), (_, Vec<Veto>))| {
+    let judged = constancies.into_iter().zip(checks);
+    let member = |((place, form), (constancy, checks)): ((usize, &usize), (_, Vec<Check>))| {
         let instance = signatures.forms[*form].instance;
-        let instead = rivals.instead_of(&instances, instance);
-        let holds = vetoes.is_empty();
+        let mut instead = rivals.instead_of(&instances, instance);
+        instead.extend(signatures.set_aside_for(instance));
+        let holds = judgement::holds(&checks);
         Member {
             form: *form,
-            status: match (holds, rivals.is_alone(instance)) {
-                (false, _) => Status::Surrogate,
-                (true, true) => Status::Named,
-                (true, false) => Status::Set,
-            },
             confidence: recalibrated(
                 scope.config,
                 rivals.probability(instance) * adequacy * if holds { 1.0 } else { 0.5 },
             ),
             confusable: confusable(signatures, normal, &instead, *form, forms),
             constancy,
-            vetoes,
+            checks,
             rivals: without(signatures, best, instance),
             estimate: best.refit.estimates[place].clone(),
         }
@@ -154,22 +157,48 @@ pub(crate) fn judged(
         .zip(judged)
         .map(member)
         .collect();
-    let rank = |member: &Member| (member.status == Status::Surrogate, -member.estimate.d);
+    let rank = |member: &Member| (member.status() == Status::Surrogate, -member.estimate.d);
     members.sort_by(|a, b| rank(a).partial_cmp(&rank(b)).expect("D is a number"));
     members
 }
 
-/// Constancy of each member, and all that speaks against it.
-fn vetoes(
+/// Constancy of each member, and all its checks.
+fn checks(
     scope: &Scope<'_, '_>,
     signatures: &Library,
     best: &Best,
     rivals: &Rivals,
     is_closed: bool,
-) -> (Vec<Constancy>, Vec<Vec<Veto>>) {
-    let (constancies, mut vetoes) = own_vetoes(scope, signatures, best);
-    let kept: Vec<usize> = (0..vetoes.len())
-        .filter(|place| vetoes[*place].is_empty())
+) -> (Vec<Constancy>, Vec<Vec<Check>>) {
+    let (constancies, mut checks) = own_checks(scope, signatures, best);
+    add_shares(scope, best, is_closed, &mut checks);
+    for (place, n) in counts_alike(signatures, best, &checks) {
+        let most = in_common::MOST_ALIKE;
+        let check = Check::new(CheckId::OwnCause, n <= most);
+        checks[place].push(check.with(count(n), count(most)));
+    }
+    let [before, after] = [scope.stack.z.norm_squared(), best.left.norm_squared()];
+    let instances = best.instances(signatures);
+    for (place, checks) in checks.iter_mut().enumerate() {
+        let instance = signatures.forms[best.set[place]].instance;
+        let (own, most) = (
+            best.refit.estimates[place].d.powi(2),
+            MOST_CANCELLING * (before - after),
+        );
+        checks.push(Check::new(CheckId::NotCancelled, own <= most).with(own, most));
+        if !is_closed {
+            checks.push(beside_shapes(scope, signatures, best, place));
+        }
+        let is_shared = signatures.set_aside_for(instance).next().is_some();
+        checks.extend(rivals.checks(&instances, instance, is_shared));
+    }
+    (constancies, checks)
+}
+
+/// Adds the checks of what each member gains, the others that hold by themselves beside it.
+fn add_shares(scope: &Scope<'_, '_>, best: &Best, is_closed: bool, checks: &mut [Vec<Check>]) {
+    let kept: Vec<usize> = (0..checks.len())
+        .filter(|place| judgement::holds(&checks[*place]))
         .collect();
     let parts: Vec<DVector<f64>> = kept
         .iter()
@@ -177,93 +206,76 @@ fn vetoes(
         .collect();
     let confirmed = confirm::held_out_gains(scope.stack, &parts);
     let gains = drop_one_gains(scope.stack, &parts);
-    let [before, after] = [scope.stack.z.norm_squared(), best.left.norm_squared()];
-    let unexplained = (after - scope.stack.freedom()).max(0.0);
-    for (k, place) in kept.into_iter().enumerate() {
-        if !confirmed[k] && scope.config.applies(Rule::HeldOut) {
-            vetoes[place].push(Veto::HeldOut);
-        }
-        if !is_closed && gains[k] < LEAST_RATIO * unexplained {
-            vetoes[place].push(Veto::SmallBesideLeft);
-        }
-    }
-    for place in common(signatures, best, &vetoes) {
-        vetoes[place].push(Veto::InCommon);
-    }
-    let instances = best.instances(signatures);
-    for (place, vetoes) in vetoes.iter_mut().enumerate() {
-        let instance = signatures.forms[best.set[place]].instance;
-        if best.refit.estimates[place].d.powi(2) > MOST_CANCELLING * (before - after) {
-            vetoes.push(Veto::Cancels);
-        }
-        if !is_closed && is_beaten(scope, signatures, best, place) {
-            vetoes.push(Veto::Shape);
-        }
-        if !rivals.is_needed(&instances, instance) {
-            vetoes.push(Veto::NotNeeded);
+    let unexplained = (best.left.norm_squared() - scope.stack.freedom()).max(0.0);
+    let shares = kept.into_iter().zip(confirmed).zip(gains);
+    for ((place, held_out), gain) in shares {
+        checks[place].extend(scope.config.tried(Rule::HeldOut, held_out));
+        if !is_closed {
+            let least = LEAST_RATIO * unexplained;
+            let check = Check::new(CheckId::BesideUnexplained, gain >= least);
+            checks[place].push(check.with(gain, least));
         }
     }
-    (constancies, vetoes)
 }
 
-/// Constancy of each member, and what speaks against it whatever the others are.
-fn own_vetoes(
+/// Constancy of each member, and the checks that it passes or fails whatever the others are.
+fn own_checks(
     scope: &Scope<'_, '_>,
     signatures: &Library,
     best: &Best,
-) -> (Vec<Constancy>, Vec<Vec<Veto>>) {
-    let of = |(place, ((form, estimate), sure)): (usize, ((&usize, &Estimate), bool))| {
+) -> (Vec<Constancy>, Vec<Vec<Check>>) {
+    let stack = scope.stack;
+    let of = |(place, ((form, estimate), relative_u)): (usize, ((&usize, &Estimate), f64))| {
         let instance = &signatures.instances[signatures.forms[*form].instance];
-        let raw = scope.stack.simulate(&[&*instance.effect(&estimate.values)]);
+        let raw = stack.simulate(&[&*instance.effect(&estimate.values)]);
         let (jacobian, left) = (&best.refit.jacobian, &best.left);
         let limits = confirm::Limits::of(scope.config, instance.kind);
-        let constancy = confirm::constancy(scope.stack, &raw, jacobian, left, limits);
-        let mut vetoes = Vec::new();
-        if !constancy.passed {
-            let split_by = constancy.split_by.clone();
-            vetoes.push(Veto::Constancy { split_by });
-        }
-        if railed(instance, estimate, best, place) {
-            vetoes.push(Veto::AtBound);
-        }
-        if is_straight(scope.stack, instance, estimate) {
-            vetoes.push(Veto::Straight);
-        }
-        if is_before_all(scope.stack, instance, estimate) {
-            vetoes.push(Veto::NoChange);
-        }
-        let least = least_d_squared(estimate.active.len(), scope.stack.freedom().ln());
-        if estimate.d.powi(2) < least {
-            vetoes.push(Veto::NearNoise);
-        }
-        if !rises(scope.stack, raw, scope.config) {
-            vetoes.push(Veto::BelowForm);
-        }
-        if !sure {
-            vetoes.push(Veto::NotSure);
-        }
-        (constancy, vetoes)
+        let (constancy, one_size) = confirm::constancy(stack, &raw, jacobian, left, limits);
+        let railed = railed(instance, estimate, best, place);
+        let off_bounds = Check::new(CheckId::OffBounds, railed == 0).with(count(railed), 0.0);
+        let bend = bend(stack, instance, estimate)
+            .map(|(bend, least)| Check::new(CheckId::Curved, bend >= least).with(bend, least));
+        let begins = since_begin(stack, instance, estimate)
+            .map(|changed| Check::new(CheckId::Begins, changed >= SAME).with(changed, SAME));
+        let last = [
+            above_noise(estimate, stack.freedom().ln()),
+            above_form(stack, raw, scope.config),
+            Check::new(CheckId::Sure, relative_u * SURE < 1.0).with(1.0 / relative_u, SURE),
+        ];
+        let first = [one_size, off_bounds];
+        let checks = first.into_iter().chain(bend).chain(begins).chain(last);
+        (constancy, checks.collect())
     };
     let members = best.set.iter().zip(&best.refit.estimates);
-    let members = members.zip(surely(scope.stack, best));
+    let members = members.zip(relative_uncertainties(stack, best));
     members.enumerate().map(of).unzip()
 }
 
-/// Members that hold by themselves and are one cause that every axis shows.
-fn common(signatures: &Library, best: &Best, vetoes: &[Vec<Veto>]) -> BTreeSet<usize> {
-    let members: Vec<(usize, &Instance, &Estimate)> = (0..vetoes.len())
-        .filter(|place| vetoes[*place].is_empty())
+/// Whether a member is larger than what noise makes now and then.
+pub(crate) fn above_noise(estimate: &Estimate, log_rows: f64) -> Check {
+    let least = least_d_squared(estimate.active.len(), log_rows);
+    Check::new(CheckId::AboveNoise, estimate.d.powi(2) >= least).with(estimate.d, least.sqrt())
+}
+
+/// Of the members that hold so far, how many of one kind have the size that a member has.
+fn counts_alike(
+    signatures: &Library,
+    best: &Best,
+    checks: &[Vec<Check>],
+) -> BTreeMap<usize, usize> {
+    let members: Vec<(usize, &Instance, &Estimate)> = (0..checks.len())
+        .filter(|place| judgement::holds(&checks[*place]))
         .map(|place| {
             let instance = signatures.forms[best.set[place]].instance;
             let estimate = &best.refit.estimates[place];
             (place, &signatures.instances[instance], estimate)
         })
         .collect();
-    in_common(&members)
+    alike(&members)
 }
 
-/// Whether a shape without a physics does better in the place of a member.
-fn is_beaten(scope: &Scope<'_, '_>, signatures: &Library, best: &Best, place: usize) -> bool {
+/// Whether no shape without a physics does better in the place of a member.
+fn beside_shapes(scope: &Scope<'_, '_>, signatures: &Library, best: &Best, place: usize) -> Check {
     let widths = || {
         best.refit
             .estimates
@@ -282,7 +294,7 @@ fn is_beaten(scope: &Scope<'_, '_>, signatures: &Library, best: &Best, place: us
         log_rows: scope.stack.freedom().ln(),
         log_instances: count(signatures.seen().max(2)).ln(),
     };
-    challenge::is_beaten(
+    challenge::check(
         scope.slots,
         &best.left,
         &best.refit.parts[place],
@@ -322,35 +334,90 @@ fn without(signatures: &Library, best: &Best, instance: usize) -> Vec<(Set, f64)
 /// Standard uncertainties by which a size must be off zero.
 pub const SURE: f64 = 4.5;
 
-/// Whether the size of each member is surely not zero by how it differs from run to run: noise that a dozen touches
-/// show too small makes any D.
-fn surely(stack: &Stack<'_>, best: &Best) -> Vec<bool> {
+/// Standard uncertainty of the size of each member over that size, by how it differs from run to run: noise that a dozen
+/// touches show too small makes any D.
+fn relative_uncertainties(stack: &Stack<'_>, best: &Best) -> Vec<f64> {
     if best.refit.parts.is_empty() {
         return vec![];
     }
     let parts = DMatrix::from_columns(&best.refit.parts);
-    let relative = refit::standard_uncertainties(stack, &parts, &best.left);
-    relative.into_iter().map(|u| u * SURE < 1.0).collect()
+    refit::standard_uncertainties(stack, &parts, &best.left)
 }
 
 /// A block with fewer stations shows no waves.
 const FEWEST_STATIONS: usize = 24;
 
-/// Whether a signature rises anywhere above the error of form that every simulator has: below it nothing is named,
+/// Whether a signature rises somewhere above the error of form that every simulator has: below it nothing is named,
 /// however often it was measured. What smooth waves over the test do not tell of it (steps, ripple of a screw) is held
 /// against the part of that error which is not smooth either.
-fn rises(stack: &Stack<'_>, raw: Vec<f64>, config: &GapConfig) -> bool {
+fn above_form(stack: &Stack<'_>, raw: Vec<f64>, config: &GapConfig) -> Check {
     let base = FormError::base(config);
     let floated = stack.floated(raw);
-    let above = |rows: &[f64], least: f64| rows.iter().any(|row| row.abs() > least);
-    stack.rows.blocks.iter().any(|block| {
-        let least = base.of(block);
-        let rows = &floated[block.range()];
-        above(rows, least)
-            || (block.channel != Channel::Touch
-                && rows.len() >= FEWEST_STATIONS
-                && above(&rough(stack, block, rows), guard::ROUGH * least))
-    })
+    let height = |rows: &[f64]| rows.iter().fold(0.0_f64, |most, row| most.max(row.abs()));
+    let plain = |block: &Block| Height {
+        unit: unit(&block.channel),
+        value: height(&floated[block.range()]),
+        limit: base.of(block),
+    };
+    let blocks = || stack.rows.blocks.iter();
+    let mut best = Height::best(blocks().map(plain));
+    if !best.as_ref().is_some_and(Height::is_above) {
+        let is_path = |block: &&Block| {
+            block.channel != Channel::Touch && block.range().len() >= FEWEST_STATIONS
+        };
+        let rough = |block: &Block| Height {
+            value: height(&rough(stack, block, &floated[block.range()])),
+            limit: guard::ROUGH * base.of(block),
+            ..plain(block)
+        };
+        best = Height::best(best.into_iter().chain(blocks().filter(is_path).map(rough)));
+    }
+    let check = Check::new(
+        CheckId::AboveForm,
+        best.as_ref().is_some_and(Height::is_above),
+    );
+    match best {
+        // Inside mm, K and rad; for people thousandths of them.
+        Some(best) => check
+            .with(1e3 * best.value, 1e3 * best.limit)
+            .in_unit(best.unit),
+        None => check,
+    }
+}
+
+/// Greatest height of a signature in a block with what it must be above.
+struct Height {
+    unit: &'static str,
+    value: f64,
+    limit: f64,
+}
+
+impl Height {
+    fn is_above(&self) -> bool {
+        self.value > self.limit
+    }
+
+    /// One that is above its limit before others, the farthest first; those without a limit last.
+    fn best(all: impl Iterator<Item = Self>) -> Option<Self> {
+        let rank = |one: &Self| {
+            let ratio = one.value / one.limit;
+            let ratio = if ratio.is_finite() { ratio } else { 0.0 };
+            (one.is_above(), ratio)
+        };
+        all.max_by(|a, b| {
+            let (a, b) = (rank(a), rank(b));
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        })
+    }
+}
+
+/// Thousandths of the unit that a channel's readings have inside.
+fn unit(channel: &Channel) -> &'static str {
+    match channel {
+        Channel::Thermometer(_) => "mK",
+        Channel::Motor(axis) | Channel::Scale(axis) if !axis.is_linear() => "mrad",
+        _ => "µm",
+    }
 }
 
 /// What smooth waves over a block leave of its rows.
@@ -363,16 +430,18 @@ fn rough(stack: &Stack<'_>, block: &Block, rows: &[f64]) -> Vec<f64> {
     (rows - told).iter().copied().collect()
 }
 
-/// Whether an amplitude of a member stands at a bound that is not zero, or a shape that the recording tells of at one that is
-/// no machine's: a form that wants to be beyond is another's. A range as far below zero as above tells an end of an
-/// axis, and either is as good as the middle; warmth flows with every time constant, of which a model has one or two.
-fn railed(instance: &Instance, estimate: &Estimate, best: &Best, member: usize) -> bool {
+/// Number of parameters of a member that lie at the end of their range: amplitudes at an end other than zero, and shapes
+/// that the recording determines at an end that no machine has. A form at such an end is that of another effect. Exempt
+/// are a symmetric range, whose ends are the ends of an axis, and time constants of heat, of which a model has one or two.
+fn railed(instance: &Instance, estimate: &Estimate, best: &Best, member: usize) -> usize {
     let own = instance.kind.parameters;
     let all: Vec<&Parameter> = own.iter().chain(instance.kind.free).collect();
     let widths = best.refit.estimates.iter().map(|e| e.active.len());
     let first: usize = widths.take(member).sum();
-    estimate.active.iter().enumerate().any(|(k, place)| {
-        let parameter = all[*place];
+    let active = estimate.active.iter().enumerate();
+    let is_railed = |(k, place): &(usize, &usize)| {
+        let (k, place) = (*k, **place);
+        let parameter = all[place];
         let is_told = || match parameter.role {
             Role::Amplitude => true,
             Role::Shape { .. } | Role::Frequency { .. } => {
@@ -381,8 +450,9 @@ fn railed(instance: &Instance, estimate: &Estimate, best: &Best, member: usize) 
                 !is_end && !parameter.name.ends_with(LAG) && told > SAME
             }
         };
-        estimate.at_bound[*place] && estimate.values[*place] != 0.0 && is_told()
-    })
+        estimate.at_bound[place] && estimate.values[place] != 0.0 && is_told()
+    };
+    active.filter(is_railed).count()
 }
 
 /// End of the names of time constants of heat.
@@ -402,15 +472,14 @@ fn beside_others(jacobian: &[DVector<f64>], own: usize) -> f64 {
 /// the place of a scale or a squareness 0.10 and less.
 const LEAST_BEND: f64 = 0.2;
 
-/// Whether a curve over the travel is a line where it was read: its slope is another matter's.
-fn is_straight(stack: &Stack<'_>, instance: &Instance, estimate: &Estimate) -> bool {
-    let Some(line) = effects::line(instance.kind, &instance.target) else {
-        return false;
-    };
+/// What a curve over the travel has beside a line where it was read, whitened, and the least that it must have: the slope of
+/// a line is another matter's. None for what is no curve.
+fn bend(stack: &Stack<'_>, instance: &Instance, estimate: &Estimate) -> Option<(f64, f64)> {
+    let line = effects::line(instance.kind, &instance.target)?;
     let whole = stack.signature(&*instance.effect(&estimate.values));
     let line = stack.signature(&*line);
     let bend = &whole - &line * (whole.dot(&line) / line.norm_squared().max(f64::MIN_POSITIVE));
-    bend.norm() < SAME.max(LEAST_BEND * whole.norm())
+    Some((bend.norm(), SAME.max(LEAST_BEND * whole.norm())))
 }
 
 /// Parameter that tells when an effect begins, min.
@@ -418,19 +487,18 @@ const BEGINS: &str = "at_min";
 /// Whitened distance below which two signatures are the same.
 const SAME: f64 = 3.0;
 
-/// Whether a step in time would look the same at the very beginning: then what is there does not change.
-fn is_before_all(stack: &Stack<'_>, instance: &Instance, estimate: &Estimate) -> bool {
+/// Whitened distance of a step in time from the same at the very beginning: where it is small, what is there does not change.
+/// None for what is no step.
+fn since_begin(stack: &Stack<'_>, instance: &Instance, estimate: &Estimate) -> Option<f64> {
     let own = instance.kind.parameters;
     let shapes = || own.iter().filter(|p| p.role != Role::Amplitude);
     let is_step = shapes().count() == 1 && estimate.active.iter().all(|place| *place < own.len());
     let begins = own.iter().position(|parameter| parameter.name == BEGINS);
-    let Some(begins) = begins.filter(|_| is_step) else {
-        return false;
-    };
+    let begins = begins.filter(|_| is_step)?;
     let mut values = estimate.values.clone();
     values[begins] = own[begins].low;
     let of = |values: &[f64]| stack.signature(&*instance.effect(values));
-    (of(&values) - of(&estimate.values)).norm() < SAME
+    Some((of(&values) - of(&estimate.values)).norm())
 }
 
 /// What is lost when each member alone is left out, the others refitted.

@@ -15,15 +15,22 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use machine::effects::Target;
+
 use crate::normal::Normal;
+use crate::resolved;
 use crate::selection::Set;
-use crate::signature::Library;
+use crate::signature::{Instance, Library};
 use crate::stack::Stack;
 
 /// Most instances that are widened.
 const MOST_WIDENED: usize = 12;
+/// The effect that is a curve along an axis at the point that is read.
+const CURVE: &str = "pitch_error";
 /// Most free amplitudes that are taken one after another.
 const MOST_PARTS: usize = 6;
+/// The same of a curve through targets.
+const MOST_OF_CURVE: usize = 14;
 /// Sets whose C is worse by this share of what the best one explains stand nearly as well.
 const NEAR: f64 = 0.1;
 
@@ -66,18 +73,45 @@ pub fn widen(
         beside.extend(own.map(|own| others(sizes[own])));
         beside.dedup();
         for others in beside {
-            add_parts(signatures, &normal, &others, wide, log_rows);
+            add_parts(signatures, &normal, &others, wide, (log_rows, MOST_PARTS));
         }
     }
 }
 
-/// Adds a wide form with the free amplitudes that hold (1) beside other forms.
+/// Adds the curve of any form to the pitch error of every axis that was read at some targets only. Its plain curve may be
+/// absent from the error that the targets show alike upwards and downwards.
+pub fn widen_curves(stack: &Stack<'_>, signatures: &mut Library) {
+    let is_curve = |instance: &Instance| match instance.target {
+        Target::Axis(axis) => instance.kind.id == CURVE && resolved::is_coarse(stack, axis),
+        _ => false,
+    };
+    let curves: Vec<usize> = (0..signatures.instances.len())
+        .filter(|place| is_curve(&signatures.instances[*place]))
+        .collect();
+    let mut added = vec![];
+    for instance in curves {
+        let kind = signatures.instances[instance].kind;
+        let values = vec![0.0; kind.parameters.len() + kind.free.len()];
+        added.extend(signatures.add(stack, instance, values, true));
+        signatures.curves.insert(instance);
+    }
+    if added.is_empty() {
+        return;
+    }
+    let normal = signatures.normal(&stack.z);
+    let log_rows = stack.freedom().ln();
+    for wide in added {
+        add_parts(signatures, &normal, &[], wide, (log_rows, MOST_OF_CURVE));
+    }
+}
+
+/// Adds a wide form with the free amplitudes, so many at most, that hold (1) beside other forms.
 fn add_parts(
     signatures: &mut Library,
     normal: &Normal,
     others: &[usize],
     wide: usize,
-    log_rows: f64,
+    (log_rows, most): (f64, usize),
 ) {
     let form = signatures.forms[wide].clone();
     let own = signatures.instances[form.instance].kind.parameters.len();
@@ -91,7 +125,7 @@ fn add_parts(
     if taken.is_empty() {
         return;
     }
-    for _ in 0..MOST_PARTS {
+    for _ in 0..most {
         let columns = taken.iter().map(|k| form.columns[*k]);
         let beside: Vec<usize> = others.iter().copied().chain(columns).collect();
         let groups = open.iter().map(|k| std::slice::from_ref(&form.columns[*k]));

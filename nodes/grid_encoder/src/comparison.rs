@@ -9,10 +9,14 @@
 //! ```text
 //!   ΔR = X β + c_u cos θ + c_v sin θ − ½ Σ_a b_a sign_a n_a                             (1)
 //!   unknown j is seen by itself  ⇔  (X⁺X)_jj = 1                                        (2)
+//!   station of equation k = 0 to 13:  floor[(k + s) n / 14],   s = 0 and s = 1/2         (3)
 //! ```
 //!
 //! (1) has the centre c of the trace, which every plate has by how it was put down, and the lost motion b of
 //! both axes. What (2) does not grant is a number of the method and not of the machine.
+//!
+//! The source solves any 14 of its 360 equations. Two such choices (3), both spaced evenly and with no station in common,
+//! stand beside the solution of all: how far they are apart is what the choice decides.
 //!
 //! # Agreement
 //! `val_a_scale_error_alone_is_printed_as_errors_that_are_not_there`: the determined sums hold the truth to
@@ -24,10 +28,15 @@ use crate::error::IdentifyError;
 use crate::identify::{
     Disturbed, Identification, IdentifyOptions, Noise, PlateCertificate, identify,
 };
-use crate::published::{fourteen_unknowns, of_recording, solve};
+use crate::published::{
+    RadialSystem, any_stations, fourteen_unknowns, of_recording, solve, trace_mm,
+};
 use crate::recording::Recording;
 use crate::spectrum::Visibility;
 use crate::unknown::{Nuisances, Unknown};
+
+/// Equations that the source solves.
+const EQUATIONS: usize = 14;
 
 /// One of the published unknowns.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,10 +47,25 @@ pub struct Compared {
     pub published_mm: f64,
     /// As another U prints it, mm at the radius.
     pub other_mm: f64,
+    /// As either choice of 14 stations prints it with U = 0, mm at the radius; `None` without [`Comparison::fourteen`].
+    pub fourteen_mm: Option<[f64; 2]>,
     /// Whether the circle determines it, (2).
     pub visibility: Visibility,
     /// Its own unit per mm at the radius.
     pub scale: f64,
+}
+
+/// Two choices of 14 stations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fourteen {
+    /// (3): their numbers in the recording, from 0.
+    pub stations: [Vec<usize>; 2],
+    /// Greatest distance between the two solutions, mm at the radius.
+    pub apart_mm: f64,
+    /// Greatest distance between the traces that they predict at all stations, mm.
+    pub traces_apart_mm: f64,
+    /// Each solution: β of `published`, mm at the radius.
+    pub beta_mm: [Vec<f64>; 2],
 }
 
 /// Both, unknown by unknown.
@@ -53,6 +77,10 @@ pub struct Comparison {
     pub rank: usize,
     /// Stations.
     pub n_stations: usize,
+    /// Readings that a station is the mean of, on average.
+    pub readings_per_station: f64,
+    /// Two choices of 14 stations; `None` where there are not 28.
+    pub fourteen: Option<Fourteen>,
     /// What the published fit leaves of the trace, root of the mean square, mm.
     pub left_mm: f64,
     /// Greatest distance between the traces of the two members, mm.
@@ -101,7 +129,15 @@ pub fn compare(
         .zip(&radial_mm)
         .map(|(fitted, measured)| (measured - fitted).powi(2))
         .sum();
+    let fourteen = fourteen(&system, &radial_mm);
+    let readings = recording
+        .points
+        .iter()
+        .map(|point| f64::from(point.n_readings));
     let unknowns = (0..system.scale.len()).map(|j| Compared {
+        fourteen_mm: fourteen
+            .as_ref()
+            .map(|two| two.beta_mm.each_ref().map(|beta| beta[j])),
         unknown: determined.unknowns[j].clone(),
         published_mm: published.beta_mm[j],
         other_mm: other.beta_mm[j],
@@ -112,10 +148,38 @@ pub fn compare(
         unknowns: unknowns.collect(),
         rank: published.rank,
         n_stations: radial_mm.len(),
+        readings_per_station: readings.sum::<f64>() / radial_mm.len().max(1) as f64,
         left_mm: (left / radial_mm.len().max(1) as f64).sqrt(),
         apart_mm: (&published.trace_mm - &other.trace_mm).amax(),
         determined,
+        fourteen,
     }))
+}
+
+/// The solutions of two choices (3).
+fn fourteen(system: &RadialSystem, radial_mm: &[f64]) -> Option<Fourteen> {
+    let n = radial_mm.len();
+    if n < 2 * EQUATIONS {
+        return None;
+    }
+    // In halves: (2 k + 2 s) n / 28 is whole arithmetic.
+    let stations = [0, 1].map(|half| {
+        let of = |k: usize| (2 * k + half) * n / (2 * EQUATIONS);
+        (0..EQUATIONS).map(of).collect::<Vec<usize>>()
+    });
+    let solutions = stations.each_ref().map(|idx| {
+        let (chosen, of_chosen) = any_stations(system, radial_mm, idx);
+        solve(&chosen, &of_chosen, &[])
+    });
+    let [first, second] = &solutions;
+    Some(Fourteen {
+        apart_mm: (&first.beta_mm - &second.beta_mm).amax(),
+        traces_apart_mm: (trace_mm(system, first) - trace_mm(system, second)).amax(),
+        beta_mm: solutions
+            .each_ref()
+            .map(|solution| solution.beta_mm.iter().copied().collect()),
+        stations,
+    })
 }
 
 #[cfg(test)]

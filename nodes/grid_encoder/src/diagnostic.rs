@@ -1,5 +1,6 @@
 //! What the stage has to say besides its model; each is in the bag and on `/diagnostics`.
 
+use metrology::number::number;
 use metrology::sample::TestPlane;
 
 use crate::error::IdentifyError;
@@ -113,7 +114,7 @@ pub enum Diagnostic {
     NotFitted { reason: IdentifyError },
     #[error("the oldest recording, run {run}, was dropped: {limit} are kept")]
     Dropped { run: u32, limit: usize },
-    #[error("clock went back by {by_s} s: positions and open recordings dropped")]
+    #[error("clock went back by {by_s} s: positions and open recordings dropped", by_s = number(*by_s))]
     ClockWentBack { by_s: f64 },
     #[error("{n} grid readings waited for positions in vain")]
     Unpaired { n: usize },

@@ -2,13 +2,14 @@
 
 use machine::ChainError;
 use metrology::Axis;
+use metrology::number::{number, quantity};
 use metrology::sample::TestKind;
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GridEncoderError {
     /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
     OutOfRange {
         /// Parameter.
         name: &'static str,

@@ -19,7 +19,8 @@
 //! in `combinations`.
 //!
 //! *Gauge.* Straightness has no linear term: what is linear in it is squareness, or the direction that
-//! a plate's rotation leaves open.
+//! a plate's rotation leaves open. Squareness is therefore the angle between the tangents where the curves have their
+//! origin, wherever the circles lie; `reference_lines` states it between the lines of ISO 230-1.
 //!
 //! # Holds when
 //! First order in the errors (1e-4 of 1 rad times 10 µm is 1 nm), plate flat, lost motion constant

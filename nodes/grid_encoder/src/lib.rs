@@ -7,7 +7,7 @@
 //! `unknown` what is unknown besides, `equations` puts both into rows; `triangle` and `spectrum` solve them
 //! and tell what they see, `combination` what they see only together; `identify` is the whole fit and
 //! `geometry` what is published of it. `published` is the source's own solution, which prints single errors
-//! that one circle cannot tell, `comparison` shows both. `preflight` says before a measurement what it will see. `trace` lays out
+//! that one circle cannot tell, `comparison` shows both. `reference_lines` is squareness as ISO 230-1 defines it. `preflight` says before a measurement what it will see. `trace` lays out
 //! the picture. `axis_log` and `stage` are the node.
 //!
 //! On one circle about the origin, x = R cos θ, y = R sin θ, for `[w X' Y' b Z t]` with φ taken as C_x = φ y
@@ -39,6 +39,7 @@ mod open;
 pub mod preflight;
 pub mod published;
 pub mod recording;
+pub mod reference_lines;
 pub mod spectrum;
 pub mod stage;
 pub mod trace;

@@ -239,7 +239,7 @@ mod tests {
         );
         assert_eq!(
             refused(|config| config.period_ms = f64::NAN),
-            "period_ms = NaN: must be from 5 to 10000"
+            "period_ms = NaN ms: must be from 5 to 10000 ms"
         );
         assert_eq!(
             refused(|config| config.period_ms = 9000.0),

@@ -1,10 +1,12 @@
 //! Parameters that cannot work and inputs that break the stage's contract.
 
+use metrology::number::{number, quantity};
+
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HostClockError {
     /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
     OutOfRange {
         /// Parameter.
         name: &'static str,
@@ -23,8 +25,7 @@ pub enum HostClockError {
     },
     /// The window cannot hold as many exchanges as an estimate needs.
     #[error(
-        "window_s = {window_s}: holds {holds} exchanges at period_ms = {period_ms}, least_exchanges = {least_exchanges} are needed"
-    )]
+        "window_s = {window_s}: holds {holds} exchanges at period_ms = {period_ms}, least_exchanges = {least_exchanges} are needed", window_s = number(*window_s), period_ms = number(*period_ms))]
     WindowTooShort {
         /// Time that is looked back, s.
         window_s: f64,

@@ -27,6 +27,7 @@
 
 use std::collections::VecDeque;
 
+use metrology::number::number;
 use metrology::sample::ClockExchange;
 use metrology::stamp::Span;
 use metrology::{ClockMap, Host, Reference, Stamp};
@@ -109,8 +110,7 @@ pub enum Taken {
 /// Why an exchange says nothing.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "the answer was {round_trip_s} s on its way with its question, {away_s} s after the question left and {there_s} s after it came: no time can be below 0"
-)]
+    "the answer was {round_trip_s} s on its way with its question, {away_s} s after the question left and {there_s} s after it came: no time can be below 0", round_trip_s = number(*round_trip_s), away_s = number(*away_s), there_s = number(*there_s))]
 pub struct Impossible {
     /// Time on the way, s.
     pub round_trip_s: f64,

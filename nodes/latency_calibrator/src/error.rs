@@ -2,12 +2,13 @@
 
 use machine::ChainError;
 use metrology::Axis;
+use metrology::number::{number, quantity};
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LatencyCalibratorError {
     /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
     OutOfRange {
         /// Parameter.
         name: &'static str,
@@ -20,8 +21,7 @@ pub enum LatencyCalibratorError {
     },
     /// The log forgets what a touch needs before it comes.
     #[error(
-        "log_samples = {log_samples} at control.servo_period_ms = {servo_period_ms}: covers {covered_ms} ms, feed_window_ms + hold_ms need {needed_ms} ms"
-    )]
+        "log_samples = {log_samples} at control.servo_period_ms = {servo_period_ms}: covers {covered_ms} ms, feed_window_ms + hold_ms need {needed_ms} ms", servo_period_ms = number(*servo_period_ms), covered_ms = number(*covered_ms), needed_ms = number(*needed_ms))]
     LogTooShort {
         /// Positions that the log holds.
         log_samples: usize,
@@ -41,14 +41,13 @@ pub enum LatencyCalibratorError {
     },
     /// Without repeatability there is no uncertainty.
     #[error(
-        "probe.repeatability_um = {repeatability_um}: the uncertainty of a latency needs a value above 0"
-    )]
+        "probe.repeatability_um = {repeatability_um}: the uncertainty of a latency needs a value above 0", repeatability_um = number(*repeatability_um))]
     NoRepeatability {
         /// Repeatability of the machine file, µm.
         repeatability_um: f64,
     },
     /// The approach of a trigger is no unit vector.
-    #[error("trigger {sequence}: approach has length {length}, must be 1")]
+    #[error("trigger {sequence}: approach has length {length}, must be 1", length = number(*length))]
     ApproachNotUnit {
         /// Number of the trigger.
         sequence: u32,

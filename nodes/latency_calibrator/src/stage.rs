@@ -3,8 +3,11 @@
 //! Touches of a latency segment are collected with their feed at contact, as soon as the log reaches
 //! their latch; `hold_ms` after the segment's end they are evaluated, feature by feature.
 
+use std::collections::{BTreeMap, VecDeque};
+
 use machine::file::Latch;
 use machine::{Kinematics, MachineFile};
+use metrology::bound::TOUCHES_OF_RUN;
 use metrology::sample::{AxisState, NewTouches, ProbeLatency, ProbeTrigger, TestKind, TestSegment};
 use metrology::{Axis, AxisSet, Host, Machine, Stage, Stamp};
 
@@ -14,6 +17,8 @@ use crate::error::LatencyCalibratorError;
 use crate::evaluation::{FeedTouch, LatencyEvaluation, TouchNoise, evaluate};
 use crate::motion_log::MotionLog;
 
+/// Touches whose latch the log has not reached yet: of more the oldest is read as the log is now.
+const MOST_UNREAD: usize = 1_000;
 /// Rounding allowed in the length of an approach.
 const UNIT_ROUNDING: f64 = 1e-6;
 /// Least cosine between the approaches of one feature: 0.1°.
@@ -67,6 +72,8 @@ pub struct LatencyCalibratorStage {
 struct Run {
     number: u32,
     touches: Vec<Touch>,
+    /// Places of those whose feed is not read yet, in order.
+    unread: VecDeque<usize>,
     /// End and when it was told.
     end: Option<(Stamp<Host>, TestSegment)>,
 }
@@ -132,9 +139,10 @@ impl LatencyCalibratorStage {
                 from,
                 to: state.controller_at,
             });
-            let touches = self.run.iter_mut().flat_map(|run| &mut run.touches);
-            for touch in touches.filter(|touch| touch.feed.is_none()) {
-                touch.feed = Some(Err(TouchFault::ClockWentBack));
+            if let Some(run) = &mut self.run {
+                for place in run.unread.drain(..) {
+                    run.touches[place].feed = Some(Err(TouchFault::ClockWentBack));
+                }
             }
         }
         self.read_feeds(false);
@@ -144,18 +152,25 @@ impl LatencyCalibratorStage {
     /// Reads the feed of every touch whose latch the log has reached, or of all.
     fn read_feeds(&mut self, all: bool) {
         let newest = self.log.newest();
-        let touches = self.run.iter_mut().flat_map(|run| &mut run.touches);
-        for touch in touches.filter(|touch| touch.feed.is_none()) {
+        let Some(run) = &mut self.run else { return };
+        let mut surplus = run.unread.len().saturating_sub(MOST_UNREAD);
+        let (log, config, touches) = (&self.log, &self.config, &mut run.touches);
+        run.unread.retain(|place| {
+            let touch = &mut touches[*place];
             let latch_at = touch.trigger.controller_at;
-            if all || newest.is_some_and(|newest| newest >= latch_at) {
-                touch.feed = Some(self.log.feed_at_contact_mm_s(
-                    latch_at,
-                    &touch.trigger.approach,
-                    self.config.feed_window(),
-                    self.config.steady_share,
-                ));
+            let is_reached = newest.is_some_and(|newest| newest >= latch_at);
+            if !(all || is_reached || surplus > 0) {
+                return true;
             }
-        }
+            surplus = surplus.saturating_sub(1);
+            touch.feed = Some(log.feed_at_contact_mm_s(
+                latch_at,
+                &touch.trigger.approach,
+                config.feed_window(),
+                config.steady_share,
+            ));
+            false
+        });
     }
 
     fn take_trigger(
@@ -179,12 +194,24 @@ impl LatencyCalibratorStage {
             return Ok(());
         }
         if let Some(run) = &mut self.run {
+            let held = run.touches.len();
+            if held >= TOUCHES_OF_RUN {
+                out.push(Output::Refused(Refusal::TooManyTouches {
+                    run: run.number,
+                    held,
+                    sequence: trigger.sequence,
+                }));
+                return Ok(());
+            }
             let finite = trigger.approach.iter().all(|c| c.is_finite())
                 && self
                     .axes
                     .iter()
                     .all(|axis| trigger.latched[axis].is_finite());
             let feed = (!finite).then_some(Err(TouchFault::NotFinite));
+            if finite {
+                run.unread.push_back(held);
+            }
             run.touches.push(Touch { trigger, feed });
             self.read_feeds(false);
         }
@@ -206,6 +233,7 @@ impl LatencyCalibratorStage {
             self.run = Some(Run {
                 number: segment.run,
                 touches: Vec::new(),
+                unread: VecDeque::new(),
                 end: None,
             });
         } else if let Some(run) = &mut self.run
@@ -242,25 +270,21 @@ impl LatencyCalibratorStage {
         } else if made == 0 {
             out.push(Output::Refused(Refusal::NothingTouched { run: run.number }));
         } else {
-            let mut features: Vec<&str> = Vec::new();
-            for touch in &run.touches {
-                if !features.contains(&touch.trigger.feature_id.as_str()) {
-                    features.push(&touch.trigger.feature_id);
-                }
-            }
-            for feature in features {
-                self.evaluate_feature(feature, at, &run, out);
+            for (feature, touches) in by_feature(&run.touches) {
+                self.evaluate_feature(feature, at, &touches, out);
             }
         }
     }
 
-    fn evaluate_feature(&self, feature: &str, at: Stamp<Host>, run: &Run, out: &mut Vec<Output>) {
-        let of_feature = || {
-            let touches = run.touches.iter();
-            touches.filter(|touch| touch.trigger.feature_id == feature)
-        };
+    fn evaluate_feature(
+        &self,
+        feature: &str,
+        at: Stamp<Host>,
+        touches: &[&Touch],
+        out: &mut Vec<Output>,
+    ) {
         let mut usable: Vec<FeedTouch> = Vec::new();
-        for touch in of_feature() {
+        for touch in touches {
             match self.usable(touch, usable.first()) {
                 Ok(touch) => usable.push(touch),
                 Err(fault) => out.push(Output::Refused(Refusal::Touch {
@@ -270,7 +294,7 @@ impl LatencyCalibratorStage {
                 })),
             }
         }
-        let made = of_feature().count();
+        let made = touches.len();
         match evaluate(feature, at, &usable, made, &self.noise, &self.config) {
             Ok(evaluation) => self.publish(evaluation, out),
             Err(refusal) => out.push(Output::Refused(refusal)),
@@ -328,6 +352,21 @@ impl LatencyCalibratorStage {
             None => Ok(()),
         }
     }
+}
+
+/// The touches of each feature, features in the order in which they were first touched.
+fn by_feature(touches: &[Touch]) -> Vec<(&str, Vec<&Touch>)> {
+    let mut places = BTreeMap::new();
+    let mut features: Vec<(&str, Vec<&Touch>)> = Vec::new();
+    for touch in touches {
+        let feature = touch.trigger.feature_id.as_str();
+        let place = *places.entry(feature).or_insert_with(|| {
+            features.push((feature, Vec::new()));
+            features.len() - 1
+        });
+        features[place].1.push(touch);
+    }
+    features
 }
 
 /// Whether the log reaches from the latest moment at which a touch may be read back over its window.

@@ -6,6 +6,8 @@
 //! whatever arrives, HAL's `limit3` bounds size, rate and acceleration, so that neither a wrong
 //! number nor the death of the bridge steps an axis.
 //!
+//! Before every axis is homed nothing is passed on but zero: see [`metrology::homed_gate`].
+//!
 //! The signal `abbe-heartbeat` changes as long as fresh compensation comes. When it stands still,
 //! because compensation is stale or the bridge is dead, HAL turns the target to zero and fades the
 //! offsets out at the rate that `limit3` allows.
@@ -144,8 +146,17 @@ impl CompensationPath {
         })
     }
 
-    /// Commands for HAL that are due, one a line; `None` when there are none.
-    pub fn due(&mut self, at: Stamp<Host>) -> Option<String> {
+    /// Greatest of the offsets last sent to HAL for linear axes, mm.
+    #[must_use]
+    pub fn greatest_passed_mm(&self) -> f64 {
+        let linear = self.joints.iter().filter(|axis| axis.is_linear());
+        let passed = linear.filter_map(|axis| self.passed[*axis]);
+        passed.fold(0.0, |greatest: f64, offset| greatest.max(offset.abs()))
+    }
+
+    /// Commands for HAL that are due, one a line; `None` when nothing is due. While the way is not `open`, HAL gets zero,
+    /// towards which it fades what it has at its own rate.
+    pub fn due(&mut self, at: Stamp<Host>, open: bool) -> Option<String> {
         // A host clock that went back must not make the heartbeat wait.
         for stamp in [&mut self.received, &mut self.passed_at, &mut self.beat_at] {
             *stamp = stamp.map(|stamp| stamp.min(at));
@@ -159,7 +170,7 @@ impl CompensationPath {
             .is_none_or(|passed_at| at - passed_at >= LEAST_PERIOD)
         {
             for &axis in &self.joints {
-                let wanted = self.wanted[axis];
+                let wanted = if open { self.wanted[axis] } else { 0.0 };
                 let step = if axis.is_linear() {
                     LEAST_CHANGE
                 } else {
@@ -237,7 +248,7 @@ mod tests {
             if tick < 100 {
                 path.receive(at, &offsets(at)).unwrap();
             }
-            path.due(at)
+            path.due(at, true)
         });
         commands
             .filter(|lines| lines.contains("abbe-heartbeat"))
@@ -255,7 +266,7 @@ mod tests {
         path.receive(now, &offsets(now)).unwrap();
         let silent = (0..300).filter_map(|tick| {
             let at = now - hour + Span::from_nanos(tick * 10_000_000);
-            path.due(at)
+            path.due(at, true)
         });
         assert!(silent.count() <= 11);
     }

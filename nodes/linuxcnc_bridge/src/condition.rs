@@ -1,11 +1,14 @@
 //! Conditions worth reporting, each with the values that belong to it.
 
 use metrology::Axis;
+use metrology::number::number;
 
 use crate::compensation::CompensationRefused;
 use crate::fault::FaultKind;
 use crate::latch::NoTouch;
 use crate::protocol::JointLimit;
+use crate::waiting::Wait;
+use crate::watch::Trouble;
 
 pub use metrology::Severity;
 
@@ -31,7 +34,7 @@ pub enum Lost {
         step: String,
     },
     /// An answer did not come.
-    #[error("no answer to `{request}` within {limit_s} s")]
+    #[error("no answer to `{request}` within {limit_s} s", limit_s = number(*limit_s))]
     Silent {
         /// The request.
         request: String,
@@ -61,6 +64,9 @@ pub enum Condition {
         /// Whether it is on.
         on: bool,
     },
+    /// The emergency stop is on at a machine that no axis of which is homed: it was never released.
+    #[error("emergency stop on: the machine has not been switched on yet")]
+    NotSwitchedOn,
     /// The drives were switched.
     #[error("drives {}", if *.on { "on" } else { "off" })]
     Drives {
@@ -74,7 +80,7 @@ pub enum Condition {
         homed: bool,
     },
     /// Homing took too long.
-    #[error("homing was not over within {limit_s} s")]
+    #[error("homing was not over within {limit_s} s", limit_s = number(*limit_s))]
     HomingTimeout {
         /// The limit, s.
         limit_s: f64,
@@ -117,10 +123,19 @@ pub enum Condition {
         reason: String,
     },
     /// Nothing has come from the sampler.
-    #[error("no positions for {silence_s} s")]
+    #[error("no positions for {silence_s} s", silence_s = number(*silence_s))]
     SamplerSilent {
         /// For how long, s.
         silence_s: f64,
+    },
+    /// The bridge itself was not at work.
+    #[error(
+        "the bridge stood still for {for_s} s (a busy or stopped computer): what came meanwhile is read now",
+        for_s = number(*for_s)
+    )]
+    StoodStill {
+        /// For how long, s.
+        for_s: f64,
     },
     /// Records were lost.
     #[error("{lost} servo periods were not recorded")]
@@ -157,11 +172,34 @@ pub enum Condition {
         /// Why.
         reason: NoTouch,
     },
+    /// The program does not go on by itself.
+    #[error("{0}")]
+    ProgramWaits(Wait),
+    /// The program goes on, or has ended.
+    #[error("the program does not wait")]
+    ProgramGoesOn,
+    /// The program was stopped.
+    #[error("{0}")]
+    Stopped(Trouble),
+    /// The control's modal state is another one for a program of machine coordinates.
+    #[error("machine coordinates: {changed}; it is put back at the end")]
+    FrameSet {
+        /// What was set and what was found.
+        changed: String,
+    },
+    /// The modal state after a program is not the one that was found.
+    #[error(
+        "machine coordinates: the state that was found could not be put back: {left}: set it at the control"
+    )]
+    StateLeft {
+        /// What is left.
+        left: String,
+    },
     /// Compensation was refused; the last good one stays.
     #[error("compensation refused: {}", refusal(.0))]
     CompensationRefused(CompensationRefused),
     /// Compensation has stopped coming; HAL fades it out.
-    #[error("no compensation for {limit_s} s: fading out")]
+    #[error("no compensation for {limit_s} s: fading out", limit_s = number(*limit_s))]
     CompensationStale {
         /// The limit, s.
         limit_s: f64,
@@ -169,6 +207,30 @@ pub enum Condition {
     /// Compensation comes.
     #[error("compensation is passed on")]
     CompensationFresh,
+    /// Compensation waits for homing; what HAL had of it fades.
+    #[error("compensation is held back until every axis is homed")]
+    CompensationHeld,
+    /// Axes were homed again before what HAL had of an offset can have faded.
+    #[error(
+        "homed again {after_s:.1} s after offsets of up to {greatest_um:.1} um began to fade: where HAL takes longer the zero is off by what was left; home once more"
+    )]
+    HomedUnderOffset {
+        /// Time between, s.
+        after_s: f64,
+        /// Greatest offset of a linear axis, um.
+        greatest_um: f64,
+    },
+    /// Somebody publishes compensation, and none has come.
+    #[error(
+        "no compensation has come for {limit_s} s although {publishers} publish it: is the publisher active, and is its quality of service compatible?",
+        limit_s = number(*limit_s)
+    )]
+    CompensationNeverCame {
+        /// How many publish it.
+        publishers: usize,
+        /// The limit, s.
+        limit_s: f64,
+    },
     /// HAL refused a setting.
     #[error("HAL: {message}")]
     HalRefused {
@@ -197,7 +259,7 @@ impl Condition {
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Connected | Self::Disconnected(_) => "connection",
-            Self::Estop { .. } => "emergency_stop",
+            Self::Estop { .. } | Self::NotSwitchedOn => "emergency_stop",
             Self::Drives { .. } => "drives",
             Self::Homed { .. } | Self::HomingTimeout { .. } => "homing",
             Self::AxisLimit { .. } => "axis_limit",
@@ -205,12 +267,22 @@ impl Condition {
             Self::UnexpectedLine { .. } => "unexpected_line",
             Self::CommandRefused { .. } => "command_refused",
             Self::Sampling | Self::SamplerEnded { .. } | Self::SamplerSilent { .. } => "sampler",
+            Self::StoodStill { .. } => "stood_still",
             Self::SamplerOverrun { .. } => "sampler_overrun",
             Self::MalformedSample { .. } => "malformed_sample",
             Self::ServoSlip { .. } | Self::ServoInTime => "servo_period",
             Self::TouchUnusable { .. } => "touch_unusable",
             Self::CompensationRefused(_) => "compensation_refused",
-            Self::CompensationStale { .. } | Self::CompensationFresh => "compensation",
+            Self::ProgramWaits(_) | Self::ProgramGoesOn => "program_waits",
+            Self::Stopped(Trouble::Tripped { .. }) => "probe_tripped",
+            Self::Stopped(Trouble::Astray { .. }) => "axis_astray",
+            Self::FrameSet { .. } => "machine_frame",
+            Self::StateLeft { .. } => "modal_state",
+            Self::HomedUnderOffset { .. } => "homed_under_offset",
+            Self::CompensationStale { .. }
+            | Self::CompensationFresh
+            | Self::CompensationHeld
+            | Self::CompensationNeverCame { .. } => "compensation",
             Self::HalRefused { .. } => "hal",
         }
     }
@@ -223,6 +295,9 @@ impl Condition {
             | Self::Sampling
             | Self::ServoInTime
             | Self::CompensationFresh
+            | Self::CompensationHeld
+            | Self::ProgramGoesOn
+            | Self::FrameSet { .. }
             | Self::Estop { on: false }
             | Self::Drives { on: true }
             | Self::Homed { homed: true }
@@ -230,7 +305,12 @@ impl Condition {
                 limit: JointLimit::Free,
                 ..
             } => Severity::Info,
-            Self::Drives { on: false }
+            Self::NotSwitchedOn
+            | Self::Drives { on: false }
+            | Self::ProgramWaits(_)
+            | Self::StateLeft { .. }
+            | Self::HomedUnderOffset { .. }
+            | Self::CompensationNeverCame { .. }
             | Self::Homed { homed: false }
             | Self::AxisLimit {
                 limit: JointLimit::MinSoft | JointLimit::MaxSoft,
@@ -242,6 +322,7 @@ impl Condition {
                 ..
             }
             | Self::ServoSlip { .. }
+            | Self::StoodStill { .. }
             | Self::TouchUnusable { .. }
             | Self::CompensationRefused(_)
             | Self::CompensationStale { .. } => Severity::Warn,

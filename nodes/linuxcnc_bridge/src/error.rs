@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use metrology::Axis;
+use metrology::number::{number, quantity};
 
 /// Errors of the bridge: its configuration, and starting and reaching LinuxCNC.
 #[derive(Debug, thiserror::Error)]
 pub enum BridgeError {
     /// A number of the configuration is out of its range.
-    #[error("{key} = {value}: must be from {least} to {greatest}")]
+    #[error("{key} = {value}: must be from {least} to {greatest}", value = quantity(key, *value), least = number(*least), greatest = quantity(key, *greatest))]
     OutOfRange {
         /// Key in the parameter file.
         key: &'static str,
@@ -78,8 +79,7 @@ pub enum BridgeError {
     },
     /// LinuxCNC did not listen in time.
     #[error(
-        "{ini}: LinuxCNC did not listen on port {port} within {limit_s} s; its last words: {last_words}"
-    )]
+        "{ini}: LinuxCNC did not listen on port {port} within {limit_s} s; its last words: {last_words}", limit_s = number(*limit_s))]
     NotReady {
         /// The INI file.
         ini: PathBuf,

@@ -19,6 +19,10 @@ pub enum FaultKind {
     /// The servo thread ran late for the first time since LinuxCNC was started. It says so once and goes on: no program ends
     /// of it.
     RealtimeDelay,
+    /// The probe was touched while no touch was under way.
+    ProbeTripped,
+    /// An axis does not go where a program of machine coordinates sends it.
+    Astray,
     /// The program's text is wrong, or anything else.
     Other,
 }
@@ -33,7 +37,9 @@ pub fn classify(message: &str) -> FaultKind {
     let has = |phrase: &str| text.contains(phrase);
     if has("without making contact") || has("without breaking contact") {
         FaultKind::ProbeMissed
-    } else if has("probe is already") || has("probe tripped") {
+    } else if has("probe tripped") {
+        FaultKind::ProbeTripped
+    } else if has("probe is already") {
         FaultKind::ProbeStuck
     } else if has("following error") {
         FaultKind::FollowingError
@@ -66,6 +72,10 @@ mod tests {
             (
                 "Linear move on line 2 would exceed X's positive limit",
                 FaultKind::Limit,
+            ),
+            (
+                "Probe tripped during non-probe move.",
+                FaultKind::ProbeTripped,
             ),
             ("joint 0 following error", FaultKind::FollowingError),
             (

@@ -90,6 +90,8 @@ pub struct LiveBridge {
     opening: Option<Opening>,
     work: Option<Work>,
     said: Vec<Output>,
+    /// How many publish offsets, since the last tick.
+    publishers: Option<usize>,
 }
 
 impl LiveBridge {
@@ -112,6 +114,7 @@ impl LiveBridge {
             opening: Some(opening),
             work: None,
             said: Vec::new(),
+            publishers: None,
         };
         if config.autostart {
             bridge.open()?;
@@ -130,6 +133,7 @@ impl LiveBridge {
                 _controller: controller,
             }),
             said: Vec::new(),
+            publishers: None,
         }
     }
 
@@ -142,6 +146,11 @@ impl LiveBridge {
             self.work = Some(opening.open()?);
         }
         Ok(())
+    }
+
+    /// So many publish offsets; the stage gets the number at the next tick.
+    pub fn sees_publishers(&mut self, publishers: usize) {
+        self.publishers = Some(publishers);
     }
 
     /// Leaves LinuxCNC, and ends it where it was started here.
@@ -190,6 +199,9 @@ impl Stage for LiveBridge {
                 let event = |work: &mut Work| work.io.event();
                 while let Some((came_at, event)) = self.work.as_mut().and_then(event) {
                     self.pass(came_at, Input::Io(event), out)?;
+                }
+                if let Some(publishers) = self.publishers.take() {
+                    self.pass(at, Input::Publishers(publishers), out)?;
                 }
                 self.pass(at, Input::Tick, out)
             }

@@ -1,19 +1,59 @@
-//! What the bridge knows of a program's text: its length and which feature each line touches.
+//! What the bridge knows of a program's text: its frame and length, which feature each line touches, where it may
+//! stop, and which words would shift the machine's coordinates.
+
+use machine::program_frame::is_machine_frame;
+
+use crate::waiting::Stops;
+use crate::watch::{plain_words, tenths};
 
 /// A program that was handed over.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ProgramText {
     lines: u32,
     features: Vec<(u32, String)>,
+    stops: Stops,
+    is_machine_frame: bool,
+    shifting: Option<(u32, ShiftingWord)>,
+}
+
+/// A word that shifts, turns or scales coordinates: its number in tenths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ShiftingWord(u32);
+
+/// G10, G41 to G43.2, G52, G54 to G59.3, G92 to G92.3.
+const SHIFTING: [u32; 22] = [
+    100, 410, 411, 420, 421, 430, 431, 432, 520, 540, 550, 560, 570, 580, 590, 591, 592, 593, 920,
+    921, 922, 923,
+];
+
+impl std::fmt::Display for ShiftingWord {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "G{}", f64::from(self.0) / 10.0)
+    }
+}
+
+fn shifting_word(line: &str) -> Option<ShiftingWord> {
+    let upper = line.to_ascii_uppercase();
+    { plain_words(&upper)?.into_iter() }.find_map(|(letter, value)| {
+        let code = tenths(value).filter(|code| letter == "G" && SHIFTING.contains(code))?;
+        Some(ShiftingWord(code))
+    })
 }
 
 impl ProgramText {
     /// Reads the `(feature: NAME)` comments of a program.
     #[must_use]
     pub fn new(text: &str) -> Self {
-        let mut program = Self::default();
+        let mut program = Self {
+            is_machine_frame: is_machine_frame(text),
+            ..Self::default()
+        };
         for line in text.lines() {
             program.lines = program.lines.saturating_add(1);
+            program.stops.line(program.lines, line);
+            if program.shifting.is_none() {
+                program.shifting = shifting_word(line).map(|word| (program.lines, word));
+            }
             if let Some(name) = feature_comment(line) {
                 program.features.push((program.lines, name.to_owned()));
             }
@@ -25,6 +65,24 @@ impl ProgramText {
     #[must_use]
     pub fn lines(&self) -> u32 {
         self.lines
+    }
+
+    /// Where it may stop.
+    #[must_use]
+    pub fn stops(&self) -> &Stops {
+        &self.stops
+    }
+
+    /// Whether its coordinates are the machine's.
+    #[must_use]
+    pub fn is_machine_frame(&self) -> bool {
+        self.is_machine_frame
+    }
+
+    /// The first word that would shift the coordinates of a program of the machine frame, and its line.
+    #[must_use]
+    pub fn breaks_frame(&self) -> Option<(u32, ShiftingWord)> {
+        self.shifting.filter(|_| self.is_machine_frame)
     }
 
     /// Name in the last feature comment at or before `line` (from 1); empty where there is none.
@@ -78,6 +136,38 @@ mod tests {
         assert_eq!(program.feature_at(3), "block_1/x");
         assert_eq!(program.feature_at(4), "block_1/y");
         assert_eq!(program.feature_at(u32::MAX), "block_1/y");
+    }
+
+    #[test]
+    fn a_program_of_the_machine_frame_may_not_shift_it() {
+        let head = machine::program_frame::HEAD;
+        assert_eq!(
+            ProgramText::new(&format!("{head}G0 X1\nM2\n")).breaks_frame(),
+            None
+        );
+        for word in [
+            "G54",
+            "g 59.3",
+            "G92 X0",
+            "G52 X1",
+            "G10 L2 P1 X0",
+            "G43 H1",
+            "N7G41D1",
+            "G92.1",
+        ] {
+            let (line, told) = ProgramText::new(&format!("{head}G0 X1 (G54)\n{word}\nM2\n"))
+                .breaks_frame()
+                .unwrap();
+            assert_eq!(line, 4, "{word}");
+            assert!(
+                word.to_uppercase()
+                    .replace(' ', "")
+                    .contains(&told.to_string()),
+                "{told}"
+            );
+            let own = ProgramText::new(&format!("G21\n{word}\nM2\n"));
+            assert_eq!(own.breaks_frame(), None, "{word}");
+        }
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //! Owns no socket: bytes go in, signals and the next line to send come out, and time arrives with
 //! the call. Quirks that were seen and are handled here: commands are echoed until `set echo off`;
 //! `set` is acknowledged only after `set verbose on`, with the line end `\n\r` instead of `\r\n`;
-//! some answers are followed by an empty line; an unknown command is not answered at all.
+//! some answers are followed by an empty line; an unknown command is not answered at all; `get spindle` ends
+//! `linuxcncrsh`, and LinuxCNC with it, so it is never asked.
 //!
 //! # References
 //! linuxcncrsh(1), LinuxCNC 2.9.
@@ -39,13 +40,23 @@ pub enum Request {
 pub enum Setting {
     EstopOff,
     MachineOn,
-    ModeManual,
-    ModeAuto,
+    Mode(Mode),
     HomeAll,
+    /// Execute this block.
+    Mdi(String),
     /// Load the program at this path.
     Open(String),
     Run,
     Abort,
+}
+
+/// Who gives LinuxCNC its commands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "named as in linuxcncrsh")]
+pub enum Mode {
+    Manual,
+    Auto,
+    Mdi,
 }
 
 /// A question.
@@ -61,6 +72,16 @@ pub enum Query {
     JointHomed,
     JointLimit,
     Program,
+    /// Active G codes, F and S.
+    ProgramCodes,
+    /// The oldest unread message of a `(debug, …)` comment.
+    OperatorDisplay,
+    /// Commanded position without any offset, mm.
+    AbsCmdPos,
+    /// Commanded position as programs see it, mm.
+    RelCmdPos,
+    /// Sum of work offset and G92 or G52, mm; the rotation is not in it.
+    PosOffset,
 }
 
 /// What the interpreter does.
@@ -97,8 +118,8 @@ pub enum Reply {
     Estop(bool),
     /// The drives are on.
     Machine(bool),
-    /// Programs can be run (mode auto).
-    ModeAuto(bool),
+    /// Who gives commands.
+    Mode(Mode),
     /// What the interpreter does.
     ProgramStatus(ProgramStatus),
     /// Line of the motion that is being executed; 0 where there is none.
@@ -111,6 +132,16 @@ pub enum Reply {
     JointLimit([JointLimit; JOINTS]),
     /// Path of the loaded program, or `NONE`.
     Program(String),
+    /// Active G codes, F and S, as LinuxCNC prints them.
+    ProgramCodes(String),
+    /// A message of the program, where there is one.
+    OperatorDisplay(Option<String>),
+    /// Commanded position without any offset, mm.
+    AbsCmdPos(Vec<f64>),
+    /// Commanded position as programs see it, mm.
+    RelCmdPos(Vec<f64>),
+    /// Sum of work offset and G92 or G52, mm.
+    PosOffset(Vec<f64>),
 }
 
 /// What came out of the received bytes or of the time that has passed.
@@ -155,6 +186,11 @@ impl Client {
     /// Puts a request at the end of the queue.
     pub fn ask(&mut self, request: Request) {
         self.queue.push_back(request);
+    }
+
+    /// Puts a request before those that have not been sent yet.
+    pub fn ask_first(&mut self, request: Request) {
+        self.queue.push_front(request);
     }
 
     /// Whether nothing is queued or unanswered.
@@ -207,6 +243,13 @@ impl Client {
         }
     }
 
+    /// What waits for an answer waits anew from `at`.
+    pub fn asked_not_before(&mut self, at: Stamp<Host>) {
+        if let Some((_, asked_at)) = &mut self.waiting {
+            *asked_at = (*asked_at).max(at);
+        }
+    }
+
     /// Reports an answer that is overdue; the request is dropped.
     pub fn expire(&mut self, at: Stamp<Host>) -> Option<Signal> {
         let (_, asked_at) = self.waiting.as_ref()?;
@@ -237,9 +280,11 @@ fn setting_words(setting: &Setting) -> (&'static str, &str) {
     match setting {
         Setting::EstopOff => ("estop", "off"),
         Setting::MachineOn => ("machine", "on"),
-        Setting::ModeManual => ("mode", "manual"),
-        Setting::ModeAuto => ("mode", "auto"),
+        Setting::Mode(Mode::Manual) => ("mode", "manual"),
+        Setting::Mode(Mode::Auto) => ("mode", "auto"),
+        Setting::Mode(Mode::Mdi) => ("mode", "mdi"),
         Setting::HomeAll => ("home", "-1"),
+        Setting::Mdi(block) => ("mdi", block),
         Setting::Open(path) => ("open", path),
         Setting::Run => ("run", ""),
         Setting::Abort => ("abort", ""),
@@ -257,6 +302,11 @@ const fn query_word(query: Query) -> &'static str {
         Query::JointHomed => "joint_homed",
         Query::JointLimit => "joint_limit",
         Query::Program => "program",
+        Query::ProgramCodes => "program_codes",
+        Query::OperatorDisplay => "operator_display",
+        Query::AbsCmdPos => "abs_cmd_pos",
+        Query::RelCmdPos => "rel_cmd_pos",
+        Query::PosOffset => "pos_offset",
     }
 }
 
@@ -328,7 +378,12 @@ fn parse_answer(query: Query, value: &str) -> Option<Reply> {
     Some(match query {
         Query::Estop => Reply::Estop(on_off(value)?),
         Query::Machine => Reply::Machine(on_off(value)?),
-        Query::Mode => Reply::ModeAuto(equals(value, "auto")),
+        Query::Mode => Reply::Mode(match value.to_ascii_lowercase().as_str() {
+            "manual" => Mode::Manual,
+            "auto" => Mode::Auto,
+            "mdi" => Mode::Mdi,
+            _ => return None,
+        }),
         Query::ProgramStatus => Reply::ProgramStatus(match value.to_ascii_lowercase().as_str() {
             "idle" => ProgramStatus::Idle,
             "running" => ProgramStatus::Running,
@@ -340,6 +395,13 @@ fn parse_answer(query: Query, value: &str) -> Option<Reply> {
             Reply::ProgramLine(u32::try_from(value.parse::<i64>().ok()?.max(0)).ok()?)
         }
         Query::Program => Reply::Program(value.to_owned()),
+        Query::ProgramCodes => Reply::ProgramCodes(value.to_owned()),
+        Query::AbsCmdPos => Reply::AbsCmdPos(positions(value)?),
+        Query::RelCmdPos => Reply::RelCmdPos(positions(value)?),
+        Query::PosOffset => Reply::PosOffset(positions(value)?),
+        Query::OperatorDisplay => {
+            Reply::OperatorDisplay((!equals(value, "ok")).then(|| value.to_owned()))
+        }
         Query::Error => Reply::Error((!equals(value, "ok")).then(|| value.to_owned())),
         Query::JointHomed => Reply::JointHomed(joints(value, false, |word| match word {
             "yes" => Some(true),
@@ -357,6 +419,14 @@ fn parse_answer(query: Query, value: &str) -> Option<Reply> {
             })
         })?),
     })
+}
+
+/// Finite positions of at most as many axes as there are joints.
+fn positions(value: &str) -> Option<Vec<f64>> {
+    let words = value.split_ascii_whitespace().take(JOINTS + 1);
+    let found: Vec<f64> = words.map(|word| word.parse().ok()).collect::<Option<_>>()?;
+    let known = !found.is_empty() && found.len() <= JOINTS;
+    (known && found.iter().all(|position| position.is_finite())).then_some(found)
 }
 
 fn on_off(value: &str) -> Option<bool> {

@@ -10,8 +10,8 @@ use crate::condition::{Condition, Lost};
 use crate::config::{Prepare, Settings};
 use crate::fault::classify;
 use crate::protocol::{
-    Client, JOINTS, JointLimit, LINE_LIMIT_BYTES, ProgramStatus, Query, Reply, Request, Setting,
-    Signal,
+    Client, JOINTS, JointLimit, LINE_LIMIT_BYTES, Mode, ProgramStatus, Query, Reply, Request,
+    Setting, Signal,
 };
 
 /// Steps of the greeting: hello, echo off, verbose on, enable.
@@ -41,6 +41,8 @@ pub struct ControllerState {
     pub drives: Option<bool>,
     /// Every joint homed.
     pub homed: Option<bool>,
+    /// At least one joint homed.
+    pub any_homed: Option<bool>,
     /// What the interpreter does.
     pub status: Option<ProgramStatus>,
     limits: [Option<JointLimit>; JOINTS],
@@ -221,7 +223,8 @@ impl Session {
         if let Link::Greeting { done } = self.link {
             self.link = Link::Greeting { done: done + 1 };
             if done + 1 == GREETINGS {
-                for query in [Query::Estop, Query::Machine, Query::JointHomed] {
+                // Homing first: it tells whether a machine was switched off or never on.
+                for query in [Query::JointHomed, Query::Estop, Query::Machine] {
                     self.client.ask(Request::Get(query));
                 }
             }
@@ -248,8 +251,13 @@ impl Session {
     fn observe(&mut self, at: Stamp<Host>, reply: Reply, conditions: &mut Vec<Condition>) {
         match reply {
             Reply::Estop(on) => {
-                let changed = self.state.estop.replace(on) != Some(on);
-                conditions.extend(changed.then_some(Condition::Estop { on }));
+                let before = self.state.estop.replace(on);
+                let condition = if on && before.is_none() && self.state.any_homed == Some(false) {
+                    Condition::NotSwitchedOn
+                } else {
+                    Condition::Estop { on }
+                };
+                conditions.extend((before != Some(on)).then_some(condition));
             }
             Reply::Machine(on) => {
                 let changed = self.state.drives.replace(on) != Some(on);
@@ -275,6 +283,7 @@ impl Session {
         let used = &joints[..self.settings.joints.len().min(JOINTS)];
         let homed = used.iter().all(|joint| *joint);
         let first_look = self.state.homed.is_none();
+        self.state.any_homed = Some(used.iter().any(|joint| *joint));
         if self.state.homed.replace(homed) != Some(homed) {
             conditions.push(Condition::Homed { homed });
         }
@@ -285,7 +294,7 @@ impl Session {
                 for setting in [
                     Setting::EstopOff,
                     Setting::MachineOn,
-                    Setting::ModeManual,
+                    Setting::Mode(Mode::Manual),
                     Setting::HomeAll,
                 ] {
                     self.client.ask(Request::Set(setting));

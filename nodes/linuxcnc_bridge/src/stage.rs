@@ -6,20 +6,23 @@ use metrology::Stage;
 use metrology::sample::{AxisCompensation, AxisState, ProbeTrigger};
 use metrology::stamp::{Host, Machine, Span, Stamp};
 
-use crate::clock::{SampleClock, Succession};
-use crate::compensation::{CompensationPath, Freshness};
+use crate::clock::SampleClock;
 use crate::condition::{Condition, Lost};
 use crate::config::Settings;
 use crate::latch::TouchDetector;
+use crate::program::ProgramText;
 use crate::protocol::ProgramStatus;
 use crate::run::{Ending, Refusal, Run, RunState};
-use crate::samples::{PROBING, Record, SampleEvent, SampleReader};
+use crate::samples::{PROBING, SampleReader};
 use crate::session::{Session, Want};
 
-/// From where on a slow servo thread is reported.
-const SLIP_LIMIT: f64 = 0.01;
-/// Least time between two [`Output::Joints`].
-const JOINT_PERIOD: Span = Span::from_nanos(20_000_000);
+mod offsets;
+mod records;
+
+use offsets::Offsets;
+
+/// Ticks come every few milliseconds; further apart than this, the bridge itself stood still.
+const STOOD_STILL: Span = Span::from_nanos(500_000_000);
 /// The sampler is started anew after this silence.
 const SILENCE_LIMIT: Span = Span::from_nanos(2_000_000_000);
 
@@ -44,6 +47,8 @@ pub enum Input {
     },
     /// What is to be added to the commands.
     Compensation(AxisCompensation),
+    /// So many publish what is to be added to the commands.
+    Publishers(usize),
     /// Time has passed.
     Tick,
     /// News from outside.
@@ -166,13 +171,13 @@ pub struct BridgeStage {
     slow: bool,
     sequence: u32,
     motion_type: i32,
-    compensation: CompensationPath,
-    freshness: Option<Freshness>,
+    offsets: Offsets,
     active: bool,
     resting: bool,
     stopping: bool,
     stopped: bool,
     conditions: Vec<Condition>,
+    ticked_at: Option<Stamp<Host>>,
 }
 
 impl BridgeStage {
@@ -192,13 +197,13 @@ impl BridgeStage {
             slow: false,
             sequence: 0,
             motion_type: 0,
-            compensation: CompensationPath::new(settings),
-            freshness: None,
+            offsets: Offsets::new(settings),
             active: true,
             resting: false,
             stopping: false,
             stopped: false,
             conditions: Vec::new(),
+            ticked_at: None,
             settings: settings.clone(),
         }
     }
@@ -210,13 +215,12 @@ impl BridgeStage {
         self
     }
 
-    fn act(&mut self, active: bool) {
+    fn act(&mut self, active: bool, out: &mut Vec<Output>) {
         self.active = active;
         self.resting = !active;
         if !active {
-            self.call_off(None);
-            self.compensation.release();
-            self.freshness = None;
+            self.call_off(None, out);
+            self.offsets.release();
         }
     }
 
@@ -228,6 +232,8 @@ impl BridgeStage {
             Some(Refusal::Inactive)
         } else if program.trim().is_empty() {
             Some(Refusal::Empty)
+        } else if let Some((line, word)) = ProgramText::new(program).breaks_frame() {
+            Some(Refusal::ShiftsFrame { line, word })
         } else if !self.session.is_up() {
             Some(Refusal::NotConnected)
         } else if state.estop != Some(false) {
@@ -253,11 +259,28 @@ impl BridgeStage {
         out.push(Output::Accepted { goal });
         self.stored = self.stored.wrapping_add(1);
         self.news = None;
-        self.run = Some(Run::new(goal, self.stored, &text));
-        out.push(Output::Io(IoCommand::Store {
-            number: self.stored,
-            text,
-        }));
+        let axes = self.settings.axes;
+        self.run = Some(Run::new(
+            goal,
+            self.stored,
+            &text,
+            axes,
+            &mut self.session.client,
+        ));
+        self.follow(None, out);
+    }
+
+    /// Acts on the results of a run: stores its text, reports its conditions, finishes it.
+    fn follow(&mut self, ending: Option<Ending>, out: &mut Vec<Output>) {
+        let Some(run) = &mut self.run else { return };
+        self.conditions.extend(run.take_conditions());
+        if let Some(text) = run.take_text() {
+            let number = run.number;
+            out.push(Output::Io(IoCommand::Store { number, text }));
+        }
+        if let Some(ending) = ending {
+            self.finish(ending, out);
+        }
     }
 
     fn finish(&mut self, ending: Ending, out: &mut Vec<Output>) {
@@ -269,12 +292,14 @@ impl BridgeStage {
         }
     }
 
-    fn call_off(&mut self, goal: Option<u64>) {
-        if let Some(run) = &mut self.run
-            && goal.is_none_or(|goal| goal == run.goal)
-        {
-            run.call_off(&mut self.session.client);
-        }
+    fn call_off(&mut self, goal: Option<u64>, out: &mut Vec<Output>) {
+        let state = *self.session.state();
+        let run = self
+            .run
+            .as_mut()
+            .filter(|run| goal.is_none_or(|goal| goal == run.goal));
+        let ending = run.and_then(|run| run.call_off(&state, &mut self.session.client));
+        self.follow(ending, out);
     }
 
     fn handle_io(&mut self, at: Stamp<Host>, event: IoEvent, out: &mut Vec<Output>) {
@@ -294,24 +319,21 @@ impl BridgeStage {
             }
             IoEvent::Stored { number, path } => self.stored(number, &path, out),
             IoEvent::NotStored { number, reason } => {
-                let ending = self
-                    .run
-                    .as_ref()
-                    .filter(|run| run.number == number)
-                    .map(|run| run.not_stored(&reason));
-                if let Some(ending) = ending {
-                    self.finish(ending, out);
-                }
+                let state = *self.session.state();
+                let client = &mut self.session.client;
+                let run = self.run.as_mut().filter(|run| run.number == number);
+                let ending = run.and_then(|run| run.not_stored(&reason, &state, client));
+                self.follow(ending, out);
             }
         }
     }
 
     fn stored(&mut self, number: u32, path: &str, out: &mut Vec<Output>) {
+        let state = *self.session.state();
         let client = &mut self.session.client;
         let run = self.run.as_mut().filter(|run| run.number == number);
-        if let Some(ending) = run.and_then(|run| run.stored(path, client)) {
-            self.finish(ending, out);
-        }
+        let ending = run.and_then(|run| run.stored(path, &state, client));
+        self.follow(ending, out);
     }
 
     fn lose(&mut self, at: Stamp<Host>, reason: Lost, out: &mut Vec<Output>) {
@@ -321,14 +343,13 @@ impl BridgeStage {
 
     /// What follows from a lost connection.
     fn abandon(&mut self, out: &mut Vec<Output>) {
-        if let Some(ending) = self.run.as_ref().map(Run::abandoned) {
-            self.finish(ending, out);
-        }
+        let ending = self.run.as_mut().map(Run::abandoned);
+        self.follow(ending, out);
         if !matches!(self.sampling, Sampling::Off { .. }) {
             out.push(Output::Io(IoCommand::StopSampler));
         }
         self.sampling = Sampling::Off { retry_at: None };
-        self.compensation.forget_passed();
+        self.offsets.forget_passed();
     }
 
     fn hear(&mut self, at: Stamp<Host>, bytes: &[u8], out: &mut Vec<Output>) {
@@ -343,9 +364,7 @@ impl BridgeStage {
                         ending = run.hear(signal, state, client);
                     }
                 });
-        if let Some(ending) = ending {
-            self.finish(ending, out);
-        }
+        self.follow(ending, out);
         self.want(want, out);
     }
 
@@ -360,9 +379,30 @@ impl BridgeStage {
         }
     }
 
+    /// After a time in which the bridge stood still what came meanwhile is not read yet: nobody was silent.
+    fn wait_anew_after_standstill(&mut self, at: Stamp<Host>) {
+        let Some(before) = self.ticked_at.replace(at) else {
+            return;
+        };
+        if at - before <= STOOD_STILL {
+            return;
+        }
+        let for_s = (at - before).as_secs_f64();
+        self.conditions.push(Condition::StoodStill { for_s });
+        self.session.client.asked_not_before(at);
+        if let Sampling::Started { at: last } | Sampling::Flowing { last } = &mut self.sampling {
+            *last = at;
+        }
+    }
+
     fn tick(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        self.wait_anew_after_standstill(at);
         let want = self.session.tick(at, &mut self.conditions);
         self.want(want, out);
+        let state = *self.session.state();
+        let client = &mut self.session.client;
+        let ending = { self.run.as_mut() }.and_then(|run| run.tick(at, &state, client));
+        self.follow(ending, out);
         match &mut self.sampling {
             Sampling::Off { retry_at } => {
                 let next_try_at = at + self.settings.reconnect_period;
@@ -385,12 +425,10 @@ impl BridgeStage {
             }
             _ => {}
         }
-        if matches!(self.sampling, Sampling::Flowing { .. })
-            && let Some(lines) = self.compensation.due(at)
-        {
-            out.push(Output::Io(IoCommand::Hal(lines)));
-        }
-        self.watch_freshness(at);
+        let homed = self.session.state().homed == Some(true);
+        let reached = matches!(self.sampling, Sampling::Flowing { .. });
+        let lines = self.offsets.tick(at, homed, reached, &mut self.conditions);
+        out.extend(lines.map(|lines| Output::Io(IoCommand::Hal(lines))));
         self.tell_news(out);
     }
 
@@ -400,19 +438,6 @@ impl BridgeStage {
         self.clock.interrupt();
         self.sampling = Sampling::Started { at };
         out.push(Output::Io(IoCommand::StartSampler));
-    }
-
-    fn watch_freshness(&mut self, at: Stamp<Host>) {
-        let freshness = self.compensation.freshness(at);
-        if freshness != self.freshness {
-            self.conditions.push(match freshness {
-                Some(Freshness::Stale) => Condition::CompensationStale {
-                    limit_s: self.settings.compensation_stale_after.as_secs_f64(),
-                },
-                _ => Condition::CompensationFresh,
-            });
-            self.freshness = freshness;
-        }
     }
 
     fn tell_news(&mut self, out: &mut Vec<Output>) {
@@ -435,115 +460,6 @@ impl BridgeStage {
             });
         }
     }
-
-    fn sampled(&mut self, at: Stamp<Host>, bytes: &[u8], out: &mut Vec<Output>) {
-        if matches!(self.sampling, Sampling::Off { .. }) {
-            return;
-        }
-        let mut reader = std::mem::take(&mut self.reader);
-        reader.receive(bytes, |event| match event {
-            SampleEvent::Record(record) => self.record(at, &record, out),
-            // The gap in the numbers that follows says how many were lost.
-            SampleEvent::Overrun => self.touches.gap(),
-            SampleEvent::Malformed { columns, expected } => {
-                self.touches.gap();
-                self.conditions
-                    .push(Condition::MalformedSample { columns, expected });
-            }
-        });
-        self.reader = reader;
-    }
-
-    fn record(&mut self, at: Stamp<Host>, record: &Record, out: &mut Vec<Output>) {
-        if !matches!(self.sampling, Sampling::Flowing { .. }) {
-            self.conditions.push(Condition::Sampling);
-        }
-        self.sampling = Sampling::Flowing { last: at };
-        let (controller_at, succession) = self.clock.stamp(record.number, at);
-        match succession {
-            Succession::Next => {}
-            Succession::Lost(lost) => {
-                self.touches.gap();
-                self.conditions.push(Condition::SamplerOverrun { lost });
-            }
-            Succession::First | Succession::Restarted => self.touches.gap(),
-        }
-        self.watch_slip();
-        let state = AxisState {
-            received_at: at,
-            controller_at,
-            axes: self.settings.axes,
-            commanded: record.commanded,
-            motor: record.motor,
-            scale: record.scale,
-            velocity: self.touches.velocity(record),
-        };
-        out.push(Output::State(state));
-        if self
-            .joints_at
-            .is_none_or(|last| controller_at - last >= JOINT_PERIOD)
-        {
-            self.joints_at = Some(controller_at);
-            out.push(Output::Joints(state));
-        }
-        self.motion_type = record.motion_type;
-        if let Some(run) = &mut self.run
-            && record.motion_type != 0
-        {
-            run.moving(record.line);
-        }
-        self.touch(at, controller_at, record, out);
-    }
-
-    fn watch_slip(&mut self) {
-        let Some(slip) = self.clock.take_slip() else {
-            return;
-        };
-        let slow = slip > SLIP_LIMIT;
-        if slow {
-            self.conditions.push(Condition::ServoSlip {
-                slip,
-                limit: SLIP_LIMIT,
-            });
-        } else if self.slow {
-            self.conditions.push(Condition::ServoInTime);
-        }
-        self.slow = slow;
-    }
-
-    fn touch(
-        &mut self,
-        received_at: Stamp<Host>,
-        controller_at: Stamp<Machine>,
-        record: &Record,
-        out: &mut Vec<Output>,
-    ) {
-        match self.touches.step(record) {
-            None => {}
-            Some(Err(reason)) => {
-                let line = record.line;
-                self.conditions
-                    .push(Condition::TouchUnusable { line, reason });
-            }
-            Some(Ok(touch)) => {
-                let feature = self
-                    .run
-                    .as_ref()
-                    .map_or("", |run| run.program.feature_at(touch.line));
-                out.push(Output::Trigger(ProbeTrigger {
-                    received_at,
-                    controller_at,
-                    feature_id: feature.to_owned(),
-                    approach: touch.approach,
-                    feed_mm_s: touch.feed_mm_s,
-                    axes: self.settings.axes,
-                    latched: touch.latched,
-                    sequence: self.sequence,
-                }));
-                self.sequence = self.sequence.wrapping_add(1);
-            }
-        }
-    }
 }
 
 impl Stage for BridgeStage {
@@ -559,11 +475,12 @@ impl Stage for BridgeStage {
     ) -> Result<(), Infallible> {
         match input {
             Input::Goal { goal, program } => self.begin(goal, program, out),
-            Input::Cancel { goal } => self.call_off(Some(goal)),
-            Input::Active(active) => self.act(active),
+            Input::Cancel { goal } => self.call_off(Some(goal), out),
+            Input::Active(active) => self.act(active, out),
+            Input::Publishers(publishers) => self.offsets.publishers(at, publishers, self.active),
             Input::Compensation(_) if !self.active => {}
             Input::Compensation(compensation) => {
-                if let Err(refused) = self.compensation.receive(at, &compensation) {
+                if let Err(refused) = self.offsets.receive(at, &compensation) {
                     self.conditions
                         .push(Condition::CompensationRefused(refused));
                 }
@@ -572,7 +489,7 @@ impl Stage for BridgeStage {
             Input::Io(event) => self.handle_io(at, event, out),
             Input::Shutdown => {
                 self.stopping = true;
-                self.call_off(None);
+                self.call_off(None, out);
             }
         }
         while let Some(line) = self.session.client.send(at) {

@@ -8,6 +8,7 @@
 //!   start            s = b - n standoff,  target  e = b + n overtravel        (2)
 //!   standoff   >= f^2/(2 a) + f ln((1-k)/0.01)/Kv + 0.2 mm                    (3)
 //!   overtravel >= f^2/(2 a) + 0.2 mm                                          (4)
+//!   overtravel  = g^2/(2 a) + g (T + D + (1-k)/Kv)                            (5)
 //! ```
 //!
 //! | symbol | here | unit |
@@ -17,6 +18,8 @@
 //! | r | effective radius of the stylus ball | mm |
 //! | f | feed | mm/s |
 //! | a | smallest acceleration limit, seen along n | mm/s² |
+//! | g | guarded feed: of every move that may meet a surface and is no touch | mm/s |
+//! | T, D | latest that the probe's signal arrives: 20 ms, or `probe.latency_ms` where that is more; servo period | s |
 //! | Kv, k | position gain and velocity feed-forward of the slowest axis that moves | 1/s, 1 |
 //!
 //! (3): the feed is reached after f²/(2a); a position loop of first order then closes the share
@@ -24,6 +27,13 @@
 //! the target, so it brakes before it. 0.2 mm is how far a surface may lie from its nominal place.
 //! A touch that breaks (3) or (4) is made below its feed, and its latency is estimated too small;
 //! such a cycle is refused.
+//!
+//! (5): after a contact that nobody expects the axis goes on until the control sees it, by its lag, and by the way of
+//! its braking; the probe takes as much as its overtravel. G0 is written only where no surface is: at the
+//! top of Z, straight up, and from a contact back to the start of its touch. Not even a machine whose zero is
+//! wrong meets a surface in G0, as long as the top of Z is above everything.
+//!
+//! Each program begins with [`crate::program_frame::HEAD`]: its coordinates are the machine's.
 //!
 //! Positions are those of the ball's centre with rotary axes at zero: axes read the machine
 //! coordinates of the ball's centre, no work or tool offset is active. A stylus is vertical and its
@@ -39,6 +49,7 @@ mod bore;
 mod feature;
 mod latency;
 mod plane;
+mod pointed;
 pub(crate) mod program;
 mod reach;
 mod rotary;
@@ -53,7 +64,8 @@ pub use bore::bores;
 pub use feature::{FeatureId, artefact_id};
 pub use latency::latency;
 pub use plane::planes;
-pub use reach::{needed_overtravel_mm, needed_standoff_mm};
+pub use pointed::{PointedOrder, pointed};
+pub use reach::{guarded_feed_mm_min, needed_overtravel_mm, needed_standoff_mm};
 pub use rotary::{RotaryOrder, rotary};
 pub use sphere::spheres;
 pub use touch::touches;

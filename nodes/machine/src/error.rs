@@ -1,6 +1,8 @@
 //! What can be wrong with a machine file, a chain, an orientation or the plan of a touching cycle.
 
 use metrology::Axis;
+use metrology::number::{number, quantity, unit_of};
+use metrology::yaml::YamlError;
 
 use crate::chain::ChainError;
 use crate::poses::PoseError;
@@ -9,21 +11,17 @@ use crate::poses::PoseError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MachineFileError {
     /// The text is not a machine file; the reason names the key.
-    #[error("{source_name}:{line}:{column}: {reason}")]
+    #[error("{source_name}:{source}")]
     Syntax {
         /// File name as the caller gave it.
         source_name: String,
-        /// Line, from 1; 0 where the reader could not tell.
-        line: u64,
-        /// Column, from 1; 0 where the reader could not tell.
-        column: u64,
-        /// What the YAML reader says.
-        reason: String,
+        /// Line, column, key and what belongs there.
+        source: YamlError,
     },
     /// A number outside its physical range.
-    #[error("{source_name}: {key} = {value}: {rule}")]
+    #[error("{source_name}: {key} = {value}: {rule}", value = quantity(key, *value))]
     Number {
-        /// File name.
+        /// File name, with the place in it where that is known.
         source_name: String,
         /// Path of the key.
         key: String,
@@ -32,8 +30,20 @@ pub enum MachineFileError {
         /// What holds for it.
         rule: &'static str,
     },
+    /// A number or a list out of its bound.
+    #[error("{source_name}: {source}")]
+    Bound {
+        /// File name.
+        source_name: String,
+        /// Key, value and bound.
+        #[source]
+        source: metrology::BoundError,
+    },
     /// A pair of limits in the wrong order.
-    #[error("{source_name}: {key} = [{least}, {greatest}]: the first must be below the second")]
+    #[error(
+        "{source_name}: {key} = [{least}, {greatest}]{unit}: the first must be below the second",
+        least = number(*least), greatest = number(*greatest), unit = in_unit(key)
+    )]
     Order {
         /// File name.
         source_name: String,
@@ -77,6 +87,40 @@ pub enum MachineFileError {
     },
 }
 
+fn in_unit(key: &str) -> String {
+    unit_of(key).map_or_else(String::new, |unit| format!(" {unit}"))
+}
+
+impl MachineFileError {
+    /// Path of the key that breaks a rule.
+    #[must_use]
+    pub fn key(&self) -> String {
+        match self {
+            Self::Syntax { source, .. } => source.key.clone(),
+            Self::Number { key, .. } | Self::Order { key, .. } | Self::Name { key, .. } => {
+                key.clone()
+            }
+            Self::Chain { .. } => "chain".to_owned(),
+            Self::Axis { axis, .. } => format!("axes.{axis}"),
+            Self::Bound { source, .. } => source.place().to_owned(),
+        }
+    }
+
+    /// The same with another name of its file, which has the place in it.
+    pub(crate) fn placed(mut self, place: &str) -> Self {
+        match &mut self {
+            Self::Syntax { source_name, .. }
+            | Self::Number { source_name, .. }
+            | Self::Order { source_name, .. }
+            | Self::Name { source_name, .. }
+            | Self::Chain { source_name, .. }
+            | Self::Axis { source_name, .. }
+            | Self::Bound { source_name, .. } => place.clone_into(source_name),
+        }
+        self
+    }
+}
+
 /// A touching cycle that cannot or must not be run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CycleError {
@@ -96,7 +140,8 @@ pub enum CycleError {
     },
     /// A move would leave the travel.
     #[error(
-        "feature \"{feature}\": axis {axis} would go to {position}, travel is [{least}, {greatest}] (mm, deg)"
+        "feature \"{feature}\": axis {axis} would go to {} {unit}, its travel is from {} to {} {unit}",
+        number(*position), number(*least), number(*greatest), unit = unit_of_axis(*axis)
     )]
     OutsideTravel {
         /// What was to be touched.
@@ -118,8 +163,7 @@ pub enum CycleError {
     },
     /// The stand-off does not suffice to reach the feed.
     #[error(
-        "feature \"{feature}\": feed {feed_mm_min} mm/min needs a stand-off of {needed_mm:.3} mm (acceleration {acceleration_mm_s2} mm/s2), probe.standoff_mm is {standoff_mm}"
-    )]
+        "feature \"{feature}\": feed {feed_mm_min} mm/min needs a stand-off of {needed_mm:.3} mm (acceleration {acceleration_mm_s2} mm/s2), probe.standoff_mm is {standoff_mm}", feed_mm_min = number(*feed_mm_min), standoff_mm = number(*standoff_mm), acceleration_mm_s2 = number(*acceleration_mm_s2))]
     StandoffTooShort {
         /// What was to be touched.
         feature: String,
@@ -134,8 +178,7 @@ pub enum CycleError {
     },
     /// The controller would brake for the end of the move before it touches.
     #[error(
-        "feature \"{feature}\": feed {feed_mm_min} mm/min needs an overtravel of {needed_mm:.3} mm to be held at contact (acceleration {acceleration_mm_s2} mm/s2), probe.overtravel_mm is {overtravel_mm}"
-    )]
+        "feature \"{feature}\": feed {feed_mm_min} mm/min needs an overtravel of {needed_mm:.3} mm to be held at contact (acceleration {acceleration_mm_s2} mm/s2), probe.overtravel_mm is {overtravel_mm}", feed_mm_min = number(*feed_mm_min), overtravel_mm = number(*overtravel_mm), acceleration_mm_s2 = number(*acceleration_mm_s2))]
     OvertravelTooShort {
         /// What was to be touched.
         feature: String,
@@ -149,7 +192,7 @@ pub enum CycleError {
         acceleration_mm_s2: f64,
     },
     /// A feed that is no feed.
-    #[error("feeds[{index}] = {feed_mm_min} mm/min: must be a finite number above 0")]
+    #[error("feeds[{index}] = {feed_mm_min} mm/min: must be a finite number above 0", feed_mm_min = number(*feed_mm_min))]
     FeedNotPositive {
         /// Place in the list.
         index: usize,
@@ -157,7 +200,7 @@ pub enum CycleError {
         feed_mm_min: f64,
     },
     /// A feed above an axis' limit.
-    #[error("feed {feed_mm_min} mm/min exceeds the limit of axis {axis}, {limit_mm_min} mm/min")]
+    #[error("feed {feed_mm_min} mm/min exceeds the limit of axis {axis}, {limit_mm_min} mm/min", feed_mm_min = number(*feed_mm_min), limit_mm_min = number(*limit_mm_min))]
     FeedAboveLimit {
         /// Feed, mm/min.
         feed_mm_min: f64,
@@ -176,8 +219,7 @@ pub enum CycleError {
     },
     /// Two feeds are the same.
     #[error(
-        "feeds[{first}] and feeds[{second}] are both {feed_mm_min} mm/min: latency needs different feeds"
-    )]
+        "feeds[{first}] and feeds[{second}] are both {feed_mm_min} mm/min: latency needs different feeds", feed_mm_min = number(*feed_mm_min))]
     EqualFeeds {
         /// Place of the first.
         first: usize,
@@ -194,8 +236,7 @@ pub enum CycleError {
     },
     /// The ball does not fit with room to move.
     #[error(
-        "feature \"{feature}\": radius {radius_mm} mm leaves {room_mm:.3} mm of room to a ball of radius {ball_radius_mm} mm, a stand-off of {standoff_mm} mm needs more than half of that"
-    )]
+        "feature \"{feature}\": radius {radius_mm} mm leaves {room_mm:.3} mm of room to a ball of radius {ball_radius_mm} mm, a stand-off of {standoff_mm} mm needs more than half of that", radius_mm = number(*radius_mm), ball_radius_mm = number(*ball_radius_mm), standoff_mm = number(*standoff_mm))]
     BoreTooSmall {
         /// The bore.
         feature: String,
@@ -220,8 +261,7 @@ pub enum CycleError {
     },
     /// A plane whose normal is not along an axis.
     #[error(
-        "feature \"{feature}\": normal [{x}, {y}, {z}] is not along one axis; a plane cycle probes along one axis"
-    )]
+        "feature \"{feature}\": normal [{x}, {y}, {z}] is not along one axis; a plane cycle probes along one axis", x = number(*x), y = number(*y), z = number(*z))]
     NormalNotAlongAxis {
         /// The plane.
         feature: String,
@@ -248,6 +288,24 @@ pub enum CycleError {
         /// Why.
         reason: &'static str,
     },
+    /// A direction of the probe's axis that the machine cannot take.
+    #[error("probe_axes[{index}]: {source}")]
+    ProbeAxis {
+        /// Place in the list.
+        index: usize,
+        /// Why.
+        source: OrientationError,
+    },
+    /// A sphere that cannot be touched along a direction of the probe's axis.
+    #[error("probe_axes[{index}] ({} deg): {reason}", in_words(pose))]
+    ProbeAxisUnreachable {
+        /// Place in the list.
+        index: usize,
+        /// Positions of the rotary axes, deg.
+        pose: Vec<(Axis, f64)>,
+        /// Why.
+        reason: &'static str,
+    },
     /// A turn that would swing a feature into the tool.
     #[error(
         "feature \"{feature}\": turning would lift it to {highest_mm:.1} mm, the tool waits at {lowest_mm:.1} mm"
@@ -260,6 +318,10 @@ pub enum CycleError {
         /// Where the ball's lowest point is then, less a clearance, mm.
         lowest_mm: f64,
     },
+}
+
+const fn unit_of_axis(axis: Axis) -> &'static str {
+    if axis.is_linear() { "mm" } else { "deg" }
 }
 
 /// Rotary positions in degrees, for a message.
@@ -297,7 +359,7 @@ pub enum OrientationError {
     #[error("probe axis or present position is not finite")]
     NotFinite,
     /// The vector has no direction.
-    #[error("probe axis of length {length} has no direction")]
+    #[error("probe axis of length {length} has no direction; give a vector from the ball to the spindle", length = number(*length))]
     NoDirection {
         /// Its length.
         length: f64,

@@ -13,6 +13,15 @@
 //! is not `c` but something of its own: the actual position, the error with its sign, increments of
 //! pulses. Sign, unit and rounding of each control are stated in its module and nowhere else.
 //!
+//! # Signs
+//!
+//! | table | sign known from |
+//! |---|---|
+//! | LinuxCNC `COMP_FILE` | tried on LinuxCNC 2.9 |
+//! | SINUMERIK `$AA_ENC_COMP`, `$AN_CEC` | its manual, in words |
+//! | SINUMERIK temperature, HEIDENHAIN `.COM`, FANUC pitch error | nobody: given by the user as [`Sign`] |
+//! | CSV | none needed: error and compensation both stand in it |
+//!
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | p | `position` | mm, rad |
@@ -45,6 +54,7 @@ pub mod heidenhain;
 pub mod linuxcnc;
 mod number;
 pub mod selection;
+mod sign;
 pub mod sinumerik;
 
 pub use axis_errors::AxisErrors;
@@ -52,3 +62,4 @@ pub use cross_errors::{CrossErrors, Unestimable};
 pub use error::ExportError;
 pub use file::ExportFile;
 pub use grid::Grid;
+pub use sign::Sign;

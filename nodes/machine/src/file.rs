@@ -1,24 +1,29 @@
 //! The machine file: a machine as its maker would describe it.
 //!
-//! Keys carry their units; unknown keys are refused by name; physics has no default and nothing is
-//! clamped. Units of the file are those of a data sheet; [`MachineFile`] keeps them as written and
-//! offers inner units (mm, rad, s) through methods. [`MachineFile::parse`] reads and checks a whole
-//! file; a value made otherwise is checked by [`MachineFile::check`].
+//! Keys carry their units; unknown keys are refused by name; nothing is clamped. Linear axes, and a control and a probe that
+//! are left out as a whole, have the defaults of a common machining centre; other physics has no default. Units of the file
+//! are those of a data sheet; [`MachineFile`] keeps them as written and offers inner units (mm, rad, s) through methods.
+//! [`MachineFile::parse`] reads and checks a whole file; a value made otherwise is checked by [`MachineFile::check`].
 
 mod axes;
+mod certificate;
 mod check;
+mod defaults;
+mod limits;
 mod read;
 mod reference;
 
 use std::collections::BTreeMap;
 
 use metrology::{Axis, AxisSet};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use certificate::CertificateEntry;
 pub use reference::{BeamEntry, GridEncoderEntry, GridPlacement, GridPlane, LengthReferenceEntry};
 
 /// A whole machine file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MachineFile {
     /// Name of the machine.
@@ -27,13 +32,21 @@ pub struct MachineFile {
     pub chain: String,
     /// Axes by letter.
     #[serde(deserialize_with = "axes::deserialize")]
+    #[schemars(schema_with = "axes::schema")]
     pub axes: BTreeMap<Axis, AxisEntry>,
     /// Where the rotary axes lie; required with rotary axes.
     #[serde(default)]
     pub rotary: Option<RotaryEntry>,
-    /// The control.
+    /// The control; where it is left out, that of [`ControlEntry::default`].
+    #[serde(default)]
+    #[schemars(description = "The control; all its keys or none.")]
     pub control: ControlEntry,
-    /// The touch probe.
+    /// The spindle; where absent, programs turn none.
+    #[serde(default)]
+    pub spindle: Option<SpindleEntry>,
+    /// The touch probe; where it is left out, that of [`ProbeEntry::default`].
+    #[serde(default)]
+    #[schemars(description = "The touch probe; all its keys or none.")]
     pub probe: ProbeEntry,
     /// Reference blocks on the table.
     #[serde(default)]
@@ -41,6 +54,9 @@ pub struct MachineFile {
     /// Other probing artefacts on the table.
     #[serde(default)]
     pub artefacts: Vec<ArtefactEntry>,
+    /// Certificates of those that are calibrated.
+    #[serde(default)]
+    pub certificates: Vec<CertificateEntry>,
     /// The table, where rotary axes turn it; poses are then planned clear of it.
     #[serde(default)]
     pub table: Option<TableEntry>,
@@ -58,6 +74,14 @@ pub struct MachineFile {
     pub effects: Vec<EffectEntry>,
 }
 
+/// The spindle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SpindleEntry {
+    /// Greatest speed.
+    pub max_speed_rpm: f64,
+}
+
 /// One axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
@@ -69,20 +93,25 @@ pub enum AxisEntry {
 }
 
 /// A linear axis driven by a ball screw.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinearAxisEntry {
     /// Least and greatest position.
     pub travel_mm: [f64; 2],
     /// Feed limit.
+    #[serde(default = "defaults::feed_limit_mm_min")]
     pub feed_limit_mm_min: f64,
     /// Acceleration limit.
+    #[serde(default = "defaults::acceleration_limit_mm_s2")]
     pub acceleration_limit_mm_s2: f64,
     /// Lead of the screw.
+    #[serde(default = "defaults::lead_mm")]
     pub lead_mm: f64,
     /// Gain of the position loop.
+    #[serde(default = "defaults::position_gain_per_s")]
     pub position_gain_per_s: f64,
     /// Share of velocity feed-forward, 0 to 1.
+    #[serde(default = "defaults::velocity_feedforward")]
     pub velocity_feedforward: f64,
     /// The velocity loop inside the position loop; ideal where absent.
     #[serde(default)]
@@ -91,17 +120,44 @@ pub struct LinearAxisEntry {
     #[serde(default)]
     pub guide_friction: Option<GuideFrictionEntry>,
     /// Resolution of the motor encoder, seen at the slide.
+    #[serde(default = "defaults::encoder_resolution_um")]
     pub encoder_resolution_um: f64,
     /// Resolution of the linear scale, where there is one.
     #[serde(default)]
     pub scale_resolution_um: Option<f64>,
+    /// Expanded uncertainty (k = 2) of the linear scale as its certificate states it: the part that every length has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_expanded_uncertainty_um: Option<f64>,
+    /// The part of it that grows with the length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_expanded_uncertainty_um_per_m: Option<f64>,
+    /// Signal period of the linear scale.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_signal_period_um: Option<f64>,
+    /// Travel over which another part of the drive repeats: a turn of a gear, a tooth of a rack or belt.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub periods_mm: Vec<f64>,
     /// What closes the position loop: `motor`, or `scale` where there is one.
     #[serde(default)]
     pub position_feedback: PositionFeedback,
 }
 
+impl LinearAxisEntry {
+    /// Periods in which the axis repeats itself while it moves, mm: lead, further periods, and that of the scale where the
+    /// scale closes the loop.
+    #[must_use]
+    pub fn repeats_mm(&self) -> Vec<f64> {
+        let by_scale = self.position_feedback == PositionFeedback::Scale;
+        let signal_um = self.scale_signal_period_um.filter(|_| by_scale);
+        let mut periods_mm = vec![self.lead_mm];
+        periods_mm.extend(&self.periods_mm);
+        periods_mm.extend(signal_um.map(|period_um| period_um * 1e-3));
+        periods_mm
+    }
+}
+
 /// The encoder that closes a position loop.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PositionFeedback {
     /// The motor's: semi-closed.
@@ -111,8 +167,8 @@ pub enum PositionFeedback {
     Scale,
 }
 
-/// How a slide slows down by the friction of its guides alone: force over mass, as the drive's commissioning tells them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// How a slide slows down by the friction of its guides alone: force over mass, from the drive's commissioning.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GuideFrictionEntry {
     /// Its part at every speed.
@@ -123,7 +179,7 @@ pub struct GuideFrictionEntry {
 }
 
 /// A velocity loop with proportional and integral action, as it is tuned.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VelocityLoopEntry {
     /// Natural frequency of the closed loop: root of its gain over its integral time, over 2 pi.
@@ -135,7 +191,7 @@ pub struct VelocityLoopEntry {
 }
 
 /// A rotary axis.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotaryAxisEntry {
     /// Least and greatest position.
@@ -156,7 +212,7 @@ pub struct RotaryAxisEntry {
 }
 
 /// Nominal lines of the rotary axes, machine frame, all axes at zero.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotaryEntry {
     /// A point on each rotary axis' line.
@@ -164,7 +220,7 @@ pub struct RotaryEntry {
 }
 
 /// The control.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ControlEntry {
     /// Servo period.
@@ -176,7 +232,7 @@ pub struct ControlEntry {
 }
 
 /// How a control latches positions at a probe trigger.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Latch {
     /// A hardware latch at the instant the signal arrives.
@@ -186,7 +242,7 @@ pub enum Latch {
 }
 
 /// The touch probe.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeEntry {
     /// Styli by name.
@@ -207,7 +263,7 @@ pub struct ProbeEntry {
 }
 
 /// A stylus.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StylusEntry {
     /// Effective radius of the ball.
@@ -217,7 +273,7 @@ pub struct StylusEntry {
 }
 
 /// A reference block: three orthogonal faces that meet in a corner.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BlockEntry {
     /// Name.
@@ -231,7 +287,7 @@ pub struct BlockEntry {
 }
 
 /// Another artefact for probing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum ArtefactEntry {
     /// A sphere.
@@ -275,7 +331,7 @@ pub enum ArtefactEntry {
 }
 
 /// A round table and what may not touch it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TableEntry {
     /// Height of its top, machine frame, rotary axes at zero.
@@ -287,7 +343,7 @@ pub struct TableEntry {
 }
 
 /// A temperature sensor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorEntry {
     /// Name; the topic is `temperature/<id>`.
@@ -299,7 +355,7 @@ pub struct SensorEntry {
 }
 
 /// Where a temperature sensor sits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[expect(missing_docs, reason = "named places")]
 pub enum SensorPlace {
@@ -314,7 +370,7 @@ pub enum SensorPlace {
 }
 
 /// One known effect; its own keys are checked by the effect itself.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EffectEntry {
     /// Id: the file name of the effect in the catalogue.
     pub kind: String,

@@ -8,7 +8,8 @@
 //! most. `export` turns measured errors into the tables that
 //! other controls load. `volumetric` is the geometric error of the tool tip anywhere in the working
 //! volume, component by component and all together, and what has to be commanded to undo it.
-//! `trajectory` writes the programs that a grid encoder, a laser or a scale measures.
+//! `trajectory` writes the programs that a grid encoder, a laser or a scale measures; `program_frame` is how all of
+//! them say that their coordinates are the machine's.
 //! `effects` is the catalogue of what can be wrong with a machine, one file each, and `twin` simulates a
 //! recorded session with any of them switched on.
 
@@ -22,6 +23,7 @@ pub mod frames;
 pub mod kinematics;
 pub mod orientation;
 pub mod poses;
+pub mod program_frame;
 pub mod trajectory;
 pub mod twin;
 pub mod volumetric;

@@ -12,7 +12,7 @@
 //!
 //! so a table-table machine has d = (sin A sin C, sin A cos C, cos A) and C = atan2(dx, dy). Both
 //! signs of (2) are solutions, each repeated every full turn; of those inside the travel the one
-//! nearest to the present position is taken.
+//! nearest to the present position is taken, and the other is given beside it.
 //!
 //! The arc tangent keeps what the arc cosine of dz loses: at a tilt of 1e-9 rad dz is 1 to the last
 //! bit. At h = 0 the direction says nothing about C and the present C is kept, since (2) would turn
@@ -62,11 +62,22 @@ pub struct RotaryPosition {
 pub struct Pointing {
     /// Where to go.
     pub position: RotaryPosition,
+    /// Both solutions of (2), that with `position` first.
+    pub solutions: [Solution; 2],
     /// Sine of the tilt: C moves its inverse times as fast as the direction. Gate on it where C
     /// has to follow a moving direction.
     pub sine_of_tilt: f64,
     /// Whether the direction says nothing about C, so that the present C was kept.
     pub singular: bool,
+}
+
+/// One of the two solutions of (2).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solution {
+    /// The repetition nearest to the present position: of those inside the travel, where there is one.
+    pub position: RotaryPosition,
+    /// Whether it lies inside the travel.
+    pub is_inside_travel: bool,
 }
 
 impl Orientation {
@@ -135,17 +146,23 @@ impl Orientation {
         } else {
             sine_of_tilt.atan2(d.z) // (2)
         };
-        let position = [(tilt_rad, d.x.atan2(-d.y)), (-tilt_rad, (-d.x).atan2(d.y))]
-            .into_iter()
-            .flat_map(|(a, c)| self.inside_travel(a, (!singular).then_some(c), present))
-            .min_by(|p, q| distance_rad(p, &present).total_cmp(&distance_rad(q, &present)))
-            .ok_or(OrientationError::OutsideTravel {
+        let mut solutions = [(tilt_rad, d.x.atan2(-d.y)), (-tilt_rad, (-d.x).atan2(d.y))]
+            .map(|(a, c)| self.solution(a, (!singular).then_some(c), present));
+        let from_present = |solution: &Solution| distance_rad(&solution.position, &present);
+        solutions.sort_by(|p, q| {
+            let inside_first = q.is_inside_travel.cmp(&p.is_inside_travel);
+            inside_first.then(from_present(p).total_cmp(&from_present(q)))
+        });
+        if !solutions[0].is_inside_travel {
+            return Err(OrientationError::OutsideTravel {
                 a_deg: (self.sense_a * tilt_rad).to_degrees(),
                 travel_a_deg: self.travel_a_rad.map(f64::to_degrees),
                 travel_c_deg: self.travel_c_rad.map(f64::to_degrees),
-            })?;
+            });
+        }
         Ok(Pointing {
-            position,
+            position: solutions[0].position,
+            solutions,
             sine_of_tilt,
             singular,
         })
@@ -157,6 +174,23 @@ impl Orientation {
         let (sin_a, cos_a) = (self.sense_a * position.a_rad).sin_cos();
         let (sin_c, cos_c) = (self.sense_c * position.c_rad).sin_cos();
         Vector3::new(sin_a * sin_c, -sin_a * cos_c, cos_a)
+    }
+
+    /// One solution of (2); `c_rad` is `None` where C is free.
+    fn solution(&self, a_rad: f64, c_rad: Option<f64>, present: RotaryPosition) -> Solution {
+        let inside = self.inside_travel(a_rad, c_rad, present).into_iter();
+        let nearest =
+            inside.min_by(|p, q| distance_rad(p, &present).total_cmp(&distance_rad(q, &present)));
+        let turned = |angle_rad: f64, near_rad: f64| {
+            angle_rad + ((near_rad - angle_rad) / TAU).round() * TAU
+        };
+        Solution {
+            is_inside_travel: nearest.is_some(),
+            position: nearest.unwrap_or_else(|| RotaryPosition {
+                a_rad: turned(self.sense_a * a_rad, present.a_rad),
+                c_rad: c_rad.map_or(present.c_rad, |c| turned(self.sense_c * c, present.c_rad)),
+            }),
+        }
     }
 
     /// All repetitions of one solution inside the travel; `c_rad` is `None` where C is free.

@@ -1,12 +1,13 @@
 //! Parameters and machine files that cannot work.
 
 use machine::ChainError;
+use metrology::number::{number, quantity};
 
 /// Why a stage is not built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MachineFramesError {
     /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
     OutOfRange {
         /// Parameter.
         name: &'static str,

@@ -204,5 +204,8 @@ fn a_parameter_out_of_range_is_refused_with_its_limits() {
     let refused = MachineFramesStage::new(&config, &machine(THREE_AXIS), str::to_owned);
     let error = refused.unwrap_err();
     assert!(matches!(error, MachineFramesError::OutOfRange { .. }));
-    assert_eq!(error.to_string(), "rate_hz = -1: must be from 0 to 1000");
+    assert_eq!(
+        error.to_string(),
+        "rate_hz = -1 Hz: must be from 0 to 1000 Hz"
+    );
 }

@@ -18,7 +18,7 @@
 //! | reference length (setting up) | l | mm |
 //! | radial expansion | R (s₁ + s₂)/2 | mm/mm |
 //! | scaling mismatch | (R/2)(s₁ − s₂) cos 2θ | mm/mm |
-//! | squareness | (R φ/2) sin 2θ; φ above 0: less than 90° between the positive directions | rad |
+//! | squareness | −(s R φ/2) sin 2θ; φ the component of ISO 230-1, s of [`crate::squareness`] | rad |
 //! | servo mismatch | σ (v/2)(T₁ − T₂) sin 2θ | s |
 //! | radius contraction | −v² T²/(2R) | s² |
 //! | backlash | step outward by b after each reversal, four numbers: [`BacklashEnd`] | mm |

@@ -48,6 +48,7 @@ pub use growth::relaxed_s;
 use growth::{Relaxed, growth_mm};
 
 use crate::axis::Axis;
+use crate::number::number;
 use crate::sample::{AxisDrift, DriftGrowth, ThermalModel};
 use crate::stamp::{Host, Stamp};
 
@@ -73,13 +74,13 @@ pub enum DriftRefusal {
         axis: Axis,
     },
     /// The instant is before the model's validity.
-    #[error("model is valid only in {early_s} s")]
+    #[error("model is valid only in {early_s} s", early_s = number(*early_s))]
     NotYetValid {
         /// Time that is missing, s.
         early_s: f64,
     },
     /// The instant is after the model's validity.
-    #[error("model expired {late_s} s ago")]
+    #[error("model expired {late_s} s ago", late_s = number(*late_s))]
     Expired {
         /// Time since then, s.
         late_s: f64,
@@ -92,8 +93,7 @@ pub enum DriftRefusal {
     },
     /// The policy refuses positions outside the span.
     #[error(
-        "position {position_mm} mm of axis {axis} is outside the blocks' span {lower_mm} to {upper_mm} mm"
-    )]
+        "position {position_mm} mm of axis {axis} is outside the blocks' span {lower_mm} to {upper_mm} mm", position_mm = number(*position_mm), lower_mm = number(*lower_mm), upper_mm = number(*upper_mm))]
     OutOfSpan {
         /// The coordinate that is outside.
         axis: Axis,
@@ -106,8 +106,7 @@ pub enum DriftRefusal {
     },
     /// Where the axis may go, the drift is not known well enough.
     #[error(
-        "axis {axis}: expanded uncertainty of the drift reaches {expanded_uncertainty_mm} mm at the travel's corners, limit is {limit_mm} mm"
-    )]
+        "axis {axis}: expanded uncertainty of the drift reaches {expanded_uncertainty_mm} mm at the travel's corners, limit is {limit_mm} mm", expanded_uncertainty_mm = number(*expanded_uncertainty_mm), limit_mm = number(*limit_mm))]
     TooUncertain {
         /// The axis.
         axis: Axis,

@@ -14,6 +14,7 @@ pub use plane::{PlaneFit, fit_plane};
 pub use round::{CircleFit, RoundFit, SphereFit, fit_round};
 
 use crate::least_squares::FitError;
+use crate::number::number;
 
 /// Why a shape is not fitted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -45,7 +46,7 @@ pub enum ShapeError {
         n: usize,
     },
     /// The iteration did not settle.
-    #[error("the {shape} did not settle in {iterations} iterations, last step {last_step_mm} mm")]
+    #[error("the {shape} did not settle in {iterations} iterations, last step {last_step_mm} mm", last_step_mm = number(*last_step_mm))]
     NotSettled {
         /// Which shape.
         shape: &'static str,

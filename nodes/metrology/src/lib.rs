@@ -6,22 +6,32 @@
 //! to the command. Axes follow ISO 841.
 
 pub mod axis;
+pub mod bound;
 pub mod breakdown;
 pub mod clock_map;
 pub mod drift;
+pub mod epoch;
 pub mod error_component;
 pub mod fit;
+pub mod homed_gate;
 pub mod iso230;
 pub mod least_squares;
+pub mod leaves;
+pub mod number;
 pub mod parameter;
 pub mod sample;
 pub mod severity;
+pub mod squareness;
 pub mod stage;
 pub mod stamp;
+pub mod text;
+pub mod yaml;
 
 pub use axis::{Axis, AxisSet, PerAxis};
+pub use bound::{Bound, BoundError, Range};
 pub use clock_map::ClockMap;
 pub use error_component::ErrorComponent;
+pub use homed_gate::{GateNews, HomedGate};
 pub use parameter::ParameterDoc;
 pub use severity::Severity;
 pub use stage::Stage;

@@ -34,7 +34,9 @@ pub use plan::{PlanState, PlanStatus};
 pub use positioning::PositioningTable;
 pub use report::{MachineValue, Quantity, Verdict};
 pub use segment::{Sense, TestKind, TestPlane, TestSegment};
-pub use sensor::{GridSample, LengthSample, TemperatureSample};
+pub use sensor::{
+    AngleSample, FARTHEST_FROM_NOMINAL, GridSample, LATE_S, LengthSample, TemperatureSample,
+};
 pub use thermal::{AxisDrift, DriftGrowth, ThermalModel, UpdateReason, UpdateRequest};
 pub use touch::{
     Correction, LatencyMethod, NewTouches, ProbeLatency, ProbeTrigger, ProbedPoint, Rejection,

@@ -12,23 +12,36 @@
 //!   OUT_OF_RANGE         the agent's own word for n < first                                      (3)
 //! ```
 //!
-//! After a loss, `current` says what holds now, so that no old value stays. After a cut line nothing is lost
-//! while the agent still has n: `current` tells again what was told up to n, and the stream goes on from n. An
-//! agent with another `instanceId` has started anew and counts from 1.
+//! The numbers count the observations of all devices. Where one is asked for, the number of its own observations in a gap
+//! is unknown: the condition has no number of losses.
+//!
+//! After a loss, `current` lists all that holds now, so no old value stays. What was published is not published again.
+//! An agent that loses again is asked after pauses that double, until a part follows on the one before it. A part that
+//! cannot be read is left out: the next one says by (2), or by its head, what was lost. After such a part or a cut line
+//! nothing else is lost while the agent still has n: `current` repeats the values up to n, and the stream goes on from n.
+//! An agent with another `instanceId` has started anew and counts from 1.
+//!
+//! Its `probe` is compared with the mapping: what is not there, units that differ, positions in work coordinates.
 //!
 //! # References
 //! \[1\] MTConnect standard, part 1 (fundamentals): request `sample` with `from`, `count`, `interval` and
 //! `heartbeat`; buffer and sequence numbers of an agent.
 
-use metrology::stamp::Span;
+use std::collections::BTreeMap;
+
+use metrology::stamp::{Host, Span, Stamp};
 
 use crate::condition::{Condition, Lost};
-use crate::config::AgentConfig;
-use crate::document::{Answer, DataItem, Header, Numbered, read};
-use crate::mapping::{Mapping, Use};
+use crate::config::{AgentConfig, Settings};
+use crate::document::{Answer, DocumentFlaw, Header, Numbered, read_mended};
 use crate::multipart::{PART_LIMIT, PartFlaw, Parts, boundary};
-use crate::observation::Observation;
+use crate::observation::{Observation, Told};
+use crate::offer::Wanted;
 use crate::stage::IoCommand;
+use crate::text;
+
+/// Keys whose last number is remembered; more are no machine's.
+const KEY_LIMIT: usize = 100_000;
 
 /// What the agent was asked last.
 #[derive(Clone, Debug)]
@@ -36,7 +49,14 @@ enum Asked {
     Nothing,
     Probe,
     Current,
-    Sample { parts: Option<Parts>, body: Vec<u8> },
+    Sample {
+        parts: Option<Parts>,
+        body: Vec<u8>,
+    },
+    /// Nothing; `current` is asked then.
+    Pausing {
+        until: Stamp<Host>,
+    },
 }
 
 /// What follows from an answer.
@@ -44,40 +64,89 @@ enum Asked {
 pub enum Heard {
     /// The machine told something.
     Observation(Observation),
+    /// Something that the machine told before, maybe long ago, and that still holds.
+    Held(Observation),
+    /// A document was read.
+    Read {
+        /// Invalid letters that were replaced.
+        replaced: usize,
+        /// Observations that could not be read.
+        left: usize,
+    },
+    /// A part of a stream cannot be read and is left out.
+    PartLeftOut {
+        /// What was asked.
+        path: String,
+        /// Why.
+        flaw: DocumentFlaw,
+    },
     /// Something worth reporting.
     Condition(Condition),
     /// Something to be done outside.
     Io(IoCommand),
 }
 
+/// Parts in a row that cannot be read before no value counts as known any more.
+const MOST_UNREADABLE: u32 = 3;
+
 /// The conversation with one agent.
 #[derive(Clone, Debug)]
 pub struct AgentLink {
     config: AgentConfig,
-    wanted: Vec<String>,
+    wanted: Wanted,
+    /// First and longest pause before `current` is asked after repeated losses.
+    pauses: (Span, Span),
+    pause: Span,
     asked: Asked,
     instance: Option<u64>,
     next: Option<u64>,
     gap_from: Option<u64>,
+    passes_over: bool,
     resumes: bool,
     lost: u64,
+    /// Gaps in the numbers of all devices, where one is asked for.
+    gaps: u64,
+    told: BTreeMap<String, u64>,
+    progress: bool,
+    /// Parts of the stream that could not be read, since the last that could.
+    unreadable: u32,
 }
 
 impl AgentLink {
     /// With an agent that has not been asked yet.
     #[must_use]
-    pub fn new(config: &AgentConfig, mapping: &Mapping) -> Self {
-        let wanted = mapping.uses().filter(|(_, used)| **used != Use::Nothing);
+    pub fn new(settings: &Settings) -> Self {
         Self {
-            config: config.clone(),
-            wanted: wanted.map(|(key, _)| key.to_owned()).collect(),
+            config: settings.agent.clone(),
+            wanted: Wanted::new(&settings.mapping),
+            pauses: (settings.reconnect_first, settings.reconnect_longest),
+            pause: Span::default(),
             asked: Asked::Nothing,
             instance: None,
             next: None,
             gap_from: None,
+            passes_over: false,
             resumes: false,
             lost: 0,
+            gaps: 0,
+            told: BTreeMap::new(),
+            progress: false,
+            unreadable: 0,
         }
+    }
+
+    /// Time has passed: asks what a pause has kept back.
+    pub fn tick(&mut self, now: Stamp<Host>, out: &mut Vec<Heard>) {
+        if let Asked::Pausing { until } = self.asked
+            && now >= until
+        {
+            self.ask_current(out);
+        }
+    }
+
+    /// Whether a part of a stream has been read since this was asked.
+    pub fn take_progress(&mut self) -> bool {
+        std::mem::take(&mut self.progress)
     }
 
     /// A stream is silent for no longer than this.
@@ -97,7 +166,7 @@ impl AgentLink {
 
     fn asked_path(&self) -> String {
         self.path(match self.asked {
-            Asked::Nothing => "",
+            Asked::Nothing | Asked::Pausing { .. } => "",
             Asked::Probe => "probe",
             Asked::Current => "current",
             Asked::Sample { .. } => "sample",
@@ -107,7 +176,10 @@ impl AgentLink {
     /// Begins, or begins again after the connection was lost.
     pub fn begin(&mut self) -> IoCommand {
         self.asked = Asked::Probe;
+        self.unreadable = 0;
         self.resumes = self.next.is_some();
+        // No value is known any more, so all that hold are published again.
+        self.told.clear();
         let path = self.path("probe");
         IoCommand::Get { path }
     }
@@ -116,6 +188,19 @@ impl AgentLink {
         self.asked = Asked::Current;
         let path = self.path("current");
         out.push(Heard::Io(IoCommand::Get { path }));
+    }
+
+    /// After a loss: at once, and after doubling pauses where losses follow each other.
+    fn ask_again(&mut self, at: Stamp<Host>, out: &mut Vec<Heard>) {
+        out.push(Heard::Io(IoCommand::Disconnect));
+        let (first, longest) = self.pauses;
+        let pause = self.pause;
+        let twice = Span::from_nanos(pause.nanos().saturating_mul(2));
+        self.pause = twice.max(first).min(longest);
+        if pause == Span::default() {
+            return self.ask_current(out);
+        }
+        self.asked = Asked::Pausing { until: at + pause };
     }
 
     fn ask_sample(&mut self, from: u64, out: &mut Vec<Heard>) {
@@ -130,21 +215,53 @@ impl AgentLink {
         out.push(Heard::Io(IoCommand::Stream { path }));
     }
 
-    /// Takes a whole answer.
+    /// Takes a whole answer that came at `at`.
     ///
     /// # Errors
     /// When it is of no use; the conversation begins again.
-    pub fn answered(&mut self, status: u16, body: &[u8], out: &mut Vec<Heard>) -> Result<(), Lost> {
+    pub fn answered(
+        &mut self,
+        at: Stamp<Host>,
+        status: u16,
+        body: &[u8],
+        out: &mut Vec<Heard>,
+    ) -> Result<(), Lost> {
         let path = self.asked_path();
-        let answer = match read(body) {
-            Ok(answer) => answer,
+        let body = text::decode(body);
+        let (answer, mended) = match read_mended(&body.text) {
+            Ok(read) => read,
             Err(_) if status != 200 => return Err(Lost::Status { path, status }),
-            Err(flaw) => return Err(Lost::Document { path, flaw }),
+            Err(flaw) => {
+                self.pass_over();
+                return Err(Lost::Document { path, flaw });
+            }
         };
+        let left = match &answer {
+            Answer::Streams { malformed, .. } => *malformed,
+            _ => 0,
+        };
+        let replaced = body.replaced + mended;
+        out.push(Heard::Read { replaced, left });
+        self.understood(at, path, answer, out)
+    }
+
+    fn understood(
+        &mut self,
+        at: Stamp<Host>,
+        path: String,
+        answer: Answer,
+        out: &mut Vec<Heard>,
+    ) -> Result<(), Lost> {
         match (answer, &self.asked) {
-            (Answer::Devices { instance_id, items }, Asked::Probe) => {
+            (
+                Answer::Devices {
+                    instance_id, items, ..
+                },
+                Asked::Probe,
+            ) => {
                 self.meet(instance_id, out);
-                self.compare(&items, out);
+                let compared = self.wanted.compare(&items);
+                out.extend(compared.into_iter().map(Heard::Condition));
                 self.ask_current(out);
                 Ok(())
             }
@@ -153,29 +270,21 @@ impl AgentLink {
                     header,
                     observations,
                     malformed,
+                    unstamped,
                 },
-                Asked::Current,
+                Asked::Current | Asked::Sample { .. },
             ) => {
-                report_malformed(malformed, out);
-                self.holds_now(header, observations, out);
-                Ok(())
-            }
-            (
-                Answer::Streams {
-                    header,
-                    observations,
-                    malformed,
-                },
-                Asked::Sample { .. },
-            ) => {
-                report_malformed(malformed, out);
-                self.happened(header, observations, out);
+                report(malformed, unstamped, out);
+                if matches!(self.asked, Asked::Current) {
+                    self.holds_now(header, observations, out);
+                } else {
+                    self.happened(at, header, observations, out);
+                }
                 Ok(())
             }
             (Answer::Error { errors }, Asked::Sample { .. }) if is_out_of_range(&errors) => {
                 self.gap_from = self.next.take();
-                out.push(Heard::Io(IoCommand::Disconnect));
-                self.ask_current(out);
+                self.ask_again(at, out);
                 Ok(())
             }
             (Answer::Error { errors }, _) => {
@@ -183,6 +292,13 @@ impl AgentLink {
                 Err(Lost::Refused { path, code, text })
             }
             _ => Err(Lost::AnotherAnswer { path }),
+        }
+    }
+
+    /// A part that cannot be read would be sent again and again: the stream goes on behind it.
+    fn pass_over(&mut self) {
+        if matches!(self.asked, Asked::Sample { .. }) {
+            self.passes_over = true;
         }
     }
 
@@ -198,7 +314,12 @@ impl AgentLink {
     ///
     /// # Errors
     /// As [`Self::answered`].
-    pub fn received(&mut self, bytes: &[u8], out: &mut Vec<Heard>) -> Result<(), Lost> {
+    pub fn received(
+        &mut self,
+        at: Stamp<Host>,
+        bytes: &[u8],
+        out: &mut Vec<Heard>,
+    ) -> Result<(), Lost> {
         let Asked::Sample { parts, body } = &mut self.asked else {
             return Ok(());
         };
@@ -213,27 +334,49 @@ impl AgentLink {
         };
         let mut whole = Vec::new();
         let cut = stream.receive(bytes, |part| whole.push(part.to_vec()));
-        cut.map_err(Lost::Parts)?;
         for part in whole {
             // A part may end the stream: what comes behind it belongs to nobody.
             if !matches!(self.asked, Asked::Sample { .. }) {
                 break;
             }
-            self.answered(200, &part, out)?;
+            match self.answered(at, 200, &part, out) {
+                // The next part may be good.
+                Err(Lost::Document { path, flaw }) if self.unreadable < MOST_UNREADABLE => {
+                    self.unreadable += 1;
+                    out.push(Heard::PartLeftOut { path, flaw });
+                }
+                taken => taken?,
+            }
         }
-        Ok(())
+        match cut {
+            Err(flaw) if matches!(self.asked, Asked::Sample { .. }) => {
+                self.pass_over();
+                Err(Lost::Parts(flaw))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The stream has ended; an agent answers so when it refuses.
     ///
     /// # Errors
     /// As [`Self::answered`]; [`Lost::Closed`] where the end says nothing.
-    pub fn ended(&mut self, reason: &str, status: u16, out: &mut Vec<Heard>) -> Result<(), Lost> {
+    pub fn ended(
+        &mut self,
+        at: Stamp<Host>,
+        reason: &str,
+        status: u16,
+        out: &mut Vec<Heard>,
+    ) -> Result<(), Lost> {
+        // Only a stream ends so: this one was given up before.
+        if !matches!(self.asked, Asked::Sample { .. }) {
+            return Ok(());
+        }
         if let Asked::Sample { parts: None, body } = &mut self.asked
             && !body.is_empty()
         {
             let body = std::mem::take(body);
-            return self.answered(status, &body, out);
+            return self.answered(at, status, &body, out);
         }
         Err(Lost::Closed {
             reason: reason.to_owned(),
@@ -248,26 +391,12 @@ impl AgentLink {
                 let now = instance;
                 out.push(Heard::Condition(Condition::AgentRestarted { before, now }));
                 (self.next, self.gap_from, self.resumes) = (None, None, false);
+                (self.passes_over, self.pause) = (false, Span::default());
+                self.told.clear();
                 true
             }
             None => false,
         }
-    }
-
-    fn compare(&self, items: &[DataItem], out: &mut Vec<Heard>) {
-        let has = |key: &String| {
-            items
-                .iter()
-                .any(|item| item.id == *key || item.name == *key)
-        };
-        let missing = self.wanted.iter().filter(|key| !has(key));
-        let keys: Vec<_> = missing.map(String::as_str).collect();
-        out.push(Heard::Condition(if keys.is_empty() {
-            Condition::Offered
-        } else {
-            let keys = keys.join(", ");
-            Condition::NotOffered { keys }
-        }));
     }
 
     fn gap(&mut self, from: u64, to: u64, out: &mut Vec<Heard>) {
@@ -275,13 +404,29 @@ impl AgentLink {
         if lost == 0 {
             return;
         }
-        self.lost += lost;
-        out.push(Heard::Condition(Condition::SequenceGap {
-            from,
-            to,
-            lost,
-            total: self.lost,
-        }));
+        let condition = match self.config.device.as_str() {
+            "" => {
+                // An agent may name any number up to the greatest.
+                self.lost = self.lost.saturating_add(lost);
+                let total = self.lost;
+                Condition::SequenceGap {
+                    from,
+                    to,
+                    lost,
+                    total,
+                }
+            }
+            device => {
+                self.gaps += 1;
+                Condition::DeviceGap {
+                    device: device.to_owned(),
+                    from,
+                    to,
+                    count: self.gaps,
+                }
+            }
+        };
+        out.push(Heard::Condition(condition));
     }
 
     /// `current`: everything that holds; after a cut line only what was told before it, for the rest comes again.
@@ -289,29 +434,64 @@ impl AgentLink {
         self.meet(header.instance_id, out);
         let resumed = self.next.filter(|_| self.resumes);
         self.resumes = false;
+        let passes_over = std::mem::take(&mut self.passes_over);
         let until = match (self.gap_from.take(), resumed) {
             (None, Some(next))
-                if (header.first_sequence..=header.next_sequence).contains(&next) =>
+                if !passes_over
+                    && (header.first_sequence..=header.next_sequence).contains(&next) =>
             {
                 next
             }
             (from, resumed) => {
                 if let Some(from) = from.or(resumed) {
-                    self.gap(from, header.first_sequence.max(from), out);
+                    let to = if passes_over {
+                        header.next_sequence
+                    } else {
+                        header.first_sequence
+                    };
+                    self.gap(from, to.max(from), out);
                 }
-                header.next_sequence
+                // What was told is not asked again, also of an agent whose `current` stays behind its stream.
+                header.next_sequence.max(self.next.unwrap_or_default())
             }
         };
-        let held = observations
-            .into_iter()
-            .filter(|numbered| numbered.sequence < until);
-        out.extend(held.map(|numbered| Heard::Observation(numbered.observation)));
+        for numbered in observations {
+            let is_news = self.is_news(&numbered);
+            if numbered.sequence < until && is_news {
+                self.note(&numbered);
+                out.push(Heard::Held(numbered.observation));
+            }
+        }
         self.next = Some(until);
         self.ask_sample(until, out);
     }
 
+    /// Whether it was not published before. Of a condition several may be active, and each report is one of them.
+    fn is_news(&self, numbered: &Numbered) -> bool {
+        let last = self.told.get(&numbered.observation.key);
+        let is_alarm = matches!(numbered.observation.told, Told::Alarm(_));
+        is_alarm || last.is_none_or(|last| numbered.sequence > *last)
+    }
+
+    fn note(&mut self, numbered: &Numbered) {
+        let key = &numbered.observation.key;
+        if let Some(last) = self.told.get_mut(key) {
+            *last = numbered.sequence;
+        } else if self.told.len() < KEY_LIMIT {
+            self.told.insert(key.clone(), numbered.sequence);
+        }
+    }
+
     /// A part of the stream.
-    fn happened(&mut self, header: Header, observations: Vec<Numbered>, out: &mut Vec<Heard>) {
+    fn happened(
+        &mut self,
+        at: Stamp<Host>,
+        header: Header,
+        observations: Vec<Numbered>,
+        out: &mut Vec<Heard>,
+    ) {
+        self.progress = true;
+        self.unreadable = 0;
         if self.meet(header.instance_id, out) {
             out.push(Heard::Io(IoCommand::Disconnect));
             return self.ask_current(out);
@@ -319,20 +499,30 @@ impl AgentLink {
         let next = self.next.unwrap_or(header.next_sequence);
         let begins = observations.first().map(|numbered| numbered.sequence);
         let is_whole = self.config.device.is_empty();
-        let hole = begins.filter(|begins| is_whole && *begins > next);
+        // Behind a part that could not be read the head alone tells of a loss.
+        let passes_over = std::mem::take(&mut self.passes_over);
+        let begins = begins.or(passes_over.then_some(header.next_sequence));
+        let hole = begins.filter(|begins| (is_whole || passes_over) && *begins > next);
         let lost_to = match header.first_sequence > next {
             true => Some(header.first_sequence),
             false => hole,
         };
-        let new = observations
-            .into_iter()
-            .filter(|numbered| numbered.sequence >= next);
-        out.extend(new.map(|numbered| Heard::Observation(numbered.observation)));
+        let follows = !observations.is_empty() && lost_to.is_none();
+        for numbered in observations {
+            if numbered.sequence >= next {
+                self.note(&numbered);
+                out.push(Heard::Observation(numbered.observation));
+            }
+        }
         self.next = Some(header.next_sequence);
         if let Some(to) = lost_to {
             self.gap(next, to, out);
-            out.push(Heard::Io(IoCommand::Disconnect));
-            self.ask_current(out);
+            // The agent has lost nothing behind such a part.
+            self.resumes = passes_over;
+            return self.ask_again(at, out);
+        }
+        if follows {
+            self.pause = Span::default();
         }
     }
 }
@@ -341,8 +531,13 @@ fn is_out_of_range(errors: &[(String, String)]) -> bool {
     errors.iter().any(|(code, _)| code == "OUT_OF_RANGE")
 }
 
-fn report_malformed(count: usize, out: &mut Vec<Heard>) {
-    if count > 0 {
+fn report(malformed: usize, unstamped: usize, out: &mut Vec<Heard>) {
+    if malformed > 0 {
+        let count = malformed;
         out.push(Heard::Condition(Condition::MalformedObservations { count }));
+    }
+    if unstamped > 0 {
+        let count = unstamped;
+        out.push(Heard::Condition(Condition::Unstamped { count }));
     }
 }

@@ -16,6 +16,17 @@ use crate::observation::{AlarmLevel, AlarmReport};
 /// Codes that one data item may have active; more are no machine's.
 pub const ACTIVE_LIMIT: usize = 256;
 
+/// Bytes of the words of one condition that are kept.
+const TEXT_BYTES: usize = 16 * 1024;
+/// Bytes of a code, a severity or a qualifier that are kept.
+const CODE_BYTES: usize = 128;
+/// Bytes of the words of all conditions of a data item together; beyond it each keeps [`LEAST_BYTES`].
+const ITEM_BYTES: usize = 32 * 1024;
+/// Bytes that the words of each condition may have in any case.
+const LEAST_BYTES: usize = 256;
+/// Bytes of a state in words: below the 64 KiB that a sentence of a message may have.
+const STATE_BYTES: usize = 48 * 1024;
+
 #[derive(Clone, Debug, PartialEq)]
 struct Active {
     since: Stamp<Machine>,
@@ -44,6 +55,7 @@ pub struct AlarmState {
 impl Alarms {
     /// Takes a report; says the state when it changed.
     pub fn hear(&mut self, at: Stamp<Machine>, report: AlarmReport) -> Option<AlarmState> {
+        let report = self.bounded(report);
         let before = self.told.then(|| self.state());
         match report.level {
             AlarmLevel::Unavailable => {
@@ -76,6 +88,23 @@ impl Alarms {
         (before.as_ref() != Some(&state)).then_some(state)
     }
 
+    /// A report with words and codes of bounded length.
+    fn bounded(&self, mut report: AlarmReport) -> AlarmReport {
+        for code in [
+            &mut report.code,
+            &mut report.severity,
+            &mut report.qualifier,
+        ] {
+            shorten(code, CODE_BYTES);
+        }
+        let others = self.active.iter();
+        let others = others.filter(|(code, _)| **code != report.code);
+        let kept: usize = others.map(|(_, active)| active.report.text.len()).sum();
+        let room = ITEM_BYTES.saturating_sub(kept);
+        shorten(&mut report.text, room.clamp(LEAST_BYTES, TEXT_BYTES));
+        report
+    }
+
     fn state(&self) -> AlarmState {
         if let Some(since) = self.absent_since {
             return AlarmState {
@@ -93,17 +122,46 @@ impl Alarms {
             (false, false) => Severity::Warn,
             (false, true) => Severity::Error,
         };
-        let each = self.active.values().map(|active| words(&active.report));
-        let words: Vec<_> = each.collect();
         AlarmState {
             severity,
-            words: if words.is_empty() {
-                "normal".to_owned()
-            } else {
-                words.join("; ")
-            },
+            words: self.words(),
             active: self.active.len(),
         }
+    }
+
+    fn words(&self) -> String {
+        let mut all = String::new();
+        let mut n_left = 0;
+        for active in self.active.values() {
+            let words = words(&active.report);
+            if all.len() + words.len() > STATE_BYTES {
+                n_left += 1;
+                continue;
+            }
+            if !all.is_empty() {
+                all.push_str("; ");
+            }
+            all.push_str(&words);
+        }
+        match (self.active.is_empty(), n_left) {
+            (true, _) => "normal".to_owned(),
+            (false, 0) => all,
+            (false, n_left) => {
+                format!(
+                    "{all}; {n_left} more conditions, whose words are longer than a message holds"
+                )
+            }
+        }
+    }
+}
+
+/// Shortens a text to so many bytes, with a note.
+fn shorten(text: &mut String, limit: usize) {
+    let length = text.len();
+    if length > limit {
+        let mut ends = (0..=limit).rev();
+        let end = ends.find(|at| text.is_char_boundary(*at)).unwrap_or(0);
+        *text = format!("{} [cut: {length} bytes, limit {limit}]", &text[..end]);
     }
 }
 
@@ -146,6 +204,41 @@ mod tests {
 
     fn at(s: i64) -> Stamp<Machine> {
         Stamp::from_nanos(s * 1_000_000_000)
+    }
+
+    /// A message holds a sentence of 64 KiB.
+    #[test]
+    fn words_of_any_length_are_cut_to_what_a_message_holds_and_that_is_told() {
+        let long = |code: &str, bytes: usize| AlarmReport {
+            text: "ö".repeat(bytes / 2),
+            ..report(AlarmLevel::Fault, code)
+        };
+        let mut alarms = Alarms::default();
+        let state = alarms.hear(at(1), long("1", 1_000_000)).unwrap();
+        let words = &state.words;
+        assert!(words.starts_with("FAULT 1: öö"), "{:.40}", words);
+        assert!(words.ends_with("ö [cut: 1000000 bytes, limit 16384]"));
+        let told_again = alarms.hear(at(2), long("1", 1_000_000));
+        assert_eq!(told_again, None);
+        // Many of them, each with a code of a megabyte besides.
+        for k in 0..ACTIVE_LIMIT {
+            let code = format!("{k}{}", "9".repeat(1_000_000 + k));
+            let _ = alarms.hear(at(3), long(&code, 100_000));
+        }
+        let state = alarms.state();
+        assert_eq!(state.active, ACTIVE_LIMIT);
+        assert!(state.words.len() < 64 * 1024, "{}", state.words.len());
+        assert!(state.words.ends_with("longer than a message holds"));
+        let kept: usize = alarms
+            .active
+            .values()
+            .map(|one| one.report.text.len())
+            .sum();
+        assert!(kept < 128 * 1024, "{kept}");
+        // What is short is whole.
+        let mut alarms = Alarms::default();
+        let state = alarms.hear(at(1), long("2", 16_000)).unwrap();
+        assert_eq!(state.words.len(), "FAULT 2: ".len() + 16_000);
     }
 
     #[test]

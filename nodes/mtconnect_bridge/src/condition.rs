@@ -2,11 +2,14 @@
 
 use chrono::{DateTime, SecondsFormat};
 use metrology::Severity;
+use metrology::number::number;
 use metrology::stamp::{Clock, Stamp};
 
+use crate::account::Account;
 use crate::alarm::AlarmState;
 use crate::document::DocumentFlaw;
 use crate::multipart::PartFlaw;
+use crate::possible::Possible;
 use crate::shdr::Flaw;
 
 /// A stamp as a person reads it, UTC.
@@ -15,23 +18,48 @@ pub fn words<C: Clock>(stamp: Stamp<C>) -> String {
     DateTime::from_timestamp_nanos(stamp.nanos()).to_rfc3339_opts(SecondsFormat::AutoSi, true)
 }
 
+fn place(line: usize) -> String {
+    match line {
+        0 => String::new(),
+        line => format!("log line {line}: "),
+    }
+}
+
+const fn at_least(is_all: bool) -> &'static str {
+    if is_all { "" } else { "at least " }
+}
+
+fn behind(passed_s: Option<f64>) -> String {
+    passed_s.map_or_else(
+        || ": its lines go on without a pause".to_owned(),
+        |passed_s| format!(", while {passed_s} s passed here"),
+    )
+}
+
+fn are_none(wanted: usize) -> String {
+    match wanted {
+        1 => "is no finite number".to_owned(),
+        wanted => format!("is not {wanted} finite numbers"),
+    }
+}
+
 /// Why there is no connection.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Lost {
-    /// Nobody listens.
-    #[error("nobody listens: {reason}")]
+    /// The connection is refused, or the answer is not HTTP or has no end.
+    #[error("{reason}")]
     NotConnected {
-        /// The system's word for it.
+        /// The reason that the system or the reader of HTTP gives.
         reason: String,
     },
     /// The other side ended it.
     #[error("closed: {reason}")]
     Closed {
-        /// The system's word for it.
+        /// The reason that the system gives.
         reason: String,
     },
     /// Nothing has come.
-    #[error("silent for more than {limit_s} s")]
+    #[error("silent for more than {limit_s} s", limit_s = number(*limit_s))]
     Silent {
         /// The limit, s.
         limit_s: f64,
@@ -83,7 +111,7 @@ pub enum Condition {
         address: String,
     },
     /// The connection does not stand; it is tried again.
-    #[error("not connected to {address}: {lost}; next attempt in {retry_s} s")]
+    #[error("not connected to {address}: {lost}; next attempt in {retry_s} s", retry_s = number(*retry_s))]
     Disconnected {
         /// Whom.
         address: String,
@@ -108,8 +136,7 @@ pub enum Condition {
     },
     /// A reading cannot be.
     #[error(
-        "{value} at {at} between {before} and {after} cannot be: at most {allowed} may lie between two; {count} so far"
-    )]
+        "{value} at {at} between {before} and {after} cannot be: at most {allowed} may lie between two; {count} so far", allowed = number(*allowed))]
     Impossible {
         /// Which value.
         name: String,
@@ -149,7 +176,7 @@ pub enum Condition {
         state: AlarmState,
     },
     /// A stamp of a value lies before the one before.
-    #[error("{key}: the stamp went back by {by_s} s, to {to}; {count} so far")]
+    #[error("{key}: the stamp went back by {by_s} s, to {to}; {count} so far", by_s = number(*by_s))]
     ClockBack {
         /// Which value.
         key: String,
@@ -160,9 +187,98 @@ pub enum Condition {
         /// How many there were.
         count: u64,
     },
-    /// A line cannot be read.
-    #[error("line refused: {flaw}; {count} so far")]
+    /// The machine's clock leaps.
+    #[error("the machine's clock leaps by {by_s} s, from {from} to {to}{}; {count} so far", behind(*passed_s), by_s = number(*by_s))]
+    ClockLeap {
+        /// The stamp before.
+        from: String,
+        /// The stamp behind.
+        to: String,
+        /// By how much, s.
+        by_s: f64,
+        /// Host's time between both, s; `None`: of a log, whose lines go on without the pause.
+        passed_s: Option<f64>,
+        /// How many there were.
+        count: u64,
+    },
+    /// A log has been replayed.
+    #[error("the log has been told: {account}")]
+    LogEnded {
+        /// What was taken and left out.
+        account: Account,
+    },
+    /// The bridge ends before its log does.
+    #[error("{}{lines} lines of the log were not replayed: the next one is due in {next_s} s; {account}", at_least(*is_all), next_s = number(*next_s))]
+    LogLeft {
+        /// How many.
+        lines: usize,
+        /// Whether there are none beyond these.
+        is_all: bool,
+        /// Time to the next of them, s.
+        next_s: f64,
+        /// What was taken and left out before.
+        account: Account,
+    },
+    /// A log cannot be read on.
+    #[error(
+        "the log cannot be read from byte {at_byte} on: {reason}; what stands behind is not replayed"
+    )]
+    LogUnreadable {
+        /// The reason that the system gives.
+        reason: String,
+        /// Bytes that were read before.
+        at_byte: u64,
+    },
+    /// What was taken and left out of a connection.
+    #[error("{account}")]
+    Account {
+        /// The account so far.
+        account: Account,
+    },
+    /// Invalid letters were replaced.
+    #[error(
+        "{letters} letters that are no UTF-8 or may not stand there are replaced by U+FFFD; {count} so far"
+    )]
+    Replaced {
+        /// How many in this line or answer.
+        letters: usize,
+        /// How many in all.
+        count: u64,
+    },
+    /// The agent describes a value in another unit than the mapping.
+    #[error(
+        "{key}: the mapping has {mapped}, the agent's probe {offered}: told as the mapping says; correct the mapping or the agent's device file"
+    )]
+    UnitDiffers {
+        /// Which value.
+        key: String,
+        /// The mapping's unit.
+        mapped: &'static str,
+        /// The agent's unit.
+        offered: String,
+    },
+    /// The agent describes a value as the mapping does, after it did not.
+    #[error("{key}: the agent's probe has the mapping's unit")]
+    UnitAgrees {
+        /// Which value.
+        key: String,
+    },
+    /// Positions are in machine coordinates, after they were not.
+    #[error("no position of the mapping is in work coordinates")]
+    MachineCoordinates,
+    /// Positions that a work offset moves.
+    #[error(
+        "positions in work coordinates, which every work offset moves: {keys}; map those in machine coordinates"
+    )]
+    WorkCoordinates {
+        /// Keys.
+        keys: String,
+    },
+    /// A line, or a part of it, cannot be read.
+    #[error("{}{flaw}; {count} so far", place(*.line))]
     Malformed {
+        /// Number of the log's line; 0: of a connection.
+        line: usize,
         /// Why.
         flaw: Flaw,
         /// How many there were.
@@ -178,17 +294,52 @@ pub enum Condition {
         /// How many lines were refused.
         count: u64,
     },
-    /// A line is no text.
-    #[error("line of {length} bytes refused: no UTF-8; {count} so far")]
-    NotText {
+    /// A part of an agent's stream cannot be read.
+    #[error("{path}: a part is left out: {flaw}; {count} so far")]
+    PartLeftOut {
+        /// What was asked.
+        path: String,
+        /// Why.
+        flaw: DocumentFlaw,
+        /// How many parts were refused.
+        count: u64,
+    },
+    /// A value is longer than a message holds.
+    #[error(
+        "{}{key}: a value of {length} bytes, limit {limit}: left out; {count} so far",
+        place(*.line)
+    )]
+    ValueTooLong {
+        /// Number of the log's line; 0: of a connection.
+        line: usize,
+        /// Key of the value.
+        key: String,
         /// Its length.
         length: usize,
-        /// How many lines were refused.
+        /// The limit.
+        limit: usize,
+        /// How many there were.
+        count: u64,
+    },
+    /// A number beyond the range of its quantity.
+    #[error("{}{key}: {text}: {possible}; {count} so far", place(*.line))]
+    OutOfRange {
+        /// Number of the log's line; 0: of a connection.
+        line: usize,
+        /// Key of the value.
+        key: String,
+        /// What was sent.
+        text: String,
+        /// What it would have to be.
+        possible: Possible,
+        /// Values refused so far.
         count: u64,
     },
     /// A value is no number where one must be.
-    #[error("{key}: {text:?} is not {wanted} finite numbers; {count} so far")]
+    #[error("{}{key}: {text:?} {}; {count} so far", place(*.line), are_none(*.wanted))]
     NotNumbers {
+        /// Number of the log's line; 0: of a connection.
+        line: usize,
         /// Which value.
         key: String,
         /// What was told.
@@ -199,8 +350,18 @@ pub enum Condition {
         count: u64,
     },
     /// Observations of an answer cannot be read.
-    #[error("{count} observations of an answer have no number, stamp, key or value")]
+    #[error(
+        "{count} observations of an answer left out: no number, key or value, or a level that is none"
+    )]
     MalformedObservations {
+        /// How many.
+        count: usize,
+    },
+    /// Observations of an answer without a stamp of 1970 to 2106.
+    #[error(
+        "{count} observations of an answer have no stamp of 1970 to 2106: told with the time of receipt"
+    )]
+    Unstamped {
         /// How many.
         count: usize,
     },
@@ -231,6 +392,20 @@ pub enum Condition {
         /// How many in all.
         total: u64,
     },
+    /// Numbers were lost that the agent gives to all of its devices, while one device is asked for.
+    #[error(
+        "the numbers from {from} to {to} of all the agent's devices were lost; how many observations of {device} are among them is not known: none is counted as lost, and what holds is asked again; {count} such gaps so far"
+    )]
+    DeviceGap {
+        /// The device that is asked for.
+        device: String,
+        /// First number that was lost.
+        from: u64,
+        /// First number that came again.
+        to: u64,
+        /// How many gaps there were.
+        count: u64,
+    },
     /// The agent has started anew.
     #[error("the agent started anew: instance {now}, was {before}")]
     AgentRestarted {
@@ -259,14 +434,26 @@ impl Condition {
             Self::Impossible { name, .. } => return format!("impossible/{name}"),
             Self::Unconfirmed { name, .. } => return format!("unconfirmed/{name}"),
             Self::Alarm { name, .. } => return format!("alarm/{name}"),
-            Self::ClockBack { .. } => "machine_clock",
-            Self::Malformed { .. } | Self::LineTooLong { .. } | Self::NotText { .. } => {
-                "refused_line"
+            Self::UnitDiffers { key, .. } | Self::UnitAgrees { key } => {
+                return format!("unit/{}", crate::mapping::name_of(key));
             }
-            Self::NotNumbers { .. } | Self::MalformedObservations { .. } => "refused_value",
+            Self::ClockBack { .. } | Self::ClockLeap { .. } | Self::Unstamped { .. } => {
+                "machine_clock"
+            }
+            Self::LogEnded { .. } | Self::LogLeft { .. } => "log",
+            Self::LogUnreadable { .. } => "log_unreadable",
+            Self::Account { .. } => "account",
+            Self::Replaced { .. } => "replaced_letters",
+            Self::WorkCoordinates { .. } | Self::MachineCoordinates => "work_coordinates",
+            Self::Malformed { .. } | Self::LineTooLong { .. } => "refused_line",
+            Self::PartLeftOut { .. } => "refused_part",
+            Self::NotNumbers { .. }
+            | Self::ValueTooLong { .. }
+            | Self::OutOfRange { .. }
+            | Self::MalformedObservations { .. } => "refused_value",
             Self::Unmapped { .. } => "unmapped",
             Self::NotOffered { .. } | Self::Offered => "not_offered",
-            Self::SequenceGap { .. } => "sequence_gap",
+            Self::SequenceGap { .. } | Self::DeviceGap { .. } => "sequence_gap",
             Self::AgentRestarted { .. } => "agent_restarted",
             Self::Uncommanded { .. } => "uncommanded",
         };
@@ -275,15 +462,21 @@ impl Condition {
 
     /// How bad it is.
     #[must_use]
-    pub const fn severity(&self) -> Severity {
+    pub fn severity(&self) -> Severity {
         match self {
+            Self::LogEnded { account } if account.is_whole() && account.told > 0 => Severity::Info,
+            Self::Account { account } if account.is_whole() => Severity::Info,
             Self::Connected { .. }
             | Self::Present { .. }
             | Self::Offered
+            | Self::UnitAgrees { .. }
+            | Self::MachineCoordinates
             | Self::Unmapped { .. }
             | Self::Uncommanded { .. } => Severity::Info,
             Self::Alarm { state, .. } => state.severity,
-            Self::Disconnected { .. } | Self::SequenceGap { .. } => Severity::Error,
+            Self::Disconnected { .. } | Self::SequenceGap { .. } | Self::LogUnreadable { .. } => {
+                Severity::Error
+            }
             _ => Severity::Warn,
         }
     }
@@ -295,10 +488,15 @@ impl Condition {
             Self::Impossible { count, .. }
             | Self::Unconfirmed { count, .. }
             | Self::ClockBack { count, .. }
+            | Self::ClockLeap { count, .. }
+            | Self::Replaced { count, .. }
             | Self::Malformed { count, .. }
             | Self::LineTooLong { count, .. }
-            | Self::NotText { count, .. }
-            | Self::NotNumbers { count, .. } => Some(*count),
+            | Self::PartLeftOut { count, .. }
+            | Self::ValueTooLong { count, .. }
+            | Self::NotNumbers { count, .. }
+            | Self::DeviceGap { count, .. }
+            | Self::OutOfRange { count, .. } => Some(*count),
             Self::SequenceGap { total, .. } => Some(*total),
             _ => None,
         }

@@ -22,6 +22,9 @@ pub struct BridgeConfig {
     /// Lines of an adapter that were logged, relative to the parameter file; for the source `log` alone.
     #[serde(default)]
     pub log_file: Option<String>,
+    /// A longer pause in a log is a leap of the machine's clock.
+    #[serde(default = "BridgeConfig::default_longest_pause_s")]
+    pub log_longest_pause_s: f64,
     /// What each key is, relative to the parameter file.
     pub map_file: String,
     /// Times and limits of the connection.
@@ -51,6 +54,12 @@ impl BridgeConfig {
 
     const fn default_port() -> u16 {
         7878
+    }
+
+    /// Half a day: longer than a night shift's break, shorter than a day's step of a clock.
+    #[must_use]
+    pub const fn default_longest_pause_s() -> f64 {
+        43_200.0
     }
 }
 
@@ -111,6 +120,8 @@ pub struct Settings {
     pub source: Source,
     /// `host:port`.
     pub address: String,
+    /// A longer pause in a log is a leap of the machine's clock.
+    pub longest_pause: Span,
     /// What each key is.
     pub mapping: Mapping,
     /// Time to the second attempt.
@@ -191,6 +202,10 @@ impl Settings {
         Ok(Self {
             source: config.source,
             address: format!("{}:{}", config.host, config.port),
+            longest_pause: Span::from_secs_f64(checked(
+                "log_longest_pause_s",
+                config.log_longest_pause_s,
+            )?),
             mapping: Mapping::new(map)?,
             reconnect_first: Span::from_secs_f64(first_s),
             reconnect_longest: Span::from_secs_f64(longest_s),

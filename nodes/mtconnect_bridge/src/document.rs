@@ -14,6 +14,7 @@ use crate::observation::{
     AlarmLevel, AlarmReport, MachineTime, Observation, Told, UNAVAILABLE, read_stamp,
 };
 use crate::shdr::read_series;
+use crate::{text, xml};
 
 /// More nodes than this are no answer of an agent.
 const NODE_LIMIT: u32 = 2_000_000;
@@ -38,11 +39,22 @@ pub struct Numbered {
     pub observation: Observation,
 }
 
+/// A device that the agent describes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Device {
+    /// Its name, else its uuid or id.
+    pub name: String,
+    /// Whether it is the agent itself.
+    pub is_of_agent: bool,
+}
+
 /// Something that the agent can tell.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DataItem {
-    /// Device it belongs to.
+    /// Device it belongs to: its name, else its uuid.
     pub device: String,
+    /// Whether it is the agent itself.
+    pub is_of_agent: bool,
     /// Nearest component with a name: its kind and the name, e.g. `Linear X`.
     pub component: String,
     /// Key.
@@ -59,6 +71,10 @@ pub struct DataItem {
     pub units: String,
     /// `VALUE`, `TIME_SERIES`, …; empty: `VALUE`.
     pub representation: String,
+    /// `MACHINE` or `WORK`; empty: not said, which for a position means `MACHINE`.
+    pub coordinates: String,
+    /// What is formed over an interval, e.g. `AVERAGE`; empty: nothing.
+    pub statistic: String,
 }
 
 /// One answer.
@@ -68,6 +84,8 @@ pub enum Answer {
     Devices {
         /// The agent's instance.
         instance_id: u64,
+        /// Its devices, also those without data items.
+        devices: Vec<Device>,
         /// All that it can tell.
         items: Vec<DataItem>,
     },
@@ -79,6 +97,8 @@ pub enum Answer {
         observations: Vec<Numbered>,
         /// Observations that could not be read.
         malformed: usize,
+        /// Observations without a stamp that has a place in a message.
+        unstamped: usize,
     },
     /// The agent refuses.
     Error {
@@ -90,12 +110,6 @@ pub enum Answer {
 /// Why an answer cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DocumentFlaw {
-    /// It is no UTF-8.
-    #[error("no text after {valid} bytes")]
-    NotText {
-        /// Bytes up to there.
-        valid: usize,
-    },
     /// It is no XML.
     #[error("no XML: {reason}")]
     NotXml {
@@ -121,11 +135,16 @@ pub enum DocumentFlaw {
 /// Reads one answer.
 ///
 /// # Errors
-/// When it is none of an agent.
+/// When it is not an agent's answer.
 pub fn read(bytes: &[u8]) -> Result<Answer, DocumentFlaw> {
-    let text = std::str::from_utf8(bytes).map_err(|error| DocumentFlaw::NotText {
-        valid: error.valid_up_to(),
-    })?;
+    read_text(&text::decode(bytes).text)
+}
+
+/// Reads one answer, whose invalid letters have been replaced.
+///
+/// # Errors
+/// When it is not an agent's answer.
+pub fn read_text(text: &str) -> Result<Answer, DocumentFlaw> {
     let options = ParsingOptions {
         nodes_limit: NODE_LIMIT,
         ..ParsingOptions::default()
@@ -133,12 +152,13 @@ pub fn read(bytes: &[u8]) -> Result<Answer, DocumentFlaw> {
     // A byte order mark and white space before the declaration are no XML, and seen.
     let text = text.trim_start_matches(|c: char| c == '\u{feff}' || c.is_whitespace());
     let xml = Xml::parse_with_options(text, options).map_err(|error| DocumentFlaw::NotXml {
-        reason: error.to_string(),
+        reason: xml::in_own_words(&error),
     })?;
     let root = xml.root_element();
     match root.tag_name().name() {
         "MTConnectDevices" => Ok(Answer::Devices {
             instance_id: header_number(&root, "instanceId")?,
+            devices: root.descendants().filter(is_device).map(device).collect(),
             items: data_items(&root),
         }),
         "MTConnectStreams" => streams(&root),
@@ -148,6 +168,23 @@ pub fn read(bytes: &[u8]) -> Result<Answer, DocumentFlaw> {
         other => Err(DocumentFlaw::AnotherRoot {
             root: other.to_owned(),
         }),
+    }
+}
+
+/// Reads one answer. Letters that XML does not allow are replaced by U+FFFD; the second value is their number.
+///
+/// # Errors
+/// When it is not an agent's answer.
+pub fn read_mended(text: &str) -> Result<(Answer, usize), DocumentFlaw> {
+    match read_text(text) {
+        Err(flaw @ DocumentFlaw::NotXml { .. }) => {
+            let (mended, replaced) = xml::mended(text);
+            match read_text(&mended) {
+                Ok(answer) if replaced > 0 => Ok((answer, replaced)),
+                _ => Err(flaw),
+            }
+        }
+        read => read.map(|answer| (answer, 0)),
     }
 }
 
@@ -189,6 +226,21 @@ fn data_items(root: &Node<'_, '_>) -> Vec<DataItem> {
     items.map(|node| data_item(&node)).collect()
 }
 
+/// `Device`, or `Agent`, which is a device that describes the agent itself.
+fn is_device(node: &Node<'_, '_>) -> bool {
+    let parent = node.parent_element();
+    node.is_element() && parent.is_some_and(|parent| is(&parent, "Devices"))
+}
+
+fn device(node: Node<'_, '_>) -> Device {
+    let name = node.attribute("name").filter(|name| !name.is_empty());
+    let other = node.attribute("uuid").or(node.attribute("id"));
+    Device {
+        name: name.or(other).unwrap_or_default().to_owned(),
+        is_of_agent: is(&node, "Agent"),
+    }
+}
+
 fn data_item(node: &Node<'_, '_>) -> DataItem {
     let is_component = |above: &Node<'_, '_>| {
         let plumbing = ["DataItems", "Components"].contains(&above.tag_name().name());
@@ -199,9 +251,11 @@ fn data_item(node: &Node<'_, '_>) -> DataItem {
         let kind = component.tag_name().name();
         format!("{kind} {}", attribute(&component, "name"))
     });
-    let device = node.ancestors().find(|above| is(above, "Device"));
+    let found = node.ancestors().find(is_device).map(device);
+    let Device { name, is_of_agent } = found.unwrap_or_default();
     DataItem {
-        device: device.map_or_else(String::new, |device| attribute(&device, "name")),
+        device: name,
+        is_of_agent,
         component: component.unwrap_or_default(),
         id: attribute(node, "id"),
         name: attribute(node, "name"),
@@ -210,6 +264,8 @@ fn data_item(node: &Node<'_, '_>) -> DataItem {
         sub_kind: attribute(node, "subType"),
         units: attribute(node, "units"),
         representation: attribute(node, "representation"),
+        coordinates: attribute(node, "coordinateSystem"),
+        statistic: attribute(node, "statistic"),
     }
 }
 
@@ -228,12 +284,15 @@ fn streams(root: &Node<'_, '_>) -> Result<Answer, DocumentFlaw> {
                 .parent_element()
                 .is_some_and(|above| is(&above, "ComponentStream"))
     };
-    let (mut observations, mut malformed) = (Vec::new(), 0);
+    let (mut observations, mut malformed, mut unstamped) = (Vec::new(), 0, 0);
     for group in root.descendants().filter(is_group) {
         let is_condition = is(&group, "Condition");
         for node in group.children().filter(Node::is_element) {
             match numbered(&node, is_condition) {
-                Some(found) => observations.push(found),
+                Some(found) => {
+                    unstamped += usize::from(found.observation.time == MachineTime::Absent);
+                    observations.push(found);
+                }
                 None => malformed += 1,
             }
         }
@@ -244,12 +303,15 @@ fn streams(root: &Node<'_, '_>) -> Result<Answer, DocumentFlaw> {
         header,
         observations,
         malformed,
+        unstamped,
     })
 }
 
 fn numbered(node: &Node<'_, '_>, is_condition: bool) -> Option<Numbered> {
     let sequence = node.attribute("sequence")?.parse().ok()?;
-    let time = MachineTime::Absolute(read_stamp(node.attribute("timestamp")?)?);
+    // A value is not lost for its stamp.
+    let stamp = node.attribute("timestamp").and_then(read_stamp);
+    let time = stamp.map_or(MachineTime::Absent, MachineTime::Absolute);
     let key = node.attribute("dataItemId")?.to_owned();
     let told = if is_condition {
         Told::Alarm(alarm(node)?)
@@ -318,11 +380,27 @@ mod tests {
     <TemperatureTimeSeries dataItemId="t" timestamp="2016-11-29T10:00:01Z" sequence="12" sampleRate="10" sampleCount="3">20.5 20.6 20.7</TemperatureTimeSeries></Samples>
    <Events><Execution dataItemId="e" timestamp="2016-11-29T10:00:00Z" sequence="10">ACTIVE</Execution>
     <VariableDataSet dataItemId="v" timestamp="2016-11-29T10:00:00Z" sequence="8"><Entry key="a">1</Entry><Entry key="b">2</Entry></VariableDataSet>
-    <Execution dataItemId="e" timestamp="yesterday" sequence="7">READY</Execution></Events>
+    <Execution dataItemId="e" timestamp="yesterday" sequence="7">READY</Execution>
+    <Execution timestamp="2016-11-29T10:00:00Z" sequence="7">READY</Execution></Events>
    <Condition><Fault dataItemId="c" timestamp="2016-11-29T10:00:00Z" sequence="6" type="TEMPERATURE" nativeCode="417" qualifier="HIGH">hot</Fault></Condition>
   </ComponentStream></DeviceStream></Streams>
 </MTConnectStreams>"#
         )
+    }
+
+    #[test]
+    fn an_answer_that_is_no_xml_is_refused_in_own_words() {
+        for (bytes, words) in [
+            (&b"<!DOCTYPE a><a/>"[..], "a document type"),
+            (b"", "no element stands there"),
+            (b"<a><b>", "the text ends inside of an element"),
+            (b"<a></b>", "</b> closes <a>"),
+            (b"<a>&c;</a>", "&c; is not defined"),
+            (b"<a", "no XML: 1:1: no element stands there"),
+        ] {
+            let shown = read(bytes).unwrap_err().to_string();
+            assert!(shown.contains(words), "{words}: {shown}");
+        }
     }
 
     #[test]
@@ -333,6 +411,7 @@ mod tests {
                 header,
                 observations,
                 malformed,
+                unstamped,
             } = answer
             else {
                 panic!("{version}");
@@ -346,7 +425,13 @@ mod tests {
                 (77, 5, 13)
             );
             let numbers: Vec<_> = observations.iter().map(|n| n.sequence).collect();
-            assert_eq!((numbers, malformed), (vec![6, 8, 9, 10, 11, 12], 1));
+            assert_eq!(numbers, [6, 7, 8, 9, 10, 11, 12]);
+            assert_eq!((malformed, unstamped), (1, 1));
+            assert_eq!(observations[1].observation.time, MachineTime::Absent);
+            let observations: Vec<_> = observations
+                .iter()
+                .filter(|numbered| numbered.sequence != 7)
+                .collect();
             let told = |at: usize| &observations[at].observation.told;
             assert!(
                 matches!(told(0), Told::Alarm(a) if a.level == AlarmLevel::Fault && a.code == "417")
@@ -390,12 +475,24 @@ mod tests {
         );
         let bomb = b"<!DOCTYPE a [<!ENTITY b \"c\">]><MTConnectError/>";
         assert!(matches!(read(bomb), Err(DocumentFlaw::NotXml { .. })));
-        assert!(matches!(
-            read(b"\xff"),
-            Err(DocumentFlaw::NotText { valid: 0 })
-        ));
+        assert!(matches!(read(b"\xff"), Err(DocumentFlaw::NotXml { .. })));
         let header = b"<MTConnectStreams><Header instanceId=\"x\"/></MTConnectStreams>";
         assert!(matches!(read(header), Err(DocumentFlaw::Header { .. })));
+    }
+
+    #[test]
+    fn a_byte_that_is_no_letter_costs_no_other_value() {
+        for broken in [&b"\xf6"[..], b"\xff\xfe", b"\0", b"\x07"] {
+            let whole = streams_of("1.3");
+            let at = whole.find("ACTIVE").unwrap();
+            let bytes = [&whole.as_bytes()[..at], broken, &whole.as_bytes()[at..]].concat();
+            let Answer::Streams { observations, .. } = read(&bytes).unwrap() else {
+                panic!("no streams");
+            };
+            assert_eq!(observations.len(), 7, "{broken:?}");
+            let broken = |numbered: &Numbered| matches!(&numbered.observation.told, Told::Value(text) if text.contains(text::REPLACED));
+            assert_eq!(observations.iter().filter(|one| broken(one)).count(), 1);
+        }
     }
 
     proptest! {

@@ -1,12 +1,16 @@
 //! What can go wrong before or beneath the stage.
 
 use metrology::Axis;
+use metrology::number::{number, quantity};
 
 /// Errors of the bridge: its parameters, its mapping, and its thread.
 #[derive(Debug, thiserror::Error)]
 pub enum BridgeError {
     /// A number of the configuration is out of its range.
-    #[error("{key} = {value}: must be from {least} to {greatest}")]
+    #[error(
+        "{key} = {}: must be from {} to {}",
+        quantity(key, *value), number(*least), quantity(key, *greatest)
+    )]
     OutOfRange {
         /// Key in the parameter file.
         key: &'static str,
@@ -29,8 +33,8 @@ pub enum BridgeError {
     #[error("log_file: belongs to source = log, and to no other")]
     LogFile,
     /// The mapping file is none.
-    #[error("mapping: {0}")]
-    MapFile(serde_saphyr::Error),
+    #[error("{0}")]
+    MapFile(metrology::yaml::YamlError),
     /// A unit does not measure what the mapping says.
     #[error("{key}: {unit} does not measure {what}")]
     Unit {
@@ -66,7 +70,10 @@ pub enum BridgeError {
         axis: Axis,
     },
     /// A number of a rule is out of its range.
-    #[error("{key}: change.{field} = {value}: must be from {least} to {greatest}")]
+    #[error(
+        "{key}: change.{field} = {}: must be from {} to {}",
+        quantity(field, *value), number(*least), quantity(field, *greatest)
+    )]
     Change {
         /// Key of the mapping.
         key: String,
@@ -95,15 +102,62 @@ pub enum BridgeError {
         /// Why.
         reason: String,
     },
+    /// An agent has several devices.
+    #[error("the agent has {} devices: choose one by --device: {}", .names.len(), .names.join(", "))]
+    Devices {
+        /// Their names.
+        names: Vec<String>,
+    },
+    /// An agent has no such device.
+    #[error("the agent has no device {name:?}: it has {}", .names.join(", "))]
+    NoDevice {
+        /// The name.
+        name: String,
+        /// Those that it has.
+        names: Vec<String>,
+    },
+    /// Several devices of an agent share a name.
+    #[error(
+        "the agent has {count} devices {name:?}: give each a name of its own in the agent's device file"
+    )]
+    DeviceTwice {
+        /// The name.
+        name: String,
+        /// How many have it.
+        count: usize,
+    },
+    /// Data items share an id.
+    #[error("data items with one id, whose values cannot be kept apart: {}; correct the agent's device file", .ids.join("; "))]
+    IdTwice {
+        /// Each id with its items.
+        ids: Vec<String>,
+    },
     /// The mapping has no such spindle.
-    #[error("the mapping has no spindle speed {name:?}")]
+    #[error(
+        "the mapping has no spindle speed {name:?}: give one that name, or name another as spindle in the order"
+    )]
     NoSpindle {
         /// Its name.
         name: String,
     },
+    /// The log has no value within the shift.
+    #[error(
+        "the order asks for {from} to {to}, and nothing of the log lies within (all times in UTC): {reason}; {account}"
+    )]
+    NothingWithin {
+        /// First instant that was asked for.
+        from: String,
+        /// Last instant.
+        to: String,
+        /// Why, and what to do.
+        reason: String,
+        /// What was taken and left out.
+        account: String,
+    },
     /// A part of a shift is too fast for the other machine.
     #[error(
-        "at {at_s} s: feed {feed_mm_min:.0} mm/min, limit {limit_mm_min:.0} mm/min: take longer bins"
+        "at {} s: feed {feed_mm_min:.0} mm/min, limit {limit_mm_min:.0} mm/min: take longer bins",
+        number(*at_s)
     )]
     FeedTooHigh {
         /// Time from the shift's begin, s.

@@ -1,23 +1,47 @@
 //! From the bytes of a connection to lines.
 //!
 //! A line ends at a line feed, with or without a carriage return before it. A line over the limit is not kept:
-//! its bytes are counted to its end, and it is handed over as refused with its length.
+//! its bytes are counted to its end, and it is handed over as refused with its length. What is no letter of a line is
+//! replaced and counted ([`crate::text`]).
+
+use crate::text;
 
 /// What came.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Framed<'a> {
     /// A line without its end.
-    Line(&'a str),
-    /// A line that is no UTF-8.
-    NotText {
-        /// Its length, bytes.
-        length: usize,
+    Line {
+        /// The line.
+        text: &'a str,
+        /// How many of its letters were invalid and were replaced.
+        replaced: usize,
     },
     /// A line over the limit.
     TooLong {
         /// Its length, bytes.
         length: usize,
     },
+}
+
+/// Makes a line feed of every end of a line in the pieces of a log: of CR LF, of LF, and of CR alone.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LineEnds {
+    follows_return: bool,
+}
+
+impl LineEnds {
+    /// Takes the next piece.
+    pub fn unify(&mut self, bytes: &mut Vec<u8>) {
+        bytes.retain_mut(|byte| {
+            let is_return = *byte == b'\r';
+            let follows = std::mem::replace(&mut self.follows_return, is_return);
+            let is_second = follows && *byte == b'\n';
+            if is_return {
+                *byte = b'\n';
+            }
+            !is_second
+        });
+    }
 }
 
 /// Cuts bytes into lines.
@@ -39,10 +63,17 @@ impl Lines {
         }
     }
 
-    /// Forgets a line that has begun.
-    pub fn restart(&mut self) {
+    /// Drops a line that has begun and returns its length, bytes.
+    pub fn restart(&mut self) -> usize {
         self.kept.clear();
-        self.length = 0;
+        std::mem::take(&mut self.length)
+    }
+
+    /// Hands over a last line that has no end.
+    pub fn finish(&mut self, take: impl FnMut(Framed<'_>)) {
+        if self.length > 0 {
+            self.receive(b"\n", take);
+        }
     }
 
     /// Takes bytes and hands over every line that ends in them.
@@ -60,11 +91,12 @@ impl Lines {
             if self.length > self.limit {
                 let length = self.length;
                 take(Framed::TooLong { length });
-            } else if let Ok(line) = std::str::from_utf8(line) {
-                take(Framed::Line(line));
             } else {
-                let length = line.len();
-                take(Framed::NotText { length });
+                let line = text::utf8(line);
+                take(Framed::Line {
+                    text: &line.text,
+                    replaced: line.replaced,
+                });
             }
             self.restart();
         }
@@ -88,20 +120,35 @@ mod tests {
     #[test]
     fn lines_are_whole_however_they_come() {
         let found = framed(10, &[b"a|", b"b\r", b"\nc\n\nd"]);
-        assert_eq!(found, ["Line(\"a|b\")", "Line(\"c\")", "Line(\"\")"]);
+        let line = |text: &str| format!("Line {{ text: {text:?}, replaced: 0 }}");
+        assert_eq!(found, [line("a|b"), line("c"), line("")]);
     }
 
     #[test]
     fn a_line_over_the_limit_is_refused_with_its_length_and_the_next_is_read() {
-        let found = framed(4, &[b"12345", b"678\nab\n\xff\xfe\n"]);
+        let found = framed(4, &[b"12345", b"678\nab\na\xff\xfe\n"]);
         assert_eq!(
             found,
             [
                 "TooLong { length: 8 }",
-                "Line(\"ab\")",
-                "NotText { length: 2 }"
+                "Line { text: \"ab\", replaced: 0 }",
+                "Line { text: \"a\u{fffd}\u{fffd}\", replaced: 2 }"
             ]
         );
+    }
+
+    #[test]
+    fn every_end_of_a_line_of_a_log_is_a_line_feed_however_it_comes() {
+        let whole = b"a\rb\r\nc\nd\r\re\n\r\nf\r";
+        for piece in 1..=whole.len() {
+            let (mut ends, mut found) = (LineEnds::default(), Vec::new());
+            for piece in whole.chunks(piece) {
+                let mut bytes = piece.to_vec();
+                ends.unify(&mut bytes);
+                found.extend(bytes);
+            }
+            assert_eq!(found, b"a\nb\nc\nd\n\ne\n\nf\n", "pieces of {piece}");
+        }
     }
 
     proptest! {

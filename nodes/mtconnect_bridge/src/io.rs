@@ -19,8 +19,10 @@ use crate::error::BridgeError;
 use crate::stage::{IoCommand, IoEvent};
 
 pub mod http;
+mod log_file;
 
 use http::Stream;
+pub use log_file::LogFile;
 
 /// An attempt to connect ends after this time.
 const CONNECT_LIMIT: Duration = Duration::from_secs(3);

@@ -13,11 +13,12 @@
 //! ([`plausibility`]); and a value that is good.
 //!
 //! Two clocks are told with each message: the machine's stamp, as it was sent, and the host's instant of
-//! receipt. Values are taken in the order of arrival; a machine's clock may step back, which is said.
+//! receipt. Values are taken in the order of arrival; a machine's clock may step back or leap, which is reported.
 //!
 //! What the bridge does outside (connect, ask, read) is in [`io`]; everything else is the pure
 //! [`stage::BridgeStage`].
 
+pub mod account;
 pub mod agent;
 pub mod alarm;
 pub mod condition;
@@ -26,20 +27,27 @@ pub mod document;
 pub mod error;
 pub mod framing;
 pub mod io;
+pub mod leap;
 pub mod live;
 pub mod logged;
 pub mod mapping;
 pub mod multipart;
 pub mod observation;
+pub mod offer;
+pub mod pacing;
 pub mod parameters;
 pub mod plausibility;
 pub mod positions;
+pub mod possible;
 pub mod proposal;
+pub mod reader;
 pub mod shdr;
 pub mod shift;
 pub mod stage;
+pub mod text;
 pub mod unit;
 pub mod values;
+pub mod xml;
 
 pub use config::{BridgeConfig, Settings};
 pub use error::BridgeError;

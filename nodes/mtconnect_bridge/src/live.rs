@@ -10,7 +10,7 @@ use metrology::stamp::{Host, Stamp};
 
 use crate::config::Settings;
 use crate::error::BridgeError;
-use crate::io::BridgeIo;
+use crate::io::{BridgeIo, LogFile};
 use crate::stage::{BridgeStage, Input, Output};
 
 /// What the shell tells.
@@ -30,6 +30,7 @@ const EVENTS_PER_TICK: usize = 256;
 pub struct LiveBridge {
     stage: BridgeStage,
     io: Option<BridgeIo>,
+    log: Option<LogFile>,
     said: Vec<Output>,
 }
 
@@ -42,17 +43,29 @@ impl LiveBridge {
         Ok(Self {
             stage: BridgeStage::new(settings),
             io: Some(BridgeIo::start(settings.address.clone())?),
+            log: None,
             said: Vec::new(),
         })
     }
 
-    /// Tells a log; nothing is opened.
+    /// Replays a log; no connection is made.
     #[must_use]
-    pub fn of_log(settings: &Settings, text: &str) -> Self {
+    pub fn of_log(settings: &Settings, log: LogFile) -> Self {
         Self {
-            stage: BridgeStage::of_log(settings, text),
+            stage: BridgeStage::new(settings),
             io: None,
+            log: Some(log),
             said: Vec::new(),
+        }
+    }
+
+    /// Reads the log as far as the stage wants it.
+    fn read_log(&mut self, out: &mut Vec<Output>) {
+        let Some(log) = &mut self.log else {
+            return;
+        };
+        while self.stage.wants_log() {
+            self.stage.read_log(log.read(), out);
         }
     }
 
@@ -91,6 +104,7 @@ impl Stage for LiveBridge {
         if input == LiveInput::Shutdown {
             return self.pass(at, Input::Shutdown, out);
         }
+        self.read_log(out);
         for _ in 0..EVENTS_PER_TICK {
             let Some((came_at, event)) = self.io.as_ref().and_then(BridgeIo::event) else {
                 break;

@@ -23,11 +23,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::BridgeError;
 use crate::plausibility::Rule;
+use crate::possible::Possible;
 use crate::shdr::Shape;
 use crate::unit::Unit;
 
 /// The mapping file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapFile {
     /// What each key is.
@@ -182,6 +183,25 @@ pub enum Use {
 }
 
 impl Use {
+    /// The number as it is inside.
+    #[must_use]
+    pub fn inner(&self, number: f64) -> f64 {
+        match self {
+            Self::Position { factor, .. } => number * factor,
+            Self::Number {
+                to_inner: (factor, offset),
+                ..
+            } => number * factor + offset,
+            _ => number,
+        }
+    }
+
+    /// What it would have to be, where it cannot be this number.
+    #[must_use]
+    pub fn refuses(&self, number: f64) -> Option<Possible> {
+        Possible::of(self).filter(|possible| !possible.holds(self.inner(number)))
+    }
+
     /// How an adapter's line tells it.
     #[must_use]
     pub const fn shape(&self) -> Shape {
@@ -200,6 +220,7 @@ impl Use {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mapping {
     uses: BTreeMap<String, Use>,
+    units: BTreeMap<String, Unit>,
 }
 
 impl MapFile {
@@ -208,9 +229,7 @@ impl MapFile {
     /// # Errors
     /// When a key is unknown, missing or of the wrong type; the message has line and column.
     pub fn from_yaml(text: &str) -> Result<Self, BridgeError> {
-        // `axis: Y` is a letter here, not the truth value that YAML 1.1 takes it for.
-        let options = serde_saphyr::options! { strict_booleans: true };
-        serde_saphyr::from_str_with_options(text, options).map_err(BridgeError::MapFile)
+        metrology::yaml::read_letters(text).map_err(BridgeError::MapFile)
     }
 }
 
@@ -273,11 +292,12 @@ impl Mapping {
     /// A unit that does not measure what it is said to, a name that is no topic's or told twice, an axis told
     /// twice, a rule out of range.
     pub fn new(file: &MapFile) -> Result<Self, BridgeError> {
-        let mut uses = BTreeMap::new();
+        let (mut uses, mut units) = (BTreeMap::new(), BTreeMap::new());
         for (key, meaning) in &file.values {
             uses.insert(key.clone(), meaning.checked(key)?);
+            units.extend(meaning.unit().map(|unit| (key.clone(), unit)));
         }
-        let mapping = Self { uses };
+        let mapping = Self { uses, units };
         mapping.check_names()?;
         mapping.check_axes()?;
         Ok(mapping)
@@ -345,6 +365,12 @@ impl Mapping {
             .next()
     }
 
+    /// The unit of a key of the mapping; `None`: it is no number.
+    #[must_use]
+    pub fn unit(&self, key: &str) -> Option<Unit> {
+        self.units.get(key).copied()
+    }
+
     /// Every key with its use.
     pub fn uses(&self) -> impl Iterator<Item = (&str, &Use)> {
         self.uses.iter().map(|(key, used)| (key.as_str(), used))
@@ -378,6 +404,19 @@ impl Mapping {
 }
 
 impl Meaning {
+    const fn unit(&self) -> Option<Unit> {
+        match self {
+            Self::Position(entry) | Self::CommandedPosition(entry) => Some(entry.unit),
+            Self::PathPosition(entry) => Some(entry.unit),
+            Self::Feed(entry)
+            | Self::SpindleSpeed(entry)
+            | Self::Temperature(entry)
+            | Self::Load(entry)
+            | Self::Override(entry) => Some(entry.unit),
+            _ => None,
+        }
+    }
+
     fn checked(&self, key: &str) -> Result<Use, BridgeError> {
         let named = |name: &Option<String>| name.clone().unwrap_or_else(|| name_of(key));
         let text = |entry: &TextEntry, quantity, is_message| Use::Text {
@@ -512,7 +551,7 @@ mod tests {
             ),
             (
                 "  T: {is: temperature, unit: CELSIUS, change: {step: 1.0, rate_limit_per_s: 0.0, sample_period_s: 1.0}}\n",
-                "T: change.rate_limit_per_s = 0: must be from 0.000000001 to 1000000000",
+                "T: change.rate_limit_per_s = 0 1/s: must be from 1e-9 to 1000000000 1/s",
             ),
         ] {
             assert_eq!(mapping(values).unwrap_err(), said);

@@ -4,7 +4,8 @@
 //!   --boundary CRLF  headers CRLF  CRLF  document CRLF   again and again
 //! ```
 //!
-//! A part is as long as its `Content-length` says, or reaches to the next boundary where it does not say it.
+//! A part is as long as its `Content-length` says, or reaches to the next boundary where it does not say it. Headers
+//! that end in a line feed alone are taken as well.
 //!
 //! # References
 //! \[1\] RFC 2046, 5.1.1.
@@ -93,7 +94,7 @@ impl Parts {
         };
         let header_at = mark_at + self.mark.len();
         let behind = &self.bytes[header_at..];
-        let Some(header_length) = find(behind, b"\r\n\r\n") else {
+        let Some((header_length, body_at)) = header_end(behind) else {
             let is_lost = behind.len() > HEADER_LIMIT;
             return if is_lost {
                 Err(PartFlaw::NoBoundary)
@@ -101,7 +102,7 @@ impl Parts {
                 Ok(None)
             };
         };
-        let body = &behind[header_length + 4..];
+        let body = &behind[body_at..];
         let told = content_length(&behind[..header_length]);
         let length = told.or_else(|| find(body, &self.mark));
         if let Some(length) = length.filter(|length| *length > PART_LIMIT) {
@@ -110,12 +111,19 @@ impl Parts {
         match length.and_then(|length| body.get(..length)) {
             Some(part) => {
                 take(part);
-                Ok(Some(header_at + header_length + 4 + part.len()))
+                Ok(Some(header_at + body_at + part.len()))
             }
             None if body.len() > PART_LIMIT => Err(PartFlaw::TooLong { length: body.len() }),
             None => Ok(None),
         }
     }
+}
+
+/// Where the headers end and where the body begins: behind an empty line.
+fn header_end(bytes: &[u8]) -> Option<(usize, usize)> {
+    let ends = [&b"\n\r\n"[..], b"\n\n"].map(|end| Some((find(bytes, end)?, end.len())));
+    let (at, length) = ends.into_iter().flatten().min()?;
+    Some((at, at + length))
 }
 
 fn content_length(headers: &[u8]) -> Option<usize> {
@@ -147,6 +155,19 @@ mod tests {
     #[test]
     fn parts_are_as_long_as_they_say_or_reach_to_the_next_boundary() {
         assert_eq!(parts(&[ANSWER]), ["<a>\r\n\r", "<b/>\r\n", "<c/>"]);
+    }
+
+    #[test]
+    fn headers_may_end_in_line_feeds_alone() {
+        let plain: Vec<u8> = ANSWER
+            .iter()
+            .copied()
+            .filter(|byte| *byte != b'\r')
+            .collect();
+        let shorter = String::from_utf8(plain).unwrap().replace(": 6", ": 5");
+        assert_eq!(parts(&[shorter.as_bytes()]), ["<a>\n\n", "<b/>\n", "<c/>"]);
+        let mixed = b"--b7\nContent-length: 4\r\n\r\n<a/>\r\n--b7\r\nContent-length: 4\n\n<b/>";
+        assert_eq!(parts(&[mixed]), ["<a/>", "<b/>"]);
     }
 
     #[test]

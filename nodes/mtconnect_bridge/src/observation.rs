@@ -6,12 +6,18 @@
 //!   t_machine = t_host                              no stamp                                (3)
 //! ```
 //!
+//! A counter of milliseconds that leaps by more than a year has begun anew: (2) begins with it.
+//!
 //! # References
 //! \[1\] MTConnect information model, version 2.4, ObservationInformationModel (`UNAVAILABLE`, levels of a
 //! condition), and there Representations/TimeSeries: the stamp is that of the last value.
 
 use chrono::{DateTime, NaiveDateTime};
+use metrology::epoch;
 use metrology::stamp::{Host, Machine, Span, Stamp};
+
+/// Milliseconds that leap by more have been counted anew: a year.
+const LONGEST_COUNT: Span = Span::from_nanos(31_557_600_000_000_000);
 
 /// The word for a value that the machine cannot tell.
 pub const UNAVAILABLE: &str = "UNAVAILABLE";
@@ -114,9 +120,14 @@ impl MachineClock {
             MachineTime::Absolute(stamp) => stamp,
             MachineTime::Absent => Stamp::from_nanos(received_at.nanos()),
             MachineTime::Relative(at_ms) => {
-                let origin = *self.origin.get_or_insert((received_at, at_ms));
-                let since = Span::from_secs_f64((at_ms - origin.1) * 1e-3);
-                Stamp::from_nanos((origin.0 + since).nanos().max(0))
+                let (origin, first_ms) = *self.origin.get_or_insert((received_at, at_ms));
+                let since = Span::from_secs_f64((at_ms - first_ms) * 1e-3);
+                let at = Stamp::from_nanos((origin + since).nanos());
+                if since.nanos().saturating_abs() <= LONGEST_COUNT.nanos() && epoch::holds(at) {
+                    return at;
+                }
+                self.origin = Some((received_at, at_ms));
+                Stamp::from_nanos(received_at.nanos())
             }
         }
     }
@@ -127,20 +138,25 @@ impl MachineClock {
     }
 }
 
-/// Reads a stamp: `2016-11-29T09:28:49.444Z`, with another offset, or without any (then UTC).
+/// Reads a stamp: `2016-11-29T09:28:49.444Z`, with another offset (`+01:00`, `+0100`), or without any (then UTC).
 ///
-/// Stamps before 1970 or from 2038 on have no place in a message and are none.
+/// Any number of digits of the second is read, after a point or a comma; a leap second (`:60`) is the second behind it.
+/// Stamps before 1970 or from 2106-02-07T06:28:16Z on have no place in a message; they give `None`.
 #[must_use]
 pub fn read_stamp(text: &str) -> Option<Stamp<Machine>> {
-    let instant = match DateTime::parse_from_rfc3339(text) {
-        Ok(instant) => instant.to_utc(),
-        Err(_) => NaiveDateTime::parse_from_str(text, "%Y-%m-%dT%H:%M:%S%.f")
+    let text = text.replacen(',', ".", 1);
+    let with_offset = || DateTime::parse_from_str(&text, "%Y-%m-%dT%H:%M:%S%.f%z").ok();
+    let instant = match DateTime::parse_from_rfc3339(&text)
+        .ok()
+        .or_else(with_offset)
+    {
+        Some(instant) => instant.to_utc(),
+        None => NaiveDateTime::parse_from_str(&text, "%Y-%m-%dT%H:%M:%S%.f")
             .ok()?
             .and_utc(),
     };
-    let fits = (0..i64::from(i32::MAX)).contains(&instant.timestamp());
-    let nanos = instant.timestamp_nanos_opt().filter(|_| fits)?;
-    Some(Stamp::from_nanos(nanos))
+    let stamp = Stamp::from_nanos(instant.timestamp_nanos_opt()?);
+    epoch::holds(stamp).then_some(stamp)
 }
 
 #[cfg(test)]
@@ -166,6 +182,32 @@ mod tests {
             nanos("2016-11-29T10:28:49.5+01:00"),
             Some(1_480_411_729_500_000_000)
         );
+        for (text, seconds) in [
+            ("2016-11-29T10:28:49+0100", 1_480_411_729),
+            ("2016-11-29T04:28:49-05:00", 1_480_411_729),
+            ("2016-11-29t09:28:49z", 1_480_411_729),
+            ("1970-01-01T00:00:00Z", 0),
+            ("2038-01-19T03:14:08Z", 2_147_483_648),
+            ("2106-02-07T06:28:15Z", 4_294_967_295),
+            // A leap second is the one behind it, as POSIX counts.
+            ("2016-12-31T23:59:60Z", 1_483_228_800),
+            ("2017-01-01T00:59:60+01:00", 1_483_228_800),
+        ] {
+            assert_eq!(nanos(text), Some(seconds * 1_000_000_000), "{text}");
+        }
+        let fraction = |digits: &str| nanos(&format!("2016-11-29T09:28:49{digits}Z"));
+        for (digits, part) in [
+            (".4", 400_000_000),
+            (",25", 250_000_000),
+            (".123456789", 123_456_789),
+            (".123456789123", 123_456_789),
+        ] {
+            assert_eq!(
+                fraction(digits),
+                Some(1_480_411_729_000_000_000 + part),
+                "{digits}"
+            );
+        }
     }
 
     #[test]
@@ -175,8 +217,15 @@ mod tests {
             "09:28:49",
             "2016-13-29T09:28:49Z",
             "1969-12-31T23:59:59Z",
-            "2038-01-19T03:14:08Z",
+            "2106-02-07T06:28:16Z",
+            "2262-04-11T23:47:17Z",
+            "9999-12-31T23:59:59Z",
             "9999999-01-01T00:00:00Z",
+            "2016-11-29T25:00:00Z",
+            "2016-11-29T09:28:61Z",
+            "2016-02-30T09:28:49Z",
+            "NaN",
+            "1767600000000",
         ] {
             assert_eq!(nanos(text), None, "{text}");
         }
@@ -193,5 +242,10 @@ mod tests {
         clock.forget();
         let anew = clock.stamp(MachineTime::Relative(0.0), host(130));
         assert_eq!(anew.nanos(), 130_000_000_000);
+        // Milliseconds since 1970 are counted from the first as well, and a leap of years begins anew.
+        let leapt = clock.stamp(MachineTime::Relative(1.7676e12), host(140));
+        assert_eq!(leapt.nanos(), 140_000_000_000);
+        let on = clock.stamp(MachineTime::Relative(1.7676e12 + 1500.0), host(150));
+        assert_eq!(on.nanos(), 141_500_000_000);
     }
 }

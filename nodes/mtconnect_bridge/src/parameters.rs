@@ -42,6 +42,12 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "log_file",
         "Lines of an adapter that were logged, relative to the parameter file; for the source log alone.",
     ),
+    number(
+        "log_longest_pause_s",
+        "s",
+        "A longer pause in a log is taken for a leap of the machine's clock: it is said, and the lines go on without it.",
+        (60.0, 31_622_400.0),
+    ),
     text(
         "map_file",
         "What each key is, relative to the parameter file.",

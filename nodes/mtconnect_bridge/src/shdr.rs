@@ -1,4 +1,4 @@
-//! Lines as an adapter sends them (SHDR).
+//! Lines as an adapter sends them (SHDR), read as the reference agent reads them.
 //!
 //! ```text
 //!   time|key|value|key|value…                                   values
@@ -9,19 +9,42 @@
 //! ```
 //!
 //! `time` is a date with a fraction of a second, milliseconds since an instant of the adapter's, or empty; a
-//! duration may follow after `@`. A key may have a device before it (`device:key`). A bar within a value is
-//! written `\|`. The line does not say what it is: that is known of the key, and of a key that nobody has
-//! described a line is a condition where its second field is a level and it has seven fields.
+//! duration may follow after `@`. A key may have a device before it (`device:key`). [`fields`] says how a line is cut
+//! and [`block`] what a block of several lines is. The line does not say what it is: that is known of the key.
 //!
-//! # Holds when
-//! An adapter puts a condition, message or time series on a line of its own, as adapters do.
+//! | what | reading |
+//! |---|---|
+//! | a key that nobody described | it and one field behind it are passed over; after `* shdrVersion: 2`, it alone |
+//! | a condition, message or series | takes its fields, as many as there are; what follows on the line is let go, after `* shdrVersion: 2` read |
+//! | a key whose fields are missing | its value is not known |
+//! | a value whose key is empty | left out and reported |
+//! | a quote or a block that does not end | reported; the block's field is left out |
+//! | an invalid time | the line is published with the time of its receipt, in a log with the stamp of the line beside it |
+//! | an asset (`@…@`) | ends the line |
+//!
+//! What was read before a flaw stays. On purpose it differs from the reference in this: a condition that nobody
+//! described is reported when its line has the form of one (level WARNING or FAULT, seven fields, a qualifier HIGH, LOW or
+//! empty), so that an alarm is not lost for a mapping that is not whole. A stamp's offset is heeded (the reference
+//! passes over it), and so is a leap second. `relativeTime` and `device` are for an agent and change nothing here.
+//!
+//! # Agreement
+//! `val_cppagent_a_table_of_lines_is_read_as_the_reference_agent_reads_it` (tests), its sources and tests read, not run.
 //!
 //! # References
-//! \[1\] MTConnect C++ agent (`mtconnect/cppagent`), README, "Adapter Agent Protocol". \[2\] See [`crate::observation`].
+//! \[1\] MTConnect C++ agent (`mtconnect/cppagent` 2.5), `src/mtconnect/pipeline/shdr_token_mapper.cpp`,
+//! `timestamp_extractor.hpp`, `source/adapter/shdr/`. \[2\] See [`crate::observation`].
 
 use crate::observation::{
     AlarmLevel, AlarmReport, MachineTime, Observation, Told, UNAVAILABLE, read_stamp,
 };
+
+pub mod block;
+mod fields;
+mod flaw;
+
+pub use block::Record;
+pub use fields::{cut, fields};
+pub use flaw::Flaw;
 
 /// How the fields behind a key are to be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +62,8 @@ pub enum Shape {
 /// What a line was.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Line {
+    /// Nothing stands in it.
+    Empty,
     /// Observations with one stamp.
     Observations(Vec<Observation>),
     /// An answer to our `PING`: the adapter wants to be asked this often.
@@ -46,86 +71,81 @@ pub enum Line {
         /// Period, ms.
         period_ms: f64,
     },
-    /// Another command for an agent, or an asset; nothing for us.
+    /// From here on lines are of this version of SHDR.
+    Version(u32),
+    /// Another command for an agent; nothing for us.
     Command,
-    /// Not readable.
-    Malformed(Flaw),
 }
 
-/// Why a line cannot be read.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Flaw {
-    /// There is no bar in it.
-    #[error("no bar in it")]
-    NoFields,
-    /// The stamp is none.
-    #[error("stamp {text:?} is none")]
-    Stamp {
-        /// What stands there.
-        text: String,
-    },
-    /// A key without what belongs to it.
-    #[error("key {key:?}: {fields} fields behind it, needs {needed}")]
-    Fields {
-        /// Key.
-        key: String,
-        /// Fields behind it.
-        fields: usize,
-        /// Fields that it needs.
-        needed: usize,
-    },
-    /// A level that is none.
-    #[error("key {key:?}: level {level:?} is none")]
-    Level {
-        /// Key.
-        key: String,
-        /// What stands there.
-        level: String,
-    },
-    /// A time series whose numbers are none or not as many as it says.
-    #[error("key {key:?}: time series of {count:?} values is none")]
-    Series {
-        /// Key.
-        key: String,
-        /// How many it says.
-        count: String,
-    },
+/// What a line was, and what was wrong with it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// What could be read.
+    pub line: Line,
+    /// Whether it had an asset, which is nothing for us.
+    pub has_asset: bool,
+    /// What could not be read.
+    pub flaws: Vec<Flaw>,
 }
 
-/// Reads a line; `shape` says what is known of a key (`None`: nothing).
-#[must_use]
-pub fn read(line: &str, shape: impl Fn(&str) -> Option<Shape>) -> Line {
-    if let Some(command) = line.strip_prefix('*') {
-        return self::command(command.trim());
+impl Reading {
+    const fn of(line: Line) -> Self {
+        Self {
+            line,
+            has_asset: false,
+            flaws: Vec::new(),
+        }
     }
-    observations(line, shape).map_or_else(Line::Malformed, |found| {
-        found.map_or(Line::Command, Line::Observations)
-    })
+}
+
+/// Reads a record of an adapter that speaks `version`; `shape` says what is known of a key (`None`: nothing).
+#[must_use]
+pub fn read(record: &Record, version: u32, shape: impl Fn(&str) -> Option<Shape>) -> Reading {
+    if record.head.trim().is_empty() && record.body.is_none() {
+        return record.flaw.clone().map_or_else(
+            || Reading::of(Line::Empty),
+            |flaw| Reading {
+                flaws: vec![flaw],
+                ..Reading::of(Line::Observations(Vec::new()))
+            },
+        );
+    }
+    if let Some(command) = record.head.strip_prefix('*') {
+        return Reading::of(self::command(command.trim()));
+    }
+    let (mut fields, open_quote) = cut(&record.head);
+    if let (Some(body), Some(last)) = (&record.body, fields.last_mut()) {
+        *last = format!("{last}\n{body}").trim().to_owned();
+    }
+    if let Some(Flaw::Block { .. }) = record.flaw {
+        // The field in which the block began has no contents.
+        fields.pop();
+    }
+    let mut observing = Observing::new(version, shape);
+    observing.flaws.extend(record.flaw.clone());
+    let open_quote = open_quote.map(|field| Flaw::Quote { field });
+    observing.flaws.extend(open_quote);
+    observing.read(&fields)
 }
 
 fn command(command: &str) -> Line {
-    let period = command.strip_prefix("PONG").map(str::trim);
-    let period_ms = period.and_then(|period| period.parse::<f64>().ok());
-    match period_ms.filter(|period_ms| period_ms.is_finite() && *period_ms > 0.0) {
-        Some(period_ms) => Line::Pong { period_ms },
-        None => Line::Command,
+    if let Some(period) = command.strip_prefix("PONG") {
+        let digits = period.trim_start();
+        let end = digits.find(|c: char| !c.is_ascii_digit() && c != '.');
+        let period_ms = digits[..end.unwrap_or(digits.len())].parse::<f64>().ok();
+        let is_positive = |period_ms: &f64| period_ms.is_finite() && *period_ms > 0.0;
+        return match period_ms.filter(is_positive) {
+            Some(period_ms) => Line::Pong { period_ms },
+            None => Line::Command,
+        };
     }
-}
-
-/// The fields between bars; `\|` is a bar within a field.
-fn fields(line: &str) -> Vec<String> {
-    let mut fields = vec![String::new()];
-    let mut letters = line.chars().peekable();
-    while let Some(letter) = letters.next() {
-        let bar_follows = letters.peek() == Some(&'|');
-        let field = fields.last_mut().expect("there is one from the start on");
-        match letter {
-            '\\' if bar_follows => field.extend(letters.next()),
-            '|' => fields.push(String::new()),
-            other => field.push(other),
+    match command.split_once(':') {
+        Some((name, value)) if name.trim().eq_ignore_ascii_case("shdrversion") => {
+            let whole = value.trim().split('.').next().unwrap_or_default();
+            Line::Version(whole.parse().unwrap_or(1))
         }
+        _ => Line::Command,
     }
-    fields
 }
 
 fn time(text: &str) -> Result<MachineTime, Flaw> {
@@ -139,7 +159,7 @@ fn time(text: &str) -> Result<MachineTime, Flaw> {
     if let Some(stamp) = read_stamp(stamp) {
         return Ok(MachineTime::Absolute(stamp));
     }
-    // A century of milliseconds: beyond that it is a mistake, and no sum may overflow.
+    // Longer than a century of milliseconds it is a mistake, and no sum may overflow.
     let relative = stamp.parse::<f64>().ok();
     let relative = relative.filter(|at_ms| (0.0..3.2e12).contains(at_ms));
     relative
@@ -149,110 +169,237 @@ fn time(text: &str) -> Result<MachineTime, Flaw> {
         })
 }
 
-/// `None`: an asset, which is nothing for us.
-fn observations(
-    line: &str,
-    shape: impl Fn(&str) -> Option<Shape>,
-) -> Result<Option<Vec<Observation>>, Flaw> {
-    let fields = fields(line);
-    let [stamp, rest @ ..] = fields.as_slice() else {
-        return Err(Flaw::NoFields);
-    };
-    if rest.is_empty() {
-        return Err(Flaw::NoFields);
-    }
-    if rest.first().is_some_and(|key| key.starts_with('@')) {
-        return Ok(None);
-    }
-    let time = time(stamp)?;
-    let mut found = Vec::new();
-    let mut left = rest;
-    while let Some((key, behind)) = left.split_first() {
-        // A line that ends in a bar has an empty field at its end.
-        if key.is_empty() && behind.is_empty() && !found.is_empty() {
-            break;
+/// The time of a record, where it has one; a log is replayed by it.
+#[must_use]
+pub fn time_of(record: &Record) -> MachineTime {
+    let is_command = record.head.starts_with('*') || record.head.trim().is_empty();
+    let stamp = record.head.split('|').next().filter(|_| !is_command);
+    stamp.map_or(MachineTime::Absent, |stamp| {
+        time(stamp).unwrap_or(MachineTime::Absent)
+    })
+}
+
+/// A line of observations that is read.
+struct Observing<F> {
+    version: u32,
+    shape: F,
+    time: MachineTime,
+    found: Vec<Observation>,
+    flaws: Vec<Flaw>,
+}
+
+/// What the fields behind a key became, and how many of them.
+type Taken = (Option<Told>, usize);
+
+impl<F: Fn(&str) -> Option<Shape>> Observing<F> {
+    const fn new(version: u32, shape: F) -> Self {
+        Self {
+            version,
+            shape,
+            time: MachineTime::Absent,
+            found: Vec::new(),
+            flaws: Vec::new(),
         }
-        let shape = shape(key).unwrap_or_else(|| guess(behind, found.is_empty()));
-        let (told, rest) = told(key, shape, behind)?;
-        found.push(Observation {
-            time,
-            key: key.trim().to_owned(),
+    }
+
+    fn read(mut self, fields: &[String]) -> Reading {
+        let [stamp, rest @ ..] = fields else {
+            return self.done(false);
+        };
+        if rest.is_empty() {
+            self.flaws.push(Flaw::NoFields);
+            return self.done(false);
+        }
+        let is_asset = |key: &String| key.starts_with('@');
+        match time(stamp) {
+            Ok(time) => self.time = time,
+            Err(flaw) if !rest.first().is_some_and(is_asset) => self.flaws.push(flaw),
+            Err(_) => {}
+        }
+        let (mut left, mut follows_unknown) = (rest, false);
+        while let Some((key, behind)) = left.split_first() {
+            if is_asset(key) {
+                return self.done(true);
+            }
+            // A line that ends in a bar has an empty field at its end.
+            if key.is_empty() && behind.is_empty() {
+                break;
+            }
+            let known = (self.shape)(key).or_else(|| self.guess(behind));
+            let used = match known {
+                Some(shape) => self.known(key, shape, behind),
+                None => self.unknown(key, behind, follows_unknown),
+            };
+            follows_unknown = known.is_none();
+            left = behind.get(used..).unwrap_or_default();
+            if self.version < 2 && used > 1 {
+                self.let_go(key, left);
+                break;
+            }
+        }
+        self.done(false)
+    }
+
+    fn done(self, has_asset: bool) -> Reading {
+        Reading {
+            line: Line::Observations(self.found),
+            has_asset,
+            flaws: self.flaws,
+        }
+    }
+
+    fn tell(&mut self, key: &str, told: Told) {
+        self.found.push(Observation {
+            time: self.time,
+            key: key.to_owned(),
             name: None,
             told,
         });
-        left = rest;
     }
-    Ok(Some(found))
+
+    fn known(&mut self, key: &str, shape: Shape, behind: &[String]) -> usize {
+        let (told, used) = self.told(key, shape, behind);
+        if let Some(told) = told {
+            self.tell(key, told);
+        }
+        used
+    }
+
+    /// Passes over a key that nobody described; of several in a row the first is handed on, to be named.
+    fn unknown(&mut self, key: &str, behind: &[String], follows_unknown: bool) -> usize {
+        let is_pair = self.version < 2;
+        match behind.first().filter(|value| is_pair && !value.is_empty()) {
+            Some(value) if key.is_empty() => self.flaws.push(Flaw::Key {
+                value: value.clone(),
+            }),
+            None if is_pair && behind.is_empty() => self.missing(key, 0, 1),
+            _ => {}
+        }
+        if !key.is_empty() && (is_pair || !follows_unknown) {
+            let value = behind.first().filter(|_| is_pair);
+            self.tell(key, Told::Value(value.cloned().unwrap_or_default()));
+        }
+        usize::from(is_pair).min(behind.len())
+    }
+
+    /// Whether the fields behind a key that nobody described are those of an active condition.
+    fn guess(&self, behind: &[String]) -> Option<Shape> {
+        let [level, code, _severity, qualifier, _text] = behind else {
+            return None;
+        };
+        let is_active = matches!(
+            AlarmLevel::read(level),
+            Some(AlarmLevel::Warning | AlarmLevel::Fault)
+        );
+        let is_qualifier = ["", "HIGH", "LOW"]
+            .iter()
+            .any(|word| qualifier.eq_ignore_ascii_case(word));
+        let is_code = (self.shape)(code).is_none();
+        (self.found.is_empty() && is_active && is_qualifier && is_code).then_some(Shape::Condition)
+    }
+
+    fn let_go(&mut self, key: &str, left: &[String]) {
+        if left.iter().any(|field| !field.is_empty()) {
+            self.flaws.push(Flaw::Behind {
+                key: key.to_owned(),
+                fields: left.len(),
+            });
+        }
+    }
+
+    fn missing(&mut self, key: &str, fields: usize, needed: usize) {
+        self.flaws.push(Flaw::Fields {
+            key: key.to_owned(),
+            fields,
+            needed,
+        });
+    }
+
+    fn told(&mut self, key: &str, shape: Shape, behind: &[String]) -> Taken {
+        match (shape, behind) {
+            (Shape::Value, [value, ..]) => (Some(value_of(value)), 1),
+            (Shape::Value | Shape::Message, []) => {
+                self.missing(key, 0, if shape == Shape::Value { 1 } else { 2 });
+                (Some(Told::Unavailable), 0)
+            }
+            (Shape::Condition, behind) => self.condition(key, behind),
+            (Shape::Message, [only]) => {
+                if !is_absent(only) {
+                    self.missing(key, 1, 2);
+                }
+                (Some(Told::Unavailable), 1)
+            }
+            (Shape::Message, [code, text, ..]) => {
+                let is_unknown = is_absent(code) && text.is_empty();
+                let told = if is_unknown {
+                    Told::Unavailable
+                } else {
+                    value_of(text)
+                };
+                (Some(told), 2)
+            }
+            (Shape::Series, behind) => self.series(key, behind),
+        }
+    }
+
+    fn condition(&mut self, key: &str, behind: &[String]) -> Taken {
+        let text_at = |at: usize| behind.get(at).cloned().unwrap_or_default();
+        let Some(word) = behind.first() else {
+            self.missing(key, 0, 1);
+            return (Some(Told::Unavailable), 0);
+        };
+        let used = behind.len().min(5);
+        let Some(level) = AlarmLevel::read(word) else {
+            self.flaws.push(Flaw::Level {
+                key: key.to_owned(),
+                level: word.clone(),
+            });
+            return (None, used);
+        };
+        let report = AlarmReport {
+            level,
+            code: text_at(1),
+            severity: text_at(2),
+            qualifier: text_at(3),
+            text: text_at(4),
+        };
+        (Some(Told::Alarm(report)), used)
+    }
+
+    fn series(&mut self, key: &str, behind: &[String]) -> Taken {
+        let used = behind.len().min(3);
+        if behind[..used].iter().any(|field| is_absent(field)) {
+            return (Some(Told::Unavailable), used);
+        }
+        let [count, rate, values, ..] = behind else {
+            self.missing(key, behind.len(), 3);
+            return (None, used);
+        };
+        let series = read_series(count.parse().ok(), rate, values);
+        if series.is_none() {
+            self.flaws.push(Flaw::Series {
+                key: key.to_owned(),
+                count: count.clone(),
+            });
+        }
+        (series, used)
+    }
 }
 
-/// What the fields behind a key that nobody described look like.
-fn guess(behind: &[String], is_first: bool) -> Shape {
-    let has_level = behind.first().and_then(|word| AlarmLevel::read(word));
-    if is_first && behind.len() == 5 && has_level.is_some() {
-        Shape::Condition
-    } else {
-        Shape::Value
-    }
-}
-
-fn told<'a>(key: &str, shape: Shape, behind: &'a [String]) -> Result<(Told, &'a [String]), Flaw> {
-    let missing = |needed| Flaw::Fields {
-        key: key.to_owned(),
-        fields: behind.len(),
-        needed,
-    };
-    let is_absent = |text: &str| text.trim().eq_ignore_ascii_case(UNAVAILABLE);
-    match (shape, behind) {
-        (Shape::Value, [value, rest @ ..]) => Ok((value_of(value), rest)),
-        (Shape::Value, []) => Err(missing(1)),
-        (Shape::Condition, [level, rest @ ..]) => {
-            let report = AlarmReport {
-                level: AlarmLevel::read(level.trim()).ok_or_else(|| Flaw::Level {
-                    key: key.to_owned(),
-                    level: level.clone(),
-                })?,
-                code: text_at(rest, 0),
-                severity: text_at(rest, 1),
-                qualifier: text_at(rest, 2),
-                text: text_at(rest, 3),
-            };
-            Ok((Told::Alarm(report), rest.get(4..).unwrap_or_default()))
-        }
-        (Shape::Condition, []) => Err(missing(5)),
-        (Shape::Message | Shape::Series, [only, ..]) if is_absent(only) => {
-            Ok((Told::Unavailable, &[]))
-        }
-        (Shape::Message, [_code, text, rest @ ..]) => Ok((value_of(text), rest)),
-        (Shape::Message, _) => Err(missing(2)),
-        (Shape::Series, [count, rate, values, rest @ ..]) => {
-            Ok((series(key, count, rate, values)?, rest))
-        }
-        (Shape::Series, _) => Err(missing(3)),
-    }
-}
-
-fn text_at(fields: &[String], at: usize) -> String {
-    fields
-        .get(at)
-        .map(|text| text.trim().to_owned())
-        .unwrap_or_default()
+fn is_absent(text: &str) -> bool {
+    text.eq_ignore_ascii_case(UNAVAILABLE)
 }
 
 fn value_of(text: &str) -> Told {
-    let text = text.trim();
-    if text.eq_ignore_ascii_case(UNAVAILABLE) {
+    if is_absent(text) {
         Told::Unavailable
     } else {
         Told::Value(text.to_owned())
     }
 }
 
-fn series(key: &str, count: &str, rate: &str, values: &str) -> Result<Told, Flaw> {
-    read_series(count.trim().parse().ok(), rate, values).ok_or_else(|| Flaw::Series {
-        key: key.to_owned(),
-        count: count.to_owned(),
-    })
-}
+/// Slowest and fastest rate of a time series, 1/s; its first value must not lie years back.
+const RATES_HZ: std::ops::RangeInclusive<f64> = 1e-4..=1e9;
 
 /// A time series of `count` values (where it is told); `None`: a number is none, or their count differs.
 #[must_use]
@@ -261,132 +408,13 @@ pub fn read_series(count: Option<usize>, rate: &str, values: &str) -> Option<Tol
     let values: Option<Vec<f64>> = values.split_whitespace().map(number).collect();
     let rate_hz = match rate.trim() {
         "" => None,
-        rate => Some(number(rate)?).filter(|rate_hz| *rate_hz > 0.0),
+        rate => match number(rate)? {
+            rate_hz if RATES_HZ.contains(&rate_hz) => Some(rate_hz),
+            // That of the data item, which is not told here.
+            rate_hz if rate_hz <= 0.0 => None,
+            _ => return None,
+        },
     };
     let values = values.filter(|values| count.is_none_or(|count| count == values.len()))?;
     Some(Told::Series { rate_hz, values })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn none(_: &str) -> Option<Shape> {
-        None
-    }
-
-    fn values(line: &str) -> Vec<(String, Told)> {
-        match read(line, none) {
-            Line::Observations(all) => all.into_iter().map(|o| (o.key, o.told)).collect(),
-            other => panic!("{line}: {other:?}"),
-        }
-    }
-
-    fn value(text: &str) -> Told {
-        Told::Value(text.to_owned())
-    }
-
-    /// A line of the log of 2016-11-29, and one of the first of that day.
-    #[test]
-    fn val_nist_lines_are_read() {
-        let line = "2016-11-29T09:29:02.072Z|Stemp|0";
-        let Line::Observations(found) = read(line, none) else {
-            panic!("{line}");
-        };
-        let stamp = MachineTime::Absolute(read_stamp("2016-11-29T09:29:02.072Z").unwrap());
-        assert_eq!((found[0].time, &found[0].told), (stamp, &value("0")));
-        let absent = values("2016-11-28T20:23:28.439772Z|coolant_temp|Unavailable");
-        assert_eq!(absent, [("coolant_temp".to_owned(), Told::Unavailable)]);
-    }
-
-    #[test]
-    fn one_line_tells_several_values_and_may_end_in_a_bar() {
-        let pair = |key: &str, text| (key.to_owned(), value(text));
-        let wanted = [pair("mill:Xabs", "1.5"), pair("Sload", "")];
-        assert_eq!(values("|mill:Xabs|1.5|Sload|"), wanted);
-        assert_eq!(values("|mill:Xabs|1.5|Sload||"), wanted);
-        assert_eq!(values(r"|program|A\|B"), [pair("program", "A|B")]);
-    }
-
-    #[test]
-    fn stamps_are_dates_milliseconds_or_nothing_and_may_have_a_duration() {
-        let time = |line: &str| match read(line, none) {
-            Line::Observations(found) => found[0].time,
-            other => panic!("{other:?}"),
-        };
-        assert_eq!(time("1250.5|a|1"), MachineTime::Relative(1250.5));
-        assert_eq!(time("|a|1"), MachineTime::Absent);
-        let date = MachineTime::Absolute(read_stamp("2016-11-29T09:29:02Z").unwrap());
-        assert_eq!(time("2016-11-29T09:29:02Z@10.5|a|1"), date);
-        assert!(matches!(
-            read("tomorrow|a|1", none),
-            Line::Malformed(Flaw::Stamp { .. })
-        ));
-        assert!(matches!(read("-5|a|1", none), Line::Malformed(_)));
-    }
-
-    #[test]
-    fn a_condition_has_five_fields_also_where_nobody_described_its_key() {
-        let report = AlarmReport {
-            level: AlarmLevel::Fault,
-            code: "417".to_owned(),
-            severity: "2".to_owned(),
-            qualifier: "HIGH".to_owned(),
-            text: "spindle too hot".to_owned(),
-        };
-        let line = "2016-11-29T09:29:02Z|stemp_c|FAULT|417|2|HIGH|spindle too hot";
-        assert_eq!(values(line), [("stemp_c".to_owned(), Told::Alarm(report))]);
-        let shape = |_: &str| Some(Shape::Condition);
-        let short = read("|c|NORMAL", shape);
-        assert!(matches!(short, Line::Observations(found)
-            if matches!(&found[0].told, Told::Alarm(report) if report.level == AlarmLevel::Normal)));
-        let wrong = read("|c|BROKEN||||", shape);
-        assert!(matches!(wrong, Line::Malformed(Flaw::Level { .. })));
-    }
-
-    #[test]
-    fn messages_and_time_series_are_read_by_their_shape() {
-        let message = read("|m|17|refill oil", |_| Some(Shape::Message));
-        assert!(
-            matches!(message, Line::Observations(found) if found[0].told == value("refill oil"))
-        );
-        let told = Told::Series {
-            rate_hz: Some(100.0),
-            values: vec![1.0, -2.5, 3.0],
-        };
-        let series = read("|v|3|100|1 -2.5 3", |_| Some(Shape::Series));
-        assert!(matches!(series, Line::Observations(found) if found[0].told == told));
-        let wrong = read("|v|4|100|1 -2.5 3", |_| Some(Shape::Series));
-        assert!(matches!(wrong, Line::Malformed(Flaw::Series { .. })));
-        let absent = read("|v|UNAVAILABLE||", |_| Some(Shape::Series));
-        assert!(matches!(absent, Line::Observations(found) if found[0].told == Told::Unavailable));
-    }
-
-    #[test]
-    fn commands_are_no_values() {
-        assert_eq!(
-            read("* PONG 10000", none),
-            Line::Pong {
-                period_ms: 10_000.0
-            }
-        );
-        for line in [
-            "* device: mill",
-            "* PONG",
-            "* PONG nan",
-            "|@ASSET@|7|CuttingTool|x",
-        ] {
-            assert_eq!(read(line, none), Line::Command, "{line}");
-        }
-        assert_eq!(read("garbage", none), Line::Malformed(Flaw::NoFields));
-    }
-
-    proptest! {
-        #[test]
-        fn prop_no_line_panics(line in "[\\|\\*\\\\@a-zA-Z0-9 .:\\-é]{0,60}", kind in 0_usize..5) {
-            let shapes = [Shape::Value, Shape::Condition, Shape::Message, Shape::Series];
-            let _ = read(&line, |_| shapes.get(kind).copied());
-        }
-    }
 }

@@ -20,13 +20,16 @@
 //! 479,879 turns and travels of 80,172, 6,071 and 29,979 mm; the programs agree within 6e-6 of each, and last 14,400.2 s.
 
 use metrology::sample::Quantity;
-use metrology::stamp::{Host, Machine, Span, Stamp};
+use metrology::stamp::{Machine, Span, Stamp};
 use metrology::{Axis, PerAxis};
 
 use crate::error::BridgeError;
-use crate::mapping::{Mapping, Use};
-use crate::observation::{MachineClock, Told};
-use crate::shdr::{self, Line};
+use crate::mapping::Use;
+use crate::observation::Told;
+
+mod reading;
+
+pub use reading::{Shift, bins};
 
 /// A spindle that turns more slowly than this stands, 1/s.
 const STANDS_RAD_S: f64 = 1.0;
@@ -169,41 +172,6 @@ fn event(used: &Use, spindle: &str, told: &Told) -> Option<Event> {
     }
 }
 
-/// Cuts the lines of an adapter's log into bins.
-///
-/// # Errors
-/// When the mapping has no such spindle.
-pub fn bins<'a>(
-    lines: impl Iterator<Item = &'a str>,
-    mapping: &Mapping,
-    order: &ShiftOrder,
-) -> Result<Vec<Bin>, BridgeError> {
-    let is_spindle = |used: &Use| matches!(used, Use::Number { name, quantity: Quantity::SpindleSpeed, .. } if *name == order.spindle);
-    if !mapping.uses().any(|(_, used)| is_spindle(used)) {
-        return Err(BridgeError::NoSpindle {
-            name: order.spindle.clone(),
-        });
-    }
-    let mut cutter = Cutter::new(order);
-    let mut clock = MachineClock::default();
-    for line in lines {
-        let shape = |key: &str| mapping.find(key, None).map(|(_, used)| used.shape());
-        let Line::Observations(observations) = shdr::read(line, shape) else {
-            continue;
-        };
-        for observation in observations {
-            let at = clock.stamp(observation.time, Stamp::<Host>::default());
-            let found = mapping.find(&observation.key, None);
-            let event = found.and_then(|(_, used)| event(used, &order.spindle, &observation.told));
-            if let Some(event) = event {
-                cutter.take(at, event);
-            }
-        }
-    }
-    cutter.take(order.to, Event::Spindle(None));
-    Ok(cutter.bins)
-}
-
 /// Writes programs.
 #[derive(Debug)]
 struct Writer<'a> {
@@ -227,7 +195,7 @@ impl Writer<'_> {
         });
         let [x, y, z] = Axis::LINEAR.map(|axis| self.at_mm[axis]);
         self.text = format!(
-            "({title})\nG21 G90 G17\nG0 Z{}\nG0 X{x} Y{y}\nG0 Z{z}\n",
+            "(frame: machine) ({title})\nG21 G90 G17\nG0 Z{}\nG0 X{x} Y{y}\nG0 Z{z}\n",
             order.clear_mm
         );
         self.rpm = 0;
@@ -348,7 +316,8 @@ pub fn programs(bins: &[Bin], title: &str, order: &ShiftOrder) -> Result<Vec<Str
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mapping::MapFile;
+    use crate::condition::words;
+    use crate::mapping::{MapFile, Mapping};
     use crate::observation::read_stamp;
 
     const MAP: &str = "values:\n  Xabs: {is: position, axis: X, unit: MILLIMETER}\n  Srpm: {is: spindle_speed, name: spindle, unit: REVOLUTION/MINUTE}\n";
@@ -383,7 +352,9 @@ mod tests {
     /// By hand: half of the first bin at 600, half at 1200; 30 mm forth and back; absent, it stands.
     #[test]
     fn eq1_eq2_a_log_becomes_mean_speeds_and_travels() {
-        let bins = bins(LOG.into_iter(), &mapping(), &order()).unwrap();
+        let bins = bins(LOG.join("\n").as_bytes(), &mapping(), &order())
+            .unwrap()
+            .bins;
         let rpm = bins
             .iter()
             .map(|bin| bin.spindle_rad_s * 30.0 / std::f64::consts::PI);
@@ -396,11 +367,12 @@ mod tests {
 
     #[test]
     fn eq3_a_program_goes_the_travel_within_its_window_and_lasts_the_time() {
-        let bins = bins(LOG.into_iter(), &mapping(), &order()).unwrap();
+        let bins = bins(LOG.join("\n").as_bytes(), &mapping(), &order())
+            .unwrap()
+            .bins;
         let programs = programs(&bins, "a shift", &order()).unwrap();
-        let first = "(a shift, part 1)\nG21 G90 G17\nG0 Z240\nG0 X50 Y50\nG0 Z50\nS900 M3\nG1 X80 F360\nG1 X50 F360\nS1200 M3\nG4 P10\nG0 Z240\nM5\nM2\n";
-        let second =
-            "(a shift, part 2)\nG21 G90 G17\nG0 Z240\nG0 X50 Y50\nG0 Z50\nG4 P10\nG0 Z240\nM2\n";
+        let first = "(frame: machine) (a shift, part 1)\nG21 G90 G17\nG0 Z240\nG0 X50 Y50\nG0 Z50\nS900 M3\nG1 X80 F360\nG1 X50 F360\nS1200 M3\nG4 P10\nG0 Z240\nM5\nM2\n";
+        let second = "(frame: machine) (a shift, part 2)\nG21 G90 G17\nG0 Z240\nG0 X50 Y50\nG0 Z50\nG4 P10\nG0 Z240\nM2\n";
         assert_eq!(programs, [first, second]);
     }
 
@@ -408,17 +380,110 @@ mod tests {
     fn what_the_other_machine_cannot_is_refused() {
         let mut slow = order();
         slow.feed_limit_mm_s = 5.0;
-        let bins = bins(LOG.into_iter(), &mapping(), &slow).unwrap();
+        let bins = bins(LOG.join("\n").as_bytes(), &mapping(), &slow)
+            .unwrap()
+            .bins;
         let refused = programs(&bins, "a", &slow).unwrap_err().to_string();
         assert_eq!(
             refused,
             "at 0 s: feed 360 mm/min, limit 300 mm/min: take longer bins"
         );
         slow.spindle = "main".to_owned();
-        let refused = super::bins(LOG.into_iter(), &mapping(), &slow).unwrap_err();
+        let refused = super::bins(LOG.join("\n").as_bytes(), &mapping(), &slow).unwrap_err();
         assert_eq!(
             refused.to_string(),
-            "the mapping has no spindle speed \"main\""
+            "the mapping has no spindle speed \"main\": give one that name, or name another as spindle in the order"
         );
+    }
+
+    /// What is missing of a log and its leaps, as a person sees them.
+    fn missing(log: &str) -> (bool, Vec<String>, usize) {
+        let shift = bins(log.as_bytes(), &mapping(), &order()).unwrap();
+        let covered = shift.covered.iter();
+        let covered = covered.map(|(first, last)| format!("{} {}", words(*first), words(*last)));
+        (shift.is_whole, covered.collect(), shift.leaps.len())
+    }
+
+    #[test]
+    fn a_log_that_has_a_part_of_the_shift_alone_says_which() {
+        let whole = "2016-11-29T10:00:00Z 2016-11-29T10:00:22Z".to_owned();
+        assert_eq!(missing(&LOG.join("\n")), (true, vec![whole], 0));
+        // It ends early.
+        let part = "2016-11-29T10:00:00Z 2016-11-29T10:00:06Z".to_owned();
+        assert_eq!(missing(&LOG[..4].join("\n")), (false, vec![part], 0));
+        // The day jumps by one.
+        let part = "2016-11-29T10:00:00Z 2016-11-29T10:00:05Z".to_owned();
+        let jumped = LOG.join("\n").replace("29T10:00:06", "30T10:00:06");
+        let jumped = jumped.replace("29T10:00:2", "30T10:00:2");
+        assert_eq!(missing(&jumped), (false, vec![part], 1));
+        // One line cannot be read.
+        let odd = format!("{}\nhello\n", LOG.join("\n"));
+        assert!(!missing(&odd).0);
+    }
+
+    /// By hand: the speed before the stamp of 2035 holds to 5 s, that of its line from 6 s on, so the first bin has
+    /// (5 · 600 + 4 · 1200)/10 1/min and no later bin the speed of before.
+    #[test]
+    fn one_stamp_of_2035_is_told_and_turns_no_spindle() {
+        let log = "2016-11-29T09:59:00Z|Srpm|600\n2016-11-29T10:00:05Z|Xabs|5\n2035-01-01T00:00:00Z|Srpm|1200\n2016-11-29T10:00:06Z|Xabs|5\n2016-11-29T10:00:30Z|Xabs|5\n";
+        let shift = bins(log.as_bytes(), &mapping(), &order()).unwrap();
+        let rpm = shift.bins.iter();
+        let rpm = rpm.map(|bin| bin.spindle_rad_s * 30.0 / std::f64::consts::PI);
+        let rpm: Vec<_> = rpm.map(|rpm| rpm.round() as i64).collect();
+        assert_eq!(rpm, [780, 1200, 1200]);
+        assert_eq!((shift.leaps.len(), shift.is_whole), (2, false));
+    }
+
+    #[test]
+    fn a_log_of_which_nothing_lies_within_the_order_is_refused_with_its_range() {
+        let other_day = LOG.join("\n").replace("2016", "2026");
+        let other_keys = LOG.join("\n").replace("Xabs", "x").replace("Srpm", "s");
+        for (log, words) in [
+            ("", "no line with a value has a date; 0 lines taken"),
+            ("hello\n", "1 lines without a bar (first in line 1)"),
+            ("|Srpm|600\n", "no line with a value has a date"),
+            (
+                other_day.as_str(),
+                "it reaches from 2026-11-29T09:59:00Z to 2026-11-29T10:00:22Z: correct from and to in the order, with an offset",
+            ),
+            (
+                other_keys.as_str(),
+                "without a number of the spindle or an axis",
+            ),
+        ] {
+            let refused = bins(log.as_bytes(), &mapping(), &order()).unwrap_err();
+            let refused = refused.to_string();
+            assert!(refused.contains(words), "{refused}");
+        }
+    }
+
+    /// It was off for two days, and the order lies between.
+    #[test]
+    fn an_order_within_a_pause_of_the_log_is_refused_with_the_pause_and_one_time_zone() {
+        let log = "2016-11-28T09:00:00Z|Srpm|600\n2016-11-28T10:10:00+01:00|Srpm|600\n2016-11-30T09:00:00Z|Srpm|600\n2016-11-30T09:10:00Z|Srpm|600\n";
+        let refused = bins(log.as_bytes(), &mapping(), &order()).unwrap_err();
+        let refused = refused.to_string();
+        for words in [
+            "the order asks for 2016-11-29T10:00:00Z to",
+            "(all times in UTC): it reaches from 2016-11-28T09:00:00Z to 2016-11-30T09:10:00Z",
+            "and has nothing from 2016-11-28T09:10:00Z to 2016-11-30T09:00:00Z: correct from and to",
+            "without one they are UTC",
+        ] {
+            assert!(refused.contains(words), "{words}: {refused}");
+        }
+    }
+
+    /// A line without a date belongs to the one before it; a log of a Mac of old ends its lines with CR.
+    #[test]
+    fn lines_without_a_date_and_other_ends_of_lines_change_no_bin() {
+        let wanted = bins(LOG.join("\n").as_bytes(), &mapping(), &order());
+        let wanted = wanted.unwrap().bins;
+        for end in ["\r", "\r\n"] {
+            let log = LOG
+                .join(end)
+                .replace("|Srpm|600|Xabs|5", &format!("|Srpm|600{end}|Xabs|5"));
+            let found = bins(log.as_bytes(), &mapping(), &order()).unwrap();
+            assert_eq!(found.bins, wanted, "{end:?}");
+        }
     }
 }

@@ -10,8 +10,9 @@ use crate::agent::{AgentLink, Heard};
 use crate::condition::{Condition, Lost};
 use crate::config::{Settings, Source};
 use crate::framing::{Framed, Lines};
-use crate::logged::Log;
-use crate::shdr::{self, Line, Shape};
+use crate::logged::{Due, Log};
+use crate::reader::Reader;
+use crate::shdr::block::Blocks;
 use crate::values::Values;
 
 /// What the bridge is told.
@@ -32,7 +33,7 @@ pub enum IoEvent {
     Connected,
     /// It could not be made, nor a request sent.
     NotConnected {
-        /// The system's word for it.
+        /// The reason that the system gives.
         reason: String,
     },
     /// An agent answered as a whole.
@@ -51,10 +52,26 @@ pub enum IoEvent {
     Received(Vec<u8>),
     /// The connection or the stream has ended.
     Closed {
-        /// The system's word for it.
+        /// The reason that the system gives.
         reason: String,
         /// HTTP status of the stream; 0 for an adapter.
         status: u16,
+    },
+}
+
+/// What was read of a log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LogRead<'a> {
+    /// The next bytes.
+    Bytes(&'a [u8]),
+    /// Its end was read.
+    End,
+    /// It cannot be read on.
+    Failed {
+        /// The reason that the system gives.
+        reason: String,
+        /// Bytes that were read before.
+        at_byte: u64,
     },
 }
 
@@ -108,6 +125,7 @@ enum Phase {
 #[derive(Clone, Debug)]
 struct ShdrLink {
     lines: Lines,
+    blocks: Blocks,
     heartbeat: Option<Span>,
     pinged_at: Option<Stamp<Host>>,
 }
@@ -116,7 +134,7 @@ struct ShdrLink {
 enum Link {
     Shdr(ShdrLink),
     Agent(AgentLink),
-    Log(Log),
+    Log(Box<Log>),
 }
 
 /// The bridge.
@@ -127,8 +145,7 @@ pub struct BridgeStage {
     phase: Phase,
     heard_at: Stamp<Host>,
     retry: Span,
-    values: Values,
-    refused_lines: u64,
+    reader: Reader,
     stopping: bool,
     greeted: bool,
 }
@@ -140,49 +157,77 @@ impl BridgeStage {
         let link = match settings.source {
             Source::Shdr => Link::Shdr(ShdrLink {
                 lines: Lines::new(settings.line_limit),
+                blocks: Blocks::default(),
                 heartbeat: None,
                 pinged_at: None,
             }),
-            Source::Log => Link::Log(Log::default()),
-            Source::Agent => Link::Agent(AgentLink::new(&settings.agent, &settings.mapping)),
+            Source::Log => Link::Log(Box::new(Log::new(
+                settings.longest_pause,
+                settings.line_limit,
+            ))),
+            Source::Agent => Link::Agent(AgentLink::new(settings)),
         };
         Self {
             link,
             phase: Phase::Waiting { until: None },
             heard_at: Stamp::default(),
             retry: settings.reconnect_first,
-            values: Values::new(settings.mapping.clone()),
-            refused_lines: 0,
+            reader: Reader::new(Values::new(settings.mapping.clone())),
             stopping: false,
             greeted: false,
             settings: settings.clone(),
         }
     }
 
-    /// A bridge that tells the lines of a log when their time has come.
+    /// A bridge that replays the lines of a log, of whatever encoding, when their time has come.
     #[must_use]
-    pub fn of_log(settings: &Settings, text: &str) -> Self {
+    pub fn of_log(settings: &Settings, bytes: &[u8]) -> Self {
+        let mut log = Log::new(settings.longest_pause, settings.line_limit);
+        log.feed(bytes);
+        log.finish();
         Self {
-            link: Link::Log(Log::new(text)),
+            link: Link::Log(Box::new(log)),
             ..Self::new(settings)
+        }
+    }
+
+    /// Whether more bytes of a log are to be read.
+    #[must_use]
+    pub const fn wants_log(&self) -> bool {
+        matches!(&self.link, Link::Log(log) if log.wants_more())
+    }
+
+    /// Takes what was read of a log.
+    pub fn read_log(&mut self, read: LogRead<'_>, out: &mut Vec<Output>) {
+        let Link::Log(log) = &mut self.link else {
+            return;
+        };
+        match read {
+            LogRead::Bytes(bytes) => log.feed(bytes),
+            LogRead::End => log.finish(),
+            LogRead::Failed { reason, at_byte } => {
+                log.finish();
+                out.push(Output::Condition(Condition::LogUnreadable {
+                    reason,
+                    at_byte,
+                }));
+            }
         }
     }
 
     fn tick(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
         self.greet(out);
         if let Link::Log(log) = &mut self.link {
-            let (values, refused) = (&mut self.values, &mut self.refused_lines);
-            log.due(at, |line| {
-                let flaw = take(line, at, values, &mut None, out);
-                out.extend(flaw.map(|flaw| {
-                    *refused += 1;
-                    let count = *refused;
-                    Output::Condition(Condition::Malformed { flaw, count })
-                }));
-            });
-            return self.values.wait(at, out);
+            tell_log(log, &mut self.reader, at, out);
+            return self.reader.values.wait(at, out);
         }
-        self.values.wait(at, out);
+        self.reader.values.wait(at, out);
+        self.reader.tell_account(at, out);
+        if let (Link::Agent(agent), Phase::Up) = (&mut self.link, self.phase) {
+            let mut heard = Vec::new();
+            agent.tick(at, &mut heard);
+            self.follow(at, heard, out);
+        }
         match self.phase {
             Phase::Waiting { until } if until.is_none_or(|until| at >= until) => {
                 self.phase = Phase::Asking { since: at };
@@ -204,7 +249,7 @@ impl BridgeStage {
 
     /// Says once what the mapping leaves open.
     fn greet(&mut self, out: &mut Vec<Output>) {
-        let axes = self.values.mapping().uncommanded();
+        let axes = self.reader.values.mapping().uncommanded();
         if !std::mem::replace(&mut self.greeted, true) && !axes.is_empty() {
             let letters: Vec<_> = axes.iter().map(|axis| axis.letter()).collect();
             let axes = letters.join(" ");
@@ -235,11 +280,12 @@ impl BridgeStage {
 
     fn lose(&mut self, at: Stamp<Host>, lost: Lost, out: &mut Vec<Output>) {
         out.push(Output::Io(IoCommand::Disconnect));
-        self.values.absent_all(at, out);
         if let Link::Shdr(link) = &mut self.link {
-            link.lines.restart();
+            self.reader
+                .end_of_connection(&mut link.lines, &mut link.blocks, out);
             (link.heartbeat, link.pinged_at) = (None, None);
         }
+        self.reader.values.absent_all(at, out);
         self.phase = Phase::Waiting {
             until: Some(at + self.retry),
         };
@@ -255,7 +301,10 @@ impl BridgeStage {
     fn up(&mut self, out: &mut Vec<Output>) {
         if self.phase != Phase::Up {
             self.phase = Phase::Up;
-            self.retry = self.settings.reconnect_first;
+            // An agent's stream may begin and then hold nothing that can be read: its first part counts.
+            if matches!(self.link, Link::Shdr(_)) {
+                self.retry = self.settings.reconnect_first;
+            }
             let address = self.settings.address.clone();
             out.push(Output::Condition(Condition::Connected { address }));
         }
@@ -282,21 +331,28 @@ impl BridgeStage {
             }
             (Link::Shdr(_), IoEvent::Closed { reason, .. }) => Err(Lost::Closed { reason }),
             (Link::Agent(agent), IoEvent::Answered { status, body }) => {
-                agent.answered(status, &body, &mut heard)
+                agent.answered(at, status, &body, &mut heard)
             }
             (Link::Agent(agent), IoEvent::Began { content_type }) => {
                 agent.began(&content_type);
                 Ok(())
             }
-            (Link::Agent(agent), IoEvent::Received(bytes)) => agent.received(&bytes, &mut heard),
+            (Link::Agent(agent), IoEvent::Received(bytes)) => {
+                agent.received(at, &bytes, &mut heard)
+            }
             (Link::Agent(agent), IoEvent::Closed { reason, status }) => {
-                agent.ended(&reason, status, &mut heard)
+                agent.ended(at, &reason, status, &mut heard)
             }
             (Link::Log(_), _)
             | (Link::Shdr(_), IoEvent::Answered { .. } | IoEvent::Began { .. })
             | (Link::Agent(_), IoEvent::Connected) => Ok(()),
         };
         self.follow(at, heard, out);
+        if let Link::Agent(agent) = &mut self.link
+            && agent.take_progress()
+        {
+            self.retry = self.settings.reconnect_first;
+        }
         if let Err(lost) = taken {
             self.lose(at, lost, out);
         }
@@ -305,7 +361,17 @@ impl BridgeStage {
     fn follow(&mut self, at: Stamp<Host>, heard: Vec<Heard>, out: &mut Vec<Output>) {
         for heard in heard {
             match heard {
-                Heard::Observation(observation) => self.values.hear(observation, at, out),
+                Heard::Observation(observation) => self.reader.values.hear(observation, at, out),
+                Heard::Held(observation) => self.reader.values.hear_held(observation, at, out),
+                Heard::Read { replaced, left } => {
+                    self.reader.account.lines += 1;
+                    self.reader.account.is_of_agent = true;
+                    self.reader.replaced(replaced, out);
+                    for _ in 0..left {
+                        self.reader.account.leave("observations that are none", 0);
+                    }
+                }
+                Heard::PartLeftOut { path, flaw } => self.reader.part_left_out(path, flaw, out),
                 Heard::Condition(condition) => out.push(Output::Condition(condition)),
                 Heard::Io(command) => {
                     if matches!(command, IoCommand::Stream { .. }) {
@@ -321,75 +387,68 @@ impl BridgeStage {
         let Link::Shdr(link) = &mut self.link else {
             return;
         };
-        let (values, refused, limit) = (
-            &mut self.values,
-            &mut self.refused_lines,
-            self.settings.line_limit,
-        );
-        let heartbeat = &mut link.heartbeat;
-        link.lines.receive(bytes, |framed| {
-            let condition = match framed {
-                Framed::TooLong { length } => {
-                    *refused += 1;
-                    Some(Condition::LineTooLong {
-                        length,
-                        limit,
-                        count: *refused,
-                    })
-                }
-                Framed::NotText { length } => {
-                    *refused += 1;
-                    Some(Condition::NotText {
-                        length,
-                        count: *refused,
-                    })
-                }
-                Framed::Line(line) => take(line, at, values, heartbeat, out).map(|flaw| {
-                    *refused += 1;
-                    Condition::Malformed {
-                        flaw,
-                        count: *refused,
+        let (reader, limit) = (&mut self.reader, self.settings.line_limit);
+        let ShdrLink {
+            lines,
+            blocks,
+            heartbeat,
+            ..
+        } = link;
+        lines.receive(bytes, |framed| match framed {
+            Framed::TooLong { length } => reader.too_long(length, limit, out),
+            Framed::Line { text, replaced } => {
+                reader.replaced(replaced, out);
+                blocks.push(text, at, |record| match record {
+                    Ok(record) => {
+                        if let Some(asked) = reader.take(&record, at, None, out) {
+                            *heartbeat = asked;
+                        }
                     }
-                }),
-            };
-            out.extend(condition.map(Output::Condition));
+                    Err(given_up) => reader.give_up(given_up, out),
+                });
+            }
         });
+    }
+
+    /// What is left of a log, or open of a connection, when the bridge ends.
+    fn leave(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        match &mut self.link {
+            Link::Log(log) => out.extend(log.left(at).map(|left| {
+                Output::Condition(Condition::LogLeft {
+                    lines: left.lines,
+                    is_all: left.is_all,
+                    next_s: left.next.as_secs_f64(),
+                    account: self.reader.account(),
+                })
+            })),
+            Link::Shdr(link) => {
+                self.reader
+                    .end_of_connection(&mut link.lines, &mut link.blocks, out);
+            }
+            Link::Agent(_) => {}
+        }
     }
 }
 
 const PING: &str = "* PING\n";
-/// An adapter that wants to be asked more or less often than this is not watched, ms.
-const HEARTBEATS_MS: std::ops::RangeInclusive<f64> = 100.0..=3.6e6;
 
-/// Takes one line; returns what is wrong with it.
-fn take(
-    line: &str,
-    at: Stamp<Host>,
-    values: &mut Values,
-    heartbeat: &mut Option<Span>,
-    out: &mut Vec<Output>,
-) -> Option<shdr::Flaw> {
-    if line.trim().is_empty() {
-        return None;
-    }
-    let shape = |key: &str| -> Option<Shape> {
-        let found = values.mapping().find(key.trim(), None);
-        found.map(|(_, used)| used.shape())
-    };
-    match shdr::read(line, shape) {
-        Line::Observations(observations) => {
-            for observation in observations {
-                values.hear(observation, at, out);
-            }
-            None
+/// Replays the lines whose time has come; with the last one, reports the account.
+fn tell_log(log: &mut Log, reader: &mut Reader, at: Stamp<Host>, out: &mut Vec<Output>) {
+    log.due(at, |due| {
+        let Due {
+            record,
+            dated,
+            leap,
+        } = due;
+        if let Some(leap) = leap {
+            out.push(reader.values.leap(leap));
         }
-        Line::Pong { period_ms } => {
-            let is_sensible = HEARTBEATS_MS.contains(&period_ms);
-            *heartbeat = is_sensible.then(|| Span::from_secs_f64(period_ms * 1e-3));
-            None
-        }
-        Line::Command => None,
-        Line::Malformed(flaw) => Some(flaw),
+        reader.take(record, at, dated, out);
+    });
+    if log.ends() {
+        reader.replaced(log.replaced(), out);
+        let account = reader.account();
+        out.push(Output::Condition(Condition::LogEnded { account }));
     }
 }
 
@@ -412,7 +471,8 @@ impl Stage for BridgeStage {
             Input::Io(event) => self.handle(at, event, out),
             Input::Shutdown => {
                 self.stopping = true;
-                self.values.finish(out);
+                self.reader.values.finish(out);
+                self.leave(at, out);
                 out.push(Output::Io(IoCommand::Disconnect));
                 out.push(Output::Stopped);
             }

@@ -2,19 +2,30 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use metrology::sample::{MachineValue, Quantity, TemperatureSample, Verdict};
+use metrology::number::number;
+use metrology::sample::Verdict;
 use metrology::stamp::{Host, Machine, Span, Stamp};
+use metrology::yaml::shown;
 
+use crate::account::Left;
 use crate::alarm::Alarms;
 use crate::condition::{Condition, words};
+use crate::leap::{Leap, Watch};
 use crate::mapping::{Mapping, Use};
-use crate::observation::{AlarmLevel, AlarmReport, MachineClock, Observation, Told};
+use crate::observation::{AlarmLevel, AlarmReport, MachineClock, MachineTime, Observation, Told};
 use crate::plausibility::{Judge, Reading};
 use crate::positions::Positions;
+use crate::possible::Possible;
+use crate::shdr::Shape;
 use crate::stage::Output;
 
+mod channel;
+
 /// Unknown keys are named up to this many.
-const UNMAPPED_LIMIT: usize = 40;
+pub const UNMAPPED_LIMIT: usize = 40;
+
+/// A longer value has no place in a message, bytes: the limit of a text in `abbe_msgs`.
+pub const VALUE_LIMIT: usize = 65_536;
 
 /// What is kept of one key of the mapping.
 #[derive(Clone, Debug)]
@@ -37,8 +48,15 @@ pub struct Values {
     positions: Positions,
     clock: MachineClock,
     unmapped: BTreeSet<String>,
+    watch: Watch,
     stamps_back: u64,
-    not_numbers: u64,
+    leaps: u64,
+    not_numbers: Left,
+    too_long: Left,
+    /// The log's line that is heard; 0: of a connection.
+    line: usize,
+    told: u64,
+    passed_over: u64,
     judged: Vec<(Reading, Verdict)>,
 }
 
@@ -69,8 +87,14 @@ impl Values {
             positions: Positions::default(),
             clock: MachineClock::default(),
             unmapped: BTreeSet::new(),
+            watch: Watch::default(),
             stamps_back: 0,
-            not_numbers: 0,
+            leaps: 0,
+            not_numbers: Left::default(),
+            too_long: Left::default(),
+            line: 0,
+            told: 0,
+            passed_over: 0,
             judged: Vec::new(),
         }
     }
@@ -81,8 +105,74 @@ impl Values {
         &self.mapping
     }
 
-    /// Takes an observation that came at `received_at`.
+    /// How the fields behind a key are to be read; `None`: nothing is known of it.
+    #[must_use]
+    pub fn shape(&self, key: &str) -> Option<Shape> {
+        let found = self.mapping.find(key, None);
+        let has_alarmed = || self.channels.get(key).map(|channel| channel.used.shape());
+        found.map(|(_, used)| used.shape()).or_else(has_alarmed)
+    }
+
+    /// Values that were taken or refused, and values of keys that are not in the mapping.
+    #[must_use]
+    pub const fn counts(&self) -> (u64, u64) {
+        (self.told, self.passed_over)
+    }
+
+    /// Values that were refused, by reason.
+    #[must_use]
+    pub const fn refused(&self) -> [(&'static str, Left); 2] {
+        [
+            ("values that are no numbers", self.not_numbers),
+            ("values over the limit", self.too_long),
+        ]
+    }
+
+    /// What is heard next stands in this line of a log; 0: it is of a connection.
+    pub const fn at_line(&mut self, line: usize) {
+        self.line = line;
+    }
+
+    /// The first keys that are not in the mapping.
+    #[must_use]
+    pub fn unmapped_keys(&self) -> BTreeSet<String> {
+        self.unmapped.clone()
+    }
+
+    /// Takes an observation that came at `received_at`, and watches the machine's clock by it.
     pub fn hear(
+        &mut self,
+        observation: Observation,
+        received_at: Stamp<Host>,
+        out: &mut Vec<Output>,
+    ) {
+        let is_stamped = observation.time != MachineTime::Absent;
+        let is_mapped = self
+            .mapping
+            .find(&observation.key, observation.name.as_deref())
+            .is_some();
+        if is_stamped && is_mapped {
+            let machine_at = self.clock.stamp(observation.time, received_at);
+            let leap = self.watch.hear(machine_at, received_at);
+            out.extend(leap.map(|leap| self.leap(leap)));
+        }
+        self.hear_held(observation, received_at, out);
+    }
+
+    /// Counts and reports a leap of the machine's clock.
+    pub fn leap(&mut self, leap: Leap) -> Output {
+        self.leaps += 1;
+        Output::Condition(Condition::ClockLeap {
+            from: words(leap.from),
+            to: words(leap.to),
+            by_s: (leap.to - leap.from).as_secs_f64(),
+            passed_s: leap.passed.map(Span::as_secs_f64),
+            count: self.leaps,
+        })
+    }
+
+    /// Takes an observation whose stamp may be of long ago, since it still holds.
+    pub fn hear_held(
         &mut self,
         observation: Observation,
         received_at: Stamp<Host>,
@@ -98,6 +188,8 @@ impl Values {
         let Some(mut channel) = self.channels.remove(&key) else {
             return;
         };
+        let is_published = channel.used != Use::Nothing && observation.told != Told::Unavailable;
+        self.told += u64::from(is_published);
         self.watch_clock(&key, &mut channel, machine_at, out);
         let moment = (machine_at, received_at);
         match observation.told {
@@ -138,10 +230,12 @@ impl Values {
                         impossible: 0,
                         unconfirmed: 0,
                     });
+                self.told += 1;
                 channel.alarm("", machine_at, report, out);
             }
             return;
         }
+        self.passed_over += 1;
         if self.unmapped.len() < UNMAPPED_LIMIT && self.unmapped.insert(observation.key) {
             let keys: Vec<_> = self.unmapped.iter().map(String::as_str).collect();
             let keys = keys.join(", ");
@@ -226,44 +320,43 @@ impl Values {
             Use::Number { .. } => 1,
             Use::Position { axes, .. } => axes.len(),
         };
+        if text.len() > VALUE_LIMIT {
+            self.refuse_long(key, text.len(), out);
+            return self.absent(key, channel, machine_at, out);
+        }
         let numbers = numbers(&text);
         if wanted > 0
             && numbers
                 .as_ref()
                 .is_none_or(|numbers| numbers.len() != wanted)
         {
-            return self.refuse(key, text, wanted, out);
+            self.refuse(key, text, wanted, out);
+            // What it is instead nobody knows: the last good one is over.
+            return self.absent(key, channel, machine_at, out);
         }
         let numbers = numbers.unwrap_or_default();
+        let impossible = numbers.iter().find_map(|one| channel.used.refuses(*one));
+        if let Some(possible) = impossible {
+            self.refuse_impossible(key, text, possible, out);
+            return self.absent(key, channel, machine_at, out);
+        }
         channel.appear(key, out);
         match &channel.used {
             Use::Position {
-                axes,
-                commanded,
-                factor,
+                axes, commanded, ..
             } => {
                 for (axis, number) in axes.iter().zip(numbers) {
-                    let position = number * factor;
+                    let position = channel.used.inner(number);
                     let positions = &mut self.positions;
                     let whole =
                         positions.hear(*axis, *commanded, position, machine_at, received_at);
                     out.extend(whole.map(Output::State));
                 }
             }
-            Use::Number { to_inner, .. } => {
-                let value = numbers
-                    .first()
-                    .map_or(f64::NAN, |n| n * to_inner.0 + to_inner.1);
-                let reading = Reading {
-                    machine_at,
-                    received_at,
-                    value,
-                    text,
-                };
-                channel.judge(reading, &mut self.judged, out);
-            }
-            _ => {
-                let value = f64::NAN;
+            used => {
+                let is_number = matches!(used, Use::Number { .. });
+                let first = numbers.first().filter(|_| is_number);
+                let value = first.map_or(f64::NAN, |one| used.inner(*one));
                 let reading = Reading {
                     machine_at,
                     received_at,
@@ -275,13 +368,42 @@ impl Values {
         }
     }
 
-    fn refuse(&mut self, key: &str, text: String, wanted: usize, out: &mut Vec<Output>) {
-        self.not_numbers += 1;
-        out.push(Output::Condition(Condition::NotNumbers {
+    fn refuse_long(&mut self, key: &str, length: usize, out: &mut Vec<Output>) {
+        self.too_long.note(self.line);
+        out.push(Output::Condition(Condition::ValueTooLong {
+            line: self.line,
             key: key.to_owned(),
-            text,
+            length,
+            limit: VALUE_LIMIT,
+            count: self.too_long.count,
+        }));
+    }
+
+    fn refuse(&mut self, key: &str, text: String, wanted: usize, out: &mut Vec<Output>) {
+        self.not_numbers.note(self.line);
+        out.push(Output::Condition(Condition::NotNumbers {
+            line: self.line,
+            key: key.to_owned(),
+            text: shown(&text),
             wanted,
-            count: self.not_numbers,
+            count: self.not_numbers.count,
+        }));
+    }
+
+    fn refuse_impossible(
+        &mut self,
+        key: &str,
+        text: String,
+        possible: Possible,
+        out: &mut Vec<Output>,
+    ) {
+        self.not_numbers.note(self.line);
+        out.push(Output::Condition(Condition::OutOfRange {
+            line: self.line,
+            key: key.to_owned(),
+            text: shown(&text),
+            possible,
+            count: self.not_numbers.count,
         }));
     }
 
@@ -295,7 +417,7 @@ impl Values {
         values: &[f64],
         out: &mut Vec<Output>,
     ) {
-        let Use::Number { to_inner, .. } = channel.used else {
+        let Use::Number { .. } = channel.used else {
             return self.refuse(key, format!("a series of {}", values.len()), 1, out);
         };
         channel.appear(key, out);
@@ -305,12 +427,16 @@ impl Values {
         };
         let first = values.len().saturating_sub(n_before + 1);
         for (at, value) in values.iter().enumerate().skip(first) {
+            if let Some(possible) = channel.used.refuses(*value) {
+                self.refuse_impossible(key, number(*value), possible, out);
+                continue;
+            }
             let n_after = (values.len() - 1 - at) as f64;
             let before = Span::from_secs_f64(rate_hz.map_or(0.0, |rate_hz| n_after / rate_hz));
             let reading = Reading {
                 machine_at: Stamp::from_nanos((machine_at - before).nanos().max(0)),
                 received_at,
-                value: value * to_inner.0 + to_inner.1,
+                value: channel.used.inner(*value),
                 text: value.to_string(),
             };
             channel.judge(reading, &mut self.judged, out);
@@ -355,138 +481,12 @@ impl Values {
             self.channels.insert(key, channel);
         }
         self.clock.forget();
+        self.watch.forget();
     }
 }
 
 /// All numbers in a text, where it has nothing else and all are finite.
 fn numbers(text: &str) -> Option<Vec<f64>> {
-    let number = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
-    text.split_whitespace().map(number).collect()
-}
-
-impl Channel {
-    fn name(&self, key: &str) -> String {
-        match &self.used {
-            Use::Number { name, .. } | Use::Text { name, .. } | Use::Alarm { name } => name.clone(),
-            Use::Position { .. } | Use::Nothing => crate::mapping::name_of(key),
-        }
-    }
-
-    fn alarm(&mut self, key: &str, at: Stamp<Machine>, report: AlarmReport, out: &mut Vec<Output>) {
-        let name = self.name(key);
-        let state = self.alarms.hear(at, report);
-        self.present = true;
-        out.extend(state.map(|state| Output::Condition(Condition::Alarm { name, state })));
-    }
-
-    fn appear(&mut self, key: &str, out: &mut Vec<Output>) {
-        self.present = true;
-        if std::mem::take(&mut self.absent) {
-            let name = self.name(key);
-            out.push(Output::Condition(Condition::Present { name }));
-        }
-    }
-
-    fn judge(
-        &mut self,
-        reading: Reading,
-        judged: &mut Vec<(Reading, Verdict)>,
-        out: &mut Vec<Output>,
-    ) {
-        let before = match &mut self.judge {
-            None => {
-                judged.push((reading, Verdict::Good));
-                None
-            }
-            Some(judge) => {
-                let before = judge.base().cloned();
-                judge.hear(reading, judged);
-                before
-            }
-        };
-        self.tell(judged, before, out);
-    }
-
-    /// Tells what has been judged; `before` is the last good reading before all of it.
-    fn tell(
-        &mut self,
-        judged: &mut Vec<(Reading, Verdict)>,
-        before: Option<Reading>,
-        out: &mut Vec<Output>,
-    ) {
-        if judged.is_empty() {
-            return;
-        }
-        let (name, quantity) = match &self.used {
-            Use::Number { name, quantity, .. } | Use::Text { name, quantity, .. } => {
-                (name.clone(), *quantity)
-            }
-            _ => return judged.clear(),
-        };
-        let after = judged.last().map(|(reading, _)| reading.text.clone());
-        for (reading, verdict) in judged.drain(..) {
-            let condition = self.count(&name, &reading, verdict, before.as_ref(), after.as_deref());
-            out.extend(condition.map(Output::Condition));
-            if quantity == Quantity::Temperature && verdict == Verdict::Good {
-                out.push(Output::Temperature(TemperatureSample {
-                    at: reading.received_at,
-                    sensor: name.clone(),
-                    temperature_degc: reading.value,
-                    variance_k2: 0.0,
-                }));
-            }
-            out.push(Output::Value(MachineValue {
-                received_at: reading.received_at,
-                machine_at: reading.machine_at,
-                name: name.clone(),
-                quantity,
-                verdict,
-                value: reading.value,
-                text: reading.text,
-            }));
-        }
-    }
-
-    fn count(
-        &mut self,
-        name: &str,
-        reading: &Reading,
-        verdict: Verdict,
-        before: Option<&Reading>,
-        after: Option<&str>,
-    ) -> Option<Condition> {
-        let (name, value, at) = (
-            name.to_owned(),
-            reading.text.clone(),
-            words(reading.machine_at),
-        );
-        match verdict {
-            Verdict::Good => None,
-            Verdict::Impossible => {
-                self.impossible += 1;
-                let judge = self.judge.as_ref();
-                Some(Condition::Impossible {
-                    name,
-                    value,
-                    before: before.map(|before| before.text.clone()).unwrap_or_default(),
-                    after: after.unwrap_or_default().to_owned(),
-                    allowed: before
-                        .zip(judge)
-                        .map_or(f64::NAN, |(before, judge)| judge.allowed(before, reading)),
-                    at,
-                    count: self.impossible,
-                })
-            }
-            Verdict::Unconfirmed => {
-                self.unconfirmed += 1;
-                let count = self.unconfirmed;
-                Some(Condition::Unconfirmed {
-                    name,
-                    value,
-                    at,
-                    count,
-                })
-            }
-        }
-    }
+    let parsed = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
+    text.split_whitespace().map(parsed).collect()
 }

@@ -211,7 +211,7 @@ impl Arguments {
         if name.is_empty() {
             return Err(bad("the name is empty"));
         }
-        let value = Tree::from_yaml(text).map_err(|error| bad(&error.to_string()))?;
+        let value = Tree::from_yaml(text).map_err(|error| bad(&error.rule))?;
         self.parameters.push(ParameterSource::Value {
             node,
             name: name.to_owned(),

@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use abbe_msgs::builtin_interfaces::msg::Time;
-use metrology::Stamp;
-use metrology::stamp::{Host, NANOS_PER_S};
+use metrology::stamp::Host;
+use metrology::{Stamp, epoch};
 
 mod host_time;
 
@@ -77,17 +77,11 @@ impl Clock {
     }
 }
 
-/// A stamp as ROS writes it; times before 1970 or after 2038 come out as zero.
+/// A stamp as ROS writes it; times before 1970 or after 2106 come out as zero.
 pub(crate) fn ros_time(at: Stamp<Host>) -> Time {
-    let sec = i32::try_from(at.nanos().div_euclid(NANOS_PER_S));
-    let nanosec = u32::try_from(at.nanos().rem_euclid(NANOS_PER_S));
-    match (sec, nanosec) {
-        (Ok(sec), Ok(nanosec)) => Time { sec, nanosec },
-        _ => Time::default(),
+    if epoch::holds(at) {
+        abbe_msgs::time(at)
+    } else {
+        Time::default()
     }
-}
-
-/// A time of ROS as a stamp.
-pub(crate) fn stamp(time: &Time) -> Stamp<Host> {
-    Stamp::from_nanos(i64::from(time.sec) * NANOS_PER_S + i64::from(time.nanosec))
 }

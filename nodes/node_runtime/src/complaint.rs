@@ -2,8 +2,7 @@
 //!
 //! An error that shows its source in its own sentence, as those of the pure crates do, and has it as
 //! a source as well would say it twice when the chain is printed. Here a cause that stands in what was
-//! said already is left out. The reader of YAML draws the place that it complains of over several lines,
-//! with its reason once more; that becomes one line.
+//! said already is left out.
 
 use std::fmt::Arguments;
 use std::io::Write;
@@ -25,16 +24,9 @@ pub fn line(text: Arguments<'_>) {
 /// The whole chain of `error` in one text.
 #[must_use]
 pub fn in_words(error: &anyhow::Error) -> String {
-    let of_yaml = error
-        .chain()
-        .find_map(|cause| cause.downcast_ref::<serde_saphyr::Error>());
     let mut said = String::new();
     for cause in error.chain() {
-        let is_yaml = cause.is::<serde_saphyr::Error>();
-        let mut words = cause.to_string();
-        if let Some(yaml) = of_yaml {
-            words = words.replace(&yaml.to_string(), &reason(yaml));
-        }
+        let words = cause.to_string();
         if said.is_empty() {
             said = words;
         } else if words.starts_with(&said) {
@@ -43,38 +35,8 @@ pub fn in_words(error: &anyhow::Error) -> String {
         } else if !said.contains(words.trim_end()) {
             said = format!("{said}: {words}");
         }
-        // What it has as a source is itself once more, without the drawing.
-        if is_yaml {
-            break;
-        }
     }
     said
-}
-
-/// Line, column and reason of an error in a YAML text.
-fn reason(error: &serde_saphyr::Error) -> String {
-    let text = error.without_snippet().to_string();
-    let line = text.lines().next().unwrap_or_default();
-    match (error.location(), line.split_once(" at line ")) {
-        (Some(at), Some((reason, _))) => {
-            format!("line {}, column {}: {reason}", at.line(), at.column())
-        }
-        _ => line.to_owned(),
-    }
-}
-
-/// The same with what stands in that line of `text`.
-#[must_use]
-pub fn of_yaml(error: &serde_saphyr::Error, text: &str) -> String {
-    let reason = reason(error);
-    let line = error
-        .location()
-        .and_then(|at| usize::try_from(at.line()).ok()?.checked_sub(1))
-        .and_then(|above| text.lines().nth(above));
-    match line.map(str::trim) {
-        Some(line) if !line.is_empty() => format!("{reason}, in `{line}`"),
-        _ => reason,
-    }
 }
 
 #[cfg(test)]
@@ -106,33 +68,6 @@ mod tests {
             in_words(&placed),
             format!("node probe: cannot open bag: {reason}")
         );
-    }
-
-    #[derive(Debug, thiserror::Error)]
-    #[error("plan: {0}")]
-    struct Plan(#[source] serde_saphyr::Error);
-
-    #[derive(Debug, serde::Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct Step {
-        _minutes: f64,
-    }
-
-    #[test]
-    fn an_error_in_yaml_is_one_line_with_place_reason_and_what_stands_there() {
-        let text = "# steps\nminuets: 3.0\n";
-        let error = serde_saphyr::from_str::<Step>(text).unwrap_err();
-        assert!(error.to_string().lines().count() > 1, "it draws no place");
-        let shown = of_yaml(&error, text);
-        assert!(shown.starts_with("line 2, column 1: "), "{shown}");
-        assert!(shown.ends_with(", in `minuets: 3.0`"), "{shown}");
-        let chained = in_words(&anyhow::Error::new(Plan(error)).context("plan p.yaml"));
-        assert!(
-            chained.starts_with("plan p.yaml: plan: line 2, column 1: "),
-            "{chained}"
-        );
-        assert_eq!(chained.lines().count(), 1, "{chained}");
-        assert_eq!(chained.matches("unknown field").count(), 1, "{chained}");
     }
 
     #[test]

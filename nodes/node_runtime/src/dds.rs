@@ -5,6 +5,7 @@
 //! endpoints whose samples it decodes itself. What leaves this module is free of DDS types: Zenoh
 //! stands beside it.
 
+use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, UdpSocket};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -124,6 +125,11 @@ impl ByHand {
     }
 }
 
+/// Participants whose nodes are kept by name.
+const MOST_NEIGHBOURS: usize = 1_000;
+/// Nodes of one participant that are named.
+const MOST_NAMES: usize = 4;
+
 /// A node's place on the network.
 ///
 /// The participant comes last, so that it is dropped last: an endpoint that outlives it complains.
@@ -134,6 +140,8 @@ pub(crate) struct Participant {
     subscriber: rustdds::Subscriber,
     node: NodeName,
     entities: Mutex<NodeEntitiesInfo>,
+    /// Names of the nodes of other participants.
+    neighbours: Mutex<BTreeMap<[u8; 12], String>>,
     /// What is sent past the library; nothing where packets are encrypted.
     by_hand: Option<ByHand>,
     /// Where there may be other hosts.
@@ -212,6 +220,7 @@ impl Participant {
             graph_reader,
             node,
             entities,
+            neighbours: Mutex::default(),
         })
     }
 
@@ -322,6 +331,7 @@ impl Participant {
             match self.graph_reader.try_take_one() {
                 Ok(Some(change)) => {
                     let info = change.into_value();
+                    self.meet(&info);
                     found |= info.gid() != mine
                         && info
                             .nodes()
@@ -335,6 +345,35 @@ impl Participant {
         }
     }
 
+    /// Keeps the names of a participant's nodes.
+    fn meet(&self, info: &ParticipantEntitiesInfo) {
+        let gid = info.gid();
+        let Some(participant) = gid.as_bytes().first_chunk::<12>().copied() else {
+            return;
+        };
+        let mut neighbours = self
+            .neighbours
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        // Participants beyond this number are reported without a name.
+        if neighbours.len() < MOST_NEIGHBOURS || neighbours.contains_key(&participant) {
+            let names = info.nodes().iter().take(MOST_NAMES);
+            let names: Vec<String> = names.map(NodeEntitiesInfo::fully_qualified_name).collect();
+            neighbours.insert(participant, names.join(" or "));
+        }
+    }
+
+    /// The node, or nodes, of an endpoint.
+    fn node_of(&self, guid: [u8; 16]) -> String {
+        let neighbours = self
+            .neighbours
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let prefix = guid.first_chunk::<12>();
+        let name = prefix.and_then(|prefix| neighbours.get(prefix));
+        name.cloned().unwrap_or_default()
+    }
+
     /// Everybody's writers, ours included.
     pub fn writers(&self) -> Vec<Remote> {
         let describe = |found: rustdds::discovery::DiscoveredWriterData| {
@@ -342,6 +381,7 @@ impl Participant {
             let (role, name) = role_of(&data.topic_name)?;
             Some(Remote {
                 guid: data.key.to_bytes(),
+                node: self.node_of(data.key.to_bytes()),
                 role,
                 name: name.to_owned(),
                 dds_type: data.type_name.clone(),
@@ -362,6 +402,7 @@ impl Participant {
             let qos = data.qos();
             Some(Remote {
                 guid: data.key().to_bytes(),
+                node: self.node_of(data.key().to_bytes()),
                 role,
                 name: name.to_owned(),
                 dds_type: data.type_name().clone(),

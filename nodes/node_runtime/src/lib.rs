@@ -25,6 +25,7 @@ pub mod node;
 pub mod parameter;
 pub mod setup;
 pub mod tap;
+pub mod text_file;
 pub mod wiring;
 #[cfg(feature = "zenoh")]
 mod zenoh;
@@ -34,6 +35,7 @@ pub use diagnostic::{Diagnostic, Level};
 pub use harness::Harness;
 pub use interruption::Interruption;
 pub use live::{Composition, Running, launch, run, run_composed};
+pub use log::deafness;
 pub use node::{Bytes, Emission, Event, GoalId, GoalStatus, Node, NodeFault};
 pub use setup::Setup;
 pub use tap::{RawPublisher, RawTap};

@@ -29,6 +29,7 @@ pub(crate) mod incoming;
 mod logger_levels;
 mod owner;
 mod parameters;
+mod refusals;
 mod related;
 mod requests;
 mod service;
@@ -170,15 +171,26 @@ pub fn launch(
         let owner = assembly::assemble(&setup, node, participant)
             .with_context(|| format!("node {name}"))?;
         let span = tracing::error_span!("node", node = name.as_str());
-        if let Some(warning) = warning {
-            span.in_scope(|| tracing::warn!("{warning}"));
-        }
+        span.in_scope(|| {
+            for line in warning.into_iter().chain(without_effect(&setup)) {
+                tracing::warn!("{line}");
+            }
+        });
         let stopped = shift.stop.subscribe();
         shift
             .tasks
             .spawn_on(owner.run(stopped).instrument(span), runtime.handle());
     }
     Ok(Running { runtime, shifts })
+}
+
+/// What was given to a node and does nothing there.
+fn without_effect(setup: &Setup) -> Vec<String> {
+    let rules = setup.names().unused_rules().into_iter();
+    let rules = rules.map(|rule| {
+        format!("remap rule `{rule}` has no effect: the node has no topic, service or action of that name")
+    });
+    setup.unused_files().into_iter().chain(rules).collect()
 }
 
 /// How a node is told to end.
@@ -221,7 +233,7 @@ impl Running {
     /// Runs until an end is asked for, then stops; at once when that is asked for.
     ///
     /// # Errors
-    /// When a node ended by a panic, and the others have been stopped then; when the end was forced.
+    /// When a node ended by a panic or hears no more, and the others have been stopped then; when the end was forced.
     pub fn until(mut self, interruption: &Interruption) -> anyhow::Result<()> {
         let mut ended = None;
         while !interruption.wait(LOOK) {
@@ -234,8 +246,11 @@ impl Running {
         ended.map_or(stopped, Err)
     }
 
-    /// Why a node has ended although nobody asked it to; `None`: all are at work.
+    /// Why a node has ended although nobody asked it to, or hears no more; `None`: all are at work.
     pub fn ended(&mut self) -> Option<anyhow::Error> {
+        if let Some(reason) = log::deafness() {
+            return Some(anyhow::anyhow!(reason));
+        }
         let mut shifts = self.shifts.iter_mut();
         let ended = shifts.find_map(|shift| shift.tasks.try_join_next())?;
         Some(match ended {

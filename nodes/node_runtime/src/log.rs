@@ -30,8 +30,10 @@ use crate::clock::{self, Clock};
 use crate::environment::Environment;
 use crate::network::Writer;
 
+mod deaf;
 mod levels;
 
+pub use deaf::deafness;
 use levels::Levels;
 pub(crate) use levels::Severity;
 
@@ -147,7 +149,7 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
     let filter = environment
         .log_filter
         .as_deref()
-        .and_then(|directives| EnvFilter::try_new(directives).ok())
+        .and_then(|directives| EnvFilter::try_new(deaf::heard(directives)).ok())
         .unwrap_or_else(|| EnvFilter::new(default));
     // Before its node speaks the lines of a program are those of all its nodes.
     let mut outputs = arguments.iter().map(|arguments| arguments.log_outputs);
@@ -162,6 +164,7 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
     // A program that composes nodes may have a subscriber of its own: its lines are its affair then.
     let _ = tracing_subscriber::registry()
         .with(Levels::above(filter))
+        .with(deaf::LastWords::of_process())
         .with(console)
         .with(Rosout)
         .try_init();

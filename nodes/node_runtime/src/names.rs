@@ -2,6 +2,9 @@
 //!
 //! Rules: design.ros2.org, "Topic and Service name mapping to DDS" and "Remapping names".
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 /// A name that ROS forbids.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("name `{name}`: {reason}")]
@@ -60,6 +63,19 @@ impl RemapRule {
     #[must_use]
     pub fn concerns(&self, name: &str) -> bool {
         self.node.as_deref().is_none_or(|node| node == name)
+    }
+}
+
+/// A rule of one node, and whether it has renamed something.
+#[derive(Clone, Debug)]
+struct Rule {
+    rule: RemapRule,
+    is_used: Arc<AtomicBool>,
+}
+
+impl PartialEq for Rule {
+    fn eq(&self, other: &Self) -> bool {
+        self.rule == other.rule
     }
 }
 
@@ -129,7 +145,7 @@ pub struct NodeNames {
     /// Namespace, `/` or `/a/b`.
     pub namespace: String,
     /// Topic and service rules that concern it.
-    rules: Vec<RemapRule>,
+    rules: Vec<Rule>,
 }
 
 impl NodeNames {
@@ -150,7 +166,10 @@ impl NodeNames {
         check_namespace(&namespace)?;
         let rules = mine()
             .filter(|rule| !rule.from.starts_with("__"))
-            .cloned()
+            .map(|rule| Rule {
+                rule: rule.clone(),
+                is_used: Arc::default(),
+            })
             .collect();
         Ok(Self {
             name,
@@ -193,11 +212,26 @@ impl NodeNames {
     pub fn resolve(&self, name: &str) -> Result<String, NameError> {
         check(name)?;
         let expanded = self.expand(name);
-        Ok(self
-            .rules
-            .iter()
-            .find(|rule| self.expand(&rule.from) == expanded)
-            .map_or(expanded, |rule| self.expand(&rule.to)))
+        let mut rules = self.rules.iter();
+        Ok(
+            match rules.find(|rule| self.expand(&rule.rule.from) == expanded) {
+                Some(rule) => {
+                    rule.is_used.store(true, Ordering::Relaxed);
+                    self.expand(&rule.rule.to)
+                }
+                None => expanded,
+            },
+        )
+    }
+
+    /// Rules for this node that have renamed nothing so far, as they were given.
+    #[must_use]
+    pub fn unused_rules(&self) -> Vec<String> {
+        let unused = self.rules.iter();
+        let unused = unused.filter(|rule| !rule.is_used.load(Ordering::Relaxed));
+        unused
+            .map(|rule| format!("{}:={}", rule.rule.from, rule.rule.to))
+            .collect()
     }
 }
 
@@ -272,7 +306,9 @@ mod tests {
         let node = names(&["__ns:=/cell", "other:a:=b", "a:=/x/c", "a:=d", "/tf:=tf"]);
         assert_eq!(node.resolve("a").unwrap(), "/x/c");
         assert_eq!(node.resolve("/cell/a").unwrap(), "/x/c");
+        assert_eq!(node.unused_rules(), ["a:=d", "/tf:=tf"]);
         assert_eq!(node.resolve("/tf").unwrap(), "/cell/tf");
+        assert_eq!(node.unused_rules(), ["a:=d"]);
     }
 
     #[test]

@@ -49,6 +49,17 @@ pub(crate) enum PublishError {
     Broken(String),
 }
 
+impl PublishError {
+    /// The reason in few words, the same for every sample of its kind.
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Self::Encapsulation { .. } => "no little-endian plain CDR",
+            Self::Full => "too many samples wait for an acknowledgement",
+            Self::Broken(_) => "the middleware did not take it",
+        }
+    }
+}
+
 const HEADER_LEN: usize = 4;
 const CDR_LE: [u8; 2] = [0, 1];
 
@@ -76,6 +87,8 @@ pub(crate) enum Role {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Remote {
     pub guid: Guid,
+    /// Full name of its node; of a process with several nodes all of them; empty where it is not known.
+    pub node: String,
     pub role: Role,
     /// Of the topic or service.
     pub name: String,

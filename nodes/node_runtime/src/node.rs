@@ -9,7 +9,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use abbe_msgs::service_msgs::msg::ServiceEventInfo;
-use abbe_msgs::{Description, Qos, Service, ServiceEvent, WireError, from_cdr, to_cdr};
+use abbe_msgs::{Defect, Description, Qos, Service, ServiceEvent, WireError, from_cdr, to_cdr};
 use metrology::stamp::{Host, Span, Stamp};
 
 use crate::diagnostic::Diagnostic;
@@ -252,6 +252,46 @@ pub struct NodeFault {
     pub port: String,
     /// The error, with place, value and limit.
     pub reason: String,
+    /// What is wrong with the bytes; none: the node does not take what they say.
+    pub defect: Option<Defect>,
+}
+
+/// Why an event could not be taken.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Refusal {
+    /// The error, with place, value and limit.
+    pub reason: String,
+    /// What is wrong with the bytes; none: the node does not take what they say.
+    pub defect: Option<Defect>,
+}
+
+impl Refusal {
+    /// By the node itself.
+    pub fn by_node(error: impl ToString) -> Self {
+        Self {
+            reason: error.to_string(),
+            defect: None,
+        }
+    }
+
+    /// As the fault of a node and its port.
+    pub fn fault(self, node: &str, port: &str) -> NodeFault {
+        NodeFault {
+            node: node.to_owned(),
+            port: port.to_owned(),
+            reason: self.reason,
+            defect: self.defect,
+        }
+    }
+}
+
+impl From<WireError> for Refusal {
+    fn from(error: WireError) -> Self {
+        Self {
+            defect: Some(error.defect()),
+            reason: error.to_string(),
+        }
+    }
 }
 
 /// A node, ready to be driven by a runner.
@@ -284,6 +324,10 @@ pub trait Node: Send {
     /// The node is put on a live graph: real time passes while it computes. Told once, before any event; a node in the
     /// harness is never told.
     fn goes_live(&mut self) {}
+
+    /// So many publishers of a subscription's topic are on the graph, looked at once a second. The harness, where
+    /// everybody is known, never says it.
+    fn sees_publishers(&mut self, _subscription: usize, _publishers: usize) {}
 
     /// Copies everything that what it will say depends on; `None`: it cannot, or not now.
     fn save(&self) -> Option<Saved> {

@@ -1,15 +1,14 @@
 //! What a node is told before it is built: its name, its parameters, and files that these name.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "parameter files and the files they name are read here"
-)]
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use anyhow::Context;
 use metrology::ParameterDoc;
+use metrology::number::{number, unit_of};
+use metrology::yaml::Place;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -19,19 +18,23 @@ use crate::log::{self, Severity};
 use crate::names::{NameError, NodeNames};
 use crate::node::Node;
 use crate::parameter::{Parameter, Value};
+use crate::text_file::{self, TextFileError};
 
 mod file;
 mod of_every_node;
 mod tree;
 
+pub use file::is_for;
 use of_every_node::OfEveryNode;
+pub use of_every_node::PARAMETERS_OF_EVERY_NODE;
 
 pub use tree::{Tree, TreeError};
 
 /// Where a parameter's value comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Origin {
-    File(PathBuf),
+    /// A file, and where in it.
+    File(PathBuf, Option<Place>),
     CommandLine,
 }
 
@@ -41,20 +44,13 @@ pub enum SetupError {
     /// The node's name or namespace.
     #[error(transparent)]
     Name(#[from] NameError),
-    /// A parameter file cannot be opened.
-    #[error("parameter file {path}: {source}", path = path.display())]
-    Unreadable {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    /// A parameter file cannot be read.
+    #[error("parameter file {0}")]
+    Unreadable(#[from] TextFileError),
     /// A parameter file cannot be understood.
-    #[error("parameter file {path}: {reason}", path = path.display())]
+    #[error("parameter file {reason}")]
     BadFile {
-        /// Which.
-        path: PathBuf,
-        /// Why.
+        /// File, line, column, and what is wrong.
         reason: String,
     },
     /// A parameter that the node cannot take.
@@ -85,11 +81,24 @@ pub struct Setup {
     names: NodeNames,
     parameters: Tree,
     origins: BTreeMap<String, Origin>,
+    /// Parameter files without a section for this node, with the sections that they have.
+    unfitting: Vec<(PathBuf, Vec<String>)>,
+    /// Sections of its files that are for other nodes.
+    of_others: Vec<(PathBuf, String)>,
     every: OfEveryNode,
     log_level: Option<Severity>,
     log_outputs: LogOutputs,
     /// Where the parameters go when nothing but these is asked for.
-    asked: Option<Arc<OnceLock<Vec<Parameter>>>>,
+    asked: Option<Arc<OnceLock<Described>>>,
+}
+
+/// A node's parameters without the node.
+#[derive(Clone, Debug, Default)]
+pub struct Described {
+    /// What the node's table says of each.
+    pub docs: Vec<ParameterDoc>,
+    /// Those that have a value, defaults included.
+    pub parameters: Vec<Parameter>,
 }
 
 /// How building a node ends when nothing but its parameters was asked for.
@@ -108,6 +117,8 @@ impl Setup {
             names,
             parameters: Tree::empty(),
             origins: BTreeMap::new(),
+            unfitting: Vec::new(),
+            of_others: Vec::new(),
             every: OfEveryNode::default(),
             log_level: None,
             log_outputs: arguments.log_outputs,
@@ -137,19 +148,48 @@ impl Setup {
     }
 
     fn add_file(&mut self, path: &Path) -> Result<(), SetupError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SetupError::Unreadable {
-            path: path.to_owned(),
-            source,
-        })?;
-        for section in file::sections(path, &text, &self.names.fully_qualified())? {
-            self.origins.extend(file::origins(path, &section));
-            if let Tree::Map(entries) = section {
+        let text = text_file::yaml(path)?;
+        let sections = file::sections(path, &text, &self.names.fully_qualified())?;
+        let others = sections.of_others.iter();
+        self.of_others
+            .extend(others.map(|name| (path.to_owned(), name.clone())));
+        if sections.fitting.is_empty() {
+            let others = sections.of_others.clone();
+            self.unfitting.push((path.to_owned(), others));
+        }
+        for section in &sections.fitting {
+            self.origins.extend(sections.origins(path, section));
+            if let Tree::Map(entries) = &section.values {
                 for (key, value) in entries {
-                    self.parameters.insert(&key, value);
+                    self.parameters.insert(key, value.clone());
                 }
             }
         }
         Ok(())
+    }
+
+    /// Sections of this node's parameter files that are for other nodes: the file, and the name in front of them.
+    #[must_use]
+    pub fn sections_of_others(&self) -> &[(PathBuf, String)] {
+        &self.of_others
+    }
+
+    /// Parameter files that were given and have nothing for this node, each with what it has.
+    #[must_use]
+    pub fn unused_files(&self) -> Vec<String> {
+        let own = self.names.fully_qualified();
+        let line = |(path, sections): &(PathBuf, Vec<String>)| {
+            let has = match sections.as_slice() {
+                [] => "it has no sections".to_owned(),
+                several => format!("its sections are for {}", several.join(", ")),
+            };
+            format!(
+                "parameter file {} has no section for {own}: {has}; write `{own}:`, or `/**/{}:` for any namespace",
+                path.display(),
+                self.name()
+            )
+        };
+        self.unfitting.iter().map(line).collect()
     }
 
     /// The node's name on the graph, without namespace.
@@ -219,34 +259,59 @@ impl Setup {
 
     fn explain(&self, error: &TreeError) -> SetupError {
         let place = error.place();
-        let key = place.split('[').next().unwrap_or_default();
-        match self.parameters.get(key) {
-            Some(value) if !matches!(value, Tree::Map(_)) => {
-                let mut explained = self.bad(key, value, error.reason.clone());
-                if let SetupError::BadParameter { name, .. } = &mut explained {
-                    *name = place;
-                }
-                explained
+        let reason = error.reason();
+        match self.parameters.at(&place) {
+            Some(value) if !place.is_empty() && !matches!(value, Tree::Map(_)) => {
+                self.bad(&place, value, reason)
             }
             _ if place.is_empty() => SetupError::Missing {
                 origin: self.files(),
-                reason: error.reason.clone(),
+                reason,
             },
             _ => SetupError::Missing {
-                origin: self.files(),
-                reason: format!("parameter `{place}`: {}", error.reason),
+                origin: self.origin(&place).unwrap_or_else(|| self.files()),
+                reason: format!("parameter `{place}`: {reason}"),
             },
         }
     }
 
+    /// The files that parameters come from, and those that have nothing for this node.
     fn files(&self) -> String {
-        let mut files: Vec<_> = self.origins.values().map(describe).collect();
+        let file = |origin: &Origin| match origin {
+            Origin::File(path, _) => path.display().to_string(),
+            Origin::CommandLine => describe(origin),
+        };
+        let mut files: Vec<_> = self.origins.values().map(file).collect();
         files.sort();
         files.dedup();
+        files.extend(self.unused_files());
         if files.is_empty() {
             "no parameter file".to_owned()
         } else {
             files.join(", ")
+        }
+    }
+
+    /// File, line and column of a parameter, of a part of it, or of what is below it.
+    fn origin(&self, place: &str) -> Option<String> {
+        let key = place.split('[').next().unwrap_or_default();
+        let below = format!("{key}.");
+        let own = self.origins.get(key);
+        let found = own.or_else(|| {
+            let mut all = self.origins.iter();
+            let (_, origin) = all.find(|(name, _)| name.starts_with(&below))?;
+            Some(origin)
+        });
+        found.map(describe)
+    }
+
+    /// A message that begins with the name of a parameter, with file, line and column in front.
+    #[must_use]
+    pub fn placed(&self, message: &str) -> String {
+        let name = message.split([' ', ':', ',']).next().unwrap_or_default();
+        match self.origin(name) {
+            Some(origin) => format!("{origin}: {message}"),
+            None => message.to_owned(),
         }
     }
 
@@ -258,16 +323,14 @@ impl Setup {
     }
 
     fn bad(&self, name: &str, value: &Tree, reason: String) -> SetupError {
-        let below = format!("{name}.");
-        let origin = self
-            .origins
-            .iter()
-            .find(|(key, _)| key.as_str() == name || key.starts_with(&below))
-            .map_or_else(|| self.where_not_set(), |(_, origin)| describe(origin));
+        let value = match (value, unit_of(name)) {
+            (Tree::Integer(_) | Tree::Double(_), Some(unit)) => format!("{value} {unit}"),
+            _ => value.to_string(),
+        };
         SetupError::BadParameter {
-            origin,
+            origin: self.origin(name).unwrap_or_else(|| self.where_not_set()),
             name: name.to_owned(),
-            value: value.to_string(),
+            value,
             reason,
         }
     }
@@ -279,9 +342,17 @@ impl Setup {
     /// When the parameter is absent or no text, or the file cannot be read.
     pub fn file_text(&self, key: &str) -> anyhow::Result<(PathBuf, String)> {
         let path = self.file_path(key)?;
-        let text = std::fs::read_to_string(&path)
-            .with_context(|| format!("parameter `{key}`: file {}", path.display()))?;
+        let text = text_file::yaml(&path).with_context(|| format!("parameter `{key}`"))?;
         Ok((path, text))
+    }
+
+    /// The file that the parameter `key` names, open, and its length: it is read in pieces, however long it is.
+    ///
+    /// # Errors
+    /// When the parameter is absent or no text, or the file cannot be opened or is no regular file.
+    pub fn file_opened(&self, key: &str) -> anyhow::Result<(File, u64)> {
+        let path = self.file_path(key)?;
+        text_file::open(&path).with_context(|| format!("parameter `{key}`"))
     }
 
     /// The path that the parameter `key` names; a relative path is relative to the parameter file that
@@ -303,7 +374,7 @@ impl Setup {
             ),
         };
         let directory = match self.origins.get(key) {
-            Some(Origin::File(file)) => file.parent().unwrap_or(Path::new("")),
+            Some(Origin::File(file, _)) => file.parent().unwrap_or(Path::new("")),
             _ => Path::new(""),
         };
         Ok(directory.join(path))
@@ -335,7 +406,8 @@ impl Setup {
             None => Ok(parameters),
             Some(told) => {
                 // The first answer counts: a node resolves its parameters once.
-                let _ = told.set(parameters);
+                let docs = docs.to_vec();
+                let _ = told.set(Described { docs, parameters });
                 Err(ParametersOnly.into())
             }
         }
@@ -350,16 +422,31 @@ impl Setup {
         &self,
         build: impl FnOnce(&Self) -> anyhow::Result<Box<dyn Node>>,
     ) -> anyhow::Result<Vec<Parameter>> {
-        let told = Arc::<OnceLock<Vec<Parameter>>>::default();
+        self.described_by(build)
+            .map(|described| described.parameters)
+    }
+
+    /// The same with the table in which the node says what each parameter is.
+    ///
+    /// # Errors
+    /// As [`Self::resolved_by`].
+    pub fn described_by(
+        &self,
+        build: impl FnOnce(&Self) -> anyhow::Result<Box<dyn Node>>,
+    ) -> anyhow::Result<Described> {
+        let told = Arc::<OnceLock<Described>>::default();
         let asking = Self {
             asked: Some(Arc::clone(&told)),
             ..self.clone()
         };
         let built = build(&asking);
-        if let Some(parameters) = told.get() {
-            return Ok(parameters.clone());
+        if let Some(described) = told.get() {
+            return Ok(described.clone());
         }
-        Ok(built?.parameters().to_vec())
+        Ok(Described {
+            docs: vec![],
+            parameters: built?.parameters().to_vec(),
+        })
     }
 
     /// The parameters that the runtime gives to every node.
@@ -391,7 +478,8 @@ impl Setup {
 
 fn describe(origin: &Origin) -> String {
     match origin {
-        Origin::File(path) => path.display().to_string(),
+        Origin::File(path, Some(at)) => format!("{}:{}:{}", path.display(), at.line, at.column),
+        Origin::File(path, None) => path.display().to_string(),
         Origin::CommandLine => "command line".to_owned(),
     }
 }
@@ -419,7 +507,7 @@ fn check_range(value: &Value, range: Option<(f64, f64)>) -> Result<(), String> {
     if fits {
         Ok(())
     } else {
-        Err(format!("must be {least} to {greatest}"))
+        Err(format!("must be {} to {}", number(least), number(greatest)))
     }
 }
 

@@ -7,18 +7,24 @@ use std::time::Duration;
 use abbe_msgs::{Durability, Qos, Reliability};
 use anyhow::Context as _;
 use metrology::Stamp;
-use metrology::stamp::Host;
+use metrology::stamp::{Host, Span};
 use tokio::runtime::Runtime;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinHandle;
 use tokio::time::Instant;
 
 use crate::clock;
 use crate::environment::Environment;
-use crate::live::incoming::GapCounter;
+use crate::log;
 use crate::names::{self, NodeNames};
-use crate::network::{Participant, Reader, Remote, Role, Writer};
-use crate::node::{Bytes, TopicPort};
+use crate::network::{Participant, Remote, Role};
+use crate::node::Bytes;
+
+mod ending;
+mod publisher;
+
+use ending::{End, LONGEST, Reading};
+pub use publisher::{PublishReport, RawPublisher, Unsent};
 
 /// A topic that was found on the network.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,6 +74,15 @@ pub enum TapEvent {
         topic: Arc<TappedTopic>,
         /// Why.
         reason: String,
+    },
+    /// Samples that were sent before the end could not be handed over in time.
+    Left {
+        /// Which topic.
+        topic: Arc<TappedTopic>,
+        /// How many of them were counted; there may be more.
+        samples: u64,
+        /// How long before the end the last sample that was handed over had been sent.
+        behind: Span,
     },
 }
 
@@ -124,8 +139,6 @@ const DEPTH: u32 = 20_000;
 const QUEUE_LEN: usize = 4_096;
 /// Between looks for new topics.
 const LOOK: Duration = Duration::from_millis(100);
-/// Between tries to find room in a full queue.
-const RETRY: Duration = Duration::from_micros(200);
 /// How long what was sent before the end may take to arrive.
 const ACKNOWLEDGEMENT: Duration = Duration::from_secs(1);
 
@@ -158,6 +171,8 @@ impl RawTap {
         selection: Selection,
         mut take: impl FnMut(TapEvent) + Send + 'static,
     ) -> anyhow::Result<Self> {
+        // Without a log nobody hears that the network's library has given up.
+        log::start(&[], environment);
         let runtime = runtime()?;
         let (participant, warning) = {
             let _inside = runtime.enter();
@@ -184,7 +199,7 @@ impl RawTap {
         })
     }
 
-    /// Stops listening, hands over what has arrived, and leaves the network.
+    /// Stops listening, hands over what was sent before (what is not there within 3 s is counted), and leaves the network.
     ///
     /// # Errors
     /// When the callback panicked.
@@ -208,6 +223,7 @@ async fn look(
 ) -> Participant {
     let mut found: BTreeMap<String, (Arc<TappedTopic>, Vec<String>)> = BTreeMap::new();
     let mut readers = tokio::task::JoinSet::new();
+    let (ending, end) = watch::channel(None);
     loop {
         for (name, writers) in offered(&participant.writers(), &selection) {
             let Some(first) = writers.first() else {
@@ -233,7 +249,8 @@ async fn look(
                 {
                     return participant;
                 }
-                readers.spawn(read(reader, Arc::clone(&topic), queue.clone()));
+                let reading = Reading::new(Arc::clone(&topic), queue.clone(), end.clone());
+                readers.spawn(reading.run(reader, clock::host_now));
                 found.insert(name.clone(), (topic, vec![first.dds_type.clone()]));
             }
             let Some((topic, types)) = found.get_mut(&name) else {
@@ -252,7 +269,12 @@ async fn look(
             () = tokio::time::sleep(LOOK) => {}
         }
     }
-    readers.shutdown().await;
+    ending.send_replace(Some(End {
+        asked: clock::host_now(),
+        latest: Instant::now() + LONGEST,
+    }));
+    // Each ends by itself, as soon as the callback has room for its last sample.
+    while readers.join_next().await.is_some() {}
     participant
 }
 
@@ -286,217 +308,6 @@ fn common_qos(writers: &[&Remote]) -> Qos {
     }
 }
 
-async fn read(reader: Reader, topic: Arc<TappedTopic>, queue: mpsc::Sender<TapEvent>) {
-    let mut gaps = GapCounter::default();
-    loop {
-        let topic = Arc::clone(&topic);
-        let event = match reader.next().await {
-            Ok(sample) => TapEvent::Sample(Tapped {
-                topic,
-                source: sample.source,
-                received: sample.received,
-                sequence: sample.sequence,
-                lost: gaps.count(sample.writer, sample.sequence),
-                bytes: sample.bytes,
-            }),
-            Err(reason) => TapEvent::Unreadable { topic, reason },
-        };
-        if queue.send(event).await.is_err() {
-            return;
-        }
-    }
-}
-
-/// A sample on its way out.
-struct Sample {
-    place: usize,
-    source: Option<Stamp<Host>>,
-    bytes: Bytes,
-}
-
-/// What the publishing thread is given.
-enum Outgoing {
-    Sample(Sample),
-    /// Answer when everything before has been acknowledged, or at the latest in so long.
-    Settle(Duration, oneshot::Sender<bool>),
-}
-
-/// Speaks on topics from any thread: the mirror of a run in one process, and a replay.
-///
-/// A slow network never holds the caller: what finds no room in the queue within the stated time is
-/// dropped and counted.
-pub struct RawPublisher {
-    runtime: Runtime,
-    queue: mpsc::Sender<Outgoing>,
-    publishing: JoinHandle<(Participant, Vec<Writer>, u64)>,
-    patience: Duration,
-    dropped: u64,
-}
-
-/// What became of the samples given to a [`RawPublisher`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PublishReport {
-    /// Found no room in the queue in time.
-    pub dropped: u64,
-    /// Were refused by the network: too many unacknowledged, or no little-endian CDR.
-    pub refused: u64,
-}
-
-impl RawPublisher {
-    /// Joins the network as the node `names` with one writer for each of `topics`; `patience` is the
-    /// longest that [`Self::publish`] waits.
-    ///
-    /// # Errors
-    /// When there is no network, or a topic's name breaks the rules of ROS.
-    pub fn start(
-        environment: &Environment,
-        names: &NodeNames,
-        topics: &[TopicPort],
-        queue_len: usize,
-        patience: Duration,
-    ) -> anyhow::Result<Self> {
-        let topics: Vec<TappedTopic> = topics
-            .iter()
-            .map(|port| TappedTopic {
-                name: port.topic.clone(),
-                type_name: port.type_name.to_owned(),
-                qos: port.qos,
-            })
-            .collect();
-        Self::of_found(environment, names, &topics, queue_len, patience)
-    }
-
-    /// The same for topics that were found somewhere, e.g. in a bag.
-    ///
-    /// # Errors
-    /// As [`Self::start`].
-    pub fn of_found(
-        environment: &Environment,
-        names: &NodeNames,
-        topics: &[TappedTopic],
-        queue_len: usize,
-        patience: Duration,
-    ) -> anyhow::Result<Self> {
-        let runtime = runtime()?;
-        let (mut participant, warning) = {
-            let _inside = runtime.enter();
-            Participant::join(environment, names)?
-        };
-        participant.wait_for_room();
-        if let Some(warning) = warning {
-            tracing::warn!("{warning}");
-        }
-        let mut writers = Vec::with_capacity(topics.len());
-        for topic in topics {
-            let name = names.resolve(&topic.name)?;
-            let dds_type = names::dds_type(&topic.type_name);
-            writers.push(participant.writer(&name, &dds_type, topic.qos)?);
-        }
-        participant.announce()?;
-        let (queue, mut outgoing) = mpsc::channel::<Outgoing>(queue_len.max(1));
-        let publishing = runtime.spawn(async move {
-            let mut refused = 0;
-            while let Some(next) = outgoing.recv().await {
-                match next {
-                    Outgoing::Sample(sample) => {
-                        let writer = writers.get(sample.place);
-                        let sent = writer.map(|w| w.publish(&sample.bytes, sample.source));
-                        refused += u64::from(!matches!(sent, Some(Ok(()))));
-                    }
-                    Outgoing::Settle(patience, answer) => {
-                        let all =
-                            futures::future::join_all(writers.iter().map(Writer::acknowledged));
-                        let settled = tokio::time::timeout(patience, all).await.is_ok();
-                        // Who asked may have gone.
-                        let _ = answer.send(settled);
-                    }
-                }
-            }
-            (participant, writers, refused)
-        });
-        Ok(Self {
-            runtime,
-            queue,
-            publishing,
-            patience,
-            dropped: 0,
-        })
-    }
-
-    /// Publishes on the topic at `place`; `source` is the sample's own time, else the present. False
-    /// when it was dropped.
-    pub fn publish(&mut self, place: usize, source: Option<Stamp<Host>>, bytes: Bytes) -> bool {
-        let outgoing = Outgoing::Sample(Sample {
-            place,
-            source,
-            bytes,
-        });
-        let taken = match self.queue.try_send(outgoing) {
-            Ok(()) => true,
-            Err(mpsc::error::TrySendError::Closed(_)) => false,
-            Err(mpsc::error::TrySendError::Full(outgoing)) => {
-                !self.patience.is_zero() && self.wait(outgoing)
-            }
-        };
-        self.dropped += u64::from(!taken);
-        taken
-    }
-
-    /// Waits until every reliable reader has acknowledged what was published so far; false when that took longer
-    /// than `patience`. Not from within an event loop.
-    #[must_use]
-    pub fn settle(&self, patience: Duration) -> bool {
-        let (answer, settled) = oneshot::channel();
-        let asked = self.queue.blocking_send(Outgoing::Settle(patience, answer));
-        asked.is_ok() && settled.blocking_recv().unwrap_or(false)
-    }
-
-    /// How many samples find room in the queue now.
-    #[must_use]
-    pub fn room(&self) -> usize {
-        self.queue.capacity()
-    }
-
-    /// Waits in the caller's thread, which may be one of another tokio runtime.
-    fn wait(&self, mut outgoing: Outgoing) -> bool {
-        let deadline = Instant::now() + self.patience;
-        while Instant::now() < deadline {
-            std::thread::park_timeout(RETRY);
-            match self.queue.try_send(outgoing) {
-                Ok(()) => return true,
-                Err(mpsc::error::TrySendError::Full(back)) => outgoing = back,
-                Err(mpsc::error::TrySendError::Closed(_)) => return false,
-            }
-        }
-        false
-    }
-
-    /// The time now, as samples are stamped.
-    #[must_use]
-    pub fn now() -> Stamp<Host> {
-        clock::host_now()
-    }
-
-    /// Sends what is left, waits until it has arrived, and leaves the network.
-    ///
-    /// # Errors
-    /// When the publishing thread panicked.
-    pub fn stop(self) -> anyhow::Result<PublishReport> {
-        drop(self.queue);
-        self.runtime.block_on(async {
-            let (participant, writers, refused) = self.publishing.await.context("publisher")?;
-            let all = futures::future::join_all(writers.iter().map(Writer::acknowledged));
-            let _ = tokio::time::timeout(ACKNOWLEDGEMENT, all).await;
-            let _ = participant.withdraw();
-            let _ = tokio::time::timeout(ACKNOWLEDGEMENT, participant.graph_acknowledged()).await;
-            Ok(PublishReport {
-                dropped: self.dropped,
-                refused,
-            })
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -523,6 +334,7 @@ mod tests {
     fn a_tap_asks_for_what_every_writer_offers() {
         let writer = |reliable, latched| Remote {
             guid: [0; 16],
+            node: String::new(),
             role: Role::Message,
             name: "/x".to_owned(),
             dds_type: "t".to_owned(),

@@ -25,20 +25,21 @@ use metrology::stamp::{Host, Span, Stamp};
 
 use crate::diagnostic::Diagnostic;
 use crate::node::{
-    Bytes, Emission, Event, Node, NodeFault, PATIENCE, Ports, Saved, ServiceEvents, ServicePort,
-    TopicPort,
+    Bytes, Emission, Event, Node, NodeFault, PATIENCE, Ports, Refusal, Saved, ServiceEvents,
+    ServicePort, TopicPort,
 };
 use crate::parameter::Parameter;
 
 mod action;
 mod managed;
+mod outgoing;
 mod snapshot;
 
 pub use action::{ClientSignal, GoalNews, GoalSignal};
 pub use managed::Lifecycle;
 
 /// Turns serialised bytes into a stage input, or says why it cannot.
-type Decode<I> = Box<dyn Fn(&[u8]) -> Result<I, String> + Send>;
+type Decode<I> = Box<dyn Fn(&[u8]) -> Result<I, Refusal> + Send>;
 /// Turns a stage output into emissions of one port.
 type Emit<O> = Box<dyn Fn(&O, &mut Vec<Emission>) + Send>;
 /// Decodes a request and forms the reply from what the stage answered.
@@ -48,10 +49,12 @@ type ServiceTable<I, O> = (Decode<I>, Reply<O>);
 /// Whether an output is the awaited one.
 type Satisfied<O> = Box<dyn Fn(&O) -> bool + Send>;
 /// Decodes the answer to a call of ours.
-type Answer<I> = Box<dyn Fn(u64, Option<&[u8]>) -> Result<I, String> + Send>;
+type Answer<I> = Box<dyn Fn(u64, Option<&[u8]>) -> Result<I, Refusal> + Send>;
 
 /// Tells a stage of what its runner does.
 type Told<S> = Box<dyn Fn(&mut S) + Send>;
+/// Tells a stage how many publish what it listens to.
+type Counted<S> = Box<dyn Fn(&mut S, usize) + Send>;
 
 /// The table of one node: a stage and what its inputs and outputs are called outside.
 pub struct Wiring<S: Stage> {
@@ -72,6 +75,7 @@ pub struct Wiring<S: Stage> {
     last: bool,
     own_time: bool,
     live: Option<Told<S>>,
+    publishers: Vec<(String, Counted<S>)>,
     snapshots: Option<snapshot::Snapshots<S>>,
     outputs: Vec<S::Output>,
 }
@@ -91,8 +95,17 @@ fn encode<M: Message>(message: &M) -> Bytes {
     Arc::from(to_cdr(message))
 }
 
-fn decode<M: Message>(bytes: &[u8]) -> Result<M, String> {
-    from_cdr(bytes).map_err(|error| error.to_string())
+/// Length of one message, request or goal: what nodes of ours send is below 16 MiB, a program of 100,000 touches included.
+const MOST_MESSAGE_BYTES: usize = 64 << 20;
+
+fn decode<M: Message>(bytes: &[u8]) -> Result<M, Refusal> {
+    let n = bytes.len();
+    if n > MOST_MESSAGE_BYTES {
+        let name = M::TYPE_NAME;
+        let reason = format!("{name}: {n} bytes: at most {MOST_MESSAGE_BYTES}");
+        return Err(Refusal::by_node(reason));
+    }
+    Ok(from_cdr(bytes)?)
 }
 
 impl<S> Wiring<S>
@@ -122,6 +135,7 @@ where
             last: false,
             own_time: false,
             live: None,
+            publishers: Vec::new(),
             snapshots: None,
             outputs: Vec::new(),
         }
@@ -158,10 +172,7 @@ where
         self.ports.subscriptions.push(port);
         self.messages.push(Box::new(move |bytes| {
             let message: M = decode(bytes)?;
-            message
-                .into_inner()
-                .map(&input)
-                .map_err(|error| error.to_string())
+            Ok(input(message.into_inner()?))
         }));
         self
     }
@@ -181,7 +192,10 @@ where
         topic: &Topic<M>,
         select: impl for<'a> Fn(&'a S::Output) -> Option<&'a M::Inner> + Send + 'static,
     ) -> Self {
-        self.publish_message(topic, move |output| select(output).map(M::from_inner))
+        self.say(
+            topic_port::<M>(topic.name.to_owned(), topic.qos),
+            move |output| select(output).map(M::from_inner),
+        )
     }
 
     /// As [`Wiring::publish`], with the name of a frame at `place` of each message.
@@ -193,11 +207,14 @@ where
         place: fn(&mut M) -> &mut String,
         select: impl for<'a> Fn(&'a S::Output) -> Option<&'a M::Inner> + Send + 'static,
     ) -> Self {
-        self.publish_message(topic, move |output| {
-            let mut message = M::from_inner(select(output)?);
-            place(&mut message).clone_from(&frame_id);
-            Some(message)
-        })
+        self.say(
+            topic_port::<M>(topic.name.to_owned(), topic.qos),
+            move |output| {
+                let mut message = M::from_inner(select(output)?);
+                place(&mut message).clone_from(&frame_id);
+                Some(message)
+            },
+        )
     }
 
     /// Publishes the outputs that `select` picks as one member of a topic family.
@@ -211,24 +228,33 @@ where
         select: impl for<'a> Fn(&'a S::Output) -> Option<&'a M::Inner> + Send + 'static,
     ) -> Result<Self, WireError> {
         let port = topic_port::<M>(family.of(member)?, family.qos);
-        Ok(self.speak(port, move |output| select(output).map(M::from_inner)))
+        Ok(self.say(port, move |output| select(output).map(M::from_inner)))
+    }
+
+    /// Publishes what its readers can take; see [`outgoing`].
+    fn say<M: Wire>(
+        mut self,
+        port: TopicPort,
+        form: impl Fn(&S::Output) -> Option<M> + Send + 'static,
+    ) -> Self {
+        let guard = outgoing::Outgoing::new(self.ports.publications.len(), port.topic.clone());
+        self.ports.publications.push(port);
+        self.emitters.push(Box::new(move |output, out| {
+            if let Some(message) = form(output) {
+                guard.push(&message, out);
+            }
+        }));
+        self
     }
 
     /// Publishes a message that `form` makes itself (standard messages without an inner form).
     #[must_use]
     pub fn publish_message<M: Message>(
-        self,
+        mut self,
         topic: &Topic<M>,
         form: impl Fn(&S::Output) -> Option<M> + Send + 'static,
     ) -> Self {
-        self.speak(topic_port::<M>(topic.name.to_owned(), topic.qos), form)
-    }
-
-    fn speak<M: Message>(
-        mut self,
-        port: TopicPort,
-        form: impl Fn(&S::Output) -> Option<M> + Send + 'static,
-    ) -> Self {
+        let port = topic_port::<M>(topic.name.to_owned(), topic.qos);
         let publication = self.ports.publications.len();
         self.ports.publications.push(port);
         self.emitters.push(Box::new(move |output, out| {
@@ -345,6 +371,18 @@ where
         self
     }
 
+    /// Tells the stage once a second how many publish a topic that it listens to; on a live graph alone.
+    #[must_use]
+    pub fn publishers_of<M: Wire>(
+        mut self,
+        topic: &Topic<M>,
+        told: impl Fn(&mut S, usize) + Send + 'static,
+    ) -> Self {
+        self.publishers
+            .push((topic.name.to_owned(), Box::new(told)));
+        self
+    }
+
     /// Closes the table.
     #[must_use]
     pub fn node(self) -> Box<dyn Node> {
@@ -404,14 +442,14 @@ impl<S: Stage> Wiring<S> {
     fn step(
         &mut self,
         at: Stamp<Host>,
-        input: Result<S::Input, String>,
+        input: Result<S::Input, Refusal>,
         out: &mut Vec<Emission>,
-    ) -> Result<(), String> {
+    ) -> Result<(), Refusal> {
         self.outputs.clear();
         let result = input.and_then(|input| {
             self.stage
                 .step(at, input, &mut self.outputs)
-                .map_err(|error| error.to_string())
+                .map_err(Refusal::by_node)
         });
         for output in &self.outputs {
             for emit in &self.emitters {
@@ -430,7 +468,7 @@ impl<S: Stage> Wiring<S> {
         (service, id): (usize, u64),
         bytes: &[u8],
         out: &mut Vec<Emission>,
-    ) -> Result<(), String> {
+    ) -> Result<(), Refusal> {
         let Some((decode, _)) = self.services.get(service) else {
             return Ok(());
         };
@@ -439,14 +477,14 @@ impl<S: Stage> Wiring<S> {
         let reply = &self.services[service].1;
         let bytes = match &result {
             Ok(()) => reply(Ok(&self.outputs)),
-            Err(reason) => reply(Err(reason)),
+            Err(refusal) => reply(Err(&refusal.reason)),
         };
         out.push(Emission::Respond { service, id, bytes });
         result
     }
 
     /// The stage input of every event but requests; `None` for a port that does not exist.
-    fn input(&self, event: Event<'_>) -> Option<Result<S::Input, String>> {
+    fn input(&self, event: Event<'_>) -> Option<Result<S::Input, Refusal>> {
         match event {
             Event::Message {
                 subscription,
@@ -496,6 +534,15 @@ where
         }
     }
 
+    fn sees_publishers(&mut self, subscription: usize, publishers: usize) {
+        let port = self.ports.subscriptions.get(subscription);
+        for (topic, told) in &self.publishers {
+            if port.is_some_and(|port| port.topic == *topic) {
+                told(&mut self.stage, publishers);
+            }
+        }
+    }
+
     fn save(&self) -> Option<Saved> {
         self.snapshots.as_ref()?.save(&self.stage)
     }
@@ -523,10 +570,6 @@ where
                 None => Ok(()),
             },
         };
-        result.map_err(|reason| NodeFault {
-            node: self.name.clone(),
-            port: place.name(&self.ports).to_owned(),
-            reason,
-        })
+        result.map_err(|refusal| refusal.fault(&self.name, place.name(&self.ports)))
     }
 }

@@ -186,14 +186,14 @@ mod tests {
                 longest_gap_ms: f64::NAN,
                 ..ProbeConfig::default()
             }),
-            "longest_gap_ms = NaN: must be from 0.01 to 1000"
+            "longest_gap_ms = NaN ms: must be from 0.01 to 1000 ms"
         );
         assert_eq!(
             refused(ProbeConfig {
                 latency_ms: Some(-1.0),
                 ..ProbeConfig::default()
             }),
-            "latency_ms = -1: must be from 0 to 1000"
+            "latency_ms = -1 ms: must be from 0 to 1000 ms"
         );
     }
 

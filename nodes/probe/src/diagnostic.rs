@@ -1,6 +1,7 @@
 //! Conditions worth reporting that are not measurements.
 
 use metrology::fit::ShapeError;
+use metrology::number::number;
 use metrology::{Axis, Machine, Stamp};
 
 use crate::queue::QueueMiss;
@@ -22,7 +23,7 @@ pub enum Diagnostic {
         waiting: u32,
     },
     /// A position was not a finite number.
-    #[error("position of axis {axis} at {} ns is {value}", at.nanos())]
+    #[error("position of axis {axis} at {} ns is {value}", at.nanos(), value = number(*value))]
     PositionNotFinite {
         /// The axis.
         axis: Axis,
@@ -45,6 +46,14 @@ pub enum Diagnostic {
         /// Number of the touch.
         sequence: u32,
     },
+    /// More than a node holds: a stream without an end, or two who speak at once.
+    #[error("{held} {what} are held already, the most there may be; one more is not used")]
+    TooMany {
+        /// How many.
+        held: usize,
+        /// Of what.
+        what: &'static str,
+    },
     /// A touch was corrected with feed times latency, since the queue had no answer.
     #[error("touch {sequence} corrected with feed times latency: {miss}")]
     CorrectedByFeed {
@@ -55,8 +64,7 @@ pub enum Diagnostic {
     },
     /// A calibrated latency was refused.
     #[error(
-        "latency of {latency_s} s with standard uncertainty {standard_uncertainty_s} s refused: must be finite and not significantly negative"
-    )]
+        "latency of {latency_s} s with standard uncertainty {standard_uncertainty_s} s refused: must be finite and not significantly negative", latency_s = number(*latency_s), standard_uncertainty_s = number(*standard_uncertainty_s))]
     LatencyRefused {
         /// Latency, s.
         latency_s: f64,

@@ -2,12 +2,13 @@
 
 use machine::ChainError;
 use metrology::Axis;
+use metrology::number::{number, quantity};
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProbeError {
     /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
     OutOfRange {
         /// Parameter.
         name: &'static str,
@@ -20,8 +21,7 @@ pub enum ProbeError {
     },
     /// A latency without its uncertainty.
     #[error(
-        "a latency of {latency_ms} ms is given, but latency_standard_uncertainty_ms is not: a correction needs both"
-    )]
+        "a latency of {latency_ms} ms is given, but latency_standard_uncertainty_ms is not: a correction needs both", latency_ms = number(*latency_ms))]
     UncertaintyMissing {
         /// The latency, ms.
         latency_ms: f64,
@@ -40,7 +40,7 @@ pub enum ProbeError {
         stylus: String,
     },
     /// The approach of a trigger is no unit vector.
-    #[error("trigger {sequence}: approach has length {length}, must be 1")]
+    #[error("trigger {sequence}: approach has length {length}, must be 1", length = number(*length))]
     ApproachNotUnit {
         /// Number of the trigger.
         sequence: u32,

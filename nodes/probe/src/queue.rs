@@ -15,6 +15,7 @@
 //! When stamps run backwards the queue starts anew, since older positions are on another time line.
 //! The ring is allocated once.
 
+use metrology::number::number;
 use metrology::sample::AxisState;
 use metrology::stamp::Span;
 use metrology::{Axis, AxisSet, Machine, PerAxis, Stamp};
@@ -62,19 +63,19 @@ pub enum QueueMiss {
     #[error("nothing is queued")]
     Empty,
     /// The instant is before the oldest position.
-    #[error("{early_s} s before the oldest queued position")]
+    #[error("{early_s} s before the oldest queued position", early_s = number(*early_s))]
     BeforeOldest {
         /// By how much, s.
         early_s: f64,
     },
     /// The instant is after the newest position.
-    #[error("{late_s} s after the newest queued position")]
+    #[error("{late_s} s after the newest queued position", late_s = number(*late_s))]
     AfterNewest {
         /// By how much, s.
         late_s: f64,
     },
     /// The positions around the instant are too far apart.
-    #[error("in a gap of {gap_s} s, longest allowed {limit_s} s")]
+    #[error("in a gap of {gap_s} s, longest allowed {limit_s} s", gap_s = number(*gap_s), limit_s = number(*limit_s))]
     Gap {
         /// Time between the positions, s.
         gap_s: f64,
@@ -105,7 +106,7 @@ impl CoordinateQueue {
         self.ring.len()
     }
 
-    /// Whether there is none.
+    /// Whether nothing waits.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.ring.is_empty()

@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 
 use machine::file::Latch;
 use machine::{Kinematics, MachineFile};
+use metrology::bound::TOUCHES_OF_RUN;
 use metrology::sample::{
     AxisState, BlockMeasurement, Correction, NewTouches, ProbeLatency, ProbeTrigger, ProbedFeature,
     ProbedPoint, Rejection, TestKind, TestSegment,
@@ -25,6 +26,8 @@ use crate::queue::{CoordinateQueue, Stored};
 use crate::run::{Run, RunTouch, is_probing};
 use crate::{block, shape};
 
+/// Touches and segments that may wait at once: a touch waits for `hold_ms`, and a machine makes a few in a second.
+const MOST_WAITING: usize = 10_000;
 /// Rounding allowed in the length of an approach.
 const UNIT_ROUNDING: f64 = 1e-6;
 
@@ -198,6 +201,9 @@ impl ProbeStage {
             }));
         }
         self.last_sequence = Some(trigger.sequence);
+        if self.is_full(out) {
+            return Ok(());
+        }
         // The last touch of a run may come after the end of its segment.
         let behind_end = self
             .waiting
@@ -235,8 +241,19 @@ impl ProbeStage {
         }
     }
 
-    fn take_segment(&mut self, at: Stamp<Host>, segment: TestSegment) {
-        if is_probing(segment.kind) {
+    /// Whether nothing more can wait; reports it then.
+    fn is_full(&self, out: &mut Vec<Output>) -> bool {
+        let held = self.waiting.len();
+        let is_full = held >= MOST_WAITING;
+        if is_full {
+            let what = "touches and segments that wait";
+            out.push(Output::Diagnostic(Diagnostic::TooMany { held, what }));
+        }
+        is_full
+    }
+
+    fn take_segment(&mut self, at: Stamp<Host>, segment: TestSegment, out: &mut Vec<Output>) {
+        if is_probing(segment.kind) && !self.is_full(out) {
             let event = if segment.begin {
                 WaitingEvent::Begin(segment)
             } else {
@@ -262,7 +279,13 @@ impl ProbeStage {
                     };
                     out.push(Output::Point(touch.point.clone()));
                     if let Some(run) = &mut self.run {
-                        run.touches.push(touch);
+                        let held = run.touches.len();
+                        if held < TOUCHES_OF_RUN {
+                            run.touches.push(touch);
+                        } else {
+                            let what = "touches of a run";
+                            out.push(Output::Diagnostic(Diagnostic::TooMany { held, what }));
+                        }
                     }
                 }
                 WaitingEvent::Begin(segment) => self.begin(segment, out),
@@ -437,7 +460,7 @@ impl Stage for ProbeStage {
             Input::State(state) => self.take_state(&state, out)?,
             Input::Trigger(trigger) => self.take_trigger(at, trigger, out)?,
             Input::Latency(latency) => self.take_latency(at, &latency, out),
-            Input::Segment(segment) => self.take_segment(at, segment),
+            Input::Segment(segment) => self.take_segment(at, segment, out),
             Input::Tick => {}
         }
         self.settle(at, out);

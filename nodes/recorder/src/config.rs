@@ -1,12 +1,13 @@
 //! Parameters of the recorder.
 
 use metrology::ParameterDoc;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::RecorderError;
 
 /// Compression of the chunks inside a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ChunkCompression {
     /// Fastest to write, largest.
@@ -109,6 +110,26 @@ pub struct NodeConfig {
     /// How the bag is written.
     #[serde(default)]
     pub writing: RecorderConfig,
+}
+
+impl NodeConfig {
+    /// Refuses a name in `topics` or `exclude` that is no topic's: such names are absolute.
+    ///
+    /// # Errors
+    /// The parameter and the name.
+    pub fn check_names(&self) -> Result<(), RecorderError> {
+        for (key, names) in [("topics", &self.topics), ("exclude", &self.exclude)] {
+            let relative = names.iter().position(|name| !name.starts_with(['/', '*']));
+            if let Some(index) = relative {
+                return Err(RecorderError::RelativeName {
+                    key,
+                    index,
+                    name: names[index].clone(),
+                });
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What is kept in memory, and when it is saved.
@@ -354,6 +375,27 @@ mod tests {
     #[test]
     fn defaults_pass_their_own_check() {
         RecorderConfig::default().checked().unwrap();
+    }
+
+    #[test]
+    fn a_relative_name_of_a_topic_is_refused_with_its_place() {
+        let config = |topics: &str, exclude: &str| NodeConfig {
+            bag: "bag".to_owned(),
+            bag_per_start: false,
+            topics: vec!["/a".to_owned(), topics.to_owned()],
+            exclude: vec![exclude.to_owned()],
+            machine_file: String::new(),
+            ring: None,
+            writing: RecorderConfig::default(),
+        };
+        config("*b", "/c*").check_names().unwrap();
+        let words = config("b", "/c").check_names().unwrap_err().to_string();
+        assert!(
+            words.starts_with("topics[1] = \"b\": names of topics are absolute"),
+            "{words}"
+        );
+        let words = config("*", "c").check_names().unwrap_err().to_string();
+        assert!(words.starts_with("exclude[0] = \"c\""), "{words}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What can go wrong with a recording.
 
+use metrology::number::number;
 use std::io;
 use std::path::PathBuf;
 
@@ -18,7 +19,7 @@ pub enum RecorderError {
     NotRead {
         /// The file or directory.
         path: PathBuf,
-        /// What it is.
+        /// Its kind.
         what: &'static str,
     },
     /// A file neither begins nor ends as an MCAP file does.
@@ -26,6 +27,20 @@ pub enum RecorderError {
     NotMcap {
         /// The file.
         path: PathBuf,
+    },
+    /// All files of a bag are empty.
+    #[error("{path} is no bag: nothing is in it (0 bytes)")]
+    Empty {
+        /// The file, or the folder of several.
+        path: PathBuf,
+    },
+    /// A file of a bag is no regular file.
+    #[error("{path} is {kind}, must be a regular file: copy the bag to a folder")]
+    NotRegular {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        kind: &'static str,
     },
     /// A path has no last part to name the files by.
     #[error("{path} has no name to call a recording by")]
@@ -70,6 +85,18 @@ pub enum RecorderError {
         messages_written: u64,
         /// Messages taken but not written.
         messages_lost: u64,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The description beside the files cannot be written; every message is in the files.
+    #[error(
+        "cannot write {path}: {source}; the {messages_written} messages are written, and the bag is read without it"
+    )]
+    Undescribed {
+        /// The description.
+        path: PathBuf,
+        /// Messages in the files.
+        messages_written: u64,
         /// The system's reason.
         source: io::Error,
     },
@@ -148,7 +175,7 @@ pub enum RecorderError {
         time_nanos: i64,
     },
     /// A period that is not a time.
-    #[error("{key} = {value_s} s: must lie between {least_s} s and {most_s} s")]
+    #[error("{key} = {value_s} s: must lie between {least_s} s and {most_s} s", value_s = number(*value_s), least_s = number(*least_s), most_s = number(*most_s))]
     PeriodOutOfRange {
         /// The parameter.
         key: &'static str,
@@ -251,6 +278,18 @@ pub enum RecorderError {
         /// The system's reason.
         source: io::Error,
     },
+    /// A name that no topic can have.
+    #[error(
+        "{key}[{index}] = \"{name}\": names of topics are absolute: must begin with / (or with *, which stands for any run of characters)"
+    )]
+    RelativeName {
+        /// The parameter.
+        key: &'static str,
+        /// Its place in the list.
+        index: usize,
+        /// The name.
+        name: String,
+    },
     /// A message that its definition does not describe.
     #[error("topic {topic}, message {message} at {log_time_nanos} ns: {source}")]
     Decode {
@@ -273,4 +312,34 @@ pub enum RecorderError {
         /// Why.
         source: crate::ReflectError,
     },
+}
+
+impl RecorderError {
+    /// Corrects the count of lost messages by what has come of it meanwhile.
+    pub(crate) fn set_lost(&mut self, messages: u64) {
+        if let Self::StorageFull { messages_lost, .. }
+        | Self::Write { messages_lost, .. }
+        | Self::Stopped { messages_lost, .. } = self
+        {
+            *messages_lost = messages;
+        }
+    }
+
+    /// Messages that stay readable and messages that are lost, of a recording that stopped at a failed write.
+    #[must_use]
+    pub fn written_and_lost(&self) -> Option<(u64, u64)> {
+        match self {
+            Self::StorageFull {
+                messages_written,
+                messages_lost,
+                ..
+            }
+            | Self::Write {
+                messages_written,
+                messages_lost,
+                ..
+            } => Some((*messages_written, *messages_lost)),
+            _ => None,
+        }
+    }
 }

@@ -48,6 +48,17 @@ pub struct RecorderStats {
     pub bytes_written: u64,
     /// Why the recording stopped, where it did.
     pub failure: Option<String>,
+    /// What goes wrong while messages are written all the same.
+    pub trouble: Option<String>,
+}
+
+impl RecorderStats {
+    fn take(&mut self, summary: &RecordingSummary) {
+        self.messages_written = summary.messages_written;
+        self.messages_back_in_time = summary.messages_back_in_time;
+        self.bytes_written = summary.bytes_written;
+        self.messages_lost = summary.messages_lost;
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -90,6 +101,8 @@ struct State {
     topics: Vec<(String, String)>,
     stats: RecorderStats,
     lost_in_queue: u64,
+    /// Why the recording stopped, until the worker's end.
+    failure: Option<RecorderError>,
     stopped: bool,
     closing: bool,
     worker_waits: bool,
@@ -207,9 +220,15 @@ impl RecorderSink {
     /// Counts as of now.
     #[must_use]
     pub fn stats(&self) -> RecorderStats {
-        let state = self.shared.lock();
+        let mut state = self.shared.lock();
+        let lost = state.stats.messages_lost;
+        let failure = state.failure.as_mut().map(|failure| {
+            failure.set_lost(lost);
+            failure.to_string()
+        });
         RecorderStats {
             queue_bytes: state.batch.waiting_bytes(),
+            failure: failure.or_else(|| state.stats.failure.clone()),
             ..state.stats.clone()
         }
     }
@@ -256,7 +275,7 @@ impl Recorder {
         let worker = Worker {
             shared: Arc::clone(&shared),
             recording,
-            failure: None,
+            has_failed: false,
             idle,
         };
         let thread = std::thread::Builder::new()
@@ -317,7 +336,7 @@ impl Drop for Recorder {
 struct Worker<S: Shelf> {
     shared: Arc<Shared>,
     recording: Recording<S>,
-    failure: Option<RecorderError>,
+    has_failed: bool,
     idle: Option<Duration>,
 }
 
@@ -331,13 +350,29 @@ impl<S: Shelf> Worker<S> {
         }
         let lost = self.shared.lock().lost_in_queue;
         self.recording.note_lost(lost);
-        if let Some(failure) = self.failure.take() {
+        let failure = self.shared.lock().failure.take();
+        if let Some(mut failure) = failure {
+            // What was offered since the recording stopped is lost with it.
+            let lost = self.recording.summary().messages_lost;
+            failure.set_lost(lost);
+            let mut state = self.shared.lock();
+            state.stats.messages_lost = lost;
+            state.stats.failure = Some(failure.to_string());
             return Err(failure);
         }
         let finished = self.recording.finish();
-        if let Err(failure) = &finished {
-            self.shared.lock().stats.failure = Some(failure.to_string());
+        let mut state = self.shared.lock();
+        match &finished {
+            Ok(summary) => state.stats.take(summary),
+            Err(failure) => {
+                state.stats.failure = Some(failure.to_string());
+                if let Some((written, lost)) = failure.written_and_lost() {
+                    state.stats.messages_written = written;
+                    state.stats.messages_lost = lost;
+                }
+            }
         }
+        drop(state);
         finished
     }
 
@@ -378,7 +413,7 @@ impl<S: Shelf> Worker<S> {
     }
 
     fn flush_idle(&mut self) {
-        if self.failure.is_none()
+        if !self.has_failed
             && let Err(error) = self.recording.flush()
         {
             self.fail(error);
@@ -388,7 +423,7 @@ impl<S: Shelf> Worker<S> {
 
     fn write(&mut self, batch: &Batch) {
         for channel in &batch.channels {
-            if self.failure.is_none()
+            if !self.has_failed
                 && let Err(error) = self.recording.add_channel(channel)
             {
                 self.fail(error);
@@ -399,7 +434,7 @@ impl<S: Shelf> Worker<S> {
             while let Some((_, record)) = notes.next_if(|(place, _)| *place <= index) {
                 self.add_note(record);
             }
-            if self.failure.is_some() {
+            if self.has_failed {
                 self.recording
                     .note_lost((batch.entries.len() - index) as u64);
                 break;
@@ -416,7 +451,7 @@ impl<S: Shelf> Worker<S> {
     }
 
     fn add_note(&mut self, (name, metadata): &MetadataRecord) {
-        if self.failure.is_none()
+        if !self.has_failed
             && let Err(error) = self.recording.add_metadata(name, metadata)
         {
             self.fail(error);
@@ -424,19 +459,20 @@ impl<S: Shelf> Worker<S> {
     }
 
     fn fail(&mut self, error: RecorderError) {
-        self.failure = Some(error);
-        self.shared.lock().stopped = true;
+        let mut state = self.shared.lock();
+        state.stopped = true;
+        state.failure = Some(error);
+        drop(state);
+        self.has_failed = true;
         self.shared.room.notify_all();
     }
 
     fn publish(&mut self) {
         let summary = self.recording.summary();
         let mut state = self.shared.lock();
-        let stats = &mut state.stats;
-        stats.messages_written = summary.messages_written;
-        stats.messages_back_in_time = summary.messages_back_in_time;
-        stats.bytes_written = summary.bytes_written;
-        stats.failure = self.failure.as_ref().map(ToString::to_string);
-        state.stats.messages_lost = state.lost_in_queue + summary.messages_lost;
+        state.stats.take(&summary);
+        let lost_in_queue = state.lost_in_queue;
+        state.stats.messages_lost += lost_in_queue;
+        state.stats.trouble = self.recording.trouble();
     }
 }

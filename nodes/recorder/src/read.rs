@@ -12,6 +12,7 @@ mod file_order;
 mod foreign;
 mod framing;
 mod index;
+mod regular;
 mod time_order;
 mod walk;
 

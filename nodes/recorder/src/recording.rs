@@ -70,6 +70,8 @@ pub struct Recording<S: Shelf> {
     messages_back_in_time: u64,
     largest_step_back_nanos: u64,
     described_at_nanos: Option<u64>,
+    /// Why the description beside the files could not be refreshed; messages are written all the same.
+    undescribed: Option<io::Error>,
 }
 
 impl<S: Shelf> Recording<S> {
@@ -94,9 +96,12 @@ impl<S: Shelf> Recording<S> {
             messages_back_in_time: 0,
             largest_step_back_nanos: 0,
             described_at_nanos: None,
+            undescribed: None,
         };
         recording.open_split()?;
         recording.describe()?;
+        // One that cannot be described from the begin is not begun.
+        recording.described()?;
         Ok(recording)
     }
 
@@ -299,6 +304,7 @@ impl<S: Shelf> Recording<S> {
         ]);
         self.finish_split(Some(closing))?;
         self.describe()?;
+        self.described()?;
         Ok(self.summary())
     }
 
@@ -406,6 +412,29 @@ impl<S: Shelf> Recording<S> {
         }
     }
 
+    /// An error where the description could not be written.
+    fn described(&mut self) -> Result<(), RecorderError> {
+        match self.undescribed.take() {
+            None => Ok(()),
+            Some(source) => Err(RecorderError::Undescribed {
+                path: self.shelf.path().join(METADATA_FILE),
+                messages_written: self.summary().messages_written,
+                source,
+            }),
+        }
+    }
+
+    /// What goes wrong while messages are written all the same.
+    #[must_use]
+    pub fn trouble(&self) -> Option<String> {
+        let source = self.undescribed.as_ref()?;
+        let path = self.shelf.path().join(METADATA_FILE);
+        Some(format!(
+            "cannot write {}: {source}; messages are written all the same",
+            path.display()
+        ))
+    }
+
     /// Stops the recording: cuts the file behind its last whole chunk and counts what is lost.
     fn fault(&mut self, name: &str, fault: SplitFault) -> RecorderError {
         if let Some(split) = self.current.take() {
@@ -418,10 +447,10 @@ impl<S: Shelf> Recording<S> {
             self.finished_messages += sealed;
             self.finished_bytes += split.sealed_bytes();
             self.finished_span.join(split.span());
-            let keep_bytes = split.sealed_bytes();
+            let (own_name, keep_bytes) = (split.name.clone(), split.sealed_bytes());
             split.abandon();
             // Both may fail on a broken disk; the fault itself is what is reported.
-            let _ = self.shelf.truncate(name, keep_bytes);
+            let _ = self.shelf.truncate(&own_name, keep_bytes);
             self.finished.push(entry);
             let _ = self.describe();
         }
@@ -465,10 +494,9 @@ impl<S: Shelf> Recording<S> {
     fn describe(&mut self) -> Result<(), RecorderError> {
         let text = self.metadata().to_yaml();
         let text = text.map_err(|source| self.layout_error(source))?;
-        match self.shelf.replace(METADATA_FILE, text.as_bytes()) {
-            Ok(()) => Ok(()),
-            Err(error) => Err(self.fault(METADATA_FILE, SplitFault::Io(error))),
-        }
+        // Readers find the files without it too, so that no message is given up for it.
+        self.undescribed = self.shelf.replace(METADATA_FILE, text.as_bytes()).err();
+        Ok(())
     }
 
     /// What `metadata.yaml` says of the whole chunks.

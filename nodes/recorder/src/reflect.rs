@@ -151,7 +151,7 @@ enum Kind {
     Nested(Arc<Vec<Field>>),
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Many {
     One,
     Fixed(usize),
@@ -187,6 +187,13 @@ impl Reflector {
         Ok(Self { fields })
     }
 
+    /// The first field in which the bytes of another definition are laid out otherwise, with the names of what holds it;
+    /// `None`: the same bytes mean the same in both. Comments, constants and defaults are no part of the layout.
+    #[must_use]
+    pub fn first_difference(&self, other: &Self) -> Option<String> {
+        first_difference("", &self.fields, &other.fields)
+    }
+
     /// Decodes one message: CDR with its encapsulation header.
     ///
     /// # Errors
@@ -216,6 +223,28 @@ impl Reflector {
         }
         Ok(value)
     }
+}
+
+fn first_difference(path: &str, ours: &[Field], theirs: &[Field]) -> Option<String> {
+    let place = |field: &Field| match path {
+        "" => field.name.to_string(),
+        path => format!("{path}.{}", field.name),
+    };
+    for (own, other) in ours.iter().zip(theirs) {
+        let is_same = own.name == other.name && own.many == other.many;
+        match (&own.kind, &other.kind) {
+            (Kind::Primitive(a), Kind::Primitive(b)) if is_same && a == b => {}
+            (Kind::Nested(a), Kind::Nested(b)) if is_same => {
+                let inside = first_difference(&place(own), a, b);
+                if inside.is_some() {
+                    return inside;
+                }
+            }
+            _ => return Some(place(own)),
+        }
+    }
+    let more = ours.get(theirs.len()).or(theirs.get(ours.len()));
+    more.map(place)
 }
 
 /// `package/Name` and its brackets of a type that says its kind, as the parts of services and actions do.

@@ -253,6 +253,23 @@ impl Snapshot {
         config: &RecorderConfig,
         context: &RunContext,
     ) -> Result<RecordingSummary, RecorderError> {
+        self.write_all(shelf, name, config, context)
+            .map_err(|mut error| {
+                // What was still to be written is lost as well.
+                if let Some((written, _)) = error.written_and_lost() {
+                    error.set_lost(self.messages.len() as u64 - written);
+                }
+                error
+            })
+    }
+
+    fn write_all<S: Shelf>(
+        &self,
+        shelf: S,
+        name: &str,
+        config: &RecorderConfig,
+        context: &RunContext,
+    ) -> Result<RecordingSummary, RecorderError> {
         let mut recording = Recording::begin(shelf, name, config.clone())?;
         recording.add_context(context)?;
         let mut ids = Vec::with_capacity(self.channels.len());

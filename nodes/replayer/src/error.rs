@@ -1,5 +1,6 @@
 //! Why a bag cannot be replayed or played.
 
+use metrology::number::{number, quantity};
 use node_runtime::harness::{ComposeError, SnapshotError};
 
 /// Why a bag cannot be replayed.
@@ -16,17 +17,10 @@ pub enum ReplayError {
     Arrival,
     #[error("the bag does not name the nodes that ran (metadata record \"abbe.nodes\")")]
     NoNodes,
-    #[error("start of the run {nanos} ns: must be below 2^63")]
-    Start { nanos: u64 },
     #[error(
-        "topic {topic}: the bag's {type_name} is another version (hash {recorded}, here {known})"
+        "start of the run {nanos} ns: must be from 0 to 4294967295999999999 ns since 1970 (to 2106-02-07)"
     )]
-    OtherVersion {
-        topic: String,
-        type_name: String,
-        recorded: String,
-        known: String,
-    },
+    Start { nanos: u64 },
     #[error(
         "resumed after {after_messages} messages: the bag has {messages}, so nothing would be resumed"
     )]
@@ -41,16 +35,18 @@ pub enum ReplayError {
 #[derive(Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "fields are named in the messages")]
 pub enum PlaybackError {
-    #[error("{key} = {value}: must be {least} to {greatest}")]
+    #[error("{key} = {value}: must be {least} to {greatest}", value = quantity(key, *value), least = number(*least), greatest = quantity(key, *greatest))]
     OutOfRange {
         key: &'static str,
         value: f64,
         least: f64,
         greatest: f64,
     },
-    #[error("to_s = {to_s} s is before from_s = {from_s} s: nothing would be played")]
+    #[error("rate = {rate}: must be 0, or {least} to 1000", rate = number(*rate), least = number(*least))]
+    Slow { rate: f64, least: f64 },
+    #[error("to_s = {to_s} s is before from_s = {from_s} s: nothing would be played", from_s = number(*from_s), to_s = number(*to_s))]
     EmptyRange { from_s: f64, to_s: f64 },
-    #[error("{bag}: no message of {topics:?} between {from_s} s and its end; it holds {held:?}")]
+    #[error("{bag}: no message of {topics:?} between {from_s} s and its end; it holds {held:?}", from_s = number(*from_s))]
     Nothing {
         bag: String,
         topics: Vec<String>,

@@ -11,18 +11,30 @@
 //!
 //! Equality is claimed for one build on one machine; another build differs in the last digits of its numbers, which
 //! the first difference shows in units of the last place.
+//!
+//! Whoever wants to know what a bag's messages say reads it by [`reading`]: one reader that keeps an account, so that one bad
+//! message never refuses a bag.
 
+pub mod account;
 mod difference;
 mod error;
 mod inputs;
+pub mod known;
+pub mod leap;
 mod listening;
 pub mod pace;
+pub mod pause;
 pub mod playback;
+pub mod reading;
 mod replay;
+mod usable;
 
+pub use account::{Account, LeftOut, Place, Reason, TopicAccount};
 pub use difference::{Difference, Discrepancy};
 pub use error::{PlaybackError, ReplayError};
 pub use inputs::{is_source, sources_first};
+pub use leap::{Leap, Leaps};
 pub use listening::NotInBag;
 pub use playback::{PARAMETERS, Playback, PlaybackConfig};
-pub use replay::{Compared, Outcome, Relay, check};
+pub use reading::{Reading, Taken};
+pub use replay::{Compared, Doubtful, Outcome, Relay, check};

@@ -38,6 +38,12 @@ pub struct PlaybackConfig {
     pub clock: bool,
 }
 
+/// Longest way into a bag, s: from a first message that was recorded before the clock was set to any later one.
+const LONGEST_S: f64 = 9e9;
+
+/// Least rate above 0: slower, a second of the bag takes a quarter of an hour.
+const LEAST_RATE: f64 = 1e-3;
+
 /// What the parameters of the node mean.
 pub const PARAMETERS: &[ParameterDoc] = &[
     text(
@@ -52,18 +58,18 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         "rate",
         "",
         (0.0, 1000.0),
-        "Time of the bag over time; 0: as fast as subscribers acknowledge.",
+        "Time of the bag over time, from 0.001 on; 0: as fast as subscribers acknowledge.",
     ),
     number(
         "from_s",
         "s",
-        (0.0, 1e9),
+        (0.0, LONGEST_S),
         "Messages before this are left out, from the bag's first message; of latched topics the last ones are sent first.",
     ),
     number(
         "to_s",
         "s",
-        (0.0, 1e9),
+        (0.0, LONGEST_S),
         "Messages after this are left out, from the bag's first message; absent: to the end.",
     ),
     text("repeat", "Begin again at the end."),
@@ -165,6 +171,12 @@ impl PlaybackConfig {
             return Err(PlaybackError::EmptyRange { from_s, to_s });
         }
         let rate = within("rate", self.rate)?;
+        if rate > 0.0 && rate < LEAST_RATE {
+            return Err(PlaybackError::Slow {
+                rate,
+                least: LEAST_RATE,
+            });
+        }
         Ok(Playback {
             rate: (rate > 0.0).then_some(rate),
             from: Span::from_secs_f64(from_s),
@@ -205,6 +217,12 @@ mod tests {
         };
         assert_eq!(with(|c| c.rate = -1.0), "rate = -1: must be 0 to 1000");
         assert_eq!(with(|c| c.rate = f64::NAN), "rate = NaN: must be 0 to 1000");
+        for rate in [1e-300, 1e-9, 9.9e-4] {
+            let mut config = PlaybackConfig::whole("bag".to_owned());
+            config.rate = rate;
+            let shown = config.checked().unwrap_err().to_string();
+            assert!(shown.ends_with(": must be 0, or 0.001 to 1000"), "{shown}");
+        }
         let text = with(|c| (c.from_s, c.to_s) = (5.0, Some(4.0)));
         assert_eq!(
             text,

@@ -2,16 +2,22 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use abbe_msgs::WireError;
 use abbe_msgs::topics::Origin;
 use metrology::stamp::{Host, Stamp};
 use node_runtime::{Harness, Node};
-use recorder::{Bag, Event, Loss, MessageOrder, Order, RecordedCall, RecordedRun};
+use recorder::{Bag, Event, MessageOrder, MessageRef, Order, RecordedCall, RecordedRun, TopicInfo};
 use serde::Serialize;
 
+use crate::account::{Reason, TopicAccount};
 use crate::difference::{Difference, Discrepancy};
 use crate::error::ReplayError;
 use crate::inputs;
+use crate::known::unreadable;
+use crate::leap::{self, LEAST};
 use crate::listening::{Ear, Listening, NotInBag};
+use crate::reading::{Reading, place_of};
+use crate::usable::{self, Usable};
 
 /// Messages of one topic that were held against computed ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -33,18 +39,29 @@ pub struct Outcome {
     pub first: Option<Difference>,
     /// Messages and service calls that were put in.
     pub inputs: u64,
-    /// What of the bag could not be read.
-    pub losses: Vec<Loss>,
+    /// What of the bag was read, lost and left out.
+    pub reading: Reading,
+    /// What differs behind the first input that was lost or left out, which may come of that.
+    pub doubtful: Option<Doubtful>,
+}
+
+/// Differences that may come of what was lost or left out before them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Doubtful {
+    /// How many.
+    pub messages: u64,
+    /// The first of them.
+    pub first: Difference,
 }
 
 impl Outcome {
     /// Whether results were computed and the bag had nothing to hold them against.
     #[must_use]
     pub fn compared_nothing(&self) -> bool {
-        self.compared.is_empty() && !self.not_in_bag.is_empty() && self.losses.is_empty()
+        self.compared.is_empty() && !self.not_in_bag.is_empty() && self.reading.is_whole()
     }
 
-    /// Whether what the bag has was computed again byte for byte.
+    /// Whether what the bag has was computed again byte for byte, as far as its inputs were there.
     #[must_use]
     pub fn is_equal(&self) -> bool {
         self.first.is_none() && !self.compared_nothing()
@@ -60,13 +77,23 @@ pub struct Relay {
 }
 
 /// What is done with a topic of the bag.
-#[derive(Clone, Copy)]
 enum Role {
     Input {
         route: usize,
+        row: usize,
+        usable: Option<Usable>,
     },
     Result {
         route: usize,
+        row: usize,
+        usable: Option<Usable>,
+    },
+    /// None of its messages can be used.
+    LeftOut {
+        row: usize,
+        is_input: bool,
+        reason: Reason,
+        what: String,
     },
     /// Nobody here hears it, or it is about the programs themselves.
     Aside,
@@ -78,7 +105,10 @@ struct Replay<'b> {
     listening: Listening,
     roles: Vec<Role>,
     relays: VecDeque<Relay>,
+    start: Stamp<Host>,
     stop: Option<Stamp<Host>>,
+    /// An input was lost or left out, or the log times leaped: what differs from here on may come of that.
+    is_doubtful: bool,
     outcome: Outcome,
 }
 
@@ -87,8 +117,8 @@ struct Replay<'b> {
 /// turn comes.
 ///
 /// # Errors
-/// When the bag is none of a composed run, or has messages of another version; when a node's state cannot be handed on,
-/// or the bag ends before a relay's turn.
+/// When the bag is not of a composed run; when a node's state cannot be handed on, or the bag ends before a relay's
+/// turn.
 pub fn check(
     bag: &Bag,
     run: &RecordedRun,
@@ -98,7 +128,7 @@ pub fn check(
     if run.order != MessageOrder::Total {
         return Err(ReplayError::Arrival);
     }
-    if i64::try_from(run.start_time_nanos).is_err() {
+    if !leap::is_start(run.start_time_nanos) {
         return Err(ReplayError::Start {
             nanos: run.start_time_nanos,
         });
@@ -107,7 +137,12 @@ pub fn check(
     let ports = nodes.iter().flat_map(|node| &node.ports().publications);
     let computed: Vec<String> = ports.map(|port| port.topic.clone()).collect();
     let mut harness = Harness::compose(nodes, stamp(run.start_time_nanos))?;
-    let roles = roles(bag, &harness, &computed)?;
+    let mut outcome = Outcome::default();
+    let rows = &mut outcome.reading.account.topics;
+    let infos = bag.topics().iter();
+    let roles: Vec<Role> = infos
+        .map(|info| role(info, &harness, &computed, rows))
+        .collect();
     let listening = Listening::new(ears(&harness, &roles, &computed));
     listening.attend(&mut harness);
     relays.sort_by_key(|relay| relay.after_messages);
@@ -117,8 +152,10 @@ pub fn check(
         listening,
         roles,
         relays: relays.into(),
+        start: stamp(run.start_time_nanos),
         stop: run.stop_time_nanos.map(stamp),
-        outcome: Outcome::default(),
+        is_doubtful: false,
+        outcome,
     };
     replay.run()?;
     Ok(replay.summed_up())
@@ -132,29 +169,34 @@ fn computing(nodes: Vec<Box<dyn Node>>) -> Vec<Box<dyn Node>> {
         .collect()
 }
 
-fn roles(bag: &Bag, harness: &Harness, computed: &[String]) -> Result<Vec<Role>, ReplayError> {
-    let of = |topic: &recorder::TopicInfo| {
-        let name = topic.topic.trim_start_matches('/');
-        let (Some(entry), Some(route)) = (inputs::entry_of(name), harness.place_of_topic(name))
-        else {
-            return Ok(Role::Aside);
-        };
-        let known = entry.description.type_hash;
-        if !topic.type_hash.is_empty() && topic.type_hash != known {
-            return Err(ReplayError::OtherVersion {
-                topic: topic.topic.clone(),
-                type_name: topic.type_name.clone(),
-                recorded: topic.type_hash.clone(),
-                known: known.to_owned(),
-            });
-        }
-        Ok(match entry.origin {
-            Origin::Housekeeping => Role::Aside,
-            _ if computed.iter().any(|own| own == name) => Role::Result { route },
-            _ => Role::Input { route },
-        })
+/// What is done with a topic of the bag; its row of the account is added.
+fn role(
+    info: &TopicInfo,
+    harness: &Harness,
+    computed: &[String],
+    rows: &mut Vec<TopicAccount>,
+) -> Role {
+    let name = info.topic.trim_start_matches('/');
+    let (Some(entry), Some(route)) = (inputs::entry_of(name), harness.place_of_topic(name)) else {
+        return Role::Aside;
     };
-    bag.topics().iter().map(of).collect()
+    if entry.origin == Origin::Housekeeping {
+        return Role::Aside;
+    }
+    let row = rows.len();
+    rows.push(TopicAccount::new(&info.topic, &info.type_name));
+    let is_input = !computed.iter().any(|own| own == name);
+    let usable = usable::of_topic(entry.name);
+    match unreadable(info, &entry.description) {
+        Some((reason, what)) => Role::LeftOut {
+            row,
+            is_input,
+            reason,
+            what,
+        },
+        None if is_input => Role::Input { route, row, usable },
+        None => Role::Result { route, row, usable },
+    }
 }
 
 /// What is done with what the nodes say, by topic of the harness.
@@ -169,7 +211,7 @@ fn ears(harness: &Harness, roles: &[Role], computed: &[String]) -> Vec<Ear> {
         })
         .collect();
     for role in roles {
-        if let Role::Result { route } = role {
+        if let Role::Result { route, .. } = role {
             ears[*route] = Ear::Compare;
         }
     }
@@ -186,35 +228,40 @@ impl Replay<'_> {
         let mut last = None;
         let mut calls: VecDeque<_> = RecordedCall::all_of(self.bag).into();
         let mut read = 0;
+        let strays = leap::strays(self.bag, self.start);
         while let Some(event) = messages.next_event() {
             let message = match event {
                 Event::Message(message) => message,
                 Event::Loss(loss) => {
-                    self.outcome.losses.push(loss);
+                    self.outcome.reading.losses.push(loss);
+                    self.is_doubtful = true;
                     continue;
                 }
             };
-            let at = stamp(message.log_time_nanos);
+            let now = last.unwrap_or(self.start);
+            let is_stray = strays.contains(&read);
+            let at = if is_stray {
+                now
+            } else {
+                stamp(message.log_time_nanos)
+            };
+            self.is_doubtful |= is_stray;
+            let (before, after) = (now.nanos().unsigned_abs(), message.log_time_nanos);
+            self.outcome.reading.leaps.pass(before, after);
             // Where messages were taken out of a bag, the count stands too high and the time tells.
-            self.put_calls(&mut calls, &mut last, |call| {
+            self.put_calls(&mut calls, &mut last, at, |call| {
                 call.after_messages <= read || stamp(call.time_nanos) < at
             });
             self.hand_over_after(read)?;
             read += 1;
             self.arrive(at, &mut last);
-            let topic = message.topic.index();
-            match self.roles[topic] {
-                Role::Input { route } => {
-                    self.outcome.inputs += 1;
-                    self.harness.put(route, message.data);
-                }
-                Role::Result { route } => self.compare(topic, route, at, message.data),
-                Role::Aside => {}
-            }
+            self.take(at, &message);
         }
         // What a cut file would have gone on with is not known.
-        if let (Some(end), true) = (last, self.outcome.losses.is_empty()) {
-            self.put_calls(&mut calls, &mut last, |call| stamp(call.time_nanos) <= end);
+        if let (Some(end), true) = (last, self.outcome.reading.losses.is_empty()) {
+            self.put_calls(&mut calls, &mut last, end, |call| {
+                stamp(call.time_nanos) <= end
+            });
             self.go_on(|due| due <= end);
             self.nothing_is_left();
         }
@@ -227,17 +274,56 @@ impl Replay<'_> {
         }
     }
 
-    /// Puts in the next service calls as long as they are due.
+    /// Puts in an input, or compares a result; what cannot be used is left out.
+    fn take(&mut self, at: Stamp<Host>, message: &MessageRef<'_>) {
+        let topic = message.topic.index();
+        let rows = &mut self.outcome.reading.account.topics;
+        match &self.roles[topic] {
+            Role::Input { route, row, usable } => {
+                let row = &mut rows[*row];
+                row.messages += 1;
+                if let Err(error) = usable.map_or(Ok(()), |usable| usable(message.data)) {
+                    leave_out(row, message, &self.bag.topics()[topic], &error);
+                    self.is_doubtful = true;
+                    return;
+                }
+                row.used += 1;
+                self.outcome.inputs += 1;
+                self.harness.put(*route, message.data);
+            }
+            Role::Result { route, row, usable } => {
+                rows[*row].messages += 1;
+                let (route, row, usable) = (*route, *row, *usable);
+                self.compare(topic, (route, row, usable), at, message);
+            }
+            Role::LeftOut {
+                row,
+                is_input,
+                reason,
+                what,
+            } => {
+                let row = &mut rows[*row];
+                row.messages += 1;
+                let first = place_of(row.messages, message, None);
+                row.leave_out(*reason, first, || what.clone());
+                self.is_doubtful |= is_input;
+            }
+            Role::Aside => {}
+        }
+    }
+
+    /// Puts in the next service calls as long as they are due; none is later than what follows it at `next`.
     fn put_calls(
         &mut self,
         calls: &mut VecDeque<RecordedCall>,
         last: &mut Option<Stamp<Host>>,
+        next: Stamp<Host>,
         is_due: impl Fn(&RecordedCall) -> bool,
     ) {
         while calls.front().is_some_and(&is_due)
             && let Some(call) = calls.pop_front()
         {
-            self.arrive(stamp(call.time_nanos), last);
+            self.arrive(stamp(call.time_nanos).min(next), last);
             let is_request = self.harness.put_request(&call.topic, &call.event);
             self.outcome.inputs += u64::from(is_request);
         }
@@ -274,11 +360,22 @@ impl Replay<'_> {
     /// Lets everything happen that is due before `at`, when time goes on.
     fn arrive(&mut self, at: Stamp<Host>, last: &mut Option<Stamp<Host>>) {
         if last.is_none_or(|last| at > last) {
+            if at - last.unwrap_or(self.start) > LEAST {
+                self.leap_to(at);
+            }
             self.go_on(|due| due < at);
             self.nothing_is_left();
             self.harness.wait_until(at);
             *last = Some(at);
         }
+    }
+
+    /// Delivers what waits and leaves out the ticks before `at`: nothing was recorded for so long that the log times leaped.
+    fn leap_to(&mut self, at: Stamp<Host>) {
+        while self.harness.deliver_next() {}
+        self.nothing_is_left();
+        self.harness.skip_ticks_before(at);
+        self.is_doubtful = true;
     }
 
     /// Delivers what waits and hands out the ticks (and the end of the run) that are due.
@@ -308,7 +405,14 @@ impl Replay<'_> {
     }
 
     /// Lets the nodes go on until they say something on the recorded message's topic, and compares.
-    fn compare(&mut self, topic: usize, route: usize, at: Stamp<Host>, recorded: &[u8]) {
+    fn compare(
+        &mut self,
+        topic: usize,
+        (route, row, usable): (usize, usize, Option<Usable>),
+        at: Stamp<Host>,
+        message: &MessageRef<'_>,
+    ) {
+        let recorded = message.data;
         let found = loop {
             let found = self.listening.take(route);
             if found.is_some() || !self.step(&|due| due <= at) {
@@ -324,6 +428,14 @@ impl Replay<'_> {
             Some((0, _)) => None,
             Some(_) => Some(Discrepancy::Order),
         };
+        let row = &mut self.outcome.reading.account.topics[row];
+        let unusable = usable.and_then(|usable| usable(recorded).err());
+        // What differs because it cannot be read tells nothing of what was computed.
+        if let (Some(_), Some(error)) = (&discrepancy, unusable) {
+            leave_out(row, message, info, &error);
+            return;
+        }
+        row.used += 1;
         let name = info.topic.clone();
         self.outcome
             .compared
@@ -347,11 +459,30 @@ impl Replay<'_> {
         let compared = self.outcome.compared.entry(topic.clone()).or_default();
         compared.differing += 1;
         let message = compared.messages.saturating_sub(1);
-        self.outcome.first.get_or_insert(Difference {
+        let difference = Difference {
             at_nanos: at.nanos(),
             topic,
             message,
             discrepancy,
+        };
+        if !self.is_doubtful {
+            self.outcome.first.get_or_insert(difference);
+            return;
+        }
+        let doubtful = self.outcome.doubtful.get_or_insert(Doubtful {
+            messages: 0,
+            first: difference,
         });
+        doubtful.messages += 1;
     }
+}
+
+fn leave_out(
+    row: &mut TopicAccount,
+    message: &MessageRef<'_>,
+    info: &TopicInfo,
+    error: &WireError,
+) {
+    let first = place_of(row.messages, message, Some(&info.type_name));
+    row.leave_out(error.defect().into(), first, || error.to_string());
 }

@@ -22,8 +22,9 @@
 //!
 //! The sphere is where the linear axes say, so what they are wrong by is read as a displacement of a rotary
 //! axis, and more visits do not average it out. (5): the first harmonic of an error motion and a location
-//! error are alike at most poses; of each motion the allowance is the standard deviation over a turn, two thirds of
-//! it in each coefficient of the first harmonic, one third in the second. A pair that was estimated is not allowed for.
+//! error are alike at most poses; of each motion the allowance s is the root mean square over a turn, counted from its value
+//! at q = 0, as (5) is: a coefficient c of either kind makes c² (3/2 + 1/2) together, so that shares of 0.63 and 0.32 of s
+//! in each coefficient of both harmonics make 2 (0.63² + 0.32²) s² = s². A pair that was estimated is not allowed for.
 //!
 //! # Holds when
 //! The allowances are standard uncertainties of their causes, independent of each other.
@@ -87,44 +88,58 @@ pub fn common_covariance(
     found: &RotaryEstimate,
     known: Known<'_>,
 ) -> DMatrix<f64> {
+    let rows = used_rows(design, found);
+    through(design, &rows, &found.unknowns, known, &found.fit.gain)
+}
+
+/// The readings that an estimate was made from, each at its sphere's place.
+pub(crate) fn used_rows<'a>(
+    design: &SphereDesign,
+    found: &'a RotaryEstimate,
+) -> Vec<(PoseRow, &'a SphereVisit)> {
     let used = found.residuals.iter().filter(|left| !left.doubtful);
-    let rows: Vec<(PoseRow, &SphereVisit)> = used
-        .filter_map(|left| {
-            let place = found.spheres.iter().find(|s| s.0 == left.visit.sphere)?.1;
-            Some((design.row(&place, &left.visit.pose_rad), &left.visit))
-        })
-        .collect();
-    let gain = &found.fit.gain;
-    let p = gain.nrows();
-    if gain.ncols() != 3 * rows.len() {
-        return DMatrix::zeros(p, p);
-    }
-    let readings = Readings {
-        design,
-        rows: &rows,
-    };
+    used.filter_map(|left| {
+        let place = found.spheres.iter().find(|s| s.0 == left.visit.sphere)?.1;
+        Some((design.row(&place, &left.visit.pose_rad), &left.visit))
+    })
+    .collect()
+}
+
+/// T C Tᵀ for the readings `rows` and any linear map T of them; zero where nothing is known.
+pub(crate) fn through(
+    design: &SphereDesign,
+    rows: &[(PoseRow, &SphereVisit)],
+    estimated: &[Unknown],
+    known: Known<'_>,
+    map: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let p = map.nrows();
     let mut sum = DMatrix::zeros(p, p);
+    if map.ncols() != 3 * rows.len() {
+        return sum;
+    }
+    let readings = Readings { design, rows };
     let mut add = |columns: &DMatrix<f64>| {
-        let effect = gain * columns;
+        let effect = map * columns;
         sum += &effect * effect.transpose();
     };
     if let Some(allowance) = known.allowance {
         add(&readings.setup(allowance.setup_um / 1e3));
-        add(&readings.motions(allowance, &found.unknowns));
+        add(&readings.motions(allowance, estimated));
         if known.linear.is_none() {
             add(&readings.scale_and_squareness(allowance));
             let smooth = readings.smooth(allowance);
-            sum += gain * smooth * gain.transpose();
+            sum += map * smooth * map.transpose();
         }
     }
     if let Some(model) = known.linear {
-        let effect = gain * readings.coefficients(model);
+        let effect = map * readings.coefficients(model);
         sum += &effect * &model.covariance * effect.transpose();
     }
     sum
 }
 
-/// The readings that were used.
+/// Readings and what causes do to them.
 struct Readings<'a> {
     design: &'a SphereDesign,
     rows: &'a [(PoseRow, &'a SphereVisit)],
@@ -229,5 +244,24 @@ impl Readings<'_> {
             }
         }
         self.matrix(&columns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::OF_HARMONIC;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn eq5_shares_make_the_allowance_over_a_turn_counted_from_zero() {
+        let n = 3600;
+        let square = |share: f64, order: f64| {
+            let at = (0..n).map(|k| order * TAU * f64::from(k) / f64::from(n));
+            let sum: f64 = at.map(|q| (q.cos() - 1.0).powi(2) + q.sin().powi(2)).sum();
+            share * share * sum / f64::from(n)
+        };
+        let [first, second] = OF_HARMONIC;
+        let whole = square(first, 1.0) + square(second, 2.0);
+        assert!((whole - 1.0).abs() < 0.01, "{whole}");
     }
 }

@@ -213,7 +213,7 @@ mod tests {
         };
         assert_eq!(
             config.check().unwrap_err().to_string(),
-            "pose_repeatability_um = -0.1: must be from 0 to 100"
+            "pose_repeatability_um = -0.1 µm: must be from 0 to 100 µm"
         );
         let error = serde_saphyr::from_str::<RotaryAxesConfig>("harmonics: 3").unwrap_err();
         assert!(error.to_string().contains("harmonics"));

@@ -1,8 +1,10 @@
 //! Conditions worth reporting: what was found, and what spoils it.
 
 use metrology::Axis;
+use metrology::number::number;
 
 use crate::error::EstimateError;
+use crate::expectation::Reason;
 
 pub use metrology::Severity;
 
@@ -34,8 +36,8 @@ pub enum Diagnostic {
     },
     /// A model was held against other poses.
     #[error(
-        "run {run}: {visits} visits, {:.2} µm rms without the model, {:.2} µm with it ({:.2} µm at most); noise and the model's uncertainty alone would leave {:.2} µm",
-        before_mm * 1e3, after_mm * 1e3, greatest_mm * 1e3, expected_mm * 1e3
+        "run {run}: {visits} visits, {:.2} µm rms without the model, {:.2} µm with it ({:.2} µm at most); expected {:.2} µm by scatter, model and allowances, of which the stated noise is {:.2} µm",
+        before_mm * 1e3, after_mm * 1e3, greatest_mm * 1e3, allowed_mm * 1e3, expected_mm * 1e3
     )]
     Verified {
         /// Run.
@@ -48,10 +50,34 @@ pub enum Diagnostic {
         after_mm: f64,
         /// Greatest with it, mm.
         greatest_mm: f64,
-        /// What chance would leave, mm.
+        /// What the stated noise would leave, mm.
         expected_mm: f64,
+        /// What scatter, model and allowances would leave, mm.
+        allowed_mm: f64,
+        /// p value of more than that.
+        allowed_p: f64,
         /// Whether the sphere's place is that of the calibration.
         same_places: bool,
+    },
+    /// A verification left more than its uncertainties explain.
+    #[error(
+        "run {run}: {:.2} µm rms are left where {:.2} µm are expected (p = {p:.1e}); {}{}",
+        after_mm * 1e3, allowed_mm * 1e3, advice(reason),
+        if *has_allowance { "" } else { "; no allowance is stated: state what the linear axes and error motions may add" }
+    )]
+    BeyondExpected {
+        /// Run.
+        run: u32,
+        /// Root mean square that is left, mm.
+        after_mm: f64,
+        /// What was expected, mm.
+        allowed_mm: f64,
+        /// p value.
+        p: f64,
+        /// The likely reason.
+        reason: Reason,
+        /// Whether allowances are stated.
+        has_allowance: bool,
     },
     /// What the poses cannot see.
     #[error("run {run}: {names} cannot be told apart by these poses")]
@@ -70,7 +96,7 @@ pub enum Diagnostic {
         run: u32,
     },
     /// The poses tell too little.
-    #[error("run {run}: merit of the poses is {merit:.3}, at least {least} is wanted")]
+    #[error("run {run}: merit of the poses is {merit:.3}, at least {least} is wanted", least = number(*least))]
     LowMerit {
         /// Run.
         run: u32,
@@ -139,6 +165,28 @@ pub enum Diagnostic {
     ToldBefore {
         /// Run.
         run: u32,
+        /// Sphere.
+        sphere: String,
+    },
+    /// A sphere of a run that is evaluated.
+    #[error(
+        "run {run}: a visit of sphere {sphere} came after the run was evaluated; not used: raise hold_ms"
+    )]
+    TooLate {
+        /// Run.
+        run: u32,
+        /// Sphere.
+        sphere: String,
+    },
+    /// A run of more visits than are held.
+    #[error(
+        "run {run}: {held} visits are held already, the most there may be; one of {sphere} is not used"
+    )]
+    TooManyVisits {
+        /// Run.
+        run: u32,
+        /// Visits that are held.
+        held: usize,
         /// Sphere.
         sphere: String,
     },
@@ -221,6 +269,25 @@ pub enum LinearRefusal {
     Pose(#[from] machine::volumetric::PoseRefusal),
 }
 
+/// The likely reason of a residual, and what to do.
+fn advice(reason: &Reason) -> String {
+    let um = |shift_mm: &nalgebra::Vector3<f64>| {
+        let [x, y, z] = [shift_mm.x, shift_mm.y, shift_mm.z].map(|mm| mm * 1e3);
+        format!("X {x:+.1}, Y {y:+.1}, Z {z:+.1} µm")
+    };
+    match reason {
+        Reason::MachineShift(shift_mm) => format!(
+            "all centres are shifted alike since the calibration, by {} along the machine's axes, as by heat or another seat of the probe: let the machine warm up and calibrate again",
+            um(shift_mm)
+        ),
+        Reason::WorkpieceShift(shift_mm) => format!(
+            "all centres are shifted alike since the calibration, by {} along the workpiece's axes, as by a sphere or a table that moved: fasten the sphere and calibrate again",
+            um(shift_mm)
+        ),
+        Reason::Poses => "no common shift explains it, the poses differ: error motions, reversal errors or linear axes are worse than stated; calibrate at more poses, or state greater allowances".to_owned(),
+    }
+}
+
 fn counted(spheres: usize) -> String {
     match spheres {
         1 => "1 sphere".to_owned(),
@@ -248,11 +315,14 @@ impl Diagnostic {
             | Self::LowMerit { .. }
             | Self::Doubtful { .. }
             | Self::LackOfFit { .. }
+            | Self::BeyondExpected { .. }
             | Self::VisitMissing { .. }
             | Self::ToldBefore { .. } => Severity::Warn,
             Self::OtherSphere { .. }
             | Self::UnknownSphere { .. }
             | Self::OfAnotherTime { .. }
+            | Self::TooLate { .. }
+            | Self::TooManyVisits { .. }
             | Self::NotFinite { .. }
             | Self::OutsideTravel { .. }
             | Self::NotEstimated { .. }
@@ -269,6 +339,7 @@ impl Diagnostic {
         match self {
             Self::Calibrated { .. } => "calibrated",
             Self::Verified { .. } => "verified",
+            Self::BeyondExpected { .. } => "beyond_expected",
             Self::NotEstimable { .. } => "not_estimable",
             Self::NoAllowance { .. } => "no_allowance",
             Self::LowMerit { .. } => "low_merit",
@@ -279,6 +350,8 @@ impl Diagnostic {
             Self::UnknownSphere { .. } => "unknown_sphere",
             Self::ToldBefore { .. } => "told_before",
             Self::OfAnotherTime { .. } => "of_another_time",
+            Self::TooLate { .. } => "too_late",
+            Self::TooManyVisits { .. } => "too_many_visits",
             Self::NotFinite { .. } => "not_finite",
             Self::OutsideTravel { .. } => "outside_travel",
             Self::NotEstimated { .. } => "not_estimated",

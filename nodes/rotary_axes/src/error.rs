@@ -2,12 +2,13 @@
 
 use machine::PoseError;
 use metrology::Axis;
+use metrology::number::{number, quantity};
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RotaryAxesError {
     /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}")]
+    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
     OutOfRange {
         /// Parameter.
         name: &'static str,

@@ -58,6 +58,8 @@ pub struct SphereFit {
     pub estimable: Vec<bool>,
     /// Change of each unknown per mm of each reading, machine frame: b = G y of (3).
     pub gain: DMatrix<f64>,
+    /// Change of each sphere's place per mm of each reading, machine frame, the unknowns held: N+ L^-1 of (4).
+    pub place_gain: Vec<DMatrix<f64>>,
     /// What is seen of the unknowns that are not estimable alone.
     pub combinations: Vec<Combination>,
     /// Step of each sphere's place, workpiece frame, mm.
@@ -317,6 +319,7 @@ fn assemble(
         }),
         estimable,
         gain: gain(rows, weights, seen, scale),
+        place_gain: place_gain(rows, weights),
         place_per_unknown: place_per_unknown(rows, weights, scale),
         place_steps_mm,
         place_covariances_mm2: weights.to_vec(),
@@ -357,6 +360,18 @@ fn gain(
         }
     }
     gain
+}
+
+/// N+ L^-1, a matrix of three rows for each sphere.
+fn place_gain(rows: &[Row], weights: &[Matrix3<f64>]) -> Vec<DMatrix<f64>> {
+    let mut gains = vec![DMatrix::zeros(3, 3 * rows.len()); weights.len()];
+    for (k, row) in rows.iter().enumerate() {
+        let own = weights[row.sphere] * row.turn.transpose() * row.whitener;
+        gains[row.sphere]
+            .fixed_view_mut::<3, 3>(0, 3 * k)
+            .copy_from(&own);
+    }
+    gains
 }
 
 fn place_per_unknown(

@@ -5,8 +5,8 @@
 //! centre at one pose. `unknown` lists what may be asked: location errors, and low harmonics of the
 //! rotary axes' error motions. `fit` is the weighted least-squares solution that says what it cannot
 //! see; `estimate` puts it to use: the sphere's place, doubtful visits, lack of fit, harmonics where
-//! they are needed; `allowance` adds to its uncertainty what no visit shows. `verification` holds a model against other poses, `published` turns it into the
-//! message. `stage` is the node's whole computation. The poses themselves are planned, and what they
+//! they are needed; `allowance` adds to its uncertainty what no visit shows. `verification` holds a model against other
+//! poses, `expectation` says what it may leave there; `published` turns the estimate into the message. `stage` is the node's whole computation. The poses themselves are planned, and what they
 //! would tell is predicted, in `machine::poses`.
 //!
 //! One sphere and one stylus length cannot tell a tilt from a displacement that looks alike at that
@@ -18,6 +18,7 @@ pub mod config;
 pub mod diagnostic;
 pub mod error;
 pub mod estimate;
+pub mod expectation;
 pub mod fit;
 pub mod published;
 mod run;

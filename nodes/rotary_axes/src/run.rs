@@ -9,6 +9,9 @@ use nalgebra::{Matrix3, Vector3};
 use crate::diagnostic::Diagnostic;
 use crate::visit::SphereVisit;
 
+/// Visits of one run, as many as a plan may have: doubtful ones are sought one by one, which takes as the square of them.
+const MOST_VISITS: usize = 500;
+
 /// A rotary test and what has come of it so far.
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
@@ -33,6 +36,10 @@ impl Run {
         pose_repeatability_mm: f64,
     ) -> Result<SphereVisit, Diagnostic> {
         let (run, sphere) = (self.number(), feature.feature_id.clone());
+        let held = self.visits.len();
+        if held >= MOST_VISITS {
+            return Err(Diagnostic::TooManyVisits { run, held, sphere });
+        }
         if self.told.contains(&(feature.at, feature.centre_mm)) {
             return Err(Diagnostic::ToldBefore { run, sphere });
         }
@@ -150,6 +157,6 @@ impl Run {
 }
 
 /// How far the clocks of hosts may be apart.
-const LATE: Span = Span::from_nanos(2_000_000_000);
+pub(crate) const LATE: Span = Span::from_nanos(2_000_000_000);
 /// How far a servo may stand beyond the end of the travel, deg.
 const BESIDE_DEG: f64 = 0.01;

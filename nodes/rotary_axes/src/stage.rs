@@ -1,7 +1,8 @@
 //! The node's whole computation: probed spheres and segments in, models of the rotary axes out.
 //!
 //! The probe evaluates a run a little after its end, and the next run may have begun by then: spheres
-//! are sorted by the number of their run, and a run is evaluated `hold_ms` after its end. A rotary
+//! are sorted by the number of their run, and a run is evaluated `hold_ms` after its end. Spheres and segments come on two
+//! topics, which have no order: spheres that overtake the begin of their run wait for it. A rotary
 //! test of a sphere replaces an earlier one of the same sphere and is put together with those of other
 //! spheres of the same set-up; another set-up begins anew.
 
@@ -52,6 +53,9 @@ pub enum Output {
     Diagnostic(Diagnostic),
 }
 
+/// Spheres that wait for the begin of their run; of more the oldest is forgotten, for runs of other kinds begin elsewhere.
+const MOST_WAITING: usize = 500;
+
 /// The node's computation.
 #[derive(Clone, Debug)]
 pub struct RotaryAxesStage {
@@ -62,6 +66,9 @@ pub struct RotaryAxesStage {
     pose_repeatability_mm: f64,
     least_merit: f64,
     runs: VecDeque<Run>,
+    waiting: VecDeque<ProbedFeature>,
+    /// The run that was evaluated last, and when its end came: numbers begin anew when a sequencer does.
+    evaluated: Option<(u32, Stamp<Host>)>,
     setup_id: u32,
     visits: Vec<SphereVisit>,
     found: Option<RotaryEstimate>,
@@ -85,6 +92,8 @@ impl RotaryAxesStage {
             pose_repeatability_mm: config.pose_repeatability_um / 1e3,
             least_merit: config.least_merit,
             runs: VecDeque::new(),
+            waiting: VecDeque::new(),
+            evaluated: None,
             setup_id: 0,
             visits: Vec::new(),
             found: None,
@@ -94,12 +103,17 @@ impl RotaryAxesStage {
         })
     }
 
-    fn take_segment(&mut self, at: Stamp<Host>, segment: TestSegment, out: &mut Vec<Output>) {
+    fn take_segment(
+        &mut self,
+        at: Stamp<Host>,
+        segment: TestSegment,
+        out: &mut Vec<Output>,
+    ) -> Result<(), RotaryAxesError> {
         if !matches!(
             segment.kind,
             TestKind::Rotary | TestKind::RotaryVerification
         ) {
-            return;
+            return Ok(());
         }
         let number = segment.run;
         if segment.begin {
@@ -114,11 +128,44 @@ impl RotaryAxesStage {
                 told: Vec::new(),
                 end: None,
             });
+            return self.take_waiting(out);
         } else if let Some(run) = self.runs.iter_mut().find(|run| run.number() == number) {
             run.end = Some((at, segment.completed));
         } else {
             out.push(say(Diagnostic::NotBracketed { run: number }));
         }
+        Ok(())
+    }
+
+    /// Takes the spheres that overtook the begin of their run, all of them whatever one of them lacks.
+    fn take_waiting(&mut self, out: &mut Vec<Output>) -> Result<(), RotaryAxesError> {
+        let Some(run) = self.runs.back().map(Run::number) else {
+            return Ok(());
+        };
+        let waiting = std::mem::take(&mut self.waiting).into_iter();
+        let (of_run, others) = waiting.partition::<VecDeque<_>, _>(|feature| feature.run == run);
+        self.waiting = others;
+        let taken = of_run.iter().map(|feature| self.take_feature(feature, out));
+        taken.fold(Ok(()), Result::and)
+    }
+
+    /// A sphere of a run that is over, or of one that has not begun here.
+    fn take_without_run(&mut self, feature: &ProbedFeature, out: &mut Vec<Output>) {
+        if feature.kind != FeatureKind::Sphere {
+            return;
+        }
+        let is_late = |(run, ended): (u32, Stamp<Host>)| run == feature.run && feature.at <= ended;
+        if self.evaluated.is_some_and(is_late) {
+            out.push(say(Diagnostic::TooLate {
+                run: feature.run,
+                sphere: feature.feature_id.clone(),
+            }));
+            return;
+        }
+        if self.waiting.len() >= MOST_WAITING {
+            self.waiting.pop_front();
+        }
+        self.waiting.push_back(feature.clone());
     }
 
     fn take_feature(
@@ -128,6 +175,7 @@ impl RotaryAxesStage {
     ) -> Result<(), RotaryAxesError> {
         let machine = (&self.file, &self.design);
         let Some(run) = self.runs.iter_mut().find(|run| run.number() == feature.run) else {
+            self.take_without_run(feature, out);
             return Ok(());
         };
         let mut turning = self.design.rotary_axes().iter();
@@ -167,10 +215,11 @@ impl RotaryAxesStage {
             if at - *ended < self.hold {
                 return;
             }
-            let completed = *completed;
+            let (ended, completed) = (*ended, *completed);
             let Some(run) = self.runs.pop_front() else {
                 return;
             };
+            self.evaluated = Some((run.number(), ended));
             if completed {
                 self.evaluate(at, run, out);
             } else {
@@ -227,13 +276,7 @@ impl RotaryAxesStage {
         let spheres = self.spheres(&visits);
         match estimate(&self.design, &visits, &spheres, &self.rules) {
             Ok(found) => {
-                let found = found.with_common(
-                    &self.design,
-                    Known {
-                        allowance: self.allowance.as_ref(),
-                        linear: self.linear.as_ref().map(|(_, model)| model),
-                    },
-                );
+                let found = found.with_common(&self.design, self.known());
                 self.visits = visits;
                 self.report(number, &found, out);
                 self.sequence += 1;
@@ -312,6 +355,14 @@ impl RotaryAxesStage {
         }
     }
 
+    /// What is known besides the visits.
+    fn known(&self) -> Known<'_> {
+        Known {
+            allowance: self.allowance.as_ref(),
+            linear: self.linear.as_ref().map(|(_, model)| model),
+        }
+    }
+
     fn verify(&self, run: &Run, out: &mut Vec<Output>) {
         let number = run.number();
         let (Some(found), false) = (&self.found, run.visits.is_empty()) else {
@@ -320,7 +371,15 @@ impl RotaryAxesStage {
         };
         let spheres = self.spheres(&run.visits);
         let same_setup = run.begin.setup_id == self.setup_id;
-        match verify(&self.design, found, &run.visits, &spheres, same_setup) {
+        let known = self.known();
+        match verify(
+            &self.design,
+            found,
+            known,
+            &run.visits,
+            &spheres,
+            same_setup,
+        ) {
             Ok(verified) => {
                 out.push(say(Diagnostic::Verified {
                     run: number,
@@ -329,8 +388,20 @@ impl RotaryAxesStage {
                     after_mm: verified.rms_after_mm,
                     greatest_mm: verified.greatest_after_mm,
                     expected_mm: verified.expected_mm,
+                    allowed_mm: verified.allowed_mm,
+                    allowed_p: verified.judged.p,
                     same_places: verified.same_places,
                 }));
+                if verified.judged.p < self.rules.lack_of_fit_p {
+                    out.push(say(Diagnostic::BeyondExpected {
+                        run: number,
+                        after_mm: verified.rms_after_mm,
+                        allowed_mm: verified.allowed_mm,
+                        p: verified.judged.p,
+                        reason: verified.judged.reason,
+                        has_allowance: self.allowance.is_some(),
+                    }));
+                }
                 out.push(Output::Verification(Box::new(verified)));
             }
             Err(reason) => out.push(say(Diagnostic::NotEstimated {
@@ -402,7 +473,7 @@ impl Stage for RotaryAxesStage {
     ) -> Result<(), RotaryAxesError> {
         match input {
             Input::Feature(feature) => self.take_feature(&feature, out)?,
-            Input::Segment(segment) => self.take_segment(at, segment, out),
+            Input::Segment(segment) => self.take_segment(at, segment, out)?,
             Input::Linear(model) => self.take_linear(&model, out),
             Input::Tick => {}
         }

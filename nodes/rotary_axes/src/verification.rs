@@ -8,13 +8,16 @@
 //! (1) is what is left of a machine without compensation after a workpiece datum was taken there; (2)
 //! what the model does not explain. Both are in the motors' readings, in which a sphere is found at
 //! the same place whether a compensation acts or not. Where the sphere was not part of the
-//! calibration, or was set up anew, its place is fitted in (2) too.
+//! calibration, or was set up anew, its place is fitted in (2) too. `expectation` says what (2) may be, and why it is
+//! more where it is.
 
 use machine::SphereDesign;
 use nalgebra::{Matrix3, Vector3};
 
+use crate::allowance::Known;
 use crate::error::EstimateError;
 use crate::estimate::{RotaryEstimate, prediction_covariance_mm2};
+use crate::expectation::{Held, Judged, judge};
 use crate::fit::fit;
 use crate::visit::SphereVisit;
 
@@ -27,7 +30,7 @@ pub struct VerifiedVisit {
     pub before_mm: Vector3<f64>,
     /// (2), machine frame, mm.
     pub after_mm: Vector3<f64>,
-    /// Standard uncertainty of (2) in all three directions together, mm.
+    /// Standard uncertainty of (2) in all three directions together from the stated noise alone, mm.
     pub standard_uncertainty_mm: f64,
 }
 
@@ -42,28 +45,36 @@ pub struct Verification {
     pub rms_after_mm: f64,
     /// Greatest size of (2), mm.
     pub greatest_after_mm: f64,
-    /// Root mean square of the standard uncertainty of (2), mm: what chance alone would leave.
+    /// Root mean square of the standard uncertainty of (2), mm: what the stated noise alone would leave.
     pub expected_mm: f64,
+    /// The same with the scatter that repeats showed and the allowances, mm.
+    pub allowed_mm: f64,
+    /// (2) against that.
+    pub judged: Judged,
     /// Whether the spheres' places are those of the calibration.
     pub same_places: bool,
 }
 
-/// Verifies an estimate; `same_setup`: the spheres stand where they stood during the calibration.
+/// Verifies an estimate; `same_setup`: the spheres stand where they stood during the calibration; `known` is what the
+/// estimate was made with.
 ///
 /// # Errors
 /// When a visit cannot be used.
 pub fn verify(
     design: &SphereDesign,
     found: &RotaryEstimate,
+    known: Known<'_>,
     visits: &[SphereVisit],
     spheres: &[(String, Vector3<f64>)],
     same_setup: bool,
 ) -> Result<Verification, EstimateError> {
     let nominal = places(design, visits, spheres, |visit, _| visit.clone())?;
-    let known = |name: &str| found.spheres.iter().find(|(known, _)| known == name);
-    let same_places = same_setup && spheres.iter().all(|(name, _)| known(name).is_some());
+    let calibrated = |name: &str| found.spheres.iter().find(|(known, _)| known == name);
+    let same_places = same_setup && spheres.iter().all(|(name, _)| calibrated(name).is_some());
     let modelled = if same_places {
-        let kept = spheres.iter().filter_map(|(name, _)| known(name).cloned());
+        let kept = spheres
+            .iter()
+            .filter_map(|(name, _)| calibrated(name).cloned());
         kept.collect()
     } else {
         // What the model adds is taken off the readings; the rest is a nominal machine.
@@ -94,6 +105,17 @@ pub fn verify(
         })
     });
     let visits: Vec<VerifiedVisit> = verified.collect();
+    let left_mm: Vec<Vector3<f64>> = visits.iter().map(|v| v.after_mm).collect();
+    let of_all: Vec<SphereVisit> = visits.iter().map(|v| v.visit.clone()).collect();
+    let held = Held {
+        visits: &of_all,
+        spheres: &modelled,
+        same_places,
+        left_mm: &left_mm,
+    };
+    let judged = judge(design, found, known, &held)?;
+    let allowed = judged.standard_uncertainty_mm.iter().map(|u| u * u);
+    let allowed_mm = (allowed.sum::<f64>() / visits.len() as f64).sqrt();
     let rms = |size: &dyn Fn(&VerifiedVisit) -> f64| {
         (visits.iter().map(|v| size(v).powi(2)).sum::<f64>() / visits.len() as f64).sqrt()
     };
@@ -102,6 +124,8 @@ pub fn verify(
         rms_after_mm: rms(&|v| v.after_mm.norm()),
         greatest_after_mm: visits.iter().map(|v| v.after_mm.norm()).fold(0.0, f64::max),
         expected_mm: rms(&|v| v.standard_uncertainty_mm),
+        allowed_mm,
+        judged,
         same_places,
         visits,
     })

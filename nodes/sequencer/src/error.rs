@@ -1,6 +1,27 @@
 //! What can be wrong with a plan or an event.
 
 use machine::{CycleError, TrajectoryError};
+use metrology::BoundError;
+use metrology::number::number;
+
+/// Why an ordered cycle is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "fields are named in the messages")]
+pub enum OrderError {
+    #[error(transparent)]
+    Bound(#[from] BoundError),
+    #[error(transparent)]
+    Cycle(#[from] CycleError),
+    #[error("{key} = {value}: a {cycle} cycle does not use it: {reason}")]
+    Unused {
+        key: &'static str,
+        value: String,
+        cycle: &'static str,
+        reason: &'static str,
+    },
+    #[error("features: {n} names ({names}): a latency cycle touches exactly one feature")]
+    OneFeature { n: usize, names: String },
+}
 
 /// Why a plan cannot be run or an event cannot be taken.
 #[derive(Debug, thiserror::Error)]
@@ -12,12 +33,16 @@ pub enum SequencerError {
         program: String,
         known: String,
     },
-    #[error("steps[{step}].minutes = {minutes}: must be above 0 and finite")]
+    #[error("steps[{step}].minutes = {minutes} min: must be above 0 and finite", minutes = number(*minutes))]
     Minutes { step: usize, minutes: f64 },
-    #[error("steps[{step}].seconds = {seconds}: must be above 0 and finite")]
+    #[error("steps[{step}].seconds = {seconds} s: must be above 0 and finite", seconds = number(*seconds))]
     Seconds { step: usize, seconds: f64 },
+    #[error(transparent)]
+    Bound(#[from] BoundError),
     #[error("steps[{step}]: {source}")]
     Cycle { step: usize, source: CycleError },
+    #[error("steps[{step}]: {source}")]
+    Order { step: usize, source: OrderError },
     #[error("steps[{step}]: {source}")]
     Trajectory {
         step: usize,
@@ -56,6 +81,8 @@ pub enum SequencerError {
     NoRepeats { step: usize },
     #[error("steps[{step}].points = 0: must be above 0")]
     NoPoints { step: usize },
+    #[error("steps[{step}].id = \"{id}\": the machine file has no artefact of this name")]
+    UnknownArtefact { step: usize, id: String },
     #[error("steps: the plan has none")]
     NoSteps,
 }

@@ -11,19 +11,25 @@
 //!
 //! The sequencer is the only publisher of `test/segment`, which keeps run numbers unique in a bag.
 
+mod bounds;
 pub mod config;
 mod cycle;
 pub mod error;
 mod job;
+pub mod load;
 mod measuring;
 pub mod plan;
 pub mod recordings;
 pub mod rotary;
 pub mod stage;
 mod task;
+pub mod touch_along;
 
 pub use config::Config;
 pub use error::SequencerError;
-pub use plan::{DiagonalStep, GridStep, GridTrajectory, Plan, PositioningStep, Senses, Step};
+pub use load::{Load, load};
+pub use plan::{
+    DiagonalStep, GridStep, GridTrajectory, Plan, PlanError, PositioningStep, Senses, Step,
+};
 pub use recordings::{PlannedRecording, recordings};
 pub use stage::{CANCELED, CycleGoal, CycleOutcome, Input, Output, ProgramEnd, Sequencer};

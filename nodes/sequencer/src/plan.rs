@@ -3,15 +3,20 @@
 mod grid;
 mod linear;
 
+use metrology::BoundError;
+use metrology::yaml::{self, Places, YamlError};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::bounds;
 use crate::rotary::RotaryStep;
+use crate::touch_along::TouchAlongStep;
 
 pub use grid::{GridStep, GridTrajectory, Senses};
 pub use linear::{DiagonalStep, PositioningStep};
 
 /// A whole plan.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
     /// One line for displays.
@@ -21,7 +26,7 @@ pub struct Plan {
 }
 
 /// One step.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Step {
     /// Touches the three faces of each block.
@@ -51,6 +56,8 @@ pub enum Step {
     },
     /// Touches a sphere at several poses of the rotary axes.
     Rotary(RotaryStep),
+    /// Touches a sphere along given directions of the probe's axis.
+    TouchAlong(TouchAlongStep),
     /// Switches the compensation.
     Compensation {
         /// On or off.
@@ -92,15 +99,40 @@ pub enum Step {
     Diagonals(DiagonalStep),
 }
 
+/// Why a text is no plan.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// It is no YAML, or a key is unknown, missing or of the wrong type; the message has line and column.
+    #[error(transparent)]
+    Syntax(#[from] YamlError),
+    /// A number is out of its bound.
+    #[error("{line}:{column}: {source}")]
+    Bound {
+        /// Line of the number.
+        line: usize,
+        /// Column of the number.
+        column: usize,
+        /// Place, value and bound.
+        source: BoundError,
+    },
+}
+
 impl Plan {
     /// Reads a plan from its text.
     ///
     /// # Errors
-    /// When a key is unknown, missing or of the wrong type; the message has line and column.
-    pub fn from_yaml(text: &str) -> Result<Self, serde_saphyr::Error> {
-        // `axis: Y` is a letter here, not the truth value that YAML 1.1 takes it for.
-        let options = serde_saphyr::options! { strict_booleans: true };
-        serde_saphyr::from_str_with_options(text, options)
+    /// When a key is unknown, missing or of the wrong type, or a number is out of its bound; the message begins with the line.
+    pub fn from_yaml(text: &str) -> Result<Self, PlanError> {
+        let plan: Self = yaml::read_letters(text)?;
+        bounds::of_plan(&plan).map_err(|source| {
+            let place = Places::of(text).known(source.place());
+            PlanError::Bound {
+                line: place.map_or(1, |at| at.line),
+                column: place.map_or(1, |at| at.column),
+                source,
+            }
+        })?;
+        Ok(plan)
     }
 }
 
@@ -118,6 +150,7 @@ impl Step {
             }
             Self::Artefact { id, .. } => format!("touching {id}"),
             Self::Rotary(step) => step.activity(),
+            Self::TouchAlong(step) => step.activity(),
             Self::Compensation { enable } => {
                 format!(
                     "switching compensation {}",

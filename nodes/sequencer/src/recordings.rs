@@ -9,6 +9,7 @@ use metrology::sample::TestSegment;
 use metrology::stamp::Stamp;
 use nalgebra::Vector3;
 
+use crate::bounds;
 use crate::error::SequencerError;
 use crate::job::Job;
 use crate::measuring::{Setups, runs};
@@ -34,6 +35,7 @@ pub fn recordings(
     plan: &Plan,
     machine: &MachineFile,
 ) -> Result<Vec<PlannedRecording>, SequencerError> {
+    bounds::of_plan(plan)?;
     let mut setups = Setups::default();
     let mut found = Vec::new();
     for (at, step) in plan.steps.iter().enumerate() {

@@ -6,6 +6,7 @@ use machine::cycle::{RotaryOrder, rotary};
 use machine::poses::{ReachLimits, calibration_poses, verification_poses};
 use machine::{CycleError, MachineFile};
 use metrology::{Axis, PerAxis};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SequencerError;
@@ -14,7 +15,7 @@ use crate::plan::Step;
 use crate::task::of_cycle;
 
 /// What a rotary step says.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotaryStep {
     /// Name of the sphere.

@@ -17,6 +17,7 @@ use crate::measuring::{self, Measurement, Setups};
 use crate::plan::{Plan, Step};
 use crate::rotary;
 use crate::task;
+use crate::touch_along::{self, PointedTouch};
 
 /// What the sequencer is told.
 #[derive(Clone, Debug)]
@@ -102,6 +103,8 @@ pub enum Output {
     CycleEnded(CycleOutcome),
     /// What is being done.
     Status(PlanStatus),
+    /// How a run takes a direction of the probe's axis.
+    Pointed { run: u32, touch: PointedTouch },
     /// A touch was told again, or after a later one: it does not count.
     ToldBefore { sequence: u32 },
     /// A program did not run to its end.
@@ -311,6 +314,17 @@ impl Sequencer {
                 let at = self.step - 1;
                 match rotary::task(at, rotary, self.steps(), &self.machine) {
                     Ok(task) => self.begin(task, 0, out),
+                    Err(error) => self.fail(error.to_string(), out),
+                }
+            }
+            Step::TouchAlong(along) => {
+                match touch_along::task(self.step - 1, along, &self.machine) {
+                    Ok((task, touches)) => {
+                        let run = self.next_run;
+                        self.begin(task, 0, out);
+                        let pointed = touches.into_iter();
+                        out.extend(pointed.map(|touch| Output::Pointed { run, touch }));
+                    }
                     Err(error) => self.fail(error.to_string(), out),
                 }
             }

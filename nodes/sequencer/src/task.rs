@@ -2,18 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use machine::CycleError;
 use machine::MachineFile;
 use machine::cycle::Cycle;
 use machine::file::ArtefactEntry;
 use metrology::sample::{CycleKind, CycleOrder, TestKind};
 
+use crate::bounds;
 use crate::cycle;
-use crate::error::SequencerError;
+use crate::error::{OrderError, SequencerError};
 use crate::job::{Owner, Task, Trace};
 use crate::measuring;
 use crate::plan::{Plan, Step};
 use crate::rotary;
+use crate::touch_along;
 
 /// Checks that every step of a plan can be run on this machine.
 pub(crate) fn check(
@@ -24,11 +25,15 @@ pub(crate) fn check(
     if plan.steps.is_empty() {
         return Err(SequencerError::NoSteps);
     }
+    bounds::of_plan(plan)?;
     for (at, step) in plan.steps.iter().enumerate() {
         match step {
             Step::Compensation { .. } => {}
             Step::Rotary(step) => {
                 rotary::task(at, step, &plan.steps, machine)?;
+            }
+            Step::TouchAlong(step) => {
+                touch_along::task(at, step, machine)?;
             }
             Step::Wait { seconds } => {
                 if !(seconds.is_finite() && *seconds > 0.0) {
@@ -102,7 +107,7 @@ pub(crate) fn of_step(
         },
         Step::Artefact { id, points } => CycleOrder {
             points: *points,
-            ..order(kind_of(machine, id), vec![id.clone()], false)
+            ..order(kind_of(at, machine, id)?, vec![id.clone()], false)
         },
         Step::Verify { program, label } => {
             let text = text(at, program, programs)?;
@@ -123,12 +128,13 @@ pub(crate) fn of_step(
         | Step::Positioning(_)
         | Step::Scan(_)
         | Step::Diagonals(_)
-        | Step::Rotary(_) => {
+        | Step::Rotary(_)
+        | Step::TouchAlong(_) => {
             return Ok(plain("", "", TestKind::Dwell, Vec::new()));
         }
     };
     of_order(&order, machine, Owner::Step)
-        .map_err(|source| SequencerError::Cycle { step: at, source })
+        .map_err(|source| SequencerError::Order { step: at, source })
 }
 
 /// The task of an ordered cycle.
@@ -136,7 +142,7 @@ pub(crate) fn of_order(
     order: &CycleOrder,
     machine: &MachineFile,
     owner: Owner,
-) -> Result<Task, CycleError> {
+) -> Result<Task, OrderError> {
     let cycle = cycle::plan(machine, order)?;
     Ok(of_cycle(cycle, order.cold, machine, owner))
 }
@@ -161,7 +167,7 @@ pub(crate) fn of_cycle(cycle: Cycle, cold: bool, machine: &MachineFile, owner: O
 }
 
 /// The block cycle that the thermal model asked for.
-pub(crate) fn update(machine: &MachineFile) -> Result<Task, CycleError> {
+pub(crate) fn update(machine: &MachineFile) -> Result<Task, OrderError> {
     of_order(
         &order(CycleKind::Blocks, Vec::new(), false),
         machine,
@@ -201,16 +207,19 @@ fn plain(name: &str, text: &str, kind: TestKind, features: Vec<String>) -> Task 
     }
 }
 
-/// The cycle that measures an artefact; an unknown one is left to the cycle to refuse by name.
-fn kind_of(machine: &MachineFile, id: &str) -> CycleKind {
+/// The cycle that measures an artefact.
+fn kind_of(step: usize, machine: &MachineFile, id: &str) -> Result<CycleKind, SequencerError> {
     let named = machine
         .artefacts
         .iter()
         .find(|entry| machine::cycle::artefact_id(entry) == id);
     match named {
-        Some(ArtefactEntry::Sphere { .. }) => CycleKind::Sphere,
-        Some(ArtefactEntry::Plane { .. }) => CycleKind::Plane,
-        Some(ArtefactEntry::Bore { .. } | ArtefactEntry::Boss { .. }) => CycleKind::Bore,
-        None => CycleKind::Touch,
+        Some(ArtefactEntry::Sphere { .. }) => Ok(CycleKind::Sphere),
+        Some(ArtefactEntry::Plane { .. }) => Ok(CycleKind::Plane),
+        Some(ArtefactEntry::Bore { .. } | ArtefactEntry::Boss { .. }) => Ok(CycleKind::Bore),
+        None => Err(SequencerError::UnknownArtefact {
+            step,
+            id: id.to_owned(),
+        }),
     }
 }

@@ -1,6 +1,7 @@
 //! What the stage has to say besides its model; each is in the bag and on `/diagnostics`.
 
 use metrology::Axis;
+use metrology::number::number;
 
 use crate::cycle::FaceRefusal;
 use crate::load::LoadChange;
@@ -29,6 +30,15 @@ pub enum Diagnostic {
     BlockMissing { block_id: String, run: u32 },
     #[error("cold reference taken: {n_faces} faces of {n_expected}")]
     ReferenceTaken { n_faces: usize, n_expected: usize },
+    #[error(
+        "blocks \"{first}\" and \"{second}\" at the ends of the diagonal differ by {height_mm} mm in height, 150 to 200 mm are wanted: the slope of Z is measured over it; set one of them higher or lower",
+        height_mm = number(*height_mm)
+    )]
+    BlockHeights {
+        first: String,
+        second: String,
+        height_mm: f64,
+    },
     #[error("run {run}: blocks measured warm, but there is no cold reference")]
     NoReference { run: u32 },
     #[error("run {run}: no usable face")]
@@ -77,7 +87,7 @@ pub enum Diagnostic {
     JumpContradicted,
     #[error("update overdue: tt {elapsed_s:.0} s, period {period_s:.0} s")]
     UpdateOverdue { elapsed_s: f64, period_s: f64 },
-    #[error("clock went back by {by_s} s")]
+    #[error("clock went back by {by_s} s", by_s = number(*by_s))]
     ClockWentBack { by_s: f64 },
     #[error("load changed: {change:?}")]
     LoadChanged { change: LoadChange },
@@ -155,6 +165,7 @@ impl Diagnostic {
                 "block_jump"
             }
             Self::ClockWentBack { .. } => "clock",
+            Self::BlockHeights { .. } => "block_heights",
             Self::LoadChanged { .. } => "load",
             Self::TimeConstant { .. }
             | Self::NoTimeConstant { .. }

@@ -2,12 +2,13 @@
 
 use metrology::Axis;
 use metrology::least_squares::FitError;
+use metrology::number::number;
 
 /// A configuration, machine or geometry from which no thermal model can be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ThermalModelError {
     /// A parameter is outside its limits.
-    #[error("{key} = {value} {unit}: must be from {lower} to {upper} {unit}")]
+    #[error("{key} = {value} {unit}: must be from {lower} to {upper} {unit}", value = number(*value), lower = number(*lower), upper = number(*upper))]
     ParameterOutOfRange {
         /// The parameter.
         key: &'static str,
@@ -45,12 +46,16 @@ pub enum ThermalModelError {
         axis: Axis,
     },
     /// A sensor is named that the machine file does not have.
-    #[error("{key} = \"{sensor}\": the machine file has no such temperature sensor")]
+    #[error(
+        "{key} = \"{sensor}\": the machine file has no such temperature sensor, it has {known}"
+    )]
     UnknownSensor {
         /// The parameter.
         key: &'static str,
         /// The name given.
         sensor: String,
+        /// The names that there are.
+        known: String,
     },
     /// The least-squares fit refused its numbers.
     #[error(transparent)]

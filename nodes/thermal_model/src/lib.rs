@@ -14,7 +14,8 @@
 //! cannot make. `update_rule` asks for the next cycle, `load` sees that the heat sources changed.
 //! Between cycles `relaxation` extrapolates with a time constant where the data show one, and
 //! `temperature` by the sensors where they have earned it; `prediction` keeps the score of both
-//! against simply holding the last value. `reference` and `cycle` gather the touches, `stage` joins
+//! against simply holding the last value. `block_heights` remarks blocks
+//! whose heights differ too little or too much. `reference` and `cycle` gather the touches, `stage` joins
 //! everything.
 //!
 //! # References
@@ -22,6 +23,7 @@
 //! reference blocks, Xi'an University of Technology, published 2024-01-16. ISO 230-3:2020.
 
 pub mod alignment;
+pub mod block_heights;
 pub mod config;
 pub mod cycle;
 pub mod diagnostic;

@@ -156,6 +156,21 @@ impl Reference {
         self.blocks.get(block).map_or("", |b| &b.entry.id)
     }
 
+    /// Name and corner of each block, machine frame, mm; of a face without a cold position its nominal place.
+    #[must_use]
+    pub fn corners(&self) -> Vec<(&str, Vector3<f64>)> {
+        let corner = |block: &ColdBlock| {
+            Vector3::from_fn(|row, _| {
+                let face = block.faces[Axis::LINEAR[row]];
+                face.map_or(block.entry.corner_mm[row], |face| face.position_mm)
+            })
+        };
+        let blocks = self.blocks.iter();
+        blocks
+            .map(|block| (block.entry.id.as_str(), corner(block)))
+            .collect()
+    }
+
     /// Faces that have a cold position.
     pub fn faces(&self) -> impl Iterator<Item = (usize, Axis)> + '_ {
         self.blocks.iter().enumerate().flat_map(|(index, block)| {

@@ -98,6 +98,11 @@ impl ThermalModelStage {
             return Err(ThermalModelError::UnknownSensor {
                 key: "load.sensor",
                 sensor: config.load.sensor.clone(),
+                known: if sensors.is_empty() {
+                    "none".to_owned()
+                } else {
+                    sensors.join(", ")
+                },
             });
         }
         let error_mm = config.slope_error_limit_um * 1e-3;

@@ -5,6 +5,7 @@ use metrology::stamp::Span;
 use metrology::{Axis, Host, PerAxis, Stamp};
 
 use crate::alignment;
+use crate::block_heights;
 use crate::config::SingleBlockJump;
 use crate::cycle::Cycle;
 use crate::diagnostic::Diagnostic;
@@ -50,6 +51,8 @@ impl ThermalModelStage {
             n_faces: self.reference.faces().count(),
             n_expected: 3 * self.reference.n_blocks(),
         }));
+        let remark = block_heights::remark(&self.reference.corners());
+        out.extend(remark.map(Output::Diagnostic));
         self.quarantine.clear();
         self.forget();
         self.model = None;

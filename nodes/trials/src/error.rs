@@ -5,6 +5,7 @@ use machine::MachineFileError;
 use sequencer::SequencerError;
 
 use crate::arm::Arm;
+use metrology::number::number;
 
 /// A trial that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -53,8 +54,8 @@ pub enum TrialError {
     /// The plan is no plan.
     #[error("drawn programme: {source}")]
     ProgrammeText {
-        /// Line and column.
-        source: serde_saphyr::Error,
+        /// Line, and what is wrong there.
+        source: sequencer::PlanError,
     },
     /// A program ended early on the plant.
     #[error("run {run} failed: {message}")]
@@ -65,13 +66,13 @@ pub enum TrialError {
         message: String,
     },
     /// The plan did not end.
-    #[error("the programme takes more than {limit_s} s")]
+    #[error("the programme takes more than {limit_s} s", limit_s = number(*limit_s))]
     Endless {
         /// Simulated time that it had.
         limit_s: f64,
     },
     /// An effect that this machine cannot have.
-    #[error("hidden {effect} {axis}: {size} cannot be hidden in this machine")]
+    #[error("hidden {effect} {axis}: {size} cannot be hidden in this machine", size = number(*size))]
     Impossible {
         /// Id of the effect.
         effect: &'static str,

@@ -192,7 +192,10 @@ impl Session<'_> {
                 let end = Some(ProgramEnd { done, message });
                 self.ask(ToSequencer::ProgramEnd { id: goal, end })?;
             }
-            FromControl::Feedback { .. } | FromControl::Diagnostic(_) | FromControl::AtRest => {}
+            FromControl::Feedback { .. }
+            | FromControl::Diagnostic(_)
+            | FromControl::Answer(_)
+            | FromControl::AtRest => {}
         }
         Ok(())
     }

@@ -55,7 +55,7 @@ const EASY: f64 = 0.02;
 /// Touches of the programme for scatter: feeds, mm/min, repeats of a step, and how often the two steps are done.
 const TOUCHES: ([f64; 2], u32, usize) = ([30.0, 960.0], 12, 15);
 /// Three minutes of the spindle.
-const WARM_UP: &str = "S10000 M3\nG4 P180\nM5\nM2\n";
+const WARM_UP: &str = "(frame: machine)\nS10000 M3\nG4 P180\nM5\nM2\n";
 
 /// Gives a machine the programme of a class, and nothing of the class.
 ///

@@ -1,7 +1,8 @@
 //! What the diagnosis should reach, and whether it does: the protocol's table.
 //!
-//! A share meets its target where the share itself does; the interval beside it says how surely. Shares of nothing
-//! and figures without a trial are not measured, which is neither met nor missed.
+//! A share meets its target where its whole 95 % interval does and misses it where none of the interval does. Where
+//! the interval holds the target's edge the trials are too few to tell: not measured, as shares of nothing and figures without a
+//! trial are, which is neither met nor missed. Figures without an interval are judged by themselves.
 
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +35,7 @@ pub struct Target {
     pub limit: Option<Limit>,
     /// Of how many.
     pub n: usize,
-    /// Whether it is where it should be.
+    /// Whether it is where it should be; none: not measured, or by too few trials to tell.
     pub met: Option<bool>,
 }
 
@@ -54,6 +55,22 @@ impl Bound {
             AtLeast(low) => value >= low,
             AtMost(high) => value <= high,
             Within(low, high) => (low..=high).contains(&value),
+        }
+    }
+
+    /// Whether all of an interval is where it should be, or none of it; none: the interval cannot tell.
+    fn decides(self, [least, greatest]: [f64; 2]) -> Option<bool> {
+        let (low, high) = match self {
+            AtLeast(low) => (low, f64::INFINITY),
+            AtMost(high) => (f64::NEG_INFINITY, high),
+            Within(low, high) => (low, high),
+        };
+        if low <= least && greatest <= high {
+            Some(true)
+        } else if greatest < low || high < least {
+            Some(false)
+        } else {
+            None
         }
     }
 
@@ -83,15 +100,16 @@ impl Sheet {
     fn share(&mut self, metric: &str, bound: Bound, all: impl Iterator<Item = bool>) {
         let count = Proportion::of(all);
         let value = count.share();
+        let interval = value.map(|_| count.wilson());
         self.0.push(Target {
             metric: metric.to_owned(),
             wanted: bound.words(true),
             count: Some(count),
-            interval: value.map(|_| count.wilson()),
+            interval,
             value,
             limit: None,
             n: count.n,
-            met: value.map(|value| bound.holds(value)),
+            met: interval.and_then(|interval| bound.decides(interval)),
         });
     }
 
@@ -108,12 +126,12 @@ impl Sheet {
         });
     }
 
-    /// A detection limit, which is where it should be if all of where it may lie is.
+    /// A detection limit, which is where it should be if all of where it may lie is, and is not if none of it is.
     fn limit(&mut self, metric: &str, most: f64, limit: Option<Limit>, n: usize) {
         self.figure(metric, AtMost(most), limit.and_then(Limit::value), n);
         if let Some(target) = self.0.last_mut() {
             target.limit = limit;
-            target.met = limit.map(|limit| limit.ends()[1] <= most);
+            target.met = limit.and_then(|limit| AtMost(most).decides(limit.ends()));
         }
     }
 
@@ -478,6 +496,34 @@ mod tests {
             told.iter().filter(|target| target.limit.is_some()).count(),
             3
         );
+    }
+
+    #[test]
+    fn a_share_whose_interval_holds_its_target_is_not_measured() {
+        // Wilson's 95 % intervals by hand, z = 1.96: 0 of 20: 0 to z2/(n + z2) = 3.8416/23.8416 = 0.1611.
+        // 0 of 1000: 0 to 3.8416/1003.84 = 0.0038. 20 of 100: (0.2 + 0.019208 +- 1.96 sqrt(0.0016 + 0.00009604))/1.038416
+        // = 0.1334 to 0.2888. 132 of 136: 0.9269 to 0.9885.
+        let told = |k: usize, n: usize, bound: Bound| {
+            let mut sheet = Sheet(vec![]);
+            sheet.share("", bound, (0..n).map(|index| index < k));
+            (sheet.0[0].interval.unwrap(), sheet.0[0].met)
+        };
+        for (k, n, bound, interval, met) in [
+            (0, 20, AtMost(0.01), [0.0, 0.1611], None),
+            (0, 1000, AtMost(0.01), [0.0, 0.0038], Some(true)),
+            (20, 100, AtMost(0.01), [0.1334, 0.2888], Some(false)),
+            (20, 100, AtMost(0.15), [0.1334, 0.2888], None),
+            (132, 136, AtLeast(0.98), [0.9269, 0.9885], None),
+            (20, 100, Within(0.1, 0.3), [0.1334, 0.2888], Some(true)),
+            (20, 100, Within(0.19, 0.21), [0.1334, 0.2888], None),
+            (20, 100, Within(0.3, 0.4), [0.1334, 0.2888], Some(false)),
+        ] {
+            let (seen, seen_met) = told(k, n, bound);
+            for (seen, by_hand) in seen.iter().zip(interval) {
+                assert!((seen - by_hand).abs() < 1e-4, "{k}/{n}: {seen} {by_hand}");
+            }
+            assert_eq!(seen_met, met, "{k}/{n} {}", bound.words(true));
+        }
     }
 
     #[test]

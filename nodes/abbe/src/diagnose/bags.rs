@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe_msgs::topics::{self, Topic};
-use abbe_msgs::{Message, Wire, from_cdr};
+use abbe_msgs::topics;
 use anyhow::{Context, Result, anyhow, bail};
 use gap_diagnosis::report;
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
 use machine::file::AxisEntry;
 use machine::twin::Session;
-use recorder::{Bag, Event, Order};
+use metrology::text::{self, Comments};
+use recorder::{Bag, Order};
+use replayer::{Reading, Taken, reading};
 use sha2::{Digest, Sha256};
 
 /// The attachment that holds the machine file of a recording.
@@ -24,18 +25,18 @@ pub struct Recorded {
     pub bags: Vec<report::Bag>,
     /// What was left out, in words.
     pub remarks: Vec<String>,
-    /// What could not be read, in words.
-    pub losses: Vec<String>,
+    /// What of each bag was read, lost and left out.
+    pub readings: Vec<Reading>,
 }
 
 impl Recorded {
     /// Reads bags one after another.
     ///
     /// # Errors
-    /// When one cannot be read, holds a message that is none, or is another machine's.
+    /// When one cannot be opened, or is another machine's.
     pub fn read(paths: &[PathBuf], machine: &MachineFile) -> Result<Self> {
         let mut builder = SessionBuilder::new(machine, SessionConfig::default())?;
-        let (mut losses, mut hashes, mut ends) = (vec![], vec![], vec![]);
+        let (mut readings, mut hashes, mut ends) = (vec![], vec![], vec![]);
         for path in paths {
             let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
             if let Some(attachment) = bag.attachment(MACHINE)? {
@@ -43,9 +44,7 @@ impl Recorded {
                     .with_context(|| format!("bag {}", path.display()))?;
             }
             builder.next_bag();
-            losses.extend(
-                messages(&bag, &mut builder).with_context(|| format!("bag {}", path.display()))?,
-            );
+            readings.push(messages(&bag, &mut builder));
             let hash = hash(&bag)?;
             if let Some(place) = hashes.iter().position(|known| *known == hash) {
                 bail!(
@@ -60,7 +59,7 @@ impl Recorded {
         }
         let (session, account) = builder
             .finish()
-            .map_err(|error| not_whole(error.into(), &losses))?;
+            .map_err(|error| not_whole(error.into(), &lines(&readings)))?;
         let mut from = 0;
         let bags = paths
             .iter()
@@ -81,7 +80,7 @@ impl Recorded {
             session,
             bags,
             remarks: account.remarks().collect(),
-            losses,
+            readings,
         })
     }
 }
@@ -92,6 +91,11 @@ pub fn not_whole(lacking: anyhow::Error, losses: &[String]) -> anyhow::Error {
         return lacking;
     }
     lacking.context(format!("a part was lost: {}", losses.join("; ")))
+}
+
+/// What of bags was lost or left out, in words.
+pub fn lines(readings: &[Reading]) -> Vec<String> {
+    readings.iter().flat_map(Reading::lines).collect()
 }
 
 /// Lengths and angles of two machine files that differ by less are one.
@@ -153,20 +157,14 @@ pub fn machine_text(path: &Path) -> Result<(String, String)> {
         return Err(none.context(format!("bag {}", path.display())));
     };
     let name = format!("machine.yaml of {}", path.display());
-    let text = String::from_utf8(attachment.data).with_context(|| name.clone())?;
+    let text = text::decode(&attachment.data, Comments::Yaml)
+        .map_err(|wrong| anyhow!("{name}:{wrong}"))?;
     Ok((name, text))
 }
 
 /// What of a bag cannot be read, in words.
 fn losses(bag: &Bag) -> Vec<String> {
-    let mut losses = vec![];
-    let mut messages = bag.messages(Order::LogTime);
-    while let Some(event) = messages.next_event() {
-        if let Event::Loss(loss) = event {
-            losses.push(loss.to_string());
-        }
-    }
-    losses
+    reading::read(bag, Order::LogTime, &[], |_| ()).lines()
 }
 
 fn hash(bag: &Bag) -> Result<String> {
@@ -178,62 +176,48 @@ fn hash(bag: &Bag) -> Result<String> {
     Ok(format!("{:x}", hash.finalize()))
 }
 
-fn messages(bag: &Bag, builder: &mut SessionBuilder) -> Result<Vec<String>> {
-    let names: Vec<String> = bag
-        .topics()
-        .iter()
-        .map(|info| info.topic.trim_start_matches('/').to_owned())
-        .collect();
-    let mut losses = vec![];
-    let mut messages = bag.messages(Order::LogTime);
-    while let Some(event) = messages.next_event() {
-        match event {
-            Event::Message(message) => {
-                let name = names.get(message.topic.index()).map_or("", String::as_str);
-                if let Some(input) = input(name, message.data)? {
-                    builder.take(input);
-                }
-            }
-            Event::Loss(loss) => losses.push(format!("{loss}")),
-        }
-    }
-    Ok(losses)
+/// Hands what a bag says to the session; what cannot be used is left out and counted.
+fn messages(bag: &Bag, builder: &mut SessionBuilder) -> Reading {
+    let wanted = WANTED.each_ref().map(|(name, _)| *name);
+    reading::read(bag, Order::LogTime, &wanted, |mut taken| {
+        let of_topic = WANTED.iter().find(|(name, _)| taken.is_named(name));
+        let input = of_topic.and_then(|(_, input)| input(&mut taken));
+        input.into_iter().for_each(|input| builder.take(input));
+    })
 }
 
-/// Whether `name` is `topic`, in whatever namespace.
-fn is<M: Message>(name: &str, topic: &Topic<M>) -> bool {
-    name.strip_suffix(topic.name)
-        .is_some_and(|space| space.is_empty() || space.ends_with('/'))
-}
+type ToInput = fn(&mut Taken<'_>) -> Option<Input>;
 
-fn read<M: Message + Wire>(_: &Topic<M>, bytes: &[u8]) -> Result<M::Inner> {
-    Ok(from_cdr::<M>(bytes)?.into_inner()?)
-}
-
-fn input(name: &str, bytes: &[u8]) -> Result<Option<Input>> {
-    Ok(Some(if is(name, &topics::AXES_STATE) {
-        Input::State(read(&topics::AXES_STATE, bytes)?)
-    } else if is(name, &topics::GRID_POSITION) {
-        Input::Grid(read(&topics::GRID_POSITION, bytes)?)
-    } else if is(name, &topics::LENGTH_POSITION) {
-        Input::Length(read(&topics::LENGTH_POSITION, bytes)?)
-    } else if is(name, &topics::COMPENSATION) {
-        Input::Compensation(read(&topics::COMPENSATION, bytes)?)
-    } else if is(name, &topics::PROBE_TRIGGER) {
-        Input::Trigger(read(&topics::PROBE_TRIGGER, bytes)?)
-    } else if is(name, &topics::BLOCKS_MEASUREMENT) {
-        Input::Block(read(&topics::BLOCKS_MEASUREMENT, bytes)?)
-    } else if is(name, &topics::TEST_SEGMENT) {
-        Input::Segment(read(&topics::TEST_SEGMENT, bytes)?)
-    } else if let Some(sensor) = topics::TEMPERATURE.member_of(name) {
-        let mut sample =
-            from_cdr::<abbe_msgs::sensor_msgs::msg::Temperature>(bytes)?.into_inner()?;
+/// Topics that a diagnosis reads, and what each is to the session.
+static WANTED: [(&str, ToInput); 8] = [
+    (topics::AXES_STATE.name, |taken| {
+        taken.of(&topics::AXES_STATE).map(Input::State)
+    }),
+    (topics::GRID_POSITION.name, |taken| {
+        taken.of(&topics::GRID_POSITION).map(Input::Grid)
+    }),
+    (topics::LENGTH_POSITION.name, |taken| {
+        taken.of(&topics::LENGTH_POSITION).map(Input::Length)
+    }),
+    (topics::COMPENSATION.name, |taken| {
+        taken.of(&topics::COMPENSATION).map(Input::Compensation)
+    }),
+    (topics::PROBE_TRIGGER.name, |taken| {
+        taken.of(&topics::PROBE_TRIGGER).map(Input::Trigger)
+    }),
+    (topics::BLOCKS_MEASUREMENT.name, |taken| {
+        taken.of(&topics::BLOCKS_MEASUREMENT).map(Input::Block)
+    }),
+    (topics::TEST_SEGMENT.name, |taken| {
+        taken.of(&topics::TEST_SEGMENT).map(Input::Segment)
+    }),
+    (topics::TEMPERATURE.base, |taken| {
+        let mut sample = taken.of_member(&topics::TEMPERATURE)?;
+        let sensor = topics::TEMPERATURE.member_of(taken.topic())?;
         sensor.clone_into(&mut sample.sensor);
-        Input::Temperature(sample)
-    } else {
-        return Ok(None);
-    }))
-}
+        Some(Input::Temperature(sample))
+    }),
+];
 
 #[cfg(test)]
 mod tests {

@@ -1,18 +1,46 @@
-//! What is not known about the measurements of a bag: `budget.yaml`, in the units of data sheets.
+//! What is stated about the measurements of a bag: `budget.yaml`, in the units of data sheets.
 //!
-//! Nothing in it has a default: a term that is left out would be an uncertainty of zero.
+//! Nothing uncertain in it has a default: a term that is left out would be an uncertainty of zero. Temperatures may be
+//! stated or read from thermometers of the bag; without them lengths are not corrected to 20 °C.
 
 use std::path::Path;
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, anyhow};
 use metrology::iso230::budget::{DeviceUncertainty, Expansion};
 use metrology::iso230::circular::CircularBudget;
 use metrology::iso230::positioning::budget::PositioningBudget;
-use node_runtime::complaint;
+use metrology::iso230::positioning::rotary::RotaryBudget;
+use metrology::number::{number, quantity};
+use metrology::yaml;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
+mod statement;
+#[cfg(test)]
+mod tests;
+
+use super::circles;
+use super::test_conditions::{Readings, Thermometers};
+pub use statement::{Instrument, Instruments, NOT_STATED};
+
+/// Temperature at which lengths are defined, °C.
+const REFERENCE_DEGC: f64 = 20.0;
+/// Farthest from it that a machine is measured, K.
+const FARTHEST_K: f64 = 100.0;
+/// The largest that can be stated, by the unit that a key ends with: the longest first. Beyond it the unit is mistaken.
+const GREATEST: [(&str, f64); 6] = [
+    ("_um_per_m_k", 100.0),
+    ("_um_per_m", 1e4),
+    ("_um", 1e4),
+    ("_mm", 100.0),
+    ("_arcsec", 3600.0),
+    ("_k", FARTHEST_K),
+];
+/// Coverage factors: 1 of a standard uncertainty, 12.7 of one degree of freedom at 95 % (GUM, table G.2).
+const FACTORS: [f64; 2] = [1.0, 13.0];
+
 /// Uncertainty of a measuring device, as its certificate states it.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Device {
     /// Constant part.
@@ -24,17 +52,37 @@ struct Device {
 }
 
 /// Temperature and expansion of a body.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Body {
-    temperature_deviation_k: f64,
+pub struct Body {
+    /// Temperature minus 20 °C, where it is stated.
+    #[serde(default)]
+    temperature_deviation_k: Option<f64>,
+    /// Thermometers of the bag whose mean is its temperature, where it is read.
+    #[serde(default)]
+    thermometers: Vec<String>,
+    /// Half of the interval in which the temperature lies.
     temperature_half_width_k: f64,
+    /// Coefficient of expansion.
     expansion_um_per_m_k: f64,
+    /// Half of the interval in which the coefficient lies.
     expansion_half_width_um_per_m_k: f64,
 }
 
+/// Angular reference of rotary axes, as its certificate states it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Angular {
+    /// Expanded uncertainty.
+    expanded_uncertainty_arcsec: f64,
+    /// Its coverage factor.
+    coverage_factor: f64,
+    /// Range of a reading with the axis at rest, as long as a test takes.
+    environmental_drift_arcsec: f64,
+}
+
 /// `budget.yaml`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Budget {
     /// Plate and head, for circles.
@@ -45,10 +93,28 @@ pub struct Budget {
     machine: Body,
     /// The device's own body; coefficient 0 for an interferometer.
     device: Body,
+    /// The plate of the grid encoder; where absent, radii of its circles are not corrected to 20 °C.
+    #[serde(default)]
+    plate: Option<Body>,
     /// By how much beam and axis can part sideways over the measured length.
     misalignment_mm: f64,
     /// Range of a reading with the axes at rest, as long as a test takes.
     environmental_drift_um: f64,
+    /// For rotary axes; where absent, their figures have no uncertainty.
+    #[serde(default)]
+    angular_reference: Option<Angular>,
+    /// Whether the length reference corrects its own readings to 20 °C: material compensation on.
+    #[serde(default)]
+    pub length_corrected_by_instrument: bool,
+    /// The instruments and their certificates.
+    #[serde(default)]
+    pub instruments: Instruments,
+    /// Who measured.
+    #[serde(default)]
+    pub operator: Option<String>,
+    /// What the machine did before.
+    #[serde(default)]
+    pub warm_up: Option<String>,
 }
 
 impl Device {
@@ -61,15 +127,106 @@ impl Device {
     }
 }
 
+/// Temperature of a body during a test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyTemperature {
+    /// Temperature minus 20 °C, K.
+    pub deviation_k: f64,
+    /// Half of the interval in which it lies, K.
+    pub half_width_k: f64,
+    /// Where it is from.
+    pub source: String,
+}
+
 impl Body {
+    /// What stands under `temperature_deviation_k`, or the mean of the thermometers over a test; the half width grows by half
+    /// the range of their mean, as a root of squares.
+    ///
+    /// # Errors
+    /// Why it is unknown.
+    pub fn temperature(&self, read: &Thermometers) -> Result<BodyTemperature, String> {
+        let stated = |source: &str, deviation_k| BodyTemperature {
+            deviation_k,
+            half_width_k: self.temperature_half_width_k,
+            source: source.to_owned(),
+        };
+        if let Some(deviation_k) = self.temperature_deviation_k {
+            return Ok(stated("stated in the budget", deviation_k));
+        }
+        if !self.expands() {
+            return Ok(stated("does not expand", 0.0));
+        }
+        if self.thermometers.is_empty() {
+            return Err("has neither temperature_deviation_k nor thermometers".to_owned());
+        }
+        let mut all = Vec::new();
+        for name in &self.thermometers {
+            let silent = || format!("thermometer {name} has no reading during this test");
+            all.push(read.get(name).ok_or_else(silent)?);
+        }
+        let n = all.len() as f64;
+        let mean = |of: fn(&Readings) -> f64| all.iter().map(|one| of(one)).sum::<f64>() / n;
+        let range_k = mean(|one| one.range_k());
+        Ok(BodyTemperature {
+            deviation_k: mean(|one| one.mean_degc()) - REFERENCE_DEGC,
+            half_width_k: self.temperature_half_width_k.hypot(range_k / 2.0),
+            source: format!("read by {}", self.thermometers.join(", ")),
+        })
+    }
+
+    fn expands(&self) -> bool {
+        self.expansion_um_per_m_k > 0.0 || self.expansion_half_width_um_per_m_k > 0.0
+    }
+
+    /// Refuses a temperature out of range, or one from two sources: key and rule.
+    fn check(&self) -> Result<(), (&'static str, String)> {
+        let Some(deviation_k) = self.temperature_deviation_k else {
+            return Ok(());
+        };
+        let key = "temperature_deviation_k";
+        if !deviation_k.is_finite() || deviation_k.abs() > FARTHEST_K {
+            let value = quantity(key, deviation_k);
+            return Err((
+                key,
+                format!(" = {value}: must be from -{FARTHEST_K} to {FARTHEST_K} K"),
+            ));
+        }
+        if !self.thermometers.is_empty() {
+            let rule = ": leave it out where thermometers are named, they read it".to_owned();
+            return Err((key, rule));
+        }
+        Ok(())
+    }
+
+    /// Coefficient of expansion, 1/K.
+    pub fn expansion_per_k(&self) -> f64 {
+        self.expansion_um_per_m_k * 1e-6
+    }
+
+    /// With its temperature, where that is known.
+    pub fn at(&self, temperature: Option<&BodyTemperature>) -> Expansion {
+        let inner = self.inner();
+        temperature.map_or(inner, |known| Expansion {
+            temperature_deviation_k: known.deviation_k,
+            temperature_half_width_k: known.half_width_k,
+            ..inner
+        })
+    }
+
     fn inner(&self) -> Expansion {
         Expansion {
-            temperature_deviation_k: self.temperature_deviation_k,
+            temperature_deviation_k: self.temperature_deviation_k.unwrap_or(0.0),
             temperature_half_width_k: self.temperature_half_width_k,
             expansion_per_k: self.expansion_um_per_m_k * 1e-6,
             expansion_half_width_per_k: self.expansion_half_width_um_per_m_k * 1e-6,
         }
     }
+}
+
+/// The largest value of a key; none where its unit has no limit.
+fn greatest(key: &str) -> f64 {
+    let of_unit = GREATEST.iter().find(|(unit, _)| key.ends_with(unit));
+    of_unit.map_or(f64::MAX, |(_, greatest)| *greatest)
 }
 
 impl Budget {
@@ -78,25 +235,86 @@ impl Budget {
     /// # Errors
     /// With key and value where one is missing, unknown or no number above zero where it must be.
     pub fn read(text: &str, place: &Path) -> Result<Self> {
-        let place = place.display();
-        let budget: Self = serde_saphyr::from_str(text).map_err(|error| {
-            anyhow!("budget file {place}: {}", complaint::of_yaml(&error, text))
-        })?;
-        for (key, device) in [
-            ("grid_encoder", &budget.grid_encoder),
-            ("length_reference", &budget.length_reference),
-        ] {
-            let factor = device.coverage_factor;
-            if !(factor.is_finite() && factor > 0.0) {
-                bail!("{place}: {key}.coverage_factor = {factor}: must be finite and above 0");
+        let file = place.display().to_string();
+        let wrong = |message: &str| anyhow!("budget file {}", yaml::placed(&file, text, message));
+        let budget: Self = yaml::read(text).map_err(|error| wrong(&error.to_string()))?;
+        let angular = budget.angular_reference.as_ref();
+        let factors = [
+            ("grid_encoder", Some(budget.grid_encoder.coverage_factor)),
+            (
+                "length_reference",
+                Some(budget.length_reference.coverage_factor),
+            ),
+            ("angular_reference", angular.map(|one| one.coverage_factor)),
+        ];
+        for (key, factor) in factors {
+            let factor = factor.unwrap_or(1.0);
+            let [least, greatest] = FACTORS;
+            if !(least..=greatest).contains(&factor) {
+                let factor = number(factor);
+                let key = format!("{key}.coverage_factor");
+                return Err(wrong(&format!(
+                    "{key} = {factor}: must be from {least} to {greatest}"
+                )));
             }
         }
         for (key, value) in budget.numbers() {
-            if !(value.is_finite() && value >= 0.0) {
-                bail!("{place}: {key} = {value}: must be finite and not below 0");
+            let greatest = greatest(key);
+            if !(0.0..=greatest).contains(&value) {
+                let [value, greatest] = [value, greatest].map(|one| quantity(key, one));
+                return Err(wrong(&format!(
+                    "{key} = {value}: must be from 0 to {greatest}"
+                )));
             }
         }
+        let plate = budget.plate.as_ref().map(|plate| ("plate", plate));
+        let bodies = [("machine", &budget.machine), ("device", &budget.device)];
+        for (key, body) in bodies.into_iter().chain(plate) {
+            body.check()
+                .map_err(|(name, rule)| wrong(&format!("{key}.{name}{rule}")))?;
+        }
+        for (key, text) in budget.texts() {
+            statement::check(&key, text).map_err(|message| wrong(&message))?;
+        }
         Ok(budget)
+    }
+
+    fn texts(&self) -> Vec<(String, &str)> {
+        let own = [("operator", &self.operator), ("warm_up", &self.warm_up)];
+        let own = own.map(|(key, text)| (key.to_owned(), text.as_deref()));
+        let all = own.into_iter().chain(self.instruments.texts());
+        all.filter_map(|(key, text)| Some((key, text?))).collect()
+    }
+
+    /// The numbers of the parts that may be absent.
+    fn numbers_of_parts(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        let angular = self.angular_reference.iter();
+        let of_angles = angular.flat_map(|one| {
+            [
+                (
+                    "angular_reference.expanded_uncertainty_arcsec",
+                    one.expanded_uncertainty_arcsec,
+                ),
+                (
+                    "angular_reference.environmental_drift_arcsec",
+                    one.environmental_drift_arcsec,
+                ),
+            ]
+        });
+        let plate = self.plate.iter();
+        of_angles.chain(plate.flat_map(|plate| {
+            [
+                (
+                    "plate.temperature_half_width_k",
+                    plate.temperature_half_width_k,
+                ),
+                ("plate.expansion_um_per_m_k", plate.expansion_um_per_m_k),
+                (
+                    "plate.expansion_half_width_um_per_m_k",
+                    plate.expansion_half_width_um_per_m_k,
+                ),
+            ]
+        }))
     }
 
     fn numbers(&self) -> Vec<(&'static str, f64)> {
@@ -107,7 +325,7 @@ impl Budget {
             device,
             ..
         } = self;
-        vec![
+        let mut numbers = vec![
             (
                 "grid_encoder.expanded_uncertainty_um",
                 grid.expanded_uncertainty_um,
@@ -144,30 +362,94 @@ impl Budget {
             ),
             ("misalignment_mm", self.misalignment_mm),
             ("environmental_drift_um", self.environmental_drift_um),
-        ]
+        ];
+        numbers.extend(self.numbers_of_parts());
+        numbers
     }
 
-    /// For ISO 230-2 and 230-6.
+    /// For rotary axes by ISO 230-2; `None` where the budget says nothing of an angular reference.
     #[must_use]
-    pub fn positioning(&self) -> PositioningBudget {
+    pub fn rotary(&self) -> Option<RotaryBudget> {
+        let arcsec_rad = |arcsec: f64| (arcsec / 3600.0).to_radians();
+        self.angular_reference.map(|one| RotaryBudget {
+            expanded_uncertainty_rad: arcsec_rad(one.expanded_uncertainty_arcsec),
+            coverage_factor: one.coverage_factor,
+            environmental_drift_rad: arcsec_rad(one.environmental_drift_arcsec),
+        })
+    }
+
+    /// For ISO 230-2 and 230-6, with the temperatures of machine and device where they are known.
+    #[must_use]
+    pub fn positioning(
+        &self,
+        machine: Option<&BodyTemperature>,
+        device: Option<&BodyTemperature>,
+    ) -> PositioningBudget {
         PositioningBudget {
             device: self.length_reference.inner(),
             misalignment_mm: self.misalignment_mm,
-            machine: self.machine.inner(),
-            device_expansion: self.device.inner(),
+            machine: self.machine.at(machine),
+            device_expansion: self.device.at(device),
             environmental_drift_mm: self.environmental_drift_um * 1e-3,
         }
     }
 
-    /// For ISO 230-4.
+    /// For what the machine's own scale read, with the scale's uncertainty where it is known: nothing is aligned, and nothing
+    /// is corrected to another temperature.
     #[must_use]
-    pub fn circular(&self) -> CircularBudget {
+    pub fn of_scale(&self, scale: Option<DeviceUncertainty>) -> PositioningBudget {
+        let nothing = Self::nothing();
+        PositioningBudget {
+            device: scale.unwrap_or(nothing.length_reference.inner()),
+            environmental_drift_mm: self.environmental_drift_um * 1e-3,
+            ..nothing.positioning(None, None)
+        }
+    }
+
+    /// The machine, and the device's own body.
+    pub fn bodies(&self) -> (&Body, &Body) {
+        (&self.machine, &self.device)
+    }
+
+    /// Whether temperature and expansion of the plate are stated.
+    #[must_use]
+    pub const fn has_plate(&self) -> bool {
+        self.plate.is_some()
+    }
+
+    /// With the certificate and the body of what read a circle in place of the grid encoder's and the device's.
+    #[must_use]
+    pub fn of_circles(&self, read_by: circles::Instrument) -> Self {
+        let mut budget = self.clone();
+        match (read_by, &self.plate) {
+            (circles::Instrument::Ballbar, _) => budget.grid_encoder = self.length_reference,
+            (circles::Instrument::GridEncoder, Some(plate)) => budget.device = plate.clone(),
+            (circles::Instrument::GridEncoder, None) => {}
+        }
+        budget
+    }
+
+    /// For ISO 230-4: one device, plate and head, reads deviations and radius; with the temperatures of machine and device
+    /// where they are known.
+    #[must_use]
+    pub fn circular(
+        &self,
+        machine: Option<&BodyTemperature>,
+        device: Option<&BodyTemperature>,
+    ) -> CircularBudget {
         CircularBudget {
             displacement: self.grid_encoder.inner(),
-            length: self.grid_encoder.inner(),
-            expansion: self.machine.inner(),
+            length: None,
+            machine: self.machine.at(machine),
+            device_expansion: self.device.at(device),
             environmental_drift_mm: self.environmental_drift_um * 1e-3,
         }
+    }
+
+    /// Standard uncertainty of a radius as the plate's certificate states it, mm.
+    #[must_use]
+    pub fn radius_standard_mm(&self, radius_mm: f64) -> f64 {
+        self.grid_encoder.inner().standard_mm(radius_mm)
     }
 
     /// A budget without any term, for figures whose uncertainty is not stated.
@@ -179,7 +461,8 @@ impl Budget {
             coverage_factor: 2.0,
         };
         const BODY: Body = Body {
-            temperature_deviation_k: 0.0,
+            temperature_deviation_k: None,
+            thermometers: Vec::new(),
             temperature_half_width_k: 0.0,
             expansion_um_per_m_k: 0.0,
             expansion_half_width_um_per_m_k: 0.0,
@@ -189,54 +472,14 @@ impl Budget {
             length_reference: DEVICE,
             machine: BODY,
             device: BODY,
+            plate: None,
             misalignment_mm: 0.0,
             environmental_drift_um: 0.0,
+            angular_reference: None,
+            length_corrected_by_instrument: false,
+            instruments: Instruments::NONE,
+            operator: None,
+            warm_up: None,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const WHOLE: &str = "
-grid_encoder: {expanded_uncertainty_um: 0.6, expanded_uncertainty_um_per_m: 1.0, coverage_factor: 2.0}
-length_reference: {expanded_uncertainty_um: 0.1, expanded_uncertainty_um_per_m: 0.5, coverage_factor: 2.0}
-machine: {temperature_deviation_k: 0.5, temperature_half_width_k: 0.5, expansion_um_per_m_k: 11.0, expansion_half_width_um_per_m_k: 1.0}
-device: {temperature_deviation_k: 0.0, temperature_half_width_k: 0.1, expansion_um_per_m_k: 0.0, expansion_half_width_um_per_m_k: 0.0}
-misalignment_mm: 0.1
-environmental_drift_um: 0.6
-";
-
-    fn refusal(from: &str, to: &str) -> String {
-        assert!(WHOLE.contains(from));
-        let text = WHOLE.replacen(from, to, 1);
-        let error = Budget::read(&text, Path::new("budget.yaml")).unwrap_err();
-        format!("{error:#}")
-    }
-
-    #[test]
-    fn a_data_sheet_becomes_mm_and_ratios() {
-        let budget = Budget::read(WHOLE, Path::new("budget.yaml")).unwrap();
-        let device = budget.positioning().device;
-        assert!((device.expanded_uncertainty_mm - 1e-4).abs() < 1e-18);
-        assert!((device.expanded_uncertainty_per_length - 5e-7).abs() < 1e-18);
-        assert!((budget.circular().environmental_drift_mm - 6e-4).abs() < 1e-18);
-    }
-
-    #[test]
-    fn a_wrong_budget_is_refused_with_key_and_value() {
-        assert!(
-            refusal("misalignment_mm: 0.1", "misalignment_mm: -0.1")
-                .contains("misalignment_mm = -0.1: must be finite and not below 0")
-        );
-        assert!(
-            refusal("misalignment_mm: 0.1", "misalignment_um: 0.1").contains("misalignment_um")
-        );
-        assert!(refusal("misalignment_mm: 0.1\n", "").contains("misalignment_mm"));
-        assert!(
-            refusal("coverage_factor: 2.0", "coverage_factor: 0.0")
-                .contains("grid_encoder.coverage_factor = 0")
-        );
     }
 }

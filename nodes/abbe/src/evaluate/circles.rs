@@ -1,8 +1,9 @@
-//! Circles over the plate of a grid encoder, or with a ballbar: the readings while the command was on the circle.
+//! Circles over the plate of a grid encoder, or with a ballbar: the readings of one whole turn at the test feed.
 //!
-//! The grid counts from where it was zeroed. A recording is shifted by the mean of commanded minus read
-//! place, which takes the centre offset of the setting-up out; what is left of it the evaluations fit.
-//! Run-in and run-out are left out: there the command is not at its feed.
+//! The grid counts from where it was zeroed, which nothing states. All circles under one zero are therefore shifted
+//! alike: by the mean of commanded minus read place over all of them. A sense that is shifted alone would lose what
+//! the senses differ by, and G(b), D and H compare them.
+//! [`turn`] has the rules by which run-in and run-out are left out.
 //!
 //! A length that is read during a circle is that of a ballbar, from the centre: it lies at the angle of the command, and
 //! counts from the centre of its mount, for nothing tells where that is. Where the plate was read too, the plate counts.
@@ -11,7 +12,12 @@ use metrology::Axis;
 use metrology::sample::{
     AxisState, GridSample, LengthSample, Sense, TestKind, TestPlane, TestSegment,
 };
-use metrology::stamp::{Host, Stamp};
+use metrology::stamp::{Host, Machine, Stamp};
+
+mod turn;
+
+use turn::{AtFeed, Tick};
+pub use turn::{EvaluatedTurn, SETTLING_S, TurnBy};
 
 /// The command is on the circle when it is this close to it, mm.
 const ON_CIRCLE_MM: f64 = 2e-3;
@@ -21,9 +27,9 @@ const AT_FEED: f64 = 0.98;
 /// One reading on the circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CirclePoint {
-    /// Place from the nominal centre along u and v, mm.
+    /// Place along u and v, mm: from the nominal centre in the frame of the zero, or from a ballbar's mount.
     pub at_mm: [f64; 2],
-    /// Time since the beginning of the recording, s.
+    /// Time since the first evaluated reading, s.
     pub time_s: f64,
 }
 
@@ -32,8 +38,10 @@ pub struct CirclePoint {
 pub struct CircleRecording {
     /// The test.
     pub segment: TestSegment,
-    /// Readings in the order of time.
+    /// Readings of the evaluated turn in the order of time.
     pub points: Vec<CirclePoint>,
+    /// Which turn it is.
+    pub turn: EvaluatedTurn,
     /// Whether anything was added to the commands.
     pub compensated: bool,
     /// What measured.
@@ -60,32 +68,39 @@ pub fn plane_axes(plane: TestPlane) -> Option<[Axis; 2]> {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Tick {
-    at: Stamp<Host>,
-    /// Command from the centre along u and v, mm.
-    place_mm: [f64; 2],
-    speed_mm_s: f64,
-}
-
 #[derive(Debug)]
 struct Current {
     segment: TestSegment,
     axes: [Axis; 2],
-    tick: Option<Tick>,
-    /// Readings of the plate with the command of their tick.
-    pairs: Vec<(CirclePoint, [f64; 2])>,
-    /// Readings of a ballbar.
-    radial: Vec<CirclePoint>,
-    began: Option<Stamp<Host>>,
+    /// The last state, with its stamp of the controller.
+    state: Option<(Tick, Stamp<Machine>)>,
+    /// Speed of the command there, mm/s.
+    speed_mm_s: f64,
+    /// When the command reached its feed on the circle.
+    at_feed_since: Option<Stamp<Host>>,
+    /// States on the circle at feed.
+    ticks: Vec<Tick>,
+    /// Readings of the plate there.
+    plate: Vec<AtFeed>,
+    /// Readings of a ballbar there.
+    radial: Vec<AtFeed>,
     compensated: bool,
+}
+
+/// A circle in the frame of its instrument.
+#[derive(Debug)]
+struct Recorded {
+    circle: CircleRecording,
+    /// Nominal centre along u and v in the machine frame, mm.
+    centre_mm: [f64; 2],
+    apart: Apart,
 }
 
 /// Collects the circles of a recording.
 #[derive(Debug, Default)]
 pub struct Circles {
     current: Option<Current>,
-    done: Vec<CircleRecording>,
+    done: Vec<Recorded>,
 }
 
 impl Circles {
@@ -98,10 +113,12 @@ impl Circles {
             self.current = axes.map(|axes| Current {
                 segment: segment.clone(),
                 axes,
-                tick: None,
-                pairs: Vec::new(),
+                state: None,
+                speed_mm_s: 0.0,
+                at_feed_since: None,
+                ticks: Vec::new(),
+                plate: Vec::new(),
                 radial: Vec::new(),
-                began: None,
                 compensated: false,
             });
         } else if let Some(current) = self.current.take()
@@ -122,26 +139,9 @@ impl Circles {
 
     /// Positions at one tick.
     pub fn axes(&mut self, state: &AxisState) {
-        let Some(current) = &mut self.current else {
-            return;
-        };
-        let place_mm = current
-            .axes
-            .map(|axis| state.commanded[axis] - current.segment.centre_mm[axis.index()]);
-        let speed_mm_s = current.tick.map_or(0.0, |before| {
-            let dt_s = (state.received_at - before.at).as_secs_f64();
-            let way_mm = (place_mm[0] - before.place_mm[0]).hypot(place_mm[1] - before.place_mm[1]);
-            if dt_s > 0.0 {
-                way_mm / dt_s
-            } else {
-                before.speed_mm_s
-            }
-        });
-        current.tick = Some(Tick {
-            at: state.received_at,
-            place_mm,
-            speed_mm_s,
-        });
+        if let Some(current) = &mut self.current {
+            current.axes(state);
+        }
     }
 
     /// One reading of the plate.
@@ -153,10 +153,11 @@ impl Circles {
             return;
         }
         if let Some(tick) = current.counting() {
-            let time_s = current.time_s(sample.at);
-            let at_mm = [sample.u_mm, sample.v_mm];
-            let point = CirclePoint { at_mm, time_s };
-            current.pairs.push((point, tick.place_mm));
+            current.plate.push(AtFeed {
+                at: sample.at,
+                read_mm: [sample.u_mm, sample.v_mm],
+                tick,
+            });
         }
     }
 
@@ -168,167 +169,145 @@ impl Circles {
         if let Some(tick) = current.counting()
             && sample.displacement_mm.is_finite()
         {
-            let time_s = current.time_s(sample.at);
             let [u, v] = tick.place_mm;
-            let at_mm = [u, v].map(|along| along / u.hypot(v) * sample.displacement_mm);
-            current.radial.push(CirclePoint { at_mm, time_s });
+            current.radial.push(AtFeed {
+                at: sample.at,
+                read_mm: [u, v].map(|along| along / u.hypot(v) * sample.displacement_mm),
+                tick,
+            });
         }
     }
 
-    /// The circles, in the order of the recording.
+    /// The circles, in the order of the recording, those under one zero in one frame.
     #[must_use]
     pub fn recordings(self) -> Vec<CircleRecording> {
-        self.done
+        let apart = || self.done.iter().map(|circle| &circle.apart);
+        let shifts_mm: Vec<[f64; 2]> = apart()
+            .map(|own| mean_mm(apart().filter(|other| other.zero == own.zero)))
+            .collect();
+        let all = self.done.into_iter().zip(shifts_mm);
+        all.map(|(circle, shift_mm)| circle.framed(shift_mm))
+            .collect()
     }
 }
 
+/// Commanded minus read places of one circle.
+#[derive(Debug)]
+struct Apart {
+    /// Instrument, plane, set-up and zero.
+    zero: (Instrument, TestPlane, u32, u32),
+    sum_mm: [f64; 2],
+    n: usize,
+}
+
+fn mean_mm<'a>(all: impl Iterator<Item = &'a Apart>) -> [f64; 2] {
+    let (mut sum_mm, mut n) = ([0.0; 2], 0);
+    for apart in all {
+        n += apart.n;
+        sum_mm = [0, 1].map(|idx| sum_mm[idx] + apart.sum_mm[idx]);
+    }
+    sum_mm.map(|sum_mm| sum_mm / n.max(1) as f64)
+}
+
 impl Current {
+    fn axes(&mut self, state: &AxisState) {
+        let place_mm = self
+            .axes
+            .map(|axis| state.commanded[axis] - self.segment.centre_mm[axis.index()]);
+        let at = state.received_at;
+        let mut tick = Tick {
+            at,
+            place_mm,
+            step_s: 0.0,
+            swept_rad: 0.0,
+            since_feed_s: 0.0,
+        };
+        if let Some((before, stamped_at)) = self.state {
+            let dt_s = (at - before.at).as_secs_f64();
+            let [u, v] = before.place_mm;
+            if dt_s > 0.0 {
+                self.speed_mm_s = (place_mm[0] - u).hypot(place_mm[1] - v) / dt_s;
+            }
+            tick.step_s = (state.controller_at - stamped_at).as_secs_f64();
+            if self.at_feed_since.is_some() {
+                let (sin, cos) = (
+                    u * place_mm[1] - v * place_mm[0],
+                    u * place_mm[0] + v * place_mm[1],
+                );
+                tick.swept_rad = before.swept_rad + sin.atan2(cos).abs();
+            }
+        }
+        if self.is_at_feed(&tick) {
+            let since = *self.at_feed_since.get_or_insert(at);
+            tick.since_feed_s = (at - since).as_secs_f64();
+            self.ticks.push(tick);
+        }
+        self.state = Some((tick, state.controller_at));
+    }
+
+    fn is_at_feed(&self, tick: &Tick) -> bool {
+        let [u, v] = tick.place_mm;
+        (u.hypot(v) - self.segment.radius_mm).abs() < ON_CIRCLE_MM
+            && self.speed_mm_s >= AT_FEED * self.segment.feed_mm_s
+    }
+
     /// The command, where a reading counts: on the circle at its feed.
     fn counting(&self) -> Option<Tick> {
-        self.tick.filter(|tick| {
-            let [u, v] = tick.place_mm;
-            (u.hypot(v) - self.segment.radius_mm).abs() < ON_CIRCLE_MM
-                && tick.speed_mm_s >= AT_FEED * self.segment.feed_mm_s
-        })
+        let (tick, _) = self.state?;
+        self.is_at_feed(&tick).then_some(tick)
     }
 
-    /// Time since the first reading that counts, s.
-    fn time_s(&mut self, at: Stamp<Host>) -> f64 {
-        (at - *self.began.get_or_insert(at)).as_secs_f64()
-    }
-
-    fn finished(self) -> CircleRecording {
-        if self.pairs.is_empty() && !self.radial.is_empty() {
-            return CircleRecording {
-                segment: self.segment,
-                points: self.radial,
-                compensated: self.compensated,
-                instrument: Instrument::Ballbar,
-            };
-        }
-        let n = self.pairs.len().max(1) as f64;
-        let shift_mm: [f64; 2] = [0, 1].map(|idx| {
-            let differences = self
-                .pairs
-                .iter()
-                .map(|(point, place)| place[idx] - point.at_mm[idx]);
-            differences.sum::<f64>() / n
-        });
-        let shifted = |(point, _): (CirclePoint, [f64; 2])| CirclePoint {
-            at_mm: [point.at_mm[0] + shift_mm[0], point.at_mm[1] + shift_mm[1]],
-            ..point
+    fn finished(self) -> Recorded {
+        let (readings, instrument) = if self.plate.is_empty() && !self.radial.is_empty() {
+            (self.radial, Instrument::Ballbar)
+        } else {
+            (self.plate, Instrument::GridEncoder)
         };
-        CircleRecording {
-            segment: self.segment,
-            points: self.pairs.into_iter().map(shifted).collect(),
-            compensated: self.compensated,
-            instrument: Instrument::GridEncoder,
+        let (readings, turn) = turn::evaluated(&self.ticks, readings);
+        let segment = self.segment;
+        let centre_mm = self.axes.map(|axis| segment.centre_mm[axis.index()]);
+        let along = |idx: usize| -> f64 {
+            let readings = readings.iter();
+            readings
+                .map(|r| centre_mm[idx] + r.tick.place_mm[idx] - r.read_mm[idx])
+                .sum()
+        };
+        let begin = readings.first().map(|reading| reading.at);
+        let point = |reading: &AtFeed| CirclePoint {
+            at_mm: reading.read_mm,
+            time_s: begin.map_or(0.0, |begin| (reading.at - begin).as_secs_f64()),
+        };
+        Recorded {
+            centre_mm,
+            apart: Apart {
+                zero: (instrument, segment.plane, segment.setup_id, segment.zero_id),
+                sum_mm: [0, 1].map(along),
+                n: readings.len(),
+            },
+            circle: CircleRecording {
+                segment,
+                points: readings.iter().map(point).collect(),
+                turn,
+                compensated: self.compensated,
+                instrument,
+            },
         }
+    }
+}
+
+impl Recorded {
+    /// With points from the nominal centre.
+    fn framed(self, shift_mm: [f64; 2]) -> CircleRecording {
+        let mut circle = self.circle;
+        if circle.instrument == Instrument::GridEncoder {
+            for point in &mut circle.points {
+                let at_mm = point.at_mm;
+                point.at_mm = [0, 1].map(|idx| at_mm[idx] + shift_mm[idx] - self.centre_mm[idx]);
+            }
+        }
+        circle
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use metrology::{AxisSet, PerAxis};
-    use nalgebra::Vector3;
-
-    fn segment(begin: bool) -> TestSegment {
-        TestSegment {
-            at: Stamp::from_nanos(0),
-            run: 3,
-            begin,
-            kind: TestKind::Circle,
-            plane: TestPlane::Yz,
-            centre_mm: Vector3::new(1.0, 20.0, 30.0),
-            radius_mm: 50.0,
-            feed_mm_s: 50.0,
-            sense: Sense::CounterClockwise,
-            repeat: 0,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
-            zero_id: 7,
-            setup_id: 1,
-            cold: false,
-            features: Vec::new(),
-            completed: !begin,
-        }
-    }
-
-    /// A circle at 50 mm/s in ticks of 10 ms, run in along a radius; the plate lies 3 mm off. Without a number of its zero
-    /// it is read by a ballbar.
-    fn recorded(zero_id: impl Into<Option<u32>>) -> Vec<CircleRecording> {
-        let zero_id = zero_id.into();
-        let mut circles = Circles::default();
-        circles.segment(&segment(true));
-        let place = |tick: i64| {
-            if tick < 40 {
-                (f64::from(tick as i32) * 1.25, 0.0)
-            } else {
-                let angle = f64::from((tick - 40) as i32) * 0.01;
-                (50.0 * angle.cos(), 50.0 * angle.sin())
-            }
-        };
-        for tick in 0..(40 + 629) {
-            let (u, v) = place(tick);
-            let mut commanded = PerAxis::default();
-            commanded[Axis::X] = 1.0;
-            commanded[Axis::Y] = 20.0 + u;
-            commanded[Axis::Z] = 30.0 + v;
-            let at = Stamp::from_nanos(tick * 10_000_000);
-            circles.axes(&AxisState {
-                received_at: at,
-                controller_at: Stamp::from_nanos(tick * 10_000_000),
-                axes: AxisSet::XYZ,
-                commanded,
-                motor: commanded,
-                scale: PerAxis([f64::NAN; 6]),
-                velocity: PerAxis::default(),
-            });
-            // An oval of 2 µm, on a plate that was zeroed 3 mm beside the centre.
-            let stretch = 1.0 + 4e-5;
-            match zero_id {
-                Some(zero_id) => circles.grid(&GridSample {
-                    at,
-                    plane: TestPlane::Yz,
-                    u_mm: u * stretch + 3.0,
-                    v_mm: v - 1.0,
-                    zero_id,
-                }),
-                None => circles.length(&LengthSample {
-                    at,
-                    axis: Axis::Y,
-                    displacement_mm: (u * stretch).hypot(v),
-                    zero_id: 1,
-                }),
-            }
-        }
-        circles.segment(&segment(false));
-        circles.recordings()
-    }
-
-    #[test]
-    fn readings_on_the_circle_at_feed_are_kept_about_the_nominal_centre() {
-        for (recordings, instrument) in [
-            (recorded(7), Instrument::GridEncoder),
-            (recorded(None), Instrument::Ballbar),
-        ] {
-            assert_eq!(recordings.len(), 1);
-            assert_eq!(recordings[0].instrument, instrument);
-            let points = &recordings[0].points;
-            assert!((620..=630).contains(&points.len()), "{}", points.len());
-            let radial = points.iter().map(|p| p.at_mm[0].hypot(p.at_mm[1]) - 50.0);
-            let (least, greatest) =
-                radial.fold((1.0_f64, -1.0_f64), |(l, g), r| (l.min(r), g.max(r)));
-            assert!((greatest - 0.002).abs() < 2e-5, "{greatest}");
-            assert!(least.abs() < 2e-5, "{least}");
-            assert!(!recordings[0].compensated);
-        }
-    }
-
-    #[test]
-    fn readings_under_another_zero_are_not_of_this_circle() {
-        assert!(recorded(8)[0].points.is_empty());
-    }
-}
+mod tests;

@@ -1,40 +1,55 @@
-//! Which figures of a bag conform to their limits (ISO 14253-1): `limits.yaml`, in µm.
+//! Which figures of a bag conform to their limits (ISO 14253-1): `limits.yaml`, lengths in µm, angles in
+//! seconds of arc.
 //!
 //! ```yaml
 //! rule: guard_band                        # or simple, or {probability: {at_least: 0.95}}
 //! limits:
 //!   iso230_2.accuracy: {upper_um: 20.0}
 //!   iso230_4.both.circular_error: {upper_um: 12.0}
+//!   iso230_2_rotary.figures.both.accuracy: {upper_arcsec: 8.0}
 //! ```
 //!
-//! A figure is named as `abbe report --json` has it below each test. Every test that has it is judged.
+//! A figure is named as `abbe report --json` has it below each test. Every test that has it is judged, but those that cannot
+//! be: lengths that are not those at 20 °C, and what the machine's own scale read.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail};
-use metrology::iso230::ExpandedLength;
-use metrology::iso230::conformance::{Decision, Policy, Specification, Verdict, decide};
-use node_runtime::complaint;
+use metrology::iso230::conformance::Policy;
+use metrology::yaml;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::report::section::{Rows, Section, head, um};
+mod judged;
+
+use crate::report::section::{Rows, Section, head};
+use crate::report::terminal::Rank;
+use judged::{CONFORMS, Figure, Judged};
 
 /// `limits.yaml`.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
+    /// How the uncertainty of a figure is taken into account.
     rule: Policy,
+    /// Limits by the name of a figure, as `abbe report --json` has it below each test.
     limits: BTreeMap<String, Limit>,
 }
 
 /// Limits of one figure; at least one.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Limit {
+    /// Least length that conforms.
     lower_um: Option<f64>,
+    /// Greatest length that conforms.
     upper_um: Option<f64>,
+    /// Least angle that conforms.
+    lower_arcsec: Option<f64>,
+    /// Greatest angle that conforms.
+    upper_arcsec: Option<f64>,
 }
 
 impl Limits {
@@ -44,9 +59,8 @@ impl Limits {
     /// With the key where one is missing or unknown, or where there is no limit at all.
     pub fn read(text: &str, place: &Path) -> Result<Self> {
         let place = place.display();
-        let limits: Self = serde_saphyr::from_str(text).map_err(|error| {
-            anyhow!("limits file {place}: {}", complaint::of_yaml(&error, text))
-        })?;
+        let limits: Self =
+            yaml::read(text).map_err(|error| anyhow!("limits file {place}:{error}"))?;
         if limits.limits.is_empty() {
             bail!("limits file {place}: limits: must name one figure at least");
         }
@@ -58,10 +72,10 @@ impl Limits {
     /// # Errors
     /// When no test has a figure that is named, or its limits leave no zone.
     pub fn section(&self, tests: &[Value]) -> Result<Section> {
-        let mut section = Section::new("Conformance, ISO 14253-1");
+        let mut section = Section::new("Conformance, ISO 14253-1").ranked(Rank::Answer);
         let mut verdicts = Vec::new();
         let mut table = Rows {
-            head: head(&["figure / µm", "test", "value", "limits", "decision", "P"]),
+            head: head(&["figure", "test", "value", "limits", "decision", "P"]),
             note: format!(
                 "{} P: probability that the true value is within its limits.",
                 rule_in_words(self.rule)
@@ -69,94 +83,99 @@ impl Limits {
             ..Rows::default()
         };
         for (name, limit) in &self.limits {
-            let found: Vec<(&str, ExpandedLength)> = tests
+            let found: Vec<(&Value, Figure)> = tests
                 .iter()
-                .filter_map(|test| Some((title(test), figure(test, name)?)))
+                .filter_map(|test| Some((test, Figure::of(test, name)?)))
                 .collect();
             if found.is_empty() {
                 let known: BTreeSet<String> = tests.iter().flat_map(names).collect();
                 bail!("limits.{name}: no test has such a figure; there are {known:?}");
             }
             for (test, figure) in found {
-                let verdict = decide(&figure, &limit.specification(), self.rule)
+                let judged = Judged::of(figure, *limit, self.rule)
                     .with_context(|| format!("limits.{name}"))?;
-                table.rows.push(row(name, test, limit, &verdict));
-                verdicts
-                    .push(serde_json::json!({ "figure": name, "test": test, "verdict": verdict }));
+                let why = no_verdict(test, name).or_else(|| figure.lacks());
+                table
+                    .rows
+                    .push(judged.row((name, title(test)), *limit, why.is_some()));
+                let mut entry = serde_json::json!({ "figure": name, "test": title(test) });
+                if let Some(why) = why {
+                    let about = format!("{name}, {}", title(test));
+                    section.warn(
+                        "Nothing is decided",
+                        format!("{about}: nothing is decided, {why}."),
+                    );
+                    entry["verdict"] = Value::Null;
+                    entry["no_verdict"] = why.into();
+                } else {
+                    entry["verdict"] = judged.verdict;
+                }
+                verdicts.push(entry);
             }
         }
+        section.answers.push(in_short(&table.rows));
         section.tables.push(table);
         section.figures = verdicts.into();
         Ok(section)
     }
 }
 
-impl Limit {
-    fn specification(self) -> Specification {
-        let mm = |um: f64| um * 1e-3;
-        Specification {
-            lower_mm: self.lower_um.map(mm),
-            upper_mm: self.upper_um.map(mm),
+/// The decisions of a table of figures in one sentence; each figure that does not conform is named.
+fn in_short(rows: &[Vec<String>]) -> String {
+    let mut by_decision: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for row in rows {
+        if let [figure, test, _, _, decision, ..] = row.as_slice() {
+            let named = by_decision.entry(decision).or_default();
+            named.push(format!("{figure} of {test}"));
         }
     }
+    let counts = by_decision.iter().map(|(decision, figures)| {
+        let n = figures.len();
+        if *decision == CONFORMS {
+            format!("{decision}: {n}")
+        } else {
+            format!("{decision}: {n} ({})", figures.join("; "))
+        }
+    });
+    let counts: Vec<String> = counts.collect();
+    format!("figures judged: {}; {}.", rows.len(), counts.join("; "))
 }
 
 fn title(test: &Value) -> &str {
     test["test"].as_str().unwrap_or_default()
 }
 
-/// A length with its uncertainty, by the names on the way to it.
-fn figure(test: &Value, name: &str) -> Option<ExpandedLength> {
-    let pointer = format!("/{}", name.replace('.', "/"));
-    length(test.pointer(&pointer)?)
+/// Figures of circles that are lengths from the nominal radius.
+const RADIAL: [&str; 3] = [
+    "mean_radial_deviation",
+    "greatest_radial_deviation",
+    "least_radial_deviation",
+];
+
+/// Why nothing is decided about a figure of a test; none: it is decided.
+fn no_verdict(test: &Value, name: &str) -> Option<String> {
+    let last = name.rsplit('.').next().unwrap_or(name);
+    let key = if RADIAL.contains(&last) {
+        "no_verdict_on_radii"
+    } else {
+        "no_verdict"
+    };
+    test[key].as_str().map(str::to_owned)
 }
 
-/// A list of two numbers is no length with its uncertainty.
-fn length(value: &Value) -> Option<ExpandedLength> {
-    let entries = value.as_object()?.clone();
-    serde_json::from_value(entries.into()).ok()
-}
-
-/// Names of all lengths with uncertainty that a test has, those of its single points left out.
+/// Names of all figures with uncertainty that a test has, those of its single points left out.
 fn names(test: &Value) -> Vec<String> {
     let Some(entries) = test.as_object() else {
         return Vec::new();
     };
     let below = |(name, value): (&String, &Value)| -> Vec<String> {
-        if length(value).is_some() {
+        if Figure::read(value).is_some() {
             return vec![name.clone()];
         }
         let further = names(value).into_iter();
         further.map(|rest| format!("{name}.{rest}")).collect()
     };
     entries.iter().flat_map(below).collect()
-}
-
-fn row(name: &str, test: &str, limit: &Limit, verdict: &Verdict) -> Vec<String> {
-    let figure = verdict.figure;
-    let limits = match (limit.lower_um, limit.upper_um) {
-        (Some(lower), Some(upper)) => format!("{lower} to {upper}"),
-        (Some(lower), None) => format!("≥ {lower}"),
-        (None, Some(upper)) => format!("≤ {upper}"),
-        (None, None) => String::new(),
-    };
-    let decision = match verdict.decision {
-        Decision::Conforms => "conforms",
-        Decision::DoesNotConform => "does not conform",
-        Decision::CannotBeDecided => "cannot be decided",
-    };
-    vec![
-        name.to_owned(),
-        test.to_owned(),
-        format!(
-            "{} ± {}",
-            um(figure.value_mm),
-            um(figure.expanded_uncertainty_mm)
-        ),
-        limits,
-        decision.to_owned(),
-        format!("{:.3}", verdict.probability_of_conformance),
-    ]
 }
 
 fn rule_in_words(rule: Policy) -> String {
@@ -211,6 +230,97 @@ mod tests {
     }
 
     #[test]
+    fn nothing_is_decided_of_lengths_that_are_not_those_at_20_degc() {
+        let length =
+            |value: f64| serde_json::json!({"value_mm": value, "expanded_uncertainty_mm": 0.001});
+        let why = "not corrected to 20 °C: no budget was given (--budget)";
+        let all = vec![
+            serde_json::json!({"test": "X", "iso230_2": {"accuracy": length(0.0085)}, "no_verdict": why}),
+            serde_json::json!({"test": "Y", "iso230_2": {"accuracy": {"value_mm": 0.0115, "expanded_uncertainty_mm": null}}, "no_verdict": "read by the machine's scale"}),
+            serde_json::json!({"test": "circle", "no_verdict_on_radii": why, "iso230_4": {"mean_radial_deviation": length(0.001), "circular_error": length(0.001)}}),
+        ];
+        let text = "rule: guard_band\nlimits:\n  iso230_2.accuracy: {upper_um: 10.0}\n  iso230_4.mean_radial_deviation: {upper_um: 10.0}\n  iso230_4.circular_error: {upper_um: 10.0}\n";
+        let section = limits(text).unwrap().section(&all).unwrap();
+        let decisions: Vec<&str> = section.tables[0]
+            .rows
+            .iter()
+            .map(|row| row[4].as_str())
+            .collect();
+        let none = "not decided";
+        assert_eq!(decisions, [none, none, "conforms", none], "{section:?}");
+        assert!(section.figures[0]["verdict"].is_null());
+        assert_eq!(section.figures[0]["no_verdict"], why);
+        assert!(section.lines[0].contains(why), "{:?}", section.lines);
+        assert_eq!(section.lines.len(), 3, "{:?}", section.lines);
+    }
+
+    #[test]
+    fn radii_of_a_circle_at_20_degc_are_judged() {
+        let length = serde_json::json!({"value_mm": 0.001, "expanded_uncertainty_mm": 0.000_5});
+        let circle = serde_json::json!({"test": "circle", "no_verdict_on_radii": null, "iso230_4": {"mean_radial_deviation": length}});
+        let text = "rule: guard_band\nlimits:\n  iso230_4.mean_radial_deviation: {upper_um: 2.0}\n";
+        let section = limits(text).unwrap().section(&[circle]).unwrap();
+        assert_eq!(section.figures[0]["verdict"]["decision"], "conforms");
+    }
+
+    #[test]
+    fn an_angle_is_judged_in_seconds_of_arc_by_hand() {
+        // With U = 1.5'' against 6'': 4 + 1.5 < 6 conforms; 5 + 1.5 > 6 > 5 - 1.5 is open; 8 - 1.5 > 6 does not.
+        let arcsec = |arcsec: f64| (arcsec / 3600.0).to_radians();
+        let test = |value: f64| {
+            serde_json::json!({"test": format!("C {value}"), "iso230_2_rotary": {"figures": {"both": {
+            "accuracy": {"value_rad": arcsec(value), "expanded_uncertainty_rad": arcsec(1.5)}}}}})
+        };
+        let text = "rule: guard_band\nlimits:\n  iso230_2_rotary.figures.both.accuracy: {upper_arcsec: 6.0}\n";
+        let all = [test(4.0), test(5.0), test(8.0)];
+        let section = limits(text).unwrap().section(&all).unwrap();
+        let rows = &section.tables[0].rows;
+        let said: Vec<[&str; 3]> = rows
+            .iter()
+            .map(|row| [2, 3, 4].map(|i| row[i].as_str()))
+            .collect();
+        assert_eq!(
+            said,
+            [
+                ["4.00 ± 1.50 arcsec", "≤ 6 arcsec", "conforms"],
+                ["5.00 ± 1.50 arcsec", "≤ 6 arcsec", "cannot be decided"],
+                ["8.00 ± 1.50 arcsec", "≤ 6 arcsec", "does not conform"],
+            ]
+        );
+        let guard_rad = section.figures[0]["verdict"]["guard_band_rad"]
+            .as_f64()
+            .unwrap();
+        assert!((guard_rad - arcsec(1.5)).abs() < 1e-18);
+    }
+
+    #[test]
+    fn a_limit_in_the_wrong_unit_and_an_angle_without_uncertainty_are_told() {
+        let angle = serde_json::json!({"value_rad": 1e-5, "expanded_uncertainty_rad": null});
+        let tests = [serde_json::json!({"test": "C", "iso230_2_rotary": {"accuracy": angle}})];
+        let of = |limit: &str| {
+            let text = format!("rule: guard_band\nlimits:\n  iso230_2_rotary.accuracy: {limit}\n");
+            limits(&text).unwrap().section(&tests)
+        };
+        let wrong = format!("{:#}", of("{upper_um: 6.0}").unwrap_err());
+        assert!(
+            wrong.contains("is an angle: lower_arcsec and upper_arcsec"),
+            "{wrong}"
+        );
+        let crossed = format!(
+            "{:#}",
+            of("{lower_arcsec: 6.0, upper_arcsec: 2.0}").unwrap_err()
+        );
+        assert!(crossed.contains("6 arcsec"), "{crossed}");
+        let section = of("{upper_arcsec: 6.0}").unwrap();
+        assert!(section.figures[0]["verdict"].is_null(), "{section:?}");
+        assert!(
+            section.lines[0].contains("angular_reference"),
+            "{:?}",
+            section.lines
+        );
+    }
+
+    #[test]
     fn what_no_test_has_and_what_is_no_zone_are_refused_by_name() {
         let refused = |text: &str| {
             let error = limits(text).and_then(|limits| limits.section(&tests()));
@@ -227,7 +337,8 @@ mod tests {
             refused("rule: simple\nlimits:\n  iso230_2.accuracy: {lower_um: 3.0, upper_um: 2.0}\n");
         assert!(said.starts_with("limits.iso230_2.accuracy: "), "{said}");
         let said = refused("rule: simple\nlimits:\n  iso230_2.accuracy: {upper_um: lots}\n");
-        let line = "in `iso230_2.accuracy: {upper_um: lots}`";
+        let line =
+            "limits.yaml:3:33: limits.iso230_2.accuracy.upper_um = lots: must be a number, in µm";
         assert!(said.ends_with(line), "{said}");
         let said = refused("rule: simple\nlimits: {}\n");
         assert!(said.contains("must name one figure at least"), "{said}");

@@ -2,8 +2,9 @@
 //!
 //! A stop counts when the command stands still; readings of its first part, while the machine settles,
 //! are left out, and a stop that is shorter than that gives nothing. A target is a place that every run
-//! approached from both sides; the places of overrun and arrival are none. The reading is that of the
-//! length reference along its beam, or, without one, of the linear scale of the axis.
+//! approached once from both sides; where no two places were, one that every run approached once from the side that
+//! all share. The places of overrun and arrival are no targets. Other places with readings are named as left out. The
+//! reading is that of the length reference along its beam, or, without one, of the linear scale of the axis.
 
 use std::collections::BTreeMap;
 
@@ -11,6 +12,10 @@ use metrology::Axis;
 use metrology::sample::{AxisState, LengthSample, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 use nalgebra::Vector3;
+
+pub(super) mod targets;
+
+use targets::{left_out, targets};
 
 /// Rest after which readings count.
 pub const SETTLE: Span = Span::from_nanos(300_000_000);
@@ -37,6 +42,10 @@ pub struct LinearTest {
     pub name: String,
     /// Number of its first run.
     pub first_run: u32,
+    /// Numbers of all its runs.
+    pub runs: Vec<u32>,
+    /// Programmed feed, mm/s.
+    pub feed_mm_s: f64,
     /// What measured.
     pub reference: Reference,
     /// Where the line leads, from its smaller positions to its greater ones; of length 1.
@@ -45,8 +54,10 @@ pub struct LinearTest {
     pub targets_mm: Vec<f64>,
     /// Deviations per run and target towards greater positions, mm.
     pub up_mm: Vec<Vec<f64>>,
-    /// The same towards smaller positions, mm.
+    /// The same towards smaller positions, mm. One of the two is empty where all targets were approached from one side.
     pub down_mm: Vec<Vec<f64>>,
+    /// Places with readings that are no targets, and why.
+    pub left_out: Vec<String>,
     /// Whether anything was added to the commands while it ran.
     pub compensated: bool,
     /// The longest rest between the first and the last one of a run; none: nothing rested.
@@ -111,8 +122,10 @@ impl LinearRuns {
     /// Begin or end of a test.
     pub fn segment(&mut self, segment: &TestSegment) {
         if segment.begin {
-            self.current = matches!(segment.kind, TestKind::Positioning | TestKind::Diagonal)
-                .then(|| (segment.clone(), Run::default(), None, false));
+            let is_linear = axis_of(segment).is_none_or(Axis::is_linear);
+            self.current = (is_linear
+                && matches!(segment.kind, TestKind::Positioning | TestKind::Diagonal))
+            .then(|| (segment.clone(), Run::default(), None, false));
         } else if let Some((begin, mut run, stop, compensated)) = self.current.take()
             && segment.completed
             && segment.run == begin.run
@@ -210,15 +223,21 @@ impl Stop {
     }
 }
 
+/// The axis that a test names first.
+pub(super) fn axis_of(segment: &TestSegment) -> Option<Axis> {
+    segment.features.first()?.parse().ok()
+}
+
 /// Deviations by direction and place: (up, down).
-type Visits = BTreeMap<i64, [Vec<f64>; 2]>;
+pub(super) type Visits = BTreeMap<i64, [Vec<f64>; 2]>;
 
 fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
     let (first, ..) = group.first()?;
-    let axis: Option<Axis> = first.features.first().and_then(|name| name.parse().ok());
+    let axis = axis_of(first);
     let stops = || group.iter().flat_map(|(_, run, _)| &run.stops);
-    // Where the reference is put up and zeroed it says nothing yet.
-    let reference = if stops().any(|stop| stop.length_mm.is_some()) {
+    // Where the reference is put up and zeroed it says nothing yet. Where nothing was read, no scale was.
+    let is_by_length = stops().any(|stop| stop.length_mm.is_some());
+    let reference = if is_by_length || stops().next().is_none() {
         Reference::Length
     } else {
         Reference::Scale
@@ -230,12 +249,13 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
         .iter()
         .map(|(_, run, _)| visits(run, axis, &direction, reference))
         .collect();
-    let in_every = |place: &&i64| {
-        let complete = |visits: &[Vec<f64>; 2]| visits.iter().all(|values| values.len() == 1);
-        runs.iter().all(|run| run.get(place).is_some_and(complete))
-    };
-    let places: Vec<i64> = runs.first()?.keys().filter(in_every).copied().collect();
+    let (places, sides) = targets(&runs);
+    let numbers: Vec<u32> = group.iter().map(|(segment, ..)| segment.run).collect();
+    let left_out = left_out(&runs, &numbers, (&places, sides), (SAME_MM, "mm"));
     let of = |side: usize| {
+        if !sides.contains(&side) {
+            return vec![];
+        }
         let row = |run: &Visits| places.iter().map(|place| run[place][side][0]).collect();
         runs.iter().map(row).collect::<Vec<Vec<f64>>>()
     };
@@ -246,11 +266,14 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
         axis,
         name: first.features.join(" "),
         first_run: first.run,
+        runs: numbers,
+        feed_mm_s: first.feed_mm_s,
         reference,
         direction,
         targets_mm: places.iter().map(|place| *place as f64 * SAME_MM).collect(),
         up_mm,
         down_mm,
+        left_out,
         compensated: group.iter().any(|(.., compensated)| *compensated),
         longest_rest: group
             .iter()
@@ -299,15 +322,15 @@ fn visits(run: &Run, axis: Option<Axis>, direction: &Vector3<f64>, reference: Re
 }
 
 /// A reference counts from where it was zeroed: the mean of all deviations is taken out.
-fn level(up_mm: &mut [Vec<f64>], down_mm: &mut [Vec<f64>]) {
-    let all = || up_mm.iter().chain(down_mm.iter()).flatten();
+pub fn level(up: &mut [Vec<f64>], down: &mut [Vec<f64>]) {
+    let all = || up.iter().chain(down.iter()).flatten();
     let n = all().count();
     if n == 0 {
         return;
     }
-    let mean_mm = all().sum::<f64>() / n as f64;
-    for value in up_mm.iter_mut().chain(down_mm.iter_mut()).flatten() {
-        *value -= mean_mm;
+    let mean = all().sum::<f64>() / n as f64;
+    for value in up.iter_mut().chain(down.iter_mut()).flatten() {
+        *value -= mean;
     }
 }
 
@@ -478,6 +501,53 @@ mod tests {
             let rest_s = tests[0].longest_rest.unwrap().as_secs_f64();
             assert!((rest_s - 0.19).abs() < 1e-9, "{kind:?}: {rest_s}");
         }
+    }
+
+    fn tests_of(ways: &[&[f64]]) -> Vec<LinearTest> {
+        let mut machine = Machine::new();
+        for (repeat, places) in (0_u32..).zip(ways) {
+            let begin = segment(repeat + 1, repeat, true, TestKind::Positioning, &["X"]);
+            machine.runs.segment(&begin);
+            for x_mm in *places {
+                // A place that is only passed has no rest.
+                let rest = if x_mm.fract() == 0.0 { 60 } else { 2 };
+                machine.go(Vector3::new(*x_mm, 0.0, 0.0), rest, |_, _| 0.0);
+            }
+            let end = segment(repeat + 1, repeat, false, TestKind::Positioning, &["X"]);
+            machine.runs.segment(&end);
+        }
+        machine.runs.tests()
+    }
+
+    #[test]
+    fn targets_that_were_approached_from_one_side_alone_are_targets_of_that_side() {
+        for (ways, up) in [
+            (&[5.5, 10.0, 20.0, 30.0][..], true),
+            (&[35.5, 30.0, 20.0, 10.0], false),
+        ] {
+            let tests = tests_of(&[ways, ways, ways]);
+            assert_eq!(tests[0].targets_mm, [10.0, 20.0, 30.0]);
+            let (has, lacks) = (&tests[0].up_mm, &tests[0].down_mm);
+            let (has, lacks) = if up { (has, lacks) } else { (lacks, has) };
+            assert_eq!((has.len(), lacks.len()), (3, 0));
+            assert_eq!(tests[0].left_out, [""; 0]);
+        }
+    }
+
+    #[test]
+    fn a_target_that_a_run_lacks_or_has_twice_is_named_with_the_run() {
+        let whole = &[5.5, 10.0, 20.0, 30.0, 35.5, 30.0, 20.0, 10.0][..];
+        let lacks = &[5.5, 10.0, 20.5, 30.0, 35.5, 30.0, 20.0, 10.0];
+        let tests = tests_of(&[whole, lacks, whole]);
+        assert_eq!(tests[0].targets_mm, [10.0, 30.0]);
+        assert_eq!(tests[0].left_out, ["20.000 mm: run 2 has no reading up"]);
+        let twice = &[5.5, 10.0, 20.0, 19.5, 20.0, 30.0, 35.5, 30.0, 20.0, 10.0];
+        let tests = tests_of(&[whole, whole, twice]);
+        assert_eq!(tests[0].left_out, ["20.000 mm: run 3 has 2 readings up"]);
+        let one_sided = &[5.5, 10.0, 20.0, 30.0][..];
+        let tests = tests_of(&[one_sided, one_sided, &[5.5, 10.0, 30.0]]);
+        assert_eq!(tests[0].targets_mm, [10.0, 30.0]);
+        assert_eq!(tests[0].left_out, ["20.000 mm: run 3 has no reading up"]);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The first circle of a bag that was recorded with stops, reduced to stations as the grid encoder node does.
+//! The circles of a bag that were recorded with stops, reduced to stations as the grid encoder node does.
 //!
 //! It is what the published separation works on, and the machine file in the bag says of which chain.
 
@@ -19,14 +19,14 @@ pub struct StationCircle {
     pub recording: Recording,
 }
 
-/// Looks for the circle while a bag is read.
+/// Looks for the circles while a bag is read.
 #[derive(Debug, Default)]
 pub struct Stationwise {
     stage: Option<GridEncoderStage>,
     kinematics: Option<Kinematics>,
-    listens: bool,
-    run: Option<u32>,
-    found: Option<Recording>,
+    /// Runs that are under way or not reduced yet.
+    awaited: Vec<u32>,
+    found: Vec<Recording>,
 }
 
 impl Stationwise {
@@ -44,17 +44,16 @@ impl Stationwise {
     /// Whether it still looks at readings.
     #[must_use]
     pub fn listens(&self) -> bool {
-        self.listens && self.found.is_none()
+        !self.awaited.is_empty()
     }
 
     /// Begin or end of a test.
     pub fn segment(&mut self, segment: &TestSegment) {
         let is_wanted = segment.kind == TestKind::Circle && segment.stations > 0;
-        if segment.begin && is_wanted && self.found.is_none() && self.run.is_none() {
-            self.run = Some(segment.run);
-            self.listens = true;
+        if segment.begin && is_wanted && self.stage.is_some() {
+            self.awaited.push(segment.run);
         }
-        if self.run == Some(segment.run) {
+        if self.awaited.contains(&segment.run) {
             self.step(segment.at, Input::Segment(segment.clone()));
         }
     }
@@ -71,28 +70,39 @@ impl Stationwise {
 
     fn step(&mut self, at: Stamp<Host>, input: Input) {
         let mut out = Vec::new();
-        let Some(stage) = self.stage.as_mut().filter(|_| self.listens) else {
+        let is_needed = !self.awaited.is_empty();
+        let Some(stage) = self.stage.as_mut().filter(|_| is_needed) else {
             return;
         };
         if stage.step(at, input, &mut out).is_err() {
             // States of another machine than the file's: there is nothing to compare.
-            self.listens = false;
+            self.stage = None;
+            self.awaited.clear();
         }
         for output in out {
             match output {
-                Output::Recording(recording) => self.found = Some(*recording),
-                Output::Diagnostic(Diagnostic::Refused { .. }) => self.run = None,
+                Output::Recording(recording) => {
+                    self.awaited.retain(|run| *run != recording.run);
+                    self.found.push(*recording);
+                }
+                Output::Diagnostic(Diagnostic::Refused { run, .. }) => {
+                    self.awaited.retain(|awaited| *awaited != run);
+                }
                 _ => {}
             }
         }
     }
 
-    /// The circle, where there was one.
+    /// The circles, in the order of their runs.
     #[must_use]
-    pub fn circle(self) -> Option<StationCircle> {
-        Some(StationCircle {
-            kinematics: self.kinematics?,
-            recording: self.found?,
-        })
+    pub fn circles(self) -> Vec<StationCircle> {
+        let Some(kinematics) = self.kinematics else {
+            return Vec::new();
+        };
+        let of_recording = |recording| StationCircle {
+            kinematics: kinematics.clone(),
+            recording,
+        };
+        self.found.into_iter().map(of_recording).collect()
     }
 }

@@ -1,16 +1,13 @@
 //! What a bag has for tables, and why it has nothing.
 
-use std::path::Path;
-
-use abbe_msgs::topics::{self, Topic};
-use abbe_msgs::{Message, Wire, from_cdr};
-use anyhow::{Context, Result};
+use abbe_msgs::topics;
 use machine::export::selection::Measured;
 use metrology::sample::PositioningTable;
 use metrology::{Axis, AxisSet, PerAxis};
-use recorder::{Bag, Event, Order};
+use recorder::{Bag, Order};
+use replayer::{Reading, reading};
 
-use super::origin::{Origin, Said, Which};
+use super::origin::{GEOMETRY, Origin, ROTARY, Said, THERMAL, Which};
 use crate::evaluate::stops::Stops;
 
 /// What a bag has for an export.
@@ -18,16 +15,16 @@ use crate::evaluate::stops::Stops;
 pub(super) struct Found {
     /// The last table of each axis and the last models.
     pub measured: Measured,
-    /// What could not be read, in words.
-    pub losses: Vec<String>,
+    /// What was read, lost and left out.
+    pub reading: Reading,
     /// Messages on each of [`SOURCES`]; `None`: the bag has no such topic.
-    pub topics: [Option<u64>; 3],
+    pub topics: [Option<u64>; 4],
     /// Where the tables come from.
     pub origin: Origin,
 }
 
 /// Topics that tables are made of, and who publishes them when.
-const SOURCES: [(&str, &str); 3] = [
+const SOURCES: [(&str, &str); 4] = [
     (
         topics::POSITIONING_TABLE.name,
         "deviations of an axis from its scale, by axis_compensation when a positioning run gives a table",
@@ -40,16 +37,19 @@ const SOURCES: [(&str, &str); 3] = [
         topics::THERMAL_MODEL.name,
         "thermal drift, by thermal_model after a block cycle that follows a cold one",
     ),
+    (
+        topics::GEOMETRY_ROTARY.name,
+        "errors of rotary axes, by rotary_axes after its spheres",
+    ),
 ];
 
 /// Whether `name` is `topic`; a machine's namespace may stand in front.
-fn is(name: &str, topic: &str) -> bool {
+pub(super) fn is(name: &str, topic: &str) -> bool {
     name == topic || name.ends_with(&format!("/{topic}"))
 }
 
 /// What a bag says of a machine's errors: the first or the last table of each axis, and the last models.
-pub(super) fn read(path: &Path, which: Which) -> Result<Found> {
-    let bag = Bag::open(path)?;
+pub(super) fn read(bag: &Bag, which: Which) -> Found {
     let mut found = Found::default();
     for info in bag.topics() {
         for ((topic, _), count) in SOURCES.iter().zip(&mut found.topics) {
@@ -58,39 +58,39 @@ pub(super) fn read(path: &Path, which: Which) -> Result<Found> {
             }
         }
     }
-    let measured = &mut found.measured;
-    let mut messages = bag.messages(Order::LogTime);
-    while let Some(event) = messages.next_event() {
-        let message = match event {
-            Event::Message(message) => message,
-            Event::Loss(loss) => {
-                found.losses.push(loss.to_string());
-                continue;
-            }
-        };
-        let name = bag.topic(message.topic).topic.as_str();
-        found
-            .origin
-            .began_nanos
-            .get_or_insert(message.log_time_nanos);
-        if is(name, topics::POSITIONING_TABLE.name) {
-            let table = decode(&topics::POSITIONING_TABLE, message.data)?;
+    found.origin.began_nanos = bag.log_times_nanos().map(|(first, _)| first);
+    let (measured, origin) = (&mut found.measured, &mut found.origin);
+    let wanted = SOURCES.map(|(topic, _)| topic);
+    found.reading = reading::read(bag, Order::LogTime, &wanted, |mut taken| {
+        let at_nanos = taken.log_time_nanos();
+        if taken.is(&topics::POSITIONING_TABLE)
+            && let Some(table) = taken.of(&topics::POSITIONING_TABLE)
+        {
             let axis = table.axis;
-            let said = Said::new(&table, message.log_time_nanos);
-            found.origin.tables[axis].get_or_insert_default().add(said);
+            let said = Said::new(&table, at_nanos);
+            origin.tables[axis].get_or_insert_default().add(said);
             let known = &mut measured.tables[axis];
             if known.is_none() || which == Which::Last {
                 *known = Some(table);
             }
-        } else if is(name, topics::THERMAL_MODEL.name) {
-            found.origin.add_model(1, message.log_time_nanos);
-            measured.thermal = Some(decode(&topics::THERMAL_MODEL, message.data)?);
-        } else if is(name, topics::GEOMETRY_MODEL.name) {
-            found.origin.add_model(0, message.log_time_nanos);
-            measured.geometry = Some(decode(&topics::GEOMETRY_MODEL, message.data)?);
+        } else if taken.is(&topics::THERMAL_MODEL)
+            && let Some(model) = taken.of(&topics::THERMAL_MODEL)
+        {
+            origin.add_model(THERMAL, at_nanos);
+            measured.thermal = Some(model);
+        } else if taken.is(&topics::GEOMETRY_MODEL)
+            && let Some(model) = taken.of(&topics::GEOMETRY_MODEL)
+        {
+            origin.add_model(GEOMETRY, at_nanos);
+            measured.geometry = Some(model);
+        } else if taken.is(&topics::GEOMETRY_ROTARY)
+            && let Some(model) = taken.of(&topics::GEOMETRY_ROTARY)
+        {
+            origin.add_model(ROTARY, at_nanos);
+            measured.rotary = Some(model);
         }
-    }
-    Ok(found)
+    });
+    found
 }
 
 /// A table for each axis that has none and stood at stops with nothing added to its commands; the last such run counts. The axes
@@ -114,7 +114,7 @@ pub(super) fn tables_of_stops(stops: &[Stops], measured: &mut Measured) -> AxisS
 /// Each source of tables with why it gave none.
 pub(super) fn looked_for(
     measured: &Measured,
-    topics: [Option<u64>; 3],
+    topics: [Option<u64>; 4],
     axes: AxisSet,
 ) -> Vec<String> {
     let of_axes = |known: AxisSet| {
@@ -147,13 +147,11 @@ pub(super) fn looked_for(
         })
         .collect();
     lines.push(format!("for axes {}", wanted.join(" ")));
+    lines.push(
+        "runs of a length or angular reference along one axis with nothing added to its commands: none with targets that every run stopped at".to_owned(),
+    );
     lines.push("stops of verifications along one axis count with --stops alone".to_owned());
     lines
-}
-
-fn decode<M: Message + Wire>(topic: &Topic<M>, bytes: &[u8]) -> Result<M::Inner> {
-    let message: M = from_cdr(bytes).with_context(|| topic.name.to_owned())?;
-    message.into_inner().with_context(|| topic.name.to_owned())
 }
 
 #[cfg(test)]

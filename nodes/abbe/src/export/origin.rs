@@ -71,6 +71,17 @@ impl Tables {
     }
 }
 
+/// Models that a bag has.
+const MODELS: [&str; 3] = [
+    "geometric errors",
+    "thermal drift",
+    "errors of the rotary axes",
+];
+/// Places among them.
+pub(super) const GEOMETRY: usize = 0;
+pub(super) const THERMAL: usize = 1;
+pub(super) const ROTARY: usize = 2;
+
 /// Where tables come from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Origin {
@@ -78,10 +89,12 @@ pub(super) struct Origin {
     pub began_nanos: Option<u64>,
     /// By axis.
     pub tables: PerAxis<Option<Tables>>,
-    /// Models of the geometry and of the thermal drift: how many, and the log time of the last, ns.
-    pub models: [Option<(u64, u64)>; 2],
+    /// Models of [`MODELS`]: how many, and the log time of the last, ns.
+    pub models: [Option<(u64, u64)>; 3],
     /// Axes whose table was made of the stops of a verification.
     pub of_stops: AxisSet,
+    /// Of each axis whose table was made of runs of an external reference, what these were.
+    pub of_references: PerAxis<Option<String>>,
 }
 
 impl Origin {
@@ -95,7 +108,9 @@ impl Origin {
     pub fn lines(&self, bag: &Path, counting: &Counting) -> Vec<String> {
         let mut lines = vec![format!("made of the bag {}", bag.display())];
         for (axis, span) in counting.written() {
-            if self.of_stops.contains(axis) {
+            if let Some(said) = &self.of_references[axis] {
+                lines.push(said.clone());
+            } else if self.of_stops.contains(axis) {
                 lines.push(format!(
                     "positioning of {axis}: of the last verification along it with nothing added to its commands (--stops), one run"
                 ));
@@ -108,8 +123,7 @@ impl Origin {
             }
             lines.push(counting.zero(axis, span));
         }
-        let names = ["geometric errors", "thermal drift"];
-        for (name, (n, nanos)) in names
+        for (name, (n, nanos)) in MODELS
             .iter()
             .zip(self.models)
             .filter_map(|(name, model)| Some((name, model?)))

@@ -2,16 +2,41 @@
 
 use std::fmt;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use machine::MachineFile;
-use metrology::Axis;
+use metrology::leaves::{Row, check_number};
+use metrology::number::number;
+use metrology::{Axis, Host, epoch};
 
-use super::map::{Map, Plane, Test};
+use super::map::{Column, Map, Plane, Test, What, units};
+use super::times;
 
 /// Greatest deviation or displacement that an instrument reads, µm.
 const DEVIATION_UM: f64 = 1e5;
+/// Greatest deviation of a rotary axis, arcsec: a degree.
+const DEVIATION_ARCSEC: f64 = 3600.0;
 /// Least and greatest temperature of a machine, degC.
 const TEMPERATURE_DEGC: [f64; 2] = [-50.0, 200.0];
+
+/// Rests shorter than this, s, are taken for the slowing down of an axis.
+pub const SETTLE_S: f64 = 0.4;
+/// Angles of a column: ten thousand turns either way, deg.
+const ANGLE_DEG: f64 = 3.6e6;
+/// Numbers of a map, by their keys.
+const ROWS: &[Row] = &[
+    ("feed_mm_min", 0.01, 1e7),
+    ("dwell_s", 0.5, 3600.0),
+    ("overrun_mm", 1e-3, 1e4),
+    ("feed_deg_min", 0.01, 1e7),
+    ("overrun_deg", 1e-3, 360.0),
+    ("resolution_um", 1e-6, 1e4),
+    ("resolution_arcsec", 1e-6, 3600.0),
+    ("same_target_um", 0.0, 1e4),
+    ("same_target_arcsec", 0.0, 3600.0),
+    ("radius_mm", 0.1, 1e5),
+    ("centre_mm", -1e5, 1e5),
+    ("at_mm", -1e5, 1e5),
+];
 
 /// From where to where a number may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +58,34 @@ impl Range {
 
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "from {} to {} {}", self.low, self.high, self.what)
+        write!(
+            f,
+            "from {} to {} {}",
+            number(self.low),
+            number(self.high),
+            self.what
+        )
+    }
+}
+
+/// Range of a column of times.
+const TIME: Range = Range::new(
+    -(epoch::END_S as f64) + 1.0,
+    epoch::END_S as f64 - 1.0,
+    SECONDS,
+);
+const SECONDS: &str = "s";
+
+impl Range {
+    /// What is to be done about a number that is not in the range; empty where nothing is known.
+    pub fn remedy(&self, number: f64) -> String {
+        if self.what != SECONDS {
+            return String::new();
+        }
+        match epoch::likely_unit(number) {
+            Some((unit, scale)) => format!("; it looks like {unit}: divide the column by {scale}"),
+            None => "; the column is in seconds: divide it where its unit is another".to_owned(),
+        }
     }
 }
 
@@ -42,30 +94,34 @@ fn travel(machine: &MachineFile, axis: Axis) -> Option<Range> {
     Some(Range::new(low, high, "mm, the axis' travel"))
 }
 
-/// Ranges of a test's columns, in their order.
-pub fn ranges(test: &Test, machine: &MachineFile) -> Vec<Option<Range>> {
-    let deviation = Some(Range::new(-DEVIATION_UM, DEVIATION_UM, "µm"));
-    match test {
-        Test::Positioning {
-            axis, direction, ..
-        } => {
-            let direction = direction.iter().map(|_| None);
-            let fixed = [None, travel(machine, *axis), deviation];
-            fixed.into_iter().chain(direction).collect()
-        }
-        Test::Circle { .. } => vec![None, None, deviation],
-        Test::Log {
-            run,
-            temperature_degc,
-            ..
-        } => {
-            let [low, high] = TEMPERATURE_DEGC;
-            let degc = Some(Range::new(low, high, "degC"));
-            let run = run.iter().map(|_| None);
-            let sensors = temperature_degc.iter().map(|_| degc);
-            run.chain([None, deviation]).chain(sensors).collect()
-        }
+/// The same of any axis, in the unit of its targets.
+pub fn targets(machine: &MachineFile, axis: Axis) -> Option<Range> {
+    if axis.is_linear() {
+        return travel(machine, axis);
     }
+    let [low, high] = machine.rotary_axis(axis)?.travel_deg;
+    Some(Range::new(low, high, "deg, the axis' travel"))
+}
+
+/// Ranges of a test's columns, in their order; that of a measured position is of its deviation from the target.
+pub fn ranges(test: &Test, machine: &MachineFile) -> Vec<Option<Range>> {
+    let [low, high] = TEMPERATURE_DEGC;
+    let range = |column: &Column<'_>| match (column.what, test) {
+        (What::Run | What::Direction, _) => None,
+        (What::Place(_), Test::Positioning { axis, .. }) => targets(machine, *axis),
+        (What::Place(_), _) => Some(Range::new(-ANGLE_DEG, ANGLE_DEG, "deg")),
+        (What::Deviation(_) | What::Measured(_), Test::Positioning { axis, .. })
+            if !axis.is_linear() =>
+        {
+            Some(Range::new(-DEVIATION_ARCSEC, DEVIATION_ARCSEC, "arcsec"))
+        }
+        (What::Deviation(_) | What::Measured(_), _) => {
+            Some(Range::new(-DEVIATION_UM, DEVIATION_UM, "µm"))
+        }
+        (What::Time, _) => Some(TIME),
+        (What::Temperature, _) => Some(Range::new(low, high, "degC")),
+    };
+    test.columns().iter().map(range).collect()
 }
 
 /// Checks a map against the machine: axes, travels and feeds.
@@ -73,9 +129,18 @@ pub fn ranges(test: &Test, machine: &MachineFile) -> Vec<Option<Range>> {
 /// # Errors
 /// Names the key, its value and the limit.
 pub fn check(map: &Map, machine: &MachineFile) -> Result<()> {
+    epoch::whole_seconds::<Host>(map.start_s, times::LONGEST_S as i64)
+        .map_err(|error| anyhow!("start_s = {error}"))?;
+    numbers(map)?;
     for (axis, at_mm) in &map.at_mm {
-        within(machine, "at_mm", *axis, *at_mm)?;
+        within(machine, &format!("at_mm.{axis}"), *axis, *at_mm)?;
+        if map.test.moved().contains(axis) {
+            bail!(
+                "at_mm.{axis} = {at_mm} mm: does nothing, the test says where {axis} is: remove it"
+            );
+        }
     }
+    map.check_columns()?;
     match &map.test {
         Test::Positioning {
             axis, feed_mm_min, ..
@@ -100,8 +165,87 @@ pub fn check(map: &Map, machine: &MachineFile) -> Result<()> {
             }
             feed(machine, &axes, *feed_mm_min)
         }
-        Test::Log { axis, .. } => feed(machine, &[*axis], 0.0),
+        Test::Log {
+            axis,
+            temperature_degc,
+            ..
+        } => {
+            if !axis.is_linear() {
+                bail!("test.log.axis = {axis}: must be one of X, Y, Z: displacements are lengths");
+            }
+            feed(machine, &[*axis], 0.0)?;
+            temperature_degc
+                .keys()
+                .try_for_each(|id| sensor(machine, id))
+        }
     }
+}
+
+/// Checks every number of a map by itself.
+fn numbers(map: &Map) -> Result<()> {
+    let at_mm = map.at_mm.iter();
+    let mut numbers: Vec<(String, f64)> = at_mm
+        .map(|(axis, at_mm)| (format!("at_mm.{axis}"), *at_mm))
+        .collect();
+    let resolution = map.resolution().into_iter();
+    numbers.extend(resolution.map(|(key, value)| (key.to_owned(), value)));
+    match &map.test {
+        Test::Positioning {
+            axis,
+            feed_mm_min,
+            dwell_s,
+            overrun_mm,
+            same_target_um,
+            ..
+        } => {
+            let [feed, overrun] = units(*axis).keys;
+            let same = if axis.is_linear() {
+                "same_target_um"
+            } else {
+                "same_target_arcsec"
+            };
+            let same_target = same_target_um.iter();
+            numbers.extend(same_target.map(|value| (format!("test.positioning.{same}"), *value)));
+            let fields = [
+                (feed, feed_mm_min),
+                ("dwell_s", dwell_s),
+                (overrun, overrun_mm),
+            ];
+            numbers.extend(fields.map(|(key, value)| (format!("test.positioning.{key}"), *value)));
+        }
+        Test::Circle {
+            centre_mm,
+            radius_mm,
+            feed_mm_min,
+            ..
+        } => {
+            let fields = [("radius_mm", radius_mm), ("feed_mm_min", feed_mm_min)];
+            numbers.extend(fields.map(|(key, value)| (format!("test.circle.{key}"), *value)));
+            let centre = centre_mm.iter().enumerate();
+            numbers.extend(centre.map(|(k, mm)| (format!("test.circle.centre_mm[{k}]"), *mm)));
+        }
+        Test::Log { .. } => {}
+    }
+    for (key, value) in numbers {
+        check_number(ROWS, &key, value)?;
+    }
+    Ok(())
+}
+
+/// A thermometer of the machine file.
+fn sensor(machine: &MachineFile, id: &str) -> Result<()> {
+    let sensors = &machine.temperature_sensors;
+    if sensors.iter().any(|sensor| sensor.id == id) {
+        return Ok(());
+    }
+    let known: Vec<&str> = sensors.iter().map(|sensor| sensor.id.as_str()).collect();
+    let known = match known.as_slice() {
+        [] => "none; add it to temperature_sensors there".to_owned(),
+        several => several.join(", "),
+    };
+    bail!(
+        "temperature_degc.{id}: the machine file has no thermometer of this name, it has {known}"
+    );
 }
 
 fn within(machine: &MachineFile, key: &str, axis: Axis, at_mm: f64) -> Result<()> {
@@ -109,20 +253,27 @@ fn within(machine: &MachineFile, key: &str, axis: Axis, at_mm: f64) -> Result<()
         bail!("{key}: the machine has no axis {axis}");
     };
     if !range.holds(at_mm) {
-        bail!("{key}: {axis} = {at_mm} mm: must be {range}");
+        bail!("{key}: {axis} = {} mm: must be {range}", number(at_mm));
     }
     Ok(())
 }
 
 fn feed(machine: &MachineFile, axes: &[Axis], feed_mm_min: f64) -> Result<()> {
     for axis in axes {
-        let Some(entry) = machine.linear(*axis) else {
+        let linear = machine.linear(*axis).map(|entry| entry.feed_limit_mm_min);
+        let rotary = machine.rotary_axis(*axis);
+        let limit = linear.or_else(|| rotary.map(|entry| entry.feed_limit_deg_min));
+        let Some(limit) = limit else {
             bail!("test: the machine has no axis {axis}");
         };
-        if feed_mm_min > entry.feed_limit_mm_min {
+        if feed_mm_min > limit {
+            let units = units(*axis);
             bail!(
-                "feed_mm_min = {feed_mm_min}: must be at most {}, the limit of {axis}",
-                entry.feed_limit_mm_min
+                "{} = {} {unit}: must be at most {} {unit}, the limit of {axis}",
+                units.keys[0],
+                number(feed_mm_min),
+                number(limit),
+                unit = units.feed
             );
         }
     }
@@ -143,6 +294,88 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::too_many_lines, reason = "a table of cases")]
+    fn a_number_of_the_map_that_no_test_has_is_refused_by_its_key() {
+        const CIRCLE: &str = "circle: {plane: XY, centre_mm: [0.0, 0.0, 0.0], radius_mm: RADIUS, feed_mm_min: FEED, run: n, angle_deg: w, radial_um: r}";
+        const STOPS: &str = "positioning: {axis: X, feed_mm_min: FEED, dwell_s: DWELL, overrun_mm: OVERRUN, run: n, target_mm: t, deviation_um: d}";
+        let good = [
+            ("RADIUS", "50.0"),
+            ("FEED", "1000.0"),
+            ("DWELL", "2.0"),
+            ("OVERRUN", "5.0"),
+        ];
+        for (test, name, bad, words) in [
+            (
+                CIRCLE,
+                "RADIUS",
+                "1e-9",
+                "test.circle.radius_mm = 1e-9 mm: must be from 0.1 to 100000 mm",
+            ),
+            (
+                CIRCLE,
+                "RADIUS",
+                "-50",
+                "test.circle.radius_mm = -50 mm: must be from 0.1 to",
+            ),
+            (
+                CIRCLE,
+                "RADIUS",
+                "1e300",
+                "test.circle.radius_mm = 1e300 mm: must be from 0.1 to",
+            ),
+            (
+                CIRCLE,
+                "FEED",
+                "1e-300",
+                "test.circle.feed_mm_min = 1e-300 mm/min: must be from 0.01 to",
+            ),
+            (
+                CIRCLE,
+                "FEED",
+                "0.0",
+                "test.circle.feed_mm_min = 0 mm/min: must be from 0.01 to",
+            ),
+            (
+                STOPS,
+                "FEED",
+                "1e-9",
+                "test.positioning.feed_mm_min = 1e-9 mm/min: must be from 0.01 to",
+            ),
+            (
+                STOPS,
+                "DWELL",
+                "0.0",
+                "test.positioning.dwell_s = 0 s: must be from 0.5 to 3600 s",
+            ),
+            (
+                STOPS,
+                "DWELL",
+                "1e9",
+                "test.positioning.dwell_s = 1000000000 s: must be from 0.5 to 3600 s",
+            ),
+            (
+                STOPS,
+                "OVERRUN",
+                "0.0",
+                "test.positioning.overrun_mm = 0 mm: must be from 0.001 to",
+            ),
+            (
+                STOPS,
+                "OVERRUN",
+                "1e12",
+                "test.positioning.overrun_mm = 1000000000000 mm: must be from 0.001 to",
+            ),
+        ] {
+            let bad_first = [(name, bad)].into_iter().chain(good);
+            let test = bad_first.fold(test.to_owned(), |test, (name, value)| {
+                test.replace(name, value)
+            });
+            let shown = refused(&test);
+            assert!(shown.starts_with(words), "{words}: {shown}");
+        }
+    }
+
+    #[test]
     fn what_the_machine_cannot_do_was_not_measured_on_it() {
         let circle = "circle: {plane: XY, centre_mm: [0.0, 0.0, 0.0], radius_mm: 1000.0, feed_mm_min: 1000.0, run: n, angle_deg: w, radial_um: r}";
         let said = refused(circle);
@@ -153,9 +386,21 @@ mod tests {
         let fast = "positioning: {axis: X, feed_mm_min: 600000.0, dwell_s: 2.0, overrun_mm: 5.0, run: n, target_mm: t, deviation_um: d}";
         let said = refused(fast);
         assert!(
-            said.contains("feed_mm_min = 600000: must be at most"),
+            said.contains("feed_mm_min = 600000 mm/min: must be at most"),
             "{said}"
         );
+        let log =
+            "log: {axis: Z, time_s: t, displacement_um: d, temperature_degc: {spindle_frnt: s}}";
+        let said = refused(log);
+        assert!(
+            said.contains("temperature_degc.spindle_frnt: the machine file has no thermometer of this name, it has nut_x, nut_y"),
+            "{said}"
+        );
+        let twice = fast
+            .replace("600000", "6000")
+            .replace("target_mm: t", "target_mm: d");
+        let said = refused(&twice);
+        assert!(said.contains("two keys name the column \"d\""), "{said}");
         let said = refused(&fast.replace("axis: X", "axis: A"));
         assert!(said.contains("the machine has no axis A"), "{said}");
     }

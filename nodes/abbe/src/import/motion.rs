@@ -1,12 +1,17 @@
 //! The motion that a measurement was made with, from the order of its rows.
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
+use metrology::iso230::thermal::DriftCause;
+use metrology::number::number;
 use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
 use metrology::{Axis, PerAxis, Stamp};
 use nalgebra::Vector3;
 
-use super::map::{Map, Plane, Test};
-use super::table::Table;
+use super::limits::SETTLE_S;
+use super::map::{Map, Plane, Test, units};
+use super::runs::{Runs, SAME_MM, first_way};
+use super::table::Row;
+use super::times;
 use super::writer::Writer;
 
 /// Spacing of the axis states, s.
@@ -15,68 +20,63 @@ const TICK_S: f64 = 0.01;
 const REST_S: f64 = 2.0;
 /// Readings at a stop.
 const READINGS: u32 = 5;
-/// Rest before the readings of a stop, s.
-const SETTLE_S: f64 = 0.4;
 /// Longest motion that is made up for a table, s: a day.
 const LONGEST_S: f64 = 86_400.0;
-/// Slowest feed of one, mm/min.
-const SLOWEST_MM_MIN: f64 = 0.01;
-/// Targets nearer than this are one, mm.
-const SAME_MM: f64 = 1e-9;
 /// Share of a turn that a circle runs ahead of its first row.
 const AHEAD_RAD: f64 = std::f64::consts::FRAC_PI_2;
+/// The shortest arc that is a test of circles, deg.
+const LEAST_ARC_DEG: f64 = 20.0;
 
-/// Writes every run of the table; gives their number.
+/// Writes every run of a table; gives their number.
 ///
 /// # Errors
 /// When rows contradict the map, or the bag cannot be written.
-pub fn write(map: &Map, table: &Table, writer: &mut Writer) -> Result<u32> {
+pub fn write(map: &Map, runs: &Runs, writer: &mut Writer) -> Result<u32> {
     let mut position = PerAxis::default();
     for (axis, mm) in &map.at_mm {
         position[*axis] = *mm;
     }
     let mut n = 0;
-    if let Test::Log {
-        axis,
-        run,
-        temperature_degc,
-        ..
-    } = &map.test
-    {
-        let sensors: Vec<&str> = temperature_degc.keys().map(String::as_str).collect();
-        let begin_s = table.rows[0][usize::from(run.is_some())];
-        let runs: Vec<&[Vec<f64>]> = match run {
-            Some(_) => table.runs().collect(),
-            None => vec![&table.rows],
-        };
-        for rows in runs {
-            n += 1;
-            let rows = rows.iter().map(|row| &row[usize::from(run.is_some())..]);
-            log((*axis, n, begin_s), &sensors, rows, &position, writer)?;
-        }
-        return Ok(n);
+    check_time(&map.test, &runs.runs)?;
+    if let Test::Log { run, .. } = &map.test {
+        let column = usize::from(run.is_some());
+        times::check(runs.runs.iter().flatten().map(|row| row.cells[column]))?;
     }
-    check_time(&map.test, table)?;
-    check_directions(table)?;
-    for rows in table.runs() {
+    for rows in &runs.runs {
         n += 1;
         match &map.test {
             Test::Circle { .. } => circle(map, rows, n, &mut position, writer)?,
-            _ => positioning(map, rows, n, &mut position, writer)?,
+            Test::Positioning { .. } => positioning(map, rows, n, &mut position, writer)?,
+            Test::Log {
+                axis,
+                cause,
+                run,
+                temperature_degc,
+                ..
+            } => {
+                let sensors: Vec<&str> = temperature_degc.keys().map(String::as_str).collect();
+                let first = usize::from(run.is_some());
+                let begin_s = runs.runs[0][0].cells[first];
+                let rows = rows.iter().map(|row| (row.line, &row.cells[first..]));
+                let mut test = segment(TestKind::Dwell, n, 0.0);
+                test.features = named(*axis, *cause);
+                log((*axis, &test, begin_s), &sensors, rows, &position, writer)?;
+            }
         }
     }
     Ok(n)
 }
 
 /// Refuses stops so far apart, or a feed so slow, that the motion would go on for days.
-fn check_time(test: &Test, table: &Table) -> Result<()> {
+fn check_time(test: &Test, runs: &[Vec<Row>]) -> Result<()> {
     let (Test::Positioning { feed_mm_min, .. } | Test::Circle { feed_mm_min, .. }) = test else {
         return Ok(());
     };
-    if feed_mm_min.is_nan() || *feed_mm_min < SLOWEST_MM_MIN {
-        bail!("feed_mm_min = {feed_mm_min}: must be at least {SLOWEST_MM_MIN}");
+    if let Test::Circle { radius_mm, .. } = test {
+        return check_circle_time(*radius_mm, *feed_mm_min, runs);
     }
     let Test::Positioning {
+        axis,
         dwell_s,
         overrun_mm,
         ..
@@ -84,56 +84,44 @@ fn check_time(test: &Test, table: &Table) -> Result<()> {
     else {
         return Ok(());
     };
-    let stops = table.rows.len() as f64;
-    let targets_mm = table
-        .rows
-        .windows(2)
-        .map(|two| (two[1][1] - two[0][1]).abs());
-    let way_mm = targets_mm.sum::<f64>() + 2.0 * stops * overrun_mm;
+    let targets: Vec<f64> = runs.iter().flatten().map(|row| row.cells[1]).collect();
+    let stops = targets.len() as f64;
+    let ways_mm = targets.windows(2).map(|two| (two[1] - two[0]).abs());
+    let way_mm = ways_mm.sum::<f64>() + 2.0 * stops * overrun_mm;
     let time_s = way_mm / (feed_mm_min / 60.0) + stops * dwell_s;
     if time_s.is_nan() || time_s > LONGEST_S {
+        let units = units(*axis);
         bail!(
-            "{stops} stops, {way_mm} mm of way at feed_mm_min = {feed_mm_min} take {time_s:.0} s: at most {LONGEST_S} s"
+            "{stops} stops, {} {} of way at {} = {feed_mm_min} {} of the map take {} s: at most {LONGEST_S} s",
+            number(way_mm),
+            units.target,
+            units.keys[0],
+            units.feed,
+            number(time_s)
         );
     }
     Ok(())
 }
 
-/// Where the first target of a run is approached from, as a sign of the way: as it is told, or from the side that the
-/// second one lies away from.
-fn first_way(rows: &[Vec<f64>]) -> f64 {
-    let first_mm = rows[0][1];
-    let told = rows[0].get(3).copied();
-    let mut ways = rows.iter().map(|row| row[1] - first_mm);
-    told.unwrap_or_else(|| ways.find(|way| way.abs() > SAME_MM).unwrap_or(1.0).signum())
-}
-
-/// Refuses rows whose order makes another direction than their column tells.
-fn check_directions(table: &Table) -> Result<()> {
-    for rows in table.runs() {
-        let mut way = first_way(rows);
-        for (k, two) in rows.windows(2).enumerate() {
-            let by_mm = two[1][1] - two[0][1];
-            way = if by_mm.abs() > SAME_MM {
-                by_mm.signum()
-            } else {
-                -way
-            };
-            if two[1].get(3).is_some_and(|told| *told * way < 0.0) {
-                let (word, other) = if way > 0.0 {
-                    ("up", "down")
-                } else {
-                    ("down", "up")
-                };
-                bail!(
-                    "run {}, row {}: target {} mm after {} mm is approached {word}, and its direction says {other}: rows must be in the order of the measurement",
-                    two[1][0],
-                    k + 2,
-                    two[1][1],
-                    two[0][1]
-                );
-            }
-        }
+/// Refuses circles that would take days at their feed.
+fn check_circle_time(radius_mm: f64, feed_mm_min: f64, runs: &[Vec<Row>]) -> Result<()> {
+    let turned_deg: f64 = runs
+        .iter()
+        .map(|rows| {
+            let steps = rows.windows(2);
+            steps
+                .map(|two| (two[1].cells[1] - two[0].cells[1]).abs())
+                .sum::<f64>()
+        })
+        .sum();
+    let way_mm = turned_deg.to_radians() * radius_mm;
+    let time_s = way_mm / (feed_mm_min / 60.0);
+    if time_s.is_nan() || time_s > LONGEST_S {
+        bail!(
+            "{} mm of arc at feed_mm_min = {feed_mm_min} mm/min of the map take {} s: at most {LONGEST_S} s",
+            number(way_mm),
+            number(time_s)
+        );
     }
     Ok(())
 }
@@ -172,21 +160,21 @@ fn rest(position: &PerAxis<f64>, time_s: f64, writer: &mut Writer) -> Result<()>
     Ok(())
 }
 
-/// Goes along one axis.
+/// Goes along one axis, at a speed, to within what counts as one place.
 fn go(
     position: &mut PerAxis<f64>,
     axis: Axis,
-    to_mm: f64,
-    feed_mm_s: f64,
+    to: f64,
+    (per_s, same): (f64, f64),
     writer: &mut Writer,
 ) -> Result<()> {
-    let step_mm = feed_mm_s * TICK_S;
-    while (to_mm - position[axis]).abs() > SAME_MM {
-        let way_mm = to_mm - position[axis];
-        position[axis] = if way_mm.abs() <= step_mm {
-            to_mm
+    let step = per_s * TICK_S;
+    while (to - position[axis]).abs() > same {
+        let way = to - position[axis];
+        position[axis] = if way.abs() <= step {
+            to
         } else {
-            position[axis] + way_mm.signum() * step_mm
+            position[axis] + way.signum() * step
         };
         writer.tick(position)?;
         writer.wait(TICK_S);
@@ -196,7 +184,7 @@ fn go(
 
 fn positioning(
     map: &Map,
-    rows: &[Vec<f64>],
+    rows: &[Row],
     run: u32,
     position: &mut PerAxis<f64>,
     writer: &mut Writer,
@@ -211,35 +199,44 @@ fn positioning(
     else {
         return Ok(());
     };
-    if !(*feed_mm_min > 0.0 && *dwell_s > SETTLE_S && *overrun_mm > 0.0) {
-        bail!("feed_mm_min and overrun_mm must be above 0, dwell_s above {SETTLE_S}");
-    }
-    let mut test = segment(TestKind::Positioning, run, *feed_mm_min);
+    // From here on in the inner units of the axis: mm, or rad.
+    let units = units(*axis);
+    let inner = units.target_inner;
+    let (feed_s, overrun) = (feed_mm_min * inner / 60.0, overrun_mm * inner);
+    let same = SAME_MM * inner;
+    let mut test = segment(TestKind::Positioning, run, 0.0);
+    // A feed of degrees is no speed of the wire.
+    test.feed_mm_s = if axis.is_linear() { feed_s } else { 0.0 };
     test.features = vec![axis.letter().to_owned()];
     test.stations = u32::try_from(rows.len()).unwrap_or(u32::MAX);
-    let feed_mm_s = feed_mm_min / 60.0;
-    let before_mm = rows[0][1] - first_way(rows) * overrun_mm;
+    let before = rows[0].cells[1] * inner - first_way(rows) * overrun;
     if run == 1 {
-        position[*axis] = before_mm;
+        position[*axis] = before;
     }
     rest(position, REST_S, writer)?;
     writer.segment(&test, true)?;
-    go(position, *axis, before_mm, feed_mm_s, writer)?;
-    let mut last = before_mm;
+    go(position, *axis, before, (feed_s, same), writer)?;
+    let mut last = before;
     for row in rows {
-        let (target_mm, deviation_um) = (row[1], row[2]);
-        if (target_mm - position[*axis]).abs() < SAME_MM {
+        let target = row.cells[1] * inner;
+        let read = target + row.cells[2] * units.deviation_inner;
+        if (target - position[*axis]).abs() < same {
             // Measured from the other side: beyond it and back.
-            let beyond_mm = target_mm + (target_mm - last).signum() * overrun_mm;
-            go(position, *axis, beyond_mm, feed_mm_s, writer)?;
+            let beyond = target + (target - last).signum() * overrun;
+            go(position, *axis, beyond, (feed_s, same), writer)?;
         }
         last = position[*axis];
-        go(position, *axis, target_mm, feed_mm_s, writer)?;
+        go(position, *axis, target, (feed_s, same), writer)?;
         rest(position, SETTLE_S, writer)?;
         let spacing_s = (dwell_s - SETTLE_S) / f64::from(READINGS);
         for _ in 0..READINGS {
             writer.tick(position)?;
-            writer.length(*axis, target_mm + deviation_um * 1e-3)?;
+            // A stop without a reading is a stop all the same.
+            match (read.is_finite(), axis.is_linear()) {
+                (false, _) => {}
+                (true, true) => writer.length(*axis, read)?,
+                (true, false) => writer.angle(*axis, read)?,
+            }
             writer.wait(TICK_S);
             rest(position, spacing_s - TICK_S, writer)?;
         }
@@ -257,7 +254,7 @@ fn end(test: &TestSegment, writer: &mut Writer) -> Result<()> {
 
 fn circle(
     map: &Map,
-    rows: &[Vec<f64>],
+    rows: &[Row],
     run: u32,
     position: &mut PerAxis<f64>,
     writer: &mut Writer,
@@ -272,16 +269,13 @@ fn circle(
     else {
         return Ok(());
     };
-    if !(*feed_mm_min > 0.0 && *radius_mm > 0.0) {
-        bail!("feed_mm_min and radius_mm must be above 0");
-    }
     let (kind, axes) = match plane {
         Plane::Xy => (TestPlane::Xy, [Axis::X, Axis::Y]),
         Plane::Yz => (TestPlane::Yz, [Axis::Y, Axis::Z]),
         Plane::Zx => (TestPlane::Zx, [Axis::Z, Axis::X]),
     };
-    let angles = unwrapped(rows.iter().map(|row| row[1].to_radians()));
-    let sign = sense(&angles, run)?;
+    let angles = unwrapped(rows.iter().map(|row| row.cells[1].to_radians()));
+    let sign = sense(&angles, rows, run)?;
     let mut test = segment(TestKind::Circle, run, *feed_mm_min);
     test.plane = kind;
     test.centre_mm = Vector3::from(*centre_mm);
@@ -316,21 +310,40 @@ fn circle(
             writer.tick(position)?;
             k += 1.0;
         }
-        writer.length(axes[0], radius_mm + row[2] * 1e-3)?;
+        if row.cells[2].is_finite() {
+            writer.length(axes[0], radius_mm + row.cells[2] * 1e-3)?;
+        }
     }
     end(&test, writer)
 }
 
 /// Sign of the sense in which angles go round.
-fn sense(angles: &[f64], run: u32) -> Result<f64> {
+fn sense(angles: &[f64], rows: &[Row], run: u32) -> Result<f64> {
     let swept = angles.last().unwrap_or(&0.0) - angles.first().unwrap_or(&0.0);
     let sign = swept.signum();
     let goes_on = |two: &[f64]| {
         let step = (two[1] - two[0]) * sign;
         step > 0.0 && step <= std::f64::consts::PI
     };
-    if !angles.windows(2).all(goes_on) {
-        bail!("run {run}: angles must go round in one sense, in steps below half a turn");
+    if let Some(at) = angles.windows(2).position(|two| !goes_on(two)) {
+        let line = rows.get(at + 1).map_or(0, |row| row.line);
+        let [from, to] = [at, at + 1].map(|k| rows.get(k).map_or(f64::NAN, |row| row.cells[1]));
+        bail!(
+            "line {line}: run {run}: {to} deg after {from} deg: angles must go round in one sense, in steps below half a turn; a circle the other way round is a run of its own"
+        );
+    }
+    let swept_deg = swept.abs().to_degrees();
+    if swept_deg < LEAST_ARC_DEG {
+        let line = rows.first().map_or(0, |row| row.line);
+        let remedy = if swept_deg <= 2.0 * std::f64::consts::TAU {
+            "; where they are radians, convert them to degrees"
+        } else {
+            ""
+        };
+        bail!(
+            "line {line}: run {run}: angles sweep {} deg, a circle at least {LEAST_ARC_DEG} deg{remedy}",
+            number(swept_deg)
+        );
     }
     Ok(sign)
 }
@@ -348,28 +361,45 @@ fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
     all
 }
 
+/// What a log is of: its axis and, where it was said, the cause of the drift, as [`crate::evaluate::drift`] reads them.
+fn named(axis: Axis, cause: Option<DriftCause>) -> Vec<String> {
+    let cause = match cause {
+        None | Some(DriftCause::NotStated) => None,
+        Some(DriftCause::Environment) => Some("environment"),
+        Some(DriftCause::Spindle) => Some("spindle"),
+        Some(DriftCause::LinearAxis) => Some("linear_axis"),
+        Some(DriftCause::RotaryAxis) => Some("rotary_axis"),
+    };
+    let names = std::iter::once(axis.letter()).chain(cause);
+    names.map(str::to_owned).collect()
+}
+
 fn log<'a>(
-    (axis, run, begin_s): (Axis, u32, f64),
+    (axis, test, begin_s): (Axis, &TestSegment, f64),
     sensors: &[&str],
-    rows: impl Iterator<Item = &'a [f64]>,
+    rows: impl Iterator<Item = (u64, &'a [f64])>,
     position: &PerAxis<f64>,
     writer: &mut Writer,
 ) -> Result<()> {
-    let test = segment(TestKind::Dwell, run, 0.0);
     let mut has_begun = false;
-    for row in rows {
-        writer.wait_until(row[0] - begin_s)?;
+    for (line, row) in rows {
+        writer
+            .wait_until(row[0] - begin_s)
+            .with_context(|| format!("line {line}: time {} s", row[0]))?;
         if !has_begun {
-            writer.segment(&test, true)?;
+            writer.segment(test, true)?;
             has_begun = true;
         }
         writer.tick(position)?;
-        writer.length(axis, position[axis] + row[1] * 1e-3)?;
-        for (sensor, degc) in sensors.iter().zip(&row[2..]) {
+        if row[1].is_finite() {
+            writer.length(axis, position[axis] + row[1] * 1e-3)?;
+        }
+        let read = sensors.iter().zip(&row[2..]);
+        for (sensor, degc) in read.filter(|(_, degc)| degc.is_finite()) {
             writer.temperature(sensor, *degc)?;
         }
     }
-    writer.segment(&test, false)
+    writer.segment(test, false)
 }
 
 #[cfg(test)]
@@ -382,13 +412,44 @@ mod tests {
             feed_mm_min: 6000.0,
             dwell_s: 2.0,
             overrun_mm: 5.0,
-            run: "run".to_owned(),
+            run: Some("run".to_owned()),
             target_mm: "target".to_owned(),
-            deviation_um: "deviation".to_owned(),
+            deviation_um: Some("deviation".to_owned()),
+            measured_mm: None,
+            passes_um: vec![],
             direction: None,
+            same_target_um: None,
         };
-        let rows = targets_mm.iter().map(|mm| vec![1.0, *mm, 0.0]).collect();
-        check_time(&test, &Table { rows })
+        let row = |mm: &f64| Row {
+            line: 2,
+            cells: vec![1.0, *mm, 0.0],
+        };
+        check_time(&test, &[targets_mm.iter().map(row).collect()])
+    }
+
+    #[test]
+    fn circles_that_would_take_days_are_refused_with_the_time() {
+        let of = |feed_mm_min: f64, last_deg: f64| {
+            let test = Test::Circle {
+                plane: Plane::Xy,
+                centre_mm: [0.0; 3],
+                radius_mm: 100.0,
+                feed_mm_min,
+                run: "run".to_owned(),
+                angle_deg: "angle".to_owned(),
+                radial_um: "radial".to_owned(),
+            };
+            let row = |deg: f64| Row {
+                line: 2,
+                cells: vec![1.0, deg, 0.0],
+            };
+            check_time(&test, &[vec![row(0.0), row(last_deg)]])
+        };
+        assert!(of(1000.0, 360.0).is_ok());
+        for (feed_mm_min, last_deg) in [(0.1, 360.0), (1000.0, 360e9), (1000.0, f64::MAX)] {
+            let error = of(feed_mm_min, last_deg).expect_err("days");
+            assert!(format!("{error}").contains("at most 86400 s"), "{error}");
+        }
     }
 
     #[test]
@@ -400,33 +461,34 @@ mod tests {
         }
     }
 
-    fn directions(rows: &[(f64, f64)]) -> Result<()> {
-        let rows = rows.iter().map(|(mm, way)| vec![1.0, *mm, 0.0, *way]);
-        check_directions(&Table {
-            rows: rows.collect(),
-        })
-    }
-
     #[test]
-    fn rows_whose_order_is_not_that_of_their_directions_are_refused_with_the_row() {
-        let (up, down) = (1.0, -1.0);
-        assert!(directions(&[(0.0, up), (9.0, up), (9.0, down), (0.0, down)]).is_ok());
-        assert!(directions(&[(0.0, down), (0.0, up), (9.0, up), (9.0, down)]).is_ok());
-        // Sorted by target.
-        let sorted = directions(&[(0.0, down), (0.0, up), (9.0, down), (9.0, up)]);
-        assert_eq!(
-            format!("{}", sorted.expect_err("in another order")),
-            "run 1, row 3: target 9 mm after 0 mm is approached up, and its direction says down: rows must be in the order of the measurement"
-        );
+    fn a_turn_in_radians_is_refused_with_what_to_do() {
+        let turn = |least: f64, greatest: f64| {
+            let angle = move |k: i32| least + (greatest - least) * f64::from(k) / 360.0;
+            let angles: Vec<f64> = (0..=360).map(|k| angle(k).to_radians()).collect();
+            sense(&angles, &[], 3).map_err(|error| error.to_string())
+        };
+        let tau = std::f64::consts::TAU;
+        for (least, greatest) in [(0.0, tau), (tau, 0.0), (-tau / 2.0, tau / 2.0)] {
+            let error = turn(least, greatest).expect_err("radians");
+            assert!(
+                error.contains("run 3: angles sweep 6.28319 deg") && error.contains("radians"),
+                "{error}"
+            );
+        }
+        // Arcs of ballbars, from a part of a turn to a turn with its overshoot.
+        for swept_deg in [30.0, 220.0, 360.0, -360.0, 540.0] {
+            assert!(turn(0.0, swept_deg).is_ok(), "{swept_deg}");
+        }
     }
 
     #[test]
     fn angles_beyond_all_turns_are_refused_and_not_followed() {
         for far_deg in [1e18, 1e300, f64::MAX] {
             let angles = [0.0, 10.0, far_deg].map(f64::to_radians);
-            assert!(sense(&unwrapped(angles.into_iter()), 1).is_err());
+            assert!(sense(&unwrapped(angles.into_iter()), &[], 1).is_err());
         }
         let turn = (0..=36).map(|k| f64::from(k * 10).to_radians());
-        assert!(sense(&unwrapped(turn), 1).is_ok());
+        assert!(sense(&unwrapped(turn), &[], 1).is_ok());
     }
 }

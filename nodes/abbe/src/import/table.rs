@@ -2,84 +2,342 @@
 
 use anyhow::{Context, Result, bail};
 
-use super::limits::Range;
-use super::map::Map;
+use metrology::yaml::shown;
 
-/// Rows of numbers, in the order of the map's columns.
+use super::limits::Range;
+use super::map::{Column, Direction, Map, Test, What, units};
+use super::sheet::Sheet;
+use super::times;
+use super::units::Unit;
+
+/// One row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Its line in the file, from 1.
+    pub line: u64,
+    /// Its numbers, in the order of the map's columns.
+    pub cells: Vec<f64>,
+}
+
+/// Rows of numbers.
 #[derive(Debug)]
 pub struct Table {
     /// Rows.
-    pub rows: Vec<Vec<f64>>,
+    pub rows: Vec<Row>,
+    /// What of the file is in no row, and why.
+    pub left_out: Vec<String>,
 }
 
 impl Table {
-    /// Reads a CSV text; lines that begin with `#` are comments. `ranges` are those of the map's columns.
+    /// Reads the cells of a file. `ranges` are those of the map's columns.
     ///
     /// # Errors
-    /// Names the column that is missing, or line, column and text of a cell that is no number or out of its range.
-    pub fn read(text: &str, map: &Map, ranges: &[Option<Range>]) -> Result<Self> {
-        let separator = u8::try_from(map.separator).context("separator: must be one byte")?;
-        let mut reader = csv::ReaderBuilder::new()
-            .delimiter(separator)
-            .comment(Some(b'#'))
-            .trim(csv::Trim::All)
-            .from_reader(text.as_bytes());
-        let head = reader.headers()?.clone();
+    /// Names the column that is missing or there twice, or line, column and text of a cell that is no number or out of
+    /// its range.
+    pub fn of(sheet: &Sheet, map: &Map, ranges: &[Option<Range>]) -> Result<Self> {
         let columns = map.test.columns();
-        let place = |name: &&str| {
-            head.iter().position(|cell| cell == *name).with_context(|| {
-                let there: Vec<&str> = head.iter().collect();
-                format!("no column \"{name}\"; there are {}", there.join(", "))
-            })
+        let names: Vec<&str> = columns.iter().map(|column| column.name).collect();
+        let at = sheet.head(&names).context("no rows")?;
+        let (head_line, head) = &sheet.lines[at];
+        let place = |name: &&str| place_of(name, head, sheet.separator);
+        let places: Vec<usize> = names.iter().map(place).collect::<Result<_>>()?;
+        let mut left_out = unnamed(head, &places);
+        left_out.extend(above(&sheet.lines[..at], *head_line));
+        let mut reader = Reader {
+            map,
+            columns: &columns,
+            places: &places,
+            ranges,
+            n_missing: 0,
+            first_missing: None,
         };
-        let places: Vec<usize> = columns.iter().map(place).collect::<Result<_>>()?;
         let mut rows = vec![];
-        for record in reader.records() {
-            let record = record?;
-            let line = record.position().map_or(0, csv::Position::line);
-            let mut row = vec![];
-            for ((place, name), range) in places.iter().zip(&columns).zip(ranges) {
-                let cell = record.get(*place).unwrap_or("");
-                if map.test.direction() == Some(*name) {
-                    let sign = sign(cell).with_context(|| {
-                        format!("line {line}, column \"{name}\": \"{cell}\": must be one of up, +, down, -")
-                    })?;
-                    row.push(sign);
-                    continue;
-                }
-                let number = cell.replace(map.decimal, ".").parse::<f64>();
-                match number {
-                    Ok(number) if number.is_finite() => {
-                        if let Some(range) = range.as_ref().filter(|range| !range.holds(number)) {
-                            bail!("line {line}, column \"{name}\": {cell}: must be {range}");
-                        }
-                        row.push(number);
-                    }
-                    _ => bail!("line {line}, column \"{name}\": \"{cell}\": must be a number"),
-                }
+        let mut n_empty = 0_u64;
+        for (k, (line, cells)) in sheet.lines.iter().enumerate().skip(at + 1) {
+            if cells.iter().all(String::is_empty) {
+                n_empty += 1;
+                continue;
             }
-            rows.push(row);
+            if k == at + 1 && reader.is_units(cells) {
+                left_out.push(format!("line {line}: units alone"));
+                continue;
+            }
+            check_length(cells, head.len(), *line)?;
+            rows.push(Row {
+                line: *line,
+                cells: reader.row(cells, *line)?,
+            });
         }
-        if rows.is_empty() {
-            bail!("no rows");
+        let found = reader.missing(&rows)?;
+        left_out.extend(found);
+        if n_empty > 0 {
+            left_out.push(format!("{n_empty} rows: all their cells are empty"));
         }
-        Ok(Self { rows })
-    }
-
-    /// Rows that follow one another with one value in the first column.
-    pub fn runs(&self) -> impl Iterator<Item = &[Vec<f64>]> {
-        let number = |row: &Vec<f64>| row.first().map_or(0, |run| run.to_bits());
-        self.rows.chunk_by(move |a, b| number(a) == number(b))
+        let rows = shaped(rows, map);
+        Ok(Self { rows, left_out })
     }
 }
 
-/// Sign of a direction of approach.
-fn sign(cell: &str) -> Option<f64> {
-    match cell.to_lowercase().as_str() {
-        "up" | "+" => Some(1.0),
-        "down" | "-" => Some(-1.0),
-        _ => None,
+/// What stands above the names of the columns.
+fn above(lines: &[(u64, Vec<String>)], head_line: u64) -> Option<String> {
+    let n = lines.len();
+    (n > 0).then(|| format!("{n} lines above line {head_line}, which has the names of the columns"))
+}
+
+/// Refuses a row of another length than the line with the names; separators at its end do no harm.
+fn check_length(cells: &[String], wanted: usize, line: u64) -> Result<()> {
+    let used = cells.iter().rposition(|cell| !cell.is_empty());
+    let used = used.map_or(0, |last| last + 1);
+    if cells.len() < wanted || used > wanted {
+        bail!(
+            "line {line}: {} cells, the first line has {wanted}: check separators and quotes",
+            cells.len(),
+        );
     }
+    Ok(())
+}
+
+/// Reads the cells of rows.
+struct Reader<'t> {
+    map: &'t Map,
+    columns: &'t [Column<'t>],
+    places: &'t [usize],
+    ranges: &'t [Option<Range>],
+    /// Readings without a number.
+    n_missing: u64,
+    /// Line and column of the first.
+    first_missing: Option<(u64, String)>,
+}
+
+impl Reader<'_> {
+    fn cell<'c>(&self, cells: &'c [String], k: usize) -> &'c str {
+        let place = self.places.get(k);
+        place
+            .and_then(|place| cells.get(*place))
+            .map_or("", String::as_str)
+    }
+
+    /// Whether a line below the names has units.
+    fn is_units(&self, cells: &[String]) -> bool {
+        let words: Vec<&str> = (0..self.columns.len())
+            .map(|k| self.cell(cells, k))
+            .filter(|word| !word.is_empty())
+            .collect();
+        let bare = |word: &str| {
+            let brackets = ['[', ']', '(', ')'];
+            Unit::of_word(word.trim_matches(brackets)).is_some()
+        };
+        !words.is_empty() && words.into_iter().all(bare)
+    }
+
+    /// The numbers of a row; a reading that is not there is no number (NaN).
+    fn row(&mut self, cells: &[String], line: u64) -> Result<Vec<f64>> {
+        let mut numbers: Vec<f64> = vec![];
+        for (k, column) in self.columns.iter().enumerate() {
+            let cell = self.cell(cells, k);
+            if column.what.is_reading() && is_missing(cell) {
+                self.n_missing += 1;
+                let first = (line, column.name.to_owned());
+                self.first_missing.get_or_insert(first);
+                numbers.push(f64::NAN);
+                continue;
+            }
+            let range = self.ranges.get(k).and_then(Option::as_ref);
+            let before = numbers.last().copied();
+            let number = read_cell(cell, *column, self.map, range, before);
+            numbers
+                .push(number.with_context(|| format!("line {line}, column \"{}\"", column.name))?);
+        }
+        Ok(numbers)
+    }
+
+    /// How many readings are not there.
+    fn missing(&self, rows: &[Row]) -> Result<Option<String>> {
+        if rows.is_empty() {
+            bail!("no rows");
+        }
+        let Some((line, name)) = &self.first_missing else {
+            return Ok(None);
+        };
+        let is_read = |row: &Row| {
+            let pairs = row.cells.iter().zip(self.columns);
+            pairs
+                .filter(|(_, column)| column.what.is_reading())
+                .any(|(cell, _)| cell.is_finite())
+        };
+        if !rows.iter().any(is_read) {
+            bail!(
+                "line {line}, column \"{name}\": the cell is empty, and no other row has a reading"
+            );
+        }
+        Ok(Some(format!(
+            "{} readings: their cells are empty or no number (NaN), the first in line {line}, column \"{name}\"",
+            self.n_missing
+        )))
+    }
+}
+
+/// Rows as every kind of table of a test has them: of a positioning test run, target, deviation and, where it is known,
+/// direction.
+fn shaped(rows: Vec<Row>, map: &Map) -> Vec<Row> {
+    let passes = map.test.passes();
+    if passes.is_empty() {
+        return match &map.test {
+            Test::Positioning { run: None, .. } => rows.into_iter().map(numbered).collect(),
+            _ => rows,
+        };
+    }
+    let mut shaped = vec![];
+    for (k, pass) in passes.iter().enumerate() {
+        let sign = pass.direction.sign();
+        let mut own: Vec<Row> = rows
+            .iter()
+            .map(|row| Row {
+                line: row.line,
+                cells: vec![(k + 1) as f64, row.cells[0], row.cells[k + 1], sign],
+            })
+            .collect();
+        own.sort_by(|a, b| (sign * a.cells[1]).total_cmp(&(sign * b.cells[1])));
+        shaped.extend(own);
+    }
+    shaped
+}
+
+/// A row without a number of run as one of the first.
+fn numbered(row: Row) -> Row {
+    let Row { line, mut cells } = row;
+    cells.insert(0, 1.0);
+    Row { line, cells }
+}
+
+/// Where a column stands.
+fn place_of(name: &str, head: &[String], separator: Option<char>) -> Result<usize> {
+    let mut named = head.iter().enumerate().filter(|(_, cell)| *cell == name);
+    let Some((place, _)) = named.next() else {
+        let remedy = match separator {
+            Some(separator) if head.len() == 1 => {
+                format!(" (one column alone: is the separator \"{separator}\"?)")
+            }
+            _ => String::new(),
+        };
+        bail!(
+            "no column \"{name}\"; there are {}{remedy}",
+            head.join(", ")
+        );
+    };
+    if named.next().is_some() {
+        bail!("column \"{name}\" is there twice: rename one of them");
+    }
+    Ok(place)
+}
+
+/// The columns that no key of the map names.
+fn unnamed(head: &[String], places: &[usize]) -> Vec<String> {
+    let others = head.iter().enumerate();
+    let others = others.filter(|(place, name)| !places.contains(place) && !name.is_empty());
+    others
+        .map(|(_, name)| format!("column \"{name}\": the map does not name it"))
+        .collect()
+}
+
+/// Whether a cell stands for a missing reading.
+fn is_missing(cell: &str) -> bool {
+    let words = [
+        "", "nan", "n/a", "na", "#n/a", "null", "none", "-", "--", "---",
+    ];
+    words.contains(&cell.to_lowercase().as_str())
+}
+
+/// A number as a person or a program writes it: with a typographic minus, and spaces that mark thousands.
+pub fn number_of(cell: &str, decimal: char) -> Option<f64> {
+    let mut text: String = cell
+        .chars()
+        .filter(|letter| !matches!(letter, '\u{a0}' | '\u{2009}' | '\u{202f}'))
+        .map(|letter| match letter {
+            '\u{2212}' | '\u{2013}' => '-',
+            letter if letter == decimal => '.',
+            letter => letter,
+        })
+        .collect();
+    if text.starts_with("- ") {
+        text.remove(1);
+    }
+    let is_digit = |letter: char| letter.is_ascii_digit();
+    let number = text.parse::<f64>().ok();
+    // "inf" and "nan" are words of the parser and no readings.
+    number.filter(|number| number.is_finite() && text.contains(is_digit))
+}
+
+fn read_cell(
+    cell: &str,
+    column: Column<'_>,
+    map: &Map,
+    range: Option<&Range>,
+    before: Option<f64>,
+) -> Result<f64> {
+    if cell.is_empty() {
+        bail!("the cell is empty: write what was measured, or remove the row");
+    }
+    if column.what == What::Direction {
+        return Direction::of_word(cell)
+            .map(Direction::sign)
+            .with_context(|| {
+                format!(
+                    "\"{}\": must be one of up, +, 1, forward, ↑, down, -, -1, reverse, ↓",
+                    shown(cell)
+                )
+            });
+    }
+    if column.what == What::Time
+        && let Some(time_s) = times::of_text(cell)?
+    {
+        return Ok(time_s);
+    }
+    if map.decimal != '.' && cell.contains('.') {
+        bail!(
+            "\"{}\": has a point, and the map says `decimal: \"{}\"`: remove points that mark thousands, or correct the map",
+            shown(cell),
+            map.decimal
+        );
+    }
+    let Some(read) = number_of(cell, map.decimal) else {
+        let remedy = if cell.contains(',') && map.decimal == '.' {
+            "; with decimal commas the map needs `decimal: \",\"`"
+        } else {
+            ""
+        };
+        bail!("\"{}\": must be a number{remedy}", shown(cell));
+    };
+    let number = converted(read, column, map, before);
+    match range.filter(|range| !range.holds(number)) {
+        Some(range) if matches!(column.what, What::Measured(_)) => bail!(
+            "{}: lies {} beside its target: must be {range}",
+            shown(cell),
+            metrology::number::number(number)
+        ),
+        Some(range) => bail!("{}: must be {range}{}", shown(cell), range.remedy(number)),
+        None => Ok(number),
+    }
+}
+
+/// A number in the unit that its column is wanted in; a measured position as its deviation from the target `before` it.
+fn converted(read: f64, column: Column<'_>, map: &Map, before: Option<f64>) -> f64 {
+    let stated = map.units.get(column.name);
+    let number = match (stated, column.what.unit()) {
+        (Some(stated), Some(wanted)) if *stated != wanted => stated.convert(read, wanted),
+        _ => read,
+    };
+    let (What::Measured(_), Test::Positioning { axis, .. }) = (column.what, &map.test) else {
+        return number;
+    };
+    let units = units(*axis);
+    let deviation = number - before.unwrap_or(0.0);
+    let deviation = match units.turn {
+        // 359.999 deg at the target 0 deg.
+        Some(turn) => deviation - turn * (deviation / turn).round(),
+        None => deviation,
+    };
+    deviation / units.deviation_in_targets()
 }
 
 #[cfg(test)]
@@ -98,16 +356,43 @@ test:
         serde_saphyr::from_str(MAP).expect("a map")
     }
 
+    fn read_by(text: &str, map: &Map, ranges: &[Option<Range>]) -> Result<Table> {
+        Table::of(&Sheet::of_text(text, map.separator)?, map, ranges)
+    }
+
     fn read(text: &str) -> Result<Table> {
         let deviation = Range::new(-1e5, 1e5, "µm");
-        Table::read(text, &map(), &[None, None, Some(deviation)])
+        read_by(text, &map(), &[None, None, Some(deviation)])
+    }
+
+    #[test]
+    fn a_point_in_a_table_of_decimal_commas_is_no_decimal_point() {
+        let of = |cell: &str| read(&format!("n;w;r\n1;0,0;{cell}\n"));
+        assert_eq!(
+            of("-1,5").expect("a number").rows[0].cells,
+            [1.0, 0.0, -1.5]
+        );
+        for cell in ["-1.292", "1.280,000", "0.5"] {
+            let error = format!("{:#}", of(cell).expect_err("a point"));
+            let words = format!("line 2, column \"r\": \"{cell}\": has a point");
+            assert!(error.contains(&words), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_file_without_a_line_is_said_to_be_empty() {
+        for text in ["", "\n\n", "# a comment\n"] {
+            let error = read(text).expect_err("empty");
+            assert!(format!("{error:#}").contains("it is empty"), "{error:#}");
+        }
     }
 
     #[test]
     fn columns_are_found_by_name_with_the_decimals_of_the_map() {
         let table = read("# made by hand\nn;x;r;w\n1;9;0,5;10\n2;9;-1;20\n").expect("rows");
-        assert_eq!(table.rows, [vec![1.0, 10.0, 0.5], vec![2.0, 20.0, -1.0]]);
-        assert_eq!(table.runs().count(), 2);
+        let rows: Vec<(u64, &[f64])> = table.rows.iter().map(|r| (r.line, &r.cells[..])).collect();
+        assert_eq!(rows, [(3, &[1.0, 10.0, 0.5][..]), (4, &[2.0, 20.0, -1.0])]);
+        assert_eq!(table.left_out, ["column \"x\": the map does not name it"]);
     }
 
     #[test]
@@ -122,24 +407,146 @@ test:
     }
 
     #[test]
+    fn empty_rows_are_counted_and_everything_else_that_is_no_number_is_refused() {
+        let table = read("n;w;r\n1;2;3\n;;\n\n1;3;4\n;;\n").expect("rows");
+        assert_eq!(table.rows.len(), 2);
+        assert_eq!(table.left_out, ["2 rows: all their cells are empty"]);
+        for (text, wanted) in [
+            ("n;w;r\n1;2;\n", "line 2, column \"r\": the cell is empty"),
+            ("n;w;r\n1;;3\n", "line 2, column \"w\": the cell is empty"),
+            ("n;w;r\n1;2\n", "line 2: 2 cells, the first line has 3"),
+            ("n;w;r\n1;2;3;4\n", "line 2: 4 cells, the first line has 3"),
+            ("n;w;r;w\n1;2;3;4\n", "column \"w\" is there twice"),
+            ("n,w,r\n1,2,3\n", "is the separator \";\"?"),
+            ("n;w;r\n", "no rows"),
+        ] {
+            let words = format!("{:#}", read(text).expect_err(text));
+            assert!(words.contains(wanted), "{text}: {words}");
+        }
+    }
+
+    #[test]
     fn a_direction_is_a_word_or_a_sign_and_nothing_else() {
         let map: Map = serde_saphyr::from_str(
             "start_s: 1767600000\ntest:\n  positioning: {axis: X, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 5.0, run: n, target_mm: t, deviation_um: d, direction: way}",
         )
         .expect("a map");
-        let read = |text: &str| Table::read(text, &map, &[None; 4]);
+        let read = |text: &str| read_by(text, &map, &[None; 4]);
         let table = read("way,n,t,d\nup,1,0,2\n-,1,0,3\n").expect("rows");
-        assert_eq!(
-            table.rows,
-            [vec![1.0, 0.0, 2.0, 1.0], vec![1.0, 0.0, 3.0, -1.0]]
-        );
+        let rows: Vec<&[f64]> = table.rows.iter().map(|row| &row.cells[..]).collect();
+        assert_eq!(rows, [[1.0, 0.0, 2.0, 1.0], [1.0, 0.0, 3.0, -1.0]]);
         let said = format!(
             "{:#}",
             read("way,n,t,d\nnorth,1,0,2\n").expect_err("no way")
         );
         assert_eq!(
             said,
-            "line 2, column \"way\": \"north\": must be one of up, +, down, -"
+            "line 2, column \"way\": \"north\": must be one of up, +, 1, forward, ↑, down, -, -1, reverse, ↓"
+        );
+    }
+
+    const STOPS: &str = "{axis: AXIS, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 5.0, ";
+
+    fn stops(head: &str, axis: &str, keys: &str) -> Map {
+        let test = STOPS.replace("AXIS", axis);
+        let text = format!("start_s: 1767600000\n{head}\ntest:\n  positioning: {test}{keys}}}\n");
+        serde_saphyr::from_str(&text).expect("a map")
+    }
+
+    /// Cells of a table of numbers; what is no number is -999.
+    fn cells(text: &str, map: &Map) -> Vec<Vec<f64>> {
+        let ranges = vec![None; map.test.columns().len()];
+        let table = read_by(text, map, &ranges).expect("rows");
+        let number = |cell: &f64| if cell.is_nan() { -999.0 } else { *cell };
+        let rows = table.rows.iter();
+        rows.map(|row| row.cells.iter().map(number).collect())
+            .collect()
+    }
+
+    fn near(found: &[Vec<f64>], wanted: &[&[f64]]) {
+        assert_eq!(found.len(), wanted.len(), "{found:?}");
+        for (found, wanted) in found.iter().zip(wanted) {
+            assert_eq!(found.len(), wanted.len(), "{found:?}");
+            let mut pairs = found.iter().zip(*wanted);
+            assert!(
+                pairs.all(|(a, b)| (a - b).abs() < 1e-9),
+                "{found:?} {wanted:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_measured_position_gives_its_deviation_in_the_units_that_are_stated() {
+        let map = stops("", "X", "run: n, target_mm: t, measured_mm: m");
+        near(
+            &cells("n,t,m\n1,100,100.0035\n1,200,199.998\n", &map),
+            &[&[1.0, 100.0, 3.5], &[1.0, 200.0, -2.0]],
+        );
+        // 0.0001 inch are 2.54 µm.
+        let map = stops(
+            "units: {t: inch, m: inch}",
+            "X",
+            "run: n, target_mm: t, measured_mm: m",
+        );
+        near(&cells("n,t,m\n1,2,2.0001\n", &map), &[&[1.0, 50.8, 2.54]]);
+        let map = stops("", "C", "run: n, target_deg: t, measured_deg: m");
+        // 0.001 deg are 3.6 arcsec; 359.999 deg lie 0.001 deg before 0 deg.
+        near(
+            &cells("n,t,m\n1,30,30.001\n1,0,359.999\n", &map),
+            &[&[1.0, 30.0, 3.6], &[1.0, 0.0, -3.6]],
+        );
+        let map = stops(
+            "units: {d: mm}",
+            "X",
+            "run: n, target_mm: t, deviation_um: d",
+        );
+        near(&cells("n,t,d\n1,5,0.0042\n", &map), &[&[1.0, 5.0, 4.2]]);
+    }
+
+    #[test]
+    fn lines_above_the_names_units_below_them_and_readings_that_are_missing_do_no_harm() {
+        let map = stops(
+            "separator: \"\\t\"\ndecimal: \",\"",
+            "X",
+            "run: n, target_mm: t, deviation_um: d, direction: w",
+        );
+        let text = "Report\tof X\nDate\t05.01.2026\t\nn\tw\tt\td\t\n\t\tmm\tµm\t\n1\tforward\t0,5\t\u{2212}1,25\t\n1\t↑\t9\tNaN\t\n1\t\u{2212}1\t9\t\t\n";
+        near(
+            &cells(text, &map),
+            &[
+                &[1.0, 0.5, -1.25, 1.0],
+                &[1.0, 9.0, -999.0, 1.0],
+                &[1.0, 9.0, -999.0, -1.0],
+            ],
+        );
+        let table = read_by(text, &map, &[None; 4]).expect("rows");
+        assert_eq!(
+            table.left_out,
+            [
+                "2 lines above line 3, which has the names of the columns",
+                "line 4: units alone",
+                "2 readings: their cells are empty or no number (NaN), the first in line 6, column \"d\"",
+            ]
+        );
+    }
+
+    #[test]
+    fn a_column_for_each_pass_gives_rows_in_the_order_of_the_measurement() {
+        let map = stops(
+            "",
+            "X",
+            "target_mm: Position, passes_um: [{column: 1 up, direction: up}, {column: 1 down, direction: down}]",
+        );
+        near(
+            &cells("Position,1 up,1 down\n0,1,2\n100,3,4\n50,5,6\n", &map),
+            &[
+                &[1.0, 0.0, 1.0, 1.0],
+                &[1.0, 50.0, 5.0, 1.0],
+                &[1.0, 100.0, 3.0, 1.0],
+                &[2.0, 100.0, 4.0, -1.0],
+                &[2.0, 50.0, 6.0, -1.0],
+                &[2.0, 0.0, 2.0, -1.0],
+            ],
         );
     }
 

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Qos, Wire, to_cdr};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use machine::MachineFile;
-use metrology::sample::{AxisState, LengthSample, TemperatureSample, TestSegment};
-use metrology::stamp::{NANOS_PER_S, Span};
-use metrology::{Axis, AxisSet, PerAxis, Stamp};
+use metrology::sample::{AngleSample, AxisState, LengthSample, TemperatureSample, TestSegment};
+use metrology::stamp::Span;
+use metrology::{Axis, AxisSet, PerAxis, Stamp, epoch};
 use recorder::{
     Channel, ChannelId, Directory, MessageStamp, RecorderConfig, Recording, RunContext,
 };
@@ -24,22 +24,31 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Begins a bag with its machine file.
+    /// Begins a bag with its machine file, and with what the map states beside the readings, as YAML.
     ///
     /// # Errors
     /// When the folder exists or cannot be written.
-    pub fn begin(path: &Path, machine: &MachineFile, text: String, start_s: i64) -> Result<Self> {
+    pub fn begin(
+        path: &Path,
+        (machine, text): (&MachineFile, String),
+        start_s: i64,
+        stated: Option<String>,
+    ) -> Result<Self> {
         let name = path.file_name().context("-o: no folder name")?;
         let mut recording = Recording::begin(
             Directory::create(path)?,
             &name.to_string_lossy(),
             RecorderConfig::default(),
         )?;
-        let at = Stamp::from_nanos(start_s * NANOS_PER_S);
+        let at = epoch::whole_seconds(start_s, 0).map_err(|error| anyhow!("start_s = {error}"))?;
         recording.add_context(&RunContext {
-            start_time_nanos: u64::try_from(at.nanos()).context("start_s is below 0")?,
+            start_time_nanos: at.nanos().cast_unsigned(),
             commit: env!("ABBE_COMMIT").to_owned(),
             machine_file: Some(text),
+            parameters: stated
+                .map(|text| ("import".to_owned(), text))
+                .into_iter()
+                .collect(),
             ..RunContext::default()
         })?;
         Ok(Self {
@@ -64,7 +73,10 @@ impl Writer {
     pub fn wait_until(&mut self, time_s: f64) -> Result<()> {
         let at = self.start + Span::from_secs_f64(time_s);
         if at < self.at {
-            bail!("time {time_s} s: must not be before the row above");
+            let before_s = (self.at - self.start).as_secs_f64();
+            bail!(
+                "{time_s} s after the first row: must not be before the row above, which is at {before_s} s"
+            );
         }
         self.at = at;
         Ok(())
@@ -102,6 +114,23 @@ impl Writer {
                 at: self.at,
                 axis,
                 displacement_mm,
+                zero_id: 1,
+            },
+        )
+    }
+
+    /// A reading of an angle.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn angle(&mut self, axis: Axis, angle_rad: f64) -> Result<()> {
+        self.write(
+            &topics::ANGLE_POSITION,
+            topics::ANGLE_POSITION.name.to_owned(),
+            &AngleSample {
+                at: self.at,
+                axis,
+                angle_rad,
                 zero_id: 1,
             },
         )
@@ -174,6 +203,9 @@ impl Writer {
                 channel
             }
         };
+        if !epoch::holds(self.at) {
+            bail!("the measurement goes on beyond 2106-02-07: begin earlier (start_s)");
+        }
         let nanos = self.at.nanos();
         let sequence = u32::try_from(self.messages).unwrap_or(u32::MAX);
         let stamp = MessageStamp {

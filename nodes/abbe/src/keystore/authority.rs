@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use chrono::{DateTime, TimeDelta, Utc};
 use node_runtime::environment::ENCLAVE_FILES;
+use node_runtime::text_file;
 use openssl::asn1::Asn1Time;
 use openssl::bn::{BigNum, MsbOption};
 use openssl::ec::{EcGroup, EcKey};
@@ -91,7 +92,7 @@ impl Authority {
     }
 
     fn open(keystore: &Path) -> Result<Self> {
-        let read = |file: &str| fs::read(keystore.join(file)).with_context(|| file.to_owned());
+        let read = |file: &str| text_file::bytes(&keystore.join(file));
         let own = Self {
             keystore: keystore.to_owned(),
             certificate: X509::from_pem(&read(CERTIFICATE)?).context(CERTIFICATE)?,
@@ -169,7 +170,7 @@ impl Authority {
             permissions,
         ] = ENCLAVE_FILES.map(|file| folder.join(file));
         let key = if key_file.is_file() {
-            PKey::private_key_from_pem(&fs::read(&key_file)?).context("key.pem")?
+            PKey::private_key_from_pem(&text_file::bytes(&key_file)?).context("key.pem")?
         } else {
             let key = new_key()?;
             write_secret(&key_file, &key.private_key_to_pem_pkcs8()?)?;
@@ -185,7 +186,7 @@ impl Authority {
         }
         write(
             &governance,
-            &fs::read(self.keystore.join(SIGNED_GOVERNANCE))?,
+            &text_file::bytes(&self.keystore.join(SIGNED_GOVERNANCE))?,
         )?;
         let text = documents::permissions(&enclave.name, &enclave.access, validity);
         write(&folder.join("permissions.xml"), text.as_bytes())?;

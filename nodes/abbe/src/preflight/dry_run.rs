@@ -17,7 +17,7 @@ use super::ideal::IdealMachine;
 /// Time between two looks of the sequencer at its plan.
 const LOOK: Span = Span::from_nanos(100_000_000);
 /// Longest programme, s.
-const LIMIT_S: f64 = 24.0 * 3600.0;
+pub const LIMIT_S: f64 = 24.0 * 3600.0;
 
 /// What a plan would record.
 pub struct DryRun {
@@ -75,7 +75,10 @@ pub fn dry_run(
         }
         let passed_s = rehearsal.now.as_secs_f64();
         if passed_s > LIMIT_S {
-            bail!("plan: it would take more than {} h", LIMIT_S / 3600.0);
+            bail!(
+                "plan: it would take more than {} h: ask it of a part of the plan",
+                LIMIT_S / 3600.0
+            );
         }
         rehearsal.now += period;
     }
@@ -136,7 +139,7 @@ impl Rehearsal {
                     message,
                 }),
             },
-            Said::Feedback { .. } | Said::Diagnostic(_) | Said::AtRest => return,
+            Said::Feedback { .. } | Said::Diagnostic(_) | Said::Answer(_) | Said::AtRest => return,
         };
         self.news.push_back(news);
     }
@@ -171,6 +174,7 @@ impl Rehearsal {
             | Told::CycleRejected { .. }
             | Told::CycleProgress { .. }
             | Told::CycleEnded(_)
+            | Told::Pointed { .. }
             | Told::ToldBefore { .. }
             | Told::ProgramFailed { .. } => {}
         }

@@ -55,6 +55,25 @@ pub fn argument(text: &str) -> Result<FloorArgument, String> {
     })
 }
 
+/// Refuses an instrument that is named twice.
+///
+/// # Errors
+/// Names it.
+pub fn check(said: &[FloorArgument]) -> Result<(), String> {
+    for (k, one) in said.iter().enumerate() {
+        if said[..k]
+            .iter()
+            .any(|before| before.instrument == one.instrument)
+        {
+            return Err(format!(
+                "--floor {} is given twice: give it once",
+                one.instrument
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// Floors of all instruments: those said, else the probe's repeatability of the machine file and the usual.
 pub fn floors(machine: &MachineFile, said: &[FloorArgument]) -> Floors {
     let usual = READING_UM.into_iter().map(|(instrument, reading_um)| {

@@ -50,7 +50,7 @@ impl Seen {
     pub fn section(&self, programme: &Programme) -> Section {
         let found = &self.identification;
         let mut section = Section::new("What the recordings over the plate determine");
-        section.lines.push(format!(
+        section.answer(format!(
             "Chain {}: {} recordings, {} unknowns of which {} are set-up, rank {}.",
             self.model.chain,
             programme.recordings.len(),
@@ -64,9 +64,7 @@ impl Seen {
         ] {
             let names = self.names(visibility);
             if !names.is_empty() {
-                section
-                    .lines
-                    .push(format!("{words}: {}.", names.join(", ")));
+                section.answer(format!("{words}: {}.", names.join(", ")));
             }
         }
         let known = coefficients(&self.model);

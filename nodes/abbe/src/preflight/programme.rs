@@ -13,7 +13,9 @@ use machine::{Kinematics, MachineFile};
 use metrology::Axis;
 use node_runtime::Setup;
 use node_runtime::arguments::Arguments;
+use node_runtime::text_file::{self, Comments};
 use sequencer::{Plan, Step, recordings};
+use sequencer_node::read_plan;
 
 use crate::launch::LaunchNode;
 use crate::scenario::Scenario;
@@ -128,7 +130,7 @@ fn of_scenario(folder: &Path, machine: Option<&Path>) -> Result<Planned> {
     };
     let setup = setup(sequencer)?;
     let (path, text) = setup.file_text("plan_file")?;
-    let plan = Plan::from_yaml(&text).with_context(|| format!("plan {}", path.display()))?;
+    let plan = read_plan(&text, &path)?;
     let own = setup.file_path("machine_file")?;
     let machine = machine_file(machine.unwrap_or(&own))?;
     Ok(Planned {
@@ -206,8 +208,8 @@ fn programs(plan: &Plan, plan_path: &Path) -> Result<BTreeMap<String, String>> {
     });
     let read = |program: &String| {
         let path: PathBuf = folder.join(program);
-        let text = std::fs::read_to_string(&path)
-            .with_context(|| format!("plan {}: {}", plan_path.display(), path.display()))?;
+        let text = text_file::read(&path, Comments::Gcode)
+            .with_context(|| format!("plan {}", plan_path.display()))?;
         Ok((program.clone(), text))
     };
     named.map(read).collect()
@@ -219,12 +221,11 @@ fn setup(node: &LaunchNode) -> Result<Setup> {
 }
 
 fn plan_file(path: &Path) -> Result<Plan> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("plan {}", path.display()))?;
-    Plan::from_yaml(&text).with_context(|| format!("plan {}", path.display()))
+    let text = text_file::yaml(path).context("plan")?;
+    read_plan(&text, path)
 }
 
 fn machine_file(path: &Path) -> Result<MachineFile> {
-    let text = std::fs::read_to_string(path)
-        .with_context(|| format!("machine file {}", path.display()))?;
+    let text = text_file::yaml(path).context("machine file")?;
     Ok(MachineFile::parse(&text, &path.display().to_string())?)
 }

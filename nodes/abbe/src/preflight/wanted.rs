@@ -96,12 +96,10 @@ impl Proposal {
     pub fn section(&self) -> Section {
         let mut section = Section::new(format!("Wanted: {}", self.wanted));
         if self.open.is_empty() {
-            section.lines.push("The plan determines it.".to_owned());
+            section.answer("The plan determines it.".to_owned());
             return section;
         }
-        section
-            .lines
-            .push(format!("The plan leaves open: {}.", self.open.join(", ")));
+        section.answer(format!("The plan leaves open: {}.", self.open.join(", ")));
         let beyond: Vec<String> = self
             .choice
             .beyond_the_list
@@ -109,14 +107,14 @@ impl Proposal {
             .map(ToString::to_string)
             .collect();
         if !beyond.is_empty() {
-            section.lines.push(format!(
+            section.answer(format!(
                 "No circle that was tried determines {}: another offset of the head may (--head-offset X,Y,Z).",
                 beyond.join(", ")
             ));
         }
         let n = self.choice.recordings.len();
         if n > 0 {
-            section.lines.push(if self.choice.is_least {
+            section.answer(if self.choice.is_least {
                 format!("Fewest circles to add: {n}. Fewer of the {} that were tried do not do.", self.list.len())
             } else {
                 format!("Circles to add: {n}, none of which is superfluous; that fewer would do is not excluded.")

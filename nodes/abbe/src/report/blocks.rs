@@ -6,6 +6,8 @@ use maud::{Markup, html};
 use metrology::Axis;
 
 use super::page::table;
+use super::section::{Rows, head};
+use super::terminal::Part;
 use crate::evidence::Evidence;
 
 const HEAD: [&str; 6] = ["block", "run", "cold", "X / mm", "Y / mm", "Z / mm"];
@@ -34,6 +36,16 @@ fn rows(evidence: &Evidence) -> Vec<Vec<String>> {
         .collect()
 }
 
+/// The condition of blocks whose heights differ too little or too much.
+const HEIGHTS: &str = "block_heights";
+
+/// What the thermal model remarked of the blocks' heights.
+pub fn remark(evidence: &Evidence) -> Option<String> {
+    let mut conditions = evidence.conditions.iter().rev();
+    let said = conditions.find(|condition| condition.diagnostic.name == HEIGHTS)?;
+    Some(format!("Remark: {}.", said.diagnostic.message))
+}
+
 /// The table, where blocks were measured.
 pub fn section(evidence: &Evidence) -> Markup {
     let rows = rows(evidence);
@@ -46,13 +58,19 @@ pub fn section(evidence: &Evidence) -> Markup {
 }
 
 /// The same for a terminal.
-pub fn text(evidence: &Evidence) -> String {
+pub fn part(evidence: &Evidence) -> Part {
+    let rows = rows(evidence);
     let mut text = String::new();
-    for row in rows(evidence) {
+    for row in &rows {
         for cell in row {
             let _ = write!(text, "{cell:>26}");
         }
         text.push('\n');
     }
-    text
+    let rows = Rows {
+        head: head(&HEAD),
+        rows,
+        note: String::new(),
+    };
+    Part::table("Blocks", text, rows)
 }

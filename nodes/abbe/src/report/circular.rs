@@ -3,16 +3,23 @@
 use anyhow::Result;
 use metrology::breakdown::{
     self, Alias, BreakdownConfig, CircularPlane, CircularRecording, CircularSample, CircularSense,
-    Needed, PlaneBreakdown, ReferenceLength, Unit,
+    Needed, PlaneBreakdown, ReferenceLength, RowKey, Unit,
 };
 use metrology::iso230::circular::{CircularResult, CircularTest, CircularTrace, evaluate};
 use metrology::sample::{Sense, TestPlane};
+use metrology::squareness::{between, in_words};
 
 use super::positioning::figure;
 use super::section::{Drawing, Rows, Section, head, rounded, um};
 use super::trace;
 use crate::evaluate::budget::Budget;
 use crate::evaluate::circles::{CircleRecording, Instrument, plane_axes};
+use crate::evaluate::correction::{Correction, MeasuredCircle};
+use crate::evaluate::test_conditions::TestConditions;
+use scale::Expansion;
+
+mod scale;
+mod turn;
 
 /// Coverage factor of what is printed.
 const COVERAGE: f64 = 2.0;
@@ -21,24 +28,33 @@ const BY_CHANCE: f64 = 0.01;
 
 /// What a ballbar cannot tell.
 const BY_BALLBAR: &str =
-    "Read by a ballbar, radially alone: F and D count from the centre of its mount.";
+    "Read by a ballbar, radially alone: F and D need the calibrated length of the ballbar.";
+/// About which centre each figure is.
+const CENTRES: &str = "G of a sense: about the least-squares centre of that sense. G of both, F, D and H: about that of both senses together, in one frame. F is not about the centre to which the instrument was set up, the standard's other choice: nothing tells how far that is from the programmed one.";
 
 /// One part for each circle (both senses together), then one for the breakdown.
 ///
 /// # Errors
 /// When a plot cannot be drawn.
-pub fn sections(circles: &[CircleRecording], budget: Option<&Budget>) -> Result<Vec<Section>> {
+pub fn sections(
+    circles: &[CircleRecording],
+    budget: Option<&Budget>,
+    conditions: &TestConditions,
+) -> Result<Vec<Section>> {
     let mut sections = Vec::new();
     for group in groups(circles) {
-        sections.push(section(&group, budget)?);
+        let runs: Vec<u32> = group.iter().map(|circle| circle.segment.run).collect();
+        let read = conditions.during(&runs);
+        let measured = MeasuredCircle::of(budget, &read, group[0].instrument);
+        sections.push(section(&group, &measured, budget.is_some())?);
     }
     if !circles.is_empty() {
-        sections.extend(breakdowns(circles, budget));
+        sections.extend(breakdowns(circles, budget, conditions));
     }
     Ok(sections)
 }
 
-/// Recordings of one circle: each sense once.
+/// Recordings of one circle under one zero, which is one frame: each sense once.
 fn groups(circles: &[CircleRecording]) -> Vec<Vec<&CircleRecording>> {
     let mut groups: Vec<Vec<&CircleRecording>> = Vec::new();
     for circle in circles {
@@ -49,6 +65,7 @@ fn groups(circles: &[CircleRecording]) -> Vec<Vec<&CircleRecording>> {
                 && (a.centre_mm - b.centre_mm).norm() < 1e-6
                 && (a.radius_mm - b.radius_mm).abs() < 1e-6
                 && (a.feed_mm_s - b.feed_mm_s).abs() < 1e-6
+                && (a.setup_id, a.zero_id) == (b.setup_id, b.zero_id)
                 && (first.compensated, first.instrument) == (circle.compensated, circle.instrument)
                 && group.iter().all(|other| other.segment.sense != b.sense)
         };
@@ -60,7 +77,7 @@ fn groups(circles: &[CircleRecording]) -> Vec<Vec<&CircleRecording>> {
     groups
 }
 
-fn section(group: &[&CircleRecording], budget: Option<&Budget>) -> Result<Section> {
+fn section(group: &[&CircleRecording], measured: &MeasuredCircle, stated: bool) -> Result<Section> {
     let segment = &group[0].segment;
     let state = if group[0].compensated {
         "compensated"
@@ -68,11 +85,7 @@ fn section(group: &[&CircleRecording], budget: Option<&Budget>) -> Result<Sectio
         "not compensated"
     };
     let letters = plane_axes(segment.plane).map_or_else(String::new, |[u, v]| format!("{u}{v}"));
-    let runs: Vec<String> = group.iter().map(|c| c.segment.run.to_string()).collect();
-    let runs = match runs.as_slice() {
-        [one] => format!("run {one}"),
-        several => format!("runs {}", several.join(" and ")),
-    };
+    let runs = runs_of(group);
     let mut section = Section::new(format!(
         "Circle {letters}, R {:.3} mm, {:.0} mm/min about ({:.1}, {:.1}, {:.1}), {runs}: {state}",
         segment.radius_mm,
@@ -84,35 +97,97 @@ fn section(group: &[&CircleRecording], budget: Option<&Budget>) -> Result<Sectio
     if group[0].instrument == Instrument::Ballbar {
         section.lines.push(BY_BALLBAR.to_owned());
     }
+    section.lines.extend(turn::lines(group));
+    let test = at_20_degc(group, &measured.correction);
+    let mut centre_mm = [0.0; 2];
+    match evaluate(&test, &measured.budget) {
+        Ok(result) => {
+            section.answers.push(in_short(&result, stated));
+            section.tables.push(figures(&result, stated));
+            section.lines.push(radii_in_words(measured, &test));
+            section.figures = serde_json::json!({
+                "test": section.title,
+                "iso230_4": result,
+                "turns": turn::figures(group),
+                "correction_to_20_degc": measured.correction.as_json(),
+                "no_verdict_on_radii": no_verdict(group[0].instrument, &measured.correction),
+            });
+            centre_mm = centre(&result);
+        }
+        Err(error) => section.not_evaluated(error),
+    }
+    let drawn = trace::svg(&traces(group, &test, centre_mm), segment.plane)?;
+    section.drawings.push(Drawing {
+        svg: drawn.svg,
+        caption: format!(
+            "Deviations from the circle about its least-squares centre, {}",
+            drawn.scale
+        ),
+    });
+    Ok(section)
+}
+
+/// The recordings of a circle, with its radii at 20 °C where they are corrected here.
+fn at_20_degc(group: &[&CircleRecording], correction: &Correction) -> CircularTest {
     let of = |sense| {
         let found = group.iter().find(|circle| circle.segment.sense == sense);
         found.map(|circle| {
             CircularTrace::PointsMm(circle.points.iter().map(|point| point.at_mm).collect())
         })
     };
-    let test = CircularTest {
-        nominal_radius_mm: segment.radius_mm,
+    let as_read = CircularTest {
+        nominal_radius_mm: group[0].segment.radius_mm,
         clockwise: of(Sense::Clockwise),
         counter_clockwise: of(Sense::CounterClockwise),
     };
-    let used = budget.copied().unwrap_or(Budget::nothing()).circular();
-    match evaluate(&test, &used) {
-        Ok(result) => {
-            section.tables.push(figures(&result, budget.is_some()));
-            section.figures = serde_json::json!({ "test": section.title, "iso230_4": result });
-        }
-        Err(error) => section.lines.push(format!("Not evaluated: {error}.")),
+    as_read.corrected_to_20_degc(correction.differential_expansion())
+}
+
+/// At which temperature the radii of F and D are.
+fn radii_in_words(measured: &MeasuredCircle, test: &CircularTest) -> String {
+    let words = measured.correction.in_words(test.nominal_radius_mm);
+    format!("F and D: {words}")
+}
+
+/// Why nothing is decided of F and D; none: they are the radii at 20 °C.
+fn no_verdict(instrument: Instrument, correction: &Correction) -> Option<String> {
+    let without_length = "the calibrated length of the ballbar is not stated";
+    let by_ballbar = (instrument == Instrument::Ballbar).then(|| without_length.to_owned());
+    by_ballbar.or_else(|| correction.lacks())
+}
+
+/// Angle and radial deviation of every reading about a centre, of each sense as it was recorded, rad and mm.
+fn traces(
+    group: &[&CircleRecording],
+    test: &CircularTest,
+    centre_mm: [f64; 2],
+) -> Vec<(String, Vec<(f64, f64)>)> {
+    let about = |[u, v]: &[f64; 2]| {
+        let (u, v) = (u - centre_mm[0], v - centre_mm[1]);
+        (v.atan2(u), u.hypot(v) - test.nominal_radius_mm)
+    };
+    let of = |circle: &&CircleRecording| {
+        let sense = circle.segment.sense;
+        let trace = match sense {
+            Sense::Clockwise => test.clockwise.as_ref(),
+            _ => test.counter_clockwise.as_ref(),
+        };
+        let points = match trace {
+            Some(CircularTrace::PointsMm(points)) => points.iter().map(about).collect(),
+            _ => Vec::new(),
+        };
+        (sense_name(sense).to_owned(), points)
+    };
+    group.iter().map(of).collect()
+}
+
+/// Which runs these are, in words.
+fn runs_of(group: &[&CircleRecording]) -> String {
+    let runs: Vec<String> = group.iter().map(|c| c.segment.run.to_string()).collect();
+    match runs.as_slice() {
+        [one] => format!("run {one}"),
+        several => format!("runs {}", several.join(" and ")),
     }
-    let traces: Vec<(String, Vec<(f64, f64)>)> = group
-        .iter()
-        .map(|circle| (sense_name(circle.segment.sense).to_owned(), radial(circle)))
-        .collect();
-    let drawn = trace::svg(&traces, segment.plane)?;
-    section.drawings.push(Drawing {
-        svg: drawn.svg,
-        caption: format!("Deviations from the circle, {}", drawn.scale),
-    });
-    Ok(section)
 }
 
 fn sense_name(sense: Sense) -> &'static str {
@@ -123,10 +198,31 @@ fn sense_name(sense: Sense) -> &'static str {
     }
 }
 
-/// Angle and radial deviation of every reading, rad and mm.
-fn radial(circle: &CircleRecording) -> Vec<(f64, f64)> {
-    let point = |[u, v]: [f64; 2]| (v.atan2(u), u.hypot(v) - circle.segment.radius_mm);
-    circle.points.iter().map(|p| point(p.at_mm)).collect()
+/// Least-squares centre of both senses, or of the one that was recorded, mm.
+fn centre(result: &CircularResult) -> [f64; 2] {
+    let one = result.clockwise.or(result.counter_clockwise);
+    let both = result.both.map(|both| both.centre_mm);
+    both.or(one.map(|one| one.centre_mm)).unwrap_or_default()
+}
+
+/// The circular error of both senses, or of each that was recorded.
+fn in_short(result: &CircularResult, stated: bool) -> String {
+    if let Some(both) = &result.both {
+        let error = figure(&both.circular_error, stated);
+        return format!("circular error G of both senses {error} µm.");
+    }
+    let senses = [
+        ("clockwise", &result.clockwise),
+        ("counter-clockwise", &result.counter_clockwise),
+    ];
+    let mut errors = vec![];
+    for (name, sense) in senses {
+        if let Some(sense) = sense {
+            let error = figure(&sense.circular_error, stated);
+            errors.push(format!("{name} {error} µm"));
+        }
+    }
+    format!("circular error G, {}.", errors.join(", "))
 }
 
 fn figures(result: &CircularResult, stated: bool) -> Rows {
@@ -160,14 +256,18 @@ fn figures(result: &CircularResult, stated: bool) -> Rows {
         head: head(&["ISO 230-4 / µm", "G", "F max", "F min", "D", "H (1996)"]),
         rows,
         note: if stated {
-            "± expanded uncertainty, k = 2. G: about the least-squares centre; F: about the nominal one.".to_owned()
+            format!("± expanded uncertainty, k = 2. {CENTRES}")
         } else {
-            "Without --budget no uncertainty is stated.".to_owned()
+            format!("Without --budget no uncertainty is stated. {CENTRES}")
         },
     }
 }
 
-fn breakdowns(circles: &[CircleRecording], budget: Option<&Budget>) -> Vec<Section> {
+fn breakdowns(
+    circles: &[CircleRecording],
+    budget: Option<&Budget>,
+    conditions: &TestConditions,
+) -> Vec<Section> {
     let mut sections = Vec::new();
     for compensated in [false, true] {
         let recordings: Vec<CircularRecording> = circles
@@ -185,11 +285,15 @@ fn breakdowns(circles: &[CircleRecording], budget: Option<&Budget>) -> Vec<Secti
         };
         match breakdown::evaluate(&recordings, &BreakdownConfig::default()) {
             Ok(found) => {
-                sections.extend(found.planes.iter().map(|plane| plane_section(plane, state)));
+                sections.extend(found.planes.iter().map(|plane| {
+                    let own = (circles, compensated);
+                    let expansion = Expansion::of(plane, own, budget, conditions);
+                    plane_section(plane, state, &expansion)
+                }));
             }
             Err(error) => {
                 let mut section = Section::new(format!("Causes, {state}"));
-                section.lines.push(format!("Not evaluated: {error}."));
+                section.not_evaluated(error);
                 sections.push(section);
             }
         }
@@ -223,25 +327,27 @@ fn recording(circle: &CircleRecording, budget: Option<&Budget>) -> Option<Circul
         sense,
         setup_id: segment.setup_id,
         zero_id: segment.zero_id,
-        reference: budget.map_or(ReferenceLength::Free, |budget| {
-            let length = budget.circular().length;
-            ReferenceLength::Calibrated {
-                standard_uncertainty_mm: length.standard_mm(segment.radius_mm),
-            }
-        }),
+        reference: match (circle.instrument, budget) {
+            (Instrument::GridEncoder, Some(budget)) => ReferenceLength::Calibrated {
+                standard_uncertainty_mm: budget.radius_standard_mm(segment.radius_mm),
+            },
+            _ => ReferenceLength::Free,
+        },
         samples: samples.collect(),
     })
 }
 
-fn plane_section(plane: &PlaneBreakdown, state: &str) -> Section {
+fn plane_section(plane: &PlaneBreakdown, state: &str, expansion: &Expansion) -> Section {
     let [u, v] = plane.axes;
     let mut section = Section::new(format!("Causes in {u}{v}, {state}"));
-    section.lines.push(format!(
+    section.answer(format!(
         "{} recordings, worst circularity {} µm; what no row explains has {:.2} µm standard deviation.",
         plane.recordings.len(),
         um(plane.worst_circularity_mm),
         plane.noise.residual_mm * 1e3
     ));
+    let (lines, scale_at_20_degc) = expansion.state(plane);
+    section.lines.extend(lines);
     let rows = plane.rows.iter().map(|row| {
         vec![
             row.name.clone(),
@@ -263,13 +369,26 @@ fn plane_section(plane: &PlaneBreakdown, state: &str) -> Section {
         ]),
         rows: rows.collect(),
         note: format!(
-            "Span: greatest minus least deviation that the cause alone makes on one circle. G without: the greatest circular error that would be left. {}",
+            "Span: greatest minus least deviation that the cause alone makes on one circle. G without: the greatest circular error that would be left. {}{}",
+            squareness(plane),
             needed(plane)
         ),
     });
     section.tables.extend(where_to_look(plane));
-    section.figures = serde_json::json!({ "test": section.title, "breakdown": plane });
+    section.figures = serde_json::json!({
+        "test": section.title,
+        "breakdown": plane,
+        "scale_at_20_degc": scale_at_20_degc,
+    });
     section
+}
+
+/// The sign of the squareness, where there is a row of it.
+fn squareness(plane: &PlaneBreakdown) -> String {
+    let [u, v] = plane.axes;
+    let row = plane.row(&RowKey::Squareness);
+    let words = row.and_then(|_| in_words(between(u, v)?));
+    words.map_or_else(String::new, |words| format!("{words} "))
 }
 
 /// Where to look, for the causes that chance does not explain.

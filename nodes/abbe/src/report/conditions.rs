@@ -34,6 +34,6 @@ pub fn section(evidence: &Evidence) -> Markup {
         h2 { "Conditions" }
         @if rows.is_empty() && evidence.undecoded.is_empty() { p { "None was reported." } }
         @else { (table(&["node: condition", "level", "times", "last message"], &rows)) }
-        @for message in &evidence.undecoded { p.bad { "Not decoded: " (message) } }
+        @for line in evidence.not_used() { p.bad { "Left out: " (line) "." } }
     }
 }

@@ -7,6 +7,8 @@ use maud::{Markup, html};
 use metrology::sample::{Rejection, TestKind};
 
 use super::page::table;
+use super::section::{Rows, head};
+use super::terminal::Part;
 use crate::evidence::Evidence;
 
 /// Corrected touches of one feed in the last latency run that was corrected.
@@ -114,17 +116,23 @@ pub fn section(evidence: &Evidence) -> Markup {
 }
 
 /// The same for a terminal.
-pub fn text(evidence: &Evidence) -> String {
+pub fn part(evidence: &Evidence) -> Part {
     let rows = rows(evidence);
     let mut text = String::new();
     if rows.is_empty() {
-        return text;
+        return Part::default();
     }
-    for row in std::iter::once(HEAD.map(str::to_owned).to_vec()).chain(rows) {
+    let head = head(&HEAD);
+    for row in std::iter::once(&head).chain(&rows) {
         for cell in row {
             let _ = write!(text, "{cell:>24.24}");
         }
         text.push('\n');
     }
-    text
+    let rows = Rows {
+        head,
+        rows,
+        note: String::new(),
+    };
+    Part::table("Corrected points across feeds", text, rows)
 }

@@ -4,16 +4,19 @@ use anyhow::Result;
 use gap_diagnosis::report::{Cause, GapReport, ParameterValue, Status};
 use maud::html;
 
-use words::{covariate, name};
+use words::{covariate, name, signs};
 
 use super::Report;
 use super::section::{Rows, Section, head};
+use super::terminal::{self, Part, Rank};
 use crate::diagnose::Diagnosed;
+use crate::machine_defaults;
 
 mod drawings;
 mod matrix;
 pub mod planned;
 mod sentences;
+mod why;
 mod words;
 
 /// Begin of the names of amplitudes that only widen an effect's form.
@@ -23,34 +26,37 @@ const WHOLE: &str = "whole_";
 /// Most rows of a table on the page.
 const MOST_ROWS: usize = 24;
 
-/// The page of a diagnosis.
+/// The page of a diagnosis; with `explain` its text has every check of every cause, which the page has folded.
 ///
 /// # Errors
 /// When a drawing cannot be made.
-pub fn page(title: &str, diagnosed: &Diagnosed) -> Result<Report> {
+pub fn page(title: &str, diagnosed: &Diagnosed, explain: bool) -> Result<Report> {
     let report = &diagnosed.diagnosis.report;
     let figures = &diagnosed.diagnosis.figures;
-    let lost = sentences::lost(&diagnosed.losses);
-    let lines: Vec<String> = lost.into_iter().chain(sentences::answers(report)).collect();
+    let lost = sentences::lost(&diagnosed.losses());
+    let defaults = machine_defaults::in_words(&diagnosed.defaults);
+    let answers = sentences::answers(report).into_iter().chain(defaults);
+    let lines: Vec<String> = lost.into_iter().chain(answers).collect();
     let sections = sections(diagnosed);
     let notes: Vec<String> = notes(diagnosed);
     let traces = drawings::traces(&figures.traces)?;
-    let text = sections
-        .iter()
-        .map(Section::terminal)
-        .chain(matrix::terminal(&figures.isolability))
-        .chain((!notes.is_empty()).then(|| format!("Remarks\n{}\n", notes.join("\n"))))
-        .collect::<Vec<_>>()
-        .join("\n");
+    let parts = explain
+        .then(|| Part::of(&why::section(report)))
+        .into_iter()
+        .chain(sections.iter().map(Part::of))
+        .chain(matrix::section(&figures.isolability).as_ref().map(Part::of))
+        .chain(remarks(&notes));
+    let parts = terminal::apart(parts);
     Ok(Report {
         title: title.to_owned(),
-        text,
+        parts,
         body: html! {
             h1 { (title) }
             (matrix::style())
             @for line in &lines { p { (line) } }
             (matrix::heat(&figures.heat))
             div.traces { @for trace in &traces { (trace) } }
+            (why::folded(report))
             @for section in &sections { (section.html()) }
             (matrix::isolability(&figures.isolability))
             @if !notes.is_empty() {
@@ -59,7 +65,7 @@ pub fn page(title: &str, diagnosed: &Diagnosed) -> Result<Report> {
             }
             p.note { (read(report)) }
         },
-        figures: serde_json::to_value(report)?,
+        figures: diagnosed.json()?,
         lines,
     })
 }
@@ -69,11 +75,16 @@ pub fn without(title: &str, reason: &str) -> Report {
     let line = format!("No diagnosis: {reason}.");
     Report {
         title: title.to_owned(),
-        text: String::new(),
+        parts: vec![],
         body: html! { h2 { (title) } p { (line) } },
         figures: serde_json::json!({ "refused": reason }),
         lines: vec![line],
     }
+}
+
+/// The remarks of a diagnosis, which the whole text has.
+fn remarks(notes: &[String]) -> Option<Part> {
+    (!notes.is_empty()).then(|| Part::plain(format!("Remarks\n{}\n", notes.join("\n"))))
 }
 
 fn read(report: &GapReport) -> String {
@@ -95,7 +106,7 @@ fn read(report: &GapReport) -> String {
 fn notes(diagnosed: &Diagnosed) -> Vec<String> {
     let notes = diagnosed.diagnosis.notes.iter().map(ToString::to_string);
     notes
-        .chain(diagnosed.losses.iter().cloned())
+        .chain(diagnosed.losses())
         .chain(diagnosed.remarks.iter().cloned())
         .collect()
 }
@@ -125,11 +136,11 @@ fn sections(diagnosed: &Diagnosed) -> Vec<Section> {
     let report = &diagnosed.diagnosis.report;
     let all = [
         causes(report),
-        places(diagnosed),
-        gap(report),
+        places(diagnosed).ranked(Rank::Detail),
+        gap(report).ranked(Rank::Detail),
         held_out(diagnosed),
         next(report),
-        not_excited(report),
+        not_excited(report).ranked(Rank::Detail),
     ];
     all.into_iter()
         .filter(|section| section.tables.iter().any(|table| !table.rows.is_empty()))
@@ -212,8 +223,16 @@ fn sizes(report: &GapReport) -> Rows {
         rows: report.causes.iter().flat_map(of_cause).collect(),
         note: "From and to: 95 % interval of noise and repeats; in blind trials 95 % of them held. What the instruments themselves are off by \
                is not in them. Amplitudes of an effect's free form are in the JSON; `in all` is with those that are shares of a value."
-            .to_owned(),
+            .to_owned()
+            + &sign_of_squareness(report),
     }
+}
+
+/// The sign of every squareness among the causes.
+fn sign_of_squareness(report: &GapReport) -> String {
+    let causes = report.causes.iter();
+    let signs = signs(causes.map(|cause| (cause.effect.as_str(), cause.axis.as_str())));
+    signs.map_or_else(String::new, |signs| format!(" {signs}"))
 }
 
 fn status(status: Status) -> &'static str {

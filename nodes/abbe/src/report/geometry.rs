@@ -1,9 +1,9 @@
 //! Geometric errors as they were identified: what is known, how well, and what is not known.
 
-use metrology::ErrorComponent;
 use metrology::sample::{
     CurveForm, ErrorCurve, EstimableCombination, GeometryModel, PositioningTable,
 };
+use metrology::{ErrorComponent, squareness};
 
 use super::section::{Rows, Section, head, rounded, um};
 
@@ -38,7 +38,10 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
         model.n_samples,
         um(model.residual_standard_deviation_mm)
     ));
-    section.lines.push(count(&all, known.len()));
+    section.answer(count(&all, known.len()));
+    section
+        .lines
+        .extend(signs(model.curves.iter().map(|curve| curve.component)));
     section.tables.push(Rows {
         head: head(&["coefficient", "at the end of the span", "± U (k = 2)", "span"]),
         rows: known.iter().map(|coefficient| coefficient.row()).collect(),
@@ -61,6 +64,17 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
     }
     section.figures = figures(title, model, &all);
     section
+}
+
+/// A sentence for the sign of each squareness among components; none without one.
+#[must_use]
+pub fn signs(components: impl Iterator<Item = ErrorComponent>) -> Option<String> {
+    let mut components: Vec<ErrorComponent> = components.collect();
+    components.sort();
+    components.dedup();
+    let words = components.into_iter().filter_map(squareness::in_words);
+    let words: Vec<String> = words.collect();
+    (!words.is_empty()).then(|| words.join(" "))
 }
 
 fn count(all: &[Coefficient], n_known: usize) -> String {

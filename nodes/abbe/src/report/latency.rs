@@ -167,15 +167,10 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         (super::blocks::section(evidence))
         (conditions::section(evidence))
     };
-    let text = format!(
-        "{}{}",
-        super::feeds::text(evidence),
-        super::blocks::text(evidence)
-    );
     Ok(Report {
         title: title.to_owned(),
         lines,
-        text,
+        parts: vec![super::feeds::part(evidence), super::blocks::part(evidence)],
         body,
         figures: figures(evidence),
     })

@@ -1,17 +1,25 @@
 //! ISO 230-2 and 230-6 of a bag.
 
+use abbe_msgs::topics;
 use anyhow::Result;
-use metrology::iso230::diagonal::{DiagonalResult, DiagonalRuns, DiagonalsResult, SpaceDiagonal};
+use machine::MachineFile;
+use metrology::Axis;
+use metrology::iso230::positioning::one_sided::{self, OneSidedPoint, OneSidedResult};
 use metrology::iso230::positioning::{
     PointResult, PositioningRemark, PositioningResult, PositioningRuns,
 };
-use metrology::iso230::{ExpandedLength, diagonal, positioning};
+use metrology::iso230::{Direction, ExpandedLength, positioning};
 use metrology::sample::TestKind;
+
+mod diagonals;
 
 use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head, um};
+use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
-use crate::evaluate::linear::{LinearTest, Reference, SETTLE};
+use crate::evaluate::correction::{BY_OWN_SCALE, Measured};
+use crate::evaluate::linear::{LinearTest, Reference, SETTLE, level};
+use crate::report_bag::unstate;
 
 /// A figure and, where a budget was given, its expanded uncertainty.
 pub fn figure(value: &ExpandedLength, stated: bool) -> String {
@@ -30,26 +38,56 @@ pub fn figure(value: &ExpandedLength, stated: bool) -> String {
 ///
 /// # Errors
 /// When a plot cannot be drawn.
-pub fn sections(tests: &[LinearTest], budget: Option<&Budget>) -> Result<Vec<Section>> {
+pub fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> {
     let mut sections = Vec::new();
-    for test in tests {
-        sections.push(section(test, budget)?);
+    for test in &tests.linear {
+        let about: (&[u32], _, _) = (&test.runs, test.reference, test.axis);
+        let measured = Measured::of(tests, budget, about);
+        sections.push(section(tests, test, &measured)?);
     }
-    sections.extend(diagonals(tests, budget));
+    sections.extend(diagonals::sections(tests, budget));
     Ok(sections)
 }
 
-fn runs(test: &LinearTest) -> PositioningRuns {
-    PositioningRuns {
+/// The runs at 20 °C, where they are corrected here.
+fn runs(test: &LinearTest, periods_mm: Vec<f64>, measured: &Measured) -> PositioningRuns {
+    let as_read = PositioningRuns {
         targets_mm: test.targets_mm.clone(),
         up_mm: test.up_mm.clone(),
         down_mm: test.down_mm.clone(),
         zero_mm: test.targets_mm.first().copied().unwrap_or(0.0),
-        periods_mm: Vec::new(),
-    }
+        periods_mm,
+    };
+    let expansion = measured.correction.differential_expansion();
+    let mut runs = as_read.corrected_to_20_degc(expansion);
+    level(&mut runs.up_mm, &mut runs.down_mm);
+    runs
 }
 
-fn section(test: &LinearTest, budget: Option<&Budget>) -> Result<Section> {
+/// Least share of an axis in a line at which its periods count.
+const LEAST_SHARE: f64 = 0.1;
+
+/// Linear axes whose periods count along the line of a test.
+pub fn axes_along(test: &LinearTest) -> Vec<Axis> {
+    let has_share = |axis: &Axis| test.direction[axis.index()].abs() >= LEAST_SHARE;
+    Axis::LINEAR.into_iter().filter(has_share).collect()
+}
+
+/// Periods of the machine along the line of a test, mm.
+fn periods_mm(test: &LinearTest, machine: Option<&MachineFile>) -> Vec<f64> {
+    let mut periods_mm = Vec::new();
+    for axis in axes_along(test) {
+        let share = test.direction[axis.index()].abs();
+        let entry = machine.and_then(|machine| machine.linear(axis));
+        if let Some(entry) = entry {
+            let repeats_mm = entry.repeats_mm().into_iter();
+            periods_mm.extend(repeats_mm.map(|period_mm| period_mm / share));
+        }
+    }
+    periods_mm
+}
+
+fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Section> {
     let what = match test.kind {
         TestKind::Diagonal => "Diagonal",
         _ => "Positioning",
@@ -60,22 +98,177 @@ fn section(test: &LinearTest, budget: Option<&Budget>) -> Result<Section> {
         "not compensated"
     };
     let by = match test.reference {
-        Reference::Length => "length reference",
-        Reference::Scale => "linear scale",
+        _ if nothing_was_read(test) => "nothing was read",
+        Reference::Length => "by the length reference",
+        Reference::Scale => "by the linear scale",
     };
     let mut section = Section::new(format!(
-        "{what} {}, run {} on: {state}, by the {by}",
+        "{what} {}, run {} on: {state}, {by}",
         test.name, test.first_run
     ));
-    let used = budget.copied().unwrap_or(Budget::nothing()).positioning();
-    match positioning::evaluate(&runs(test), &used) {
-        Ok(result) => fill(&mut section, test, &result, budget.is_some())?,
+    let runs = runs(test, periods_mm(test, tests.machine.as_ref()), measured);
+    let found = match side_of(test) {
+        None => positioning::evaluate(&runs, &measured.budget)
+            .map(|result| fill(&mut section, test, &result, measured.is_stated)),
+        Some(direction) => one_sided::evaluate(&runs, direction, &measured.budget)
+            .map(|result| fill_one_sided(&mut section, test, &result, measured.is_stated)),
+    };
+    match found {
+        Ok(filled) => {
+            filled?;
+            state_reference(&mut section, test, measured);
+        }
         Err(error) => {
-            let why = too_short(test).unwrap_or_else(|| error.to_string());
-            section.lines.push(format!("Not evaluated: {why}."));
+            let why = too_short(test).or_else(|| without_places(tests, test));
+            let why = why.or_else(|| without_readings(test));
+            let why = why.unwrap_or_else(|| error.to_string());
+            section.not_evaluated(why);
         }
     }
+    section.tell_left_out(&test.left_out);
     Ok(section)
+}
+
+/// By what the test was read, at which temperature its lengths are, and why nothing is decided of it.
+fn state_reference(section: &mut Section, test: &LinearTest, measured: &Measured) {
+    let (first_mm, last_mm) = (test.targets_mm.first(), test.targets_mm.last());
+    let span_mm = first_mm
+        .zip(last_mm)
+        .map_or(0.0, |(first, last)| last - first);
+    let correction = &measured.correction;
+    let mut no_verdict = correction.lacks();
+    section.figures["feed_mm_min"] = (test.feed_mm_s * 60.0).into();
+    section.figures["dwell_s"] = test.longest_rest.map(|rest| rest.as_secs_f64()).into();
+    section.figures["correction_to_20_degc"] = correction.as_json();
+    if test.reference == Reference::Scale {
+        section
+            .lines
+            .insert(0, format!("{}.", capital(BY_OWN_SCALE)));
+        if !measured.is_stated {
+            section.lines.insert(1, SCALE_NOT_STATED.to_owned());
+        }
+        section.figures["label"] = BY_OWN_SCALE.into();
+        no_verdict = Some(BY_OWN_SCALE.to_owned());
+        let tables = section.tables.iter_mut();
+        tables.for_each(|table| table.head[0] = "read by the machine's scale / µm".to_owned());
+    }
+    if !measured.is_stated {
+        unstate(&mut section.figures);
+    }
+    section.lines.push(correction.in_words(span_mm));
+    section.figures["no_verdict"] = no_verdict.into();
+}
+
+const SCALE_NOT_STATED: &str = "The scale's uncertainty is not stated: scale_expanded_uncertainty_um and scale_expanded_uncertainty_um_per_m of the axis in the machine file, and a budget (--budget).";
+
+fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
+}
+
+/// The side from which alone the targets were approached; none: both.
+fn side_of(test: &LinearTest) -> Option<Direction> {
+    match (test.up_mm.is_empty(), test.down_mm.is_empty()) {
+        (false, true) => Some(Direction::Up),
+        (true, false) => Some(Direction::Down),
+        _ => None,
+    }
+}
+
+fn fill_one_sided(
+    section: &mut Section,
+    test: &LinearTest,
+    result: &OneSidedResult,
+    stated: bool,
+) -> Result<()> {
+    let towards = result.direction;
+    section.lines.push(format!(
+        "{} targets from {:.3} to {:.3} mm, {} runs {towards} only (one-way): the values of ISO 230-2 for one side; reversal and what is made of both sides need runs the other way. The range of the means of one way is its E.",
+        test.targets_mm.len(),
+        test.targets_mm.first().copied().unwrap_or(f64::NAN),
+        test.targets_mm.last().copied().unwrap_or(f64::NAN),
+        result.n_runs
+    ));
+    section
+        .lines
+        .extend(result.remarks.iter().map(remark_in_words));
+    let arrow = match towards {
+        Direction::Up => "↑",
+        Direction::Down => "↓",
+    };
+    let row =
+        |name: &str, value: &ExpandedLength| vec![format!("{name}{arrow}"), figure(value, stated)];
+    let of = &result.result;
+    section.answers.push(format!(
+        "one way: accuracy A{arrow} {} µm, systematic deviation E{arrow} {} µm, repeatability R{arrow} {} µm.",
+        figure(&of.accuracy, stated),
+        figure(&of.systematic_error, stated),
+        figure(&of.repeatability, stated)
+    ));
+    section.tables.push(Rows {
+        head: head(&["ISO 230-2, one side / µm", &towards.to_string()]),
+        rows: vec![
+            row("accuracy A", &of.accuracy),
+            row("systematic deviation E", &of.systematic_error),
+            row("repeatability R", &of.repeatability),
+        ],
+        note: uncertainty_note(stated),
+    });
+    let mean = |point: &OneSidedPoint| (point.target_mm, point.side.mean_mm * 1e3);
+    let points = result.points.iter().map(mean).collect();
+    section
+        .drawings
+        .push(drawing(vec![trace(&towards.to_string(), points)])?);
+    let mut figures = serde_json::json!({
+        "one_sided": towards,
+        "n_runs": result.n_runs,
+        "points": result.points,
+        "contributions": result.contributions,
+        "remarks": result.remarks,
+    });
+    // Under the names that they have in a test of both sides.
+    figures[towards.to_string()] = serde_json::to_value(of)?;
+    section.figures = serde_json::json!({
+        "test": section.title, "iso230_2": figures, "left_out": test.left_out,
+    });
+    Ok(())
+}
+
+fn uncertainty_note(stated: bool) -> String {
+    if stated {
+        "± expanded uncertainty, k = 2.".to_owned()
+    } else {
+        "No uncertainty is stated: without --budget, or without the scale's certificate.".to_owned()
+    }
+}
+
+/// Whether no place has a reading.
+const fn nothing_was_read(test: &LinearTest) -> bool {
+    test.targets_mm.is_empty() && test.left_out.is_empty()
+}
+
+/// Why a test has no target when no position of the axes was recorded.
+fn without_places(tests: &Tests, test: &LinearTest) -> Option<String> {
+    let name = topics::AXES_STATE.name;
+    let mut rows = tests.reading.account.topics.iter();
+    let came = rows.any(|row| row.topic.ends_with(name) && row.used > 0);
+    (nothing_was_read(test) && !came).then(|| {
+        format!(
+            "no message of the topic {name} can be used, so nothing tells where the axes were: record it together with {}",
+            topics::LENGTH_POSITION.name
+        )
+    })
+}
+
+/// Why a test has no target, where nothing was read at its stops.
+fn without_readings(test: &LinearTest) -> Option<String> {
+    nothing_was_read(test).then(|| {
+        format!(
+            "no reading of {}, nor one of a scale, counts at any stop",
+            topics::LENGTH_POSITION.name
+        )
+    })
 }
 
 /// Why a test has no target, where its stops were too short for one.
@@ -105,9 +298,19 @@ fn fill(
     ));
     let remarks = result.remarks.iter().map(remark_in_words);
     section.lines.extend(remarks);
+    let of = |value: &ExpandedLength| figure(value, stated);
+    section.answers.push(format!(
+        "accuracy A {} µm, systematic deviation E {} µm, repeatability R {} µm, reversal B {} µm.",
+        of(&result.accuracy),
+        of(&result.systematic_error),
+        of(&result.repeatability),
+        of(&result.reversal)
+    ));
     section.tables.push(figures(result, stated));
     section.drawings.push(means(result)?);
-    section.figures = serde_json::json!({ "test": section.title, "iso230_2": result });
+    section.figures = serde_json::json!({
+        "test": section.title, "iso230_2": result, "left_out": test.left_out,
+    });
     Ok(())
 }
 
@@ -148,34 +351,40 @@ fn figures(result: &PositioningResult, stated: bool) -> Rows {
                 &result.mean_systematic_error,
             ),
         ],
-        note: if stated {
-            "± expanded uncertainty, k = 2.".to_owned()
-        } else {
-            "Without --budget no uncertainty is stated.".to_owned()
-        },
+        note: uncertainty_note(stated),
     }
 }
 
 fn means(result: &PositioningResult) -> Result<Drawing> {
-    let trace = |name: &str, value: fn(&PointResult) -> f64| Trace {
-        name: name.to_owned(),
-        points: result
-            .points
-            .iter()
-            .map(|p| (p.target_mm, value(p) * 1e3))
-            .collect(),
-        marks: false,
+    let of = |name: &str, value: fn(&PointResult) -> f64| {
+        let points = result.points.iter();
+        trace(
+            name,
+            points.map(|p| (p.target_mm, value(p) * 1e3)).collect(),
+        )
     };
+    drawing(vec![
+        of("up", |point| point.up.mean_mm),
+        of("down", |point| point.down.mean_mm),
+    ])
+}
+
+fn trace(name: &str, points: Vec<(f64, f64)>) -> Trace {
+    Trace {
+        name: name.to_owned(),
+        points,
+        marks: false,
+    }
+}
+
+fn drawing(traces: Vec<Trace>) -> Result<Drawing> {
     Ok(Drawing {
         svg: plot::svg(&Plot {
             x: "target / mm".to_owned(),
             y: "mean deviation / µm".to_owned(),
-            traces: vec![
-                trace("up", |point| point.up.mean_mm),
-                trace("down", |point| point.down.mean_mm),
-            ],
+            traces,
         })?,
-        caption: "Mean deviation at each target, from either side; the mean of all is taken out."
+        caption: "Mean deviation at each target, from each side; the mean of all is taken out."
             .to_owned(),
     })
 }
@@ -202,138 +411,8 @@ fn remark_in_words(remark: &PositioningRemark) -> String {
             period_mm,
             phase_spread_rad,
         } => format!(
-            "All targets lie within {phase_spread_rad:.2} rad of one phase of the {period_mm:.3} mm period."
+            "All targets lie within {phase_spread_rad:.2} rad of one phase of the {period_mm:.3} mm period: an error of that period is not seen. Choose targets that are no multiples of it."
         ),
-    }
-}
-
-/// Least share of every axis in a space diagonal.
-const LEAST_SHARE: f64 = 0.1;
-
-/// The space diagonal along which a test ran, and whether it ran it upwards.
-fn space_diagonal(test: &LinearTest) -> Option<(SpaceDiagonal, bool)> {
-    let along = test.direction;
-    if test.kind != TestKind::Diagonal || along.iter().any(|share| share.abs() < LEAST_SHARE) {
-        return None;
-    }
-    let positive = along.map(|share| share > 0.0);
-    // A diagonal and its reverse are one: the one with at most one negative axis names it.
-    let upwards = positive.iter().filter(|p| **p).count() >= 2;
-    let [x, y, z] = [positive.x, positive.y, positive.z].map(|p| p == upwards);
-    let diagonal = match (x, y, z) {
-        (false, _, _) => SpaceDiagonal::Npp,
-        (_, false, _) => SpaceDiagonal::Pnp,
-        (_, _, false) => SpaceDiagonal::Ppn,
-        _ => SpaceDiagonal::Ppp,
-    };
-    Some((diagonal, upwards))
-}
-
-/// The runs as they are upwards along the diagonal, positions counted from its lower end.
-fn upwards(test: &LinearTest, is_upwards: bool) -> PositioningRuns {
-    let mut runs = runs(test);
-    if is_upwards {
-        return runs;
-    }
-    let last_mm = test.targets_mm.last().copied().unwrap_or(0.0);
-    runs.targets_mm = test
-        .targets_mm
-        .iter()
-        .rev()
-        .map(|at| last_mm - at)
-        .collect();
-    // Seen from the other end a deviation along the line is of the other sign, and up is down.
-    let turned = |all: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        let turn = |run: &Vec<f64>| run.iter().rev().map(|deviation| -deviation).collect();
-        all.iter().map(turn).collect()
-    };
-    (runs.up_mm, runs.down_mm) = (turned(&test.down_mm), turned(&test.up_mm));
-    runs.zero_mm = runs.targets_mm.first().copied().unwrap_or(0.0);
-    runs
-}
-
-/// Deviations from the mean at the lower end, so that diagonals of one corner can be compared.
-fn from_lower_end(runs: &mut PositioningRuns) {
-    let all = || runs.up_mm.iter().chain(&runs.down_mm);
-    let first: Vec<f64> = all().filter_map(|run| run.first().copied()).collect();
-    let mean_mm = first.iter().sum::<f64>() / first.len().max(1) as f64;
-    for deviation in runs.up_mm.iter_mut().chain(&mut runs.down_mm).flatten() {
-        *deviation -= mean_mm;
-    }
-}
-
-/// ISO 230-6, for each state in which the four space diagonals are there.
-fn diagonals(tests: &[LinearTest], budget: Option<&Budget>) -> Vec<Section> {
-    let mut sections = Vec::new();
-    for compensated in [false, true] {
-        let mut first: Vec<DiagonalRuns> = Vec::new();
-        let evaluable =
-            |test: &&LinearTest| test.compensated == compensated && !test.targets_mm.is_empty();
-        for test in tests.iter().filter(evaluable) {
-            if let Some((diagonal, is_upwards)) = space_diagonal(test)
-                && first.iter().all(|known| known.diagonal != diagonal)
-            {
-                let mut runs = upwards(test, is_upwards);
-                from_lower_end(&mut runs);
-                first.push(DiagonalRuns { diagonal, runs });
-            }
-        }
-        if first.len() == SpaceDiagonal::ALL.len() {
-            sections.push(diagonals_section(&first, compensated, budget));
-        }
-    }
-    sections
-}
-
-fn diagonals_section(runs: &[DiagonalRuns], compensated: bool, budget: Option<&Budget>) -> Section {
-    let state = if compensated {
-        "compensated"
-    } else {
-        "not compensated"
-    };
-    let mut section = Section::new(format!("Space diagonals, ISO 230-6: {state}"));
-    let used = budget.copied().unwrap_or(Budget::nothing()).positioning();
-    match diagonal::evaluate(runs, &used) {
-        Ok(result) => {
-            let stated = budget.is_some();
-            section.lines.push(format!(
-                "Systematic deviation E_d {} µm, reversal B_d {} µm; the diagonals differ by {} µm.",
-                figure(&result.systematic_error, stated),
-                figure(&result.reversal, stated),
-                figure(&result.spread, stated)
-            ));
-            section.tables.push(of_diagonals(&result, stated));
-            section.figures = serde_json::json!({ "test": section.title, "iso230_6": result });
-        }
-        Err(error) => section.lines.push(format!("Not evaluated: {error}.")),
-    }
-    section
-}
-
-fn of_diagonals(result: &DiagonalsResult, stated: bool) -> Rows {
-    let row = |one: &DiagonalResult| {
-        let (points, found) = (&one.positioning.points, &one.positioning);
-        let mean = |point: Option<&PointResult>| {
-            point.map_or(f64::NAN, |p| f64::midpoint(p.up.mean_mm, p.down.mean_mm))
-        };
-        vec![
-            one.diagonal.name().to_owned(),
-            um(mean(points.last()) - mean(points.first())),
-            figure(&found.systematic_error, stated),
-            figure(&found.reversal, stated),
-            figure(&found.repeatability, stated),
-            figure(&found.accuracy, stated),
-        ]
-    };
-    Rows {
-        head: head(&["diagonal / µm", "too long by", "E", "B", "R", "A"]),
-        rows: result.diagonals.iter().map(row).collect(),
-        note: if stated {
-            "± expanded uncertainty, k = 2. All too long alike: a scale error; unlike: squareness."
-        } else {
-            "Without --budget no uncertainty is stated. All too long alike: a scale error; unlike: squareness."
-        }
-        .to_owned(),
     }
 }
 
@@ -342,20 +421,31 @@ mod tests {
     use super::*;
     use metrology::stamp::Span;
     use nalgebra::Vector3;
+    use std::path::Path;
 
-    fn test(direction: [f64; 3]) -> LinearTest {
+    pub(super) fn test(direction: [f64; 3]) -> LinearTest {
         LinearTest {
             kind: TestKind::Diagonal,
             axis: None,
             name: String::new(),
             first_run: 1,
+            runs: vec![1],
+            feed_mm_s: 100.0,
             reference: Reference::Length,
             direction: Vector3::from(direction).normalize(),
             targets_mm: vec![0.0, 100.0, 300.0],
             up_mm: vec![vec![0.0, 0.001, 0.003]],
             down_mm: vec![vec![0.002, 0.003, 0.005]],
+            left_out: vec![],
             compensated: false,
             longest_rest: None,
+        }
+    }
+
+    fn tests_of(test: LinearTest) -> Tests {
+        Tests {
+            linear: vec![test],
+            ..Tests::default()
         }
     }
 
@@ -365,7 +455,7 @@ mod tests {
         short.longest_rest = Some(Span::from_nanos(200_000_000));
         short.targets_mm.clear();
         (short.up_mm, short.down_mm) = (vec![vec![]], vec![vec![]]);
-        let section = &sections(&[short.clone()], None).unwrap()[0];
+        let section = &sections(&tests_of(short.clone()), None).unwrap()[0];
         let words =
             "the command rested for 0.20 s at most, and readings of a stop count from 0.3 s on";
         assert!(section.lines[0].contains(words), "{:?}", section.lines);
@@ -373,34 +463,125 @@ mod tests {
         assert_eq!(too_short(&short), None);
     }
 
-    #[test]
-    fn a_diagonal_is_known_by_its_direction_and_not_by_its_place_in_the_plan() {
-        for (direction, wanted) in [
-            ([2.0, 1.0, 1.5], (SpaceDiagonal::Ppp, true)),
-            ([-2.0, 1.0, 1.5], (SpaceDiagonal::Npp, true)),
-            ([2.0, -1.0, 1.5], (SpaceDiagonal::Pnp, true)),
-            ([2.0, 1.0, -1.5], (SpaceDiagonal::Ppn, true)),
-            ([-2.0, -1.0, 1.5], (SpaceDiagonal::Ppn, false)),
-            ([-2.0, -1.0, -1.5], (SpaceDiagonal::Ppp, false)),
-        ] {
-            assert_eq!(
-                space_diagonal(&test(direction)),
-                Some(wanted),
-                "{direction:?}"
-            );
+    const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
+
+    /// A positioning test of X of a machine of which only its length changed: 400 mm at 22 °C, 11 µm/(m K), and 0.05 µm of its own.
+    fn warm(reference: Reference, targets_mm: &[f64]) -> Tests {
+        let deviation = |target: &f64| 22e-6 * target + if *target > 399.0 { 5e-5 } else { 0.0 };
+        let run: Vec<f64> = targets_mm.iter().map(deviation).collect();
+        let mut warm = test([1.0, 0.0, 0.0]);
+        (warm.kind, warm.axis, warm.reference) = (TestKind::Positioning, Some(Axis::X), reference);
+        warm.targets_mm = targets_mm.to_vec();
+        warm.up_mm = vec![run; 5];
+        warm.down_mm = warm.up_mm.clone();
+        let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
+        Tests {
+            machine: Some(machine),
+            ..tests_of(warm)
         }
-        assert_eq!(space_diagonal(&test([1.0, 1.0, 0.0])), None);
+    }
+
+    const UNEVEN_MM: [f64; 5] = [0.0, 103.1, 196.3, 301.7, 400.0];
+
+    fn budget() -> Budget {
+        let text = "
+grid_encoder: {expanded_uncertainty_um: 0.4, expanded_uncertainty_um_per_m: 2.0, coverage_factor: 2.0}
+length_reference: {expanded_uncertainty_um: 0.1, expanded_uncertainty_um_per_m: 0.5, coverage_factor: 2.0}
+machine: {temperature_deviation_k: 2.0, temperature_half_width_k: 0.2, expansion_um_per_m_k: 11.0, expansion_half_width_um_per_m_k: 1.0}
+device: {temperature_deviation_k: 0.0, temperature_half_width_k: 0.1, expansion_um_per_m_k: 0.0, expansion_half_width_um_per_m_k: 0.0}
+misalignment_mm: 0.1
+environmental_drift_um: 0.0
+";
+        Budget::read(text, Path::new("budget.yaml")).unwrap()
+    }
+
+    fn um_of(figure: &serde_json::Value, key: &str) -> f64 {
+        figure[key].as_f64().unwrap() * 1e3
     }
 
     #[test]
-    fn a_diagonal_that_is_run_from_its_upper_end_is_as_long_and_has_the_same_reversal() {
-        let turned = upwards(&test([-1.0, -1.0, 1.0]), false);
-        assert_eq!(turned.targets_mm, [0.0, 200.0, 300.0]);
-        assert_eq!(turned.up_mm, [vec![-0.005, -0.003, -0.002]]);
-        assert_eq!(turned.down_mm, [vec![-0.003, -0.001, -0.0]]);
-        let mut levelled = turned;
-        from_lower_end(&mut levelled);
-        assert!((levelled.up_mm[0][0] + 0.001).abs() < 1e-12);
-        assert!((levelled.down_mm[0][0] - 0.001).abs() < 1e-12);
+    fn an_axis_of_400_mm_at_22_degc_has_its_figures_at_20_degc() {
+        let tests = warm(Reference::Length, &UNEVEN_MM);
+        let section = &sections(&tests, Some(&budget())).unwrap()[0];
+        let found = &section.figures["iso230_2"]["systematic_error"];
+        assert!((um_of(found, "value_mm") - 0.05).abs() < 1e-6, "{found}");
+        // By hand, k = 2, rectangular: 11 µm/(m K) 0.2 K 0.4 m, 2 K 1 µm/(m K) 0.4 m, beam (0.1 mm)²/(4 · 400 mm); device 0.3 µm.
+        let squares = (0.88_f64.powi(2) + 0.8_f64.powi(2) + 0.006_25_f64.powi(2)) / 3.0;
+        let by_hand_um = 2.0 * (squares + 0.15_f64.powi(2)).sqrt();
+        let stated_um = um_of(found, "expanded_uncertainty_mm");
+        assert!(
+            (stated_um - by_hand_um).abs() < 1e-6,
+            "{stated_um} {by_hand_um}"
+        );
+        assert!(
+            section
+                .lines
+                .iter()
+                .any(|line| line.contains("8.80 µm taken out over 400 mm"))
+        );
+        assert!(section.figures["no_verdict"].is_null(), "{section:?}");
+        assert_eq!(section.figures["correction_to_20_degc"]["done"], true);
+        let without = &sections(&tests, None).unwrap()[0];
+        let found = &without.figures["iso230_2"]["systematic_error"];
+        assert!((um_of(found, "value_mm") - 8.85).abs() < 1e-6, "{found}");
+        assert!(
+            without
+                .lines
+                .iter()
+                .any(|line| line.starts_with("Not corrected to 20 °C: "))
+        );
+    }
+
+    #[test]
+    fn what_the_machines_own_scale_read_is_labelled_and_has_the_scales_uncertainty_or_none() {
+        let mut tests = warm(Reference::Scale, &UNEVEN_MM);
+        let of = |tests: &Tests| sections(tests, Some(&budget())).unwrap().remove(0);
+        let section = of(&tests);
+        assert_eq!(
+            section.lines[0],
+            "Not ISO 230-2: read by the machine's scale."
+        );
+        assert!(
+            section.lines[1].contains("scale_expanded_uncertainty_um"),
+            "{section:?}"
+        );
+        assert_eq!(section.figures["no_verdict"], BY_OWN_SCALE);
+        assert!(section.figures["iso230_2"]["accuracy"]["expanded_uncertainty_mm"].is_null());
+        let text = MACHINE.replacen(
+            "encoder_resolution_um: 0.05",
+            "encoder_resolution_um: 0.05, scale_resolution_um: 0.05, scale_expanded_uncertainty_um: 0.6, scale_expanded_uncertainty_um_per_m: 3.0",
+            1,
+        );
+        tests.machine = Some(MachineFile::parse(&text, "machine.yaml").unwrap());
+        let section = of(&tests);
+        // 0.6 µm and 3 µm/m over 0.4 m; the laser's and the temperatures' parts are none of the scale's.
+        let stated_um = um_of(
+            &section.figures["iso230_2"]["systematic_error"],
+            "expanded_uncertainty_mm",
+        );
+        assert!((stated_um - 1.8).abs() < 1e-6, "{stated_um}");
+        assert_eq!(section.figures["label"], BY_OWN_SCALE);
+    }
+
+    #[test]
+    fn targets_on_whole_leads_of_the_machine_file_are_warned_of() {
+        let on_leads = [0.0, 100.0, 190.0, 310.0, 400.0];
+        for (targets_mm, warned) in [(on_leads, true), (UNEVEN_MM, false)] {
+            let tests = warm(Reference::Length, &targets_mm);
+            let section = &sections(&tests, None).unwrap()[0];
+            let remark = |line: &String| line.contains("one phase of the 10.000 mm period");
+            assert_eq!(
+                section.lines.iter().any(remark),
+                warned,
+                "{:?}",
+                section.lines
+            );
+        }
+        let text = MACHINE.replacen("lead_mm: 10.0", "lead_mm: 10.0, periods_mm: [51.55]", 1);
+        let mut tests = warm(Reference::Length, &[0.0, 103.1, 206.2, 309.3, 412.4]);
+        tests.machine = Some(MachineFile::parse(&text, "machine.yaml").unwrap());
+        let section = &sections(&tests, None).unwrap()[0];
+        let remark = |line: &String| line.contains("the 51.550 mm period");
+        assert!(section.lines.iter().any(remark), "{:?}", section.lines);
     }
 }

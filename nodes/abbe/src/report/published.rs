@@ -1,6 +1,6 @@
-//! The published separation of one circle, as it prints single errors, beside what the circle determines.
+//! The published separation of each circle with stops, as it prints single errors, beside what the circle determines.
 
-use grid_encoder::comparison::{Compared, Comparison, compare};
+use grid_encoder::comparison::{Compared, Comparison, Fourteen, compare};
 use grid_encoder::geometry::geometry_model;
 use grid_encoder::spectrum::Visibility;
 use grid_encoder::unknown::Unknown;
@@ -10,6 +10,7 @@ use metrology::stamp::Stamp;
 
 use super::geometry::{self, coefficients};
 use super::section::{Rows, Section, head, rounded, um};
+use super::terminal::Rank;
 use crate::evaluate::circles::plane_axes;
 use crate::evaluate::stationwise::StationCircle;
 
@@ -30,9 +31,16 @@ struct Together {
 pub fn sections(circle: &StationCircle, all: Option<&GeometryModel>) -> Vec<Section> {
     let place = &circle.recording.place;
     let letters = plane_axes(place.plane).map_or_else(String::new, |[u, v]| format!("{u}{v}"));
+    let [u, v] = grid_encoder::recording::in_plane(place.plane, &place.centre_mm);
+    let about = if u.hypot(v) > 0.0 {
+        format!(" about ({u:.0}, {v:.0}) mm")
+    } else {
+        String::new()
+    };
+    let run = circle.recording.run;
     let title = format!(
-        "One circle {letters}, R {:.0} mm, run {}: the published separation and what it determines",
-        place.radius_mm, circle.recording.run
+        "One circle {letters}, R {:.0} mm{about}, run {run}: the published separation and what it determines",
+        place.radius_mm
     );
     let of_all = |compared: &Compared| together(all?, compared, normal(place.plane)?);
     match compare(&circle.kinematics, &circle.recording, OTHER_MM) {
@@ -41,20 +49,24 @@ pub fn sections(circle: &StationCircle, all: Option<&GeometryModel>) -> Vec<Sect
             let chain = circle.kinematics.chain().to_string();
             let model = geometry_model(&found.determined, &chain, Stamp::from_nanos(0), 1);
             vec![
-                comparison(title, &found, &of_all),
-                geometry::section("What this circle alone determines", &model),
+                comparison((run, title), &found, &of_all).ranked(Rank::Detail),
+                geometry::section(
+                    &format!("What the circle of run {run} alone determines"),
+                    &model,
+                )
+                .ranked(Rank::Detail),
             ]
         }
         Err(error) => {
             let mut section = Section::new(title);
-            section.lines.push(format!("Not evaluated: {error}."));
+            section.not_evaluated(error);
             vec![section]
         }
     }
 }
 
 fn comparison(
-    title: String,
+    (run, title): (u32, String),
     found: &Comparison,
     of_all: &dyn Fn(&Compared) -> Option<Together>,
 ) -> Section {
@@ -62,8 +74,9 @@ fn comparison(
     let n = found.unknowns.len();
     let seen = found.unknowns.iter().filter(|c| is_seen(c)).count();
     section.lines.push(format!(
-        "{} stations give the published equations rank {} for {n} unknowns: their solution has {} arbitrary numbers U.",
+        "{} stations of {:.0} readings each give the published equations rank {} for {n} unknowns: their solution has {} arbitrary numbers U.",
         found.n_stations,
+        found.readings_per_station,
         found.rank,
         n - found.rank
     ));
@@ -73,11 +86,23 @@ fn comparison(
         found.apart_mm * 1e3,
         um(found.left_mm)
     ));
+    section
+        .lines
+        .extend(found.fourteen.as_ref().map(|two| fourteen(found, two)));
+    let component = |compared: &Compared| match compared.unknown {
+        Unknown::Power { component, .. } | Unknown::Knot { component, .. } => Some(component),
+        _ => None,
+    };
+    section
+        .lines
+        .extend(geometry::signs(found.unknowns.iter().filter_map(component)));
     let rows = found.unknowns.iter().map(|compared| {
         vec![
             compared.unknown.to_string(),
             format!("{}{}", um(compared.published_mm), mark(compared)),
             format!("{}{}", um(compared.other_mm), mark(compared)),
+            of_fourteen(compared, 0),
+            of_fourteen(compared, 1),
             verdict(compared).to_owned(),
             of_all(compared).map_or_else(|| "—".to_owned(), in_words),
         ]
@@ -87,14 +112,36 @@ fn comparison(
             "µm at the radius",
             "published, U = 0",
             "published, other U",
+            "14 stations",
+            "14 others",
             "this circle",
             "all recordings, ± U (k = 2)",
         ]),
         rows: rows.collect(),
-        note: "Each number is the error at the radius from the machine's origin, a turn times the radius. The last column is what all recordings of the bag determine, at the height of the plate; a dash: not even they.".to_owned(),
+        note: "Each number is the error at the point of the circle that is farthest from the machine's origin along the axis (at the radius, where the circle is about the origin), a turn times that distance. The last column is what all recordings of the bag determine, at the height of the plate; a dash: not even they. A squareness is that of the tangents where both axes are at zero, a number of this model; that of ISO 230-1 between reference lines stands with the geometric errors.".to_owned(),
     });
-    section.figures = figures(&section.title, found, of_all);
+    section.figures = figures((run, &section.title), found, of_all);
     section
+}
+
+/// How far two choices of 14 stations are apart.
+fn fourteen(found: &Comparison, two: &Fourteen) -> String {
+    format!(
+        "Any 14 of the {} stations, as the source takes them: every {:.1}th from the first, and the same from half a spacing later. The two choices print errors up to {} µm apart; their traces are up to {} µm apart.",
+        found.n_stations,
+        found.n_stations as f64 / 14.0,
+        um(two.apart_mm),
+        um(two.traces_apart_mm)
+    )
+}
+
+/// What one choice of 14 stations prints.
+fn of_fourteen(compared: &Compared, choice: usize) -> String {
+    let value_mm = compared.fourteen_mm.map(|both| both[choice]);
+    value_mm.map_or_else(
+        || "—".to_owned(),
+        |value_mm| format!("{}{}", um(value_mm), mark(compared)),
+    )
 }
 
 fn is_seen(compared: &Compared) -> bool {
@@ -170,7 +217,7 @@ fn together(model: &GeometryModel, compared: &Compared, normal: Axis) -> Option<
 }
 
 fn figures(
-    title: &str,
+    (run, title): (u32, &str),
     found: &Comparison,
     of_all: &dyn Fn(&Compared) -> Option<Together>,
 ) -> serde_json::Value {
@@ -179,6 +226,7 @@ fn figures(
             "name": compared.unknown.to_string(),
             "published_mm": compared.published_mm,
             "published_other_mm": compared.other_mm,
+            "fourteen_stations_mm": compared.fourteen_mm,
             "determined_by_the_circle": is_seen(compared),
             "all_recordings": of_all(compared),
         })
@@ -186,7 +234,14 @@ fn figures(
     serde_json::json!({
         "test": title,
         "published": {
+            "run": run,
             "stations": found.n_stations,
+            "readings_per_station": found.readings_per_station,
+            "fourteen": found.fourteen.as_ref().map(|two| serde_json::json!({
+                "stations": two.stations,
+                "apart_mm": two.apart_mm,
+                "traces_apart_mm": two.traces_apart_mm,
+            })),
             "rank": found.rank,
             "other_u_mm": OTHER_MM,
             "traces_apart_mm": found.apart_mm,

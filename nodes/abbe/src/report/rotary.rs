@@ -8,10 +8,14 @@ use maud::html;
 use metrology::sample::{CurveForm, ErrorCurve, GeometryModel};
 
 use super::page::table;
+use super::section::{Rows, head};
+use super::terminal::Part;
 use super::tool_error::quantile;
-use super::{Report, conditions, latency};
-use crate::evidence::{Evidence, Verification};
+use super::{Report, conditions, latency, pointed};
+use crate::evidence::{Condition, Evidence, Verification};
 
+/// The condition of a verification that left more than expected.
+const BEYOND_EXPECTED: &str = "beyond_expected";
 /// Coverage factor of what is printed.
 const COVERAGE: f64 = 2.0;
 
@@ -38,27 +42,46 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         h2 { "Tool error at the verification poses" }
         (table(&TOOL_HEAD, &tools))
         p.note { "Truth of the plant at poses that the machine really went to, all five axes' errors included; no node sees it." }
+        (pointed::section(evidence))
         (latency::section(evidence)?)
         (conditions::section(evidence))
     };
-    let mut text = String::new();
-    for (head, rows) in [(&LOCATION_HEAD[..], &locations), (&TOOL_HEAD[..], &tools)] {
-        for row in std::iter::once(head.iter().map(ToString::to_string).collect())
-            .chain(rows.iter().cloned())
-        {
-            let row: Vec<String> = row;
-            let cells: Vec<String> = row.iter().map(|cell| format!("{cell:>16}")).collect();
-            let _ = writeln!(text, "{}", cells.join("  "));
-        }
-        text.push('\n');
-    }
+    let pointed = pointed::rows(evidence);
+    let tables = [
+        ("Location errors", &LOCATION_HEAD[..], locations),
+        (
+            "Tool error at the verification poses",
+            &TOOL_HEAD[..],
+            tools,
+        ),
+        (
+            "Touches along given directions",
+            &pointed::HEAD[..],
+            pointed,
+        ),
+    ];
+    let filled = tables.into_iter().filter(|(.., rows)| !rows.is_empty());
+    let parts = filled.map(|(title, names, rows)| part(title, names, rows));
     Ok(Report {
         title: title.to_owned(),
         lines,
-        text,
+        parts: parts.collect(),
         body,
         figures: figures(evidence),
     })
+}
+
+/// A table, and how it stands in the whole text.
+fn part(title: &str, names: &[&str], rows: Vec<Vec<String>>) -> Part {
+    let head = head(names);
+    let mut text = String::new();
+    for row in std::iter::once(&head).chain(&rows) {
+        let cells: Vec<String> = row.iter().map(|cell| format!("{cell:>16}")).collect();
+        let _ = writeln!(text, "{}", cells.join("  "));
+    }
+    text.push('\n');
+    let note = String::new();
+    Part::table(title, text, Rows { head, rows, note })
 }
 
 const LOCATION_HEAD: [&str; 4] = ["component", "value", "± U (k = 2)", "unit"];
@@ -109,14 +132,21 @@ fn motion_names(model: &GeometryModel) -> String {
     names.join(", ")
 }
 
-/// What the calibration said of itself and of the verifications.
+/// What the calibration said of itself and of the verifications, and of residuals beyond what was expected.
 fn judgements(evidence: &Evidence) -> Vec<String> {
-    let judged = evidence.judgements.iter();
+    let is_beyond = |condition: &&Condition| condition.diagnostic.name == BEYOND_EXPECTED;
+    let beyond = evidence.conditions.iter().filter(is_beyond);
+    let judged = evidence.judgements.iter().map(|condition| {
+        let name = &condition.diagnostic.name;
+        format!("Rotary axes {name}: {}.", condition.diagnostic.message)
+    });
     judged
-        .map(|condition| {
-            let name = &condition.diagnostic.name;
-            format!("Rotary axes {name}: {}.", condition.diagnostic.message)
-        })
+        .chain(beyond.map(|condition| {
+            format!(
+                "Rotary axes, beyond expected: {}.",
+                condition.diagnostic.message
+            )
+        }))
         .collect()
 }
 
@@ -175,6 +205,9 @@ fn tool_line(evidence: &Evidence) -> Option<String> {
 
 fn figures(evidence: &Evidence) -> serde_json::Value {
     let mut figures = latency::figures(evidence);
+    if !evidence.pointings.is_empty() {
+        figures["touched_along"] = pointed::figures(evidence);
+    }
     if let Some(model) = evidence.rotary_models.last() {
         for curve in locations(model) {
             figures["location_errors"][curve.component.to_string()] = serde_json::json!({

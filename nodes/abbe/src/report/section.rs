@@ -1,9 +1,15 @@
 //! A part of a page: sentences, tables and plots, laid out for a terminal and for HTML alike.
 
+use std::fmt::Display;
+
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Width, presets};
 use maud::{Markup, html};
 
 use super::page;
+use super::terminal::Rank;
+
+/// What warnings of tests without a result have in common.
+pub const NOT_EVALUATED: &str = "Not evaluated";
 
 /// Columns of a terminal that tables may take.
 const TERMINAL_WIDTH: u16 = 160;
@@ -43,6 +49,21 @@ pub struct Section {
     pub drawings: Vec<Drawing>,
     /// The figures, for machines.
     pub figures: serde_json::Value,
+    /// How much of it the short text has.
+    pub rank: Rank,
+    /// What it found, a sentence each, for the short text.
+    pub answers: Vec<String>,
+    /// What it could not find, for the short text; each is one of [`Self::lines`] as well.
+    pub warnings: Vec<Warning>,
+}
+
+/// A sentence on what was not evaluated or not used.
+#[derive(Clone, Debug)]
+pub struct Warning {
+    /// What it has in common with others, such as `Not evaluated`.
+    pub kind: &'static str,
+    /// The sentence.
+    pub line: String,
 }
 
 impl Section {
@@ -52,6 +73,36 @@ impl Section {
         Self {
             title: title.into(),
             ..Self::default()
+        }
+    }
+
+    /// The same with another rank.
+    #[must_use]
+    pub fn ranked(self, rank: Rank) -> Self {
+        Self { rank, ..self }
+    }
+
+    /// A line that is an answer as well.
+    pub fn answer(&mut self, line: String) {
+        self.answers.push(line.clone());
+        self.lines.push(line);
+    }
+
+    /// A line that is a warning of this kind.
+    pub fn warn(&mut self, kind: &'static str, line: String) {
+        self.lines.push(line.clone());
+        self.warnings.push(Warning { kind, line });
+    }
+
+    /// The line of a test that has no result, with the reason.
+    pub fn not_evaluated(&mut self, why: impl Display) {
+        self.warn(NOT_EVALUATED, format!("Not evaluated: {why}."));
+    }
+
+    /// A line for everything of a test that was left out.
+    pub fn tell_left_out(&mut self, left_out: &[String]) {
+        for line in left_out {
+            self.warn("Left out", format!("Left out: {line}."));
         }
     }
 
@@ -90,7 +141,8 @@ impl Section {
     }
 }
 
-fn laid_out(rows: &Rows) -> String {
+/// A table for a terminal, without its note.
+pub(super) fn laid_out(rows: &Rows) -> String {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
     table.set_content_arrangement(ContentArrangement::Dynamic);

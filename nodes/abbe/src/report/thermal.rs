@@ -11,8 +11,10 @@ use nalgebra::Vector3;
 
 use super::page::{figure, table};
 use super::plot::{Plot, Trace, svg};
+use super::section::{Rows, head};
+use super::terminal::Part;
 use super::tool_error::{self, BlocksSpan, Places, ToolError};
-use super::{Report, conditions, latency};
+use super::{Report, blocks, conditions, latency};
 use crate::evidence::{Evidence, Verification};
 
 /// Label prefix of the cold verification in a plan.
@@ -27,8 +29,10 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
     let errors = span.map_or_else(Vec::new, |span| tool_errors(&evidence.verifications, &span));
     let mut lines = latency::headline(evidence);
     lines.extend(headline(&errors, span.as_ref()));
+    lines.extend(blocks::remark(evidence));
     let mut figures = latency::figures(evidence);
     figures["tool_error_in_blocks_span"] = figures_of(&errors, span.as_ref());
+    figures["block_heights"] = blocks::remark(evidence).into();
     let drift = drift_traces(evidence);
     let body = html! {
         h1 { (title) }
@@ -56,7 +60,7 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
     Ok(Report {
         title: title.to_owned(),
         lines,
-        text: text(&errors, span.as_ref()),
+        parts: parts(&errors, span.as_ref()),
         body,
         figures,
     })
@@ -295,6 +299,35 @@ fn drift_traces(evidence: &Evidence) -> BTreeMap<Axis, Vec<Trace>> {
         .collect()
 }
 
+/// The tables: laid out by hand in the whole text, and once more for the short one.
+fn parts(errors: &[ToolError], span: Option<&BlocksSpan>) -> Vec<Part> {
+    let of = |title: &str, head: Vec<String>, rows: Vec<Vec<String>>, whole: String| {
+        let note = String::new();
+        Part::table(title, whole, Rows { head, rows, note })
+    };
+    let mut parts = vec![of(
+        "Change of the tool error since cold, in the blocks' span, µm",
+        head(&HEAD),
+        error_rows(errors),
+        text(errors, span),
+    )];
+    parts.extend(places(errors).map(|places| {
+        of(
+            "Change of the tool error since cold at five places, µm",
+            places_head(errors),
+            place_rows(errors, &places),
+            String::new(),
+        )
+    }));
+    parts
+}
+
+fn places_head(errors: &[ToolError]) -> Vec<String> {
+    let mut head = vec!["size (x, y, z)".to_owned()];
+    head.extend(errors.iter().map(|error| error.label.clone()));
+    head
+}
+
 /// The tables as they stand on a terminal.
 fn text(errors: &[ToolError], span: Option<&BlocksSpan>) -> String {
     let mut text = String::new();
@@ -319,9 +352,7 @@ fn text(errors: &[ToolError], span: Option<&BlocksSpan>) -> String {
         text,
         "\nChange of the tool error since cold at five places, µm"
     );
-    let mut head = vec!["size (x, y, z)".to_owned()];
-    head.extend(errors.iter().map(|error| error.label.clone()));
-    for row in std::iter::once(head).chain(place_rows(errors, &places)) {
+    for row in std::iter::once(places_head(errors)).chain(place_rows(errors, &places)) {
         let _ = write!(text, "  {:<20}", row[0]);
         for cell in &row[1..] {
             let _ = write!(text, "{cell:>30}");

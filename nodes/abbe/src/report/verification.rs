@@ -84,7 +84,7 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
         ] {
             let p95_mm = |verification| quantile_mm(&sizes_mm(verification, aligned), 0.95);
             let (before_mm, after_mm) = (p95_mm(without), p95_mm(with));
-            section.lines.push(format!(
+            section.answer(format!(
                 "p95 {what}: {} µm without compensation, {} µm with it ({:.1}-fold less), {} poses.",
                 um(before_mm),
                 um(after_mm),

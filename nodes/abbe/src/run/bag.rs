@@ -8,9 +8,10 @@ use metrology::stamp::{Host, Stamp};
 use node_runtime::Node;
 use node_runtime::node::TopicPort;
 use node_runtime::parameter::{Parameter, Value};
+use node_runtime::text_file::{self, Comments};
 use recorder::{
-    Channel, Directory, MessageOrder, RecordedRun, Recorder, RecorderConfig, Recording, RunContext,
-    RunNode, WhenFull,
+    Channel, Directory, MessageOrder, RecordedRun, Recorder, RecorderConfig, RecorderError,
+    Recording, RunContext, RunNode, WhenFull,
 };
 
 use crate::scenario::Scenario;
@@ -66,6 +67,25 @@ pub fn begin(
     Ok(Recorder::start(recording, &config)?)
 }
 
+/// Why a run failed, and what is wrong with its bag although every message is in it; `failure`: why its plan did not run
+/// to its end.
+pub fn ended(
+    failure: Option<String>,
+    of_bag: Option<RecorderError>,
+) -> (Option<String>, Option<String>) {
+    match of_bag {
+        None => (failure, None),
+        Some(error @ RecorderError::Undescribed { .. }) => (failure, Some(error.to_string())),
+        Some(error) => {
+            // The last count of what was lost is the right one.
+            let own = failure.filter(|reason| !reason.starts_with(super::NOT_RECORDED));
+            let told = format!("{}: {error}", super::NOT_RECORDED);
+            let both = own.map_or_else(|| told.clone(), |own| format!("{own}; the bag: {error}"));
+            (Some(both), None)
+        }
+    }
+}
+
 fn context(
     scenario: &Scenario,
     parameters: BTreeMap<String, String>,
@@ -80,19 +100,21 @@ fn context(
                 .unwrap_or_default()
                 .to_string_lossy()
                 .into_owned();
-            let text = std::fs::read_to_string(&path)
-                .with_context(|| format!("program {}", path.display()))?;
+            let text = text_file::read(&path, Comments::Gcode).context("program")?;
             programs.insert(name, text);
         }
     }
-    let read = |name: &str| std::fs::read_to_string(scenario.folder.join(name)).ok();
+    let read = |name: &str| {
+        let path = scenario.folder.join(name);
+        path.exists().then(|| text_file::yaml(&path)).transpose()
+    };
     Ok(RunContext {
         start_time_nanos,
         scenario_name: scenario.name.clone(),
         seed: None,
         commit: env!("ABBE_COMMIT").to_owned(),
-        machine_file: read("machine.yaml"),
-        scenario_file: read("scenario.yaml"),
+        machine_file: read("machine.yaml")?,
+        scenario_file: read("scenario.yaml")?,
         programs,
         parameters,
         ..RunContext::default()

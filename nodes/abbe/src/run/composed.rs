@@ -8,20 +8,22 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use abbe_msgs::SERVICE_EVENT_SUFFIX;
+use abbe_msgs::{SERVICE_EVENT_SUFFIX, topics};
 use anyhow::{Context, Result, bail};
+use metrology::epoch;
 use metrology::sample::PlanState;
 use metrology::stamp::{Host, Span, Stamp};
 use node_runtime::arguments::Arguments;
 use node_runtime::harness::Published;
 use node_runtime::tap::Selection;
-use node_runtime::{Harness, Interruption, Node, Setup};
+use node_runtime::{Diagnostic, Harness, Interruption, Level, Node, Setup, complain};
 use recorder::{
     CALL_RECORD, ChannelId, MessageStamp, RecordedCall, Recorder, RecorderSink, RunNode,
 };
 
 use super::mirror::Mirror;
-use super::{INTERRUPTED, Outcome, bag};
+use super::{INTERRUPTED, NOT_RECORDED, Outcome, bag};
+use crate::alarm;
 use crate::evidence::Evidence;
 use crate::launch::LaunchNode;
 use crate::node;
@@ -34,6 +36,9 @@ const SHUTDOWN_PATIENCE: Span = Span::from_nanos(120_000_000_000);
 
 /// Nodes evaluate the last program of a plan after its end: this long the run goes on.
 const EVALUATION: Span = Span::from_nanos(3_000_000_000);
+
+/// Who says that a run cannot be recorded any more.
+const NAME: &str = "abbe_run";
 
 /// How a scenario is run.
 #[derive(Clone, Copy)]
@@ -58,8 +63,9 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
         .iter()
         .map(|node| Ok((node.name().to_owned(), bag::parameters(node.as_ref())?)))
         .collect::<Result<BTreeMap<_, _>>>()?;
-    let start = Stamp::from_nanos(start_s * metrology::stamp::NANOS_PER_S);
-    let start_nanos = u64::try_from(start.nanos()).context("simulated_start_s is below 0")?;
+    let start = epoch::whole_seconds(start_s, 0)
+        .map_err(|error| anyhow::anyhow!("simulated_start_s = {error}"))?;
+    let start_nanos = start.nanos().cast_unsigned();
     let mut harness = Harness::compose(nodes, start)?;
     let recorder = bag::begin(bag_path, scenario, parameters, start_nanos, Some(ran))?;
     record(&mut harness, &recorder, &scenario.file.recording.exclude)?;
@@ -69,7 +75,12 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
         None
     };
     let evidence = gather(&mut harness, &truth);
-    let failure = play(&mut harness, scenario, start, how, &evidence, &truth);
+    let watched = Watched {
+        evidence: &evidence,
+        truth: &truth,
+        sink: &recorder.sink(),
+    };
+    let failure = play(&mut harness, scenario, start, how, watched);
     if !how.interruption.is_forced() {
         recorder
             .sink()
@@ -80,16 +91,45 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
     if let Some(mirror) = mirror {
         mirror.finish()?;
     }
-    let summary = recorder.finish()?;
+    let sink = recorder.sink();
+    let finished = recorder.finish();
+    let stats = sink.stats();
     let evidence = Rc::try_unwrap(evidence)
         .map_err(|_| anyhow::anyhow!("an observer outlived its harness"))?
         .into_inner();
+    let (failure, trouble) = bag::ended(failure, finished.err());
     Ok(Outcome {
         evidence,
         failure,
-        recorded: summary.messages_written,
-        lost: summary.messages_lost,
+        recorded: stats.messages_written,
+        lost: stats.messages_lost,
+        trouble,
     })
+}
+
+/// What a run in simulated time is watched by.
+#[derive(Clone, Copy)]
+struct Watched<'w> {
+    evidence: &'w Rc<RefCell<Evidence>>,
+    truth: &'w Truth,
+    sink: &'w RecorderSink,
+}
+
+impl Watched<'_> {
+    /// The reason to call the plan off; a failure of the recording is reported at once.
+    fn called_off(&self, harness: &mut Harness, how: How<'_>) -> Option<String> {
+        if how.interruption.is_asked() {
+            return Some(INTERRUPTED.to_owned());
+        }
+        let reason = format!("{NOT_RECORDED}: {}", self.sink.stats().failure?);
+        complain!("abbe: {reason}");
+        let now = harness.now();
+        let message = alarm::message(NAME, &reason, now);
+        harness.inject(topics::DIAGNOSTICS.name, &message);
+        let diagnostic = Diagnostic::new(Level::Error, "recording", reason.clone());
+        self.evidence.borrow_mut().condition(now, NAME, &diagnostic);
+        Some(reason)
+    }
 }
 
 /// Which nodes run, in their order; a composition has no two of one name.
@@ -198,7 +238,7 @@ fn gather(harness: &mut Harness, truth: &Arc<Truth>) -> Rc<RefCell<Evidence>> {
         if wanted[published.topic] {
             let mut evidence = seen.borrow_mut();
             settle(&mut evidence, &truth);
-            evidence.message(&names[published.topic], published.bytes);
+            evidence.message(&names[published.topic], published.at, published.bytes);
             truth
                 .verifying
                 .store(evidence.verifying(), Ordering::Relaxed);
@@ -226,9 +266,11 @@ fn play(
     scenario: &Scenario,
     start: Stamp<Host>,
     how: How<'_>,
-    evidence: &Rc<RefCell<Evidence>>,
-    truth: &Truth,
+    watched: Watched<'_>,
 ) -> Option<String> {
+    let Watched {
+        evidence, truth, ..
+    } = watched;
     let title = format!("{}: {}", scenario.name, scenario.file.title);
     let mut progress = Progress::new(&title, start);
     let limit = start + Span::from_secs_f64(scenario.file.limit_min * 60.0);
@@ -241,8 +283,8 @@ fn play(
         if progress.due() {
             settle(&mut evidence.borrow_mut(), truth);
             progress.show(now, &evidence.borrow());
-            if how.interruption.is_asked() {
-                break Some(INTERRUPTED.to_owned());
+            if let Some(reason) = watched.called_off(harness, how) {
+                break Some(reason);
             }
         }
         match evidence
@@ -261,10 +303,9 @@ fn play(
             break None;
         }
         if now > limit {
-            break Some(format!(
-                "limit_min = {} min have passed",
-                scenario.file.limit_min
-            ));
+            let limit_min = scenario.file.limit_min;
+            let waits = evidence.borrow().waiting_for();
+            break Some(format!("limit_min = {limit_min} min have passed{waits}"));
         }
         if how.pace > 0.0 {
             let due = Duration::from_secs_f64((now - start).as_secs_f64() / how.pace);

@@ -17,7 +17,8 @@ use node_runtime::{HostTime, Interruption, Node, Running, Setup};
 use recorder::Recorder;
 use recorder_node::Capture;
 
-use super::{INTERRUPTED, Outcome, bag};
+use super::{INTERRUPTED, NOT_RECORDED, Outcome, bag};
+use crate::alarm::Alarm;
 use crate::launch::LaunchNode;
 use crate::node;
 use crate::progress::Progress;
@@ -33,6 +34,8 @@ use processes::Processes;
 const LOOK: Duration = Duration::from_millis(50);
 /// What the last program leads to is evaluated and recorded within this.
 const AFTERMATH: Duration = Duration::from_secs(1);
+/// Who says that a run cannot be recorded any more.
+const NAME: &str = "abbe_run";
 /// The recorder's own name on the graph.
 const TAP: &str = "abbe_run_tap";
 
@@ -67,28 +70,29 @@ pub fn run(
         Prepared::Here(nodes) => Cast::Here(node_runtime::launch(&environment, nodes)?),
         Prepared::Separate(_) => Cast::Separate(Processes::start(&scenario.nodes)?),
     };
-    let failure = play(scenario, &evidence, &mut cast, interruption);
+    let mut alarm = None;
+    let failed = || {
+        let reason = format!("{NOT_RECORDED}: {}", capture.stats().failure?);
+        alarm.get_or_insert_with(|| Alarm::raise(&environment, NAME, &reason));
+        Some(reason)
+    };
+    let failure = play(scenario, &evidence, &mut cast, interruption, failed);
     let _ = interruption.wait_until_forced(AFTERMATH);
     let stopped = cast.stop(interruption);
     let captured = capture.finish()?;
+    alarm.into_iter().for_each(Alarm::end);
     for word in capture_words(&captured) {
         complain!("abbe: {word}");
     }
-    let failure = failure
-        .or_else(|| stopped.err().map(|error| format!("{error:#}")))
-        .or_else(|| {
-            captured
-                .bag
-                .as_ref()
-                .err()
-                .map(|error| format!("bag: {error}"))
-        });
+    let failure = failure.or_else(|| stopped.err().map(|error| format!("{error:#}")));
+    let (failure, trouble) = bag::ended(failure, captured.bag.err());
     let evidence = std::mem::take(&mut *lock(&evidence)).into_evidence();
     Ok(Outcome {
         evidence,
         failure,
         recorded: captured.stats.messages_written,
         lost: captured.stats.messages_lost + captured.lost_on_network,
+        trouble,
     })
 }
 
@@ -184,7 +188,7 @@ impl Cast {
     fn ended(&mut self) -> Option<String> {
         match self {
             Self::Here(running) => running.ended().map(|error| format!("{error:#}")),
-            Self::Separate(processes) => processes.look(),
+            Self::Separate(processes) => processes.look().or_else(node_runtime::deafness),
         }
     }
 
@@ -205,6 +209,7 @@ fn play(
     evidence: &Mutex<GraphEvidence>,
     cast: &mut Cast,
     interruption: &Interruption,
+    mut not_recorded: impl FnMut() -> Option<String>,
 ) -> Option<String> {
     let title = format!("{}: {}", scenario.name, scenario.file.title);
     let mut progress = Progress::new(&title, Stamp::<Host>::from_nanos(0));
@@ -214,6 +219,9 @@ fn play(
         if interruption.wait(LOOK) {
             complain!("abbe: interrupted: the nodes wind down; a second Ctrl-C ends at once");
             break Some(INTERRUPTED.to_owned());
+        }
+        if let Some(reason) = not_recorded() {
+            break Some(reason);
         }
         let elapsed = began.elapsed();
         {
@@ -233,10 +241,9 @@ fn play(
             break Some(reason);
         }
         if elapsed > limit {
-            break Some(format!(
-                "limit_min = {} min have passed",
-                scenario.file.limit_min
-            ));
+            let limit_min = scenario.file.limit_min;
+            let waits = lock(evidence).evidence().waiting_for();
+            break Some(format!("limit_min = {limit_min} min have passed{waits}"));
         }
     };
     progress.finish(lock(evidence).evidence());

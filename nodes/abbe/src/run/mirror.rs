@@ -10,11 +10,10 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use abbe_msgs::builtin_interfaces::msg::Time;
 use abbe_msgs::rosgraph_msgs::msg::Clock;
 use abbe_msgs::{Durability, Message, Reliability, to_cdr, topics};
 use anyhow::{Context, Result};
-use metrology::stamp::{Host, NANOS_PER_S, Stamp};
+use metrology::stamp::{Host, Stamp};
 use node_runtime::complain;
 use node_runtime::environment::Environment;
 use node_runtime::harness::Published;
@@ -142,13 +141,9 @@ impl Showing {
     }
 }
 
-/// Simulated time for `/clock`; zero where ROS has no number for it.
+/// Simulated time for `/clock`.
 fn clock(at: Stamp<Host>) -> Clock {
-    let sec = i32::try_from(at.nanos().div_euclid(NANOS_PER_S));
-    let nanosec = u32::try_from(at.nanos().rem_euclid(NANOS_PER_S));
-    let clock = match (sec, nanosec) {
-        (Ok(sec), Ok(nanosec)) => Time { sec, nanosec },
-        _ => Time::default(),
-    };
-    Clock { clock }
+    Clock {
+        clock: abbe_msgs::time(at),
+    }
 }

@@ -29,13 +29,7 @@ pub fn of(evidence: &Evidence, lost_messages: u64) -> Vec<String> {
             "{lost_messages} messages are not in the bag: they were lost on the way to it"
         ));
     }
-    if !evidence.undecoded.is_empty() {
-        let n = evidence.undecoded.len();
-        lines.push(format!(
-            "{n} messages could not be decoded, the last: {}",
-            evidence.undecoded[n - 1]
-        ));
-    }
+    lines.extend(evidence.not_used());
     lines.extend(conditions(evidence));
     lines
 }
@@ -101,6 +95,9 @@ fn conditions(evidence: &Evidence) -> Vec<String> {
     let mut found = BTreeMap::<(&str, &str), Told<'_>>::new();
     for condition in &evidence.conditions {
         let (node, name) = (condition.node.as_str(), condition.diagnostic.name.as_ref());
+        if condition.is_of_start && evidence.start_up.has_passed(node, name) {
+            continue;
+        }
         let told = found.entry((node, name)).or_insert(Told {
             level: Level::Ok,
             times: 0,
@@ -197,9 +194,125 @@ mod tests {
         );
     }
 
+    /// Conditions of a controller as (second, name, level), with the second at which a program was proposed and that at
+    /// which it ended; what is listed at the end, by name.
+    fn listed(
+        reported: &[(i64, &'static str, Level)],
+        proposed_s: i64,
+        ended_s: i64,
+    ) -> Vec<String> {
+        let at =
+            |second: i64| Stamp::from_nanos(1_767_600_000_000_000_000 + second * 1_000_000_000);
+        let mut evidence = Evidence::default();
+        for second in 0..200 {
+            if second == proposed_s {
+                evidence.start_up.propose(at(second));
+            }
+            if second == ended_s {
+                evidence.start_up.work();
+            }
+            for (_, name, level) in reported.iter().filter(|(when, ..)| *when == second) {
+                let diagnostic = Diagnostic::new(*level, *name, (*name).to_owned());
+                evidence.condition(at(second), "controller", &diagnostic);
+            }
+        }
+        of(&evidence, 0)
+    }
+
+    #[test]
+    #[expect(clippy::too_many_lines, reason = "a table of cases")]
+    #[expect(clippy::type_complexity, reason = "a table of cases")]
+    fn states_that_a_start_passes_through_are_not_listed_unless_they_stay_or_return() {
+        use Level::{Error, Ok, Warn};
+        let start = [
+            (1, "stop", Warn),
+            (1, "drives", Warn),
+            (2, "homing", Warn),
+            (3, "stop", Ok),
+            (4, "drives", Ok),
+            (30, "homing", Ok),
+        ];
+        let with = |more: &[(i64, &'static str, Level)]| [&start[..], more].concat();
+        let table: [(&str, Vec<(i64, &'static str, Level)>, &[&str]); 12] = [
+            ("a normal start", with(&[]), &[]),
+            ("a program is proposed long before", with(&[]), &[]),
+            (
+                "states shown one after another",
+                vec![
+                    (1, "stop", Warn),
+                    (3, "stop", Ok),
+                    (4, "drives", Warn),
+                    (8, "drives", Ok),
+                    (9, "homing", Warn),
+                    (39, "homing", Ok),
+                ],
+                &[],
+            ),
+            (
+                "shown twice",
+                with(&[(31, "stop", Warn), (32, "stop", Ok)]),
+                &[],
+            ),
+            (
+                "one stays",
+                with(&[(2, "tool", Warn)]),
+                &["controller (tool): warning: tool"],
+            ),
+            (
+                "homing is not over",
+                start[..5].to_vec(),
+                &["controller (homing): warning: homing"],
+            ),
+            (
+                "over after the program has ended",
+                [&start[..5], &[(150, "homing", Ok)]].concat(),
+                &["came and went, 1 warnings: controller (homing); see the page"],
+            ),
+            (
+                "one returns in a program",
+                with(&[(70, "stop", Warn), (71, "stop", Ok)]),
+                &["came and went, 1 warnings: controller (stop); see the page"],
+            ),
+            (
+                "one returns and stays",
+                with(&[(150, "drives", Warn)]),
+                &["controller (drives): warning: drives"],
+            ),
+            (
+                "an error of the start",
+                with(&[(3, "servo", Error), (4, "servo", Ok)]),
+                &["controller (servo): error, over since: servo"],
+            ),
+            (
+                "one that comes when it was calm",
+                with(&[(60, "hot", Warn), (61, "hot", Ok)]),
+                &["came and went, 1 warnings: controller (hot); see the page"],
+            ),
+            (
+                "one that comes after the program",
+                with(&[(150, "hot", Warn), (151, "hot", Ok)]),
+                &["came and went, 1 warnings: controller (hot); see the page"],
+            ),
+        ];
+        for (what, reported, wanted) in table {
+            for proposed_s in [0, 5, 35] {
+                assert_eq!(
+                    listed(&reported, proposed_s, 120),
+                    wanted,
+                    "{what}, {proposed_s} s"
+                );
+            }
+        }
+        // Who speaks for the first time in the midst of a run is not starting.
+        let late = [(80, "hot", Warn), (81, "hot", Ok)];
+        assert_eq!(listed(&late, 5, 120).len(), 1);
+        assert!(listed(&late, 60, 120).is_empty());
+    }
+
     #[test]
     fn what_stands_at_the_end_is_named_and_what_went_is_counted() {
         let mut evidence = Evidence::default();
+        evidence.start_up.work();
         let mut tell = |level, name: &'static str, message: &str| {
             let diagnostic = Diagnostic::new(level, name, message.to_owned());
             evidence.condition(Stamp::from_nanos(0), "axis_compensation", &diagnostic);

@@ -53,7 +53,7 @@ impl TableTrial<'_> {
     }
 
     fn stops_of(&self, bag: &Path) -> Result<Stops> {
-        let tests = Tests::of(&Bag::open(bag)?)?;
+        let tests = Tests::of(&Bag::open(bag)?);
         let axis = self.table.axis;
         let found = tests.stops.into_iter().find(|stops| stops.axis == axis);
         found.with_context(|| {

@@ -15,6 +15,7 @@ use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use gap_diagnosis::{GapConfig, GapReport, Rule, diagnose};
 use machine::MachineFile;
 use machine::twin::Session;
+use node_runtime::text_file;
 use trials::baseline::{self, Names};
 use trials::{Method, Rig, Sample, measure};
 
@@ -128,7 +129,7 @@ pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Resu
     }
     let report = serde_json::from_slice(&output.stdout).context("report of abbe diagnose")?;
     let machine = if question.writes_machine {
-        let text = std::fs::read_to_string(&found)?;
+        let text = text_file::yaml(&found)?;
         Some(MachineFile::parse(&text, FOUND)?)
     } else {
         None

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use gap_diagnosis::Rule;
+use node_runtime::text_file;
 use trials::{Arm, Verdict};
 
 /// A journal that goes on.
@@ -22,11 +23,12 @@ impl Journal {
     /// When it cannot be read or written, or a line is no verdict.
     pub fn open(path: &Path) -> Result<Self> {
         let place = || format!("journal {}", path.display());
-        let text = match std::fs::read_to_string(path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(error) => return Err(error).with_context(place),
+        let bytes = match text_file::bytes(path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.is_absent() => Vec::new(),
+            Err(error) => return Err(error).context("journal"),
         };
+        let text = String::from_utf8(bytes).with_context(place)?;
         let whole = text.rfind('\n').map_or(0, |end| end + 1);
         let mut verdicts = Vec::new();
         for (number, line) in text[..whole].lines().enumerate() {

@@ -4,6 +4,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use node_runtime::text_file;
 use sha2::{Digest, Sha256};
 use trials::Truth;
 
@@ -49,15 +50,14 @@ impl Seal {
     /// When it cannot be read, or is another file than was shut.
     pub fn open(&self) -> Result<Truth> {
         mode(&self.path, OPEN)?;
-        let text = std::fs::read_to_string(&self.path)
-            .with_context(|| format!("seal {}", self.path.display()))?;
+        let text = text_file::bytes(&self.path).context("seal")?;
         if format!("{:x}", Sha256::digest(&text)) != self.sha256 {
             bail!(
                 "seal {}: was changed after it was shut",
                 self.path.display()
             );
         }
-        Ok(serde_json::from_str(&text)?)
+        Ok(serde_json::from_slice(&text)?)
     }
 }
 

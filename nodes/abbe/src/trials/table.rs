@@ -107,7 +107,7 @@ impl Table {
         let report = Report {
             title: TITLE.to_owned(),
             lines: vec![],
-            text: String::new(),
+            parts: vec![],
             body: html! {
                 h1 { (TITLE) }
                 @for line in &lines { p { (line) } }

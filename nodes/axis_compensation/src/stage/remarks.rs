@@ -73,7 +73,20 @@ impl AxisCompensationStage {
             return;
         };
         let position_mm = point_mm[axis.index()];
-        let change = self.spans[axis].look(drift, position_mm);
+        let policy = self.gate.policy();
+        let expanded_mm = |point_mm: &Vector3<f64>| {
+            let u_mm = drift_standard_uncertainty_mm(model, axis, point_mm, policy);
+            COVERAGE_FACTOR * u_mm.unwrap_or(f64::NAN)
+        };
+        let matters = || {
+            let mut end_mm = *point_mm;
+            end_mm[axis.index()] = position_mm.clamp(drift.span_mm.0, drift.span_mm.1);
+            let (there_mm, at_end_mm) = (expanded_mm(point_mm), expanded_mm(&end_mm));
+            // (2) of span_watch; a NaN matters.
+            let is_outweighed = there_mm * there_mm <= 2.0 * at_end_mm * at_end_mm;
+            !is_outweighed
+        };
+        let change = self.spans[axis].look(drift, position_mm, matters);
         out.extend(change.map(|change| {
             Output::Diagnostic(match change {
                 SpanChange::KeptWithin => Diagnostic::WithinSpan { axis },
@@ -82,9 +95,7 @@ impl AxisCompensationStage {
                     position_mm,
                     lower_mm: drift.span_mm.0,
                     upper_mm: drift.span_mm.1,
-                    expanded_uncertainty_mm: COVERAGE_FACTOR
-                        * drift_standard_uncertainty_mm(model, axis, point_mm, self.gate.policy())
-                            .unwrap_or(f64::NAN),
+                    expanded_uncertainty_mm: expanded_mm(point_mm),
                     greatest_mm: self.gate.expanded_uncertainty_mm(axis),
                 },
             })

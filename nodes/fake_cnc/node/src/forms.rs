@@ -3,13 +3,16 @@
 use std::cell::Cell;
 
 use abbe_msgs::action::{RunProgram, RunProgramFeedback, RunProgramGoal, RunProgramResult};
-use abbe_msgs::joint_state;
 use abbe_msgs::sensor_msgs::msg::JointState;
+use abbe_msgs::std_srvs::srv::TriggerResponse;
+use abbe_msgs::{joint_state, topics};
 use fake_cnc::{Input, Outcome, Output, ProgramState};
 use metrology::sample::{AxisState, GridSample, LengthSample, ProbeTrigger, TemperatureSample};
 use metrology::stamp::Span;
 use metrology::{Host, Stamp};
-use node_runtime::{Diagnostic, GoalSignal, GoalStatus, Level};
+use node_runtime::{Diagnostic, GoalSignal, GoalStatus, Level, Wiring};
+
+use crate::witness::Witnessed;
 
 /// Everybody's tools get positions at 50 Hz.
 const JOINT_PERIOD: Span = Span::from_nanos(20_000_000);
@@ -148,7 +151,33 @@ fn outcome_code(outcome: Outcome) -> u8 {
     }
 }
 
-pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
+/// What a person at the control has: its services and its conditions.
+pub(crate) fn at_the_control(wiring: Wiring<Witnessed>) -> Wiring<Witnessed> {
+    wiring
+        .service(&topics::PAUSE_PROGRAM, |_| Input::Pause, answer)
+        .service(&topics::RESUME_PROGRAM, |_| Input::Resume, answer)
+        .service(&topics::STEP_PROGRAM, |_| Input::StepBlock, answer)
+        .service(&topics::HOME, |_| Input::Home, answer)
+        .diagnose(condition)
+}
+
+/// The answer to a request of the control.
+fn answer(outcome: Result<&[Output], &str>) -> TriggerResponse {
+    let message = match outcome {
+        Ok(outputs) => outputs.iter().find_map(|output| match output {
+            Output::Answer(answer) => Some(answer.err()),
+            _ => None,
+        }),
+        Err(fault) => Some(Some(fault)),
+    };
+    let message = message.unwrap_or(Some("the control gave no answer"));
+    TriggerResponse {
+        success: message.is_none(),
+        message: message.unwrap_or_default().to_owned(),
+    }
+}
+
+fn condition(output: &Output) -> Option<Diagnostic> {
     let Output::Diagnostic(condition) = output else {
         return None;
     };
@@ -158,4 +187,26 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
         condition.name(),
         condition.to_string(),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_is_answered_with_done_or_with_the_reason() {
+        let done = answer(Ok(&[Output::AtRest, Output::Answer(Ok(()))]));
+        assert!(done.success && done.message.is_empty());
+        let refused = answer(Ok(&[Output::Answer(Err("no program is running"))]));
+        assert_eq!(
+            (refused.success, refused.message.as_str()),
+            (false, "no program is running")
+        );
+        let lost = answer(Err("the node is not configured"));
+        assert_eq!(
+            (lost.success, lost.message.as_str()),
+            (false, "the node is not configured")
+        );
+        assert!(!answer(Ok(&[])).success);
+    }
 }

@@ -1,9 +1,9 @@
 //! ROS shell of the fake machine.
 
 use abbe_msgs::topics;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use fake_cnc::config::PARAMETERS;
-use fake_cnc::{Cnc, Config, Input, Output, Plant};
+use fake_cnc::{Cnc, Config, Input, Output};
 use machine::MachineFile;
 use metrology::stamp::Span;
 use node_runtime::{Lifecycle, Node, Setup, Wiring};
@@ -33,19 +33,16 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
     let (path, text) = setup.file_text("machine_file")?;
     let of_machine = path.display().to_string();
     let machine = MachineFile::parse(&text, &of_machine)?;
-    let (path, text) = setup.file_text("plant_file")?;
-    let truth =
-        plant_file::read(&text).with_context(|| format!("plant file {}", path.display()))?;
-    let plant =
-        Plant::new(&machine, &truth).with_context(|| format!("plant file {}", path.display()))?;
+    let plant = plant_file::plant(setup, &machine)?;
     let cnc = Cnc::new(&config, &machine, plant)
+        .map_err(|error| anyhow!("{}", setup.placed(&error.to_string())))
         .with_context(|| format!("with the machine file {of_machine}"))?
         .inactive();
     let period = Span::from_secs_f64(machine.control.servo_period_ms / 1e3);
     let within = Span::from_secs_f64(config.rest_s());
     let at_rest = |output: &Output| *output == Output::AtRest;
     let lifecycle = Lifecycle::new(config.autostart, within, Input::Active, at_rest);
-    let mut wiring = Wiring::new(setup.name(), parameters, Witnessed { cnc, witness })
+    let wiring = Wiring::new(setup.name(), parameters, Witnessed { cnc, witness })
         .every(period, || Input::Tick)
         .on(&topics::COMPENSATION, Input::Compensation)
         .publish_in(
@@ -68,8 +65,8 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
             forms::run,
             forms::cancel,
             forms::signals,
-        )
-        .diagnose(forms::condition);
+        );
+    let mut wiring = forms::at_the_control(wiring);
     for sensor in &machine.temperature_sensors {
         let id = sensor.id.clone();
         wiring = wiring.publish_member(&topics::TEMPERATURE, &sensor.id, move |output| {

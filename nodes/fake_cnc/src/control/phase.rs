@@ -2,12 +2,13 @@
 
 use metrology::PerAxis;
 
+use super::waiting::Then;
 use super::{Control, Event, Run};
 use crate::hardware::Hardware;
 use crate::lookahead::Command;
 use crate::outcome::{Ending, ProgramState};
 use crate::path::{Segment, target};
-use crate::rs274::program::{Action, Motion, Touch};
+use crate::rs274::program::{Action, Motion, Touch, Wait};
 
 /// Periods for which the velocity loops brake after a following error.
 const BRAKING_PERIODS: u64 = 500;
@@ -36,6 +37,12 @@ pub(super) enum Phase {
     Dwelling {
         left: u64,
     },
+    /// Slowing down along the path before a feed hold.
+    Pausing,
+    /// At rest until somebody lets the program go on.
+    Waiting {
+        then: Then,
+    },
     /// Slowing down along the path before the end.
     Stopping {
         ending: Ending,
@@ -48,6 +55,19 @@ pub(super) enum Phase {
 }
 
 impl Phase {
+    /// Whether a probe that closes now has met something that no touch is about; one that leans on what it touched may
+    /// tremble there.
+    pub(super) const fn is_watched(&self, leans: bool) -> bool {
+        match self {
+            Self::Following | Self::Pausing => true,
+            Self::Settling { .. }
+            | Self::Leading { .. }
+            | Self::Dwelling { .. }
+            | Self::Waiting { .. } => !leans,
+            _ => false,
+        }
+    }
+
     pub(super) fn ending(&self) -> bool {
         matches!(self, Self::Stopping { .. } | Self::Braking { .. })
     }
@@ -57,6 +77,7 @@ impl Phase {
             Self::Idle if running => ProgramState::Running,
             Self::Idle => ProgramState::Idle,
             Self::Leading { .. } | Self::Touching { .. } | Self::Touched => ProgramState::Probing,
+            Self::Pausing | Self::Waiting { .. } => ProgramState::Holding,
             Self::Stopping { ending } | Self::Braking { ending, .. } => match ending {
                 Ending::Fault { .. } => ProgramState::Fault,
                 _ => ProgramState::Holding,
@@ -68,6 +89,16 @@ impl Phase {
 
 impl<H: Hardware> Control<H> {
     pub(super) fn brake(&mut self, ending: Ending) {
+        let is_along = matches!(
+            self.phase,
+            Phase::Following | Phase::Pausing | Phase::Stopping { .. }
+        );
+        let along = self.chain.tag().filter(|_| is_along);
+        if let (Some(run), Some(tag)) = (&mut self.run, along) {
+            // What follows on the path has not been done.
+            run.next = tag + 1;
+        }
+        self.rest = None;
         self.chain.clear();
         self.command.velocity = PerAxis::default();
         self.phase = Phase::Braking {
@@ -81,7 +112,10 @@ impl<H: Hardware> Control<H> {
         let settle = self.settings.settle;
         match &mut self.phase {
             Phase::Idle => {}
-            Phase::Following | Phase::Touched | Phase::Stopping { .. } if moving => {}
+            Phase::Following | Phase::Touched | Phase::Pausing | Phase::Stopping { .. }
+                if moving => {}
+            Phase::Pausing => self.rest_in_path(events),
+            Phase::Waiting { .. } => {}
             Phase::Following | Phase::Touched => self.phase = Phase::Settling { left: settle },
             Phase::Settling { left }
             | Phase::Leading { left }
@@ -120,8 +154,29 @@ impl<H: Hardware> Control<H> {
 
     fn end(&mut self, ending: Ending, events: &mut Vec<Event>) {
         self.spindle_rpm = 0.0;
+        self.leave_registers(&ending);
         self.phase = Phase::Idle;
+        self.rest = None;
+        self.no_longer_waits(events);
         events.push(Event::Ended(ending));
+    }
+
+    /// The state that the next program finds.
+    fn leave_registers(&mut self, ending: &Ending) {
+        let along = self.chain.tag().filter(|_| !self.chain.at_end());
+        let Some(run) = &self.run else {
+            return;
+        };
+        self.change_up_to(along.unwrap_or(run.next));
+        let restored = self
+            .run
+            .as_ref()
+            .and_then(|run| run.program.restored.as_deref());
+        match (restored, ending) {
+            (Some(found), _) => self.registers = *found,
+            (None, Ending::Done) => self.registers.end_program(),
+            (None, _) => {}
+        }
     }
 
     /// Forgets the ended program; gives its goal and the line of its last step taken.
@@ -131,45 +186,70 @@ impl<H: Hardware> Control<H> {
     }
 
     /// Takes steps until one of them needs time.
-    fn next_step(&mut self, events: &mut Vec<Event>) {
+    pub(super) fn next_step(&mut self, events: &mut Vec<Event>) {
         while let Some(step) = self
             .run
             .as_ref()
             .and_then(|run| run.program.steps.get(run.next).copied())
         {
-            match step.action {
-                Action::Move(_) => {
-                    if self.begin_chain() {
-                        self.phase = Phase::Following;
-                        return;
-                    }
-                    continue;
+            if self.waits_before(step.line, events) {
+                return;
+            }
+            if matches!(step.action, Action::Move(_)) {
+                if self.begin_chain() {
+                    return;
                 }
-                Action::Touch(..) => {
-                    self.phase = Phase::Leading {
-                        left: self.settings.touch_margin,
-                    };
-                }
-                Action::Dwell(time_s) => {
-                    self.phase = Phase::Dwelling {
-                        left: self.settings.periods(time_s),
-                    };
-                }
-                Action::Spindle(rpm) => self.spindle_rpm = rpm,
-                Action::Mount(device) => self.mount(device),
-                Action::ZeroGrid => self.hardware.zero_grid(),
-                Action::ZeroLength => self.hardware.zero_length(),
-                Action::End => {}
+                continue;
             }
             if let Some(run) = &mut self.run {
                 run.next += 1;
             }
-            match step.action {
-                Action::End => return self.end(Ending::Done, events),
-                Action::Spindle(_) | Action::Mount(_) | Action::ZeroGrid | Action::ZeroLength => {}
-                _ => return,
+            if self.take(&step.action, events) {
+                return;
             }
         }
+    }
+
+    /// Takes a step that is no motion; true where it needs time.
+    fn take(&mut self, action: &Action, events: &mut Vec<Event>) -> bool {
+        match *action {
+            Action::Move(_) => return false,
+            Action::Touch(..) => {
+                self.phase = Phase::Leading {
+                    left: self.settings.touch_margin,
+                };
+            }
+            Action::Dwell(time_s) => {
+                self.phase = Phase::Dwelling {
+                    left: self.settings.periods(time_s),
+                };
+            }
+            Action::Wait(Wait::OptionalStop) if !self.settings.optional_stop => return false,
+            Action::Wait(why) => self.wait(why, Then::Step, events),
+            Action::End => self.end(Ending::Done, events),
+            Action::Spindle(rpm) => {
+                self.spindle_rpm = rpm;
+                return false;
+            }
+            Action::Mount(device) => {
+                self.mount(device);
+                return false;
+            }
+            Action::ZeroGrid => {
+                self.hardware.zero_grid();
+                return false;
+            }
+            Action::ZeroLength => {
+                self.hardware.zero_length();
+                return false;
+            }
+            Action::Set(_) => {
+                let next = self.run.as_ref().map_or(0, |run| run.next);
+                self.change_up_to(next);
+                return false;
+            }
+        }
+        true
     }
 
     fn mount(&mut self, device: usize) {
@@ -182,21 +262,32 @@ impl<H: Hardware> Control<H> {
         }
     }
 
-    /// Plans every motion up to the next stop; false where none of them has a length.
-    fn begin_chain(&mut self) -> bool {
+    /// Plans every motion up to the next stop and begins it; false where none of them has a length.
+    pub(super) fn begin_chain(&mut self) -> bool {
+        let is_single = self.is_single();
         let Some(Run { program, next, .. }) = &mut self.run else {
             return false;
         };
         self.chain.clear();
         let mut at = self.command.position;
-        while let Some(step) = program.steps.get(*next) {
-            let Action::Move(motion) = &step.action else {
-                break;
-            };
-            if let Some(segment) = Segment::new(motion, &at, &self.settings.limits) {
-                self.chain.push(segment, *next);
+        let mut is_full = false;
+        if let Some((rest, tag)) = self.rest.take() {
+            at = *rest.end();
+            self.chain.push(rest, tag);
+            is_full = is_single;
+        }
+        while let Some(step) = program.steps.get(*next).filter(|_| !is_full) {
+            match &step.action {
+                Action::Move(motion) => {
+                    if let Some(segment) = Segment::new(motion, &at, &self.settings.limits) {
+                        self.chain.push(segment, *next);
+                    }
+                    at = target(motion, &at);
+                    is_full = is_single;
+                }
+                Action::Set(_) => {}
+                _ => break,
             }
-            at = target(motion, &at);
             *next += 1;
         }
         self.chain.plan(&self.settings.limits);
@@ -205,8 +296,11 @@ impl<H: Hardware> Control<H> {
                 position: at,
                 velocity: PerAxis::default(),
             };
+            return false;
         }
-        !self.chain.done()
+        self.leans = false;
+        self.phase = Phase::Following;
+        true
     }
 
     fn current_touch(&self) -> Option<(usize, u32, Motion, Touch)> {

@@ -1,6 +1,8 @@
 //! What can be wrong with a plant file, and with the two files together.
 
-use metrology::Axis;
+use metrology::number::{number, quantity, unit_of};
+use metrology::yaml::YamlError;
+use metrology::{Axis, BoundError};
 
 use super::file::Place;
 
@@ -12,10 +14,13 @@ pub enum PlantError {
     Syntax {
         /// What the reader found.
         #[from]
-        source: serde_saphyr::Error,
+        source: YamlError,
     },
+    /// A number is outside the range of any machine.
+    #[error(transparent)]
+    Bound(#[from] BoundError),
     /// A value is outside its range.
-    #[error("{place} = {value}: must be {limit}")]
+    #[error("{place} = {}: must be {limit}", of_key(place, *value))]
     OutOfRange {
         /// Path of the key, unit in its name.
         place: String,
@@ -62,8 +67,9 @@ pub enum PlantError {
     },
     /// A drive whose elastic mode is too fast for the servo period.
     #[error(
-        "drive {axis}: natural frequency times inner step = {product}: must be below {limit} \
-         (lower the stiffnesses or the servo period)"
+        "drive {axis}: natural frequency times inner step = {}: must be below {} \
+         (lower the stiffnesses or the servo period)",
+        number(*product), number(*limit)
     )]
     TooStiff {
         /// The axis.
@@ -72,6 +78,24 @@ pub enum PlantError {
         product: f64,
         /// Greatest allowed.
         limit: f64,
+    },
+    /// A spindle that would melt the machine.
+    #[error(
+        "heat.spindle: at the machine file's spindle.max_speed_rpm = {speed_rpm}, {place} settles at {temp_degc} °C: \
+         must be at most {limit_degc} °C (lower the speed or the losses, or raise the conductances)",
+        speed_rpm = quantity("speed_rpm", *speed_rpm),
+        temp_degc = number(*temp_degc),
+        limit_degc = number(*limit_degc)
+    )]
+    TooHot {
+        /// Greatest speed of the machine file, 1/min.
+        speed_rpm: f64,
+        /// The hottest place.
+        place: Place,
+        /// Where it settles.
+        temp_degc: f64,
+        /// The greatest temperature allowed.
+        limit_degc: f64,
     },
     /// A lumped place without an entry.
     #[error("heat.places: no entry for {place}")]
@@ -99,6 +123,15 @@ pub enum PlantError {
         /// The normal as written.
         normal: [f64; 3],
     },
+}
+
+/// A number with the unit of its key, or of the key above it, as in `standing_heat_w.bed`.
+fn of_key(place: &str, value: f64) -> String {
+    let above = place.rsplit_once('.').map(|(above, _)| above);
+    match above.filter(|_| unit_of(place).is_none()) {
+        Some(above) => quantity(above, value),
+        None => quantity(place, value),
+    }
 }
 
 /// Refuses a value outside `limit`.
@@ -142,4 +175,30 @@ pub(super) fn require_not_negative(place: impl Into<String>, value: f64) -> Resu
 /// Refuses infinities and NaN.
 pub(super) fn require_finite(place: impl Into<String>, value: f64) -> Result<(), PlantError> {
     require(value.is_finite(), place, value, "finite")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_below_a_key_has_the_unit_of_the_key() {
+        for (place, words) in [
+            (
+                "heat.standing_heat_w.bed",
+                "heat.standing_heat_w.bed = -1 W: must be",
+            ),
+            (
+                "drives.X.torque_limit_n_m",
+                "= -1 N m: must be finite and above 0",
+            ),
+            (
+                "heat.spindle.motor_exponent",
+                "heat.spindle.motor_exponent = -1: must be",
+            ),
+        ] {
+            let said = require_positive(place, -1.0).unwrap_err().to_string();
+            assert!(said.contains(words), "{said}");
+        }
+    }
 }

@@ -77,6 +77,6 @@ impl PlantFile {
     /// # Errors
     /// When a key is unknown, missing or of the wrong type; the message has line and column.
     pub fn from_yaml(text: &str) -> Result<Self, PlantError> {
-        Ok(serde_saphyr::from_str(text)?)
+        Ok(metrology::yaml::read(text)?)
     }
 }

@@ -24,6 +24,11 @@ use super::thermometer::{Thermometer, nut_axis};
 /// Time between heat steps, s.
 pub(super) const HEAT_STEP_S: f64 = 1.0;
 
+/// Temperature that no place of a machine tool survives, °C.
+const HOTTEST_DEGC: f64 = 300.0;
+/// Greatest exponent of a loss over speed; air friction has 3.
+const GREATEST_EXPONENT: f64 = 5.0;
+
 /// A screw, and which castings it stands on.
 #[derive(Clone, Debug)]
 struct MountedScrew {
@@ -74,6 +79,7 @@ impl Heat {
             require_not_negative(format!("heat.standing_heat_w.{place}"), power_w)?;
             standing_w[place as usize] = power_w;
         }
+        check_spindle_heat(machine, truth, &standing_w)?;
         let mut built = Self {
             network: Network::new(heat, HEAT_STEP_S)?,
             air: ShopAir::new(&heat.shop_air, truth.seed, HEAT_STEP_S)?,
@@ -279,6 +285,44 @@ fn spindle_w(entry: &SpindleLossEntry, spindle_rpm: f64) -> [f64; 3] {
     ]
 }
 
+/// At its greatest speed the spindle must settle at a temperature that a machine survives.
+fn check_spindle_heat(
+    machine: &MachineFile,
+    truth: &PlantFile,
+    standing_w: &[f64; Place::COUNT],
+) -> Result<(), PlantError> {
+    let Some(spindle) = &machine.spindle else {
+        return Ok(());
+    };
+    let heat = &truth.heat;
+    let [front, rear, motor] = spindle_w(&heat.spindle, spindle.max_speed_rpm);
+    let mut heat_w = *standing_w;
+    heat_w[Place::SpindleFront as usize] += front;
+    heat_w[Place::SpindleRear as usize] += rear;
+    heat_w[Place::SpindleMotor as usize] += motor;
+    let settled = Network::settled_degc(heat, &heat_w, heat.shop_air.start_temp_degc)?;
+    let hottest = Place::ALL
+        .into_iter()
+        .map(|place| {
+            (
+                place,
+                settled.map_or(f64::INFINITY, |all| all[place as usize]),
+            )
+        })
+        .max_by(|(_, a), (_, b)| a.total_cmp(b));
+    match hottest {
+        // Written so that a temperature that is no number is refused as well.
+        Some((_, temp_degc)) if temp_degc <= HOTTEST_DEGC => Ok(()),
+        Some((place, temp_degc)) => Err(PlantError::TooHot {
+            speed_rpm: spindle.max_speed_rpm,
+            place,
+            temp_degc: temp_degc.round(),
+            limit_degc: HOTTEST_DEGC,
+        }),
+        None => Ok(()),
+    }
+}
+
 fn check_spindle(entry: &SpindleLossEntry) -> Result<(), PlantError> {
     let at = |key: &str| format!("heat.spindle.{key}");
     require_not_negative(
@@ -290,6 +334,12 @@ fn check_spindle(entry: &SpindleLossEntry) -> Result<(), PlantError> {
         entry.rear_bearing_w_at_1000_rpm,
     )?;
     require_not_negative(at("motor_w_at_1000_rpm"), entry.motor_w_at_1000_rpm)?;
-    require_positive(at("bearing_exponent"), entry.bearing_exponent)?;
-    require_positive(at("motor_exponent"), entry.motor_exponent)
+    for (key, exponent) in [
+        ("bearing_exponent", entry.bearing_exponent),
+        ("motor_exponent", entry.motor_exponent),
+    ] {
+        let holds = exponent > 0.0 && exponent <= GREATEST_EXPONENT;
+        require(holds, at(key), exponent, "above 0 and at most 5")?;
+    }
+    Ok(())
 }

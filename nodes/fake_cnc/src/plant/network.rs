@@ -17,7 +17,7 @@
 //! # References
 //! \[1\] C. F. Van Loan, IEEE Trans. Autom. Control 23(3), 1978, doi:10.1109/TAC.1978.1101743, for (2).
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::error::{PlantError, require_not_negative, require_positive};
 use super::file::{HeatEntry, Place};
@@ -68,6 +68,19 @@ impl Network {
     #[cfg(test)]
     pub(super) fn set_degc(&mut self, place: Place, temp_degc: f64) {
         self.temp_degc[place as usize] = temp_degc;
+    }
+
+    /// Where each place settles under constant heat (W) and air temperature, °C; `None` where heat cannot leave.
+    pub(super) fn settled_degc(
+        heat: &HeatEntry,
+        heat_w: &[f64; N],
+        air_degc: f64,
+    ) -> Result<Option<[f64; N]>, PlantError> {
+        let (_, rates) = balance(heat)?;
+        let losses = DMatrix::from_fn(N, N, |i, j| -rates[i][j]);
+        let sources = DVector::from_fn(N, |i, _| heat_w[i] + rates[i][N] * air_degc);
+        let settled = losses.lu().solve(&sources);
+        Ok(settled.map(|settled| std::array::from_fn(|i| settled[i])))
     }
 
     /// One step under constant heat (W) and air temperature.

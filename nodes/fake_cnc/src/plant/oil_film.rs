@@ -270,7 +270,7 @@ mod tests {
         let told = OilFilm::draw(1, Axis::X, TRAVEL_MM, &short).unwrap_err();
         assert_eq!(
             told.to_string(),
-            "oil_film.X.length_mm = 31: must be finite and not below a twentieth of the travel"
+            "oil_film.X.length_mm = 31 mm: must be finite and not below a twentieth of the travel"
         );
     }
 }

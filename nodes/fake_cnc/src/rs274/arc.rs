@@ -50,6 +50,8 @@ fn offset_letter(axis: Axis) -> char {
 }
 
 /// Centre from the start, mm, of the arc that `block` describes; `end_mm` is its end from its start.
+///
+/// With `start_mm` the centre's words are a point of the same coordinates (G90.1), and both must be there.
 pub fn centre_from_start(
     block: &Block,
     word: &Word,
@@ -57,6 +59,7 @@ pub fn centre_from_start(
     clockwise: bool,
     end_mm: [f64; 2],
     mm_per_unit: f64,
+    start_mm: Option<[f64; 2]>,
 ) -> Result<[f64; 2], ProgramError> {
     let [first, second, normal] = plane.axes();
     if let Some(stray) = block.word(offset_letter(normal)) {
@@ -91,7 +94,18 @@ pub fn centre_from_start(
             needs: "R, or the centre along an axis of its plane",
         }),
         (None, offsets) => {
-            let centre = offsets.map(|offset| offset.map_or(0.0, |w| w.value * mm_per_unit));
+            let words = offsets.map(|offset| offset.map(|word| word.value * mm_per_unit));
+            let centre = match (words, start_mm) {
+                (words, None) => words.map(|word| word.unwrap_or(0.0)),
+                ([Some(first), Some(second)], Some(start)) => [first - start[0], second - start[1]],
+                (_, Some(_)) => {
+                    return Err(ProgramError::Needs {
+                        at: block.at(word),
+                        word: word.text(),
+                        needs: "both coordinates of its centre, by G90.1",
+                    });
+                }
+            };
             check_radii(block, word, centre, end_mm)?;
             Ok(centre)
         }

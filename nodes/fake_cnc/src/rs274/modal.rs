@@ -1,85 +1,70 @@
-//! Modal state: turns blocks into steps and checks each against the machine.
+//! Reads a program block by block: what each changes, does, and what it may not.
 
-use std::f64::consts::PI;
+use metrology::{AxisSet, PerAxis};
 
-use metrology::{Axis, AxisSet, PerAxis};
-
-use super::arc;
-use super::block::{Block, Mode, NonModal, Said};
-use super::program::{Action, Aim, Arc, Feed, Motion, Plane, Program, Step, Touch};
+use super::block::{Block, Mode, NonModal, Said, Stop};
+use super::bounds;
+use super::program::{Action, Feed, Program, Step};
+use super::reach::Reach;
+use super::registers::{Change, Modes, Registers};
 use super::words::{Comment, Line, Word, read_line};
 use crate::error::{Place, ProgramError};
-use crate::sweep::Sweep;
 
-/// Lines that a program may have.
-const LINES_LIMIT: u32 = 1_000_000;
-/// Rounding that a position may exceed its limit by, mm or rad.
-const TRAVEL_ROUNDING: f64 = 1e-9;
 const MM_PER_INCH: f64 = 25.4;
 
 /// What a program is checked against.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Envelope {
     /// The machine's axes.
     pub axes: AxisSet,
     /// Least and greatest command of each, mm or rad.
     pub travel: PerAxis<[f64; 2]>,
+    /// Greatest speed of each, mm/s or rad/s.
+    pub speed: PerAxis<f64>,
+    /// Greatest speed of the spindle, where there is one, 1/min.
+    pub spindle_limit_rpm: Option<f64>,
+    /// Length of tools H1, H2 ..., mm.
+    pub tool_lengths_mm: Vec<f64>,
 }
 
-/// Where an axis can be at some line: one value, or anywhere that a touch may have ended.
-#[derive(Clone, Copy, Debug)]
-struct Reach {
-    least: f64,
-    greatest: f64,
-}
-
-impl Reach {
-    const fn at(value: f64) -> Self {
-        Self {
-            least: value,
-            greatest: value,
-        }
-    }
-
-    fn known(self) -> Option<f64> {
-        (self.greatest <= self.least).then_some(self.least)
-    }
-
-    fn hull(self, other: Self) -> Self {
-        Self {
-            least: self.least.min(other.least),
-            greatest: self.greatest.max(other.greatest),
-        }
-    }
-}
-
-struct Reader<'a> {
-    envelope: &'a Envelope,
-    program: Program,
-    reach: PerAxis<Reach>,
+pub(super) struct Reader<'a> {
+    pub(super) envelope: &'a Envelope,
+    pub(super) program: Program,
+    pub(super) reach: PerAxis<Reach>,
+    pub(super) registers: Registers,
     mode: Option<Mode>,
-    plane: Plane,
-    inch: bool,
-    incremental: bool,
-    feed: Feed,
-    feed_per_min: f64,
+    pub(super) feed: Feed,
+    pub(super) feed_per_min: f64,
     spindle_rpm: f64,
     spindle_turning: bool,
-    feature: usize,
+    pub(super) feature: usize,
     full_rate: bool,
     ended: bool,
 }
 
-/// Reads and checks a whole program that starts with the axes at `start` (mm, rad).
-///
-/// Modal state at the start is G17 G21 G90, no motion mode, no feed, spindle speed 0.
+/// Reads and checks a whole program for a control that was just switched on, with the axes at `start` (mm, rad).
 ///
 /// # Errors
-/// The first thing that this control could not execute as written, with its place.
+/// As [`read_in`].
 pub fn read(
     text: &str,
     envelope: &Envelope,
     start: &PerAxis<f64>,
+) -> Result<Program, ProgramError> {
+    read_in(text, envelope, start, &Registers::default())
+}
+
+/// Reads and checks a whole program that starts with the axes at `start` (mm, rad), in the state `found`.
+///
+/// What is not in [`Registers`] begins anew: no motion mode, no feed, spindle speed 0.
+///
+/// # Errors
+/// The first thing that this control could not execute as written, with its place.
+pub fn read_in(
+    text: &str,
+    envelope: &Envelope,
+    start: &PerAxis<f64>,
+    found: &Registers,
 ) -> Result<Program, ProgramError> {
     let mut reader = Reader {
         envelope,
@@ -88,10 +73,8 @@ pub fn read(
             ..Program::default()
         },
         reach: PerAxis::from_fn(|axis| Reach::at(start[axis])),
+        registers: *found,
         mode: None,
-        plane: Plane::Xy,
-        inch: false,
-        incremental: false,
         feed: Feed::Rate {
             linear_mm_s: 0.0,
             rotary_rad_s: 0.0,
@@ -106,10 +89,10 @@ pub fn read(
     let mut number = 0;
     for text in text.lines() {
         number += 1;
-        if number > LINES_LIMIT {
+        if number > bounds::LINES {
             return Err(ProgramError::TooLong {
                 line: number,
-                limit: LINES_LIMIT,
+                limit: bounds::LINES,
             });
         }
         reader.line(&read_line(number, text)?)?;
@@ -130,7 +113,7 @@ impl Reader<'_> {
             });
         }
         for comment in &line.comments {
-            self.comment(line.number, comment)?;
+            self.comment(line, comment)?;
         }
         let block = Block::read(line, self.envelope.axes)?;
         self.feed_word(&block)?;
@@ -143,41 +126,49 @@ impl Reader<'_> {
         {
             self.dwell(&block, &word, mode.as_ref())?;
         }
-        self.plane = block.plane.map_or(self.plane, |said| said.what);
-        self.inch = block.inch.map_or(self.inch, |said| said.what);
-        self.incremental = block.incremental.map_or(self.incremental, |said| said.what);
+        self.modes(&block)?;
         self.unused(&block, mode.as_ref())?;
+        self.settings(&block)?;
         self.machine_coordinates(&block, mode.as_ref())?;
         if let Some(said) = mode {
             self.motion(&block, &said)?;
         }
-        self.mode = block.mode.map_or(self.mode, |said| Some(said.what));
-        if block.end.is_some() {
-            self.push(&block, Action::End);
-            self.ended = true;
+        if let Some(said) = block.mode {
+            self.mode = Some(said.what).filter(|mode| *mode != Mode::Cancelled);
         }
+        match block.stop.map(|said| said.what) {
+            None => Ok(()),
+            Some(Stop::Wait(why)) => self.push(block.line, Action::Wait(why)),
+            Some(Stop::End) => {
+                self.ended = true;
+                self.push(block.line, Action::End)
+            }
+        }
+    }
+
+    pub(super) fn push(&mut self, line: u32, action: Action) -> Result<(), ProgramError> {
+        bounds::check_count(line, "steps", self.program.steps.len())?;
+        self.program.steps.push(Step {
+            line,
+            full_rate: self.full_rate,
+            action,
+        });
         Ok(())
     }
 
-    fn push(&mut self, block: &Block, action: Action) {
-        self.program.steps.push(Step {
-            line: block.line,
-            full_rate: self.full_rate,
-            action,
-        });
+    /// Makes a change of the state, where it is one, here and when the program runs.
+    pub(super) fn change(&mut self, line: u32, change: Change) -> Result<(), ProgramError> {
+        let before = self.registers;
+        self.registers.apply(&change);
+        if self.registers == before {
+            return Ok(());
+        }
+        self.push(line, Action::Set(change))
     }
 
-    fn push_comment(&mut self, line: u32, action: Action) {
-        self.program.steps.push(Step {
-            line,
-            full_rate: self.full_rate,
-            action,
-        });
-    }
-
-    fn comment(&mut self, line: u32, comment: &Comment<'_>) -> Result<(), ProgramError> {
+    fn comment(&mut self, line: &Line<'_>, comment: &Comment<'_>) -> Result<(), ProgramError> {
         let at = Place {
-            line,
+            line: line.number,
             column: comment.column,
         };
         let refuse = |what, rule| {
@@ -195,6 +186,7 @@ impl Reader<'_> {
             ("feature", "") => return refuse("feature", "followed by a name"),
             ("feature", name) => {
                 self.feature = self.program.features.len();
+                bounds::check_count(at.line, "feature comments", self.feature)?;
                 self.program.features.push(name.to_owned());
             }
             ("rate", "full") => self.full_rate = true,
@@ -203,15 +195,34 @@ impl Reader<'_> {
             ("mount", "") => return refuse("mount", "followed by a placement or beam"),
             ("mount", name) => {
                 let index = self.program.devices.len();
+                self.push(at.line, Action::Mount(index))?;
                 self.program.devices.push((name.to_owned(), at));
-                self.push_comment(line, Action::Mount(index));
             }
-            ("zero", "grid") => self.push_comment(line, Action::ZeroGrid),
-            ("zero", "length") => self.push_comment(line, Action::ZeroLength),
+            ("zero", "grid") => self.push(at.line, Action::ZeroGrid)?,
+            ("zero", "length") => self.push(at.line, Action::ZeroLength)?,
             ("zero", _) => return refuse("zero", "grid or length"),
+            (key, frame) if key.eq_ignore_ascii_case("frame") => {
+                if !frame.eq_ignore_ascii_case("machine") {
+                    let rule = "machine; without it a program is in the work system in use";
+                    return refuse("frame", rule);
+                }
+                if !self.may_choose_frame(line, comment) {
+                    return refuse("frame", "once, in parentheses, on line 1, before any word");
+                }
+                self.machine_frame(at)?;
+            }
             _ => {}
         }
         Ok(())
+    }
+
+    fn may_choose_frame(&self, line: &Line<'_>, comment: &Comment<'_>) -> bool {
+        let is_first = line
+            .words
+            .first()
+            .is_none_or(|word| comment.column < word.column);
+        let is_single = self.program.restored.is_none();
+        line.number == 1 && is_first && is_single && !comment.is_tail
     }
 
     fn feed_word(&mut self, block: &Block) -> Result<(), ProgramError> {
@@ -229,8 +240,7 @@ impl Reader<'_> {
 
     fn spindle(&mut self, block: &Block) -> Result<(), ProgramError> {
         if let Some(word) = block.word('S') {
-            not_negative(block, word)?;
-            self.spindle_rpm = word.value;
+            self.spindle_rpm = self.spindle_speed(block, word)?;
         }
         self.spindle_turning = block.spindle.map_or(self.spindle_turning, |s| s.what);
         if block.spindle.is_some() || (block.word('S').is_some() && self.spindle_turning) {
@@ -239,18 +249,51 @@ impl Reader<'_> {
             } else {
                 0.0
             };
-            self.push(block, Action::Spindle(rpm));
+            self.push(block.line, Action::Spindle(rpm))?;
         }
         Ok(())
     }
 
-    /// The motion of this block: said in it, or modal where there are axis words.
+    fn spindle_speed(&self, block: &Block, word: &Word) -> Result<f64, ProgramError> {
+        not_negative(block, word)?;
+        let (at, speed_rpm) = (block.at(word), word.value);
+        match self.envelope.spindle_limit_rpm {
+            Some(limit_rpm) if speed_rpm > limit_rpm => Err(ProgramError::SpindleSpeed {
+                at,
+                speed_rpm,
+                limit_rpm,
+            }),
+            None if speed_rpm > 0.0 => Err(ProgramError::NoSpindle { at, speed_rpm }),
+            _ => Ok(speed_rpm),
+        }
+    }
+
+    /// The motion of this block: said in it, or modal where there are axis words that nothing else takes.
     fn mode_of(&self, block: &Block) -> Result<Option<Said<Mode>>, ProgramError> {
-        if block.mode.is_some() {
-            return Ok(block.mode);
+        let taken = block.takes_axes();
+        if let Some(said) = block.mode {
+            let stray = match (said.what, taken) {
+                (Mode::Cancelled, None) => block.first_axis(),
+                (Mode::Cancelled, Some(_)) | (_, None) => None,
+                (_, Some(other)) => {
+                    return Err(ProgramError::Conflict {
+                        at: block.at(&said.word),
+                        word: said.word.text(),
+                        other: other.text(),
+                    });
+                }
+            };
+            if let Some(word) = stray {
+                return Err(ProgramError::UnusedWord {
+                    at: block.at(word),
+                    word: word.text(),
+                });
+            }
+            return Ok(Some(said).filter(|said| said.what != Mode::Cancelled));
         }
         match (block.first_axis(), self.mode) {
             (None, _) => Ok(None),
+            (Some(_), _) if taken.is_some() => Ok(None),
             (Some(&word), Some(what)) => Ok(Some(Said { what, word })),
             (Some(word), None) => Err(ProgramError::Needs {
                 at: block.at(word),
@@ -280,18 +323,51 @@ impl Reader<'_> {
                 needs: "P, its time in seconds",
             });
         };
-        not_negative(block, seconds)?;
-        self.push(block, Action::Dwell(seconds.value));
-        Ok(())
+        if seconds.value > bounds::DWELL_S {
+            return Err(ProgramError::Value {
+                at: block.at(seconds),
+                word: 'P',
+                value: seconds.value,
+                rule: "at most 86400 s, a day, of a dwell",
+            });
+        }
+        self.push(block.line, Action::Dwell(seconds.value))
+    }
+
+    fn modes(&mut self, block: &Block) -> Result<(), ProgramError> {
+        let now = self.registers.modes;
+        let modes = Modes {
+            plane: block.plane.map_or(now.plane, |said| said.what),
+            is_inch: block.inch.map_or(now.is_inch, |said| said.what),
+            is_incremental: block.incremental.map_or(now.is_incremental, |s| s.what),
+            has_absolute_centres: block
+                .absolute_centres
+                .map_or(now.has_absolute_centres, |said| said.what),
+            path: block.path.map_or(now.path, |said| said.what),
+        };
+        self.change(block.line, Change::Modes(modes))
     }
 
     /// Refuses words that nothing in the block uses.
     fn unused(&self, block: &Block, mode: Option<&Said<Mode>>) -> Result<(), ProgramError> {
         let arc = matches!(mode.map(|said| said.what), Some(Mode::Arc { .. }));
-        let dwell = matches!(block.non_modal.map(|s| s.what), Some(NonModal::Dwell));
-        let strays = "IJKR".chars().filter(|_| !arc);
-        let stray_p = Some('P').filter(|_| !arc && !dwell);
-        match strays.chain(stray_p).find_map(|letter| block.word(letter)) {
+        let non_modal = block.non_modal.map(|said| said.what);
+        let dwell = non_modal == Some(NonModal::Dwell);
+        let system = non_modal == Some(NonModal::SetSystem);
+        let blend = block.is_blend();
+        let used = |letter| match letter {
+            'I' | 'J' | 'K' => arc,
+            'R' => arc || system,
+            'P' => arc || dwell || system || blend,
+            'Q' => blend,
+            'L' => system,
+            _ => block.is_tool_from_table(),
+        };
+        match "IJKRPQLH"
+            .chars()
+            .filter(|letter| !used(*letter))
+            .find_map(|letter| block.word(letter))
+        {
             None => Ok(()),
             Some(word) => Err(ProgramError::UnusedWord {
                 at: block.at(word),
@@ -313,7 +389,9 @@ impl Reader<'_> {
             return Ok(());
         };
         let needs = match mode.map(|said| said.what) {
-            Some(Mode::Rapid | Mode::Straight) if !self.incremental => return Ok(()),
+            Some(Mode::Rapid | Mode::Straight) if !self.registers.modes.is_incremental => {
+                return Ok(());
+            }
             Some(Mode::Rapid | Mode::Straight) => "G90",
             _ => "a motion by G0 or G1",
         };
@@ -324,195 +402,16 @@ impl Reader<'_> {
         })
     }
 
-    fn mm_per_unit(&self) -> f64 {
-        if self.inch { MM_PER_INCH } else { 1.0 }
-    }
-
-    fn motion(&mut self, block: &Block, said: &Said<Mode>) -> Result<(), ProgramError> {
-        let word = &said.word;
-        if said.what != Mode::Rapid && self.feed_per_min <= 0.0 {
-            return Err(ProgramError::Feed {
-                at: block.at(word),
-                word: word.text(),
-                feed: self.feed_per_min,
-            });
-        }
-        let aim = self.aim(block);
-        let mut motion = Motion {
-            aim,
-            arc: None,
-            feed: self.feed,
-        };
-        match said.what {
-            Mode::Rapid => motion.feed = Feed::Rapid,
-            Mode::Straight => {}
-            Mode::Arc { clockwise } => {
-                motion.arc = Some(self.arc(block, word, &aim, clockwise)?);
-            }
-            Mode::Touch {
-                until_closed,
-                must_happen,
-            } => {
-                let touch = Touch {
-                    until_closed,
-                    must_happen,
-                    feature: self.feature,
-                };
-                return self.touch(block, word, motion, touch);
-            }
-        }
-        self.go(block, word, &aim)?;
-        self.push(block, Action::Move(motion));
-        Ok(())
-    }
-
-    fn aim(&self, block: &Block) -> PerAxis<Aim> {
-        PerAxis::from_fn(|axis| {
-            let Some(word) = block.axis(axis) else {
-                return Aim::Keep;
-            };
-            let value = if axis.is_linear() {
-                word.value * self.mm_per_unit()
-            } else {
-                word.value.to_radians()
-            };
-            match (self.incremental, self.reach[axis].known()) {
-                (false, _) => Aim::At(value),
-                (true, Some(from)) => Aim::At(from + value),
-                (true, None) => Aim::By(value),
-            }
-        })
-    }
-
-    /// Where `aim` leads each axis, refused beyond its travel.
-    fn target(
-        &self,
-        block: &Block,
-        word: &Word,
-        aim: &PerAxis<Aim>,
-    ) -> Result<PerAxis<Reach>, ProgramError> {
-        let target = PerAxis::from_fn(|axis| match (aim[axis], self.reach[axis]) {
-            (Aim::Keep, reach) => reach,
-            (Aim::At(value), _) => Reach::at(value),
-            (Aim::By(step), reach) => Reach {
-                least: reach.least + step,
-                greatest: reach.greatest + step,
-            },
-        });
-        for axis in self.envelope.axes.iter() {
-            let word = block.axis(axis).unwrap_or(word);
-            if aim[axis] != Aim::Keep {
-                self.within(block.at(word), axis, target[axis])?;
-            }
-        }
-        Ok(target)
-    }
-
-    fn within(&self, at: Place, axis: Axis, reach: Reach) -> Result<(), ProgramError> {
-        let [least, greatest] = self.envelope.travel[axis];
-        let (value, limit) = if reach.least < least - TRAVEL_ROUNDING {
-            (reach.least, least)
-        } else if reach.greatest > greatest + TRAVEL_ROUNDING {
-            (reach.greatest, greatest)
+    pub(super) const fn mm_per_unit(&self) -> f64 {
+        if self.registers.modes.is_inch {
+            MM_PER_INCH
         } else {
-            return Ok(());
-        };
-        let (scale, unit) = if axis.is_linear() {
-            (1.0, "mm")
-        } else {
-            (180.0 / PI, "deg")
-        };
-        Err(ProgramError::Travel {
-            at,
-            axis,
-            value: value * scale,
-            limit: limit * scale,
-            unit,
-        })
-    }
-
-    fn go(&mut self, block: &Block, word: &Word, aim: &PerAxis<Aim>) -> Result<(), ProgramError> {
-        self.reach = self.target(block, word, aim)?;
-        Ok(())
-    }
-
-    fn arc(
-        &self,
-        block: &Block,
-        word: &Word,
-        aim: &PerAxis<Aim>,
-        clockwise: bool,
-    ) -> Result<Arc, ProgramError> {
-        let at = block.at(word);
-        let [first, second, _] = self.plane.axes();
-        let step = |axis: Axis| match (aim[axis], self.reach[axis].known()) {
-            (Aim::Keep, _) => Ok(0.0),
-            (Aim::By(step), _) => Ok(step),
-            (Aim::At(value), Some(from)) => Ok(value - from),
-            (Aim::At(_), None) => Err(ProgramError::ArcAfterTouch { at }),
-        };
-        let end_mm = [step(first)?, step(second)?];
-        let centre_from_start_mm = arc::centre_from_start(
-            block,
-            word,
-            self.plane,
-            clockwise,
-            end_mm,
-            self.mm_per_unit(),
-        )?;
-        let arc = Arc {
-            plane: self.plane,
-            clockwise,
-            centre_from_start_mm,
-            turns: turns(block)?,
-        };
-        let extremes = Sweep::new(&arc, end_mm).extremes_from_start();
-        for (axis, [least, greatest]) in [first, second].into_iter().zip(extremes) {
-            let from = self.reach[axis];
-            let reach = Reach {
-                least: from.least + least,
-                greatest: from.greatest + greatest,
-            };
-            self.within(at, axis, reach)?;
+            1.0
         }
-        Ok(arc)
-    }
-
-    fn touch(
-        &mut self,
-        block: &Block,
-        word: &Word,
-        motion: Motion,
-        touch: Touch,
-    ) -> Result<(), ProgramError> {
-        let at = block.at(word);
-        if let Some(axis) = Axis::ROTARY.into_iter().find(|a| block.axis(*a).is_some()) {
-            return Err(ProgramError::RotaryTouch { at, axis });
-        }
-        if block.first_axis().is_none() {
-            return Err(ProgramError::Needs {
-                at,
-                word: word.text(),
-                needs: "an axis word",
-            });
-        }
-        let target = self.target(block, word, &motion.aim)?;
-        let stays = Axis::LINEAR.into_iter().all(|axis| match motion.aim[axis] {
-            Aim::Keep => true,
-            Aim::By(step) => step == 0.0,
-            Aim::At(value) => self.reach[axis].known() == Some(value),
-        });
-        if stays {
-            return Err(ProgramError::TouchWithoutLength { at });
-        }
-        // The touch may end anywhere on its way.
-        self.reach = PerAxis::from_fn(|axis| self.reach[axis].hull(target[axis]));
-        self.push(block, Action::Touch(motion, touch));
-        Ok(())
     }
 }
 
-fn not_negative(block: &Block, word: &Word) -> Result<(), ProgramError> {
+pub(super) fn not_negative(block: &Block, word: &Word) -> Result<(), ProgramError> {
     if word.value < 0.0 {
         return Err(ProgramError::Value {
             at: block.at(word),
@@ -522,25 +421,4 @@ fn not_negative(block: &Block, word: &Word) -> Result<(), ProgramError> {
         });
     }
     Ok(())
-}
-
-fn turns(block: &Block) -> Result<u32, ProgramError> {
-    let Some(word) = block.word('P') else {
-        return Ok(1);
-    };
-    let whole = word.value.round();
-    if (word.value - whole).abs() > 0.001 || !(1.0..=10_000.0).contains(&whole) {
-        return Err(ProgramError::Value {
-            at: block.at(word),
-            word: 'P',
-            value: word.value,
-            rule: "a whole number of turns from 1 to 10000",
-        });
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "checked to lie in 1..=10000"
-    )]
-    Ok(whole as u32)
 }

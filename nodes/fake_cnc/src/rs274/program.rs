@@ -1,7 +1,8 @@
 //! A checked program: what the control does, step by step.
 
-use metrology::PerAxis;
+use metrology::{Axis, PerAxis};
 
+use super::registers::{Change, Registers};
 use crate::error::Place;
 
 /// Where one axis goes; mm or rad.
@@ -37,6 +38,31 @@ pub struct Arc {
     pub centre_from_start_mm: [f64; 2],
     /// Turns: 1 is anything up to a full circle.
     pub turns: u32,
+    /// Cosine and sine of the angle about Z by which the plane is turned, where it is and is not X Y.
+    pub turn: Option<[f64; 2]>,
+}
+
+/// A line across the machine's X and Y on which a motion ends: one coordinate of a turned work system is given, the other
+/// stays as a touch left it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slide {
+    /// Point of the line nearest to the machine's zero, mm.
+    pub foot_mm: [f64; 2],
+    /// Direction of the line.
+    pub direction: [f64; 2],
+}
+
+impl Slide {
+    /// X and Y at its end, for a motion that starts at `from_mm`.
+    #[must_use]
+    pub fn end_mm(&self, from_mm: [f64; 2]) -> [f64; 2] {
+        let [x, y] = self.direction;
+        let along_mm = from_mm[0] * x + from_mm[1] * y;
+        [
+            self.foot_mm[0] + along_mm * x,
+            self.foot_mm[1] + along_mm * y,
+        ]
+    }
 }
 
 /// Feed of a motion.
@@ -58,6 +84,8 @@ pub enum Feed {
 pub struct Motion {
     /// Target of each axis.
     pub aim: PerAxis<Aim>,
+    /// Replaces the aims of X and Y.
+    pub slide: Option<Slide>,
     /// `None`: straight.
     pub arc: Option<Arc>,
     /// Speed.
@@ -73,6 +101,57 @@ pub struct Touch {
     pub must_happen: bool,
     /// Index into [`Program::features`].
     pub feature: usize,
+}
+
+/// Why a program waits until somebody lets it go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "named after what a person does")]
+pub enum Wait {
+    /// M0.
+    Stop,
+    /// M1.
+    OptionalStop,
+    /// M60.
+    PalletChange,
+    FeedHold,
+    SingleBlock,
+}
+
+impl std::fmt::Display for Wait {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Stop => "M0",
+            Self::OptionalStop => "M1",
+            Self::PalletChange => "M60",
+            Self::FeedHold => "feed hold",
+            Self::SingleBlock => "single block",
+        })
+    }
+}
+
+/// What the text of a program in machine coordinates says of the end of its first motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirstMotion {
+    /// Index of its step.
+    pub step: usize,
+    /// Numbers of its axis words, mm or rad.
+    pub words: PerAxis<Option<f64>>,
+}
+
+impl FirstMotion {
+    /// The first axis whose position differs from its word by more than its tolerance, with both.
+    #[must_use]
+    pub fn difference(
+        &self,
+        position: &PerAxis<f64>,
+        tolerance: &PerAxis<f64>,
+    ) -> Option<(Axis, f64, f64)> {
+        Axis::ALL.into_iter().find_map(|axis| {
+            let wanted = self.words[axis]?;
+            let is_there = (position[axis] - wanted).abs() <= tolerance[axis];
+            (!is_there).then_some((axis, wanted, position[axis]))
+        })
+    }
 }
 
 /// One thing that the control does.
@@ -92,6 +171,10 @@ pub enum Action {
     ZeroGrid,
     /// Sets the count of the length reference to zero.
     ZeroLength,
+    /// Changes the state that the control keeps.
+    Set(Change),
+    /// Waits until somebody lets it go on.
+    Wait(Wait),
     /// Ends the program.
     End,
 }
@@ -118,6 +201,10 @@ pub struct Program {
     pub devices: Vec<(String, Place)>,
     /// Number of lines.
     pub lines: u32,
+    /// The state that is put back at any end: that of the start, for a program in machine coordinates.
+    pub restored: Option<Box<Registers>>,
+    /// What is verified when the first motion of a program in machine coordinates has ended.
+    pub first_motion: Option<FirstMotion>,
 }
 
 impl Program {
@@ -125,7 +212,7 @@ impl Program {
     #[must_use]
     pub fn longest_chain(&self) -> usize {
         self.steps
-            .split(|step| !matches!(step.action, Action::Move(_)))
+            .split(|step| !matches!(step.action, Action::Move(_) | Action::Set(_)))
             .map(<[Step]>::len)
             .max()
             .unwrap_or(0)

@@ -3,6 +3,7 @@
 //! A word is a letter and a number; blanks may stand anywhere, also within the number; letters are
 //! of either case (RS274/NGC 3.3.2).
 
+use super::bounds;
 use crate::error::{Place, ProgramError};
 
 /// A letter with its number.
@@ -31,6 +32,8 @@ pub struct Comment<'a> {
     pub text: &'a str,
     /// Column where it opens, from 1.
     pub column: u32,
+    /// After a semicolon, up to the end of the line.
+    pub is_tail: bool,
 }
 
 /// One line of a program.
@@ -81,7 +84,8 @@ impl Cursor<'_> {
 /// Splits one line, without its newline, into words and comments.
 ///
 /// # Errors
-/// A character outside the grammar, a malformed number, an open or nested comment.
+/// A line beyond [`bounds::LINE_CHARACTERS`], a character outside the grammar, a malformed number or one beyond
+/// [`bounds::NUMBER`], an open or nested comment.
 pub fn read_line(number: u32, text: &str) -> Result<Line<'_>, ProgramError> {
     let mut line = Line {
         number,
@@ -92,6 +96,12 @@ pub fn read_line(number: u32, text: &str) -> Result<Line<'_>, ProgramError> {
         line: number,
         column: 1,
     };
+    if text.len() > bounds::LINE_CHARACTERS && text.chars().count() > bounds::LINE_CHARACTERS {
+        return Err(ProgramError::LineTooLong {
+            line: number,
+            limit: bounds::LINE_CHARACTERS,
+        });
+    }
     let mut cursor = Cursor {
         text,
         byte: 0,
@@ -109,12 +119,14 @@ pub fn read_line(number: u32, text: &str) -> Result<Line<'_>, ProgramError> {
                 line.comments.push(Comment {
                     text: text[cursor.byte..].trim(),
                     column: at.column,
+                    is_tail: true,
                 });
                 return Ok(line);
             }
             '(' => line.comments.push(Comment {
                 text: comment(&mut cursor, text, at)?,
                 column: at.column,
+                is_tail: false,
             }),
             letter if letter.is_ascii_alphabetic() => {
                 let letter = letter.to_ascii_uppercase();
@@ -165,12 +177,27 @@ fn value(cursor: &mut Cursor<'_>, letter: char) -> Result<f64, ProgramError> {
         return Err(ProgramError::NumberMissing { at, letter });
     }
     match number.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(ProgramError::NumberMalformed {
+        Ok(value) if value.abs() <= bounds::NUMBER => Ok(value),
+        Ok(_) => Err(ProgramError::NumberTooLarge {
             at,
             letter,
-            text: number,
+            text: shortened(&number),
+            limit: bounds::NUMBER,
         }),
+        Err(_) => Err(ProgramError::NumberMalformed {
+            at,
+            letter,
+            text: shortened(&number),
+        }),
+    }
+}
+
+/// The first characters of a number that fills a line.
+fn shortened(number: &str) -> String {
+    const KEPT: usize = 20;
+    match number.char_indices().nth(KEPT) {
+        Some((end, _)) => format!("{}...", &number[..end]),
+        None => number.to_owned(),
     }
 }
 
@@ -194,7 +221,9 @@ mod tests {
 
     #[test]
     fn malformed_text_is_refused_with_its_place() {
-        let message = |text| read_line(7, text).unwrap_err().to_string();
+        fn message(text: &str) -> String {
+            read_line(7, text).unwrap_err().to_string()
+        }
         assert_eq!(message("G0 X"), "line 7, column 5: word X has no number");
         assert_eq!(
             message("G0 X1.2.3"),
@@ -217,6 +246,17 @@ mod tests {
             "line 7, column 4: character '≥' has no meaning here"
         );
         assert!(message("X--1").contains("malformed"));
-        assert!(message(&format!("X{}", "9".repeat(400))).contains("malformed"));
+        let nines = "9".repeat(400);
+        assert_eq!(
+            message(&format!("X{nines}")),
+            "line 7, column 2: number of word X is no finite number that this control can hold: \
+             \"99999999999999999999...\", limit 1000000000000"
+        );
+        let zeros = "0".repeat(300);
+        assert!(message(&format!("S1{zeros}")).contains("no finite number that"));
+        assert_eq!(
+            message(&"X".repeat(1001)),
+            "line 7: longer than 1000 characters"
+        );
     }
 }

@@ -64,6 +64,12 @@ fn condition(output: &Output) -> Option<Diagnostic> {
             let message = format!("a rest that no known effect explains goes with {covariate}");
             (Level::Warn, "unknown_effect", message)
         }
+        Output::OtherMachine(error) => {
+            let message = format!(
+                "axes/state: {error}; such states are left out and counted, the diagnosis goes on: remap the other machine's topic"
+            );
+            (Level::Warn, "another_machine", message)
+        }
         Output::NotYet(error) => (Level::Ok, "no_diagnosis", error.to_string()),
         Output::LeftOut(remarks) => (Level::Ok, "left_out", remarks.join("; ")),
         Output::Report(_) | Output::Due(_) => return None,

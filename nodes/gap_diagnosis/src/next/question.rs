@@ -71,14 +71,14 @@ pub fn questions(found: &Found) -> Vec<Question> {
     for member in found
         .members
         .iter()
-        .filter(|member| member.status != Status::Named)
+        .filter(|member| member.status() != Status::Named)
     {
-        if member.vetoes == [Veto::NearNoise] {
+        if member.vetoes() == [Veto::NearNoise] {
             all.push(resized(found, member));
             continue;
         }
         let is_open = |behind: f64| {
-            member.status == Status::Set && behind <= 2.0 * ODDS.ln() || behind < NEAR
+            member.status() == Status::Set && behind <= 2.0 * ODDS.ln() || behind < NEAR
         };
         let near = member.rivals.iter().filter(|(_, behind)| is_open(*behind));
         let sets: Vec<&Set> = std::iter::once(&found.set)
@@ -149,7 +149,7 @@ fn between(found: &Found, member: &Member, ours: &Set, theirs: &Set) -> Option<Q
 /// A member that fails a check without a rival.
 fn resized(found: &Found, member: &Member) -> Question {
     let instance = found.instance(member);
-    let is_noise = member.vetoes == [Veto::NearNoise];
+    let is_noise = member.vetoes() == [Veto::NearNoise];
     let other = if is_noise {
         "noise"
     } else {
@@ -178,7 +178,7 @@ fn least_d(found: &Found, member: &Member) -> f64 {
 
 /// The form of a member near noise, and the set that it is sized in.
 fn too_small(found: &Found, member: &Member) -> Option<(usize, Set)> {
-    let is_near = member.vetoes.contains(&Veto::NearNoise);
+    let is_near = member.vetoes().contains(&Veto::NearNoise);
     is_near.then(|| (member.form, found.set.clone()))
 }
 impl Question {

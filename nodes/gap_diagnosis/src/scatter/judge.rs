@@ -14,9 +14,10 @@ use super::{Bench, STEP, Scattered, is_tried, parameters};
 use crate::cause;
 use crate::confidence::Rivals;
 use crate::confirm;
+use crate::judgement::{self, Check, CheckId};
 use crate::normal::Normal;
 use crate::recalibration::recalibrated;
-use crate::report::{Cause, Constancy, ParameterValue, Status};
+use crate::report::{Cause, Constancy, ParameterValue};
 use crate::rows::count;
 use crate::rule::Rule;
 use crate::selection::Set;
@@ -42,8 +43,8 @@ impl Judge<'_, '_, '_> {
         let parts = self.parts(&forms, &fit);
         let confirmed = confirm::held_out_gains_of(stack, &self.bench.squares.y, &parts);
         let config = self.bench.scope.config;
-        let is_confirmed = |place: usize| confirmed[place] || !config.applies(Rule::HeldOut);
-        let beats_runs = self.visited[set] < self.of_runs();
+        let (own, of_runs) = (self.visited[set], self.of_runs());
+        let beats_runs = Check::new(CheckId::BeatsRuns, own < of_runs).with(own, of_runs);
         let rivals = Rivals::new(&self.bench.signatures, self.visited);
         let columns = forms.iter().flat_map(|form| &form.columns);
         let columns: Vec<DVector<f64>> = columns
@@ -54,36 +55,25 @@ impl Judge<'_, '_, '_> {
         let instances: BTreeSet<usize> = forms.iter().map(|form| form.instance).collect();
         let of_set = self.one_of_each(set);
         let mut first = 0;
-        for (place, form) in forms.iter().enumerate() {
+        for (place, (form, held_out)) in forms.iter().zip(confirmed).enumerate() {
             let own = first..first + form.columns.len();
             first = own.end;
             let instance = &self.bench.signatures.instances[form.instance];
             let (parameters, values) = sized(instance.kind, form, &fit, own.clone());
-            let constancy = self.constancy(instance, &values, &columns, &left);
-            let railed = parameters.iter().any(|p| p.at_bound && p.value > 0.0);
-            let is_sure = own_sizes(&fit, &own).any(|(size, doubt)| size > veto::SURE * doubt);
-            let is_needed = rivals.is_needed(&instances, form.instance);
-            let holds = is_confirmed(place)
-                && beats_runs
-                && constancy.passed
-                && !railed
-                && is_sure
-                && is_needed;
-            let status = match (holds, rivals.is_alone(form.instance)) {
-                (false, _) => Status::Surrogate,
-                (true, true) => Status::Named,
-                (true, false) => Status::Set,
-            };
-            if status == Status::Named {
-                found.entries.push(cause::entry(instance, &values));
-            }
+            let (constancy, one_size) = self.constancy(instance, &values, &columns, &left);
+            let mut why = config.tried(Rule::HeldOut, held_out);
+            why.extend([beats_runs.clone(), one_size, off_bounds(&parameters)]);
+            why.push(sure(&fit, &own));
+            why.extend(rivals.checks(&instances, form.instance, false));
+            let holds = judgement::holds(&why);
+            found.entries.push(cause::entry(instance, &values));
             let instead = rivals.instead_of(&instances, form.instance);
             let probability = rivals.probability(form.instance) * if holds { 1.0 } else { 0.5 };
             let (signatures, normal) = (&self.bench.signatures, &self.bench.normal);
             found.causes.push(Cause {
                 effect: instance.kind.id.to_owned(),
                 axis: instance.target.to_string(),
-                status,
+                status: judgement::status(&why),
                 confidence: recalibrated(config, probability),
                 parameters,
                 d: self.distance(&forms, place, &fit),
@@ -91,6 +81,7 @@ impl Judge<'_, '_, '_> {
                     signatures, normal, &instead, set[place], &of_set,
                 ),
                 constancy,
+                why,
             });
         }
     }
@@ -155,7 +146,7 @@ impl Judge<'_, '_, '_> {
         values: &[f64],
         columns: &[DVector<f64>],
         left: &DVector<f64>,
-    ) -> Constancy {
+    ) -> (Constancy, Check) {
         let raw = self
             .bench
             .squares
@@ -220,6 +211,21 @@ struct Fit {
     sizes: Vec<f64>,
     doubts: Vec<f64>,
     level: DVector<f64>,
+}
+
+/// Whether no size of an effect is at its bound.
+fn off_bounds(parameters: &[ParameterValue]) -> Check {
+    let railed = parameters.iter().filter(|p| p.at_bound && p.value > 0.0);
+    let railed = railed.count();
+    Check::new(CheckId::OffBounds, railed == 0).with(count(railed), 0.0)
+}
+
+/// Whether a size of an effect is surely off zero.
+fn sure(fit: &Fit, own: &std::ops::Range<usize>) -> Check {
+    let is_sure = own_sizes(fit, own).any(|(size, doubt)| size > veto::SURE * doubt);
+    let ratios = own_sizes(fit, own).map(|(size, doubt)| size / doubt);
+    let most = ratios.fold(f64::NEG_INFINITY, f64::max);
+    Check::new(CheckId::Sure, is_sure).with(most, veto::SURE)
 }
 
 /// Sizes of some columns with their standard uncertainties.

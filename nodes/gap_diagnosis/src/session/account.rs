@@ -20,6 +20,8 @@ pub struct Account {
 pub enum Reason {
     /// A sample with a value that is no number.
     NotFinite,
+    /// An axis state with other axes, or outside of the travel: another machine's.
+    OtherMachine,
     /// A sample older than one before it.
     WentBack,
     /// A touch that was told again, or after a later one.
@@ -52,6 +54,8 @@ pub enum Reason {
     SegmentLate,
     /// Ticks beyond what a run may hold.
     TooLong,
+    /// A sample after more than a month, or of one thermometer too many.
+    TooMuch,
     /// A run during which the compensation's messages broke off; its last value was held.
     CompensationHeld,
 }
@@ -62,6 +66,7 @@ impl Reason {
     pub const fn text(self) -> &'static str {
         match self {
             Self::NotFinite => "samples were no numbers",
+            Self::OtherMachine => "axis states were of another machine",
             Self::WentBack => "samples were older than one before them",
             Self::ToldBefore => "touches were told before, or a later one before them",
             Self::ClockJump => "times the clock jumped back, or ahead by more than a week",
@@ -83,7 +88,10 @@ impl Reason {
             Self::SegmentLate => {
                 "segments came more than 2 s after their stamp, or bear that of another clock; they begin and end when they came"
             }
-            Self::TooLong => "ticks were beyond what one run may hold",
+            Self::TooLong => "samples were beyond what one run may hold",
+            Self::TooMuch => {
+                "samples came after more than 31 days, or of more than 200 thermometers, and are no part of the history"
+            }
             Self::CompensationHeld => {
                 "runs had a hole in the compensation; its last value was held"
             }

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use machine::file::AxisEntry;
 use machine::twin::{Run, Session, simulate};
 use machine::{Kinematics, MachineFile};
+use metrology::bound::TOUCHES_OF_RUN;
 use metrology::sample::{
     AxisCompensation, AxisState, BlockMeasurement, GridSample, LengthSample, NewTouches,
     ProbeTrigger, TemperatureSample, TestSegment,
@@ -19,7 +20,7 @@ use super::error::SessionError;
 use super::nominal;
 use super::past::Past;
 use super::recent::{LATE_S, Recent};
-use super::record::{Offset, Record, Tick};
+use super::record::{MOST_READINGS, MOST_TEMPERATURES, Offset, Record, Tick};
 use super::time::{At, SessionTime};
 
 /// One recorded sample.
@@ -45,6 +46,9 @@ pub enum Input {
 
 /// How far beyond the travel of the machine file a command may go, share of the travel.
 const BEYOND_TRAVEL: f64 = 0.01;
+
+/// Of so many axis states one may be of another machine; where more are, the recording is another machine's.
+const STATES_PER_STRANGER: usize = 100;
 
 /// Most runs that have ended and are not closed yet.
 const MOST_ENDED: usize = 4;
@@ -77,7 +81,10 @@ pub struct SessionBuilder {
     base: [u32; 3],
     first_bag_ends: Option<u32>,
     greatest: [u32; 3],
+    /// Why the first axis state was refused that is of another machine.
     other_machine: Option<SessionError>,
+    /// Axis states with numbers, those of another machine included.
+    states: usize,
     has_commands: bool,
 }
 
@@ -108,6 +115,7 @@ impl SessionBuilder {
             greatest: [0; 3],
             first_bag_ends: None,
             other_machine: None,
+            states: 0,
             has_commands: false,
         })
     }
@@ -144,13 +152,15 @@ impl SessionBuilder {
                 sample.zero_id = sample.zero_id.saturating_add(self.base[2]);
                 self.recent.grid(sample);
                 let of = self.run_at(sample.at);
-                of.into_iter().for_each(|run| run.grid.push(sample));
+                of.into_iter()
+                    .for_each(|run| run.hold(sample, MOST_READINGS, |run| &mut run.grid));
             }
             Input::Length(mut sample) => {
                 sample.zero_id = sample.zero_id.saturating_add(self.base[2]);
                 self.recent.length(sample);
                 let of = self.run_at(sample.at);
-                of.into_iter().for_each(|run| run.length.push(sample));
+                of.into_iter()
+                    .for_each(|run| run.hold(sample, MOST_READINGS, |run| &mut run.length));
             }
             Input::Trigger(trigger) => self.trigger(trigger),
             Input::Block(measurement) => self.block(&measurement),
@@ -161,6 +171,12 @@ impl SessionBuilder {
     #[must_use]
     pub fn runs(&self) -> &[Run] {
         &self.runs
+    }
+
+    /// Whether the session has become longer than what is held of its past.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.past.is_over(self.time.newest_s())
     }
 
     /// Number of runs with readings that were closed since the start.
@@ -197,7 +213,10 @@ impl SessionBuilder {
     /// When it is another machine's, or holds nothing that could be diagnosed.
     pub fn finish(mut self) -> Result<(Session, Account), SessionError> {
         self.end_bag();
-        if let Some(error) = self.other_machine {
+        let strangers = self.account.count(Reason::OtherMachine);
+        if let Some(error) = self.other_machine.take()
+            && strangers.saturating_mul(STATES_PER_STRANGER) > self.states
+        {
             return Err(error);
         }
         if self.runs.is_empty() {
@@ -268,6 +287,9 @@ impl SessionBuilder {
             self.account.note(Reason::WentBack);
             return;
         }
+        if self.past.is_over(time_s) {
+            self.account.note(Reason::TooMuch);
+        }
         self.past.axes(time_s, &state.commanded);
         let tick = Tick::new(time_s, state);
         self.recent.tick(tick, self.config.lead_in_s);
@@ -275,11 +297,21 @@ impl SessionBuilder {
         self.records().for_each(|run| run.take(tick, most));
     }
 
+    /// Refuses this one state; what is the machine's own is taken before and after it.
     fn is_another_machine(&mut self, state: &AxisState) -> bool {
-        if self.other_machine.is_none() {
-            self.other_machine = other_machine(&self.machine, self.axes, state);
-        }
-        self.other_machine.is_some()
+        self.states += 1;
+        let Some(error) = other_machine(&self.machine, self.axes, state) else {
+            return false;
+        };
+        self.account.note(Reason::OtherMachine);
+        self.other_machine.get_or_insert(error);
+        true
+    }
+
+    /// Why the first axis state was refused that is of another machine.
+    #[must_use]
+    pub const fn other_machine(&self) -> Option<&SessionError> {
+        self.other_machine.as_ref()
     }
 
     fn compensation(&mut self, compensation: &AxisCompensation) {
@@ -304,12 +336,18 @@ impl SessionBuilder {
     fn temperature(&mut self, sample: &TemperatureSample) {
         if sample.temperature_degc.is_finite() {
             let time_s = self.session_time(sample.at);
-            self.past
-                .temperature(time_s, &sample.sensor, sample.temperature_degc);
+            let degc = sample.temperature_degc;
+            if !self.past.temperature(time_s, &sample.sensor, degc) {
+                self.account.note(Reason::TooMuch);
+                return;
+            }
             self.recent.temperature(sample);
             let of = self.run_at(sample.at);
-            of.into_iter()
-                .for_each(|run| run.temperatures.push(sample.clone()));
+            of.into_iter().for_each(|run| {
+                run.hold(sample.clone(), MOST_TEMPERATURES, |run| {
+                    &mut run.temperatures
+                })
+            });
         } else {
             self.account.note(Reason::NotFinite);
         }
@@ -329,11 +367,11 @@ impl SessionBuilder {
             let time_s = self.session_time(trigger.received_at);
             self.recent.trigger(time_s, &trigger);
             if let Some(run) = self.run_at(trigger.received_at) {
-                run.triggers.push((time_s, trigger));
+                run.hold((time_s, trigger), TOUCHES_OF_RUN, |run| &mut run.triggers);
             } else if self.awaits_touches
                 && let Some((_, ended)) = self.ended.back_mut()
             {
-                ended.triggers.push((time_s, trigger));
+                ended.hold((time_s, trigger), TOUCHES_OF_RUN, |run| &mut run.triggers);
             }
         } else {
             self.account.note(Reason::NotFinite);
@@ -355,7 +393,8 @@ impl SessionBuilder {
             };
             let time_s = self.time.of(face.at);
             if let Some(run) = self.records().find(|run| run.segment.run == number) {
-                run.faces.push((time_s, feature, approach, positions));
+                let face = (time_s, feature, approach, positions);
+                run.hold(face, TOUCHES_OF_RUN, |run| &mut run.faces);
             }
         }
     }

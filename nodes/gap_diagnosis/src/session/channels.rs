@@ -17,6 +17,8 @@ use super::thermometers;
 
 /// Greatest distance between ticks on either side of a reading, s.
 const GAP_S: f64 = 0.25;
+/// Zeros that are remembered; of more the oldest is forgotten, and a run under it has one of its own.
+const MOST_ZEROS: usize = 10_000;
 /// Greatest distance of the path between those ticks from the parabola that is taken for it, mm or rad.
 const BOW: f64 = 1e-4;
 /// What an acceleration that changes evenly by 1 makes of it in a time of 1: the peak of s (1 - s) (1 - 2 s) / 12.
@@ -340,6 +342,9 @@ pub(super) fn take_zero(zeros: &mut Vec<Zero>, record: &Record, series: &mut [Se
             |zero| zero.shift_mm,
         );
         if known.is_none() {
+            if zeros.len() >= MOST_ZEROS {
+                zeros.remove(0);
+            }
             zeros.push(Zero {
                 is_grid,
                 setup_id: segment.setup_id,

@@ -1,7 +1,7 @@
 //! Makes a run of what was recorded of it.
 
 use machine::twin::{Channel, Motion, Reading, Run, Touch};
-use metrology::sample::{ProbeTrigger, TestSegment};
+use metrology::sample::{FARTHEST_FROM_NOMINAL, ProbeTrigger, TestSegment};
 use metrology::{Axis, PerAxis};
 
 use super::account::Reason;
@@ -16,9 +16,8 @@ use super::touching;
 
 /// A touch further from every tick than this has its own motion, s.
 const NEAR_S: f64 = 0.05;
-
-/// A reading further from its nominal value is none, mm, rad or K.
-const BEYOND: f64 = 1e4;
+/// Kinds of tests of which is remembered how many readings make one mean; of more the oldest is forgotten.
+const MOST_KINDS: usize = 1_000;
 
 impl SessionBuilder {
     /// Ends a run.
@@ -59,7 +58,7 @@ impl SessionBuilder {
         let mut series = scope.channels(&mut self.account);
         for (_, readings) in &mut series {
             let before = readings.len();
-            readings.retain(|raw| raw.deviation.abs() <= BEYOND);
+            readings.retain(|raw| raw.deviation.abs() <= FARTHEST_FROM_NOMINAL);
             self.account
                 .note_many(Reason::Beyond, before - readings.len());
             *readings = selection.apply(readings, block);
@@ -96,6 +95,9 @@ impl SessionBuilder {
             return *block;
         }
         let block = n.div_ceil(self.config.readings_per_run.max(1)).max(1) | 1;
+        if self.blocks.len() >= MOST_KINDS {
+            self.blocks.remove(0);
+        }
         self.blocks.push((segment.clone(), block));
         block
     }
@@ -217,7 +219,7 @@ fn nearest(open: &Record, trigger: &ProbeTrigger) -> Option<usize> {
     let before = after.checked_sub(1)?;
     let off = |k: usize| {
         let tick = open.ticks.get(k)?;
-        Some((tick.controller_at - at).nanos().abs())
+        Some((tick.controller_at - at).nanos().saturating_abs())
     };
     match (off(before), off(after)) {
         (Some(a), Some(b)) if b < a => Some(after),

@@ -3,6 +3,7 @@
 use machine::ChainError;
 use machine::twin::TwinError;
 use metrology::Axis;
+use metrology::number::number;
 
 /// A recording that cannot be diagnosed at all.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -26,8 +27,7 @@ pub enum SessionError {
     OtherAxes { found: String, wanted: String },
     /// The bag is of a machine with another travel.
     #[error(
-        "axis {axis} was commanded to {position} {unit}, its travel in the machine file is {low} to {high}: it is another machine's"
-    )]
+        "axis {axis} was commanded to {position} {unit}, its travel in the machine file is {low} to {high}: it is another machine's", position = number(*position), low = number(*low), high = number(*high))]
     OutsideTravel {
         axis: Axis,
         position: f64,

@@ -2,13 +2,11 @@
 
 use std::collections::VecDeque;
 
+pub(super) use metrology::sample::LATE_S;
 use metrology::sample::{GridSample, LengthSample, ProbeTrigger, TemperatureSample};
 use metrology::stamp::{Host, Span, Stamp};
 
 use super::record::{Offset, Tick};
-
-/// How long a message may come after those of other topics with its stamp, s.
-pub(super) const LATE_S: f64 = 2.0;
 
 /// Samples of the last [`LATE_S`], ticks of a lead-in before them.
 #[derive(Clone, Debug, Default)]

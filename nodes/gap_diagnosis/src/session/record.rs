@@ -8,6 +8,7 @@ use metrology::sample::{
 };
 use metrology::stamp::{Host, Machine, Stamp};
 
+use super::motion::times_s;
 use super::recent::Recent;
 
 /// Positions at one tick.
@@ -90,6 +91,11 @@ pub(super) struct Record {
     pub beyond_limit: usize,
 }
 
+/// Readings of one instrument, or offsets, that are held of a run while it is open: half an hour at 1 kHz, as of ticks.
+pub(super) const MOST_READINGS: usize = 2_000_000;
+/// Temperatures of all thermometers that are held of a run: an hour at 30 Hz.
+pub(super) const MOST_TEMPERATURES: usize = 100_000;
+
 /// Ticks of axes that stand are kept this far apart, s: nothing happens between them.
 const STANDING_S: f64 = 0.02;
 /// A command that changes by less stands, mm or rad.
@@ -168,10 +174,25 @@ impl Record {
         self.triggers.retain(|(_, touch)| touch.received_at < from);
     }
 
+    /// Holds a sample in one of its lists; what is beyond the limit is counted, as ticks are.
+    pub(super) fn hold<T>(
+        &mut self,
+        sample: T,
+        most: usize,
+        list: impl Fn(&mut Self) -> &mut Vec<T>,
+    ) {
+        let list = list(self);
+        if list.len() < most {
+            list.push(sample);
+        } else {
+            self.beyond_limit += 1;
+        }
+    }
+
     /// Takes an offset that was added before the end.
     pub(super) fn compensated(&mut self, offset: Offset) {
         if self.to.is_none_or(|to| offset.at <= to) {
-            self.offsets.push(offset);
+            self.hold(offset, MOST_READINGS, |run| &mut run.offsets);
         }
     }
 
@@ -226,23 +247,21 @@ impl Record {
     }
 
     /// Whether states are missing from the midst of a motion: speed, acceleration and turns there would be made up, and with
-    /// them all that an effect remembers of them.
+    /// them all that an effect remembers of them. States that a busy computer received in one lump are there.
     pub(super) fn has_hole_in_motion(&self) -> bool {
         let run = self.ticks.get(self.lead_in..).unwrap_or(&[]);
-        let mut spacings_s: Vec<f64> = run
-            .windows(2)
-            .map(|two| two[1].time_s - two[0].time_s)
-            .collect();
+        let times_s = times_s(run);
+        let spacing_s = |k: usize| times_s[k + 1] - times_s[k];
+        let mut spacings_s: Vec<f64> = (1..run.len()).map(|k| spacing_s(k - 1)).collect();
         if spacings_s.is_empty() {
             return false;
         }
         let middle = spacings_s.len() / 2;
         let (_, middle_s, _) = spacings_s.select_nth_unstable_by(middle, f64::total_cmp);
         let least_s = HOLE_S.max(HOLE_SPACINGS * *middle_s);
-        run.windows(2).any(|two| {
+        run.windows(2).enumerate().any(|(k, two)| {
             let pairs = two[0].commanded.0.iter().zip(&two[1].commanded.0);
-            two[1].time_s - two[0].time_s > least_s
-                && pairs.into_iter().any(|(a, b)| (a - b).abs() > MOVED)
+            spacing_s(k) > least_s && pairs.into_iter().any(|(a, b)| (a - b).abs() > MOVED)
         })
     }
 

@@ -48,7 +48,9 @@ impl Selection {
         let mut counts = at_full_rate(motion, lead_in);
         if segment.kind == TestKind::Circle {
             on_circle(segment, motion, &mut counts);
-        } else if segment.kind != TestKind::Dwell {
+        } else if segment.kind == TestKind::Dwell {
+            from_the_first(motion, lead_in, &mut counts);
+        } else {
             between_motions(motion, lead_in, &mut counts);
             on_the_way_of_the_test(segment, motion, &mut counts);
         }
@@ -172,6 +174,13 @@ fn at_full_rate(motion: &Motion, lead_in: usize) -> Vec<bool> {
     (0..n)
         .map(|k| k >= lead_in && k > 0 && spacing(k) <= limit_s)
         .collect()
+}
+
+/// A log begins with its first row, however long nothing was written before it.
+fn from_the_first(motion: &Motion, lead_in: usize, counts: &mut [bool]) {
+    if counts.get(lead_in + 1).copied().unwrap_or(false) && lead_in < motion.len() {
+        counts[lead_in] = true;
+    }
 }
 
 fn on_circle(segment: &TestSegment, motion: &Motion, counts: &mut [bool]) {

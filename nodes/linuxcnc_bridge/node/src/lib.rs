@@ -42,6 +42,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     Ok(Wiring::new(setup.name(), parameters, bridge)
         .every(TICK, || LiveInput::Tick)
         .on(&topics::COMPENSATION, LiveInput::Compensation)
+        .publishers_of(&topics::COMPENSATION, LiveBridge::sees_publishers)
         .publish_in(
             &topics::AXES_STATE,
             setup.frame(""),

@@ -1,4 +1,8 @@
 //! Writes the moves of a cycle and refuses those that leave the travel.
+//!
+//! G0 is written for three moves only: at the top of Z, straight up from beside or above a surface, and back
+//! from a contact to the start of its touch. Every other move goes at the guarded feed, equation (5) of
+//! [`super`], so that the ball never meets a surface in G0, wherever the surface really lies.
 
 use std::fmt::Write as _;
 
@@ -6,14 +10,18 @@ use metrology::sample::TestKind;
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
 
-use super::reach::{check_feed, linear};
+use super::reach::{check_feed, guarded_feed_mm_min, linear};
 use super::{Cycle, PlannedTouch};
 use crate::error::CycleError;
 use crate::file::MachineFile;
 use crate::poses::SphereDesign;
+use crate::program_frame::HEAD;
 
 /// Distance kept from the top of Z, so that a compensation can still be added to the command, mm.
 pub(crate) const TRAVEL_MARGIN_MM: f64 = 1.0;
+
+/// An approach that rises by no more than this leads to a surface that does not reach over its start.
+const LEVEL: f64 = 1e-9;
 
 /// One wanted touch.
 pub(super) struct Touch {
@@ -62,6 +70,11 @@ pub(super) struct Program<'a> {
     features: Vec<String>,
     top_z_mm: f64,
     ball_radius_mm: f64,
+    guarded_feed_mm_min: f64,
+    /// Where Z stands, mm.
+    at_z_mm: f64,
+    /// Whether the last surface reaches over the ball's place, so that a way up leads past it.
+    is_overhung: bool,
     /// Ball less linear positions, mm: what a turned head adds.
     ball_from_slides_mm: Vector3<f64>,
 }
@@ -75,11 +88,14 @@ impl<'a> Program<'a> {
         let top_z_mm = linear(file, Axis::Z)?.travel_mm[1] - TRAVEL_MARGIN_MM;
         let mut program = Self {
             file,
-            text: String::from("G21 G90 G17\n"),
+            text: String::from(HEAD),
             touches: Vec::new(),
             features: Vec::new(),
             top_z_mm,
             ball_radius_mm: file.ball_radius_mm(),
+            guarded_feed_mm_min: guarded_feed_mm_min(file)?,
+            at_z_mm: top_z_mm,
+            is_overhung: false,
             ball_from_slides_mm: Vector3::zeros(),
         };
         program.line(format_args!("G0 Z{}", Number(top_z_mm)));
@@ -99,8 +115,7 @@ impl<'a> Program<'a> {
 
     /// Turns the rotary axes with the tool at the top of Z.
     pub(super) fn turn_to(&mut self, design: &SphereDesign, pose_rad: &PerAxis<f64>) {
-        let top_z_mm = self.top_z_mm;
-        self.line(format_args!("G0 Z{}", Number(top_z_mm)));
+        self.rise_to(self.top_z_mm);
         let mut words = String::new();
         for &axis in design.rotary_axes() {
             let _ = write!(words, " {axis}{}", Number(pose_rad[axis].to_degrees()));
@@ -154,6 +169,7 @@ impl<'a> Program<'a> {
             Number(touch.feed_mm_min)
         ));
         self.line(format_args!("G0 {}", Words(&self.slides(&start))));
+        self.is_overhung = touch.approach.z > LEVEL;
         self.touches.push(PlannedTouch {
             feature_id: touch.feature_id,
             approach: touch.approach,
@@ -175,20 +191,41 @@ impl<'a> Program<'a> {
         let slides = self.slides(point);
         let height_mm = match path {
             Path::Straight => {
-                self.line(format_args!("G0 {}", Words(&slides)));
+                self.guarded(format_args!("{}", Words(&slides)));
+                self.at_z_mm = slides.z;
                 return Ok(());
             }
             Path::Over => self.top_z_mm,
             Path::LowOver(height_mm) => (height_mm - self.ball_from_slides_mm.z).min(self.top_z_mm),
         };
-        self.line(format_args!("G0 Z{}", Number(height_mm)));
-        self.line(format_args!(
-            "G0 X{} Y{}",
-            Number(slides.x),
-            Number(slides.y)
-        ));
-        self.line(format_args!("G0 Z{}", Number(slides.z)));
+        self.rise_to(height_mm);
+        let across = format!("X{} Y{}", Number(slides.x), Number(slides.y));
+        if height_mm < self.top_z_mm {
+            self.guarded(format_args!("{across}"));
+        } else {
+            self.line(format_args!("G0 {across}"));
+        }
+        self.guarded(format_args!("Z{}", Number(slides.z)));
+        self.at_z_mm = slides.z;
+        self.is_overhung = false;
         Ok(())
+    }
+
+    /// Z to a height: G0 where nothing can be met on the way.
+    fn rise_to(&mut self, height_mm: f64) {
+        if self.is_overhung || height_mm < self.at_z_mm {
+            self.guarded(format_args!("Z{}", Number(height_mm)));
+        } else {
+            self.line(format_args!("G0 Z{}", Number(height_mm)));
+        }
+        self.at_z_mm = height_mm;
+        self.is_overhung = false;
+    }
+
+    /// A move that may meet a surface.
+    fn guarded(&mut self, words: std::fmt::Arguments<'_>) {
+        let feed_mm_min = self.guarded_feed_mm_min;
+        self.line(format_args!("G1 {words} F{}", Number(feed_mm_min)));
     }
 
     /// Names a block, face or artefact that the cycle touches.
@@ -200,8 +237,7 @@ impl<'a> Program<'a> {
 
     /// Retracts and ends the program.
     pub(super) fn finish(mut self, kind: TestKind) -> Cycle {
-        let top_z_mm = self.top_z_mm;
-        self.line(format_args!("G0 Z{}", Number(top_z_mm)));
+        self.rise_to(self.top_z_mm);
         self.line(format_args!("M2"));
         Cycle {
             program: self.text,

@@ -141,7 +141,7 @@ fn check(
 }
 
 /// Refuses a turn during which the sphere would come as high as the ball at the top of Z.
-fn check_swing(
+pub(super) fn check_swing(
     program: &Program<'_>,
     design: &SphereDesign,
     (sphere, place_mm, radius_mm): (&str, &Vector3<f64>, f64),

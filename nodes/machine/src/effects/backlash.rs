@@ -22,11 +22,13 @@
 //! negative width is a backlash that the control over-compensates: (1) with |b|, its sign turned.
 //! The wider form adds steps that fade with the way since the reversal, hats in its logarithm of which the first
 //! reaches back to the reversal, and plays with soft corners, which the slide crosses the further the more force F over
-//! its mass carries it, half of the way at F_k:
+//! its mass carries it, half of the way at F_k, and a play that is another one along the axis, as a screw that is worn where
+//! it works most has it, x the place within the travel, -1 to 1:
 //!
 //! ```text
 //!   q - m += -sgn(last motion) sum_k f_k h_k(log10 s)                     (5)
 //!   q - m += -sum_k (s_k / 2) F / (|F| + F_k),   F = a + c sgn(last motion) + k v    (6)
+//!   q - m += -sgn(last motion) (w_1 P_1(x) + w_2 P_2(x)) / 2              (7)
 //! ```
 //!
 //! | symbol | here | unit |
@@ -36,6 +38,7 @@
 //! | f_k | `free_0p01mm_um` .. `free_3mm_um` | µm |
 //! | s | `since_reversal` | mm |
 //! | s_k | `free_soft_3mm_s2_um` .. `free_soft_100mm_s2_um`, where the file tells the friction | µm |
+//! | w_n | `free_by_place_um`, `free_by_place2_um`, of the width | µm |
 //! | a, v | acceleration and velocity | mm/s², mm/s |
 //!
 //! # Holds when
@@ -56,7 +59,7 @@ use std::collections::BTreeSet;
 
 use metrology::Axis;
 
-use super::form::{WAY_HATS, way_hats};
+use super::form::{Travel, WAY_HATS, legendre, way_hats};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
 use crate::file::{AxisEntry, GuideFrictionEntry};
 use crate::twin::Response;
@@ -67,18 +70,20 @@ pub static KIND: Kind = Kind {
     id: "backlash",
     title: "backlash",
     targets: Targets::LinearAxes,
-    parameters: &[Parameter::amplitude("width_um", 30.0, 4.0)],
+    parameters: &[Parameter::amplitude("width_um", 300.0, 4.0)],
     free: &[
-        Parameter::amplitude("free_0p01mm_um", 30.0, 1.0),
-        Parameter::amplitude("free_0p03mm_um", 30.0, 1.0),
-        Parameter::amplitude("free_0p1mm_um", 30.0, 1.0),
-        Parameter::amplitude("free_0p3mm_um", 30.0, 1.0),
-        Parameter::amplitude("free_1mm_um", 30.0, 1.0),
-        Parameter::amplitude("free_3mm_um", 30.0, 1.0),
-        Parameter::share("free_soft_3mm_s2_um", 30.0, 1.0),
-        Parameter::share("free_soft_10mm_s2_um", 30.0, 1.0),
-        Parameter::share("free_soft_30mm_s2_um", 30.0, 1.0),
-        Parameter::share("free_soft_100mm_s2_um", 30.0, 1.0),
+        Parameter::amplitude("free_0p01mm_um", 300.0, 1.0),
+        Parameter::amplitude("free_0p03mm_um", 300.0, 1.0),
+        Parameter::amplitude("free_0p1mm_um", 300.0, 1.0),
+        Parameter::amplitude("free_0p3mm_um", 300.0, 1.0),
+        Parameter::amplitude("free_1mm_um", 300.0, 1.0),
+        Parameter::amplitude("free_3mm_um", 300.0, 1.0),
+        Parameter::share("free_soft_3mm_s2_um", 300.0, 1.0),
+        Parameter::share("free_soft_10mm_s2_um", 300.0, 1.0),
+        Parameter::share("free_soft_30mm_s2_um", 300.0, 1.0),
+        Parameter::share("free_soft_100mm_s2_um", 300.0, 1.0),
+        Parameter::amplitude("free_by_place_um", 300.0, 2.0),
+        Parameter::amplitude("free_by_place2_um", 300.0, 2.0),
     ],
     moment: Moment::Mean,
     wanders: 0.0,
@@ -104,6 +109,7 @@ struct Backlash {
     width_mm: f64,
     free_mm: [f64; WAY_HATS],
     soft_mm: [f64; SOFT_MM_S2.len()],
+    by_place_mm: [f64; 2],
 }
 
 impl Backlash {
@@ -113,6 +119,9 @@ impl Backlash {
             width_mm: values[0] * 1e-3,
             free_mm: std::array::from_fn(|k| values[1 + k] * 1e-3),
             soft_mm: std::array::from_fn(|k| values[1 + WAY_HATS + k] * 1e-3),
+            by_place_mm: std::array::from_fn(|k| {
+                values[1 + WAY_HATS + SOFT_MM_S2.len() + k] * 1e-3
+            }),
         }
     }
 
@@ -138,6 +147,23 @@ impl Backlash {
         for (sum, ((sense, v), a)) in response.drive[self.axis].iter_mut().zip(ticks) {
             let dragged = f64::from(*sense) * friction.coulomb_mm_s2 + friction.viscous_per_s * v;
             *sum += self.soft_mm(a + dragged);
+        }
+    }
+}
+
+impl Backlash {
+    /// Adds (7).
+    fn add_by_place(&self, scene: &Scene<'_>, response: &mut Response) {
+        if self.by_place_mm.iter().all(|width| *width == 0.0) {
+            return;
+        }
+        let (motion, travel) = (&scene.run.motion, Travel::of(scene, self.axis));
+        let ticks = motion.sense[self.axis]
+            .iter()
+            .zip(&motion.position[self.axis]);
+        for (sum, (sense, here)) in response.drive[self.axis].iter_mut().zip(ticks) {
+            let width_mm = legendre(1, &self.by_place_mm, travel.share(*here));
+            *sum -= 0.5 * f64::from(*sense) * width_mm;
         }
     }
 }
@@ -266,5 +292,6 @@ impl Effect for Backlash {
             *sum += lag_mm * self.width_mm.signum() - f64::from(sense[tick]) * free_mm; // (5)
         }
         self.add_soft(scene, response);
+        self.add_by_place(scene, response);
     }
 }

@@ -21,7 +21,8 @@
 //!
 //! # Holds when
 //! The column stands behind the table, so that it bends in the plane of Y and Z; the wider form has the other
-//! directions. The bend is small and one number.
+//! directions. The bend is small and one number. A thermometer may itself be as slow as the frame of a small machine: the
+//! lag between the two may be next to nothing.
 //!
 //! # Agreement
 //! `val_column_bend_timoshenko_strip`: shift and tilt of a column whose sides differ in temperature, by the
@@ -49,9 +50,9 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("tilt_x_urad_per_k", 100.0, 8.0),
         Parameter::shape(
             "lag_min",
-            [1.0, 480.0],
+            [0.05, 480.0],
             60.0,
-            &[5.0, 20.0, 60.0, 180.0, 360.0],
+            &[0.5, 5.0, 20.0, 60.0, 180.0, 360.0],
         ),
     ],
     free: &[
@@ -82,7 +83,7 @@ impl Effect for ColumnBend {
         let Some(gradient_k) = gradient_k(scene) else {
             return;
         };
-        let bend = scene.history.lagged(&gradient_k, self.lag_s); // (1)
+        let bend = scene.history.lagged_temperature(&gradient_k, self.lag_s); // (1)
         let position = &scene.run.motion.position;
         let on_tool_side =
             Axis::LINEAR.map(|axis| scene.kinematics.chain().tool_side().contains(&axis));

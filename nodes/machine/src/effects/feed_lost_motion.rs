@@ -38,10 +38,10 @@ pub static KIND: Kind = Kind {
     title: "lost motion that depends on the feed",
     targets: Targets::LinearAxes,
     parameters: &[
-        Parameter::amplitude("width_um", 60.0, 2.0),
+        Parameter::amplitude("width_um", 300.0, 2.0),
         Parameter::shape("speed_mm_s", [0.1, 100.0], 5.0, &[1.0, 3.0, 10.0, 30.0]),
     ],
-    free: &[Parameter::amplitude("free_viscous_um", 60.0, 2.0)],
+    free: &[Parameter::amplitude("free_viscous_um", 300.0, 2.0)],
     moment: Moment::Mean,
     wanders: 0.0,
     needs: "motion at two feeds, one of them slow, in both senses",

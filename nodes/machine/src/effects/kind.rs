@@ -6,7 +6,7 @@ use metrology::{Axis, ErrorComponent};
 
 use super::{Effect, linear_axes};
 use crate::chain::Chain;
-use crate::file::{EffectEntry, MachineFile};
+use crate::file::{EffectEntry, MachineFile, SensorPlace};
 use crate::twin::{Instrument, TwinError};
 use crate::volumetric::components_of;
 
@@ -54,6 +54,9 @@ pub enum Targets {
     RotaryMotions,
     /// The machine as a whole; the entry names no axis.
     Machine,
+    /// The machine as a whole, by the first thermometer of its spindle; where it has thermometers at the front and at the
+    /// rear of it, by the first at the rear as well, which the entry then names.
+    Spindle,
     /// Each thermometer of the machine file.
     Thermometers,
     /// Each of these instruments.
@@ -307,6 +310,10 @@ impl Kind {
                     .collect(),
             ),
             Targets::Machine => vec![Target::Machine],
+            Targets::Spindle => {
+                let rear = rear_beside_front(machine).map(Target::Thermometer);
+                std::iter::once(Target::Machine).chain(rear).collect()
+            }
             Targets::Thermometers => machine
                 .temperature_sensors
                 .iter()
@@ -417,6 +424,16 @@ impl Kind {
         };
         all().map(value_of).collect()
     }
+}
+
+/// The first thermometer at the rear of a spindle that has one at its front too.
+fn rear_beside_front(machine: &MachineFile) -> Option<String> {
+    let at = |place: SensorPlace| {
+        let mut sensors = machine.temperature_sensors.iter();
+        sensors.find(|sensor| sensor.place == place)
+    };
+    at(SensorPlace::SpindleFront)?;
+    at(SensorPlace::SpindleRear).map(|sensor| sensor.id.clone())
 }
 
 impl fmt::Display for Target {

@@ -38,8 +38,8 @@ pub static KIND: Kind = Kind {
     title: "pitch error",
     targets: Targets::LinearAxes,
     parameters: &[
-        Parameter::amplitude("p2_um", 60.0, 4.0),
-        Parameter::amplitude("p3_um", 60.0, 3.0),
+        Parameter::amplitude("p2_um", 500.0, 4.0),
+        Parameter::amplitude("p3_um", 500.0, 3.0),
     ],
     free: CURVE_UM,
     moment: Moment::Mean,

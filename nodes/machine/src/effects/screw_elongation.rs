@@ -117,7 +117,9 @@ impl Effect for ScrewElongation {
         let by_square = || lagged(square, 1.0, STATED_SPEED_MM_S.powi(2));
         let by_nut = || {
             let warming = scene.warming_k(&[nut_of(self.axis)]);
-            warming.map_or_else(Vec::new, |series| lagged(&series, 1.0, 1.0))
+            warming.map_or_else(Vec::new, |series| {
+                history.lagged_temperature(&series, self.lag_s)
+            })
         };
         let (third, once, thrice) = (|| by_speed(1.0 / 3.0), || by_speed(1.0), || by_speed(3.0));
         let of_speed = [(self.growth_per_mm, 1.0), (fast, 1.0 / 3.0), (slow, 3.0)];

@@ -11,6 +11,9 @@
 //!   tip_z = -(k_1 y_1 + k_2 y_2),   y_i = 1 - exp(-t/tau_i) where w = 1   (3)
 //! ```
 //!
+//! Which thermometer goes with the growth is tried: of a spindle with thermometers at its front and at its rear the front one
+//! is that of the entry without an axis, the rear one that of the entry that names it.
+//!
 //! The wider form lets the nose move sideways too, with the slower of the two.
 //!
 //! | symbol | here | unit |
@@ -31,7 +34,7 @@
 //! \[1\] ISO 230-3:2020, clause 6 (thermal distortion caused by rotating spindle).
 
 use super::slow::mixture;
-use super::{Effect, Kind, Moment, Parameter, Scene, Targets};
+use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
 use crate::file::SensorPlace;
 use crate::twin::Response;
 
@@ -39,7 +42,7 @@ use crate::twin::Response;
 pub static KIND: Kind = Kind {
     id: "spindle_growth",
     title: "growth of the spindle",
-    targets: Targets::Machine,
+    targets: Targets::Spindle,
     parameters: &[
         Parameter::amplitude("fast_um", 200.0, 15.0),
         Parameter::amplitude("slow_um", 200.0, 25.0),
@@ -53,8 +56,12 @@ pub static KIND: Kind = Kind {
     moment: Moment::Mean,
     wanders: 0.0,
     needs: "measurements of Z over some minutes while the spindle warms or cools",
-    build: |_, values| {
+    build: |target, values| {
         Box::new(SpindleGrowth {
+            thermometer: match target {
+                Target::Thermometer(id) => Some(id),
+                _ => None,
+            },
             fast_mm: values[0] * 1e-3,
             slow_mm: values[1] * 1e-3,
             fast_s: values[2] * 60.0,
@@ -68,6 +75,8 @@ pub static KIND: Kind = Kind {
 const STATED_WARMING_K: f64 = 10.0;
 
 struct SpindleGrowth {
+    /// The one whose warming it follows, where it is not the first of the spindle.
+    thermometer: Option<String>,
     fast_mm: f64,
     slow_mm: f64,
     fast_s: f64,
@@ -75,12 +84,24 @@ struct SpindleGrowth {
     sideways_mm: [f64; 2],
 }
 
+impl SpindleGrowth {
+    fn warming_k(&self, scene: &Scene<'_>) -> Option<Vec<f64>> {
+        let places = [SensorPlace::SpindleFront, SensorPlace::SpindleRear];
+        match &self.thermometer {
+            Some(id) => scene.history.warming_k(id),
+            None => scene.warming_k(&places),
+        }
+    }
+}
+
 impl Effect for SpindleGrowth {
     fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
-        let places = [SensorPlace::SpindleFront, SensorPlace::SpindleRear];
         let [x, y, z] = &mut response.tip_mm;
         let [along_x_mm, along_y_mm] = self.sideways_mm;
-        let Some(warming_k) = scene.warming_k(&places) else {
+        let Some(warming_k) = self.warming_k(scene) else {
+            if self.thermometer.is_some() {
+                return;
+            }
             let times = &scene.run.motion.time_s;
             let terms = [
                 (x, [0.0, along_x_mm]),
@@ -98,8 +119,8 @@ impl Effect for SpindleGrowth {
             }
             return;
         };
-        let fast = || scene.history.lagged(&warming_k, self.fast_s); // (1)
-        let slow = || scene.history.lagged(&warming_k, self.slow_s);
+        let fast = || scene.history.lagged_temperature(&warming_k, self.fast_s); // (1)
+        let slow = || scene.history.lagged_temperature(&warming_k, self.slow_s);
         let per_k = |mm: f64| mm / STATED_WARMING_K;
         let growth = mixture(&[(per_k(self.fast_mm), &fast), (per_k(self.slow_mm), &slow)]);
         scene.add_slow(&growth, z, |_| -1.0);

@@ -76,7 +76,7 @@ impl Effect for WorkpieceExpansion {
         };
         let first_k = air_k.first().copied().unwrap_or(0.0);
         let change: Vec<f64> = air_k.iter().map(|k| k - first_k).collect();
-        let workpiece_k = scene.history.lagged(&change, self.lag_s); // (1)
+        let workpiece_k = scene.history.lagged_temperature(&change, self.lag_s); // (1)
         for (travel, touch) in response.travel_mm.iter_mut().zip(&scene.run.touches) {
             let above_k = first_k + scene.history.at(&workpiece_k, touch.time_s);
             let along =

@@ -1,15 +1,15 @@
 //! Why a table cannot be made for a control.
 
+use metrology::number::{along, number};
 use metrology::{Axis, ErrorComponent};
 
-use super::grid::SAME;
 use crate::volumetric::VolumetricError;
 
 /// Errors that a control cannot be given.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExportError {
     /// A number that is none.
-    #[error("axis {axis}: {quantity}[{index}] = {value}: must be finite")]
+    #[error("axis {axis}: {quantity}[{index}] = {value}: must be finite", value = number(*value))]
     NotFinite {
         /// The axis.
         axis: Axis,
@@ -55,7 +55,10 @@ pub enum ExportError {
         limit: usize,
     },
     /// Positions do not ascend.
-    #[error("axis {axis}: position[{index}] = {position} does not lie above {before} (mm, rad)")]
+    #[error(
+        "axis {axis}: position[{index}] = {} does not lie above {}",
+        along(*axis, *position), along(*axis, *before)
+    )]
     NotAscending {
         /// The axis.
         axis: Axis,
@@ -68,7 +71,8 @@ pub enum ExportError {
     },
     /// Unequal spacing where the control knows only one.
     #[error(
-        "axis {axis}: spacing before point {index} is {spacing}, before point 1 {first}: {control} needs equal spacing (mm, rad)"
+        "axis {axis}: spacing before point {index} is {}, before point 1 {}: {control} needs equal spacing",
+        along(*axis, *spacing), along(*axis, *first)
     )]
     UnequalSpacing {
         /// Control and kind of table.
@@ -83,15 +87,23 @@ pub enum ExportError {
         first: f64,
     },
     /// A spacing that is no spacing.
-    #[error("axis {axis}: spacing {spacing}: must be a finite number above {least:e} (mm, rad)", least = SAME)]
+    #[error(
+        "axis {axis}: spacing {}: must be a finite number above {}",
+        along(*axis, *spacing), along(*axis, *least)
+    )]
     Spacing {
         /// The axis.
         axis: Axis,
         /// The spacing, mm or rad.
         spacing: f64,
+        /// The spacing that it must be above, mm or rad.
+        least: f64,
     },
     /// A point outside the travel.
-    #[error("axis {axis}: point at {position}: travel is [{least}, {greatest}] (mm, rad)")]
+    #[error(
+        "axis {axis}: point at {}: the travel is from {} to {}",
+        along(*axis, *position), along(*axis, *least), along(*axis, *greatest)
+    )]
     OutsideTravel {
         /// The axis.
         axis: Axis,
@@ -104,7 +116,8 @@ pub enum ExportError {
     },
     /// A point where nothing was measured.
     #[error(
-        "axis {axis}: point at {position}: measured is [{least}, {greatest}], nothing is extrapolated (mm, rad)"
+        "axis {axis}: point at {}: measured from {} to {}, nothing is extrapolated",
+        along(*axis, *position), along(*axis, *least), along(*axis, *greatest)
     )]
     OutsideMeasured {
         /// The axis.
@@ -118,7 +131,8 @@ pub enum ExportError {
     },
     /// A value beyond what the control takes.
     #[error(
-        "axis {axis}: value {value} {unit} at {position}: {control} takes at most {limit} {unit}"
+        "axis {axis}: value {} {unit} at {}: {control} takes at most {} {unit}",
+        number(*value), along(*axis, *position), number(*limit)
     )]
     BeyondLimit {
         /// Control and kind of table.
@@ -136,7 +150,8 @@ pub enum ExportError {
     },
     /// The value at the reference point is not zero.
     #[error(
-        "axis {axis}: error {error} at the reference point {reference}: {control} needs zero there, or the axis jumps when it is referenced (mm, rad)"
+        "axis {axis}: error {} at the reference point {}: {control} needs zero there, or the axis jumps when it is referenced",
+        along(*axis, *error), along(*axis, *reference)
     )]
     ReferenceNotZero {
         /// Control and kind of table.
@@ -150,7 +165,8 @@ pub enum ExportError {
     },
     /// The reference point is not one of the points.
     #[error(
-        "axis {axis}: point at {position} is not a whole number of spacings {spacing} from the reference point {reference}: {control} counts from there (mm, rad)"
+        "axis {axis}: point at {} is not a whole number of spacings of {} from the reference point {}: {control} counts from there",
+        along(*axis, *position), along(*axis, *spacing), along(*axis, *reference)
     )]
     OffReference {
         /// Control and kind of table.
@@ -166,7 +182,8 @@ pub enum ExportError {
     },
     /// The two directions differ and the control has one table.
     #[error(
-        "axis {axis}: errors up and down differ by {difference} at {position}: {control} has one table for both, choose their mean or another table (mm, rad)"
+        "axis {axis}: errors up and down differ by {} at {}: {control} has one table for both, choose their mean or another table",
+        along(*axis, *difference), along(*axis, *position)
     )]
     DirectionDependent {
         /// Control and kind of table.
@@ -220,7 +237,7 @@ pub enum ExportError {
         /// Direction of the error.
         direction: Axis,
     },
-    /// A curve that is none.
+    /// An invalid curve.
     #[error("{source}")]
     Curve {
         /// What is wrong with it.
@@ -236,7 +253,7 @@ pub enum ExportError {
         rule: &'static str,
     },
     /// A number of the control's set-up that is out of range.
-    #[error("{control}: {quantity} = {value}: {rule}")]
+    #[error("{control}: {quantity} = {value}: {rule}", value = metrology::number::quantity(quantity, *value))]
     Setting {
         /// Control and kind of table.
         control: &'static str,
@@ -246,6 +263,32 @@ pub enum ExportError {
         value: f64,
         /// What holds for it.
         rule: &'static str,
+    },
+    /// Nobody knows which way a positive value moves the axis.
+    #[error(
+        "{control}: no manual seen says which way a positive value moves the axis, and a wrong sign doubles every error: \
+         nothing is written without --sign plus|minus. To find it: {check}"
+    )]
+    SignUnproven {
+        /// Control and kind of table.
+        control: &'static str,
+        /// One step at the machine that shows the sign.
+        check: &'static str,
+    },
+    /// A point's number that another axis has.
+    #[error(
+        "axis {axis}: point number {number} is one of axis {other}: {control} has one list for all axes; \
+         give another number of the reference point (--reference-number {axis}=...)"
+    )]
+    NumberTaken {
+        /// Control and kind of table.
+        control: &'static str,
+        /// The axis.
+        axis: Axis,
+        /// The number.
+        number: i64,
+        /// Whose it is.
+        other: Axis,
     },
     /// A name that the control cannot have.
     #[error(
@@ -283,7 +326,8 @@ pub enum ExportError {
     },
     /// The drift depends on other axes, which the control's parameters cannot say.
     #[error(
-        "axis {axis}: its drift changes with axis {other} by {slope}: {control} knows the own position only (mm/mm)"
+        "axis {axis}: its drift changes with axis {other} by {} mm/mm: {control} knows the own position only",
+        number(*slope)
     )]
     DriftOfOtherAxis {
         /// Control and kind of parameters.

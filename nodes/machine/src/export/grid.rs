@@ -44,7 +44,12 @@ impl Grid {
             }
         }
         if !spacing.is_finite() || spacing <= SAME {
-            return Err(ExportError::Spacing { axis, spacing });
+            let least = SAME;
+            return Err(ExportError::Spacing {
+                axis,
+                spacing,
+                least,
+            });
         }
         if count < 2 {
             let (n, least) = (count, 2);
@@ -86,7 +91,12 @@ impl Grid {
     /// As [`Grid::new`].
     pub fn inside(axis: Axis, spacing: f64, span: (f64, f64)) -> Result<Self, ExportError> {
         if !spacing.is_finite() || spacing <= SAME {
-            return Err(ExportError::Spacing { axis, spacing });
+            let least = SAME;
+            return Err(ExportError::Spacing {
+                axis,
+                spacing,
+                least,
+            });
         }
         let first = ((span.0 - SAME) / spacing).ceil();
         let last = ((span.1 + SAME) / spacing).floor();
@@ -152,10 +162,10 @@ mod tests {
         assert_eq!(
             names,
             [
-                "axis X: point at 150: travel is [-100, 100] (mm, rad)",
+                "axis X: point at 150 mm: the travel is from -100 mm to 100 mm",
                 "axis X: start[0] = NaN: must be finite",
-                "axis X: spacing inf: must be a finite number above 1e-7 (mm, rad)",
-                "axis X: spacing -1: must be a finite number above 1e-7 (mm, rad)",
+                "axis X: spacing inf mm: must be a finite number above 1e-7 mm",
+                "axis X: spacing -1 mm: must be a finite number above 1e-7 mm",
                 "axis X: 1 points: at least 2 are needed",
                 "axis X: 0 points: at least 2 are needed",
                 "axis X: start[0] = NaN: must be finite",

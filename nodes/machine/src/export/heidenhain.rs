@@ -10,14 +10,19 @@
 //!
 //! # Sign
 //!
+//! No page seen says which way a positive value of a `.COM` table moves its axis, so the user gives it ([`Sign`]):
+//!
 //! ```text
-//!   value = +e(p)         position reached = command - value + e(p)          (1)
+//!   own column, BACKLASH:   value = +e(p) or -e(p)       as a positive value moves to minus or plus    (1)
+//!   C1 to C6:               value = e(p)                 the component as ISO 230-1 defines it         (2)
 //! ```
 //!
-//! For the linear compensation the manual says that the error is entered with its sign, positive when the travel
-//! is too long \[4\]; for the table it says that points *of the error curve* are entered \[5\] and draws that curve over an
-//! ordinate "error" \[6\]. (1) is **derived** from those: no page seen states the sign of a `.COM` value as such. What KinematicsComp
-//! does with a column is up to the sign of the entry in the kinematic table.
+//! What the pages say points to +e: for the linear compensation the error is entered with its sign, "positive if the table travel is too
+//! long" \[4\]; into the table go "the compensation points of the error curve" \[5\], whose ordinate is "Error" \[6\]. But \[4\] is of another
+//! function, and neither \[5\] nor \[6\] says when that error is positive.
+//!
+//! (2) is the scheme of KinematicsComp, which enters EYX, EZX, ... of ISO 230-1 by name \[2\], \[3\]; how a column acts is decided by the
+//! entry that refers to it in the kinematic table, whose sign whoever makes that entry tries in the same way.
 //!
 //! # Units and rounding
 //! mm to 0.1 µm, degrees to 1e-6 degree, both **derived** from the controls' input resolution.
@@ -31,8 +36,8 @@
 //! controls \[5\], which no sound axis comes near. The table is made active in `config.CMA` \[1\].
 //!
 //! # Agreement
-//! Interpreted from the manuals, an axis off by 32.5 µm is left with 50 nm, half of the rounding; with the sign turned
-//! round the error becomes 1.998 to 2.002 times as large.
+//! Of an axis off by 32.5 µm, moved as the given sign says, 50 nm are left, half of the rounding. The error curve of the
+//! example of \[5\] comes out as printed there.
 //!
 //! # References
 //! \[1\] MANUALplus 620 Technical Manual, 01/2012, 6.10.3, p. 713 to 718. \[2\] iTNC 530 HSCI Technical Manual,
@@ -48,8 +53,11 @@ use super::error::ExportError;
 use super::file::ExportFile;
 use super::grid::SAME;
 use super::number::{fixed, is_name, mm_or_deg, unit};
+use super::sign::{Sign, check, given};
 
-const CONTROL: &str = "HEIDENHAIN .COM";
+pub(super) const CONTROL: &str = "HEIDENHAIN .COM";
+/// One step at the machine that shows the sign.
+pub(super) const CHECK: &str = "in a .COM table of one axis enter 0.010 in the axis' own column at one row in mid-travel and 0 in the others, move the axis to that AXISPOS, make the line in config.CMA active and read a dial gauge along the axis: the display stays and the dial moves by 10 um, towards greater positions: --sign plus, towards smaller ones: --sign minus";
 const MOST_ROWS: usize = 256;
 const STEEPEST: f64 = 1.0 / 64.0;
 const LENGTH_DECIMALS: usize = 4;
@@ -59,10 +67,21 @@ const ANGLE_DECIMALS: usize = 6;
 struct Column<'a> {
     name: String,
     direction: Axis,
-    values: &'a [f64],
+    errors: &'a [f64],
+    /// What a positive value does; none in the columns of KinematicsComp.
+    sign: Option<Sign>,
 }
 
-/// The table of an axis: its positioning, and other errors of the same axis at the same positions.
+impl Column<'_> {
+    /// Value of a row: (1) or (2).
+    fn value(&self, row: usize) -> f64 {
+        let error = self.errors[row];
+        self.sign.map_or(error, |sign| sign.value_of(error))
+    }
+}
+
+/// The table of an axis: its positioning, and other errors of the same axis at the same positions; `sign` says which way a positive
+/// value of the axis' own column moves it.
 ///
 /// # Errors
 /// A table name that cannot be, more than 256 rows, columns at other positions or of another axis, a value that
@@ -71,6 +90,7 @@ pub fn compensation_table(
     name: &str,
     positioning: &AxisErrors,
     others: &[CrossErrors],
+    sign: Sign,
 ) -> Result<ExportFile, ExportError> {
     if !is_name(name) {
         let name = name.to_owned();
@@ -81,24 +101,26 @@ pub fn compensation_table(
     }
     let axis = positioning.axis();
     check_count(CONTROL, axis, positioning.position().len(), MOST_ROWS)?;
-    let columns = columns(positioning, others)?;
+    let columns = columns(positioning, others, sign)?;
     for column in &columns {
         check_steepness(axis, positioning.position(), column)?;
     }
     let text = table(name, positioning, &columns);
-    let notes = notes(name, positioning, others);
+    let notes = notes(name, positioning, others, sign);
     Ok(ExportFile::new(format!("{name}.COM"), text, notes))
 }
 
 fn columns<'a>(
     positioning: &'a AxisErrors,
     others: &'a [CrossErrors],
+    sign: Sign,
 ) -> Result<Vec<Column<'a>>, ExportError> {
     let axis = positioning.axis();
-    let column = |name: &str, direction, values| Column {
+    let column = |name: &str, direction, errors, sign| Column {
         name: name.to_owned(),
         direction,
-        values,
+        errors,
+        sign,
     };
     let mut columns = Vec::new();
     let differ = positioning
@@ -107,9 +129,9 @@ fn columns<'a>(
         .zip(positioning.down())
         .any(|(up, down)| (up - down).abs() > SAME);
     if differ {
-        columns.push(column("BACKLASH", axis, positioning.down()));
+        columns.push(column("BACKLASH", axis, positioning.down(), Some(sign)));
     }
-    columns.push(column(axis.letter(), axis, positioning.up()));
+    columns.push(column(axis.letter(), axis, positioning.up(), Some(sign)));
     for errors in others {
         let component = errors.parts()[0];
         let own = errors.base() == axis;
@@ -132,13 +154,13 @@ fn columns<'a>(
             return Err(ExportError::DifferentPositions { axis, component });
         }
         let name = format!("C{}", errors.direction().index() + 1);
-        columns.push(column(&name, errors.direction(), errors.error()));
+        columns.push(column(&name, errors.direction(), errors.error(), None));
     }
     Ok(columns)
 }
 
 fn check_steepness(axis: Axis, position: &[f64], column: &Column) -> Result<(), ExportError> {
-    let steps = position.windows(2).zip(column.values.windows(2));
+    let steps = position.windows(2).zip(column.errors.windows(2));
     for (at, value) in steps {
         let spacing = mm_or_deg(axis, at[1] - at[0]);
         let difference = mm_or_deg(column.direction, value[1] - value[0]);
@@ -175,8 +197,7 @@ fn table(name: &str, positioning: &AxisErrors, columns: &[Column]) -> String {
     for (row, at) in positioning.position().iter().enumerate() {
         text.push_str(&format!("{row:<5}{:<13}", number(axis, *at)));
         for column in columns {
-            // (1)
-            let value = number(column.direction, column.values[row]);
+            let value = number(column.direction, column.value(row));
             text.push_str(&format!("{value:<12}"));
         }
         close_line(&mut text);
@@ -190,19 +211,24 @@ fn close_line(text: &mut String) {
     text.push('\n');
 }
 
-fn notes(name: &str, positioning: &AxisErrors, others: &[CrossErrors]) -> Vec<String> {
+fn notes(name: &str, positioning: &AxisErrors, others: &[CrossErrors], sign: Sign) -> Vec<String> {
     let axis = positioning.axis();
     let mut notes = vec![
-        format!("HEIDENHAIN compensation table of axis {axis}; AXISPOS in {} against the machine datum; lengths mm, angles deg", unit(axis)),
-        "value = error with its own sign (actual - commanded), positive when the travel is too long; DERIVED for the table from the error curve that the manuals show: verify before use".to_owned(),
+        format!(
+            "HEIDENHAIN compensation table of axis {axis}; AXISPOS in {} against the machine datum; lengths mm, angles deg",
+            unit(axis)
+        ),
+        given(sign),
+        check(CHECK),
         "layout of the text file is DERIVED from HEIDENHAIN's text tables".to_owned(),
         format!("enter {name}.COM in config.CMA for axis {axis} and make the line active"),
-        "BACKLASH, where present, holds the positioning values measured in the negative direction".to_owned(),
+        "BACKLASH, where present, holds the positioning values measured in the negative direction"
+            .to_owned(),
     ];
     for errors in others {
         let n = errors.direction().index() + 1;
         notes.push(format!(
-            "C{n} holds {}: it acts through an entry {name}.C{n} in column COMPTAB of the kinematic table",
+            "C{n} holds {} with the sign of ISO 230-1 (iTNC 530 HSCI Technical Manual, KinematicsComp, p. 680, 684); what a positive value does is decided by your entry, so try that entry's sign in the same way: it acts through an entry {name}.C{n} in column COMPTAB of the kinematic table",
             errors.names()
         ));
     }

@@ -15,7 +15,7 @@ use super::error::ExportError;
 use super::file::ExportFile;
 use super::grid::Grid;
 
-pub use controls::{Control, Fanuc, Sinumerik};
+pub use controls::{Control, Fanuc, PitchTables, Sinumerik};
 
 /// The last that is known of a machine.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,6 +26,15 @@ pub struct Measured {
     pub thermal: Option<ThermalModel>,
     /// Geometric errors.
     pub geometry: Option<GeometryModel>,
+    /// Errors of the rotary axes.
+    pub rotary: Option<GeometryModel>,
+}
+
+impl Measured {
+    /// Models of geometric errors.
+    fn models(&self) -> impl Iterator<Item = &GeometryModel> {
+        self.geometry.iter().chain(&self.rotary)
+    }
 }
 
 /// What is wanted.
@@ -110,6 +119,12 @@ impl Selected {
         }
     }
 
+    /// A component that stands in a list of everything is not left out.
+    fn list(&mut self, component: ErrorComponent) {
+        let name = component.to_string();
+        self.left_out.retain(|left| left.what != name);
+    }
+
     /// A file that has the positioning of an axis, with or without more.
     fn take_positioning(&mut self, own: &AxisErrors, file: Result<ExportFile, ExportError>) {
         if file.is_ok() {
@@ -135,7 +150,7 @@ pub fn select(measured: &Measured, wanted: &Wanted, control: &Control) -> Select
         if let Some(positioning) = positioning(measured, wanted, axis, &mut selected) {
             errors.positioning.push(positioning);
         }
-        if let Some(model) = &measured.geometry {
+        for model in measured.models() {
             cross(model, wanted, axis, &mut errors, &mut selected);
         }
     }
@@ -158,8 +173,7 @@ fn positioning(
     selected: &mut Selected,
 ) -> Option<AxisErrors> {
     let own = ErrorComponent::motion(axis, axis);
-    let model = measured.geometry.as_ref();
-    let fitted = model.filter(|model| has(model, own));
+    let fitted = measured.models().find(|model| has(model, own));
     let errors = match (&measured.tables[axis], fitted) {
         (Some(table), fitted) => {
             if fitted.is_some() {

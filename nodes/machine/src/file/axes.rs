@@ -5,15 +5,34 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use metrology::Axis;
+use schemars::{Schema, SchemaGenerator};
 use serde::de::{Deserializer, Error, MapAccess, Visitor};
 
-use super::AxisEntry;
+use super::{AxisEntry, LinearAxisEntry, RotaryAxisEntry};
 
 /// Reads a map of axes by letter.
 pub(super) fn deserialize<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<BTreeMap<Axis, AxisEntry>, D::Error> {
     deserializer.deserialize_map(Axes)
+}
+
+/// What [`deserialize`] takes, for editors: which keys an axis has follows from its letter.
+pub(super) fn schema(generator: &mut SchemaGenerator) -> Schema {
+    let mut entries = Schema::default();
+    for axis in Axis::ALL {
+        let entry = if axis.is_linear() {
+            generator.subschema_for::<LinearAxisEntry>()
+        } else {
+            generator.subschema_for::<RotaryAxisEntry>()
+        };
+        entries.insert(axis.letter().to_owned(), entry.to_value());
+    }
+    let mut schema = Schema::default();
+    schema.insert("type".to_owned(), "object".into());
+    schema.insert("properties".to_owned(), entries.to_value());
+    schema.insert("additionalProperties".to_owned(), false.into());
+    schema
 }
 
 struct Axes;

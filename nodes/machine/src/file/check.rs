@@ -2,20 +2,26 @@
 
 use std::collections::BTreeSet;
 
-use metrology::Axis;
+use metrology::{Axis, Bound, leaves};
 
 use super::{
-    ArtefactEntry, AxisEntry, BlockEntry, GuideFrictionEntry, LinearAxisEntry, MachineFile,
-    PositionFeedback, RotaryAxisEntry, VelocityLoopEntry, reference,
+    ArtefactEntry, AxisEntry, BlockEntry, LinearAxisEntry, MachineFile, PositionFeedback, limits,
+    reference,
 };
 use crate::chain::Chain;
 use crate::cycle::artefact_id;
+use crate::effects::CATALOGUE;
 use crate::error::MachineFileError;
 
-const ABOVE_ZERO: &str = "must be a finite number above 0";
 const FINITE: &str = "must be a finite number";
-const NOT_NEGATIVE: &str = "must be a finite number, 0 or above";
-const SHARE: &str = "must be from 0 to 1";
+/// Magnitude of any number of the file, in the unit of its key: products of a few of them stay finite.
+const GREATEST_NUMBER: f64 = 1e12;
+const IN_MAGNITUDE: &str = "must be at most 1e12 in magnitude";
+/// Blocks, artefacts, styli, thermometers, placements, beams or effects: a machine has tens; each is planned for, and each
+/// thermometer is a topic.
+const ENTRIES: Bound = Bound::at_most(1_000);
+/// Length of an id in bytes: it is a part of topics, frames and messages.
+const ID_BYTES: Bound = Bound::at_most(128);
 const ROS_NAME: &str =
     "must begin with a letter and consist of letters, digits and single underscores";
 
@@ -26,25 +32,26 @@ impl MachineFile {
     /// The first rule that is broken, with its key and value.
     pub fn check(&self, source_name: &str) -> Result<(), MachineFileError> {
         let check = Check { source_name };
+        check.amounts(self)?;
         check.ros_name("name", &self.name)?;
+        check.physics(self)?;
         for (axis, entry) in &self.axes {
             let key = format!("axes.{axis}");
             match entry {
-                AxisEntry::Linear(entry) => check.linear(&key, entry)?,
-                AxisEntry::Rotary(entry) => check.rotary(&key, entry)?,
+                AxisEntry::Linear(entry) => {
+                    check.travel(&format!("{key}.travel_mm"), entry.travel_mm)?;
+                }
+                AxisEntry::Rotary(entry) => {
+                    check.travel(&format!("{key}.travel_deg"), entry.travel_deg)?;
+                }
             }
             check.kind(*axis, entry)?;
         }
         check.chain(self)?;
         check.origins(self)?;
-        check.positive("control.servo_period_ms", self.control.servo_period_ms)?;
-        check.positive(
-            "control.pulse_equivalent_um",
-            self.control.pulse_equivalent_um,
-        )?;
         check.probe(self)?;
         check.features(self)?;
-        check.table(self)?;
+        check.certificates(self)?;
         check.sensors(self)?;
         let (grid, length) = (self.grid_encoder.as_ref(), self.length_reference.as_ref());
         reference::check(&check, grid, length)?;
@@ -64,9 +71,15 @@ impl Check<'_> {
         holds: bool,
         rule: &'static str,
     ) -> Result<(), MachineFileError> {
-        if holds && value.is_finite() {
+        let is_small = value.abs() <= GREATEST_NUMBER;
+        if holds && is_small {
             return Ok(());
         }
+        let rule = if holds && value.is_finite() {
+            IN_MAGNITUDE
+        } else {
+            rule
+        };
         Err(MachineFileError::Number {
             source_name: self.source_name.to_owned(),
             key: key.to_owned(),
@@ -75,19 +88,61 @@ impl Check<'_> {
         })
     }
 
-    pub(super) fn positive(&self, key: &str, value: f64) -> Result<(), MachineFileError> {
-        self.number(key, value, value > 0.0, ABOVE_ZERO)
+    /// Refuses physical numbers that no machine has; those of effects have the ranges of their kinds.
+    fn physics(&self, file: &MachineFile) -> Result<(), MachineFileError> {
+        let physical = MachineFile {
+            effects: vec![],
+            ..file.clone()
+        };
+        leaves::check(limits::ROWS, &physical).map_err(|source| self.bound(source))
     }
 
-    pub(super) fn finite(&self, key: &str, values: &[f64]) -> Result<(), MachineFileError> {
-        for (index, &value) in values.iter().enumerate() {
-            self.number(&format!("{key}[{index}]"), value, true, FINITE)?;
+    fn bound(&self, source: metrology::BoundError) -> MachineFileError {
+        MachineFileError::Bound {
+            source_name: self.source_name.to_owned(),
+            source,
+        }
+    }
+
+    /// Refuses lists that are too long before anything is made of them.
+    fn amounts(&self, file: &MachineFile) -> Result<(), MachineFileError> {
+        let grid = file.grid_encoder.as_ref();
+        let length = file.length_reference.as_ref();
+        let lists = [
+            ("blocks", file.blocks.len()),
+            ("artefacts", file.artefacts.len()),
+            ("certificates", file.certificates.len()),
+            ("probe.styli", file.probe.styli.len()),
+            ("temperature_sensors", file.temperature_sensors.len()),
+            ("effects", file.effects.len()),
+            (
+                "grid_encoder.placements",
+                grid.map_or(0, |grid| grid.placements.len()),
+            ),
+            (
+                "length_reference.beams",
+                length.map_or(0, |length| length.beams.len()),
+            ),
+        ];
+        let refuse = |key: &dyn Fn() -> String, n| {
+            let checked = ENTRIES.check_amount(key, "entries", n);
+            checked.map_err(|source| self.bound(source))
+        };
+        for (key, n) in lists {
+            refuse(&|| key.to_owned(), n)?;
+        }
+        for (axis, entry) in &file.axes {
+            if let AxisEntry::Linear(linear) = entry {
+                refuse(
+                    &|| format!("axes.{axis}.periods_mm"),
+                    linear.periods_mm.len(),
+                )?;
+            }
         }
         Ok(())
     }
 
     fn travel(&self, key: &str, [least, greatest]: [f64; 2]) -> Result<(), MachineFileError> {
-        self.finite(key, &[least, greatest])?;
         if least < greatest {
             return Ok(());
         }
@@ -99,7 +154,7 @@ impl Check<'_> {
         })
     }
 
-    fn name(
+    pub(super) fn name(
         &self,
         key: &str,
         name: &str,
@@ -118,75 +173,13 @@ impl Check<'_> {
     }
 
     fn ros_name(&self, key: &str, name: &str) -> Result<(), MachineFileError> {
+        ID_BYTES
+            .check_amount(|| key.to_owned(), "bytes of text", name.len())
+            .map_err(|source| self.bound(source))?;
         let legal = name.starts_with(|c: char| c.is_ascii_alphabetic())
             && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
             && !name.contains("__");
         self.name(key, name, legal, ROS_NAME)
-    }
-
-    fn loop_of(&self, key: &str, gain_per_s: f64, share: f64) -> Result<(), MachineFileError> {
-        self.positive(&format!("{key}.position_gain_per_s"), gain_per_s)?;
-        let holds = (0.0..=1.0).contains(&share);
-        self.number(&format!("{key}.velocity_feedforward"), share, holds, SHARE)
-    }
-
-    fn velocity_loop(
-        &self,
-        key: &str,
-        entry: Option<&VelocityLoopEntry>,
-    ) -> Result<(), MachineFileError> {
-        let Some(entry) = entry else { return Ok(()) };
-        let at = |field: &str| format!("{key}.velocity_loop.{field}");
-        self.positive(&at("frequency_hz"), entry.frequency_hz)?;
-        self.positive(&at("damping"), entry.damping)?;
-        let holds = entry.filter_ms >= 0.0 && entry.filter_ms.is_finite();
-        self.number(&at("filter_ms"), entry.filter_ms, holds, NOT_NEGATIVE)
-    }
-
-    fn linear(&self, key: &str, entry: &LinearAxisEntry) -> Result<(), MachineFileError> {
-        self.travel(&format!("{key}.travel_mm"), entry.travel_mm)?;
-        let fields = [
-            ("feed_limit_mm_min", entry.feed_limit_mm_min),
-            ("acceleration_limit_mm_s2", entry.acceleration_limit_mm_s2),
-            ("lead_mm", entry.lead_mm),
-            ("encoder_resolution_um", entry.encoder_resolution_um),
-        ];
-        for (field, value) in fields {
-            self.positive(&format!("{key}.{field}"), value)?;
-        }
-        if let Some(value) = entry.scale_resolution_um {
-            self.positive(&format!("{key}.scale_resolution_um"), value)?;
-        }
-        self.guide_friction(key, entry.guide_friction.as_ref())?;
-        self.velocity_loop(key, entry.velocity_loop.as_ref())?;
-        self.loop_of(key, entry.position_gain_per_s, entry.velocity_feedforward)
-    }
-
-    fn guide_friction(
-        &self,
-        key: &str,
-        entry: Option<&GuideFrictionEntry>,
-    ) -> Result<(), MachineFileError> {
-        let Some(entry) = entry else { return Ok(()) };
-        let at = |field: &str| format!("{key}.guide_friction.{field}");
-        self.positive(&at("coulomb_mm_s2"), entry.coulomb_mm_s2)?;
-        let viscous = entry.viscous_per_s;
-        let holds = viscous >= 0.0 && viscous.is_finite();
-        self.number(&at("viscous_per_s"), viscous, holds, NOT_NEGATIVE)
-    }
-
-    fn rotary(&self, key: &str, entry: &RotaryAxisEntry) -> Result<(), MachineFileError> {
-        self.travel(&format!("{key}.travel_deg"), entry.travel_deg)?;
-        let fields = [
-            ("feed_limit_deg_min", entry.feed_limit_deg_min),
-            ("acceleration_limit_deg_s2", entry.acceleration_limit_deg_s2),
-            ("encoder_resolution_arcsec", entry.encoder_resolution_arcsec),
-        ];
-        for (field, value) in fields {
-            self.positive(&format!("{key}.{field}"), value)?;
-        }
-        self.velocity_loop(key, entry.velocity_loop.as_ref())?;
-        self.loop_of(key, entry.position_gain_per_s, entry.velocity_feedforward)
     }
 
     fn axis(&self, axis: Axis, rule: &'static str) -> MachineFileError {
@@ -205,12 +198,28 @@ impl Check<'_> {
                     let rule = "has position_feedback: scale, and no scale_resolution_um";
                     return Err(self.axis(axis, rule));
                 }
-                Ok(())
+                self.scale(axis, linear)
             }
             (false, AxisEntry::Rotary(_)) => Ok(()),
             (true, AxisEntry::Rotary(_)) => Err(self.axis(axis, "X Y Z are linear axes")),
             (false, AxisEntry::Linear(_)) => Err(self.axis(axis, "A B C are rotary axes")),
         }
+    }
+
+    /// What a scale's certificate and data sheet state needs the scale, and the certificate both of its parts.
+    fn scale(&self, axis: Axis, linear: &LinearAxisEntry) -> Result<(), MachineFileError> {
+        let constant = linear.scale_expanded_uncertainty_um.is_some();
+        let growing = linear.scale_expanded_uncertainty_um_per_m.is_some();
+        let described = constant || growing || linear.scale_signal_period_um.is_some();
+        if described && linear.scale_resolution_um.is_none() {
+            let rule = "describes a linear scale, and has no scale_resolution_um";
+            return Err(self.axis(axis, rule));
+        }
+        if constant != growing {
+            let rule = "needs both scale_expanded_uncertainty_um and scale_expanded_uncertainty_um_per_m, or neither";
+            return Err(self.axis(axis, rule));
+        }
+        Ok(())
     }
 
     fn chain(&self, file: &MachineFile) -> Result<(), MachineFileError> {
@@ -245,8 +254,7 @@ impl Check<'_> {
                 (false, Some(_)) => {
                     return Err(self.axis(axis, "stands in rotary.origin_mm but is not described"));
                 }
-                (true, Some(origin)) => self.finite(&format!("rotary.origin_mm.{axis}"), origin)?,
-                (false, None) => {}
+                (true, Some(_)) | (false, None) => {}
             }
         }
         let linear = file
@@ -262,28 +270,12 @@ impl Check<'_> {
 
     fn probe(&self, file: &MachineFile) -> Result<(), MachineFileError> {
         let probe = &file.probe;
-        for (name, stylus) in &probe.styli {
-            let key = format!("probe.styli.{name}");
-            self.ros_name(&key, name)?;
-            self.positive(&format!("{key}.radius_mm"), stylus.radius_mm)?;
-            self.positive(&format!("{key}.length_mm"), stylus.length_mm)?;
+        for name in probe.styli.keys() {
+            self.ros_name(&format!("probe.styli.{name}"), name)?;
         }
         let known = probe.styli.contains_key(&probe.mounted);
         let rule = "must be one of probe.styli";
-        self.name("probe.mounted", &probe.mounted, known, rule)?;
-        self.positive("probe.standoff_mm", probe.standoff_mm)?;
-        self.positive("probe.overtravel_mm", probe.overtravel_mm)?;
-        self.positive("probe.feed_mm_min", probe.feed_mm_min)?;
-        self.number(
-            "probe.repeatability_um",
-            probe.repeatability_um,
-            probe.repeatability_um >= 0.0,
-            NOT_NEGATIVE,
-        )?;
-        match probe.latency_ms {
-            Some(value) => self.number("probe.latency_ms", value, value >= 0.0, NOT_NEGATIVE),
-            None => Ok(()),
-        }
+        self.name("probe.mounted", &probe.mounted, known, rule)
     }
 
     fn features(&self, file: &MachineFile) -> Result<(), MachineFileError> {
@@ -312,7 +304,6 @@ impl Check<'_> {
     }
 
     fn block(&self, key: &str, block: &BlockEntry) -> Result<(), MachineFileError> {
-        self.finite(&format!("{key}.corner_mm"), &block.corner_mm)?;
         for (index, sign) in block.approach_sign.into_iter().enumerate() {
             self.number(
                 &format!("{key}.approach_sign[{index}]"),
@@ -321,52 +312,16 @@ impl Check<'_> {
                 "must be 1 or -1",
             )?;
         }
-        self.positive(&format!("{key}.inset_mm"), block.inset_mm)
+        Ok(())
     }
 
     fn artefact(&self, key: &str, artefact: &ArtefactEntry) -> Result<(), MachineFileError> {
-        match artefact {
-            ArtefactEntry::Sphere {
-                centre_mm,
-                radius_mm,
-                ..
-            }
-            | ArtefactEntry::Bore {
-                centre_mm,
-                radius_mm,
-                ..
-            }
-            | ArtefactEntry::Boss {
-                centre_mm,
-                radius_mm,
-                ..
-            } => {
-                self.finite(&format!("{key}.centre_mm"), centre_mm)?;
-                self.positive(&format!("{key}.radius_mm"), *radius_mm)
-            }
-            ArtefactEntry::Plane {
-                point_mm,
-                normal,
-                half_side_mm,
-                ..
-            } => {
-                self.finite(&format!("{key}.point_mm"), point_mm)?;
-                self.finite(&format!("{key}.normal"), normal)?;
-                let norm = nalgebra::Vector3::from(*normal).norm();
-                let rule = "must have a length above 1e-9";
-                self.number(&format!("{key}.normal"), norm, norm > 1e-9, rule)?;
-                self.positive(&format!("{key}.half_side_mm"), *half_side_mm)
-            }
-        }
-    }
-
-    fn table(&self, file: &MachineFile) -> Result<(), MachineFileError> {
-        let Some(table) = &file.table else {
+        let ArtefactEntry::Plane { normal, .. } = artefact else {
             return Ok(());
         };
-        self.finite("table.top_z_mm", &[table.top_z_mm])?;
-        self.positive("table.radius_mm", table.radius_mm)?;
-        self.positive("table.nose_radius_mm", table.nose_radius_mm)
+        let norm = nalgebra::Vector3::from(*normal).norm();
+        let rule = "must have a length above 1e-9";
+        self.number(&format!("{key}.normal"), norm, norm > 1e-9, rule)
     }
 
     fn sensors(&self, file: &MachineFile) -> Result<(), MachineFileError> {
@@ -374,7 +329,6 @@ impl Check<'_> {
         for (index, sensor) in file.temperature_sensors.iter().enumerate() {
             let key = format!("temperature_sensors[{index}]");
             self.new_id(&format!("{key}.id"), &sensor.id, &mut ids)?;
-            self.positive(&format!("{key}.period_s"), sensor.period_s)?;
         }
         Ok(())
     }
@@ -382,8 +336,19 @@ impl Check<'_> {
     fn effects(&self, file: &MachineFile) -> Result<(), MachineFileError> {
         for (index, effect) in file.effects.iter().enumerate() {
             self.ros_name(&format!("effects[{index}].kind"), &effect.kind)?;
+            let kind = CATALOGUE.iter().find(|kind| kind.id == effect.kind);
+            let known = || {
+                kind.iter()
+                    .flat_map(|kind| kind.parameters.iter().chain(kind.free))
+            };
             for (name, value) in &effect.parameters {
-                self.number(&format!("effects[{index}].{name}"), *value, true, FINITE)?;
+                let key = format!("effects[{index}].{name}");
+                self.number(&key, *value, value.is_finite(), FINITE)?;
+                if let Some(parameter) = known().find(|parameter| parameter.name == name) {
+                    let rows = [(parameter.name, parameter.low, parameter.high)];
+                    leaves::check_number(&rows, &key, *value)
+                        .map_err(|source| self.bound(source))?;
+                }
             }
         }
         Ok(())

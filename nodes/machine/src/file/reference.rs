@@ -5,13 +5,14 @@ use std::collections::BTreeSet;
 use metrology::Axis;
 use metrology::sample::TestPlane;
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::check::Check;
 use crate::error::MachineFileError;
 
 /// A grid encoder: one plate, one head, and the places where the plate is put.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridEncoderEntry {
     /// Radius of the plate's usable field.
@@ -23,7 +24,7 @@ pub struct GridEncoderEntry {
 }
 
 /// One placement of a grid encoder's plate.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridPlacement {
     /// Name.
@@ -37,7 +38,7 @@ pub struct GridPlacement {
 }
 
 /// Plane of a placement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[expect(missing_docs, reason = "the planes of G17, G19 and G18")]
 pub enum GridPlane {
@@ -77,7 +78,7 @@ impl GridPlacement {
 }
 
 /// A laser interferometer or other reference of length along straight beams.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LengthReferenceEntry {
     /// Resolution.
@@ -87,7 +88,7 @@ pub struct LengthReferenceEntry {
 }
 
 /// One beam; readings grow from its beginning to its end.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BeamEntry {
     /// Name.
@@ -138,23 +139,15 @@ pub(super) fn check(
 ) -> Result<(), MachineFileError> {
     let mut ids = BTreeSet::new();
     if let Some(grid) = grid {
-        check.positive("grid_encoder.radius_mm", grid.radius_mm)?;
-        check.positive("grid_encoder.resolution_um", grid.resolution_um)?;
         for (index, placement) in grid.placements.iter().enumerate() {
             let key = format!("grid_encoder.placements[{index}]");
             check.new_id(&format!("{key}.id"), &placement.id, &mut ids)?;
-            check.finite(&format!("{key}.centre_mm"), &placement.centre_mm)?;
-            check.finite(&format!("{key}.tool_offset_mm"), &placement.tool_offset_mm)?;
         }
     }
     if let Some(length) = length {
-        check.positive("length_reference.resolution_um", length.resolution_um)?;
         for (index, beam) in length.beams.iter().enumerate() {
             let key = format!("length_reference.beams[{index}]");
             check.new_id(&format!("{key}.id"), &beam.id, &mut ids)?;
-            check.finite(&format!("{key}.from_mm"), &beam.from_mm)?;
-            check.finite(&format!("{key}.to_mm"), &beam.to_mm)?;
-            check.finite(&format!("{key}.tool_offset_mm"), &beam.tool_offset_mm)?;
             let length_mm = (Vector3::from(beam.to_mm) - Vector3::from(beam.from_mm)).norm();
             let rule = "is its length, which must be at least 1 mm";
             check.number(&key, length_mm, length_mm >= SHORTEST_BEAM_MM, rule)?;

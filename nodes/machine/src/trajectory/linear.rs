@@ -132,6 +132,7 @@ pub fn positioning(file: &MachineFile, order: &AxisRun<'_>) -> Result<Trajectory
 /// # Errors
 /// As [`positioning`]; the overrun must be long enough to reach the feed.
 pub fn scan(file: &MachineFile, order: &AxisRun<'_>) -> Result<Trajectory, TrajectoryError> {
+    linear_axis(order.axis)?;
     let needed_mm = run_in_mm(file, &[order.axis], order.feed_mm_min)?;
     if order.overrun_mm < needed_mm {
         return Err(TrajectoryError::OverrunTooShort {
@@ -163,6 +164,13 @@ pub fn scan(file: &MachineFile, order: &AxisRun<'_>) -> Result<Trajectory, Traje
     ))
 }
 
+fn linear_axis(axis: Axis) -> Result<(), TrajectoryError> {
+    if axis.is_linear() {
+        return Ok(());
+    }
+    Err(TrajectoryError::NotLinear { axis })
+}
+
 /// Where the axis runs.
 struct Line<'a> {
     axis: Axis,
@@ -175,6 +183,7 @@ struct Line<'a> {
 
 impl<'a> Line<'a> {
     fn new(file: &'a MachineFile, order: &AxisRun<'_>) -> Result<Self, TrajectoryError> {
+        linear_axis(order.axis)?;
         let beam = match order.beam {
             Some(id) => Some(beam(file, id)?),
             None => None,

@@ -117,8 +117,8 @@ impl Shape {
     }
 
     fn check(&self) -> Result<(), TrajectoryError> {
-        const SWEPT: &str = "must be above 0 and at most 360 deg (radians)";
-        const BETWEEN: &str = "must be above 0 and below 180 deg (radians)";
+        const SWEPT: &str = "must be above 0 and at most 360 deg";
+        const BETWEEN: &str = "must be above 0 and below 180 deg";
         let (heading, lengths, turn) = self.numbers();
         finite(heading.0, heading.1)?;
         for (key, value) in lengths {
@@ -127,11 +127,11 @@ impl Shape {
         match (self, turn) {
             (Self::Corner { .. }, Some(between_rad)) => {
                 let holds = between_rad > 0.0 && between_rad < std::f64::consts::PI;
-                require("between_rad", between_rad, holds, BETWEEN)
+                require("between_deg", between_rad.to_degrees(), holds, BETWEEN)
             }
             (_, Some(swept_rad)) => {
                 let holds = swept_rad > 0.0 && swept_rad <= std::f64::consts::TAU;
-                require("swept_rad", swept_rad, holds, SWEPT)
+                require("swept_deg", swept_rad.to_degrees(), holds, SWEPT)
             }
             (_, None) => Ok(()),
         }
@@ -378,12 +378,12 @@ mod tests {
         };
         assert_eq!(
             told(circle),
-            "radius_mm = -1: must be a finite number above 0"
+            "radius_mm = -1 mm: must be a finite number above 0"
         );
         let line = Shape::Line {
             angle_rad: f64::NAN,
             length_mm: 10.0,
         };
-        assert_eq!(told(line), "angle_rad = NaN: must be a finite number");
+        assert_eq!(told(line), "angle_rad = NaN rad: must be a finite number");
     }
 }

@@ -10,6 +10,7 @@ use super::contour::Element;
 use super::error::TrajectoryError;
 use crate::cycle::program::{Number, TRAVEL_MARGIN_MM, Words};
 use crate::file::{GridPlane, LinearAxisEntry, MachineFile};
+use crate::program_frame::HEAD;
 
 /// Rest before a count is set to zero, s.
 const REST_BEFORE_ZERO_S: f64 = 1.0;
@@ -27,7 +28,7 @@ impl<'a> Writer<'a> {
     pub(super) fn new(file: &'a MachineFile) -> Self {
         Self {
             file,
-            text: String::from("G21 G90 G17\n(rate: background)\n"),
+            text: format!("{HEAD}(rate: background)\n"),
         }
     }
 

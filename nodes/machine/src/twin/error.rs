@@ -1,13 +1,14 @@
 //! What can be wrong with a session or an effect that is to be simulated.
 
 use metrology::Axis;
+use metrology::number::{number, quantity};
 
 /// A session that cannot be simulated, or an effect that is none.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message names each field")]
 pub enum TwinError {
     /// Time must grow.
-    #[error("motion: time {time_s} s at tick {index} does not lie after the tick before")]
+    #[error("motion: time {time_s} s at tick {index} does not lie after the tick before", time_s = number(*time_s))]
     Time { index: usize, time_s: f64 },
     /// Vectors of different length.
     #[error("motion: axis {axis} has {found} positions, time has {wanted}")]
@@ -17,7 +18,7 @@ pub enum TwinError {
         wanted: usize,
     },
     /// A position that is no number.
-    #[error("motion: axis {axis} at tick {index} is {value}: must be finite")]
+    #[error("motion: axis {axis} at tick {index} is {value}: must be finite", value = number(*value))]
     NotFinite {
         axis: Axis,
         index: usize,
@@ -62,7 +63,7 @@ pub enum TwinError {
         name: String,
     },
     /// A parameter outside its physical range.
-    #[error("effects[{index}] ({kind}): {name} = {value}: must be within {low} and {high}")]
+    #[error("effects[{index}] ({kind}): {name} = {value}: must be within {low} and {high}", value = quantity(name, *value), low = number(*low), high = quantity(name, *high))]
     Range {
         index: usize,
         kind: String,

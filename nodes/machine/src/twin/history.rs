@@ -1,6 +1,7 @@
 //! The slow past of a session: what heats a machine, on a coarse grid of time.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use metrology::PerAxis;
 
@@ -23,7 +24,14 @@ pub struct History {
     pub rubbing: PerAxis<Rubbing>,
     /// Temperature of each sensor by the name in the machine file, degC; NaN before the first reading.
     pub temperature_degc: BTreeMap<String, Vec<f64>>,
+    /// Entries in which nothing at all was recorded, longer than the usual spacing of what was: nights, meals.
+    pub pauses: Vec<Range<usize>>,
+    /// By sensor: entries in which it was not read for longer than usual; its temperature is taken to go evenly there.
+    pub unread: BTreeMap<String, Vec<Range<usize>>>,
 }
+
+/// After a pause of more lags than this what follows a temperature is settled at it.
+pub const SETTLED_LAGS: f64 = 5.0;
 
 impl History {
     /// Number of entries.
@@ -82,6 +90,41 @@ impl History {
         series.iter().map(follow).collect()
     }
 
+    /// What follows a temperature, as [`History::lagged`], but begins settled at the temperature after a pause of more
+    /// than [`SETTLED_LAGS`] time constants.
+    ///
+    /// What is not read over a pause P is taken to go evenly. A machine that is left to itself tends to its surroundings,
+    /// fast at first, and its slope at the end of the pause lies between that of the even way and nought. With a change D
+    /// over the pause what follows it lies, when the next run begins, between
+    ///
+    /// ```text
+    ///   T - D tau/P   and   T
+    /// ```
+    ///
+    /// so that T is off by at most a fifth of D where P is five time constants, while after a shorter pause the state
+    /// from before it is not forgotten and only the even way has it. Heat of friction is no temperature: it stops with the motion.
+    #[must_use]
+    pub fn lagged_temperature(&self, series: &[f64], lag_s: f64) -> Vec<f64> {
+        let is_long = |pause: &&Range<usize>| {
+            let entries = u32::try_from(pause.len()).unwrap_or(u32::MAX);
+            f64::from(entries) * self.step_s > SETTLED_LAGS * lag_s
+        };
+        let mut starts = self.pauses.iter().filter(is_long).map(|pause| pause.end);
+        let mut start = starts.next();
+        let half = (-0.5 * self.step_s / lag_s).exp();
+        let mut state = 0.0;
+        let follow = |(k, input): (usize, &f64)| {
+            if start == Some(k) {
+                state = *input;
+                start = starts.next();
+            }
+            let middle = input + (state - input) * half;
+            state = input + (middle - input) * half;
+            middle
+        };
+        series.iter().enumerate().map(follow).collect()
+    }
+
     /// Value of a series of this history at an instant of the session, linear between the middles of the
     /// entries and constant beyond the first and last; NaN for an empty series.
     #[must_use]
@@ -129,6 +172,30 @@ mod tests {
         for (k, value) in lagged.iter().enumerate() {
             let at_s = 7.0 * (f64::from(u32::try_from(k).expect("few")) + 0.5);
             assert!((value - 2.0 * (1.0 - (-at_s / 100.0).exp())).abs() < 1e-12);
+        }
+    }
+
+    /// 8 K up, a pause of n entries, and 8 K up again from where it began.
+    #[test]
+    fn after_a_long_pause_what_follows_begins_settled_and_after_a_short_one_remembers() {
+        for (n, lag_s, is_settled) in [(600, 1000.0, true), (600, 1300.0, false)] {
+            let history = History {
+                step_s: 10.0,
+                pauses: std::iter::once(100..100 + n).collect(),
+                ..History::default()
+            };
+            let mut series = vec![8.0; 100];
+            series.extend((0..n).map(|k| 8.0 - 8.0 * k as f64 / n as f64));
+            series.extend([0.0; 10]);
+            let lagged = history.lagged_temperature(&series, lag_s);
+            let plain = history.lagged(&series, lag_s);
+            assert_eq!(lagged[..100 + n], plain[..100 + n]);
+            if is_settled {
+                assert_eq!(lagged[100 + n..], [0.0; 10]);
+            } else {
+                assert_eq!(lagged, plain);
+                assert!(lagged[100 + n] > 1.0);
+            }
         }
     }
 

@@ -139,4 +139,14 @@ mod tests {
         assert!(!has_component(&two, ErrorComponent::SQUARENESS[2]));
         assert_eq!(components_of(&two).len(), 13);
     }
+
+    #[test]
+    fn a_squareness_leans_as_its_sign_is_stated() {
+        for (component, against) in ErrorComponent::SQUARENESS.into_iter().zip([0, 0, 1]) {
+            let opens = metrology::squareness::opening(component);
+            // Towards the plus of the other axis closes the angle.
+            let towards = lean(component)[against];
+            assert!((towards + opens).abs() < 1e-12, "{component}: {towards}");
+        }
+    }
 }

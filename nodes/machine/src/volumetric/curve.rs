@@ -532,7 +532,7 @@ mod tests {
         );
         assert_eq!(
             with(|c| c.span = (1.0, 1.0)),
-            "EXX: recorded span from 1 to 1: must be finite and ascending"
+            "EXX: recorded span from 1 mm to 1 mm: must be finite and ascending"
         );
         assert!(with(|c| c.origin = f64::INFINITY).contains("origin[0] = inf"));
         assert_eq!(
@@ -543,7 +543,7 @@ mod tests {
                 &[0.0, 2.0, 2.0],
                 &[1.0, 2.0, 3.0]
             )),
-            "EXX: knot 2 at 2 must lie above the one before, at 2"
+            "EXX: knot 2 at 2 mm must lie above the one before, at 2 mm"
         );
         assert_eq!(
             message(&curve("EXX", CurveForm::Table, &[], &[0.0], &[1.0])),

@@ -1,5 +1,6 @@
 //! What is refused of a geometry model, and of a pose.
 
+use metrology::number::{along, number};
 use metrology::{Axis, ErrorComponent};
 
 use crate::chain::ChainError;
@@ -53,7 +54,7 @@ pub enum VolumetricError {
         component: ErrorComponent,
     },
     /// A number is not finite.
-    #[error("{component}: {what}[{index}] = {value}: must be a finite number")]
+    #[error("{component}: {what}[{index}] = {value}: must be a finite number", value = number(*value))]
     NotFinite {
         /// The component.
         component: ErrorComponent,
@@ -97,7 +98,10 @@ pub enum VolumetricError {
         power: u8,
     },
     /// Knots of a table in the wrong order.
-    #[error("{component}: knot {index} at {position} must lie above the one before, at {before}")]
+    #[error(
+        "{component}: knot {index} at {} must lie above the one before, at {}",
+        along(component.of, *position), along(component.of, *before)
+    )]
     KnotsNotAscending {
         /// The component.
         component: ErrorComponent,
@@ -109,7 +113,10 @@ pub enum VolumetricError {
         position: f64,
     },
     /// A span that is none.
-    #[error("{component}: recorded span from {lower} to {upper}: must be finite and ascending")]
+    #[error(
+        "{component}: recorded span from {} to {}: must be finite and ascending",
+        along(component.of, *lower), along(component.of, *upper)
+    )]
     SpanNotAscending {
         /// The component.
         component: ErrorComponent,
@@ -136,7 +143,10 @@ pub enum PoseRefusal {
         axis: Axis,
     },
     /// The policy refuses positions outside what was recorded.
-    #[error("position {position} of axis {axis} is outside the recorded span {lower} to {upper}")]
+    #[error(
+        "position {} of axis {axis} is outside the recorded span {} to {}",
+        along(*axis, *position), along(*axis, *lower), along(*axis, *upper)
+    )]
     OutOfSpan {
         /// The axis.
         axis: Axis,

@@ -3,7 +3,9 @@
 use super::report::{Alias, Unit};
 use super::scene::Scene;
 use super::search::Kind;
+use super::squareness;
 use super::term::{BacklashEnd, RowKey};
+use crate::squareness::between;
 
 /// Unit of a row's value.
 pub(super) const fn unit(key: &RowKey) -> Unit {
@@ -35,7 +37,10 @@ pub(super) fn name(key: &RowKey, scene: &Scene) -> String {
         RowKey::ReferenceLength { reference } => format!("reference length {reference}"),
         RowKey::RadialExpansion => format!("radial expansion {plane}"),
         RowKey::ScalingMismatch => format!("scaling mismatch {first}-{second}"),
-        RowKey::Squareness => format!("squareness {plane}"),
+        RowKey::Squareness => {
+            let component = between(first, second).map(|component| format!(" ({component})"));
+            format!("squareness {plane}{}", component.unwrap_or_default())
+        }
         RowKey::ServoMismatch => format!("servo mismatch {first}-{second}"),
         RowKey::RadiusContraction => format!("radius contraction {plane}"),
         RowKey::Backlash {
@@ -113,7 +118,8 @@ pub(super) fn cause(key: &RowKey, value: f64, scene: &Scene) -> String {
             format!("{long} travels farther than {short}: pitch error, a screw that is warmer or stretched")
         }
         RowKey::Squareness => {
-            let way = if positive { "less" } else { "more" };
+            let opens = squareness::sign(scene.axes) * value > 0.0;
+            let way = if opens { "more" } else { "less" };
             format!("{first}+ and {second}+ enclose {way} than 90°: guideway alignment, worn guides, foundation")
         }
         RowKey::ServoMismatch => {

@@ -5,12 +5,13 @@
 //! With ρ the deviation about the least-squares centre, read within 1.5° of an angle:
 //!
 //! ```text
-//!   squareness = (ρ45 + ρ225 − ρ135 − ρ315)/(2 R)                             (1)
+//!   squareness = −s (ρ45 + ρ225 − ρ135 − ρ315)/(2 R)                          (1)
 //!   diameter 1 = (ρ5 + ρ355 + ρ175 + ρ185)/2                                  (2)
 //!   diameter 2 = (ρ85 + ρ95 + ρ265 + ρ275)/2                                  (3)
 //! ```
 //!
-//! (1) is the difference of the diameters at 45° and 135° over the nominal diameter \[1\]. On one sense
+//! (1) is the difference of the diameters at 45° and 135° over the nominal diameter \[1\], as the component of ISO 230-1:
+//! s is its sign in the enclosed angle ([`crate::squareness`]). On one sense
 //! it holds servo mismatch and backlash as well; the mean over both senses does not. 5° off the reversals,
 //! backlash steps and spikes have passed.
 //!
@@ -22,6 +23,8 @@ use serde::{Deserialize, Serialize};
 
 use super::contribution::{circularity_mm, one_turn};
 use super::scene::{Scene, Trace};
+use super::squareness::sign;
+use crate::axis::Axis;
 
 /// Samples nearer than this to an angle stand for it, rad (1.5°).
 const WINDOW_RAD: f64 = 0.026_179_938_779_914_94;
@@ -49,7 +52,9 @@ pub(super) fn cross_check(
     trace: &Trace,
     deviations_mm: &DVector<f64>,
     weights: &[f64],
+    axes: [Axis; 2],
 ) -> CrossCheck {
+    let sign = sign(axes);
     let turn = one_turn(trace, weights);
     let at = |degrees: f64| {
         let near = |row: &&usize| {
@@ -80,7 +85,7 @@ pub(super) fn cross_check(
         recording: trace.recording,
         circularity_mm: circularity_mm(trace, deviations_mm, weights),
         mean_radial_deviation_mm: calibrated.then_some(mean),
-        four_point_squareness_rad: across.map(|four| four / (2.0 * trace.radius_mm)),
+        four_point_squareness_rad: across.map(|four| -sign * four / (2.0 * trace.radius_mm)),
         diameter_deviation_mm: diameters.map(|d| d.filter(|_| calibrated)),
         diameter_difference_mm: diameters[0].zip(diameters[1]).map(|(a, b)| a - b),
     }

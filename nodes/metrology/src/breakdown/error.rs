@@ -3,6 +3,7 @@
 use crate::axis::Axis;
 use crate::fit::ShapeError;
 use crate::least_squares::FitError;
+use crate::number::{degrees, number, quantity};
 
 /// Why a breakdown is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -22,14 +23,14 @@ pub enum BreakdownError {
         least: usize,
     },
     /// A length or feed is not above 0.
-    #[error("recording {recording}: {quantity} = {value}: must be finite and above 0")]
+    #[error("recording {recording}: {quantity} = {value}: must be finite and above 0", value = crate::number::quantity(quantity, *value))]
     NotPositive {
         recording: usize,
         quantity: &'static str,
         value: f64,
     },
     /// An uncertainty is below 0.
-    #[error("recording {recording}: {quantity} = {value}: must be finite and not below 0")]
+    #[error("recording {recording}: {quantity} = {value}: must be finite and not below 0", value = crate::number::quantity(quantity, *value))]
     Negative {
         recording: usize,
         quantity: &'static str,
@@ -43,8 +44,7 @@ pub enum BreakdownError {
     SampleNotFinite { recording: usize, sample: usize },
     /// A deviation is so large that it is none.
     #[error(
-        "recording {recording}, sample {sample}: radial deviation {deviation_mm} mm is beyond {limit_mm} mm"
-    )]
+        "recording {recording}, sample {sample}: radial deviation {deviation_mm} mm is beyond {limit_mm} mm", deviation_mm = number(*deviation_mm), limit_mm = number(*limit_mm))]
     DeviationTooLarge {
         recording: usize,
         sample: usize,
@@ -52,7 +52,7 @@ pub enum BreakdownError {
         limit_mm: f64,
     },
     /// Samples are not in order of time.
-    #[error("recording {recording}, sample {sample}: time {time_s} s after {previous_s} s")]
+    #[error("recording {recording}, sample {sample}: time {time_s} s after {previous_s} s", time_s = number(*time_s), previous_s = number(*previous_s))]
     TimeRunsBack {
         recording: usize,
         sample: usize,
@@ -60,13 +60,13 @@ pub enum BreakdownError {
         previous_s: f64,
     },
     /// The angle runs against the stated sense.
-    #[error("recording {recording}: angles sweep {swept_rad} rad, against the stated sense")]
+    #[error("recording {recording}: angles sweep {}, against the stated sense", degrees(*swept_rad))]
     SenseContradicted { recording: usize, swept_rad: f64 },
     /// Fewer samples than parameters.
     #[error("{n} usable samples for {n_parameters} parameters in one plane")]
     TooFewForModel { n: usize, n_parameters: usize },
     /// A number of the configuration is out of its limits.
-    #[error("{key} = {value}: must be above {above} and below {below}")]
+    #[error("{key} = {value}: must be above {above} and below {below}", value = quantity(key, *value), above = number(*above), below = quantity(key, *below))]
     Config {
         key: &'static str,
         value: f64,

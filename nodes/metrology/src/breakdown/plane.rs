@@ -44,7 +44,7 @@ pub(super) fn evaluate(
     let checks: Vec<_> = scene
         .traces
         .iter()
-        .map(|trace| cross_check(trace, &deviations_mm, &fit.weights))
+        .map(|trace| cross_check(trace, &deviations_mm, &fit.weights, scene.axes))
         .collect();
     let residuals = DVector::from_column_slice(&fit.residuals_mm);
     let summary = |trace: &Trace| RecordingSummary {

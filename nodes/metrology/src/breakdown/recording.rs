@@ -306,7 +306,7 @@ mod tests {
         bad.feed_mm_s = 0.0;
         assert_eq!(
             bad.check(0).unwrap_err().to_string(),
-            "recording 0: feed_mm_s = 0: must be finite and above 0"
+            "recording 0: feed_mm_s = 0 mm/s: must be finite and above 0"
         );
         let mut bad = good;
         bad.samples.truncate(10);

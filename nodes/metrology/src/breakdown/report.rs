@@ -195,7 +195,7 @@ pub struct PlaneBreakdown {
     pub scales: Option<[(f64, f64); 2]>,
     /// The robust figures, one of each recording.
     pub cross_checks: Vec<CrossCheck>,
-    /// Four-point squareness averaged over senses, rad; none where one sense or an angle is missing.
+    /// Four-point squareness, the component of ISO 230-1, averaged over senses, rad; none where one sense or an angle is missing.
     pub four_point_squareness_rad: Option<f64>,
     /// Greatest circularity, mm.
     pub worst_circularity_mm: f64,

@@ -191,7 +191,7 @@ impl Term {
             Self::RadialExpansion => scale::radial_expansion(point),
             Self::ScalingMismatch => scale::mismatch(point),
             Self::QuadraticPitch { axis } => scale::quadratic_pitch(axis, point),
-            Self::Squareness => squareness::squareness(point),
+            Self::Squareness => squareness::squareness(scene.axes, point),
             Self::ServoMismatch => servo::mismatch(trace, point),
             Self::RadiusContraction => servo::contraction(trace),
             Self::Backlash {

@@ -22,8 +22,10 @@
 //! | E_VE | `environmental_drift_mm`, range of drift with the axis at rest | mm |
 //!
 //! # Holds when
-//! Lengths were corrected to 20 °C with the stated temperature and expansion; (4) and (5) are what
-//! is then left. (3) holds for R well below L.
+//! Lengths are corrected to 20 °C with the same temperature and expansion, here
+//! ([`PositioningRuns::corrected_to_20_degc`](super::positioning::PositioningRuns::corrected_to_20_degc)) or by the
+//! instrument; (4) and (5) are what is then left. They do not hold for lengths at another temperature.
+//! (3) holds for R well below L.
 //!
 //! # Agreement
 //! `eq1_to_eq6_for_a_metre_by_hand`: below 1e-12 mm.
@@ -115,6 +117,12 @@ impl Expansion {
         )
     }
 
+    /// Nominal expansion from 20 °C to the temperature, mm/mm: α (θ − 20 °C).
+    #[must_use]
+    pub fn nominal(&self) -> f64 {
+        self.expansion_per_k * self.temperature_deviation_k
+    }
+
     /// Both together, mm.
     #[must_use]
     pub fn standard_mm(&self, length_mm: f64) -> f64 {
@@ -131,6 +139,12 @@ impl Expansion {
             self.expansion_half_width_per_k,
         )
     }
+}
+
+/// By how much a warm machine is too long as a warm device reads it, mm/mm: α_m (θ_m − 20 °C) − α_d (θ_d − 20 °C).
+#[must_use]
+pub fn differential_expansion(machine: &Expansion, device: &Expansion) -> f64 {
+    machine.nominal() - device.nominal()
 }
 
 /// Standard uncertainty by a beam that is `misalignment_mm` off at the end of a length, mm: (3).

@@ -28,11 +28,13 @@
 //! \[1\] ISO 14253-1:2013 and 2017; rules as the literature gives them, the texts were not at hand.
 //! \[2\] JCGM 106:2012, 7.2 and 8.3.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use super::expanded::COVERAGE_FACTOR;
 use super::extent::{check_finite, check_not_negative};
-use super::{ExpandedLength, Iso230Error};
+use super::{ExpandedAngle, ExpandedLength, Iso230Error};
 
 /// Probability of the default rule of the edition of 2017.
 pub const DEFAULT_PROBABILITY: f64 = 0.95;
@@ -48,14 +50,20 @@ pub struct Specification {
 }
 
 /// How uncertainty is taken into account.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Policy {
     /// Not at all: the figure alone decides, and there is always a decision.
     Simple,
     /// (1), the whole expanded uncertainty.
+    #[schemars(
+        description = "A guard band of the whole expanded uncertainty (k = 2) at each limit."
+    )]
     GuardBand,
     /// (3).
+    #[schemars(
+        description = "Conforms where the true value is within its limits with this probability."
+    )]
     Probability {
         /// p, above 0.5 and below 1.
         at_least: f64,
@@ -91,6 +99,33 @@ pub struct Verdict {
     pub probability_of_conformance: f64,
 }
 
+/// Limits of an angle; at least one is given.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AngularSpecification {
+    /// Least value that conforms, rad.
+    pub lower_rad: Option<f64>,
+    /// Greatest value that conforms, rad.
+    pub upper_rad: Option<f64>,
+}
+
+/// A decision about an angle and what it rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AngularVerdict {
+    /// The decision.
+    pub decision: Decision,
+    /// By which rule.
+    pub policy: Policy,
+    /// The figure.
+    pub figure: ExpandedAngle,
+    /// Its limits.
+    pub specification: AngularSpecification,
+    /// Width of the guard band, rad; for a probability that of a far limit, (4).
+    pub guard_band_rad: f64,
+    /// P of (2).
+    pub probability_of_conformance: f64,
+}
+
 /// Decides about one figure.
 ///
 /// # Errors
@@ -105,31 +140,59 @@ pub fn decide(
         "figure.expanded_uncertainty_mm",
         figure.expanded_uncertainty_mm,
     )?;
-    specification.check()?;
-    let probability_of_conformance = specification.probability(figure);
-    let (decision, guard_band_mm) = match policy {
-        Policy::Simple => (specification.guarded(figure.value_mm, 0.0), 0.0),
-        Policy::GuardBand => {
-            let guard_mm = figure.expanded_uncertainty_mm;
-            (specification.guarded(figure.value_mm, guard_mm), guard_mm)
-        }
-        Policy::Probability { at_least } => {
-            let factor = guard_factor(at_least)?;
-            let decision = match probability_of_conformance {
-                p if p >= at_least => Decision::Conforms,
-                p if p <= 1.0 - at_least => Decision::DoesNotConform,
-                _ => Decision::CannotBeDecided,
-            };
-            (decision, factor * figure.standard_uncertainty_mm())
-        }
+    let zone = Zone {
+        lower: specification.lower_mm,
+        upper: specification.upper_mm,
     };
+    if !zone.has_room()? {
+        return Err(Iso230Error::NoZone {
+            lower_mm: zone.lower,
+            upper_mm: zone.upper,
+        });
+    }
+    let judged = zone.judged((figure.value_mm, figure.expanded_uncertainty_mm), policy)?;
     Ok(Verdict {
-        decision,
+        decision: judged.decision,
         policy,
         figure: *figure,
         specification: *specification,
-        guard_band_mm,
-        probability_of_conformance,
+        guard_band_mm: judged.guard_band,
+        probability_of_conformance: judged.probability,
+    })
+}
+
+/// Decides about one angle.
+///
+/// # Errors
+/// As [`decide`].
+pub fn decide_angle(
+    figure: &ExpandedAngle,
+    specification: &AngularSpecification,
+    policy: Policy,
+) -> Result<AngularVerdict, Iso230Error> {
+    check_finite("figure.value_rad", 0, &[figure.value_rad])?;
+    check_not_negative(
+        "figure.expanded_uncertainty_rad",
+        figure.expanded_uncertainty_rad,
+    )?;
+    let zone = Zone {
+        lower: specification.lower_rad,
+        upper: specification.upper_rad,
+    };
+    if !zone.has_room()? {
+        return Err(Iso230Error::NoAngularZone {
+            lower_rad: zone.lower,
+            upper_rad: zone.upper,
+        });
+    }
+    let judged = zone.judged((figure.value_rad, figure.expanded_uncertainty_rad), policy)?;
+    Ok(AngularVerdict {
+        decision: judged.decision,
+        policy,
+        figure: *figure,
+        specification: *specification,
+        guard_band_rad: judged.guard_band,
+        probability_of_conformance: judged.probability,
     })
 }
 
@@ -149,28 +212,62 @@ pub fn guard_factor(probability: f64) -> Result<f64, Iso230Error> {
     })
 }
 
-impl Specification {
-    fn check(&self) -> Result<(), Iso230Error> {
-        let given = [self.lower_mm, self.upper_mm];
+/// Limits in the unit of their figure.
+struct Zone {
+    lower: Option<f64>,
+    upper: Option<f64>,
+}
+
+/// What follows for a figure, in its unit.
+struct Judged {
+    decision: Decision,
+    guard_band: f64,
+    probability: f64,
+}
+
+impl Zone {
+    /// Whether there is a limit, and the lower one below the upper one.
+    fn has_room(&self) -> Result<bool, Iso230Error> {
+        let given = [self.lower, self.upper];
         let limits: Vec<f64> = given.into_iter().flatten().collect();
         check_finite("specification", 0, &limits)?;
-        match limits[..] {
-            [_] => Ok(()),
-            [lower, upper] if lower < upper => Ok(()),
-            _ => Err(Iso230Error::NoZone {
-                lower_mm: self.lower_mm,
-                upper_mm: self.upper_mm,
-            }),
-        }
+        Ok(match limits[..] {
+            [_] => true,
+            [lower, upper] => lower < upper,
+            _ => false,
+        })
+    }
+
+    fn judged(&self, (value, expanded): (f64, f64), policy: Policy) -> Result<Judged, Iso230Error> {
+        let u = expanded / COVERAGE_FACTOR;
+        let probability = self.probability(value, u);
+        let (decision, guard_band) = match policy {
+            Policy::Simple => (self.guarded(value, 0.0), 0.0),
+            Policy::GuardBand => (self.guarded(value, expanded), expanded),
+            Policy::Probability { at_least } => {
+                let factor = guard_factor(at_least)?;
+                let decision = match probability {
+                    p if p >= at_least => Decision::Conforms,
+                    p if p <= 1.0 - at_least => Decision::DoesNotConform,
+                    _ => Decision::CannotBeDecided,
+                };
+                (decision, factor * u)
+            }
+        };
+        Ok(Judged {
+            decision,
+            guard_band,
+            probability,
+        })
     }
 
     /// (1); with no guard band there is nothing between.
-    fn guarded(&self, value_mm: f64, guard_mm: f64) -> Decision {
-        let lower_mm = self.lower_mm.unwrap_or(f64::NEG_INFINITY);
-        let upper_mm = self.upper_mm.unwrap_or(f64::INFINITY);
-        if value_mm >= lower_mm + guard_mm && value_mm <= upper_mm - guard_mm {
+    fn guarded(&self, value: f64, guard: f64) -> Decision {
+        let lower = self.lower.unwrap_or(f64::NEG_INFINITY);
+        let upper = self.upper.unwrap_or(f64::INFINITY);
+        if value >= lower + guard && value <= upper - guard {
             Decision::Conforms
-        } else if value_mm < lower_mm - guard_mm || value_mm > upper_mm + guard_mm {
+        } else if value < lower - guard || value > upper + guard {
             Decision::DoesNotConform
         } else {
             Decision::CannotBeDecided
@@ -178,18 +275,18 @@ impl Specification {
     }
 
     /// (2).
-    fn probability(&self, figure: &ExpandedLength) -> f64 {
-        let u_mm = figure.standard_uncertainty_mm();
-        if u_mm == 0.0 {
-            let inside = self.guarded(figure.value_mm, 0.0) == Decision::Conforms;
+    fn probability(&self, value: f64, u: f64) -> f64 {
+        if u == 0.0 {
+            let inside = self.guarded(value, 0.0) == Decision::Conforms;
             return f64::from(u8::from(inside));
         }
         let normal = standard_normal();
-        let above = |limit_mm: f64| normal.sf((limit_mm - figure.value_mm) / u_mm);
-        let over_upper = self.upper_mm.map_or(0.0, above);
-        let under_lower = self.lower_mm.map_or(0.0, |limit_mm| {
-            normal.cdf((limit_mm - figure.value_mm) / u_mm)
-        });
+        let over_upper = self
+            .upper
+            .map_or(0.0, |upper| normal.sf((upper - value) / u));
+        let under_lower = self
+            .lower
+            .map_or(0.0, |lower| normal.cdf((lower - value) / u));
         (1.0 - over_upper - under_lower).max(0.0)
     }
 }

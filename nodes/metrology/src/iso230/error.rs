@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::axis::Axis;
 use crate::fit::ShapeError;
 use crate::least_squares::FitError;
+use crate::number::{degrees, number, quantity};
 
 /// Side from which a target is approached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,7 +64,7 @@ pub enum Iso230Error {
         expected: usize,
     },
     /// A value is no number.
-    #[error("{place}[{row}], value {index} is {value}: must be finite")]
+    #[error("{place}[{row}], value {index} is {value}: must be finite", value = number(*value))]
     NotFinite {
         /// Which list.
         place: &'static str,
@@ -75,7 +76,7 @@ pub enum Iso230Error {
         value: f64,
     },
     /// A value must be above 0.
-    #[error("{place} = {value}: must be above 0")]
+    #[error("{place} = {value}: must be above 0", value = quantity(place, *value))]
     NotPositive {
         /// Which value; its unit ends the name.
         place: &'static str,
@@ -83,7 +84,7 @@ pub enum Iso230Error {
         value: f64,
     },
     /// A value must not be below 0.
-    #[error("{place} = {value}: must be at least 0")]
+    #[error("{place} = {value}: must be at least 0", value = quantity(place, *value))]
     Negative {
         /// Which value; its unit ends the name.
         place: &'static str,
@@ -91,7 +92,10 @@ pub enum Iso230Error {
         value: f64,
     },
     /// Values must ascend.
-    #[error("{place}[{index}] = {value} follows {previous}: must be greater")]
+    #[error(
+        "{place}[{index}] = {value} follows {previous}: must be greater",
+        value = measured(place, *value), previous = measured(place, *previous)
+    )]
     NotAscending {
         /// Which list; its unit ends the name.
         place: &'static str,
@@ -103,7 +107,10 @@ pub enum Iso230Error {
         previous: f64,
     },
     /// One target is given twice.
-    #[error("targets_mm[{index}] = {value_mm} mm is the target before it once more")]
+    #[error(
+        "targets_mm[{index}] = {value_mm} mm is the target before it once more",
+        value_mm = number(*value_mm)
+    )]
     DuplicateTarget {
         /// Which target, from 0.
         index: usize,
@@ -125,7 +132,10 @@ pub enum Iso230Error {
         n_down: usize,
     },
     /// A value is outside the range that has a meaning.
-    #[error("{place} = {value}: must be in {lower} to {upper}")]
+    #[error(
+        "{place} = {value}: must be from {lower} to {upper}",
+        value = measured(place, *value), lower = measured(place, *lower), upper = measured(place, *upper)
+    )]
     OutOfRange {
         /// Which value; its unit ends the name.
         place: &'static str,
@@ -137,7 +147,10 @@ pub enum Iso230Error {
         upper: f64,
     },
     /// A recording covers too little.
-    #[error("{place}: {covered} is covered, {needed} is needed")]
+    #[error(
+        "{name}: {covered} are covered, {needed} are needed",
+        name = without_unit(place), covered = measured(place, *covered), needed = measured(place, *needed)
+    )]
     TooShort {
         /// Along what; its unit ends the name.
         place: &'static str,
@@ -147,7 +160,10 @@ pub enum Iso230Error {
         needed: f64,
     },
     /// A recording has a hole.
-    #[error("{place}: a gap of {gap} at {at} exceeds {limit}")]
+    #[error(
+        "{name}: a gap of {gap} behind {at}, at most {limit} are allowed",
+        name = without_unit(place), gap = measured(place, *gap), at = measured(place, *at), limit = measured(place, *limit)
+    )]
     Gap {
         /// Along what; its unit ends the name.
         place: &'static str,
@@ -157,6 +173,21 @@ pub enum Iso230Error {
         at: f64,
         /// The longest gap allowed.
         limit: f64,
+    },
+    /// Angles round a circle have a hole.
+    #[error(
+        "{place}: a gap of {} behind {}, at most {} are allowed: are the angles in degrees, and does the circle close?",
+        degrees(*gap_rad), degrees(*at_rad), degrees(*limit_rad)
+    )]
+    AngularGap {
+        /// Which trace.
+        place: &'static str,
+        /// Length of the gap, rad.
+        gap_rad: f64,
+        /// Where it begins, rad.
+        at_rad: f64,
+        /// The longest gap allowed, rad.
+        limit_rad: f64,
     },
     /// The data do not tell two quantities apart.
     #[error("{place}: the {n_points} positions determine {rank} of {n_parameters} parameters")]
@@ -192,12 +223,26 @@ pub enum Iso230Error {
         n: usize,
     },
     /// A specification has no limit at all or its limits are crossed.
-    #[error("lower limit {lower_mm:?} mm and upper limit {upper_mm:?} mm specify nothing")]
+    #[error(
+        "lower limit {} and upper limit {} specify nothing: the lower one must be below the upper one",
+        limit(*lower_mm), limit(*upper_mm)
+    )]
     NoZone {
         /// Lower limit, mm.
         lower_mm: Option<f64>,
         /// Upper limit, mm.
         upper_mm: Option<f64>,
+    },
+    /// A specification of an angle has no limit at all or its limits are crossed.
+    #[error(
+        "lower limit {} and upper limit {} specify nothing: the lower one must be below the upper one",
+        angle(*lower_rad), angle(*upper_rad)
+    )]
+    NoAngularZone {
+        /// Lower limit, rad.
+        lower_rad: Option<f64>,
+        /// Upper limit, rad.
+        upper_rad: Option<f64>,
     },
     /// A shape could not be fitted.
     #[error(transparent)]
@@ -205,6 +250,38 @@ pub enum Iso230Error {
     /// A fit was refused.
     #[error(transparent)]
     Fit(#[from] FitError),
+}
+
+/// A value with its unit; angles in degrees.
+fn measured(place: &str, value: f64) -> String {
+    if place.ends_with("_rad") {
+        degrees(value)
+    } else {
+        quantity(place, value)
+    }
+}
+
+/// What a value is of, without the unit that its name ends with.
+fn without_unit(place: &'static str) -> &'static str {
+    place
+        .strip_suffix("_rad")
+        .or_else(|| place.strip_suffix("_mm"))
+        .or_else(|| place.strip_suffix("_s"))
+        .unwrap_or(place)
+}
+
+fn angle(value_rad: Option<f64>) -> String {
+    value_rad.map_or_else(
+        || "none".to_owned(),
+        |value_rad| format!("{} arcsec", number(value_rad.to_degrees() * 3600.0)),
+    )
+}
+
+fn limit(value_mm: Option<f64>) -> String {
+    value_mm.map_or_else(
+        || "none".to_owned(),
+        |value_mm| format!("{} mm", number(value_mm)),
+    )
 }
 
 /// Why channels of one axis do not make an angle.

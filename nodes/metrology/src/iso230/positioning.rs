@@ -29,7 +29,9 @@
 //! # Holds when
 //! (8) holds unless one rectangular contribution outweighs all others: then it holds too often.
 //! The axis was tested as the standard says (feed, dwell, warm-up are the reader's business).
-//! Rotary axes are not evaluated here: their deviations are no lengths.
+//! Deviations are those at 20 °C: [`PositioningRuns::corrected_to_20_degc`] takes the nominal differential expansion out.
+//! Rotary axes are evaluated in [`rotary`]: their deviations are no lengths.
+//! A test that came to its targets from one side alone has the values of that side and no others ([`one_sided`]).
 //!
 //! # Agreement
 //! `val_iso230_2_report_of_a_slit_axis`: a measured axis with the figures of another program \[3\], all of them to the
@@ -46,7 +48,10 @@
 //! tests_2/11358/axis1, report of 2021-11-03.
 
 pub mod budget;
+pub mod one_sided;
 pub mod periodic;
+mod reference_temperature;
+pub mod rotary;
 mod spacing;
 
 use serde::{Deserialize, Serialize};
@@ -100,6 +105,18 @@ impl PositioningRuns {
     }
 
     fn check(&self) -> Result<(), Iso230Error> {
+        self.check_targets()?;
+        for direction in [Direction::Up, Direction::Down] {
+            self.check_direction(direction)?;
+        }
+        let (n_up, n_down) = (self.up_mm.len(), self.down_mm.len());
+        if n_up != n_down {
+            return Err(Iso230Error::RunCounts { n_up, n_down });
+        }
+        Ok(())
+    }
+
+    fn check_targets(&self) -> Result<(), Iso230Error> {
         check_points("targets_mm", self.targets_mm.len(), LEAST_TARGETS)?;
         check_finite("targets_mm", 0, &self.targets_mm)?;
         let twice = |pair: &[f64]| matches!(pair, [a, b] if a.total_cmp(b).is_eq());
@@ -113,13 +130,6 @@ impl PositioningRuns {
         check_finite("zero_mm", 0, &[self.zero_mm])?;
         for period_mm in &self.periods_mm {
             check_positive("periods_mm", *period_mm)?;
-        }
-        for direction in [Direction::Up, Direction::Down] {
-            self.check_direction(direction)?;
-        }
-        let (n_up, n_down) = (self.up_mm.len(), self.down_mm.len());
-        if n_up != n_down {
-            return Err(Iso230Error::RunCounts { n_up, n_down });
         }
         Ok(())
     }
@@ -276,17 +286,7 @@ fn point(runs: &PositioningRuns, budget: &PositioningBudget, i: usize) -> PointR
     let target_mm = runs.targets_mm[i];
     let length_mm = target_mm - runs.zero_mm;
     let u_length_mm = budget.over(length_mm, runs.span_mm()).length_part_mm();
-    let side = |direction| {
-        let rows = runs.in_direction(direction);
-        let values: Vec<f64> = rows.iter().map(|row| row[i]).collect();
-        let (mean_mm, standard_deviation_mm) = (mean(&values), standard_deviation(&values));
-        PointDirection {
-            mean_mm,
-            interval: interval(mean_mm, standard_deviation_mm, values.len(), u_length_mm),
-            standard_deviation_mm,
-            repeatability_mm: 4.0 * standard_deviation_mm, // (3)
-        }
-    };
+    let side = |direction| side(runs.in_direction(direction), i, u_length_mm);
     let (up, down) = (side(Direction::Up), side(Direction::Down));
     let reversal_mm = up.mean_mm - down.mean_mm; // (2)
     let across_mm =
@@ -300,6 +300,18 @@ fn point(runs: &PositioningRuns, budget: &PositioningBudget, i: usize) -> PointR
             .max(down.repeatability_mm), // (3)
         up,
         down,
+    }
+}
+
+/// One target from one side.
+fn side(rows: &[Vec<f64>], i: usize, u_length_mm: f64) -> PointDirection {
+    let values: Vec<f64> = rows.iter().map(|row| row[i]).collect();
+    let (mean_mm, standard_deviation_mm) = (mean(&values), standard_deviation(&values));
+    PointDirection {
+        mean_mm,
+        interval: interval(mean_mm, standard_deviation_mm, values.len(), u_length_mm),
+        standard_deviation_mm,
+        repeatability_mm: 4.0 * standard_deviation_mm, // (3)
     }
 }
 

@@ -31,6 +31,24 @@ pub struct GridSample {
     pub zero_id: u32,
 }
 
+/// One reading of an angular reference of a rotary axis (polygon and autocollimator, rotary indexer).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AngleSample {
+    /// When it was read.
+    pub at: Stamp<Host>,
+    /// Rotary axis whose position it measures.
+    pub axis: Axis,
+    /// Angle in the sense of the axis, rad.
+    pub angle_rad: f64,
+    /// Changes whenever the reference is zeroed anew.
+    pub zero_id: u32,
+}
+
+/// How long a message may come after those of other topics with its stamp, s.
+pub const LATE_S: f64 = 2.0;
+/// Largest credible distance of a reading from its nominal value, mm, rad or K.
+pub const FARTHEST_FROM_NOMINAL: f64 = 1e4;
+
 /// One reading of a length reference (interferometer, tracker, step gauge).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LengthSample {

@@ -161,7 +161,8 @@ def circular():
     for sense, name in ((-1, "clockwise"), (1, "counter_clockwise")):
         points = paths[sense]
         own = circle(points, np.ones(len(points)))
-        radial = np.hypot(*points.T) - radius
+        # F about the centre of both senses.
+        radial = np.hypot(*(points - c[:2]).T) - radius
         result[name] = {
             "g": float(np.ptp(np.hypot(*(points - own[:2]).T))),
             "f_max": float(radial.max()),

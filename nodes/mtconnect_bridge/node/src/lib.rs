@@ -1,13 +1,15 @@
 //! ROS shell of mtconnect_bridge.
 
 use abbe_msgs::topics;
-use anyhow::{Context, Result};
+use anyhow::{Result, anyhow};
 use metrology::sample::Quantity;
 use metrology::stamp::Span;
+use metrology::yaml;
 use mtconnect_bridge::config::Source;
+use mtconnect_bridge::io::LogFile;
 use mtconnect_bridge::live::{LiveBridge, LiveInput};
 use mtconnect_bridge::mapping::{MapFile, Use};
-use mtconnect_bridge::{BridgeConfig, Output, PARAMETERS, Settings};
+use mtconnect_bridge::{BridgeConfig, BridgeError, Output, PARAMETERS, Settings};
 use node_runtime::{Node, Setup, Wiring};
 
 mod forms;
@@ -23,10 +25,17 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: BridgeConfig = setup.config()?;
     let parameters = setup.resolved(&config, PARAMETERS)?;
     let (path, text) = setup.file_text("map_file")?;
-    let map = MapFile::from_yaml(&text).with_context(|| path.display().to_string())?;
-    let settings = Settings::new(&config, &map).with_context(|| path.display().to_string())?;
+    let placed = |error: BridgeError| {
+        let file = path.display().to_string();
+        anyhow!("mapping {}", yaml::placed(&file, &text, &error.to_string()))
+    };
+    let map = MapFile::from_yaml(&text).map_err(placed)?;
+    let settings = Settings::new(&config, &map).map_err(placed)?;
     let bridge = match settings.source {
-        Source::Log => LiveBridge::of_log(&settings, &setup.file_text("log_file")?.1),
+        Source::Log => {
+            let (file, length) = setup.file_opened("log_file")?;
+            LiveBridge::of_log(&settings, LogFile::new(file, length))
+        }
         Source::Shdr | Source::Agent => LiveBridge::open(&settings)?,
     };
     let mut wiring = Wiring::new(setup.name(), parameters, bridge)

@@ -63,7 +63,8 @@ impl Relation {
     fn correction(&self, own: Stamp<Host>) -> Span {
         let given_up = Span::from_secs_f64(SLEWING * (own - self.since).as_secs_f64().max(0.0));
         let rest = self.rest.nanos();
-        let left = (rest.abs() - given_up.nanos()).max(0) * rest.signum(); // (2)
+        let left = rest.saturating_abs().saturating_sub(given_up.nanos()); // (2)
+        let left = left.max(0) * rest.signum();
         Span::from_nanos(self.clock.map.offset(own).nanos().saturating_add(left)) // (1)
     }
 }
@@ -126,7 +127,7 @@ impl HostTime {
             .unwrap_or_default()
             .nanos()
             .saturating_sub(wanted.nanos());
-        let steps = shown.is_none() || by.abs() > STEP.nanos();
+        let steps = shown.is_none() || by.saturating_abs() > STEP.nanos();
         let rest = Span::from_nanos(if steps { 0 } else { by });
         *relation = Some(Relation {
             clock,

@@ -8,7 +8,7 @@
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use metrology::stamp::{Host, Stamp};
+use metrology::stamp::{Host, Span, Stamp};
 
 use super::{Delivery, End, Event, Harness};
 
@@ -26,6 +26,16 @@ impl Harness {
     /// Sets the time, which never goes back.
     pub fn wait_until(&mut self, at: Stamp<Host>) {
         self.now = self.now.max(at);
+    }
+
+    /// Leaves out every tick before `at`; each timer goes on in its own rhythm.
+    pub fn skip_ticks_before(&mut self, at: Stamp<Host>) {
+        let timers = std::mem::take(&mut self.timers).into_iter();
+        let timers = timers.map(|Reverse((due, node, timer))| {
+            let period = self.periods[node][timer];
+            Reverse((next_due(due, period, at), node, timer))
+        });
+        self.timers = timers.collect();
     }
 
     /// Publishes what an absent node said; it waits for [`Harness::deliver_next`].
@@ -78,6 +88,47 @@ impl Harness {
     pub fn ask_to_stop(&mut self) {
         for node in 0..self.nodes.len() {
             self.inbox.push_back(Delivery::Shutdown { node });
+        }
+    }
+}
+
+/// The first instant of a timer at or behind `at`; the latest instant there is where it would be later.
+fn next_due(due: Stamp<Host>, period: Span, at: Stamp<Host>) -> Stamp<Host> {
+    if due >= at {
+        return due;
+    }
+    let (period, missing) = (
+        i128::from(period.nanos().max(1)),
+        i128::from(at.nanos()) - i128::from(due.nanos()),
+    );
+    let n_periods = (missing + period - 1) / period;
+    let next = i128::from(due.nanos()) + n_periods * period;
+    Stamp::from_nanos(i64::try_from(next).unwrap_or(i64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_timer_goes_on_in_its_rhythm_behind_a_leap() {
+        for (due, period, at, wanted) in [
+            (100, 10, 50, 100),
+            (100, 10, 100, 100),
+            (100, 10, 101, 110),
+            (100, 10, 110, 110),
+            (100, 10, 1_000_000_007, 1_000_000_010),
+            (-100, 30, -1, 20),
+            (0, 7, i64::MAX, i64::MAX),
+            (i64::MIN, 3, i64::MAX, i64::MAX),
+            (0, 0, 5, 5),
+        ] {
+            let next = next_due(
+                Stamp::from_nanos(due),
+                Span::from_nanos(period),
+                Stamp::from_nanos(at),
+            );
+            assert_eq!(next.nanos(), wanted, "{due} {period} {at}");
         }
     }
 }

@@ -315,3 +315,53 @@ fn a_restarted_node_takes_its_place_and_one_with_other_ports_does_not() {
     harness.inject("thermal/update_request", &bytes);
     assert_eq!(*log.borrow(), ["answerer counted "]);
 }
+
+/// Asks with elapsed times that are good, no number, infinite, and good again.
+struct Spoiler(usize);
+
+impl Stage for Spoiler {
+    type Input = ();
+    type Output = UpdateRequest;
+    type Error = Refused;
+
+    fn step(
+        &mut self,
+        at: Stamp<Host>,
+        (): (),
+        out: &mut Vec<UpdateRequest>,
+    ) -> Result<(), Refused> {
+        let elapsed_s = [1.0, f64::NAN, f64::INFINITY, 2.0, 3.0][self.0];
+        self.0 += 1;
+        out.push(UpdateRequest {
+            at,
+            reason: UpdateReason::Period,
+            elapsed_s,
+        });
+        Ok(())
+    }
+}
+
+#[test]
+fn what_no_reader_could_take_is_not_published_and_told_of_by_the_node_that_made_it() {
+    let spoiler = Wiring::new("spoiler", Vec::new(), Spoiler(0))
+        .every(PERIOD, || ())
+        .publish(&topics::THERMAL_UPDATE_REQUEST, |request| Some(request))
+        .node();
+    let (mut harness, log) = composed(vec![spoiler, answerer()]);
+    harness.run_until(Stamp::from_nanos(5_500_000));
+    let log = log.borrow();
+    let told = |place: usize, words: &[&str]| {
+        assert!(
+            words.iter().all(|word| log[place].contains(word)),
+            "{log:?}"
+        );
+    };
+    assert_eq!(log.len(), 6, "{log:?}");
+    told(0, &["answerer counted"]);
+    let refused = "spoiler output_refused/thermal/update_request";
+    told(1, &[refused, "elapsed_s", "NaN", "not published"]);
+    told(2, &[refused, "elapsed_s", "inf", "not published"]);
+    told(3, &[refused, "published again"]);
+    told(4, &["answerer counted"]);
+    told(5, &["answerer counted"]);
+}

@@ -64,6 +64,9 @@ impl Goal {
     }
 }
 
+/// Requests for the result of one goal that wait for its end; of more the oldest stays without an answer.
+const MOST_ASKING: usize = 1_024;
+
 /// All goals of one action.
 #[derive(Default)]
 pub(super) struct ActionServer {
@@ -162,6 +165,9 @@ impl ActionServer {
                 ..
             }) => Some(result_answer(to, bytes)),
             Some(goal) => {
+                if goal.asked_for_result.len() >= MOST_ASKING {
+                    goal.asked_for_result.remove(0);
+                }
                 goal.asked_for_result.push(to);
                 None
             }
@@ -176,14 +182,16 @@ impl ActionServer {
     /// Somebody calls goals off: those to be told to the node, and the answer.
     pub fn cancel(&mut self, to: ReplyTo, request: &CancelGoalRequest) -> (Vec<GoalId>, Answer) {
         let GoalInfo { goal_id, stamp } = &request.goal_info;
-        let before = (stamp.sec, stamp.nanosec);
+        // Seconds are unsigned here as everywhere: a goal of 2040 comes after one of 2030.
+        let ordered = |time: &Time| (time.sec.cast_unsigned(), time.nanosec);
+        let before = ordered(stamp);
         let (any_id, any_time) = (goal_id.uuid == [0; 16], before == (0, 0));
         let mut response = CancelGoalResponse::default();
         let mut cancelled = Vec::new();
         let mut found = None;
         for (id, goal) in &mut self.goals {
             let is_named = goal.uuid == goal_id.uuid;
-            let is_before = (goal.accepted.sec, goal.accepted.nanosec) <= before;
+            let is_before = ordered(&goal.accepted) <= before;
             let is_meant = is_named || if any_time { any_id } else { is_before };
             if !is_meant {
                 continue;

@@ -16,8 +16,10 @@ use super::incoming::{Incoming, QUEUE_LEN, Readers};
 use super::logger_levels::LoggerService;
 use super::owner::{
     ActionEnd, ClientUse, Hearing, Owner, Publication, ServerUse, Subscription, Timers, UsedAction,
+    Writers,
 };
 use super::parameters::ParameterService;
+use super::refusals::Refusals;
 use super::related;
 use super::service::{Client, Server};
 use super::timers::{HostTimers, SimulatedTimers};
@@ -90,6 +92,7 @@ impl Assembly {
                 received: 0,
                 lost: 0,
                 turns: 0,
+                writers: Writers::default(),
             });
         }
         Ok(subscriptions)
@@ -244,6 +247,10 @@ fn goal_service_type(service: GoalService, action_type: &str) -> String {
 }
 
 /// Gives a node its endpoints and an owner that drives it.
+#[expect(
+    clippy::too_many_lines,
+    reason = "a table of cases, read from top to bottom"
+)]
 pub(super) fn assemble(
     setup: &Setup,
     node: Box<dyn Node>,
@@ -277,6 +284,7 @@ pub(super) fn assemble(
         log_level: setup.log_level(),
         is_on_console: setup.log_outputs().stdout,
         board: Board::new(&name),
+        refusals: Refusals::default(),
         name,
         parameters: with_runtime_parameters(node.parameters(), setup),
         patience: patience(node.as_ref()),

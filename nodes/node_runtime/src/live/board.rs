@@ -29,6 +29,10 @@ struct Standing {
     shown: bool,
 }
 
+/// Conditions that may stand at once: some have the name of a feature in theirs, which anybody on the network may choose.
+const MOST_STANDING: usize = 500;
+const TOO_MANY: &str = "too_many_conditions";
+
 /// All standing conditions and counters of one node.
 pub(super) struct Board {
     node: String,
@@ -103,6 +107,15 @@ impl Board {
             }
             return;
         }
+        let held = self.standing.len();
+        if held >= MOST_STANDING && name != TOO_MANY && !self.standing.contains_key(&name) {
+            self.count("conditions not shown", 1);
+            let message = format!(
+                "{held} conditions stand, the most that are shown; the newest is not: {name}"
+            );
+            let too_many = Diagnostic::new(Level::Error, TOO_MANY, message);
+            return self.put(too_many, now, Some(now + OVER_AFTER));
+        }
         match self.standing.get_mut(&name) {
             Some(standing) if standing.diagnostic.level == diagnostic.level => {
                 standing.diagnostic = diagnostic;
@@ -135,10 +148,10 @@ impl Board {
             .standing
             .iter()
             .filter(|(_, standing)| standing.expires.is_some_and(|at| at <= now))
-            .map(|(name, _)| name.clone())
+            .map(|(name, standing)| (name.clone(), standing.diagnostic.message.clone()))
             .collect();
-        for name in over {
-            let message = format!("not seen for {} s", OVER_AFTER.as_secs());
+        for (name, was) in over {
+            let message = format!("over for {} s: {was}", OVER_AFTER.as_secs());
             self.put(Diagnostic::new(Level::Ok, name, message), now, None);
         }
     }
@@ -223,6 +236,19 @@ mod tests {
     }
 
     #[test]
+    fn conditions_without_end_are_not_held_and_it_is_said() {
+        let mut board = Board::new("/probe");
+        let now = Instant::now();
+        for n in 0..3 * MOST_STANDING {
+            let name = format!("shape_not_evaluated/{n}");
+            board.report(Diagnostic::new(Level::Error, name, "no".into()), now);
+        }
+        assert_eq!(board.standing.len(), MOST_STANDING + 1);
+        let shown = names(&mut board);
+        assert!(shown.iter().any(|(name, _)| name.ends_with(TOO_MANY)));
+    }
+
+    #[test]
     fn a_condition_stands_until_it_is_reported_ok() {
         let mut board = Board::new("/probe");
         let now = Instant::now();
@@ -276,7 +302,8 @@ mod tests {
         board.expire(now + Duration::from_secs(9));
         assert_eq!(names(&mut board).len(), 2);
         board.expire(now + Duration::from_secs(11));
-        assert_eq!(names(&mut board)[1].1, 0);
+        let over = board.message(Stamp::from_nanos(0)).status.swap_remove(1);
+        assert_eq!((over.level, over.message.as_str()), (0, "over for 10 s: 3"));
         assert_eq!(names(&mut board).len(), 1);
     }
 

@@ -12,7 +12,6 @@ use metrology::stamp::Host;
 use tokio::sync::mpsc::Sender;
 use tokio::task::JoinSet;
 
-use crate::clock;
 use crate::network::{Guid, Reader, RequestIdentity, Sample};
 use crate::node::Bytes;
 
@@ -30,6 +29,7 @@ pub(super) enum Incoming {
         subscription: usize,
         bytes: Bytes,
         received: Stamp<Host>,
+        writer: Guid,
         after: After,
     },
     /// A sample that is no plain CDR.
@@ -66,6 +66,9 @@ pub(super) struct After {
     pub takes_turns: bool,
 }
 
+/// Writers of one topic that are remembered; where more come, all are forgotten and counted anew.
+const MOST_WRITERS: usize = 4_096;
+
 /// Counts what a topic's writers sent and we never got.
 #[derive(Debug, Default)]
 pub(crate) struct GapCounter {
@@ -84,6 +87,9 @@ impl GapCounter {
             // Out of order: counted as lost before, or a repetition.
             Some(_) => 0,
             None => {
+                if self.last.len() >= MOST_WRITERS {
+                    self.last.clear();
+                }
                 self.last.insert(writer, sequence);
                 0
             }
@@ -103,6 +109,9 @@ impl Turns {
     pub fn take(&mut self, writer: Guid) -> bool {
         match self.speaks.replace(writer) {
             Some(before) if before != writer => {
+                if self.spoke.len() >= MOST_WRITERS {
+                    self.spoke.clear();
+                }
                 self.spoke.insert(before);
                 self.spoke.contains(&writer)
             }
@@ -161,12 +170,16 @@ impl Readers {
                 takes_turns: turns.take(sample.writer),
             };
             let Sample {
-                bytes, received, ..
+                bytes,
+                received,
+                writer,
+                ..
             } = sample;
             Some(Incoming::Message {
                 subscription,
                 bytes,
                 received,
+                writer,
                 after,
             })
         });
@@ -209,7 +222,16 @@ impl Readers {
         let name: Arc<str> = Arc::from(topic);
         self.spawn(topic, reader, move |sample| {
             Some(match from_cdr::<ClockMessage>(&sample.bytes) {
-                Ok(message) => Incoming::Clock(clock::stamp(&message.clock)),
+                Ok(message) => match abbe_msgs::instant(&message.clock) {
+                    Some(now) => Incoming::Clock(now),
+                    None => Incoming::Unreadable {
+                        topic: Arc::clone(&name),
+                        reason: format!(
+                            "clock: {} ns: must be below 1000000000 ns",
+                            message.clock.nanosec
+                        ),
+                    },
+                },
                 Err(error) => Incoming::Unreadable {
                     topic: Arc::clone(&name),
                     reason: error.to_string(),
@@ -250,6 +272,17 @@ mod tests {
             .map(|(writer, sequence)| gaps.count(writer, sequence))
             .into();
         assert_eq!(lost, [0, 0, 0, 2, 0, 0, 0]);
+    }
+
+    #[test]
+    fn writers_without_end_are_not_remembered() {
+        let (mut gaps, mut turns) = (GapCounter::default(), Turns::default());
+        for n in 0..3 * u128::try_from(MOST_WRITERS).unwrap() {
+            let writer = n.to_be_bytes();
+            gaps.count(writer, 1);
+            turns.take(writer);
+            assert!(gaps.last.len() <= MOST_WRITERS && turns.spoke.len() <= MOST_WRITERS);
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use abbe_msgs::{Qos, to_cdr, topics};
+use abbe_msgs::{Defect, Qos, to_cdr, topics};
 use metrology::Stamp;
 use metrology::stamp::Host;
 use tokio::sync::{mpsc, watch};
@@ -19,6 +19,7 @@ use super::event_time::EventTime;
 use super::incoming::{Incoming, Readers};
 use super::logger_levels::LoggerService;
 use super::parameters::{self, ParameterService};
+use super::refusals::Refusals;
 use super::related::Related;
 use super::service::{Client, ReplyTo, Server, shared};
 use super::timers::{HostTimers, SimulatedTimers};
@@ -35,6 +36,7 @@ mod graph;
 mod take;
 
 pub(super) use early::Hearing;
+pub(super) use graph::Writers;
 
 /// What a server is there for.
 #[derive(Clone, Copy, Debug)]
@@ -61,6 +63,7 @@ pub(super) struct Subscription {
     pub lost: u64,
     /// Samples since the last look at which another publisher came back.
     pub turns: u64,
+    pub writers: Writers,
 }
 
 pub(super) struct Publication {
@@ -115,6 +118,7 @@ pub(super) struct Owner {
     pub log_level: Option<Severity>,
     pub is_on_console: bool,
     pub board: Board,
+    pub refusals: Refusals,
     pub emissions: Vec<Emission>,
     pub event_time: EventTime,
     pub next_request: RequestId,
@@ -143,6 +147,10 @@ const SERVER_POLL: Duration = Duration::from_millis(20);
 const LIMIT_POLL: Duration = Duration::from_millis(200);
 /// Between publications of `/diagnostics` when conditions come and go quickly.
 const DIAGNOSTICS_PAUSE: Duration = Duration::from_millis(100);
+/// Why an input was refused that the wire has nothing against.
+const NOT_TAKEN: &str = "not taken by the node";
+/// Why a sample was refused that another type's publisher sent.
+const FOREIGN_TYPE: &str = "of another type";
 /// Events handled before chores are looked at again.
 const BATCH: usize = 256;
 
@@ -282,10 +290,28 @@ impl Owner {
         }
         self.emissions = emissions;
         if let Err(fault) = outcome {
-            self.board.count("inputs refused", 1);
-            let diagnostic = Diagnostic::new(Level::Error, "input_refused", fault.to_string());
-            self.notice(diagnostic.with("port", &fault.port));
+            let reason = fault.defect.map_or(NOT_TAKEN, Defect::words);
+            self.refuse(
+                ("input_refused", fault.port.as_str()),
+                reason,
+                at,
+                &fault.to_string(),
+            );
         }
+    }
+
+    /// Reports an input that cannot be used, and counts it by port and reason.
+    fn refuse(
+        &mut self,
+        (name, port): (&str, &str),
+        reason: &'static str,
+        at: Stamp<Host>,
+        what: &str,
+    ) {
+        self.board.count("inputs refused", 1);
+        let (diagnostic, counter) = self.refusals.add((name, port), reason, at, what);
+        self.board.set(counter.name, counter.inputs);
+        self.notice(diagnostic);
     }
 
     /// Reports a sample that could not be sent.

@@ -14,7 +14,7 @@ use abbe_msgs::rcl_interfaces::srv::{
     SetParameters, SetParametersAtomically, SetParametersAtomicallyRequest,
     SetParametersAtomicallyResponse, SetParametersRequest, SetParametersResponse,
 };
-use abbe_msgs::{Service, WireError, from_cdr, to_cdr};
+use abbe_msgs::{Message, Service, WireError, from_cdr, to_cdr};
 use metrology::Stamp;
 use metrology::stamp::Host;
 
@@ -64,24 +64,32 @@ impl ParameterService {
     pub fn answer(self, parameters: &[Parameter], bytes: &[u8]) -> Result<Bytes, WireError> {
         let table = Table(parameters);
         let answer = match self {
-            Self::List => to_cdr(&table.list(&from_cdr(bytes)?)),
+            Self::List => {
+                let request: ListParametersRequest = from_cdr(bytes)?;
+                at_most::<ListParametersRequest>("prefixes", request.prefixes.len())?;
+                to_cdr(&table.list(&request))
+            }
             Self::Get => {
                 let GetParametersRequest { names } = from_cdr(bytes)?;
+                at_most::<GetParametersRequest>("names", names.len())?;
                 let values = names.iter().map(|name| table.value(name)).collect();
                 to_cdr(&GetParametersResponse { values })
             }
             Self::Types => {
                 let GetParameterTypesRequest { names } = from_cdr(bytes)?;
+                at_most::<GetParameterTypesRequest>("names", names.len())?;
                 let types = names.iter().map(|name| table.value(name).r#type).collect();
                 to_cdr(&GetParameterTypesResponse { types })
             }
             Self::Describe => {
                 let DescribeParametersRequest { names } = from_cdr(bytes)?;
+                at_most::<DescribeParametersRequest>("names", names.len())?;
                 let descriptors = names.iter().map(|name| table.describe(name)).collect();
                 to_cdr(&DescribeParametersResponse { descriptors })
             }
             Self::Set => {
                 let SetParametersRequest { parameters } = from_cdr(bytes)?;
+                at_most::<SetParametersRequest>("parameters", parameters.len())?;
                 let results = parameters.iter().map(|p| table.refuse(p)).collect();
                 to_cdr(&SetParametersResponse { results })
             }
@@ -101,6 +109,23 @@ impl ParameterService {
         };
         Ok(shared(&answer))
     }
+}
+
+/// Names in one request: a node has some hundred parameters, and each name is answered by a text.
+const MOST_NAMES: usize = 10_000;
+
+/// Refuses a request of more names than that.
+fn at_most<M: Message>(field: &'static str, n: usize) -> Result<(), WireError> {
+    if n <= MOST_NAMES {
+        return Ok(());
+    }
+    Err(WireError::TooMany {
+        message: M::TYPE_NAME,
+        field,
+        n,
+        what: "entries",
+        greatest: MOST_NAMES,
+    })
 }
 
 struct Table<'p>(&'p [Parameter]);
@@ -338,6 +363,47 @@ mod tests {
             parameter("fade.steps", Value::Integer(3), Some((1.0, 9.0))),
             parameter("use_sim_time", Value::Bool(false), None),
         ]
+    }
+
+    #[test]
+    fn a_request_of_endless_names_is_refused() {
+        let names = vec![String::new(); MOST_NAMES + 1];
+        let requests = [
+            (
+                ParameterService::List,
+                to_cdr(&ListParametersRequest {
+                    prefixes: names.clone(),
+                    depth: 0,
+                }),
+            ),
+            (
+                ParameterService::Get,
+                to_cdr(&GetParametersRequest {
+                    names: names.clone(),
+                }),
+            ),
+            (
+                ParameterService::Types,
+                to_cdr(&GetParameterTypesRequest {
+                    names: names.clone(),
+                }),
+            ),
+            (
+                ParameterService::Describe,
+                to_cdr(&DescribeParametersRequest { names }),
+            ),
+            (
+                ParameterService::Set,
+                to_cdr(&SetParametersRequest {
+                    parameters: vec![ParameterMessage::default(); MOST_NAMES + 1],
+                }),
+            ),
+        ];
+        for (service, request) in requests {
+            let refused = service.answer(&parameters(), &request).unwrap_err();
+            let said = refused.to_string();
+            assert!(said.contains("10001 entries: at most 10000"), "{said}");
+        }
     }
 
     fn list(prefixes: &[&str], depth: u64) -> Vec<String> {

@@ -120,7 +120,7 @@ impl SimulatedTimers {
         for (due, period) in self.due.iter_mut().flatten().zip(&self.periods) {
             if *due <= now {
                 let ticks = (now - *due).nanos() / period.nanos().max(1) + 1;
-                *due += Span::from_nanos(ticks * period.nanos());
+                *due += Span::from_nanos(ticks.saturating_mul(period.nanos()));
                 skipped += u64::try_from(ticks).unwrap_or(0);
             }
         }

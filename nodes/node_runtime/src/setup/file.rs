@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use metrology::yaml::{self, Places};
+
 use super::tree::Tree;
 use super::{Origin, SetupError};
-use crate::complaint;
 
 const PARAMETERS_KEY: &str = "ros__parameters";
 
@@ -25,66 +26,114 @@ fn fits(pattern: &[&str], name: &[&str]) -> bool {
     }
 }
 
+/// Whether a section of a parameter file, such as `/mill/*`, is for the node `/mill/probe`.
+#[must_use]
+pub fn is_for(section: &str, fully_qualified: &str) -> bool {
+    fits(&tokens(section), &tokens(fully_qualified))
+}
+
 fn tokens(name: &str) -> Vec<&str> {
     name.split('/').filter(|token| !token.is_empty()).collect()
 }
 
-/// What a file says to the node `/name/space/node`, section by section in the order of the file's keys:
-/// wildcards before the node's own section, so that the particular overrides the general.
+/// A part of a file that is for one node or several.
+#[derive(Debug)]
+pub(super) struct Section {
+    /// The name that it is for, with `*` for any word of it.
+    pub name: String,
+    /// Path of its values in the file.
+    path: String,
+    /// Its values.
+    pub values: Tree,
+}
+
+/// What a file has for the node `/name/space/node`.
+#[derive(Debug)]
+pub(super) struct Sections {
+    /// Those that fit, in the order of the file's keys: wildcards before the node's own, so that the particular
+    /// overrides the general.
+    pub fitting: Vec<Section>,
+    /// Names of the others.
+    pub of_others: Vec<String>,
+    places: Places,
+}
+
+/// The sections of a file.
 pub(super) fn sections(
     path: &Path,
     text: &str,
     fully_qualified: &str,
-) -> Result<Vec<Tree>, SetupError> {
+) -> Result<Sections, SetupError> {
     let bad = |reason: String| SetupError::BadFile {
-        path: path.to_owned(),
-        reason,
+        reason: yaml::placed(&path.display().to_string(), text, &reason),
     };
-    let tree: Tree =
-        Tree::from_yaml(text).map_err(|error| bad(complaint::of_yaml(&error, text)))?;
+    let tree: Tree = if text.lines().all(is_blank) {
+        Tree::Null
+    } else {
+        yaml::read(text).map_err(|error| bad(error.to_string()))?
+    };
     let mut found = Vec::new();
     if tree != Tree::Null {
-        walk(&tree, "", &tokens(fully_qualified), &mut found).map_err(bad)?;
+        walk(&tree, "", "", &mut found).map_err(bad)?;
     }
-    found.sort_by_key(|(general, _)| !*general);
-    Ok(found.into_iter().map(|(_, section)| section).collect())
+    let node = tokens(fully_qualified);
+    let (mut fitting, others): (Vec<Section>, Vec<Section>) = found
+        .into_iter()
+        .partition(|section| fits(&tokens(&section.name), &node));
+    fitting.sort_by_key(|section| !section.name.contains('*'));
+    Ok(Sections {
+        fitting,
+        of_others: others.into_iter().map(|section| section.name).collect(),
+        places: Places::of(text),
+    })
 }
 
-fn walk(
-    tree: &Tree,
-    name: &str,
-    node: &[&str],
-    found: &mut Vec<(bool, Tree)>,
-) -> Result<(), String> {
+fn is_blank(line: &str) -> bool {
+    let line = line.trim();
+    line.is_empty() || line.starts_with('#')
+}
+
+fn walk(tree: &Tree, name: &str, path: &str, found: &mut Vec<Section>) -> Result<(), String> {
     let Tree::Map(map) = tree else {
-        let shown = if name.is_empty() { "the file" } else { name };
-        return Err(format!("{shown} has no {PARAMETERS_KEY}: it is {tree}"));
+        let shown = if path.is_empty() { "the file" } else { path };
+        return Err(format!(
+            "{shown}: must hold {PARAMETERS_KEY} below the name of a node, got {tree}"
+        ));
     };
     for (key, below) in map {
+        let path = if path.is_empty() {
+            key.clone()
+        } else {
+            format!("{path}.{key}")
+        };
         if key == PARAMETERS_KEY {
             if !matches!(below, Tree::Map(_)) {
-                return Err(format!(
-                    "{name}.{PARAMETERS_KEY} must hold names and values, got {below}"
-                ));
+                return Err(format!("{path}: must hold names and values, got {below}"));
             }
-            if fits(&tokens(name), node) {
-                found.push((name.contains('*'), below.clone()));
-            }
+            found.push(Section {
+                name: if name.is_empty() { "/" } else { name }.to_owned(),
+                path,
+                values: below.clone(),
+            });
         } else {
-            walk(below, &format!("{name}/{key}"), node, found)?;
+            let name = format!("{name}/{}", key.trim_start_matches('/'));
+            walk(below, &name, &path, found)?;
         }
     }
     Ok(())
 }
 
-/// Where each leaf of a section comes from.
-pub(super) fn origins(path: &Path, section: &Tree) -> Vec<(String, Origin)> {
-    let origin = Origin::File(path.to_owned());
-    section
-        .leaves()
-        .into_iter()
-        .map(|(name, _)| (name, origin.clone()))
-        .collect()
+impl Sections {
+    /// Where each value of a section comes from.
+    pub(super) fn origins(&self, path: &Path, section: &Section) -> Vec<(String, Origin)> {
+        let leaves = section.values.leaves().into_iter();
+        leaves
+            .map(|(name, _)| {
+                let place = self.places.find(&format!("{}.{name}", section.path));
+                (name, Origin::File(path.to_owned(), place))
+            })
+            .collect()
+    }
 }
 
 #[cfg(test)]
@@ -94,10 +143,8 @@ mod tests {
     fn read(text: &str, node: &str) -> Result<Vec<String>, String> {
         sections(Path::new("p.yaml"), text, node)
             .map(|found| {
-                found
-                    .iter()
-                    .flat_map(|s| s.leaves().into_iter().map(|(n, v)| format!("{n}={v}")))
-                    .collect()
+                let leaves = found.fitting.iter().flat_map(|s| s.values.leaves());
+                leaves.map(|(n, v)| format!("{n}={v}")).collect()
             })
             .map_err(|error| error.to_string())
     }

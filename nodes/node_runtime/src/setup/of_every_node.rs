@@ -1,7 +1,7 @@
 //! The parameters that the runtime gives to every node.
 
-use metrology::Stamp;
 use metrology::stamp::NANOS_PER_S;
+use metrology::{ParameterDoc, Stamp};
 use serde::Deserialize;
 
 use super::{Setup, SetupError, Tree, tree};
@@ -14,6 +14,40 @@ pub(super) const USE_SIM_TIME: &str = "use_sim_time";
 const CLOCK_HOST: &str = "clock_host";
 /// An error that the computer's clock is given.
 const CLOCK_ERROR: &str = "clock_error";
+
+/// What the parameters of every node mean, beside those of its own table.
+pub const PARAMETERS_OF_EVERY_NODE: [ParameterDoc; 5] = [
+    ParameterDoc {
+        name: USE_SIM_TIME,
+        unit: "",
+        description: "Whether time comes from /clock.",
+        range: None,
+    },
+    ParameterDoc {
+        name: CLOCK_HOST,
+        unit: "",
+        description: "Host by whose map of host_clock/map stamps are taken over to the reference's clock.",
+        range: None,
+    },
+    ParameterDoc {
+        name: "clock_error.offset_s",
+        unit: "s",
+        description: "What this node's clock is made to show too much at since_s",
+        range: Some((-GREATEST_OFFSET_S, GREATEST_OFFSET_S)),
+    },
+    ParameterDoc {
+        name: "clock_error.drift_us_per_s",
+        unit: "µs/s",
+        description: "What this node's clock is made to gain",
+        range: Some((-GREATEST_DRIFT_US_PER_S, GREATEST_DRIFT_US_PER_S)),
+    },
+    ParameterDoc {
+        name: "clock_error.since_s",
+        unit: "s",
+        description: "When its error is offset_s, in seconds since 1970 by the computer's clock",
+        range: Some((-GREATEST_OFFSET_S, GREATEST_OFFSET_S)),
+    },
+];
 
 /// Greatest error of a clock, s: a century.
 const GREATEST_OFFSET_S: f64 = 3.2e9;
@@ -58,7 +92,7 @@ impl OfEveryNode {
         }
         if let Some(given) = setup.parameters.remove(CLOCK_ERROR) {
             let read = tree::read::<GivenError>(&given)
-                .map_err(|error| setup.bad(CLOCK_ERROR, &given, error.reason))?;
+                .map_err(|error| setup.bad(CLOCK_ERROR, &given, error.reason()))?;
             read.check()
                 .map_err(|reason| setup.bad(CLOCK_ERROR, &given, reason))?;
             taken.clock_error = Some(read);
@@ -69,29 +103,23 @@ impl OfEveryNode {
 
     /// As ROS serves them; those of the clock where they were given.
     pub fn parameters(&self) -> Vec<Parameter> {
-        let served = |name: String, value, description: &str| Parameter {
-            name,
-            value,
-            description: description.to_owned(),
-            range: None,
-        };
-        let mut all = vec![served(
-            USE_SIM_TIME.to_owned(),
-            Value::Bool(self.use_sim_time),
-            "Whether time comes from /clock.",
-        )];
-        if !self.clock_host.is_empty() {
-            all.push(served(
-                CLOCK_HOST.to_owned(),
-                Value::String(self.clock_host.clone()),
-                "Host by whose map of host_clock/map stamps are taken over to the reference's clock.",
-            ));
-        }
-        for (key, value, description) in self.clock_error.iter().flat_map(GivenError::fields) {
-            let name = format!("{CLOCK_ERROR}.{key}");
-            all.push(served(name, Value::Double(value), description));
-        }
-        all
+        let values = [
+            Some(Value::Bool(self.use_sim_time)),
+            (!self.clock_host.is_empty()).then(|| Value::String(self.clock_host.clone())),
+            self.clock_error.map(|error| Value::Double(error.offset_s)),
+            { self.clock_error }.map(|error| Value::Double(error.drift_us_per_s)),
+            self.clock_error.map(|error| Value::Double(error.since_s)),
+        ];
+        let all = PARAMETERS_OF_EVERY_NODE.iter().zip(values);
+        all.filter_map(|(doc, value)| {
+            Some(Parameter {
+                name: doc.name.to_owned(),
+                value: value?,
+                description: super::describe_doc(doc),
+                range: None,
+            })
+        })
+        .collect()
     }
 }
 
@@ -123,25 +151,5 @@ impl GivenError {
             drift: self.drift_us_per_s * 1e-6,
             since: Stamp::from_nanos(nanos),
         }
-    }
-
-    fn fields(&self) -> [(&'static str, f64, &'static str); 3] {
-        [
-            (
-                "offset_s",
-                self.offset_s,
-                "What this node's clock is made to show too much at since_s [s]",
-            ),
-            (
-                "drift_us_per_s",
-                self.drift_us_per_s,
-                "What this node's clock is made to gain [µs/s]",
-            ),
-            (
-                "since_s",
-                self.since_s,
-                "When its error is offset_s, in seconds since 1970 by the computer's clock [s]",
-            ),
-        ]
     }
 }

@@ -1,3 +1,5 @@
+#![expect(clippy::disallowed_methods, reason = "files of the tests")]
+
 use std::fs;
 
 use serde::Deserialize;
@@ -84,7 +86,7 @@ fn an_integer_is_no_double_and_the_error_says_who_said_so() {
     let error = setup.unwrap().config::<Config>().unwrap_err().to_string();
     assert_eq!(
         error,
-        "command line: parameter `rate_hz` = 3: expected a double, got the integer 3: write 3.0"
+        "command line: parameter `rate_hz` = 3 Hz: expected a double, got the integer 3: write 3.0"
     );
 }
 
@@ -121,7 +123,7 @@ fn a_value_outside_of_its_range_or_of_a_wrong_kind_is_refused() {
     lone.parameters.remove("mixed");
     let error = lone.parameters(&DOCS).unwrap_err().to_string();
     assert!(
-        error.contains("`rate_hz` = 1000.0: must be 1 to 100"),
+        error.contains("`rate_hz` = 1000.0 Hz: must be 1 to 100"),
         "{error}"
     );
     let (_folder, bad) = self::setup(GOOD, &["-p", "use_sim_time:=1"]);

@@ -6,6 +6,8 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use metrology::number::unit_of;
+use metrology::yaml::{self, YamlError};
 use serde::de::value::{MapAccessDeserializer, MapDeserializer, StrDeserializer};
 use serde::de::{
     self, DeserializeSeed, Deserializer, EnumAccess, IntoDeserializer, MapAccess, SeqAccess,
@@ -57,8 +59,22 @@ impl Tree {
     ///
     /// # Errors
     /// When the text is no YAML.
-    pub fn from_yaml(text: &str) -> Result<Self, serde_saphyr::Error> {
-        serde_saphyr::from_str(text)
+    pub fn from_yaml(text: &str) -> Result<Self, YamlError> {
+        yaml::read(text)
+    }
+
+    /// The value at a place as errors name it: dotted, with the places of lists in brackets.
+    #[must_use]
+    pub fn at(&self, place: &str) -> Option<&Self> {
+        let places = place.replace('[', ".[");
+        places.split('.').try_fold(self, |tree, key| match tree {
+            Self::Map(map) => map.get(key),
+            Self::List(values) => {
+                let index = key.strip_prefix('[')?.strip_suffix(']')?;
+                values.get(index.parse::<usize>().ok()?)
+            }
+            _ => None,
+        })
     }
 
     /// The value under a dotted name.
@@ -201,12 +217,20 @@ impl<'de> Visitor<'de> for TreeVisitor {
 
 /// What is wrong with a tree, and where.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{reason}")]
+#[error("{}", self.reason())]
 pub struct TreeError {
     /// Keys from the place of the error outwards.
     path: Vec<String>,
-    /// What is wrong.
-    pub reason: String,
+    flaw: Flaw,
+}
+
+/// What is wrong.
+#[derive(Clone, Debug, PartialEq)]
+enum Flaw {
+    /// In words.
+    Other(String),
+    /// Something else belongs there, as serde names it, or a list of another length than this one.
+    Kind(String, Option<usize>),
 }
 
 impl TreeError {
@@ -223,18 +247,68 @@ impl TreeError {
         place
     }
 
+    /// What is wrong there, and what belongs there in which unit.
+    #[must_use]
+    pub fn reason(&self) -> String {
+        match &self.flaw {
+            Flaw::Other(words) => words.clone(),
+            Flaw::Kind(expected, length) => {
+                let wanted = yaml::wanted(expected, &self.place());
+                let has = length.map_or_else(String::new, |length| format!(", and has {length}"));
+                format!("must be {wanted}{has}")
+            }
+        }
+    }
+
     fn under(mut self, key: String) -> Self {
         self.path.push(key);
         self
+    }
+
+    fn new(flaw: Flaw) -> Self {
+        Self {
+            path: Vec::new(),
+            flaw,
+        }
     }
 }
 
 impl de::Error for TreeError {
     fn custom<T: fmt::Display>(message: T) -> Self {
-        Self {
-            path: Vec::new(),
-            reason: message.to_string(),
-        }
+        Self::new(Flaw::Other(message.to_string()))
+    }
+
+    // What stands there instead is shown with the parameter.
+    fn invalid_type(_: de::Unexpected<'_>, expected: &dyn de::Expected) -> Self {
+        Self::new(Flaw::Kind(expected.to_string(), None))
+    }
+
+    fn invalid_value(_: de::Unexpected<'_>, expected: &dyn de::Expected) -> Self {
+        Self::new(Flaw::Kind(expected.to_string(), None))
+    }
+
+    fn invalid_length(length: usize, expected: &dyn de::Expected) -> Self {
+        Self::new(Flaw::Kind(expected.to_string(), Some(length)))
+    }
+
+    fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
+        let known = expected.join(", ");
+        Self::custom(format!(
+            "\"{variant}\" is not known here: must be one of {known}"
+        ))
+    }
+
+    fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
+        Self::custom(yaml::known_keys(field, expected))
+    }
+
+    fn missing_field(field: &'static str) -> Self {
+        let unit = unit_of(field).map_or_else(String::new, |unit| format!(", in {unit}"));
+        Self::custom(format!("the parameter `{field}` is missing: add it{unit}"))
+    }
+
+    fn duplicate_field(field: &'static str) -> Self {
+        Self::custom(format!("`{field}` is there twice: keep one of them"))
     }
 }
 
@@ -305,9 +379,13 @@ impl<'de> Deserializer<'de> for &'de Tree {
     fn deserialize_enum<V: Visitor<'de>>(
         self,
         _name: &'static str,
-        _variants: &'static [&'static str],
+        variants: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, TreeError> {
+        let must = || {
+            let known = variants.join(", ");
+            Err(de::Error::custom(format!("must be one of {known}")))
+        };
         match self {
             Tree::String(variant) => visitor.visit_enum(Variant {
                 name: variant,
@@ -318,11 +396,9 @@ impl<'de> Deserializer<'de> for &'de Tree {
                     name,
                     value: Some(value),
                 }),
-                _ => Err(de::Error::custom("expected one key that names the variant")),
+                _ => must(),
             },
-            other => Err(de::Error::custom(format!(
-                "expected the name of a variant, got {other}"
-            ))),
+            _ => must(),
         }
     }
 
@@ -383,9 +459,8 @@ impl<'t> MapAccess<'t> for Entries<'t> {
     }
 
     fn next_value_seed<V: DeserializeSeed<'t>>(&mut self, seed: V) -> Result<V::Value, TreeError> {
-        let (key, value) = self.value.take().ok_or_else(|| TreeError {
-            path: Vec::new(),
-            reason: "a value was asked for before its key".to_owned(),
+        let (key, value) = self.value.take().ok_or_else(|| {
+            <TreeError as de::Error>::custom("a value was asked for before its key")
         })?;
         seed.deserialize(value)
             .map_err(|error| error.under(key.clone()))
@@ -455,87 +530,4 @@ impl<'t> VariantAccess<'t> for Variant<'t> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[derive(Debug, Deserialize, PartialEq)]
-    #[serde(deny_unknown_fields)]
-    struct Config {
-        rate_hz: f64,
-        #[serde(default)]
-        count: Option<u32>,
-        #[serde(default)]
-        inner: Vec<Inner>,
-        #[serde(default)]
-        kind: Kind,
-    }
-
-    #[derive(Debug, Deserialize, PartialEq)]
-    #[serde(deny_unknown_fields)]
-    struct Inner {
-        width_mm: f64,
-    }
-
-    #[derive(Debug, Default, Deserialize, PartialEq)]
-    #[serde(rename_all = "snake_case")]
-    enum Kind {
-        #[default]
-        Hold,
-        Fade {
-            seconds_s: f64,
-        },
-    }
-
-    fn place(yaml: &str) -> (String, String) {
-        let error = read::<Config>(&Tree::from_yaml(yaml).unwrap()).unwrap_err();
-        (error.place(), error.reason)
-    }
-
-    #[test]
-    fn a_configuration_is_read_with_all_kinds_of_values() {
-        let yaml =
-            "rate_hz: 10.0\ncount: 3\ninner: [{width_mm: 0.5}]\nkind: {fade: {seconds_s: 2.0}}";
-        let config: Config = read(&Tree::from_yaml(yaml).unwrap()).unwrap();
-        let expected = Config {
-            rate_hz: 10.0,
-            count: Some(3),
-            inner: vec![Inner { width_mm: 0.5 }],
-            kind: Kind::Fade { seconds_s: 2.0 },
-        };
-        assert_eq!(config, expected);
-        let dotted = "rate_hz: 1e1\nkind.fade.seconds_s: 2.0";
-        let config: Config = read(&Tree::from_yaml(dotted).unwrap()).unwrap();
-        assert_eq!(config.kind, Kind::Fade { seconds_s: 2.0 });
-    }
-
-    #[test]
-    fn errors_name_the_place_and_the_value() {
-        assert_eq!(
-            place("rate_hz: 10"),
-            (
-                "rate_hz".into(),
-                "expected a double, got the integer 10: write 10.0".into()
-            )
-        );
-        let (where_, reason) = place("rate_hz: 1.0\ninner: [{width_mm: 0.5}, {width_um: 1.0}]");
-        assert_eq!(where_, "inner[1].width_um");
-        assert!(reason.contains("unknown field `width_um`"), "{reason}");
-        let (where_, reason) = place("rate_hz: 1.0\ncount: many");
-        assert_eq!(where_, "count");
-        assert!(reason.contains("many"), "{reason}");
-        assert!(place("count: 1").1.contains("rate_hz"));
-    }
-
-    #[test]
-    fn later_values_override_and_maps_merge() {
-        let mut tree = Tree::from_yaml("a: {b: 1, c: 2}").unwrap();
-        tree.insert("a", Tree::from_yaml("{c: 3, d: [1.5]}").unwrap());
-        tree.insert("a.b", Tree::Bool(true));
-        let names: Vec<_> = tree
-            .leaves()
-            .into_iter()
-            .map(|(n, v)| format!("{n}={v}"))
-            .collect();
-        assert_eq!(names, ["a.b=true", "a.c=3", "a.d=a list of 1"]);
-    }
-}
+mod tests;

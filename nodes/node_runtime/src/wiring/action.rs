@@ -5,7 +5,7 @@ use abbe_msgs::{Action, GetResultResponse};
 use metrology::Stage;
 
 use super::{Wiring, decode, encode};
-use crate::node::{ActionPort, Emission, Event, GoalId, GoalStatus};
+use crate::node::{ActionPort, Emission, Event, GoalId, GoalStatus, Refusal};
 
 /// What a stage that offers an action says of a goal.
 pub enum GoalSignal<A: Action> {
@@ -37,7 +37,7 @@ pub enum GoalNews<A: Action> {
     Ended(GoalId, GoalStatus, Option<A::Result>),
 }
 
-type DecodeGoal<I> = Box<dyn Fn(GoalId, &[u8]) -> Result<I, String> + Send>;
+type DecodeGoal<I> = Box<dyn Fn(GoalId, &[u8]) -> Result<I, Refusal> + Send>;
 
 /// How an offered action's events become inputs.
 pub(super) struct ServerTable<I> {
@@ -50,7 +50,7 @@ pub(super) struct ClientTable<I> {
     answer: Box<dyn Fn(GoalId, bool) -> I + Send>,
     feedback: DecodeGoal<I>,
     #[expect(clippy::type_complexity, reason = "one closure of a private table")]
-    ended: Box<dyn Fn(GoalId, GoalStatus, Option<&[u8]>) -> Result<I, String> + Send>,
+    ended: Box<dyn Fn(GoalId, GoalStatus, Option<&[u8]>) -> Result<I, Refusal> + Send>,
 }
 
 impl<S> Wiring<S>
@@ -143,7 +143,7 @@ where
 
 impl<S: Stage> Wiring<S> {
     /// Decoded input of an action's event; `None` for a port that does not exist.
-    pub(super) fn action_input(&self, event: Event<'_>) -> Option<Result<S::Input, String>> {
+    pub(super) fn action_input(&self, event: Event<'_>) -> Option<Result<S::Input, Refusal>> {
         match event {
             Event::Goal { server, id, bytes } => {
                 Some((self.action_servers.get(server)?.goal)(id, bytes))

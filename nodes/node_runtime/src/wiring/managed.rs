@@ -244,6 +244,12 @@ where
         Node::goes_live(&mut self.wiring);
     }
 
+    fn sees_publishers(&mut self, subscription: usize, publishers: usize) {
+        if self.hears() {
+            self.wiring.sees_publishers(subscription, publishers);
+        }
+    }
+
     fn save(&self) -> Option<Saved> {
         let stage = self.wiring.save()?;
         Some(Box::new((stage, self.standing.clone())))
@@ -281,11 +287,8 @@ where
             && let Some(call) = Call::ALL.get(place)
         {
             let asked = self.asked(at, *call, (service, id), bytes, out);
-            return asked.map_err(|reason| NodeFault {
-                node: self.wiring.name.clone(),
-                port: self.ports.services[service].service.clone(),
-                reason,
-            });
+            let port = &self.ports.services[service].service;
+            return asked.map_err(|refusal| refusal.fault(&self.wiring.name, port));
         }
         if self.hears() {
             return self.pass(at, event, out);

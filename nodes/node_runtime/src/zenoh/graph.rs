@@ -60,9 +60,10 @@ impl Graph {
 
     /// The ends that have a role.
     pub fn ends(&self, role_of: impl Fn(Kind) -> Option<Role>) -> Vec<Remote> {
-        let describe = |(guid, end): &(Guid, End)| {
+        let describe = |node: &NodeId, (guid, end): &(Guid, End)| {
             Some(Remote {
                 guid: *guid,
+                node: node.fully_qualified(),
                 role: role_of(end.kind)?,
                 name: end.name.clone(),
                 dds_type: end.dds_type.clone(),
@@ -72,8 +73,10 @@ impl Graph {
             })
         };
         let seen = self.seen();
-        let ends = seen.values().filter_map(|seen| seen.end.as_ref());
-        ends.filter_map(describe).collect()
+        let ends = seen
+            .values()
+            .filter_map(|seen| Some((&seen.node, seen.end.as_ref()?)));
+        ends.filter_map(|(node, end)| describe(node, end)).collect()
     }
 }
 

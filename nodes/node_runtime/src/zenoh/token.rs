@@ -86,6 +86,13 @@ pub(super) struct NodeId {
     pub name: String,
 }
 
+impl NodeId {
+    /// Its full name.
+    pub fn fully_qualified(&self) -> String {
+        format!("{}/{}", self.namespace.trim_end_matches('/'), self.name)
+    }
+}
+
 /// The token of a node.
 pub(super) fn of_node(domain: u16, id: &NodeId) -> String {
     let NodeId {

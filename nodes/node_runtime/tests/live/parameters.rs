@@ -75,7 +75,8 @@ impl Asker {
                 qos,
             )
             .unwrap();
-        std::thread::sleep(Duration::from_millis(500));
+        // Until both have met, on a busy computer as well: a request before that is lost.
+        std::thread::sleep(Duration::from_millis(1_500));
         let call = async { client.async_call_service(request).await };
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()

@@ -211,7 +211,7 @@ fn bad_arguments_and_parameters_are_refused_with_their_names() {
         (
             &["--ros-args", "-p", "ofset:=1"],
             1,
-            "`ofset` = 1: unknown field",
+            "`ofset` = 1: unknown key, is offset meant?",
         ),
         (
             &["--ros-args", "--params-file", "/nowhere.yaml"],
@@ -340,8 +340,9 @@ fn a_killed_subscriber_holds_nobody_up() {
         longest_gap_ms = longest_gap_ms.max((sent - last) / 1_000_000);
         last = sent;
     }
+    // A writer that waits for the dead one waits until its lease ends, 4 s on Zenoh and 60 s on DDS; a busy computer holds it up for less.
     assert!(
-        longest_gap_ms < 500,
+        longest_gap_ms < 3_000,
         "nothing was sent for {longest_gap_ms} ms"
     );
     let started = Process::start(&environment, &second);

@@ -67,6 +67,7 @@ impl Node for Puppet {
             node: self.name.clone(),
             port: "test".to_owned(),
             reason,
+            defect: None,
         })
     }
 }

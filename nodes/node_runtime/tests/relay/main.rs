@@ -88,6 +88,7 @@ impl Node for Relay {
                     node: self.name.clone(),
                     port: "in".to_owned(),
                     reason: error.to_string(),
+                    defect: Some(error.defect()),
                 };
                 let Int64 { data } = from_cdr(bytes).map_err(fault)?;
                 let data = data.wrapping_add(self.offset);

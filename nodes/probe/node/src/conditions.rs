@@ -14,6 +14,7 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
         }
         Condition::TriggersLost { .. } => (Level::Error, "triggers_lost".to_owned()),
         Condition::ToldBefore { .. } => (Level::Warn, "told_before".to_owned()),
+        Condition::TooMany { .. } => (Level::Error, "too_many".to_owned()),
         Condition::CorrectedByFeed { .. } => (Level::Warn, "corrected_by_feed".to_owned()),
         Condition::LatencyRefused { .. } => (Level::Error, "latency_refused".to_owned()),
         Condition::LatencyOlder { .. } => (Level::Warn, "latency_older".to_owned()),

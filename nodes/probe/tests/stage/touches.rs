@@ -311,3 +311,33 @@ fn a_latency_of_before_the_one_in_use_is_refused_unless_the_clock_was_set_back()
     rig.send(calibrated_at(3_650, LATENCY_S + 1e-4));
     assert!((applied_s(&mut rig) - LATENCY_S - 1e-4).abs() < 1e-12);
 }
+
+/// A stranger's touches: all of them wait for positions that never come.
+#[test]
+fn touches_without_end_wait_up_to_a_limit_and_it_is_said() {
+    let mut rig = Rig::new(&known_latency());
+    let state = rig.state(&Vector3::zeros(), rig.now_ns);
+    for n in 0..10_050 {
+        let at = Stamp::from_nanos(rig.now_ns + n);
+        rig.send(Input::Trigger(ProbeTrigger {
+            received_at: at,
+            controller_at: Stamp::from_nanos(rig.now_ns + 1_000_000_000_000 + n),
+            feature_id: "top.1".to_owned(),
+            approach: -Vector3::z(),
+            feed_mm_s: 2.0,
+            axes: state.axes,
+            latched: state.motor,
+            sequence: u32::try_from(n).unwrap(),
+        }));
+    }
+    let is_too_many = |o: &&Output| {
+        matches!(
+            o,
+            Output::Diagnostic(Diagnostic::TooMany { held: 10_000, .. })
+        )
+    };
+    assert_eq!(rig.out.iter().filter(is_too_many).count(), 50);
+    rig.settle();
+    let points = rig.out.iter().filter(|o| matches!(o, Output::Point(_)));
+    assert_eq!(points.count(), 10_000);
+}

@@ -1,6 +1,6 @@
 //! From the network into a bag: every topic that is found becomes a channel, every sample a message.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -99,6 +99,8 @@ pub(crate) enum Store {
 pub(crate) struct Scribe {
     store: Store,
     channels: BTreeMap<String, ChannelId>,
+    /// Topics of which a message was no plain CDR; each is reported once.
+    unreadable: BTreeSet<String>,
     troubles: Arc<Troubles>,
     time: HostTime,
 }
@@ -108,6 +110,7 @@ impl Scribe {
         Self {
             store,
             channels: BTreeMap::new(),
+            unreadable: BTreeSet::new(),
             troubles,
             time,
         }
@@ -122,7 +125,29 @@ impl Scribe {
                 let word = format!("{name}: somebody publishes {found}: only {first} is recorded");
                 self.troubles.topics().push(word);
             }
-            TapEvent::Unreadable { .. } => self.lose(1),
+            TapEvent::Left {
+                topic,
+                samples,
+                behind,
+            } => {
+                // At least one is missing where the last that came was sent before the end.
+                self.lose((*samples).max(1));
+                let (name, behind_s) = (&topic.name, behind.as_secs_f64());
+                let word = format!(
+                    "{name}: the computer was too busy at the end: what was sent in the last {behind_s:.1} s is not recorded, {samples} messages of it are known"
+                );
+                self.troubles.topics().push(word);
+            }
+            TapEvent::Unreadable { topic, reason } => {
+                self.lose(1);
+                if self.unreadable.insert(topic.name.clone()) {
+                    let name = &topic.name;
+                    let word = format!(
+                        "{name}: what cannot be read is not recorded and counts as lost, the first: {reason}"
+                    );
+                    self.troubles.topics().push(word);
+                }
+            }
         }
     }
 

@@ -30,6 +30,7 @@ const TICK: Span = Span::from_nanos(500_000_000);
 /// When a parameter is wrong, the bag is there already or cannot be written, or there is no network.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: NodeConfig = setup.config()?;
+    config.check_names()?;
     let machine = (!config.machine_file.is_empty()).then(|| setup.file_text("machine_file"));
     let machine = machine.transpose()?.map(|(_, text)| text);
     listen(setup, &config, machine)

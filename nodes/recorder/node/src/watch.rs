@@ -5,8 +5,9 @@ use std::convert::Infallible;
 use abbe_msgs::std_srvs::srv::TriggerResponse;
 use metrology::{Host, Stage, Stamp};
 use node_runtime::{Diagnostic, Level};
+use recorder::RecorderError;
 
-use crate::capture::Capture;
+use crate::capture::{Capture, Captured};
 use crate::ring::{RingCapture, Saved};
 
 pub(crate) enum Input {
@@ -47,6 +48,7 @@ pub(crate) struct Watch {
     work: Option<Work>,
     lost: (u64, u64),
     is_short: bool,
+    is_troubled: bool,
 }
 
 impl Watch {
@@ -55,6 +57,7 @@ impl Watch {
             work: Some(work),
             lost: (0, 0),
             is_short: false,
+            is_troubled: false,
         }
     }
 
@@ -66,6 +69,11 @@ impl Watch {
                 if let Some(reason) = &stats.failure {
                     out.push(failure(reason));
                 }
+                let is_troubled = stats.trouble.is_some();
+                if is_troubled || self.is_troubled {
+                    out.push(trouble(stats.trouble.as_deref()));
+                }
+                self.is_troubled = is_troubled;
                 let lost = (stats.messages_lost, capture.lost_on_network());
                 (lost, capture.unrecorded())
             }
@@ -84,6 +92,10 @@ impl Watch {
                 ((0, troubles.lost_on_network()), troubles.unrecorded())
             }
         };
+        self.report_losses(lost, unrecorded, out);
+    }
+
+    fn report_losses(&mut self, lost: (u64, u64), unrecorded: Vec<String>, out: &mut Vec<Output>) {
         if lost != self.lost {
             self.lost = lost;
             let message = format!(
@@ -107,7 +119,7 @@ impl Watch {
             None => return,
             Some(Work::Bag(capture)) => {
                 let finished = std::thread::spawn(move || capture.finish()).join();
-                finished.map(|captured| captured.map(|captured| captured.bag.err()))
+                finished.map(|captured| captured.map(|captured| self.finished(captured, out)))
             }
             Some(Work::Ring(mut ring)) => {
                 out.extend(ring.ended(true).into_iter().map(told));
@@ -121,6 +133,13 @@ impl Watch {
             Ok(Err(error)) => out.push(failure(&format!("{error:#}"))),
             Err(_) => out.push(failure("the bag's thread panicked")),
         }
+    }
+
+    /// What was lost and not recorded since the last look; why the bag ended before.
+    fn finished(&mut self, captured: Captured, out: &mut Vec<Output>) -> Option<RecorderError> {
+        let lost = (captured.stats.messages_lost, captured.lost_on_network);
+        self.report_losses(lost, captured.unrecorded, out);
+        captured.bag.err()
     }
 
     fn asked_to_save(&mut self, out: &mut Vec<Output>) {
@@ -173,6 +192,14 @@ fn told((path, outcome): Saved) -> Output {
 fn short(reach_s: f64, bytes: u64) -> Output {
     let message = format!("the last {reach_s:.1} s are kept: more needs more than {bytes} bytes");
     Output::Condition(Diagnostic::new(Level::Warn, "ring_short", message).with("reach_s", reach_s))
+}
+
+fn trouble(reason: Option<&str>) -> Output {
+    let level = reason.map_or(Level::Ok, |_| Level::Warn);
+    let message = reason
+        .unwrap_or("metadata.yaml is written again")
+        .to_owned();
+    Output::Condition(Diagnostic::new(level, "recording_description", message))
 }
 
 fn failure(reason: &str) -> Output {

@@ -13,6 +13,7 @@ use mcap::records::{Record, op};
 use super::file_order::FileOrder;
 use super::foreign;
 use super::index::{FileIndex, parse};
+use super::regular;
 use super::time_order::TimeOrder;
 use super::walk::Walker;
 use super::{
@@ -97,7 +98,7 @@ impl Bag {
             absent,
         };
         for name in names {
-            let mut file = File::open(&name).map_err(|source| failed(&name, source))?;
+            let mut file = regular::open(&name)?;
             bag.add_file(name, FileIndex::read(&mut file));
         }
         Ok(bag)
@@ -112,13 +113,20 @@ impl Bag {
                 .cloned()
                 .unwrap_or_default();
             let of = |key: &str| channel.metadata.get(key).cloned().unwrap_or_default();
-            let known =
-                |info: &TopicInfo| info.topic == channel.topic && info.type_name == schema.name;
+            let type_hash = of("topic_type_hash");
+            // One name with another type or another version of it is another topic: its bytes mean something else.
+            let known = |info: &TopicInfo| {
+                info.topic == channel.topic
+                    && info.type_name == schema.name
+                    && info.type_hash == type_hash
+                    && info.definition == schema.text
+                    && info.message_encoding == channel.encoding
+            };
             let topic = self.topics.iter().position(known).unwrap_or_else(|| {
                 self.topics.push(TopicInfo {
                     topic: channel.topic.clone(),
                     type_name: schema.name.clone(),
-                    type_hash: of("topic_type_hash"),
+                    type_hash: type_hash.clone(),
                     definition_encoding: schema.encoding.clone(),
                     definition: schema.text.clone(),
                     message_encoding: channel.encoding.clone(),
@@ -284,7 +292,7 @@ fn files_of(directory: &Path) -> std::io::Result<Found> {
             found.insert((number, stem), path);
         }
     }
-    let text = fs::read_to_string(directory.join(METADATA_FILE)).unwrap_or_default();
+    let text = regular::text(&directory.join(METADATA_FILE)).unwrap_or_default();
     let listed = file_names_of(&text).unwrap_or_default();
     let mut files = Vec::new();
     let mut absent = Vec::new();

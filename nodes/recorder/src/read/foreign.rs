@@ -8,6 +8,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use super::regular;
 use crate::error::RecorderError;
 use crate::layout::{METADATA_FILE, compression_of, file_names_of};
 
@@ -21,11 +22,23 @@ const SQLITE: &[u8] = b"SQLite format 3";
 /// # Errors
 /// Names the file and what it is. A file that cannot be opened is told by whoever reads it.
 pub(super) fn refuse(folder: &Path, files: &[PathBuf]) -> Result<(), RecorderError> {
+    let mut is_empty = !files.is_empty();
     for path in files {
+        let length = regular::open(path)?
+            .metadata()
+            .map(|metadata| metadata.len());
+        is_empty &= length.is_ok_and(|bytes| bytes == 0);
         if let Some(what) = kind_of(path) {
             let path = path.clone();
             return Err(RecorderError::NotRead { path, what });
         }
+    }
+    if is_empty {
+        let path = match files {
+            [only] => only.clone(),
+            _ => folder.to_owned(),
+        };
+        return Err(RecorderError::Empty { path });
     }
     // Where one file of several is such it is damaged, and told with what else is missing.
     if let [only] = files
@@ -37,7 +50,7 @@ pub(super) fn refuse(folder: &Path, files: &[PathBuf]) -> Result<(), RecorderErr
         [only] if folder == only => only.with_file_name(METADATA_FILE),
         _ => folder.join(METADATA_FILE),
     };
-    let Ok(text) = std::fs::read_to_string(&metadata) else {
+    let Some(text) = regular::text(&metadata) else {
         return Ok(());
     };
     let names = file_names_of(&text).unwrap_or_default();
@@ -53,8 +66,7 @@ pub(super) fn refuse(folder: &Path, files: &[PathBuf]) -> Result<(), RecorderErr
     }
 }
 
-/// Whether a file neither begins nor ends as MCAP does, as far as it goes. One without a byte is a bag that a recorder
-/// could not begin if it is called so.
+/// Whether a file neither begins nor ends as MCAP does, as far as it goes.
 fn is_no_mcap(path: &Path) -> Option<bool> {
     let mut file = File::open(path).ok()?;
     let mut first = Vec::new();
@@ -62,9 +74,6 @@ fn is_no_mcap(path: &Path) -> Option<bool> {
         .take(mcap::MAGIC.len() as u64)
         .read_to_end(&mut first)
         .ok()?;
-    if first.is_empty() {
-        return Some(path.extension().is_none_or(|extension| extension != "mcap"));
-    }
     if mcap::MAGIC.starts_with(&first) {
         return Some(false);
     }
@@ -110,13 +119,15 @@ mod tests {
         for (name, bytes) in [
             ("letter.mcap", &b"Dear all, here is it."[..]),
             ("short.mcap", b"hi"),
-            ("empty.txt", b""),
         ] {
             let none = refusal(&[(name, bytes)]).unwrap();
             assert!(none.contains(&format!("{name} is no bag")), "{none}");
         }
-        // A recorder that was killed at once leaves nothing, or half of the first bytes.
-        assert_eq!(refusal(&[("bag_0.mcap", b"")]), None);
+        // A recorder that was killed at once leaves half of the first bytes, or an empty file behind others.
+        assert_eq!(
+            refusal(&[("bag_0.mcap", mcap::MAGIC), ("bag_1.mcap", b"")]),
+            None
+        );
         assert_eq!(refusal(&[("bag_0.mcap", &mcap::MAGIC[..5])]), None);
         assert_eq!(
             refusal(&[("bag_0.mcap", mcap::MAGIC), ("bag_1.mcap", &[0; 64])]),

@@ -48,7 +48,7 @@ fn prop_a_cut_anywhere_gives_all_before_it_and_says_where() {
         let (bytes, path) = whole(home.path(), compression);
         let all = originals();
         let mut partial = 0;
-        let cuts = runner(300).run(&(0..bytes.len()), |cut| {
+        let cuts = runner(300).run(&(1..bytes.len()), |cut| {
             fs::write(&path, &bytes[..cut]).unwrap();
             let bag = Bag::open(&path).unwrap();
             let (found, losses) = read(&bag, Order::File);
@@ -64,7 +64,7 @@ fn prop_a_cut_anywhere_gives_all_before_it_and_says_where() {
         cuts.unwrap();
         // A later cut never gives less.
         let mut before = 0;
-        for cut in (0..bytes.len()).step_by(97) {
+        for cut in (1..bytes.len()).step_by(97) {
             fs::write(&path, &bytes[..cut]).unwrap();
             let (found, _) = read(&Bag::open(&path).unwrap(), Order::File);
             assert!(found.len() >= before, "{compression:?}: cut at {cut}");
@@ -126,7 +126,9 @@ fn prop_arbitrary_bytes_never_panic() {
             }
             fs::write(&path, &bytes).unwrap();
             let bag = match Bag::open(&path) {
-                Err(RecorderError::NotMcap { .. }) if !magic => return Ok(()),
+                Err(RecorderError::NotMcap { .. } | RecorderError::Empty { .. }) if !magic => {
+                    return Ok(());
+                }
                 opened => opened.unwrap(),
             };
             for order in [Order::File, Order::LogTime] {

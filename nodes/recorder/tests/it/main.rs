@@ -8,6 +8,7 @@
 
 mod damage;
 mod foreign;
+mod full_disk;
 #[cfg(feature = "peers")]
 mod peers;
 mod queue;

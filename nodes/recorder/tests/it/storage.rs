@@ -13,12 +13,21 @@ use recorder::{
 use crate::sample::{add_channels, message, read, record, small_chunks};
 
 /// A directory on a disk of so many bytes.
-struct SmallDisk {
+pub struct SmallDisk {
     inner: Directory,
     left: Arc<Mutex<u64>>,
 }
 
-struct SmallFile {
+impl SmallDisk {
+    pub fn of(path: &Path, bytes: u64) -> Self {
+        Self {
+            inner: Directory::create(path).unwrap(),
+            left: Arc::new(Mutex::new(bytes)),
+        }
+    }
+}
+
+pub struct SmallFile {
     file: File,
     left: Arc<Mutex<u64>>,
 }

@@ -26,7 +26,7 @@ pub fn voice(names: &NodeNames) -> NodeNames {
 /// When the bag cannot be opened or a topic has no name of ROS.
 pub fn access(names: &NodeNames, config: &PlaybackConfig) -> Result<[(String, Access); 2]> {
     let bag = Bag::open(Path::new(&config.bag))?;
-    let contents = Contents::of(&bag, config, &config.checked()?)?;
+    let contents = Contents::of(&bag, config, &config.checked()?, names)?;
     let mut node = Access::of(names, &Ports::default())?;
     for service in [
         topics::PAUSE_PLAYING.name,

@@ -1,11 +1,12 @@
 //! What of a bag is played, and as what its topics are offered.
 
 use abbe_msgs::{Durability, Qos, Reliability, topics};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use metrology::stamp::{Host, Stamp};
+use node_runtime::names::NodeNames;
 use node_runtime::tap::{Selection, TappedTopic};
 use recorder::{Bag, TopicInfo, qos_from_yaml};
-use replayer::{Playback, PlaybackConfig, PlaybackError};
+use replayer::{Playback, PlaybackConfig, PlaybackError, Reason};
 
 /// Least depth of a topic whose history nobody asks for: more than is sent between two looks at acknowledgements.
 const LEAST_DEPTH: u32 = 1_000;
@@ -14,8 +15,10 @@ const LEAST_DEPTH: u32 = 1_000;
 pub struct Contents {
     /// What each topic is offered as; `/clock` last where the player has its own.
     pub offered: Vec<TappedTopic>,
-    /// For each topic of the bag its place among those, if it is played.
-    pub places: Vec<Option<usize>>,
+    /// What is done with each topic of the bag.
+    pub plans: Vec<Plan>,
+    /// Time of the bag's first message.
+    pub first: Stamp<Host>,
     /// First time that is played.
     pub from: Stamp<Host>,
     /// Last time that is played.
@@ -24,34 +27,83 @@ pub struct Contents {
     pub clock: Option<usize>,
 }
 
+/// What is done with a topic of the bag.
+pub enum Plan {
+    /// It is not picked.
+    Aside,
+    /// It is published; its place among what is offered.
+    Play(usize),
+    /// It is picked and cannot be published.
+    LeftOut(Reason, String),
+}
+
+/// Why a topic cannot be published; `None`: it can.
+fn unplayable(info: &TopicInfo, names: &NodeNames) -> Option<(Reason, String)> {
+    if !["", "cdr"].contains(&info.message_encoding.as_str()) {
+        let what = format!(
+            "its messages are {}, cdr alone is sent",
+            info.message_encoding
+        );
+        return Some((Reason::Encoding, what));
+    }
+    if info
+        .type_name
+        .split('/')
+        .filter(|part| !part.is_empty())
+        .count()
+        != 3
+    {
+        let what = format!(
+            "its type is {:?}, not of the form package/msg/Name",
+            info.type_name
+        );
+        return Some((Reason::NotSent, what));
+    }
+    let name = names.resolve(&info.topic).err();
+    name.map(|error| (Reason::NotSent, error.to_string()))
+}
+
 impl Contents {
-    /// What of `bag` the parameters pick.
+    /// What of `bag` the parameters pick, for the node `names`.
     ///
     /// # Errors
-    /// When nothing is left, or the recorded quality of service of a topic cannot be read.
-    pub fn of(bag: &Bag, config: &PlaybackConfig, playback: &Playback) -> Result<Self> {
+    /// When nothing is left.
+    pub fn of(
+        bag: &Bag,
+        config: &PlaybackConfig,
+        playback: &Playback,
+        names: &NodeNames,
+    ) -> Result<Self> {
         let selection = Selection::Matching(config.topics.clone());
         let mut offered = Vec::new();
-        let mut places = Vec::new();
+        let mut plans = Vec::new();
         for info in bag.topics() {
             let own_clock = config.clock && info.topic == topics::CLOCK.name;
-            if selection.takes(&info.topic) && !own_clock {
-                places.push(Some(offered.len()));
-                offered.push(TappedTopic {
-                    name: info.topic.clone(),
-                    type_name: info.type_name.clone(),
-                    qos: qos_of(info)?,
-                });
-            } else {
-                places.push(None);
+            if !selection.takes(&info.topic) || own_clock {
+                plans.push(Plan::Aside);
+                continue;
             }
+            let unplayable = unplayable(info, names);
+            let unplayable = unplayable.map_or_else(|| qos_of(info), Err);
+            plans.push(match unplayable {
+                Ok(qos) => {
+                    offered.push(TappedTopic {
+                        name: info.topic.clone(),
+                        type_name: info.type_name.clone(),
+                        qos,
+                    });
+                    Plan::Play(offered.len() - 1)
+                }
+                Err((reason, what)) => Plan::LeftOut(reason, what),
+            });
         }
         let (first, last) = bag.log_times_nanos().unwrap_or_default();
-        let stamp = |nanos: u64| i64::try_from(nanos).map(Stamp::from_nanos);
-        let first = stamp(first).context("the bag's first time does not fit 64 bits")?;
-        let last = stamp(last).context("the bag's last time does not fit 64 bits")?;
+        // A message of a later time is left out when its turn comes.
+        let stamp = |nanos: u64| Stamp::from_nanos(i64::try_from(nanos).unwrap_or(i64::MAX));
+        let (first, last) = (stamp(first), stamp(last));
         let from = first + playback.from;
-        if offered.is_empty() || from > last {
+        let is_picked = plans.iter().any(|plan| !matches!(plan, Plan::Aside));
+        if !is_picked || from > last {
             return Err(PlaybackError::Nothing {
                 bag: config.bag.clone(),
                 topics: config.topics.clone(),
@@ -70,7 +122,8 @@ impl Contents {
         });
         Ok(Self {
             offered,
-            places,
+            plans,
+            first,
             from,
             to: playback.to.map_or(last, |to| first + to),
             clock,
@@ -79,9 +132,11 @@ impl Contents {
 }
 
 /// What every recorded publisher offered; where they differed, what most subscribers can take.
-fn qos_of(info: &TopicInfo) -> Result<Qos> {
-    let profiles = qos_from_yaml(&info.qos_yaml)
-        .with_context(|| format!("topic {}: recorded quality of service", info.topic))?;
+fn qos_of(info: &TopicInfo) -> Result<Qos, (Reason, String)> {
+    let profiles = qos_from_yaml(&info.qos_yaml).map_err(|error| {
+        let what = format!("its recorded quality of service cannot be read: {error}");
+        (Reason::NotSent, what)
+    })?;
     let latched = |p: &recorder::QosProfile| p.durability == recorder::Durability::TransientLocal;
     let best_effort = |p: &recorder::QosProfile| p.reliability == recorder::Reliability::BestEffort;
     let is_latched = !profiles.is_empty() && profiles.iter().all(latched);

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use metrology::stamp::{Host, Span, Stamp};
 use replayer::pace::{Due, Pace};
+use replayer::pause::Pause;
 
 use crate::player::Played;
 
@@ -17,6 +18,8 @@ pub struct Progress {
     pub sent: u64,
     /// Whether it stands.
     pub paused: bool,
+    /// Where nothing was recorded for long: the last such pause that has begun, and how many have.
+    pub pause: Option<(usize, Pause)>,
     /// What it came to, or why it failed, once it has come to its end.
     pub over: Option<Result<Played, String>>,
 }
@@ -25,6 +28,7 @@ struct State {
     pace: Pace,
     steps: u32,
     sent: u64,
+    pause: Option<(usize, Pause)>,
     stop: bool,
     over: Option<Result<Played, String>>,
 }
@@ -61,6 +65,7 @@ impl Desk {
                 pace,
                 steps: 0,
                 sent: 0,
+                pause: None,
                 stop: false,
                 over: None,
             }),
@@ -84,6 +89,7 @@ impl Desk {
             at: state.pace.bag_time(self.now_nanos()),
             sent: state.sent,
             paused: state.pace.is_paused(),
+            pause: state.pause,
             over: state.over.clone(),
         }
     }
@@ -108,6 +114,14 @@ impl Desk {
             state.steps += u32::from(stands);
             stands
         })
+    }
+
+    /// A long time begins in which nothing was recorded.
+    pub(crate) fn begin_pause(&self, pause: Pause) {
+        self.change(|state, _| {
+            let before = state.pause.map_or(0, |(n, _)| n);
+            state.pause = Some((before + 1, pause));
+        });
     }
 
     pub(crate) fn stop(&self) {

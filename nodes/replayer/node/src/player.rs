@@ -5,18 +5,18 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use abbe_msgs::builtin_interfaces::msg::Time;
 use abbe_msgs::rosgraph_msgs::msg::Clock;
 use abbe_msgs::to_cdr;
 use anyhow::{Context, Result, anyhow};
-use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
+use metrology::stamp::{Host, Span, Stamp};
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::{Bytes, RawPublisher};
 use recorder::{Bag, Event, MessageRef, Order};
-use replayer::{Playback, PlaybackConfig};
+use replayer::pause::Pause;
+use replayer::{Account, Place, Playback, PlaybackConfig, Reason, TopicAccount};
 
-use crate::contents::Contents;
+use crate::contents::{Contents, Plan};
 use crate::desk::{Desk, Next};
 use crate::latched::Latched;
 
@@ -36,9 +36,9 @@ const ON_THE_WAY: u64 = 64;
 pub struct Played {
     /// Messages sent, `/clock` of the player not counted.
     pub messages: u64,
-    /// Messages that the network did not take, or that subscribers did not acknowledge in time.
+    /// Messages that were left out, that the network did not take, or that subscribers did not acknowledge in time.
     pub lost: u64,
-    /// Parts of the bag that could not be read, a sentence each.
+    /// What was lost and left out, by topic and reason, and parts of the bag that could not be read, a sentence each.
     pub losses: Vec<String>,
 }
 
@@ -60,7 +60,7 @@ impl Player {
     ) -> Result<Self> {
         let playback = config.checked()?;
         let bag = Bag::open(Path::new(&config.bag))?;
-        let contents = Contents::of(&bag, config, &playback)?;
+        let contents = Contents::of(&bag, config, &playback, names)?;
         let publisher =
             RawPublisher::of_found(environment, names, &contents.offered, QUEUE_LEN, PATIENCE)?;
         let mut playing = Playing::new(bag, contents, publisher, config, &playback);
@@ -124,6 +124,14 @@ struct Playing<V> {
     told: Option<Instant>,
     told_at: Option<Stamp<Host>>,
     played: Played,
+    /// By topic of the bag, of the first round.
+    account: Account,
+    is_first_round: bool,
+    /// Time of the message before, within this round.
+    before: Stamp<Host>,
+    rate: Option<f64>,
+    /// Times that subscribers did not acknowledge in time.
+    unsettled: u64,
 }
 
 /// Whether the bag goes on.
@@ -142,7 +150,16 @@ impl<V: Voice> Playing<V> {
         playback: &Playback,
     ) -> Self {
         let desk = Desk::new(contents.from, playback.rate, config.start_paused);
+        let rows = bag.topics().iter();
+        let rows = rows.map(|info| TopicAccount::new(&info.topic, &info.type_name));
         Self {
+            account: Account {
+                topics: rows.collect(),
+            },
+            is_first_round: true,
+            before: contents.from,
+            rate: playback.rate,
+            unsettled: 0,
             bag: Arc::new(bag),
             contents,
             desk: Arc::new(desk),
@@ -158,22 +175,24 @@ impl<V: Voice> Playing<V> {
 
     fn run(&mut self, delay: Duration) {
         std::thread::park_timeout(delay);
-        let mut rounds = 0_u32;
-        while self.round(rounds == 0) == Goes::On && self.repeat {
-            rounds = rounds.saturating_add(1);
+        while self.round() == Goes::On && self.repeat {
+            self.is_first_round = false;
+            self.before = self.contents.from;
             self.desk.again(self.contents.from);
         }
         self.settle();
     }
 
     /// The bag once, from its first message that is played to its last.
-    fn round(&mut self, first: bool) -> Goes {
+    fn round(&mut self) -> Goes {
         let bag = Arc::clone(&self.bag);
         let mut messages = bag.messages(Order::LogTime);
         let mut goes = Goes::On;
         while let Some(event) = messages.next_event() {
             match event {
-                Event::Loss(loss) if first => self.played.losses.push(loss.to_string()),
+                Event::Loss(loss) if self.is_first_round => {
+                    self.played.losses.push(loss.to_string())
+                }
                 Event::Loss(_) => {}
                 Event::Message(message) => {
                     goes = self.take(&message);
@@ -188,11 +207,9 @@ impl<V: Voice> Playing<V> {
     }
 
     fn take(&mut self, message: &MessageRef<'_>) -> Goes {
-        let Some(place) = self.contents.places[message.topic.index()] else {
+        let Some((place, at)) = self.playable(message) else {
             return Goes::On;
         };
-        let nanos = i64::try_from(message.log_time_nanos).unwrap_or(i64::MAX);
-        let at = Stamp::from_nanos(nanos);
         if at < self.contents.from {
             let qos = self.contents.offered[place].qos;
             self.latched.keep(place, qos, message.data);
@@ -201,6 +218,7 @@ impl<V: Voice> Playing<V> {
         if at > self.contents.to {
             return Goes::On;
         }
+        self.tell_pause(at);
         loop {
             match self.desk.next(at, CLOCK_PERIOD) {
                 Next::Stop => return Goes::Out,
@@ -214,6 +232,43 @@ impl<V: Voice> Playing<V> {
         self.send_latched();
         self.send(place, message.data.into());
         Goes::On
+    }
+
+    /// Its topic's place and its time, where it can be published; where not, it is left out and counted.
+    fn playable(&mut self, message: &MessageRef<'_>) -> Option<(usize, Stamp<Host>)> {
+        let topic = message.topic.index();
+        let (place, unplayable) = match &self.contents.plans[topic] {
+            Plan::Aside => return None,
+            Plan::Play(place) => (Some(*place), unplayable(message)),
+            Plan::LeftOut(reason, what) => (None, Some((*reason, what.clone()))),
+        };
+        let row = &mut self.account.topics[topic];
+        row.messages += u64::from(self.is_first_round);
+        let Some((reason, what)) = unplayable else {
+            row.used += u64::from(self.is_first_round);
+            let nanos = i64::try_from(message.log_time_nanos).unwrap_or(i64::MAX);
+            return place.map(|place| (place, Stamp::from_nanos(nanos)));
+        };
+        if self.is_first_round {
+            let first = Place {
+                number: row.messages,
+                log_time_nanos: message.log_time_nanos,
+                stamp: None,
+            };
+            row.leave_out(reason, first, || what);
+        }
+        self.played.lost += 1;
+        None
+    }
+
+    /// Says that nothing was recorded for long before the message of time `at`.
+    fn tell_pause(&mut self, at: Stamp<Host>) {
+        let before = std::mem::replace(&mut self.before, at);
+        if let Some(rate) = self.rate
+            && let Some(pause) = Pause::between(self.contents.first, before, at, rate)
+        {
+            self.desk.begin_pause(pause);
+        }
     }
 
     fn send_latched(&mut self) {
@@ -233,6 +288,7 @@ impl<V: Voice> Playing<V> {
     fn settle(&mut self) {
         if !self.voice.settle() {
             self.played.lost += 1;
+            self.unsettled += 1;
         }
     }
 
@@ -252,27 +308,67 @@ impl<V: Voice> Playing<V> {
         };
         self.told = Some(Instant::now());
         self.told_at = Some(at);
-        let clock = Time {
-            sec: i32::try_from(at.nanos().div_euclid(NANOS_PER_S)).unwrap_or(i32::MAX),
-            nanosec: u32::try_from(at.nanos().rem_euclid(NANOS_PER_S)).unwrap_or(0),
-        };
+        let clock = abbe_msgs::time(at);
         self.voice.say(place, to_cdr(&Clock { clock }).into());
     }
 }
 
 impl Playing<RawPublisher> {
     fn finish(self) {
-        let ended = self.voice.stop().map(|report| Played {
-            lost: self.played.lost + report.dropped + report.refused,
-            ..self.played
+        let Self {
+            mut played,
+            account,
+            contents,
+            unsettled,
+            ..
+        } = self;
+        played.losses.extend(account.lines());
+        if unsettled > 0 {
+            let patience_s = PATIENCE.as_secs();
+            played.losses.push(format!(
+                "{unsettled} times subscribers did not acknowledge within {patience_s} s what was sent"
+            ));
+        }
+        let ended = self.voice.stop().map(|report| {
+            played.lost += report.dropped + report.refused;
+            played.losses.extend(report.unsent.iter().map(|unsent| {
+                let topic = contents.offered.get(unsent.place);
+                let topic = topic.map_or("", |topic| topic.name.as_str());
+                format!(
+                    "{topic}: {} messages not sent: {}",
+                    unsent.samples, unsent.reason
+                )
+            }));
+            played
         });
         self.desk.end(ended.map_err(|error| format!("{error:#}")));
     }
 }
 
+/// Why the network would not take a message; `None`: it would.
+fn unplayable(message: &MessageRef<'_>) -> Option<(Reason, String)> {
+    if i64::try_from(message.log_time_nanos).is_err() {
+        let what = "its log time is beyond the year 2262".to_owned();
+        return Some((Reason::Stamp, what));
+    }
+    let what = match message.data {
+        [0, 1, _, _, ..] => return None,
+        [0, 0, _, _, ..] => "big-endian CDR (00 00): little-endian alone is sent".to_owned(),
+        [high, low, _, _, ..] => {
+            format!("encapsulation {high:02x} {low:02x}: must be 00 01 (little-endian plain CDR)")
+        }
+        short => format!(
+            "{} bytes: the encapsulation header alone has 4",
+            short.len()
+        ),
+    };
+    Some((Reason::Encoding, what))
+}
+
 #[cfg(test)]
 mod tests {
     use abbe_msgs::from_cdr;
+    use metrology::stamp::NANOS_PER_S;
     use recorder::{
         Channel, ChannelId, Directory, Durability, MessageStamp, QosProfile, RecorderConfig,
         Recording, Reliability, qos_to_yaml,
@@ -339,7 +435,8 @@ mod tests {
                 publish_time_nanos: FIRST + behind,
                 sequence: 0,
             };
-            recording.write(ids[place], stamp, &[says]).unwrap();
+            let data = [0, 1, 0, 0, says];
+            recording.write(ids[place], stamp, &data).unwrap();
         }
         recording.finish().unwrap();
         Bag::open(&path).unwrap()
@@ -371,7 +468,8 @@ mod tests {
             ..PlaybackConfig::whole(String::new())
         };
         let playback = config.checked().unwrap();
-        let contents = Contents::of(&bag, &config, &playback).unwrap();
+        let names = NodeNames::new("player", &[]).unwrap();
+        let contents = Contents::of(&bag, &config, &playback, &names).unwrap();
         let mut playing = Playing::new(bag, contents, Said::default(), &config, &playback);
         playing.run(Duration::ZERO);
         let clock = playing.contents.clock.unwrap();
@@ -379,14 +477,16 @@ mod tests {
         for (place, data) in &playing.voice.0 {
             if *place == clock {
                 let Clock { clock } = from_cdr(data).unwrap();
-                let nanos = i64::from(clock.sec) * NANOS_PER_S + i64::from(clock.nanosec);
-                times.push(nanos - FIRST);
+                let at = abbe_msgs::instant::<Host>(&clock).unwrap();
+                times.push(at.nanos() - FIRST);
                 continue;
             }
-            let message = MESSAGES.iter().find(|(_, _, says)| [*says] == **data);
+            let message = MESSAGES
+                .iter()
+                .find(|(_, _, says)| Some(says) == data.get(4));
             let topic = message.unwrap().0;
             assert_eq!(playing.contents.offered[*place].name, topic);
-            said.push(data[0]);
+            said.push(data[4]);
         }
         assert_eq!(playing.played.messages, said.len() as u64);
         assert_eq!((playing.played.lost, playing.played.losses.len()), (0, 0));

@@ -5,6 +5,7 @@ use std::convert::Infallible;
 use abbe_msgs::std_srvs::srv::TriggerResponse;
 use metrology::{Host, Stage, Stamp};
 use node_runtime::{Diagnostic, Level};
+use replayer::pause::Pause;
 
 use crate::player::Player;
 
@@ -41,6 +42,9 @@ impl Output {
 pub(crate) struct Watch {
     player: Option<Player>,
     over: bool,
+    /// Number of pauses reported so far.
+    pauses: usize,
+    is_pausing: bool,
 }
 
 impl Watch {
@@ -48,6 +52,8 @@ impl Watch {
         Self {
             player: Some(player),
             over: false,
+            pauses: 0,
+            is_pausing: false,
         }
     }
 
@@ -55,6 +61,21 @@ impl Watch {
         let Some(progress) = self.player.as_ref().map(|player| player.desk().progress()) else {
             return;
         };
+        if let Some((begun, pause)) = progress.pause
+            && begun > self.pauses
+        {
+            self.pauses = begun;
+            self.is_pausing = true;
+            let diagnostic = Diagnostic::new(Level::Warn, "pause", pause.to_string());
+            let wait_s = pause.wait_s();
+            out.push(Output::Condition(diagnostic.with("wait_s", wait_s)));
+        }
+        let is_behind = |pause: &Pause| progress.at >= pause.to;
+        if self.is_pausing && progress.pause.is_none_or(|(_, pause)| is_behind(&pause)) {
+            self.is_pausing = false;
+            let diagnostic = Diagnostic::new(Level::Ok, "pause", "it is over".to_owned());
+            out.push(Output::Condition(diagnostic));
+        }
         let Some(outcome) = progress.over.filter(|_| !self.over) else {
             return;
         };
@@ -65,7 +86,9 @@ impl Watch {
                     out.push(failure(loss));
                 }
                 if played.lost > 0 {
-                    out.push(failure(&format!("{} messages were lost", played.lost)));
+                    let all = played.losses.join("; ");
+                    let lost = played.lost;
+                    out.push(failure(&format!("{lost} messages were lost: {all}")));
                 }
                 let message = format!("the bag is played to its end: {} messages", played.messages);
                 let diagnostic = Diagnostic::new(Level::Ok, "played", message);

@@ -28,6 +28,8 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
             after_mm,
             greatest_mm,
             expected_mm,
+            allowed_mm,
+            allowed_p,
             same_places,
             ..
         } => told
@@ -35,7 +37,18 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
             .with("rms_after_um", after_mm * 1e3)
             .with("greatest_after_um", greatest_mm * 1e3)
             .with("noise_alone_um", expected_mm * 1e3)
+            .with("expected_um", allowed_mm * 1e3)
+            .with("expected_p", allowed_p)
             .with("same_places", same_places),
+        Condition::BeyondExpected {
+            after_mm,
+            allowed_mm,
+            p,
+            ..
+        } => told
+            .with("rms_after_um", after_mm * 1e3)
+            .with("expected_um", allowed_mm * 1e3)
+            .with("expected_p", p),
         _ => told,
     })
 }

@@ -140,7 +140,7 @@ impl Rig {
     }
 
     #[track_caller]
-    fn expect(&self, words: &[&str]) {
+    pub fn expect(&self, words: &[&str]) {
         let said = self.said();
         let fits = |line: &&String| words.iter().all(|word| line.contains(word));
         assert!(
@@ -341,6 +341,45 @@ fn another_set_up_begins_anew() {
     assert_eq!(rig.models()[1].n_samples, 12);
 }
 
+/// Spheres come on one topic and segments on another: nothing orders the two.
+#[test]
+fn spheres_that_overtake_the_begin_of_their_run_are_its_visits() {
+    let poses = good_poses(12);
+    let told = |overtaking: usize| {
+        let (mut rig, wrong) = (Rig::new(), Wrong::drawn(3));
+        let mut random = Pcg64Mcg::seed_from_u64(1);
+        rig.run = 1;
+        for (place, pose) in poses.iter().enumerate() {
+            if place == overtaking {
+                rig.segment(TestKind::Rotary, true, false, "ball");
+            }
+            let seen = visit("ball", &BALL_MM, &wrong, pose, (0.0005, &mut random));
+            let feature = rig.feature("ball", pose, seen.centre_mm);
+            rig.send(Input::Feature(feature));
+        }
+        rig.segment(TestKind::Rotary, false, true, "ball");
+        rig.settle();
+        rig
+    };
+    let in_order = told(0);
+    assert_eq!(in_order.models().len(), 1);
+    for overtaking in [1, 5, 11] {
+        let mut rig = told(overtaking);
+        assert_eq!(models_of(&rig), models_of(&in_order), "{overtaking}");
+        // One that was found in the run and comes when all is over is told of.
+        let mut late = rig.feature("ball", &poses[0], BALL_MM);
+        late.at = Stamp::from_nanos(1_000_000_000);
+        rig.send(Input::Feature(late));
+        rig.expect(&["too_late: run 1: a visit of sphere ball came after"]);
+        // One of a later run of the same number, of a sequencer that was started again, waits for its begin.
+        rig.now_ns += 60_000_000_000;
+        rig.out.clear();
+        let next = rig.feature("ball", &poses[0], BALL_MM);
+        rig.send(Input::Feature(next));
+        assert_eq!(rig.said(), [""; 0]);
+    }
+}
+
 /// In words: what is not known is NaN, which equals nothing.
 fn models_of(rig: &Rig) -> String {
     format!("{:?}", rig.models())
@@ -383,4 +422,18 @@ fn a_sphere_of_an_hour_ago_is_none_of_a_run_of_the_same_number() {
     let (without, stale) = (told(false), told(true));
     assert_eq!(models_of(&without), models_of(&stale));
     stale.expect(&["of_another_time: run 1: sphere ball", "3360.0 s before"]);
+}
+
+#[test]
+fn a_sphere_of_an_hour_ago_that_arrives_before_the_begin_is_reported_too() {
+    let mut rig = Rig::new();
+    rig.now_ns += 4_000_000_000_000;
+    rig.run = 1;
+    let poses = good_poses(12);
+    let mut stale = rig.feature("ball", &poses[0], BALL_MM);
+    stale.at = Stamp::from_nanos(stale.at.nanos() - 3_600_000_000_000);
+    rig.send(Input::Feature(stale));
+    assert_eq!(rig.said(), [""; 0]);
+    rig.segment(TestKind::Rotary, true, false, "ball");
+    rig.expect(&["of_another_time: run 1: sphere ball"]);
 }

@@ -5,6 +5,7 @@
 mod bench;
 mod closed_forms;
 mod coverage;
+mod expectation;
 mod faults;
 mod messages;
 mod properties;

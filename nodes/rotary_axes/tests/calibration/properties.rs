@@ -4,8 +4,8 @@ use machine::SphereDesign;
 use machine::poses::{ReachLimits, calibration_poses, verification_poses};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use rotary_axes::estimate;
 use rotary_axes::verification::verify;
+use rotary_axes::{Known, estimate};
 
 use crate::bench::{BALL_MM, Wrong, file, visits};
 use crate::coverage::RULES;
@@ -63,14 +63,14 @@ fn a_verification_at_other_poses_is_as_good_as_the_uncertainties_say() {
         let seen = visits(&wrong, &BALL_MM, &poses, 2, (0.0005, 2 * seed));
         let found = estimate(&design, &seen, &spheres, &RULES).unwrap();
         let checked = visits(&wrong, &BALL_MM, &others, 1, (0.0005, 2 * seed + 1));
-        let same = verify(&design, &found, &checked, &spheres, true).unwrap();
+        let same = verify(&design, &found, Known::default(), &checked, &spheres, true).unwrap();
         assert!(same.same_places && same.rms_before_mm > 5.0 * same.rms_after_mm);
         left += same.rms_after_mm.powi(2);
         expected += same.expected_mm.powi(2);
         // Set down anew 0.1 mm away, the sphere's place is fitted: its errors are as small.
         let moved = BALL_MM + Vector3::new(0.1, 0.0, -0.1);
         let checked = visits(&wrong, &moved, &others, 1, (0.0005, 2 * seed + 1));
-        let anew = verify(&design, &found, &checked, &spheres, false).unwrap();
+        let anew = verify(&design, &found, Known::default(), &checked, &spheres, false).unwrap();
         assert!(!anew.same_places && anew.rms_after_mm < 1.5 * same.rms_after_mm + 2e-4);
     }
     let ratio: f64 = left / expected;

@@ -1,14 +1,25 @@
-//! Programs that a plan names.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "the shell reads the files that parameters name"
-)]
-
+//! A plan and the programs that it names.
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use anyhow::{Context, Result};
-use sequencer::{Plan, Step};
+use anyhow::{Context, Result, anyhow};
+use metrology::yaml;
+use node_runtime::text_file::{self, Comments};
+use sequencer::{Plan, SequencerError, Step};
+
+/// Reads a plan from the text of the file `path`.
+///
+/// # Errors
+/// With file, line, key, value and limit.
+pub fn plan(text: &str, path: &Path) -> Result<Plan> {
+    Plan::from_yaml(text).map_err(|error| anyhow!("plan {}:{error}", path.display()))
+}
+
+/// An error of the plan with the line of the step that it names.
+pub(crate) fn placed(error: &SequencerError, text: &str, path: &Path) -> anyhow::Error {
+    let file = path.display().to_string();
+    anyhow!("plan {}", yaml::placed(&file, text, &error.to_string()))
+}
 
 /// Reads every program of `plan`; paths are relative to the plan's file.
 pub(crate) fn programs(plan: &Plan, plan_path: &Path) -> Result<BTreeMap<String, String>> {
@@ -21,13 +32,8 @@ pub(crate) fn programs(plan: &Plan, plan_path: &Path) -> Result<BTreeMap<String,
             continue;
         };
         let path = folder.join(program);
-        let text = std::fs::read_to_string(&path).with_context(|| {
-            format!(
-                "{}: steps[{at}].program: {}",
-                plan_path.display(),
-                path.display()
-            )
-        })?;
+        let text = text_file::read(&path, Comments::Gcode)
+            .with_context(|| format!("{}: steps[{at}].program", plan_path.display()))?;
         programs.insert(program.clone(), text);
     }
     Ok(programs)

@@ -3,15 +3,17 @@
 use std::collections::BTreeMap;
 
 use abbe_msgs::topics;
-use anyhow::{Context, Result, anyhow};
+use anyhow::Result;
 use machine::MachineFile;
 use metrology::stamp::Span;
-use node_runtime::{Node, Setup, Wiring, complaint};
+use node_runtime::{Node, Setup, Wiring};
 use sequencer::config::PARAMETERS;
-use sequencer::{Config, Input, Plan, Sequencer};
+use sequencer::{Config, Input, Sequencer};
 
 mod files;
 mod forms;
+
+pub use files::plan as read_plan;
 
 /// Time between two looks at the plan.
 const TICK: Span = Span::from_nanos(100_000_000);
@@ -25,18 +27,15 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(&config, PARAMETERS)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
-    let (plan, programs): (Option<Plan>, BTreeMap<_, _>) = if config.plan_file.is_empty() {
-        (None, BTreeMap::new())
+    let stage = if config.plan_file.is_empty() {
+        Sequencer::new(config, machine, None, BTreeMap::new())?
     } else {
         let (path, text) = setup.file_text("plan_file")?;
-        let plan = Plan::from_yaml(&text).map_err(|error| {
-            let reason = complaint::of_yaml(&error, &text);
-            anyhow!("plan {}: {reason}", path.display())
-        })?;
+        let plan = files::plan(&text, &path)?;
         let programs = files::programs(&plan, &path)?;
-        (Some(plan), programs)
+        Sequencer::new(config, machine, Some(plan), programs)
+            .map_err(|error| files::placed(&error, &text, &path))?
     };
-    let stage = Sequencer::new(config, machine, plan, programs).context("plan")?;
     Ok(Wiring::new(setup.name(), parameters, stage)
         .on(&topics::PROBE_TRIGGER, Input::Touch)
         .on(&topics::THERMAL_UPDATE_REQUEST, Input::UpdateRequest)

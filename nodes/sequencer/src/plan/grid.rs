@@ -3,12 +3,13 @@
 use machine::trajectory::{Arrival, Pace, PlanarOrder, Shape, Trajectory, planar};
 use machine::{MachineFile, TrajectoryError};
 use metrology::sample::Sense;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SequencerError;
 
 /// A planar trajectory; which of the lengths and angles it has follows from `trajectory`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridStep {
     /// Which shape.
@@ -66,7 +67,7 @@ const fn once() -> u32 {
 }
 
 /// Name of a shape.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[expect(missing_docs, reason = "as in machine::trajectory::Shape")]
 pub enum GridTrajectory {
@@ -80,7 +81,7 @@ pub enum GridTrajectory {
 }
 
 /// Sense or senses of a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Senses {
     /// Clockwise, or backwards.

@@ -6,13 +6,14 @@ use machine::trajectory::{
 use machine::{MachineFile, TrajectoryError};
 use metrology::Axis;
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::grid::in_step;
 use crate::error::SequencerError;
 
 /// Stops along one axis, up and down.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PositioningStep {
     /// The axis.
@@ -47,7 +48,7 @@ pub struct PositioningStep {
 }
 
 /// Stops along beams, up and down.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiagonalStep {
     /// Beams of the length reference.

@@ -5,6 +5,7 @@ use maud::{Markup, PreEscaped, html};
 
 use super::three;
 use crate::report::section::{Rows, Section, head};
+use crate::report::terminal::Rank;
 
 /// Standard score at which a cell begins to be shaded, and how many times that it is fully: scores run over decades.
 const FIRST_Z: f64 = 4.0;
@@ -134,7 +135,7 @@ pub(super) fn isolability(isolability: &Isolability) -> Markup {
 }
 
 /// Pairs that look alike, and the smallest sizes, for a terminal.
-pub(super) fn terminal(isolability: &Isolability) -> Option<String> {
+pub(super) fn section(isolability: &Isolability) -> Option<Section> {
     let order = order(isolability);
     let rows: Vec<Vec<String>> = order
         .iter()
@@ -159,13 +160,13 @@ pub(super) fn terminal(isolability: &Isolability) -> Option<String> {
     if rows.is_empty() {
         return None;
     }
-    let section = Section {
+    Some(Section {
         tables: vec![Rows {
             head: head(&["effect", "sine alone", "found from", "looks like (cosine)"]),
             rows,
             note: String::new(),
         }],
+        rank: Rank::Detail,
         ..Section::new("What can be told from what")
-    };
-    Some(section.terminal())
+    })
 }

@@ -6,6 +6,7 @@ use maud::html;
 use super::{matrix, name, section, three};
 use crate::report::Report;
 use crate::report::section::Section;
+use crate::report::terminal::{self, Part, Rank};
 
 /// Names of other effects in one cell.
 const MOST_NAMES: usize = 3;
@@ -13,14 +14,17 @@ const MOST_NAMES: usize = 3;
 /// The page of a programme of so many minutes.
 pub fn page(title: &str, forecast: &Preflight, minutes: f64) -> Report {
     let lines = sentences(forecast, minutes);
-    let sections: Vec<Section> = [effects(forecast), hidden(forecast), floor(forecast)]
-        .into_iter()
-        .filter(|section| section.tables.iter().any(|table| !table.rows.is_empty()))
-        .collect();
-    let text: Vec<String> = sections.iter().map(Section::terminal).collect();
+    let sections: Vec<Section> = [
+        effects(forecast),
+        hidden(forecast),
+        floor(forecast).ranked(Rank::Detail),
+    ]
+    .into_iter()
+    .filter(|section| section.tables.iter().any(|table| !table.rows.is_empty()))
+    .collect();
     Report {
         title: title.to_owned(),
-        text: text.join("\n"),
+        parts: terminal::apart(sections.iter().map(Part::of)),
         body: html! {
             h2 { (title) }
             (matrix::style())

@@ -13,7 +13,7 @@ pub(super) fn lost(losses: &[String]) -> Option<String> {
         n => format!(", and {} more (see the remarks)", n - 1),
     };
     Some(format!(
-        "Lost: a part of the recording could not be read: {first}{more}. What follows is of the rest."
+        "Lost: a part of the recording could not be used: {first}{more}. What follows is of the rest."
     ))
 }
 

@@ -2,6 +2,9 @@
 
 use gap_diagnosis::report::GapReport;
 use machine::effects::{self, Targets};
+use metrology::{ErrorComponent, squareness};
+
+use crate::report::geometry;
 
 /// Name of an effect with what it acts on, components by their symbols of ISO 230-1.
 pub(super) fn name(effect: &str, axis: &str) -> String {
@@ -22,14 +25,20 @@ pub(super) fn name(effect: &str, axis: &str) -> String {
     format!("{} {place}", kind.title).trim_end().to_owned()
 }
 
-/// The angle between two linear axes, ISO 230-1, 3.6.
-fn between(pair: &str) -> Option<&'static str> {
-    match pair {
-        "XY" => Some("EC0Y"),
-        "XZ" => Some("EB0Z"),
-        "YZ" => Some("EA0Z"),
-        _ => None,
-    }
+/// The angle between two linear axes such as `XY`.
+fn between(pair: &str) -> Option<ErrorComponent> {
+    let one = pair.get(..1)?.parse().ok()?;
+    squareness::between(one, pair.get(1..)?.parse().ok()?)
+}
+
+/// The sign of every squareness among effects and what they act on.
+pub(super) fn signs<'a>(effects: impl Iterator<Item = (&'a str, &'a str)>) -> Option<String> {
+    let is_pair = |effect: &str| {
+        let kind = effects::kind(effect);
+        kind.is_some_and(|kind| matches!(kind.targets, Targets::LinearPairs))
+    };
+    let pairs = effects.filter(|(effect, _)| is_pair(effect));
+    geometry::signs(pairs.filter_map(|(_, axis)| between(axis)))
 }
 
 /// A covariate of a report.
@@ -99,6 +108,18 @@ mod tests {
         assert_eq!(name("straightness", "YX"), "straightness EYX");
         assert_eq!(name("squareness", "XY"), "squareness XY (EC0Y)");
         assert_eq!(name("backlash", "X"), "backlash X");
+        assert_eq!(signs([("backlash", "X")].into_iter()), None);
+        let pairs = [
+            ("squareness", "XZ"),
+            ("squareness", "XY"),
+            ("backlash", "X"),
+        ];
+        assert_eq!(
+            signs(pairs.into_iter()).as_deref(),
+            Some(
+                "EB0Z above 0: X+ and Z+ enclose less than 90° (ISO 230-1). EC0Y above 0: X+ and Y+ enclose more than 90° (ISO 230-1)."
+            )
+        );
         assert_eq!(name("probe_latency", ""), "latency of the probe signal");
         assert_eq!(covariate("position_y"), "the position of Y");
         assert!(covariate("sense*log_distance_since_reversal_x").contains("since X turned"));

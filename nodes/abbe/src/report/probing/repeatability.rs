@@ -6,12 +6,14 @@
 use std::collections::BTreeMap;
 
 use metrology::Axis;
+use metrology::iso230::ExpandedLength;
+use metrology::iso230::probing::{REPETITIONS, single_point};
 use metrology::sample::{ProbedPoint, Rejection, TestSegment};
 use serde::Serialize;
 use serde_json::json;
-use statrs::statistics::Statistics;
 
-use super::range;
+use crate::evaluate::budget::Budget;
+use crate::report::positioning::figure;
 use crate::report::section::{Rows, Section, head, um};
 
 /// Fewest touches of one place whose spread says anything.
@@ -27,7 +29,11 @@ const SAME_DIRECTION_RAD: f64 = 1e-2;
 type Touch<'a> = (u32, &'a ProbedPoint);
 
 /// The part, where a place was touched often enough.
-pub(super) fn section(touches: &[(TestSegment, ProbedPoint)]) -> Option<Section> {
+pub(super) fn section(
+    touches: &[(TestSegment, ProbedPoint)],
+    budget: Option<&Budget>,
+) -> Option<Section> {
+    let drift_mm = super::drift_mm(budget);
     let touches = touches
         .iter()
         .filter(|(_, point)| point.rejection == Rejection::None)
@@ -35,15 +41,15 @@ pub(super) fn section(touches: &[(TestSegment, ProbedPoint)]) -> Option<Section>
     let spreads: Vec<Spread> = places(touches)
         .iter()
         .filter(|place| place.len() >= LEAST_TOUCHES)
-        .map(|place| Spread::of(place))
+        .filter_map(|place| Spread::of(place, drift_mm))
         .collect();
     (!spreads.is_empty()).then(|| {
         let mut section = Section::new("Repeatability of touches, ISO 230-10");
         section.tables.push(Rows {
-            head: head(&["feature", "place / mm", "feed / mm/min", "touches", "range / µm", "s / µm"]),
-            rows: spreads.iter().map(Spread::row).collect(),
+            head: head(&["feature", "place / mm", "feed / mm/min", "touches", "R_SPT / µm", "s / µm"]),
+            rows: spreads.iter().map(|spread| spread.row(budget.is_some())).collect(),
             note: format!(
-                "Single-point repeatability along the approach. One place: same feature, run and feed, direction of approach and rotary axes \
+                "R_SPT: single-point repeatability, greatest minus least touch along the approach; {REPETITIONS} touches are usual. One place: same feature, run and feed, direction of approach and rotary axes \
                  within 0.6°, surface points within {SAME_PLACE_MM} mm of the first one. Fewer than {LEAST_TOUCHES} touches are not shown."
             ),
         });
@@ -95,31 +101,35 @@ struct Spread {
     touches: usize,
     range_mm: f64,
     standard_deviation_mm: f64,
+    repeatability: ExpandedLength,
 }
 
 impl Spread {
-    fn of(place: &[Touch]) -> Self {
+    /// Of at least two touches; nothing where a number is not finite.
+    fn of(place: &[Touch], drift_mm: f64) -> Option<Self> {
         let (run, first) = place[0];
         let along_mm = |(_, point): &Touch| point.point_in_machine_mm.dot(&first.approach);
         let values: Vec<f64> = place.iter().map(along_mm).collect();
-        Self {
+        let found = single_point(&values, drift_mm).ok()?;
+        Some(Self {
             test: format!("{}, run {run}", first.feature_id),
             place_mm: first.point_in_machine_mm.into(),
             feed_mm_min: feed_mm_min(first),
             touches: values.len(),
-            range_mm: range(values.iter().copied()),
-            standard_deviation_mm: values.iter().std_dev(),
-        }
+            range_mm: found.repeatability.value_mm,
+            standard_deviation_mm: found.standard_deviation_mm,
+            repeatability: found.repeatability,
+        })
     }
 
-    fn row(&self) -> Vec<String> {
+    fn row(&self, stated: bool) -> Vec<String> {
         let [x, y, z] = self.place_mm;
         vec![
             self.test.clone(),
             format!("({x:.1}, {y:.1}, {z:.1})"),
             self.feed_mm_min.to_string(),
             self.touches.to_string(),
-            um(self.range_mm),
+            figure(&self.repeatability, stated),
             um(self.standard_deviation_mm),
         ]
     }
@@ -168,12 +178,19 @@ mod tests {
             .flat_map(|k| [touch(0.0, f64::from(k)), touch(180.0, 2.0 * f64::from(k))])
             .collect();
         let of_rounds = places(rounds.iter().map(|point| (1, point)));
-        let spreads: Vec<Spread> = of_rounds.iter().map(|place| Spread::of(place)).collect();
+        let spreads = of_rounds
+            .iter()
+            .filter_map(|place| Spread::of(place, 0.0006));
+        let spreads: Vec<Spread> = spreads.collect();
         let told: Vec<(usize, f64)> = spreads
             .iter()
             .map(|spread| (spread.touches, (spread.range_mm * 1e6).round()))
             .collect();
         assert_eq!(told, [(5, 4000.0), (5, 8000.0)]);
         assert!((spreads[1].place_mm[0] + 100.0).abs() < 1e-9);
+        // By hand: each touch by 0.3 µm either way, rectangular; two of them, k = 2.
+        let expanded_um = 2.0 * (2.0_f64 * 0.3 * 0.3 / 3.0).sqrt();
+        let found = spreads[0].repeatability.expanded_uncertainty_mm;
+        assert!((found * 1e3 - expanded_um).abs() < 1e-9, "{found}");
     }
 }

@@ -46,7 +46,7 @@ impl GraphEvidence {
         if sample.topic.name == topics::DIAGNOSTICS.name {
             self.diagnostics(sample.received, &sample.bytes);
         } else if let Some(topic) = wanted(&sample.topic.name) {
-            self.evidence.message(topic, &sample.bytes);
+            self.evidence.message(topic, sample.received, &sample.bytes);
         }
     }
 
@@ -55,7 +55,7 @@ impl GraphEvidence {
             Ok(array) => array,
             Err(error) => {
                 let name = topics::DIAGNOSTICS.name;
-                self.evidence.undecoded.push(format!("{name}: {error}"));
+                self.evidence.cannot_use(name, at, &error);
                 return;
             }
         };

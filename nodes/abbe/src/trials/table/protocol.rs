@@ -30,7 +30,8 @@ pub fn section(targets: &[Target]) -> Section {
             .map(str::to_owned)
             .to_vec(),
         rows: targets.iter().map(row).collect(),
-        note: "A share meets its target where the share itself does; its interval says how surely. D named in 95 %: of \
+        note: "A share meets its target where its whole interval does and misses it where none of it does; where the interval holds \
+               the target, the trials are too few to tell: not measured. D named in 95 %: of \
                classes of which the trials tell only that it is below the least D that was tried (<), or beyond the \
                largest (>), with that."
             .to_owned(),

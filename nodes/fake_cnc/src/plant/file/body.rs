@@ -59,7 +59,8 @@ pub struct GeometryEntry {
     pub squareness_urad: SquarenessEntry,
 }
 
-/// Tilt of one axis' line towards another's.
+/// Tilt of one axis' line towards another's, µrad: the slope itself, not a component of ISO 230-1, of which it is
+/// −EC0Y, +EB0Z and −EA0Z in this order (`metrology::squareness`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SquarenessEntry {

@@ -4,9 +4,11 @@ use metrology::{Axis, PerAxis};
 
 use super::super::axis_errors::AxisErrors;
 use super::super::cross_errors::CrossErrors;
+use super::super::error::ExportError;
 use super::super::file::ExportFile;
 use super::super::grid::Grid;
 use super::super::linuxcnc::FileType;
+use super::super::sign::Sign;
 use super::super::sinumerik::{
     CrossTable, EncoderTable, OtherAxes, Temperature, cross_table, direction_tables, encoder_table,
     temperature,
@@ -33,6 +35,19 @@ pub struct Sinumerik {
     pub for_each_direction: bool,
     /// What to do with drift that depends on other axes.
     pub other_axes: OtherAxes,
+    /// Which way a positive value of the temperature compensation moves an axis; none: nobody has tried it, and the drift is left out.
+    pub temperature_sign: Option<Sign>,
+}
+
+/// Which pitch error tables a FANUC axis gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PitchTables {
+    /// Two where the lost motion varies along the axis by more than the backlash parameters can undo, else one.
+    AsMeasured,
+    /// One, the mean of both directions.
+    One,
+    /// One for each direction.
+    Two,
 }
 
 /// Numbers of a FANUC's set-up.
@@ -50,6 +65,10 @@ pub struct Fanuc {
     pub max_number: u32,
     /// Kind of record.
     pub record: fanuc::Record,
+    /// Which tables.
+    pub tables: PitchTables,
+    /// Which way a positive value moves an axis; none: nobody has tried it, and nothing is written.
+    pub sign: Option<Sign>,
 }
 
 /// For whom.
@@ -59,8 +78,8 @@ pub enum Control {
     LinuxCnc(FileType),
     /// Error tables, cross-axis tables, temperature parameters.
     Sinumerik(Sinumerik),
-    /// `.COM` tables.
-    Heidenhain,
+    /// `.COM` tables, and which way a positive value moves an axis; none: nobody has tried it, and nothing is written.
+    Heidenhain(Option<Sign>),
     /// Stored pitch error tables.
     Fanuc(Fanuc),
     /// One plain table.
@@ -72,10 +91,21 @@ impl Control {
         match self {
             Self::LinuxCnc(_) => "LinuxCNC",
             Self::Sinumerik(_) => "SINUMERIK",
-            Self::Heidenhain => "HEIDENHAIN",
+            Self::Heidenhain(_) => "HEIDENHAIN",
             Self::Fanuc(_) => "FANUC",
             Self::Csv => "CSV",
         }
+    }
+
+    /// Why this control can be given no table at all: nobody knows the sign, and how it is found.
+    #[must_use]
+    pub fn without_sign(&self) -> Option<ExportError> {
+        let (control, check) = match self {
+            Self::Heidenhain(None) => (heidenhain::CONTROL, heidenhain::CHECK),
+            Self::Fanuc(Fanuc { sign: None, .. }) => (fanuc::CONTROL, fanuc::CHECK),
+            _ => return None,
+        };
+        Some(ExportError::SignUnproven { control, check })
     }
 }
 
@@ -94,27 +124,19 @@ pub(super) fn write(
             }
         }
         Control::Sinumerik(set_up) => sinumerik(errors, wanted, set_up, selected),
-        Control::Heidenhain => {
+        Control::Heidenhain(sign) => {
             for axis in wanted.axes.iter() {
-                heidenhain_axis(errors, axis, wanted, selected);
+                heidenhain_axis(errors, (axis, *sign), wanted, selected);
             }
         }
         Control::Fanuc(set_up) => {
+            let mut taken = Vec::new();
             for own in &errors.positioning {
-                let file = fanuc_file(own, wanted, set_up);
+                let file = fanuc_file(own, wanted, set_up, &mut taken);
                 selected.take_positioning(own, file);
             }
         }
-        Control::Csv => {
-            if !(errors.positioning.is_empty() && errors.cross.is_empty()) {
-                selected
-                    .files
-                    .push(csv::table(&errors.positioning, &errors.cross));
-                for own in &errors.positioning {
-                    selected.positioning[own.axis()] = Some(own.span());
-                }
-            }
-        }
+        Control::Csv => csv_file(errors, measured, wanted, selected),
     }
     say_what_has_no_place(errors, measured, wanted, control, selected);
 }
@@ -132,7 +154,8 @@ fn say_what_has_no_place(
             selected.leave_out(cross.names(), no_place(cross, name));
         }
     }
-    if let (Some(model), false) = (&measured.thermal, matches!(control, Control::Sinumerik(_))) {
+    let takes_drift = matches!(control, Control::Sinumerik(_) | Control::Csv);
+    if let (Some(model), false) = (&measured.thermal, takes_drift) {
         for axis in wanted
             .axes
             .iter()
@@ -154,6 +177,7 @@ fn say_what_has_no_place(
                 machine_axis: set_up.names[axis].clone(),
                 max_slope: set_up.max_slope,
                 other_axes: set_up.other_axes,
+                sign: set_up.temperature_sign,
             };
             selected.take(
                 &format!("drift of {axis}"),
@@ -213,7 +237,7 @@ fn sinumerik(errors: &Errors, wanted: &Wanted, set_up: &Sinumerik, selected: &mu
                 reference: wanted.reference[axis],
             };
             let file = encoder_table(&own.mean(), &encoder);
-            file.map(|file| for_both(own, "MD32450 $MA_BACKLASH", file))
+            file.map(|file| for_both(own, "MD32450 $MA_BACKLASH (positive where the encoder leads the machine part: SINUMERIK 808D ADVANCED Parameter Manual, 08/2013, p. 228)", file))
         };
         selected.take_positioning(own, file);
     }
@@ -232,12 +256,18 @@ fn sinumerik(errors: &Errors, wanted: &Wanted, set_up: &Sinumerik, selected: &mu
     }
 }
 
+/// The record of an axis; `taken` are the numbers of the axes before it.
 fn fanuc_file(
     own: &AxisErrors,
     wanted: &Wanted,
     set_up: &Fanuc,
-) -> Result<ExportFile, super::ExportError> {
+    taken: &mut Vec<(Axis, fanuc::Numbers)>,
+) -> Result<ExportFile, ExportError> {
     let axis = own.axis();
+    let sign = set_up.sign.ok_or(ExportError::SignUnproven {
+        control: fanuc::CONTROL,
+        check: fanuc::CHECK,
+    })?;
     let table = fanuc::PitchTable {
         reference_number: set_up.reference_number[axis],
         reference: wanted.reference[axis],
@@ -246,13 +276,81 @@ fn fanuc_file(
         max_pulses: set_up.max_pulses,
         max_number: set_up.max_number,
         record: set_up.record,
+        sign,
     };
-    let file = fanuc::pitch_table(&own.mean(), &table)?;
-    Ok(for_both(own, "parameters 1851 and 1852", file))
+    let varies = fanuc::lost_motion_varies(own, &table);
+    let two = match set_up.tables {
+        PitchTables::AsMeasured => varies && set_up.magnification == 1,
+        PitchTables::One => false,
+        PitchTables::Two => true,
+    };
+    let mut pitch = if two {
+        fanuc::two_way_tables(own, &table)?
+    } else {
+        let pitch = fanuc::pitch_table(&own.mean(), &table)?;
+        fanuc::Pitch {
+            file: for_both(own, "parameters 1851 and 1852", pitch.file),
+            numbers: pitch.numbers,
+        }
+    };
+    if varies && !two {
+        pitch.file.notes.push("the lost motion varies along the axis by more than two pulses, which 1851 cannot undo: --pitch-tables two with magnification 1 makes a table for each direction".to_owned());
+    }
+    for numbers in &pitch.numbers {
+        let mut both = taken
+            .iter()
+            .map(|(other, of)| (*other, numbers.0.max(of.0), numbers.1.min(of.1)));
+        if let Some((other, number, _)) = both.find(|(_, from, to)| from <= to) {
+            return Err(ExportError::NumberTaken {
+                control: fanuc::CONTROL,
+                axis,
+                number,
+                other,
+            });
+        }
+    }
+    taken.extend(pitch.numbers.iter().map(|numbers| (axis, *numbers)));
+    Ok(pitch.file)
+}
+
+/// Everything that is known in one table.
+fn csv_file(errors: &Errors, measured: &Measured, wanted: &Wanted, selected: &mut Selected) {
+    let mut known = csv::Known::default();
+    for model in measured.models() {
+        for (index, curve) in model.curves.iter().enumerate() {
+            if wanted.axes.contains(curve.component.of) {
+                let spacing = super::spacing(wanted, curve.component.of);
+                let covariance = csv::covariance_of(model, index);
+                match known.add_curve(curve, covariance.as_ref(), spacing) {
+                    Ok(()) => selected.list(curve.component),
+                    Err(why) => selected.leave_out(curve.component.to_string(), why),
+                }
+            }
+        }
+    }
+    if let Some(model) = &measured.thermal {
+        for axis in wanted.axes.iter().filter(|a| model.axes[*a].is_some()) {
+            if let Err(why) = known.add_drift(model, axis) {
+                selected.leave_out(format!("drift of {axis}"), why);
+            }
+        }
+    }
+    if !(errors.positioning.is_empty() && errors.cross.is_empty() && known.is_empty()) {
+        let file = csv::table(&errors.positioning, &errors.cross, &known);
+        selected.files.push(file);
+        for own in &errors.positioning {
+            selected.positioning[own.axis()] = Some(own.span());
+        }
+    }
 }
 
 /// One table for an axis: its columns need common points.
-fn heidenhain_axis(errors: &Errors, axis: Axis, wanted: &Wanted, selected: &mut Selected) {
+fn heidenhain_axis(
+    errors: &Errors,
+    (axis, sign): (Axis, Option<Sign>),
+    wanted: &Wanted,
+    selected: &mut Selected,
+) {
     let own = errors.positioning.iter().find(|own| own.axis() == axis);
     let others: Vec<&CrossErrors> = errors.cross.iter().filter(|c| c.base() == axis).collect();
     let Some(own) = own else {
@@ -266,12 +364,16 @@ fn heidenhain_axis(errors: &Errors, axis: Axis, wanted: &Wanted, selected: &mut 
         .map(|c| (c.position()[0], c.position()[c.position().len() - 1]));
     let span = spans.fold(own.span(), |a, b| (a.0.max(b.0), a.1.min(b.1)));
     let file = Grid::inside(axis, super::spacing(wanted, axis), span).and_then(|grid| {
+        let sign = sign.ok_or(ExportError::SignUnproven {
+            control: heidenhain::CONTROL,
+            check: heidenhain::CHECK,
+        })?;
         let own = own.on_grid(&grid)?;
         let others: Vec<CrossErrors> = others
             .iter()
             .map(|c| c.on_grid(&grid))
             .collect::<Result<_, _>>()?;
-        heidenhain::compensation_table(&format!("{axis}_AXIS"), &own, &others)
+        heidenhain::compensation_table(&format!("{axis}_AXIS"), &own, &others, sign)
     });
     selected.take_positioning(own, file);
 }

@@ -9,10 +9,14 @@ use super::super::cross_errors::CrossErrors;
 use super::super::error::ExportError;
 use super::super::file::{ExportFile, comments};
 use super::super::number::{fixed, mm_or_deg, unit};
+use super::super::sign::{Sign, check, proven};
 use super::{POSITION_DECIMALS, VALUE_DECIMALS, check_name};
 use metrology::Axis;
 
 const CONTROL: &str = "SINUMERIK $AN_CEC";
+/// (1) of the module above.
+const SIGN: Sign = Sign::Minus;
+const PROOF: &str = "SINUMERIK 840D sl Function Manual Extended Functions, 03/2009, 6FC5397-1BP10-4BA0, K3 5.4.3 p. 372 (additional setpoint; a positive compensation value moves the axis in the negative direction): value = +error";
 
 /// Directions of the input axis in which a table counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,7 +148,8 @@ impl Rows<'_> {
         let spacing = self.check(set_up, table)?;
         let mut text = String::new();
         for (n, error) in self.error.iter().enumerate() {
-            let value = fixed(mm_or_deg(self.direction, *error), VALUE_DECIMALS);
+            let value = mm_or_deg(self.direction, SIGN.value_of(*error));
+            let value = fixed(value, VALUE_DECIMALS);
             text.push_str(&format!("$AN_CEC[{table},{n}]={value}\n"));
         }
         let (input, output) = (&set_up.input_axis, &set_up.output_axis);
@@ -176,8 +181,14 @@ fn program(tables: &[String], set_up: &CrossTable, base: Axis, what: &str) -> Ex
     let (input, output) = (&set_up.input_axis, &set_up.output_axis);
     let notes = vec![
         format!("SINUMERIK cross-axis compensation of {output} by the setpoint of {input}: {what}"),
-        format!("positions in {} of {input}, values in mm (degrees where {output} is rotary)", unit(base)),
-        "value = error with its own sign (actual - commanded); DERIVED from the leadscrew table, where a positive value moves the axis in the negative direction: verify before use".to_owned(),
+        format!(
+            "positions in {} of {input}, values in mm (degrees where {output} is rotary)",
+            unit(base)
+        ),
+        proven(PROOF),
+        check(&format!(
+            "write 0.010 at one node and 0 elsewhere, move {input} to that node, read a dial gauge along {output} with the table off and on: it must move by 10 um towards smaller {output}"
+        )),
         format!(
             "load with MD32710[{output}]=0, then set it to 1, and SD41300 $SN_CEC_TABLE_ENABLE of table {}",
             set_up.table

@@ -4,9 +4,13 @@ use super::super::axis_errors::{AxisErrors, check_count, equal_spacing};
 use super::super::error::ExportError;
 use super::super::file::{ExportFile, comments};
 use super::super::number::{fixed, mm_or_deg, unit};
+use super::super::sign::{Sign, check, proven};
 use super::{POSITION_DECIMALS, VALUE_DECIMALS, check_name};
 
 const CONTROL: &str = "SINUMERIK $AA_ENC_COMP";
+/// (1) of the module above.
+const SIGN: Sign = Sign::Minus;
+const PROOF: &str = "SINUMERIK 840D sl / 828D Function Manual Extended Functions, 03/2013, 6FC5397-1BP40-3BA1, K3 4.4.2.1 p. 238 (a positive compensation value moves the axis in the negative direction): value = +error";
 
 /// What the control's set-up says.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,7 +56,7 @@ pub fn encoder_table(
     let notes = notes(errors, set_up);
     text.push_str(&comments(";", &notes));
     for (n, e) in error.iter().enumerate() {
-        let value = fixed(mm_or_deg(axis, *e), VALUE_DECIMALS);
+        let value = fixed(mm_or_deg(axis, SIGN.value_of(*e)), VALUE_DECIMALS);
         let (encoder, name) = (set_up.encoder, &set_up.machine_axis);
         text.push_str(&format!("$AA_ENC_COMP[{encoder},{n},{name}]={value}\n"));
     }
@@ -94,8 +98,14 @@ fn notes(errors: &AxisErrors, set_up: &EncoderTable) -> Vec<String> {
     let axis = errors.axis();
     let name = &set_up.machine_axis;
     vec![
-        format!("SINUMERIK error table of axis {axis} ({name}), values and positions in {}", unit(axis)),
-        "value = error with its own sign (actual - commanded): a positive value makes the axis move in the negative direction".to_owned(),
+        format!(
+            "SINUMERIK error table of axis {axis} ({name}), values and positions in {}",
+            unit(axis)
+        ),
+        proven(PROOF),
+        check(&format!(
+            "write 0.010 at one node and 0 elsewhere, move {name} to that node, read a dial gauge along {name} with the table off and on: it must move by 10 um towards smaller {name}"
+        )),
         format!(
             "load with MD32700[{}]=0, then set it to 1; MD38000 >= {}",
             set_up.encoder,

@@ -2,22 +2,26 @@
 //!
 //! ```text
 //!   K(P) = SD43900 + SD43910 (P - SD43920)                                   (1)
-//!   d(p) = k0 + slope (p - p0),   e(p) = -d(p),   K = e                      (2)
+//!   d(p) = k0 + slope (p - p0),   e(p) = -d(p),   K = -e or +e               (2)
 //! ```
 //!
 //! d is the drift of the *reading* of a fixed place: where the control now reads p + d it stands at p, so its error
-//! is -d. By the sign rule of the module above, K = e: absolute value -k0, slope -slope, reference position p0.
+//! is -d. K is what undoes e by the sign that the user gives, since no page seen says it: where a positive K moves the axis towards smaller
+//! positions, K = e (absolute value -k0, slope -slope), else K = -e; reference position p0 in both.
 //! (1) is the line of \[4\]; that 43900 is its absolute value, 43910 its slope and 43920 its reference is in the
 //! description of MD32750 (SINUMERIK 808D ADVANCED Parameter Manual, p. 252).
 
 use super::super::error::ExportError;
 use super::super::file::{ExportFile, comments};
 use super::super::number::fixed;
+use super::super::sign::{Sign, check, given};
 use super::check_name;
 use metrology::Axis;
 use metrology::sample::ThermalModel;
 
 const CONTROL: &str = "SINUMERIK temperature compensation";
+/// One step at the machine that shows the sign.
+const CHECK: &str = "with the axis at rest and MD32750 = 1 enter SD43900 $SA_TEMP_COMP_ABS_VALUE = 0.010 and read a dial gauge along the axis: the display stays and the dial moves by 10 um, towards greater positions: --sign plus, towards smaller ones: --sign minus; then set it back to 0";
 const SLOPE_DECIMALS: usize = 9;
 const VALUE_DECIMALS: usize = 6;
 
@@ -39,12 +43,14 @@ pub struct Temperature {
     pub max_slope: f64,
     /// What to do with cross terms.
     pub other_axes: OtherAxes,
+    /// Which way a positive value moves the axis; none: nobody has tried it.
+    pub sign: Option<Sign>,
 }
 
 /// A subprogram that sets the parameters of one axis.
 ///
 /// # Errors
-/// A model in quarantine, without this axis, or whose offset is not identifiable; a slope that is too great;
+/// No sign given; a model in quarantine, without this axis, or whose offset is not identifiable; a slope that is too great;
 /// cross terms (unless left out); numbers that are none. A slope that is not identifiable is zero in the model
 /// by definition, and only the shift is exported, which the notes say.
 pub fn temperature(
@@ -59,6 +65,10 @@ pub fn temperature(
             axis,
         });
     }
+    let sign = set_up.sign.ok_or(ExportError::SignUnproven {
+        control: CONTROL,
+        check: CHECK,
+    })?;
     if model.quarantined {
         return Err(ExportError::Quarantined { axis });
     }
@@ -96,14 +106,14 @@ pub fn temperature(
             });
         }
     }
-    let error = (-drift.k0_mm, -slope, drift.p0_mm); // (2)
-    Ok(program(
-        model,
-        axis,
-        set_up,
-        error,
-        drift.slope_identifiable,
-    ))
+    let value = [-drift.k0_mm, -slope].map(|error| sign.value_of(error)); // (2)
+    let line = Line {
+        absolute_mm: value[0],
+        slope: value[1],
+        reference_mm: drift.p0_mm,
+        slope_identifiable: drift.slope_identifiable,
+    };
+    Ok(program(model, axis, (set_up, sign), &line))
 }
 
 fn check_slope(axis: Axis, slope: f64, position: f64, limit: f64) -> Result<(), ExportError> {
@@ -131,17 +141,25 @@ fn check_slope(axis: Axis, slope: f64, position: f64, limit: f64) -> Result<(), 
     Ok(())
 }
 
+/// (1), mm and mm/mm.
+struct Line {
+    absolute_mm: f64,
+    slope: f64,
+    reference_mm: f64,
+    slope_identifiable: bool,
+}
+
 fn program(
     model: &ThermalModel,
     axis: Axis,
-    set_up: &Temperature,
-    (absolute_mm, slope, reference_mm): (f64, f64, f64),
-    slope_identifiable: bool,
+    (set_up, sign): (&Temperature, Sign),
+    line: &Line,
 ) -> ExportFile {
     let name = &set_up.machine_axis;
     let mut notes = vec![
         format!("SINUMERIK temperature compensation of axis {axis} ({name}), mm and mm/mm"),
-        "value = error with its own sign (minus the drift of the readings); DERIVED from the leadscrew table, where a positive value moves the axis in the negative direction: verify before use".to_owned(),
+        given(sign),
+        check(CHECK),
         format!("set MD32750[{name}] = 3 once; MD32760 limits how fast a change is travelled"),
         format!(
             "fitted at {} ns, may be used until {} ns of the host's clock: a drift is of its hour",
@@ -149,15 +167,15 @@ fn program(
             model.valid_until.nanos()
         ),
     ];
-    if !slope_identifiable {
+    if !line.slope_identifiable {
         notes.push("the slope was not identifiable and is 0: a pure shift".to_owned());
     }
     let mut text = format!("%_N_ABBE_TC_{name}_SPF\n");
     text.push_str(&comments(";", &notes));
     let data = [
-        ("ABS_VALUE", fixed(absolute_mm, VALUE_DECIMALS)),
-        ("SLOPE", fixed(slope, SLOPE_DECIMALS)),
-        ("REF_POSITION", fixed(reference_mm, VALUE_DECIMALS)),
+        ("ABS_VALUE", fixed(line.absolute_mm, VALUE_DECIMALS)),
+        ("SLOPE", fixed(line.slope, SLOPE_DECIMALS)),
+        ("REF_POSITION", fixed(line.reference_mm, VALUE_DECIMALS)),
     ];
     for (datum, value) in data {
         text.push_str(&format!("$SA_TEMP_COMP_{datum}[{name}]={value}\n"));

@@ -69,11 +69,11 @@ fn check_full(points: &[Vector2<f64>], place: &'static str) -> Result<(), Iso230
     for (&at, next) in angles.iter().zip(round) {
         // Half a percent: stations at exactly 10 degrees round to either side.
         if next - at > 1.005 * LONGEST_GAP_RAD {
-            return Err(Iso230Error::Gap {
+            return Err(Iso230Error::AngularGap {
                 place,
-                gap: next - at,
-                at,
-                limit: LONGEST_GAP_RAD,
+                gap_rad: next - at,
+                at_rad: at,
+                limit_rad: LONGEST_GAP_RAD,
             });
         }
     }
@@ -151,7 +151,7 @@ mod tests {
         };
         let error = half.points(50.0, "clockwise").unwrap_err();
         assert!(
-            matches!(error, Iso230Error::Gap { gap, at, .. } if gap > 3.1 && (at - 3.1086).abs() < 1e-9),
+            matches!(error, Iso230Error::AngularGap { gap_rad, at_rad, .. } if gap_rad > 3.1 && (at_rad - 3.1086).abs() < 1e-9),
             "{error}"
         );
     }

@@ -16,6 +16,7 @@
 //! ```
 //!
 //! # Holds when
+//! The lengths are corrected to 20 °C with the temperatures and expansions of the same budget.
 //! E_VE was watched for as long as one test takes. (3), (4) and (7) are bounds: u_V at a target
 //! is part of s already, and a machine that scatters more than it drifts hides it.
 //!
@@ -30,7 +31,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::iso230::Iso230Error;
-use crate::iso230::budget::{DeviceUncertainty, Expansion, alignment_mm, combined, drift_mm};
+use crate::iso230::budget::{
+    DeviceUncertainty, Expansion, alignment_mm, combined, differential_expansion, drift_mm,
+};
 use crate::iso230::extent::check_not_negative;
 
 /// What is not known about a positioning test.
@@ -71,6 +74,12 @@ pub struct PositioningContributions {
 }
 
 impl PositioningBudget {
+    /// Nominal differential expansion of machine against device, mm/mm; equation (1) of `reference_temperature`.
+    #[must_use]
+    pub fn differential_expansion(&self) -> f64 {
+        differential_expansion(&self.machine, &self.device_expansion)
+    }
+
     /// Standard uncertainties over a length; the misalignment is that over `span_mm`.
     #[must_use]
     pub fn over(&self, length_mm: f64, span_mm: f64) -> PositioningContributions {

@@ -1,11 +1,29 @@
 //! Looking at the others on the network: wrong types, impossible QoS, a second node of our name, a second publisher.
 
-use abbe_msgs::{Durability, Qos, Reliability, parts_of};
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
-use super::Owner;
+use abbe_msgs::{Durability, Qos, Reliability, parts_of};
+use tokio::time::Instant;
+
+use super::{Owner, now};
 use crate::diagnostic::{Diagnostic, Level};
 use crate::names;
-use crate::network::{Remote, Role};
+use crate::network::{Guid, Remote, Role};
+
+/// Who writes on a topic that is read.
+#[derive(Debug, Default)]
+pub(in crate::live) struct Writers {
+    /// Of our type.
+    ours: BTreeSet<Guid>,
+    /// Of another type: which.
+    foreign: BTreeMap<Guid, String>,
+    /// Before that the graph is not looked at again because of one whom nobody has described.
+    next_look: Option<Instant>,
+}
+
+/// Between looks at the graph because of samples of a writer whom nobody has described.
+const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
 /// Our end of a topic.
 struct End<'o> {
@@ -28,14 +46,19 @@ impl End<'_> {
         // name, type and hash, so that they would be missed in silence.
         let own_hash = names::ros_type(self.dds_type).and_then(|name| parts_of(&name));
         let own_hash = own_hash.map(|parts| parts.type_hash);
+        let by = if other.node.is_empty() {
+            String::new()
+        } else {
+            format!(" of {}", other.node)
+        };
         let of_type = match (other.type_hash.as_deref(), own_hash) {
             _ if other.dds_type != self.dds_type => Some(format!(
-                "{topic}: expected {}, found {}",
+                "{topic}: expected {}, found {}{by}",
                 shown(self.dds_type),
                 shown(&other.dds_type)
             )),
             (Some(found), Some(expected)) if found != expected => Some(format!(
-                "{topic}: {} has the hash {expected} here, {found} there",
+                "{topic}: {} has the hash {expected} here, {found} there{by}",
                 shown(self.dds_type)
             )),
             _ => None,
@@ -60,9 +83,58 @@ impl End<'_> {
 }
 
 impl Owner {
+    /// What is wrong with a writer that sends another type than ours on a topic: nothing that it sends means what is read.
+    pub(super) fn foreign(&mut self, place: usize, writer: Guid) -> Option<String> {
+        let known = &self.subscriptions[place].writers;
+        if known.ours.contains(&writer) {
+            return None;
+        }
+        if let Some(what) = known.foreign.get(&writer) {
+            return Some(what.clone());
+        }
+        if known.next_look.is_some_and(|at| at > now()) {
+            return None;
+        }
+        self.subscriptions[place].writers.next_look = Some(now() + LOOK_AGAIN);
+        let writers = self.participant.writers();
+        self.meet(place, &writers);
+        let known = &self.subscriptions[place].writers;
+        known.foreign.get(&writer).cloned()
+    }
+
+    /// Keeps which writers of a topic that is read are of its type.
+    fn meet(&mut self, place: usize, writers: &[Remote]) {
+        let subscription = &mut self.subscriptions[place];
+        let end = End {
+            topic: &subscription.topic,
+            dds_type: &subscription.dds_type,
+            qos: subscription.qos,
+            is_reader: true,
+        };
+        let (mut ours, mut foreign) = (BTreeSet::new(), BTreeMap::new());
+        for writer in writers
+            .iter()
+            .filter(|it| it.is_of(Role::Message, end.topic))
+        {
+            match end.complaints(writer).0 {
+                Some(what) => {
+                    foreign.insert(writer.guid, what);
+                }
+                None => {
+                    ours.insert(writer.guid);
+                }
+            }
+        }
+        subscription.writers.ours = ours;
+        subscription.writers.foreign = foreign;
+    }
+
     /// Looks once at everybody's endpoints.
     pub(super) fn check_graph(&mut self) {
         let (writers, readers) = (self.participant.writers(), self.participant.readers());
+        for place in 0..self.subscriptions.len() {
+            self.meet(place, &writers);
+        }
         let subscriptions = self.subscriptions.iter().map(|subscription| End {
             topic: &subscription.topic,
             dds_type: &subscription.dds_type,
@@ -85,6 +157,14 @@ impl Owner {
         }
         self.complain("type_mismatch", of_type);
         self.complain("qos_incompatible", of_qos);
+        for (place, subscription) in self.subscriptions.iter().enumerate() {
+            let publish = |other: &&Remote| {
+                other.is_of(Role::Message, &subscription.topic)
+                    && other.dds_type == subscription.dds_type
+            };
+            let publishers = writers.iter().filter(publish).count();
+            self.node.sees_publishers(place, publishers);
+        }
         self.check_publishers();
         if self.participant.namesake() {
             let message = format!("another node is called {}", self.name);
@@ -133,6 +213,7 @@ mod tests {
         };
         let mut other = Remote {
             guid: [0; 16],
+            node: String::new(),
             role: Role::Message,
             name: "/latency".to_owned(),
             dds_type: end.dds_type.to_owned(),
@@ -151,6 +232,9 @@ mod tests {
             of_type.unwrap(),
             "/latency: expected abbe_msgs/msg/ProbeLatency, found std_msgs/msg/String"
         );
+        other.node = "/shop/scale".to_owned();
+        let of_type = end.complaints(&other).0.unwrap();
+        assert!(of_type.ends_with("String of /shop/scale"), "{of_type}");
         assert!(of_qos.unwrap().contains("transient local is wanted"));
         let offering = End {
             is_reader: false,

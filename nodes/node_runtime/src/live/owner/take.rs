@@ -1,12 +1,12 @@
 //! Taking in what happens.
 
 use abbe_msgs::action_msgs::srv::CancelGoalRequest;
-use abbe_msgs::{Reliability, WireError, from_cdr};
+use abbe_msgs::{Defect, Reliability, WireError, from_cdr};
 use metrology::Stamp;
 use metrology::stamp::Host;
 use tokio::time::Instant;
 
-use super::{ClientUse, Owner, Reply, ServerUse, Timers, now};
+use super::{ClientUse, FOREIGN_TYPE, Owner, Reply, ServerUse, Timers, now};
 use crate::diagnostic::{Diagnostic, Level};
 use crate::live::action_client::{Ask, News};
 use crate::live::action_server::{Answer, GoalService};
@@ -18,16 +18,23 @@ use crate::live::type_description;
 use crate::node::{Bytes, Event};
 
 impl Owner {
+    #[expect(clippy::too_many_lines, reason = "one arm or field after another")]
     pub(super) fn take(&mut self, incoming: Incoming) {
         match incoming {
             Incoming::Message {
                 subscription,
                 bytes,
                 received,
+                writer,
                 after,
             } => {
                 self.count_message(subscription, after);
                 let at = self.instant(Some(received));
+                if let Some(what) = self.foreign(subscription, writer) {
+                    let port = self.node.ports().subscriptions[subscription].topic.clone();
+                    let name = ("input_refused", port.as_str());
+                    return self.refuse(name, FOREIGN_TYPE, at, &what);
+                }
                 let bytes = &bytes;
                 let event = Event::Message {
                     subscription,
@@ -37,9 +44,9 @@ impl Owner {
             }
             Incoming::Unreadable { topic, reason } => {
                 self.board.count("samples unreadable", 1);
-                let message = format!("{topic}: {reason}");
-                let diagnostic = Diagnostic::new(Level::Error, "sample_unreadable", message);
-                self.notice(diagnostic.with("topic", topic));
+                let (at, what) = (self.instant(None), format!("{topic}: {reason}"));
+                let name = ("sample_unreadable", &*topic);
+                self.refuse(name, Defect::Encoding.words(), at, &what);
             }
             Incoming::Request {
                 server,

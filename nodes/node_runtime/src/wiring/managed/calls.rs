@@ -12,7 +12,7 @@ use metrology::stamp::{Host, Stamp};
 
 use super::Managed;
 use crate::lifecycle::{State, Transition};
-use crate::node::{Bytes, Emission, RequestId, ServiceEvents, ServicePort};
+use crate::node::{Bytes, Emission, Refusal, RequestId, ServiceEvents, ServicePort};
 use crate::wiring::{decode, encode};
 
 /// The services, in the order in which they stand behind the stage's own.
@@ -80,7 +80,7 @@ where
         by: (usize, RequestId),
         bytes: &[u8],
         out: &mut Vec<Emission>,
-    ) -> Result<(), String> {
+    ) -> Result<(), Refusal> {
         let answer = match call {
             Call::ChangeState => {
                 let request: ChangeStateRequest = decode(bytes)?;

@@ -154,7 +154,8 @@ where
         out: &mut Vec<Emission>,
     ) -> Result<(), String> {
         let input = (self.lifecycle.activity)(active);
-        self.wiring.step(at, Ok(input), out)
+        let told = self.wiring.step(at, Ok(input), out);
+        told.map_err(|refusal| refusal.reason)
     }
 
     /// Whether the stage has just said that it is at rest, or has had its time.

@@ -1,0 +1,200 @@
+//! Positioning runs of rotary axes: what the angular reference read while the axis rested at each target.
+//!
+//! Stops, targets and directions are found as those of linear axes ([`super::linear`]). The reading is that of the angular
+//! reference; an axis' own encoder says nothing about its positioning. A reference or a control that wraps at a turn does
+//! no harm: deviations are taken without whole turns from the first one.
+
+use metrology::Axis;
+use metrology::iso230::positioning::rotary::within_half_a_turn_rad;
+use metrology::sample::{AngleSample, AxisState, TestKind, TestSegment};
+use metrology::stamp::{Host, Span, Stamp};
+
+use super::linear::targets::{left_out, targets};
+use super::linear::{SETTLE, Visits, axis_of, level};
+
+/// Spacing of the grid on which places are compared, deg.
+const GRID_DEG: f64 = 1e-6;
+
+/// Runs of one rotary axis, up and down.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RotaryTest {
+    /// The axis.
+    pub axis: Axis,
+    /// Number of its first run.
+    pub first_run: u32,
+    /// Targets, ascending, rad.
+    pub targets_rad: Vec<f64>,
+    /// Deviations per run and target towards greater angles, their mean over all taken out, rad.
+    pub up_rad: Vec<Vec<f64>>,
+    /// The same towards smaller angles, rad. One of the two is empty where all targets were approached from one side.
+    pub down_rad: Vec<Vec<f64>>,
+    /// Places with readings that are no targets, and why.
+    pub left_out: Vec<String>,
+    /// Longest rest of the command; none: nothing rested.
+    pub longest_rest: Option<Span>,
+    /// Whether the angular reference read anything.
+    pub has_readings: bool,
+}
+
+/// One rest of the command.
+#[derive(Clone, Copy, Debug)]
+struct Stop {
+    at_rad: f64,
+    from_rad: f64,
+    since: Stamp<Host>,
+    until: Stamp<Host>,
+    /// Sum of the readings less the first one, and how many.
+    sum_rad: f64,
+    first_rad: f64,
+    n: u32,
+}
+
+#[derive(Clone, Debug)]
+struct Run {
+    begin: TestSegment,
+    axis: Axis,
+    stops: Vec<Stop>,
+}
+
+/// Collects the runs of a recording.
+#[derive(Debug, Default)]
+pub struct RotaryRuns {
+    current: Option<Run>,
+    done: Vec<Run>,
+}
+
+impl RotaryRuns {
+    /// Begin or end of a test.
+    pub fn segment(&mut self, segment: &TestSegment) {
+        if segment.begin {
+            let axis = axis_of(segment).filter(|axis| !axis.is_linear());
+            let axis = axis.filter(|_| segment.kind == TestKind::Positioning);
+            self.current = axis.map(|axis| Run {
+                begin: segment.clone(),
+                axis,
+                stops: vec![],
+            });
+        } else if let Some(run) = self.current.take()
+            && segment.completed
+            && segment.run == run.begin.run
+        {
+            self.done.push(run);
+        }
+    }
+
+    /// Positions at one tick.
+    pub fn axes(&mut self, state: &AxisState) {
+        let Some(run) = &mut self.current else {
+            return;
+        };
+        let at_rad = state.commanded[run.axis];
+        let last_was_passed = run
+            .stops
+            .last()
+            .is_some_and(|stop| stop.until == stop.since);
+        match run.stops.last_mut() {
+            Some(stop) if (stop.at_rad - at_rad).to_degrees().abs() < GRID_DEG => {
+                stop.until = state.received_at;
+            }
+            last => {
+                let from_rad = last.map_or(at_rad, |before| before.at_rad);
+                // Of a place that was only passed nothing is left.
+                if last_was_passed {
+                    run.stops.pop();
+                }
+                run.stops.push(Stop {
+                    at_rad,
+                    from_rad,
+                    since: state.received_at,
+                    until: state.received_at,
+                    sum_rad: 0.0,
+                    first_rad: 0.0,
+                    n: 0,
+                });
+            }
+        }
+    }
+
+    /// One reading of the angular reference.
+    pub fn angle(&mut self, sample: &AngleSample) {
+        if let Some(run) = &mut self.current
+            && sample.axis == run.axis
+            && let Some(stop) = run.stops.last_mut()
+            && sample.at - stop.since >= SETTLE
+        {
+            if stop.n == 0 {
+                stop.first_rad = sample.angle_rad;
+            }
+            stop.sum_rad += within_half_a_turn_rad(sample.angle_rad - stop.first_rad);
+            stop.n += 1;
+        }
+    }
+
+    /// The tests: runs that repeat one another belong together.
+    #[must_use]
+    pub fn tests(self) -> Vec<RotaryTest> {
+        let groups = self.done.chunk_by(|a, b| {
+            a.axis == b.axis
+                && a.begin.features == b.begin.features
+                && b.begin.repeat == a.begin.repeat + 1
+        });
+        groups.filter_map(test).collect()
+    }
+}
+
+fn test(group: &[Run]) -> Option<RotaryTest> {
+    let first = group.first()?;
+    let read = || group.iter().flat_map(|run| &run.stops);
+    let zero_rad = read().find_map(Stop::deviation_rad);
+    let runs: Vec<Visits> = group
+        .iter()
+        .map(|run| visits(run, zero_rad.unwrap_or(0.0)))
+        .collect();
+    let (places, sides) = targets(&runs);
+    let numbers: Vec<u32> = group.iter().map(|run| run.begin.run).collect();
+    let left_out = left_out(&runs, &numbers, (&places, sides), (GRID_DEG, "deg"));
+    let of = |side: usize| {
+        if !sides.contains(&side) {
+            return vec![];
+        }
+        let row = |run: &Visits| places.iter().map(|place| run[place][side][0]).collect();
+        runs.iter().map(row).collect::<Vec<Vec<f64>>>()
+    };
+    let (mut up_rad, mut down_rad) = (of(0), of(1));
+    level(&mut up_rad, &mut down_rad);
+    let to_rad = |place: &i64| (*place as f64 * GRID_DEG).to_radians();
+    Some(RotaryTest {
+        axis: first.axis,
+        first_run: first.begin.run,
+        targets_rad: places.iter().map(to_rad).collect(),
+        up_rad,
+        down_rad,
+        left_out,
+        longest_rest: read().map(|stop| stop.until - stop.since).max(),
+        has_readings: zero_rad.is_some(),
+    })
+}
+
+impl Stop {
+    /// Mean reading minus command, by whole turns anything, rad.
+    fn deviation_rad(&self) -> Option<f64> {
+        let mean_rad = self.first_rad + self.sum_rad / f64::from(self.n.max(1));
+        (self.n > 0).then_some(mean_rad - self.at_rad)
+    }
+}
+
+fn visits(run: &Run, zero_rad: f64) -> Visits {
+    let mut visits = Visits::new();
+    for stop in &run.stops {
+        let way_deg = (stop.at_rad - stop.from_rad).to_degrees();
+        if let Some(deviation_rad) = stop.deviation_rad()
+            && way_deg.abs() > GRID_DEG
+        {
+            let place = (stop.at_rad.to_degrees() / GRID_DEG).round() as i64;
+            let [up, down] = visits.entry(place).or_default();
+            let side = if way_deg > 0.0 { up } else { down };
+            side.push(within_half_a_turn_rad(deviation_rad - zero_rad));
+        }
+    }
+    visits
+}

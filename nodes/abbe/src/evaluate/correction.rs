@@ -1,0 +1,340 @@
+//! Whether the lengths of a positioning test, or the radii of a circle, are those at 20 °C, what corrects them, and their uncertainty.
+
+use metrology::Axis;
+use metrology::iso230::budget::{DeviceUncertainty, differential_expansion};
+use metrology::iso230::circular::CircularBudget;
+use metrology::iso230::positioning::budget::PositioningBudget;
+use serde_json::{Value, json};
+
+use super::Tests;
+use super::budget::{BodyTemperature, Budget};
+use super::circles::Instrument;
+use super::linear::Reference;
+use super::test_conditions::Thermometers;
+
+/// What makes the lengths of a test those at 20 °C.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Correction {
+    /// The nominal differential expansion is taken out here.
+    Here {
+        /// ε of machine against device, mm/mm.
+        differential_expansion: f64,
+        /// The machine: temperature, and coefficient in 1/K.
+        machine: (BodyTemperature, f64),
+        /// The device, alike.
+        device: (BodyTemperature, f64),
+    },
+    /// The instrument did, as the budget states.
+    ByInstrument,
+    /// Nothing does.
+    Missing {
+        /// Why not, and what to state.
+        reason: String,
+    },
+}
+
+/// How a test was measured, as far as it is stated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Uncertainties; all zero where nothing is stated.
+    pub budget: PositioningBudget,
+    /// Whether expanded uncertainties can be stated.
+    pub is_stated: bool,
+    /// What makes its lengths those at 20 °C.
+    pub correction: Correction,
+}
+
+/// Why no conformance is decided of what the machine read itself.
+pub const BY_OWN_SCALE: &str = "not ISO 230-2: read by the machine's scale";
+
+impl Measured {
+    /// How runs of these numbers were measured by `reference`; `axis` where they run along one.
+    #[must_use]
+    pub fn of(
+        tests: &Tests,
+        budget: Option<&Budget>,
+        (runs, reference, axis): (&[u32], Reference, Option<Axis>),
+    ) -> Self {
+        let nothing = Budget::nothing();
+        let used = budget.unwrap_or(&nothing);
+        if reference == Reference::Scale {
+            let scale = axis.and_then(|axis| scale(tests, axis));
+            return Self {
+                budget: used.of_scale(scale),
+                is_stated: budget.is_some() && scale.is_some(),
+                correction: Correction::Missing {
+                    reason: "the machine's own scale was read".to_owned(),
+                },
+            };
+        }
+        let known = Known::of(budget, &tests.conditions.during(runs));
+        let corrects_itself = used.length_corrected_by_instrument;
+        Self {
+            budget: used.positioning(known.machine.as_ref().ok(), known.device.as_ref().ok()),
+            is_stated: budget.is_some(),
+            correction: known.correction(budget, corrects_itself),
+        }
+    }
+}
+
+/// How a circle was measured, as far as it is stated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredCircle {
+    /// Uncertainties; all zero where nothing is stated.
+    pub budget: CircularBudget,
+    /// What makes its radii those at 20 °C.
+    pub correction: Correction,
+}
+
+impl MeasuredCircle {
+    /// How circles were measured while `read` was the temperature; a plate corrects nothing itself, a ballbar is a length
+    /// reference that may.
+    #[must_use]
+    pub fn of(budget: Option<&Budget>, read: &Thermometers, instrument: Instrument) -> Self {
+        let is_plate = instrument == Instrument::GridEncoder;
+        let stated = budget.map(|budget| budget.of_circles(instrument));
+        let used = stated.clone().unwrap_or_else(Budget::nothing);
+        let known = Known::of(stated.as_ref(), read);
+        let circular = used.circular(known.machine.as_ref().ok(), known.device.as_ref().ok());
+        let correction = if is_plate && stated.is_some() && !used.has_plate() {
+            Correction::Missing {
+                reason: "the budget file states no plate (temperature and expansion of the grid encoder's plate)".to_owned(),
+            }
+        } else {
+            known.correction(
+                stated.as_ref(),
+                !is_plate && used.length_corrected_by_instrument,
+            )
+        };
+        Self {
+            budget: circular,
+            correction,
+        }
+    }
+}
+
+/// Temperatures of machine and device during a test, or why they are unknown.
+struct Known {
+    machine: Result<BodyTemperature, String>,
+    device: Result<BodyTemperature, String>,
+}
+
+impl Known {
+    fn of(budget: Option<&Budget>, read: &Thermometers) -> Self {
+        let nothing = Budget::nothing();
+        let (machine, device) = budget.unwrap_or(&nothing).bodies();
+        Self {
+            machine: machine.temperature(read),
+            device: device.temperature(read),
+        }
+    }
+
+    fn correction(self, budget: Option<&Budget>, corrects_itself: bool) -> Correction {
+        let missing = |reason: String| Correction::Missing { reason };
+        let Some(budget) = budget else {
+            return missing("no budget was given (--budget)".to_owned());
+        };
+        if corrects_itself {
+            return Correction::ByInstrument;
+        }
+        let (of_machine, of_device) = match (self.machine, self.device) {
+            (Err(why), _) => return missing(format!("machine of the budget file {why}")),
+            (_, Err(why)) => return missing(format!("device of the budget file {why}")),
+            (Ok(of_machine), Ok(of_device)) => (of_machine, of_device),
+        };
+        let (machine, device) = budget.bodies();
+        Correction::Here {
+            differential_expansion: differential_expansion(
+                &machine.at(Some(&of_machine)),
+                &device.at(Some(&of_device)),
+            ),
+            machine: (of_machine, machine.expansion_per_k()),
+            device: (of_device, device.expansion_per_k()),
+        }
+    }
+}
+
+/// What the machine file states about the scale of an axis.
+fn scale(tests: &Tests, axis: Axis) -> Option<DeviceUncertainty> {
+    let linear = tests.machine.as_ref()?.linear(axis)?;
+    Some(DeviceUncertainty {
+        expanded_uncertainty_mm: linear.scale_expanded_uncertainty_um? * 1e-3,
+        expanded_uncertainty_per_length: linear.scale_expanded_uncertainty_um_per_m? * 1e-6,
+        coverage_factor: 2.0,
+    })
+}
+
+impl Correction {
+    /// What is taken out of each length here, mm/mm.
+    #[must_use]
+    pub fn differential_expansion(&self) -> f64 {
+        match self {
+            Self::Here {
+                differential_expansion,
+                ..
+            } => *differential_expansion,
+            Self::ByInstrument | Self::Missing { .. } => 0.0,
+        }
+    }
+
+    /// Why no conformance is decided; none: the lengths are those at 20 °C.
+    #[must_use]
+    pub fn lacks(&self) -> Option<String> {
+        match self {
+            Self::Missing { reason } => Some(format!("not corrected to 20 °C: {reason}")),
+            Self::Here { .. } | Self::ByInstrument => None,
+        }
+    }
+
+    /// A sentence, for a test over `span_mm`.
+    #[must_use]
+    pub fn in_words(&self, span_mm: f64) -> String {
+        match self {
+            Self::Here {
+                differential_expansion,
+                machine,
+                device,
+            } => format!(
+                "Corrected to 20 °C: {:.2} µm taken out over {span_mm:.0} mm; machine {}, device {}.",
+                differential_expansion * span_mm * 1e3,
+                body_in_words(machine),
+                body_in_words(device)
+            ),
+            Self::ByInstrument => {
+                "Corrected to 20 °C by the instrument, as the budget states; nothing is taken out here."
+                    .to_owned()
+            }
+            Self::Missing { reason } => format!("Not corrected to 20 °C: {reason}. No conformance is decided."),
+        }
+    }
+
+    /// The same for machines.
+    #[must_use]
+    pub fn as_json(&self) -> Value {
+        let body = |(temperature, expansion_per_k): &(BodyTemperature, f64)| {
+            json!({
+                "temperature_degc": 20.0 + temperature.deviation_k,
+                "temperature_half_width_k": temperature.half_width_k,
+                "expansion_per_k": expansion_per_k,
+                "source": temperature.source,
+            })
+        };
+        match self {
+            Self::Here {
+                differential_expansion,
+                machine,
+                device,
+            } => json!({
+                "done": true,
+                "by": "nominal differential expansion",
+                "differential_expansion": differential_expansion,
+                "machine": body(machine),
+                "device": body(device),
+            }),
+            Self::ByInstrument => json!({ "done": true, "by": "instrument" }),
+            Self::Missing { reason } => json!({ "done": false, "reason": reason }),
+        }
+    }
+}
+
+fn body_in_words((temperature, expansion_per_k): &(BodyTemperature, f64)) -> String {
+    if *expansion_per_k > 0.0 {
+        format!(
+            "{:.2} °C ({}), {:.1} µm/(m K)",
+            20.0 + temperature.deviation_k,
+            temperature.source,
+            expansion_per_k * 1e6
+        )
+    } else {
+        "without expansion".to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    const BUDGET: &str = "
+grid_encoder: {expanded_uncertainty_um: 0.4, expanded_uncertainty_um_per_m: 2.0, coverage_factor: 2.0}
+length_reference: {expanded_uncertainty_um: 0.1, expanded_uncertainty_um_per_m: 0.5, coverage_factor: 2.0}
+machine: {temperature_deviation_k: 2.0, temperature_half_width_k: 0.2, expansion_um_per_m_k: 11.0, expansion_half_width_um_per_m_k: 1.0}
+device: {temperature_deviation_k: 1.0, temperature_half_width_k: 0.1, expansion_um_per_m_k: 5.0, expansion_half_width_um_per_m_k: 0.0}
+misalignment_mm: 0.1
+environmental_drift_um: 0.3
+";
+
+    fn measured(budget: Option<&str>, reference: Reference) -> Measured {
+        let budget = budget.map(|text| Budget::read(text, Path::new("budget.yaml")).unwrap());
+        let about: (&[u32], _, _) = (&[1], reference, Some(Axis::X));
+        Measured::of(&Tests::default(), budget.as_ref(), about)
+    }
+
+    #[test]
+    fn what_is_taken_out_is_machine_less_device_by_hand() {
+        // 11 µm/(m K) 2 K − 5 µm/(m K) 1 K = 17 µm/m; 6.8 µm over 400 mm.
+        let found = measured(Some(BUDGET), Reference::Length).correction;
+        assert!((found.differential_expansion() - 17e-6).abs() < 1e-15);
+        assert_eq!(found.lacks(), None);
+        let words = found.in_words(400.0);
+        assert!(
+            words
+                .starts_with("Corrected to 20 °C: 6.80 µm taken out over 400 mm; machine 22.00 °C"),
+            "{words}"
+        );
+    }
+
+    #[test]
+    fn an_instrument_that_corrects_is_not_corrected_again() {
+        let text = format!("{BUDGET}length_corrected_by_instrument: true\n");
+        let found = measured(Some(&text), Reference::Length);
+        assert_eq!(found.correction, Correction::ByInstrument);
+        assert!(found.correction.differential_expansion().abs() < 1e-30);
+        // What is not known about temperature and coefficient stays.
+        let terms = found.budget.over(400.0, 400.0);
+        assert!((terms.machine_expansion_mm - 0.000_8 / 3.0_f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_plate_does_not_correct_itself_and_a_ballbar_may() {
+        let text = format!("{BUDGET}length_corrected_by_instrument: true\n");
+        let without = Budget::read(&text, Path::new("budget.yaml")).unwrap();
+        let unstated = MeasuredCircle::of(
+            Some(&without),
+            &Thermometers::new(),
+            Instrument::GridEncoder,
+        );
+        assert!(unstated.correction.lacks().unwrap().contains("no plate"));
+        // 11 µm/(m K) 2 K − 8 µm/(m K) 1.5 K = 10 µm/m.
+        let text = format!(
+            "{text}plate: {{temperature_deviation_k: 1.5, temperature_half_width_k: 0.1, expansion_um_per_m_k: 8.0, expansion_half_width_um_per_m_k: 0.0}}\n"
+        );
+        let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
+        let of = |instrument| MeasuredCircle::of(Some(&budget), &Thermometers::new(), instrument);
+        let plate = of(Instrument::GridEncoder);
+        assert!((plate.correction.differential_expansion() - 10e-6).abs() < 1e-15);
+        assert!((plate.budget.differential_expansion() - 10e-6).abs() < 1e-15);
+        assert!((plate.budget.displacement.expanded_uncertainty_mm - 0.4e-3).abs() < 1e-15);
+        let ballbar = of(Instrument::Ballbar);
+        assert_eq!(ballbar.correction, Correction::ByInstrument);
+        // The certificate of the length reference, not of the plate.
+        assert!((ballbar.budget.displacement.expanded_uncertainty_mm - 0.1e-3).abs() < 1e-15);
+        let unknown = MeasuredCircle::of(None, &Thermometers::new(), Instrument::GridEncoder);
+        assert!(unknown.correction.lacks().unwrap().contains("no budget"));
+    }
+
+    #[test]
+    fn without_temperatures_the_reason_names_what_to_state() {
+        let lacks = |budget, reference| measured(budget, reference).correction.lacks().unwrap();
+        assert!(lacks(None, Reference::Length).contains("no budget was given (--budget)"));
+        let silent = BUDGET.replacen("temperature_deviation_k: 2.0", "thermometers: [bed]", 1);
+        let why = lacks(Some(&silent), Reference::Length);
+        assert!(
+            why.contains("machine of the budget file thermometer bed has no reading"),
+            "{why}"
+        );
+        let own = measured(Some(BUDGET), Reference::Scale);
+        assert!(own.correction.lacks().unwrap().contains("own scale"));
+        assert!(!own.is_stated);
+    }
+}

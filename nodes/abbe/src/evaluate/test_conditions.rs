@@ -1,0 +1,312 @@
+//! Under which conditions the tests of a bag ran: when, how fast, after what, and what its thermometers read meanwhile.
+
+use std::collections::BTreeMap;
+
+use abbe_msgs::topics;
+use metrology::sample::{TemperatureSample, TestKind, TestSegment};
+use metrology::stamp::{Host, Span, Stamp};
+use recorder::{Bag, Order};
+use replayer::{Taken, reading};
+
+/// Age of the last reading before a test that still counts for it: thermometers are read every few seconds to minutes.
+const LONGEST_AGE: Span = Span::from_nanos(600_000_000_000);
+/// Feeds closer than this are one, mm/s.
+const SAME_FEED_MM_S: f64 = 1e-9;
+/// Tests that touch.
+const TOUCHING: [TestKind; 8] = [
+    TestKind::Latency,
+    TestKind::Block,
+    TestKind::Touch,
+    TestKind::Plane,
+    TestKind::Bore,
+    TestKind::Sphere,
+    TestKind::Rotary,
+    TestKind::RotaryVerification,
+];
+
+/// Readings of one thermometer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Readings {
+    /// The first one, °C.
+    pub first_degc: f64,
+    /// The last one, °C.
+    pub last_degc: f64,
+    /// The least, °C.
+    pub least_degc: f64,
+    /// The greatest, °C.
+    pub greatest_degc: f64,
+    /// How many.
+    pub n: u32,
+    sum_degc: f64,
+}
+
+/// Readings by name of the thermometer.
+pub type Thermometers = BTreeMap<String, Readings>;
+
+impl Readings {
+    /// One reading.
+    #[must_use]
+    pub const fn new(degc: f64) -> Self {
+        Self {
+            first_degc: degc,
+            last_degc: degc,
+            least_degc: degc,
+            greatest_degc: degc,
+            n: 1,
+            sum_degc: degc,
+        }
+    }
+
+    /// A later reading.
+    pub fn add(&mut self, degc: f64) {
+        self.join(Self::new(degc));
+    }
+
+    /// Later readings.
+    fn join(&mut self, later: Self) {
+        self.last_degc = later.last_degc;
+        self.least_degc = self.least_degc.min(later.least_degc);
+        self.greatest_degc = self.greatest_degc.max(later.greatest_degc);
+        self.n = self.n.saturating_add(later.n);
+        self.sum_degc += later.sum_degc;
+    }
+
+    /// Mean, °C.
+    #[must_use]
+    pub fn mean_degc(&self) -> f64 {
+        self.sum_degc / f64::from(self.n)
+    }
+
+    /// Greatest minus least, K.
+    #[must_use]
+    pub fn range_k(&self) -> f64 {
+        self.greatest_degc - self.least_degc
+    }
+}
+
+/// One test.
+#[derive(Clone, Debug)]
+struct Test {
+    run: u32,
+    thermometers: Thermometers,
+}
+
+/// The conditions of a bag's tests.
+#[derive(Clone, Debug, Default)]
+pub struct TestConditions {
+    /// Begin of the first test and end of the last one.
+    pub between: Option<(Stamp<Host>, Stamp<Host>)>,
+    /// Whether a grid encoder was read during a test.
+    pub has_grid: bool,
+    /// Whether a length reference was read during a test.
+    pub has_length: bool,
+    /// Whether a test touched anything.
+    pub has_touches: bool,
+    /// Programmed feeds of the tests in their order, each once, mm/s.
+    pub feeds_mm_s: Vec<f64>,
+    /// How long programs of production ran before the first measurement, s.
+    pub production_before_s: f64,
+    /// From the first test to the last one.
+    pub thermometers: Thermometers,
+    tests: Vec<Test>,
+    latest: BTreeMap<String, (Stamp<Host>, f64)>,
+    under_way: Option<TestSegment>,
+}
+
+impl TestConditions {
+    /// Reads the conditions of a bag alone.
+    #[must_use]
+    pub fn of(bag: &Bag) -> Self {
+        let wanted = [
+            topics::TEST_SEGMENT.name,
+            topics::TEMPERATURE.base,
+            topics::GRID_POSITION.name,
+            topics::LENGTH_POSITION.name,
+        ];
+        let mut conditions = Self::default();
+        reading::read(bag, Order::LogTime, &wanted, |mut taken| {
+            conditions.message(&mut taken);
+            if taken.is(&topics::TEST_SEGMENT)
+                && let Some(segment) = taken.of(&topics::TEST_SEGMENT)
+            {
+                conditions.segment(&segment);
+            }
+        });
+        conditions
+    }
+
+    /// Any message but that of a test: what is read, and the readings of thermometers.
+    pub fn message(&mut self, taken: &mut Taken<'_>) {
+        if taken.is_named(topics::TEMPERATURE.base) {
+            self.temperature(taken);
+        } else if self.under_way.is_some() {
+            self.has_grid |= taken.is(&topics::GRID_POSITION);
+            self.has_length |= taken.is(&topics::LENGTH_POSITION);
+        }
+    }
+
+    fn temperature(&mut self, taken: &mut Taken<'_>) {
+        let Some(mut sample) = taken.of_member(&topics::TEMPERATURE) else {
+            return;
+        };
+        if let Some(name) = topics::TEMPERATURE.member_of(taken.topic()) {
+            name.clone_into(&mut sample.sensor);
+            self.read(&sample);
+        }
+    }
+
+    fn read(&mut self, sample: &TemperatureSample) {
+        let (name, degc) = (&sample.sensor, sample.temperature_degc);
+        self.latest.insert(name.clone(), (sample.at, degc));
+        if self.between.is_some() {
+            add(&mut self.thermometers, name, degc);
+        }
+        if self.under_way.is_some()
+            && let Some(test) = self.tests.last_mut()
+        {
+            add(&mut test.thermometers, name, degc);
+        }
+    }
+
+    /// Begin or end of a test.
+    pub fn segment(&mut self, segment: &TestSegment) {
+        if segment.kind == TestKind::Production {
+            self.production(segment);
+        } else if segment.begin {
+            self.begin(segment);
+        } else if self.under_way.take().is_some()
+            && let Some((_, last)) = &mut self.between
+        {
+            *last = segment.at;
+        }
+    }
+
+    fn production(&mut self, segment: &TestSegment) {
+        let began = self.under_way.take();
+        if segment.begin {
+            self.under_way = Some(segment.clone());
+        } else if let Some(began) = began.filter(|_| self.between.is_none()) {
+            self.production_before_s += (segment.at - began.at).as_secs_f64();
+        }
+    }
+
+    fn begin(&mut self, segment: &TestSegment) {
+        let is_fresh =
+            |(_, (at, _)): &(&String, &(Stamp<Host>, f64))| segment.at - *at <= LONGEST_AGE;
+        let latest = self.latest.iter().filter(is_fresh);
+        let thermometers: Thermometers = latest
+            .map(|(name, (_, degc))| (name.clone(), Readings::new(*degc)))
+            .collect();
+        let (first, _) = *self.between.get_or_insert_with(|| {
+            self.thermometers.clone_from(&thermometers);
+            (segment.at, segment.at)
+        });
+        self.between = Some((first, segment.at));
+        self.has_touches |= TOUCHING.contains(&segment.kind);
+        let feed_mm_s = segment.feed_mm_s;
+        let is_known = |known: &f64| (known - feed_mm_s).abs() < SAME_FEED_MM_S;
+        if feed_mm_s > 0.0 && !self.feeds_mm_s.iter().any(is_known) {
+            self.feeds_mm_s.push(feed_mm_s);
+        }
+        self.tests.push(Test {
+            run: segment.run,
+            thermometers,
+        });
+        self.under_way = Some(segment.clone());
+    }
+
+    /// What the thermometers read during tests, by the numbers of their runs.
+    #[must_use]
+    pub fn during(&self, runs: &[u32]) -> Thermometers {
+        let mut joined = Thermometers::new();
+        for test in self.tests.iter().filter(|test| runs.contains(&test.run)) {
+            for (name, readings) in &test.thermometers {
+                match joined.get_mut(name) {
+                    Some(known) => known.join(*readings),
+                    None => {
+                        joined.insert(name.clone(), *readings);
+                    }
+                }
+            }
+        }
+        joined
+    }
+}
+
+fn add(thermometers: &mut Thermometers, name: &str, degc: f64) {
+    match thermometers.get_mut(name) {
+        Some(known) => known.add(degc),
+        None => {
+            thermometers.insert(name.to_owned(), Readings::new(degc));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metrology::sample::{Sense, TestPlane};
+    use nalgebra::Vector3;
+
+    fn segment(at_s: i64, run: u32, begin: bool, kind: TestKind) -> TestSegment {
+        TestSegment {
+            at: Stamp::from_nanos(at_s * 1_000_000_000),
+            run,
+            begin,
+            kind,
+            plane: TestPlane::None,
+            centre_mm: Vector3::zeros(),
+            radius_mm: 0.0,
+            feed_mm_s: 100.0,
+            sense: Sense::None,
+            repeat: 0,
+            stylus: String::new(),
+            tool_offset_mm: Vector3::zeros(),
+            stations: 0,
+            zero_id: 1,
+            setup_id: 1,
+            cold: false,
+            features: vec![],
+            completed: !begin,
+        }
+    }
+
+    fn reading(at_s: i64, temperature_degc: f64) -> TemperatureSample {
+        TemperatureSample {
+            at: Stamp::from_nanos(at_s * 1_000_000_000),
+            sensor: "bed".to_owned(),
+            temperature_degc,
+            variance_k2: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_test_has_the_readings_of_its_time_and_the_last_one_before_it() {
+        let mut conditions = TestConditions::default();
+        conditions.segment(&segment(0, 1, true, TestKind::Production));
+        conditions.read(&reading(10, 30.0));
+        conditions.segment(&segment(600, 1, false, TestKind::Production));
+        conditions.read(&reading(610, 21.0));
+        conditions.segment(&segment(615, 2, true, TestKind::Positioning));
+        conditions.read(&reading(620, 22.0));
+        conditions.read(&reading(630, 20.5));
+        conditions.segment(&segment(635, 2, false, TestKind::Positioning));
+        conditions.read(&reading(640, 25.0));
+        // The last reading is older than ten minutes.
+        conditions.segment(&segment(2_000, 3, true, TestKind::Positioning));
+        conditions.segment(&segment(2_010, 3, false, TestKind::Positioning));
+        let bed = conditions.during(&[2])["bed"];
+        assert_eq!((bed.first_degc, bed.last_degc, bed.n), (21.0, 20.5, 3));
+        assert_eq!((bed.least_degc, bed.greatest_degc), (20.5, 22.0));
+        assert!((bed.mean_degc() - 63.5 / 3.0).abs() < 1e-12);
+        assert!(conditions.during(&[3]).is_empty());
+        assert_eq!(conditions.during(&[2, 3])["bed"], bed);
+        // The bag as a whole: without the production, with what came between the tests.
+        let all = conditions.thermometers["bed"];
+        assert_eq!((all.first_degc, all.last_degc, all.n), (21.0, 25.0, 4));
+        assert!((conditions.production_before_s - 600.0).abs() < 1e-9);
+        assert_eq!(conditions.feeds_mm_s, [100.0]);
+        let (first, last) = conditions.between.unwrap();
+        assert_eq!(last - first, Span::from_nanos(1_395_000_000_000));
+    }
+}

@@ -1,0 +1,184 @@
+//! Tables of what an external reference read: a laser's runs along an axis, an autocollimator's round one.
+//!
+//! The deviation of such a run is measured minus commanded position, as that of a table is scale minus motor: the signs are
+//! the same. The mean over the runs is taken at every target for each direction, as ISO 230-2 does (x-bar up and down).
+
+use abbe_msgs::topics;
+use machine::export::selection::Measured;
+use metrology::sample::{PositioningTable, TestKind};
+use metrology::stamp::Stamp;
+use metrology::{Axis, PerAxis};
+use recorder::Bag;
+
+use crate::evaluate::Tests;
+use crate::evaluate::angular::RotaryTest;
+use crate::evaluate::linear::{LinearTest, Reference};
+
+use super::found::is;
+
+/// Whether a bag has readings of an external reference.
+pub(super) fn are_in(bag: &Bag) -> bool {
+    let topics = bag.topics();
+    let names = [topics::LENGTH_POSITION.name, topics::ANGLE_POSITION.name];
+    topics
+        .iter()
+        .any(|info| info.message_count > 0 && names.iter().any(|name| is(&info.topic, name)))
+}
+
+/// A table for each axis that has none and was measured with nothing added to its commands; the last such test counts. Says
+/// of each what it was made of.
+pub(super) fn tables(tests: &Tests, measured: &mut Measured) -> PerAxis<Option<String>> {
+    let linear = tests.linear.iter().filter_map(of_linear);
+    let rotary = tests.rotary_positioning.iter().filter_map(of_rotary);
+    let mut last = PerAxis::<Option<(PositioningTable, String)>>::default();
+    for (table, said) in linear.chain(rotary) {
+        let axis = table.axis;
+        last[axis] = Some((table, said));
+    }
+    let mut told = PerAxis::<Option<String>>::default();
+    for axis in Axis::ALL {
+        let known = &mut measured.tables[axis];
+        if known.is_none()
+            && let Some((table, said)) = last[axis].take()
+        {
+            *known = Some(table);
+            told[axis] = Some(said);
+        }
+    }
+    told
+}
+
+fn of_linear(test: &LinearTest) -> Option<(PositioningTable, String)> {
+    let is_wanted = test.kind == TestKind::Positioning
+        && test.reference == Reference::Length
+        && !test.compensated;
+    let axis = test.axis.filter(|_| is_wanted)?;
+    let both = [&test.up_mm, &test.down_mm];
+    of_means(axis, &test.targets_mm, both, test.first_run)
+}
+
+fn of_rotary(test: &RotaryTest) -> Option<(PositioningTable, String)> {
+    let both = [&test.up_rad, &test.down_rad];
+    let axis = Some(test.axis).filter(|_| test.has_readings)?;
+    of_means(axis, &test.targets_rad, both, test.first_run)
+}
+
+/// The table of the means of runs up and down; of one direction alone both sides are that one.
+fn of_means(
+    axis: Axis,
+    targets: &[f64],
+    [up, down]: [&Vec<Vec<f64>>; 2],
+    first_run: u32,
+) -> Option<(PositioningTable, String)> {
+    let means = [means(up, targets.len()), means(down, targets.len())];
+    let (deviation_up, deviation_down, sides) = match means {
+        [Some(up), Some(down)] => (up, down, "up and down"),
+        [Some(up), None] => (
+            up.clone(),
+            up,
+            "up alone, so that its lost motion is not in it,",
+        ),
+        [None, Some(down)] => (
+            down.clone(),
+            down,
+            "down alone, so that its lost motion is not in it,",
+        ),
+        [None, None] => return None,
+    };
+    let n_runs = up.len().max(down.len());
+    let said = format!(
+        "positioning of {axis}: means {sides} of {n_runs} runs (run {first_run} on) of an external reference at {} targets, as read and not corrected to 20 °C",
+        targets.len()
+    );
+    let table = PositioningTable {
+        at: Stamp::from_nanos(0),
+        axis,
+        position: targets.to_vec(),
+        deviation_up,
+        deviation_down,
+        n_runs: u32::try_from(n_runs).unwrap_or(u32::MAX),
+        weight: 0.0,
+        sequence: 0,
+    };
+    Some((table, said))
+}
+
+/// Means over the runs at each of `n` targets; none without a run or a target.
+fn means(runs: &[Vec<f64>], n: usize) -> Option<Vec<f64>> {
+    let all_have = runs.iter().all(|run| run.len() == n);
+    if runs.is_empty() || n == 0 || !all_have {
+        return None;
+    }
+    let mean = |k: usize| runs.iter().map(|run| run[k]).sum::<f64>() / runs.len() as f64;
+    Some((0..n).map(mean).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    fn laser(axis: Axis, reference: Reference, compensated: bool) -> LinearTest {
+        LinearTest {
+            kind: TestKind::Positioning,
+            axis: Some(axis),
+            name: axis.letter().to_owned(),
+            first_run: 1,
+            runs: vec![1, 2],
+            feed_mm_s: 100.0,
+            reference,
+            direction: Vector3::ith(axis.index(), 1.0),
+            targets_mm: vec![0.0, 42.0, 83.0],
+            up_mm: vec![vec![0.001, 0.002, 0.003], vec![0.003, 0.004, 0.005]],
+            down_mm: vec![vec![-0.001, -0.002, -0.003], vec![-0.003, -0.002, -0.001]],
+            left_out: vec![],
+            compensated,
+            longest_rest: None,
+        }
+    }
+
+    #[test]
+    fn a_laser_gives_the_means_of_both_sides_where_there_is_no_table() {
+        let tests = Tests {
+            linear: vec![
+                laser(Axis::X, Reference::Length, false),
+                laser(Axis::Y, Reference::Scale, false),
+                laser(Axis::Z, Reference::Length, true),
+            ],
+            ..Tests::default()
+        };
+        let mut measured = Measured::default();
+        let told = tables(&tests, &mut measured);
+        let x = measured.tables[Axis::X].clone().unwrap();
+        assert_eq!(x.position, [0.0, 42.0, 83.0]);
+        for (found, wanted) in [
+            (&x.deviation_up, [0.002, 0.003, 0.004]),
+            (&x.deviation_down, [-0.002, -0.002, -0.002]),
+        ] {
+            let mut pairs = found.iter().zip(wanted);
+            assert!(pairs.all(|(a, b)| (a - b).abs() < 1e-15), "{found:?}");
+        }
+        let said = told[Axis::X].as_ref().unwrap();
+        assert!(said.contains("means up and down of 2 runs"), "{said}");
+        for axis in [Axis::Y, Axis::Z] {
+            assert!(measured.tables[axis].is_none() && told[axis].is_none());
+        }
+        // A table that a node learned stays.
+        let learned = measured.tables[Axis::X].clone();
+        let other = Tests {
+            linear: vec![laser(Axis::X, Reference::Length, false)],
+            ..Tests::default()
+        };
+        assert!(tables(&other, &mut measured)[Axis::X].is_none());
+        assert_eq!(measured.tables[Axis::X], learned);
+    }
+
+    #[test]
+    fn of_one_side_both_are_that_side_and_it_is_said() {
+        let mut one = laser(Axis::X, Reference::Length, false);
+        one.down_mm = vec![];
+        let (table, said) = of_linear(&one).unwrap();
+        assert_eq!(table.deviation_up, table.deviation_down);
+        assert!(said.contains("up alone"), "{said}");
+    }
+}

@@ -1,0 +1,227 @@
+//! The cells of a file: of a text with separators, or of a worksheet (xlsx).
+
+use std::io::Cursor;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use calamine::{DataRef, ExcelDateTime, Reader, Xlsx};
+use node_runtime::text_file::{self, Comments};
+
+use super::sheet::Sheet;
+
+/// Begin of a ZIP archive, which an xlsx file is.
+const ZIP: &[u8] = b"PK\x03\x04";
+/// Begin of the files of older spreadsheet programs (xls).
+const OLD: &[u8] = &[0xD0, 0xCF, 0x11, 0xE0];
+/// Most rows and columns of a worksheet that are read, and most cells in all.
+const MOST_ROWS: u32 = 1_000_000;
+const MOST_COLUMNS: u32 = 1_000;
+const MOST_CELLS: usize = 8_000_000;
+/// Longest file of a worksheet, bytes: it is packed.
+const MOST_BYTES: usize = 32 << 20;
+
+/// Separator, decimal sign and worksheet of a file.
+#[derive(Clone, Copy, Debug)]
+pub struct Form<'m> {
+    /// Between the cells of a text.
+    pub separator: char,
+    /// Before decimals.
+    pub decimal: char,
+    /// Worksheet, where there are several.
+    pub sheet: Option<&'m str>,
+}
+
+/// Whether a file is a worksheet.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn is_worksheet(path: &Path) -> Result<bool> {
+    let bytes = text_file::bytes(path)?;
+    Ok(bytes.starts_with(ZIP) || bytes.starts_with(OLD))
+}
+
+/// Reads the cells of a file.
+///
+/// # Errors
+/// When the file cannot be read, is no table of a kind that is known, or has no such worksheet.
+pub fn read(path: &Path, form: Form<'_>) -> Result<Sheet> {
+    let bytes = text_file::bytes(path)?;
+    if bytes.starts_with(OLD) {
+        bail!("a worksheet of the older kind (xls): save it as xlsx or as CSV");
+    }
+    if bytes.starts_with(ZIP) {
+        return of_xlsx(bytes, form);
+    }
+    if let Some(name) = form.sheet {
+        bail!("sheet = {name}: does nothing, the file is a text: remove it");
+    }
+    Sheet::of_text(&text_file::read(path, Comments::Csv)?, form.separator)
+}
+
+/// The cells of a worksheet of an xlsx file.
+fn of_xlsx(bytes: Vec<u8>, form: Form<'_>) -> Result<Sheet> {
+    if bytes.len() > MOST_BYTES {
+        bail!(
+            "a worksheet of {} bytes: must be at most {MOST_BYTES}: save it as CSV",
+            bytes.len()
+        );
+    }
+    let mut book = Xlsx::new(Cursor::new(bytes)).context("xlsx")?;
+    let names = book.sheet_names();
+    let wanted = match form.sheet {
+        Some(name) if !names.iter().any(|known| known == name) => bail!(
+            "sheet = {name}: the file has no such worksheet, it has {}",
+            names.join(", ")
+        ),
+        Some(name) => vec![name.to_owned()],
+        None => names,
+    };
+    for name in wanted {
+        let mut lines = cells(&mut book, &name, form.decimal)
+            .with_context(|| format!("worksheet \"{name}\""))?;
+        if lines.is_empty() {
+            continue;
+        }
+        let width = lines.iter().map(|(_, cells)| cells.len()).max();
+        let width = width.unwrap_or(0);
+        if lines.len() * width > MOST_CELLS {
+            bail!(
+                "worksheet \"{name}\": {} rows of {width} columns: must be at most {MOST_CELLS} cells",
+                lines.len()
+            );
+        }
+        for (_, cells) in &mut lines {
+            cells.resize(width, String::new());
+        }
+        return Ok(Sheet {
+            lines,
+            separator: None,
+        });
+    }
+    bail!("the file has no line with the names of columns: its worksheets are empty")
+}
+
+/// Lines of a worksheet that hold anything.
+fn cells(
+    book: &mut Xlsx<Cursor<Vec<u8>>>,
+    name: &str,
+    decimal: char,
+) -> Result<Vec<(u64, Vec<String>)>> {
+    let mut reader = book.worksheet_cells_reader(name)?;
+    let mut lines: Vec<(u64, Vec<String>)> = vec![];
+    while let Some(cell) = reader.next_cell()? {
+        let (row, column) = cell.get_position();
+        if row >= MOST_ROWS || column >= MOST_COLUMNS {
+            bail!(
+                "row {}, column {}: must be at most {MOST_ROWS} rows and {MOST_COLUMNS} columns",
+                u64::from(row) + 1,
+                u64::from(column) + 1
+            );
+        }
+        let text = text_of(cell.get_value(), decimal);
+        if text.is_empty() {
+            continue;
+        }
+        let line = u64::from(row) + 1;
+        if lines.last().is_none_or(|(last, _)| *last != line) {
+            lines.push((line, vec![]));
+        }
+        if let Some((_, cells)) = lines.last_mut() {
+            let place = column as usize;
+            if cells.len() <= place {
+                cells.resize(place + 1, String::new());
+            }
+            cells[place] = text;
+        }
+    }
+    Ok(lines)
+}
+
+/// A value as a text file would have it.
+fn text_of(value: &DataRef<'_>, decimal: char) -> String {
+    let number = |number: f64| number.to_string().replace('.', &decimal.to_string());
+    match value {
+        DataRef::Int(whole) => whole.to_string(),
+        DataRef::Float(value) => number(*value),
+        DataRef::String(text) => text.trim().to_owned(),
+        DataRef::SharedString(text) => text.trim().to_owned(),
+        DataRef::Bool(is_true) => is_true.to_string(),
+        DataRef::DateTime(time) => instant(time, &number),
+        DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => text.clone(),
+        // #DIV/0! and its like are no readings.
+        DataRef::Error(_) => "NaN".to_owned(),
+        DataRef::Empty => String::new(),
+    }
+}
+
+/// A date with its time, a time of the day, or a duration in s.
+fn instant(time: &ExcelDateTime, number: &dyn Fn(f64) -> String) -> String {
+    if time.is_duration() {
+        return number(time.as_f64() * 86_400.0);
+    }
+    let (year, month, day, hour, minute, second, milli) = time.to_ymd_hms_milli();
+    let clock = format!("{hour:02}:{minute:02}:{second:02}.{milli:03}");
+    if time.as_f64() < 1.0 {
+        return clock;
+    }
+    format!("{year:04}-{month:02}-{day:02} {clock}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn form(decimal: char) -> Form<'static> {
+        Form {
+            separator: ',',
+            decimal,
+            sheet: None,
+        }
+    }
+
+    fn file(name: &str, bytes: &[u8]) -> Result<Sheet> {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        read(&path, form('.'))
+    }
+
+    #[test]
+    fn a_worksheet_has_the_cells_that_it_was_made_with() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/import/wide.xlsx");
+        let sheet = read(&path, form(',')).unwrap();
+        let texts =
+            |k: usize| -> Vec<&str> { sheet.lines[k].1[..3].iter().map(String::as_str).collect() };
+        assert_eq!(sheet.lines[0].0, 1);
+        assert_eq!(texts(0), ["Positioning of X", "", ""]);
+        assert_eq!(texts(1), ["Date", "2026-01-05 08:00:00.000", ""]);
+        // An empty row between them.
+        assert_eq!(sheet.lines[2].0, 4);
+        assert_eq!(texts(2), ["Position [mm]", "Run 1 ↑", "Run 1 ↓"]);
+        assert_eq!(texts(3), ["-280", "-3,45", "1,47"]);
+        let named = Form {
+            sheet: Some("Laser"),
+            ..form('.')
+        };
+        assert_eq!(read(&path, named).unwrap().lines.len(), sheet.lines.len());
+        let absent = Form {
+            sheet: Some("laser 2"),
+            ..form('.')
+        };
+        let said = format!("{:#}", read(&path, absent).unwrap_err());
+        assert!(
+            said.contains("no such worksheet, it has Empty, Laser"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn what_is_no_table_is_refused_with_its_remedy() {
+        let said = format!(
+            "{:#}",
+            file("a.xls", &[0xD0, 0xCF, 0x11, 0xE0, 1]).unwrap_err()
+        );
+        assert!(said.contains("save it as xlsx or as CSV"), "{said}");
+        assert!(file("a.xlsx", b"PK\x03\x04 and no archive").is_err());
+    }
+}

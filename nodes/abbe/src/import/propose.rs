@@ -1,0 +1,521 @@
+//! A map for a table that nobody has described yet, and a machine file with only what the table contains.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use metrology::Axis;
+use metrology::number::number;
+use node_runtime::text_file::{self, Comments};
+
+use super::file::{self, Form};
+use super::map::{Direction, Map, Test, units};
+use super::recognise::{self, Known, Recognised, Role};
+use super::times;
+use super::units::{Kind, Unit};
+
+/// Deviations below this are no micrometres (seconds of arc), greatest of a table.
+const LEAST_UM: f64 = 0.05;
+/// Targets that reach less far are no millimetres.
+const LEAST_MM: f64 = 2.0;
+
+/// A map with what it rests on.
+#[derive(Debug)]
+pub struct Proposal {
+    /// The map.
+    pub map: String,
+    /// What was recognised, a line each.
+    pub recognised: Vec<String>,
+    /// What the table lacks, a line each.
+    pub needed: Vec<String>,
+}
+
+/// Proposes a map for a table.
+///
+/// # Errors
+/// When the file cannot be read, or none of its columns is recognised.
+pub fn of(path: &Path) -> Result<Proposal> {
+    let found = looked_at(path)?.with_context(|| {
+        "no line with the names of columns that has rows of numbers below it was found: write a map (docs/reference/scenario.md#import-map)"
+    })?;
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy());
+    let axis = found.axis(&stem.unwrap_or_default());
+    let mut text = Text::new(&found, path);
+    match kind(&found) {
+        Some(Of::Positioning) => text.positioning(axis)?,
+        Some(Of::Log) => text.log(axis)?,
+        Some(Of::Circle) => text.circle()?,
+        None => bail!(
+            "columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations: write a map (docs/reference/scenario.md#import-map)",
+            names(&found).join(", ")
+        ),
+    };
+    Ok(Proposal {
+        map: text.finished(),
+        recognised: text.recognised,
+        needed: text.needed,
+    })
+}
+
+fn looked_at(path: &Path) -> Result<Option<Recognised>> {
+    let form = Form {
+        separator: ',',
+        decimal: '.',
+        sheet: None,
+    };
+    if file::is_worksheet(path)? {
+        return Ok(recognise::of(&file::read(path, form)?, form.decimal));
+    }
+    Ok(recognise::of_text(&text_file::read(path, Comments::Csv)?))
+}
+
+/// Kinds of tests.
+#[derive(Clone, Copy)]
+enum Of {
+    Positioning,
+    Log,
+    Circle,
+}
+
+fn kind(found: &Recognised) -> Option<Of> {
+    let has = |role: Role| found.first(role).is_some();
+    let is_read = has(Role::Deviation) || has(Role::Measured) || !found.passes().is_empty();
+    if has(Role::Target) && is_read {
+        Some(Of::Positioning)
+    } else if has(Role::Time) && (has(Role::Displacement) || has(Role::Deviation)) {
+        Some(Of::Log)
+    } else if has(Role::Angle) && (has(Role::Radial) || has(Role::Deviation)) {
+        Some(Of::Circle)
+    } else {
+        None
+    }
+}
+
+fn names(found: &Recognised) -> Vec<&str> {
+    let columns = found.columns.iter();
+    columns.map(|column| column.name.as_str()).collect()
+}
+
+/// A word as YAML takes any.
+fn quoted(word: &str) -> String {
+    format!("\"{}\"", word.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+/// A map on its way.
+struct Text<'t> {
+    found: &'t Recognised,
+    head: String,
+    test: String,
+    units: Vec<String>,
+    used: Vec<String>,
+    start_s: f64,
+    recognised: Vec<String>,
+    needed: Vec<String>,
+}
+
+impl<'t> Text<'t> {
+    fn new(found: &'t Recognised, path: &Path) -> Self {
+        let form = match found.separator {
+            '\t' => "tabs".to_owned(),
+            other => format!("\"{other}\""),
+        };
+        let said = format!(
+            "{}: names of columns in line {}, {} rows below; cells apart by {form}, decimals behind \"{}\"",
+            path.display(),
+            found.head_line,
+            found.n_rows,
+            found.decimal
+        );
+        Self {
+            found,
+            head: format!(
+                "# Proposed by abbe for {}. NEEDED marks what the table lacks: state it.\nseparator: {}\ndecimal: {}\n",
+                path.display(),
+                if found.separator == '\t' {
+                    "\"\\t\"".to_owned()
+                } else {
+                    quoted(&found.separator.to_string())
+                },
+                quoted(&found.decimal.to_string())
+            ),
+            test: String::new(),
+            units: vec![],
+            used: vec![],
+            start_s: 0.0,
+            recognised: vec![said],
+            needed: vec![],
+        }
+    }
+
+    /// Names a column under a key.
+    fn column(&mut self, key: &str, column: &Known) {
+        self.used.push(column.name.clone());
+        let _ = writeln!(self.test, "    {key}: {}", quoted(&column.name));
+        self.recognised
+            .push(format!("{key}: column \"{}\"", column.name));
+    }
+
+    /// Lists what the table lacks.
+    fn stated(&mut self, key: &str, value: &str, why: &str) {
+        let _ = writeln!(self.test, "    {key}: {value}  # NEEDED: {why}");
+        self.needed.push(format!("{key} = {value}: {why}"));
+    }
+
+    /// States the unit of a column that is read in `wanted`; of one without a unit that cannot be right the `likely` one.
+    fn unit(&mut self, column: &Known, wanted: Unit, likely: Option<Unit>) -> Result<()> {
+        let unit = match (column.unit, likely) {
+            (Some(unit), _) if unit.kind() != wanted.kind() => bail!(
+                "column \"{}\": its unit {} cannot be that of a quantity in {}: write a map",
+                column.name,
+                unit.name(),
+                wanted.name()
+            ),
+            (_, Some(likely)) => {
+                let why = format!(
+                    "column \"{}\": its numbers are too small for {}; {} is likely, correct it where it is another",
+                    column.name,
+                    column.unit.unwrap_or(wanted).name(),
+                    likely.name()
+                );
+                self.needed.push(why);
+                likely
+            }
+            (Some(unit), None) => unit,
+            (None, None) => {
+                let name = &column.name;
+                let wanted = wanted.name();
+                self.needed.push(format!(
+                    "column \"{name}\": no unit in its name, read in {wanted}"
+                ));
+                return Ok(());
+            }
+        };
+        if unit != wanted {
+            self.units
+                .push(format!("{}: {}", quoted(&column.name), unit.name()));
+        }
+        self.recognised
+            .push(format!("column \"{}\" is in {}", column.name, unit.name()));
+        Ok(())
+    }
+
+    fn positioning(&mut self, told: Option<Axis>) -> Result<()> {
+        let found = self.found;
+        let target = found.first(Role::Target).context("no column of targets")?;
+        let is_angle = target.unit.is_some_and(|unit| unit.kind() == Kind::Angle);
+        let axis = told.filter(|axis| axis.is_linear() != is_angle);
+        let taken = axis.unwrap_or(if is_angle { Axis::C } else { Axis::X });
+        let units = units(taken);
+        let [place, deviation] = units.of_cells;
+        let is_linear = taken.is_linear();
+        let key =
+            |linear: &'static str, rotary: &'static str| if is_linear { linear } else { rotary };
+        self.test.push_str("  positioning:\n");
+        self.axis(axis, taken);
+        let [feed, overrun] = units.keys;
+        self.stated(
+            feed,
+            "1000.0",
+            "feed between the targets; figures do not depend on it",
+        );
+        self.stated(
+            "dwell_s",
+            "2.0",
+            "rest at each target; figures do not depend on it",
+        );
+        self.stated(
+            overrun,
+            "1.0",
+            "how far it turned round beyond an end; figures do not depend on it",
+        );
+        self.column(key("target_mm", "target_deg"), target);
+        self.unit(target, place, likely_target(target, place))?;
+        let passes = found.passes();
+        if !passes.is_empty() {
+            self.passes(&passes, key("passes_um", "passes_arcsec"), deviation)?;
+            return Ok(());
+        }
+        match (found.first(Role::Deviation), found.first(Role::Measured)) {
+            (Some(read), _) => {
+                self.column(key("deviation_um", "deviation_arcsec"), read);
+                self.unit(read, deviation, likely_deviation(&[read], deviation))?;
+            }
+            (None, Some(read)) => {
+                self.column(key("measured_mm", "measured_deg"), read);
+                let likely = likely_target(read, place);
+                self.unit(read, place, likely)?;
+            }
+            (None, None) => bail!("no column of deviations"),
+        }
+        if let Some(run) = found.first(Role::Run) {
+            self.column("run", run);
+        }
+        if let Some(direction) = found.first(Role::Direction) {
+            self.column("direction", direction);
+        } else {
+            self.needed.push(
+                "no column of directions: the side of approach follows from the order of the rows, which must be that of the measurement".to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    fn passes(&mut self, passes: &[(&Known, Direction)], key: &str, wanted: Unit) -> Result<()> {
+        let _ = writeln!(self.test, "    {key}:");
+        let columns: Vec<&Known> = passes.iter().map(|(column, _)| *column).collect();
+        let likely = likely_deviation(&columns, wanted);
+        for (column, direction) in passes {
+            let word = match direction {
+                Direction::Up => "up",
+                Direction::Down => "down",
+            };
+            self.used.push(column.name.clone());
+            let name = quoted(&column.name);
+            let _ = writeln!(self.test, "      - {{column: {name}, direction: {word}}}");
+            self.recognised
+                .push(format!("pass {word}: column \"{}\"", column.name));
+            self.unit(column, wanted, likely)?;
+        }
+        Ok(())
+    }
+
+    fn axis(&mut self, told: Option<Axis>, taken: Axis) {
+        if told.is_some() {
+            let _ = writeln!(self.test, "    axis: {taken}");
+            self.recognised.push(format!("axis {taken}"));
+        } else {
+            self.stated("axis", taken.letter(), "which axis moved");
+        }
+    }
+
+    fn log(&mut self, told: Option<Axis>) -> Result<()> {
+        let found = self.found;
+        let time = found.first(Role::Time).context("no column of times")?;
+        let read = found.first(Role::Displacement);
+        let read = read.or_else(|| found.first(Role::Deviation));
+        let read = read.context("no column of displacements")?;
+        let axis = told.filter(|axis| axis.is_linear());
+        let taken = axis.unwrap_or(Axis::Z);
+        self.test.push_str("  log:\n");
+        self.axis(axis, taken);
+        self.column("time_s", time);
+        match times::of_text(&time.first)? {
+            Some(first_s) => self.start_s = first_s,
+            None => self.time_unit(time)?,
+        }
+        self.column("displacement_um", read);
+        self.unit(read, Unit::Um, likely_deviation(&[read], Unit::Um))?;
+        if let Some(run) = found.first(Role::Run) {
+            self.column("run", run);
+        }
+        let mut sensors: Vec<String> = vec![];
+        for column in found.all(Role::Temperature) {
+            let id = sensor_id(&column.name, sensors.len());
+            if sensors.is_empty() {
+                self.test.push_str("    temperature_degc:\n");
+            }
+            if sensors.contains(&id) {
+                continue;
+            }
+            let _ = writeln!(self.test, "      {id}: {}", quoted(&column.name));
+            self.used.push(column.name.clone());
+            self.recognised
+                .push(format!("temperature_degc.{id}: column \"{}\"", column.name));
+            sensors.push(id);
+        }
+        if !sensors.is_empty() {
+            self.needed.push(
+                "temperature_degc: the thermometers' names in the machine file, in place of those made from the columns".to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    /// The unit of times that are numbers: named, or that of an epoch.
+    fn time_unit(&mut self, time: &Known) -> Result<()> {
+        let first = time.numbers.first().copied().unwrap_or(0.0);
+        let named = time.unit.filter(|unit| unit.kind() == Kind::Time);
+        let of_epoch = || {
+            let (word, _) = metrology::epoch::likely_unit(first)?;
+            match word {
+                "milliseconds" => Some(Unit::Ms),
+                "microseconds" => Some(Unit::Us),
+                "nanoseconds" => Some(Unit::Ns),
+                _ => None,
+            }
+        };
+        let unit = named.or_else(of_epoch).unwrap_or(Unit::Second);
+        let first_s = unit.convert(first, Unit::Second);
+        if first_s > 6e8 {
+            self.start_s = first_s;
+        }
+        let told = Known {
+            unit: Some(unit),
+            ..time.clone()
+        };
+        self.unit(&told, Unit::Second, None)
+    }
+
+    fn circle(&mut self) -> Result<()> {
+        let found = self.found;
+        let angle = found.first(Role::Angle).context("no column of angles")?;
+        let read = found.first(Role::Radial);
+        let read = read.or_else(|| found.first(Role::Deviation));
+        let read = read.context("no column of radial deviations")?;
+        let run = found.first(Role::Run);
+        let run =
+            run.context("no column of the run: a circle needs one that numbers the circles")?;
+        self.test.push_str("  circle:\n");
+        self.stated("plane", "XY", "plane of the circles");
+        self.stated("centre_mm", "[0.0, 0.0, 0.0]", "centre of the circles");
+        self.stated(
+            "radius_mm",
+            "100.0",
+            "nominal radius; lengths that follow from it (scale, squareness) depend on it",
+        );
+        self.stated(
+            "feed_mm_min",
+            "1000.0",
+            "feed; what follows from speed depends on it",
+        );
+        self.column("run", run);
+        self.column("angle_deg", angle);
+        self.unit(angle, Unit::Deg, None)?;
+        self.column("radial_um", read);
+        self.unit(read, Unit::Um, likely_deviation(&[read], Unit::Um))?;
+        Ok(())
+    }
+
+    /// The whole map, with a comment for each column that it does not use.
+    fn finished(&mut self) -> String {
+        let mut map = self.head.clone();
+        if self.start_s > 0.0 {
+            let _ = writeln!(map, "start_s: {:.0}", self.start_s.floor());
+        } else {
+            map.push_str("start_s: 0  # NEEDED: when the measurement began, s since 1970\n");
+            self.needed
+                .push("start_s: when the measurement began, s since 1970".to_owned());
+        }
+        if !self.units.is_empty() {
+            let _ = writeln!(map, "units: {{{}}}", self.units.join(", "));
+        }
+        for line in &self.needed {
+            if line.starts_with("column") {
+                let _ = writeln!(map, "# NEEDED: {line}");
+            }
+        }
+        let others: Vec<&str> = names(self.found)
+            .into_iter()
+            .filter(|name| !self.used.iter().any(|used| used == name))
+            .collect();
+        if !others.is_empty() {
+            self.recognised.push(format!(
+                "columns that were not recognised: {}",
+                others.join(", ")
+            ));
+        }
+        map.push_str("test:\n");
+        map.push_str(&self.test);
+        map
+    }
+}
+
+fn greatest(numbers: &[f64]) -> f64 {
+    numbers
+        .iter()
+        .fold(0.0, |most: f64, number| most.max(number.abs()))
+}
+
+/// Metres, where targets reach less far than any test in mm.
+fn likely_target(column: &Known, wanted: Unit) -> Option<Unit> {
+    let most = greatest(&column.numbers);
+    let is_bare = column.unit.is_none_or(|unit| unit == Unit::Mm);
+    (wanted == Unit::Mm && is_bare && most > 0.0 && most < LEAST_MM).then_some(Unit::Metre)
+}
+
+/// Millimetres, where all deviations are below what any machine has in µm.
+fn likely_deviation(columns: &[&Known], wanted: Unit) -> Option<Unit> {
+    let most = columns.iter().map(|column| greatest(&column.numbers));
+    let most = most.fold(0.0, f64::max);
+    let is_bare = |column: &&Known| column.unit.is_none_or(|unit| unit == Unit::Um);
+    let is_small = most > 0.0 && most < LEAST_UM;
+    (wanted == Unit::Um && columns.iter().all(is_bare) && is_small).then_some(Unit::Mm)
+}
+
+/// A thermometer's name from that of its column.
+fn sensor_id(name: &str, n: usize) -> String {
+    let plain = name.split(['[', '(']).next().unwrap_or_default();
+    let words = plain.split(|letter: char| !letter.is_ascii_alphanumeric());
+    let words: Vec<String> = words
+        .filter(|word| !word.is_empty())
+        .map(str::to_lowercase)
+        .collect();
+    let id = words.join("_");
+    if id.starts_with(|letter: char| letter.is_ascii_lowercase()) {
+        id
+    } else {
+        format!("sensor_{}", n + 1)
+    }
+}
+
+/// A machine of which nothing is stated but what a map names, wide enough for any table.
+pub fn machine_for(map: &Map) -> String {
+    let (axis, sensors) = match &map.test {
+        Test::Positioning { axis, .. } => (*axis, vec![]),
+        Test::Circle { .. } => (Axis::X, vec![]),
+        Test::Log {
+            axis,
+            temperature_degc,
+            ..
+        } => (*axis, temperature_degc.keys().collect()),
+    };
+    let linear = "{travel_mm: [-100000.0, 100000.0], feed_limit_mm_min: 1000000.0}";
+    let rotary = "{travel_deg: [-3600.0, 3600.0], feed_limit_deg_min: 1000000.0, acceleration_limit_deg_s2: 1000.0, position_gain_per_s: 40.0, velocity_feedforward: 0.98, encoder_resolution_arcsec: 0.1}";
+    let mut text = String::from("name: not_stated\n");
+    if axis.is_linear() {
+        text.push_str("chain: \"[w X' Y' b Z t]\"\n");
+    } else {
+        let _ = writeln!(text, "chain: \"[w {axis}' X' Y' b Z t]\"");
+    }
+    let _ = writeln!(text, "axes:\n  X: {linear}\n  Y: {linear}\n  Z: {linear}");
+    if !axis.is_linear() {
+        let _ = writeln!(
+            text,
+            "  {axis}: {rotary}\nrotary:\n  origin_mm: {{{axis}: [0.0, 0.0, 0.0]}}"
+        );
+    }
+    if !sensors.is_empty() {
+        text.push_str("temperature_sensors:\n");
+    }
+    for id in sensors {
+        let _ = writeln!(text, "  - {{id: {id}, place: ambient, period_s: 10.0}}");
+    }
+    text
+}
+
+/// Asks about deviations that are too small for the unit that they are read in; `likely` is the one that they could be in.
+pub fn doubt(numbers: &[f64], name: &str, [unit, likely]: [&str; 2]) -> Option<String> {
+    let most = greatest(numbers);
+    (most > 0.0 && most < LEAST_UM).then(|| {
+        format!(
+            "column \"{name}\": all its numbers are at most {} {unit}, below what machines have: are they {likely}? Then the map needs `units: {{{}: {likely}}}`",
+            number(most),
+            quoted(name)
+        )
+    })
+}
+
+/// Asks about targets of a linear axis, mm, that all lie closer to zero than any but the shortest test has them.
+pub fn doubt_of_targets(targets_mm: &[f64], name: &str) -> Option<String> {
+    let most = greatest(targets_mm);
+    (most > 0.0 && most < LEAST_MM).then(|| {
+        format!(
+            "column \"{name}\": its targets reach to {} mm alone: are they m? Then the map needs `units: {{{}: m}}`",
+            number(most),
+            quoted(name)
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests;

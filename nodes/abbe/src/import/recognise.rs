@@ -1,0 +1,431 @@
+//! What the columns of a table are, by their names and their cells.
+
+use metrology::Axis;
+
+use super::map::Direction;
+use super::sheet::Sheet;
+use super::table::number_of;
+use super::units::{Kind, Unit};
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    Run,
+    Direction,
+    Target,
+    Deviation,
+    Measured,
+    Pass(Direction),
+    Time,
+    Displacement,
+    Temperature,
+    Angle,
+    Radial,
+}
+
+/// A column with what it holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Known {
+    /// Its name as it stands in the file.
+    pub name: String,
+    /// What it holds; nothing that is known.
+    pub role: Option<Role>,
+    /// The unit in its name.
+    pub unit: Option<Unit>,
+    /// Its cells that are numbers.
+    pub numbers: Vec<f64>,
+    /// Its first cell.
+    pub first: String,
+}
+
+/// A table that was looked at.
+#[derive(Clone, Debug)]
+pub struct Recognised {
+    /// Separator of a text.
+    pub separator: char,
+    /// Before decimals.
+    pub decimal: char,
+    /// Line of the file that has the names, from 1.
+    pub head_line: u64,
+    /// Columns in their order.
+    pub columns: Vec<Known>,
+    /// Rows below the names.
+    pub n_rows: usize,
+    /// Words above the names.
+    pub above: String,
+}
+
+/// Rows that are looked at for what a column holds.
+const LOOKED_AT: usize = 2000;
+/// Rows among which a line of units may stand below the names.
+const NEAR: usize = 2;
+
+/// Looks at the cells of a file; `None`: no line of names has rows of numbers below it.
+pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
+    let is_number = |cell: &String| number_of(cell, decimal).is_some() || is_instant(cell);
+    let n_numbers = |cells: &[String]| cells.iter().filter(|cell| is_number(cell)).count();
+    let n_words = |cells: &[String]| {
+        let words = cells.iter().filter(|cell| !cell.is_empty());
+        words.filter(|cell| !is_number(cell)).count()
+    };
+    let lines = &sheet.lines;
+    let at = (0..lines.len()).find(|k| {
+        let cells = &lines[*k].1;
+        let mut below = lines[k + 1..].iter().take(NEAR);
+        n_words(cells) >= 2
+            && n_words(cells) > n_numbers(cells)
+            && below.any(|(_, cells)| n_numbers(cells) >= 2)
+    })?;
+    let (head_line, head) = &lines[at];
+    let rows: Vec<&Vec<String>> = lines[at + 1..]
+        .iter()
+        .map(|(_, cells)| cells)
+        .filter(|cells| n_numbers(cells) > 0)
+        .take(LOOKED_AT)
+        .collect();
+    let columns = head.iter().enumerate().filter(|(_, name)| !name.is_empty());
+    let columns = columns.map(|(k, name)| {
+        let cells: Vec<&str> = rows
+            .iter()
+            .filter_map(|row| row.get(k))
+            .map(String::as_str)
+            .filter(|cell| !cell.is_empty())
+            .collect();
+        known(name, &cells, decimal)
+    });
+    let above = lines[..at].iter().map(|(_, cells)| cells.join(" "));
+    Some(Recognised {
+        separator: sheet.separator.unwrap_or(','),
+        decimal,
+        head_line: *head_line,
+        columns: columns.collect(),
+        n_rows: lines.len() - at - 1,
+        above: above.collect::<Vec<_>>().join(" "),
+    })
+}
+
+/// Whether a cell looks like a time of the day, with or without its date.
+fn is_instant(cell: &str) -> bool {
+    cell.contains(':') && cell.starts_with(|letter: char| letter.is_ascii_digit())
+}
+
+/// The best way to cut a text into cells: the one that gives most numbers in columns that have names.
+pub fn of_text(text: &str) -> Option<Recognised> {
+    let forms = [(';', ','), ('\t', ','), (';', '.'), ('\t', '.'), (',', '.')];
+    let looked = forms.into_iter().filter_map(|(separator, decimal)| {
+        let sheet = Sheet::of_text(text, separator).ok()?;
+        of(&sheet, decimal)
+    });
+    looked.max_by_key(|found| {
+        let numbers: usize = found
+            .columns
+            .iter()
+            .map(|column| column.numbers.len())
+            .sum();
+        // Of ways that give the same cells the plain one: a point as decimal.
+        (numbers, found.decimal == '.')
+    })
+}
+
+fn known(name: &str, cells: &[&str], decimal: char) -> Known {
+    let (words, unit_word) = parts(name);
+    let unit = unit_word.as_deref().and_then(Unit::of_word);
+    let degc = ["°c", "degc", "c", "ºc"];
+    let is_degc = unit_word.is_some_and(|word| degc.contains(&word.to_lowercase().as_str()));
+    let numbers: Vec<f64> = cells
+        .iter()
+        .filter_map(|cell| number_of(cell, decimal))
+        .collect();
+    let is_numeric = 2 * numbers.len() > cells.len();
+    let role = if is_degc {
+        Some(Role::Temperature)
+    } else {
+        role(name, &words, unit, (cells, is_numeric))
+    };
+    let role =
+        role.or_else(|| (is_numeric && is_warm(&words, &numbers)).then_some(Role::Temperature));
+    Known {
+        name: name.to_owned(),
+        role,
+        unit,
+        numbers,
+        first: cells.first().copied().unwrap_or_default().to_owned(),
+    }
+}
+
+/// Whether a column without a unit is that of a thermometer: named by a place, with numbers that are degrees Celsius.
+fn is_warm(words: &[String], numbers: &[f64]) -> bool {
+    const PLACES: [&str; 14] = [
+        "spindle", "bearing", "ambient", "room", "air", "bed", "column", "nut", "coolant", "table",
+        "raum", "luft", "spindel", "bett",
+    ];
+    let named = words.iter().any(|word| PLACES.contains(&word.as_str()));
+    named && !numbers.is_empty() && numbers.iter().all(|degc| (-20.0..=150.0).contains(degc))
+}
+
+/// The words of a name in lower case, and what stands where a unit does: in brackets, or last behind a blank, `/` or `_`.
+fn parts(name: &str) -> (Vec<String>, Option<String>) {
+    let mut rest = name.to_owned();
+    let mut unit = None;
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let (Some(from), Some(to)) = (rest.rfind(open), rest.rfind(close))
+            && from < to
+        {
+            unit = Some(rest[from + open.len_utf8()..to].trim().to_owned());
+            rest.replace_range(from..=to, " ");
+            break;
+        }
+    }
+    let tokens =
+        rest.split(|letter: char| !letter.is_alphanumeric() && letter != 'µ' && letter != '°');
+    let mut words: Vec<String> = tokens
+        .filter(|word| !word.is_empty())
+        .map(str::to_lowercase)
+        .collect();
+    if unit.is_none()
+        && words.len() > 1
+        && let Some(last) = words.last()
+        && (Unit::of_word(last).is_some() || last == "degc" || last == "°c")
+    {
+        unit = words.pop();
+    }
+    (words, unit)
+}
+
+fn role(
+    name: &str,
+    words: &[String],
+    unit: Option<Unit>,
+    (cells, is_numeric): (&[&str], bool),
+) -> Option<Role> {
+    let has = |starts: &[&str]| {
+        words
+            .iter()
+            .any(|word| starts.iter().any(|start| word.starts_with(start)))
+    };
+    let is_one = |whole: &[&str]| words.iter().any(|word| whole.contains(&word.as_str()));
+    let names_way = has(&["dir", "way", "richt", "approach", "sense"]);
+    let all_ways = !cells.is_empty() && cells.iter().all(|cell| Direction::of_word(cell).is_some());
+    if all_ways && (names_way || !is_numeric) {
+        return Some(Role::Direction);
+    }
+    let kind = unit.map(Unit::kind);
+    let has_clock = cells.first().is_some_and(|cell| is_instant(cell));
+    if has_clock || kind == Some(Kind::Time) {
+        return Some(Role::Time);
+    }
+    if !is_numeric {
+        return None;
+    }
+    if let Some(direction) = way_of(name, words) {
+        return Some(Role::Pass(direction));
+    }
+    let roles: [(Role, bool); 9] = [
+        (Role::Temperature, has(&["temp", "therm"])),
+        (
+            Role::Time,
+            has(&["time", "zeit", "stamp", "epoch"]) || is_one(&["t", "date", "datum"]),
+        ),
+        (Role::Radial, has(&["radial", "radius", "ballbar"])),
+        (Role::Angle, has(&["angle", "winkel", "theta", "phi"])),
+        (
+            Role::Deviation,
+            has(&["dev", "err", "abweich", "fehler", "diff", "delta"]),
+        ),
+        (
+            Role::Measured,
+            has(&["measur", "actual", "reading", "mess"]) || is_one(&["ist", "istwert", "laser"]),
+        ),
+        (
+            Role::Target,
+            has(&["target", "soll", "nominal", "position", "command", "ziel"]) || is_one(&["pos"]),
+        ),
+        (
+            Role::Run,
+            has(&["run", "cycle", "lauf", "zyklus", "pass"]) || is_one(&["nr", "no", "n"]),
+        ),
+        (
+            Role::Displacement,
+            has(&["displ", "drift", "growth", "weg"])
+                || kind == Some(Kind::Length)
+                || is_one(&["x", "y", "z"]),
+        ),
+    ];
+    roles
+        .into_iter()
+        .find(|(_, is_it)| *is_it)
+        .map(|(role, _)| role)
+}
+
+/// The direction in the name of a pass: `1 up`, `Run 2 ↓`, `3-`.
+fn way_of(name: &str, words: &[String]) -> Option<Direction> {
+    for (sign, direction) in [('↑', Direction::Up), ('↓', Direction::Down)] {
+        if name.contains(sign) {
+            return Some(direction);
+        }
+    }
+    let of_words = words.iter().filter(|word| {
+        let is_number = word.parse::<f64>().is_ok();
+        !is_number && word.as_str() != "pos" && word.as_str() != "neg"
+    });
+    let mut told = of_words.filter_map(|word| Direction::of_word(word));
+    let by_sign = || {
+        let trimmed = name.trim();
+        let numbered = trimmed.trim_end_matches(['+', '-', '\u{2212}']);
+        let sign = trimmed.get(numbered.len()..).unwrap_or_default();
+        let is_number = numbered.chars().any(|letter| letter.is_ascii_digit());
+        Direction::of_word(sign).filter(|_| is_number && !sign.is_empty())
+    };
+    told.next().or_else(by_sign)
+}
+
+impl Recognised {
+    /// The first column of a role.
+    pub fn first(&self, role: Role) -> Option<&Known> {
+        self.columns.iter().find(|column| column.role == Some(role))
+    }
+
+    /// Every column of a role.
+    pub fn all(&self, role: Role) -> impl Iterator<Item = &Known> {
+        let columns = self.columns.iter();
+        columns.filter(move |column| column.role == Some(role))
+    }
+
+    /// The columns of passes with their directions, in their order.
+    pub fn passes(&self) -> Vec<(&Known, Direction)> {
+        let columns = self.columns.iter();
+        let pass = |column: &'_ Known| match column.role {
+            Some(Role::Pass(direction)) => Some(direction),
+            _ => None,
+        };
+        columns
+            .filter_map(|column| Some((column, pass(column)?)))
+            .collect()
+    }
+
+    /// The axis that is named by the file, the lines above the table, or a column.
+    pub fn axis(&self, stem: &str) -> Option<Axis> {
+        let letter = |word: &str| word.parse::<Axis>().ok().filter(|_| word.len() == 1);
+        let split = |text: &str| -> Vec<String> {
+            let words = text.split(|letter: char| !letter.is_alphanumeric());
+            words
+                .filter(|word| !word.is_empty())
+                .map(str::to_uppercase)
+                .collect()
+        };
+        let above = split(&self.above);
+        let beside = above.windows(2).find_map(|two| {
+            let names = |word: &str| word == "AXIS" || word == "ACHSE";
+            match two {
+                [name, axis] if names(name) => letter(axis),
+                [axis, name] if names(name) => letter(axis),
+                _ => None,
+            }
+        });
+        // Of a name of a file a capital alone: `c.csv` is no axis.
+        let of_name = || {
+            let mut words = stem.split(|letter: char| !letter.is_alphanumeric());
+            words.find_map(letter)
+        };
+        let of_column = || {
+            let read = [Role::Displacement, Role::Deviation, Role::Target];
+            let columns = read.into_iter().flat_map(|role| self.all(role));
+            columns.map(|column| split(&column.name)).find_map(|words| {
+                let first = words.first()?;
+                letter(first)
+            })
+        };
+        beside.or_else(of_name).or_else(of_column)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn roles(text: &str) -> Vec<(String, Option<Role>)> {
+        let found = of_text(text).expect("a table");
+        let columns = found.columns.into_iter();
+        columns.map(|column| (column.name, column.role)).collect()
+    }
+
+    #[test]
+    fn columns_are_known_by_their_names_and_cells() {
+        for (text, wanted) in [
+            (
+                "run,direction,target_mm,deviation_um\n1,up,0,0.5\n1,down,0,2\n",
+                vec![Role::Run, Role::Direction, Role::Target, Role::Deviation],
+            ),
+            (
+                "Laser\n\nLauf;Richtung;Sollposition [mm];Abweichung [µm]\n1;+;0,000;-1,5\n1;-;0,000;2,5\n",
+                vec![Role::Run, Role::Direction, Role::Target, Role::Deviation],
+            ),
+            (
+                "Position [mm]\t1 up\t1 down\tRun 2 ↑\t2-\n0\t1.5\t2.5\t1.0\t3\n",
+                vec![
+                    Role::Target,
+                    Role::Pass(Direction::Up),
+                    Role::Pass(Direction::Down),
+                    Role::Pass(Direction::Up),
+                    Role::Pass(Direction::Down),
+                ],
+            ),
+            (
+                "time_s,z_um,spindle [°C],room (degC)\n0,0.1,20.5,20.0\n",
+                vec![
+                    Role::Time,
+                    Role::Displacement,
+                    Role::Temperature,
+                    Role::Temperature,
+                ],
+            ),
+            (
+                "time_s,x_um,spindle,spindle speed,room\n0,0.1,20.5,6000,20.0\n",
+                vec![
+                    Role::Time,
+                    Role::Displacement,
+                    Role::Temperature,
+                    Role::Temperature,
+                ],
+            ),
+            (
+                "cycle,angle_deg,radial_um\n1,0,2\n1,10,3\n",
+                vec![Role::Run, Role::Angle, Role::Radial],
+            ),
+            (
+                "Target position (inch),Measured position (inch)\n1,1.0001\n2,2.0001\n",
+                vec![Role::Target, Role::Measured],
+            ),
+        ] {
+            let found: Vec<Role> = roles(text)
+                .into_iter()
+                .filter_map(|(_, role)| role)
+                .collect();
+            assert_eq!(found, wanted, "{text}");
+        }
+    }
+
+    #[test]
+    fn separators_decimals_and_units_are_those_of_the_text() {
+        let found =
+            of_text("n;Position [mm];Error [µm]\n1;0,5;-1,25\n1;1,5;2,5\n").expect("a table");
+        assert_eq!((found.separator, found.decimal), (';', ','));
+        let units: Vec<Option<Unit>> = found.columns.iter().map(|column| column.unit).collect();
+        assert_eq!(units, [None, Some(Unit::Mm), Some(Unit::Um)]);
+        let found = of_text("# made\nAxis Y\nn,t,d\n1,0,1.5\n").expect("a table");
+        assert_eq!(
+            (found.separator, found.decimal, found.head_line),
+            (',', '.', 3)
+        );
+        assert_eq!(found.axis("table"), Some(Axis::Y));
+        assert_eq!(
+            of_text("no numbers\nat all\n").map(|found| found.n_rows),
+            None
+        );
+        let found = of_text("time_s,z_um\n0,1\n60,2\n").expect("a table");
+        assert_eq!(
+            (found.axis("log"), found.axis("lead_X")),
+            (Some(Axis::Z), Some(Axis::X))
+        );
+    }
+}

@@ -1,0 +1,489 @@
+//! Which rows of a table are one run, and in what order they were measured.
+//!
+//! Rows with one number of run that stand together are a run, in the order of the measurement. A number that comes
+//! again after another one shows that the table was sorted by something else. Of a positioning test with a column of
+//! the direction the rows of each number are then gathered, upwards by ascending target first and downwards behind; of
+//! every other test the order of the measurement is lost, and the table is refused. Targets that are meant to be one become
+//! one ([`same`]), rows without a number of run are counted, and passes that are numbered as runs become cycles
+//! ([`passes`]).
+
+use std::collections::BTreeMap;
+
+use anyhow::{Result, bail};
+use metrology::Axis;
+use metrology::number::number;
+
+use super::limits::Range;
+use super::map::{Test, Units, units};
+use super::passes;
+use super::same;
+use super::table::{Row, Table};
+
+/// Targets nearer than this are one, mm.
+pub const SAME_MM: f64 = 1e-9;
+/// Spacing of the grid on which targets are compared from run to run, mm.
+pub const GRID_MM: f64 = 1e-6;
+
+/// The runs of a table.
+#[derive(Debug)]
+pub struct Runs {
+    /// Rows of each, in the order of the measurement.
+    pub runs: Vec<Vec<Row>>,
+    /// What a reader should know of them.
+    pub remarks: Vec<String>,
+}
+
+/// Finds the runs of a test's table.
+///
+/// # Errors
+/// Line and remedy where rows contradict their column of the direction, repeat each other, or are in no order from
+/// which the motion follows.
+pub fn of(test: &Test, table: &Table) -> Result<Runs> {
+    let Runs {
+        mut runs,
+        mut remarks,
+    } = numbered(test, table)?;
+    let Test::Positioning {
+        axis,
+        run,
+        same_target_um,
+        ..
+    } = test
+    else {
+        return Ok(Runs { runs, remarks });
+    };
+    let units = units(*axis);
+    if let Some(turn) = units.turn {
+        remarks.extend(unwrap(&mut runs, turn));
+    }
+    remarks.extend(same::merge(&mut runs, *same_target_um, units));
+    let is_counted = run.is_none() && test.passes().is_empty();
+    if is_counted || passes::are_rows(&runs) {
+        let (counted, remark) = passes::repetitions(runs.concat())?;
+        runs = counted;
+        remarks.push(remark);
+    }
+    remarks.extend(passes::pair(&mut runs));
+    check_directions(&runs, units)?;
+    remarks.extend(check_targets(&runs, units)?);
+    Ok(Runs { runs, remarks })
+}
+
+/// The runs by their numbers.
+fn numbered(test: &Test, table: &Table) -> Result<Runs> {
+    let column = match test.run() {
+        Some(column) => column,
+        None if !test.passes().is_empty() => "",
+        None => {
+            return Ok(Runs {
+                runs: vec![table.rows.clone()],
+                remarks: vec![],
+            });
+        }
+    };
+    let together: Vec<&[Row]> = table
+        .rows
+        .chunk_by(|a, b| a.cells[0].total_cmp(&b.cells[0]).is_eq())
+        .collect();
+    let mut remarks = vec![];
+    let runs = match again(&together) {
+        None => together.iter().map(|rows| rows.to_vec()).collect(),
+        Some((row, before)) if test.direction().is_some() => {
+            remarks.push(format!(
+                "run {} comes again in line {}, after run {before}: the rows are not in the order of the measurement. They were gathered by run, \
+                 upwards first and then downwards; how long a stop came after another is not known",
+                row.cells[0], row.line
+            ));
+            gathered(&table.rows)
+        }
+        Some((row, before)) => {
+            let remedy = if matches!(test, Test::Positioning { .. }) {
+                "; or name a column of the direction in the map"
+            } else {
+                ""
+            };
+            bail!(
+                "line {}: column \"{column}\": run {} comes again after run {before}, so the order of the measurement is lost: \
+                 put the rows of a run one after another, as they were measured{remedy}",
+                row.line,
+                row.cells[0],
+            );
+        }
+    };
+    Ok(Runs { runs, remarks })
+}
+
+/// The first row whose number of run was there before another number, with that number.
+fn again<'a>(together: &[&'a [Row]]) -> Option<(&'a Row, f64)> {
+    let mut seen: Vec<f64> = vec![];
+    for rows in together {
+        let first = rows.first()?;
+        let number = first.cells[0];
+        if seen.iter().any(|known| known.total_cmp(&number).is_eq()) {
+            return Some((first, *seen.last()?));
+        }
+        seen.push(number);
+    }
+    None
+}
+
+/// Rows by their number of run, upwards by ascending target, then downwards by descending target.
+pub fn gathered(rows: &[Row]) -> Vec<Vec<Row>> {
+    let mut runs: Vec<Vec<Row>> = vec![];
+    for row in rows {
+        let own = runs.iter_mut().find(|run| {
+            run.iter()
+                .any(|of| of.cells[0].total_cmp(&row.cells[0]).is_eq())
+        });
+        match own {
+            Some(run) => run.push(row.clone()),
+            None => runs.push(vec![row.clone()]),
+        }
+    }
+    for run in &mut runs {
+        run.sort_by(|a, b| {
+            let (down_a, down_b) = (a.cells[3] < 0.0, b.cells[3] < 0.0);
+            let targets = a.cells[1].total_cmp(&b.cells[1]);
+            let targets = if down_a { targets.reverse() } else { targets };
+            down_a.cmp(&down_b).then(targets)
+        });
+    }
+    runs
+}
+
+/// Counts targets of a rotary axis on where they wrap: a step against its direction of more than half a turn goes on beyond
+/// the turn. Without a column of directions nothing shows that a step wrapped.
+fn unwrap(runs: &mut [Vec<Row>], turn: f64) -> Option<String> {
+    let mut n = 0;
+    for rows in runs {
+        let mut added = 0.0;
+        let mut before: Option<f64> = None;
+        for row in rows {
+            let told = row.cells.get(3).copied().unwrap_or(0.0);
+            let step = before.map_or(0.0, |before| row.cells[1] + added - before);
+            if told * step < 0.0 && step.abs() > turn / 2.0 {
+                added += told.signum() * turn;
+                n += 1;
+            }
+            row.cells[1] += added;
+            before = Some(row.cells[1]);
+        }
+    }
+    (n > 0).then(|| {
+        format!(
+            "targets wrap {n} times at {turn} deg against their direction: they were counted on"
+        )
+    })
+}
+
+/// Refuses targets that the axis cannot reach once they were counted on, and places where a linear axis would have turned
+/// round beyond its travel; those of a rotary axis, whose travel may be one of the control's alone, are remarks.
+///
+/// # Errors
+/// With line, value and travel.
+pub fn check_travel(
+    runs: &Runs,
+    travel: Option<&Range>,
+    (axis, overrun): (Axis, f64),
+) -> Result<Option<String>> {
+    let Some(travel) = travel else {
+        return Ok(None);
+    };
+    if let Some(row) = { runs.runs.iter().flatten() }.find(|row| !travel.holds(row.cells[1])) {
+        bail!(
+            "line {}: target {}: must be {travel}",
+            row.line,
+            row.cells[1]
+        );
+    }
+    let turns = runs.runs.iter().flat_map(|rows| turns(rows, overrun));
+    let mut beyond = turns.filter(|(_, at)| !travel.holds(*at));
+    let Some((row, at)) = beyond.next() else {
+        return Ok(None);
+    };
+    let others = beyond.count();
+    let units = units(axis);
+    let key = units.keys[1];
+    let words = format!(
+        "line {}: target {} {unit} with test.positioning.{key} = {} {unit}: {axis} turns round at {} {unit}: must be {travel}; \
+         correct {key} in the map, or travel_{unit} in the machine file{}",
+        row.line,
+        row.cells[1],
+        number(overrun),
+        number(at),
+        if others > 0 {
+            format!(" (places beyond it: {})", others + 1)
+        } else {
+            String::new()
+        },
+        unit = units.target
+    );
+    if axis.is_linear() {
+        bail!("{words}");
+    }
+    Ok(Some(words))
+}
+
+/// Where a run turns round beyond a target, and the row of the target: before its first one, and between two rows of one.
+fn turns(rows: &[Row], overrun: f64) -> Vec<(&Row, f64)> {
+    let is_turn = |k: usize| match k.checked_sub(1).and_then(|before| rows.get(before)) {
+        None => true,
+        Some(before) => (rows[k].cells[1] - before.cells[1]).abs() <= SAME_MM,
+    };
+    let ways = ways(rows).into_iter().zip(rows).enumerate();
+    ways.filter(|(k, _)| is_turn(*k))
+        .map(|(_, (way, row))| (row, row.cells[1] - way * overrun))
+        .collect()
+}
+
+/// Sign of the approach to the first target of a run, as its row states it. Without it, the sign of the way to the next
+/// other target.
+pub fn first_way(rows: &[Row]) -> f64 {
+    let first_mm = rows[0].cells[1];
+    let told = rows[0].cells.get(3).copied();
+    let mut ways = rows.iter().map(|row| row.cells[1] - first_mm);
+    told.unwrap_or_else(|| ways.find(|way| way.abs() > SAME_MM).unwrap_or(1.0).signum())
+}
+
+/// From which side each target of a run is approached, by the order of its rows.
+pub fn ways(rows: &[Row]) -> Vec<f64> {
+    let mut way = first_way(rows);
+    let mut all = vec![way];
+    for two in rows.windows(2) {
+        let by_mm = two[1].cells[1] - two[0].cells[1];
+        way = if by_mm.abs() > SAME_MM {
+            by_mm.signum()
+        } else {
+            -way
+        };
+        all.push(way);
+    }
+    all
+}
+
+const fn word(way: f64) -> &'static str {
+    if way > 0.0 { "up" } else { "down" }
+}
+
+/// Refuses rows whose order makes another direction than their column tells.
+fn check_directions(runs: &[Vec<Row>], units: Units) -> Result<()> {
+    for rows in runs {
+        for (k, way) in ways(rows).into_iter().enumerate().skip(1) {
+            let (row, before) = (&rows[k], &rows[k - 1]);
+            if row.cells.get(3).is_some_and(|told| *told * way < 0.0) {
+                bail!(
+                    "line {}: run {}: target {} {unit} after {} {unit} is approached {}, and its direction says {}: rows must be in the order of the measurement",
+                    row.line,
+                    row.cells[0],
+                    row.cells[1],
+                    before.cells[1],
+                    word(way),
+                    word(-way),
+                    unit = units.target
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A target from one side, comparable from run to run.
+type Visit = (i64, bool);
+
+/// Refuses a target that a run has twice from one side; names those that a run lacks.
+fn check_targets(runs: &[Vec<Row>], units: Units) -> Result<Vec<String>> {
+    let unit = units.target;
+    let mut seen: BTreeMap<Visit, (f64, Vec<usize>)> = BTreeMap::new();
+    for (k, rows) in runs.iter().enumerate() {
+        let mut own: BTreeMap<Visit, u64> = BTreeMap::new();
+        for (row, way) in rows.iter().zip(ways(rows)) {
+            if row.cells[2].is_nan() {
+                // It was stopped at and nothing was read.
+                continue;
+            }
+            let target_mm = row.cells[1];
+            let visit = ((target_mm / GRID_MM).round() as i64, way > 0.0);
+            if let Some(line) = own.insert(visit, row.line) {
+                bail!(
+                    "line {}: run {} has target {target_mm} {unit} {} already in line {line}: give every repetition a number of run of its own",
+                    row.line,
+                    row.cells[0],
+                    word(way)
+                );
+            }
+            seen.entry(visit).or_insert((target_mm, vec![])).1.push(k);
+        }
+    }
+    let mut remarks = vec![];
+    for ((_, is_up), (target_mm, has)) in seen {
+        let lacking: Vec<String> = (0..runs.len())
+            .filter(|k| !has.contains(k))
+            .map(|k| runs[k][0].cells[0].to_string())
+            .collect();
+        if !lacking.is_empty() {
+            remarks.push(format!(
+                "target {target_mm} {unit} {} has no row in run {}: an evaluation leaves it out",
+                if is_up { "up" } else { "down" },
+                lacking.join(", ")
+            ));
+        }
+    }
+    Ok(remarks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn test(direction: bool) -> Test {
+        Test::Positioning {
+            axis: Axis::X,
+            feed_mm_min: 6000.0,
+            dwell_s: 2.0,
+            overrun_mm: 5.0,
+            run: Some("n".to_owned()),
+            target_mm: "t".to_owned(),
+            deviation_um: Some("d".to_owned()),
+            measured_mm: None,
+            passes_um: vec![],
+            direction: direction.then(|| "way".to_owned()),
+            same_target_um: None,
+        }
+    }
+
+    fn table(rows: &[[f64; 4]], columns: usize) -> Table {
+        let row = |(k, cells): (usize, &[f64; 4])| Row {
+            line: k as u64 + 2,
+            cells: cells[..columns].to_vec(),
+        };
+        Table {
+            rows: rows.iter().enumerate().map(row).collect(),
+            left_out: vec![],
+        }
+    }
+
+    const UP: f64 = 1.0;
+    const DOWN: f64 = -1.0;
+
+    /// Three runs over three targets, both ways, in the order of the measurement.
+    fn measured() -> Vec<[f64; 4]> {
+        let mut rows = vec![];
+        for run in [1.0, 2.0, 3.0] {
+            for target in [0.0, 9.0, 20.0] {
+                rows.push([run, target, run + target, UP]);
+            }
+            for target in [20.0, 9.0, 0.0] {
+                rows.push([run, target, run - target, DOWN]);
+            }
+        }
+        rows
+    }
+
+    fn cells(runs: &Runs) -> Vec<Vec<Vec<f64>>> {
+        let run = |rows: &Vec<Row>| rows.iter().map(|row| row.cells.clone()).collect();
+        runs.runs.iter().map(run).collect()
+    }
+
+    #[test]
+    fn a_table_in_any_order_gives_the_runs_as_they_were_measured() {
+        let rows = measured();
+        let wanted = cells(&of(&test(true), &table(&rows, 4)).unwrap());
+        assert_eq!(wanted.len(), 3);
+        type Order = fn(&[f64; 4], &[f64; 4]) -> std::cmp::Ordering;
+        let orders: [Order; 4] = [
+            |a, b| a[1].total_cmp(&b[1]),
+            |a, b| a[3].total_cmp(&b[3]).then(a[1].total_cmp(&b[1])),
+            |a, b| b[1].total_cmp(&a[1]),
+            |a, b| a[2].total_cmp(&b[2]),
+        ];
+        for (k, order) in orders.iter().enumerate() {
+            let mut sorted = rows.clone();
+            sorted.sort_by(order);
+            let runs = of(&test(true), &table(&sorted, 4)).unwrap();
+            let mut found = cells(&runs);
+            found.sort_by(|a, b| a[0][0].total_cmp(&b[0][0]));
+            assert_eq!(found, wanted, "order {k}");
+            assert!(
+                runs.remarks[0].contains("comes again in line"),
+                "{:?}",
+                runs.remarks
+            );
+        }
+    }
+
+    #[test]
+    fn without_a_direction_a_sorted_table_is_refused_with_line_and_remedy() {
+        let mut rows = measured();
+        assert_eq!(of(&test(false), &table(&rows, 3)).unwrap().runs.len(), 3);
+        rows.sort_by(|a, b| a[1].total_cmp(&b[1]));
+        let words = of(&test(false), &table(&rows, 3)).unwrap_err().to_string();
+        assert!(
+            words.starts_with("line 8: column \"n\": run 1 comes again after run 3"),
+            "{words}"
+        );
+        assert!(words.contains("name a column of the direction"), "{words}");
+    }
+
+    #[test]
+    fn rows_whose_order_is_not_that_of_their_directions_are_refused_with_the_line() {
+        let rows = |rows: &[(f64, f64)]| {
+            let rows: Vec<_> = rows.iter().map(|(mm, way)| [1.0, *mm, 0.0, *way]).collect();
+            of(&test(true), &table(&rows, 4))
+        };
+        assert!(rows(&[(0.0, UP), (9.0, UP), (9.0, DOWN), (0.0, DOWN)]).is_ok());
+        assert!(rows(&[(0.0, DOWN), (0.0, UP), (9.0, UP), (9.0, DOWN)]).is_ok());
+        let sorted = rows(&[(0.0, DOWN), (0.0, UP), (9.0, DOWN), (9.0, UP)]);
+        assert_eq!(
+            sorted.unwrap_err().to_string(),
+            "line 4: run 1: target 9 mm after 0 mm is approached up, and its direction says down: rows must be in the order of the measurement"
+        );
+    }
+
+    #[test]
+    fn a_target_that_a_run_lacks_or_has_twice_is_named() {
+        let mut rows = measured();
+        rows.remove(7);
+        let runs = of(&test(true), &table(&rows, 4)).unwrap();
+        let words = "target 9 mm up has no row in run 2: an evaluation leaves it out";
+        assert_eq!(runs.remarks, [words]);
+        let mut rows = measured();
+        rows.insert(1, [1.0, 9.0, 5.0, UP]);
+        rows.insert(2, [1.0, 5.0, 5.0, DOWN]);
+        let words = of(&test(true), &table(&rows, 4)).unwrap_err().to_string();
+        assert!(
+            words.contains("run 1 has target 9 mm up already in line 3"),
+            "{words}"
+        );
+    }
+    /// Targets to 315 mm in a travel to 320 mm: turned round 5 mm behind the last it is at its end, 6 mm are beyond.
+    #[test]
+    fn an_overrun_beyond_the_travel_is_refused_with_line_value_limit_and_remedy() {
+        let travel = Range::new(-320.0, 320.0, "mm, the axis' travel");
+        let rows: Vec<_> = [(-315.0, UP), (315.0, UP), (315.0, DOWN), (-315.0, DOWN)]
+            .map(|(mm, way)| [1.0, mm, 0.0, way])
+            .to_vec();
+        let runs = of(&test(true), &table(&rows, 4)).unwrap();
+        let of = |axis, overrun| check_travel(&runs, Some(&travel), (axis, overrun));
+        assert_eq!(of(Axis::X, 5.0).unwrap(), None);
+        let said = of(Axis::X, 6.0).unwrap_err().to_string();
+        let words = "line 2: target -315 mm with test.positioning.overrun_mm = 6 mm: X turns round at -321 mm: must be from -320 to 320 mm, the axis' travel; correct overrun_mm in the map, or travel_mm in the machine file (places beyond it: 2)";
+        assert_eq!(said, words);
+        let told = of(Axis::C, 6.0).unwrap().unwrap();
+        assert!(told.contains("C turns round at -321 deg"), "{told}");
+    }
+
+    #[test]
+    fn a_run_turns_round_before_its_first_target_and_between_two_rows_of_one() {
+        let rows = table(
+            &[
+                [1.0, 0.0, 0.0, UP],
+                [1.0, 9.0, 0.0, UP],
+                [1.0, 9.0, 0.0, DOWN],
+            ],
+            4,
+        )
+        .rows;
+        let at: Vec<f64> = turns(&rows, 5.0).iter().map(|(_, at)| *at).collect();
+        assert_eq!(at, [-5.0, 14.0]);
+    }
+}

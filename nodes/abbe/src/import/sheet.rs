@@ -1,0 +1,64 @@
+//! The cells of a table as words, whatever kind of file they stood in.
+
+use anyhow::{Context, Result, bail};
+
+/// Lines of cells, with the number of each line in its file, from 1.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sheet {
+    /// Lines that hold anything.
+    pub lines: Vec<(u64, Vec<String>)>,
+    /// Separator of a text, which messages quote.
+    pub separator: Option<char>,
+}
+
+impl Sheet {
+    /// The cells of a text; lines that begin with `#` are comments.
+    ///
+    /// # Errors
+    /// When the separator is no byte, or the file holds no line.
+    pub fn of_text(text: &str, separator: char) -> Result<Self> {
+        let byte = u8::try_from(separator).context("separator: must be one byte")?;
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(byte)
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .has_headers(false)
+            .from_reader(text.as_bytes());
+        let mut lines = vec![];
+        for record in reader.records() {
+            let record = record?;
+            let line = record.position().map_or(0, csv::Position::line);
+            lines.push((line, record.iter().map(str::to_owned).collect()));
+        }
+        if lines.is_empty() {
+            bail!(
+                "the file has no line with the names of columns: it is empty, or holds comments alone"
+            );
+        }
+        Ok(Self {
+            lines,
+            separator: Some(separator),
+        })
+    }
+
+    /// The first line that holds every one of some names; otherwise the first of those that hold most of them.
+    pub fn head(&self, names: &[&str]) -> Option<usize> {
+        let held = |cells: &[String]| names.iter().filter(|name| holds(cells, name)).count();
+        let mut best: Option<(usize, usize)> = None;
+        for (k, (_, cells)) in self.lines.iter().enumerate() {
+            let n = held(cells);
+            if n == names.len() {
+                return Some(k);
+            }
+            if best.is_none_or(|(_, most)| n > most) {
+                best = Some((k, n));
+            }
+        }
+        best.map(|(k, _)| k)
+    }
+}
+
+fn holds(cells: &[String], name: &str) -> bool {
+    cells.iter().any(|cell| cell == name)
+}

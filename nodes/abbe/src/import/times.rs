@@ -1,0 +1,260 @@
+//! Times as loggers write them, and whether a column of times can be one of seconds.
+//!
+//! A cell is a number of seconds (or of the unit that the map states), a time of the day (`08:15:00`), or a date with a
+//! time: ISO 8601 with or without offset (then UTC), the same with a blank for the `T`, `05.01.2026 08:15:00` with the day
+//! first, and `01/25/2026 08:15 PM` where one of both numbers can be no month. A logger's milliseconds are the commonest mistake, and as seconds they are a log that goes on for months with
+//! hours between its rows.
+
+use anyhow::{Context as _, Result, bail};
+use metrology::number::number;
+use metrology::yaml::shown;
+use mtconnect_bridge::observation::read_stamp;
+
+/// Longest log or session, s: a leap year.
+pub const LONGEST_S: f64 = 366.0 * 86_400.0;
+/// Greatest spacing of most of the rows, s: slower, no warm-up is seen.
+const SPACING_S: f64 = 6.0 * 3600.0;
+/// The units in which rows are looked for: how many make a second, and what they are called.
+const UNITS: [(f64, &str); 3] = [
+    (1e3, "milliseconds"),
+    (1e6, "microseconds"),
+    (1e9, "nanoseconds"),
+];
+
+/// Seconds since 1970, or of the day, of a cell that is no plain number; `None`: it has neither date nor clock.
+///
+/// # Errors
+/// The cell, where it is no time, or where day and month are ambiguous.
+pub fn of_text(cell: &str) -> Result<Option<f64>> {
+    let has_date = cell.get(1..).is_some_and(|rest| {
+        let parts = |separator: char| rest.matches(separator).count() >= 2;
+        let is_digits = |letter: char| !letter.is_ascii_alphabetic() || letter == 'T';
+        rest.chars().all(is_digits) && (parts('-') || parts('/') || parts('.'))
+    });
+    if !cell.contains(':') && !has_date {
+        return Ok(None);
+    }
+    let words = || {
+        format!(
+            "\"{}\": must be a time: seconds, 08:15:00, or 2026-01-05 08:15:00",
+            shown(cell)
+        )
+    };
+    let (date, clock) = match cell.split_once(['T', ' ']) {
+        Some((date, clock)) if !date.contains(':') => (Some(date), clock.trim()),
+        _ if cell.contains(':') => (None, cell),
+        _ => (Some(cell), "00:00:00"),
+    };
+    let clock = in_24_hours(clock).with_context(words)?;
+    let Some(date) = date else {
+        let day = read_stamp(&format!("1970-01-01T{clock}")).with_context(words)?;
+        return Ok(Some(seconds(day.nanos())));
+    };
+    let date = in_order(date)?.with_context(words)?;
+    let stamp = read_stamp(&format!("{date}T{clock}")).with_context(words)?;
+    Ok(Some(seconds(stamp.nanos())))
+}
+
+fn seconds(nanos: i64) -> f64 {
+    nanos as f64 / 1e9
+}
+
+/// A time of the day with seconds, in 24 hours; an offset at its end stays.
+fn in_24_hours(clock: &str) -> Option<String> {
+    let upper = clock.to_uppercase();
+    let (clock, added) = match upper.split_once([' ', 'A', 'P']) {
+        Some((clock, _)) if upper.ends_with("PM") => (clock, Some(12)),
+        Some((clock, _)) if upper.ends_with("AM") => (clock, Some(0)),
+        _ => (upper.as_str(), None),
+    };
+    let (hour, rest) = clock.split_once(':')?;
+    let hour: u32 = hour.parse().ok()?;
+    let hour = match added {
+        Some(added) if (1..=12).contains(&hour) => hour % 12 + added,
+        Some(_) => return None,
+        None => hour,
+    };
+    let minutes = rest.get(..2)?;
+    let behind = rest.get(2..)?;
+    // 08:15 and 08:15+01:00 have no seconds.
+    let seconds = if behind.starts_with(':') { "" } else { ":00" };
+    Some(format!("{hour:02}:{minutes}{seconds}{behind}"))
+}
+
+/// Year, month and day of a date; `None` for any other text.
+fn in_order(date: &str) -> Result<Option<String>> {
+    let separator = date.chars().find(|letter| !letter.is_ascii_digit());
+    let Some(separator) = separator else {
+        return Ok(None);
+    };
+    let parts: Vec<&str> = date.split(separator).collect();
+    let numbers: Option<Vec<u32>> = parts.iter().map(|part| part.parse().ok()).collect();
+    let (Some([a, b, c]), [first, _, last]) = (numbers.as_deref(), parts.as_slice()) else {
+        return Ok(None);
+    };
+    let iso = |year: &u32, month: &u32, day: &u32| Some(format!("{year:04}-{month:02}-{day:02}"));
+    if first.len() == 4 {
+        return Ok(iso(a, b, c));
+    }
+    if last.len() != 4 {
+        return Ok(None);
+    }
+    match (separator, *a > 12, *b > 12) {
+        ('.', ..) | (_, true, false) => Ok(iso(c, b, a)),
+        (_, false, true) => Ok(iso(c, a, b)),
+        _ if a == b => Ok(iso(c, a, b)),
+        _ => bail!(
+            "\"{}\": day and month are ambiguous: write dates as 2026-01-05",
+            shown(date)
+        ),
+    }
+}
+
+/// Refuses times of which most lie too far apart, or the last too far behind the first; rows that go back are refused
+/// where they are written, by their row.
+///
+/// # Errors
+/// With the value, its limit, and the unit that it looks like or the row with the leap.
+pub fn check(times_s: impl Iterator<Item = f64>) -> Result<()> {
+    let times_s: Vec<f64> = times_s.collect();
+    let [first_s, .., last_s] = times_s.as_slice() else {
+        return Ok(());
+    };
+    let steps_s: Vec<f64> = times_s.windows(2).map(|two| two[1] - two[0]).collect();
+    let mut sorted_s = steps_s.clone();
+    sorted_s.sort_by(f64::total_cmp);
+    let spacing_s = sorted_s[sorted_s.len() / 2];
+    if spacing_s > SPACING_S {
+        let unit = unit(spacing_s);
+        bail!(
+            "times: most rows lie {} s apart: must be at most {SPACING_S} s{unit}",
+            number(spacing_s)
+        );
+    }
+    let length_s = last_s - first_s;
+    if length_s > LONGEST_S {
+        let leap = (1..times_s.len()).max_by(|a, b| steps_s[a - 1].total_cmp(&steps_s[b - 1]));
+        let row = leap.unwrap_or(1);
+        bail!(
+            "times: {} s from the first row to the last: must be at most {LONGEST_S} s; the greatest leap is at row {}, from {} to {} s",
+            number(length_s),
+            row + 1,
+            number(times_s[row - 1]),
+            number(times_s[row])
+        );
+    }
+    Ok(())
+}
+
+/// Whether rows lie as far apart as the days, weeks, months or years of a calendar.
+fn is_of_calendar(spacing_s: f64) -> bool {
+    let days = spacing_s / 86_400.0;
+    let is_near = |period: f64| (days / period - 1.0).abs() < 0.01;
+    [
+        1.0, 2.0, 7.0, 14.0, 28.0, 30.0, 30.44, 31.0, 91.0, 182.5, 365.25,
+    ]
+    .into_iter()
+    .any(is_near)
+}
+
+fn unit(spacing_s: f64) -> String {
+    if is_of_calendar(spacing_s) {
+        return "; make a table of its own of the rows of each session".to_owned();
+    }
+    let unit = UNITS
+        .into_iter()
+        .find(|(scale, _)| spacing_s / scale <= SPACING_S);
+    unit.map_or_else(String::new, |(scale, unit)| {
+        format!("; it looks like {unit}: divide the column by {scale}")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(times_s: &[f64]) -> String {
+        match check(times_s.iter().copied()) {
+            Ok(()) => String::new(),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn times_in_another_unit_are_refused_with_the_unit() {
+        for (scale, unit) in UNITS {
+            let rows: Vec<f64> = (0..90).map(|k| f64::from(k) * 60.0 * scale).collect();
+            let said = said(&rows);
+            assert!(said.contains("must be at most 21600 s"), "{said}");
+            let remedy = format!("it looks like {unit}: divide the column by {scale}");
+            assert!(said.ends_with(&remedy), "{said}");
+        }
+    }
+
+    /// Seconds by `date -u -d "2026-01-05 08:15:30" +%s`.
+    #[test]
+    fn every_spelling_of_an_instant_is_the_same_one() {
+        for cell in [
+            "2026-01-05T08:15:30Z",
+            "2026-01-05T08:15:30",
+            "2026-01-05 08:15:30",
+            "2026-01-05T09:15:30+01:00",
+            "2026/01/05 08:15:30.000",
+            "05.01.2026 08:15:30",
+            "5.1.2026 8:15:30,0",
+        ] {
+            let found = of_text(cell).unwrap();
+            assert_eq!(found, Some(1_767_600_930.0), "{cell}");
+        }
+        for (cell, wanted) in [
+            ("08:15:30", 29_730.0),
+            ("8:15:30.5", 29_730.5),
+            ("08:15", 29_700.0),
+            ("12:00 AM", 0.0),
+            ("12:30:00 PM", 45_000.0),
+            ("1/25/2026 08:15:30 PM", 1_769_372_130.0),
+            ("25/1/2026 20:15:30", 1_769_372_130.0),
+            ("2026-01-05", 1_767_571_200.0),
+        ] {
+            assert_eq!(of_text(cell).unwrap(), Some(wanted), "{cell}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_left_to_others_and_what_is_no_time_is_refused() {
+        for cell in ["0", "-5", "1.5e-3", "1767600930,5", "", "abc"] {
+            assert_eq!(of_text(cell).unwrap(), None, "{cell}");
+        }
+        for cell in ["8:xx", "2026-13-05 08:00", "25:00:00", "1-2-3", "13:00 PM"] {
+            let said = of_text(cell).unwrap_err().to_string();
+            assert!(said.contains("must be a time"), "{said}");
+        }
+        let said = of_text("05/01/2026 08:00").unwrap_err().to_string();
+        assert!(said.contains("day and month are ambiguous"), "{said}");
+    }
+
+    #[test]
+    fn rows_of_a_calendar_are_no_other_unit() {
+        for days in [1.0, 7.0, 30.0, 30.44, 31.0, 91.3, 365.0, 365.2425, 366.0] {
+            let rows: Vec<f64> = (0..9).map(|k| f64::from(k) * days * 86_400.0).collect();
+            let shown = said(&rows);
+            assert!(
+                shown.ends_with("; make a table of its own of the rows of each session"),
+                "{shown}"
+            );
+        }
+    }
+
+    #[test]
+    fn mornings_with_nights_between_them_are_times_and_a_leap_is_named() {
+        let day = |day: u32| (0..90).map(move |k| f64::from(day * 86_400 + k * 60));
+        assert_eq!(said(&(0..3).flat_map(day).collect::<Vec<_>>()), "");
+        assert_eq!(said(&[0.0]), "");
+        assert_eq!(said(&[1_767_600_000.0, 1_767_600_060.0]), "");
+        let wrong = said(&[0.0, 60.0, 120.0, 6e8]);
+        assert!(
+            wrong.ends_with("the greatest leap is at row 4, from 120 to 600000000 s"),
+            "{wrong}"
+        );
+    }
+}

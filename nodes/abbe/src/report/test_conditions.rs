@@ -1,0 +1,344 @@
+//! Under which conditions the tests of a page ran, and what is not stated about them.
+
+use chrono::DateTime;
+use metrology::stamp::{Host, Stamp};
+use serde_json::{Value, json};
+
+use super::section::{Rows, Section, head};
+use crate::evaluate::Tests;
+use crate::evaluate::budget::{Budget, Instrument, NOT_STATED};
+use crate::evaluate::correction::Measured;
+use crate::evaluate::linear::LinearTest;
+use crate::evaluate::test_conditions::{Readings, TestConditions};
+
+/// The conditions: whole for page and JSON, a few lines for a terminal.
+pub struct Conditions {
+    /// The whole.
+    pub section: Section,
+    short: Vec<String>,
+}
+
+impl Conditions {
+    /// For a terminal.
+    #[must_use]
+    pub fn terminal(&self) -> String {
+        let lines = self.short.iter().map(|line| format!("{line}\n"));
+        format!("{}\n{}", self.section.title, lines.collect::<String>())
+    }
+}
+
+/// One condition.
+struct Condition {
+    name: String,
+    value: Option<String>,
+    /// Where it is stated.
+    place: String,
+}
+
+impl Condition {
+    fn new(name: impl Into<String>, value: Option<String>, place: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            value,
+            place: place.into(),
+        }
+    }
+
+    fn row(&self) -> Vec<String> {
+        let missing = || format!("{NOT_STATED} ({})", self.place);
+        vec![
+            self.name.clone(),
+            self.value.clone().unwrap_or_else(missing),
+        ]
+    }
+
+    fn short(&self) -> String {
+        format!(
+            "{} {}",
+            self.name,
+            self.value.as_deref().unwrap_or(NOT_STATED)
+        )
+    }
+}
+
+/// The conditions of a bag; `tests` where they were evaluated.
+#[must_use]
+pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>) -> Conditions {
+    let mut section = Section::new("Conditions of the measurement");
+    let run = run_of(seen, budget, tests);
+    let instruments = instruments_of(seen, budget);
+    let correction = correction_of(tests, budget);
+    let rows = run.iter().chain(&instruments).map(Condition::row);
+    let last = vec!["correction to 20 °C".to_owned(), correction.clone()];
+    section.tables.push(Rows {
+        head: head(&["condition", "value"]),
+        rows: rows.chain([last]).collect(),
+        note: String::new(),
+    });
+    let temperatures: Vec<Vec<String>> = (seen.thermometers.iter())
+        .map(|(name, read)| temperature_row(name, read))
+        .collect();
+    let mut short = vec![joined(&run), joined(&instruments)];
+    if temperatures.is_empty() {
+        section.lines.push(NO_THERMOMETER.to_owned());
+        short.push(NO_THERMOMETER.to_owned());
+    } else {
+        let of = |(name, read): (&String, &Readings)| {
+            format!(
+                "{name} {:.2} to {:.2} °C (range {:.2} K)",
+                read.first_degc,
+                read.last_degc,
+                read.range_k()
+            )
+        };
+        let all: Vec<String> = seen.thermometers.iter().map(of).collect();
+        short.push(format!("Thermometers, first to last: {}.", all.join(", ")));
+        section.tables.push(Rows {
+            head: head(&[
+                "thermometer / °C",
+                "first",
+                "last",
+                "least",
+                "greatest",
+                "range / K",
+            ]),
+            rows: temperatures,
+            note: "From the first test to the last one.".to_owned(),
+        });
+    }
+    short.push(format!("Correction to 20 °C: {correction}."));
+    short.retain(|line| !line.is_empty());
+    section.figures = json!({
+        "begin": seen.between.map(|(first, _)| date(first)),
+        "end": seen.between.map(|(_, last)| date(last)),
+        "feeds_mm_min": seen.feeds_mm_s.iter().map(|feed| feed * 60.0).collect::<Vec<f64>>(),
+        "production_before_s": seen.production_before_s,
+        "warm_up": budget.and_then(|budget| budget.warm_up.clone()),
+        "operator": budget.and_then(|budget| budget.operator.clone()),
+        "instruments": instruments_json(seen, budget),
+        "thermometers": seen.thermometers.iter().map(temperature_json).collect::<Vec<Value>>(),
+        "correction_to_20_degc": correction,
+    });
+    Conditions { section, short }
+}
+
+const NO_THERMOMETER: &str = "Temperatures not stated: no thermometer was read. Name thermometers in temperature_sensors of the machine file, or state temperature_deviation_k in budget.yaml.";
+
+fn joined(conditions: &[Condition]) -> String {
+    let all: Vec<String> = conditions.iter().map(Condition::short).collect();
+    if all.is_empty() {
+        return String::new();
+    }
+    format!("{}.", all.join("; "))
+}
+
+/// Date and time, feed, dwell, what was before, and who measured.
+fn run_of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>) -> Vec<Condition> {
+    let between = seen.between.map(|(first, last)| {
+        let (first, last) = (date(first), date(last));
+        format!("{first} to {last}")
+    });
+    let feeds = listed(
+        seen.feeds_mm_s
+            .iter()
+            .map(|feed| format!("{:.0}", feed * 60.0)),
+    );
+    let dwells = tests.into_iter().flat_map(|tests| &tests.linear);
+    let dwells = dwells.filter_map(|test| test.longest_rest);
+    let dwells = listed(dwells.map(|rest| format!("{:.1}", rest.as_secs_f64())));
+    let stated = |text: fn(&Budget) -> &Option<String>| budget.and_then(|one| text(one).clone());
+    let before_min = seen.production_before_s / 60.0;
+    vec![
+        Condition::new("date", between, "the bag holds no test"),
+        Condition::new(
+            "feed",
+            feeds.map(|feeds| format!("{feeds} mm/min")),
+            "feed_mm_min of the plan's steps",
+        ),
+        Condition::new(
+            "dwell",
+            dwells.map(|dwells| format!("{dwells} s")),
+            "dwell_s of the plan's steps; no stop was evaluated",
+        ),
+        Condition::new(
+            "production before the first test",
+            Some(format!("{before_min:.0} min in this bag")),
+            "",
+        ),
+        Condition::new(
+            "warm-up",
+            stated(|budget| &budget.warm_up),
+            "warm_up in budget.yaml",
+        ),
+        Condition::new(
+            "operator",
+            stated(|budget| &budget.operator),
+            "operator in budget.yaml",
+        ),
+    ]
+}
+
+/// Each text once, in the order of coming.
+fn listed(texts: impl Iterator<Item = String>) -> Option<String> {
+    let mut once: Vec<String> = Vec::new();
+    for text in texts {
+        if !once.contains(&text) {
+            once.push(text);
+        }
+    }
+    (!once.is_empty()).then(|| once.join(", "))
+}
+
+/// Instruments that were read, by the name of their key and in words.
+fn read_by(seen: &TestConditions) -> Vec<(&'static str, &'static str)> {
+    [
+        (seen.has_length, "length_reference", "length reference"),
+        (seen.has_grid, "grid_encoder", "grid encoder"),
+        (seen.has_touches, "touch_probe", "touch probe"),
+    ]
+    .into_iter()
+    .filter_map(|(is_read, key, name)| is_read.then_some((key, name)))
+    .collect()
+}
+
+fn stated(budget: Option<&Budget>, key: &str) -> Instrument {
+    let all = budget.map(|budget| budget.instruments.clone());
+    let all = all.unwrap_or_default();
+    match key {
+        "length_reference" => all.length_reference,
+        "grid_encoder" => all.grid_encoder,
+        _ => all.touch_probe,
+    }
+}
+
+fn instruments_of(seen: &TestConditions, budget: Option<&Budget>) -> Vec<Condition> {
+    let mut all = Vec::new();
+    for (key, name) in read_by(seen) {
+        for (what, text) in stated(budget, key).texts() {
+            let place = format!("instruments.{key}.{what} in budget.yaml");
+            let name = match what {
+                "instrument" => name.to_owned(),
+                what => format!("{name}, {}", what.replace('_', " ")),
+            };
+            all.push(Condition::new(name, text.map(str::to_owned), place));
+        }
+    }
+    all
+}
+
+fn instruments_json(seen: &TestConditions, budget: Option<&Budget>) -> Value {
+    let of = |(key, _): (&str, &str)| {
+        let instrument = stated(budget, key);
+        json!({
+            "kind": key,
+            "instrument": instrument.instrument,
+            "serial_number": instrument.serial_number,
+            "certificate": instrument.certificate,
+        })
+    };
+    read_by(seen).into_iter().map(of).collect()
+}
+
+/// Which of the tests have the lengths that they have at 20 °C.
+fn correction_of(tests: Option<&Tests>, budget: Option<&Budget>) -> String {
+    let Some(tests) = tests.filter(|tests| !tests.linear.is_empty()) else {
+        return "not done: lengths, radii and locations are as measured".to_owned();
+    };
+    let lacks = |test: &LinearTest| {
+        let about: (&[u32], _, _) = (&test.runs, test.reference, test.axis);
+        Measured::of(tests, budget, about).correction.lacks()
+    };
+    let all: Vec<Option<String>> = tests.linear.iter().map(lacks).collect();
+    let n_done = all.iter().filter(|why| why.is_none()).count();
+    let done = format!(
+        "done for {n_done} of {} tests of positioning and diagonals",
+        all.len()
+    );
+    match listed(all.into_iter().flatten()) {
+        None => done,
+        Some(why) => format!("{done}; {why}"),
+    }
+}
+
+fn date(at: Stamp<Host>) -> String {
+    let known = DateTime::from_timestamp_nanos(at.nanos());
+    known.format("%Y-%m-%d %H:%M:%S UTC").to_string()
+}
+
+fn temperature_row(name: &str, read: &Readings) -> Vec<String> {
+    let of = |value: f64| format!("{value:.2}");
+    vec![
+        name.to_owned(),
+        of(read.first_degc),
+        of(read.last_degc),
+        of(read.least_degc),
+        of(read.greatest_degc),
+        of(read.range_k()),
+    ]
+}
+
+fn temperature_json((name, read): (&String, &Readings)) -> Value {
+    json!({
+        "thermometer": name,
+        "first_degc": read.first_degc,
+        "last_degc": read.last_degc,
+        "least_degc": read.least_degc,
+        "greatest_degc": read.greatest_degc,
+        "range_k": read.range_k(),
+        "readings": read.n,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn what_is_not_stated_is_named_with_where_to_state_it() {
+        let mut seen = TestConditions::default();
+        seen.between = Some((
+            Stamp::from_nanos(1_767_600_000_000_000_000),
+            Stamp::from_nanos(1_767_603_600_000_000_000),
+        ));
+        seen.has_length = true;
+        seen.feeds_mm_s = vec![100.0];
+        let cell = |conditions: &Conditions, name: &str| -> String {
+            let rows = &conditions.section.tables[0].rows;
+            let found = rows.iter().find(|row| row[0] == name);
+            found.unwrap_or_else(|| panic!("{name}: {rows:?}"))[1].clone()
+        };
+        let silent = of(&seen, None, None);
+        assert_eq!(
+            cell(&silent, "date"),
+            "2026-01-05 08:00:00 UTC to 2026-01-05 09:00:00 UTC"
+        );
+        assert_eq!(cell(&silent, "feed"), "6000 mm/min");
+        assert_eq!(
+            cell(&silent, "length reference, serial number"),
+            "not stated (instruments.length_reference.serial_number in budget.yaml)"
+        );
+        assert!(cell(&silent, "operator").starts_with("not stated (operator in budget.yaml"));
+        assert!(silent.terminal().contains("Temperatures not stated"));
+        assert!(silent.terminal().contains("Correction to 20 °C: not done"));
+        seen.thermometers
+            .insert("bed".to_owned(), Readings::new(21.5));
+        let text = include_str!("../../../../launch_configs/diagonals/budget.yaml");
+        let text = format!(
+            "{text}\ninstruments: {{length_reference: {{instrument: a laser, serial_number: 12-3, certificate: K 7 of 2026-01-02}}}}\noperator: A. B.\nwarm_up: an hour of G0 along X\n"
+        );
+        let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
+        let whole = of(&seen, Some(&budget), None);
+        assert_eq!(cell(&whole, "length reference, serial number"), "12-3");
+        assert_eq!(whole.section.figures["operator"], "A. B.");
+        let instrument = &whole.section.figures["instruments"][0];
+        assert_eq!(instrument["certificate"], "K 7 of 2026-01-02");
+        let terminal = whole.terminal();
+        assert!(
+            terminal.contains("dwell not stated; production"),
+            "{terminal}"
+        );
+        assert!(terminal.contains("operator A. B."), "{terminal}");
+        assert!(terminal.contains("bed 21.50 to 21.50 °C (range 0.00 K)"));
+    }
+}

@@ -1,0 +1,83 @@
+//! A table in place of a bag: what is recognised in it is imported into a folder that goes away, without a machine file.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, anyhow, bail};
+use metrology::yaml;
+use tempfile::TempDir;
+
+use crate::import::map::Map;
+use crate::import::{self, Named, propose};
+
+/// Ends of names of files that are tables.
+const ENDS: [&str; 6] = ["csv", "tsv", "txt", "dat", "xlsx", "xlsm"];
+
+/// A bag of a table.
+pub struct FromTable {
+    /// Its folder, which goes away with this.
+    _home: TempDir,
+    /// The bag.
+    pub bag: PathBuf,
+    /// What was recognised in the table, what it lacks, and what is not in the bag; a line each.
+    pub lines: Vec<String>,
+}
+
+/// Whether a path is a table by its name.
+pub fn is_table(path: &Path) -> bool {
+    let end = path.extension().and_then(|end| end.to_str());
+    end.is_some_and(|end| ENDS.contains(&end.to_lowercase().as_str())) && !path.is_dir()
+}
+
+/// Imports a table by a map, or by what is recognised in it; `None` for a bag.
+///
+/// # Errors
+/// When a map is named for a bag, when table or map cannot be read, or nothing is recognised.
+pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
+    if !is_table(path) {
+        if map.is_some() {
+            bail!(
+                "--map does nothing: {} is no table, which ends with one of {}",
+                path.display(),
+                ENDS.join(", ")
+            );
+        }
+        return Ok(None);
+    }
+    let (named, mut lines) = match map {
+        Some(map) => (Named::read(map, "map")?, vec![]),
+        None => proposed(path)?,
+    };
+    let place = &named.place;
+    let read: Map = yaml::read_letters(&named.text).map_err(|error| {
+        anyhow!(
+            "map {}",
+            yaml::placed(place, &named.text, &error.to_string())
+        )
+    })?;
+    let machine = Named {
+        place: "the machine that is taken where none is stated".to_owned(),
+        text: propose::machine_for(&read),
+    };
+    let home = TempDir::new().context("a folder for the bag of the table")?;
+    let bag = home.path().join("bag");
+    let imported = import::import(path, &named, machine, &bag)?;
+    lines.extend(imported.notes);
+    Ok(Some(FromTable {
+        _home: home,
+        bag,
+        lines,
+    }))
+}
+
+/// The map that is proposed for a table, with what it rests on.
+fn proposed(path: &Path) -> Result<(Named, Vec<String>)> {
+    let proposal = propose::of(path).with_context(|| format!("table {}", path.display()))?;
+    let mut lines: Vec<String> = proposal.recognised;
+    let needed = proposal.needed.into_iter();
+    lines.extend(needed.map(|line| format!("not in the table: {line}")));
+    let named = Named {
+        place: "proposed for the table (abbe import --propose prints it)".to_owned(),
+        text: proposal.map,
+    };
+    Ok((named, lines))
+}

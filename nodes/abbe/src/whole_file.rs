@@ -1,0 +1,65 @@
+//! Files that are there whole or not at all: a disk that fills up leaves no half of a page behind.
+
+use std::io::ErrorKind;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+/// Writes a file in the place of the old one; where that fails, the old one stays as it was.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write(path: &Path, text: &str) -> Result<()> {
+    // A device or a pipe takes what comes; a link stays one.
+    let is_special =
+        |path: &Path| std::fs::metadata(path).is_ok_and(|it| !it.is_file() && !it.is_dir());
+    if is_special(path) {
+        return std::fs::write(path, text).with_context(|| path.display().to_string());
+    }
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    replace(&target, text).with_context(|| path.display().to_string())
+}
+
+fn replace(path: &Path, text: &str) -> std::io::Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let new = path.with_file_name(format!(".{name}.new"));
+    let written = std::fs::write(&new, text).and_then(|()| std::fs::rename(&new, path));
+    if written.is_err() {
+        // What could not be written whole must not stay beside the old file.
+        let _ = std::fs::remove_file(&new);
+    }
+    match written {
+        // A file that may be written in a folder that may not.
+        Err(error) if error.kind() == ErrorKind::PermissionDenied && path.is_file() => {
+            std::fs::write(path, text)
+        }
+        written => written,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_cannot_be_written_leaves_the_old_one_and_nothing_beside_it() {
+        let home = tempfile::tempdir().unwrap();
+        let page = home.path().join("page.html");
+        write(&page, "old").unwrap();
+        write(&page, "new").unwrap();
+        assert_eq!(std::fs::read_to_string(&page).unwrap(), "new");
+        // A folder in its place.
+        let taken = home.path().join("folder");
+        std::fs::create_dir_all(taken.join("full")).unwrap();
+        let error = write(&taken, "text").unwrap_err();
+        assert!(format!("{error:#}").contains("folder"), "{error:#}");
+        let missing = write(&home.path().join("no/such/page"), "text");
+        assert!(format!("{:#}", missing.unwrap_err()).contains("no/such/page"));
+        let mut left: Vec<_> = std::fs::read_dir(home.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name())
+            .collect();
+        left.sort();
+        assert_eq!(left, ["folder", "page.html"]);
+    }
+}

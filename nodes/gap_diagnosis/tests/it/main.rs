@@ -1,0 +1,10 @@
+//! The tests of this crate from outside, in one program.
+
+mod following;
+mod logs;
+mod long;
+mod schema;
+mod session;
+mod standing;
+mod targets;
+mod trials;

@@ -1,0 +1,179 @@
+//! Topics that do not arrive in the order of their stamps.
+
+use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
+use machine::twin::{Channel, Run, Session};
+use metrology::sample::{GridSample, TemperatureSample, TestKind, TestPlane, TestSegment};
+use metrology::{Axis, PerAxis, Stamp};
+
+use crate::session::{Rig, compensation, machine, of, segment, state, touch};
+
+fn temperature(millis: i64) -> Input {
+    Input::Temperature(TemperatureSample {
+        at: Stamp::from_nanos(millis * 1_000_000),
+        sensor: "bed".to_owned(),
+        temperature_degc: 20.0,
+        variance_k2: 0.0,
+    })
+}
+
+/// Two circles one after the other with all that is told of them and its stamp, ms.
+fn told() -> Vec<(i64, Input)> {
+    let mut told = vec![];
+    let mut millis = 0;
+    let stamp = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+    for run in 1..=2 {
+        let mut tick = |angle: f64| {
+            let (x, y) = (50.0 * angle.cos(), 50.0 * angle.sin());
+            let mut commanded = PerAxis::default();
+            (commanded[Axis::X], commanded[Axis::Y], commanded[Axis::Z]) = (x, y, 30.0);
+            let mut total = PerAxis::default();
+            total[Axis::X] = 1e-6 * f64::from(millis as i32);
+            let inputs = [
+                compensation(stamp(millis), total),
+                state(
+                    stamp(millis),
+                    (millis + 7000) * 1_000_000,
+                    commanded,
+                    commanded,
+                ),
+                Input::Grid(GridSample {
+                    at: stamp(millis),
+                    plane: TestPlane::Xy,
+                    u_mm: x + total[Axis::X] + 2e-3 * (2.0 * angle).cos(),
+                    v_mm: y,
+                    zero_id: 1,
+                }),
+            ];
+            told.extend(inputs.map(|input| (millis, input)));
+            if millis % 500 == 0 {
+                told.push((millis, temperature(millis)));
+            }
+            millis += 2;
+            millis
+        };
+        let begins = (0..3000).map(|_| tick(0.0)).last().expect("a rest");
+        let ends = (0..6284).map(|k| tick(f64::from(k) * 1e-3)).last();
+        let ends = ends.expect("a circle");
+        for (at, begin) in [(begins, true), (ends, false)] {
+            let segment = TestSegment {
+                at: stamp(at),
+                ..segment(run, begin, TestKind::Circle)
+            };
+            told.push((at, Input::Segment(segment)));
+        }
+    }
+    told
+}
+
+/// The session of what is told, each topic so much later than its stamps, ms.
+fn arriving(late: impl Fn(&Input) -> i64) -> Session {
+    let mut told = told();
+    told.sort_by_key(|(millis, input)| millis + late(input));
+    let mut builder = SessionBuilder::new(&machine(), SessionConfig::default()).expect("a machine");
+    for (_, input) in told {
+        builder.take(input);
+    }
+    let (session, account) = builder.finish().expect("a session");
+    assert_eq!(account.left_out.values().sum::<usize>(), 0, "{account:?}");
+    session
+}
+
+#[test]
+fn a_run_is_the_same_in_whatever_order_the_topics_arrive() {
+    let in_time = arriving(|_| 0);
+    assert_eq!(in_time.runs.len(), 2);
+    assert!(of(&in_time, 1, &Channel::GridU).len() > 1200);
+    // The begin behind the first samples or before the last of the rest; the plate before the axes or behind them.
+    for [segment, state, grid, offset, degc] in [
+        [820, 0, 0, 0, 0],
+        [0, 150, 0, 0, 0],
+        [190, 0, 16, 0, 0],
+        [0, 0, 1300, 0, 0],
+        [900, 0, 400, 50, 0],
+        [0, 30, 0, 700, 0],
+        [0, 0, 0, 0, 1500],
+        [1200, 1300, 0, 1300, 0],
+    ] {
+        let late = arriving(|input| match input {
+            Input::Segment(_) => segment,
+            Input::State(_) => state,
+            Input::Grid(_) => grid,
+            Input::Temperature(_) => degc,
+            _ => offset,
+        });
+        assert!(
+            late.runs == in_time.runs,
+            "{segment} {state} {grid} {offset} {degc}"
+        );
+    }
+}
+
+/// A circle and a run of two touches behind it, in the order of arrival.
+fn circle_and_touches(arriving: &[(i64, &str)]) -> Vec<(u32, usize)> {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.circle(1, 1.0);
+    let ended = rig.millis;
+    let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+    let segment = |run: u32, begin: bool, kind: TestKind, millis: i64| TestSegment {
+        at: at(millis),
+        ..segment(run, begin, kind)
+    };
+    for (millis, what) in arriving {
+        let millis = ended + millis;
+        rig.builder.take(match *what {
+            "end of the circle" => Input::Segment(segment(1, false, TestKind::Circle, millis)),
+            "begin" => Input::Segment(segment(2, true, TestKind::Latency, millis)),
+            "end" => Input::Segment(segment(2, false, TestKind::Latency, millis)),
+            "production" => Input::Segment(segment(3, true, TestKind::Production, millis)),
+            _ => Input::Trigger(touch(millis, "block_1.x")),
+        });
+    }
+    let (session, _) = rig.builder.finish().expect("a session");
+    let touches = |run: &Run| (run.segment.run, run.touches.len());
+    session.runs.iter().map(touches).collect()
+}
+
+#[test]
+fn a_touch_is_of_the_run_in_which_it_is_stamped_and_of_no_other() {
+    let end = (0, "end of the circle");
+    let (begin, ended) = ((100, "begin"), (900, "end"));
+    let (one, other) = ((300, "touch"), (600, "touch"));
+    for arriving in [
+        [end, begin, one, other, ended],
+        // The begin behind the first touch, the end before the last.
+        [end, one, begin, other, ended],
+        [end, begin, one, ended, other],
+        [one, end, begin, ended, other],
+    ] {
+        let found = circle_and_touches(&arriving);
+        assert_eq!(found, [(1, 0), (2, 2)], "{arriving:?}");
+    }
+    // What is made after a test is none of its touches.
+    let found = circle_and_touches(&[end, (100, "production"), one, other]);
+    assert_eq!(found, [(1, 0)]);
+}
+
+#[test]
+fn readings_with_the_stamp_of_another_clock_are_of_no_run_and_hold_nobody_up() {
+    let stray = |millis: i64| {
+        Input::Grid(GridSample {
+            at: Stamp::from_nanos(millis * 1_000_000),
+            plane: TestPlane::Xy,
+            u_mm: 7.0,
+            v_mm: 7.0,
+            zero_id: 1,
+        })
+    };
+    let in_time = arriving(|_| 0);
+    let mut builder = SessionBuilder::new(&machine(), SessionConfig::default()).expect("a machine");
+    let mut told = told();
+    told.sort_by_key(|(millis, _)| *millis);
+    for (millis, input) in told {
+        if matches!(input, Input::Segment(_)) {
+            builder.take(stray(millis + 3_600_000));
+        }
+        builder.take(input);
+    }
+    let (session, _) = builder.finish().expect("a session");
+    assert!(session.runs == in_time.runs);
+}

@@ -1,0 +1,64 @@
+//! What no effect of the catalogue makes is called unknown; noise beyond the repeats' is said, and nothing named.
+
+use gap_diagnosis::{GapConfig, GapError, Note, diagnose};
+
+use crate::trials::plant::{Noise, State, diagnosed, machine, names, session, soft_play};
+
+#[test]
+fn without_the_classes_that_span_it_a_play_is_flagged_and_placed_by_its_reversals() {
+    // Lost motion that hardly changes with the feed, below its own speed, is a play in all but name.
+    let session = session(11, Noise::default(), &soft_play(0, 5e-3));
+    let config = GapConfig {
+        left_out: ["backlash", "feed_lost_motion"].map(str::to_owned).to_vec(),
+        ..GapConfig::default()
+    };
+    let diagnosis = diagnose(&machine(), &session, &config).unwrap();
+    assert!(diagnosis.report.unknown.flagged);
+    let first = &diagnosis.report.r#where[0];
+    assert_eq!(first.channel, "grid.u");
+    assert_eq!(first.covariate, "sense*log_distance_since_reversal_x");
+}
+
+#[test]
+fn an_error_of_no_class_is_flagged() {
+    let wrong = |s: &State| {
+        [
+            2e-3 * (s.velocity[1] / 50.0).signum() * (s.position[0] / 50.0).powi(2),
+            0.0,
+        ]
+    };
+    let diagnosis = diagnosed(&session(12, Noise::default(), &wrong));
+    assert!(diagnosis.report.unknown.flagged);
+    assert!(names(&diagnosis).is_empty());
+    let description = &diagnosis.report.unknown.description;
+    let places = &diagnosis.report.r#where;
+    assert_eq!(description.parity, "odd", "{description:?} {places:#?}");
+}
+
+#[test]
+fn noise_beyond_the_repeats_is_said_and_nothing_is_named() {
+    for seed in 20..24 {
+        let noise = Noise {
+            other_runs: 1.6,
+            ..Noise::default()
+        };
+        let diagnosis = diagnosed(&session(seed, noise, &|_| [0.0; 2]));
+        assert!(names(&diagnosis).is_empty());
+        assert!(diagnosis.notes.iter().any(|note| matches!(
+            note,
+            Note::NotReproduced {
+                withdraws: true,
+                ..
+            }
+        )));
+    }
+}
+
+#[test]
+fn a_session_without_repeats_is_refused_with_what_to_record() {
+    let mut session = session(30, Noise::default(), &|_| [0.0; 2]);
+    session.runs.retain(|run| run.segment.repeat == 0);
+    let refused = diagnose(&machine(), &session, &GapConfig::default()).unwrap_err();
+    assert!(matches!(refused, GapError::NoRepeats { .. }), "{refused}");
+    assert!(refused.to_string().contains("three times"));
+}

@@ -1,0 +1,152 @@
+//! Offsets wait for homing; a normal start is no error; offsets that never come are reported.
+
+use linuxcnc_bridge::Input;
+use linuxcnc_bridge::condition::Condition;
+use linuxcnc_bridge::config::Prepare;
+use metrology::sample::{AxisCompensation, CompensationState};
+use metrology::{AxisSet, PerAxis, Severity};
+
+use crate::frame::control::{Control, State};
+use crate::frame::desk::{Desk, at};
+
+fn offsets(now_s: f64, mm: f64) -> Input {
+    Input::Compensation(AxisCompensation {
+        at: at(now_s),
+        axes: AxisSet::XYZ,
+        total: PerAxis([mm; 6]),
+        thermal: PerAxis::default(),
+        geometric: PerAxis::default(),
+        positioning: PerAxis::default(),
+        pulses: PerAxis::default(),
+        remainder: PerAxis::default(),
+        state: PerAxis([CompensationState::Active; 6]),
+    })
+}
+
+/// Offsets of X that HAL was given, mm.
+fn passed_mm(desk: &mut Desk) -> Vec<f64> {
+    let lines = desk.hal.drain(..).collect::<String>();
+    { lines.lines() }
+        .filter_map(|line| line.strip_prefix("sets abbe-compensation-x "))
+        .map(|value| value.parse().unwrap())
+        .collect()
+}
+
+fn with_offsets(desk: &mut Desk, seconds_s: f64, mm: f64) {
+    let end_s = desk.now_s + seconds_s;
+    while desk.now_s < end_s {
+        let now_s = desk.now_s;
+        desk.tell(offsets(now_s, mm));
+        desk.later(0.05);
+    }
+}
+
+#[test]
+fn offsets_wait_until_every_axis_is_homed_and_fade_when_one_is_not() {
+    let mut control = Control::new(State::usual());
+    control.homed = false;
+    let mut desk = Desk::with(control, Prepare::Observe);
+    with_offsets(&mut desk, 2.0, 0.03);
+    assert!(
+        passed_mm(&mut desk).iter().all(|mm| *mm == 0.0),
+        "nothing before homing"
+    );
+    assert!(desk.conditions.contains(&Condition::CompensationHeld));
+    assert!(!desk.conditions.contains(&Condition::CompensationFresh));
+    desk.control.homed = true;
+    with_offsets(&mut desk, 0.5, 0.03);
+    assert_eq!(passed_mm(&mut desk), [0.03]);
+    assert!(desk.conditions.contains(&Condition::CompensationFresh));
+    assert!(!desk.has("homed_under_offset"));
+
+    // Unhomed: zero at once, the heart goes on beating so that HAL fades at once, too.
+    desk.conditions.clear();
+    desk.control.homed = false;
+    with_offsets(&mut desk, 1.0, 0.03);
+    assert!(
+        desk.hal
+            .iter()
+            .any(|lines| lines.contains("abbe-heartbeat"))
+    );
+    assert_eq!(passed_mm(&mut desk), [0.0]);
+    assert!(desk.conditions.contains(&Condition::CompensationHeld));
+    desk.control.homed = true;
+    with_offsets(&mut desk, 0.5, 0.04);
+    assert_eq!(passed_mm(&mut desk), [0.04]);
+    assert!(
+        desk.has("homed_under_offset"),
+        "homed 1 s later: {:?}",
+        desk.conditions
+    );
+
+    // With time to fade there is nothing to say.
+    desk.conditions.clear();
+    desk.control.homed = false;
+    with_offsets(&mut desk, 11.0, 0.04);
+    desk.control.homed = true;
+    with_offsets(&mut desk, 0.5, 0.04);
+    assert!(!desk.has("homed_under_offset"), "{:?}", desk.conditions);
+}
+
+#[test]
+fn a_normal_start_has_no_error_and_a_stop_of_a_homed_machine_is_one() {
+    for prepare in [Prepare::Observe, Prepare::PowerOnAndHome] {
+        let mut control = Control::new(State::usual());
+        (control.homed, control.estop) = (false, true);
+        let mut desk = Desk::with(control, prepare);
+        desk.control.estop = false;
+        desk.later(0.5);
+        desk.control.homed = true;
+        desk.later(0.5);
+        let is_error = |condition: &Condition| condition.severity() == Severity::Error;
+        assert!(
+            !desk.conditions.iter().any(is_error),
+            "{:?}",
+            desk.conditions
+        );
+        assert!(desk.conditions.contains(&Condition::NotSwitchedOn));
+        desk.control.estop = true;
+        desk.later(0.5);
+        assert!(desk.conditions.contains(&Condition::Estop { on: true }));
+    }
+}
+
+#[test]
+fn compensation_that_somebody_publishes_and_that_never_comes_is_said_once() {
+    let never = |condition: &&Condition| {
+        matches!(
+            condition,
+            Condition::CompensationNeverCame { publishers: 2, .. }
+        )
+    };
+    let mut desk = Desk::new(State::usual());
+    for _ in 0..30 {
+        desk.tell(Input::Publishers(2));
+        desk.later(1.0);
+    }
+    assert_eq!(
+        desk.conditions.iter().filter(never).count(),
+        1,
+        "{:?}",
+        desk.conditions
+    );
+    // Nobody publishes, or it comes, or the bridge is not active: nothing is missing.
+    for (publishers, comes, active) in [(0, false, true), (2, true, true), (2, false, false)] {
+        let mut desk = Desk::new(State::usual());
+        desk.tell(Input::Active(active));
+        for _ in 0..30 {
+            desk.tell(Input::Publishers(publishers));
+            if comes {
+                let now_s = desk.now_s;
+                desk.tell(offsets(now_s, 0.0));
+            }
+            desk.later(1.0);
+        }
+        assert_eq!(
+            desk.conditions.iter().filter(never).count(),
+            0,
+            "{:?}",
+            desk.conditions
+        );
+    }
+}

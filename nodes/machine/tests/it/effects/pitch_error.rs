@@ -1,0 +1,72 @@
+//! Pitch error against a screw whose lead is integrated.
+
+use metrology::{Axis, AxisSet};
+
+use crate::effects::scene::{fit, response_of, rms, run, three_axes};
+
+/// A screw whose lead grows from one end to the other, with a place where it was ground twice.
+fn lead_deviation_um_per_mm(u_mm: f64) -> f64 {
+    0.02 * u_mm / 320.0 + 0.04 * (-((u_mm - 60.0) / 50.0).powi(2)).exp()
+}
+
+#[test]
+fn val_a_screw_of_drifting_lead() {
+    let machine = three_axes("[w X' Y' b Z t]");
+    let ticks = 6401_usize;
+    let run = run(ticks, AxisSet::XYZ, |t| {
+        [-320.0 + 100.0 * t, 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+    let mut travelled = vec![0.0_f64; ticks];
+    for k in 1..ticks {
+        let middle = -320.0 + 0.1 * (k as f64 - 0.5);
+        travelled[k] = travelled[k - 1] + 0.1 * lead_deviation_um_per_mm(middle);
+    }
+    let column = |name: &str| {
+        let mut given = vec![("p2_um", 0.0), ("p3_um", 0.0)];
+        given.retain(|(other, _)| *other != name);
+        given.push((name, 1.0));
+        let response = response_of(&machine, &run, "pitch_error", "X", &given);
+        response.drive[Axis::X]
+            .iter()
+            .map(|x| x * 1e3)
+            .collect::<Vec<_>>()
+    };
+    let ones = vec![1.0; ticks];
+    let line = run.motion.position[Axis::X].clone();
+    let mut columns = vec![ones, line, column("p2_um"), column("p3_um")];
+    let (_, narrow) = fit(&columns, &travelled);
+    columns.extend(["free_p4_um", "free_p5_um"].map(column));
+    columns.extend((1..8).map(|k| column(&format!("free_{k}_of_8_um"))));
+    let (_, wide) = fit(&columns, &travelled);
+    columns.extend(
+        (1..16)
+            .step_by(2)
+            .map(|k| column(&format!("free_{k}_of_16_um"))),
+    );
+    let (_, fine) = fit(&columns, &travelled);
+    let (_, straight) = fit(&columns[..2], &travelled);
+    println!(
+        "screw {straight:.2} um: P2, P3 leave {narrow:.3}, the wider form {wide:.3}, to the sixteenth {fine:.3}"
+    );
+    assert!(narrow < 0.5 * straight && wide < 0.1 * straight && fine < 0.5 * wide);
+    assert!(rms(travelled) > 1.0);
+}
+
+#[test]
+fn eq1_a_parabola_has_two_thirds_of_its_sagitta_in_p2() {
+    let machine = three_axes("[w X' Y' b Z t]");
+    let run = run(6401, AxisSet::XYZ, |t| {
+        [-320.0 + 100.0 * t, 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+    let response = response_of(
+        &machine,
+        &run,
+        "pitch_error",
+        "X",
+        &[("p2_um", 2.0), ("p3_um", 0.0)],
+    );
+    for (k, error) in response.drive[Axis::X].iter().enumerate() {
+        let x = run.motion.position[Axis::X][k] / 320.0;
+        assert!((error * 1e3 - (3.0 * x * x - 1.0)).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,137 @@
+//! Instants since 1970 as files and messages have them: their range, and the unit that a wrong one was written in.
+//!
+//! The range is that of the wire, where seconds are the bits of an unsigned 32-bit number: 1970-01-01T00:00:00Z to
+//! 2106-02-07T06:28:15.999999999Z. Every place at which a time comes in asks here.
+
+use crate::number::number;
+use crate::stamp::{Clock, NANOS_PER_S, Stamp};
+
+/// First second that no message can carry: 2106-02-07T06:28:16Z.
+pub const END_S: i64 = 1 << 32;
+/// The same in nanoseconds.
+pub const END_NANOS: i64 = END_S * NANOS_PER_S;
+
+/// Begin of the years in which a time in another unit is looked for, s: 1990-01-01.
+const LIKELY_FROM_S: f64 = 631_152_000.0;
+
+/// A number of seconds with every digit of a whole one, as it stands in the file.
+fn written(value: f64) -> String {
+    if value.fract().abs() > 0.0 || value.abs() >= 1e19 {
+        return number(value);
+    }
+    format!("{value:.0}")
+}
+
+/// A number that is no time between 1970 and 2106.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{value}: must be from {least} to {greatest} s since 1970 (to {end}){}", remedy(*value, *greatest), value = written(*value))]
+pub struct NoEpochTime {
+    /// What was written.
+    pub value: f64,
+    /// Least value that is allowed, s.
+    pub least: i64,
+    /// Greatest value that is allowed, s.
+    pub greatest: i64,
+    /// The greatest as a date.
+    pub end: &'static str,
+}
+
+/// The unit that a number which is no time in seconds since 1970 is likely to be in, with how many make a second.
+#[must_use]
+pub fn likely_unit(value: f64) -> Option<(&'static str, f64)> {
+    let units = [
+        ("milliseconds", 1e3),
+        ("microseconds", 1e6),
+        ("nanoseconds", 1e9),
+    ];
+    let fits = |scale: f64| (LIKELY_FROM_S..END_S as f64).contains(&(value / scale));
+    units.into_iter().find(|(_, scale)| fits(*scale))
+}
+
+fn remedy(value: f64, greatest: i64) -> String {
+    match likely_unit(value) {
+        // What is proposed must be taken.
+        Some((unit, scale)) if (value / scale).floor() <= greatest as f64 => {
+            let seconds_s = (value / scale).floor();
+            format!("; it looks like {unit}: write {seconds_s}")
+        }
+        _ => String::new(),
+    }
+}
+
+/// Whether an instant has a place in a message.
+#[must_use]
+pub const fn holds<C: Clock>(stamp: Stamp<C>) -> bool {
+    0 <= stamp.nanos() && stamp.nanos() < END_NANOS
+}
+
+/// The instant `seconds_s` after 1970, from which `room_s` more must fit before the range ends.
+///
+/// # Errors
+/// When it is not in the range, with value, range and the unit that it looks like.
+pub fn whole_seconds<C: Clock>(seconds_s: i64, room_s: i64) -> Result<Stamp<C>, NoEpochTime> {
+    let greatest = END_S.saturating_sub(room_s.max(0)).saturating_sub(1);
+    if (0..=greatest).contains(&seconds_s) {
+        return Ok(Stamp::from_nanos(seconds_s * NANOS_PER_S));
+    }
+    Err(NoEpochTime {
+        value: seconds_s as f64,
+        least: 0,
+        greatest,
+        end: if room_s > 0 {
+            "2106, less what follows"
+        } else {
+            "2106-02-07"
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Host;
+
+    fn said(seconds_s: i64) -> String {
+        whole_seconds::<Host>(seconds_s, 0).unwrap_err().to_string()
+    }
+
+    /// Dates by `date -u -d @4294967295`.
+    #[test]
+    fn val_the_range_ends_where_unsigned_seconds_do() {
+        for seconds_s in [0, 1_767_600_000, 2_147_483_648, 4_294_967_295] {
+            let stamp = whole_seconds::<Host>(seconds_s, 0).unwrap();
+            assert_eq!(stamp.nanos(), seconds_s * NANOS_PER_S);
+            assert!(holds(stamp));
+        }
+        assert!(!holds(Stamp::<Host>::from_nanos(-1)));
+        assert!(!holds(Stamp::<Host>::from_nanos(END_NANOS)));
+        assert!(whole_seconds::<Host>(4_294_967_290, 10).is_err());
+    }
+
+    #[test]
+    fn a_time_in_another_unit_is_refused_with_the_unit_and_the_remedy() {
+        let range = "must be from 0 to 4294967295 s since 1970 (to 2106-02-07)";
+        for (seconds_s, remedy) in [
+            (
+                1_767_600_000_123,
+                "; it looks like milliseconds: write 1767600000",
+            ),
+            (
+                1_767_600_000_000_000,
+                "; it looks like microseconds: write 1767600000",
+            ),
+            (
+                1_767_600_000_000_000_000,
+                "; it looks like nanoseconds: write 1767600000",
+            ),
+            (-1, ""),
+            (END_S, ""),
+            (i64::MIN, ""),
+        ] {
+            assert_eq!(
+                said(seconds_s),
+                format!("{}: {range}{remedy}", written(seconds_s as f64))
+            );
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! A log that is read as a shift, with what it lacks of it.
+
+use metrology::sample::Quantity;
+use metrology::stamp::{Host, Machine, Span, Stamp};
+
+use super::{Bin, Cutter, Event, ShiftOrder, event};
+use crate::account::Account;
+use crate::condition::words;
+use crate::error::BridgeError;
+use crate::leap::Leap;
+use crate::logged::moment;
+use crate::mapping::{Mapping, Use};
+use crate::observation::{MachineClock, MachineTime, Observation, Told};
+use crate::pacing::{DISORDER, Moment, Pacing, Timed, first_date};
+use crate::shdr::block::records;
+use crate::shdr::{self, Line};
+use crate::text;
+
+/// A longer pause counts as a leap of the machine's clock.
+const LONGEST_PAUSE: Span = Span::from_nanos(43_200_000_000_000);
+
+/// The part of a log that was asked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shift {
+    /// What happened, line by line of the programs.
+    pub bins: Vec<Bin>,
+    /// What of the log was taken and left out.
+    pub account: Account,
+    /// Spans of the requested range that the log covers.
+    pub covered: Vec<(Stamp<Machine>, Stamp<Machine>)>,
+    /// Leaps of the machine's clock over an instant that was asked for.
+    pub leaps: Vec<Leap>,
+    /// Whether nothing is missing that would change the programs.
+    pub is_whole: bool,
+}
+
+/// A log that is read.
+struct Reader<'a> {
+    order: &'a ShiftOrder,
+    mapping: &'a Mapping,
+    cutter: Cutter,
+    clock: MachineClock,
+    account: Account,
+    /// First and last instant of each piece of the log between two leaps.
+    pieces: Vec<(Stamp<Machine>, Stamp<Machine>)>,
+    /// Numbers of the spindle and the axes up to the order's end.
+    numbers: u64,
+}
+
+impl Reader<'_> {
+    fn take(&mut self, observation: Observation, dated: Option<Stamp<Machine>>, line: usize) {
+        let time = match (observation.time, dated) {
+            (MachineTime::Absent, Some(dated)) => MachineTime::Absolute(dated),
+            (time, _) => time,
+        };
+        if time == MachineTime::Absent {
+            return self.account.leave("values without a time", line);
+        }
+        let at = self.clock.stamp(time, Stamp::<Host>::default());
+        match self.pieces.last_mut() {
+            Some((first, last)) => (*first, *last) = ((*first).min(at), (*last).max(at)),
+            None => self.pieces.push((at, at)),
+        }
+        let found = self.mapping.find(&observation.key, None);
+        let spindle = &self.order.spindle;
+        let is_refused = found.is_some_and(|(_, used)| refuses(used, spindle, &observation.told));
+        match found {
+            Some(_) if is_refused => self
+                .account
+                .leave("values that are no numbers, or none of a machine", line),
+            Some((_, used)) => {
+                let is_published = *used != Use::Nothing && observation.told != Told::Unavailable;
+                self.account.told += u64::from(is_published);
+            }
+            None => self.account.pass_over(&observation.key),
+        }
+        // What it is instead nobody knows: the last good one is over.
+        let told = if is_refused {
+            &Told::Unavailable
+        } else {
+            &observation.told
+        };
+        let event = found.and_then(|(_, used)| event(used, spindle, told));
+        if let Some(event) = event {
+            let is_number = matches!(event, Event::Spindle(Some(_)) | Event::Axis(_, Some(_)));
+            self.numbers += u64::from(is_number && at <= self.order.to);
+            self.cutter.take(at, event);
+        }
+    }
+
+    /// The machine's clock leaps: a speed holds to the last stamp before it, and from the first one behind it.
+    fn leap(&mut self, leap: &Leap) {
+        if let Some((_, speed_rad_s)) = self.cutter.spindle {
+            self.cutter.take(leap.from, Event::Spindle(None));
+            self.cutter.spindle = Some((leap.to, speed_rad_s));
+        }
+        // It may go back to where it was before.
+        let goes_on = |(_, last): &(Stamp<Machine>, Stamp<Machine>)| {
+            *last - DISORDER <= leap.to && leap.to <= *last + LONGEST_PAUSE
+        };
+        let piece = match self.pieces.iter().rposition(goes_on) {
+            Some(at) => self.pieces.remove(at),
+            None => (leap.to, leap.to),
+        };
+        self.pieces.push(piece);
+    }
+
+    /// What the log covers of the order.
+    fn covered(&self) -> Vec<(Stamp<Machine>, Stamp<Machine>)> {
+        let (from, to) = (self.order.from, self.order.to);
+        let pieces = self.pieces.iter();
+        let within = pieces.map(|(first, last)| ((*first).max(from), (*last).min(to)));
+        let mut covered: Vec<_> = within.filter(|(first, last)| first < last).collect();
+        covered.sort_unstable();
+        covered
+    }
+
+    /// The pause of the log in which the order lies, where it lies in one.
+    fn hole(&self) -> Option<(Stamp<Machine>, Stamp<Machine>)> {
+        let (from, to) = (self.order.from, self.order.to);
+        let ends = self.pieces.iter().map(|(_, last)| *last);
+        let begins = self.pieces.iter().map(|(first, _)| *first);
+        let last = ends.filter(|last| *last <= from).max();
+        last.zip(begins.filter(|first| *first >= to).min())
+    }
+
+    /// Why nothing can be made of the log; `None`: something can.
+    fn nothing(&self, covered: &[(Stamp<Machine>, Stamp<Machine>)]) -> Option<String> {
+        let first = self.pieces.iter().map(|(first, _)| *first).min();
+        let last = self.pieces.iter().map(|(_, last)| *last).max();
+        let Some((first, last)) = first.zip(last) else {
+            return Some("no line with a value has a date".to_owned());
+        };
+        let reaches = format!("it reaches from {} to {}", words(first), words(last));
+        if covered.is_empty() {
+            let remedy = "correct from and to in the order, with an offset such as +01:00 where they are local times: without one they are UTC";
+            return Some(match self.hole() {
+                Some((last, next)) => format!(
+                    "{reaches} and has nothing from {} to {}: {remedy}",
+                    words(last),
+                    words(next)
+                ),
+                None => format!("{reaches}: {remedy}"),
+            });
+        }
+        (self.numbers == 0).then(|| {
+            format!(
+                "{reaches} without a number of the spindle or an axis: correct the mapping, or take a range in which the machine is available"
+            )
+        })
+    }
+}
+
+/// Whether a value that the programs need is not a number or is out of range.
+fn refuses(used: &Use, spindle: &str, told: &Told) -> bool {
+    let Told::Value(text) = told else {
+        return false;
+    };
+    let is_needed = event(used, spindle, &Told::Unavailable).is_some();
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+    is_needed && number.is_none_or(|number| used.refuses(number).is_some())
+}
+
+/// Cuts an adapter's log into bins; what of it could not be read is in the account.
+///
+/// # Errors
+/// When the mapping has no such spindle, or nothing of the log lies within the order.
+pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, BridgeError> {
+    let is_spindle = |used: &Use| matches!(used, Use::Number { name, quantity: Quantity::SpindleSpeed, .. } if *name == order.spindle);
+    if !mapping.uses().any(|(_, used)| is_spindle(used)) {
+        return Err(BridgeError::NoSpindle {
+            name: order.spindle.clone(),
+        });
+    }
+    let log = text::decode(log);
+    let mut reader = Reader {
+        order,
+        mapping,
+        cutter: Cutter::new(order),
+        clock: MachineClock::default(),
+        account: Account {
+            replaced: log.replaced as u64,
+            ..Account::default()
+        },
+        pieces: Vec::new(),
+        numbers: 0,
+    };
+    let leaps = read(&log.text, &mut reader);
+    let covered = reader.covered();
+    if let Some(reason) = reader.nothing(&covered) {
+        return Err(BridgeError::NothingWithin {
+            from: words(order.from),
+            to: words(order.to),
+            reason,
+            account: reader.account.to_string(),
+        });
+    }
+    reader.cutter.take(order.to, Event::Spindle(None));
+    let covered_s: f64 = covered
+        .iter()
+        .map(|(first, last)| (*last - *first).as_secs_f64())
+        .sum();
+    // What is shorter than one line of a program cannot be seen in it.
+    let is_covered = (order.to - order.from).as_secs_f64() - covered_s < order.bin_s;
+    let account = reader.account;
+    Ok(Shift {
+        bins: reader.cutter.bins,
+        is_whole: is_covered && leaps.is_empty() && account.is_whole(),
+        account,
+        covered,
+        leaps,
+    })
+}
+
+/// Reads all records; returns the leaps over an instant of the order.
+fn read(log: &str, reader: &mut Reader<'_>) -> Vec<Leap> {
+    let records = records(log);
+    let moments: Vec<Moment> = records.iter().map(moment).collect();
+    let timed: Vec<Timed> = moments
+        .iter()
+        .filter_map(|one| one.on_its_scale())
+        .collect();
+    let mut pacing = Pacing::default();
+    pacing.begin_at(first_date(moments.iter().copied()));
+    let (mut version, mut leaps, mut behind) = (1, Vec::new(), timed.as_slice());
+    let (from, to) = (reader.order.from, reader.order.to);
+    for (record, moment) in records.iter().zip(moments) {
+        if moment.on_its_scale().is_some() {
+            behind = behind.get(1..).unwrap_or_default();
+        }
+        let paced = pacing.pace(moment, behind.iter().copied(), LONGEST_PAUSE);
+        if let Some(leap) = paced.leap {
+            reader.leap(&leap);
+            if leap.from.min(leap.to) < to && leap.from.max(leap.to) > from {
+                leaps.push(leap);
+            }
+        }
+        let shape = |key: &str| reader.mapping.find(key, None).map(|(_, used)| used.shape());
+        let reading = shdr::read(record, version, shape);
+        reader.account.lines += u64::from(reading.line != Line::Empty);
+        for flaw in &reading.flaws {
+            reader.account.leave(flaw.reason(), record.line);
+        }
+        match reading.line {
+            Line::Observations(observations) => {
+                for observation in observations {
+                    reader.take(observation, paced.dated, record.line);
+                }
+            }
+            Line::Version(said) => version = said,
+            _ => {}
+        }
+    }
+    leaps
+}

@@ -1,0 +1,163 @@
+//! Errors of XML in plain words, and letters that make a text none.
+
+use metrology::yaml::shown;
+
+use crate::text::REPLACED;
+
+/// What is wrong with a text that is no XML, after its line and column: `2:7: </b> closes <a>`.
+#[must_use]
+pub fn in_own_words(error: &roxmltree::Error) -> String {
+    use roxmltree::Error;
+    let what = match error {
+        Error::DtdDetected => "a document type (`<!DOCTYPE`) is not read: remove it".to_owned(),
+        Error::NoRootNode => "no element stands there".to_owned(),
+        Error::UnclosedRootNode => "the text ends inside of an element".to_owned(),
+        Error::UnexpectedCloseTag(open, close, _) => {
+            format!("</{}> closes <{}>", shown(close), shown(open))
+        }
+        Error::DuplicatedAttribute(name, _) => {
+            format!("the attribute {} stands there twice", shown(name))
+        }
+        Error::UnknownEntityReference(name, _) => format!(
+            "&{}; is not defined: write &amp; for an ampersand",
+            shown(name)
+        ),
+        Error::MalformedEntityReference(_) => {
+            "an ampersand begins no reference, or one to a letter that may not stand in XML: write &amp; for an ampersand".to_owned()
+        },
+        Error::UnknownNamespace(prefix, _) => {
+            format!("the prefix {} is not declared", shown(prefix))
+        }
+        Error::NodesLimitReached => "it has more elements than are read".to_owned(),
+        Error::AttributesLimitReached => "it has more attributes than are read".to_owned(),
+        Error::NonXmlChar(letter, _) => {
+            format!("U+{:04X} may not stand in XML", u32::from(*letter))
+        }
+        _ => "the text is no XML: check tags, quotes and brackets".to_owned(),
+    };
+    let at = error.pos();
+    format!("{}:{}: {what}", at.row, at.col)
+}
+
+/// Longest reference that is looked for, bytes.
+const REFERENCE_LIMIT: usize = 12;
+
+/// A text in which each letter that may not stand there is U+FFFD, and how many these were: an ampersand that begins no
+/// reference, a reference to a letter that XML has not, a `<` that begins no tag.
+#[must_use]
+pub fn mended(text: &str) -> (String, usize) {
+    let (mut found, mut count, mut left) = (String::with_capacity(text.len()), 0, text);
+    while let Some(at) = left.find(['&', '<']) {
+        let (front, behind) = left.split_at(at);
+        let (length, may_stand) = piece(behind);
+        let (piece, rest) = behind.split_at(length);
+        found.push_str(front);
+        if may_stand {
+            found.push_str(piece);
+        } else {
+            found.push(REPLACED);
+            count += 1;
+        }
+        left = rest;
+    }
+    found.push_str(left);
+    (found, count)
+}
+
+/// How many bytes from a `<` or an ampersand on belong together, and whether they may stand there.
+fn piece(text: &str) -> (usize, bool) {
+    for (begin, end) in [("<![CDATA[", "]]>"), ("<!--", "-->")] {
+        if text.starts_with(begin) {
+            let length = text.find(end).map_or(text.len(), |at| at + end.len());
+            return (length, true);
+        }
+    }
+    match text.strip_prefix('<') {
+        Some(behind) => {
+            let opens = |letter: char| letter.is_alphabetic() || "_:/!?".contains(letter);
+            (1, behind.starts_with(opens))
+        }
+        None => reference(text),
+    }
+}
+
+fn reference(text: &str) -> (usize, bool) {
+    let end = text.bytes().take(REFERENCE_LIMIT).position(|b| b == b';');
+    let Some(end) = end else {
+        return (1, false);
+    };
+    let name = &text[1..end];
+    let Some(number) = name.strip_prefix('#') else {
+        let is_known = ["amp", "lt", "gt", "quot", "apos"].contains(&name);
+        return if is_known {
+            (end + 1, true)
+        } else {
+            (1, false)
+        };
+    };
+    let (digits, radix) = match number.strip_prefix('x') {
+        Some(digits) => (digits, 16),
+        None => (number, 10),
+    };
+    if digits.is_empty() || !digits.chars().all(|digit| digit.is_digit(radix)) {
+        return (1, false);
+    }
+    let code = u32::from_str_radix(digits, radix).ok();
+    let letter = code.and_then(char::from_u32);
+    (end + 1, letter.is_some_and(is_xml_letter))
+}
+
+const fn is_xml_letter(letter: char) -> bool {
+    matches!(
+        letter,
+        '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..='\u{10ffff}'
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By XML 1.0, productions 2 (Char), 66 (CharRef), 67 (Reference) and 20 (CData).
+    #[test]
+    fn letters_that_may_not_stand_in_xml_are_replaced_and_others_stay() {
+        for (text, wanted, count) in [
+            (
+                "<a b='&quot;'>&amp;&#65;&#x41;</a>",
+                "<a b='&quot;'>&amp;&#65;&#x41;</a>",
+                0,
+            ),
+            ("<a>A&B</a>", "<a>A\u{fffd}B</a>", 1),
+            ("<a>A&#1;B&#x0;</a>", "<a>A\u{fffd}B\u{fffd}</a>", 2),
+            ("<a>&#xD800;&#x110000;</a>", "<a>\u{fffd}\u{fffd}</a>", 2),
+            (
+                "<a>&nbsp;&;&#;</a>",
+                "<a>\u{fffd}nbsp;\u{fffd};\u{fffd}#;</a>",
+                3,
+            ),
+            (
+                "<a>1 < 2 & 3</a>&",
+                "<a>1 \u{fffd} 2 \u{fffd} 3</a>\u{fffd}",
+                3,
+            ),
+            (
+                "<a><![CDATA[A&B<1]]>&</a>",
+                "<a><![CDATA[A&B<1]]>\u{fffd}</a>",
+                1,
+            ),
+            ("<?xml?><!-- & --><a/>", "<?xml?><!-- & --><a/>", 0),
+        ] {
+            assert_eq!(mended(text), (wanted.to_owned(), count), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_reference_to_a_control_letter_is_no_ampersand_that_stands_alone() {
+        let error = roxmltree::Document::parse("<a>&#1;</a>").unwrap_err();
+        let words = in_own_words(&error);
+        assert!(
+            words.contains("a letter that may not stand in XML"),
+            "{words}"
+        );
+    }
+}

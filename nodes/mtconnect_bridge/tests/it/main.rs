@@ -1,0 +1,9 @@
+//! The tests of this crate from outside, in one program.
+
+mod accounts;
+mod adapter;
+mod agent;
+mod parameters;
+mod possible;
+mod reference;
+mod times;

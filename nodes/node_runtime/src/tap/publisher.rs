@@ -1,0 +1,349 @@
+//! Speaks on topics from any thread.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use anyhow::Context as _;
+use metrology::Stamp;
+use metrology::stamp::Host;
+use tokio::runtime::Runtime;
+use tokio::sync::{mpsc, oneshot};
+use tokio::task::JoinHandle;
+use tokio::time::Instant;
+
+use super::{ACKNOWLEDGEMENT, TappedTopic, runtime};
+use crate::clock;
+use crate::environment::Environment;
+use crate::names::{self, NodeNames};
+use crate::network::{Participant, PublishError, Writer};
+use crate::node::{Bytes, TopicPort};
+
+/// Between tries to find room for a sample.
+const RETRY: Duration = Duration::from_micros(200);
+
+/// Tries until there is room for a sample, for `patience` at most: on a busy computer the library's own thread may not have
+/// sent yet what came before.
+async fn once_there_is_room(
+    publish: impl Fn() -> Result<(), PublishError>,
+    patience: Duration,
+) -> Result<(), PublishError> {
+    let deadline = Instant::now() + patience;
+    loop {
+        match publish() {
+            Err(PublishError::Full) if Instant::now() < deadline => {
+                tokio::time::sleep(RETRY).await;
+            }
+            done => return done,
+        }
+    }
+}
+
+/// How long a sample of the topic at `place` waits: not at all where the one before it waited in vain.
+fn patience_for(full: &BTreeSet<usize>, place: usize, patience: Duration) -> Duration {
+    if full.contains(&place) {
+        Duration::ZERO
+    } else {
+        patience
+    }
+}
+
+/// Notes whether the topic at `place` has room after a sample of it.
+fn note_room(full: &mut BTreeSet<usize>, place: usize, sent: &Result<(), PublishError>) {
+    match sent {
+        Err(PublishError::Full) => {
+            full.insert(place);
+        }
+        _ => {
+            full.remove(&place);
+        }
+    }
+}
+
+/// A sample on its way out.
+struct Sample {
+    place: usize,
+    source: Option<Stamp<Host>>,
+    bytes: Bytes,
+}
+
+/// What the publishing thread is given.
+enum Outgoing {
+    Sample(Sample),
+    /// Answer when everything before has been acknowledged, or at the latest in so long.
+    Settle(Duration, oneshot::Sender<bool>),
+}
+
+/// Speaks on topics from any thread: the mirror of a run in one process, and a replay.
+///
+/// A slow network never holds the caller: what finds no room in the queue within the stated time is
+/// dropped and counted.
+pub struct RawPublisher {
+    runtime: Runtime,
+    queue: mpsc::Sender<Outgoing>,
+    publishing: JoinHandle<(Participant, Vec<Writer>, Unsents)>,
+    patience: Duration,
+    dropped: Unsents,
+}
+
+/// Why a sample found no room in the queue.
+const NO_ROOM: &str = "no room in the queue in time";
+
+/// Samples that were not sent, by topic and reason.
+type Unsents = BTreeMap<(usize, &'static str), u64>;
+
+/// Samples of one topic that were not sent for one reason.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unsent {
+    /// Place of the topic among those that were given.
+    pub place: usize,
+    /// Why.
+    pub reason: &'static str,
+    /// How many.
+    pub samples: u64,
+}
+
+/// What became of the samples given to a [`RawPublisher`].
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PublishReport {
+    /// Found no room in the queue in time.
+    pub dropped: u64,
+    /// Were refused by the network: too many unacknowledged, or no little-endian CDR.
+    pub refused: u64,
+    /// Both by topic and reason.
+    pub unsent: Vec<Unsent>,
+}
+
+impl RawPublisher {
+    /// Joins the network as the node `names` with one writer for each of `topics`; `patience` is the
+    /// longest that [`Self::publish`] waits.
+    ///
+    /// # Errors
+    /// When there is no network, or a topic's name breaks the rules of ROS.
+    pub fn start(
+        environment: &Environment,
+        names: &NodeNames,
+        topics: &[TopicPort],
+        queue_len: usize,
+        patience: Duration,
+    ) -> anyhow::Result<Self> {
+        let topics: Vec<TappedTopic> = topics
+            .iter()
+            .map(|port| TappedTopic {
+                name: port.topic.clone(),
+                type_name: port.type_name.to_owned(),
+                qos: port.qos,
+            })
+            .collect();
+        Self::of_found(environment, names, &topics, queue_len, patience)
+    }
+
+    /// The same for topics that were found somewhere, e.g. in a bag.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub fn of_found(
+        environment: &Environment,
+        names: &NodeNames,
+        topics: &[TappedTopic],
+        queue_len: usize,
+        patience: Duration,
+    ) -> anyhow::Result<Self> {
+        let runtime = runtime()?;
+        let (mut participant, warning) = {
+            let _inside = runtime.enter();
+            Participant::join(environment, names)?
+        };
+        participant.wait_for_room();
+        if let Some(warning) = warning {
+            tracing::warn!("{warning}");
+        }
+        let mut writers = Vec::with_capacity(topics.len());
+        for topic in topics {
+            let name = names.resolve(&topic.name)?;
+            let dds_type = names::dds_type(&topic.type_name);
+            writers.push(participant.writer(&name, &dds_type, topic.qos)?);
+        }
+        participant.announce()?;
+        let (queue, mut outgoing) = mpsc::channel::<Outgoing>(queue_len.max(1));
+        let publishing = runtime.spawn(async move {
+            let mut refused = Unsents::new();
+            // A reader that stands still costs one patience, not one for each sample that waits behind.
+            let mut full = BTreeSet::new();
+            while let Some(next) = outgoing.recv().await {
+                match next {
+                    Outgoing::Sample(sample) => {
+                        let place = sample.place;
+                        let publish = || match writers.get(place) {
+                            Some(writer) => writer.publish(&sample.bytes, sample.source),
+                            None => Err(PublishError::Broken("no such topic".to_owned())),
+                        };
+                        let own = patience_for(&full, place, patience);
+                        let sent = once_there_is_room(publish, own).await;
+                        note_room(&mut full, place, &sent);
+                        if let Err(error) = sent {
+                            *refused.entry((place, error.kind())).or_default() += 1;
+                        }
+                    }
+                    Outgoing::Settle(patience, answer) => {
+                        let all =
+                            futures::future::join_all(writers.iter().map(Writer::acknowledged));
+                        let settled = tokio::time::timeout(patience, all).await.is_ok();
+                        // Who asked may have gone.
+                        let _ = answer.send(settled);
+                    }
+                }
+            }
+            (participant, writers, refused)
+        });
+        Ok(Self {
+            runtime,
+            queue,
+            publishing,
+            patience,
+            dropped: Unsents::new(),
+        })
+    }
+
+    /// Publishes on the topic at `place`; `source` is the sample's own time, else the present. False
+    /// when it was dropped.
+    pub fn publish(&mut self, place: usize, source: Option<Stamp<Host>>, bytes: Bytes) -> bool {
+        let outgoing = Outgoing::Sample(Sample {
+            place,
+            source,
+            bytes,
+        });
+        let taken = match self.queue.try_send(outgoing) {
+            Ok(()) => true,
+            Err(mpsc::error::TrySendError::Closed(_)) => false,
+            Err(mpsc::error::TrySendError::Full(outgoing)) => {
+                !self.patience.is_zero() && self.wait(outgoing)
+            }
+        };
+        if !taken {
+            *self.dropped.entry((place, NO_ROOM)).or_default() += 1;
+        }
+        taken
+    }
+
+    /// Waits until every reliable reader has acknowledged what was published so far; false when that took longer
+    /// than `patience`. Not from within an event loop.
+    #[must_use]
+    pub fn settle(&self, patience: Duration) -> bool {
+        let (answer, settled) = oneshot::channel();
+        let asked = self.queue.blocking_send(Outgoing::Settle(patience, answer));
+        asked.is_ok() && settled.blocking_recv().unwrap_or(false)
+    }
+
+    /// How many samples find room in the queue now.
+    #[must_use]
+    pub fn room(&self) -> usize {
+        self.queue.capacity()
+    }
+
+    /// Waits in the caller's thread, which may be one of another tokio runtime.
+    fn wait(&self, mut outgoing: Outgoing) -> bool {
+        let deadline = Instant::now() + self.patience;
+        while Instant::now() < deadline {
+            std::thread::park_timeout(RETRY);
+            match self.queue.try_send(outgoing) {
+                Ok(()) => return true,
+                Err(mpsc::error::TrySendError::Full(back)) => outgoing = back,
+                Err(mpsc::error::TrySendError::Closed(_)) => return false,
+            }
+        }
+        false
+    }
+
+    /// The time now, as samples are stamped.
+    #[must_use]
+    pub fn now() -> Stamp<Host> {
+        clock::host_now()
+    }
+
+    /// Sends what is left, waits until it has arrived, and leaves the network.
+    ///
+    /// # Errors
+    /// When the publishing thread panicked.
+    pub fn stop(self) -> anyhow::Result<PublishReport> {
+        drop(self.queue);
+        self.runtime.block_on(async {
+            let (participant, writers, refused) = self.publishing.await.context("publisher")?;
+            let all = futures::future::join_all(writers.iter().map(Writer::acknowledged));
+            let _ = tokio::time::timeout(ACKNOWLEDGEMENT, all).await;
+            let _ = participant.withdraw();
+            let _ = tokio::time::timeout(ACKNOWLEDGEMENT, participant.graph_acknowledged()).await;
+            Ok(PublishReport {
+                dropped: self.dropped.values().sum(),
+                refused: refused.values().sum(),
+                unsent: (self.dropped.into_iter().chain(refused))
+                    .map(|((place, reason), samples)| Unsent {
+                        place,
+                        reason,
+                        samples,
+                    })
+                    .collect(),
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    /// What becomes of a sample that finds room at the try of number `room`, and after how many tries.
+    fn tried(room: u32, patience: Duration) -> (bool, u32) {
+        let tries = Cell::new(0);
+        let publish = || {
+            tries.set(tries.get() + 1);
+            if tries.get() < room {
+                Err(PublishError::Full)
+            } else {
+                Ok(())
+            }
+        };
+        let sent = runtime()
+            .unwrap()
+            .block_on(once_there_is_room(publish, patience));
+        (sent.is_ok(), tries.get())
+    }
+
+    #[test]
+    fn a_sample_waits_until_there_is_room_for_it() {
+        assert_eq!(tried(40, Duration::from_secs(60)), (true, 40));
+    }
+
+    #[test]
+    fn without_patience_a_sample_is_tried_once() {
+        assert_eq!(tried(2, Duration::ZERO), (false, 1));
+    }
+
+    #[test]
+    fn what_the_network_refuses_is_not_tried_again() {
+        let tries = Cell::new(0);
+        let publish = || {
+            tries.set(tries.get() + 1);
+            Err(PublishError::Broken("no such topic".to_owned()))
+        };
+        let patience = Duration::from_secs(60);
+        let sent = runtime()
+            .unwrap()
+            .block_on(once_there_is_room(publish, patience));
+        assert!(sent.is_err());
+        assert_eq!(tries.get(), 1);
+    }
+
+    #[test]
+    fn a_reader_that_stands_still_costs_one_patience_and_its_return_gives_it_again() {
+        let patience = Duration::from_secs(5);
+        let mut full = BTreeSet::new();
+        assert_eq!(patience_for(&full, 3, patience), patience);
+        note_room(&mut full, 3, &Err(PublishError::Full));
+        assert_eq!(patience_for(&full, 3, patience), Duration::ZERO);
+        assert_eq!(patience_for(&full, 4, patience), patience);
+        note_room(&mut full, 3, &Ok(()));
+        assert_eq!(patience_for(&full, 3, patience), patience);
+    }
+}

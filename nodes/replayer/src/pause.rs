@@ -1,0 +1,110 @@
+//! A long time in a bag in which nothing was recorded: the player waits and reports it.
+
+use std::fmt;
+
+use metrology::stamp::{Host, Span, Stamp};
+
+/// A longer pause is reported when it begins.
+pub const TOLD: Span = Span::from_nanos(3_600_000_000_000);
+
+/// Nothing was recorded between two messages.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pause {
+    /// Time of the bag's first message.
+    pub first: Stamp<Host>,
+    /// Time of the message before.
+    pub from: Stamp<Host>,
+    /// Time of the message behind.
+    pub to: Stamp<Host>,
+    /// Time of the bag over time.
+    pub rate: f64,
+}
+
+impl Pause {
+    /// The pause between two messages that are waited for at `rate`; `None`: it is short.
+    #[must_use]
+    pub fn between(
+        first: Stamp<Host>,
+        from: Stamp<Host>,
+        to: Stamp<Host>,
+        rate: f64,
+    ) -> Option<Self> {
+        (to - from > TOLD).then_some(Self {
+            first,
+            from,
+            to,
+            rate,
+        })
+    }
+
+    /// How long is waited, s.
+    #[must_use]
+    pub fn wait_s(&self) -> f64 {
+        (self.to - self.from).as_secs_f64() / self.rate
+    }
+
+    /// What `--from` has to be to begin behind the pause, s: a little before its end, as seconds are rounded.
+    #[must_use]
+    pub fn from_s(&self) -> f64 {
+        const MS: i64 = 1_000_000;
+        let whole_ms = (self.to - self.first).nanos() / MS - 1;
+        whole_ms as f64 * 1e-3
+    }
+}
+
+impl fmt::Display for Pause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let length = duration((self.to - self.from).as_secs_f64());
+        let wait = duration(self.wait_s());
+        let (from_s, to_s, rate) = (self.from.as_secs_f64(), self.to.as_secs_f64(), self.rate);
+        write!(f, "nothing was recorded for {length}, from {from_s:.3} s")?;
+        if self.from.nanos() == 0 {
+            write!(f, " (the recorder's clock was not set)")?;
+        }
+        write!(
+            f,
+            " to {to_s:.3} s: {wait} pass at rate {rate}; --from {:.3} begins behind it, a higher --rate shortens it, --rate 0 waits for nothing",
+            self.from_s()
+        )
+    }
+}
+
+/// A time in the unit that a person would choose.
+pub(crate) fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 120.0 => format!("{s:.1} s"),
+        s if s < 7_200.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} h", s / 3_600.0),
+        s if s < 63_115_200.0 => format!("{:.1} days", s / 86_400.0),
+        s => format!("{:.1} years", s / 31_557_600.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(s: i64) -> Stamp<Host> {
+        Stamp::from_nanos(s * 1_000_000_000)
+    }
+
+    #[test]
+    fn a_pause_names_its_length_its_wait_and_the_way_around_it() {
+        let (today, first) = (at(1_764_000_000), at(0));
+        let pause = Pause::between(first, first, today, 2.0).unwrap();
+        let text = pause.to_string();
+        for words in [
+            "nothing was recorded for 55.9 years, from 0.000 s (the recorder's clock was not set)",
+            "to 1764000000.000 s: 27.9 years pass at rate 2",
+            "--from 1763999999.999 begins behind it",
+            "--rate 0",
+        ] {
+            assert!(text.contains(words), "{words}: {text}");
+        }
+        let later = Pause::between(at(100), at(200), at(200 + 3_601), 1.0).unwrap();
+        let text = later.to_string();
+        assert!(text.contains("for 60 min, from 200.000 s to"), "{text}");
+        assert!((later.from_s() - 3_700.999).abs() < 1e-9);
+        assert!(Pause::between(first, first, at(3_600), 1.0).is_none());
+    }
+}

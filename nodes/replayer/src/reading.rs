@@ -1,0 +1,239 @@
+//! Reads the messages of a bag that are of use, one after another, and keeps an account of them.
+//!
+//! Every verb that reads what messages say reads through here: a topic is compared with ours once ([`crate::known`]), a
+//! message that cannot be used is left out alone and counted, and the rest goes on.
+
+use abbe_msgs::topics::{Entry, Topic, TopicFamily};
+use abbe_msgs::{FieldParts, Message, Wire, from_cdr, parts_of};
+use recorder::{Bag, Event, Loss, MessageRef, Order};
+
+use crate::account::{Account, Place, Reason, TopicAccount};
+use crate::known::{entry_in_any_namespace, unreadable};
+use crate::leap::Leaps;
+
+/// What became of a bag that was read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Reading {
+    /// The messages of the topics that were asked for.
+    pub account: Account,
+    /// Parts of the files that could not be read.
+    pub losses: Vec<Loss>,
+    /// Leaps of the log times of all messages, in the order in which they were read.
+    pub leaps: Leaps,
+}
+
+impl Reading {
+    /// Whether nothing was lost or left out.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.account.is_whole() && self.losses.is_empty()
+    }
+
+    /// A line for each loss, then for each topic and reason.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let losses = self.losses.iter().map(ToString::to_string);
+        losses.chain(self.account.lines()).collect()
+    }
+}
+
+/// What is done with a topic of the bag.
+enum Plan {
+    /// It is not a topic of ours, or not asked for.
+    Aside,
+    /// None of its messages can be used; its place in the account.
+    LeftOut {
+        place: usize,
+        reason: Reason,
+        what: String,
+    },
+    /// Its messages are handed on; its place in the account.
+    Read { place: usize, entry: &'static Entry },
+}
+
+/// A message that is handed on, and its topic's row of the account.
+pub struct Taken<'a> {
+    entry: &'static Entry,
+    message: MessageRef<'a>,
+    row: &'a mut TopicAccount,
+}
+
+/// Reads `bag` in an order and hands on every message of the topics `wanted` (their names in
+/// [`abbe_msgs::topics`]), in whatever namespace they are.
+pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken<'_>)) -> Reading {
+    let mut reading = Reading::default();
+    let rows = &mut reading.account.topics;
+    let plans: Vec<Plan> = (bag.topics().iter())
+        .map(|info| plan(info, wanted, rows))
+        .collect();
+    let mut messages = bag.messages(order);
+    let mut before = None;
+    while let Some(event) = messages.next_event() {
+        let message = match event {
+            Event::Message(message) => message,
+            Event::Loss(loss) => {
+                reading.losses.push(loss);
+                continue;
+            }
+        };
+        let at = message.log_time_nanos;
+        reading.leaps.pass(before.replace(at).unwrap_or(at), at);
+        match &plans[message.topic.index()] {
+            Plan::Aside => {}
+            Plan::LeftOut {
+                place,
+                reason,
+                what,
+            } => {
+                let row = &mut rows[*place];
+                row.messages += 1;
+                let first = place_of(row.messages, &message, None);
+                row.leave_out(*reason, first, || what.clone());
+            }
+            Plan::Read { place, entry } => {
+                let row = &mut rows[*place];
+                row.messages += 1;
+                take(Taken {
+                    entry,
+                    message,
+                    row,
+                });
+            }
+        }
+    }
+    reading
+}
+
+fn plan(info: &recorder::TopicInfo, wanted: &[&str], rows: &mut Vec<TopicAccount>) -> Plan {
+    let Some(entry) = entry_in_any_namespace(&info.topic) else {
+        return Plan::Aside;
+    };
+    if !wanted.contains(&entry.name) {
+        return Plan::Aside;
+    }
+    let place = rows.len();
+    rows.push(TopicAccount::new(&info.topic, &info.type_name));
+    match unreadable(info, &entry.description) {
+        None => Plan::Read { place, entry },
+        Some((reason, what)) => Plan::LeftOut {
+            place,
+            reason,
+            what,
+        },
+    }
+}
+
+impl Taken<'_> {
+    /// Whether it is of `topic`.
+    #[must_use]
+    pub fn is<M: Message>(&self, topic: &Topic<M>) -> bool {
+        self.entry.name == topic.name
+    }
+
+    /// Whether its topic, or its family of topics, has this name.
+    #[must_use]
+    pub fn is_named(&self, name: &str) -> bool {
+        self.entry.name == name
+    }
+
+    /// Full name of its topic.
+    #[must_use]
+    pub fn topic(&self) -> &str {
+        &self.row.topic
+    }
+
+    /// When it was recorded, ns.
+    #[must_use]
+    pub fn log_time_nanos(&self) -> u64 {
+        self.message.log_time_nanos
+    }
+
+    /// Where it stands.
+    #[must_use]
+    pub fn place(&self) -> Place {
+        let type_name = self.row.type_name.as_str();
+        place_of(self.row.messages, &self.message, Some(type_name))
+    }
+
+    /// Counts it, which was decoded, as one that cannot be used.
+    pub fn leave_out(&mut self, reason: Reason, what: impl FnOnce() -> String) {
+        let place = self.place();
+        self.row.take_back(reason, 1, place, what);
+    }
+
+    /// Counts it, which was decoded, as one that nobody needs.
+    pub fn release(&mut self) {
+        self.row.release(1);
+    }
+
+    /// What it says, as a message of `topic`; `None`: it cannot be used, and is counted as left out.
+    pub fn of<M: Message + Wire>(&mut self, _: &Topic<M>) -> Option<M::Inner> {
+        self.inner::<M>()
+    }
+
+    /// The same of a family's member.
+    pub fn of_member<M: Message + Wire>(&mut self, _: &TopicFamily<M>) -> Option<M::Inner> {
+        self.inner::<M>()
+    }
+
+    fn inner<M: Message + Wire>(&mut self) -> Option<M::Inner> {
+        match from_cdr::<M>(self.message.data).and_then(M::into_inner) {
+            Ok(inner) => {
+                self.row.used += 1;
+                Some(inner)
+            }
+            Err(error) => {
+                let first = place_of(self.row.messages, &self.message, Some(M::TYPE_NAME));
+                let reason = error.defect().into();
+                self.row.leave_out(reason, first, || error.to_string());
+                None
+            }
+        }
+    }
+}
+
+/// Where a message stands; of a message of type `type_name` its own stamp too.
+pub(crate) fn place_of(number: u64, message: &MessageRef<'_>, type_name: Option<&str>) -> Place {
+    Place {
+        number,
+        log_time_nanos: message.log_time_nanos,
+        stamp: type_name.and_then(|name| stamp_of(name, message.data)),
+    }
+}
+
+/// The stamp at the begin of a message, where its type has one and the bytes reach so far.
+fn stamp_of(type_name: &str, data: &[u8]) -> Option<(i32, u32)> {
+    let FieldParts { nested, .. } = parts_of(type_name)?.fields.first()?;
+    if !["std_msgs/msg/Header", "builtin_interfaces/msg/Time"].contains(nested) {
+        return None;
+    }
+    let word = |at: usize| data.get(at..at + 4)?.try_into().ok();
+    let (sec, nanosec) = (word(4)?, word(8)?);
+    match data {
+        [0, 1, ..] => Some((i32::from_le_bytes(sec), u32::from_le_bytes(nanosec))),
+        [0, 0, ..] => Some((i32::from_be_bytes(sec), u32::from_be_bytes(nanosec))),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use abbe_msgs::msg::{AxisState, TestSegment};
+
+    use super::*;
+
+    #[test]
+    fn the_stamp_of_a_message_is_read_where_its_bytes_reach_so_far() {
+        let little = [0, 1, 0, 0, 5, 0, 0, 0, 9, 0, 0, 0];
+        let big = [0, 0, 0, 0, 0, 0, 0, 5, 0, 0, 0, 9];
+        for bytes in [little, big] {
+            assert_eq!(stamp_of(AxisState::TYPE_NAME, &bytes), Some((5, 9)));
+            for short in 0..bytes.len() {
+                assert_eq!(stamp_of(AxisState::TYPE_NAME, &bytes[..short]), None);
+            }
+        }
+        assert!(stamp_of(TestSegment::TYPE_NAME, &little).is_some());
+        assert_eq!(stamp_of("std_msgs/msg/Float64", &little), None);
+        assert_eq!(stamp_of("other_msgs/msg/X", &little), None);
+    }
+}

@@ -1,0 +1,6 @@
+//! The tests of this crate from outside, in one program.
+
+mod alone;
+mod both;
+mod each;
+mod left_out;
