@@ -9,7 +9,7 @@
 //        ask REQUESTS NUMBER BYTES
 //        server REQUESTS TYPE REPLIES TYPE
 //        answer REQUESTS NUMBER BYTES
-// `greet` makes a writer that writes as soon as it is matched, and is gone 0.1 s later.
+// `greet` makes a writer that writes as soon as it is matched, and is gone before Fast DDS would send again by itself.
 //
 //   out: matched TOPIC | refused TOPIC | sample TOPIC BYTES | reply REQUESTS NUMBER BYTES | greeted TOPIC |
 //        request REQUESTS NUMBER BYTES
@@ -263,7 +263,8 @@ class Peer {
     writers_.at(name)->write(&sample);
   }
 
-  // As `ros2 topic pub --once`.
+  // As `ros2 topic pub --once`, whose writer is gone after 0.1 s. Here it stays for 1 s, so that a computer that stands
+  // still for a moment is no loss; by itself Fast DDS would send the sample again after 3 s.
   void greet(const std::string& name, const std::string& type, bool reliable, bool latched,
              const std::string& text) {
     DataWriterQos qos = DATAWRITER_QOS_DEFAULT;
@@ -276,7 +277,7 @@ class Peer {
     } while (status.current_count == 0);
     Raw sample{bytes_of(text)};
     writer->write(&sample);
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    std::this_thread::sleep_for(std::chrono::seconds(1));
     publisher_->delete_datawriter(writer);
     say("greeted " + name);
   }

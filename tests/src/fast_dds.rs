@@ -222,7 +222,7 @@ impl FastDds {
         self.say(&format!("write {} {bytes}", dds_topic(topic)));
     }
 
-    /// Writes a message as soon as a writer of its own is met, and takes the writer away 0.1 s later.
+    /// Writes a message as soon as a writer of its own is met, and takes the writer away 1 s later.
     pub fn greet<M: Message>(&mut self, topic: &Topic<M>, message: &M) {
         let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
         let bytes = hexadecimal(&to_cdr(message));

@@ -11,6 +11,7 @@ use linuxcnc_bridge::waiting::Wait;
 use machine::MachineFile;
 use machine::cycle::{guarded_feed_mm_min, touches};
 use machine::file::AxisEntry;
+use metrology::sample::AxisState;
 use metrology::{Axis, Severity};
 use nalgebra::Vector3;
 
@@ -20,6 +21,8 @@ use crate::linuxcnc::rig::Rig;
 const TOP_MM: f64 = 226.0;
 /// Feed of the touch, mm/min: faster than the probe's, which only takes time, too.
 const FEED_MM_MIN: f64 = 600.0;
+/// Where Z goes to mark a place in what the servo thread records, mm.
+const MARK_MM: [f64; 2] = [TOP_MM - 1.0, TOP_MM];
 /// Faces of block_2 behind which its body lies, mm, and the ball's radius.
 const CORNER_MM: [f64; 3] = [220.0, 180.0, 200.0];
 const BALL_MM: f64 = 3.0;
@@ -99,14 +102,32 @@ impl Person {
 }
 
 /// Takes all offsets and words back to nothing, then sets those of `blocks`.
-fn set(rig: &Rig, blocks: &[&str]) -> String {
+///
+/// What the servo thread records comes late on a busy computer, and would be taken for what follows. So Z is moved down
+/// and up first, and everything until then is read and forgotten.
+fn set(rig: &mut Rig, blocks: &[&str]) -> String {
     let zero: Vec<String> = (1..=9)
         .map(|p| format!("G10 L2 P{p} X0 Y0 Z0 R0"))
         .collect();
-    let mut all = vec!["G92.1", "G49", "G21 G90 G17 G94 G91.1 G61 G54", "G80", "F0"];
+    let [down, up] = MARK_MM.map(|z_mm| format!("G53 G0 Z{z_mm}"));
+    let mut all = vec!["G92.1", "G49", "G21 G90 G17 G94 G91.1 G61 G54", &down, &up];
+    all.extend(["G80", "F0"]);
     all.extend(zero.iter().map(String::as_str));
     all.extend(blocks);
-    Person::does(rig, "mdi", &all)
+    rig.states.clear();
+    let found = Person::does(rig, "mdi", &all);
+    rig.until("mark in the states", Duration::from_secs(30), |rig| {
+        let is_at = |state: &AxisState, z_mm: f64| (state.commanded[Axis::Z] - z_mm).abs() < 0.01;
+        let [.., before, last] = rig.states.as_slice() else {
+            return false;
+        };
+        let at_rest = before.commanded == last.commanded && is_at(last, MARK_MM[1]);
+        at_rest && rig.states.iter().any(|state| is_at(state, MARK_MM[0]))
+    });
+    rig.states.clear();
+    rig.triggers.clear();
+    rig.conditions.clear();
+    found
 }
 
 /// Least distance of the ball's centre to the block, whose body fills the octant behind its faces, mm.
@@ -145,9 +166,6 @@ fn low_machine(machine: &MachineFile) -> MachineFile {
 
 fn measure_in(rig: &mut Rig, program: &str, (name, blocks, runs): (&str, &[&str], bool)) {
     let found = set(rig, blocks);
-    rig.states.clear();
-    rig.triggers.clear();
-    rig.conditions.clear();
     let began = Instant::now();
     let ending = rig.run(program);
     println!(
@@ -195,8 +213,6 @@ fn measure_in(rig: &mut Rig, program: &str, (name, blocks, runs): (&str, &[&str]
 /// A touch on the way, at the guarded feed and in no probing move: stopped within the overtravel, and said.
 fn touch_on_the_way(rig: &mut Rig) {
     set(rig, &[]);
-    rig.states.clear();
-    rig.conditions.clear();
     let feed_mm_min = guarded_feed_mm_min(&rig.machine).unwrap();
     let ending = rig.run(&format!(
         "(frame: machine)\nG21 G90\nG0 Z225\nG0 X240 Y174\nG1 Z194 F{feed_mm_min}\nG1 X200 F{feed_mm_min}\nM2\n"
