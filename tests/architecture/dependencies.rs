@@ -150,16 +150,16 @@ fn arch_no_node_depends_on_another_and_only_abbe_on_shells() {
     let bad = [
         packages::example("nodes/probe", &["recorder", "machine"]),
         packages::example("nodes/probe/node", &["probe"]),
-        packages::example("nodes/machine", &["probe"]),
-        packages::example("nodes/node_runtime", &["probe_node"]),
+        packages::example("nodes/libraries/machine", &["probe"]),
+        packages::example("nodes/libraries/node_runtime", &["probe_node"]),
         packages::example("nodes/abbe", &["probe_node"]),
     ];
     assert_eq!(
         between_nodes(&bad, &nodes),
         [
             "nodes/probe: depends on node recorder",
-            "nodes/machine: depends on node probe",
-            "nodes/node_runtime: depends on shell probe_node: only nodes/abbe composes nodes",
+            "nodes/libraries/machine: depends on node probe",
+            "nodes/libraries/node_runtime: depends on shell probe_node: only nodes/abbe composes nodes",
         ]
     );
 }

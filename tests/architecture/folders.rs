@@ -18,6 +18,7 @@ fn misnamed(member: &Package, targets: &[Target]) -> Vec<String> {
         return Vec::new();
     };
     let mut found = Vec::new();
+    let below = below.strip_prefix("libraries/").unwrap_or(below);
     let (node, is_shell) = match below.strip_suffix("/node") {
         Some(node) => (node, true),
         None => (below, false),
@@ -62,6 +63,61 @@ fn arch_folder_crate_and_program_have_one_name() {
         [
             "nodes/probe/node: crate probe_shell: must be probe_node",
             "nodes/probe/node: programs [\"probe\"]: `abbe node probe` is the only one",
+        ]
+    );
+}
+
+/// Folders of `nodes/` that are neither a node, the program nor the libraries, and those that its README lacks.
+fn misplaced(
+    folders: &[String],
+    nodes: &[String],
+    libraries: &[String],
+    readme: &str,
+) -> Vec<String> {
+    let is_known =
+        |name: &&String| nodes.contains(name) || ["abbe", "libraries"].contains(&name.as_str());
+    let unknown = folders.iter().filter(|name| !is_known(name)).map(|name| {
+        format!(
+            "nodes/{name}: no node/ in it: a library belongs to {}",
+            tree::LIBRARIES
+        )
+    });
+    let shared = libraries.iter().map(|name| format!("libraries/{name}"));
+    let listed = folders.iter().filter(|name| *name != "libraries").cloned();
+    let is_absent = |name: &String| !readme.contains(&format!("| [`{name}`]({name}/"));
+    let absent = listed.chain(shared).filter(is_absent);
+    let absent = absent.map(|name| format!("nodes/README.md: no row of {name}"));
+    unknown.chain(absent).collect()
+}
+
+#[test]
+fn arch_nodes_and_libraries_stand_apart() {
+    let libraries = tree::folders(tree::LIBRARIES);
+    assert!(libraries.contains(&"metrology".to_owned()));
+    let readme = tree::text("nodes/README.md").unwrap();
+    check(&misplaced(
+        &tree::folders("nodes"),
+        &tree::nodes(),
+        &libraries,
+        &readme,
+    ));
+    let names = |names: &[&str]| {
+        names
+            .iter()
+            .map(|name| (*name).to_owned())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(
+        misplaced(
+            &names(&["fits", "libraries", "probe"]),
+            &names(&["probe"]),
+            &names(&["machine"]),
+            "| [`fits`](fits/README.md) | x |\n",
+        ),
+        [
+            "nodes/fits: no node/ in it: a library belongs to nodes/libraries",
+            "nodes/README.md: no row of probe",
+            "nodes/README.md: no row of libraries/machine",
         ]
     );
 }

@@ -36,7 +36,7 @@ fn metres(path: &str, source: &Source) -> Vec<String> {
 fn arch_metres_exist_only_on_the_wire() {
     let mut found = Vec::new();
     for name in PURE.iter().chain(&["linuxcnc_bridge", "mtconnect_bridge"]) {
-        let sources = sources(&format!("nodes/{name}/src"));
+        let sources = sources(&format!("{}/src", tree::folder_of(name)));
         found.extend(
             sources
                 .iter()
@@ -74,7 +74,7 @@ fn topic_names(topics: &str) -> Vec<String> {
 
 /// Literals that are topic names; a name of one word counts in shells only, for it is a word elsewhere.
 fn spelled_topics(path: &str, source: &Source, names: &[String]) -> Vec<String> {
-    let in_shell = path.contains("/node/src/") || path.starts_with("nodes/node_runtime/");
+    let in_shell = path.contains("/node/src/") || path.starts_with("nodes/libraries/node_runtime/");
     let is_topic = |text: &str| {
         let name = text.trim_start_matches('/');
         let known = names
@@ -160,7 +160,7 @@ fn arch_the_plant_shares_no_formula_with_the_machine() {
             .into_iter()
             .filter(|(path, _)| path.ends_with("/plant.rs")),
     );
-    all.extend(sources("nodes/trials/src"));
+    all.extend(sources("nodes/libraries/trials/src"));
     assert!(all.len() > 4);
     check(
         &all.iter()

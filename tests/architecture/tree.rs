@@ -109,10 +109,27 @@ pub fn nodes() -> Vec<String> {
         .collect()
 }
 
+/// Folder of libraries that nodes and programs share.
+pub const LIBRARIES: &str = "nodes/libraries";
+
+/// Folder of a crate that is a node's mathematics or a shared library.
+pub fn folder_of(crate_name: &str) -> String {
+    let shared = format!("{LIBRARIES}/{crate_name}");
+    if has(&shared) {
+        shared
+    } else {
+        format!("nodes/{crate_name}")
+    }
+}
+
 #[test]
 fn a_file_of_each_kind_is_found_and_nothing_built() {
     let all = paths("");
-    for path in ["Cargo.toml", "nodes/metrology/src/lib.rs", "clippy.toml"] {
+    for path in [
+        "Cargo.toml",
+        "nodes/libraries/metrology/src/lib.rs",
+        "clippy.toml",
+    ] {
         assert!(all.iter().any(|found| found == path), "{path}");
     }
     assert!(!all.iter().any(|path| path.starts_with("target/")));

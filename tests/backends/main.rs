@@ -3,7 +3,7 @@
 //! Without arguments short runs over Zenoh, judged: links that lose, links that are cut again and again, and computers whose
 //! clocks differ; `-- cell`, `-- cuts` and `-- clocks` run one of them.
 //! `cargo test --release --test backends --features abbe/zenoh -- 66` runs a cell over both, each with a link that is cut for
-//! 66 s, and prints the table of nodes/node_runtime/BACKENDS.md.
+//! 66 s, and prints the table of nodes/libraries/node_runtime/BACKENDS.md.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 #![expect(
     clippy::disallowed_methods,

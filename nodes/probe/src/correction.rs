@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn eq4_adds_polling_and_latency_in_quadrature() {
         let file = machine::MachineFile::parse(
-            include_str!("../../machine/tests/data/bench.yaml"),
+            include_str!("../../libraries/machine/tests/data/bench.yaml"),
             "bench.yaml",
         )
         .unwrap();

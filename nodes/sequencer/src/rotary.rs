@@ -171,7 +171,7 @@ mod tests {
     use crate::plan::Plan;
 
     fn machine() -> MachineFile {
-        let text = include_str!("../../machine/tests/data/bench.yaml");
+        let text = include_str!("../../libraries/machine/tests/data/bench.yaml");
         MachineFile::parse(text, "bench.yaml").unwrap()
     }
 

@@ -94,7 +94,7 @@ mod tests {
     use crate::plan::{Plan, Step};
 
     fn machine() -> MachineFile {
-        let text = include_str!("../../machine/tests/data/bench.yaml");
+        let text = include_str!("../../libraries/machine/tests/data/bench.yaml");
         MachineFile::parse(text, "bench.yaml").unwrap()
     }
 

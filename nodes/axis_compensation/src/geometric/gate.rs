@@ -201,7 +201,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     const CHAIN: &str = "[w C' A' Y' b X Z t]";
-    const MACHINE: &str = include_str!("../../../machine/tests/data/bench.yaml");
+    const MACHINE: &str = include_str!("../../../libraries/machine/tests/data/bench.yaml");
 
     fn model(sequence: u32, chain: &str, name: &str, value: f64) -> GeometryModel {
         let curve = ErrorCurve {

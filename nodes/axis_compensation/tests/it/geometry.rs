@@ -16,7 +16,7 @@ use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
 use nalgebra::DMatrix;
 
 const CHAIN: &str = "[w C' A' Y' b X Z t]";
-const MACHINE: &str = include_str!("../../../machine/tests/data/bench.yaml");
+const MACHINE: &str = include_str!("../../../libraries/machine/tests/data/bench.yaml");
 const GEOMETRY: &str = "geometry: {tool_offset_mm: [0.0, 0.0, -100.0], jump_limit_um: 20.0}";
 
 struct Scene {

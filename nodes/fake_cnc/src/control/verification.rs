@@ -77,7 +77,7 @@ mod tests {
     use crate::plant::{Feedback, ProbeEdge};
     use crate::rs274::Registers;
 
-    const BENCH: &str = include_str!("../../../machine/tests/data/bench.yaml");
+    const BENCH: &str = include_str!("../../../libraries/machine/tests/data/bench.yaml");
 
     /// Axes that are where their loops want them.
     struct Axes(Feedback);

@@ -12,7 +12,7 @@ use metrology::{Axis, AxisSet, PerAxis};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
-const BENCH: &str = include_str!("../../../machine/tests/data/bench.yaml");
+const BENCH: &str = include_str!("../../../libraries/machine/tests/data/bench.yaml");
 const PRODUCTION: &str = include_str!("../../../../launch_configs/first_run/production.ngc");
 const VERIFY: &str = include_str!("../../../../launch_configs/first_run/verify.ngc");
 const BLOCKS: &str = include_str!("../data/linuxcnc_blocks.tsv");

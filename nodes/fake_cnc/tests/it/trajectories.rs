@@ -19,7 +19,7 @@ use metrology::stamp::Span;
 use metrology::{Axis, Stage, Stamp};
 use nalgebra::Vector3;
 
-const MACHINE: &str = include_str!("../../../machine/tests/data/bench.yaml");
+const MACHINE: &str = include_str!("../../../libraries/machine/tests/data/bench.yaml");
 const PLANT: &str = include_str!("../../../../launch_configs/first_run/plant.yaml");
 
 fn machine() -> MachineFile {

@@ -266,7 +266,7 @@ mod tests {
     use super::*;
 
     fn machine() -> MachineFile {
-        let text = include_str!("../../../trials/data/machine.yaml");
+        let text = include_str!("../../../libraries/trials/data/machine.yaml");
         MachineFile::parse(text, "machine.yaml").expect("a machine file")
     }
 

@@ -19,7 +19,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
 
-const BENCH: &str = include_str!("../../../machine/tests/data/bench.yaml");
+const BENCH: &str = include_str!("../../../libraries/machine/tests/data/bench.yaml");
 const FEEDS_MM_S: [f64; 5] = [1.0, 2.0, 4.0, 6.0, 10.0];
 
 /// A machine with its own straight motion; times in ns.

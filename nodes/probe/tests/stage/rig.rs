@@ -10,7 +10,7 @@ use metrology::{Axis, PerAxis, Stage, Stamp};
 use nalgebra::Vector3;
 use probe::{Input, Output, ProbeConfig, ProbeStage};
 
-pub(crate) const BENCH: &str = include_str!("../../../machine/tests/data/bench.yaml");
+pub(crate) const BENCH: &str = include_str!("../../../libraries/machine/tests/data/bench.yaml");
 pub(crate) const BALL_MM: f64 = 3.0;
 pub(crate) const LATENCY_S: f64 = 0.008_37;
 

@@ -11,7 +11,7 @@ use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
 use rotary_axes::SphereVisit;
 
-pub const BENCH: &str = include_str!("../../../machine/tests/data/bench.yaml");
+pub const BENCH: &str = include_str!("../../../libraries/machine/tests/data/bench.yaml");
 /// Bench's sphere.
 pub const BALL_MM: Vector3<f64> = Vector3::new(60.0, -40.0, 90.0);
 

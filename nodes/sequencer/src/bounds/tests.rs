@@ -8,7 +8,7 @@ use crate::recordings::recordings;
 use crate::stage::Sequencer;
 
 const MACHINE: &str = include_str!("../../../../launch_configs/grid_xy/machine.yaml");
-const BENCH: &str = include_str!("../../../machine/tests/data/bench.yaml");
+const BENCH: &str = include_str!("../../../libraries/machine/tests/data/bench.yaml");
 
 fn machine() -> MachineFile {
     MachineFile::parse(MACHINE, "machine.yaml").unwrap()

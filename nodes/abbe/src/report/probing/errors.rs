@@ -261,7 +261,8 @@ mod tests {
     use super::*;
 
     /// 25 points with three lobes and noise, evaluated by scipy.
-    const REFERENCE: &str = include_str!("../../../../metrology/tests/data/iso230_reference.json");
+    const REFERENCE: &str =
+        include_str!("../../../../libraries/metrology/tests/data/iso230_reference.json");
     const MACHINE: &str = include_str!("../../../../../launch_configs/five_axis/machine.yaml");
     const BUDGET: &str = "
 grid_encoder: {expanded_uncertainty_um: 0.6, expanded_uncertainty_um_per_m: 1.0, coverage_factor: 2.0}

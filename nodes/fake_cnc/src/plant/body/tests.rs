@@ -16,7 +16,7 @@ use super::super::network::Network;
 use super::super::structure::Structure;
 use super::Body;
 
-const MACHINE: &str = include_str!("../../../../machine/tests/data/bench.yaml");
+const MACHINE: &str = include_str!("../../../../libraries/machine/tests/data/bench.yaml");
 const PLANT: &str = include_str!("../../../../../launch_configs/first_run/plant.yaml");
 /// Of the error's own size: what is left is of second order.
 const SECOND_ORDER: f64 = 2e-4;

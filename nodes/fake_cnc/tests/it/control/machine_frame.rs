@@ -5,7 +5,7 @@ use super::*;
 use fake_cnc::rs274::Registers;
 use machine::cycle;
 
-const BENCH: &str = include_str!("../../../../machine/tests/data/bench.yaml");
+const BENCH: &str = include_str!("../../../../libraries/machine/tests/data/bench.yaml");
 
 /// States that jobs leave, each made by a program; whether a program in machine coordinates can run in it.
 const STATES: [(&str, bool); 22] = [

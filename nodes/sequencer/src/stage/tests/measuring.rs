@@ -4,7 +4,7 @@ use metrology::sample::{Sense, TestPlane};
 
 use super::*;
 
-const BENCH: &str = include_str!("../../../../machine/tests/data/bench.yaml");
+const BENCH: &str = include_str!("../../../../libraries/machine/tests/data/bench.yaml");
 
 fn plan(steps: &str) -> Result<Sequencer, String> {
     let text = format!("title: test\nsteps:\n{steps}");

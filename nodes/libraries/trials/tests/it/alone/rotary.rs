@@ -23,8 +23,8 @@ const SPHERES: [&str; 5] = [
 
 /// The five-axis machine of `launch_configs`, with linear axes and rotary axes that its file describes well.
 fn five_axis() -> Rig {
-    let machine = include_str!("../../../../../launch_configs/five_axis/machine.yaml");
-    let plant = include_str!("../../../../../launch_configs/five_axis/plant.yaml");
+    let machine = include_str!("../../../../../../launch_configs/five_axis/machine.yaml");
+    let plant = include_str!("../../../../../../launch_configs/five_axis/plant.yaml");
     let mut rig = repeating(&SPHERES, 1);
     let mut own = PlantFile::from_yaml(plant).unwrap();
     let geometry = &mut own.geometry;

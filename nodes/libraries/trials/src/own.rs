@@ -43,8 +43,8 @@ use crate::rig::Rig;
 use crate::size::TOUCH_VARIANCE_MM2;
 
 const FIVE_AXIS: [&str; 2] = [
-    include_str!("../../../launch_configs/five_axis/machine.yaml"),
-    include_str!("../../../launch_configs/five_axis/plant.yaml"),
+    include_str!("../../../../launch_configs/five_axis/machine.yaml"),
+    include_str!("../../../../launch_configs/five_axis/plant.yaml"),
 ];
 /// A spring that presses nothing, N.
 const NO_SPRING_N: f64 = 0.02;

@@ -6,8 +6,8 @@ use machine::{Chain, MachineFile};
 use serde_json::Value;
 
 const BENCH: &str = include_str!("../data/bench.yaml");
-const GRID: &str = include_str!("../../../../launch_configs/grid_xy/machine.yaml");
-const FIRST_RUN: &str = include_str!("../../../../launch_configs/first_run/machine.yaml");
+const GRID: &str = include_str!("../../../../../launch_configs/grid_xy/machine.yaml");
+const FIRST_RUN: &str = include_str!("../../../../../launch_configs/first_run/machine.yaml");
 
 /// Error of the bench file with one text replaced by another.
 fn refusal(from: &str, to: &str) -> String {

@@ -122,8 +122,8 @@ fn warm_shop(like: &Rig) -> Rig {
 
 /// The five-axis machine of `launch_configs`.
 fn five_axis(like: &Rig) -> Rig {
-    let machine = include_str!("../../../../../launch_configs/five_axis/machine.yaml");
-    let plant = include_str!("../../../../../launch_configs/five_axis/plant.yaml");
+    let machine = include_str!("../../../../../../launch_configs/five_axis/machine.yaml");
+    let plant = include_str!("../../../../../../launch_configs/five_axis/plant.yaml");
     let machine = MachineFile::parse(machine, "five_axis/machine.yaml").unwrap();
     Rig {
         control: machine.clone(),

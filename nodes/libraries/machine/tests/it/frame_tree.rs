@@ -13,10 +13,11 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 const BENCH: &str = include_str!("../data/bench.yaml");
-const FIVE_AXIS: &str = include_str!("../../../../launch_configs/five_axis/machine.yaml");
-const FIRST_RUN: &str = include_str!("../../../../launch_configs/first_run/machine.yaml");
-const THREE_AXIS: &str = include_str!("../../../../launch_configs/grid_xy/machine.yaml");
-const BY_LINUXCNC: &str = include_str!("../../../../launch_configs/linuxcnc_latency/machine.yaml");
+const FIVE_AXIS: &str = include_str!("../../../../../launch_configs/five_axis/machine.yaml");
+const FIRST_RUN: &str = include_str!("../../../../../launch_configs/first_run/machine.yaml");
+const THREE_AXIS: &str = include_str!("../../../../../launch_configs/grid_xy/machine.yaml");
+const BY_LINUXCNC: &str =
+    include_str!("../../../../../launch_configs/linuxcnc_latency/machine.yaml");
 
 fn parsed(text: &str) -> MachineFile {
     MachineFile::parse(text, "machine.yaml").unwrap()

@@ -18,7 +18,7 @@ const BODY_MM: [f64; 3] = [60.0, 60.0, 2000.0];
 
 /// Machine files of all scenarios, and the bench of these tests.
 fn machines() -> Vec<(String, MachineFile)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../launch_configs");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../launch_configs");
     let mut found = vec![("bench".to_owned(), bench())];
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path().join("machine.yaml");

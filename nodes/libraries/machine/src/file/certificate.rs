@@ -81,7 +81,7 @@ impl Check<'_> {
 mod tests {
     use super::*;
 
-    const MACHINE: &str = include_str!("../../../../launch_configs/five_axis/machine.yaml");
+    const MACHINE: &str = include_str!("../../../../../launch_configs/five_axis/machine.yaml");
 
     fn with(certificates: &str) -> Result<MachineFile, MachineFileError> {
         let before = MACHINE.split("certificates:").next().unwrap_or(MACHINE);
