@@ -198,6 +198,7 @@ fn the_package_holds_program_units_and_scenarios() {
         assert!(lines.any(right), "{rights} {path}\n{contents}");
     };
     holds("-rwxr-xr-x", "./usr/bin/abbe");
+    assert!(!contents.contains("abbe-trials"), "{contents}");
     holds("-rwxr-xr-x", "./usr/lib/abbe/start-node");
     holds("-rwxr-xr-x", "./usr/lib/abbe/start-router");
     holds("-rw-r--r--", "./usr/lib/systemd/system/abbe@.service");

@@ -26,12 +26,26 @@ pub fn root() -> PathBuf {
 /// When it is not built.
 #[must_use]
 pub fn abbe() -> PathBuf {
+    built("abbe", "abbe")
+}
+
+/// The program of the blind trials.
+///
+/// # Panics
+/// When it is not built.
+#[must_use]
+pub fn abbe_trials() -> PathBuf {
+    built("abbe-trials", "abbe_trials")
+}
+
+fn built(name: &str, package: &str) -> PathBuf {
     let program = std::env::var("CARGO_TARGET_DIR")
         .map_or_else(|_| root().join("target"), PathBuf::from)
-        .join("release/abbe");
+        .join("release")
+        .join(name);
     assert!(
         program.is_file(),
-        "{} is not there: cargo build --release -p abbe makes it (tests/run does)",
+        "{} is not there: cargo build --release -p {package} makes it (tests/run does)",
         program.display()
     );
     program
@@ -84,7 +98,17 @@ pub fn command(domain: u16, arguments: &[&str]) -> Command {
 /// `abbe` with these arguments and no other, on loopback and in a domain.
 #[must_use]
 pub fn as_given(domain: u16, arguments: &[&str]) -> Command {
-    let mut command = Command::new(abbe());
+    on_loopback(&abbe(), domain, arguments)
+}
+
+/// `abbe-trials` with these arguments.
+#[must_use]
+pub fn trials(arguments: &[&str]) -> Command {
+    on_loopback(&abbe_trials(), 0, arguments)
+}
+
+fn on_loopback(program: &Path, domain: u16, arguments: &[&str]) -> Command {
+    let mut command = Command::new(program);
     command
         .args(arguments)
         .current_dir(root())

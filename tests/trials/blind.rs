@@ -4,7 +4,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use abbe_tests::program::abbe;
+use abbe_tests::program::{abbe, abbe_trials};
 use serde_json::Value;
 
 use crate::series::{folder, run, seals};
@@ -79,13 +79,11 @@ fn a_program_that_only_root_may_reach_is_handed_to_nobody_and_a_folder_of_trials
     let (closed, open) = (tempfile::tempdir().unwrap(), folder());
     let mode = std::fs::Permissions::from_mode(0o700);
     std::fs::set_permissions(closed.path(), mode).unwrap();
-    let program = closed.path().join("abbe");
-    std::fs::copy(abbe(), &program).unwrap();
+    let program = closed.path().join("abbe-trials");
+    std::fs::copy(abbe_trials(), &program).unwrap();
     let trials = |out: &Path| {
         let mut command = Command::new(&program);
-        command.args([
-            "trials", "--arm", "iv", "--n", "1", "--seed", "5", "--jobs", "1",
-        ]);
+        command.args(["--arm", "iv", "--n", "1", "--seed", "5", "--jobs", "1"]);
         let out = command.arg("--out").arg(out.join("out")).output().unwrap();
         (
             out.status.code(),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use abbe_tests::program::{Process, command};
+use abbe_tests::program::{Process, trials};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -23,11 +23,10 @@ pub fn seals(folder: &Path) -> PathBuf {
     folder.join("seals")
 }
 
-/// `abbe trials` in a folder.
+/// `abbe-trials` in a folder.
 fn series(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = command(0, &["trials"]);
+    let mut command = trials(arguments);
     command
-        .args(arguments)
         .arg("--out")
         .arg(folder.join("out"))
         .arg("--json")
@@ -38,7 +37,7 @@ fn series(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs `abbe trials` in a folder; the table, and what was said.
+/// Runs `abbe-trials` in a folder; the table, and what was said.
 pub fn run(folder: &Path, arguments: &[&str]) -> (Value, String) {
     let table = folder.join("table.json");
     let ended = Process::start(series(folder, arguments)).ended_within(Duration::from_secs(300));
@@ -188,7 +187,7 @@ fn a_rule_that_is_switched_off_is_judged_on_the_same_trials() {
 
 #[test]
 fn an_arm_that_is_none_is_refused_with_those_that_are() {
-    let mut command = command(0, &["trials", "--arm", "viii"]);
+    let mut command = trials(&["--arm", "viii"]);
     command.current_dir(std::env::temp_dir());
     let ended = Process::start(command).ended_within(Duration::from_secs(60));
     assert_eq!(ended.status.code(), Some(2));
@@ -199,4 +198,15 @@ fn an_arm_that_is_none_is_refused_with_those_that_are() {
         "{}",
         ended.said
     );
+}
+
+#[test]
+fn a_series_of_no_trials_is_refused_before_a_file_is_written() {
+    let home = tempfile::tempdir().unwrap();
+    let mut command = trials(&["--n", "0"]);
+    command.current_dir(home.path());
+    let ended = Process::start(command).ended_within(Duration::from_secs(60));
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.said);
+    assert!(ended.said.contains("0 is not in 1.."), "{}", ended.said);
+    assert_eq!(std::fs::read_dir(home.path()).unwrap().count(), 0);
 }

@@ -17,7 +17,7 @@ macro_rules! tell {
 pub(crate) use tell;
 
 /// Writes a line to standard output.
-pub(crate) fn line(text: Arguments<'_>) {
+pub fn line(text: Arguments<'_>) {
     if let Err(error) = to(&mut std::io::stdout().lock(), text) {
         complain!("abbe: standard output: {error}");
         std::process::exit(1);

@@ -1,15 +1,10 @@
 //! Arguments that can be read and cannot be used: said as clap says it, with exit code 2.
 
 use std::fmt::Display;
-use std::ops::RangeInclusive;
 
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
-/// Trials of one arm: a week of every core at a second each, and each leaves a line in the journal.
-pub const TRIALS: RangeInclusive<u64> = 1..=1_000_000;
-/// Trials at a time: each is a process, of which a computer takes some hundreds.
-pub const JOBS: RangeInclusive<u64> = 0..=256;
 /// Magnitude of any number that has a unit: products of a few of them stay finite.
 pub const GREATEST_NUMBER: f64 = 1e12;
 

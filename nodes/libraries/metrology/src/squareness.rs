@@ -24,7 +24,7 @@
 //! | messages `geometry/model`, `geometry/rotary` | `component: EC0Y` | the component, rad |
 //! | `abbe diagnose`, page of a run, JSON `abbe.gap/1`, message `gap/report`: causes | `squareness XY (EC0Y)`, `angle_urad` | the component, µrad |
 //! | machine file, `effects: {kind: squareness}` | `angle_urad` | the component, µrad |
-//! | `abbe trials`, journal and tables | `squareness`, `angle_urad` | the component, µrad |
+//! | `abbe-trials`, journal and tables | `squareness`, `angle_urad` | the component, µrad |
 //! | `abbe preflight` | `EC0Y`, `squareness XY (EC0Y)` | uncertainty alone |
 //! | `abbe export`: straightness columns and cross-axis tables | none: the lean of (1) as a shift | sign of each control |
 //! | plant file of the fake machine, `geometry.squareness_urad` | `y_to_x`, `z_to_x`, `z_to_y` | the lean itself: −EC0Y, +EB0Z, −EA0Z |

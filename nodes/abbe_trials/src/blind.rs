@@ -19,8 +19,8 @@ use node_runtime::text_file;
 use trials::baseline::{self, Names};
 use trials::{Method, Rig, Sample, measure};
 
-use super::later;
-use crate::diagnose::bags::Recorded;
+use crate::later;
+use abbe::diagnose::bags::Recorded;
 
 /// A user that owns nothing: whom the diagnosis runs as where this program runs as one who may read everything.
 const NOBODY: u32 = 65_534;

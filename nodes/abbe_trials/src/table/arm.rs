@@ -7,7 +7,7 @@ use trials::proportion::Proportion;
 use trials::tally::{ClassLine, D_BINS, Figure, bin_name};
 
 use super::reliability;
-use crate::report::section::{Rows, Section, head};
+use abbe::report::section::{Rows, Section, head};
 
 /// Everything of an arm but who was taken for whom.
 ///

@@ -7,7 +7,7 @@ use maud::{Markup, html};
 use trials::confusion::{ALIKE, NOTHING, NOTICED, Pair, UNKNOWN};
 use trials::{Class, Tally};
 
-use crate::report::section::{Rows, head};
+use abbe::report::section::{Rows, head};
 
 /// Some thirty columns have to go beside each other; what was hidden stays in sight where they do not.
 const TABLE: &str = "font-size: .7rem; line-height: 1.3";

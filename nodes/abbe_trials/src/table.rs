@@ -11,8 +11,8 @@ use trials::tally::{Figure, unknown_auroc};
 use trials::target::{Target, targets};
 use trials::{Arm, Tally, Verdict};
 
-use crate::report::Report;
-use crate::report::section::{Rows, Section};
+use abbe::report::Report;
+use abbe::report::section::{Rows, Section};
 
 mod arm;
 mod confusion;

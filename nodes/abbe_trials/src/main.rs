@@ -1,16 +1,24 @@
-//! `abbe trials`: blind trials of the diagnosis, and the table of what it found.
+//! `abbe-trials`: blind trials of the diagnosis, and the table of what it found.
 //!
 //! For each trial a machine is drawn and its session written as a bag; what is hidden in the plant goes into a sealed
-//! file of another folder, whose SHA-256 is told before the diagnosis starts. The diagnosis is this program's own
-//! `diagnose`, as a process that is given the bag and the machine file and that may not read the seal. Then the seal
-//! is opened and one line added to the journal; a series that was interrupted goes on behind its last line.
+//! file of another folder, whose SHA-256 is printed before the diagnosis starts. The diagnosis is `abbe diagnose`
+//! of the same build, as a process that receives the bag and the machine file and that may not read the seal. Then the
+//! seal is opened and one line added to the journal; a series that was interrupted goes on behind its last line.
+
+#![cfg_attr(not(test), warn(clippy::print_stderr))]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the program writes bags, journals and tables, and starts the diagnosis"
+)]
 
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use abbe::diagnose::Diagnose;
 use anyhow::{Context, Result, bail};
-use clap::Args;
+use clap::{Args, Parser, Subcommand};
 use gap_diagnosis::Rule;
 use sha2::{Digest, Sha256};
 use trials::truth::MEASURE;
@@ -30,15 +38,33 @@ use journal::Journal;
 use series::Series;
 use trial::How;
 
-use crate::tell::tell;
-use crate::usage::{JOBS, TRIALS};
-
+/// Trials of one arm: a week of every core at a second each, and each leaves a line in the journal.
+const TRIALS: RangeInclusive<u64> = 1..=1_000_000;
+/// Trials at a time: each is a process, of which a computer takes some hundreds.
+const JOBS: RangeInclusive<u64> = 0..=256;
 /// Seed of the trials that the diagnosis is developed with; those of `--final` are others.
 const DEVELOPMENT_SEED: u64 = 1;
 
-/// Arguments of `abbe trials`.
+/// Judges the diagnosis blindly on machines with a sealed hidden effect.
+#[derive(Parser)]
+#[command(name = "abbe-trials", version, args_conflicts_with_subcommands = true)]
+struct Arguments {
+    #[command(flatten)]
+    trials: Trials,
+    #[command(subcommand)]
+    verb: Option<Verb>,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// `abbe diagnose`: the process that this program starts for each trial.
+    #[command(hide = true)]
+    Diagnose(Diagnose),
+}
+
+/// Which trials are made, and where their files are.
 #[derive(Args)]
-pub struct Trials {
+struct Trials {
     /// Arms, by number: i catalogue, ii a class left out, iii different physics, iv null, v null with worse noise,
     /// vi confusable pairs, vii the same with one more run of the diagnosis' choice; alone: each class in turn, large enough to be named;
     /// limit: each class in turn, about as small as can be named; own, own-left-out: classes with programmes of their own.
@@ -95,19 +121,28 @@ pub struct Trials {
     markdown: Option<PathBuf>,
 }
 
+fn main() -> ExitCode {
+    let Arguments { trials, verb } = Arguments::parse();
+    let outcome = match verb {
+        Some(Verb::Diagnose(diagnose)) => diagnose.execute(),
+        None => trials.execute(),
+    };
+    outcome.unwrap_or_else(|error| abbe::report_failure("abbe-trials", &error))
+}
+
 impl Trials {
     /// Makes the trials and prints the table.
     ///
     /// # Errors
     /// When a trial cannot be made or a file not written.
-    pub fn execute(self) -> Result<ExitCode> {
+    fn execute(self) -> Result<ExitCode> {
         let seed = match (self.final_series, self.seed) {
             (true, _) => {
                 // What is in the journal was made by this commit already.
                 if !self.tabulate {
-                    tree::check(env!("ABBE_COMMIT"))?;
+                    tree::check(abbe::COMMIT)?;
                 }
-                seed_of(env!("ABBE_COMMIT"))
+                seed_of(abbe::COMMIT)
             }
             (false, seed) => seed.unwrap_or(DEVELOPMENT_SEED),
         };
@@ -146,7 +181,7 @@ impl Trials {
     }
 
     fn publish(&self, table: &table::Table) -> Result<()> {
-        tell!("{}", table.terminal()?);
+        abbe::tell::line(format_args!("{}", table.terminal()?));
         for (path, contents) in [
             (&self.json, table.json()?),
             (&self.html, table.html()?),

@@ -5,7 +5,7 @@ use trials::comparison::MethodLine;
 use trials::target::Target;
 
 use super::arm::methods;
-use crate::report::section::{Rows, Section};
+use abbe::report::section::{Rows, Section};
 
 /// Targets, met and missed.
 pub fn section(targets: &[Target]) -> Section {

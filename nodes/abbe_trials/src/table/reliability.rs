@@ -3,8 +3,8 @@
 use anyhow::Result;
 use trials::Tally;
 
-use crate::report::plot::{self, Plot, Trace};
-use crate::report::section::{Drawing, Rows, head};
+use abbe::report::plot::{self, Plot, Trace};
+use abbe::report::section::{Drawing, Rows, head};
 
 /// Bin by bin of confidence.
 pub fn rows(tally: &Tally) -> Rows {

@@ -40,7 +40,7 @@ pub fn write(rig: &Rig, path: &Path, machine_text: String) -> Result<()> {
     let mut recording = Recording::begin(Directory::create(path)?, &name, config)?;
     recording.add_context(&RunContext {
         start_time_nanos: u64::try_from(rig.start_s * NANOS_PER_S).context("start of a session")?,
-        commit: env!("ABBE_COMMIT").to_owned(),
+        commit: abbe::COMMIT.to_owned(),
         machine_file: Some(machine_text),
         ..RunContext::default()
     })?;

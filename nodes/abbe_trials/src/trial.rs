@@ -9,9 +9,9 @@ use gap_diagnosis::Rule;
 use gap_diagnosis::report::Status;
 use trials::{Arm, Rig, Second, Trial, Truth, Verdict, extra_run, judge, likeness};
 
-use super::blind::{self, Beside, Diagnosed, Question};
-use super::seal::Seal;
-use super::{later, session_bag};
+use crate::blind::{self, Beside, Diagnosed, Question};
+use crate::seal::Seal;
+use crate::{later, session_bag};
 
 /// How trials are made.
 pub struct How {
@@ -256,7 +256,7 @@ fn verdicts(truth: &Truth, sha256: &str, said: Said) -> Vec<Verdict> {
         Verdict {
             truth: truth.clone(),
             truth_sha256: sha256.to_owned(),
-            commit: env!("ABBE_COMMIT").to_owned(),
+            commit: abbe::COMMIT.to_owned(),
             said,
             refused,
             diagnosis_s,

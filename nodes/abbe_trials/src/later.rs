@@ -17,7 +17,7 @@ use machine::effects::CATALOGUE;
 use machine::twin::Session;
 use trials::Rig;
 
-use super::blind;
+use crate::blind;
 
 /// (1); none where there is no gap.
 ///

@@ -1,4 +1,6 @@
 //! The command line of Abbe: one verb a file.
+//!
+//! A library, so that the program of the blind trials reads bags and writes pages in the same way.
 #![cfg_attr(not(test), warn(clippy::print_stderr))]
 #![expect(
     clippy::disallowed_methods,
@@ -14,7 +16,7 @@ use node_runtime::complaint;
 mod alarm;
 mod check;
 mod completions;
-mod diagnose;
+pub mod diagnose;
 mod evaluate;
 mod evidence;
 mod export;
@@ -33,19 +35,21 @@ mod play;
 mod preflight;
 mod progress;
 mod record;
-mod report;
+pub mod report;
 mod report_bag;
 mod run;
 mod scenario;
 mod schema;
-mod tell;
-mod trials;
+pub mod tell;
 mod truth;
 mod usage;
 mod validate;
 mod whole_file;
 #[cfg(test)]
 mod wrong_files;
+
+/// Commit that this program was built from; `unknown` outside a clone.
+pub const COMMIT: &str = env!("ABBE_COMMIT");
 
 /// Measures a CNC machine, models its errors, compensates its axes and records every run.
 #[derive(Parser)]
@@ -73,8 +77,6 @@ enum Verb {
     Schema(schema::Schema),
     /// Write a commented machine file to begin with.
     NewMachine(new_machine::NewMachine),
-    /// Judge the diagnosis on machines whose hidden effect it is not told.
-    Trials(trials::Trials),
     /// Record topics of the ROS graph into a bag.
     Record(record::Record),
     /// Publish a bag's messages again, with `/clock`, at any rate.
@@ -99,14 +101,15 @@ enum Verb {
     Man(man::Man),
 }
 
-fn main() -> ExitCode {
+/// Runs the verb that the process's arguments name.
+#[must_use]
+pub fn execute() -> ExitCode {
     let outcome = match Arguments::parse().verb {
         Verb::Run(run) => run.execute(),
         Verb::Report(report) => report.execute(),
         Verb::Check(check) => check.execute(),
         Verb::Diagnose(diagnose) => diagnose.execute(),
         Verb::Preflight(preflight) => preflight.execute(),
-        Verb::Trials(trials) => trials.execute(),
         Verb::Record(record) => record.execute(),
         Verb::Play(play) => play.execute(),
         Verb::Import(import) => import.execute(),
@@ -122,16 +125,17 @@ fn main() -> ExitCode {
         Verb::Completions(completions) => completions.execute(),
         Verb::Man(man) => man.execute(),
     };
-    outcome.unwrap_or_else(|error| failed(&error))
+    outcome.unwrap_or_else(|error| report_failure("abbe", &error))
 }
 
-/// Says why the verb failed; the exit code tells what is a matter of the arguments from the rest.
-fn failed(error: &anyhow::Error) -> ExitCode {
+/// Prints why a program failed; its exit code is 2 when the arguments are wrong, else 1.
+#[must_use]
+pub fn report_failure(program: &str, error: &anyhow::Error) -> ExitCode {
     if let Some(refusal) = error.downcast_ref::<clap::Error>() {
         // Where nobody reads standard error, the exit code alone tells it.
         let _ = refusal.print();
         return ExitCode::from(usage::USAGE);
     }
-    complain!("abbe: {}", complaint::in_words(error));
+    complain!("{program}: {}", complaint::in_words(error));
     ExitCode::FAILURE
 }

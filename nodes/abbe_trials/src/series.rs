@@ -10,8 +10,8 @@ use gap_diagnosis::Rule;
 use indicatif::{ProgressBar, ProgressStyle};
 use trials::{Arm, Verdict};
 
-use super::journal::Journal;
-use super::trial::{How, Which};
+use crate::journal::Journal;
+use crate::trial::{How, Which};
 
 /// A series.
 pub struct Series<'a> {
