@@ -6,7 +6,7 @@ use crate::msg::AxisCompensation;
 use crate::wire::{Allowed, Reader, set_letters, set_positions, time};
 use crate::{Place, Wire, WireError};
 
-pub(crate) const STATES: [CompensationState; 5] = [
+pub(crate) const COMPENSATION_STATES: [CompensationState; 5] = [
     CompensationState::Off,
     CompensationState::Active,
     CompensationState::Holding,
@@ -59,7 +59,13 @@ impl Wire for AxisCompensation {
             pulses: read.per_axis("pulses", &letters, &self.pulses, 0, |_, n| Ok(n))?,
             remainder: finite("remainder", &self.remainder)?,
             state: read.per_axis("state", &letters, &self.state, off, |axis, value| {
-                read.variant("state", Place::Axis(axis), value, &STATES, state_code)
+                read.variant(
+                    "state",
+                    Place::Axis(axis),
+                    value,
+                    &COMPENSATION_STATES,
+                    state_code,
+                )
             })?,
         })
     }

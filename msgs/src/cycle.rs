@@ -7,7 +7,7 @@ use crate::msg::PlanStatus;
 use crate::wire::{Allowed, Reader, metres, millimetres, time};
 use crate::{Place, Wire, WireError};
 
-const KINDS: [CycleKind; 6] = [
+const CYCLE_KINDS: [CycleKind; 6] = [
     CycleKind::Blocks,
     CycleKind::Latency,
     CycleKind::Touch,
@@ -57,7 +57,7 @@ impl Wire for RunCycleGoal {
             feeds_mm_min.push(millimetres(feed_m_s) * S_PER_MIN);
         }
         Ok(CycleOrder {
-            kind: read.variant("cycle", Place::Whole, self.cycle, &KINDS, kind_code)?,
+            kind: read.variant("cycle", Place::Whole, self.cycle, &CYCLE_KINDS, kind_code)?,
             features: self.features.clone(),
             feeds_mm_min,
             points: self.points,
@@ -67,7 +67,7 @@ impl Wire for RunCycleGoal {
     }
 }
 
-const STATES: [PlanState; 4] = [
+const PLAN_STATES: [PlanState; 4] = [
     PlanState::Waiting,
     PlanState::Running,
     PlanState::Done,
@@ -101,7 +101,7 @@ impl Wire for PlanStatus {
         let read = Reader::of::<Self>();
         Ok(Status {
             at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
-            state: read.variant("state", Place::Whole, self.state, &STATES, state_code)?,
+            state: read.variant("state", Place::Whole, self.state, &PLAN_STATES, state_code)?,
             step: self.step,
             steps: self.steps,
             activity: self.activity.clone(),
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn an_order_keeps_its_feeds_by_the_minute() {
-        for kind in KINDS {
+        for kind in CYCLE_KINDS {
             let order = CycleOrder {
                 kind,
                 features: vec!["block_1.z".to_owned()],
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_status_comes_back_from_the_wire() {
-        for state in STATES {
+        for state in PLAN_STATES {
             let status = Status {
                 at: metrology::Stamp::from_nanos(5),
                 state,

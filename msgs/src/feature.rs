@@ -9,7 +9,7 @@ use crate::wire::{
 };
 use crate::{Place, Wire, WireError};
 
-pub(crate) const KINDS: [FeatureKind; 4] = [
+pub(crate) const FEATURE_KINDS: [FeatureKind; 4] = [
     FeatureKind::Plane,
     FeatureKind::Bore,
     FeatureKind::Boss,
@@ -68,7 +68,7 @@ impl Wire for ProbedFeature {
         Ok(Inner {
             at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
             feature_id: read.name("feature_id", &self.feature_id)?,
-            kind: read.variant("kind", Place::Whole, self.kind, &KINDS, kind_code)?,
+            kind: read.variant("kind", Place::Whole, self.kind, &FEATURE_KINDS, kind_code)?,
             centre_mm: read.point_mm("centre", &self.centre, Allowed::Finite)?,
             centre_covariance_mm2,
             normal: read.ratios("normal", &self.normal, Allowed::Finite)?,

@@ -6,7 +6,7 @@ use crate::msg::{GapCause, GapParameter, GapReport};
 use crate::wire::{Allowed, Reader, metres, millimetres, time};
 use crate::{Place, Wire, WireError, bounds};
 
-const STATES: [GapStatus; 3] = [GapStatus::Named, GapStatus::Surrogate, GapStatus::Set];
+const GAP_STATES: [GapStatus; 3] = [GapStatus::Named, GapStatus::Surrogate, GapStatus::Set];
 
 fn status_code(status: GapStatus) -> u8 {
     match status {
@@ -54,7 +54,13 @@ impl Wire for GapCause {
         Ok(sample::GapCause {
             effect: self.effect.clone(),
             axis: self.axis.clone(),
-            status: read.variant("status", Place::Whole, self.status, &STATES, status_code)?,
+            status: read.variant(
+                "status",
+                Place::Whole,
+                self.status,
+                &GAP_STATES,
+                status_code,
+            )?,
             confidence: read.finite("confidence", self.confidence)?,
             whitened_size: read.finite("whitened_size", self.whitened_size)?,
             parameters: parameters.collect::<Result<_, _>>()?,

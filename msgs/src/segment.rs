@@ -6,7 +6,7 @@ use crate::msg::TestSegment;
 use crate::wire::{Allowed, Reader, lengths, metres, point, time};
 use crate::{Place, Wire, WireError};
 
-pub(crate) const KINDS: [TestKind; 20] = [
+pub(crate) const TEST_KINDS: [TestKind; 20] = [
     TestKind::Latency,
     TestKind::Block,
     TestKind::Touch,
@@ -107,7 +107,7 @@ impl Wire for TestSegment {
             at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
             run: self.run,
             begin: self.begin,
-            kind: read.variant("kind", Place::Whole, self.kind, &KINDS, kind_code)?,
+            kind: read.variant("kind", Place::Whole, self.kind, &TEST_KINDS, kind_code)?,
             plane: read.variant("plane", Place::Whole, self.plane, &PLANES, plane_code)?,
             centre_mm: read.point_mm("centre", &self.centre, Allowed::Finite)?,
             radius_mm: read.length_mm("radius_m", self.radius_m)?,

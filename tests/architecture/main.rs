@@ -7,6 +7,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::disallowed_methods, reason = "the tree under test is files")]
 
+mod constants;
 mod dependencies;
 mod documents;
 mod folders;

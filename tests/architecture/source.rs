@@ -2,6 +2,7 @@
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use syn::UseTree;
+use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
 
 use crate::tree::{self, File};
@@ -15,6 +16,15 @@ pub struct Found {
     pub line: usize,
 }
 
+/// A constant of a module or function.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Constant {
+    /// Its name and line.
+    pub name: Found,
+    /// Its value as written, without blanks.
+    pub value: String,
+}
+
 /// What a file holds outside tests and documentation.
 #[derive(Debug, Default)]
 pub struct Source {
@@ -24,6 +34,8 @@ pub struct Source {
     pub strings: Vec<Found>,
     /// Names of fields, parameters and constants.
     pub quantities: Vec<Found>,
+    /// Constants that belong to no type.
+    pub constants: Vec<Constant>,
     /// Names of modules declared here.
     pub modules: Vec<Found>,
     /// Traits that are implemented here.
@@ -243,6 +255,15 @@ fn named(name: &syn::Ident) -> Found {
     }
 }
 
+/// The text of an expression without blanks and digit separators.
+fn written(expr: &syn::Expr) -> String {
+    let text = expr.span().source_text().unwrap();
+    let kept = text.chars().filter(|c| !c.is_whitespace() && *c != '_');
+    kept.collect::<String>()
+        .replace(",]", "]")
+        .replace(",)", ")")
+}
+
 impl<'ast> Visit<'ast> for Source {
     fn visit_item_use(&mut self, item: &'ast syn::ItemUse) {
         let line = item.use_token.span.start().line;
@@ -269,6 +290,10 @@ impl<'ast> Visit<'ast> for Source {
 
     fn visit_item_const(&mut self, item: &'ast syn::ItemConst) {
         self.quantities.push(named(&item.ident));
+        self.constants.push(Constant {
+            name: named(&item.ident),
+            value: written(&item.expr),
+        });
         visit::visit_item_const(self, item);
     }
 

@@ -21,7 +21,7 @@ use crate::node;
 use crate::tell::tell;
 
 /// Nodes whose messages are what a replay puts in.
-const SOURCES: [&str; 4] = [
+const SOURCE_NODES: [&str; 4] = [
     "fake_cnc",
     "linuxcnc_bridge",
     "mtconnect_bridge",
@@ -92,7 +92,7 @@ fn of(path: &Path, resume_after: &[u64]) -> Result<Outcome> {
 fn build_all(bag: &Bag, run: &RecordedRun, files: &Path) -> Result<Vec<Box<dyn Node>>> {
     run.nodes
         .iter()
-        .filter(|node| !SOURCES.contains(&node.executable.as_str()))
+        .filter(|node| !SOURCE_NODES.contains(&node.executable.as_str()))
         .map(|node| build(bag, node, files).with_context(|| format!("node {}", node.name)))
         .collect()
 }

@@ -32,7 +32,7 @@ const NODE: &[u8] = include_bytes!("install_ros/node");
 const SETUP: &str = include_str!("install_ros/local_setup.sh");
 /// What `ros2` takes for a program.
 const EXECUTABLE: u32 = 0o755;
-const READABLE: u32 = 0o644;
+const FILE_MODE: u32 = 0o644;
 
 impl InstallRos {
     /// Installs; says what and how it is used.
@@ -96,9 +96,9 @@ fn package(prefix: &Path, program: &[u8]) -> Result<()> {
         put(&programs.join(name), NODE, EXECUTABLE)?;
     }
     let index = prefix.join("share/ament_index/resource_index/packages");
-    put(&index.join(PROGRAM), b"", READABLE)?;
+    put(&index.join(PROGRAM), b"", FILE_MODE)?;
     let share = prefix.join("share").join(PROGRAM);
-    put(&share.join("package.xml"), PACKAGE.as_bytes(), READABLE)
+    put(&share.join("package.xml"), PACKAGE.as_bytes(), FILE_MODE)
 }
 
 /// Makes the prefix known to a shell, unless it is a workspace that has its own way.
@@ -112,7 +112,7 @@ fn setup(prefix: &Path) -> Result<()> {
     if text_file::read(&path, Comments::None).is_ok_and(|present| present != text) {
         return Ok(());
     }
-    put(&path, text.as_bytes(), READABLE)
+    put(&path, text.as_bytes(), FILE_MODE)
 }
 
 fn copy_folder(from: &Path, to: &Path) -> Result<()> {

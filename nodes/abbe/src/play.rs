@@ -55,9 +55,9 @@ pub struct Play {
 }
 
 /// The player's name on the graph.
-pub const NAME: &str = "replayer";
+pub const PLAYER_NAME: &str = "replayer";
 /// Between two looks at how far it is.
-const LOOK: Duration = Duration::from_millis(100);
+const PROGRESS_PERIOD: Duration = Duration::from_millis(100);
 impl Play {
     /// Plays to the end or to SIGINT; exit code 3 when something was lost.
     ///
@@ -84,7 +84,7 @@ impl Play {
         config.checked().map_err(|error| refused("play", error))?;
         let rules = Arguments::parse(self.ros.clone());
         let rules = rules.map_err(|error| refused("play", error))?;
-        let setup = Setup::new(NAME, &rules)?;
+        let setup = Setup::new(PLAYER_NAME, &rules)?;
         if let Some((name, _)) = setup.tree().leaves().first() {
             let reason = format!(
                 "parameter `{name}`: does nothing here, the options of `abbe play` say how a bag is played"
@@ -98,7 +98,7 @@ impl Play {
         let mut running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
         complain!("Playing {bag}; Ctrl-C ends it.");
         let mut shown = Shown::new();
-        while desk.progress().over.is_none() && !interruption.wait(LOOK) {
+        while desk.progress().over.is_none() && !interruption.wait(PROGRESS_PERIOD) {
             if let Some(error) = running.ended() {
                 return Err(error);
             }

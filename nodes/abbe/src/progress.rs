@@ -14,7 +14,7 @@ use crate::evidence::Evidence;
 
 /// Time between two looks of a person.
 const PERIOD: Duration = Duration::from_millis(120);
-const UNITS: u64 = 1000;
+const BAR_UNITS: u64 = 1000;
 
 /// What is shown while a run goes on.
 pub struct Progress {
@@ -29,7 +29,7 @@ impl Progress {
     /// Begins at `start` of the run's own time.
     pub fn new(title: &str, start: Stamp<Host>) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new(UNITS);
+            let bar = ProgressBar::new(BAR_UNITS);
             let style = ProgressStyle::with_template("{prefix}\n[{bar:40}] {percent:>3} %  {msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar.set_prefix(title.to_owned());
@@ -68,7 +68,7 @@ impl Progress {
             clippy::cast_sign_loss,
             reason = "a share of a small number"
         )]
-        bar.set_position((done.clamp(0.0, 1.0) * UNITS as f64) as u64);
+        bar.set_position((done.clamp(0.0, 1.0) * BAR_UNITS as f64) as u64);
         let numbers = numbers(evidence);
         bar.set_message(format!("{}{numbers}", step(now - self.start, status)));
     }

@@ -64,11 +64,11 @@ pub struct Record {
 }
 
 /// The recorder's own name on the graph.
-const NAME: &str = "abbe_record";
+const RECORDER_NAME: &str = "abbe_record";
 /// The name of a recorder that keeps, before which its services stand.
 const KEEPER: &str = "recorder";
 /// Between two looks at whether it is over or the disk is full; a signal wakes it at once.
-const LOOK: Duration = Duration::from_millis(500);
+const DISK_PERIOD: Duration = Duration::from_millis(500);
 
 impl Record {
     /// Records until SIGINT or SIGTERM; exit code 3 when the bag lost something.
@@ -88,7 +88,7 @@ impl Record {
         if config.ring.is_some() {
             return keep(&config, machine, &interruption);
         }
-        let capture = recorder_node::record(&config, machine, NAME)?;
+        let capture = recorder_node::record(&config, machine, RECORDER_NAME)?;
         let bag = &config.bag;
         complain!("Recording into {bag}; Ctrl-C ends it.");
         let alarm = watch(&capture, &interruption)?;
@@ -157,14 +157,18 @@ impl Record {
 /// process can still speak.
 fn watch(capture: &Capture, interruption: &Interruption) -> Result<Option<Alarm>> {
     let mut trouble = None;
-    while !interruption.wait(LOOK) {
+    while !interruption.wait(DISK_PERIOD) {
         let stats = capture.stats();
         if node_runtime::deafness().is_some() {
             break;
         }
         if let Some(reason) = stats.failure {
             let reason = format!("the recording ends, since it cannot be written: {reason}");
-            return Ok(Some(Alarm::raise(&Environment::read()?, NAME, &reason)));
+            return Ok(Some(Alarm::raise(
+                &Environment::read()?,
+                RECORDER_NAME,
+                &reason,
+            )));
         }
         if trouble.is_none() && stats.trouble.is_some() {
             trouble = stats.trouble;

@@ -165,7 +165,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
     row(
         "positioning.X.runs",
         "",
-        config::RUNS,
+        config::RUN_LIMITS,
         "runs after which a test gives a table",
     ),
     row(
@@ -237,7 +237,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         config::MEASURED_LIMIT_UM,
         "as for X",
     ),
-    row("positioning.Y.runs", "", config::RUNS, "as for X"),
+    row("positioning.Y.runs", "", config::RUN_LIMITS, "as for X"),
     row("positioning.Y.settle_s", "s", config::SETTLE_S, "as for X"),
     row("positioning.Y.dwell_s", "s", config::DWELL_S, "as for X"),
     row(
@@ -274,7 +274,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
         config::MEASURED_LIMIT_UM,
         "as for X",
     ),
-    row("positioning.Z.runs", "", config::RUNS, "as for X"),
+    row("positioning.Z.runs", "", config::RUN_LIMITS, "as for X"),
     row("positioning.Z.settle_s", "s", config::SETTLE_S, "as for X"),
     row("positioning.Z.dwell_s", "s", config::DWELL_S, "as for X"),
     row(

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! over held-out runs, every S simulated anew. With one effect taken out, v(all) - v(all - g), what two effects close alike is
-//! nobody's; with one alone, v(g), it is both's; (2) halves it. It is left out for more than [`MOST`] effects, and where
+//! nobody's; with one alone, v(g), it is both's; (2) halves it. It is left out for more than [`MAX_EFFECTS_IN_SUBSETS`] effects, and where
 //! all of them close nothing.
 //!
 //! # References
@@ -22,7 +22,7 @@ use crate::rows::count;
 use crate::shrink::Named;
 
 /// Most effects whose subsets are all simulated.
-pub const MOST: usize = 6;
+pub const MAX_EFFECTS_IN_SUBSETS: usize = 6;
 
 /// The effects whose bits are set.
 pub fn chosen<'n, 'e>(
@@ -53,8 +53,8 @@ pub fn remembered<const N: usize>(
 /// Each named effect apart; `rms_um` simulates the effects whose bits are set.
 pub fn apart(named: &[Named<'_>], rms_um: &dyn Fn(u32) -> f64) -> Vec<Apart> {
     let n = named.len();
-    let squares: Option<Vec<f64>> =
-        (n <= MOST).then(|| (0..1_u32 << n).map(|set| rms_um(set).powi(2)).collect());
+    let squares: Option<Vec<f64>> = (n <= MAX_EFFECTS_IN_SUBSETS)
+        .then(|| (0..1_u32 << n).map(|set| rms_um(set).powi(2)).collect());
     let shares = squares.as_ref().and_then(|squares| shares(n, squares));
     let one = |(place, named): (usize, &Named<'_>)| {
         let alone = 1_usize << place;

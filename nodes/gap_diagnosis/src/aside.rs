@@ -22,7 +22,7 @@ use metrology::Axis;
 use crate::isolability;
 use crate::normal::Normal;
 use crate::resolved;
-use crate::signature::{LEAST_D, Library};
+use crate::signature::{Library, MIN_D_EXCITED};
 use crate::stack::Stack;
 
 /// Errors at the point that is read.
@@ -30,9 +30,9 @@ const DIRECT: [&str; 2] = ["scale_error", "pitch_error"];
 /// What an arm makes of an angle.
 const BY_AN_ARM: [&str; 2] = ["angular_error", "guide_bow"];
 /// Share of the square of a column that rounding and the second order leave.
-const SAME: f64 = 1e-4;
+const ROUNDING_SHARE: f64 = 1e-4;
 /// Cosine from which an effect that was set aside is listed with a direct error.
-const ALIKE: f64 = 0.9;
+const MIN_COSINE_LISTED: f64 = 0.9;
 
 /// The instances that are set aside, each with the direct ones that explain it.
 pub fn set_aside(
@@ -69,7 +69,9 @@ pub fn set_aside(
             !plain.any(tells)
         };
         if forms.iter().all(is_explained) && forms.iter().any(needs_more) {
-            let alike = |one: &&usize| isolability::cos(signatures, normal, first, **one) > ALIKE;
+            let alike = |one: &&usize| {
+                isolability::cos(signatures, normal, first, **one) > MIN_COSINE_LISTED
+            };
             let by = direct.iter().filter(alike);
             aside.insert(
                 instance,
@@ -100,6 +102,6 @@ fn is_explained(signatures: &Library, normal: &Normal, by: &[usize], form: usize
         let square = normal.gram[(*column, *column)];
         let left = square - normal.explained_square(*column, by);
         let most = parameter.low.abs().max(parameter.high.abs()) / parameter.typical;
-        left < SAME * square || left.max(0.0).sqrt() * most < LEAST_D
+        left < ROUNDING_SHARE * square || left.max(0.0).sqrt() * most < MIN_D_EXCITED
     })
 }

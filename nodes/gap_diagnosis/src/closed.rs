@@ -19,7 +19,7 @@
 //! so that what is left is the middle of the draws. With the floor as it is, every draw would be closed whole, and
 //! what is not known of the noise would be no doubt.
 //!
-//! The interval is absent where the gap before cannot be told from none, and where fewer than [`LEAST_RUNS`] runs were judged:
+//! The interval is absent where the gap before cannot be told from none, and where fewer than [`MIN_RUNS_CLOSED`] runs were judged:
 //! what one or two runs have alike says nothing of others.
 
 use std::collections::BTreeMap;
@@ -37,7 +37,7 @@ use crate::report::Interval;
 use crate::stack::Stack;
 
 /// Fewest runs that are drawn from.
-pub const LEAST_RUNS: usize = 3;
+pub const MIN_RUNS_CLOSED: usize = 3;
 
 /// Sums of one run, one entry a channel.
 type Sums = Vec<Sum>;
@@ -88,7 +88,7 @@ fn of_run(stack: &Stack<'_>, channels: &[&Channel], run: usize, sizes: &[Vec<Siz
 }
 
 fn interval(runs: &[Sums], freedom: &[[f64; 2]], config: &GapConfig) -> Option<Interval> {
-    if runs.len() < LEAST_RUNS {
+    if runs.len() < MIN_RUNS_CLOSED {
         return None;
     }
     let told = share(runs.iter(), &vec![[1.0; 2]; freedom.len()])?;

@@ -40,7 +40,7 @@ use crate::rule::Rule;
 use crate::stack::Stack;
 
 /// A level of a condition needs this D of the effect to say something of its size.
-const LEAST_D: f64 = 3.0;
+const MIN_D_TO_COUNT_LEVEL: f64 = 3.0;
 
 /// The checks of (1) of each signature.
 pub fn held_out_gains(stack: &Stack<'_>, parts: &[DVector<f64>]) -> Vec<Vec<Check>> {
@@ -68,7 +68,9 @@ pub fn held_out_gains_of(
     let normals: Vec<Normal> = folds.iter().map(|fold| within(&columns, z, fold)).collect();
     (0..parts.len())
         .map(|member| {
-            let shows = |fold: &&Normal| fold.gram[(member, member)] > LEAST_D * LEAST_D;
+            let shows = |fold: &&Normal| {
+                fold.gram[(member, member)] > MIN_D_TO_COUNT_LEVEL * MIN_D_TO_COUNT_LEVEL
+            };
             let gains: Vec<Gain> = normals
                 .iter()
                 .filter(shows)
@@ -124,7 +126,7 @@ fn gain(whole: &Normal, fold: &Normal, member: usize) -> Gain {
     let changed = change.dot(&(&fold.gram * &change));
     Gain {
         gain: told(&with) - told(&without),
-        tells: changed > LEAST_D * LEAST_D,
+        tells: changed > MIN_D_TO_COUNT_LEVEL * MIN_D_TO_COUNT_LEVEL,
     }
 }
 
@@ -139,8 +141,8 @@ fn checks(gains: &[Gain]) -> Vec<Check> {
 }
 
 /// Gain over its standard error, and share of the runs with a gain, that confirm a member.
-const LEAST_GAIN: f64 = 1.0;
-const LEAST_SHARE: f64 = 0.8;
+const MIN_GAIN_TO_CONFIRM: f64 = 1.0;
+const MIN_SHARE_OF_RUNS: f64 = 0.8;
 
 fn checks_of(gains: &[f64]) -> Vec<Check> {
     if gains.len() < 2 {
@@ -154,9 +156,10 @@ fn checks_of(gains: &[f64]) -> Vec<Check> {
     let positive = count(gains.iter().filter(|gain| **gain > 0.0).count());
     let error = (variance / n).sqrt();
     vec![
-        Check::new(CheckId::HeldOutGain, mean > LEAST_GAIN * error).with(mean / error, LEAST_GAIN),
-        Check::new(CheckId::HeldOutShare, positive >= LEAST_SHARE * n)
-            .with(positive / n, LEAST_SHARE),
+        Check::new(CheckId::HeldOutGain, mean > MIN_GAIN_TO_CONFIRM * error)
+            .with(mean / error, MIN_GAIN_TO_CONFIRM),
+        Check::new(CheckId::HeldOutShare, positive >= MIN_SHARE_OF_RUNS * n)
+            .with(positive / n, MIN_SHARE_OF_RUNS),
     ]
 }
 
@@ -261,7 +264,7 @@ pub fn constancy_of(
     for (name, levels) in by_condition.chain([times]) {
         let levels: Vec<DVector<f64>> = levels
             .into_iter()
-            .filter(|level| level.norm() > LEAST_D)
+            .filter(|level| level.norm() > MIN_D_TO_COUNT_LEVEL)
             .collect();
         if levels.len() < 2 {
             continue;

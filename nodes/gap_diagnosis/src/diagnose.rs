@@ -12,7 +12,7 @@ use crate::config::GapConfig;
 use crate::error::GapError;
 use crate::experiment::Experiment;
 use crate::families::Slot;
-use crate::fewer::{FEWEST_STATIONS, fewer};
+use crate::fewer::{MIN_STATIONS_KEPT, fewer};
 use crate::figures::{Figures, Note};
 use crate::form_error::FormError;
 use crate::gap;
@@ -346,7 +346,7 @@ fn remarks(stack: &Stack<'_>, split: &Split, found: &Found) -> Vec<Note> {
         runs if runs < FEW_HELD_OUT => notes.push(Note::FewHeldOut { runs }),
         _ => {}
     }
-    if stack.runs.len() < localise::FEWEST_RUNS {
+    if stack.runs.len() < localise::MIN_RUNS_TO_LOCALISE {
         notes.push(Note::FewRuns {
             runs: stack.runs.len(),
         });
@@ -419,7 +419,7 @@ fn listed(machine: &MachineFile) -> Result<Vec<Box<dyn Effect>>, GapError> {
 /// Stations a circle or pass, fewer where the session would have too many rows.
 pub(crate) fn stations(session: &Session, runs: &[usize], config: &GapConfig) -> usize {
     let mut stations = config.stations;
-    while stations > FEWEST_STATIONS
+    while stations > MIN_STATIONS_KEPT
         && Rows::new(session, runs, stations, |_| true).len > config.most_rows
     {
         stations = stations * 3 / 4;

@@ -26,9 +26,9 @@ use crate::repeats::same_condition;
 use crate::rows::Rows;
 
 /// Fewest stations of a circle or pass.
-pub const FEWEST_STATIONS: usize = 32;
+pub const MIN_STATIONS_KEPT: usize = 32;
 /// Stations of a circle or pass where runs are left out.
-const STATIONS: usize = 64;
+const STATIONS_KEPT: usize = 64;
 /// Runs that each condition keeps.
 const KEPT: usize = 3;
 
@@ -39,11 +39,11 @@ pub fn fewer(session: &Session, config: &GapConfig) -> Option<Session> {
     }
     let all: Vec<usize> = (0..session.runs.len()).collect();
     let rows = |stations: usize| Rows::new(session, &all, stations, |_| true).len;
-    let fewest = rows(FEWEST_STATIONS.min(config.stations));
+    let fewest = rows(MIN_STATIONS_KEPT.min(config.stations));
     if fewest <= config.most_rows {
         return None;
     }
-    let rows = rows(STATIONS.min(config.stations));
+    let rows = rows(STATIONS_KEPT.min(config.stations));
     let mut kept = vec![];
     for runs in conditions(session) {
         kept.extend(spread(&runs, config.most_rows, rows));

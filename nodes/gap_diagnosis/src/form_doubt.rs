@@ -27,7 +27,7 @@ use crate::stack::Stack;
 /// Coverage factor of the intervals.
 const COVERAGE: f64 = 1.96;
 /// Squared cosine from which a free amplitude is the form over again.
-const MOST_ALIKE: f64 = 0.98;
+const MAX_SQUARED_COSINE: f64 = 0.98;
 
 /// (1) for every form of a set that has a wider one.
 pub fn widen(stack: &Stack<'_>, signatures: &Library, forms: &[&Form], estimates: &mut [Estimate]) {
@@ -98,7 +98,7 @@ fn wider(stack: &Stack<'_>, signatures: &Library, form: &Form, estimate: &Estima
         let column = signature(*place, typical);
         let is_other = |own: &DVector<f64>| {
             let square = own.norm_squared() * column.norm_squared();
-            own.dot(&column).powi(2) < MOST_ALIKE * square
+            own.dot(&column).powi(2) < MAX_SQUARED_COSINE * square
         };
         column.norm() > 1e-3 && own.iter().all(is_other)
     };

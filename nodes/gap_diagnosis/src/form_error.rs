@@ -149,7 +149,7 @@ fn edges(told: &[f64], least_mm: f64) -> Vec<(usize, f64)> {
 }
 
 /// Part of the error of form that is rough, from station to station.
-pub const ROUGH: f64 = 0.5;
+pub const ROUGH_STATION_SHARE: f64 = 0.5;
 
 /// Standard deviations of the modes of a field of size `s`.
 pub fn smooth(s: f64) -> Smooth {

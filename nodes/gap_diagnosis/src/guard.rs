@@ -56,9 +56,9 @@ const MEDIAN_SQUARE: f64 = 0.454_936;
 /// Relative variance of a variance that is found by the median of n squares, times n.
 const OF_MEDIAN: f64 = 5.4;
 /// Standard deviations by which worse noise must be sure.
-const SURE: f64 = 1.0;
+const MIN_NOISE_DEVIATIONS: f64 = 1.0;
 /// Share of the error of form that is not smooth: it stays beside the biggest model.
-pub const ROUGH: f64 = 0.25;
+pub const ROUGH_FORM_SHARE: f64 = 0.25;
 /// Rows beyond the terms of the models below which a channel is not judged.
 const FEWEST: f64 = 20.0;
 
@@ -93,7 +93,7 @@ pub fn inflation(
             continue;
         }
         let doubt = (OF_MEDIAN / left + 2.0 / noise[&channel].freedom.max(1.0)).sqrt();
-        let sure = (-SURE * doubt).exp(); // (3)
+        let sure = (-MIN_NOISE_DEVIATIONS * doubt).exp(); // (3)
         let [s2, without] = [
             middle_square(&blocks, &rest, n / left * sure),
             middle_square(&blocks, &white, sure),
@@ -202,7 +202,7 @@ fn smooth(
     form: &FormError,
 ) -> f64 {
     let within = noise[&block.channel].within(&stack.session.runs[block.run], block);
-    (ROUGH * form.of(block)).powi(2) / within.variances[0]
+    (ROUGH_FORM_SHARE * form.of(block)).powi(2) / within.variances[0]
 }
 
 /// What the effects leave, and what is left beside the biggest model as well, with its terms by channel.

@@ -27,7 +27,7 @@ use crate::signature::Instance;
 /// Ends of the names of parameters that tell a relative length or a delay.
 const OF_A_UNIT: [&str; 2] = ["_um_per_m", "_ms"];
 /// Members of one kind beyond which they are one cause.
-pub const MOST_ALIKE: usize = 2;
+pub const MAX_OF_ONE_KIND: usize = 2;
 /// Standard uncertainties of a difference within which sizes agree.
 const AGREE: f64 = 2.0;
 /// A size that is less sure, by its standard uncertainty over it, agrees with too much.
@@ -50,7 +50,7 @@ impl Size {
     }
 }
 
-/// Of each member that has a size of a unit, how many of one kind have that size, by (1): more than [`MOST_ALIKE`] are one cause.
+/// Of each member that has a size of a unit, how many of one kind have that size, by (1): more than [`MAX_OF_ONE_KIND`] are one cause.
 pub fn alike(members: &[(usize, &Instance, &Estimate)]) -> BTreeMap<usize, usize> {
     let sizes: Vec<Size> = members
         .iter()
@@ -147,7 +147,7 @@ mod tests {
             .map(|(place, (own, estimate))| (10 + place, own, estimate))
             .collect();
         let alike = alike(&members).into_iter();
-        let in_common = alike.filter(|(_, n)| *n > MOST_ALIKE);
+        let in_common = alike.filter(|(_, n)| *n > MAX_OF_ONE_KIND);
         in_common.map(|(place, _)| place).collect()
     }
 

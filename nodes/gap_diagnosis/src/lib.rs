@@ -88,7 +88,7 @@ mod whitener;
 mod whiteness;
 mod widening;
 
-pub use closed::LEAST_RUNS as LEAST_JUDGED_RUNS;
+pub use closed::MIN_RUNS_CLOSED as LEAST_JUDGED_RUNS;
 pub use config::GapConfig;
 pub use diagnose::{Diagnosis, diagnose};
 pub use error::GapError;

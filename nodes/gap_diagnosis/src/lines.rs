@@ -31,7 +31,7 @@ use crate::stack::Stack;
 /// Periods over a lead among which lines are sought.
 const RANGE: RangeInclusive<f64> = 0.6..=1.6;
 /// Share of a line's width between two numbers that are tried.
-const STEP: f64 = 0.3;
+const LINE_STEP: f64 = 0.3;
 /// Power of a line.
 const LEAST_POWER: f64 = 30.0;
 
@@ -51,7 +51,8 @@ pub fn add(stack: &Stack<'_>, slots: &[Slot], signatures: &mut Library) {
         };
         let is_tried = |n: f64| {
             let grid = own.kind.parameters[place].role.grid().unwrap_or(&[]);
-            grid.iter().any(|known| (known - n).abs() < STEP * width)
+            grid.iter()
+                .any(|known| (known - n).abs() < LINE_STEP * width)
         };
         let Some(n) = line(stack, slots, *axis, width).filter(|n| !is_tried(*n)) else {
             continue;
@@ -100,7 +101,7 @@ fn strongest(rows: &[(f64, f64)], lead_mm: f64, width: f64) -> Option<f64> {
         }
         2.0 * (c * c + s * s) / count(rows.len().max(1))
     };
-    let tried = std::iter::successors(Some(*RANGE.start()), |n| Some(n + STEP * width));
+    let tried = std::iter::successors(Some(*RANGE.start()), |n| Some(n + LINE_STEP * width));
     let all = tried.take_while(|n| RANGE.contains(n));
     let best = all
         .map(|n| (power(n), n))

@@ -57,7 +57,7 @@ pub struct Score {
 }
 
 /// Fewest runs whose signs are flipped.
-pub const FEWEST_RUNS: usize = 10;
+pub const MIN_RUNS_TO_LOCALISE: usize = 10;
 
 /// (1).
 pub fn wilson_hilferty(square: f64, freedom: f64) -> f64 {
@@ -91,7 +91,7 @@ pub fn scores(
     }
     let (many, few): (Vec<&Slot>, Vec<&Slot>) = slots
         .iter()
-        .partition(|slot| runs_of(stack, slot) >= FEWEST_RUNS);
+        .partition(|slot| runs_of(stack, slot) >= MIN_RUNS_TO_LOCALISE);
     let greatest: Vec<f64> = flipped(stack, &many, z, config)
         .into_iter()
         .zip(parametric(&few, noise, config))

@@ -46,7 +46,7 @@ pub const LONG_S: f64 = 600.0;
 /// Least difference of two temperatures that counts, K.
 const LEAST_K: f64 = 0.15;
 /// The same as a share of the range of the thermometer.
-const LEAST_SHARE: f64 = 0.02;
+const MIN_SHARE_OF_RANGE: f64 = 0.02;
 /// Rows further apart than this many of the usual spacing have nothing between them.
 const MOST_SPACINGS: f64 = 3.0;
 /// Parts of one log.
@@ -54,7 +54,7 @@ const PARTS: usize = 6;
 /// Fewest readings of a part.
 const PER_PART: usize = 20;
 /// Noise needs so many rows.
-const FEWEST_ROWS: usize = 12;
+const MIN_LOG_ROWS: usize = 12;
 /// Share of the rows that the median is worth.
 const EFFICIENCY: f64 = 0.37;
 /// How a part of a log is marked among the features of its segment.
@@ -161,7 +161,7 @@ pub fn heats_alike(session: &Session, a: &Block, b: &Block) -> bool {
         let finite = || series.iter().copied().filter(|degc| degc.is_finite());
         let range =
             finite().fold(f64::NEG_INFINITY, f64::max) - finite().fold(f64::INFINITY, f64::min);
-        let most_k = LEAST_K.max(LEAST_SHARE * range);
+        let most_k = LEAST_K.max(MIN_SHARE_OF_RANGE * range);
         (0..10).all(|tenth| {
             let since_s = shorter_s * 0.1 * (f64::from(tenth) + 0.5);
             let [one, other] = [a, b].map(|block| history.at(series, begin_s(block) + since_s));
@@ -184,7 +184,7 @@ pub fn variance_within(
         .flat_map(|block| beside_neighbours(session, block, raw))
         .map(f64::abs)
         .collect();
-    if all.len() < FEWEST_ROWS {
+    if all.len() < MIN_LOG_ROWS {
         return None;
     }
     let freedom = EFFICIENCY * count(all.len());

@@ -95,7 +95,7 @@ const CAUTION: f64 = 0.7;
 /// Coefficients of the field between runs that one difference tells about.
 const FIELD_MODES: usize = 6;
 /// Fewest rows of differences that say what noise is.
-const FEWEST_ROWS: usize = 6;
+const MIN_NOISE_ROWS: usize = 6;
 /// Fewest rows that say what it is at a pace of its own.
 const FEWEST_OF_A_PACE: f64 = 60.0;
 
@@ -159,7 +159,7 @@ fn of_channel(readings: Readings<'_>, groups: &[Contrasts], config: &GapConfig) 
     let modes = |d: &Difference| d.values.len().min(FIELD_MODES);
     let field_freedom = count(differences.iter().map(modes).sum());
     let total: usize = differences.iter().map(|d| d.values.len()).sum();
-    if total < FEWEST_ROWS {
+    if total < MIN_NOISE_ROWS {
         return None;
     }
     let all: Vec<&Difference> = differences.iter().collect();
@@ -236,7 +236,7 @@ fn repeated(differences: &[Difference], most: usize, least_mm2: f64) -> Vec<Repe
         let Some([row_s, ..]) = difference.paced else {
             continue;
         };
-        let same = |pace: &&mut (f64, _)| (pace.0 / row_s).ln().abs() < pace::SAME;
+        let same = |pace: &&mut (f64, _)| (pace.0 / row_s).ln().abs() < pace::SAME_PACE;
         match paces.iter_mut().find(same) {
             Some((_, own)) => own.push(difference),
             None => paces.push((row_s, vec![difference])),

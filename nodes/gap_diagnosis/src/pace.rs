@@ -32,13 +32,13 @@ use crate::rows::{Block, count, time_s};
 use crate::whitener::Autoregression;
 
 /// Two paces that differ by less are one.
-pub const SAME: f64 = 0.05;
+pub const SAME_PACE: f64 = 0.05;
 /// Order of the autoregression at a pace that was not repeated.
 const ORDER: usize = 3;
 /// Relative uncertainty of the variance of a single reading, which effects within a row enlarge.
 const OF_READING: f64 = 0.2;
 /// What memory must gain in chi-square to be taken: its two numbers beyond noise.
-const LEAST_GAIN: f64 = 6.0;
+const MIN_GAIN_OF_MEMORY: f64 = 6.0;
 
 /// How long a row of a block lasts, s; none where it has no pace.
 pub fn row_s(run: &Run, block: &Block) -> Option<f64> {
@@ -117,7 +117,7 @@ impl Pace {
             .repeated
             .iter()
             .min_by(|a, b| apart(a.0).total_cmp(&apart(b.0)))?;
-        if apart(nearest.0) < SAME {
+        if apart(nearest.0) < SAME_PACE {
             return Some(nearest.1.clone());
         }
         let in_time = self.in_time?;
@@ -184,7 +184,7 @@ impl InTime {
             }
         });
         let best = with_memory.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
-        Some(if misfit(&best) + LEAST_GAIN < misfit(&white) {
+        Some(if misfit(&best) + MIN_GAIN_OF_MEMORY < misfit(&white) {
             best
         } else {
             white

@@ -35,9 +35,9 @@ const STANDS_OUT: f64 = 25.0;
 /// Periods that the extent has to hold.
 const LEAST_PERIODS: f64 = 3.0;
 /// Frequencies to what the extent resolves.
-const FINER: f64 = 4.0;
+const FREQUENCY_OVERSAMPLING: f64 = 4.0;
 /// Most frequencies of one search.
-const MOST: usize = 2000;
+const MAX_FREQUENCIES: usize = 2000;
 /// Shortest period over a position, mm.
 const SHORTEST_MM: f64 = 0.5;
 
@@ -218,10 +218,10 @@ fn search(at: &[f64], z: &[f64], highest: f64) -> Option<(f64, f64)> {
     if extent <= 0.0 {
         return None;
     }
-    let step = 1.0 / (FINER * extent);
+    let step = 1.0 / (FREQUENCY_OVERSAMPLING * extent);
     let first = LEAST_PERIODS / extent;
     let mut wave = Wave::new(at, first, step);
-    let powers: Vec<f64> = (0..MOST)
+    let powers: Vec<f64> = (0..MAX_FREQUENCIES)
         .take_while(|k| first + step * count(*k) <= highest)
         .map(|_| wave.next_power(z))
         .collect();

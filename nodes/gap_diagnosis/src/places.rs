@@ -12,7 +12,7 @@ use crate::split::title;
 use crate::stack::Stack;
 
 /// Most places that are listed.
-const MOST: usize = 12;
+const MAX_LISTED_PLACES: usize = 12;
 /// Greatest p of a place that is listed.
 const MOST_P: f64 = 0.01;
 
@@ -40,7 +40,7 @@ pub fn listed(scores: &[Score]) -> impl Iterator<Item = &Score> {
     scores
         .iter()
         .filter(|score| score.p_value <= MOST_P)
-        .take(MOST)
+        .take(MAX_LISTED_PLACES)
 }
 
 fn per_condition(stack: &Stack<'_>, slot: &Slot, told: &[f64]) -> Vec<Condition> {

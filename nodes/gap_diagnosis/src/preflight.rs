@@ -65,7 +65,7 @@ pub type Floors = BTreeMap<Instrument, AssumedFloor>;
 /// Arm at which a length stands for an angle, mm.
 pub const ROTARY_ARM_MM: f64 = 100.0;
 /// Pairs from this cosine on are told as alike.
-pub const ALIKE: f64 = 0.95;
+pub const MIN_COSINE_ALIKE: f64 = 0.95;
 /// Below this sine other effects together imitate one.
 pub const IMITATED: f64 = 0.1;
 /// Repeats that a noise floor wants.
@@ -120,7 +120,7 @@ pub struct Foreseen {
     pub sin_alone: f64,
     /// (2): told from every other effect; infinite sizes are absent.
     pub told_apart_from: Option<f64>,
-    /// Effects of other kinds whose signature is the same within [`ALIKE`], with the cosine.
+    /// Effects of other kinds whose signature is the same within [`MIN_COSINE_ALIKE`], with the cosine.
     pub alike: Vec<(String, f64)>,
 }
 
@@ -274,7 +274,7 @@ fn foreseen(shown: &[&Instance], matrix: &Isolability) -> Vec<Foreseen> {
         let cos = |other: usize| matrix.cos.get(k).and_then(|row| row.get(other)).copied();
         let mut alike: Vec<(String, f64)> = alike
             .filter_map(|other| Some((shown[other].name(), cos(other)?.abs())))
-            .filter(|(_, cos)| *cos >= ALIKE)
+            .filter(|(_, cos)| *cos >= MIN_COSINE_ALIKE)
             .collect();
         alike.sort_by(|a, b| b.1.total_cmp(&a.1));
         Some(Foreseen {

@@ -42,9 +42,9 @@ const FEWEST_PLACES: usize = 24;
 /// A curve needs so many targets.
 const FEWEST_TARGETS: usize = 5;
 /// (1) from which two frequencies look alike at the places.
-const ALIKE: f64 = 0.75;
+const MIN_LIKENESS_ALIASED: f64 = 0.75;
 /// Most places that (1) is taken over, and most other frequencies.
-const MOST: usize = 400;
+const MAX_COMPARED: usize = 400;
 /// Name of the parameter that is a period by itself, of an encoder's signal.
 const PERIOD_UM: &str = "period_um";
 
@@ -116,7 +116,7 @@ fn resolves(places_mm: &[f64], period_mm: f64) -> bool {
     if close >= ENOUGH_CLOSE {
         return true;
     }
-    apart.truncate(MOST);
+    apart.truncate(MAX_COMPARED);
     apart.len() >= FEWEST_PLACES && is_alone(&apart, 1.0 / period_mm)
 }
 
@@ -131,15 +131,18 @@ fn is_alone(places_mm: &[f64], per_mm: f64) -> bool {
     others
         .into_iter()
         .filter(|other| (other - per_mm).abs() > 1.5 * finest)
-        .all(|other| own.likeness(&Wave::new(places_mm, other)) < ALIKE)
+        .all(|other| own.likeness(&Wave::new(places_mm, other)) < MIN_LIKENESS_ALIASED)
 }
 
 /// Other frequencies: longer waves, evenly, and those that even spacing makes the same.
 fn others(places_mm: &[f64], per_mm: f64, finest: f64) -> Vec<f64> {
     let highest = (1.5 * per_mm).min(2.0 * count(places_mm.len()) * finest);
-    let step = (0.25 * finest).max(highest / count(MOST));
+    let step = (0.25 * finest).max(highest / count(MAX_COMPARED));
     let even = std::iter::successors(Some(0.5 * finest), |f| Some(f + step));
-    let mut others: Vec<f64> = even.take_while(|f| *f < highest).take(MOST).collect();
+    let mut others: Vec<f64> = even
+        .take_while(|f| *f < highest)
+        .take(MAX_COMPARED)
+        .collect();
     let mut gaps: Vec<f64> = places_mm.windows(2).map(|two| two[1] - two[0]).collect();
     gaps.sort_by(f64::total_cmp);
     if let Some(gap) = gaps.get(gaps.len() / 2).filter(|gap| **gap > 0.0) {

@@ -104,13 +104,13 @@ fn add(cause: &mut Cause, check: Check) {
 }
 
 /// An effect that would stay below this D at its greatest size is not shown.
-const LEAST_D: f64 = 6.0;
+const MIN_D_TO_SHOW: f64 = 6.0;
 
 /// Steps of a shape beside the one found, to one less than this many to both sides.
-const STEP: f64 = 1.189_207_115_002_721;
-const FINER: i32 = 4;
+const SHAPE_STEP: f64 = 1.189_207_115_002_721;
+const SHAPE_STEPS: i32 = 4;
 /// How often shapes are sought anew, one after the other.
-const ROUNDS: usize = 3;
+const SHAPE_ROUNDS: usize = 3;
 
 /// Searches for effects of scatter in what the effects of the mean leave.
 pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind], left: &DVector<f64>) -> Scattered {
@@ -228,7 +228,7 @@ impl<'b, 's, 'a> Bench<'b, 's, 'a> {
     /// The set with the shapes, between those that were tried, that make what was read likeliest.
     fn refine(&mut self, set: &[usize]) -> Set {
         let mut set = set.to_vec();
-        for _ in 0..ROUNDS {
+        for _ in 0..SHAPE_ROUNDS {
             let before = set.clone();
             for member in 0..set.len() {
                 let form = &self.signatures.forms[set[member]];
@@ -309,7 +309,7 @@ impl<'b, 's, 'a> Bench<'b, 's, 'a> {
             let effect = signatures.instances[instance].effect(&on);
             let variance = self.squares.spread(self.scope, &*effect);
             let column = self.squares.column(&variance);
-            if column.norm().is_finite() && column.norm() > LEAST_D {
+            if column.norm().is_finite() && column.norm() > MIN_D_TO_SHOW {
                 amplitudes.push(place);
                 columns.push(column);
                 self.variances.push(variance);
@@ -343,8 +343,8 @@ fn parameters(kind: &'static Kind) -> impl Iterator<Item = &'static Parameter> {
 /// Values of a shape beside one: a little less and more of it; of what widens a form all that may be.
 fn beside(parameter: &Parameter, value: f64) -> Vec<f64> {
     if parameter.low > 0.0 {
-        let powers = (1 - FINER..FINER).filter(|power| *power != 0);
-        let finer = powers.map(|power| value * STEP.powi(power));
+        let powers = (1 - SHAPE_STEPS..SHAPE_STEPS).filter(|power| *power != 0);
+        let finer = powers.map(|power| value * SHAPE_STEP.powi(power));
         return finer
             .map(|finer| finer.clamp(parameter.low, parameter.high))
             .collect();

@@ -34,9 +34,9 @@ use crate::rows::count;
 use crate::stack::Stack;
 
 /// Fewest runs that are drawn from.
-const LEAST_RUNS: usize = 5;
+const MIN_RUNS_DRAWN: usize = 5;
 /// Draws.
-const DRAWS: usize = 200;
+const BOOTSTRAP_DRAWS: usize = 200;
 
 /// One run in one slot.
 struct Part {
@@ -62,13 +62,13 @@ pub fn of_places(
 ) -> Vec<Option<[f64; 2]>> {
     let listed: Vec<&Score> = places::listed(scores).collect();
     let runs = stack.runs.len();
-    if runs < LEAST_RUNS {
+    if runs < MIN_RUNS_DRAWN {
         return vec![None; listed.len()];
     }
     let parts: Vec<Vec<Part>> = slots.iter().map(|slot| parts(stack, slot)).collect();
     let shares = |weights: &[f64]| shares(slots, &parts, &listed, weights);
     let mut random = Pcg64Mcg::seed_from_u64(config.seed ^ 0x54);
-    let draws: Vec<Vec<f64>> = (0..DRAWS)
+    let draws: Vec<Vec<f64>> = (0..BOOTSTRAP_DRAWS)
         .filter_map(|_| {
             let mut weights = vec![0.0; runs];
             for _ in 0..runs {

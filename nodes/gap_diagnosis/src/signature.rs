@@ -101,7 +101,7 @@ pub struct Library {
 /// Most grid points of an instance.
 const MOST_SHAPES: usize = 24;
 /// An effect that would stay below this D at its greatest physical size is not excited.
-pub const LEAST_D: f64 = 6.0;
+pub const MIN_D_EXCITED: f64 = 6.0;
 
 impl Library {
     /// Signatures of some instances on a stack.
@@ -122,7 +122,7 @@ impl Library {
         signatures
     }
 
-    /// Adds one form and gives its place; a form that stays below [`LEAST_D`] at its greatest size is left out, and one of a
+    /// Adds one form and gives its place; a form that stays below [`MIN_D_EXCITED`] at its greatest size is left out, and one of a
     /// period that the recording does not resolve.
     pub fn add(
         &mut self,
@@ -161,7 +161,7 @@ impl Library {
             amplitudes.push(place);
             columns.push(column);
         }
-        if greatest < LEAST_D {
+        if greatest < MIN_D_EXCITED {
             return None;
         }
         self.excited[instance] = true;

@@ -88,7 +88,7 @@ impl Task {
 
 /// D from which an effect is found in every diagnosis. One nearer to what can be seen at all (about 8) is named in one and
 /// not in the next: that is no change of the machine.
-const LEAST_D: f64 = 10.0;
+const MIN_D_OF_CHANGE: f64 = 10.0;
 /// Parameter of an effect that sets in at an instant.
 const INSTANT: &str = "at_min";
 /// Where so many ticks follow one another without a word from the controller, what has ended is whole. They are counted
@@ -340,7 +340,7 @@ impl GapDiagnosisStage {
         let is_sure = |cause: &&Cause| {
             cause.status == Status::Named
                 && cause.confidence >= least_confidence
-                && cause.d >= LEAST_D
+                && cause.d >= MIN_D_OF_CHANGE
                 && (is_known || cause.parameters.iter().all(|p| p.name != INSTANT))
         };
         let sure = report.causes.iter().filter(is_sure);

@@ -67,11 +67,11 @@ const MOST_PAIRED: usize = 12;
 /// Rows that are looked at; of more every so many.
 const MOST_ROWS: usize = 1200;
 /// Least (3) of a reported fit.
-const LEAST_SHARE: f64 = 0.5;
+const MIN_SHARE_EXPLAINED: f64 = 0.5;
 /// Lags that are tried beside none: from this, min, in steps of this factor.
 const FIRST_LAG_MIN: f64 = 2.0;
 const LAG_STEP: f64 = 1.3;
-const LAGS: i32 = 21;
+const TRIED_LAGS: i32 = 21;
 /// Factors by which a lag is refined.
 const REFINED: [f64; 3] = [1.12, 1.05, 1.02];
 
@@ -151,7 +151,7 @@ impl<'s> Search<'s> {
         })
     }
 
-    /// The best set of thermometers; none that explains less than [`LEAST_SHARE`].
+    /// The best set of thermometers; none that explains less than [`MIN_SHARE_EXPLAINED`].
     fn found(&self) -> Option<ThermalFit> {
         let nothing = self.press(&[])?.0;
         let share = |press: f64| 1.0 - press / nothing;
@@ -180,7 +180,7 @@ impl<'s> Search<'s> {
             lag_min: lag_s / 60.0,
         };
         let named = |(press, (id, _)): &(f64, Term<'s>)| ((*id).to_owned(), share(*press));
-        (share(left) >= LEAST_SHARE).then(|| ThermalFit {
+        (share(left) >= MIN_SHARE_EXPLAINED).then(|| ThermalFit {
             by: by.map(of).collect(),
             share: share(left),
             alone: alone.iter().take(2).map(named).collect(),
@@ -230,7 +230,7 @@ impl<'s> Search<'s> {
 
     /// A thermometer at the lag that is best beside some terms, with (2).
     fn at_best_lag(&self, id: &'s str, terms: &[Term<'s>]) -> Option<(f64, Term<'s>)> {
-        let grid = (0..LAGS).map(|k| 60.0 * FIRST_LAG_MIN * LAG_STEP.powi(k));
+        let grid = (0..TRIED_LAGS).map(|k| 60.0 * FIRST_LAG_MIN * LAG_STEP.powi(k));
         let tried = std::iter::once(0.0).chain(grid).filter_map(|lag_s| {
             let term = (id, lag_s);
             let (press, _) = self.press(&[terms, &[term]].concat())?;

@@ -47,7 +47,7 @@ impl Leftover {
 }
 
 /// Draws of the threshold.
-const DRAWS: usize = 999;
+const THRESHOLD_DRAWS: usize = 999;
 
 /// Scores a leftover from which the columns of `fitted` were taken.
 pub fn leftover(
@@ -63,7 +63,7 @@ pub fn leftover(
     let (of_channels, channels) = channel_score(stack, noise, left);
     let grams = left_grams(slots, fitted);
     let all: Vec<&Slot> = slots.iter().collect();
-    let mut maxima = noise_maxima(&all, noise, &grams, DRAWS, config.seed ^ 0x51);
+    let mut maxima = noise_maxima(&all, noise, &grams, THRESHOLD_DRAWS, config.seed ^ 0x51);
     let mut random = Pcg64Mcg::seed_from_u64(config.seed ^ 0x52);
     for greatest in &mut maxima {
         for _ in 0..channels {

@@ -109,11 +109,11 @@ const LEAST_RATIO: f64 = 2.0;
 /// D below which nothing is named. In some 550 blind trials 15 of 19 names below it were wrong, and 27 of 330 above 8: a price that
 /// holds for white noise is too small for the noise of machines, of which only a few repeats tell. It holds for one column;
 /// each further one fits noise as well, and costs what it costs in the score (`least_d_squared`).
-pub(crate) const LEAST_D: f64 = 6.5;
+pub(crate) const MIN_D_TO_NAME: f64 = 6.5;
 
 /// D^2 below which a member with so many columns is not named, by the logarithm of the rows.
 pub(crate) fn least_d_squared(columns: usize, log_rows: f64) -> f64 {
-    LEAST_D.powi(2) + count(columns.saturating_sub(1)) * log_rows
+    MIN_D_TO_NAME.powi(2) + count(columns.saturating_sub(1)) * log_rows
 }
 
 /// The members of the best set, those that are named first.
@@ -173,7 +173,7 @@ fn checks(
     let (constancies, mut checks) = own_checks(scope, signatures, best);
     add_shares(scope, best, is_closed, &mut checks);
     for (place, n) in counts_alike(signatures, best, &checks) {
-        let most = in_common::MOST_ALIKE;
+        let most = in_common::MAX_OF_ONE_KIND;
         let check = Check::new(CheckId::OwnCause, n <= most);
         checks[place].push(check.with(count(n), count(most)));
     }
@@ -235,12 +235,14 @@ fn own_checks(
         let off_bounds = Check::new(CheckId::OffBounds, railed == 0).with(count(railed), 0.0);
         let bend = bend(stack, instance, estimate)
             .map(|(bend, least)| Check::new(CheckId::Curved, bend >= least).with(bend, least));
-        let begins = since_begin(stack, instance, estimate)
-            .map(|changed| Check::new(CheckId::Begins, changed >= SAME).with(changed, SAME));
+        let begins = since_begin(stack, instance, estimate).map(|changed| {
+            Check::new(CheckId::Begins, changed >= SAME_SIGNATURE).with(changed, SAME_SIGNATURE)
+        });
         let last = [
             above_noise(estimate, stack.freedom().ln()),
             above_form(stack, raw, scope.config),
-            Check::new(CheckId::Sure, relative_u * SURE < 1.0).with(1.0 / relative_u, SURE),
+            Check::new(CheckId::Sure, relative_u * MIN_SIZE_DEVIATIONS < 1.0)
+                .with(1.0 / relative_u, MIN_SIZE_DEVIATIONS),
         ];
         let first = [one_size, off_bounds];
         let checks = first.into_iter().chain(bend).chain(begins).chain(last);
@@ -332,7 +334,7 @@ fn without(signatures: &Library, best: &Best, instance: usize) -> Vec<(Set, f64)
 }
 
 /// Standard uncertainties by which a size must be off zero.
-pub const SURE: f64 = 4.5;
+pub const MIN_SIZE_DEVIATIONS: f64 = 4.5;
 
 /// Standard uncertainty of the size of each member over that size, by how it differs from run to run: noise that a dozen
 /// touches show too small makes any D.
@@ -345,7 +347,7 @@ fn relative_uncertainties(stack: &Stack<'_>, best: &Best) -> Vec<f64> {
 }
 
 /// A block with fewer stations shows no waves.
-const FEWEST_STATIONS: usize = 24;
+const MIN_STATIONS_OF_WAVES: usize = 24;
 
 /// Whether a signature rises somewhere above the error of form that every simulator has: below it nothing is named,
 /// however often it was measured. What smooth waves over the test do not tell of it (steps, ripple of a screw) is held
@@ -363,11 +365,11 @@ fn above_form(stack: &Stack<'_>, raw: Vec<f64>, config: &GapConfig) -> Check {
     let mut best = Height::best(blocks().map(plain));
     if !best.as_ref().is_some_and(Height::is_above) {
         let is_path = |block: &&Block| {
-            block.channel != Channel::Touch && block.range().len() >= FEWEST_STATIONS
+            block.channel != Channel::Touch && block.range().len() >= MIN_STATIONS_OF_WAVES
         };
         let rough = |block: &Block| Height {
             value: height(&rough(stack, block, &floated[block.range()])),
-            limit: guard::ROUGH * base.of(block),
+            limit: guard::ROUGH_FORM_SHARE * base.of(block),
             ..plain(block)
         };
         best = Height::best(best.into_iter().chain(blocks().filter(is_path).map(rough)));
@@ -447,7 +449,7 @@ fn railed(instance: &Instance, estimate: &Estimate, best: &Best, member: usize) 
             Role::Shape { .. } | Role::Frequency { .. } => {
                 let told = beside_others(&best.refit.jacobian, first + k) * parameter.typical;
                 let is_end = parameter.low + parameter.high <= 0.0;
-                !is_end && !parameter.name.ends_with(LAG) && told > SAME
+                !is_end && !parameter.name.ends_with(LAG) && told > SAME_SIGNATURE
             }
         };
         estimate.at_bound[place] && estimate.values[place] != 0.0 && is_told()
@@ -479,13 +481,13 @@ fn bend(stack: &Stack<'_>, instance: &Instance, estimate: &Estimate) -> Option<(
     let whole = stack.signature(&*instance.effect(&estimate.values));
     let line = stack.signature(&*line);
     let bend = &whole - &line * (whole.dot(&line) / line.norm_squared().max(f64::MIN_POSITIVE));
-    Some((bend.norm(), SAME.max(LEAST_BEND * whole.norm())))
+    Some((bend.norm(), SAME_SIGNATURE.max(LEAST_BEND * whole.norm())))
 }
 
 /// Parameter that tells when an effect begins, min.
 const BEGINS: &str = "at_min";
 /// Whitened distance below which two signatures are the same.
-const SAME: f64 = 3.0;
+const SAME_SIGNATURE: f64 = 3.0;
 
 /// Whitened distance of a step in time from the same at the very beginning: where it is small, what is there does not change.
 /// None for what is no step.
@@ -554,8 +556,8 @@ mod tests {
     #[test]
     fn each_further_column_must_bring_what_it_costs_in_the_score() {
         let log_rows = 5_000_f64.ln();
-        assert!((least_d_squared(1, log_rows).sqrt() - LEAST_D).abs() < 1e-12);
+        assert!((least_d_squared(1, log_rows).sqrt() - MIN_D_TO_NAME).abs() < 1e-12);
         assert!((least_d_squared(3, log_rows).sqrt() - 7.6996).abs() < 1e-3);
-        assert!(least_d_squared(0, log_rows) >= LEAST_D.powi(2));
+        assert!(least_d_squared(0, log_rows) >= MIN_D_TO_NAME.powi(2));
     }
 }

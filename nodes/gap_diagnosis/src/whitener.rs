@@ -170,7 +170,10 @@ impl Whitener {
                 (within, Smooth::default())
             } else {
                 (
-                    within.with_white((form_error::ROUGH * size).powi(2), WHITE_ORDER),
+                    within.with_white(
+                        (form_error::ROUGH_STATION_SHARE * size).powi(2),
+                        WHITE_ORDER,
+                    ),
                     form_error::smooth(size),
                 )
             };

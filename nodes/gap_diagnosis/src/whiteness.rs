@@ -26,7 +26,7 @@ use crate::rows::count;
 use crate::stack::Stack;
 
 /// Lags of (1).
-const LAGS: usize = 10;
+const TESTED_LAGS: usize = 10;
 /// Shortest block that is tested.
 const SHORTEST: usize = 40;
 /// Probability at which a block fails.
@@ -72,7 +72,7 @@ pub fn coloured(stack: &Stack<'_>, left: &DVector<f64>) -> Vec<Coloured> {
         .iter()
         .filter(|block| block.rows.len() >= SHORTEST)
     {
-        let (_, p) = ljung_box(&left.as_slice()[block.range()], LAGS);
+        let (_, p) = ljung_box(&left.as_slice()[block.range()], TESTED_LAGS);
         let entry = channels.entry(block.channel.to_string()).or_default();
         entry.0 += usize::from(p < LEVEL);
         entry.1 += 1;

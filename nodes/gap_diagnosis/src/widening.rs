@@ -32,7 +32,7 @@ const MOST_PARTS: usize = 6;
 /// The same of a curve through targets.
 const MOST_OF_CURVE: usize = 14;
 /// Sets whose C is worse by this share of what the best one explains stand nearly as well.
-const NEAR: f64 = 0.1;
+const NEAR_SHARE: f64 = 0.1;
 
 /// Adds the wide forms; `sizes` are the members' D.
 pub fn widen(
@@ -43,7 +43,7 @@ pub fn widen(
     visited: &BTreeMap<Set, f64>,
 ) {
     let least = visited[set];
-    let reach = NEAR * (stack.z.norm_squared() - least).max(0.0);
+    let reach = NEAR_SHARE * (stack.z.norm_squared() - least).max(0.0);
     let near = visited.iter().filter(|(_, score)| **score <= least + reach);
     let forms: BTreeSet<usize> = near.flat_map(|(set, _)| set.iter().copied()).collect();
     let mut added = BTreeMap::new();

@@ -58,7 +58,7 @@ pub use judge::Judgement;
 use solved::{Solved, Weighting};
 
 /// Rounds of (2).
-const ROUNDS: usize = 12;
+const SOLUTION_ROUNDS: usize = 12;
 
 /// How to identify.
 #[derive(Clone, Debug, PartialEq)]
@@ -269,7 +269,7 @@ pub fn identify(
     );
     let mut weighting = Weighting::even(recordings);
     let mut solved = Solved::new(&equations, &weighting, options)?;
-    for _ in 0..ROUNDS {
+    for _ in 0..SOLUTION_ROUNDS {
         if !solved.reweigh(&mut weighting, options) {
             break;
         }

@@ -16,7 +16,7 @@ use crate::two_feed::{self, AtFeed};
 /// Least number of different feeds for the line.
 const LINE_FEEDS: usize = 3;
 /// Of the uncertainty of a latency that must fit into the window.
-const COVERAGE_FACTOR: f64 = 2.0;
+const WINDOW_COVERAGE_FACTOR: f64 = 2.0;
 /// Least number of touches.
 const LEAST_TOUCHES: usize = 2;
 
@@ -151,7 +151,7 @@ fn check_window(
     config: &LatencyCalibratorConfig,
 ) -> Result<(), Refusal> {
     let window_s = config.feed_window().as_secs_f64();
-    if latency_s + COVERAGE_FACTOR * standard_uncertainty_s <= window_s {
+    if latency_s + WINDOW_COVERAGE_FACTOR * standard_uncertainty_s <= window_s {
         return Ok(());
     }
     Err(Refusal::WindowTooShort {

@@ -30,7 +30,7 @@ use crate::diagnostic::TouchFault;
 /// Positions that the fit needs.
 const LEAST_POSITIONS: usize = 6;
 /// Coverage factor of a change that is noise.
-const COVERAGE_FACTOR: f64 = 3.0;
+const NOISE_COVERAGE_FACTOR: f64 = 3.0;
 /// Uncertainty of a logged position where the fit is exact, mm.
 const LEAST_UNCERTAINTY_MM: f64 = 1e-9;
 
@@ -118,13 +118,13 @@ impl MotionLog {
         let feed_mm_s = fit.parameters[1] / half_s;
         let u_feed_mm_s = noise_mm * fit.covariance[(1, 1)].sqrt() / half_s;
         // What noise alone can make of a ball at rest is no feed.
-        if feed_mm_s <= COVERAGE_FACTOR * u_feed_mm_s {
+        if feed_mm_s <= NOISE_COVERAGE_FACTOR * u_feed_mm_s {
             return Err(TouchFault::FeedNotPositive { feed_mm_s });
         }
         // Over the window, from -1 to 1, the slope of c t² changes by 4 c.
         let change_mm_s = 4.0 * fit.parameters[2].abs() / half_s;
         let u_change_mm_s = 4.0 * noise_mm * fit.covariance[(2, 2)].sqrt() / half_s;
-        let limit_mm_s = (steady_share * feed_mm_s).max(COVERAGE_FACTOR * u_change_mm_s); // (2)
+        let limit_mm_s = (steady_share * feed_mm_s).max(NOISE_COVERAGE_FACTOR * u_change_mm_s); // (2)
         if change_mm_s > limit_mm_s {
             return Err(TouchFault::FeedNotSteady {
                 feed_mm_s,

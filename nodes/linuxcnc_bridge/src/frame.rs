@@ -28,7 +28,7 @@ const STEP_LIMIT: Span = Span::from_nanos(15_000_000_000);
 /// Absolute and relative positions are equal to within this, mm or deg: LinuxCNC prints 1e-6.
 const EQUAL: f64 = 1e-5;
 /// Offsets are those that were found to within this, mm or deg.
-const NEAR: f64 = 1e-4;
+const EQUAL_OFFSETS: f64 = 1e-4;
 /// Most inquiries of one program.
 const TOKENS: u32 = 16;
 /// Numbers in the answer about the state: #5210 to #5219, F, S, whether the spindle turns.
@@ -486,7 +486,11 @@ impl Frame {
 }
 
 fn differ(found: &[f64], now: &[f64]) -> bool {
-    found.len() != now.len() || found.iter().zip(now).any(|(a, b)| (a - b).abs() > NEAR)
+    found.len() != now.len()
+        || found
+            .iter()
+            .zip(now)
+            .any(|(a, b)| (a - b).abs() > EQUAL_OFFSETS)
 }
 
 /// By how much the second half of positions is beyond the first.
@@ -506,7 +510,7 @@ impl Found {
         }
         let tool = ["X", "Y", "Z", "A", "B", "C"].iter().zip(&self.tool);
         let tool: Vec<String> = { tool }
-            .filter(|(_, offset)| offset.abs() > NEAR)
+            .filter(|(_, offset)| offset.abs() > EQUAL_OFFSETS)
             .map(|(axis, offset)| format!("{axis}{offset:.6}"))
             .collect();
         if !tool.is_empty() {

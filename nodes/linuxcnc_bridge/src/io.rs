@@ -32,7 +32,7 @@ use account::Account;
 /// An attempt to connect ends after this time.
 const CONNECT_LIMIT: Duration = Duration::from_secs(2);
 /// A process that was asked to end is killed after this time.
-const END_LIMIT: Duration = Duration::from_secs(2);
+const KILL_LIMIT: Duration = Duration::from_secs(2);
 /// Old records are thrown away for this long before the sampler is switched on.
 const DRAIN_TIME: Duration = Duration::from_millis(150);
 
@@ -392,7 +392,7 @@ impl Hands {
             // halcmd ends at the end of its input, and leaves HAL as a component should.
             drop(hal.stdin);
             let mut child = hal.child;
-            if timeout(END_LIMIT, child.wait()).await.is_err() {
+            if timeout(KILL_LIMIT, child.wait()).await.is_err() {
                 end(child).await;
             }
         }
@@ -405,7 +405,7 @@ async fn end(mut child: Child) {
         // It may have ended in this moment.
         let _ = kill(Pid::from_raw(pid), Signal::SIGTERM);
     }
-    if timeout(END_LIMIT, child.wait()).await.is_err() {
+    if timeout(KILL_LIMIT, child.wait()).await.is_err() {
         let _ = child.kill().await;
     }
 }

@@ -15,7 +15,7 @@ use std::fmt::Write as _;
 use metrology::stamp::{Host, Span, Stamp};
 
 /// Longest line that is accepted; LinuxCNC's own messages are below 256 bytes.
-pub const LINE_LIMIT_BYTES: usize = 2048;
+pub const MESSAGE_LIMIT_BYTES: usize = 2048;
 
 /// Something to ask of the controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -224,7 +224,7 @@ impl Client {
                 if !text.trim().is_empty() {
                     out.push(self.answer(text.trim()));
                 }
-            } else if self.line.len() == LINE_LIMIT_BYTES {
+            } else if self.line.len() == MESSAGE_LIMIT_BYTES {
                 out.push(Signal::LineTooLong {
                     length_bytes: self.line.len(),
                 });

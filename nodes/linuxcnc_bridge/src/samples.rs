@@ -10,7 +10,7 @@
 use metrology::{Axis, PerAxis};
 
 /// Longest line that is accepted.
-pub const LINE_LIMIT_BYTES: usize = 1024;
+pub const SAMPLE_LIMIT_BYTES: usize = 1024;
 
 /// Motion type of LinuxCNC's `motion.motion-type` while a G38 moves.
 pub const PROBING: i32 = 5;
@@ -83,7 +83,7 @@ impl SampleReader {
         Self {
             joints: joints.to_vec(),
             scales: scales.to_vec(),
-            line: Vec::with_capacity(LINE_LIMIT_BYTES),
+            line: Vec::with_capacity(SAMPLE_LIMIT_BYTES),
             too_long: false,
         }
     }
@@ -102,7 +102,7 @@ impl SampleReader {
                     sink(self.read_line());
                 }
                 self.restart();
-            } else if self.line.len() == LINE_LIMIT_BYTES {
+            } else if self.line.len() == SAMPLE_LIMIT_BYTES {
                 self.too_long = true;
             } else {
                 self.line.push(byte);
@@ -237,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_line_without_end_is_bounded_and_the_next_one_is_read() {
-        let mut text = vec![b'7'; 5 * LINE_LIMIT_BYTES];
+        let mut text = vec![b'7'; 5 * SAMPLE_LIMIT_BYTES];
         text.extend_from_slice(b"\n12 1.5 180.0 1.4 179.0 1 5 8 1\n");
         let events = check(&text);
         assert!(matches!(

@@ -10,7 +10,7 @@ use crate::condition::{Condition, Lost};
 use crate::config::{Prepare, Settings};
 use crate::fault::classify;
 use crate::protocol::{
-    Client, JOINTS, JointLimit, LINE_LIMIT_BYTES, Mode, ProgramStatus, Query, Reply, Request,
+    Client, JOINTS, JointLimit, MESSAGE_LIMIT_BYTES, Mode, ProgramStatus, Query, Reply, Request,
     Setting, Signal,
 };
 
@@ -207,7 +207,7 @@ impl Session {
             Signal::Unexpected(line) => conditions.push(Condition::UnexpectedLine { line }),
             Signal::LineTooLong { .. } => {
                 return Some(Lost::Nonsense {
-                    limit_bytes: LINE_LIMIT_BYTES,
+                    limit_bytes: MESSAGE_LIMIT_BYTES,
                 });
             }
             Signal::TimedOut(_) => {}

@@ -15,7 +15,7 @@ use crate::samples::{PROBING, Record};
 /// Leading moves that are compared.
 const MOST_CHECKS: usize = 16;
 /// Commanded and programmed position are equal to within this, mm or rad, and within a servo period's travel.
-const NEAR: f64 = 0.01;
+const EQUAL_POSITIONS: f64 = 0.01;
 
 /// Something that ends a program at once.
 #[derive(Clone, Debug, PartialEq)]
@@ -152,7 +152,7 @@ impl Watch {
                 // It moved nothing.
                 continue;
             }
-            let near = NEAR + self.step;
+            let near = EQUAL_POSITIONS + self.step;
             let astray = { check.targets.iter() }
                 .find(|(axis, target)| (last.commanded[*axis] - target).abs() > near);
             return astray.map(|(axis, target)| Trouble::Astray {

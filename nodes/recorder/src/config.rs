@@ -284,7 +284,7 @@ pub const PARAMETERS: &[ParameterDoc] = &[
 /// Smallest chunk and queue that make sense: one record of a kilobyte must fit.
 const SMALLEST_BYTES: u64 = 1024;
 /// Largest chunk: a reader holds a whole chunk in memory.
-const LARGEST_CHUNK_BYTES: u64 = 64 << 20;
+const LARGEST_WRITTEN_CHUNK_BYTES: u64 = 64 << 20;
 /// Shortest period, s: log times are whole nanoseconds.
 const SHORTEST_PERIOD_S: f64 = 1e-9;
 /// Shortest ring, s.
@@ -344,7 +344,7 @@ impl RecorderConfig {
         check_size(
             "chunk_size_bytes",
             self.chunk_size_bytes,
-            LARGEST_CHUNK_BYTES,
+            LARGEST_WRITTEN_CHUNK_BYTES,
         )?;
         check_size("queue_limit_bytes", self.queue_limit_bytes, u64::MAX)
     }

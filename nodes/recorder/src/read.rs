@@ -24,7 +24,7 @@ use std::path::PathBuf;
 pub use bag::Bag;
 
 /// Largest chunk that is read, before and after decompression, byte.
-pub(crate) const LARGEST_CHUNK_BYTES: u64 = 256 << 20;
+pub(crate) const LARGEST_READ_CHUNK_BYTES: u64 = 256 << 20;
 
 /// Order in which messages are given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -5,7 +5,7 @@
 //! bound is far above what a measurement needs and far below what a computer notices.
 
 use metrology::bound::{
-    Bound, BoundError, MOST_POINTS, MOST_POSES, MOST_RUNS, MOST_STOPS, Range, TOUCHES_OF_RUN,
+    Bound, BoundError, MAX_FEATURE_POINTS, MOST_POSES, MOST_RUNS, MOST_STOPS, Range, TOUCHES_OF_RUN,
 };
 use metrology::leaves::{self, Row};
 use metrology::number::number;
@@ -33,7 +33,7 @@ const POSES: Bound = Bound::at_most(MOST_POSES);
 /// Visits of all poses: what `rotary_axes` evaluates as one run.
 const VISITS: Bound = Bound::at_most(500).with_remedy("; divide the poses between several steps");
 /// Points on a bore or sphere, or on the side of a plane's grid.
-const POINTS: Bound = Bound::at_most(MOST_POINTS);
+const POINTS: Bound = Bound::at_most(MAX_FEATURE_POINTS);
 /// Different feeds of one latency cycle.
 const FEEDS: Bound = Bound::at_most(100);
 /// Blocks, faces or artefacts of one cycle.

@@ -99,7 +99,7 @@ pub fn lines(readings: &[Reading]) -> Vec<String> {
 }
 
 /// Lengths and angles of two machine files that differ by less are one.
-const SAME: f64 = 1e-9;
+const EQUAL_VALUES: f64 = 1e-9;
 
 /// Whether a machine file may be that of the machine which another one, of the recording, describes: what is built
 /// into a machine is the same in both. One that cannot be read, as of an older format, tells nothing.
@@ -120,7 +120,7 @@ fn is_of(recorded: &[u8], machine: &MachineFile) -> Result<()> {
             continue;
         };
         for ((key, found), (_, wanted)) in built(known).into_iter().zip(built(entry)) {
-            if (found - wanted).abs() > SAME {
+            if (found - wanted).abs() > EQUAL_VALUES {
                 bail!(
                     "axes.{axis}.{key}: {found} in the recording, {wanted} in the machine file: it is another machine's"
                 );

@@ -10,7 +10,7 @@ use metrology::sample::{AngleSample, AxisState, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 
 use super::linear::targets::{left_out, targets};
-use super::linear::{SETTLE, Visits, axis_of, level};
+use super::linear::{STOP_SETTLE, Visits, axis_of, level};
 
 /// Spacing of the grid on which places are compared, deg.
 const GRID_DEG: f64 = 1e-6;
@@ -120,7 +120,7 @@ impl RotaryRuns {
         if let Some(run) = &mut self.current
             && sample.axis == run.axis
             && let Some(stop) = run.stops.last_mut()
-            && sample.at - stop.since >= SETTLE
+            && sample.at - stop.since >= STOP_SETTLE
         {
             if stop.n == 0 {
                 stop.first_rad = sample.angle_rad;

@@ -18,7 +18,7 @@ pub(super) mod targets;
 use targets::{left_out, targets};
 
 /// Rest after which readings count.
-pub const SETTLE: Span = Span::from_nanos(300_000_000);
+pub const STOP_SETTLE: Span = Span::from_nanos(300_000_000);
 /// Positions closer than this are one place, mm.
 const SAME_MM: f64 = 1e-6;
 
@@ -151,7 +151,7 @@ impl LinearRuns {
         match stop {
             Some(at) if (at.place_mm - place_mm).amax() < SAME_MM => {
                 at.until = state.received_at;
-                if state.received_at - at.since >= SETTLE
+                if state.received_at - at.since >= STOP_SETTLE
                     && state.scale.xyz().iter().any(|s| s.is_finite())
                 {
                     at.scale_sum_mm += state.scale.xyz();
@@ -178,7 +178,7 @@ impl LinearRuns {
     /// One reading of the length reference.
     pub fn length(&mut self, sample: &LengthSample) {
         if let Some((_, _, Some(stop), _)) = &mut self.current
-            && sample.at - stop.since >= SETTLE
+            && sample.at - stop.since >= STOP_SETTLE
         {
             stop.sum_mm += sample.displacement_mm;
             stop.n += 1;

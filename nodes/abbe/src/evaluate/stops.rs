@@ -8,7 +8,7 @@ use metrology::sample::{AxisState, PositioningTable, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 
 /// Rest after which readings count.
-const SETTLE: Span = Span::from_nanos(200_000_000);
+const READING_SETTLE: Span = Span::from_nanos(200_000_000);
 /// Commands closer than this are one place, mm.
 pub const SAME_MM: f64 = 1e-6;
 /// Readings that a stop needs.
@@ -140,7 +140,7 @@ impl StopRuns {
         };
         match &mut current.rest {
             Some(rest) if same(rest) => {
-                if state.received_at - rest.since >= SETTLE {
+                if state.received_at - rest.since >= READING_SETTLE {
                     for (sums, axis) in rest.sums_mm.iter_mut().zip(Axis::LINEAR) {
                         sums[0] += state.motor[axis] - state.commanded[axis];
                         sums[1] += state.scale[axis] - state.commanded[axis];

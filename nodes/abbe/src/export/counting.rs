@@ -18,7 +18,7 @@ pub(super) struct Counting {
 }
 
 /// Positions that differ by less are one, mm or rad.
-const SAME: f64 = 1e-7;
+const EQUAL_POSITIONS: f64 = 1e-7;
 
 impl Counting {
     /// Axes whose positioning is in a file, each with its first and last position, mm or rad.
@@ -33,7 +33,9 @@ impl Counting {
         let is_named = |(axis, _): &(Axis, _)| self.named.contains(*axis);
         for (axis, (first, last)) in self.written().filter(is_named) {
             let at = self.reference[axis];
-            if self.relative_to_reference && !(first - SAME..=last + SAME).contains(&at) {
+            if self.relative_to_reference
+                && !(first - EQUAL_POSITIONS..=last + EQUAL_POSITIONS).contains(&at)
+            {
                 return Err(format!(
                     "--reference {axis}={}: the errors of {axis} in the table reach from {} to {}: \
                      name a position in there, or keep the errors as they were measured (--absolute)",
@@ -55,7 +57,7 @@ impl Counting {
         }
         let wanted = self.reference[axis];
         let at = wanted.clamp(first, last);
-        let beyond = if (at - wanted).abs() > SAME {
+        let beyond = if (at - wanted).abs() > EQUAL_POSITIONS {
             format!(
                 ", where the table ends ({} lies outside of it)",
                 in_unit(axis, wanted)

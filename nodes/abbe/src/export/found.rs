@@ -17,14 +17,14 @@ pub(super) struct Found {
     pub measured: Measured,
     /// What was read, lost and left out.
     pub reading: Reading,
-    /// Messages on each of [`SOURCES`]; `None`: the bag has no such topic.
+    /// Messages on each of [`TABLE_TOPICS`]; `None`: the bag has no such topic.
     pub topics: [Option<u64>; 4],
     /// Where the tables come from.
     pub origin: Origin,
 }
 
 /// Topics that tables are made of, and who publishes them when.
-const SOURCES: [(&str, &str); 4] = [
+const TABLE_TOPICS: [(&str, &str); 4] = [
     (
         topics::POSITIONING_TABLE.name,
         "deviations of an axis from its scale, by axis_compensation when a positioning run gives a table",
@@ -52,7 +52,7 @@ pub(super) fn is(name: &str, topic: &str) -> bool {
 pub(super) fn read(bag: &Bag, which: Which) -> Found {
     let mut found = Found::default();
     for info in bag.topics() {
-        for ((topic, _), count) in SOURCES.iter().zip(&mut found.topics) {
+        for ((topic, _), count) in TABLE_TOPICS.iter().zip(&mut found.topics) {
             if is(&info.topic, topic) {
                 *count.get_or_insert(0) += info.message_count;
             }
@@ -60,7 +60,7 @@ pub(super) fn read(bag: &Bag, which: Which) -> Found {
     }
     found.origin.began_nanos = bag.log_times_nanos().map(|(first, _)| first);
     let (measured, origin) = (&mut found.measured, &mut found.origin);
-    let wanted = SOURCES.map(|(topic, _)| topic);
+    let wanted = TABLE_TOPICS.map(|(topic, _)| topic);
     found.reading = reading::read(bag, Order::LogTime, &wanted, |mut taken| {
         let at_nanos = taken.log_time_nanos();
         if taken.is(&topics::POSITIONING_TABLE)
@@ -129,7 +129,7 @@ pub(super) fn looked_for(
         .filter(|axis| measured.tables[*axis].is_some())
         .collect();
     let wanted: Vec<String> = axes.iter().map(|axis| axis.to_string()).collect();
-    let mut lines: Vec<String> = SOURCES
+    let mut lines: Vec<String> = TABLE_TOPICS
         .iter()
         .zip(topics)
         .map(|((topic, what), messages)| {

@@ -14,11 +14,11 @@ const ZIP: &[u8] = b"PK\x03\x04";
 /// Begin of the files of older spreadsheet programs (xls).
 const OLD: &[u8] = &[0xD0, 0xCF, 0x11, 0xE0];
 /// Most rows and columns of a worksheet that are read, and most cells in all.
-const MOST_ROWS: u32 = 1_000_000;
+const MAX_WORKSHEET_ROWS: u32 = 1_000_000;
 const MOST_COLUMNS: u32 = 1_000;
 const MOST_CELLS: usize = 8_000_000;
 /// Longest file of a worksheet, bytes: it is packed.
-const MOST_BYTES: usize = 32 << 20;
+const MAX_WORKSHEET_BYTES: usize = 32 << 20;
 
 /// Separator, decimal sign and worksheet of a file.
 #[derive(Clone, Copy, Debug)]
@@ -60,9 +60,9 @@ pub fn read(path: &Path, form: Form<'_>) -> Result<Sheet> {
 
 /// The cells of a worksheet of an xlsx file.
 fn of_xlsx(bytes: Vec<u8>, form: Form<'_>) -> Result<Sheet> {
-    if bytes.len() > MOST_BYTES {
+    if bytes.len() > MAX_WORKSHEET_BYTES {
         bail!(
-            "a worksheet of {} bytes: must be at most {MOST_BYTES}: save it as CSV",
+            "a worksheet of {} bytes: must be at most {MAX_WORKSHEET_BYTES}: save it as CSV",
             bytes.len()
         );
     }
@@ -111,9 +111,9 @@ fn cells(
     let mut lines: Vec<(u64, Vec<String>)> = vec![];
     while let Some(cell) = reader.next_cell()? {
         let (row, column) = cell.get_position();
-        if row >= MOST_ROWS || column >= MOST_COLUMNS {
+        if row >= MAX_WORKSHEET_ROWS || column >= MOST_COLUMNS {
             bail!(
-                "row {}, column {}: must be at most {MOST_ROWS} rows and {MOST_COLUMNS} columns",
+                "row {}, column {}: must be at most {MAX_WORKSHEET_ROWS} rows and {MOST_COLUMNS} columns",
                 u64::from(row) + 1,
                 u64::from(column) + 1
             );

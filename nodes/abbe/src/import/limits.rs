@@ -16,7 +16,7 @@ const DEVIATION_UM: f64 = 1e5;
 /// Greatest deviation of a rotary axis, arcsec: a degree.
 const DEVIATION_ARCSEC: f64 = 3600.0;
 /// Least and greatest temperature of a machine, degC.
-const TEMPERATURE_DEGC: [f64; 2] = [-50.0, 200.0];
+const TEMPERATURE_RANGE_DEGC: [f64; 2] = [-50.0, 200.0];
 
 /// Rests shorter than this, s, are taken for the slowing down of an axis.
 pub const SETTLE_S: f64 = 0.4;
@@ -69,7 +69,7 @@ impl fmt::Display for Range {
 }
 
 /// Range of a column of times.
-const TIME: Range = Range::new(
+const TIME_RANGE: Range = Range::new(
     -(epoch::END_S as f64) + 1.0,
     epoch::END_S as f64 - 1.0,
     SECONDS,
@@ -105,7 +105,7 @@ pub fn targets(machine: &MachineFile, axis: Axis) -> Option<Range> {
 
 /// Ranges of a test's columns, in their order; that of a measured position is of its deviation from the target.
 pub fn ranges(test: &Test, machine: &MachineFile) -> Vec<Option<Range>> {
-    let [low, high] = TEMPERATURE_DEGC;
+    let [low, high] = TEMPERATURE_RANGE_DEGC;
     let range = |column: &Column<'_>| match (column.what, test) {
         (What::Run | What::Direction, _) => None,
         (What::Place(_), Test::Positioning { axis, .. }) => targets(machine, *axis),
@@ -118,7 +118,7 @@ pub fn ranges(test: &Test, machine: &MachineFile) -> Vec<Option<Range>> {
         (What::Deviation(_) | What::Measured(_), _) => {
             Some(Range::new(-DEVIATION_UM, DEVIATION_UM, "µm"))
         }
-        (What::Time, _) => Some(TIME),
+        (What::Time, _) => Some(TIME_RANGE),
         (What::Temperature, _) => Some(Range::new(low, high, "degC")),
     };
     test.columns().iter().map(range).collect()
@@ -129,7 +129,7 @@ pub fn ranges(test: &Test, machine: &MachineFile) -> Vec<Option<Range>> {
 /// # Errors
 /// Names the key, its value and the limit.
 pub fn check(map: &Map, machine: &MachineFile) -> Result<()> {
-    epoch::whole_seconds::<Host>(map.start_s, times::LONGEST_S as i64)
+    epoch::whole_seconds::<Host>(map.start_s, times::LONGEST_LOG_S as i64)
         .map_err(|error| anyhow!("start_s = {error}"))?;
     numbers(map)?;
     for (axis, at_mm) in &map.at_mm {

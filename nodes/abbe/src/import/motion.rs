@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::limits::SETTLE_S;
 use super::map::{Map, Plane, Test, units};
-use super::runs::{Runs, SAME_MM, first_way};
+use super::runs::{Runs, SAME_TARGET_MM, first_way};
 use super::table::Row;
 use super::times;
 use super::writer::Writer;
@@ -21,7 +21,7 @@ const REST_S: f64 = 2.0;
 /// Readings at a stop.
 const READINGS: u32 = 5;
 /// Longest motion that is made up for a table, s: a day.
-const LONGEST_S: f64 = 86_400.0;
+const LONGEST_MOTION_S: f64 = 86_400.0;
 /// Share of a turn that a circle runs ahead of its first row.
 const AHEAD_RAD: f64 = std::f64::consts::FRAC_PI_2;
 /// The shortest arc that is a test of circles, deg.
@@ -89,10 +89,10 @@ fn check_time(test: &Test, runs: &[Vec<Row>]) -> Result<()> {
     let ways_mm = targets.windows(2).map(|two| (two[1] - two[0]).abs());
     let way_mm = ways_mm.sum::<f64>() + 2.0 * stops * overrun_mm;
     let time_s = way_mm / (feed_mm_min / 60.0) + stops * dwell_s;
-    if time_s.is_nan() || time_s > LONGEST_S {
+    if time_s.is_nan() || time_s > LONGEST_MOTION_S {
         let units = units(*axis);
         bail!(
-            "{stops} stops, {} {} of way at {} = {feed_mm_min} {} of the map take {} s: at most {LONGEST_S} s",
+            "{stops} stops, {} {} of way at {} = {feed_mm_min} {} of the map take {} s: at most {LONGEST_MOTION_S} s",
             number(way_mm),
             units.target,
             units.keys[0],
@@ -116,9 +116,9 @@ fn check_circle_time(radius_mm: f64, feed_mm_min: f64, runs: &[Vec<Row>]) -> Res
         .sum();
     let way_mm = turned_deg.to_radians() * radius_mm;
     let time_s = way_mm / (feed_mm_min / 60.0);
-    if time_s.is_nan() || time_s > LONGEST_S {
+    if time_s.is_nan() || time_s > LONGEST_MOTION_S {
         bail!(
-            "{} mm of arc at feed_mm_min = {feed_mm_min} mm/min of the map take {} s: at most {LONGEST_S} s",
+            "{} mm of arc at feed_mm_min = {feed_mm_min} mm/min of the map take {} s: at most {LONGEST_MOTION_S} s",
             number(way_mm),
             number(time_s)
         );
@@ -203,7 +203,7 @@ fn positioning(
     let units = units(*axis);
     let inner = units.target_inner;
     let (feed_s, overrun) = (feed_mm_min * inner / 60.0, overrun_mm * inner);
-    let same = SAME_MM * inner;
+    let same = SAME_TARGET_MM * inner;
     let mut test = segment(TestKind::Positioning, run, 0.0);
     // A feed of degrees is no speed of the wire.
     test.feed_mm_s = if axis.is_linear() { feed_s } else { 0.0 };

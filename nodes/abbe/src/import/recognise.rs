@@ -58,7 +58,7 @@ pub struct Recognised {
 /// Rows that are looked at for what a column holds.
 const LOOKED_AT: usize = 2000;
 /// Rows among which a line of units may stand below the names.
-const NEAR: usize = 2;
+const UNIT_ROWS: usize = 2;
 
 /// Looks at the cells of a file; `None`: no line of names has rows of numbers below it.
 pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
@@ -71,7 +71,7 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
     let lines = &sheet.lines;
     let at = (0..lines.len()).find(|k| {
         let cells = &lines[*k].1;
-        let mut below = lines[k + 1..].iter().take(NEAR);
+        let mut below = lines[k + 1..].iter().take(UNIT_ROWS);
         n_words(cells) >= 2
             && n_words(cells) > n_numbers(cells)
             && below.any(|(_, cells)| n_numbers(cells) >= 2)
@@ -155,11 +155,13 @@ fn known(name: &str, cells: &[&str], decimal: char) -> Known {
 
 /// Whether a column without a unit is that of a thermometer: named by a place, with numbers that are degrees Celsius.
 fn is_warm(words: &[String], numbers: &[f64]) -> bool {
-    const PLACES: [&str; 14] = [
+    const SENSOR_PLACES: [&str; 14] = [
         "spindle", "bearing", "ambient", "room", "air", "bed", "column", "nut", "coolant", "table",
         "raum", "luft", "spindel", "bett",
     ];
-    let named = words.iter().any(|word| PLACES.contains(&word.as_str()));
+    let named = words
+        .iter()
+        .any(|word| SENSOR_PLACES.contains(&word.as_str()));
     named && !numbers.is_empty() && numbers.iter().all(|degc| (-20.0..=150.0).contains(degc))
 }
 

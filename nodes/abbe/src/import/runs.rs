@@ -20,7 +20,7 @@ use super::same;
 use super::table::{Row, Table};
 
 /// Targets nearer than this are one, mm.
-pub const SAME_MM: f64 = 1e-9;
+pub const SAME_TARGET_MM: f64 = 1e-9;
 /// Spacing of the grid on which targets are compared from run to run, mm.
 pub const GRID_MM: f64 = 1e-6;
 
@@ -228,7 +228,7 @@ pub fn check_travel(
 fn turns(rows: &[Row], overrun: f64) -> Vec<(&Row, f64)> {
     let is_turn = |k: usize| match k.checked_sub(1).and_then(|before| rows.get(before)) {
         None => true,
-        Some(before) => (rows[k].cells[1] - before.cells[1]).abs() <= SAME_MM,
+        Some(before) => (rows[k].cells[1] - before.cells[1]).abs() <= SAME_TARGET_MM,
     };
     let ways = ways(rows).into_iter().zip(rows).enumerate();
     ways.filter(|(k, _)| is_turn(*k))
@@ -242,7 +242,11 @@ pub fn first_way(rows: &[Row]) -> f64 {
     let first_mm = rows[0].cells[1];
     let told = rows[0].cells.get(3).copied();
     let mut ways = rows.iter().map(|row| row.cells[1] - first_mm);
-    told.unwrap_or_else(|| ways.find(|way| way.abs() > SAME_MM).unwrap_or(1.0).signum())
+    told.unwrap_or_else(|| {
+        ways.find(|way| way.abs() > SAME_TARGET_MM)
+            .unwrap_or(1.0)
+            .signum()
+    })
 }
 
 /// From which side each target of a run is approached, by the order of its rows.
@@ -251,7 +255,7 @@ pub fn ways(rows: &[Row]) -> Vec<f64> {
     let mut all = vec![way];
     for two in rows.windows(2) {
         let by_mm = two[1].cells[1] - two[0].cells[1];
-        way = if by_mm.abs() > SAME_MM {
+        way = if by_mm.abs() > SAME_TARGET_MM {
             by_mm.signum()
         } else {
             -way

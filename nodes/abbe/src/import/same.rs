@@ -9,13 +9,13 @@ use std::collections::BTreeMap;
 use metrology::number::number;
 
 use super::map::Units;
-use super::runs::SAME_MM;
+use super::runs::SAME_TARGET_MM;
 use super::table::Row;
 
 /// Share of the least spacing of targets within which they are one where nothing is stated.
 const SHARE: f64 = 0.01;
 /// Greatest difference of targets that are one where nothing is stated, mm or deg.
-const MOST: f64 = 0.1;
+const MAX_TARGET_SCATTER: f64 = 0.1;
 /// Decimals of the roundest number, at most.
 const MOST_DECIMALS: i32 = 6;
 
@@ -26,7 +26,7 @@ type Cluster = [f64; 2];
 pub fn merge(runs: &mut [Vec<Row>], stated: Option<f64>, units: Units) -> Option<String> {
     let mut targets: Vec<f64> = runs.iter().flatten().map(|row| row.cells[1]).collect();
     targets.sort_by(f64::total_cmp);
-    targets.dedup_by(|next, before| *next - *before <= SAME_MM);
+    targets.dedup_by(|next, before| *next - *before <= SAME_TARGET_MM);
     let (clusters, how) = match stated {
         Some(stated) => {
             let most = stated * units.deviation_in_targets();
@@ -45,7 +45,7 @@ pub fn merge(runs: &mut [Vec<Row>], stated: Option<f64>, units: Units) -> Option
         }
     };
     let widest = widest(&clusters);
-    if widest <= SAME_MM {
+    if widest <= SAME_TARGET_MM {
         return None;
     }
     for row in runs.iter_mut().flatten() {
@@ -82,7 +82,7 @@ fn widest(clusters: &[Cluster]) -> f64 {
 /// The cluster that a value lies in.
 fn place(clusters: &[Cluster], value: f64) -> usize {
     clusters
-        .partition_point(|[low, _]| *low <= value + SAME_MM)
+        .partition_point(|[low, _]| *low <= value + SAME_TARGET_MM)
         .saturating_sub(1)
 }
 
@@ -101,7 +101,7 @@ fn derived(targets: &[f64], runs: &[Vec<Row>]) -> Option<(Vec<Cluster>, f64)> {
         )
     });
     candidates.find(|(clusters, least)| {
-        widest(clusters) <= (least * SHARE).min(MOST) && are_apart(runs, clusters)
+        widest(clusters) <= (least * SHARE).min(MAX_TARGET_SCATTER) && are_apart(runs, clusters)
     })
 }
 
@@ -125,7 +125,7 @@ fn are_apart(runs: &[Vec<Row>], clusters: &[Cluster]) -> bool {
 /// The roundest number from the least to the greatest value of a cluster.
 fn nominal([low, high]: Cluster) -> f64 {
     let middle = f64::midpoint(low, high);
-    if high - low <= SAME_MM {
+    if high - low <= SAME_TARGET_MM {
         return low;
     }
     let rounded = (0..=MOST_DECIMALS).map(|decimals| {

@@ -11,11 +11,11 @@ use metrology::yaml::shown;
 use mtconnect_bridge::observation::read_stamp;
 
 /// Longest log or session, s: a leap year.
-pub const LONGEST_S: f64 = 366.0 * 86_400.0;
+pub const LONGEST_LOG_S: f64 = 366.0 * 86_400.0;
 /// Greatest spacing of most of the rows, s: slower, no warm-up is seen.
 const SPACING_S: f64 = 6.0 * 3600.0;
 /// The units in which rows are looked for: how many make a second, and what they are called.
-const UNITS: [(f64, &str); 3] = [
+const TIME_UNITS: [(f64, &str); 3] = [
     (1e3, "milliseconds"),
     (1e6, "microseconds"),
     (1e9, "nanoseconds"),
@@ -132,11 +132,11 @@ pub fn check(times_s: impl Iterator<Item = f64>) -> Result<()> {
         );
     }
     let length_s = last_s - first_s;
-    if length_s > LONGEST_S {
+    if length_s > LONGEST_LOG_S {
         let leap = (1..times_s.len()).max_by(|a, b| steps_s[a - 1].total_cmp(&steps_s[b - 1]));
         let row = leap.unwrap_or(1);
         bail!(
-            "times: {} s from the first row to the last: must be at most {LONGEST_S} s; the greatest leap is at row {}, from {} to {} s",
+            "times: {} s from the first row to the last: must be at most {LONGEST_LOG_S} s; the greatest leap is at row {}, from {} to {} s",
             number(length_s),
             row + 1,
             number(times_s[row - 1]),
@@ -161,7 +161,7 @@ fn unit(spacing_s: f64) -> String {
     if is_of_calendar(spacing_s) {
         return "; make a table of its own of the rows of each session".to_owned();
     }
-    let unit = UNITS
+    let unit = TIME_UNITS
         .into_iter()
         .find(|(scale, _)| spacing_s / scale <= SPACING_S);
     unit.map_or_else(String::new, |(scale, unit)| {
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn times_in_another_unit_are_refused_with_the_unit() {
-        for (scale, unit) in UNITS {
+        for (scale, unit) in TIME_UNITS {
             let rows: Vec<f64> = (0..90).map(|k| f64::from(k) * 60.0 * scale).collect();
             let said = said(&rows);
             assert!(said.contains("must be at most 21600 s"), "{said}");

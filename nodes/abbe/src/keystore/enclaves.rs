@@ -14,7 +14,7 @@ use replayer::PlaybackConfig;
 
 use crate::launch::LaunchNode;
 use crate::node;
-use crate::play::NAME as PLAYER;
+use crate::play::PLAYER_NAME as PLAYER;
 use crate::scenario::Scenario;
 
 /// One enclave.

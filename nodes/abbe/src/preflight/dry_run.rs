@@ -15,7 +15,7 @@ use sequencer::{Plan, ProgramEnd, Sequencer};
 use super::ideal::IdealMachine;
 
 /// Time between two looks of the sequencer at its plan.
-const LOOK: Span = Span::from_nanos(100_000_000);
+const PLAN_PERIOD: Span = Span::from_nanos(100_000_000);
 /// Longest programme, s.
 pub const LIMIT_S: f64 = 24.0 * 3600.0;
 
@@ -65,7 +65,7 @@ pub fn dry_run(
     let mut look_at = rehearsal.now;
     while rehearsal.state != PlanState::Done {
         if rehearsal.now >= look_at {
-            look_at += LOOK;
+            look_at += PLAN_PERIOD;
             rehearsal.news.push_back(sequencer::Input::Tick);
         }
         rehearsal.orders.push_back(fake_cnc::Input::Tick);

@@ -18,7 +18,7 @@ use metrology::{Axis, AxisSet, PerAxis};
 use nalgebra::Vector3;
 
 /// Temperature of everything, degC.
-const TEMPERATURE_DEGC: f64 = 20.0;
+const IDEAL_TEMPERATURE_DEGC: f64 = 20.0;
 /// Half the thickness that a wall or plate is given, and half the height of a bore or boss, mm.
 const HALF_WALL_MM: f64 = 5.0;
 /// Distance from a surface within which every period is looked at, mm.
@@ -289,7 +289,7 @@ impl Hardware for IdealMachine {
     }
 
     fn sensor_reading_degc(&mut self, _id: &str) -> Option<f64> {
-        Some(TEMPERATURE_DEGC)
+        Some(IDEAL_TEMPERATURE_DEGC)
     }
 
     fn settle_at(&mut self, position: &PerAxis<f64>) {

@@ -9,7 +9,7 @@ use metrology::sample::GeometryModel;
 use metrology::stamp::Stamp;
 
 use super::programme::Programme;
-use crate::report::geometry::{COVERAGE, READABLE, coefficients, sums};
+use crate::report::geometry::{COVERAGE, MAX_READABLE_MEMBERS, coefficients, sums};
 use crate::report::section::{Rows, Section, head, rounded};
 
 /// The verdict on a plan.
@@ -84,7 +84,7 @@ impl Seen {
     fn add_sums(&self, section: &mut Section) {
         let (short, long): (Vec<_>, Vec<_>) = sums(&self.model)
             .into_iter()
-            .partition(|sum| sum.members.len() <= READABLE);
+            .partition(|sum| sum.members.len() <= MAX_READABLE_MEMBERS);
         if short.is_empty() && long.is_empty() {
             return;
         }
@@ -102,7 +102,7 @@ impl Seen {
             rows: short.iter().map(row).collect(),
             note: match long.len() {
                 0 => String::new(),
-                n => format!("And {n} sums of more than {READABLE} members: --json."),
+                n => format!("And {n} sums of more than {MAX_READABLE_MEMBERS} members: --json."),
             },
         });
     }

@@ -17,7 +17,7 @@ use crate::evaluate::circles::plane_axes;
 use crate::report::section::{Rows, Section, head};
 
 /// Heights at which a plate is tried, as shares of the travel.
-const HEIGHTS: [f64; 3] = [-0.6, 0.0, 0.6];
+const PLATE_HEIGHTS: [f64; 3] = [-0.6, 0.0, 0.6];
 /// Radius of the smaller circle beside the largest, as its share.
 const SMALLER: f64 = 0.5;
 
@@ -194,7 +194,7 @@ fn places(programme: &Programme, offsets: &[Vector3<f64>]) -> Vec<Place> {
         planes,
         radii_mm: vec![radius_mm, radius_mm * SMALLER],
         plate_radius_mm: plate.radius_mm,
-        heights: HEIGHTS.to_vec(),
+        heights: PLATE_HEIGHTS.to_vec(),
         tool_offsets_mm: head,
         rezeroed: false,
     };

@@ -10,7 +10,7 @@ use super::section::{Drawing, Rows, Section, head};
 use crate::evaluate::Tests;
 use crate::evaluate::angular::RotaryTest;
 use crate::evaluate::budget::Budget;
-use crate::evaluate::linear::SETTLE;
+use crate::evaluate::linear::STOP_SETTLE;
 
 /// Seconds of arc of a radian.
 const ARCSEC_PER_RAD: f64 = 648_000.0 / std::f64::consts::PI;
@@ -62,11 +62,11 @@ fn section(test: &RotaryTest, budget: Option<&Budget>) -> Result<Section> {
 fn why_not(test: &RotaryTest) -> Option<String> {
     if !test.has_readings {
         let longest = test.longest_rest.unwrap_or_default();
-        if longest < SETTLE {
+        if longest < STOP_SETTLE {
             return Some(format!(
                 "the command rested for {:.2} s at most, and readings of a stop count from {:.1} s on",
                 longest.as_secs_f64(),
-                SETTLE.as_secs_f64()
+                STOP_SETTLE.as_secs_f64()
             ));
         }
         return Some(format!(

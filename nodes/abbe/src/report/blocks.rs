@@ -10,7 +10,7 @@ use super::section::{Rows, head};
 use super::terminal::Part;
 use crate::evidence::Evidence;
 
-const HEAD: [&str; 6] = ["block", "run", "cold", "X / mm", "Y / mm", "Z / mm"];
+const BLOCK_COLUMNS: [&str; 6] = ["block", "run", "cold", "X / mm", "Y / mm", "Z / mm"];
 
 fn rows(evidence: &Evidence) -> Vec<Vec<String>> {
     evidence
@@ -37,12 +37,12 @@ fn rows(evidence: &Evidence) -> Vec<Vec<String>> {
 }
 
 /// The condition of blocks whose heights differ too little or too much.
-const HEIGHTS: &str = "block_heights";
+const BLOCK_HEIGHTS: &str = "block_heights";
 
 /// What the thermal model remarked of the blocks' heights.
 pub fn remark(evidence: &Evidence) -> Option<String> {
     let mut conditions = evidence.conditions.iter().rev();
-    let said = conditions.find(|condition| condition.diagnostic.name == HEIGHTS)?;
+    let said = conditions.find(|condition| condition.diagnostic.name == BLOCK_HEIGHTS)?;
     Some(format!("Remark: {}.", said.diagnostic.message))
 }
 
@@ -52,7 +52,7 @@ pub fn section(evidence: &Evidence) -> Markup {
     html! {
         @if !rows.is_empty() {
             h2 { "Blocks" }
-            (table(&HEAD, &rows))
+            (table(&BLOCK_COLUMNS, &rows))
         }
     }
 }
@@ -68,7 +68,7 @@ pub fn part(evidence: &Evidence) -> Part {
         text.push('\n');
     }
     let rows = Rows {
-        head: head(&HEAD),
+        head: head(&BLOCK_COLUMNS),
         rows,
         note: String::new(),
     };

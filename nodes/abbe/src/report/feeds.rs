@@ -76,7 +76,7 @@ fn summary(touches: &[(f64, f64)]) -> Feed {
     }
 }
 
-const HEAD: [&str; 6] = [
+const FEED_COLUMNS: [&str; 6] = [
     "feed / mm/min",
     "touches",
     "corrected surface, from the mean / µm",
@@ -109,7 +109,7 @@ pub fn section(evidence: &Evidence) -> Markup {
     html! {
         @if !rows.is_empty() {
             h2 { "Corrected points across feeds" }
-            (table(&HEAD, &rows))
+            (table(&FEED_COLUMNS, &rows))
             p.note { "A control that polls its probe input leaves each touch uncertain by up to one servo period's travel; the mean of n touches by that over the square root of 12 n." }
         }
     }
@@ -122,7 +122,7 @@ pub fn part(evidence: &Evidence) -> Part {
     if rows.is_empty() {
         return Part::default();
     }
-    let head = head(&HEAD);
+    let head = head(&FEED_COLUMNS);
     for row in std::iter::once(&head).chain(&rows) {
         for cell in row {
             let _ = write!(text, "{cell:>24.24}");

@@ -24,7 +24,7 @@ const FREE_FORM: &str = "free_";
 /// How the sum of a size and its shares begins.
 const WHOLE: &str = "whole_";
 /// Most rows of a table on the page.
-const MOST_ROWS: usize = 24;
+const MAX_PAGE_ROWS: usize = 24;
 
 /// The page of a diagnosis; with `explain` its text has every check of every cause, which the page has folded.
 ///
@@ -313,7 +313,7 @@ fn places(diagnosed: &Diagnosed) -> Section {
         Some([low, high]) => format!(" ({:.0} to {:.0})", 100.0 * low, 100.0 * high),
         None => String::new(),
     };
-    let places = report.r#where.iter().take(MOST_ROWS).enumerate();
+    let places = report.r#where.iter().take(MAX_PAGE_ROWS).enumerate();
     let rows = places.map(|(number, place)| {
         vec![
             place.channel.clone(),

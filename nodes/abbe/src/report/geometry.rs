@@ -14,7 +14,7 @@ const FEW: usize = 16;
 /// Lever of turns in sums without a linear axis, mm.
 const LEVER_MM: f64 = 100.0;
 /// Members that a person can read in one sum.
-pub const READABLE: usize = 4;
+pub const MAX_READABLE_MEMBERS: usize = 4;
 
 /// One coefficient with its place in the model.
 pub struct Coefficient<'a> {
@@ -50,7 +50,7 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
     let (short, long): (Vec<_>, Vec<_>) = model
         .combinations
         .iter()
-        .partition(|combination| combination.weights.len() <= READABLE);
+        .partition(|combination| combination.weights.len() <= MAX_READABLE_MEMBERS);
     if !model.combinations.is_empty() {
         section.tables.push(Rows {
             head: head(&["known only together", "± U (k = 2)", "at"]),
@@ -101,8 +101,10 @@ fn count(all: &[Coefficient], n_known: usize) -> String {
 fn together(n_long: usize) -> String {
     let more = match n_long {
         0 => String::new(),
-        1 => format!(" One sum of more than {READABLE} members is in report.json."),
-        n => format!(" {n} sums of more than {READABLE} members each are in report.json."),
+        1 => format!(" One sum of more than {MAX_READABLE_MEMBERS} members is in report.json."),
+        n => format!(
+            " {n} sums of more than {MAX_READABLE_MEMBERS} members each are in report.json."
+        ),
     };
     format!(
         "What the recordings determine although its members are not known: each name stands for that error's value at the stated distance from its origin, a turn for its lever of the same length.{more}"

@@ -85,7 +85,7 @@ fn rows(latencies: &[ProbeLatency]) -> Vec<Vec<String>> {
         .collect()
 }
 
-const HEAD: [&str; 8] = [
+const LATENCY_COLUMNS: [&str; 8] = [
     "method in use",
     "T / ms",
     "u(T) / ms",
@@ -143,7 +143,7 @@ pub fn section(evidence: &Evidence) -> Result<Markup> {
     };
     Ok(html! {
         h2 { "Probe latency" }
-        (table(&HEAD, &rows(&evidence.latencies)))
+        (table(&LATENCY_COLUMNS, &rows(&evidence.latencies)))
         @if any_corrected {
             (figure(&svg(&plot)?, "Touches of the latency run after correction, along the approach: a slope that is left would be latency that was not taken out"))
         }

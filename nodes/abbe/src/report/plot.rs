@@ -28,7 +28,7 @@ pub struct Plot {
 const WIDTH: u32 = 760;
 const HEIGHT: u32 = 300;
 /// Distinguishable with the common colour deficiencies (Okabe and Ito), on white and on dark grey.
-const COLOURS: [RGBColor; 6] = [
+const CURVE_COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -144,7 +144,7 @@ fn draw(plot: &Plot, text: &mut String) -> Result<(), Box<dyn std::error::Error>
         .label_style(font())
         .axis_desc_style(font())
         .draw()?;
-    for (trace, colour) in plot.traces.iter().zip(COLOURS.iter().cycle()) {
+    for (trace, colour) in plot.traces.iter().zip(CURVE_COLOURS.iter().cycle()) {
         let style = ShapeStyle {
             color: colour.to_rgba(),
             filled: true,

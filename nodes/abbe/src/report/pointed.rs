@@ -10,7 +10,7 @@ use super::page::table;
 use crate::evidence::Evidence;
 
 /// Head of the table.
-pub const HEAD: [&str; 6] = [
+pub const TOUCH_COLUMNS: [&str; 6] = [
     "touch",
     "probe axis",
     "A, C / deg",
@@ -27,7 +27,7 @@ pub fn section(evidence: &Evidence) -> Markup {
     html! {
         @if !rows.is_empty() {
             h2 { "Touches along given directions" }
-            (table(&HEAD, &rows))
+            (table(&TOUCH_COLUMNS, &rows))
             p.note { "The probe axis points from the ball to the spindle, in the workpiece frame. A and C follow from it; of the two solutions the nearest inside the travel is taken. At contact: positions as probe/point has them, of the rotary encoders." }
         }
     }

@@ -18,7 +18,7 @@ use super::section::{Drawing, Rows, Section, head, um};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
 use crate::evaluate::correction::{BY_OWN_SCALE, Measured};
-use crate::evaluate::linear::{LinearTest, Reference, SETTLE, level};
+use crate::evaluate::linear::{LinearTest, Reference, STOP_SETTLE, level};
 use crate::report_bag::unstate;
 
 /// A figure and, where a budget was given, its expanded uncertainty.
@@ -274,11 +274,11 @@ fn without_readings(test: &LinearTest) -> Option<String> {
 /// Why a test has no target, where its stops were too short for one.
 fn too_short(test: &LinearTest) -> Option<String> {
     let longest = test.longest_rest?;
-    (test.targets_mm.is_empty() && longest < SETTLE).then(|| {
+    (test.targets_mm.is_empty() && longest < STOP_SETTLE).then(|| {
         format!(
             "the command rested for {:.2} s at most, and readings of a stop count from {:.1} s on",
             longest.as_secs_f64(),
-            SETTLE.as_secs_f64()
+            STOP_SETTLE.as_secs_f64()
         )
     })
 }
@@ -459,7 +459,7 @@ mod tests {
         let words =
             "the command rested for 0.20 s at most, and readings of a stop count from 0.3 s on";
         assert!(section.lines[0].contains(words), "{:?}", section.lines);
-        short.longest_rest = Some(SETTLE);
+        short.longest_rest = Some(STOP_SETTLE);
         assert_eq!(too_short(&short), None);
     }
 

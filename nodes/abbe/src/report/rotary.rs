@@ -56,7 +56,7 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         ),
         (
             "Touches along given directions",
-            &pointed::HEAD[..],
+            &pointed::TOUCH_COLUMNS[..],
             pointed,
         ),
     ];

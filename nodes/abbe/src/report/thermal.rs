@@ -139,7 +139,7 @@ fn figures_of(errors: &[ToolError], span: Option<&BlocksSpan>) -> serde_json::Va
     })
 }
 
-const HEAD: [&str; 8] = [
+const VERIFICATION_COLUMNS: [&str; 8] = [
     "verification",
     "p95",
     "max",
@@ -180,7 +180,7 @@ fn error_rows(errors: &[ToolError]) -> Vec<Vec<String>> {
 }
 
 fn error_table(errors: &[ToolError]) -> Markup {
-    table(&HEAD, &error_rows(errors))
+    table(&VERIFICATION_COLUMNS, &error_rows(errors))
 }
 
 /// Corners and centre of what every verification visited.
@@ -212,7 +212,7 @@ fn place_rows(errors: &[ToolError], places: &Places) -> Vec<Vec<String>> {
         }
         row
     };
-    tool_error::PLACES
+    tool_error::PLACE_NAMES
         .iter()
         .zip(&places.at_mm)
         .map(row)
@@ -307,7 +307,7 @@ fn parts(errors: &[ToolError], span: Option<&BlocksSpan>) -> Vec<Part> {
     };
     let mut parts = vec![of(
         "Change of the tool error since cold, in the blocks' span, µm",
-        head(&HEAD),
+        head(&VERIFICATION_COLUMNS),
         error_rows(errors),
         text(errors, span),
     )];
@@ -335,7 +335,9 @@ fn text(errors: &[ToolError], span: Option<&BlocksSpan>) -> String {
         return text;
     }
     text.push_str("Change of the tool error since cold, in the blocks' span, µm\n");
-    for row in std::iter::once(HEAD.map(str::to_owned).to_vec()).chain(error_rows(errors)) {
+    for row in
+        std::iter::once(VERIFICATION_COLUMNS.map(str::to_owned).to_vec()).chain(error_rows(errors))
+    {
         let _ = writeln!(
             text,
             "  {:<28}{:>8}{:>8}{:>8}{:>9}{:>10}{:>8}{:>11}",

@@ -198,7 +198,7 @@ pub struct Places {
 }
 
 /// Names of [`Places::at_mm`].
-pub const PLACES: [&str; 5] = [
+pub const PLACE_NAMES: [&str; 5] = [
     "corner -X -Y",
     "corner +X -Y",
     "corner -X +Y",

@@ -17,9 +17,9 @@ const SIZE: u32 = 520;
 /// Divisions from the centre to the nominal circle.
 const NOMINAL: f64 = 10.0;
 /// Most divisions that a trace may lie from the nominal circle.
-const MOST: f64 = 8.0;
+const MAX_DIVISIONS: f64 = 8.0;
 const INK: RGBColor = RGBColor(1, 2, 3);
-const COLOURS: [RGBColor; 4] = [
+const RUN_COLOURS: [RGBColor; 4] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -77,7 +77,7 @@ fn division_um(greatest_um: f64, least_um: f64) -> f64 {
     let mut last = least_um;
     for step in steps.filter(|step| *step >= 0.999 * least_um) {
         last = step;
-        if greatest_um <= MOST * step {
+        if greatest_um <= MAX_DIVISIONS * step {
             break;
         }
     }
@@ -90,7 +90,7 @@ fn draw(
     division_um: f64,
     text: &mut String,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let reach = NOMINAL + MOST;
+    let reach = NOMINAL + MAX_DIVISIONS;
     let root = SVGBackend::with_string(text, (SIZE, SIZE)).into_drawing_area();
     let mut chart = ChartBuilder::on(&root)
         .margin(8)
@@ -119,7 +119,7 @@ fn draw(
         ];
         chart.draw_series(labels.map(|(label, at)| Text::new(label, at, font())))?;
     }
-    for ((name, points), colour) in traces.iter().zip(COLOURS.iter().cycle()) {
+    for ((name, points), colour) in traces.iter().zip(RUN_COLOURS.iter().cycle()) {
         let style = ShapeStyle {
             color: colour.to_rgba(),
             filled: false,

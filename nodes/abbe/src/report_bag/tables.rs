@@ -8,7 +8,7 @@ use crate::import::Import;
 
 const REFERENCE: &str = include_str!("../../../../tests/validation/iso230_tables.json");
 /// Rounding of made-up motions and of sums; a table has steps of 0.01 µm or 0.1″.
-const NEAR: f64 = 1e-6;
+const ROUNDING: f64 = 1e-6;
 
 fn reference(case: &str, name: &str) -> f64 {
     let all: Value = serde_json::from_str(REFERENCE).unwrap();
@@ -61,7 +61,7 @@ fn found<'r>(report: &'r Report, key: &str) -> &'r Value {
 
 fn near(found: &Value, scale: f64, wanted: f64) {
     let value = found.as_f64().unwrap() * scale;
-    assert!((value - wanted).abs() < NEAR, "{value} {wanted}");
+    assert!((value - wanted).abs() < ROUNDING, "{value} {wanted}");
 }
 
 const BUDGET: &str = "

@@ -38,7 +38,7 @@ const SHUTDOWN_PATIENCE: Span = Span::from_nanos(120_000_000_000);
 const EVALUATION: Span = Span::from_nanos(3_000_000_000);
 
 /// Who says that a run cannot be recorded any more.
-const NAME: &str = "abbe_run";
+const RUN_NAME: &str = "abbe_run";
 
 /// How a scenario is run.
 #[derive(Clone, Copy)]
@@ -124,10 +124,12 @@ impl Watched<'_> {
         let reason = format!("{NOT_RECORDED}: {}", self.sink.stats().failure?);
         complain!("abbe: {reason}");
         let now = harness.now();
-        let message = alarm::message(NAME, &reason, now);
+        let message = alarm::message(RUN_NAME, &reason, now);
         harness.inject(topics::DIAGNOSTICS.name, &message);
         let diagnostic = Diagnostic::new(Level::Error, "recording", reason.clone());
-        self.evidence.borrow_mut().condition(now, NAME, &diagnostic);
+        self.evidence
+            .borrow_mut()
+            .condition(now, RUN_NAME, &diagnostic);
         Some(reason)
     }
 }

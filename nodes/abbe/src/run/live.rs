@@ -31,11 +31,11 @@ use graph::GraphEvidence;
 use processes::Processes;
 
 /// Between two looks at the plan, the nodes and the signals.
-const LOOK: Duration = Duration::from_millis(50);
+const WATCH_PERIOD: Duration = Duration::from_millis(50);
 /// What the last program leads to is evaluated and recorded within this.
 const AFTERMATH: Duration = Duration::from_secs(1);
 /// Who says that a run cannot be recorded any more.
-const NAME: &str = "abbe_run";
+const RUN_NAME: &str = "abbe_run";
 /// The recorder's own name on the graph.
 const TAP: &str = "abbe_run_tap";
 
@@ -73,7 +73,7 @@ pub fn run(
     let mut alarm = None;
     let failed = || {
         let reason = format!("{NOT_RECORDED}: {}", capture.stats().failure?);
-        alarm.get_or_insert_with(|| Alarm::raise(&environment, NAME, &reason));
+        alarm.get_or_insert_with(|| Alarm::raise(&environment, RUN_NAME, &reason));
         Some(reason)
     };
     let failure = play(scenario, &evidence, &mut cast, interruption, failed);
@@ -216,7 +216,7 @@ fn play(
     let began = Instant::now();
     let limit = Duration::from_secs_f64(scenario.file.limit_min * 60.0);
     let failure = loop {
-        if interruption.wait(LOOK) {
+        if interruption.wait(WATCH_PERIOD) {
             complain!("abbe: interrupted: the nodes wind down; a second Ctrl-C ends at once");
             break Some(INTERRUPTED.to_owned());
         }

@@ -22,11 +22,11 @@ use node_runtime::node::TopicPort;
 use node_runtime::{Harness, RawPublisher};
 
 /// The mirror's name on the graph.
-const NAME: &str = "abbe_run";
+const RUN_NAME: &str = "abbe_run";
 /// Messages between the run and the network.
 const QUEUE_LEN: usize = 4_096;
 /// What is rare waits so long for a full queue at most; the network never lets it wait so long.
-const PATIENCE: Duration = Duration::from_millis(100);
+const QUEUE_TIMEOUT: Duration = Duration::from_millis(100);
 /// Wall time between two `/clock`.
 const CLOCK_PERIOD: Duration = Duration::from_millis(100);
 /// Topics that are this deep are meant for a message at every servo tick.
@@ -74,8 +74,8 @@ impl Mirror {
         let frequent = ports.iter().map(is_frequent).collect();
         let clock = ports.len();
         ports.push(clock_port());
-        let names = NodeNames::new(NAME, &[])?;
-        let started = RawPublisher::start(&environment, &names, &ports, QUEUE_LEN, PATIENCE);
+        let names = NodeNames::new(RUN_NAME, &[])?;
+        let started = RawPublisher::start(&environment, &names, &ports, QUEUE_LEN, QUEUE_TIMEOUT);
         let publisher = match started {
             Ok(publisher) => publisher,
             Err(error) => {

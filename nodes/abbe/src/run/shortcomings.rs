@@ -8,7 +8,7 @@ use node_runtime::Level;
 use crate::evidence::Evidence;
 
 /// Conditions that are named; the page has all.
-const MOST: usize = 12;
+const MAX_CONDITIONS: usize = 12;
 
 /// One condition of one node over the whole run.
 struct Told<'e> {
@@ -115,8 +115,8 @@ fn conditions(evidence: &Evidence) -> Vec<String> {
         .partition(|told| !told.over || told.level >= Level::Error);
     // What still stands before what is over, the worse before the better.
     told.sort_by_key(|told| (told.over, std::cmp::Reverse(told.level)));
-    let left = told.len().saturating_sub(MOST);
-    let mut lines: Vec<String> = told.iter().take(MOST).map(Told::line).collect();
+    let left = told.len().saturating_sub(MAX_CONDITIONS);
+    let mut lines: Vec<String> = told.iter().take(MAX_CONDITIONS).map(Told::line).collect();
     if left > 0 {
         lines.push(format!("{left} more conditions are on the page"));
     }

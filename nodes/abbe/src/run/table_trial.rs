@@ -19,7 +19,7 @@ use crate::report::section::Section;
 use crate::report::stops;
 use crate::scenario::{LinuxcncTable, Scenario};
 
-const TITLE: &str = "The exported table on the control itself";
+const TRIAL_TITLE: &str = "The exported table on the control itself";
 
 /// Runs of the same plan with other tables.
 pub struct TableTrial<'a> {
@@ -49,7 +49,7 @@ impl TableTrial<'_> {
             ("with the table", &with),
             ("with its sign turned", &turned),
         ];
-        stops::trial(TITLE, &runs)
+        stops::trial(TRIAL_TITLE, &runs)
     }
 
     fn stops_of(&self, bag: &Path) -> Result<Stops> {

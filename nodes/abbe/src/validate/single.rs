@@ -44,7 +44,7 @@ pub enum Kind {
 }
 
 /// Kinds by the name of the file.
-const NAMES: [(&str, Kind); 6] = [
+const FILE_NAMES: [(&str, Kind); 6] = [
     ("machine", Kind::Machine),
     ("plan", Kind::Plan),
     ("plant", Kind::Plant),
@@ -78,7 +78,7 @@ impl File {
         let stem = name.trim_end_matches(".yaml");
         let kind = if name.ends_with(".launch.xml") {
             Some(Kind::Launch)
-        } else if let Some((_, kind)) = NAMES.iter().find(|(known, _)| *known == stem) {
+        } else if let Some((_, kind)) = FILE_NAMES.iter().find(|(known, _)| *known == stem) {
             Some(*kind)
         } else if node::builder(stem).is_some() {
             Some(Kind::Parameters)
@@ -97,7 +97,9 @@ impl File {
         if let Err(error) = text_file::yaml(&self.path) {
             return error.to_string();
         }
-        let names = NAMES.map(|(name, _)| format!("{name}.yaml")).join(", ");
+        let names = FILE_NAMES
+            .map(|(name, _)| format!("{name}.yaml"))
+            .join(", ");
         format!(
             "{shown}: neither its name nor its keys are those of a known file: name it {names}, or NODE.yaml for the parameters of a node"
         )

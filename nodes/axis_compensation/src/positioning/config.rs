@@ -90,7 +90,7 @@ fn default_loop_delay_cycles() -> u32 {
 /// Limits of ω: CN 1562563 A, claim 1, step (1).
 pub const WEIGHT: (f64, f64) = (0.0, 0.3);
 /// Limits of the number of runs.
-pub const RUNS: (f64, f64) = (10.0, 20.0);
+pub const RUN_LIMITS: (f64, f64) = (10.0, 20.0);
 /// Limits of what is believed, µm.
 pub const MEASURED_LIMIT_UM: (f64, f64) = (0.1, 5000.0);
 /// Limits of the time left out of a dwell, s.
@@ -130,7 +130,7 @@ impl PositioningConfig {
                 MEASURED_LIMIT_UM,
                 "µm",
             ),
-            ("runs", f64::from(self.runs), RUNS, ""),
+            ("runs", f64::from(self.runs), RUN_LIMITS, ""),
             ("settle_s", self.settle_s, SETTLE_S, "s"),
             ("dwell_s", self.dwell_s, DWELL_S, "s"),
             ("steady_s", self.steady_s, STEADY_S, "s"),

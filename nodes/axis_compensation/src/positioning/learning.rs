@@ -32,7 +32,7 @@ use super::refusal::PositioningRefusal;
 use crate::femtometre::{FM_PER_MM, mm_from_fm};
 
 /// Least and greatest number of runs: CN 1562563 A, claim 1, step (1).
-pub const RUNS: (u32, u32) = (10, 20);
+pub const RUN_RANGE: (u32, u32) = (10, 20);
 
 #[expect(
     clippy::cast_possible_truncation,
@@ -411,7 +411,7 @@ fn mean_table(
     runs: u32,
     points: &[Point],
 ) -> Result<DeviationTable, PositioningRefusal> {
-    let (lower, upper) = RUNS;
+    let (lower, upper) = RUN_RANGE;
     if runs < lower || runs > upper {
         return Err(PositioningRefusal::RunsOutOfRange {
             axis,

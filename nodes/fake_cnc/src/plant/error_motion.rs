@@ -19,15 +19,15 @@ use super::chain::{Rigid, shift, turn_about};
 use super::guide_form::GuideForm;
 use super::noise::{Effect, Stream};
 
-const HARMONICS: usize = 5;
+const MOTION_HARMONICS: usize = 5;
 const COMPONENTS: usize = 6;
 
 /// Six error motions of one axis: three shifts (mm), three turns (rad).
 #[derive(Clone, Debug)]
 pub(super) struct ErrorMotion {
     angle_per_unit: f64,
-    sine: [[f64; HARMONICS]; COMPONENTS],
-    cosine: [[f64; HARMONICS]; COMPONENTS],
+    sine: [[f64; MOTION_HARMONICS]; COMPONENTS],
+    cosine: [[f64; MOTION_HARMONICS]; COMPONENTS],
     centre_mm: Vector3<f64>,
     forms: Vec<GuideForm>,
 }
@@ -42,7 +42,7 @@ impl ErrorMotion {
         centre_mm: Vector3<f64>,
     ) -> Self {
         let mut stream = Stream::new(seed, Effect::ErrorMotions, axis.index() as u64);
-        let squares: f64 = (1..=HARMONICS).map(|k| 2.0 / (k * k) as f64).sum();
+        let squares: f64 = (1..=MOTION_HARMONICS).map(|k| 2.0 / (k * k) as f64).sum();
         let mut draw = || {
             std::array::from_fn(|component| {
                 std::array::from_fn(|harmonic| {
@@ -71,7 +71,7 @@ impl ErrorMotion {
         let (sin, cos) = (q * self.angle_per_unit).sin_cos();
         let mut value = [0.0; COMPONENTS];
         let (mut sin_k, mut cos_k) = (sin, cos);
-        for harmonic in 0..HARMONICS {
+        for harmonic in 0..MOTION_HARMONICS {
             for (component, value) in value.iter_mut().enumerate() {
                 *value += self.sine[component][harmonic] * sin_k
                     + self.cosine[component][harmonic] * (cos_k - 1.0);
@@ -104,8 +104,8 @@ impl ErrorMotion {
     #[cfg(test)]
     pub(super) fn keep(&mut self, kept: Option<usize>) {
         for component in (0..COMPONENTS).filter(|component| Some(*component) != kept) {
-            self.sine[component] = [0.0; HARMONICS];
-            self.cosine[component] = [0.0; HARMONICS];
+            self.sine[component] = [0.0; MOTION_HARMONICS];
+            self.cosine[component] = [0.0; MOTION_HARMONICS];
         }
     }
 
@@ -142,7 +142,7 @@ mod tests {
         let motion = motion(2);
         for q in [-300.0, -12.5, 77.0, 320.0] {
             let angle = q * motion.angle_per_unit;
-            let direct: f64 = (0..HARMONICS)
+            let direct: f64 = (0..MOTION_HARMONICS)
                 .map(|h| {
                     let k = (h + 1) as f64;
                     motion.sine[1][h] * (k * angle).sin()

@@ -17,7 +17,7 @@ use super::error::{PlantError, require_not_negative, require_positive};
 use super::file::LinearScalesEntry;
 use super::noise::{Effect, Stream};
 
-const HARMONICS: usize = 5;
+const SCALE_HARMONICS: usize = 5;
 
 /// Errors of every axis' scale.
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ pub(super) struct LinearScales {
     angle_per_mm: f64,
     signal_angle_per_mm: f64,
     interpolation_mm: f64,
-    waves: PerAxis<[[f64; 2]; HARMONICS]>,
+    waves: PerAxis<[[f64; 2]; SCALE_HARMONICS]>,
 }
 
 impl LinearScales {
@@ -35,7 +35,7 @@ impl LinearScales {
         require_positive(at("graduation_length_mm"), entry.graduation_length_mm)?;
         require_positive(at("signal_period_um"), entry.signal_period_um)?;
         require_not_negative(at("interpolation_um"), entry.interpolation_um)?;
-        let squares: f64 = (1..=HARMONICS).map(|k| 2.0 / (k * k) as f64).sum();
+        let squares: f64 = (1..=SCALE_HARMONICS).map(|k| 2.0 / (k * k) as f64).sum();
         let waves = PerAxis::from_fn(|axis: Axis| {
             let mut stream = Stream::new(seed, Effect::Graduation, axis.index() as u64);
             std::array::from_fn(|index| {

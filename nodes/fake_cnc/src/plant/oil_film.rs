@@ -41,9 +41,9 @@ use super::error::{PlantError, require, require_not_negative, require_positive};
 use super::file::OilFilmEntry;
 use super::noise::{Effect, Stream};
 
-const HARMONICS: usize = 16;
+const FILM_HARMONICS: usize = 16;
 /// a_0, then a_k and b_k of every harmonic.
-const COEFFICIENTS: usize = 2 * HARMONICS + 1;
+const COEFFICIENTS: usize = 2 * FILM_HARMONICS + 1;
 /// Draws within the correlation time.
 const DRAWS_PER_TIME: f64 = 32.0;
 /// Greatest travel over correlation length that sixteen harmonics carry to 1e-3 of their weight.
@@ -57,7 +57,7 @@ pub(super) struct OilFilm {
     /// s of each direction, mm.
     size_mm: [f64; 3],
     /// g.
-    weight: [f64; HARMONICS + 1],
+    weight: [f64; FILM_HARMONICS + 1],
     /// D, rad/mm.
     angle_per_mm: f64,
     /// Time between draws, s.
@@ -96,7 +96,7 @@ impl OilFilm {
             let angle = k as f64 * angle_per_mm * entry.length_mm;
             (if k == 0 { 1.0 } else { 2.0 }) * (-0.5 * angle * angle).exp()
         };
-        let total: f64 = (0..=HARMONICS).map(share).sum();
+        let total: f64 = (0..=FILM_HARMONICS).map(share).sum();
         let mut film = Self {
             size_mm,
             weight: std::array::from_fn(|k| (share(k) / total).sqrt()), // (2)
@@ -150,7 +150,7 @@ impl OilFilm {
         let (sin, cos) = (q_mm * self.angle_per_mm).sin_cos();
         let mut sum = self.weight[0] * now(0);
         let (mut sin_k, mut cos_k) = (sin, cos);
-        for k in 1..=HARMONICS {
+        for k in 1..=FILM_HARMONICS {
             sum += self.weight[k] * (now(2 * k - 1) * cos_k + now(2 * k) * sin_k);
             (sin_k, cos_k) = (sin_k * cos + cos_k * sin, cos_k * cos - sin_k * sin);
         }
@@ -241,7 +241,7 @@ mod tests {
                 let (sin, cos) = (k as f64 * angle).sin_cos();
                 film.weight[k] * (now(2 * k - 1) * cos + now(2 * k) * sin)
             };
-            let direct = film.weight[0] * now(0) + (1..=HARMONICS).map(term).sum::<f64>();
+            let direct = film.weight[0] * now(0) + (1..=FILM_HARMONICS).map(term).sum::<f64>();
             assert!((film.shift_mm(q).x - 3e-4 * direct).abs() < 1e-16);
         }
     }

@@ -9,7 +9,7 @@ use crate::rows::time_s;
 use crate::stack::Stack;
 
 /// A surface that was touched in fewer runs shows no course.
-const FEWEST_RUNS: usize = 5;
+const MIN_RUNS_OF_COURSE: usize = 5;
 /// Seconds in a minute.
 const MINUTE_S: f64 = 60.0;
 
@@ -58,7 +58,7 @@ pub(crate) fn over_session(
     };
     surfaces
         .into_iter()
-        .filter(|(_, contacts)| runs(contacts) >= FEWEST_RUNS)
+        .filter(|(_, contacts)| runs(contacts) >= MIN_RUNS_OF_COURSE)
         .map(|(title, contacts)| Trace {
             run: stack.session.runs[contacts[0].run].segment.run,
             channel: Channel::Touch.to_string(),

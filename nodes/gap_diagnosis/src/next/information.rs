@@ -25,7 +25,7 @@ use crate::signature::{Form, Library};
 use crate::stack::Stack;
 
 /// Stations of a pass: enough for what the run-to-run field leaves.
-const STATIONS: usize = 120;
+const STATIONS_OF_PASS: usize = 120;
 
 /// (1); none where nothing of it would be read.
 pub fn added(
@@ -82,7 +82,7 @@ fn gram(
         session,
         bench.twin,
         runs,
-        STATIONS,
+        STATIONS_OF_PASS,
         noise,
         &bench.form,
         &nothing,
@@ -134,7 +134,7 @@ mod tests {
             run.segment.zero_id += 1;
         }
         let all: Vec<usize> = (0..session.runs.len()).collect();
-        let rows = Rows::new(&session, &all, STATIONS, |_| true);
+        let rows = Rows::new(&session, &all, STATIONS_OF_PASS, |_| true);
         let noise = assumed(&rows, &floors(0.3));
         let config = GapConfig {
             form_error_um,
@@ -155,7 +155,7 @@ mod tests {
             &session,
             &twin,
             &all,
-            STATIONS,
+            STATIONS_OF_PASS,
             &noise,
             &bench.form,
             &nothing,

@@ -21,7 +21,7 @@ const SURELY: f64 = 3.0;
 /// Most questions that an experiment is sought for.
 const MOST_QUESTIONS: usize = 10;
 /// A rival within this of the best set still asks for an experiment where its member fails a check.
-const NEAR: f64 = 30.0;
+const RIVAL_DISTANCE: f64 = 30.0;
 
 /// Two explanations of what was found.
 pub struct Question {
@@ -78,7 +78,7 @@ pub fn questions(found: &Found) -> Vec<Question> {
             continue;
         }
         let is_open = |behind: f64| {
-            member.status() == Status::Set && behind <= 2.0 * ODDS.ln() || behind < NEAR
+            member.status() == Status::Set && behind <= 2.0 * ODDS.ln() || behind < RIVAL_DISTANCE
         };
         let near = member.rivals.iter().filter(|(_, behind)| is_open(*behind));
         let sets: Vec<&Set> = std::iter::once(&found.set)
@@ -300,7 +300,7 @@ fn greatest<'t>(runs: &[(&'t str, Answer)], of: impl Fn(&Answer) -> f64) -> (&'t
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::veto::LEAST_D;
+    use crate::veto::MIN_D_TO_NAME;
 
     fn question(d: f64, is_noise: bool) -> Question {
         Question {
@@ -314,7 +314,7 @@ mod tests {
             too_small: None,
             effect: "backlash Z".to_owned(),
             d,
-            least_d: LEAST_D,
+            least_d: MIN_D_TO_NAME,
         }
     }
 
@@ -329,9 +329,9 @@ mod tests {
     fn what_is_too_small_wants_a_d_that_is_surely_named_and_a_rival_three_standard_deviations() {
         let small = question(6.1, true);
         let after = (6.1_f64.powi(2) + small.needed()).sqrt();
-        assert!((after - (LEAST_D + 3.0)).abs() < 1e-12, "{after}");
+        assert!((after - (MIN_D_TO_NAME + 3.0)).abs() < 1e-12, "{after}");
         // A run that adds what decides between rivals leaves it at an even chance.
-        let even = LEAST_D.powi(2) - 6.1_f64.powi(2);
+        let even = MIN_D_TO_NAME.powi(2) - 6.1_f64.powi(2);
         let chance = small.chance(&answer(even, None));
         assert!((chance - 0.5).abs() < 1e-9 && even < DECISION);
         assert!(question(9.6, true).needed() >= DECISION);
@@ -403,7 +403,7 @@ mod tests {
 
     #[test]
     fn what_is_said_to_be_wanted_is_more_than_what_a_run_would_make_it() {
-        for (d, least_d) in [(9.3, LEAST_D), (6.0, LEAST_D), (8.9, 8.5)] {
+        for (d, least_d) in [(9.3, MIN_D_TO_NAME), (6.0, MIN_D_TO_NAME), (8.9, 8.5)] {
             let small = Question {
                 least_d,
                 ..question(d, true)

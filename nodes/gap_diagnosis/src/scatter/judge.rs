@@ -10,7 +10,7 @@ use machine::effects::{Effect, Kind, Parameter};
 use nalgebra::{DMatrix, DVector};
 
 use super::squares::Squares;
-use super::{Bench, STEP, Scattered, is_tried, parameters};
+use super::{Bench, SHAPE_STEP, Scattered, is_tried, parameters};
 use crate::cause;
 use crate::confidence::Rivals;
 use crate::confirm;
@@ -222,10 +222,10 @@ fn off_bounds(parameters: &[ParameterValue]) -> Check {
 
 /// Whether a size of an effect is surely off zero.
 fn sure(fit: &Fit, own: &std::ops::Range<usize>) -> Check {
-    let is_sure = own_sizes(fit, own).any(|(size, doubt)| size > veto::SURE * doubt);
+    let is_sure = own_sizes(fit, own).any(|(size, doubt)| size > veto::MIN_SIZE_DEVIATIONS * doubt);
     let ratios = own_sizes(fit, own).map(|(size, doubt)| size / doubt);
     let most = ratios.fold(f64::NEG_INFINITY, f64::max);
-    Check::new(CheckId::Sure, is_sure).with(most, veto::SURE)
+    Check::new(CheckId::Sure, is_sure).with(most, veto::MIN_SIZE_DEVIATIONS)
 }
 
 /// Sizes of some columns with their standard uncertainties.
@@ -271,8 +271,8 @@ fn tried((parameter, value): (&Parameter, &f64)) -> Option<ParameterValue> {
     is_told.then(|| ParameterValue {
         name: parameter.name.to_owned(),
         value: *value,
-        low: (value / STEP).max(parameter.low),
-        high: (value * STEP).min(parameter.high),
+        low: (value / SHAPE_STEP).max(parameter.low),
+        high: (value * SHAPE_STEP).min(parameter.high),
         at_bound: false,
         determined: Some(true),
     })

@@ -58,7 +58,7 @@ const LEAST_LEVEL: f64 = 0.1;
 /// Waves of (3).
 const WAVES: std::ops::RangeInclusive<usize> = field::HARMONICS + 1..=40;
 /// How often the weights of a fit are taken anew.
-const ROUNDS: usize = 8;
+const WEIGHT_ROUNDS: usize = 8;
 /// Least k of touches: a square of a normal deviation has 2.
 const LEAST_OF_TOUCHES: f64 = 1.0;
 
@@ -226,7 +226,7 @@ impl Squares {
         let all: Vec<&DVector<f64>> = self.shared.iter().chain(columns.iter().copied()).collect();
         let mut level = DVector::from_element(self.squares.len(), 1.0);
         let mut sizes = vec![];
-        for _ in 0..ROUNDS {
+        for _ in 0..WEIGHT_ROUNDS {
             let scatter = level.component_mul(&self.unit);
             let over =
                 |rows: &DVector<f64>| self.levels.beside(rows.component_div(&scatter), &scatter);

@@ -23,7 +23,7 @@ const MOST_CELLS: usize = 267_840;
 const MOST_SENSORS: usize = 200;
 
 /// A hole beyond which nothing is said of the motion in it, s.
-const HOLE_S: f64 = 2.0;
+const PAST_HOLE_S: f64 = 2.0;
 /// A silence of more than so many of the usual spacings is a pause.
 const PAUSE_SPACINGS: usize = 10;
 
@@ -102,7 +102,7 @@ impl Past {
             return;
         };
         let dt_s = time_s - before_s;
-        if dt_s > HOLE_S {
+        if dt_s > PAST_HOLE_S {
             return;
         }
         cell.time_s += dt_s;

@@ -102,7 +102,7 @@ const STANDING_S: f64 = 0.02;
 const STANDSTILL: f64 = 1e-6;
 
 /// States further apart than this, and than so many times their middle spacing, leave a hole, s.
-const HOLE_S: f64 = 0.25;
+const STATE_HOLE_S: f64 = 0.25;
 const HOLE_SPACINGS: f64 = 20.0;
 /// Axes that are further on after a hole moved in it, mm or rad.
 const MOVED: f64 = 1e-2;
@@ -258,7 +258,7 @@ impl Record {
         }
         let middle = spacings_s.len() / 2;
         let (_, middle_s, _) = spacings_s.select_nth_unstable_by(middle, f64::total_cmp);
-        let least_s = HOLE_S.max(HOLE_SPACINGS * *middle_s);
+        let least_s = STATE_HOLE_S.max(HOLE_SPACINGS * *middle_s);
         run.windows(2).enumerate().any(|(k, two)| {
             let pairs = two[0].commanded.0.iter().zip(&two[1].commanded.0);
             spacing_s(k) > least_s && pairs.into_iter().any(|(a, b)| (a - b).abs() > MOVED)

@@ -57,11 +57,11 @@ const SHIFT: usize = BANDS.len();
 /// Unknowns of (3) per recording.
 const PER_RECORDING: usize = 6;
 /// Rounds of (6).
-const ROUNDS: usize = 30;
+const RATIO_ROUNDS: usize = 30;
 /// Change of a ratio that counts as none, to the greatest ratio.
 const SETTLED: f64 = 0.02;
 /// ρ that is none, to its start.
-const NONE: f64 = 1e-9;
+const ZERO_RATIO: f64 = 1e-9;
 
 /// What (1) is made of for some recordings.
 pub(super) struct Disturbances<'a> {
@@ -266,7 +266,7 @@ impl Sums {
         let mut ratios = start.map_or([even; GROUPS], |start| {
             start.map(|ratio| ratio.max(1e-3 * even))
         });
-        for _ in 0..ROUNDS {
+        for _ in 0..RATIO_ROUNDS {
             let (inverse, gamma, variance_ratio) = self.solve(&ratios)?;
             let mut found = [0.0; GROUPS];
             let mut told = [0.0; GROUPS];
@@ -282,7 +282,7 @@ impl Sums {
                 } else {
                     0.0
                 };
-                let new = new.max(NONE * even);
+                let new = new.max(ZERO_RATIO * even);
                 settled &= (new - ratios[group]).abs() <= SETTLED * greatest;
                 ratios[group] = new;
             }

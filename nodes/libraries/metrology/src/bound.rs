@@ -25,7 +25,7 @@ pub const MOST_RUNS: u64 = 10_000;
 /// Targets along one axis, stations of a contour: what one program may have.
 pub const MOST_STOPS: u64 = 100_000;
 /// Points on a bore or sphere, or on the side of a plane's grid.
-pub const MOST_POINTS: u64 = 1_000;
+pub const MAX_FEATURE_POINTS: u64 = 1_000;
 /// Poses of rotary axes, given or planned.
 pub const MOST_POSES: u64 = 1_000;
 /// Least and greatest of the counts that people write, by their keys.
@@ -34,7 +34,7 @@ pub const COUNTS: &[(&str, u64, u64)] = &[
     ("repeats", 1, MOST_RUNS),
     ("stations", 1, MOST_STOPS),
     ("targets", 2, MOST_STOPS),
-    ("points", 1, MOST_POINTS),
+    ("points", 1, MAX_FEATURE_POINTS),
     ("planned", 0, MOST_POSES),
 ];
 

@@ -128,7 +128,7 @@ impl ByHand {
 /// Participants whose nodes are kept by name.
 const MOST_NEIGHBOURS: usize = 1_000;
 /// Nodes of one participant that are named.
-const MOST_NAMES: usize = 4;
+const MAX_NAMED_NODES: usize = 4;
 
 /// A node's place on the network.
 ///
@@ -357,7 +357,7 @@ impl Participant {
             .unwrap_or_else(PoisonError::into_inner);
         // Participants beyond this number are reported without a name.
         if neighbours.len() < MOST_NEIGHBOURS || neighbours.contains_key(&participant) {
-            let names = info.nodes().iter().take(MOST_NAMES);
+            let names = info.nodes().iter().take(MAX_NAMED_NODES);
             let names: Vec<String> = names.map(NodeEntitiesInfo::fully_qualified_name).collect();
             neighbours.insert(participant, names.join(" or "));
         }

@@ -220,7 +220,7 @@ impl Shift {
 }
 
 /// Between two looks at nodes and signals.
-const LOOK: Duration = Duration::from_millis(20);
+const SIGNAL_PERIOD: Duration = Duration::from_millis(20);
 
 /// Nodes that are on the ROS graph.
 pub struct Running {
@@ -236,7 +236,7 @@ impl Running {
     /// When a node ended by a panic or hears no more, and the others have been stopped then; when the end was forced.
     pub fn until(mut self, interruption: &Interruption) -> anyhow::Result<()> {
         let mut ended = None;
-        while !interruption.wait(LOOK) {
+        while !interruption.wait(SIGNAL_PERIOD) {
             ended = self.ended();
             if ended.is_some() {
                 break;
@@ -285,7 +285,7 @@ impl Running {
                 let next = shift.tasks.join_next();
                 let ended = self
                     .runtime
-                    .block_on(async { tokio::time::timeout(LOOK, next).await });
+                    .block_on(async { tokio::time::timeout(SIGNAL_PERIOD, next).await });
                 if let Ok(Some(Err(error))) = ended {
                     outcome = Err(error);
                 }

@@ -60,12 +60,12 @@ impl PublishError {
     }
 }
 
-const HEADER_LEN: usize = 4;
+const CDR_HEADER_LEN: usize = 4;
 const CDR_LE: [u8; 2] = [0, 1];
 
 /// Whether bytes can be sent: little-endian plain CDR behind its header.
 pub(crate) fn check_encapsulation(bytes: &[u8]) -> Result<(), PublishError> {
-    if bytes.get(..2) == Some(&CDR_LE) && bytes.len() >= HEADER_LEN {
+    if bytes.get(..2) == Some(&CDR_LE) && bytes.len() >= CDR_HEADER_LEN {
         return Ok(());
     }
     let found = bytes.iter().take(2).copied().collect();

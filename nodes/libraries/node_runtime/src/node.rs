@@ -22,7 +22,7 @@ pub type Bytes = Arc<[u8]>;
 pub type Saved = Box<dyn Any + Send>;
 
 /// How long winding down may take unless a node says otherwise.
-pub const PATIENCE: Span = Span::from_nanos(5_000_000_000);
+pub const STOP_TIMEOUT: Span = Span::from_nanos(5_000_000_000);
 
 /// Names a goal between a node and its runner; unique per server or client port.
 pub type GoalId = u64;
@@ -307,7 +307,7 @@ pub trait Node: Send {
 
     /// How long it may take from [`Event::Shutdown`] to [`Emission::Stopped`]; it is stopped by force after that.
     fn patience(&self) -> Span {
-        PATIENCE
+        STOP_TIMEOUT
     }
 
     /// Whether it stops only when the others have, as a controller that others wind down through.

@@ -134,11 +134,11 @@ fn fits(pattern: &str, text: &str) -> bool {
 }
 
 /// Samples that wait in a reader while the callback is slow: 20 s at 1 kHz.
-const DEPTH: u32 = 20_000;
+const TAP_DEPTH: u32 = 20_000;
 /// Samples between the readers and the callback.
-const QUEUE_LEN: usize = 4_096;
+const TAP_QUEUE_LEN: usize = 4_096;
 /// Between looks for new topics.
-const LOOK: Duration = Duration::from_millis(100);
+const TOPIC_PERIOD: Duration = Duration::from_millis(100);
 /// How long what was sent before the end may take to arrive.
 const ACKNOWLEDGEMENT: Duration = Duration::from_secs(1);
 
@@ -182,7 +182,7 @@ impl RawTap {
             tracing::warn!("{warning}");
         }
         participant.announce()?;
-        let (queue, mut events) = mpsc::channel(QUEUE_LEN);
+        let (queue, mut events) = mpsc::channel(TAP_QUEUE_LEN);
         let (stop, stopped) = oneshot::channel();
         let looking = runtime.spawn(look(participant, selection, queue, stopped));
         // Writing a bag blocks, so it has a thread on which that is allowed.
@@ -266,7 +266,7 @@ async fn look(
         }
         tokio::select! {
             _ = &mut stopped => break,
-            () = tokio::time::sleep(LOOK) => {}
+            () = tokio::time::sleep(TOPIC_PERIOD) => {}
         }
     }
     ending.send_replace(Some(End {
@@ -304,7 +304,7 @@ fn common_qos(writers: &[&Remote]) -> Qos {
         } else {
             Durability::Volatile
         },
-        depth: DEPTH,
+        depth: TAP_DEPTH,
     }
 }
 
@@ -346,7 +346,7 @@ mod tests {
         assert_eq!(
             common_qos(&[&strong, &strong]),
             Qos {
-                depth: DEPTH,
+                depth: TAP_DEPTH,
                 ..Qos::LATCHED
             }
         );

@@ -16,7 +16,7 @@ use metrology::text::{self, TextError};
 pub use metrology::text::Comments;
 
 /// Length of a text: a program of 1,000,000 lines, the most that a control takes, has a tenth of it.
-const MOST_BYTES: u64 = 256 << 20;
+const MAX_TEXT_BYTES: u64 = 256 << 20;
 
 /// Why a file gives no text.
 #[derive(Debug, thiserror::Error)]
@@ -79,7 +79,7 @@ pub fn read(path: &Path, comments: Comments) -> Result<String, TextFileError> {
 /// # Errors
 /// When it cannot be read, is no regular file, or is longer than 256 MiB.
 pub fn bytes(path: &Path) -> Result<Vec<u8>, TextFileError> {
-    bytes_at_most(path, MOST_BYTES)
+    bytes_at_most(path, MAX_TEXT_BYTES)
 }
 
 /// A regular file of any length, to be read in pieces, and its length.

@@ -25,7 +25,7 @@ use metrology::stamp::{Host, Span, Stamp};
 
 use crate::diagnostic::Diagnostic;
 use crate::node::{
-    Bytes, Emission, Event, Node, NodeFault, PATIENCE, Ports, Refusal, Saved, ServiceEvents,
+    Bytes, Emission, Event, Node, NodeFault, Ports, Refusal, STOP_TIMEOUT, Saved, ServiceEvents,
     ServicePort, TopicPort,
 };
 use crate::parameter::Parameter;
@@ -131,7 +131,7 @@ where
             emitters: Vec::new(),
             shutdown: None,
             stopped: None,
-            patience: PATIENCE,
+            patience: STOP_TIMEOUT,
             last: false,
             own_time: false,
             live: None,

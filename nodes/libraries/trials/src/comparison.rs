@@ -7,7 +7,7 @@ use crate::arm::Arm;
 use crate::baseline::Method;
 use crate::calibration::calibration;
 use crate::proportion::Proportion;
-use crate::tally::{LARGE_D, beyond, has_wrong};
+use crate::tally::{MIN_D_OF_FOREIGN, beyond, has_wrong};
 use crate::verdict::Verdict;
 
 /// One method's line.
@@ -32,11 +32,11 @@ pub struct MethodLine {
 impl MethodLine {
     fn of(method: &str, own: &[&Verdict]) -> Self {
         let said: Vec<&Verdict> = own.iter().copied().filter(|v| v.said.is_some()).collect();
-        let large = beyond(&said, LARGE_D);
+        let large = beyond(&said, MIN_D_OF_FOREIGN);
         let pairs = said
             .iter()
             .flat_map(|v| v.truth.effects.iter().map(move |e| (v, e)));
-        let large_pairs = pairs.filter(|(_, effect)| effect.d > LARGE_D);
+        let large_pairs = pairs.filter(|(_, effect)| effect.d > MIN_D_OF_FOREIGN);
         Self {
             method: method.to_owned(),
             exact: Proportion::of(large.iter().map(|v| v.is_exact())),

@@ -26,7 +26,7 @@ use crate::proportion::{Proportion, median};
 /// Slope b that is expected: from one half to 95 % within a factor 2 of D.
 const SLOPE: f64 = 4.0;
 /// Newton steps.
-const STEPS: usize = 60;
+const NEWTON_STEPS: usize = 60;
 /// ln 19.
 const LOG_ODDS: f64 = 2.944_438_979_166_44;
 
@@ -136,7 +136,7 @@ pub fn d95(trials: &[(f64, bool)]) -> Option<Limit> {
 fn fit(trials: &[(f64, bool)]) -> Option<[f64; 2]> {
     let middle = median(trials.iter().map(|(d, _)| d.ln()).collect())?;
     let (mut a, mut b) = (0.0_f64, SLOPE);
-    for _ in 0..STEPS {
+    for _ in 0..NEWTON_STEPS {
         let mut pull = [0.0, (SLOPE - b) / SLOPE.powi(2)];
         let mut curve = [1e-9, 0.0, 1.0 / SLOPE.powi(2)];
         for (d, named) in trials {

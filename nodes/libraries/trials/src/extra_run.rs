@@ -23,7 +23,7 @@ use sequencer::{Plan, Step};
 use crate::measurement::plane_axes;
 
 /// Way of a beam at each end that a run leaves, mm.
-const MARGIN_MM: f64 = 60.0;
+const RUN_MARGIN_MM: f64 = 60.0;
 /// Way before the first target and behind the last one, for reaching the feed and settling, mm.
 const OVERRUN_MM: f64 = 40.0;
 /// Share of a plate's radius that a line goes to.
@@ -185,7 +185,7 @@ fn along_beam(
     let beams = &machine.length_reference.as_ref()?.beams;
     let beam = beams.iter().find(|own| own.id == beam)?;
     let (low, high) = (beam.from_mm[axis.index()], beam.to_mm[axis.index()]);
-    let (from_mm, to_mm) = (low + MARGIN_MM, high - MARGIN_MM);
+    let (from_mm, to_mm) = (low + RUN_MARGIN_MM, high - RUN_MARGIN_MM);
     let (what, rest) = if has_stops {
         ("positioning", format!("dwell_s: {DWELL_S:.1}, "))
     } else {

@@ -18,7 +18,7 @@ use crate::error::TrialError;
 /// Targets of a positioning run.
 const TARGETS: f64 = 9.0;
 /// Way from a beam's end to the first target, mm.
-const MARGIN_MM: f64 = 20.0;
+const BEAM_MARGIN_MM: f64 = 20.0;
 
 /// Radii and feeds of the circles, the repeated ones first.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,7 +90,7 @@ fn circle(placement: &str, radius_mm: f64, feed_mm_min: f64) -> String {
 }
 
 fn positioning(axis: Axis, beam: &str, [low, high]: [f64; 2]) -> String {
-    let (from_mm, to_mm) = (low + MARGIN_MM, high - MARGIN_MM);
+    let (from_mm, to_mm) = (low + BEAM_MARGIN_MM, high - BEAM_MARGIN_MM);
     let spacing_mm = (to_mm - from_mm) / (TARGETS - 1.0);
     format!(
         "{{do: positioning, axis: {axis}, from_mm: {from_mm:.1}, to_mm: {to_mm:.1}, \

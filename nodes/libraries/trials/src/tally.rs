@@ -27,7 +27,7 @@ pub(crate) const SINGLE_D: f64 = 10.0;
 /// D beyond which each of several effects should be named.
 pub(crate) const SEVERAL_D: f64 = 7.0;
 /// D beyond which other physics should be named.
-pub(crate) const LARGE_D: f64 = 20.0;
+pub(crate) const MIN_D_OF_FOREIGN: f64 = 20.0;
 
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -149,14 +149,14 @@ fn rates(arm: Arm, own: &[&Verdict]) -> Vec<Rate> {
     if arm.is_null() {
         rates.add("nothing named", &said, Verdict::is_exact);
     } else if arm.leaves_out() {
-        let large = beyond(&said, LARGE_D);
+        let large = beyond(&said, MIN_D_OF_FOREIGN);
         rates.add(
-            &format!("unknown flagged, D > {LARGE_D}"),
+            &format!("unknown flagged, D > {MIN_D_OF_FOREIGN}"),
             &large,
             Verdict::is_flagged,
         );
         rates.add(
-            &format!("wrong cause named, D > {LARGE_D}"),
+            &format!("wrong cause named, D > {MIN_D_OF_FOREIGN}"),
             &large,
             has_wrong,
         );
@@ -217,9 +217,9 @@ impl Rates {
         let several = beyond(&with(2, usize::MAX), SEVERAL_D);
         let what = format!("2-3 effects, each D > {SEVERAL_D}: exact");
         self.add(&what, &several, Verdict::is_exact);
-        let large = beyond(said, LARGE_D);
+        let large = beyond(said, MIN_D_OF_FOREIGN);
         self.add(
-            &format!("all D > {LARGE_D}: exact"),
+            &format!("all D > {MIN_D_OF_FOREIGN}: exact"),
             &large,
             Verdict::is_exact,
         );
@@ -238,7 +238,7 @@ impl Rates {
             }),
             ("shown as a surrogate", Verdict::shows),
         ];
-        for least in [SEVERAL_D, LARGE_D] {
+        for least in [SEVERAL_D, MIN_D_OF_FOREIGN] {
             for (question, holds) in questions {
                 let pairs = said
                     .iter()

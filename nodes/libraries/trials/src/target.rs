@@ -13,7 +13,7 @@ use crate::covariate;
 use crate::detection::{Limit, d95};
 use crate::effect::Class;
 use crate::proportion::{Proportion, auroc, median};
-use crate::tally::{LARGE_D, SEVERAL_D, SINGLE_D, beyond, has_wrong, is_reproduced};
+use crate::tally::{MIN_D_OF_FOREIGN, SEVERAL_D, SINGLE_D, beyond, has_wrong, is_reproduced};
 use crate::truth::TrueEffect;
 use crate::verdict::Verdict;
 
@@ -91,7 +91,7 @@ impl Bound {
 }
 
 /// Time that a diagnosis should not take longer than, s.
-pub(crate) const LONGEST_S: f64 = 60.0;
+pub(crate) const LONGEST_DIAGNOSIS_S: f64 = 60.0;
 
 /// The table as it fills.
 struct Sheet(Vec<Target>);
@@ -164,7 +164,7 @@ pub fn targets(verdicts: &[Verdict]) -> Vec<Target> {
     let times = times.filter_map(|v| Some(v.said.as_ref()?.runtime_s));
     sheet.middle(
         "time of a diagnosis with all its simulations, median, s",
-        AtMost(LONGEST_S),
+        AtMost(LONGEST_DIAGNOSIS_S),
         times.collect(),
     );
     sheet.0
@@ -265,13 +265,13 @@ fn of_known(sheet: &mut Sheet, known: &[&Verdict]) {
 }
 
 fn of_foreign(sheet: &mut Sheet, foreign: &[&Verdict]) {
-    let large = pairs(foreign).filter(|(_, e)| e.d > LARGE_D);
+    let large = pairs(foreign).filter(|(_, e)| e.d > MIN_D_OF_FOREIGN);
     sheet.share(
         "iii: true class named on its axis, D > 20",
         AtLeast(0.93),
         large.map(|(v, e)| v.has(e)),
     );
-    let all = beyond(foreign, LARGE_D);
+    let all = beyond(foreign, MIN_D_OF_FOREIGN);
     sheet.share(
         "iii: exact set, D > 20",
         AtLeast(0.75),
@@ -300,7 +300,7 @@ fn of_left_out(sheet: &mut Sheet, left_out: &[&Verdict], known: &[&Verdict]) {
             .collect::<Vec<_>>(),
     );
     sheet.figure("ii: the same, isolable classes", AtLeast(0.985), value, n);
-    let large = beyond(left_out, LARGE_D);
+    let large = beyond(left_out, MIN_D_OF_FOREIGN);
     sheet.share(
         "ii: wrong cause named, D > 20",
         AtMost(0.2),
@@ -363,7 +363,7 @@ fn on_truth(verdict: &Verdict, effect: &TrueEffect) -> Option<f64> {
 
 fn of_sizes(sheet: &mut Sheet, known: &[&Verdict]) {
     let sized: Vec<(f64, bool)> = pairs(known)
-        .filter(|(_, e)| e.d > LARGE_D)
+        .filter(|(_, e)| e.d > MIN_D_OF_FOREIGN)
         .filter_map(|(v, e)| {
             v.sized(e)
                 .map(|(error, covered)| (error.abs() * e.d, covered))
@@ -383,7 +383,7 @@ fn of_sizes(sheet: &mut Sheet, known: &[&Verdict]) {
 
 fn of_shrink(sheet: &mut Sheet, known: &[&Verdict], foreign: &[&Verdict]) {
     for (arm, own, closed, left) in [("i", known, 0.98, 0.03), ("iii", foreign, 0.9, 0.1)] {
-        let large = beyond(own, LARGE_D);
+        let large = beyond(own, MIN_D_OF_FOREIGN);
         let of = |ratio: &dyn Fn(&Verdict) -> Option<f64>| -> Vec<f64> {
             large.iter().filter_map(|v| ratio(v)).collect()
         };

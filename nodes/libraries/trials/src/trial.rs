@@ -23,7 +23,7 @@ use crate::truth::{MEASURE, TrueEffect, Truth};
 /// Range of D.
 const D: [f64; 2] = [2.0, 200.0];
 /// Range of D of effects that should be named in any case.
-const LARGE_D: [f64; 2] = [20.0, 200.0];
+const LARGE_D_RANGE: [f64; 2] = [20.0, 200.0];
 /// Range of D about what can just be named.
 const SMALL_D: [f64; 2] = [2.0, 40.0];
 /// How near D is to what was drawn where that takes several steps, as a logarithm.
@@ -166,7 +166,7 @@ const fn hides_nothing(arm: Arm, index: u64) -> bool {
 
 const fn range_of(arm: Arm) -> [f64; 2] {
     match arm {
-        Arm::Alone => LARGE_D,
+        Arm::Alone => LARGE_D_RANGE,
         Arm::Limit => SMALL_D,
         _ => D,
     }

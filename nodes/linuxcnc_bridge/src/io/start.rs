@@ -52,7 +52,7 @@ const REALTIME_CLEANUP: Duration = Duration::from_secs(3);
 /// The process whose threads are LinuxCNC's servo and base thread, and the priority they get.
 const REAL_TIME: (&str, &str) = ("rtapi_app", "50");
 /// A clean end takes about 3 s.
-const END_LIMIT: Duration = Duration::from_secs(20);
+const CLEAN_END_LIMIT: Duration = Duration::from_secs(20);
 /// Length of the last words in an error.
 const LAST_WORDS_BYTES: u64 = 600;
 
@@ -155,7 +155,7 @@ fn is_guarded() -> bool {
 /// Waits while the LinuxCNC of a process that was killed is being ended by its guard.
 #[expect(clippy::disallowed_methods, reason = "a process outside is waited for")]
 fn wait_for_orphan() {
-    let deadline = Instant::now() + END_LIMIT;
+    let deadline = Instant::now() + CLEAN_END_LIMIT;
     while is_guarded() && Instant::now() < deadline {
         std::thread::sleep(Duration::from_millis(100));
     }
@@ -324,11 +324,11 @@ impl Controller {
 impl Drop for Controller {
     fn drop(&mut self) {
         self.guard_stdin = None;
-        if self.wait_end(END_LIMIT) {
+        if self.wait_end(CLEAN_END_LIMIT) {
             return;
         }
         self.signal_all(Signal::SIGTERM);
-        if !self.wait_end(END_LIMIT) {
+        if !self.wait_end(CLEAN_END_LIMIT) {
             self.signal_all(Signal::SIGKILL);
             // The last resort: nothing is left to try after it.
             let _ = self.guard.kill();

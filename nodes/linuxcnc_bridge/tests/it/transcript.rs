@@ -3,7 +3,7 @@
 use linuxcnc_bridge::condition::{Condition, Lost};
 use linuxcnc_bridge::config::{ConnectionConfig, Prepare};
 use linuxcnc_bridge::protocol::{
-    Client, LINE_LIMIT_BYTES, Mode, ProgramStatus, Query, Reply, Request, Setting, Signal,
+    Client, MESSAGE_LIMIT_BYTES, Mode, ProgramStatus, Query, Reply, Request, Setting, Signal,
 };
 use linuxcnc_bridge::run::Outcome;
 use linuxcnc_bridge::stage::{IoCommand, IoEvent};
@@ -174,11 +174,11 @@ fn an_answer_to_something_else_is_not_taken_for_the_answer() {
 #[test]
 fn a_line_without_end_is_refused() {
     let mut signals = Vec::new();
-    client().receive(&vec![b'x'; 10 * LINE_LIMIT_BYTES], &mut signals);
+    client().receive(&vec![b'x'; 10 * MESSAGE_LIMIT_BYTES], &mut signals);
     assert_eq!(
         signals,
         [Signal::LineTooLong {
-            length_bytes: LINE_LIMIT_BYTES
+            length_bytes: MESSAGE_LIMIT_BYTES
         }]
     );
 }
@@ -502,7 +502,7 @@ fn silence_rubbish_and_refusals_end_the_connection_and_it_is_tried_again() {
     assert_eq!(
         lost(rubbish, 0.0),
         Lost::Nonsense {
-            limit_bytes: LINE_LIMIT_BYTES
+            limit_bytes: MESSAGE_LIMIT_BYTES
         }
         .to_string()
     );

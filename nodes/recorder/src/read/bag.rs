@@ -17,7 +17,8 @@ use super::regular;
 use super::time_order::TimeOrder;
 use super::walk::Walker;
 use super::{
-    Attachment, Inner, LARGEST_CHUNK_BYTES, Loss, LossReason, Messages, Order, TopicId, TopicInfo,
+    Attachment, Inner, LARGEST_READ_CHUNK_BYTES, Loss, LossReason, Messages, Order, TopicId,
+    TopicInfo,
 };
 use crate::error::RecorderError;
 use crate::layout::{METADATA_FILE, TimeSpan, file_names_of};
@@ -246,10 +247,10 @@ fn read_attachment(file: &BagFile, at: u64) -> Result<Attachment, LossReason> {
     if !frame.is_whole() {
         return Err(frame.cut());
     }
-    if frame.body_bytes > LARGEST_CHUNK_BYTES {
+    if frame.body_bytes > LARGEST_READ_CHUNK_BYTES {
         return Err(LossReason::ChunkTooLarge {
             bytes: frame.body_bytes,
-            limit_bytes: LARGEST_CHUNK_BYTES,
+            limit_bytes: LARGEST_READ_CHUNK_BYTES,
         });
     }
     let mut body = Vec::new();

@@ -6,7 +6,7 @@ use std::ops::Range;
 use mcap::records::op;
 
 use super::walk::{FRAME_BYTES, Frame};
-use super::{LARGEST_CHUNK_BYTES, LossReason};
+use super::{LARGEST_READ_CHUNK_BYTES, LossReason};
 
 /// Channel, sequence, log time and publish time in front of a message's bytes.
 const MESSAGE_HEADER_BYTES: usize = 22;
@@ -227,10 +227,10 @@ fn parse_header(body: &[u8], frame: Frame) -> Result<ChunkHeader, LossReason> {
     } else {
         frame.cut()
     })?;
-    if header.plain_bytes > LARGEST_CHUNK_BYTES {
+    if header.plain_bytes > LARGEST_READ_CHUNK_BYTES {
         return Err(LossReason::ChunkTooLarge {
             bytes: header.plain_bytes,
-            limit_bytes: LARGEST_CHUNK_BYTES,
+            limit_bytes: LARGEST_READ_CHUNK_BYTES,
         });
     }
     Ok(header)

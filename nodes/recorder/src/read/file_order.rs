@@ -10,7 +10,7 @@ use super::bag::BagFile;
 use super::chunk::{ChunkBuffer, Inside};
 use super::index::parse;
 use super::walk::{FRAME_BYTES, Frame, Walker};
-use super::{Event, LARGEST_CHUNK_BYTES, Loss, LossReason, MessageRef, TopicId};
+use super::{Event, LARGEST_READ_CHUNK_BYTES, Loss, LossReason, MessageRef, TopicId};
 
 /// How far the current file is.
 enum Stage {
@@ -163,10 +163,10 @@ impl<'b> FileOrder<'b> {
         let Stage::Walking(walker) = &mut self.stage else {
             return Ok(());
         };
-        if frame.body_bytes > LARGEST_CHUNK_BYTES {
+        if frame.body_bytes > LARGEST_READ_CHUNK_BYTES {
             let too_large = LossReason::ChunkTooLarge {
                 bytes: frame.body_bytes,
-                limit_bytes: LARGEST_CHUNK_BYTES,
+                limit_bytes: LARGEST_READ_CHUNK_BYTES,
             };
             walker.skip_body(frame)?;
             if !frame.is_whole() {

@@ -8,7 +8,7 @@ use mcap::records::{Record, Statistics, op};
 use super::chunk::{ChunkBuffer, Inside};
 use super::framing::is_framed;
 use super::walk::{Frame, Walker};
-use super::{LARGEST_CHUNK_BYTES, LossReason, MetadataRecord};
+use super::{LARGEST_READ_CHUNK_BYTES, LossReason, MetadataRecord};
 use crate::layout::TimeSpan;
 
 /// Footer record and magic at the end of a file, byte.
@@ -269,7 +269,7 @@ impl FileIndex {
         }
         match frame.opcode {
             op::MESSAGE | op::SCHEMA | op::CHANNEL | op::METADATA | op::ATTACHMENT => {
-                if frame.body_bytes > LARGEST_CHUNK_BYTES {
+                if frame.body_bytes > LARGEST_READ_CHUNK_BYTES {
                     walker.skip_body(frame)?;
                     return Ok(true);
                 }
@@ -288,7 +288,7 @@ impl FileIndex {
         frame: Frame,
         buffer: &mut ChunkBuffer,
     ) -> Result<(), LossReason> {
-        if frame.body_bytes > LARGEST_CHUNK_BYTES {
+        if frame.body_bytes > LARGEST_READ_CHUNK_BYTES {
             walker.skip_body(frame)?;
             // Met again, and told, when the messages are read.
             self.places.push(Place {

@@ -12,7 +12,7 @@ use super::bag::BagFile;
 use super::chunk::{ChunkBuffer, Inside};
 use super::index::Place;
 use super::walk::{Frame, Walker};
-use super::{Event, LARGEST_CHUNK_BYTES, Loss, LossReason, MessageRef, TopicId};
+use super::{Event, LARGEST_READ_CHUNK_BYTES, Loss, LossReason, MessageRef, TopicId};
 
 /// One message of an open chunk.
 struct Entry {
@@ -179,10 +179,10 @@ impl<'b> TimeOrder<'b> {
             }
             None => {
                 let frame = walker.next_frame()?.ok_or(LossReason::NoEnd)?;
-                if frame.body_bytes > LARGEST_CHUNK_BYTES {
+                if frame.body_bytes > LARGEST_READ_CHUNK_BYTES {
                     return Err(LossReason::ChunkTooLarge {
                         bytes: frame.body_bytes,
-                        limit_bytes: LARGEST_CHUNK_BYTES,
+                        limit_bytes: LARGEST_READ_CHUNK_BYTES,
                     });
                 }
                 walker.read_body(frame, &mut open.chunk.raw)?;

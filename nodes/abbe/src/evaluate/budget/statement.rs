@@ -6,7 +6,7 @@ use serde::Deserialize;
 /// What a page has where nothing is stated.
 pub const NOT_STATED: &str = "not stated";
 /// Longest text, bytes.
-const MOST_BYTES: usize = 200;
+const MAX_TEXT_BYTES: usize = 200;
 
 /// An instrument and its certificate.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
@@ -90,9 +90,9 @@ pub(super) fn check(key: &str, text: &str) -> Result<(), String> {
     if text.chars().any(char::is_control) {
         return Err(format!("{key} has a control character: must be one line"));
     }
-    if text.len() > MOST_BYTES {
+    if text.len() > MAX_TEXT_BYTES {
         let n = text.len();
-        return Err(format!("{key} has {n} bytes: at most {MOST_BYTES}"));
+        return Err(format!("{key} has {n} bytes: at most {MAX_TEXT_BYTES}"));
     }
     Ok(())
 }

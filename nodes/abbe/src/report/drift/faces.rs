@@ -11,7 +11,7 @@ use metrology::stamp::{Host, Stamp};
 use serde::Serialize;
 use serde_json::json;
 
-use super::figures::{self, Figures, NAMES};
+use super::figures::{self, FIGURE_NAMES, Figures};
 use super::{HOUR_S, in_words, show_temperatures, temperatures};
 use crate::evaluate::budget::Budget;
 use crate::evaluate::drift::{Drift, Work};
@@ -265,7 +265,10 @@ fn note(stated: bool) -> String {
 }
 
 fn table(first: &str, drifts: &[FaceDrift], stated: bool) -> Rows {
-    let names: Vec<&str> = [first, "recorded / h"].into_iter().chain(NAMES).collect();
+    let names: Vec<&str> = [first, "recorded / h"]
+        .into_iter()
+        .chain(FIGURE_NAMES)
+        .collect();
     Rows {
         head: head(&names),
         rows: drifts.iter().map(|drift| drift.row(stated)).collect(),

@@ -125,7 +125,7 @@ impl Figures {
 }
 
 /// Names of those cells.
-pub(super) const NAMES: [&str; 4] = [
+pub(super) const FIGURE_NAMES: [&str; 4] = [
     "after 1 h / µm",
     "after 3 h / µm",
     "range / µm",

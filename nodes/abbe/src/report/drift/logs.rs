@@ -5,7 +5,7 @@ use metrology::iso230::thermal::{DriftCause, DriftContributions};
 use metrology::stamp::{Host, Stamp};
 use serde_json::json;
 
-use super::figures::{self, Figures, NAMES};
+use super::figures::{self, FIGURE_NAMES, Figures};
 use super::{HOUR_S, in_words, show_temperatures, temperatures};
 use crate::evaluate::budget::Budget;
 use crate::evaluate::drift::{Drift, DriftLog};
@@ -130,7 +130,9 @@ fn parts(of: &DriftContributions) -> String {
 }
 
 fn table(log: &DriftLog, cells: &[String; 4], stated: bool) -> Rows {
-    let names: Vec<&str> = std::iter::once("displacement along").chain(NAMES).collect();
+    let names: Vec<&str> = std::iter::once("displacement along")
+        .chain(FIGURE_NAMES)
+        .collect();
     let note = if stated {
         "± expanded uncertainty, k = 2: certificate of length_reference in the budget and scatter of the readings; what the artefact and its holder grow is part of the drift."
     } else {
@@ -150,7 +152,7 @@ fn drawings(
     values: &[(f64, f64)],
     (from, to): (Stamp<Host>, Stamp<Host>),
 ) -> Result<Vec<Drawing>> {
-    const TIME: &str = "time since the first reading / h";
+    const TIME_LABEL: &str = "time since the first reading / h";
     let trace = |name: &str, points: Vec<(f64, f64)>| Trace {
         name: name.to_owned(),
         points,
@@ -159,7 +161,7 @@ fn drawings(
     let points = values.iter().map(|(s, mm)| (s / HOUR_S, mm * 1e3));
     let mut drawings = vec![Drawing {
         svg: plot::svg(&Plot {
-            x: TIME.to_owned(),
+            x: TIME_LABEL.to_owned(),
             y: format!("displacement along {} / µm", log.axis),
             traces: vec![trace(log.axis.letter(), points.collect())],
         })?,
@@ -178,7 +180,7 @@ fn drawings(
     if !traces.is_empty() {
         drawings.push(Drawing {
             svg: plot::svg(&Plot {
-                x: TIME.to_owned(),
+                x: TIME_LABEL.to_owned(),
                 y: "temperature / °C".to_owned(),
                 traces,
             })?,

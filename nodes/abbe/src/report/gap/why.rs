@@ -7,11 +7,11 @@ use super::{name, status, three};
 use crate::report::page;
 use crate::report::section::{Rows, Section, head};
 
-const TITLE: &str = "Why each cause has its status";
+const WHY_TITLE: &str = "Why each cause has its status";
 
 /// For a terminal: a sentence and a table for each cause.
 pub(super) fn section(report: &GapReport) -> Section {
-    let mut section = Section::new(TITLE);
+    let mut section = Section::new(WHY_TITLE);
     if report.causes.is_empty() {
         let none = "No effect of the catalogue was found in the gap, so that none was checked.";
         section.lines.push(none.to_owned());
@@ -35,7 +35,7 @@ pub(super) fn folded(report: &GapReport) -> Markup {
     });
     html! {
         @if !report.causes.is_empty() {
-            h2 { (TITLE) }
+            h2 { (WHY_TITLE) }
             @for cause in causes { (cause) }
         }
     }
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(title, "backlash X, named: it passes all of 2 checks.");
         let section = Section {
             tables: vec![table(&cause)],
-            ..Section::new(TITLE)
+            ..Section::new(WHY_TITLE)
         };
         let lines = words(&section.terminal());
         for line in [

@@ -14,13 +14,13 @@ use crate::launch::LaunchNode;
 
 /// A process that was told to stop is killed after this time where its launch file says nothing; a
 /// node has a limit of its own below it.
-const PATIENCE: Duration = Duration::from_secs(30);
+const STOP_TIMEOUT: Duration = Duration::from_secs(30);
 /// A node takes a second signal within this for the same Ctrl-C.
-const SAME: Duration = Duration::from_millis(600);
+const SIGNAL_WINDOW: Duration = Duration::from_millis(600);
 /// A process that was forced to end is killed after this time.
 const LAST_PATIENCE: Duration = Duration::from_secs(3);
 /// Between two looks at processes that stop.
-const LOOK: Duration = Duration::from_millis(20);
+const STOP_PERIOD: Duration = Duration::from_millis(20);
 /// They stop last, so that compensation fades through them.
 const CONTROLLERS: [&str; 2] = ["fake_cnc", "linuxcnc_bridge"];
 /// With the controllers, the node without which no plan goes on.
@@ -59,7 +59,7 @@ impl Processes {
                 name: node.name.clone(),
                 exec: node.exec.clone(),
                 child,
-                patience: node.ends_within.unwrap_or(PATIENCE),
+                patience: node.ends_within.unwrap_or(STOP_TIMEOUT),
                 ended: false,
             });
         }
@@ -108,7 +108,7 @@ impl Processes {
         let asked = Instant::now();
         let mut forced = None;
         while self.0.iter().any(open) {
-            if forced.is_none() && asked.elapsed() >= SAME && interruption.is_forced() {
+            if forced.is_none() && asked.elapsed() >= SIGNAL_WINDOW && interruption.is_forced() {
                 // For a node that was told to stop it is the second signal.
                 tell(&self.0, Signal::SIGINT);
                 forced = Some(Instant::now());
@@ -118,7 +118,7 @@ impl Processes {
                 let late = asked.elapsed() >= process.patience || forced_for >= LAST_PATIENCE;
                 process.settle(late);
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(STOP_PERIOD);
         }
     }
 }

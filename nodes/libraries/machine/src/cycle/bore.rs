@@ -12,7 +12,7 @@ use crate::error::CycleError;
 use crate::file::{ArtefactEntry, MachineFile};
 
 /// Least number of points on a circle: three determine it, the fourth shows its form.
-const LEAST_POINTS: u32 = 4;
+const MIN_POINTS_OF_BORE: u32 = 4;
 /// Clearance to the far wall at the start of a touch, mm.
 const FAR_WALL_MM: f64 = 0.5;
 
@@ -27,11 +27,11 @@ pub fn bores(
     points: u32,
     repeats: NonZeroU32,
 ) -> Result<Cycle, CycleError> {
-    if points < LEAST_POINTS {
+    if points < MIN_POINTS_OF_BORE {
         return Err(CycleError::TooFewPoints {
             shape: "bore or boss",
             points,
-            least: LEAST_POINTS,
+            least: MIN_POINTS_OF_BORE,
         });
     }
     let mut program = Program::new(file)?;

@@ -17,7 +17,7 @@ use metrology::sample::TestKind;
 use nalgebra::{Rotation3, Vector3};
 
 use super::program::{Path, Program, Touch};
-use super::sphere::{LEAST_POINTS, normals};
+use super::sphere::{MIN_POINTS_OF_SPHERE, normals};
 use super::{Cycle, FeatureId};
 use crate::error::CycleError;
 use crate::file::MachineFile;
@@ -50,11 +50,11 @@ pub struct RotaryOrder<'a> {
 /// five points, a turn that would swing the sphere into the tool, feeds the stand-off does not allow.
 pub fn rotary(file: &MachineFile, order: &RotaryOrder<'_>) -> Result<Cycle, CycleError> {
     let refuse = |source: PoseError| CycleError::Pose { source };
-    if order.points < LEAST_POINTS {
+    if order.points < MIN_POINTS_OF_SPHERE {
         return Err(CycleError::TooFewPoints {
             shape: "sphere",
             points: order.points,
-            least: LEAST_POINTS,
+            least: MIN_POINTS_OF_SPHERE,
         });
     }
     let design = SphereDesign::new(file).map_err(refuse)?;

@@ -12,7 +12,7 @@ use crate::error::CycleError;
 use crate::file::{ArtefactEntry, MachineFile};
 
 /// Least number of points: four determine a sphere, the fifth shows its form.
-pub(super) const LEAST_POINTS: u32 = 5;
+pub(super) const MIN_POINTS_OF_SPHERE: u32 = 5;
 /// From this number on, half of the ring's points move to a second ring at 45°.
 const TWO_RINGS: u32 = 9;
 
@@ -28,11 +28,11 @@ pub fn spheres(
     points: u32,
     repeats: NonZeroU32,
 ) -> Result<Cycle, CycleError> {
-    if points < LEAST_POINTS {
+    if points < MIN_POINTS_OF_SPHERE {
         return Err(CycleError::TooFewPoints {
             shape: "sphere",
             points,
-            least: LEAST_POINTS,
+            least: MIN_POINTS_OF_SPHERE,
         });
     }
     let mut program = Program::new(file)?;

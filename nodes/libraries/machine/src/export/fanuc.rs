@@ -61,9 +61,9 @@ use super::number::{fixed, mm_or_deg, unit};
 use super::sign::{Sign, check, given};
 use crate::volumetric::on_line;
 
-pub(super) const CONTROL: &str = "FANUC pitch error table";
+pub(super) const FANUC_TABLE: &str = "FANUC pitch error table";
 /// One step at the machine that shows the sign.
-pub(super) const CHECK: &str = "in a table of zeros set +5 at one number above that of the reference point, with magnification 3623 = 2 (10 um at a detection unit of 1 um); switch off and on, return to the reference point, move in the positive direction past that interval and read a dial gauge, without and with the value: the display stays and the dial moves by 10 um, towards greater positions: --sign plus, towards smaller ones: --sign minus";
+pub(super) const FANUC_CHECK: &str = "in a table of zeros set +5 at one number above that of the reference point, with magnification 3623 = 2 (10 um at a detection unit of 1 um); switch off and on, return to the reference point, move in the positive direction past that interval and read a dial gauge, without and with the value: the display stays and the dial moves by 10 um, towards greater positions: --sign plus, towards smaller ones: --sign minus";
 /// `N` of a point is its number and this.
 const NUMBER_OFFSET: i64 = 10_000;
 
@@ -117,8 +117,8 @@ pub struct Pitch {
 pub fn pitch_table(errors: &AxisErrors, set_up: &PitchTable) -> Result<Pitch, ExportError> {
     check_set_up(errors, set_up)?;
     let axis = errors.axis();
-    let error = errors.of_both_directions(CONTROL)?;
-    let spacing = equal_spacing(CONTROL, axis, errors.position())?;
+    let error = errors.of_both_directions(FANUC_TABLE)?;
+    let spacing = equal_spacing(FANUC_TABLE, axis, errors.position())?;
     let first = number_of_first(errors, set_up, spacing)?;
     let at_reference = on_line(errors.position(), error, set_up.reference);
     let sums = sums(error, at_reference, set_up);
@@ -161,7 +161,7 @@ fn lines(
         let value = pair[1].saturating_sub(pair[0]);
         if value.unsigned_abs() > u64::from(set_up.max_pulses) {
             return Err(ExportError::BeyondLimit {
-                control: CONTROL,
+                control: FANUC_TABLE,
                 axis: errors.axis(),
                 position: errors.position()[k + 1],
                 value: value as f64,
@@ -198,7 +198,7 @@ fn check_set_up(errors: &AxisErrors, set_up: &PitchTable) -> Result<(), ExportEr
     };
     match wrong {
         Some((quantity, value, rule)) => Err(ExportError::Setting {
-            control: CONTROL,
+            control: FANUC_TABLE,
             quantity,
             value,
             rule,
@@ -216,7 +216,7 @@ fn number_of_first(
     let (axis, position, reference) = (errors.axis(), errors.span().0, set_up.reference);
     let intervals = (position - reference) / spacing;
     if (intervals - intervals.round()).abs() * spacing > SAME {
-        let control = CONTROL;
+        let control = FANUC_TABLE;
         return Err(ExportError::OffReference {
             control,
             axis,
@@ -236,7 +236,7 @@ fn check_numbers((first, last): Numbers, set_up: &PitchTable) -> Result<(), Expo
     let known = 0..=i64::from(set_up.max_number);
     match [first, last].into_iter().find(|n| !known.contains(n)) {
         Some(number) => Err(ExportError::Setting {
-            control: CONTROL,
+            control: FANUC_TABLE,
             quantity: "number of a point",
             value: number as f64,
             rule: "must lie between 0 and the control's last number; choose another reference number",
@@ -252,7 +252,7 @@ fn notes(errors: &AxisErrors, set_up: &PitchTable, spacing: f64) -> Vec<String> 
         format!("FANUC stored pitch error compensation of axis {axis}, incremental, whole pulses, an interval every {} {}", of_axis(spacing), unit(axis)),
         "value = what the error grows by over the interval, undone, / (detection unit x magnification)".to_owned(),
         given(set_up.sign),
-        check(CHECK),
+        check(FANUC_CHECK),
         "number offset 10000 and mark Q0 are FROM MEMORY: compare with a table punched out by the control".to_owned(),
         format!("detection unit {} {}, reference point at {} {}", of_axis(set_up.detection_unit), unit(axis), of_axis(set_up.reference), unit(axis)),
         "switch off and on and return to the reference point after loading".to_owned(),

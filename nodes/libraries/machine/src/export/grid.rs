@@ -8,7 +8,7 @@ use super::error::ExportError;
 pub(super) const SAME: f64 = 1e-7;
 
 /// Far more points than any control takes: a spacing in the wrong unit ends here.
-const MOST_POINTS: usize = 100_000;
+const MAX_GRID_POINTS: usize = 100_000;
 
 /// Points `start + k spacing`, mm or rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,8 +55,8 @@ impl Grid {
             let (n, least) = (count, 2);
             return Err(ExportError::TooFewPoints { axis, n, least });
         }
-        if count > MOST_POINTS {
-            let (control, n, limit) = ("a grid", count, MOST_POINTS);
+        if count > MAX_GRID_POINTS {
+            let (control, n, limit) = ("a grid", count, MAX_GRID_POINTS);
             return Err(ExportError::TooManyPoints {
                 control,
                 axis,

@@ -55,9 +55,9 @@ use super::grid::SAME;
 use super::number::{fixed, is_name, mm_or_deg, unit};
 use super::sign::{Sign, check, given};
 
-pub(super) const CONTROL: &str = "HEIDENHAIN .COM";
+pub(super) const HEIDENHAIN_TABLE: &str = "HEIDENHAIN .COM";
 /// One step at the machine that shows the sign.
-pub(super) const CHECK: &str = "in a .COM table of one axis enter 0.010 in the axis' own column at one row in mid-travel and 0 in the others, move the axis to that AXISPOS, make the line in config.CMA active and read a dial gauge along the axis: the display stays and the dial moves by 10 um, towards greater positions: --sign plus, towards smaller ones: --sign minus";
+pub(super) const HEIDENHAIN_CHECK: &str = "in a .COM table of one axis enter 0.010 in the axis' own column at one row in mid-travel and 0 in the others, move the axis to that AXISPOS, make the line in config.CMA active and read a dial gauge along the axis: the display stays and the dial moves by 10 um, towards greater positions: --sign plus, towards smaller ones: --sign minus";
 const MOST_ROWS: usize = 256;
 const STEEPEST: f64 = 1.0 / 64.0;
 const LENGTH_DECIMALS: usize = 4;
@@ -95,12 +95,17 @@ pub fn compensation_table(
     if !is_name(name) {
         let name = name.to_owned();
         return Err(ExportError::Name {
-            control: CONTROL,
+            control: HEIDENHAIN_TABLE,
             name,
         });
     }
     let axis = positioning.axis();
-    check_count(CONTROL, axis, positioning.position().len(), MOST_ROWS)?;
+    check_count(
+        HEIDENHAIN_TABLE,
+        axis,
+        positioning.position().len(),
+        MOST_ROWS,
+    )?;
     let columns = columns(positioning, others, sign)?;
     for column in &columns {
         check_steepness(axis, positioning.position(), column)?;
@@ -166,7 +171,7 @@ fn check_steepness(axis: Axis, position: &[f64], column: &Column) -> Result<(), 
         let difference = mm_or_deg(column.direction, value[1] - value[0]);
         if difference.abs() > spacing * STEEPEST {
             return Err(ExportError::BeyondLimit {
-                control: CONTROL,
+                control: HEIDENHAIN_TABLE,
                 axis: column.direction,
                 position: at[1],
                 value: difference,
@@ -219,7 +224,7 @@ fn notes(name: &str, positioning: &AxisErrors, others: &[CrossErrors], sign: Sig
             unit(axis)
         ),
         given(sign),
-        check(CHECK),
+        check(HEIDENHAIN_CHECK),
         "layout of the text file is DERIVED from HEIDENHAIN's text tables".to_owned(),
         format!("enter {name}.COM in config.CMA for axis {axis} and make the line active"),
         "BACKLASH, where present, holds the positioning values measured in the negative direction"

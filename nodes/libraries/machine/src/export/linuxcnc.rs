@@ -46,9 +46,9 @@ use super::file::{ExportFile, comments};
 use super::number::{fixed, mm_or_deg, unit};
 use super::sign::{check, tried};
 
-const CONTROL: &str = "LinuxCNC COMP_FILE";
+const LINUXCNC_TABLE: &str = "LinuxCNC COMP_FILE";
 /// `EMCMOT_COMP_SIZE` of the source.
-const MOST_POINTS: usize = 256;
+const MAX_TABLE_POINTS: usize = 256;
 const DECIMALS: usize = 6;
 /// Two nominal positions must differ after rounding, mm or degrees.
 const LEAST_SPACING: f64 = 2e-6;
@@ -82,7 +82,12 @@ pub fn compensation_file(
     file_type: FileType,
 ) -> Result<ExportFile, ExportError> {
     let axis = errors.axis();
-    check_count(CONTROL, axis, errors.position().len(), MOST_POINTS)?;
+    check_count(
+        LINUXCNC_TABLE,
+        axis,
+        errors.position().len(),
+        MAX_TABLE_POINTS,
+    )?;
     for pair in errors.position().windows(2) {
         let spacing = pair[1] - pair[0];
         if mm_or_deg(axis, spacing) <= LEAST_SPACING {

@@ -11,7 +11,7 @@ use super::{Arrival, Trajectory};
 use crate::file::MachineFile;
 
 /// Least number of targets on a diagonal.
-const LEAST_TARGETS: u32 = 5;
+const MIN_TARGETS_OF_DIAGONAL: u32 = 5;
 /// Most targets on a diagonal.
 const MOST_TARGETS: u32 = 10_000;
 
@@ -46,7 +46,7 @@ pub fn diagonal(file: &MachineFile, order: &Diagonal<'_>) -> Result<Trajectory, 
     require(
         "targets",
         f64::from(order.targets),
-        (LEAST_TARGETS..=MOST_TARGETS).contains(&order.targets),
+        (MIN_TARGETS_OF_DIAGONAL..=MOST_TARGETS).contains(&order.targets),
         "must be from 5 to 10000",
     )?;
     require(

@@ -18,7 +18,7 @@ use crate::file::{BeamEntry, MachineFile};
 /// Least overrun beyond the first and last target, mm: more than any play.
 const LEAST_OVERRUN_MM: f64 = 1.0;
 /// Least number of targets of a run.
-const LEAST_TARGETS: usize = 2;
+const MIN_TARGETS_OF_RUN: usize = 2;
 /// Most stops of one program.
 const MOST_STOPS: usize = 100_000;
 /// Share of the spacing over which targets are scattered.
@@ -306,7 +306,7 @@ fn check_targets(targets_mm: &[f64]) -> Result<(f64, f64), TrajectoryError> {
     let (Some(&first), Some(&last)) = (targets_mm.first(), targets_mm.last()) else {
         return Err(too_few(0));
     };
-    if targets_mm.len() < LEAST_TARGETS {
+    if targets_mm.len() < MIN_TARGETS_OF_RUN {
         return Err(too_few(targets_mm.len()));
     }
     for (before, pair) in targets_mm.windows(2).enumerate() {
@@ -326,6 +326,6 @@ const fn too_few(n: usize) -> TrajectoryError {
     TrajectoryError::TooFew {
         what: "targets",
         n,
-        least: LEAST_TARGETS,
+        least: MIN_TARGETS_OF_RUN,
     }
 }

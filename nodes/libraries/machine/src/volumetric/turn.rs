@@ -116,7 +116,7 @@ const fn term(n: u32) -> f64 {
 
 #[inline(always)]
 fn sine(r: f64) -> f64 {
-    const C: [f64; 7] = [
+    const SINE_TERMS: [f64; 7] = [
         term(15),
         term(13),
         term(11),
@@ -126,8 +126,8 @@ fn sine(r: f64) -> f64 {
         term(3),
     ];
     let square = r * r;
-    let mut sum = C[0];
-    for c in &C[1..] {
+    let mut sum = SINE_TERMS[0];
+    for c in &SINE_TERMS[1..] {
         sum = sum * square + c;
     }
     r + r * (square * sum)
@@ -135,7 +135,7 @@ fn sine(r: f64) -> f64 {
 
 #[inline(always)]
 fn cosine(r: f64) -> f64 {
-    const C: [f64; 7] = [
+    const COSINE_TERMS: [f64; 7] = [
         term(16),
         term(14),
         term(12),
@@ -145,8 +145,8 @@ fn cosine(r: f64) -> f64 {
         term(4),
     ];
     let square = r * r;
-    let mut sum = C[0];
-    for c in &C[1..] {
+    let mut sum = COSINE_TERMS[0];
+    for c in &COSINE_TERMS[1..] {
         sum = sum * square + c;
     }
     let half = 0.5 * square;

@@ -53,7 +53,7 @@ const SAME_SPEED: f64 = 0.05;
 /// Frequencies that are tried about an expected one.
 const ABOUT: i32 = 8;
 /// Most points of the grid.
-const MOST_POINTS: f64 = 200_000.0;
+const MAX_FREQUENCY_POINTS: f64 = 200_000.0;
 
 /// A tone that may be there.
 #[derive(Clone, Debug)]
@@ -159,7 +159,7 @@ fn grid(scene: &Scene, series: &[Series], config: &BreakdownConfig) -> Option<Fr
     let last_hz = BELOW_NYQUIST * series.iter().map(rate).fold(f64::INFINITY, f64::min);
     let longest_s = series.iter().map(Series::duration_s).fold(0.0, f64::max);
     let points = (last_hz - first_hz) * longest_s * OVERSAMPLING;
-    let usable = (1.0..MOST_POINTS).contains(&points);
+    let usable = (1.0..MAX_FREQUENCY_POINTS).contains(&points);
     usable.then(|| Frequencies {
         first_hz,
         step_hz: 1.0 / (longest_s * OVERSAMPLING),

@@ -15,7 +15,7 @@ use super::error::BreakdownError;
 use crate::axis::Axis;
 
 /// Fewer samples than this say nothing about two dozen causes.
-const LEAST_SAMPLES: usize = 36;
+const MIN_SAMPLES_OF_CIRCLE: usize = 36;
 /// A deviation above this share of the radius is no deviation.
 const GREATEST_DEVIATION: f64 = 0.05;
 
@@ -138,8 +138,8 @@ impl CircularRecording {
     /// Refuses what cannot be evaluated; `recording` is its place in the caller's list.
     pub(super) fn check(&self, recording: usize) -> Result<(), BreakdownError> {
         let n = self.samples.len();
-        if n < LEAST_SAMPLES {
-            let least = LEAST_SAMPLES;
+        if n < MIN_SAMPLES_OF_CIRCLE {
+            let least = MIN_SAMPLES_OF_CIRCLE;
             return Err(BreakdownError::TooFewSamples {
                 recording,
                 n,

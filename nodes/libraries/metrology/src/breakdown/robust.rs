@@ -27,11 +27,11 @@ use super::term::Term;
 use crate::least_squares::FitError;
 
 /// Iterations of (1).
-const ITERATIONS: usize = 30;
+const WEIGHT_ITERATIONS: usize = 30;
 /// Passes of (2).
 const PASSES: usize = 3;
 /// Weights that change less end (1).
-const SETTLED: f64 = 1e-3;
+const SETTLED_WEIGHT: f64 = 1e-3;
 /// Below this a residual is rounding, mm.
 const ROUNDING_MM: f64 = 1e-12;
 /// Half width of the zone about a reversal where a peak may be friction, rad (3°).
@@ -274,7 +274,7 @@ impl<'a> System<'a> {
         config: &BreakdownConfig,
     ) -> Result<Vec<f64>, BreakdownError> {
         let mut residuals = Vec::new();
-        for _ in 0..ITERATIONS {
+        for _ in 0..WEIGHT_ITERATIONS {
             let (parameters, _) = self.solve(weights)?;
             residuals = self.residuals(&parameters);
             let used = residuals
@@ -290,7 +290,7 @@ impl<'a> System<'a> {
                     *weight = new;
                 }
             }
-            if change < SETTLED {
+            if change < SETTLED_WEIGHT {
                 break;
             }
         }

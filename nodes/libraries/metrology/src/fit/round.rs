@@ -26,9 +26,9 @@ use super::{ShapeError, check_points};
 use crate::least_squares;
 
 /// Iterations after which a fit is given up.
-const ITERATIONS: usize = 100;
+const FIT_ITERATIONS: usize = 100;
 /// A step shorter than this share of the radius ends the iteration.
-const SETTLED: f64 = 1e-14;
+const SETTLED_STEP: f64 = 1e-14;
 /// How often one step is halved.
 const HALVINGS: usize = 40;
 /// Below this ratio of singular values the start is not determined.
@@ -74,10 +74,10 @@ pub fn fit_round<const D: usize>(
     let u = DVector::from_column_slice(standard_uncertainties_mm);
     let mut round = start(&centred, &u)?;
     let mut last_step_mm = f64::INFINITY;
-    for _ in 0..ITERATIONS {
+    for _ in 0..FIT_ITERATIONS {
         let fit = least_squares::solve(&design(&centred, &round), &round.distances(&centred), &u)?;
         last_step_mm = round.improve(&centred, &u, &fit.parameters);
-        if last_step_mm <= SETTLED * round.radius_mm {
+        if last_step_mm <= SETTLED_STEP * round.radius_mm {
             break;
         }
     }
@@ -85,7 +85,7 @@ pub fn fit_round<const D: usize>(
     if last_step_mm > 1e-9 * round.radius_mm || round.radius_mm <= 0.0 {
         return Err(ShapeError::NotSettled {
             shape: shape::<D>(),
-            iterations: ITERATIONS,
+            iterations: FIT_ITERATIONS,
             last_step_mm,
         });
     }

@@ -69,7 +69,7 @@ use crate::axis::Axis;
 use crate::fit::fit_line;
 
 /// Samples without which a rate has no uncertainty.
-const LEAST_SAMPLES: usize = 3;
+const MIN_SAMPLES_OF_RATE: usize = 3;
 
 /// What made the machine drift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -244,7 +244,7 @@ pub fn evaluate(test: &DriftTest, budget: &DriftBudget) -> Result<DriftResult, I
 /// # Errors
 /// Fewer than three readings, lists that do not fit together, numbers that cannot be used.
 pub fn scatter_mm(times_s: &[f64], displacements_mm: &[f64]) -> Result<f64, Iso230Error> {
-    check_points("times_s", times_s.len(), LEAST_SAMPLES)?;
+    check_points("times_s", times_s.len(), MIN_SAMPLES_OF_RATE)?;
     check_length("displacements_mm", 0, displacements_mm.len(), times_s.len())?;
     check_finite("times_s", 0, times_s)?;
     check_finite("displacements_mm", 0, displacements_mm)?;
@@ -289,7 +289,7 @@ fn displacement(
 
 impl DriftTest {
     fn check(&self) -> Result<(), Iso230Error> {
-        check_points("times_s", self.times_s.len(), LEAST_SAMPLES)?;
+        check_points("times_s", self.times_s.len(), MIN_SAMPLES_OF_RATE)?;
         check_finite("times_s", 0, &self.times_s)?;
         check_ascending("times_s", &self.times_s)?;
         check_positive("drift_after_s", self.drift_after_s)?;
@@ -363,7 +363,7 @@ impl DriftTest {
         let end_s = self.times_s[self.times_s.len() - 1];
         let begin_s = end_s - self.rate_window_s;
         let first = self.times_s.partition_point(|t| *t < begin_s);
-        check_points("rate_window_s", values.len() - first, LEAST_SAMPLES)?;
+        check_points("rate_window_s", values.len() - first, MIN_SAMPLES_OF_RATE)?;
         // About the end of the window, so that long clocks cost no digits.
         let times: Vec<f64> = self.times_s[first..].iter().map(|t| t - end_s).collect();
         let line = fit_line(&times, &values[first..], &vec![1.0; times.len()])?;

@@ -22,7 +22,7 @@ use super::host_now;
 /// How fast the rest is given up.
 const SLEWING: f64 = 500e-6;
 /// A greater difference of maps is a step.
-const STEP: Span = Span::from_nanos(10_000_000);
+const CLOCK_STEP: Span = Span::from_nanos(10_000_000);
 
 /// An error that a computer's clock is given.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -127,7 +127,7 @@ impl HostTime {
             .unwrap_or_default()
             .nanos()
             .saturating_sub(wanted.nanos());
-        let steps = shown.is_none() || by.saturating_abs() > STEP.nanos();
+        let steps = shown.is_none() || by.saturating_abs() > CLOCK_STEP.nanos();
         let rest = Span::from_nanos(if steps { 0 } else { by });
         *relation = Some(Relation {
             clock,

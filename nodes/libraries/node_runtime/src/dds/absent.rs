@@ -33,10 +33,10 @@ use crate::environment::Interface;
 /// Where participants announce themselves (RTPS 2.5, 9.6.2.4).
 const GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 /// More than any datagram.
-const MOST_BYTES: usize = 1 << 16;
+const MAX_DATAGRAM_BYTES: usize = 1 << 16;
 
 /// Between two looks: Cyclone DDS is forgotten after 10 s.
-const LOOK: Duration = Duration::from_secs(3);
+const ABSENCE_PERIOD: Duration = Duration::from_secs(3);
 /// Silence after which somebody is said to be alive.
 const SILENT: Duration = Duration::from_secs(4);
 /// Silence after which somebody is dead of whose host others are heard.
@@ -157,8 +157,8 @@ struct Keeper {
 impl Keeper {
     async fn keep(self) {
         let mut roll = Roll::default();
-        let mut datagram = vec![0; MOST_BYTES];
-        let mut looks = tokio::time::interval(LOOK);
+        let mut datagram = vec![0; MAX_DATAGRAM_BYTES];
+        let mut looks = tokio::time::interval(ABSENCE_PERIOD);
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             tokio::select! {
@@ -221,9 +221,9 @@ mod tests {
     fn all_of_a_silent_host_are_kept_for_an_hour() {
         let began = Instant::now();
         let mut roll = three(began);
-        assert!(absent(&mut roll, began + LOOK).is_empty());
+        assert!(absent(&mut roll, began + ABSENCE_PERIOD).is_empty());
         assert_eq!(absent(&mut roll, began + GONE), [1, 2, 3]);
-        assert!(absent(&mut roll, began + GONE + LOOK).is_empty());
+        assert!(absent(&mut roll, began + GONE + ABSENCE_PERIOD).is_empty());
         assert_eq!(roll.0.len(), 0);
     }
 
@@ -234,8 +234,8 @@ mod tests {
         let at = began + DEAD;
         roll.note(&here(1), HOSTS[0], at);
         assert_eq!(absent(&mut roll, at), [2, 3]);
-        assert_eq!(absent(&mut roll, at + LOOK), [3]);
-        assert_eq!(absent(&mut roll, at + LOOK + SILENT), [1, 3]);
+        assert_eq!(absent(&mut roll, at + ABSENCE_PERIOD), [3]);
+        assert_eq!(absent(&mut roll, at + ABSENCE_PERIOD + SILENT), [1, 3]);
     }
 
     #[test]
@@ -254,6 +254,9 @@ mod tests {
         let cyclone = Announcement::Here(prefix([1, 16], 4));
         roll.note(&cyclone, HOSTS[1], began);
         assert_eq!(absent(&mut roll, began + FORGOTTEN), [4, 1, 2, 3]);
-        assert_eq!(absent(&mut roll, began + FORGOTTEN + LOOK), [1, 2, 3]);
+        assert_eq!(
+            absent(&mut roll, began + FORGOTTEN + ABSENCE_PERIOD),
+            [1, 2, 3]
+        );
     }
 }

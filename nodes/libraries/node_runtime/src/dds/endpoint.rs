@@ -18,9 +18,9 @@ use crate::clock::host_now;
 use crate::network::{Guid, PublishError, RequestIdentity, Sample, check_encapsulation};
 use crate::node::Bytes;
 
-const HEADER_LEN: usize = 4;
-const CDR_LE_HEADER: [u8; HEADER_LEN] = [0, 1, 0, 0];
-const CDR_BE_HEADER: [u8; HEADER_LEN] = [0, 0, 0, 0];
+const CDR_HEADER_LEN: usize = 4;
+const CDR_LE_HEADER: [u8; CDR_HEADER_LEN] = [0, 1, 0, 0];
+const CDR_BE_HEADER: [u8; CDR_HEADER_LEN] = [0, 0, 0, 0];
 
 /// Passes payloads through as they are, but for their end: RustDDS pads a sample to whole words unless it is sent in
 /// fragments, and Cyclone DDS 0.10 refuses a last fragment that is not padded.
@@ -94,10 +94,10 @@ impl SerializerAdapter<Bytes> for Raw {
         if value.len() > UNFRAGMENTED_LEN
             && let Cow::Owned(padded) = whole_words(value)
         {
-            return Ok(rustdds::bytes::Bytes::from(padded).slice(HEADER_LEN..));
+            return Ok(rustdds::bytes::Bytes::from(padded).slice(CDR_HEADER_LEN..));
         }
         let whole = rustdds::bytes::Bytes::from_owner(Arc::clone(value));
-        Ok(whole.slice(HEADER_LEN.min(value.len())..))
+        Ok(whole.slice(CDR_HEADER_LEN.min(value.len())..))
     }
 }
 
@@ -269,10 +269,10 @@ mod tests {
     fn what_may_be_sent_in_fragments_ends_with_a_whole_word() {
         for (len, padded) in [(1023, 1023), (1025, 1028), (1494, 1496), (1496, 1496)] {
             let mut sent = vec![7; len];
-            sent[..HEADER_LEN].copy_from_slice(&CDR_LE_HEADER);
+            sent[..CDR_HEADER_LEN].copy_from_slice(&CDR_LE_HEADER);
             let payload = Raw::to_bytes(&Arc::from(sent.as_slice())).unwrap();
-            assert_eq!(payload.len() + HEADER_LEN, padded);
-            assert_eq!(payload[..len - HEADER_LEN], sent[HEADER_LEN..]);
+            assert_eq!(payload.len() + CDR_HEADER_LEN, padded);
+            assert_eq!(payload[..len - CDR_HEADER_LEN], sent[CDR_HEADER_LEN..]);
         }
     }
 

@@ -12,7 +12,7 @@ pub(super) enum Side {
 }
 
 /// RustDDS's reader cache has this ceiling whenever less is asked for.
-const READER_FLOOR: i32 = 64;
+const DDS_READER_FLOOR: i32 = 64;
 
 /// Samples that may wait for an acknowledgement. A subscriber that was killed acknowledges nothing
 /// until its lease (60 s) is over, and RustDDS refuses every write when 8,192 wait, which at 1 kHz is
@@ -47,7 +47,7 @@ pub(super) fn policies(qos: Qos, side: Side) -> QosPolicies {
         .history(History::KeepLast { depth });
     match side {
         Side::Reader => {
-            let limit = depth.max(READER_FLOOR);
+            let limit = depth.max(DDS_READER_FLOOR);
             builder.resource_limits(limits(limit)).build()
         }
         Side::Writer => {

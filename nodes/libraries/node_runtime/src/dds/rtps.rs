@@ -22,7 +22,7 @@ pub(super) const PREFIX_LEN: usize = 12;
 /// A participant.
 pub(super) type Prefix = [u8; PREFIX_LEN];
 /// Protocol, version, vendor, participant.
-const HEADER_LEN: usize = 20;
+const RTPS_HEADER_LEN: usize = 20;
 const VERSION: [u8; 2] = [2, 4];
 const ACKNACK: u8 = 0x06;
 const INFO_TS: u8 = 0x09;
@@ -115,8 +115,8 @@ pub(super) enum Announcement {
 
 /// Whom a datagram announces, where it does.
 pub(super) fn announcement(datagram: &[u8]) -> Option<Announcement> {
-    let (head, mut rest) = datagram.split_at_checked(HEADER_LEN)?;
-    let prefix = head[HEADER_LEN - PREFIX_LEN..].try_into().ok()?;
+    let (head, mut rest) = datagram.split_at_checked(RTPS_HEADER_LEN)?;
+    let prefix = head[RTPS_HEADER_LEN - PREFIX_LEN..].try_into().ok()?;
     if !head.starts_with(b"RTPS") {
         return None;
     }

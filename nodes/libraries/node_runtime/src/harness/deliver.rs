@@ -8,8 +8,8 @@ use super::{Bytes, Delivery, Emission, End, Event, GoalId, GoalStatus, Harness, 
 use crate::clock::ros_time;
 use crate::diagnostic::{Diagnostic, Level};
 
-const SERVICE: bool = false;
-const ACTION: bool = true;
+const IS_SERVICE: bool = false;
+const IS_ACTION: bool = true;
 
 impl Harness {
     /// Hands out everything that waits, and what follows from it.
@@ -48,7 +48,7 @@ impl Harness {
                 id,
                 bytes,
             } => {
-                let own = self.number(SERVICE, server, client, id);
+                let own = self.number(IS_SERVICE, server, client, id);
                 let event = Event::Request {
                     service: server.1,
                     id: own,
@@ -80,7 +80,7 @@ impl Harness {
                 id,
                 bytes,
             } => {
-                let (server, id) = (*server, self.number(ACTION, *server, *client, *id));
+                let (server, id) = (*server, self.number(IS_ACTION, *server, *client, *id));
                 let goal = Event::Goal {
                     server: server.1,
                     id,
@@ -169,7 +169,7 @@ impl Harness {
             Emission::Diagnostic(diagnostic) => self.report(node, &diagnostic),
             Emission::Stopped => self.stopped[node] = true,
             Emission::Respond { service, id, bytes } => {
-                if let Some((client, id)) = self.asked.remove(&(SERVICE, (node, service), id))
+                if let Some((client, id)) = self.asked.remove(&(IS_SERVICE, (node, service), id))
                     && client != NOBODY
                 {
                     self.inbox.push_back(Delivery::Response {
@@ -185,7 +185,7 @@ impl Harness {
             Emission::AcceptGoal { server, id } => self.answer_goal((node, server), id, true),
             Emission::RejectGoal { server, id } => self.answer_goal((node, server), id, false),
             Emission::Feedback { server, id, bytes } => {
-                if let Some(&(client, id)) = self.asked.get(&(ACTION, (node, server), id)) {
+                if let Some(&(client, id)) = self.asked.get(&(IS_ACTION, (node, server), id)) {
                     self.inbox
                         .push_back(Delivery::Feedback { client, id, bytes });
                 }
@@ -276,14 +276,14 @@ impl Harness {
         let goal = self
             .asked
             .iter()
-            .find(|(key, value)| key.0 == ACTION && **value == wanted);
+            .find(|(key, value)| key.0 == IS_ACTION && **value == wanted);
         if let Some((&(_, server, own), _)) = goal {
             self.inbox.push_back(Delivery::Cancel { server, id: own });
         }
     }
 
     fn answer_goal(&mut self, server: End, own: GoalId, accepted: bool) {
-        let key = (ACTION, server, own);
+        let key = (IS_ACTION, server, own);
         let asked = if accepted {
             self.asked.get(&key).copied()
         } else {
@@ -299,7 +299,7 @@ impl Harness {
     }
 
     fn finish_goal(&mut self, server: End, own: GoalId, status: GoalStatus, bytes: Bytes) {
-        if let Some((client, id)) = self.asked.remove(&(ACTION, server, own)) {
+        if let Some((client, id)) = self.asked.remove(&(IS_ACTION, server, own)) {
             self.inbox.push_back(Delivery::Ended {
                 client,
                 id,

@@ -39,7 +39,7 @@ pub(super) enum News {
     },
 }
 
-const HEADER_LEN: usize = ENCAPSULATION.len();
+const ENCAPSULATION_LEN: usize = ENCAPSULATION.len();
 
 impl ActionClient {
     pub fn send(&mut self, id: GoalId, uuid: Uuid, goal: &[u8]) -> Ask {
@@ -80,7 +80,7 @@ impl ActionClient {
         match service {
             GoalService::CancelGoal => (None, None),
             GoalService::SendGoal => {
-                let accepted = bytes.and_then(|bytes| bytes.get(HEADER_LEN)) == Some(&1);
+                let accepted = bytes.and_then(|bytes| bytes.get(ENCAPSULATION_LEN)) == Some(&1);
                 let ask = if accepted {
                     let bytes = put_front(&uuid, &ENCAPSULATION);
                     Some(Ask {
@@ -97,7 +97,7 @@ impl ActionClient {
             GoalService::GetResult => {
                 self.goals.remove(&id);
                 let status = bytes
-                    .and_then(|bytes| bytes.get(HEADER_LEN))
+                    .and_then(|bytes| bytes.get(ENCAPSULATION_LEN))
                     .map(|byte| *byte as i8);
                 let news = match status {
                     Some(StatusMessage::STATUS_SUCCEEDED) => (GoalStatus::Succeeded, bytes),

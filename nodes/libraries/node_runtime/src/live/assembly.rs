@@ -12,7 +12,7 @@ use super::action_client::ActionClient;
 use super::action_server::{ActionServer, GoalService};
 use super::board::Board;
 use super::event_time::EventTime;
-use super::incoming::{Incoming, QUEUE_LEN, Readers};
+use super::incoming::{Incoming, NODE_QUEUE_LEN, Readers};
 use super::logger_levels::LoggerService;
 use super::owner::{
     ActionEnd, ClientUse, Hearing, Owner, Publication, ServerUse, Subscription, Timers, UsedAction,
@@ -133,7 +133,7 @@ impl Assembly {
             let name = self.names.resolve(name)?;
             self.server(ServerUse::Logger(service), &name, type_name)?;
         }
-        let (name, type_name) = type_description::SERVICE;
+        let (name, type_name) = type_description::TYPE_SERVICE;
         let name = self.names.resolve(name)?;
         self.server(ServerUse::TypeDescription, &name, type_name)?;
         Ok(())
@@ -257,7 +257,7 @@ pub(super) fn assemble(
     participant: Participant,
 ) -> anyhow::Result<Owner> {
     let ports = node.ports().clone();
-    let (sender, queue) = mpsc::channel(QUEUE_LEN);
+    let (sender, queue) = mpsc::channel(NODE_QUEUE_LEN);
     let mut assembly = Assembly {
         names: setup.names().clone(),
         participant,

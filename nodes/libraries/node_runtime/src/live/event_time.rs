@@ -3,7 +3,7 @@
 use metrology::stamp::{Host, Span, Stamp};
 
 /// A clock that goes back by less is waited for: time stands still until it has caught up.
-const STEP: Span = Span::from_nanos(100_000_000);
+const MAX_WAIT_BACK: Span = Span::from_nanos(100_000_000);
 
 /// The time of the last event, and what the clock showed at it.
 ///
@@ -31,7 +31,7 @@ impl EventTime {
         arrived: Option<Stamp<Host>>,
     ) -> (Stamp<Host>, Option<Span>) {
         let back = Span::from_nanos(self.shown.nanos().saturating_sub(now.nanos()));
-        let was_set = back > STEP;
+        let was_set = back > MAX_WAIT_BACK;
         if was_set {
             self.last = now;
         }

@@ -19,7 +19,7 @@ use super::service::{self, ReplyTo};
 
 /// Room in a node's queue. When it is full, samples wait in the readers' caches, which hold the
 /// topic's depth.
-pub(super) const QUEUE_LEN: usize = 1_024;
+pub(super) const NODE_QUEUE_LEN: usize = 1_024;
 
 /// One thing that happened.
 #[derive(Debug)]
@@ -67,7 +67,7 @@ pub(super) struct After {
 }
 
 /// Writers of one topic that are remembered; where more come, all are forgotten and counted anew.
-const MOST_WRITERS: usize = 4_096;
+const MAX_COUNTED_WRITERS: usize = 4_096;
 
 /// Counts what a topic's writers sent and we never got.
 #[derive(Debug, Default)]
@@ -87,7 +87,7 @@ impl GapCounter {
             // Out of order: counted as lost before, or a repetition.
             Some(_) => 0,
             None => {
-                if self.last.len() >= MOST_WRITERS {
+                if self.last.len() >= MAX_COUNTED_WRITERS {
                     self.last.clear();
                 }
                 self.last.insert(writer, sequence);
@@ -109,7 +109,7 @@ impl Turns {
     pub fn take(&mut self, writer: Guid) -> bool {
         match self.speaks.replace(writer) {
             Some(before) if before != writer => {
-                if self.spoke.len() >= MOST_WRITERS {
+                if self.spoke.len() >= MAX_COUNTED_WRITERS {
                     self.spoke.clear();
                 }
                 self.spoke.insert(before);
@@ -277,11 +277,13 @@ mod tests {
     #[test]
     fn writers_without_end_are_not_remembered() {
         let (mut gaps, mut turns) = (GapCounter::default(), Turns::default());
-        for n in 0..3 * u128::try_from(MOST_WRITERS).unwrap() {
+        for n in 0..3 * u128::try_from(MAX_COUNTED_WRITERS).unwrap() {
             let writer = n.to_be_bytes();
             gaps.count(writer, 1);
             turns.take(writer);
-            assert!(gaps.last.len() <= MOST_WRITERS && turns.spoke.len() <= MOST_WRITERS);
+            assert!(
+                gaps.last.len() <= MAX_COUNTED_WRITERS && turns.spoke.len() <= MAX_COUNTED_WRITERS
+            );
         }
     }
 

@@ -112,11 +112,11 @@ impl ParameterService {
 }
 
 /// Names in one request: a node has some hundred parameters, and each name is answered by a text.
-const MOST_NAMES: usize = 10_000;
+const MAX_REQUESTED_NAMES: usize = 10_000;
 
 /// Refuses a request of more names than that.
 fn at_most<M: Message>(field: &'static str, n: usize) -> Result<(), WireError> {
-    if n <= MOST_NAMES {
+    if n <= MAX_REQUESTED_NAMES {
         return Ok(());
     }
     Err(WireError::TooMany {
@@ -124,7 +124,7 @@ fn at_most<M: Message>(field: &'static str, n: usize) -> Result<(), WireError> {
         field,
         n,
         what: "entries",
-        greatest: MOST_NAMES,
+        greatest: MAX_REQUESTED_NAMES,
     })
 }
 
@@ -367,7 +367,7 @@ mod tests {
 
     #[test]
     fn a_request_of_endless_names_is_refused() {
-        let names = vec![String::new(); MOST_NAMES + 1];
+        let names = vec![String::new(); MAX_REQUESTED_NAMES + 1];
         let requests = [
             (
                 ParameterService::List,
@@ -395,7 +395,7 @@ mod tests {
             (
                 ParameterService::Set,
                 to_cdr(&SetParametersRequest {
-                    parameters: vec![ParameterMessage::default(); MOST_NAMES + 1],
+                    parameters: vec![ParameterMessage::default(); MAX_REQUESTED_NAMES + 1],
                 }),
             ),
         ];

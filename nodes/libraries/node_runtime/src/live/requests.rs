@@ -9,9 +9,9 @@ use crate::network::{Guid, RequestIdentity};
 use crate::node::Bytes;
 
 /// A server that sees us later than we see it would answer into the void.
-const SETTLING: Duration = Duration::from_millis(100);
+const SERVER_SETTLING: Duration = Duration::from_millis(100);
 /// After which a request counts as unanswered.
-const PATIENCE: Duration = Duration::from_secs(5);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// When the answer to a request is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +63,7 @@ impl Requests {
             token,
             bytes,
             due,
-            sent_by: now + PATIENCE,
+            sent_by: now + ANSWER_TIMEOUT,
         });
     }
 
@@ -86,7 +86,7 @@ impl Requests {
     /// The request that is due, and a server that gets it. It stays due until it was [`Self::sent`].
     pub fn next_to_send(&self, now: Instant) -> Option<(Guid, Bytes)> {
         let (server, since) = self.servers.iter().max_by_key(|(_, since)| **since)?;
-        if now.duration_since(*since) < SETTLING {
+        if now.duration_since(*since) < SERVER_SETTLING {
             return None;
         }
         let waiting = self.queue.front()?;
@@ -98,7 +98,7 @@ impl Requests {
         if let Some(Waiting { token, due, .. }) = self.queue.pop_front() {
             let asked = Asked {
                 token,
-                answered_by: (due == Due::AtOnce).then(|| now + PATIENCE),
+                answered_by: (due == Due::AtOnce).then(|| now + ANSWER_TIMEOUT),
                 of: self.servers.keys().copied().collect(),
             };
             self.asked.insert(identity, asked);
@@ -176,7 +176,7 @@ mod tests {
         assert_eq!(send(&mut requests, now), None);
         requests.servers_are([SERVER].into_iter(), now);
         assert_eq!(send(&mut requests, now), None, "it may not see us yet");
-        let later = now + SETTLING;
+        let later = now + SERVER_SETTLING;
         requests.servers_are([SERVER].into_iter(), later);
         assert_eq!(send(&mut requests, later), Some(SERVER));
         assert_eq!(requests.answered(NUMBER), Some(7));
@@ -189,12 +189,12 @@ mod tests {
         requests.servers_are([SERVER].into_iter(), now);
         requests.ask(7, shared(&[1]), Due::AtTheEnd, now);
         requests.servers_are(std::iter::empty(), now);
-        assert!(requests.expired(now + PATIENCE / 2).is_empty());
+        assert!(requests.expired(now + ANSWER_TIMEOUT / 2).is_empty());
         let given_up = Unanswered {
             token: 7,
             was_sent: false,
         };
-        assert_eq!(requests.expired(now + PATIENCE), [given_up]);
+        assert_eq!(requests.expired(now + ANSWER_TIMEOUT), [given_up]);
         assert!(!requests.is_waiting());
     }
 
@@ -202,15 +202,15 @@ mod tests {
     fn a_request_that_was_sent_late_has_all_its_time_for_the_answer() {
         let (mut requests, now) = (Requests::default(), Instant::now());
         requests.ask(7, shared(&[1]), Due::AtOnce, now);
-        let late = now + PATIENCE - SETTLING;
-        requests.servers_are([SERVER].into_iter(), late - SETTLING);
+        let late = now + ANSWER_TIMEOUT - SERVER_SETTLING;
+        requests.servers_are([SERVER].into_iter(), late - SERVER_SETTLING);
         assert_eq!(send(&mut requests, late), Some(SERVER));
-        assert!(requests.expired(now + PATIENCE).is_empty());
+        assert!(requests.expired(now + ANSWER_TIMEOUT).is_empty());
         let given_up = Unanswered {
             token: 7,
             was_sent: true,
         };
-        assert_eq!(requests.expired(late + PATIENCE), [given_up]);
+        assert_eq!(requests.expired(late + ANSWER_TIMEOUT), [given_up]);
     }
 
     #[test]
@@ -221,7 +221,7 @@ mod tests {
             requests.ask(token, shared(&[1]), Due::AtOnce, now);
         }
         assert_eq!(requests.failed(), Some(7));
-        assert_eq!(send(&mut requests, now + SETTLING), Some(SERVER));
+        assert_eq!(send(&mut requests, now + SERVER_SETTLING), Some(SERVER));
         assert_eq!(requests.answered(NUMBER), Some(8));
     }
 
@@ -230,7 +230,7 @@ mod tests {
         let (mut requests, now) = (Requests::default(), Instant::now());
         requests.servers_are([SERVER].into_iter(), now);
         requests.ask(7, shared(&[1]), Due::AtTheEnd, now);
-        assert_eq!(send(&mut requests, now + SETTLING), Some(SERVER));
+        assert_eq!(send(&mut requests, now + SERVER_SETTLING), Some(SERVER));
         assert!(requests.expired(now + Duration::from_secs(3600)).is_empty());
         assert!(requests.abandoned().is_empty());
         requests.servers_are([OTHER].into_iter(), now);

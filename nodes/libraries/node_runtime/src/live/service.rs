@@ -15,7 +15,7 @@ use crate::dds::is_cyclone;
 use crate::network::{Guid, PublishError, Remote, RequestIdentity, Role, Sample, Writer};
 use crate::node::Bytes;
 
-const HEADER_LEN: usize = 4;
+const CDR_HEADER_LEN: usize = 4;
 const CYCLONE_LEN: usize = 16;
 
 /// How the answer to a request finds its way.
@@ -27,14 +27,14 @@ pub(super) enum ReplyTo {
 
 /// Takes `count` bytes out from behind the encapsulation header.
 pub(super) fn take_front<const COUNT: usize>(bytes: &[u8]) -> Option<([u8; COUNT], Bytes)> {
-    let (header, rest) = bytes.split_at_checked(HEADER_LEN)?;
+    let (header, rest) = bytes.split_at_checked(CDR_HEADER_LEN)?;
     let (front, payload) = rest.split_first_chunk::<COUNT>()?;
     Some((*front, header.iter().chain(payload).copied().collect()))
 }
 
 /// Puts bytes in behind the encapsulation header.
 pub(super) fn put_front(front: &[u8], bytes: &[u8]) -> Bytes {
-    let (header, payload) = bytes.split_at(HEADER_LEN.min(bytes.len()));
+    let (header, payload) = bytes.split_at(CDR_HEADER_LEN.min(bytes.len()));
     header.iter().chain(front).chain(payload).copied().collect()
 }
 

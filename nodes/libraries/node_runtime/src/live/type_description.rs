@@ -14,7 +14,8 @@ use super::service::shared;
 use crate::node::Bytes;
 
 /// The service's name below the node and its type.
-pub(super) const SERVICE: (&str, &str) = ("~/get_type_description", GetTypeDescription::TYPE_NAME);
+pub(super) const TYPE_SERVICE: (&str, &str) =
+    ("~/get_type_description", GetTypeDescription::TYPE_NAME);
 
 /// The answer to a request.
 ///

@@ -88,7 +88,7 @@ pub(super) struct Reading {
 }
 
 /// Writers of a topic that are kept apart; a network with more of them is under attack.
-const MOST_WRITERS: usize = 1024;
+const MAX_ENDING_WRITERS: usize = 1024;
 /// Samples that are counted when time is over; a writer that floods the reader never stops.
 const MOST_COUNTED: u64 = 1_000_000;
 
@@ -147,7 +147,7 @@ impl Reading {
     }
 
     fn hear(&mut self, sample: &Sample, delay: Option<Span>) {
-        if self.writers.len() >= MOST_WRITERS && !self.writers.contains_key(&sample.writer) {
+        if self.writers.len() >= MAX_ENDING_WRITERS && !self.writers.contains_key(&sample.writer) {
             self.writers.clear();
         }
         let heard = self.writers.entry(sample.writer).or_insert(Heard {

@@ -35,7 +35,7 @@ use crate::network::{Guid, PublishError, RequestIdentity, Sample, check_encapsul
 use crate::node::Bytes;
 
 /// A reader holds at least so many samples.
-const READER_FLOOR: u32 = 64;
+const ZENOH_READER_FLOOR: u32 = 64;
 
 /// How often a writer says up to which number it has spoken, so that the last ones are missed too. Zenoh's other
 /// way, to say it only after something new, waits for full links: a router whose one link was cut stood for 5 s.
@@ -56,7 +56,7 @@ impl Queue {
         Arc::new(Self {
             samples: Mutex::default(),
             arrived: Notify::new(),
-            depth: usize::try_from(depth.max(READER_FLOOR)).unwrap_or(usize::MAX),
+            depth: usize::try_from(depth.max(ZENOH_READER_FLOOR)).unwrap_or(usize::MAX),
         })
     }
 
@@ -315,7 +315,7 @@ mod tests {
     #[test]
     fn a_full_queue_gives_up_its_oldest() {
         let queue = Queue::new(3);
-        let floor = i64::from(READER_FLOOR);
+        let floor = i64::from(ZENOH_READER_FLOOR);
         for sequence in 0..floor + 5 {
             queue.push(Ok(sample(sequence)));
         }

@@ -17,7 +17,7 @@ const SILENCE: Duration = Duration::from_millis(500);
 /// A writer says something at least twice a second; one that was not heard for so long was cut off.
 const CUT_OFF: Duration = Duration::from_secs(1);
 /// So long nobody may have an answer before the samples count as lost.
-const PATIENCE: Duration = Duration::from_secs(2);
+const LOSS_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// A question that is open, by the numbers of the first and last sample.
 struct Asked {
@@ -205,7 +205,7 @@ impl<T> Order<T> {
         }
         let since = *self.unanswered_since.get_or_insert(now);
         self.again_at = Some(now + AGAIN);
-        if now.duration_since(since) >= PATIENCE {
+        if now.duration_since(since) >= LOSS_TIMEOUT {
             self.skip_gap();
         }
     }
@@ -266,8 +266,8 @@ mod tests {
         assert_eq!(asks(&mut order, begin + AGAIN), Some((2, 2)));
         ends(&mut order, begin + AGAIN);
         assert!(order.ready.is_empty(), "3 waits for 2");
-        assert_eq!(asks(&mut order, begin + PATIENCE), Some((2, 2)));
-        ends(&mut order, begin + PATIENCE);
+        assert_eq!(asks(&mut order, begin + LOSS_TIMEOUT), Some((2, 2)));
+        ends(&mut order, begin + LOSS_TIMEOUT);
         assert_eq!(order.ready, [3]);
     }
 
@@ -297,7 +297,7 @@ mod tests {
         order.take(2, 2, now());
         assert_eq!(std::mem::take(&mut order.ready), [2, 3]);
         order.take(5, 5, now());
-        let later = begin + 2 * PATIENCE;
+        let later = begin + 2 * LOSS_TIMEOUT;
         assert_eq!(asks(&mut order, later), Some((4, 4)));
         ends(&mut order, later);
         assert!(order.has_gap() && order.ready.is_empty());
@@ -310,7 +310,7 @@ mod tests {
         order.told(2, begin);
         asks(&mut order, begin);
         ends(&mut order, begin);
-        let back = begin + PATIENCE;
+        let back = begin + LOSS_TIMEOUT;
         order.take(50, 50, back);
         assert_eq!(asks(&mut order, back), Some((2, 49)));
         ends(&mut order, back);

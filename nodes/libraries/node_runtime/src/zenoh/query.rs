@@ -16,10 +16,10 @@ use crate::node::Bytes;
 /// Requests that wait for their answer at a server; the oldest give way and are then never answered.
 const MOST_OPEN: usize = 1_024;
 /// Requests and replies on their way to the node.
-const DEPTH: u32 = 1_024;
+const QUERY_DEPTH: u32 = 1_024;
 /// How long Zenoh keeps a question open. A goal's result may be long in coming, and the node itself
 /// decides how long it waits for an answer.
-const PATIENCE: Duration = Duration::from_secs(30 * 24 * 3_600);
+const QUERY_TIMEOUT: Duration = Duration::from_secs(30 * 24 * 3_600);
 
 /// Queries without an answer yet.
 #[derive(Default)]
@@ -71,7 +71,7 @@ pub(super) fn server(
     key: &str,
     token: &str,
 ) -> ::zenoh::Result<(Reader, Writer)> {
-    let queue = Queue::new(DEPTH);
+    let queue = Queue::new(QUERY_DEPTH);
     let open = Arc::<Mutex<Open>>::default();
     let (into, kept) = (Arc::clone(&queue), Arc::clone(&open));
     let take = move |query: Query| {
@@ -123,14 +123,14 @@ impl Asking {
             .attachment(attachment.bytes())
             .target(QueryTarget::AllComplete)
             .consolidation(ConsolidationMode::None)
-            .timeout(PATIENCE)
+            .timeout(QUERY_TIMEOUT)
             .callback(take)
             .wait()
     }
 }
 
 pub(super) fn client(session: &Session, key: String, token: &str) -> (Reader, Writer) {
-    let replies = Queue::new(DEPTH);
+    let replies = Queue::new(QUERY_DEPTH);
     let asking = Asking {
         session: session.clone(),
         key,

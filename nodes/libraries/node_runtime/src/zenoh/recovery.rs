@@ -17,7 +17,7 @@ use super::order::{Order, Question};
 use crate::network::Sample;
 
 /// Writers of a topic that are kept in mind; the oldest give way.
-const MOST_WRITERS: usize = 256;
+const MAX_RECOVERED_WRITERS: usize = 256;
 
 type Taken = Result<Sample, String>;
 
@@ -39,7 +39,7 @@ impl Writers {
         let mut orders = self.orders();
         let known = orders.iter().position(|(known, _)| known == writer);
         let place = known.unwrap_or_else(|| {
-            if orders.len() >= MOST_WRITERS {
+            if orders.len() >= MAX_RECOVERED_WRITERS {
                 orders.remove(0);
             }
             orders.push((*writer, Order::new(self.depth)));

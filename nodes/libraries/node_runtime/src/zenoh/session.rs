@@ -14,7 +14,7 @@ use super::{settings, token};
 use crate::environment::{DiscoveryRange, Environment, ZenohSettings};
 
 /// Between looks for a router.
-const LOOK: Duration = Duration::from_secs(1);
+const ROUTER_PERIOD: Duration = Duration::from_secs(1);
 
 type Known = Vec<(Environment, Weak<Shared>)>;
 
@@ -95,7 +95,7 @@ impl Shared {
                 return None;
             }
             if look < most {
-                std::thread::sleep(LOOK);
+                std::thread::sleep(ROUTER_PERIOD);
             }
         }
         Some(format!(

@@ -33,7 +33,7 @@ const LEAST: f64 = 1e-3;
 /// Change of a size, in standard deviations, below which it stands.
 const STILL: f64 = 1e-7;
 /// Most rounds at one penalty.
-const ROUNDS: usize = 5000;
+const PENALTY_ROUNDS: usize = 5000;
 /// Columns kept beyond which smaller penalties are not worth trying.
 const MOST_KEPT: usize = 60;
 
@@ -81,7 +81,7 @@ fn descend(
     sizes: &mut DVector<f64>,
     penalty: f64,
 ) {
-    for _ in 0..ROUNDS {
+    for _ in 0..PENALTY_ROUNDS {
         let mut most = 0.0_f64;
         for k in 0..sizes.len() {
             let pull = gradient[k] + sizes[k];

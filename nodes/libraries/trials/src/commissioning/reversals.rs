@@ -23,7 +23,7 @@
 //! | t, e | time and height of a peak; with index, of (1) | s, 1 |
 //!
 //! # Holds when
-//! The axis turns round once in [`LONGEST_S`], under an acceleration that changes little meanwhile.
+//! The axis turns round once in [`LONGEST_SPIKE_S`], under an acceleration that changes little meanwhile.
 //!
 //! # Agreement
 //! `eq1_the_peaks_of_a_made_up_spike_are_found_again`: 5 % of h, 1 % of w, 10 % of l, read through an
@@ -38,7 +38,7 @@ use metrology::Axis;
 use crate::proportion::median;
 
 /// A spike has passed its peak by then, s.
-const LONGEST_S: f64 = 0.15;
+const LONGEST_SPIKE_S: f64 = 0.15;
 /// Ticks before the reversal that say where the motor stood.
 const BEFORE: usize = 6;
 /// Neighbours whose mean counts: an encoder has steps.
@@ -57,7 +57,7 @@ const STEP_S: f64 = 1e-3;
 /// Values of each of both in a round of the search; the next round is between the neighbours of the best.
 const VALUES: u8 = 9;
 /// Rounds.
-const ROUNDS: usize = 5;
+const FIT_ROUNDS: usize = 5;
 
 /// One tick of a motor on a circle.
 #[derive(Clone, Copy, Debug, Default)]
@@ -138,7 +138,7 @@ impl Reversals {
         if turn.last.len() == MEAN_OF && height_mm > turn.peak[0] && since_s > 0.0 {
             turn.peak = [height_mm, since_s, 0.5 * size * since_s * since_s];
         }
-        if since_s > LONGEST_S {
+        if since_s > LONGEST_SPIKE_S {
             self.peaks.push(turn.peak);
             self.turn = None;
         }
@@ -175,7 +175,7 @@ fn nearest(peaks: &[&[f64; 3]]) -> Option<[f64; 3]> {
     }
     let mut ranges = [WIDTHS_S.map(f64::ln), LENGTHS_MM.map(f64::ln)];
     let mut best = (f64::INFINITY, [0.0; 3]);
-    for _ in 0..ROUNDS {
+    for _ in 0..FIT_ROUNDS {
         let step = ranges.map(|[low, high]| (high - low) / f64::from(VALUES - 1));
         for i in 0..VALUES {
             for k in 0..VALUES {
@@ -214,7 +214,7 @@ fn peak(width_s: f64, length_mm: f64, acceleration_mm_s2: f64) -> [f64; 2] {
     let kept = (-STEP_S / width_s).exp();
     let (mut lagging, mut behind) = (-1.0, 0.0);
     let (mut highest, mut t) = ([0.0, STEP_S], 0.0);
-    while t < LONGEST_S {
+    while t < LONGEST_SPIKE_S {
         let middle = t + 0.5 * STEP_S;
         let off = 2.0 * (-0.5 * acceleration_mm_s2 * middle * middle / length_mm).exp();
         let level = 1.0 - off;

@@ -24,7 +24,7 @@ pub(super) struct Waves {
 impl Waves {
     const STEP_MM: f64 = 0.25;
     /// Longer than any travel's diagonal, in steps.
-    const STEPS: u32 = 8000;
+    const DIAGONAL_STEPS: u32 = 8000;
 
     /// At a distance.
     pub(super) fn alike(&self, apart_mm: f64) -> f64 {
@@ -46,7 +46,7 @@ impl Default for Waves {
     fn default() -> Self {
         let at = |step: u32| alike(f64::from(step) * Self::STEP_MM);
         Self {
-            alike: (0..Self::STEPS).map(at).collect(),
+            alike: (0..Self::DIAGONAL_STEPS).map(at).collect(),
         }
     }
 }

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::LARGE_D;
+use super::MIN_D_OF_FOREIGN;
 use crate::calibration::calibration;
 use crate::proportion::{Proportion, median, quantile};
-use crate::target::LONGEST_S;
+use crate::target::LONGEST_DIAGNOSIS_S;
 use crate::verdict::Verdict;
 
 /// One number with what it is of.
@@ -57,7 +57,7 @@ pub fn of(own: &[&Verdict]) -> Vec<Figure> {
     };
     let sized = || pairs().filter_map(|(v, e)| Some((e, v.sized(e)?)));
     let scaled = sized()
-        .filter(|(e, _)| e.d > LARGE_D)
+        .filter(|(e, _)| e.d > MIN_D_OF_FOREIGN)
         .map(|(e, (error, _))| error.abs() * e.d);
     add(
         "median relative error of a parameter times D, D > 20",
@@ -68,7 +68,7 @@ pub fn of(own: &[&Verdict]) -> Vec<Figure> {
         own.iter()
             .filter_map(|v| v.said.as_ref().map(|said| (*v, said)))
     };
-    let hidden = || said().filter(|(v, _)| v.least_d().is_some_and(|d| d > LARGE_D));
+    let hidden = || said().filter(|(v, _)| v.least_d().is_some_and(|d| d > MIN_D_OF_FOREIGN));
     add(
         "median gap closed on held-out runs, D > 20",
         hidden()
@@ -101,7 +101,7 @@ fn times(own: &[&Verdict]) -> [Figure; 6] {
     let said = own.iter().filter_map(|v| Some(v.said.as_ref()?.runtime_s));
     let said: Vec<f64> = said.collect();
     let n = said.len();
-    let longer = Proportion::of(said.iter().map(|time_s| *time_s > LONGEST_S));
+    let longer = Proportion::of(said.iter().map(|time_s| *time_s > LONGEST_DIAGNOSIS_S));
     [
         Figure::middle("median time of a diagnosis, s", said.clone()),
         Figure::new(
@@ -115,7 +115,7 @@ fn times(own: &[&Verdict]) -> [Figure; 6] {
             n,
         ),
         Figure::count(
-            &format!("diagnoses that took longer than {LONGEST_S} s"),
+            &format!("diagnoses that took longer than {LONGEST_DIAGNOSIS_S} s"),
             longer,
         ),
         Figure::middle(

@@ -38,7 +38,8 @@ use super::super::error::ExportError;
 use super::super::file::ExportFile;
 use super::super::number::{fixed, mm_or_deg, unit};
 use super::{
-    CONTROL, Pitch, PitchTable, check_numbers, check_set_up, lines, notes, number_of_first, sums,
+    FANUC_TABLE, Pitch, PitchTable, check_numbers, check_set_up, lines, notes, number_of_first,
+    sums,
 };
 use crate::volumetric::on_line;
 
@@ -63,14 +64,14 @@ pub fn two_way_tables(errors: &AxisErrors, set_up: &PitchTable) -> Result<Pitch,
     check_set_up(errors, set_up)?;
     if set_up.magnification != 1 {
         return Err(ExportError::Setting {
-            control: CONTROL,
+            control: FANUC_TABLE,
             quantity: "magnification",
             value: f64::from(set_up.magnification),
             rule: "must be 1 for a table in each direction: no page seen says whether 3627 is multiplied",
         });
     }
     let axis = errors.axis();
-    let spacing = equal_spacing(CONTROL, axis, errors.position())?;
+    let spacing = equal_spacing(FANUC_TABLE, axis, errors.position())?;
     let first = number_of_first(errors, set_up, spacing)?;
     let at_reference = on_line(errors.position(), errors.up(), set_up.reference);
     let up = sums(errors.up(), at_reference, set_up);

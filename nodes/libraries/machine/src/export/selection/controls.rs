@@ -101,8 +101,8 @@ impl Control {
     #[must_use]
     pub fn without_sign(&self) -> Option<ExportError> {
         let (control, check) = match self {
-            Self::Heidenhain(None) => (heidenhain::CONTROL, heidenhain::CHECK),
-            Self::Fanuc(Fanuc { sign: None, .. }) => (fanuc::CONTROL, fanuc::CHECK),
+            Self::Heidenhain(None) => (heidenhain::HEIDENHAIN_TABLE, heidenhain::HEIDENHAIN_CHECK),
+            Self::Fanuc(Fanuc { sign: None, .. }) => (fanuc::FANUC_TABLE, fanuc::FANUC_CHECK),
             _ => return None,
         };
         Some(ExportError::SignUnproven { control, check })
@@ -265,8 +265,8 @@ fn fanuc_file(
 ) -> Result<ExportFile, ExportError> {
     let axis = own.axis();
     let sign = set_up.sign.ok_or(ExportError::SignUnproven {
-        control: fanuc::CONTROL,
-        check: fanuc::CHECK,
+        control: fanuc::FANUC_TABLE,
+        check: fanuc::FANUC_CHECK,
     })?;
     let table = fanuc::PitchTable {
         reference_number: set_up.reference_number[axis],
@@ -302,7 +302,7 @@ fn fanuc_file(
             .map(|(other, of)| (*other, numbers.0.max(of.0), numbers.1.min(of.1)));
         if let Some((other, number, _)) = both.find(|(_, from, to)| from <= to) {
             return Err(ExportError::NumberTaken {
-                control: fanuc::CONTROL,
+                control: fanuc::FANUC_TABLE,
                 axis,
                 number,
                 other,
@@ -365,8 +365,8 @@ fn heidenhain_axis(
     let span = spans.fold(own.span(), |a, b| (a.0.max(b.0), a.1.min(b.1)));
     let file = Grid::inside(axis, super::spacing(wanted, axis), span).and_then(|grid| {
         let sign = sign.ok_or(ExportError::SignUnproven {
-            control: heidenhain::CONTROL,
-            check: heidenhain::CHECK,
+            control: heidenhain::HEIDENHAIN_TABLE,
+            check: heidenhain::HEIDENHAIN_CHECK,
         })?;
         let own = own.on_grid(&grid)?;
         let others: Vec<CrossErrors> = others

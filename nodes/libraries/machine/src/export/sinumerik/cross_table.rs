@@ -13,10 +13,10 @@ use super::super::sign::{Sign, check, proven};
 use super::{POSITION_DECIMALS, VALUE_DECIMALS, check_name};
 use metrology::Axis;
 
-const CONTROL: &str = "SINUMERIK $AN_CEC";
+const CROSS_TABLE: &str = "SINUMERIK $AN_CEC";
 /// (1) of the module above.
 const SIGN: Sign = Sign::Minus;
-const PROOF: &str = "SINUMERIK 840D sl Function Manual Extended Functions, 03/2009, 6FC5397-1BP10-4BA0, K3 5.4.3 p. 372 (additional setpoint; a positive compensation value moves the axis in the negative direction): value = +error";
+const CROSS_TABLE_PROOF: &str = "SINUMERIK 840D sl Function Manual Extended Functions, 03/2009, 6FC5397-1BP10-4BA0, K3 5.4.3 p. 372 (additional setpoint; a positive compensation value moves the axis in the negative direction): value = +error";
 
 /// Directions of the input axis in which a table counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,10 +101,10 @@ struct Rows<'a> {
 
 impl Rows<'_> {
     fn check(&self, set_up: &CrossTable, table: usize) -> Result<f64, ExportError> {
-        check_name(CONTROL, &set_up.input_axis)?;
-        check_name(CONTROL, &set_up.output_axis)?;
+        check_name(CROSS_TABLE, &set_up.input_axis)?;
+        check_name(CROSS_TABLE, &set_up.output_axis)?;
         if table >= set_up.max_tables {
-            let (control, quantity, value) = (CONTROL, "table", table as f64);
+            let (control, quantity, value) = (CROSS_TABLE, "table", table as f64);
             let rule = "the control has fewer tables";
             return Err(ExportError::Setting {
                 control,
@@ -114,7 +114,7 @@ impl Rows<'_> {
             });
         }
         if !(set_up.max_sum.is_finite() && set_up.max_sum > 0.0) {
-            let (control, quantity, value) = (CONTROL, "max_sum", set_up.max_sum);
+            let (control, quantity, value) = (CROSS_TABLE, "max_sum", set_up.max_sum);
             let rule = "must be a finite number above 0";
             return Err(ExportError::Setting {
                 control,
@@ -123,11 +123,16 @@ impl Rows<'_> {
                 rule,
             });
         }
-        check_count(CONTROL, self.base, self.position.len(), set_up.max_points)?;
+        check_count(
+            CROSS_TABLE,
+            self.base,
+            self.position.len(),
+            set_up.max_points,
+        )?;
         for (position, error) in self.position.iter().zip(self.error) {
             if error.abs() > set_up.max_sum {
                 return Err(ExportError::BeyondLimit {
-                    control: CONTROL,
+                    control: CROSS_TABLE,
                     axis: self.direction,
                     position: *position,
                     value: mm_or_deg(self.direction, *error),
@@ -136,7 +141,7 @@ impl Rows<'_> {
                 });
             }
         }
-        equal_spacing(CONTROL, self.base, self.position)
+        equal_spacing(CROSS_TABLE, self.base, self.position)
     }
 
     fn table(
@@ -185,7 +190,7 @@ fn program(tables: &[String], set_up: &CrossTable, base: Axis, what: &str) -> Ex
             "positions in {} of {input}, values in mm (degrees where {output} is rotary)",
             unit(base)
         ),
-        proven(PROOF),
+        proven(CROSS_TABLE_PROOF),
         check(&format!(
             "write 0.010 at one node and 0 elsewhere, move {input} to that node, read a dial gauge along {output} with the table off and on: it must move by 10 um towards smaller {output}"
         )),

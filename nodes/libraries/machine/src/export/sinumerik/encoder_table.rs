@@ -7,10 +7,10 @@ use super::super::number::{fixed, mm_or_deg, unit};
 use super::super::sign::{Sign, check, proven};
 use super::{POSITION_DECIMALS, VALUE_DECIMALS, check_name};
 
-const CONTROL: &str = "SINUMERIK $AA_ENC_COMP";
+const ENCODER_TABLE: &str = "SINUMERIK $AA_ENC_COMP";
 /// (1) of the module above.
 const SIGN: Sign = Sign::Minus;
-const PROOF: &str = "SINUMERIK 840D sl / 828D Function Manual Extended Functions, 03/2013, 6FC5397-1BP40-3BA1, K3 4.4.2.1 p. 238 (a positive compensation value moves the axis in the negative direction): value = +error";
+const ENCODER_TABLE_PROOF: &str = "SINUMERIK 840D sl / 828D Function Manual Extended Functions, 03/2013, 6FC5397-1BP40-3BA1, K3 4.4.2.1 p. 238 (a positive compensation value moves the axis in the negative direction): value = +error";
 
 /// What the control's set-up says.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,21 +34,26 @@ pub fn encoder_table(
     errors: &AxisErrors,
     set_up: &EncoderTable,
 ) -> Result<ExportFile, ExportError> {
-    check_name(CONTROL, &set_up.machine_axis)?;
+    check_name(ENCODER_TABLE, &set_up.machine_axis)?;
     let axis = errors.axis();
     if set_up.encoder > 1 {
         let value = f64::from(set_up.encoder);
         let rule = "must be 0 or 1";
         return Err(ExportError::Setting {
-            control: CONTROL,
+            control: ENCODER_TABLE,
             quantity: "encoder",
             value,
             rule,
         });
     }
-    check_count(CONTROL, axis, errors.position().len(), set_up.max_points)?;
-    let spacing = equal_spacing(CONTROL, axis, errors.position())?;
-    let error = errors.of_both_directions(CONTROL)?;
+    check_count(
+        ENCODER_TABLE,
+        axis,
+        errors.position().len(),
+        set_up.max_points,
+    )?;
+    let spacing = equal_spacing(ENCODER_TABLE, axis, errors.position())?;
+    let error = errors.of_both_directions(ENCODER_TABLE)?;
     check_reference(errors, set_up.reference)?;
 
     let index = format!("{},{}", set_up.encoder, set_up.machine_axis);
@@ -85,7 +90,7 @@ fn check_reference(errors: &AxisErrors, reference: f64) -> Result<(), ExportErro
     let rounded = fixed(mm_or_deg(axis, error), VALUE_DECIMALS);
     if rounded.bytes().any(|c| (b'1'..=b'9').contains(&c)) {
         return Err(ExportError::ReferenceNotZero {
-            control: CONTROL,
+            control: ENCODER_TABLE,
             axis,
             reference,
             error,
@@ -102,7 +107,7 @@ fn notes(errors: &AxisErrors, set_up: &EncoderTable) -> Vec<String> {
             "SINUMERIK error table of axis {axis} ({name}), values and positions in {}",
             unit(axis)
         ),
-        proven(PROOF),
+        proven(ENCODER_TABLE_PROOF),
         check(&format!(
             "write 0.010 at one node and 0 elsewhere, move {name} to that node, read a dial gauge along {name} with the table off and on: it must move by 10 um towards smaller {name}"
         )),

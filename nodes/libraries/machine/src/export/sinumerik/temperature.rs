@@ -19,9 +19,9 @@ use super::check_name;
 use metrology::Axis;
 use metrology::sample::ThermalModel;
 
-const CONTROL: &str = "SINUMERIK temperature compensation";
+const TEMPERATURE_TABLE: &str = "SINUMERIK temperature compensation";
 /// One step at the machine that shows the sign.
-const CHECK: &str = "with the axis at rest and MD32750 = 1 enter SD43900 $SA_TEMP_COMP_ABS_VALUE = 0.010 and read a dial gauge along the axis: the display stays and the dial moves by 10 um, towards greater positions: --sign plus, towards smaller ones: --sign minus; then set it back to 0";
+const TEMPERATURE_CHECK: &str = "with the axis at rest and MD32750 = 1 enter SD43900 $SA_TEMP_COMP_ABS_VALUE = 0.010 and read a dial gauge along the axis: the display stays and the dial moves by 10 um, towards greater positions: --sign plus, towards smaller ones: --sign minus; then set it back to 0";
 const SLOPE_DECIMALS: usize = 9;
 const VALUE_DECIMALS: usize = 6;
 
@@ -58,16 +58,16 @@ pub fn temperature(
     axis: Axis,
     set_up: &Temperature,
 ) -> Result<ExportFile, ExportError> {
-    check_name(CONTROL, &set_up.machine_axis)?;
+    check_name(TEMPERATURE_TABLE, &set_up.machine_axis)?;
     if !axis.is_linear() {
         return Err(ExportError::NotLinear {
-            control: CONTROL,
+            control: TEMPERATURE_TABLE,
             axis,
         });
     }
     let sign = set_up.sign.ok_or(ExportError::SignUnproven {
-        control: CONTROL,
-        check: CHECK,
+        control: TEMPERATURE_TABLE,
+        check: TEMPERATURE_CHECK,
     })?;
     if model.quarantined {
         return Err(ExportError::Quarantined { axis });
@@ -99,7 +99,7 @@ pub fn temperature(
         let counts = other != axis && slope.abs() > 0.0;
         if (counts || !slope.is_finite()) && set_up.other_axes == OtherAxes::Refuse {
             return Err(ExportError::DriftOfOtherAxis {
-                control: CONTROL,
+                control: TEMPERATURE_TABLE,
                 axis,
                 other,
                 slope,
@@ -118,7 +118,7 @@ pub fn temperature(
 
 fn check_slope(axis: Axis, slope: f64, position: f64, limit: f64) -> Result<(), ExportError> {
     if !(limit.is_finite() && limit > 0.0) {
-        let (control, quantity, value) = (CONTROL, "max_slope", limit);
+        let (control, quantity, value) = (TEMPERATURE_TABLE, "max_slope", limit);
         let rule = "must be a finite number above 0";
         return Err(ExportError::Setting {
             control,
@@ -128,7 +128,7 @@ fn check_slope(axis: Axis, slope: f64, position: f64, limit: f64) -> Result<(), 
         });
     }
     if slope.abs() > limit {
-        let (control, value, unit) = (CONTROL, slope, "mm/mm");
+        let (control, value, unit) = (TEMPERATURE_TABLE, slope, "mm/mm");
         return Err(ExportError::BeyondLimit {
             control,
             axis,
@@ -159,7 +159,7 @@ fn program(
     let mut notes = vec![
         format!("SINUMERIK temperature compensation of axis {axis} ({name}), mm and mm/mm"),
         given(sign),
-        check(CHECK),
+        check(TEMPERATURE_CHECK),
         format!("set MD32750[{name}] = 3 once; MD32760 limits how fast a change is travelled"),
         format!(
             "fitted at {} ns, may be used until {} ns of the host's clock: a drift is of its hour",

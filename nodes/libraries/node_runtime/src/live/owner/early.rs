@@ -17,9 +17,9 @@ use crate::node::Bytes;
 type Prefix = [u8; 12];
 
 /// From discovery to a writer that knows its reader.
-const SETTLING: Duration = Duration::from_millis(20);
+const WRITER_SETTLING: Duration = Duration::from_millis(20);
 /// After this a request is answered all the same: its answer may be read elsewhere.
-const PATIENCE: Duration = Duration::from_secs(1);
+const READER_TIMEOUT: Duration = Duration::from_secs(1);
 /// Between looks for readers while requests wait.
 pub(super) const POLL: Duration = Duration::from_millis(5);
 /// Clients that are remembered.
@@ -51,7 +51,7 @@ impl Hearing {
     /// Whether a client hears a server's answers; `looks` says whether its reader is seen now.
     fn hears(&mut self, of: (usize, Prefix), now: Instant, looks: impl FnOnce() -> bool) -> bool {
         match self.since.get(&of) {
-            Some(since) => now.duration_since(*since) >= SETTLING,
+            Some(since) => now.duration_since(*since) >= WRITER_SETTLING,
             None => {
                 if looks() {
                     if self.since.len() >= MOST_CLIENTS {
@@ -80,7 +80,7 @@ impl Owner {
             client,
             to,
             bytes,
-            until: now + PATIENCE,
+            until: now + READER_TIMEOUT,
         });
     }
 
@@ -117,7 +117,7 @@ mod tests {
         let (now, client) = (Instant::now(), (3, [7; 12]));
         assert!(!hearing.hears(client, now, || false), "no reader yet");
         assert!(!hearing.hears(client, now, || true), "just seen");
-        let later = now + SETTLING;
+        let later = now + WRITER_SETTLING;
         assert!(hearing.hears(client, later, || panic!("known by now")));
         assert!(
             !hearing.hears((4, [7; 12]), later, || false),
