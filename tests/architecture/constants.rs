@@ -20,7 +20,7 @@ fn ambiguous<'s>(files: impl Iterator<Item = (&'s str, &'s Source)>) -> Vec<Stri
     for (path, source) in files {
         for constant in &source.constants {
             let values = known
-                .entry((crate_of(path), &constant.name.text))
+                .entry((crate_of(path), constant.name.text.as_str()))
                 .or_default();
             let place = format!("{path}:{}", constant.name.line);
             values

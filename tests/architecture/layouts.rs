@@ -176,7 +176,7 @@ fn unknown_frames(named: &[String], machine: &str) -> Vec<String> {
 fn the_layouts_three_dimensional_panel_names_frames_of_the_cell() {
     let named = frames_of_foxglove(&tree::text("launch_configs/cell.foxglove.json").unwrap());
     assert!(named.len() > 10, "{named:?}");
-    let cell = tree::text("launch_configs/short_cell/machine.yaml").unwrap();
+    let cell = tree::text("launch_configs/first_run/machine.yaml").unwrap();
     check(&unknown_frames(&named, &cell));
     let bad = r#"{"configById": {"3D!a": {"followTf": "bed", "transforms": {"frame:x_slide": {}, "frame:b_rotary": {}}}}}"#;
     assert_eq!(unknown_frames(&frames_of_foxglove(bad), &cell).len(), 2);

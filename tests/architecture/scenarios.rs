@@ -319,3 +319,43 @@ fn arch_the_hosts_of_a_cell_launch_together_what_the_cell_launches_and_an_archiv
     });
     assert_eq!(wrong.1.len(), 1);
 }
+
+/// Files of one name that have one text, which a `base` would share.
+fn copies(files: &[tree::File]) -> Vec<String> {
+    let mut known: BTreeMap<(&str, &str), &str> = BTreeMap::new();
+    let mut found = Vec::new();
+    for file in files {
+        let name = file.path.rsplit('/').next().unwrap();
+        match known.insert((name, file.text.as_str()), &file.path) {
+            Some(other) if !file.text.contains("base: ") => found.push(format!(
+                "{}: is {other} again: base: PATH shares it",
+                file.path
+            )),
+            _ => {}
+        }
+    }
+    found
+}
+
+#[test]
+fn arch_scenarios_share_machines_and_plants() {
+    let mut files = tree::files(FOLDER, "/machine.yaml");
+    files.extend(tree::files(FOLDER, "/plant.yaml"));
+    assert!(files.len() > 30, "{}", files.len());
+    check(&copies(&files));
+    let file = |path: &str, text: &str| tree::File {
+        path: path.to_owned(),
+        text: text.to_owned(),
+    };
+    let bad = [
+        file("a/plant.yaml", "seed: 1\n"),
+        file("b/plant.yaml", "seed: 1\n"),
+        file("c/machine.yaml", "seed: 1\n"),
+        file("d/machine.yaml", "base: ../c/machine.yaml\n"),
+        file("e/machine.yaml", "base: ../c/machine.yaml\n"),
+    ];
+    assert_eq!(
+        copies(&bad),
+        ["b/plant.yaml: is a/plant.yaml again: base: PATH shares it"]
+    );
+}

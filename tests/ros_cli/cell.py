@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 SCENARIO = "short_cell"
+BASE = "first_run"
 NODES = [
     "axis_compensation",
     "fake_cnc",
@@ -27,7 +28,9 @@ def replaced(file: Path, old: str, new: str) -> None:
 def waiting_copy(root: Path, folder: Path) -> Path:
     """The scenario with a plan that begins in an hour: the machine stands still until asked."""
     cell = folder / SCENARIO
-    shutil.copytree(root / "launch_configs" / SCENARIO, cell)
+    # Machine and plant of the scenario are those of its base.
+    for name in (BASE, SCENARIO):
+        shutil.copytree(root / "launch_configs" / name, folder / name)
     replaced(cell / "sequencer.yaml", "start_delay_s: 3.0", "start_delay_s: 3600.0")
     replaced(cell / "scenario.yaml", "limit_min: 3.0", "limit_min: 60.0")
     return cell

@@ -103,7 +103,8 @@ fn spoiled_files_are_refused_with_their_place() {
         return;
     };
     let files = files();
-    let first = |name: &str| files[name][0].1.clone();
+    let own = |(_, value): &&(PathBuf, Value)| value.get("base").is_none();
+    let first = |name: &str| files[name].iter().find(own).unwrap().1.clone();
     let spoiled = [
         (
             "machine",
@@ -114,6 +115,11 @@ fn spoiled_files_are_refused_with_their_place() {
             "machine",
             with(&first("machine"), "/axes/X", json!({"travel_deg": [0, 1]})),
             "$.axes.X",
+        ),
+        (
+            "machine",
+            json!({"base": "../first_run/machine.yaml", "name": "mill"}),
+            "$",
         ),
         (
             "plan",

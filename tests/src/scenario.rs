@@ -3,9 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use node_runtime::text_file;
 use tempfile::TempDir;
 
 use crate::program::{Ended, Process, command, root};
+
+/// Files that scenarios share by the key `base`.
+const SHARED: [&str; 2] = ["machine.yaml", "plant.yaml"];
 
 /// A copy of a scenario in a temporary folder.
 pub struct Scenario {
@@ -26,11 +30,13 @@ impl Scenario {
         for entry in std::fs::read_dir(root().join("launch_configs").join(name)).unwrap() {
             let from = entry.unwrap().path();
             if from.is_file() {
-                std::fs::copy(
-                    &from,
-                    scenario.path(&from.file_name().unwrap().to_string_lossy()),
-                )
-                .unwrap();
+                let name = from.file_name().unwrap().to_string_lossy().into_owned();
+                // A copy stands elsewhere: what its base has is its own.
+                let held = SHARED
+                    .contains(&name.as_str())
+                    .then(|| text_file::yaml_file(&from));
+                let held = held.map_or(from, |file| file.unwrap().path);
+                std::fs::copy(held, scenario.path(&name)).unwrap();
             }
         }
         scenario

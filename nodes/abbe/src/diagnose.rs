@@ -103,10 +103,10 @@ impl Diagnose {
     /// When a bag or the machine file cannot be read, nothing was repeated, or the bag is another machine's.
     pub fn execute(self) -> Result<ExitCode> {
         let (name, text) = match &self.machine {
-            Some(path) => (
-                path.display().to_string(),
-                text_file::yaml(path).context("machine file")?,
-            ),
+            Some(path) => {
+                let file = text_file::yaml_file(path).context("machine file")?;
+                (file.path.display().to_string(), file.text)
+            }
             None => bags::machine_text(&self.bags[0])?,
         };
         // An empty file is a place that was made for it.
@@ -215,9 +215,9 @@ pub fn of(
 /// # Errors
 /// When a plot cannot be drawn or the report not written.
 pub fn of_run(bag: &Path, folder: &Path, machine: &Path, explain: bool) -> Result<Report> {
-    let text = text_file::yaml(machine).context("machine file")?;
-    let name = machine.display().to_string();
-    match of(&[bag.to_owned()], &name, &text, &GapConfig::default()) {
+    let file = text_file::yaml_file(machine).context("machine file")?;
+    let name = file.path.display().to_string();
+    match of(&[bag.to_owned()], &name, &file.text, &GapConfig::default()) {
         Ok(diagnosed) => {
             let json = serde_json::to_string_pretty(&diagnosed.json()?)?;
             let path = folder.join("gap.json");

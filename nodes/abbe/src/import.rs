@@ -85,9 +85,10 @@ impl Named {
     /// # Errors
     /// When it cannot be read.
     pub fn read(path: &Path, what: &'static str) -> Result<Self> {
+        let file = text_file::yaml_file(path).context(what)?;
         Ok(Self {
-            place: path.display().to_string(),
-            text: text_file::yaml(path).context(what)?,
+            place: file.path.display().to_string(),
+            text: file.text,
         })
     }
 }

@@ -61,6 +61,14 @@ fn text(path: &std::path::Path) -> Result<String> {
     Ok(text_file::yaml(path)?)
 }
 
+fn machine_file(path: &std::path::Path) -> Result<MachineFile> {
+    let file = text_file::yaml_file(path)?;
+    Ok(MachineFile::parse(
+        &file.text,
+        &file.path.display().to_string(),
+    )?)
+}
+
 fn stamp(key: &str, text: &str) -> Result<Stamp<Machine>> {
     read_stamp(text).with_context(|| format!("{key}: \"{text}\" is no stamp"))
 }
@@ -116,7 +124,7 @@ impl ImportShift {
     /// When a file cannot be read or written, or the other machine cannot do what the log says.
     pub fn execute(self) -> Result<ExitCode> {
         let place = |path: &PathBuf| path.display().to_string();
-        let machine = MachineFile::parse(&text(&self.machine)?, &place(&self.machine))?;
+        let machine = machine_file(&self.machine)?;
         let order_text = text(&self.order)?;
         let in_order = |error: &dyn std::fmt::Display| {
             let message = error.to_string();

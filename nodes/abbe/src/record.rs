@@ -79,10 +79,10 @@ impl Record {
         let interruption = Interruption::listen("the bag is being closed")?;
         let config = self.config()?;
         let machine = self.machine.as_ref().map(|path| {
-            let text = text_file::yaml(path).context("--machine")?;
+            let file = text_file::yaml_file(path).context("--machine")?;
             // A bag with a text that is no machine file is refused by every verb that reads it.
-            MachineFile::parse(&text, &path.display().to_string())?;
-            anyhow::Ok(text)
+            MachineFile::parse(&file.text, &file.path.display().to_string())?;
+            anyhow::Ok(file.text)
         });
         let machine = machine.transpose()?;
         if config.ring.is_some() {

@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use machine::MachineFile;
 use schemars::schema_for;
 use sequencer::plan::Plan;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::evaluate::budget::Budget;
 use crate::evaluate::limits::Limits;
@@ -63,7 +63,22 @@ fn schema_of(name: Name) -> Value {
         Name::ImportMap => ("map of abbe import", schema_for!(Map)),
     };
     schema.insert("title".to_owned(), title.into());
-    schema.to_value()
+    with_base(schema.to_value())
+}
+
+/// A schema that takes `base` as the only key as well: the path of the file that has the others.
+fn with_base(mut schema: Value) -> Value {
+    let required = schema
+        .as_object_mut()
+        .and_then(|all| all.remove("required"));
+    schema["properties"]["base"] = json!({
+        "description": "Path of the file whose contents this one has, relative to its folder; then the only key.",
+        "type": "string",
+    });
+    schema["if"] = json!({"required": ["base"]});
+    schema["then"] = json!({"maxProperties": 1});
+    schema["else"] = json!({"required": required.unwrap_or_else(|| json!([]))});
+    schema
 }
 
 #[cfg(test)]
@@ -104,9 +119,10 @@ mod tests {
         let machine = schema_of(Name::Machine);
         assert_eq!(machine["additionalProperties"], false);
         assert_eq!(
-            machine["required"],
+            machine["else"]["required"],
             serde_json::json!(["name", "chain", "axes"])
         );
+        assert_eq!(machine["then"]["maxProperties"], 1);
         let mut axes = keys(&machine, "/properties/axes/properties");
         axes.sort_unstable();
         assert_eq!(axes, ["A", "B", "C", "X", "Y", "Z"]);

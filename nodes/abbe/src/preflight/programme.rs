@@ -226,6 +226,9 @@ fn plan_file(path: &Path) -> Result<Plan> {
 }
 
 fn machine_file(path: &Path) -> Result<MachineFile> {
-    let text = text_file::yaml(path).context("machine file")?;
-    Ok(MachineFile::parse(&text, &path.display().to_string())?)
+    let file = text_file::yaml_file(path).context("machine file")?;
+    Ok(MachineFile::parse(
+        &file.text,
+        &file.path.display().to_string(),
+    )?)
 }

@@ -146,9 +146,9 @@ pub fn check(
 }
 
 fn machine_of(path: &Path) -> Result<(MachineFile, String)> {
-    let text = text_file::yaml(path).context("machine file")?;
-    let machine = MachineFile::parse(&text, &path.display().to_string())?;
-    Ok((machine, text))
+    let file = text_file::yaml_file(path).context("machine file")?;
+    let machine = MachineFile::parse(&file.text, &file.path.display().to_string())?;
+    Ok((machine, file.text))
 }
 
 fn read(path: &Path, kind: Kind, machine: Option<&MachineFile>) -> Result<()> {
@@ -158,7 +158,8 @@ fn read(path: &Path, kind: Kind, machine: Option<&MachineFile>) -> Result<()> {
     if kind == Kind::Parameters {
         return parameters(path);
     }
-    let text = text_file::yaml(path)?;
+    let file = text_file::yaml_file(path)?;
+    let (path, text) = (file.path.as_path(), file.text);
     let placed = |what: &str, message: &str| {
         let place = path.display().to_string();
         anyhow!("{what} {}", yaml::placed(&place, &text, message))

@@ -4,6 +4,7 @@
 //! column, the whole path of the key, what stands there, what belongs there in which unit. Checks that come after
 //! reading know a key and no line; [`Places`] gives them the line.
 
+mod base;
 mod homes;
 mod places;
 mod words;
@@ -12,6 +13,7 @@ use std::fmt;
 
 use serde::de::DeserializeOwned;
 
+pub use base::base_of;
 pub use places::{Place, Places};
 pub use words::{known_keys, wanted};
 

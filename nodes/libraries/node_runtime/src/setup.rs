@@ -148,7 +148,7 @@ impl Setup {
     }
 
     fn add_file(&mut self, path: &Path) -> Result<(), SetupError> {
-        let text = text_file::yaml(path)?;
+        let text = text_file::read(path, text_file::Comments::Yaml)?;
         let sections = file::sections(path, &text, &self.names.fully_qualified())?;
         let others = sections.of_others.iter();
         self.of_others
@@ -335,15 +335,15 @@ impl Setup {
         }
     }
 
-    /// Path and text of the file that the parameter `key` names; a relative path is relative to the
+    /// Path and text of the file that the parameter `key` names, or of the base of that file; a relative path is relative to the
     /// parameter file that says so.
     ///
     /// # Errors
     /// When the parameter is absent or no text, or the file cannot be read.
     pub fn file_text(&self, key: &str) -> anyhow::Result<(PathBuf, String)> {
         let path = self.file_path(key)?;
-        let text = text_file::yaml(&path).with_context(|| format!("parameter `{key}`"))?;
-        Ok((path, text))
+        let file = text_file::yaml_file(&path).with_context(|| format!("parameter `{key}`"))?;
+        Ok((file.path, file.text))
     }
 
     /// The file that the parameter `key` names, open, and its length: it is read in pieces, however long it is.

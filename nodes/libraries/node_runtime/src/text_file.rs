@@ -12,11 +12,24 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 
 use metrology::text::{self, TextError};
+use metrology::yaml::{self, YamlError};
 
 pub use metrology::text::Comments;
 
 /// Length of a text: a program of 1,000,000 lines, the most that a control takes, has a tenth of it.
 const MAX_TEXT_BYTES: u64 = 256 << 20;
+
+/// Most files of a chain in which each names the next as its base.
+const MAX_BASES: usize = 8;
+
+/// A YAML text and the file that holds it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct YamlFile {
+    /// The file that was named, or the one that its key `base` leads to.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+}
 
 /// Why a file gives no text.
 #[derive(Debug, thiserror::Error)]
@@ -52,6 +65,34 @@ pub enum TextFileError {
         path: PathBuf,
         /// Line, column and byte.
         source: TextError,
+    },
+    /// Its key `base` is no path, or not its only key.
+    #[error("{path}:{reason}", path = path.display())]
+    BadBase {
+        /// Which.
+        path: PathBuf,
+        /// Line, column and what is wrong.
+        reason: YamlError,
+    },
+    /// The file that its key `base` names cannot be read.
+    #[error("{path}: base = {base}: {reason}: must name a file that can be read, relative to the folder of this one", path = path.display())]
+    UnreadableBase {
+        /// Which.
+        path: PathBuf,
+        /// What it names.
+        base: String,
+        /// Why that cannot be read.
+        reason: Box<TextFileError>,
+    },
+    /// The files that `base` leads to never end.
+    #[error("{path}: base leads through {chain}: must lead to a file with keys of its own after at most {most} files: let one of them hold the keys", path = path.display())]
+    EndlessBase {
+        /// Which.
+        path: PathBuf,
+        /// The files on the way.
+        chain: String,
+        /// The limit.
+        most: usize,
     },
 }
 
@@ -142,12 +183,61 @@ fn bytes_at_most(path: &Path, most_bytes: u64) -> Result<Vec<u8>, TextFileError>
     Ok(bytes)
 }
 
-/// The text of a YAML file, as [`read`].
+/// The text of a YAML file, as [`yaml_file`].
 ///
 /// # Errors
-/// As [`read`].
+/// As [`yaml_file`].
 pub fn yaml(path: &Path) -> Result<String, TextFileError> {
-    read(path, Comments::Yaml)
+    Ok(yaml_file(path)?.text)
+}
+
+/// A YAML file; where `base: PATH` is its only key, the file at that path, relative to its own folder.
+///
+/// # Errors
+/// As [`read`]; where `base` is no path, is not the only key, names no file that can be read, or leads back to its own file.
+pub fn yaml_file(path: &Path) -> Result<YamlFile, TextFileError> {
+    let mut path = path.to_owned();
+    let mut text = read(&path, Comments::Yaml)?;
+    let mut chain = vec![path.clone()];
+    while let Some(base) = base_of(&path, &text)? {
+        let next = path.parent().unwrap_or(Path::new("")).join(&base);
+        let is_known = chain.iter().any(|known| is_same(known, &next));
+        if is_known || chain.len() > MAX_BASES {
+            chain.push(next);
+            let names: Vec<_> = chain
+                .iter()
+                .map(|file| file.display().to_string())
+                .collect();
+            return Err(TextFileError::EndlessBase {
+                path: chain.swap_remove(0),
+                chain: names.join(" -> "),
+                most: MAX_BASES,
+            });
+        }
+        text = read(&next, Comments::Yaml).map_err(|reason| TextFileError::UnreadableBase {
+            path,
+            base,
+            reason: Box::new(reason),
+        })?;
+        path = next;
+        chain.push(path.clone());
+    }
+    Ok(YamlFile { path, text })
+}
+
+fn base_of(path: &Path, text: &str) -> Result<Option<String>, TextFileError> {
+    yaml::base_of(text).map_err(|reason| TextFileError::BadBase {
+        path: path.to_owned(),
+        reason,
+    })
+}
+
+/// Whether two paths lead to one file.
+fn is_same(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
 }
 
 #[cfg(test)]
@@ -220,5 +310,75 @@ mod tests {
             }
         }
         assert!(open(&folder.path().join("none")).unwrap_err().is_absent());
+    }
+
+    #[test]
+    fn a_base_is_read_in_place_of_the_file_that_names_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["mill", "copy"] {
+            std::fs::create_dir(at(name)).unwrap();
+        }
+        std::fs::write(at("mill/machine.yaml"), "name: mill\n").unwrap();
+        std::fs::write(
+            at("copy/machine.yaml"),
+            "# shared\nbase: ../mill/machine.yaml\n",
+        )
+        .unwrap();
+        std::fs::write(at("third.yaml"), "base: copy/machine.yaml\n").unwrap();
+        let read = yaml_file(&at("third.yaml")).unwrap();
+        assert_eq!(read.text, "name: mill\n");
+        assert_eq!(read.path, at("copy/../mill/machine.yaml"));
+        assert_eq!(yaml(&at("mill/machine.yaml")).unwrap(), "name: mill\n");
+        let place = at("mill/machine.yaml").display().to_string();
+        std::fs::write(at("absolute.yaml"), format!("base: {place}\n")).unwrap();
+        assert_eq!(yaml(&at("absolute.yaml")).unwrap(), "name: mill\n");
+    }
+
+    #[test]
+    fn a_base_that_leads_nowhere_or_back_is_refused_with_the_way() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for (name, text) in [
+            ("gone.yaml", "base: none.yaml\n".to_owned()),
+            ("self.yaml", "base: ./self.yaml\n".to_owned()),
+            ("a.yaml", "base: b.yaml\n".to_owned()),
+            ("b.yaml", "base: a.yaml\n".to_owned()),
+            ("both.yaml", "base: a.yaml\nname: mill\n".to_owned()),
+            ("folder.yaml", "base: .\n".to_owned()),
+        ] {
+            std::fs::write(at(name), text).unwrap();
+        }
+        for n in 0..20 {
+            let next = format!("base: long_{}.yaml\n", n + 1);
+            std::fs::write(at(&format!("long_{n}.yaml")), next).unwrap();
+        }
+        for (name, words) in [
+            (
+                "gone.yaml",
+                &["/gone.yaml: base = none.yaml: ", "/none.yaml: No such file"][..],
+            ),
+            (
+                "self.yaml",
+                &[
+                    "/self.yaml: base leads through ",
+                    "let one of them hold the keys",
+                ],
+            ),
+            ("a.yaml", &["/a.yaml -> ", "/b.yaml -> "]),
+            (
+                "both.yaml",
+                &["/both.yaml:1:7: base = a.yaml: must be the only key"],
+            ),
+            ("folder.yaml", &["/folder.yaml: base = .: ", "is a folder"]),
+            ("long_0.yaml", &["after at most 8 files"]),
+        ] {
+            let error = yaml_file(&at(name)).unwrap_err();
+            assert!(!error.is_absent(), "{error}");
+            for words in words {
+                assert!(error.to_string().contains(words), "{words}: {error}");
+            }
+        }
+        assert!(yaml_file(&at("none.yaml")).unwrap_err().is_absent());
     }
 }

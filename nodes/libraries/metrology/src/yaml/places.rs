@@ -200,7 +200,8 @@ impl Places {
         Some(node)
     }
 
-    fn children(&self, node: usize) -> impl Iterator<Item = usize> {
+    /// The nodes right below a node.
+    pub(super) fn children(&self, node: usize) -> impl Iterator<Item = usize> {
         let nodes = self.nodes.iter().enumerate().skip(node + 1);
         nodes
             .filter(move |(_, child)| child.parent == Some(node))

@@ -282,3 +282,37 @@ fn a_count_is_refused_with_the_range_of_its_key() {
         assert_eq!(wanted(kind, key), words, "{key}");
     }
 }
+
+#[test]
+fn a_base_is_a_path_and_the_only_key_of_its_file() {
+    for (text, wanted) in [
+        (
+            "# shared\nbase: ../first_run/machine.yaml\n",
+            Some("../first_run/machine.yaml"),
+        ),
+        ("\"base\": 'a b.yaml'\n", Some("a b.yaml")),
+        ("{base: m.yaml}", Some("m.yaml")),
+        ("name: base\naxes: {base: x}\n", None),
+        ("- base: x\n", None),
+        ("base", None),
+        ("", None),
+    ] {
+        assert_eq!(base_of(text).unwrap().as_deref(), wanted, "{text}");
+    }
+    for (text, wanted) in [
+        (
+            "base: m.yaml\nname: mill\n",
+            "1:7: base = m.yaml: must be the only key of its file",
+        ),
+        ("name: mill\nbase: m.yaml\n", "but name stands beside it"),
+        (
+            "base:\n",
+            "base = nothing: must be the path of a file, relative to the folder of this one",
+        ),
+        ("base: [m.yaml]\n", "base = a list of 1: must be the path"),
+        ("\nbase: {path: m.yaml}\n", "2:1: base = 1 keys: must be"),
+    ] {
+        let error = base_of(text).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{text}: {error}");
+    }
+}
