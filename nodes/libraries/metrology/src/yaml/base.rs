@@ -29,8 +29,8 @@ pub fn base_of(text: &str) -> Result<Option<String>, YamlError> {
         rule,
     };
     if keys.len() > 1 {
-        let others: Vec<&str> = keys.iter().filter_map(|key| places.name(*key)).collect();
-        let others = others.into_iter().filter(|name| *name != BASE);
+        let others = keys.iter().filter(|key| **key != base);
+        let others = others.filter_map(|key| places.name(*key));
         return Err(error(format!(
             "must be the only key of its file, which has all of the base's contents, but {} stands beside it: \
              leave out base and copy its file, or leave out the other keys",

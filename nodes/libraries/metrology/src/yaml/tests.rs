@@ -305,6 +305,7 @@ fn a_base_is_a_path_and_the_only_key_of_its_file() {
             "1:7: base = m.yaml: must be the only key of its file",
         ),
         ("name: mill\nbase: m.yaml\n", "but name stands beside it"),
+        ("base: m.yaml\nbase: n.yaml\n", "but base stands beside it"),
         (
             "base:\n",
             "base = nothing: must be the path of a file, relative to the folder of this one",
