@@ -88,10 +88,7 @@ impl Hour {
         self.run += u32::from(begin);
         let is_circle = kind == TestKind::Circle;
         self.builder.take(Input::Segment(TestSegment {
-            at: self.at(),
-            run: self.run,
             begin,
-            kind,
             plane: if is_circle {
                 TestPlane::Xy
             } else {
@@ -105,15 +102,9 @@ impl Hour {
                 t if t < 0.0 => Sense::Clockwise,
                 _ => Sense::None,
             },
-            repeat: 0,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
             zero_id: u32::from(is_circle),
             setup_id: u32::from(is_circle),
-            cold: false,
-            features: vec![],
-            completed: true,
+            ..TestSegment::of_kind(kind, self.run, self.at())
         }));
     }
 

@@ -168,31 +168,18 @@ mod tests {
     use machine::twin::{Channel, Motion, Reading};
     use metrology::Stamp;
     use metrology::sample::{TestKind, TestPlane};
-    use nalgebra::Vector3;
 
     use super::*;
 
     fn run(number: u32, kind: TestKind, radius_mm: f64, feed_mm_s: f64) -> Run {
         Run {
             segment: TestSegment {
-                at: Stamp::from_nanos(0),
-                run: number,
-                begin: true,
-                kind,
                 plane: TestPlane::Xy,
-                centre_mm: Vector3::zeros(),
                 radius_mm,
                 feed_mm_s,
-                sense: Sense::None,
-                repeat: 0,
-                stylus: String::new(),
-                tool_offset_mm: Vector3::zeros(),
-                stations: 0,
                 zero_id: 1,
                 setup_id: 1,
-                cold: false,
-                features: vec![],
-                completed: true,
+                ..TestSegment::of_kind(kind, number, Stamp::from_nanos(0))
             },
             motion: Motion::default(),
             touches: vec![],

@@ -172,8 +172,6 @@ fn slope_k_per_min(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metrology::sample::{Sense, TestPlane};
-    use nalgebra::Vector3;
 
     fn at(s: i64) -> Stamp<Host> {
         Stamp::from_nanos(s * 1_000_000_000)
@@ -188,24 +186,10 @@ mod tests {
 
     fn segment(kind: TestKind, begin: bool, at_s: i64, feed_mm_s: f64) -> TestSegment {
         TestSegment {
-            at: at(at_s),
-            run: 1,
             begin,
-            kind,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
             feed_mm_s,
-            sense: Sense::None,
-            repeat: 0,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
-            zero_id: 0,
-            setup_id: 0,
-            cold: false,
-            features: Vec::new(),
             completed: !begin,
+            ..TestSegment::of_kind(kind, 1, at(at_s))
         }
     }
 

@@ -337,7 +337,6 @@ pub fn level(up: &mut [Vec<f64>], down: &mut [Vec<f64>]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metrology::sample::{Sense, TestPlane};
     use metrology::{AxisSet, PerAxis};
 
     const TICK_NANOS: i64 = 10_000_000;
@@ -350,24 +349,14 @@ mod tests {
         features: &[&str],
     ) -> TestSegment {
         TestSegment {
-            at: Stamp::from_nanos(0),
-            run,
             begin,
-            kind,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
             feed_mm_s: 10.0,
-            sense: Sense::None,
             repeat,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
             zero_id: 1,
             setup_id: 1,
-            cold: false,
             features: features.iter().map(|name| (*name).to_owned()).collect(),
             completed: !begin,
+            ..TestSegment::of_kind(kind, run, Stamp::from_nanos(0))
         }
     }
 

@@ -245,29 +245,15 @@ fn add(thermometers: &mut Thermometers, name: &str, degc: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metrology::sample::{Sense, TestPlane};
-    use nalgebra::Vector3;
 
     fn segment(at_s: i64, run: u32, begin: bool, kind: TestKind) -> TestSegment {
         TestSegment {
-            at: Stamp::from_nanos(at_s * 1_000_000_000),
-            run,
             begin,
-            kind,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
             feed_mm_s: 100.0,
-            sense: Sense::None,
-            repeat: 0,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
             zero_id: 1,
             setup_id: 1,
-            cold: false,
-            features: vec![],
             completed: !begin,
+            ..TestSegment::of_kind(kind, run, Stamp::from_nanos(at_s * 1_000_000_000))
         }
     }
 

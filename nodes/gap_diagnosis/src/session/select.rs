@@ -265,9 +265,7 @@ fn speed(motion: &Motion, k: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use metrology::sample::{Sense, TestPlane};
     use metrology::{AxisSet, PerAxis, Stamp};
-    use nalgebra::Vector3;
 
     use super::*;
 
@@ -350,24 +348,8 @@ mod tests {
 
     fn segment(kind: TestKind, feed_mm_s: f64) -> TestSegment {
         TestSegment {
-            at: Stamp::from_nanos(0),
-            run: 1,
-            begin: true,
-            kind,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
             feed_mm_s,
-            sense: Sense::None,
-            repeat: 0,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
-            zero_id: 0,
-            setup_id: 0,
-            cold: false,
-            features: vec![],
-            completed: true,
+            ..TestSegment::of_kind(kind, 1, Stamp::from_nanos(0))
         }
     }
 

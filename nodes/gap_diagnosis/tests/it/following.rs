@@ -112,24 +112,16 @@ impl Machine {
             self.tick([RADIUS_MM, 0.0], [0.0; 2]);
         }
         let segment = |run: u32, begin: bool| TestSegment {
-            at: Stamp::from_nanos(0),
-            run,
             begin,
-            kind: TestKind::Circle,
             plane: TestPlane::Xy,
             centre_mm: Vector3::new(0.0, 0.0, 30.0),
             radius_mm: RADIUS_MM,
             feed_mm_s,
             sense,
-            repeat: 0,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
             zero_id: 1,
             setup_id: 1,
-            cold: false,
             features: vec!["middle".to_owned()],
-            completed: true,
+            ..TestSegment::of_kind(TestKind::Circle, run, Stamp::from_nanos(0))
         };
         self.take(Segment(segment(self.run, true)));
         let turn = if sense == Sense::Clockwise { -1.0 } else { 1.0 };

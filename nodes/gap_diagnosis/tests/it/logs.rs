@@ -9,12 +9,9 @@ use gap_diagnosis::report::{Cause, Status};
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use gap_diagnosis::{Diagnosis, GapConfig, Note, diagnose};
 use machine::MachineFile;
-use metrology::sample::{
-    AxisState, LengthSample, Sense, TemperatureSample, TestKind, TestPlane, TestSegment,
-};
+use metrology::sample::{AxisState, LengthSample, TemperatureSample, TestKind, TestSegment};
 use metrology::stamp::Host;
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
-use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -68,24 +65,12 @@ impl Log {
 
     fn segment(&mut self, run: u32, begin: bool, time_s: f64) {
         self.builder.take(Input::Segment(TestSegment {
-            at: stamp(time_s),
-            run,
             begin,
-            kind: TestKind::Dwell,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
-            feed_mm_s: 0.0,
-            sense: Sense::None,
             repeat: run - 1,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
             zero_id: 1,
             setup_id: 1,
-            cold: false,
             features: vec!["Z".to_owned()],
-            completed: true,
+            ..TestSegment::of_kind(TestKind::Dwell, run, stamp(time_s))
         }));
     }
 

@@ -19,24 +19,16 @@ const RESOLUTION_MM: f64 = 5e-6;
 
 fn segment(kind: TestKind, begin: bool, time_s: f64) -> TestSegment {
     TestSegment {
-        at: stamp(time_s),
-        run: 1,
         begin,
-        kind,
         plane: TestPlane::Xy,
         centre_mm: Vector3::new(0.0, 0.0, 30.0),
         radius_mm: RADIUS_MM,
         feed_mm_s: FEED_MM_S,
         sense: Sense::CounterClockwise,
-        repeat: 0,
-        stylus: String::new(),
-        tool_offset_mm: Vector3::zeros(),
-        stations: 0,
         zero_id: 1,
         setup_id: 1,
-        cold: false,
         features: vec!["middle".to_owned()],
-        completed: true,
+        ..TestSegment::of_kind(kind, 1, stamp(time_s))
     }
 }
 

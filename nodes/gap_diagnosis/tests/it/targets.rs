@@ -6,10 +6,9 @@ use gap_diagnosis::report::{Cause, Status};
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use gap_diagnosis::{Diagnosis, GapConfig, diagnose};
 use machine::MachineFile;
-use metrology::sample::{AxisState, LengthSample, Sense, TestKind, TestPlane, TestSegment};
+use metrology::sample::{AxisState, LengthSample, TestKind, TestSegment};
 use metrology::stamp::Host;
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
-use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
@@ -119,24 +118,14 @@ impl Table {
     fn segment(&mut self, run: u32, begin: bool, stations: usize) {
         let at = self.now();
         self.builder.take(Input::Segment(TestSegment {
-            at,
-            run,
             begin,
-            kind: TestKind::Positioning,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
             feed_mm_s: FEED_MM_S,
-            sense: Sense::None,
             repeat: run - 1,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
             stations: u32::try_from(stations).expect("few"),
             zero_id: 1,
             setup_id: 1,
-            cold: false,
             features: vec!["X".to_owned()],
-            completed: true,
+            ..TestSegment::of_kind(TestKind::Positioning, run, at)
         }));
     }
 

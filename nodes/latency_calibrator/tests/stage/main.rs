@@ -11,7 +11,7 @@ use latency_calibrator::{
 };
 use machine::MachineFile;
 use metrology::sample::{
-    AxisState, LatencyMethod, ProbeLatency, ProbeTrigger, Sense, TestKind, TestPlane, TestSegment,
+    AxisState, LatencyMethod, ProbeLatency, ProbeTrigger, TestKind, TestSegment,
 };
 use metrology::{Axis, PerAxis, Stage, Stamp};
 use nalgebra::{Rotation3, Vector3};
@@ -67,24 +67,10 @@ impl Rig {
 
     fn segment(&mut self, begin: bool, completed: bool) {
         let segment = TestSegment {
-            at: Stamp::from_nanos(self.now_ns),
-            run: 3,
             begin,
-            kind: TestKind::Latency,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
-            feed_mm_s: 0.0,
-            sense: Sense::None,
-            repeat: 0,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
-            zero_id: 0,
-            setup_id: 0,
-            cold: false,
             features: vec![String::from("block_1.z")],
             completed,
+            ..TestSegment::of_kind(TestKind::Latency, 3, Stamp::from_nanos(self.now_ns))
         };
         self.send(Input::Segment(segment));
     }

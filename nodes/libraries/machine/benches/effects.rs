@@ -25,24 +25,12 @@ fn main() {
 
 fn segment() -> TestSegment {
     TestSegment {
-        at: Stamp::from_nanos(0),
-        run: 1,
-        begin: true,
-        kind: TestKind::Circle,
         plane: TestPlane::Xy,
-        centre_mm: Vector3::zeros(),
         radius_mm: 50.0,
         feed_mm_s: 50.0,
         sense: Sense::CounterClockwise,
-        repeat: 0,
         stylus: String::from("ruby_6"),
-        tool_offset_mm: Vector3::zeros(),
-        stations: 0,
-        zero_id: 0,
-        setup_id: 0,
-        cold: false,
-        features: vec![],
-        completed: true,
+        ..TestSegment::of_kind(TestKind::Circle, 1, Stamp::from_nanos(0))
     }
 }
 

@@ -187,24 +187,13 @@ mod tests {
 
     fn run(run: u32) -> TestSegment {
         TestSegment {
-            at: Stamp::from_nanos(0),
-            run,
-            begin: true,
-            kind: TestKind::Circle,
             plane: TestPlane::Xy,
-            centre_mm: Vector3::zeros(),
             radius_mm: 50.0,
             feed_mm_s: 50.0,
             sense: Sense::Clockwise,
-            repeat: 0,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
             zero_id: 1,
             setup_id: 1,
-            cold: false,
-            features: vec![],
-            completed: true,
+            ..TestSegment::of_kind(TestKind::Circle, run, Stamp::from_nanos(0))
         }
     }
 

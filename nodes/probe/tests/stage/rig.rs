@@ -2,8 +2,7 @@
 
 use machine::MachineFile;
 use metrology::sample::{
-    AxisState, BlockMeasurement, ProbeTrigger, ProbedFeature, ProbedPoint, Sense, TestKind,
-    TestPlane, TestSegment,
+    AxisState, BlockMeasurement, ProbeTrigger, ProbedFeature, ProbedPoint, TestKind, TestSegment,
 };
 use metrology::stamp::Span;
 use metrology::{Axis, PerAxis, Stage, Stamp};
@@ -147,24 +146,13 @@ impl Rig {
 
     pub(crate) fn segment(&mut self, kind: TestKind, begin: bool, features: &[&str]) {
         let segment = TestSegment {
-            at: Stamp::from_nanos(self.now_ns),
-            run: 7,
             begin,
-            kind,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
             feed_mm_s: 2.0,
-            sense: Sense::None,
-            repeat: 0,
             stylus: String::from("ruby_6"),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
-            zero_id: 0,
-            setup_id: 0,
             cold: true,
             features: features.iter().map(|&name| name.to_owned()).collect(),
             completed: !begin,
+            ..TestSegment::of_kind(kind, 7, Stamp::from_nanos(self.now_ns))
         };
         self.send(Input::Segment(segment));
     }

@@ -1,9 +1,7 @@
 //! The stage: runs, spheres that are missing or others', poses that cannot be.
 
 use machine::poses::{ReachLimits, calibration_poses, verification_poses};
-use metrology::sample::{
-    FeatureKind, GeometryModel, ProbedFeature, Sense, TestKind, TestPlane, TestSegment,
-};
+use metrology::sample::{FeatureKind, GeometryModel, ProbedFeature, TestKind, TestSegment};
 use metrology::{Axis, PerAxis, Stage, Stamp};
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
@@ -42,24 +40,13 @@ impl Rig {
 
     fn segment(&mut self, kind: TestKind, begin: bool, completed: bool, sphere: &str) {
         self.send(Input::Segment(TestSegment {
-            at: Stamp::from_nanos(self.now_ns),
-            run: self.run,
             begin,
-            kind,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
             feed_mm_s: 2.0,
-            sense: Sense::None,
-            repeat: 0,
             stylus: String::from("ruby_6"),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
-            zero_id: 0,
             setup_id: self.setup_id,
-            cold: false,
             features: vec![sphere.to_owned()],
             completed,
+            ..TestSegment::of_kind(kind, self.run, Stamp::from_nanos(self.now_ns))
         }));
     }
 

@@ -1,7 +1,7 @@
 //! Days in the shop: what goes wrong between a block and a model, one scene each.
 
 use crate::shop::{Shop, U_MM, config};
-use metrology::sample::{Sense, TestKind, TestPlane, TestSegment, UpdateReason};
+use metrology::sample::{TestKind, TestSegment, UpdateReason};
 use metrology::{Axis, Stamp};
 use nalgebra::Vector3;
 use thermal_model::{
@@ -22,24 +22,10 @@ fn seen(shop: &Shop, what: impl Fn(&Diagnostic) -> bool) -> usize {
 
 fn segment(shop: &Shop, kind: TestKind, begin: bool) -> Input {
     Input::Segment(TestSegment {
-        at: shop.now(),
-        run: shop.run,
         begin,
-        kind,
-        plane: TestPlane::None,
-        centre_mm: Vector3::zeros(),
-        radius_mm: 0.0,
         feed_mm_s: 2.0,
-        sense: Sense::None,
-        repeat: 0,
-        stylus: String::new(),
-        tool_offset_mm: Vector3::zeros(),
-        stations: 0,
-        zero_id: 0,
-        setup_id: 0,
-        cold: false,
-        features: Vec::new(),
         completed: !begin,
+        ..TestSegment::of_kind(kind, shop.run, shop.now())
     })
 }
 

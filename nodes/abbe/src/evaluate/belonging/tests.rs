@@ -1,5 +1,4 @@
 use metrology::sample::{Sense, TestPlane};
-use nalgebra::Vector3;
 
 use super::*;
 
@@ -14,24 +13,14 @@ fn log(s: f64) -> u64 {
 
 fn begin(kind: TestKind) -> TestSegment {
     TestSegment {
-        at: at(99.0),
-        run: 3,
-        begin: true,
-        kind,
         plane: TestPlane::Xy,
-        centre_mm: Vector3::zeros(),
         radius_mm: 50.0,
         feed_mm_s: 25.0,
         sense: Sense::CounterClockwise,
-        repeat: 0,
-        stylus: String::new(),
-        tool_offset_mm: Vector3::zeros(),
-        stations: 0,
         zero_id: 1,
         setup_id: 1,
-        cold: false,
         features: vec!["X".to_owned()],
-        completed: true,
+        ..TestSegment::of_kind(kind, 3, at(99.0))
     }
 }
 

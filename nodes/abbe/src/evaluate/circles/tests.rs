@@ -9,24 +9,16 @@ const FEED_MM_S: f64 = 50.0;
 
 fn segment(begin: bool, run: u32, sense: Sense) -> TestSegment {
     TestSegment {
-        at: Stamp::from_nanos(0),
-        run,
         begin,
-        kind: TestKind::Circle,
         plane: TestPlane::Yz,
         centre_mm: Vector3::new(1.0, 20.0, 30.0),
         radius_mm: RADIUS_MM,
         feed_mm_s: FEED_MM_S,
         sense,
-        repeat: 0,
-        stylus: String::new(),
-        tool_offset_mm: Vector3::zeros(),
-        stations: 0,
         zero_id: 7,
         setup_id: 1,
-        cold: false,
-        features: Vec::new(),
         completed: !begin,
+        ..TestSegment::of_kind(TestKind::Circle, run, Stamp::from_nanos(0))
     }
 }
 

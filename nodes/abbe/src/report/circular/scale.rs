@@ -104,7 +104,6 @@ mod tests {
 
     use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
     use metrology::stamp::Stamp;
-    use nalgebra::Vector3;
 
     use super::super::breakdowns;
     use super::*;
@@ -144,24 +143,14 @@ environmental_drift_um: 0.0
         CircleRecording {
             points: (0..720).map(point).collect(),
             segment: TestSegment {
-                at: Stamp::from_nanos(0),
-                run,
-                begin: true,
-                kind: TestKind::Circle,
                 plane: TestPlane::Xy,
-                centre_mm: Vector3::zeros(),
                 radius_mm: RADIUS_MM,
                 feed_mm_s,
                 sense,
-                repeat: 0,
-                stylus: String::new(),
-                tool_offset_mm: Vector3::zeros(),
-                stations: 0,
                 zero_id: 1,
                 setup_id: 1,
-                cold: false,
-                features: Vec::new(),
                 completed: false,
+                ..TestSegment::of_kind(TestKind::Circle, run, Stamp::from_nanos(0))
             },
             turn: EvaluatedTurn {
                 by: TurnBy::FullRate,

@@ -254,7 +254,7 @@ mod tests {
     use std::path::Path;
 
     use machine::MachineFile;
-    use metrology::sample::{Correction, Sense, TestKind, TestPlane, TestSegment};
+    use metrology::sample::{Correction, TestKind, TestSegment};
     use metrology::{AxisSet, PerAxis};
     use nalgebra::Matrix3;
 
@@ -280,24 +280,12 @@ environmental_drift_um: 0.6
 
     fn segment() -> TestSegment {
         TestSegment {
-            at: Stamp::from_nanos(0),
-            run: 4,
-            begin: true,
-            kind: TestKind::Sphere,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
             feed_mm_s: 2.0,
-            sense: Sense::None,
-            repeat: 0,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
-            stations: 0,
             zero_id: 1,
             setup_id: 1,
-            cold: false,
             features: vec!["high".to_owned()],
             completed: false,
+            ..TestSegment::of_kind(TestKind::Sphere, 4, Stamp::from_nanos(0))
         }
     }
 

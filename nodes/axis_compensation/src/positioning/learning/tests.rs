@@ -1,6 +1,5 @@
 use metrology::Stamp;
-use metrology::sample::{Sense, TestKind, TestPlane};
-use nalgebra::Vector3;
+use metrology::sample::TestKind;
 
 use super::*;
 
@@ -11,24 +10,13 @@ const POINTS_MM: [f64; 5] = [-32.0, -16.0, 0.0, 16.0, 32.0];
 
 fn segment(repeat: u32, completed: bool) -> TestSegment {
     TestSegment {
-        at: Stamp::from_nanos(0),
-        run: 100 + repeat,
         begin: false,
-        kind: TestKind::Positioning,
-        plane: TestPlane::None,
-        centre_mm: Vector3::zeros(),
-        radius_mm: 0.0,
         feed_mm_s: 10.0,
-        sense: Sense::None,
         repeat,
-        stylus: String::new(),
         zero_id: 1,
         setup_id: 1,
-        cold: false,
-        features: Vec::new(),
-        stations: 0,
-        tool_offset_mm: Vector3::zeros(),
         completed,
+        ..TestSegment::of_kind(TestKind::Positioning, 100 + repeat, Stamp::from_nanos(0))
     }
 }
 

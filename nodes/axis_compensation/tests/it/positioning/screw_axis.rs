@@ -8,11 +8,9 @@ use std::f64::consts::PI;
 
 use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Diagnostic, Input, Output};
 use metrology::sample::{
-    AxisCompensation, AxisState, CompensationState, PositioningTable, Sense, TestKind, TestPlane,
-    TestSegment,
+    AxisCompensation, AxisState, CompensationState, PositioningTable, TestKind, TestSegment,
 };
 use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
-use nalgebra::Vector3;
 
 pub const TICK_S: f64 = 1e-3;
 /// Points of the table, mm: 15 mm apart on a screw of 10 mm lead.
@@ -221,24 +219,17 @@ impl Machine {
 
     pub fn segment(&mut self, begin: bool) {
         let segment = TestSegment {
-            at: Stamp::from_nanos(self.nanos),
-            run: 1 + self.repeat,
             begin,
-            kind: TestKind::Positioning,
-            plane: TestPlane::None,
-            centre_mm: Vector3::zeros(),
-            radius_mm: 0.0,
             feed_mm_s: 50.0,
-            sense: Sense::None,
             repeat: self.repeat,
-            stylus: String::new(),
             zero_id: 1,
             setup_id: 1,
-            tool_offset_mm: Vector3::zeros(),
             stations: POINTS,
-            cold: false,
-            features: Vec::new(),
-            completed: true,
+            ..TestSegment::of_kind(
+                TestKind::Positioning,
+                1 + self.repeat,
+                Stamp::from_nanos(self.nanos),
+            )
         };
         self.step(Input::Segment(Box::new(segment)));
     }

@@ -1,8 +1,6 @@
 //! Thermal models and tests that come in.
 
-use metrology::sample::{
-    AxisDrift, DriftGrowth, Sense, TestKind, TestPlane, TestSegment, ThermalModel,
-};
+use metrology::sample::{AxisDrift, DriftGrowth, TestKind, TestSegment, ThermalModel};
 use metrology::{Axis, Host, PerAxis, Stamp};
 use nalgebra::Vector3;
 
@@ -54,23 +52,9 @@ pub fn model(
 
 pub fn segment(at: Stamp<Host>, begin: bool, completed: bool) -> TestSegment {
     TestSegment {
-        at,
-        run: 1,
         begin,
-        kind: TestKind::Positioning,
-        plane: TestPlane::None,
-        centre_mm: Vector3::zeros(),
-        radius_mm: 0.0,
         feed_mm_s: 1.0,
-        sense: Sense::None,
-        repeat: 0,
-        stylus: String::new(),
-        zero_id: 0,
-        setup_id: 0,
-        tool_offset_mm: Vector3::zeros(),
-        stations: 0,
-        cold: false,
-        features: Vec::new(),
         completed,
+        ..TestSegment::of_kind(TestKind::Positioning, 1, at)
     }
 }

@@ -5,7 +5,7 @@ use fake_cnc::plant::VibrationEntry;
 use machine::effects::{self, Effect};
 use machine::file::EffectEntry;
 use machine::twin::{Channel, Motion, Reading, Run, Session, Touch, Twin};
-use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
+use metrology::sample::{TestKind, TestPlane, TestSegment};
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
 use nalgebra::Vector3;
 
@@ -22,24 +22,8 @@ fn spread(values: &[f64]) -> (f64, f64) {
 
 fn segment(kind: TestKind, plane: TestPlane) -> TestSegment {
     TestSegment {
-        at: Stamp::from_nanos(0),
-        run: 1,
-        begin: true,
-        kind,
         plane,
-        centre_mm: Vector3::zeros(),
-        radius_mm: 0.0,
-        feed_mm_s: 0.0,
-        sense: Sense::None,
-        repeat: 0,
-        stylus: String::new(),
-        tool_offset_mm: Vector3::zeros(),
-        stations: 0,
-        zero_id: 0,
-        setup_id: 0,
-        cold: false,
-        features: vec![],
-        completed: true,
+        ..TestSegment::of_kind(kind, 1, Stamp::from_nanos(0))
     }
 }
 

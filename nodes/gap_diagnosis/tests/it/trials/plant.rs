@@ -217,10 +217,6 @@ fn field(amplitude_mm: f64, random: &mut Pcg64Mcg) -> impl Fn(f64) -> f64 + use<
 
 fn segment(run: u32, radius: f64, feed: f64, ccw: bool, repeat: u32) -> TestSegment {
     TestSegment {
-        at: Stamp::from_nanos(0),
-        run,
-        begin: true,
-        kind: TestKind::Circle,
         plane: TestPlane::Xy,
         centre_mm: Vector3::new(0.0, 0.0, 30.0),
         radius_mm: radius,
@@ -231,14 +227,9 @@ fn segment(run: u32, radius: f64, feed: f64, ccw: bool, repeat: u32) -> TestSegm
             Sense::Clockwise
         },
         repeat,
-        stylus: String::new(),
-        tool_offset_mm: Vector3::zeros(),
-        stations: 0,
         zero_id: 1,
         setup_id: 1,
-        cold: false,
-        features: vec![],
-        completed: true,
+        ..TestSegment::of_kind(TestKind::Circle, run, Stamp::from_nanos(0))
     }
 }
 

@@ -3,7 +3,7 @@
 use gap_diagnosis::report::{Cause, Status};
 use gap_diagnosis::{Diagnosis, GapConfig, diagnose};
 use machine::twin::{Channel, Motion, Reading, Run, Session, Touch};
-use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
+use metrology::sample::{TestKind, TestSegment};
 use metrology::stamp::Stamp;
 use metrology::{Axis, AxisSet, PerAxis};
 use nalgebra::Vector3;
@@ -68,24 +68,11 @@ fn polled(seed: u64, period_s: f64) -> Session {
 
 fn segment(run: u32) -> TestSegment {
     TestSegment {
-        at: Stamp::from_nanos(0),
-        run,
-        begin: true,
-        kind: TestKind::Latency,
-        plane: TestPlane::None,
-        centre_mm: Vector3::zeros(),
-        radius_mm: 0.0,
         feed_mm_s: 2.0,
-        sense: Sense::None,
         repeat: run,
         stylus: "ruby_6".to_owned(),
-        tool_offset_mm: Vector3::zeros(),
-        stations: 0,
-        zero_id: 0,
         setup_id: 1,
-        cold: false,
-        features: vec![],
-        completed: true,
+        ..TestSegment::of_kind(TestKind::Latency, run, Stamp::from_nanos(0))
     }
 }
 

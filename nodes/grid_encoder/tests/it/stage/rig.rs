@@ -10,7 +10,6 @@ use metrology::sample::{
     AxisState, GeometryModel, GridSample, Sense, TestKind, TestPlane, TestSegment,
 };
 use metrology::{Axis, AxisSet, PerAxis, Stage, Stamp};
-use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -150,24 +149,16 @@ impl Rig {
 
     fn segment_of(&mut self, at_ns: i64, run: u32, begin: bool, motion: &Motion) {
         let segment = TestSegment {
-            at: Stamp::from_nanos(at_ns),
-            run,
             begin,
-            kind: TestKind::Circle,
             plane: motion.plane,
-            centre_mm: Vector3::zeros(),
             radius_mm: motion.radius_mm,
             feed_mm_s: motion.feed_mm_s,
             sense: motion.sense,
-            repeat: 0,
-            stylus: String::new(),
-            tool_offset_mm: Vector3::zeros(),
             stations: motion.stations,
             zero_id: self.told_zero_id,
             setup_id: self.setup_id,
-            cold: false,
-            features: Vec::new(),
             completed: self.completed,
+            ..TestSegment::of_kind(TestKind::Circle, run, Stamp::from_nanos(at_ns))
         };
         self.send(Input::Segment(segment));
     }

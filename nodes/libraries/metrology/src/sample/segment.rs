@@ -102,3 +102,31 @@ pub struct TestSegment {
     /// Whether the test ran to its end (meaningful at the end).
     pub completed: bool,
 }
+
+impl TestSegment {
+    /// The begin of a test of which kind, number and instant are known alone: no plane, radius, feed, sense, stylus, stations
+    /// or features, machine frame zero, first repetition, not cold, completed. Tests name what differs.
+    #[must_use]
+    pub fn of_kind(kind: TestKind, run: u32, at: Stamp<Host>) -> Self {
+        Self {
+            at,
+            run,
+            begin: true,
+            kind,
+            plane: TestPlane::None,
+            centre_mm: Vector3::zeros(),
+            radius_mm: 0.0,
+            feed_mm_s: 0.0,
+            sense: Sense::None,
+            repeat: 0,
+            stylus: String::new(),
+            tool_offset_mm: Vector3::zeros(),
+            stations: 0,
+            zero_id: 0,
+            setup_id: 0,
+            cold: false,
+            features: Vec::new(),
+            completed: true,
+        }
+    }
+}

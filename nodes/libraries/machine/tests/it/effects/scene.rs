@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use machine::effects::{self, Effect, Target};
 use machine::file::MachineFile;
 use machine::twin::{Channel, History, Motion, Reading, Response, Run, Session, Touch, Twin};
-use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
+use metrology::sample::{TestKind, TestPlane, TestSegment};
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -41,24 +41,10 @@ pub fn three_axes(chain: &str) -> MachineFile {
 /// A segment of no special kind.
 pub fn segment(kind: TestKind, plane: TestPlane) -> TestSegment {
     TestSegment {
-        at: Stamp::from_nanos(0),
-        run: 1,
-        begin: true,
-        kind,
         plane,
-        centre_mm: Vector3::zeros(),
-        radius_mm: 0.0,
         feed_mm_s: 50.0,
-        sense: Sense::None,
-        repeat: 0,
         stylus: String::from("ruby_6"),
-        tool_offset_mm: Vector3::zeros(),
-        stations: 0,
-        zero_id: 0,
-        setup_id: 0,
-        cold: false,
-        features: vec![],
-        completed: true,
+        ..TestSegment::of_kind(kind, 1, Stamp::from_nanos(0))
     }
 }
 
