@@ -224,13 +224,8 @@ impl Loop {
         commanded[Axis::X] = number as f64 * STEP_MM;
         let at = RawPublisher::now();
         let state = AxisState {
-            received_at: at,
-            controller_at: Stamp::from_nanos(at.nanos()),
-            axes: AxisSet::XYZ,
-            commanded,
-            motor: commanded,
             scale: commanded,
-            velocity: PerAxis::default(),
+            ..AxisState::standing(at, Stamp::from_nanos(at.nanos()), AxisSet::XYZ, commanded)
         };
         let bytes = to_cdr(&msg::AxisState::from_inner(&state));
         self.state_bytes = bytes.len();

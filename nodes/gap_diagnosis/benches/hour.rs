@@ -72,15 +72,12 @@ impl Hour {
         self.lag_mm =
             (self.lag_mm - (place[0] - self.last[0])).clamp(-0.5 * PLAY_MM, 0.5 * PLAY_MM);
         self.last = place;
-        self.builder.take(Input::State(AxisState {
-            received_at: self.at(),
-            controller_at: self.at(),
-            axes: AxisSet::XYZ,
+        self.builder.take(Input::State(AxisState::standing(
+            self.at(),
+            self.at(),
+            AxisSet::XYZ,
             commanded,
-            motor: commanded,
-            scale: PerAxis([f64::NAN; 6]),
-            velocity: PerAxis::default(),
-        }));
+        )));
         self.nanos += TICK_NANOS;
     }
 

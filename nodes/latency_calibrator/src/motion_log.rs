@@ -177,13 +177,13 @@ mod tests {
             let mut motor = PerAxis::default();
             motor.0[2] = -path(k as f64 / 1e3);
             let state = AxisState {
-                received_at: Stamp::from_nanos(0),
-                controller_at: Stamp::from_nanos(k * 1_000_000),
-                axes: AxisSet::XYZ,
-                commanded: motor,
-                motor,
                 scale: motor,
-                velocity: PerAxis::default(),
+                ..AxisState::standing(
+                    Stamp::from_nanos(0),
+                    Stamp::from_nanos(k * 1_000_000),
+                    AxisSet::XYZ,
+                    motor,
+                )
             };
             assert!(log.push(&state));
         }
@@ -235,13 +235,13 @@ mod tests {
             let mut motor = PerAxis::default();
             motor.0[2] = -8.5 * k as f64 / 1e3;
             let state = AxisState {
-                received_at: Stamp::from_nanos(0),
-                controller_at: Stamp::from_nanos(k * 1_000_000),
-                axes: AxisSet::XYZ,
-                commanded: motor,
-                motor,
                 scale: motor,
-                velocity: PerAxis::default(),
+                ..AxisState::standing(
+                    Stamp::from_nanos(0),
+                    Stamp::from_nanos(k * 1_000_000),
+                    AxisSet::XYZ,
+                    motor,
+                )
             };
             if k >= 47 {
                 late.push(&state);

@@ -225,13 +225,8 @@ mod tests {
         let mut motor = PerAxis::default();
         motor[Axis::X] = x_mm;
         AxisState {
-            received_at: Stamp::from_nanos(0),
-            controller_at: instant(ms),
-            axes: AxisSet::XYZ,
-            commanded: motor,
-            motor,
             scale: motor,
-            velocity: PerAxis::default(),
+            ..AxisState::standing(Stamp::from_nanos(0), instant(ms), AxisSet::XYZ, motor)
         }
     }
 

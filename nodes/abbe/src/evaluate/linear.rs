@@ -382,15 +382,12 @@ mod tests {
             for axis in Axis::LINEAR {
                 commanded[axis] = place_mm[axis.index()];
             }
-            self.runs.axes(&AxisState {
-                received_at: at,
-                controller_at: Stamp::from_nanos(self.nanos),
-                axes: AxisSet::XYZ,
+            self.runs.axes(&AxisState::standing(
+                at,
+                Stamp::from_nanos(self.nanos),
+                AxisSet::XYZ,
                 commanded,
-                motor: commanded,
-                scale: PerAxis([f64::NAN; 6]),
-                velocity: PerAxis::default(),
-            });
+            ));
             if let Some(displacement_mm) = displacement_mm {
                 self.runs.length(&LengthSample {
                     at,

@@ -128,13 +128,13 @@ fn a_thousand_ticks_allocate_nothing() {
             commanded[Axis::A] = -0.3;
             commanded[Axis::C] = k as f64 * 1e-3;
             let state = AxisState {
-                received_at: Stamp::from_nanos(k * 1_000_000),
-                controller_at: Stamp::from_nanos(k * 1_000_000),
-                axes: AxisSet::XYZ.with(Axis::A).with(Axis::C),
-                commanded,
-                motor: commanded,
                 scale: PerAxis::from_fn(|axis| commanded[axis] + 2e-3),
-                velocity: PerAxis::default(),
+                ..AxisState::standing(
+                    Stamp::from_nanos(k * 1_000_000),
+                    Stamp::from_nanos(k * 1_000_000),
+                    AxisSet::XYZ.with(Axis::A).with(Axis::C),
+                    commanded,
+                )
             };
             stage
                 .step(

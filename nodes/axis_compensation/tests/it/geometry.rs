@@ -71,13 +71,13 @@ impl Scene {
             self.nanos += 1_000_000;
             let commanded = PerAxis(commanded);
             self.step(Input::State(AxisState {
-                received_at: Stamp::from_nanos(self.nanos),
-                controller_at: Stamp::from_nanos(self.nanos),
-                axes: self.axes,
-                commanded,
-                motor: commanded,
                 scale: commanded,
-                velocity: PerAxis::default(),
+                ..AxisState::standing(
+                    Stamp::from_nanos(self.nanos),
+                    Stamp::from_nanos(self.nanos),
+                    self.axes,
+                    commanded,
+                )
             }));
         }
     }

@@ -75,13 +75,13 @@ impl Scene {
         let mut commanded = PerAxis::default();
         commanded[Axis::X] = x_mm;
         let state = AxisState {
-            received_at: Stamp::from_nanos(self.nanos),
-            controller_at: Stamp::from_nanos(self.nanos),
-            axes: AxisSet::XYZ,
-            commanded,
-            motor: commanded,
             scale: commanded,
-            velocity: PerAxis::default(),
+            ..AxisState::standing(
+                Stamp::from_nanos(self.nanos),
+                Stamp::from_nanos(self.nanos),
+                AxisSet::XYZ,
+                commanded,
+            )
         };
         self.step(Input::State(state));
     }

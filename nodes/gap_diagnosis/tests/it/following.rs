@@ -83,15 +83,12 @@ impl Machine {
         let mut commanded = PerAxis::default();
         (commanded[Axis::X], commanded[Axis::Y], commanded[Axis::Z]) = (x, y, 30.0);
         let at = Stamp::from_nanos(self.nanos);
-        self.take(State(AxisState {
-            received_at: at,
-            controller_at: Stamp::from_nanos(self.nanos),
-            axes: AxisSet::XYZ,
+        self.take(State(AxisState::standing(
+            at,
+            Stamp::from_nanos(self.nanos),
+            AxisSet::XYZ,
             commanded,
-            motor: commanded,
-            scale: PerAxis([f64::NAN; 6]),
-            velocity: PerAxis::default(),
-        }));
+        )));
         let noise = [self.normal(), self.normal()].map(|n| 2e-4 * n);
         self.take(Grid(GridSample {
             at,
@@ -275,14 +272,8 @@ fn a_run_that_is_left_out_is_told_of_at_once_though_no_diagnosis_is_due() {
 
 /// States of other machines: axes that this one lacks or has not, places outside of its travel, other names of axes.
 fn strangers(at: Stamp<metrology::Host>) -> Vec<AxisState> {
-    let state = |axes: AxisSet, place: [f64; 6]| AxisState {
-        received_at: at,
-        controller_at: Stamp::from_nanos(at.nanos()),
-        axes,
-        commanded: PerAxis(place),
-        motor: PerAxis(place),
-        scale: PerAxis([f64::NAN; 6]),
-        velocity: PerAxis::default(),
+    let state = |axes: AxisSet, place: [f64; 6]| {
+        AxisState::standing(at, Stamp::from_nanos(at.nanos()), axes, PerAxis(place))
     };
     let of = |axes: &[Axis]| axes.iter().copied().collect::<AxisSet>();
     vec![

@@ -77,15 +77,12 @@ impl Log {
     fn row(&mut self, time_s: f64, um: f64, degc: &[(&str, f64)]) {
         let mut commanded = PerAxis::default();
         commanded[Axis::Z] = Z_MM;
-        self.builder.take(Input::State(AxisState {
-            received_at: stamp(time_s),
-            controller_at: Stamp::from_nanos(stamp(time_s).nanos()),
-            axes: AxisSet::XYZ,
+        self.builder.take(Input::State(AxisState::standing(
+            stamp(time_s),
+            Stamp::from_nanos(stamp(time_s).nanos()),
+            AxisSet::XYZ,
             commanded,
-            motor: commanded,
-            scale: PerAxis([f64::NAN; 6]),
-            velocity: PerAxis::default(),
-        }));
+        )));
         self.builder.take(Input::Length(LengthSample {
             at: stamp(time_s),
             axis: Axis::Z,

@@ -55,15 +55,12 @@ impl Shift {
     fn state(&mut self, time_s: f64, [x, y]: [f64; 2]) {
         let mut commanded = PerAxis::default();
         (commanded[Axis::X], commanded[Axis::Y], commanded[Axis::Z]) = (x, y, 30.0);
-        self.take(Input::State(AxisState {
-            received_at: stamp(time_s),
-            controller_at: Stamp::from_nanos(stamp(time_s).nanos()),
-            axes: AxisSet::XYZ,
+        self.take(Input::State(AxisState::standing(
+            stamp(time_s),
+            Stamp::from_nanos(stamp(time_s).nanos()),
+            AxisSet::XYZ,
             commanded,
-            motor: commanded,
-            scale: PerAxis([f64::NAN; 6]),
-            velocity: PerAxis::default(),
-        }));
+        )));
     }
 
     fn segment(&mut self, run: u32, begin: bool, time_s: f64) {

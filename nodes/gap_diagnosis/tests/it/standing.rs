@@ -51,15 +51,12 @@ fn recorded(
         let here = path_mm(time_s);
         let mut commanded = PerAxis::default();
         (commanded[Axis::X], commanded[Axis::Y], commanded[Axis::Z]) = (here[0], here[1], 30.0);
-        builder.take(Input::State(AxisState {
-            received_at: stamp(time_s),
-            controller_at: Stamp::from_nanos(stamp(time_s).nanos()),
-            axes: AxisSet::XYZ,
+        builder.take(Input::State(AxisState::standing(
+            stamp(time_s),
+            Stamp::from_nanos(stamp(time_s).nanos()),
+            AxisSet::XYZ,
             commanded,
-            motor: commanded,
-            scale: PerAxis([f64::NAN; 6]),
-            velocity: PerAxis::default(),
-        }));
+        )));
         let [u_mm, v_mm] = read(here).map(|mm| (mm / RESOLUTION_MM).round() * RESOLUTION_MM);
         builder.take(Input::Grid(GridSample {
             at: stamp(time_s),

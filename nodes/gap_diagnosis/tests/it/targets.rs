@@ -87,15 +87,12 @@ impl Table {
         let mut position = PerAxis::default();
         (position[Axis::X], position[Axis::Z]) = (self.x_mm, 120.0);
         let at = self.now();
-        self.builder.take(Input::State(AxisState {
-            received_at: at,
-            controller_at: Stamp::from_nanos(at.nanos()),
-            axes: AxisSet::XYZ,
-            commanded: position,
-            motor: position,
-            scale: PerAxis([f64::NAN; 6]),
-            velocity: PerAxis::default(),
-        }));
+        self.builder.take(Input::State(AxisState::standing(
+            at,
+            Stamp::from_nanos(at.nanos()),
+            AxisSet::XYZ,
+            position,
+        )));
     }
 
     fn rest(&mut self, ticks: u32) {

@@ -140,13 +140,13 @@ impl Rig {
             if self.publishes {
                 let motor = motor_at(self, self.now_ns, 0.0);
                 let state = AxisState {
-                    received_at: Stamp::from_nanos(self.now_ns),
-                    controller_at: Stamp::from_nanos(self.now_ns),
-                    axes: trigger.axes,
-                    commanded: motor,
-                    motor,
                     scale: motor,
-                    velocity: PerAxis::default(),
+                    ..AxisState::standing(
+                        Stamp::from_nanos(self.now_ns),
+                        Stamp::from_nanos(self.now_ns),
+                        trigger.axes,
+                        motor,
+                    )
                 };
                 self.send(Input::State(state));
             }
@@ -490,13 +490,13 @@ fn time_that_goes_back_is_said_and_its_touches_are_not_used() {
     let mut lost = rig.stage.clone();
     let mut out = Vec::new();
     let state = AxisState {
-        received_at: Stamp::from_nanos(0),
-        controller_at: Stamp::from_nanos(12),
-        axes: MachineFile::parse(BENCH, "bench.yaml").unwrap().axis_set(),
-        commanded: PerAxis::default(),
-        motor: PerAxis::default(),
         scale: PerAxis::default(),
-        velocity: PerAxis::default(),
+        ..AxisState::standing(
+            Stamp::from_nanos(0),
+            Stamp::from_nanos(12),
+            MachineFile::parse(BENCH, "bench.yaml").unwrap().axis_set(),
+            PerAxis::default(),
+        )
     };
     lost.step(Stamp::from_nanos(rig.now_ns), Input::State(state), &mut out)
         .unwrap();

@@ -75,15 +75,12 @@ impl Rig {
         for axis in Axis::LINEAR {
             motor[axis] = ball_mm[axis.index()];
         }
-        AxisState {
-            received_at: Stamp::from_nanos(at_ns),
-            controller_at: Stamp::from_nanos(at_ns),
-            axes: bench().axis_set(),
-            commanded: motor,
+        AxisState::standing(
+            Stamp::from_nanos(at_ns),
+            Stamp::from_nanos(at_ns),
+            bench().axis_set(),
             motor,
-            scale: PerAxis::from_fn(|_| f64::NAN),
-            velocity: PerAxis::default(),
-        }
+        )
     }
 
     /// Touches with the ball's centre at `contact_mm` at the true instant of contact.

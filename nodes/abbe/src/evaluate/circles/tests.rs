@@ -28,15 +28,12 @@ fn state(time_s: f64, u_mm: f64, v_mm: f64) -> AxisState {
     commanded[Axis::Y] = 20.0 + u_mm;
     commanded[Axis::Z] = 30.0 + v_mm;
     let nanos = (time_s * 1e9).round() as i64;
-    AxisState {
-        received_at: Stamp::from_nanos(nanos),
-        controller_at: Stamp::from_nanos(nanos + 5_000_000_000),
-        axes: AxisSet::XYZ,
+    AxisState::standing(
+        Stamp::from_nanos(nanos),
+        Stamp::from_nanos(nanos + 5_000_000_000),
+        AxisSet::XYZ,
         commanded,
-        motor: commanded,
-        scale: PerAxis([f64::NAN; 6]),
-        velocity: PerAxis::default(),
-    }
+    )
 }
 
 /// A circle at 50 mm/s in ticks of 10 ms, run in along a radius; the plate lies 3 mm off. Without a number of its zero

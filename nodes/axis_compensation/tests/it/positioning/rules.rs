@@ -286,13 +286,13 @@ fn a_test_of_two_axes_at_once_is_refused() {
             commanded[Axis::X] = 10.0 * f64::from(j);
             commanded[Axis::Z] = 20.0 * f64::from(j);
             machine.step(Input::State(AxisState {
-                received_at: Stamp::from_nanos(machine.nanos),
-                controller_at: Stamp::from_nanos(machine.nanos),
-                axes: AxisSet::XYZ,
-                commanded,
-                motor: commanded,
                 scale: commanded,
-                velocity: PerAxis::default(),
+                ..AxisState::standing(
+                    Stamp::from_nanos(machine.nanos),
+                    Stamp::from_nanos(machine.nanos),
+                    AxisSet::XYZ,
+                    commanded,
+                )
             }));
         }
     }

@@ -21,3 +21,24 @@ pub struct AxisState {
     /// Velocity of the motor, per second.
     pub velocity: PerAxis<f64>,
 }
+
+impl AxisState {
+    /// Axes that stand at `position` (mm, rad), motor and command alike, on a machine without linear scales.
+    #[must_use]
+    pub fn standing(
+        received_at: Stamp<Host>,
+        controller_at: Stamp<Machine>,
+        axes: AxisSet,
+        position: PerAxis<f64>,
+    ) -> Self {
+        Self {
+            received_at,
+            controller_at,
+            axes,
+            commanded: position,
+            motor: position,
+            scale: PerAxis([f64::NAN; 6]),
+            velocity: PerAxis::default(),
+        }
+    }
+}
