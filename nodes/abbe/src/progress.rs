@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use metrology::Axis;
 use metrology::sample::PlanStatus;
 use metrology::stamp::{Host, Span, Stamp};
+use metrology::visible::visible;
 
 use crate::evidence::Evidence;
 
@@ -32,7 +33,7 @@ impl Progress {
             let bar = ProgressBar::new(BAR_UNITS);
             let style = ProgressStyle::with_template("{prefix}\n[{bar:40}] {percent:>3} %  {msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            bar.set_prefix(title.to_owned());
+            bar.set_prefix(visible(title).into_owned());
             bar
         });
         if bar.is_none() {
@@ -70,7 +71,8 @@ impl Progress {
         )]
         bar.set_position((done.clamp(0.0, 1.0) * BAR_UNITS as f64) as u64);
         let numbers = numbers(evidence);
-        bar.set_message(format!("{}{numbers}", step(now - self.start, status)));
+        let message = format!("{}{numbers}", step(now - self.start, status));
+        bar.set_message(visible(&message).into_owned());
     }
 
     /// A line for every step that has begun since the last call; a step may be over within one look.

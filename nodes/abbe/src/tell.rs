@@ -3,6 +3,7 @@
 //! Whoever reads them may leave before the end (`abbe report BAG | head`): what is left is then not wanted, which is no
 //! failure. Any other failure to write is one, and ends the program with 1: a page that is half told is none.
 
+use metrology::visible::visible;
 use node_runtime::complain;
 
 use std::fmt::Arguments;
@@ -25,7 +26,8 @@ pub fn line(text: Arguments<'_>) {
 }
 
 fn to(out: &mut impl Write, text: Arguments<'_>) -> std::io::Result<()> {
-    match writeln!(out, "{text}") {
+    // What comes from outside commands no terminal.
+    match writeln!(out, "{}", visible(&text.to_string())) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         told => told,
     }
@@ -46,6 +48,16 @@ mod tests {
         fn flush(&mut self) -> std::io::Result<()> {
             Ok(())
         }
+    }
+
+    #[test]
+    fn control_characters_are_written_out_and_json_stays_json() {
+        let mut out = Vec::new();
+        let name = serde_json::json!({ "name": "\u{9b}2J\u{202e}" });
+        to(&mut out, format_args!("{name}")).unwrap();
+        let shown = String::from_utf8(out).unwrap();
+        assert_eq!(shown, "{\"name\":\"\\u009b2J\\u202e\"}\n");
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&shown).unwrap(), name);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The self-contained HTML page around a report.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use metrology::visible::visible;
 
 const STYLE: &str = "
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #ffffff; --rule: #d0d7de; --soft: #57606a; --good: #116329; --bad: #a40e26; }
@@ -20,7 +21,7 @@ th, td { vertical-align: top; } code { font-size: .9em; } @media print { html { 
 
 /// Puts `body` on a page.
 pub fn page(title: &str, body: &Markup) -> String {
-    html! {
+    let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
@@ -32,7 +33,9 @@ pub fn page(title: &str, body: &Markup) -> String {
             body { (body) }
         }
     }
-    .into_string()
+    .into_string();
+    // Marks of direction and control characters of names and texts from outside would show another page.
+    visible(&page).into_owned()
 }
 
 /// Characters beyond which a cell is a sentence.
@@ -62,4 +65,17 @@ pub fn table(head: &[&str], rows: &[Vec<String>]) -> Markup {
 /// An SVG text as it is.
 pub fn figure(svg: &str, caption: &str) -> Markup {
     html! { figure { (PreEscaped(svg)) figcaption.note { (caption) } } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_from_outside_turns_no_text_of_the_page_around() {
+        let name = "block\u{202e}1\u{9b}2J";
+        let page = page(name, &html! { p { (name) } });
+        assert_eq!(page.matches("block\\u202e1\\u009b2J").count(), 2, "{page}");
+        assert!(!page.contains(metrology::visible::is_unseen));
+    }
 }

@@ -25,6 +25,7 @@ pub mod squareness;
 pub mod stage;
 pub mod stamp;
 pub mod text;
+pub mod visible;
 pub mod yaml;
 
 pub use axis::{Axis, AxisSet, PerAxis};

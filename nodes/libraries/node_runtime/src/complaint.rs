@@ -7,6 +7,8 @@
 use std::fmt::Arguments;
 use std::io::Write;
 
+use metrology::visible::visible;
+
 /// A line on standard error, as `eprintln!` takes it, written by [`line()`].
 #[macro_export]
 macro_rules! complain {
@@ -18,7 +20,12 @@ macro_rules! complain {
 /// Writes a line to standard error. Where nobody reads it any more (`2>&1 | head`, or `tee` that Ctrl-C has ended first), what
 /// is being done goes on: a machine is wound down the same.
 pub fn line(text: Arguments<'_>) {
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    let _ = to(&mut std::io::stderr().lock(), text);
+}
+
+/// A line in which nothing of what comes from outside commands the terminal.
+fn to(out: &mut impl Write, text: Arguments<'_>) -> std::io::Result<()> {
+    writeln!(out, "{}", visible(&text.to_string()))
 }
 
 /// The whole chain of `error` in one text.
@@ -68,6 +75,14 @@ mod tests {
             in_words(&placed),
             format!("node probe: cannot open bag: {reason}")
         );
+    }
+
+    #[test]
+    fn a_name_from_outside_commands_no_terminal() {
+        let mut out = Vec::new();
+        to(&mut out, format_args!("bag \u{1b}[2J\u{202e}: no such file")).unwrap();
+        let shown = String::from_utf8(out).unwrap();
+        assert_eq!(shown, "bag \\u001b[2J\\u202e: no such file\n");
     }
 
     #[test]

@@ -16,6 +16,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use abbe_msgs::rcl_interfaces::msg::Log;
 use abbe_msgs::to_cdr;
+use metrology::visible::visible;
 use tracing::field::{Field, Visit};
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::fmt::format::{self, Format};
@@ -32,6 +33,7 @@ use crate::network::Writer;
 
 mod deaf;
 mod levels;
+mod shown;
 
 pub use deaf::deafness;
 use levels::Levels;
@@ -155,7 +157,7 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
     let mut outputs = arguments.iter().map(|arguments| arguments.log_outputs);
     let is_wanted = arguments.is_empty() || outputs.any(|outputs| outputs.stdout);
     let console = fmt::layer()
-        .with_writer(std::io::stderr)
+        .with_writer(|| shown::Shown(std::io::stderr()))
         .with_ansi(std::io::stderr().is_terminal())
         .event_format(Console {
             is_wanted,
@@ -251,7 +253,7 @@ where
             stamp: clock::ros_time(speaker.clock.now()),
             level: severity(*metadata.level()),
             name: speaker.name,
-            msg: fields.message + &fields.others,
+            msg: visible(&(fields.message + &fields.others)).into_owned(),
             file: metadata.file().unwrap_or_default().to_owned(),
             function: String::new(),
             line: metadata.line().unwrap_or(0),
