@@ -8,6 +8,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
+use metrology::bound::Bound;
 use metrology::stamp::NANOS_PER_S;
 use metrology::text::{self, Comments};
 use node_runtime::arguments::Arguments;
@@ -19,6 +20,7 @@ use serde_json::json;
 use crate::loss;
 use crate::node;
 use crate::tell::tell;
+use crate::usage;
 
 /// Nodes whose messages are what a replay puts in.
 const SOURCE_NODES: [&str; 4] = [
@@ -27,6 +29,9 @@ const SOURCE_NODES: [&str; 4] = [
     "mtconnect_bridge",
     "sequencer",
 ];
+
+/// Places at which fresh nodes take over: each is a copy of every node, made before the replay begins.
+const RELAYS: Bound = Bound::at_most(100);
 
 /// Arguments of `abbe check`.
 #[derive(Args)]
@@ -37,7 +42,7 @@ pub struct Check {
     #[arg(long)]
     json: bool,
     /// Copy every node's state after so many messages of the bag into fresh nodes, which go on from there: the results
-    /// stay the same where a state is whole. May be given more than once.
+    /// stay the same where a state is whole. May be given up to 100 times.
     #[arg(long, value_name = "MESSAGES")]
     resume_after: Vec<u64>,
 }
@@ -47,8 +52,13 @@ impl Check {
     /// log times leap, and nothing differs before that.
     ///
     /// # Errors
-    /// When the bag cannot be read or is none of a run in simulated time.
+    /// When the bag cannot be read or is none of a run in simulated time; with exit code 2 where there are too many
+    /// `--resume-after`.
     pub fn execute(self) -> Result<ExitCode> {
+        let place = || "--resume-after".to_owned();
+        RELAYS
+            .check_amount(place, "values", self.resume_after.len())
+            .map_err(|error| usage::refused("check", error))?;
         let outcome = of(&self.bag, &self.resume_after)
             .with_context(|| format!("bag {}", self.bag.display()))?;
         if self.json {
@@ -223,6 +233,25 @@ fn as_json(path: &Path, outcome: &Outcome) -> serde_json::Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn more_copies_of_the_nodes_than_a_hundred_are_refused_before_the_bag_is_opened() {
+        let check = Check {
+            bag: PathBuf::from("no such bag"),
+            json: false,
+            resume_after: vec![1; 101],
+        };
+        let refused = check.execute().unwrap_err();
+        assert!(
+            refused.downcast_ref::<clap::Error>().is_some(),
+            "{refused:#}"
+        );
+        let words = refused.to_string();
+        assert!(
+            words.contains("--resume-after: 101 values: at most 100"),
+            "{words}"
+        );
+    }
 
     #[test]
     fn recorded_parameters_become_a_parameter_file() {

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
+use metrology::bound::Bound;
 use mtconnect_bridge::xml;
 use node_runtime::text_file::{self, Comments};
 
@@ -27,6 +28,11 @@ pub struct LaunchNode {
     /// together, as `ros2 launch` counts them; `None`: neither is said.
     pub ends_within: Option<Duration>,
 }
+
+/// Nodes of a scenario, each with threads and sockets of its own: a cell has some fifteen.
+const NODES: Bound = Bound::at_most(100);
+/// Parameters and parameter files of one node, which become its command line.
+const PARAMETERS: Bound = Bound::at_most(1_000);
 
 /// What `ros2 launch` takes for a `sigterm_timeout` or `sigkill_timeout` that is not said, s.
 const ROS_TIMEOUT_S: f64 = 5.0;
@@ -107,8 +113,10 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<LaunchNode>> {
             root.tag_name().name()
         );
     }
+    let elements = || root.children().filter(roxmltree::Node::is_element);
+    NODES.check_amount(|| "<launch>".to_owned(), "nodes", elements().count())?;
     let mut nodes = Vec::new();
-    for child in root.children().filter(roxmltree::Node::is_element) {
+    for child in elements() {
         let place = document.text_pos_at(child.range().start);
         match child.tag_name().name() {
             "node" => nodes.push(node(child, folder).with_context(|| format!("at {place}"))?),
@@ -130,6 +138,11 @@ fn node(element: roxmltree::Node<'_, '_>, folder: &Path) -> Result<LaunchNode> {
             );
         }
     }
+    let n_parameters = element
+        .children()
+        .filter(roxmltree::Node::is_element)
+        .count();
+    PARAMETERS.check_amount(|| "<node>".to_owned(), "parameters", n_parameters)?;
     let exec = element
         .attribute("exec")
         .context("<node> lacks \"exec\"")?
@@ -247,6 +260,21 @@ mod tests {
         assert_eq!(
             nodes[0].ros_args().join(" "),
             "--ros-args -r __node:=probe -r __ns:=/m1 --params-file lc/probe.yaml -p queue_s:=2.0"
+        );
+    }
+
+    #[test]
+    fn more_nodes_or_parameters_than_a_computer_takes_are_refused_before_any_is_made() {
+        let node = |inside: &str| format!("<node pkg='abbe' exec='probe'>{inside}</node>");
+        let launch = |nodes: &str| parse(&format!("<launch>{nodes}</launch>"), Path::new("lc"));
+        assert_eq!(launch(&node("").repeat(100)).unwrap().len(), 100);
+        let refused = launch(&node("").repeat(101)).unwrap_err();
+        assert_eq!(refused.to_string(), "<launch>: 101 nodes: at most 100");
+        let parameters = "<param name='a' value='1'/>".repeat(1_001);
+        let refused = format!("{:#}", launch(&node(&parameters)).unwrap_err());
+        assert!(
+            refused.contains("<node>: 1001 parameters: at most 1000"),
+            "{refused}"
         );
     }
 

@@ -57,7 +57,10 @@ mod tests {
         to(&mut out, format_args!("{name}")).unwrap();
         let shown = String::from_utf8(out).unwrap();
         assert_eq!(shown, "{\"name\":\"\\u009b2J\\u202e\"}\n");
-        assert_eq!(serde_json::from_str::<serde_json::Value>(&shown).unwrap(), name);
+        assert_eq!(
+            serde_json::from_str::<serde_json::Value>(&shown).unwrap(),
+            name
+        );
     }
 
     #[test]

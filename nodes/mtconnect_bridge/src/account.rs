@@ -17,10 +17,16 @@ pub struct Left {
 impl Left {
     /// Notes one more.
     pub const fn note(&mut self, line: usize) {
+        self.note_many(1, line);
+    }
+
+    /// Notes so many more.
+    pub const fn note_many(&mut self, n: u64, line: usize) {
         if self.count == 0 {
             self.first_line = line;
         }
-        self.count += 1;
+        // Numbers of an agent reach to the greatest.
+        self.count = self.count.saturating_add(n);
     }
 }
 
@@ -48,7 +54,14 @@ pub struct Account {
 impl Account {
     /// Notes that something was left out.
     pub fn leave(&mut self, reason: &'static str, line: usize) {
-        self.left.entry(reason).or_default().note(line);
+        self.leave_many(reason, 1, line);
+    }
+
+    /// Notes that so many were left out.
+    pub fn leave_many(&mut self, reason: &'static str, n: u64, line: usize) {
+        if n > 0 {
+            self.left.entry(reason).or_default().note_many(n, line);
+        }
     }
 
     /// Notes a value whose key is not in the mapping.

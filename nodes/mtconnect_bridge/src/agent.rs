@@ -19,7 +19,8 @@
 //! An agent that loses again is asked after pauses that double, until a part follows on the one before it. A part that
 //! cannot be read is left out: the next one says by (2), or by its head, what was lost. After such a part or a cut line
 //! nothing else is lost while the agent still has n: `current` repeats the values up to n, and the stream goes on from n.
-//! An agent with another `instanceId` has started anew and counts from 1.
+//! An agent with another `instanceId` has started anew and counts from 1; one whose numbers go back without it as well:
+//! that is reported, and all that holds is taken anew. What comes with a number of before is left out and counted.
 //!
 //! Its `probe` is compared with the mapping: what is not there, units that differ, positions in work coordinates.
 //!
@@ -80,6 +81,11 @@ pub enum Heard {
         /// Why.
         flaw: DocumentFlaw,
     },
+    /// Observations of a part that came before are left out.
+    Repeated {
+        /// How many.
+        count: u64,
+    },
     /// Something worth reporting.
     Condition(Condition),
     /// Something to be done outside.
@@ -106,6 +112,8 @@ pub struct AgentLink {
     lost: u64,
     /// Gaps in the numbers of all devices, where one is asked for.
     gaps: u64,
+    /// How often the numbers went back.
+    backs: u64,
     told: BTreeMap<String, u64>,
     progress: bool,
     /// Parts of the stream that could not be read, since the last that could.
@@ -129,6 +137,7 @@ impl AgentLink {
             resumes: false,
             lost: 0,
             gaps: 0,
+            backs: 0,
             told: BTreeMap::new(),
             progress: false,
             unreadable: 0,
@@ -391,12 +400,27 @@ impl AgentLink {
                 let now = instance;
                 out.push(Heard::Condition(Condition::AgentRestarted { before, now }));
                 (self.next, self.gap_from, self.resumes) = (None, None, false);
-                (self.passes_over, self.pause) = (false, Span::default());
+                // An agent that always starts anew is asked after growing pauses as well.
+                self.passes_over = false;
                 self.told.clear();
                 true
             }
             None => false,
         }
+    }
+
+    /// The agent counts anew without saying so: its numbers say nothing of what was told.
+    fn went_back(&mut self, from: u64, to: u64, out: &mut Vec<Heard>) {
+        self.backs += 1;
+        let count = self.backs;
+        out.push(Heard::Condition(Condition::SequenceBack {
+            from,
+            to,
+            count,
+        }));
+        (self.next, self.gap_from, self.resumes) = (None, None, false);
+        self.passes_over = false;
+        self.told.clear();
     }
 
     fn gap(&mut self, from: u64, to: u64, out: &mut Vec<Heard>) {
@@ -432,6 +456,9 @@ impl AgentLink {
     /// `current`: everything that holds; after a cut line only what was told before it, for the rest comes again.
     fn holds_now(&mut self, header: Header, observations: Vec<Numbered>, out: &mut Vec<Heard>) {
         self.meet(header.instance_id, out);
+        if let Some(from) = self.gap_from.filter(|from| header.next_sequence < *from) {
+            self.went_back(from, header.next_sequence, out);
+        }
         let resumed = self.next.filter(|_| self.resumes);
         self.resumes = false;
         let passes_over = std::mem::take(&mut self.passes_over);
@@ -493,10 +520,13 @@ impl AgentLink {
         self.progress = true;
         self.unreadable = 0;
         if self.meet(header.instance_id, out) {
-            out.push(Heard::Io(IoCommand::Disconnect));
-            return self.ask_current(out);
+            return self.ask_again(at, out);
         }
         let next = self.next.unwrap_or(header.next_sequence);
+        if header.next_sequence < next {
+            self.went_back(next, header.next_sequence, out);
+            return self.ask_again(at, out);
+        }
         let begins = observations.first().map(|numbered| numbered.sequence);
         let is_whole = self.config.device.is_empty();
         // Behind a part that could not be read the head alone tells of a loss.
@@ -508,12 +538,7 @@ impl AgentLink {
             false => hole,
         };
         let follows = !observations.is_empty() && lost_to.is_none();
-        for numbered in observations {
-            if numbered.sequence >= next {
-                self.note(&numbered);
-                out.push(Heard::Observation(numbered.observation));
-            }
-        }
+        self.tell_new(next, observations, out);
         self.next = Some(header.next_sequence);
         if let Some(to) = lost_to {
             self.gap(next, to, out);
@@ -523,6 +548,21 @@ impl AgentLink {
         }
         if follows {
             self.pause = Span::default();
+        }
+    }
+
+    /// Tells the observations of a part from a number on, each once.
+    fn tell_new(&mut self, from: u64, mut observations: Vec<Numbered>, out: &mut Vec<Heard>) {
+        let n_all = observations.len();
+        observations.dedup();
+        observations.retain(|numbered| numbered.sequence >= from);
+        let count = (n_all - observations.len()) as u64;
+        for numbered in observations {
+            self.note(&numbered);
+            out.push(Heard::Observation(numbered.observation));
+        }
+        if count > 0 {
+            out.push(Heard::Repeated { count });
         }
     }
 }

@@ -406,6 +406,18 @@ pub enum Condition {
         /// How many gaps there were.
         count: u64,
     },
+    /// The agent's numbers go back without another instance.
+    #[error(
+        "the agent's numbers go back from {from} to {to} while its instance stays: what holds is asked anew; {count} so far"
+    )]
+    SequenceBack {
+        /// The number that was next.
+        from: u64,
+        /// The number that the agent says is next.
+        to: u64,
+        /// How many there were.
+        count: u64,
+    },
     /// The agent has started anew.
     #[error("the agent started anew: instance {now}, was {before}")]
     AgentRestarted {
@@ -453,7 +465,9 @@ impl Condition {
             | Self::MalformedObservations { .. } => "refused_value",
             Self::Unmapped { .. } => "unmapped",
             Self::NotOffered { .. } | Self::Offered => "not_offered",
-            Self::SequenceGap { .. } | Self::DeviceGap { .. } => "sequence_gap",
+            Self::SequenceGap { .. } | Self::DeviceGap { .. } | Self::SequenceBack { .. } => {
+                "sequence_gap"
+            }
             Self::AgentRestarted { .. } => "agent_restarted",
             Self::Uncommanded { .. } => "uncommanded",
         };
@@ -496,6 +510,7 @@ impl Condition {
             | Self::ValueTooLong { count, .. }
             | Self::NotNumbers { count, .. }
             | Self::DeviceGap { count, .. }
+            | Self::SequenceBack { count, .. }
             | Self::OutOfRange { count, .. } => Some(*count),
             Self::SequenceGap { total, .. } => Some(*total),
             _ => None,

@@ -56,6 +56,10 @@ impl Reader {
         };
         let refused = refused.into_iter().filter(|(_, left)| left.count > 0);
         account.left.extend(refused);
+        let leaps = self.values.leaps();
+        if leaps.count > 0 {
+            account.left.insert("leaps of the machine's clock", leaps);
+        }
         account
     }
 
@@ -85,7 +89,7 @@ impl Reader {
         if reading.line == Line::Empty {
             return None;
         }
-        self.account.lines += 1;
+        self.account.lines += record.lines as u64;
         self.account.assets += u64::from(reading.has_asset);
         for flaw in reading.flaws {
             self.flawed(flaw, record.line, out);
@@ -146,6 +150,7 @@ impl Reader {
     /// A block of a connection without its end.
     pub fn give_up(&mut self, block: GivenUp, out: &mut Vec<Output>) {
         let GivenUp { mark, lines } = block;
+        self.account.lines += lines as u64;
         self.flawed(Flaw::Block { mark, lines }, 0, out);
     }
 
@@ -159,6 +164,23 @@ impl Reader {
             limit,
             count: self.refused,
         }));
+    }
+
+    /// Observations that an agent repeats.
+    pub fn repeated(&mut self, count: u64) {
+        self.account
+            .leave_many("observations that came before", count, 0);
+    }
+
+    /// Takes what an agent's numbers show into the account.
+    pub fn of_numbers(&mut self, condition: &Condition) {
+        let (reason, n) = match condition {
+            Condition::SequenceGap { lost, .. } => ("observations that the agent lost", *lost),
+            Condition::DeviceGap { .. } => ("gaps in the numbers of all devices", 1),
+            Condition::SequenceBack { .. } => ("numbers of the agent that go back", 1),
+            _ => return,
+        };
+        self.account.leave_many(reason, n, 0);
     }
 
     /// A part of an agent's stream that cannot be read.

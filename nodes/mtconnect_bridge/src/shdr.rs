@@ -111,14 +111,17 @@ pub fn read(record: &Record, version: u32, shape: impl Fn(&str) -> Option<Shape>
         );
     }
     if let Some(command) = record.head.strip_prefix('*') {
-        return Reading::of(self::command(command.trim()));
+        return Reading {
+            flaws: record.flaw.iter().cloned().collect(),
+            ..Reading::of(self::command(command.trim()))
+        };
     }
     let (mut fields, open_quote) = cut(&record.head);
     if let (Some(body), Some(last)) = (&record.body, fields.last_mut()) {
         *last = format!("{last}\n{body}").trim().to_owned();
     }
-    if let Some(Flaw::Block { .. }) = record.flaw {
-        // The field in which the block began has no contents.
+    if record.flaw.is_some() {
+        // The field in which the block began has no contents, or not all.
         fields.pop();
     }
     let mut observing = Observing::new(version, shape);

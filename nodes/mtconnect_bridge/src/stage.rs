@@ -367,12 +367,15 @@ impl BridgeStage {
                     self.reader.account.lines += 1;
                     self.reader.account.is_of_agent = true;
                     self.reader.replaced(replaced, out);
-                    for _ in 0..left {
-                        self.reader.account.leave("observations that are none", 0);
-                    }
+                    let account = &mut self.reader.account;
+                    account.leave_many("observations that are none", left as u64, 0);
                 }
                 Heard::PartLeftOut { path, flaw } => self.reader.part_left_out(path, flaw, out),
-                Heard::Condition(condition) => out.push(Output::Condition(condition)),
+                Heard::Repeated { count } => self.reader.repeated(count),
+                Heard::Condition(condition) => {
+                    self.reader.of_numbers(&condition);
+                    out.push(Output::Condition(condition));
+                }
                 Heard::Io(command) => {
                     if matches!(command, IoCommand::Stream { .. }) {
                         self.up(out);
@@ -395,6 +398,7 @@ impl BridgeStage {
             ..
         } = link;
         lines.receive(bytes, |framed| match framed {
+            Framed::TooLong { length } if blocks.spoil(length, limit) => {}
             Framed::TooLong { length } => reader.too_long(length, limit, out),
             Framed::Line { text, replaced } => {
                 reader.replaced(replaced, out);
@@ -441,6 +445,7 @@ fn tell_log(log: &mut Log, reader: &mut Reader, at: Stamp<Host>, out: &mut Vec<O
             leap,
         } = due;
         if let Some(leap) = leap {
+            reader.values.at_line(record.line);
             out.push(reader.values.leap(leap));
         }
         reader.take(record, at, dated, out);

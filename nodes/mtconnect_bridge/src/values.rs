@@ -50,7 +50,7 @@ pub struct Values {
     unmapped: BTreeSet<String>,
     watch: Watch,
     stamps_back: u64,
-    leaps: u64,
+    leaps: Left,
     not_numbers: Left,
     too_long: Left,
     /// The log's line that is heard; 0: of a connection.
@@ -89,7 +89,7 @@ impl Values {
             unmapped: BTreeSet::new(),
             watch: Watch::default(),
             stamps_back: 0,
-            leaps: 0,
+            leaps: Left::default(),
             not_numbers: Left::default(),
             too_long: Left::default(),
             line: 0,
@@ -128,6 +128,12 @@ impl Values {
         ]
     }
 
+    /// Leaps of the machine's clock, over each of which the values go on.
+    #[must_use]
+    pub const fn leaps(&self) -> Left {
+        self.leaps
+    }
+
     /// What is heard next stands in this line of a log; 0: it is of a connection.
     pub const fn at_line(&mut self, line: usize) {
         self.line = line;
@@ -161,13 +167,13 @@ impl Values {
 
     /// Counts and reports a leap of the machine's clock.
     pub fn leap(&mut self, leap: Leap) -> Output {
-        self.leaps += 1;
+        self.leaps.note(self.line);
         Output::Condition(Condition::ClockLeap {
             from: words(leap.from),
             to: words(leap.to),
             by_s: (leap.to - leap.from).as_secs_f64(),
             passed_s: leap.passed.map(Span::as_secs_f64),
-            count: self.leaps,
+            count: self.leaps.count,
         })
     }
 

@@ -47,11 +47,17 @@ mod tests {
     #[test]
     fn what_a_terminal_obeys_is_written_out() {
         for (text, shown) in [
-            ("spindle hot, 43 °C\n\tcheck\n", "spindle hot, 43 °C\n\tcheck\n"),
+            (
+                "spindle hot, 43 °C\n\tcheck\n",
+                "spindle hot, 43 °C\n\tcheck\n",
+            ),
             ("\u{1b}[2Jgone", "\\u001b[2Jgone"),
             ("\u{9b}31mred\u{7f}\u{7}", "\\u009b31mred\\u007f\\u0007"),
             ("part\rtrap", "part\\u000dtrap"),
-            ("a\u{202e}b\u{2066}c\u{200f}d\u{2028}e", "a\\u202eb\\u2066c\\u200fd\\u2028e"),
+            (
+                "a\u{202e}b\u{2066}c\u{200f}d\u{2028}e",
+                "a\\u202eb\\u2066c\\u200fd\\u2028e",
+            ),
         ] {
             assert_eq!(visible(text), shown);
         }

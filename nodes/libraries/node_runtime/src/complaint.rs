@@ -80,7 +80,11 @@ mod tests {
     #[test]
     fn a_name_from_outside_commands_no_terminal() {
         let mut out = Vec::new();
-        to(&mut out, format_args!("bag \u{1b}[2J\u{202e}: no such file")).unwrap();
+        to(
+            &mut out,
+            format_args!("bag \u{1b}[2J\u{202e}: no such file"),
+        )
+        .unwrap();
         let shown = String::from_utf8(out).unwrap();
         assert_eq!(shown, "bag \\u001b[2J\\u202e: no such file\n");
     }

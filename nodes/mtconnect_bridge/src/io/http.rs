@@ -15,6 +15,8 @@ use crate::multipart::PART_LIMIT;
 
 /// A whole answer must be there after this time; the stage has a limit of its own.
 const ANSWER_LIMIT: Duration = Duration::from_secs(60);
+/// An answer that a person waits for must be there whole after this time, however slowly it comes.
+const FETCH_LIMIT: Duration = Duration::from_secs(10);
 /// The head of an answer must be there after this time.
 const HEAD_LIMIT: Duration = Duration::from_secs(10);
 
@@ -70,6 +72,10 @@ async fn ask(address: &str, path: &str) -> Result<Response<Incoming>, String> {
 /// # Errors
 /// In words: nobody listens, no answer in time, an answer over the limit.
 pub async fn get(address: &str, path: &str) -> Result<(u16, Vec<u8>), String> {
+    get_within(address, path, ANSWER_LIMIT).await
+}
+
+async fn get_within(address: &str, path: &str, limit: Duration) -> Result<(u16, Vec<u8>), String> {
     let whole = async {
         let answer = ask(address, path).await?;
         let status = answer.status().as_u16();
@@ -77,8 +83,11 @@ pub async fn get(address: &str, path: &str) -> Result<(u16, Vec<u8>), String> {
         let body = body.map_err(|error| error.to_string())?;
         Ok((status, body.to_bytes().to_vec()))
     };
-    let answer = timeout(ANSWER_LIMIT, whole).await;
-    answer.unwrap_or_else(|_| Err("no answer in time".to_owned()))
+    let answer = timeout(limit, whole).await;
+    answer.unwrap_or_else(|_| {
+        let limit_s = limit.as_secs_f64();
+        Err(format!("no whole answer within {limit_s} s"))
+    })
 }
 
 /// Asks for an answer that does not end.
@@ -97,11 +106,15 @@ pub async fn stream(address: &str, path: &str) -> Result<Stream, String> {
     })
 }
 
-/// The body of an answer to `http://host:port/path`, for a program that has no event loop.
+/// The body of an answer to `http://host:port/path`, for a program that has no event loop; it takes 10 s at most.
 ///
 /// # Errors
-/// When the address is none, nobody answers, or the system has no event loop left.
+/// When the address is none, nobody answers whole in time, or the system has no event loop left.
 pub fn fetch(url: &str) -> Result<Vec<u8>, BridgeError> {
+    fetch_within(url, FETCH_LIMIT)
+}
+
+fn fetch_within(url: &str, limit: Duration) -> Result<Vec<u8>, BridgeError> {
     let failed = |reason: String| BridgeError::Ask {
         url: url.to_owned(),
         reason,
@@ -121,9 +134,10 @@ pub fn fetch(url: &str) -> Result<Vec<u8>, BridgeError> {
             action: "starting the event loop",
             source,
         })?;
-    let (status, body) = runtime
-        .block_on(get(&address, &format!("/{path}")))
-        .map_err(failed)?;
+    let answer = runtime.block_on(get_within(&address, &format!("/{path}"), limit));
+    // A name that is still being looked up is not awaited.
+    runtime.shutdown_background();
+    let (status, body) = answer.map_err(failed)?;
     if status == 200 {
         Ok(body)
     } else {
@@ -131,5 +145,38 @@ pub fn fetch(url: &str) -> Result<Vec<u8>, BridgeError> {
             url: url.to_owned(),
             reason: format!("HTTP status {status}"),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Read as _, Write as _};
+    use std::net::TcpListener;
+
+    use super::*;
+
+    /// It sends a byte now and then and never ends; the answer is given up by the limit and not by the agent.
+    #[test]
+    fn an_agent_that_trickles_is_given_up_with_the_limit() {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        let port = listener.local_addr().unwrap().port();
+        let agent = std::thread::spawn(move || {
+            let (mut socket, _) = listener.accept().unwrap();
+            let mut request = [0_u8; 512];
+            let _ = socket.read(&mut request);
+            let head = b"HTTP/1.1 200 OK\r\nContent-Length: 1000000\r\n\r\n";
+            let mut sent = socket.write_all(head);
+            // It ends when nobody listens any more.
+            while sent.is_ok() {
+                std::thread::sleep(Duration::from_millis(5));
+                sent = socket.write_all(b" ").and_then(|()| socket.flush());
+            }
+        });
+        let url = format!("http://127.0.0.1:{port}/probe");
+        let refused = fetch_within(&url, Duration::from_millis(250)).unwrap_err();
+        let words = refused.to_string();
+        assert!(words.contains("no whole answer within 0.25 s"), "{words}");
+        agent.join().unwrap();
+        assert_eq!(FETCH_LIMIT, Duration::from_secs(10));
     }
 }

@@ -9,7 +9,7 @@
 //! The lines between are the end of the field in which the mark stood. In a log what follows is known: a mark that does
 //! not come again within [`BLOCK_LIMIT`] begins nothing, its field is left out and reported, and no other line is lost.
 //! Live, a block that is too long or stays open too long is given up and counted; its end may still come, and begins no
-//! new one.
+//! new one. A block of which one line is over the limit is no value: its field is left out and reported.
 //!
 //! # References
 //! \[1\] `mtconnect/cppagent`, `ShdrAdapter::processData`, which waits for the end without limit and drops blank lines.
@@ -37,6 +37,8 @@ pub struct Record {
     pub body: Option<String>,
     /// Its first line's number, from 1 on; 0: of a connection.
     pub line: usize,
+    /// Lines that it takes, blank ones not counted.
+    pub lines: usize,
     /// What was wrong with it before it was read: its block does not end, or it is too long and is left out.
     pub flaw: Option<Flaw>,
 }
@@ -49,6 +51,7 @@ impl Record {
             head: head.to_owned(),
             body: None,
             line: 0,
+            lines: 1,
             flaw: None,
         }
     }
@@ -76,6 +79,8 @@ struct Open {
     body: Vec<String>,
     bytes: usize,
     lines: usize,
+    /// A line of it that is left out.
+    flaw: Option<Flaw>,
     since: Stamp<Host>,
 }
 
@@ -98,6 +103,7 @@ impl Open {
             body: Vec::new(),
             bytes: 0,
             lines: 1,
+            flaw: None,
             since,
         }
     }
@@ -110,12 +116,20 @@ impl Open {
         }
     }
 
+    /// A line of it is over the limit and is not kept.
+    fn spoil(&mut self, flaw: Flaw) {
+        self.lines += 1;
+        self.flaw = Some(flaw);
+    }
+
+    /// Its record, with the line that ends it.
     fn record(self, line: usize) -> Record {
         Record {
             head: self.head,
             body: Some(self.body.join("\n")),
             line,
-            flaw: None,
+            lines: self.lines + 1,
+            flaw: self.flaw,
         }
     }
 }
@@ -153,6 +167,13 @@ impl Blocks {
             Some((head, mark)) => self.open = Some(Open::new(head, mark, at)),
             None => take(Ok(Record::plain(line))),
         }
+    }
+
+    /// Takes a line over the limit into the block that is open; whether one is.
+    pub fn spoil(&mut self, length: usize, limit: usize) -> bool {
+        let open = self.open.as_mut();
+        open.map(|open| open.spoil(Flaw::TooLong { length, limit }))
+            .is_some()
     }
 
     fn give_up(&mut self, open: Open, may_end: bool) -> GivenUp {
@@ -246,6 +267,7 @@ impl Assembly {
             Err(flaw) => {
                 return Some(Record {
                     line,
+                    lines: 1,
                     flaw: Some(flaw),
                     ..Record::default()
                 });
@@ -268,7 +290,10 @@ impl Assembly {
         };
         let mut block = Open::new(head, mark, Stamp::default());
         while let Some(raw) = self.pop().filter(|raw| raw.line < last) {
-            block.body.extend(raw.text.ok());
+            match raw.text {
+                Ok(text) => block.take(&text),
+                Err(flaw) => block.spoil(flaw),
+            }
         }
         Some(block.record(line))
     }

@@ -232,12 +232,16 @@ fn read(log: &str, reader: &mut Reader<'_>) -> Vec<Leap> {
         if let Some(leap) = paced.leap {
             reader.leap(&leap);
             if leap.from.min(leap.to) < to && leap.from.max(leap.to) > from {
+                let account = &mut reader.account;
+                account.leave("leaps of the machine's clock", record.line);
                 leaps.push(leap);
             }
         }
         let shape = |key: &str| reader.mapping.find(key, None).map(|(_, used)| used.shape());
         let reading = shdr::read(record, version, shape);
-        reader.account.lines += u64::from(reading.line != Line::Empty);
+        if reading.line != Line::Empty {
+            reader.account.lines += record.lines as u64;
+        }
         for flaw in &reading.flaws {
             reader.account.leave(flaw.reason(), record.line);
         }

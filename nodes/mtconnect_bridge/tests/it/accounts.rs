@@ -75,7 +75,7 @@ const OF_KEYS: &str =
     "nothing is published: the mapping has none of the keys a, b; name them in map_file";
 
 /// A log of the mapping, and what its account must have; all of these warn.
-const WARNED: [(&str, &[&str]); 21] = [
+const WARNED: [(&str, &[&str]); 22] = [
     ("", &["0 lines taken, 0 values published", NONE]),
     ("\n\n\r\n", &["0 lines taken", NONE]),
     ("\u{feff}", &["0 lines taken", NONE]),
@@ -154,6 +154,13 @@ const WARNED: [(&str, &[&str]); 21] = [
         &["1 blocks without their end (first in line 2)"],
     ),
     (
+        "2026-01-05T08:00:00Z|t|1\n2026-01-05T08:00:01Z|t|2\n2035-01-01T00:00:00Z|t|3\n2026-01-05T08:00:02Z|t|4\n",
+        &[
+            "4 lines taken, 4 values published",
+            "2 leaps of the machine's clock (first in line 3)",
+        ],
+    ),
+    (
         "yesterday|t|1\n",
         &["1 stamps that are none (first in line 1)"],
     ),
@@ -202,6 +209,26 @@ fn a_log_that_is_whole_ends_without_a_warning() {
 }
 
 /// 65,536 bytes is the limit of `abbe_msgs/MachineValue`, whose `text` no node publishes longer.
+#[test]
+fn a_block_with_a_line_over_the_limit_is_no_value_and_all_its_lines_are_in_the_account() {
+    let long = "x".repeat((1 << 20) + 1);
+    let log = format!("|t|1\n|prog|--multiline--A\none\n{long}\n--multiline--A\n|t|2\n");
+    let (severity, words) = end(MAP, &log);
+    assert_eq!(severity, Severity::Warn);
+    for wanted in [
+        "6 lines taken, 2 values published",
+        "1 lines over the limit (first in line 2)",
+    ] {
+        assert!(words.contains(wanted), "{words}");
+    }
+    let whole = "|t|1\n|prog|--multiline--A\none\ntwo\n--multiline--A\n";
+    assert!(
+        end(MAP, whole)
+            .1
+            .contains("5 lines taken, 2 values published")
+    );
+}
+
 #[test]
 fn a_value_that_no_message_holds_is_left_out_by_its_line_and_not_known() {
     let log = |length: usize| format!("|t|1|prog|A\n|prog|{}\n|t|2\n", "x".repeat(length));

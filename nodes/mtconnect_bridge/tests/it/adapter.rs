@@ -326,6 +326,31 @@ fn a_block_of_several_lines_is_one_value_and_an_asset_none() {
 }
 
 #[test]
+fn a_block_with_a_line_over_the_limit_is_no_value_and_its_lines_are_counted() {
+    let mut desk = Desk::connected();
+    let long = "x".repeat(100);
+    let said = desk.lines(&format!(
+        "|msg|1|--multiline--A\none\n{long}\n--multiline--A\n|Fact|60\n"
+    ));
+    let texts: Vec<&str> = values(&said).iter().map(|value| value.3).collect();
+    assert_eq!(texts, ["60"]);
+    let refused = "refused_line: line of 100 bytes refused, limit 64: left out; 1 so far";
+    assert_eq!(conditions(&said)[0], refused);
+    // One that stays open is given up with its lines.
+    desk.lines("|msg|1|--multiline--B\none\ntwo\n");
+    desk.at_s += 11.0;
+    desk.lines("|Fact|61\n");
+    let said = desk.after(61.0);
+    let said = conditions(&said);
+    let account = said.iter().find(|one| one.starts_with("account")).unwrap();
+    assert!(
+        account.contains("account: 9 lines taken, 2 values"),
+        "{account}"
+    );
+    assert!(account.contains("1 lines over the limit"), "{account}");
+}
+
+#[test]
 fn a_clock_that_leaps_is_said_with_both_stamps_and_every_value_told() {
     let mut desk = Desk::connected();
     desk.lines("2026-01-05T08:00:00Z|Fact|1\n");

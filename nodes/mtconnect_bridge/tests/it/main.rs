@@ -3,6 +3,7 @@
 mod accounts;
 mod adapter;
 mod agent;
+mod numbers;
 mod parameters;
 mod possible;
 mod reference;
