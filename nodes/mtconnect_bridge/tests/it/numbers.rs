@@ -20,6 +20,8 @@ struct Talk {
     stage: BridgeStage,
     at: Stamp<Host>,
     said: Vec<Output>,
+    /// Outputs whose questions have been answered.
+    answered: usize,
 }
 
 /// A document of states of the program: number and word.
@@ -56,11 +58,13 @@ impl Talk {
             stage: BridgeStage::new(&settings),
             at: Stamp::from_nanos(NOW_S * NANOS_PER_S),
             said: Vec::new(),
+            answered: 0,
         };
         talk.step(Input::Tick);
         talk.whole(PROBE);
         talk.whole(&document(7, 1, 10, &[(9, "READY")]));
         talk.stream();
+        talk.answered = talk.said.len();
         talk
     }
 
@@ -90,24 +94,20 @@ impl Talk {
 
     /// Answers whatever is asked, over the pauses, until a stream has begun.
     fn answer_all(&mut self, current: &str) {
-        let mut answered = self.said.len();
-        for _ in 0..6 {
-            self.wait(31);
-            let asked = self.said[answered..]
-                .iter()
-                .rev()
-                .find_map(|output| match output {
-                    Output::Io(IoCommand::Get { path } | IoCommand::Stream { path }) => {
-                        Some(path.clone())
-                    }
-                    _ => None,
-                });
-            answered = self.said.len();
+        for _ in 0..10 {
+            let mut news = self.said[self.answered..].iter().rev();
+            let asked = news.find_map(|output| match output {
+                Output::Io(IoCommand::Get { path } | IoCommand::Stream { path }) => {
+                    Some(path.clone())
+                }
+                _ => None,
+            });
+            self.answered = self.said.len();
             match asked.as_deref() {
                 Some("/probe") => self.whole(PROBE),
                 Some("/current") => self.whole(current),
                 Some(_) => return self.stream(),
-                None => {}
+                None => self.wait(31),
             }
         }
     }
