@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
 use machine::MachineFile;
+use metrology::bound::Bound;
 use metrology::stamp::{Machine, Stamp};
 use metrology::{Axis, PerAxis, yaml};
 use mtconnect_bridge::BridgeError;
@@ -20,6 +21,16 @@ use node_runtime::complain;
 
 use crate::loss;
 use crate::tell::tell;
+use crate::whole_file;
+
+/// Lines of all programs: a day in seconds.
+const LINES: Bound = Bound::at_most(100_000).with_remedy("; take longer bin_s or a shorter range");
+/// Programs, each a file.
+const PROGRAMS: Bound = Bound::at_most(1_000).with_remedy("; take longer slice_s");
+/// Length of a title in bytes: it stands in a comment of every program.
+const TITLE_BYTES: Bound = Bound::at_most(200);
+/// An axis goes to and fro within its window: a smaller one makes a line of every hair's breadth, mm.
+const LEAST_WINDOW_MM: f64 = 1.0;
 
 /// Arguments of `abbe import-shift`.
 #[derive(Args)]
@@ -79,6 +90,12 @@ impl OrderFile {
     /// # Errors
     /// With the key, its value and its limits.
     pub fn checked(&self, machine: &MachineFile) -> Result<ShiftOrder> {
+        TITLE_BYTES.check_amount(|| "title".to_owned(), "bytes", self.title.len())?;
+        let ends_comment = |letter: char| "()".contains(letter) || letter.is_control();
+        ensure!(
+            !self.title.contains(ends_comment),
+            "title: must have no brackets, line ends or control characters: it stands in a comment of the programs"
+        );
         let (from, to) = (stamp("from", &self.from)?, stamp("to", &self.to)?);
         ensure!(from < to, "to: must be after from");
         let times = [("bin_s", self.bin_s), ("slice_s", self.slice_s)];
@@ -88,6 +105,15 @@ impl OrderFile {
                 "{key} = {time_s} s: must be from 1 to 86400 s"
             );
         }
+        // Both ends lie between 1970 and 2106: the quotients are far below the greatest number.
+        let length_s = (to - from).as_secs_f64();
+        let amount = |time_s: f64| (length_s / time_s).ceil() as u64;
+        LINES.check_amount(
+            || "bin_s".to_owned(),
+            "lines from `from` to `to`",
+            amount(self.bin_s),
+        )?;
+        PROGRAMS.check_amount(|| "slice_s".to_owned(), "programs", amount(self.slice_s))?;
         let windows = [self.x_mm, self.y_mm, self.z_mm];
         let mut feed_limit_mm_min = f64::INFINITY;
         for (axis, (low, high)) in Axis::LINEAR.into_iter().zip(windows) {
@@ -98,8 +124,19 @@ impl OrderFile {
                 least <= low && low < high && high <= greatest,
                 "window of {axis}: {low} to {high} mm, travel {least} to {greatest} mm"
             );
+            ensure!(
+                high - low >= LEAST_WINDOW_MM,
+                "window of {axis}: {low} to {high} mm: at least {LEAST_WINDOW_MM} mm wide"
+            );
             feed_limit_mm_min = linear.feed_limit_mm_min.min(feed_limit_mm_min);
         }
+        let clear = machine.linear(Axis::Z).context("machine file: no axis Z")?;
+        let [least, greatest] = clear.travel_mm;
+        ensure!(
+            (least..=greatest).contains(&self.clear_mm),
+            "clear_mm = {} mm: must be within the travel of Z, {least} to {greatest} mm",
+            self.clear_mm
+        );
         let mut window_mm = PerAxis::default();
         for (axis, window) in Axis::LINEAR.into_iter().zip(windows) {
             window_mm[axis] = window;
@@ -155,7 +192,7 @@ impl ImportShift {
         std::fs::create_dir_all(&self.output).with_context(|| place(&self.output))?;
         for (n, program) in programs.iter().enumerate() {
             let path = self.output.join(format!("shift_{n:02}.ngc"));
-            std::fs::write(&path, program).with_context(|| place(&path))?;
+            whole_file::write(&path, program)?;
         }
         tell!("{}: {} programs", self.output.display(), programs.len());
         self.account(&shift, &order);
@@ -191,4 +228,62 @@ const LEAPS_SHOWN: usize = 10;
 
 fn between((first, last): &(Stamp<Machine>, Stamp<Machine>)) -> String {
     format!("{} to {}", words(*first), words(*last))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MACHINE: &str = include_str!("../../../launch_configs/real_shift/machine.yaml");
+    const ORDER: &str = include_str!("../../../launch_configs/real_shift/order.yaml");
+
+    fn checked(text: &str) -> Result<ShiftOrder> {
+        let machine = MachineFile::parse(MACHINE, "machine.yaml")?;
+        yaml::read_letters::<OrderFile>(text)?.checked(&machine)
+    }
+
+    #[test]
+    fn every_number_and_text_of_an_order_has_its_bound() {
+        assert!(checked(ORDER).is_ok(), "{:#}", checked(ORDER).unwrap_err());
+        let year = "to: \"2096-11-29T15:15:00Z\"";
+        for (of, spoiled, words) in [
+            ("to: \"2016-11-29T15:15:00Z\"", year, "bin_s: "),
+            (
+                "slice_s: 900.0",
+                "slice_s: 10.0",
+                "slice_s: 1440 programs: at most 1000",
+            ),
+            ("bin_s: 10.0", "bin_s: 0.0", "must be from 1 to 86400 s"),
+            (
+                "x_mm: [-60.0, 180.0]",
+                "x_mm: [-60.0, -59.9999]",
+                "at least 1 mm wide",
+            ),
+            (
+                "clear_mm: 240.0",
+                "clear_mm: .nan",
+                "within the travel of Z",
+            ),
+            (
+                "clear_mm: 240.0",
+                "clear_mm: 1.0e300",
+                "within the travel of Z",
+            ),
+            (
+                "title: a shift",
+                "title: a) G0 Z-60 (shift",
+                "title: must have no brackets",
+            ),
+            (
+                "title: a shift",
+                "title: \"a\\nG0 Z-60\" #",
+                "title: must have no brackets",
+            ),
+        ] {
+            let text = ORDER.replacen(of, spoiled, 1);
+            assert_ne!(text, ORDER, "{of}");
+            let refused = format!("{:#}", checked(&text).expect_err(spoiled));
+            assert!(refused.contains(words), "{spoiled}: {refused}");
+        }
+    }
 }

@@ -167,4 +167,14 @@ pub enum BridgeError {
         /// The limit.
         limit_mm_min: f64,
     },
+    /// More lines than programs may have.
+    #[error(
+        "the travels of the log need {lines:.0} lines within the windows of the order, limit {limit}: widen the windows or shorten the range"
+    )]
+    TooManyLines {
+        /// Lines of all programs.
+        lines: f64,
+        /// The limit.
+        limit: u32,
+    },
 }

@@ -38,6 +38,9 @@ const REST_MM: f64 = 0.01;
 /// Greatest travel of one line over the window's length.
 const WINDOW_SHARE: f64 = 0.5;
 
+/// Lines of all programs together: what a control takes in one.
+const LINE_LIMIT: u32 = 1_000_000;
+
 /// What is asked of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShiftOrder {
@@ -57,6 +60,26 @@ pub struct ShiftOrder {
     pub clear_mm: f64,
     /// Greatest feed of the other machine, mm/s.
     pub feed_limit_mm_s: f64,
+}
+
+impl ShiftOrder {
+    /// Its length in lines of programs.
+    #[must_use]
+    pub fn bins(&self) -> f64 {
+        let length_s = (self.to - self.from).as_secs_f64();
+        (length_s / self.bin_s).round().max(0.0)
+    }
+
+    /// Pieces into which the travel of a bin is cut, so that no axis leaves its window.
+    fn pieces(&self, travel_mm: &PerAxis<f64>) -> f64 {
+        let parts = Axis::LINEAR.map(|axis| {
+            let (low, high) = self.window_mm[axis];
+            (travel_mm[axis] / ((high - low) * WINDOW_SHARE))
+                .ceil()
+                .max(1.0)
+        });
+        parts.into_iter().fold(1.0, f64::max)
+    }
 }
 
 /// What happened in one bin.
@@ -86,12 +109,13 @@ struct Cutter {
 }
 
 impl Cutter {
+    /// Of an order whose number of bins is bounded.
     fn new(order: &ShiftOrder) -> Self {
-        let n = ((order.to - order.from).as_secs_f64() / order.bin_s).round();
+        let n = order.bins();
         Self {
             bin: Span::from_secs_f64(order.bin_s),
             from: order.from,
-            bins: vec![Bin::default(); n.clamp(0.0, 1e6) as usize],
+            bins: vec![Bin::default(); n as usize],
             spindle: None,
             position_mm: PerAxis::default(),
         }
@@ -104,7 +128,10 @@ impl Cutter {
 
     /// (1) of a speed that held from one instant to another.
     fn turn(&mut self, from: Stamp<Machine>, to: Stamp<Machine>, speed_rad_s: f64) {
-        for (at, bin) in self.bins.iter_mut().enumerate() {
+        let first = self.place(from.max(self.from)).unwrap_or_default();
+        let last = self.place(to).map_or(0, |last| last.saturating_add(1));
+        let bins = self.bins.iter_mut().enumerate().take(last);
+        for (at, bin) in bins.skip(first) {
             let offset = self
                 .bin
                 .nanos()
@@ -242,13 +269,7 @@ impl Writer<'_> {
     /// To and fro, so that no axis leaves its window.
     fn travel(&mut self, travel_mm: &PerAxis<f64>, length_mm: f64) {
         let order = self.order;
-        let parts = Axis::LINEAR.map(|axis| {
-            let (low, high) = order.window_mm[axis];
-            (travel_mm[axis] / ((high - low) * WINDOW_SHARE))
-                .ceil()
-                .max(1.0)
-        });
-        let n = parts.into_iter().fold(1.0, f64::max);
+        let n = order.pieces(travel_mm);
         let feed_mm_min = (length_mm / order.bin_s * 60.0 * 10.0).round() / 10.0;
         for _ in 0..n as usize {
             let mut line = "G1".to_owned();
@@ -281,7 +302,7 @@ fn round(position_mm: f64) -> f64 {
 /// One program for each slice; the last may be shorter.
 ///
 /// # Errors
-/// When a bin needs a feed that the other machine has not.
+/// When a bin needs a feed that the other machine has not, or the travels more lines than a control takes.
 pub fn programs(bins: &[Bin], title: &str, order: &ShiftOrder) -> Result<Vec<String>, BridgeError> {
     for (at, bin) in bins.iter().enumerate() {
         let feed_mm_s = bin.travel_mm.xyz().norm() / order.bin_s;
@@ -292,6 +313,13 @@ pub fn programs(bins: &[Bin], title: &str, order: &ShiftOrder) -> Result<Vec<Str
                 limit_mm_min: order.feed_limit_mm_s * 60.0,
             });
         }
+    }
+    let lines: f64 = bins.iter().map(|bin| order.pieces(&bin.travel_mm)).sum();
+    if lines.is_nan() || lines > f64::from(LINE_LIMIT) {
+        return Err(BridgeError::TooManyLines {
+            lines,
+            limit: LINE_LIMIT,
+        });
     }
     let per_slice = (order.slice_s / order.bin_s).round().max(1.0) as usize;
     let mut writer = Writer {
@@ -387,6 +415,17 @@ mod tests {
         assert_eq!(
             refused,
             "at 0 s: feed 360 mm/min, limit 300 mm/min: take longer bins"
+        );
+        let mut narrow = order();
+        narrow.window_mm[Axis::X] = (0.0, 1e-5);
+        let refused = programs(&bins, "a", &narrow).unwrap_err().to_string();
+        assert!(
+            refused.starts_with("the travels of the log need 120000"),
+            "{refused}"
+        );
+        assert!(
+            refused.contains("limit 1000000: widen the windows"),
+            "{refused}"
         );
         slow.spindle = "main".to_owned();
         let refused = super::bins(LOG.join("\n").as_bytes(), &mapping(), &slow).unwrap_err();

@@ -5,6 +5,7 @@ use std::convert::Infallible;
 
 use machine::MachineFile;
 use metrology::Stage;
+use metrology::number::number;
 use metrology::sample::{
     CycleOrder, NewTouches, PlanState, PlanStatus, ProbeTrigger, TestSegment, UpdateRequest,
 };
@@ -122,6 +123,26 @@ struct Production {
     until: Stamp<Host>,
     serve_updates: bool,
     parts: u32,
+}
+
+/// Passes of production after which their mean time counts: a few short ones do no harm.
+const PASSES_BEFORE: u32 = 100;
+/// A pass takes so long at least, s: each is a program with two marks in the bag, and two years of production are allowed.
+const SHORTEST_PASS_S: f64 = 1.0;
+
+impl Production {
+    /// Why it ends: its program does nothing that takes time.
+    fn too_short(&self, now: Stamp<Host>) -> Option<String> {
+        let (step, parts, program) = (self.step, self.parts, &self.program);
+        let mean_s = (now - self.from).as_secs_f64() / f64::from(parts.max(1));
+        (parts >= PASSES_BEFORE && mean_s < SHORTEST_PASS_S).then(|| {
+            format!(
+                "steps[{step}].program = {program}: {parts} passes took {} s each: a pass of production takes at least {} s: give a program that moves or dwells, or `do: run`",
+                number(mean_s),
+                number(SHORTEST_PASS_S)
+            )
+        })
+    }
 }
 
 /// The sequencer's stage.
@@ -272,6 +293,10 @@ impl Sequencer {
         if self.now >= production.until {
             self.production = None;
             return true;
+        }
+        if let Some(reason) = production.too_short(self.now) {
+            self.fail(reason, out);
+            return false;
         }
         let repeat = production.parts;
         production.parts += 1;

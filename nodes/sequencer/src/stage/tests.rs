@@ -114,6 +114,30 @@ fn steps_run_one_after_the_other_between_marks() {
 }
 
 #[test]
+fn production_whose_passes_take_no_time_fails_instead_of_filling_the_bag() {
+    for (pass_s, fails) in [(0.0, true), (0.9, true), (1.1, false)] {
+        let mut sequencer = sequencer(vec![produce(10.0)]);
+        give(&mut sequencer, 0.0, Input::Tick);
+        let mut out = give(&mut sequencer, 1.0, Input::Tick);
+        for pass in 1..=200 {
+            let Some((id, _)) = sent(&out) else { break };
+            let at_s = 1.0 + f64::from(pass) * pass_s;
+            out = give(&mut sequencer, at_s, Input::ProgramEnd { id, end: done() });
+        }
+        let failed = out.iter().find_map(|output| match output {
+            Output::Status(status) if status.state == PlanState::Failed => Some(&status.message),
+            _ => None,
+        });
+        assert_eq!(failed.is_some(), fails, "{pass_s}: {out:?}");
+        if let Some(message) = failed {
+            let wanted = "steps[0].program = part.ngc: 100 passes took ";
+            assert!(message.starts_with(wanted), "{message}");
+            assert!(message.contains("at least 1 s"), "{message}");
+        }
+    }
+}
+
+#[test]
 fn an_update_request_is_served_between_two_parts() {
     let mut sequencer = sequencer(vec![produce(10.0)]);
     give(&mut sequencer, 0.0, Input::Tick);
