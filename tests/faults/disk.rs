@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use abbe_msgs::topics;
 use abbe_tests::graph::Graph;
 use abbe_tests::namespace;
-use abbe_tests::program::{Process, command, domain};
+use abbe_tests::program::{Process, command, domain, root};
 use abbe_tests::scenario::Scenario;
 use nix::sys::signal::Signal;
 use recorder::{Bag, Event, Order};
@@ -186,6 +186,47 @@ fn a_run_in_real_time_whose_disk_fills_says_so_on_diagnostics_and_winds_down() {
         assert_eq!(told_of_bag(&ended.said).0, messages, "{}", ended.said);
         for word in ["called off", "no space", "messages are lost"] {
             assert!(ended.said.contains(word), "{word}: {}", ended.said);
+        }
+    });
+}
+
+#[test]
+fn what_does_not_fit_on_the_disk_leaves_no_half_file_and_an_error() {
+    namespace::alone("verbs on a full disk", || {
+        let home = tempfile::tempdir().unwrap();
+        let disk = home.path().join("disk");
+        namespace::small_disk(&disk, 4);
+        let of = |path: &str| root().join(path).display().to_string();
+        let [table, map, machine] = [
+            "tests/import/ballbar.csv",
+            "tests/import/ballbar.yaml",
+            "launch_configs/gap_first/machine.yaml",
+        ]
+        .map(of);
+        let bag = of("bags/dual_loop");
+        let out = |name: &str| disk.join(name).display().to_string();
+        let (of_import, of_new, of_page) = (out("bag"), out("machine.yaml"), out(""));
+        let imported = ["import", &table, "--map", &map, "--machine", &machine];
+        for arguments in [
+            [&imported[..], &["-o", &of_import]].concat(),
+            vec!["new-machine", &of_new],
+            vec!["report", &bag, "--out", &of_page],
+        ] {
+            let ended = Process::start(command(0, &arguments));
+            let ended = ended.ended_within(Duration::from_secs(60));
+            assert_eq!(
+                ended.status.code(),
+                Some(1),
+                "{arguments:?}: {}",
+                ended.said
+            );
+            let said = ended.said.to_lowercase();
+            assert!(said.contains("no space"), "{arguments:?}: {said}");
+            let left: Vec<_> = std::fs::read_dir(&disk)
+                .unwrap()
+                .map(|entry| entry.unwrap().file_name())
+                .collect();
+            assert!(left.is_empty(), "{arguments:?}: {left:?}");
         }
     });
 }

@@ -2,12 +2,10 @@
 
 use node_runtime::complain;
 
-use std::fs::File;
-use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use machine::export::selection::{Selected, Wanted, select};
 use machine::export::{ExportFile, Unestimable};
@@ -18,6 +16,7 @@ use crate::evaluate::Tests;
 use crate::loss;
 use crate::tell::tell;
 use crate::usage::{USAGE, above_zero, refused};
+use crate::whole_file;
 
 mod counting;
 mod effect;
@@ -318,12 +317,18 @@ impl Export {
 
     fn write(&self, selected: &Selected, of_what: &[String]) -> Result<()> {
         std::fs::create_dir_all(&self.out).with_context(|| self.out.display().to_string())?;
+        let notes = notes(of_what, &selected.files);
+        let tables = selected.files.iter();
+        let tables = tables.map(|file| (self.out.join(&file.name), file.text.as_str()));
+        let files: Vec<(PathBuf, &str)> = tables
+            .chain([(self.out.join(NOTES), notes.as_str())])
+            .collect();
+        // A part of the tables, or tables without their notes, must not be loaded.
+        let all = files.iter().map(|(path, text)| (path.as_path(), *text));
+        whole_file::create_all(all, "name another folder with --out")?;
         for file in &selected.files {
-            create(&self.out.join(&file.name), &file.text)?;
             tell!("wrote {}", self.out.join(&file.name).display());
         }
-        let notes = notes(of_what, &selected.files);
-        create(&self.out.join(NOTES), &notes)?;
         tell!(
             "wrote {}: read it before loading anything",
             self.out.join(NOTES).display()
@@ -349,22 +354,6 @@ fn notes(of_what: &[String], files: &[ExportFile]) -> String {
         }
     }
     text
-}
-
-fn create(path: &Path, text: &str) -> Result<()> {
-    let mut file = File::create_new(path).map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists => anyhow!(
-            "{}: there already, and not overwritten: name another folder with --out",
-            path.display()
-        ),
-        _ => anyhow!("{}: {error}", path.display()),
-    })?;
-    let written = file.write_all(text.as_bytes());
-    if written.is_err() {
-        // Half a table must not be loaded, nor stand in the way of the next export.
-        let _ = std::fs::remove_file(path);
-    }
-    written.with_context(|| path.display().to_string())
 }
 
 #[cfg(test)]

@@ -180,17 +180,28 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let stated = map.resolution();
     let stated = stated.map(|(key, value)| format!("{key}: {value:?}\n"));
     let of_machine = (&machine, machine_text);
-    let mut writer = Writer::begin(output, of_machine, map.start_s, stated)?;
+    // What was begun is no bag, and would stand in the way of the next attempt.
+    let is_there = output.exists();
+    let unmake = |error: anyhow::Error| {
+        let unmade = if is_there || !output.exists() {
+            Ok(())
+        } else {
+            std::fs::remove_dir_all(output)
+        };
+        match unmade {
+            Ok(()) => error,
+            Err(left) => error.context(format!("{}: not removed: {left}", output.display())),
+        }
+    };
+    let mut writer = Writer::begin(output, of_machine, map.start_s, stated).map_err(unmake)?;
     let n_runs = match motion::write(&map, &runs, &mut writer) {
         Ok(n_runs) => n_runs,
         Err(error) => {
             drop(writer);
-            // What was begun is no bag, and would stand in the way of the next attempt.
-            std::fs::remove_dir_all(output).with_context(|| format!("{}", output.display()))?;
-            return Err(error.context(in_table()));
+            return Err(unmake(error.context(in_table())));
         }
     };
-    let n_messages = writer.finish()?;
+    let n_messages = writer.finish().map_err(unmake)?;
     let mut notes = doubts(&map, &runs);
     notes.extend(table.left_out);
     let n_rows = runs.runs.iter().map(Vec::len).sum();

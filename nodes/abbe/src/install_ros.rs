@@ -140,9 +140,14 @@ fn put(path: &Path, bytes: &[u8], mode: u32) -> Result<()> {
     fs::create_dir_all(folder).with_context(place)?;
     let mut beside = path.as_os_str().to_owned();
     beside.push(".new");
-    fs::write(&beside, bytes).with_context(place)?;
-    fs::set_permissions(&beside, fs::Permissions::from_mode(mode)).with_context(place)?;
-    fs::rename(&beside, path).with_context(place)
+    let put = fs::write(&beside, bytes)
+        .and_then(|()| fs::set_permissions(&beside, fs::Permissions::from_mode(mode)))
+        .and_then(|()| fs::rename(&beside, path));
+    if put.is_err() {
+        // What could not be written whole must not stay beside the old file.
+        let _ = fs::remove_file(&beside);
+    }
+    put.with_context(place)
 }
 
 #[cfg(test)]

@@ -1,14 +1,13 @@
 //! `abbe new-machine FILE`: a machine file to begin with; axes and travels are enough.
 
-use std::fs::OpenOptions;
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 
 use crate::tell::tell;
+use crate::whole_file;
 
 /// The template; a line `# key: value` that is commented out states the value that the key has without it.
 const TEMPLATE: &str = include_str!("new_machine/machine.yaml");
@@ -27,13 +26,7 @@ impl NewMachine {
     /// When the file exists, or cannot be written.
     pub fn execute(self) -> Result<ExitCode> {
         let shown = self.file.display();
-        let mut file = OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .open(&self.file)
-            .with_context(|| format!("{shown}: a new file is made, none is overwritten"))?;
-        file.write_all(TEMPLATE.as_bytes())
-            .with_context(|| shown.to_string())?;
+        whole_file::create(&self.file, TEMPLATE, "name another file")?;
         tell!("{shown}: enter name, chain and travels, then: abbe validate {shown}");
         Ok(ExitCode::SUCCESS)
     }
@@ -92,7 +85,10 @@ mod tests {
         assert!(make().is_ok());
         std::fs::write(&file, "mine").unwrap();
         let error = format!("{:#}", make().unwrap_err());
-        assert!(error.contains("none is overwritten"), "{error}");
+        assert!(
+            error.contains("not overwritten: name another file"),
+            "{error}"
+        );
         assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
     }
 }

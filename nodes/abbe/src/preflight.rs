@@ -32,6 +32,7 @@ use crate::report::terminal::{self, Part, Room};
 use crate::report::{self, Report};
 use crate::tell::tell;
 use crate::usage::{GREATEST_NUMBER, refused};
+use crate::whole_file;
 
 /// Arguments of `abbe preflight`.
 #[derive(Args)]
@@ -114,7 +115,7 @@ impl Preflight {
                 @for section in &sections { (section.html()) }
             };
             let html = report::html(&title, &body);
-            std::fs::write(path, html).with_context(|| format!("{}", path.display()))?;
+            whole_file::write(path, &html)?;
         }
         self.tell(&plan, &geometry, page)
     }

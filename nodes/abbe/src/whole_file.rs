@@ -1,9 +1,10 @@
 //! Files that are there whole or not at all: a disk that fills up leaves no half of a page behind.
 
-use std::io::ErrorKind;
+use std::fs::File;
+use std::io::{ErrorKind, Write as _};
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 
 /// Writes a file in the place of the old one; where that fails, the old one stays as it was.
 ///
@@ -37,9 +38,70 @@ fn replace(path: &Path, text: &str) -> std::io::Result<()> {
     }
 }
 
+/// Writes a file that is not there yet; where that fails, none is left. `remedy`: what to do where one is there.
+///
+/// # Errors
+/// When it is there, or cannot be written.
+pub fn create(path: &Path, text: &str, remedy: &str) -> Result<()> {
+    let shown = path.display();
+    let mut file = File::create_new(path).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => {
+            anyhow!("{shown}: there already, and not overwritten: {remedy}")
+        }
+        _ => anyhow!("{shown}: {error}"),
+    })?;
+    let written = file.write_all(text.as_bytes());
+    if written.is_err() {
+        // Half a file must not be used, nor stand in the way of the next attempt.
+        let _ = std::fs::remove_file(path);
+    }
+    written.with_context(|| shown.to_string())
+}
+
+/// Writes files that are not there yet, all or none: where one fails, those before it are removed.
+///
+/// # Errors
+/// As [`create`].
+pub fn create_all<'a>(
+    files: impl IntoIterator<Item = (&'a Path, &'a str)>,
+    remedy: &str,
+) -> Result<()> {
+    let mut made: Vec<&Path> = Vec::new();
+    for (path, text) in files {
+        if let Err(error) = create(path, text, remedy) {
+            for path in made {
+                let _ = std::fs::remove_file(path);
+            }
+            return Err(error);
+        }
+        made.push(path);
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn new_files_are_written_all_or_none_and_none_is_overwritten() {
+        let home = tempfile::tempdir().unwrap();
+        let [first, second] = ["a.com", "b.com"].map(|name| home.path().join(name));
+        std::fs::write(&second, "mine").unwrap();
+        let files = [(first.as_path(), "1"), (second.as_path(), "2")];
+        let error = create_all(files, "name another folder")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.ends_with("not overwritten: name another folder"),
+            "{error}"
+        );
+        assert!(!first.exists());
+        assert_eq!(std::fs::read_to_string(&second).unwrap(), "mine");
+        std::fs::remove_file(&second).unwrap();
+        create_all(files, "").unwrap();
+        assert_eq!(std::fs::read_to_string(&first).unwrap(), "1");
+    }
 
     #[test]
     fn a_file_that_cannot_be_written_leaves_the_old_one_and_nothing_beside_it() {

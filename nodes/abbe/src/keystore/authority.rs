@@ -232,13 +232,22 @@ fn certificate(name: &str, key: &PKey<Private>, validity: &Validity) -> Result<X
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    fs::write(path, bytes).with_context(|| format!("writing {}", path.display()))
+    whole(path, fs::write(path, bytes))
 }
 
 /// Readable by nobody else.
 fn write_secret(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut options = fs::OpenOptions::new();
     let opened = options.write(true).create_new(true).mode(0o600).open(path);
-    let written = opened.and_then(|mut file| file.write_all(bytes));
+    let place = || format!("writing {}", path.display());
+    let mut file = opened.with_context(place)?;
+    whole(path, file.write_all(bytes))
+}
+
+/// Removes what could not be written whole: half a key or certificate is none.
+fn whole(path: &Path, written: std::io::Result<()>) -> Result<()> {
+    if written.is_err() {
+        let _ = fs::remove_file(path);
+    }
     written.with_context(|| format!("writing {}", path.display()))
 }
