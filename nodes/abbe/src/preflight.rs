@@ -10,6 +10,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use gap_diagnosis::GapConfig;
 use gap_diagnosis::preflight::preflight;
+use metrology::bound::{Bound, BoundError};
 use metrology::number::number;
 use nalgebra::Vector3;
 
@@ -33,6 +34,9 @@ use crate::report::{self, Report};
 use crate::tell::tell;
 use crate::usage::{GREATEST_NUMBER, refused};
 use crate::whole_file;
+
+/// Components that are wanted, and offsets tried for each: every pair is a fit.
+const ASKED: Bound = Bound::at_most(100);
 
 /// Arguments of `abbe preflight`.
 #[derive(Args)]
@@ -72,6 +76,17 @@ pub struct Preflight {
 }
 
 impl Preflight {
+    /// Refuses more questions than a preflight answers.
+    fn bounded(&self) -> Result<(), BoundError> {
+        let asked = [
+            ("--want", self.want.len()),
+            ("--head-offset", self.head_offset.len()),
+        ];
+        asked
+            .into_iter()
+            .try_for_each(|(option, n)| ASKED.check_amount(|| option.to_owned(), "values", n))
+    }
+
     /// Tells rank, what is determined and what to add, and what a diagnosis would find.
     ///
     /// # Errors
@@ -86,6 +101,8 @@ impl Preflight {
             );
             return Err(refused("preflight", reason));
         }
+        self.bounded()
+            .map_err(|error| refused("preflight", error))?;
         if let Some(name) = self.head_offset.first().filter(|_| self.want.is_empty()) {
             let reason = format!(
                 "--head-offset {},{},{} does nothing without --want: it is an offset to try for a component that is wanted",
@@ -209,6 +226,33 @@ fn offset(text: &str) -> Result<Vector3<f64>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn more_than_a_hundred_questions_are_refused_before_the_plan_is_read() {
+        for (want, offsets, option) in [(101, 1, "--want"), (1, 101, "--head-offset")] {
+            let preflight = Preflight {
+                what: "no such plan".into(),
+                machine: None,
+                want: vec!["EXX".to_owned(); want],
+                head_offset: vec![Vector3::zeros(); offsets],
+                station_uncertainty_um: 0.1,
+                floor: Vec::new(),
+                html: None,
+                json: false,
+                full: false,
+            };
+            let refused = preflight.execute().unwrap_err().to_string();
+            let wanted = format!("{option}: 101 values: at most 100");
+            assert!(refused.contains(&wanted), "{refused}");
+        }
+        for wrong in ["grid=1e300/0.3", "grid=0.1/inf", "grid=0/0.3"] {
+            let refused = floors::argument(wrong).unwrap_err();
+            assert!(
+                refused.contains("must be a finite number above 0"),
+                "{refused}"
+            );
+        }
+    }
 
     #[test]
     fn a_head_offset_is_three_numbers() {

@@ -5,6 +5,8 @@ use gap_diagnosis::preflight::{AssumedFloor, Floors};
 use machine::MachineFile;
 use machine::twin::Instrument;
 
+use crate::usage::above_zero;
+
 /// Instruments with the noise of a reading that is assumed unless something else is said, µm.
 const READING_UM: [(Instrument, f64); 6] = [
     (Instrument::Motor, 0.1),
@@ -42,10 +44,7 @@ pub fn argument(text: &str) -> Result<FloorArgument, String> {
             let names = known.map(|instrument| instrument.to_string());
             format!("\"{name}\" is no instrument (known: {})", names.join(", "))
         })?;
-    let number = |part: &str| match part.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err(format!("\"{part}\": must be a number above 0")),
-    };
+    let number = |part: &str| above_zero(part.trim()).map_err(|rule| format!("\"{part}\": {rule}"));
     Ok(FloorArgument {
         instrument,
         floor: AssumedFloor {
