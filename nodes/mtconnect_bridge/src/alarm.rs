@@ -72,8 +72,7 @@ impl Alarms {
             }
             AlarmLevel::Warning | AlarmLevel::Fault => {
                 self.absent_since = None;
-                let is_known = self.active.contains_key(&report.code);
-                if is_known || self.active.len() < ACTIVE_LIMIT {
+                if self.has_room_for(&report.code) {
                     let since = self
                         .active
                         .get(&report.code)
@@ -86,6 +85,19 @@ impl Alarms {
         self.told = true;
         let state = self.state();
         (before.as_ref() != Some(&state)).then_some(state)
+    }
+
+    /// Whether a report is kept: it begins nothing new, or fewer conditions are active than may be.
+    #[must_use]
+    pub fn has_room(&self, report: &AlarmReport) -> bool {
+        let begins = matches!(report.level, AlarmLevel::Warning | AlarmLevel::Fault);
+        let mut code = report.code.clone();
+        shorten(&mut code, CODE_BYTES);
+        !begins || self.has_room_for(&code)
+    }
+
+    fn has_room_for(&self, code: &str) -> bool {
+        self.active.len() < ACTIVE_LIMIT || self.active.contains_key(code)
     }
 
     /// A report with words and codes of bounded length.

@@ -27,6 +27,9 @@ pub const UNMAPPED_LIMIT: usize = 40;
 /// A longer value has no place in a message, bytes: the limit of a text in `abbe_msgs`.
 pub const VALUE_LIMIT: usize = 65_536;
 
+/// Keys of which something is kept: those of the mapping, and conditions that nobody described up to this many.
+const KEY_LIMIT: usize = 4096;
+
 /// What is kept of one key of the mapping.
 #[derive(Clone, Debug)]
 struct Channel {
@@ -53,6 +56,10 @@ pub struct Values {
     leaps: Left,
     not_numbers: Left,
     too_long: Left,
+    /// Conditions of too many keys or codes.
+    crowded: Left,
+    /// Values for keys of conditions, and conditions for keys of values.
+    misplaced: Left,
     /// The log's line that is heard; 0: of a connection.
     line: usize,
     told: u64,
@@ -92,6 +99,8 @@ impl Values {
             leaps: Left::default(),
             not_numbers: Left::default(),
             too_long: Left::default(),
+            crowded: Left::default(),
+            misplaced: Left::default(),
             line: 0,
             told: 0,
             passed_over: 0,
@@ -121,10 +130,15 @@ impl Values {
 
     /// Values that were refused, by reason.
     #[must_use]
-    pub const fn refused(&self) -> [(&'static str, Left); 2] {
+    pub const fn refused(&self) -> [(&'static str, Left); 4] {
         [
             ("values that are no numbers", self.not_numbers),
             ("values over the limit", self.too_long),
+            ("conditions over the limit", self.crowded),
+            (
+                "values that the mapping takes for conditions, or the reverse",
+                self.misplaced,
+            ),
         ]
     }
 
@@ -201,9 +215,12 @@ impl Values {
         match observation.told {
             Told::Unavailable => self.absent(&key, &mut channel, machine_at, out),
             Told::Alarm(report) if matches!(channel.used, Use::Alarm { .. }) => {
-                channel.alarm(&key, machine_at, report, out);
+                if !channel.alarm(&key, machine_at, report, out) {
+                    self.crowded.note(self.line);
+                }
             }
-            Told::Alarm(_) => {}
+            Told::Alarm(_) if channel.used == Use::Nothing => {}
+            Told::Alarm(_) => self.misplaced.note(self.line),
             Told::Series { rate_hz, values } => {
                 self.series(&key, &mut channel, moment, rate_hz, &values, out);
             }
@@ -222,7 +239,10 @@ impl Values {
         if let Told::Alarm(report) = observation.told {
             let name = crate::mapping::name_of(&observation.key);
             let machine_at = self.clock.stamp(observation.time, received_at);
-            if self.channels.len() < 4096 {
+            self.told += 1;
+            let has_room =
+                self.channels.len() < KEY_LIMIT || self.channels.contains_key(&observation.key);
+            let is_kept = has_room && {
                 let channel = self
                     .channels
                     .entry(observation.key)
@@ -236,8 +256,10 @@ impl Values {
                         impossible: 0,
                         unconfirmed: 0,
                     });
-                self.told += 1;
-                channel.alarm("", machine_at, report, out);
+                channel.alarm("", machine_at, report, out)
+            };
+            if !is_kept {
+                self.crowded.note(self.line);
             }
             return;
         }
@@ -286,7 +308,9 @@ impl Values {
                     qualifier: String::new(),
                     text: String::new(),
                 };
-                return channel.alarm(key, machine_at, report, out);
+                // That nothing is known finds room.
+                channel.alarm(key, machine_at, report, out);
+                return;
             }
             Use::Position {
                 axes, commanded, ..
@@ -321,7 +345,8 @@ impl Values {
         out: &mut Vec<Output>,
     ) {
         let wanted = match &channel.used {
-            Use::Nothing | Use::Alarm { .. } => return,
+            Use::Nothing => return,
+            Use::Alarm { .. } => return self.misplaced.note(self.line),
             Use::Text { .. } => 0,
             Use::Number { .. } => 1,
             Use::Position { axes, .. } => axes.len(),

@@ -18,17 +18,20 @@ impl Channel {
         }
     }
 
+    /// Takes a condition of the machine; whether it is kept.
     pub(super) fn alarm(
         &mut self,
         key: &str,
         at: Stamp<Machine>,
         report: AlarmReport,
         out: &mut Vec<Output>,
-    ) {
+    ) -> bool {
         let name = self.name(key);
+        let has_room = self.alarms.has_room(&report);
         let state = self.alarms.hear(at, report);
         self.present = true;
         out.extend(state.map(|state| Output::Condition(Condition::Alarm { name, state })));
+        has_room
     }
 
     pub(super) fn appear(&mut self, key: &str, out: &mut Vec<Output>) {

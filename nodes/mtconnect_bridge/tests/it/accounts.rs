@@ -230,6 +230,30 @@ fn a_block_with_a_line_over_the_limit_is_no_value_and_all_its_lines_are_in_the_a
 }
 
 #[test]
+fn conditions_of_more_keys_or_codes_than_are_kept_are_in_the_account() {
+    let of_keys = |n: u32| format!("|k{n}|FAULT|A1|1|HIGH|hot\n");
+    // The mapping has four keys.
+    let log: String = (0..4100).map(of_keys).collect();
+    let (severity, words) = end(MAP, &log);
+    assert_eq!(severity, Severity::Warn);
+    assert!(
+        words.contains("4092 values published; 8 conditions over the limit (first in line 4093)"),
+        "{words}"
+    );
+    // What is kept ends all the same.
+    let said = replayed(MAP, &(log + "|k0|NORMAL||||\n"));
+    let is_over = |one: &Condition| one.name() == "alarm/k0" && one.severity() == Severity::Info;
+    assert!(said.iter().any(is_over));
+    let of_codes = |n: u32| format!("|c|FAULT|A{n}|1|HIGH|hot\n");
+    let log: String = (0..300).map(of_codes).collect();
+    let (_, words) = end(MAP, &log);
+    assert!(
+        words.contains("256 values published; 44 conditions over the limit (first in line 257)"),
+        "{words}"
+    );
+}
+
+#[test]
 fn a_value_that_no_message_holds_is_left_out_by_its_line_and_not_known() {
     let log = |length: usize| format!("|t|1|prog|A\n|prog|{}\n|t|2\n", "x".repeat(length));
     assert_eq!(end(MAP, &log(65_536)).0, Severity::Info);

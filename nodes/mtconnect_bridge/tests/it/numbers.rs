@@ -245,6 +245,24 @@ fn an_agent_of_another_instance_with_every_part_is_asked_after_pauses() {
     assert_eq!(talk.values(), ["READY", "ACTIVE", "STOPPED"]);
 }
 
+#[test]
+fn a_condition_under_the_key_of_a_value_is_in_the_account() {
+    let mut talk = Talk::begun();
+    let fault = r#"<Condition><Fault dataItemId="ex" nativeCode="17" sequence="10" timestamp="2026-01-05T08:00:00Z">hot</Fault></Condition></ComponentStream>"#;
+    let part = document(7, 1, 11, &[]).replace("</ComponentStream>", fault);
+    talk.part(&part);
+    assert_eq!(talk.values(), ["READY"]);
+    talk.wait(61);
+    let said = talk.conditions();
+    let account = said
+        .iter()
+        .find(|one| one.contains("answers taken"))
+        .unwrap();
+    let wanted =
+        "1 values published; 1 values that the mapping takes for conditions, or the reverse";
+    assert!(account.contains(wanted), "{account}");
+}
+
 proptest! {
     /// Whatever the numbers of heads and observations are: no panic, and the last state of a good agent is published.
     #[test]
