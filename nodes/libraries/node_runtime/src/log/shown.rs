@@ -13,8 +13,14 @@ pub(super) struct Shown<W>(pub W);
 impl<W: Write> Write for Shown<W> {
     fn write(&mut self, line: &[u8]) -> Result<usize> {
         let text = String::from_utf8_lossy(line);
-        let pieces: Vec<_> = text.split(ESCAPE).map(visible).collect();
-        self.0.write_all(pieces.join(ESCAPE).as_bytes())?;
+        let (words, end) = match text.strip_suffix('\n') {
+            Some(words) => (words, "\n"),
+            None => (&*text, ""),
+        };
+        let pieces: Vec<_> = words.split(ESCAPE).map(visible).collect();
+        // A second line within a text from outside would pass for one of the program's.
+        let words = pieces.join(ESCAPE).replace('\n', "\\n");
+        self.0.write_all((words + end).as_bytes())?;
         Ok(line.len())
     }
 
@@ -60,12 +66,13 @@ mod tests {
 
     #[test]
     fn an_alarm_text_commands_no_terminal_and_colours_of_the_line_stay() {
-        let text = "spindle \u{1b}[2J\u{9b}2J\u{202e}hot\r";
+        let text = "spindle \u{1b}[2J\u{9b}2J\u{202e}hot\r\nERROR invented";
         let line = console(|| tracing::error!(condition = text, "{text}"));
         let coloured = line.replace("\u{1b}[", "");
         assert!(coloured.len() < line.len(), "{line:?}");
         assert!(!line.contains("\u{1b}[2J"), "{line:?}");
         let unseen = coloured.contains(metrology::visible::is_unseen);
         assert!(!unseen, "{line:?}");
+        assert_eq!(line.lines().count(), 1, "{line:?}");
     }
 }
