@@ -183,14 +183,10 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     // What was begun is no bag, and would stand in the way of the next attempt.
     let is_there = output.exists();
     let unmake = |error: anyhow::Error| {
-        let unmade = if is_there || !output.exists() {
-            Ok(())
+        if is_there {
+            error
         } else {
-            std::fs::remove_dir_all(output)
-        };
-        match unmade {
-            Ok(()) => error,
-            Err(left) => error.context(format!("{}: not removed: {left}", output.display())),
+            unmade(output, error)
         }
     };
     let mut writer = Writer::begin(output, of_machine, map.start_s, stated).map_err(unmake)?;
@@ -212,6 +208,16 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
         n_rows,
         notes,
     })
+}
+
+/// Removes what was begun of a bag.
+fn unmade(output: &Path, error: anyhow::Error) -> anyhow::Error {
+    match std::fs::remove_dir_all(output) {
+        Err(left) if output.exists() => {
+            error.context(format!("{}: not removed: {left}", output.display()))
+        }
+        _ => error,
+    }
 }
 
 /// Asks about deviations that cannot be in the unit that they were read in.

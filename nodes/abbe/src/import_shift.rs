@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
 use machine::MachineFile;
-use metrology::bound::Bound;
+use metrology::bound::{Bound, BoundError};
 use metrology::stamp::{Machine, Stamp};
 use metrology::{Axis, PerAxis, yaml};
 use mtconnect_bridge::BridgeError;
@@ -85,6 +85,18 @@ fn stamp(key: &str, text: &str) -> Result<Stamp<Machine>> {
 }
 
 impl OrderFile {
+    /// Refuses an order of more lines or programs than may be written, of a length in seconds.
+    fn bounded(&self, length_s: f64) -> Result<(), BoundError> {
+        // It lies between 1970 and 2106: the quotients are far below the greatest number.
+        let amount = |time_s: f64| (length_s / time_s).ceil() as u64;
+        LINES.check_amount(
+            || "bin_s".to_owned(),
+            "lines from `from` to `to`",
+            amount(self.bin_s),
+        )?;
+        PROGRAMS.check_amount(|| "slice_s".to_owned(), "programs", amount(self.slice_s))
+    }
+
     /// The order, checked against the machine.
     ///
     /// # Errors
@@ -105,15 +117,7 @@ impl OrderFile {
                 "{key} = {time_s} s: must be from 1 to 86400 s"
             );
         }
-        // Both ends lie between 1970 and 2106: the quotients are far below the greatest number.
-        let length_s = (to - from).as_secs_f64();
-        let amount = |time_s: f64| (length_s / time_s).ceil() as u64;
-        LINES.check_amount(
-            || "bin_s".to_owned(),
-            "lines from `from` to `to`",
-            amount(self.bin_s),
-        )?;
-        PROGRAMS.check_amount(|| "slice_s".to_owned(), "programs", amount(self.slice_s))?;
+        self.bounded((to - from).as_secs_f64())?;
         let windows = [self.x_mm, self.y_mm, self.z_mm];
         let mut feed_limit_mm_min = f64::INFINITY;
         for (axis, (low, high)) in Axis::LINEAR.into_iter().zip(windows) {

@@ -221,6 +221,7 @@ impl Values {
             }
             Told::Alarm(_) if channel.used == Use::Nothing => {}
             Told::Alarm(_) => self.misplaced.note(self.line),
+            Told::Series { .. } if channel.used == Use::Nothing => {}
             Told::Series { rate_hz, values } => {
                 self.series(&key, &mut channel, moment, rate_hz, &values, out);
             }

@@ -1,3 +1,5 @@
+use std::path::Path;
+
 use abbe_msgs::{Wire, topics};
 use clap::Parser;
 use metrology::sample::PositioningTable;

@@ -162,14 +162,17 @@ mod tests {
         let port = listener.local_addr().unwrap().port();
         let agent = std::thread::spawn(move || {
             let (mut socket, _) = listener.accept().unwrap();
-            let mut request = [0_u8; 512];
-            let _ = socket.read(&mut request);
+            let mut heard = [0_u8; 512];
+            assert!(socket.read(&mut heard).unwrap() > 0);
             let head = b"HTTP/1.1 200 OK\r\nContent-Length: 1000000\r\n\r\n";
-            let mut sent = socket.write_all(head);
+            socket.write_all(head).unwrap();
+            let pause = Some(Duration::from_millis(5));
+            socket.set_read_timeout(pause).unwrap();
             // It ends when nobody listens any more.
-            while sent.is_ok() {
-                std::thread::sleep(Duration::from_millis(5));
-                sent = socket.write_all(b" ").and_then(|()| socket.flush());
+            while socket.write_all(b" ").is_ok() {
+                if socket.read(&mut heard).is_ok_and(|n| n == 0) {
+                    break;
+                }
             }
         });
         let url = format!("http://127.0.0.1:{port}/probe");
