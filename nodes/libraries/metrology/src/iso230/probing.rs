@@ -27,7 +27,8 @@
 //! f²/3 takes the artefact's form as adding or taking away anything up to f.
 //!
 //! # Holds when
-//! Points are centres of the stylus ball, so radii hold the ball's radius: (3) needs it taken off
+//! Diameters are those of one temperature: (3) takes no expansion out, and u_T has what is not known of the scale where the
+//! artefact is as warm as stated and of the same coefficient. Points are centres of the stylus ball, so radii hold the ball's radius: (3) needs it taken off
 //! by `stylus_radius_mm`. Points lie all round: for that the least-squares shape must be determined.
 //!
 //! # Agreement

@@ -10,7 +10,7 @@ use rand_pcg::Pcg64Mcg;
 use super::{Body, Drift, Held, MACHINES, Screw, UM, between, hold, machine, normal, shares};
 
 /// Runs in each direction.
-const RUNS: usize = 5;
+pub const RUNS: usize = 5;
 
 /// What reads a line, with the state that all lines of one machine have in common.
 pub struct Laser {
@@ -130,7 +130,7 @@ pub fn range(values: &[f64]) -> f64 {
 }
 
 /// A, E and R of a side.
-fn of_side(columns: &[[f64; 2]]) -> [f64; 3] {
+pub fn of_side(columns: &[[f64; 2]]) -> [f64; 3] {
     let means: Vec<f64> = columns.iter().map(|c| c[0]).collect();
     let ends: Vec<f64> = columns
         .iter()
@@ -141,7 +141,7 @@ fn of_side(columns: &[[f64; 2]]) -> [f64; 3] {
 }
 
 /// A, E, R, B, mean B and M by the words of ISO 230-2.
-fn of_both(up: &[[f64; 2]], down: &[[f64; 2]]) -> [f64; 6] {
+pub fn of_both(up: &[[f64; 2]], down: &[[f64; 2]]) -> [f64; 6] {
     let [accuracy, systematic, _] = of_side(&[up, down].concat());
     let reversals: Vec<f64> = up.iter().zip(down).map(|(u, d)| u[0] - d[0]).collect();
     let means: Vec<f64> = up
@@ -175,8 +175,8 @@ fn of_result(result: &PositioningResult) -> [ExpandedLength; 6] {
     ]
 }
 
-const BOTH: [&str; 6] = ["A", "E", "R", "B", "mean B", "M"];
-const ONE: [&str; 3] = ["A up", "E up", "R up"];
+pub const BOTH: [&str; 6] = ["A", "E", "R", "B", "mean B", "M"];
+pub const ONE: [&str; 3] = ["A up", "E up", "R up"];
 
 fn pair(name: &'static str, figure: ExpandedLength, truth: f64) -> Held {
     Held {
