@@ -134,6 +134,8 @@ pub struct BodyTemperature {
     pub deviation_k: f64,
     /// Half of the interval in which it lies, K.
     pub half_width_k: f64,
+    /// Greatest minus least reading during the test, K; none where it is stated.
+    pub range_k: Option<f64>,
     /// Where it is from.
     pub source: String,
 }
@@ -142,12 +144,16 @@ impl Body {
     /// What stands under `temperature_deviation_k`, or the mean of the thermometers over a test; the half width grows by half
     /// the range of their mean, as a root of squares.
     ///
+    /// All runs of a test have this one temperature: a run of its own would bring the scatter of its thermometers into the
+    /// repeatability of the axis.
+    ///
     /// # Errors
     /// Why it is unknown.
     pub fn temperature(&self, read: &Thermometers) -> Result<BodyTemperature, String> {
         let stated = |source: &str, deviation_k| BodyTemperature {
             deviation_k,
             half_width_k: self.temperature_half_width_k,
+            range_k: None,
             source: source.to_owned(),
         };
         if let Some(deviation_k) = self.temperature_deviation_k {
@@ -170,6 +176,7 @@ impl Body {
         Ok(BodyTemperature {
             deviation_k: mean(|one| one.mean_degc()) - REFERENCE_DEGC,
             half_width_k: self.temperature_half_width_k.hypot(range_k / 2.0),
+            range_k: Some(range_k),
             source: format!("read by {}", self.thermometers.join(", ")),
         })
     }

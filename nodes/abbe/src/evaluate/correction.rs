@@ -44,6 +44,9 @@ pub struct Measured {
     pub correction: Correction,
 }
 
+/// Growth during a test from which on it is stated, µm.
+const LEAST_GROWTH_UM: f64 = 0.1;
+
 /// Why no conformance is decided of what the machine read itself.
 pub const BY_OWN_SCALE: &str = "not ISO 230-2: read by the machine's scale";
 
@@ -195,10 +198,11 @@ impl Correction {
                 machine,
                 device,
             } => format!(
-                "Corrected to 20 °C: {:.2} µm taken out over {span_mm:.0} mm; machine {}, device {}.",
+                "Corrected to 20 °C: {:.2} µm taken out over {span_mm:.0} mm; machine {}, device {}.{}",
                 differential_expansion * span_mm * 1e3,
                 body_in_words(machine),
-                body_in_words(device)
+                body_in_words(device),
+                change_in_words(machine, span_mm)
             ),
             Self::ByInstrument => {
                 "Corrected to 20 °C by the instrument, as the budget states; nothing is taken out here."
@@ -215,6 +219,7 @@ impl Correction {
             json!({
                 "temperature_degc": 20.0 + temperature.deviation_k,
                 "temperature_half_width_k": temperature.half_width_k,
+                "temperature_range_k": temperature.range_k,
                 "expansion_per_k": expansion_per_k,
                 "source": temperature.source,
             })
@@ -239,8 +244,13 @@ impl Correction {
 
 fn body_in_words((temperature, expansion_per_k): &(BodyTemperature, f64)) -> String {
     if *expansion_per_k > 0.0 {
+        // What a temperature is of: the bag as a whole, or the test, in which it may have changed.
+        let of = temperature.range_k.map_or_else(
+            || "for every test".to_owned(),
+            |range_k| format!("mean of the test for all its runs, range {range_k:.2} K"),
+        );
         format!(
-            "{:.2} °C ({}), {:.1} µm/(m K)",
+            "{:.2} °C ({}: {of}), {:.1} µm/(m K)",
             20.0 + temperature.deviation_k,
             temperature.source,
             expansion_per_k * 1e6
@@ -250,9 +260,24 @@ fn body_in_words((temperature, expansion_per_k): &(BodyTemperature, f64)) -> Str
     }
 }
 
+/// By how much the machine grew or shrank while the test lasted, where that is a tenth of a micrometre or more.
+fn change_in_words(
+    (temperature, expansion_per_k): &(BodyTemperature, f64),
+    span_mm: f64,
+) -> String {
+    let grown_um = temperature.range_k.unwrap_or(0.0) * expansion_per_k * span_mm * 1e3;
+    if grown_um < LEAST_GROWTH_UM {
+        return String::new();
+    }
+    format!(
+        " The machine's change during the test, {grown_um:.2} µm over {span_mm:.0} mm, is not taken out: it is in the scatter of the runs."
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluate::test_conditions::Readings;
     use std::path::Path;
 
     const BUDGET: &str = "
@@ -279,9 +304,39 @@ environmental_drift_um: 0.3
         let words = found.in_words(400.0);
         assert!(
             words
-                .starts_with("Corrected to 20 °C: 6.80 µm taken out over 400 mm; machine 22.00 °C"),
+                .starts_with("Corrected to 20 °C: 6.80 µm taken out over 400 mm; machine 22.00 °C (stated in the budget: for every test)"),
             "{words}"
         );
+        assert!(found.as_json()["machine"]["temperature_range_k"].is_null());
+    }
+
+    #[test]
+    fn a_temperature_that_changed_during_the_test_is_stated_with_its_range() {
+        let text = BUDGET.replacen("temperature_deviation_k: 2.0", "thermometers: [bed]", 1);
+        let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
+        // Three runs at 21.0, 22.0 and 22.6 °C: their mean is 21.87 °C, the range 1.6 K.
+        let mut bed = Readings::new(21.0);
+        bed.add(22.0);
+        bed.add(22.6);
+        let read = Thermometers::from([("bed".to_owned(), bed)]);
+        let found = Known::of(Some(&budget), &read).correction(Some(&budget), false);
+        let words = found.in_words(400.0);
+        let wanted = "machine 21.87 °C (read by bed: mean of the test for all its runs, range 1.60 K), 11.0 µm/(m K)";
+        assert!(words.contains(wanted), "{words}");
+        // 1.6 K, 11 µm/(m K), 0.4 m: 7.04 µm; over 5 mm it is below a tenth of a micrometre.
+        assert!(
+            words.contains("during the test, 7.04 µm over 400 mm, is not"),
+            "{words}"
+        );
+        assert!(!found.in_words(5.0).contains("during the test,"));
+        let machine = &found.as_json()["machine"];
+        let near = |key: &str, by_hand: f64| {
+            let value = machine[key].as_f64().unwrap();
+            assert!((value - by_hand).abs() < 1e-9, "{key}: {value}");
+        };
+        near("temperature_range_k", 1.6);
+        // ± 0.2 K of the thermometer and half of 1.6 K.
+        near("temperature_half_width_k", 0.68_f64.sqrt());
     }
 
     #[test]

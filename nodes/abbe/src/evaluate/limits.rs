@@ -155,10 +155,10 @@ const RADIAL: [&str; 3] = [
 /// Why nothing is decided about a figure of a test; none: it is decided.
 fn no_verdict(test: &Value, name: &str) -> Option<String> {
     let last = name.rsplit('.').next().unwrap_or(name);
-    let key = if RADIAL.contains(&last) {
-        "no_verdict_on_radii"
-    } else {
-        "no_verdict"
+    let key = match last {
+        radial if RADIAL.contains(&radial) => "no_verdict_on_radii",
+        "size_error" => "no_verdict_on_size",
+        _ => "no_verdict",
     };
     test[key].as_str().map(str::to_owned)
 }
@@ -252,6 +252,18 @@ mod tests {
         assert_eq!(section.figures[0]["no_verdict"], why);
         assert!(section.lines[0].contains(why), "{:?}", section.lines);
         assert_eq!(section.lines.len(), 3, "{:?}", section.lines);
+    }
+
+    #[test]
+    fn nothing_is_decided_of_a_size_that_is_not_that_at_20_degc() {
+        let length = serde_json::json!({"value_mm": 0.001, "expanded_uncertainty_mm": 0.000_5});
+        let why = "not corrected to 20 °C: the artefact's temperature is not stated";
+        let probing = serde_json::json!({"test": "spheres", "no_verdict_on_size": why, "iso230_10_errors": [{"size_error": length, "probing_error": length}]});
+        let text = "rule: guard_band\nlimits:\n  iso230_10_errors.0.probing_error: {upper_um: 2.0}\n  iso230_10_errors.0.size_error: {upper_um: 2.0}\n";
+        let section = limits(text).unwrap().section(&[probing]).unwrap();
+        assert_eq!(section.figures[0]["verdict"]["decision"], "conforms");
+        assert!(section.figures[1]["verdict"].is_null());
+        assert_eq!(section.figures[1]["no_verdict"], why);
     }
 
     #[test]

@@ -19,6 +19,10 @@ use crate::evaluate::linear::Reference;
 use crate::report::positioning::figure;
 use crate::report::section::{NOT_EVALUATED, Rows, Section, head, um};
 
+/// Why no conformance is decided of a size.
+const NOT_AT_20_DEGC: &str =
+    "not corrected to 20 °C: temperature and expansion of the artefact are not stated";
+
 /// One round shape, evaluated.
 #[derive(Serialize)]
 struct Found {
@@ -73,7 +77,9 @@ pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section>
             rows: found.iter().map(|one| one.row(budget.is_some())).collect(),
             note: note(budget.is_some()),
         });
-        section.figures = json!({ "test": section.title, "iso230_10_errors": found });
+        section.figures = json!({
+            "test": section.title, "iso230_10_errors": found, "no_verdict_on_size": NOT_AT_20_DEGC,
+        });
         section
     })
 }
@@ -85,7 +91,7 @@ fn note(stated: bool) -> String {
         " Without --budget no uncertainty is stated."
     };
     format!(
-        "P_FTU,3D of a sphere, P_FTU,2D of a bore or boss: greatest minus least distance from the fitted centre. Size error: measured diameter minus that of the certificate.{uncertainty}"
+        "P_FTU,3D of a sphere, P_FTU,2D of a bore or boss: greatest minus least distance from the fitted centre. Size error: measured diameter minus that of the certificate, {NOT_AT_20_DEGC}; no conformance of it is decided.{uncertainty}"
     )
 }
 
@@ -352,6 +358,9 @@ environmental_drift_um: 0.6
         let certificate = "certificates:\n  - {artefact: high, diameter_mm: 30.0006, expanded_uncertainty_um: 0.4, form_um: 0.3, form_expanded_uncertainty_um: 0.1, coverage_factor: 2.0, number: K-17}\n";
         let budget = Budget::read(BUDGET, Path::new("budget.yaml")).unwrap();
         let section = section(&tests(certificate), Some(&budget)).unwrap();
+        let why = section.figures["no_verdict_on_size"].as_str().unwrap();
+        assert!(why.starts_with("not corrected to 20 °C"), "{why}");
+        assert!(section.tables[0].note.contains(why), "{:?}", section.tables);
         let one = &section.figures["iso230_10_errors"][0];
         let value = |key: &str, of: &str| one[key][of].as_f64().unwrap() * 1e3;
         let by_scipy = |name: &str| reference(name).as_f64().unwrap();
