@@ -329,9 +329,9 @@ environmental_drift_um: 0.3
             "{words}"
         );
         assert!(!found.in_words(5.0).contains("during the test,"));
-        let machine = &found.as_json()["machine"];
+        let all = found.as_json();
         let near = |key: &str, by_hand: f64| {
-            let value = machine[key].as_f64().unwrap();
+            let value = all["machine"][key].as_f64().unwrap();
             assert!((value - by_hand).abs() < 1e-9, "{key}: {value}");
         };
         near("temperature_range_k", 1.6);

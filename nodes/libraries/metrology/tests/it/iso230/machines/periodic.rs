@@ -23,7 +23,7 @@ struct Cycle {
 impl Cycle {
     fn at_mm(&self, at_mm: f64) -> f64 {
         let turn = TAU * at_mm / self.period_mm;
-        let harmonics = [1.0, 2.0].into_iter().zip(&self.harmonics);
+        let harmonics = [1.0_f64, 2.0].into_iter().zip(&self.harmonics);
         harmonics.map(|(h, [a, p])| a * (h * turn + p).cos()).sum()
     }
 }
