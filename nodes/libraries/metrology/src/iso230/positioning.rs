@@ -58,8 +58,8 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::extent::{
-    check_ascending, check_finite, check_length, check_points, check_positive, greatest, least,
-    mean, range, standard_deviation,
+    check_ascending, check_finite, check_length, check_points, check_positive, greatest, mean,
+    range, standard_deviation,
 };
 use super::{Direction, ExpandedLength, Iso230Error};
 use budget::{FigureUncertainties, PositioningBudget, PositioningContributions};
@@ -256,27 +256,30 @@ pub fn evaluate(
     let points: Vec<_> = (0..runs.targets_mm.len())
         .map(|i| point(runs, budget, i))
         .collect();
-    let contributions = budget.over(runs.span_mm(), runs.span_mm());
-    let u = contributions.figures(n_runs);
-    let ups = || points.iter().map(|p| p.up);
-    let downs = || points.iter().map(|p| p.down);
+    let span_mm = runs.span_mm();
+    let u = |length_mm: f64| budget.over(length_mm, span_mm).figures(n_runs);
+    let ups = || points.iter().map(|p| (p.target_mm, p.up));
+    let downs = || points.iter().map(|p| (p.target_mm, p.down));
     let both = || ups().chain(downs());
+    let of_one_place = u(0.0);
     let reversals: Vec<f64> = points.iter().map(|p| p.reversal_mm).collect();
     let greatest_reversal_mm = greatest(reversals.iter().map(|b| b.abs()));
     let repeatability_mm = greatest(points.iter().map(|p| p.repeatability_mm));
-    let mean_systematic_mm = range(points.iter().map(|p| p.mean_mm));
+    let means = points.iter().map(|p| [p.target_mm, p.mean_mm, p.mean_mm]);
+    let means = between(means);
+    let u_means_mm = u(means.apart_mm).mean_systematic_mm;
     Ok(PositioningResult {
         n_runs,
         up: direction(ups(), &u),
         down: direction(downs(), &u),
-        reversal: ExpandedLength::new(greatest_reversal_mm, u.reversal_mm),
-        mean_reversal: ExpandedLength::new(mean(&reversals), u.reversal_mm),
-        repeatability: ExpandedLength::new(repeatability_mm, u.repeatability_mm),
-        systematic_error: ExpandedLength::new(systematic_mm(both()), u.systematic_mm),
-        mean_systematic_error: ExpandedLength::new(mean_systematic_mm, u.mean_systematic_mm),
-        accuracy: ExpandedLength::new(accuracy_mm(both()), u.accuracy_mm),
+        reversal: ExpandedLength::new(greatest_reversal_mm, of_one_place.reversal_mm),
+        mean_reversal: ExpandedLength::new(mean(&reversals), of_one_place.reversal_mm),
+        repeatability: ExpandedLength::new(repeatability_mm, of_one_place.repeatability_mm),
+        systematic_error: systematic(both(), &u),
+        mean_systematic_error: ExpandedLength::new(means.range_mm, u_means_mm),
+        accuracy: accuracy(both(), &u),
         points,
-        contributions,
+        contributions: budget.over(span_mm, span_mm),
         remarks: spacing::remarks(runs),
     })
 }
@@ -335,30 +338,60 @@ fn interval(mean_mm: f64, scatter_mm: f64, n: usize, u_length_mm: f64) -> MeanIn
     }
 }
 
+/// A highest value less a lowest one.
+struct Between {
+    range_mm: f64,
+    /// Distance of the places of both, mm.
+    apart_mm: f64,
+}
+
+/// Highest less lowest value of points as target, upper and lower value, mm; there is one at least.
+fn between(points: impl Iterator<Item = [f64; 3]>) -> Between {
+    let (mut high, mut low) = ([0.0, f64::NEG_INFINITY], [0.0, f64::INFINITY]);
+    for [target_mm, upper_mm, lower_mm] in points {
+        if upper_mm > high[1] {
+            high = [target_mm, upper_mm];
+        }
+        if lower_mm < low[1] {
+            low = [target_mm, lower_mm];
+        }
+    }
+    Between {
+        range_mm: high[1] - low[1],
+        apart_mm: (high[0] - low[0]).abs(),
+    }
+}
+
+/// One direction; `u` has the uncertainties of figures by the distance of their extremes, mm.
 fn direction(
-    points: impl Iterator<Item = PointDirection> + Clone,
-    u: &FigureUncertainties,
+    points: impl Iterator<Item = (f64, PointDirection)> + Clone,
+    u: &impl Fn(f64) -> FigureUncertainties,
 ) -> DirectionResult {
-    let repeatability_mm = greatest(points.clone().map(|p| p.repeatability_mm));
+    let repeatability_mm = greatest(points.clone().map(|(_, p)| p.repeatability_mm));
     DirectionResult {
-        repeatability: ExpandedLength::new(repeatability_mm, u.repeatability_one_way_mm),
-        systematic_error: ExpandedLength::new(systematic_mm(points.clone()), u.systematic_mm),
-        accuracy: ExpandedLength::new(accuracy_mm(points), u.accuracy_mm),
+        repeatability: ExpandedLength::new(repeatability_mm, u(0.0).repeatability_one_way_mm),
+        systematic_error: systematic(points.clone(), u),
+        accuracy: accuracy(points, u),
     }
 }
 
 /// (5).
-fn systematic_mm(points: impl Iterator<Item = PointDirection> + Clone) -> f64 {
-    range(points.map(|p| p.mean_mm))
+fn systematic(
+    points: impl Iterator<Item = (f64, PointDirection)>,
+    u: &impl Fn(f64) -> FigureUncertainties,
+) -> ExpandedLength {
+    let means = between(points.map(|(target_mm, p)| [target_mm, p.mean_mm, p.mean_mm]));
+    ExpandedLength::new(means.range_mm, u(means.apart_mm).systematic_mm)
 }
 
 /// (7).
-fn accuracy_mm(points: impl Iterator<Item = PointDirection> + Clone) -> f64 {
-    let highest_mm = greatest(
-        points
-            .clone()
-            .map(|p| p.mean_mm + 2.0 * p.standard_deviation_mm),
-    );
-    let lowest_mm = least(points.map(|p| p.mean_mm - 2.0 * p.standard_deviation_mm));
-    highest_mm - lowest_mm
+fn accuracy(
+    points: impl Iterator<Item = (f64, PointDirection)>,
+    u: &impl Fn(f64) -> FigureUncertainties,
+) -> ExpandedLength {
+    let ends = between(points.map(|(target_mm, p)| {
+        let two_s_mm = 2.0 * p.standard_deviation_mm;
+        [target_mm, p.mean_mm + two_s_mm, p.mean_mm - two_s_mm]
+    }));
+    ExpandedLength::new(ends.range_mm, u(ends.apart_mm).accuracy_mm)
 }

@@ -60,8 +60,8 @@ pub fn evaluate(
         }
     };
     let points: Vec<OneSidedPoint> = runs.targets_mm.iter().enumerate().map(point).collect();
-    let contributions = budget.over(runs.span_mm(), runs.span_mm());
-    let u = contributions.figures(rows.len());
+    let span_mm = runs.span_mm();
+    let u = |length_mm: f64| budget.over(length_mm, span_mm).figures(rows.len());
     // The remarks count runs of the side that there is.
     let counted = PositioningRuns {
         up_mm: rows.to_vec(),
@@ -71,9 +71,9 @@ pub fn evaluate(
     Ok(OneSidedResult {
         direction: towards,
         n_runs: rows.len(),
-        result: direction(points.iter().map(|point| point.side), &u),
+        result: direction(points.iter().map(|point| (point.target_mm, point.side)), &u),
         points,
-        contributions,
+        contributions: budget.over(span_mm, span_mm),
         remarks: spacing::remarks(&counted),
     })
 }

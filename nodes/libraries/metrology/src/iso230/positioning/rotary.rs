@@ -26,7 +26,7 @@
 //! # Agreement
 //! By hand: `val_a_rotary_axis_by_hand`, below 1e-15 rad. Second implementation: a table of a turn that wraps by numpy,
 //! `tests/validation/iso230_tables.py`, to the rounding of its table. U held E and M of 96 % of simulated machines, with u_D of
-//! one position of 88 % (`tests/validation/coverage_of_u.py`; `iso230_2_u_holds_the_figures_of_a_rotary_axis`).
+//! one position of 87 % (`tests/validation/coverage_of_u.py`; `iso230_2_u_holds_the_figures_of_a_rotary_axis`).
 //!
 //! # References
 //! \[1\] ISO 230-2:2014; from the literature, the text was not at hand.

@@ -5,8 +5,8 @@
 //! user would know: certificates, limits, a thermometer that is off, and the range of a watch at rest before the test.
 //!
 //! The truth is the figure of the readings that an exact instrument would have had of the same runs at 20 °C, by the words
-//! of the standard, written out here. `tests/validation/coverage_of_u.py` makes machines and figures of its own for the last
-//! three kinds. The machine's scatter is part of it: ISO 230 states figures of the runs that were made.
+//! of the standard, written out here. `tests/validation/coverage_of_u.py` makes machines and figures of its own for axes,
+//! probing and periodic errors. The machine's scatter is part of it: ISO 230 states figures of the runs that were made.
 
 mod circle;
 mod diagonals;
