@@ -51,7 +51,7 @@ fn json(path: &Path) -> Value {
 }
 
 /// Where a value does not obey its schema; of JSON Schema only what this one uses is known.
-fn against_schema(report: &Value) -> Vec<String> {
+pub fn against_schema(report: &Value) -> Vec<String> {
     let mut found = vec![];
     check(
         "report",

@@ -18,6 +18,7 @@ mod gap_import;
 mod gap_pair;
 mod gap_parts;
 mod gap_report;
+mod gap_simulated;
 mod gap_wear;
 mod grid_truth;
 mod grid_xy;

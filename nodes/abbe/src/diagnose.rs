@@ -26,8 +26,10 @@ use crate::whole_file;
 
 pub mod bags;
 mod machine_text;
+pub mod simulated;
 
 use bags::Recorded;
+use simulated::{Beside, Simulated};
 
 /// Arguments of `abbe diagnose`.
 #[derive(Args)]
@@ -38,6 +40,9 @@ pub struct Diagnose {
     /// Machine file that the simulator runs on; without it the one in the first bag.
     #[arg(long)]
     machine: Option<PathBuf>,
+    /// Bag that your own simulator made of the same tests, in the place of the twin's prediction; may be given several times.
+    #[arg(long, value_name = "SIM", conflicts_with = "write_machine")]
+    simulated: Vec<PathBuf>,
     /// Write the report as JSON (abbe.gap/1); `-` for standard output instead of the page.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -72,6 +77,8 @@ pub struct Diagnosed {
     pub readings: Vec<Reading>,
     /// Defaults of the machine file that the diagnosis uses, as `axes.X.lead_mm = 10.0`.
     pub defaults: Vec<String>,
+    /// The simulator that the machine was compared with, where it is not the machine file's own.
+    pub simulated: Option<Simulated>,
 }
 
 impl Diagnosed {
@@ -91,6 +98,9 @@ impl Diagnosed {
         }
         if !self.defaults.is_empty() {
             report["machine_defaults"] = self.defaults.as_slice().into();
+        }
+        if let Some(simulated) = &self.simulated {
+            report["simulated"] = serde_json::to_value(simulated)?;
         }
         Ok(report)
     }
@@ -122,7 +132,7 @@ impl Diagnose {
             ablated: self.ablate.iter().copied().collect(),
             ..GapConfig::default()
         };
-        let diagnosed = of(&self.bags, &name, &text, &config)?;
+        let diagnosed = beside(&self.bags, &self.simulated, &name, &text, &config)?;
         let title = format!("Simulator against machine: {}", listed(&self.bags));
         let mut page = gap::page(&title, &diagnosed, self.explain)?;
         for path in &self.bags {
@@ -189,24 +199,41 @@ pub fn of(
     machine_text: &str,
     config: &GapConfig,
 ) -> Result<Diagnosed> {
+    beside(paths, &[], name, machine_text, config)
+}
+
+/// The same against the bags of another simulator, where there are any.
+fn beside(
+    paths: &[PathBuf],
+    simulated: &[PathBuf],
+    name: &str,
+    machine_text: &str,
+    config: &GapConfig,
+) -> Result<Diagnosed> {
     let began = Instant::now();
     let machine = MachineFile::parse(machine_text, name)?;
     let left_out = machine_defaults::of(&machine, machine_text);
     let recorded = Recorded::read(paths, &machine)?;
-    let mut diagnosis = diagnose(&machine, &recorded.session, config)
+    let beside = simulated::beside(simulated, &machine, &recorded)?;
+    let session = beside.as_ref().map_or(&recorded.session, |it| &it.session);
+    let mut diagnosis = diagnose(&machine, session, config)
         .map_err(|error| bags::not_whole(error.into(), &bags::lines(&recorded.readings)))?;
     diagnosis.report.inputs.bags = recorded.bags;
     diagnosis.report.inputs.machine_sha256 = format!("{:x}", Sha256::digest(machine_text));
     diagnosis.report.runtime_s = began.elapsed().as_secs_f64();
-    let (session, report) = (&recorded.session, &diagnosis.report);
+    let report = &diagnosis.report;
     let defaults = machine_defaults::of_diagnosis(&machine, &left_out, session, report);
     let leaps = recorded.readings.iter().filter_map(|it| it.leaps.line());
-    let remarks = recorded.remarks.into_iter().chain(leaps).collect();
+    let (simulated, of_simulator) = beside.map_or((None, vec![]), |it: Beside| {
+        (Some(it.simulated), it.remarks)
+    });
+    let remarks = recorded.remarks.into_iter().chain(leaps);
     Ok(Diagnosed {
         diagnosis,
-        remarks,
+        remarks: remarks.chain(of_simulator).collect(),
         readings: recorded.readings,
         defaults,
+        simulated,
     })
 }
 

@@ -2,7 +2,8 @@
 //! shrinks once that effect is added to the simulator.
 //!
 //! A session is what was commanded and read; `machine::twin` says what should have been read. What is
-//! left is looked at against the noise that repeats show, and every question is answered with its doubt.
+//! left is looked at against the noise that repeats show, and every question is answered with its doubt. `simulated` puts
+//! another simulator in the place of the twin's prediction.
 //! `report` is the answer, in the form that people's programs read; `figures` is what pages draw beside it.
 //!
 //! `session` makes a session of recorded samples. `rows` thins readings to stations; `repeats` finds what was
@@ -76,6 +77,7 @@ pub mod session;
 mod share_interval;
 mod shrink;
 mod signature;
+pub mod simulated;
 mod split;
 mod stack;
 pub mod stage;

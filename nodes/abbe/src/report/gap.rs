@@ -10,6 +10,7 @@ use super::Report;
 use super::section::{Rows, Section, head};
 use super::terminal::{self, Part, Rank};
 use crate::diagnose::Diagnosed;
+use crate::diagnose::simulated::Simulated;
 use crate::machine_defaults;
 
 mod drawings;
@@ -36,7 +37,9 @@ pub fn page(title: &str, diagnosed: &Diagnosed, explain: bool) -> Result<Report>
     let lost = sentences::lost(&diagnosed.losses());
     let defaults = machine_defaults::in_words(&diagnosed.defaults);
     let answers = sentences::answers(report).into_iter().chain(defaults);
-    let lines: Vec<String> = lost.into_iter().chain(answers).collect();
+    let simulator = diagnosed.simulated.iter().flat_map(Simulated::in_words);
+    let lines = lost.into_iter().chain(simulator).chain(answers);
+    let lines: Vec<String> = lines.collect();
     let sections = sections(diagnosed);
     let notes: Vec<String> = notes(diagnosed);
     let traces = drawings::traces(&figures.traces)?;

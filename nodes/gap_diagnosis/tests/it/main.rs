@@ -5,6 +5,7 @@ mod logs;
 mod long;
 mod schema;
 mod session;
+mod simulated;
 mod standing;
 mod targets;
 mod trials;

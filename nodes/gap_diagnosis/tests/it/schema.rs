@@ -50,9 +50,10 @@ const SAMPLE: &str = r#"{ "schema": "abbe.gap/1",
   "runtime_s": 1.3 }"#;
 
 /// Keys that a report need not have, with their place.
-const OPTIONAL: [(&str, &str); 3] = [
+const OPTIONAL: [(&str, &str); 4] = [
     ("report", "loss"),
     ("report", "machine_defaults"),
+    ("report", "simulated"),
     ("report.causes[]", "why"),
 ];
 
