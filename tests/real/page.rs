@@ -57,7 +57,7 @@ const HEAD: &str = "# Recordings and verdicts
 
 Written by `tests/real/table`; [README.md](README.md) describes it. The numbers of the third column may differ in their last digits on another computer.
 
-| recording | right | the program | verdict |
+| recording | right answer | the program | verdict |
 |---|---|---|---|
 ";
 
@@ -183,7 +183,7 @@ mod tests {
         assert!(differences(&page, &page.replace("1.25", "-1.26")).is_empty());
         for (from, to) in [
             ("1.25 µm", "1.25 mm"),
-            ("| right |", "| **wrong** |"),
+            ("µm | right |", "µm | **wrong** |"),
             ("| c |", "| c 1 |"),
         ] {
             assert_eq!(

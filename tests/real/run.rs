@@ -76,18 +76,18 @@ pub fn outcome(recording: &Recording) -> Outcome {
     if needs_bag {
         import(expected.import.as_ref(), &files, &mut outcome);
     }
-    for report in &expected.report {
+    if let Some(report) = &expected.report {
         for of in &report.of {
             reported(*of, report, recording, &files, &mut outcome);
         }
     }
-    for wanted in &expected.diagnose {
+    if let Some(wanted) = &expected.diagnose {
         diagnosed(wanted, &files, &mut outcome);
     }
-    for wanted in &expected.export {
+    if let Some(wanted) = &expected.export {
         exported(wanted, &files, &mut outcome);
     }
-    for wanted in &expected.other {
+    if let Some(wanted) = &expected.other {
         other(wanted, &files, &mut outcome);
     }
     outcome
