@@ -104,8 +104,8 @@ pub struct TestSegment {
 }
 
 impl TestSegment {
-    /// The begin of a test of which kind, number and instant are known alone: no plane, radius, feed, sense, stylus, stations
-    /// or features, machine frame zero, first repetition, not cold, completed. Tests name what differs.
+    /// The begin of a test that has kind, number and instant alone: no plane, radius, feed, sense, stylus, stations or
+    /// features; centre and offset zero; first repetition, not cold, completed. Tests add the fields that differ.
     #[must_use]
     pub fn of_kind(kind: TestKind, run: u32, at: Stamp<Host>) -> Self {
         Self {
