@@ -1,11 +1,15 @@
 //! What can go wrong before or beneath the stage.
 
 use metrology::Axis;
+use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 
 /// Errors of the bridge: its parameters, its mapping, and its thread.
 #[derive(Debug, thiserror::Error)]
 pub enum BridgeError {
+    /// More entries than there may be.
+    #[error(transparent)]
+    Bound(#[from] BoundError),
     /// A number of the configuration is out of its range.
     #[error(
         "{key} = {}: must be from {} to {}",

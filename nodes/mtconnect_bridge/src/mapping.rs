@@ -16,6 +16,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use metrology::bound::Bound;
 use metrology::sample::Quantity;
 use metrology::stamp::Span;
 use metrology::{Axis, AxisSet};
@@ -26,6 +27,9 @@ use crate::plausibility::Rule;
 use crate::possible::Possible;
 use crate::shdr::Shape;
 use crate::unit::Unit;
+
+/// Keys of a mapping, most of which become topics: a machine with several devices has some hundred.
+const KEYS: Bound = Bound::at_most(4_000);
 
 /// The mapping file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -290,9 +294,10 @@ impl Mapping {
     ///
     /// # Errors
     /// A unit that does not measure what it is said to, a name that is no topic's or told twice, an axis told
-    /// twice, a rule out of range.
+    /// twice, a rule out of range, more keys than a machine has.
     pub fn new(file: &MapFile) -> Result<Self, BridgeError> {
         let (mut uses, mut units) = (BTreeMap::new(), BTreeMap::new());
+        KEYS.check_amount(|| "values".to_owned(), "keys", file.values.len())?;
         for (key, meaning) in &file.values {
             uses.insert(key.clone(), meaning.checked(key)?);
             units.extend(meaning.unit().map(|unit| (key.clone(), unit)));

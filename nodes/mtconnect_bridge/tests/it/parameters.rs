@@ -91,6 +91,20 @@ fn wrong_values_are_refused_by_name() {
 }
 
 #[test]
+fn a_mapping_of_more_keys_than_a_machine_has_is_refused() {
+    let map = |n: u32| {
+        let keys: String = (0..n)
+            .map(|n| format!("  k{n}: {{is: ignored}}\n"))
+            .collect();
+        let map = MapFile::from_yaml(&format!("values:\n{keys}")).unwrap();
+        Settings::new(&config(), &map).map(|settings| settings.mapping.uses().count())
+    };
+    assert_eq!(map(4_000).unwrap(), 4_000);
+    let refused = map(4_001).unwrap_err().to_string();
+    assert_eq!(refused, "values: 4001 keys: at most 4000");
+}
+
+#[test]
 fn the_mapping_of_the_readme_is_one() {
     let text = README.split("```yaml\n").nth(1).unwrap();
     let text = text.split("```").next().unwrap();
