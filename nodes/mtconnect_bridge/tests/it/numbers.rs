@@ -276,8 +276,10 @@ proptest! {
         }
         // A stream that is silent for a minute is given up, and all that holds is taken anew.
         for _ in 0..3 {
+            let good = document(7, 1, 20, &[(19, "STOPPED")]);
             talk.wait(60);
-            talk.answer_all(&document(7, 1, 20, &[(19, "STOPPED")]));
+            talk.answer_all(&good);
+            talk.part(&good);
         }
         prop_assert_eq!(talk.values().last().copied(), Some("STOPPED"));
     }
