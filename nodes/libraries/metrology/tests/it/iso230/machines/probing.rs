@@ -40,7 +40,7 @@ fn lobes(direction: &Vector3<f64>, n: f64, phase: f64) -> f64 {
 /// Range and mean of radial deviations about the least-squares sphere, in the first order of the deviations.
 fn about_own_centre(directions: &[Vector3<f64>], radial_mm: &[f64]) -> [f64; 2] {
     let row = |d: &Vector3<f64>| Vector4::new(d.x, d.y, d.z, 1.0);
-    let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    let (mut normal, mut right) = (Matrix4::<f64>::zeros(), Vector4::<f64>::zeros());
     for (d, r) in directions.iter().zip(radial_mm) {
         normal += row(d) * row(d).transpose();
         right += row(d) * *r;
