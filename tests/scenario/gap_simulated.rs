@@ -48,7 +48,7 @@ fn ballbar(
         let mut simulator = script(python, "ballbar_simulator.py");
         simulator.arg(&table);
         simulator.args([radius_mm, repeats, degrees, play_um, noise_um].map(|n| n.to_string()));
-        succeeded(&simulator.output().unwrap());
+        assert_eq!(succeeded(&simulator.output().unwrap()), "");
         imported(&table, radius_mm)
     };
     [150.0, 75.0].map(of_radius).to_vec()
@@ -129,10 +129,8 @@ fn what_an_independent_simulator_lacks_is_named_and_what_it_has_is_not() {
     let [lost] = &compared["unmatched"].as_array().unwrap()[..] else {
         panic!("{compared}");
     };
-    assert_eq!(
-        (&lost["reason"], &lost["channel"]),
-        (&"direction".into(), &"radial".into())
-    );
+    assert_eq!(lost["reason"], "direction");
+    assert_eq!(lost["channel"], "radial");
     assert_eq!(lost["readings"], 12 * 4);
     assert_eq!(compared["readings"]["of"], 12 * 361);
     assert_eq!(against_schema(&report), Vec::<String>::new());
@@ -146,7 +144,7 @@ fn a_simulators_bag_that_is_the_machines_own_or_cut_is_refused_with_the_remedy()
     let home = TempDir::new().unwrap();
     let table = home.path().join("machine.csv");
     std::fs::copy(root().join("tests/import/ballbar.csv"), &table).unwrap();
-    let bag = vec![imported(&table, 100.0)];
+    let bag = [imported(&table, 100.0)];
     let ended = diagnose(&bag, &bag, &[]);
     assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
     assert!(

@@ -66,8 +66,7 @@ pub(super) fn moving(run: &Run) -> AxisSet {
 
 fn moving_in(run: &Run, extents: &PerAxis<[f64; 2]>) -> AxisSet {
     let moves = |axis: &Axis| extents[*axis][1] - extents[*axis][0] > MOVES;
-    let axes = run.motion.axes.iter().filter(moves);
-    axes.fold(AxisSet::EMPTY, AxisSet::with)
+    run.motion.axes.iter().filter(moves).collect()
 }
 
 /// Least and greatest position of each axis over the readings of a run that are no touches; nothing where there are none.
