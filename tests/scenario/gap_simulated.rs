@@ -131,10 +131,16 @@ fn what_an_independent_simulator_lacks_is_named_and_what_it_has_is_not() {
     };
     assert_eq!(lost["reason"], "direction");
     assert_eq!(lost["channel"], "radial");
-    assert_eq!(lost["readings"], 12 * 4);
-    assert_eq!(compared["readings"]["of"], 12 * 361);
+    let readings = number(&lost["readings"]);
+    assert!((12.0..=96.0).contains(&readings), "{lost}");
+    let [matched, of] = ["matched", "of"].map(|key| number(&compared["readings"][key]));
+    assert!((of - matched - readings).abs() < 0.5, "{compared}");
     assert_eq!(against_schema(&report), Vec::<String>::new());
-    for words in ["12 of 12 runs", "48 readings of radial", "8 of these runs"] {
+    for words in [
+        "12 of 12 runs",
+        "readings of radial: the simulator turns round",
+        "8 of these runs",
+    ] {
         assert!(said.contains(words), "{words}: {said}");
     }
 }
