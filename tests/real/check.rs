@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::expected::{Diagnose, Figure, Must, Report};
+use crate::expected::{Diagnose, Figure, Follow, Must, Report};
 
 /// Largest difference from numpy, µm or arcsec: rounding of sums.
 const NUMPY_WITHIN: f64 = 1e-6;
@@ -57,8 +57,20 @@ fn figure(test: &Value, key: &str, name: &str) -> Option<f64> {
     match name {
         "runs" => return number(test, &["/n_runs", "/figures/n_runs"]),
         "targets" => {
-            let points = test.pointer("/points")?.as_array()?.len();
-            return u32::try_from(points).ok().map(f64::from);
+            let points = test
+                .get("points")
+                .or_else(|| test.pointer("/figures/points"));
+            let mut at: Vec<String> = { points?.as_array()?.iter() }
+                .map(|point| {
+                    [&point["target_mm"], &point["target_rad"]]
+                        .map(Value::to_string)
+                        .concat()
+                })
+                .collect();
+            // A rotary axis has a point for each side of a target.
+            at.sort();
+            at.dedup();
+            return u32::try_from(at.len()).ok().map(f64::from);
         }
         _ => {}
     }
@@ -150,9 +162,10 @@ fn cause_name(cause: &Value) -> String {
         .to_owned()
 }
 
-/// Whether a listed name is that of a cause: the effect alone stands for any axis.
+/// Whether a listed name is that of a cause; a `*` in place of the axis stands for any.
 fn is_of(listed: &str, cause: &str) -> bool {
-    listed == cause || (!listed.contains(' ') && cause.split(' ').next() == Some(listed))
+    let effect = listed.strip_suffix(" *");
+    listed == cause || (effect.is_some() && cause.split(' ').next() == effect)
 }
 
 /// The causes of a status.
@@ -191,28 +204,74 @@ pub fn diagnosis(wanted: &Diagnose, report: &Value) -> Vec<Check> {
 
 fn must_be_named(must: &Must, report: &Value) -> Vec<Check> {
     let name = must.one_of.join(" or ");
-    let all = report["causes"].as_array().into_iter().flatten();
-    let found = all.clone().find(|cause| {
-        let told = cause["status"] == "named" || cause["status"] == "set";
-        told && must.one_of.iter().any(|one| is_of(one, &cause_name(cause)))
+    let mut all = report["causes"].as_array().into_iter().flatten();
+    let found = all.find(|cause| {
+        let is_told = cause["status"] == "named" || cause["status"] == "set";
+        is_told && must.one_of.iter().any(|one| is_of(one, &cause_name(cause)))
     });
     let words = found.map_or("not named", |cause| {
         cause["status"].as_str().unwrap_or_default()
     });
     let mut checks = vec![Check::new(name.clone(), found.is_some(), words)];
-    checks.extend(must.sizes.iter().map(|(parameter, right)| {
+    checks.extend(must.sizes.iter().flat_map(|(parameter, right)| {
         let check = format!("{name} {parameter}");
         size(check, found, parameter, right)
     }));
     checks
 }
 
-fn size(check: String, cause: Option<&Value>, parameter: &str, right: &Figure) -> Check {
+/// The size of a cause, and its interval, which holds the right value.
+fn size(check: String, cause: Option<&Value>, parameter: &str, right: &Figure) -> [Check; 2] {
     let parameters = cause.and_then(|cause| cause["parameters"].as_array());
     let mut those = parameters.into_iter().flatten();
     let found = those.find(|one| one["name"] == parameter);
-    let value = found.and_then(|one| one["value"].as_f64());
-    compared(check, value, Some(right.value), right.within)
+    let of = |key: &str| found.and_then(|one| one[key].as_f64());
+    let interval = [of("low"), of("high")];
+    let holds =
+        matches!(interval, [Some(low), Some(high)] if low <= right.value && right.value <= high);
+    let [low, high] = interval.map(|end| end.map_or("?".to_owned(), |end| format!("{end:.2}")));
+    let within = Check::new(
+        format!("{check} interval"),
+        holds,
+        format!("{low} to {high}"),
+    );
+    [
+        compared(check, of("value"), Some(right.value), right.within),
+        within,
+    ]
+}
+
+/// What a log goes with: the line `CHANNEL goes with THERMOMETER lagged by N min, S µm/K`, with several terms.
+pub fn follows(wanted: &[Follow], text: &str) -> Vec<Check> {
+    let found = |follow: &Follow| -> Option<[f64; 2]> {
+        let lines = text.lines().filter(|line| line.contains(" goes with "));
+        let start = format!("with {} ", follow.thermometer);
+        let mut terms = lines.filter_map(|line| line.split_once(&start).map(|(_, term)| term));
+        let term = terms
+            .find(|term| term.starts_with("lagged by ") || term.starts_with("without a lag"))?;
+        let (lag, rest) = term.split_once(", ")?;
+        let lag_min = lag
+            .strip_prefix("lagged by ")
+            .map_or(Some(0.0), |lag| lag.strip_suffix(" min")?.parse().ok())?;
+        Some([lag_min, rest.split_once(" µm/K")?.0.parse().ok()?])
+    };
+    let checks = wanted.iter().flat_map(|follow| {
+        let name = &follow.thermometer;
+        let [lag_min, um_per_k] = found(follow).map_or([None; 2], |found| found.map(Some));
+        let of = |key: &str, value: Option<f64>, right: &Figure| {
+            compared(
+                format!("follows {name} {key}"),
+                value,
+                Some(right.value),
+                right.within,
+            )
+        };
+        [
+            of("lag", lag_min, &follow.lag),
+            of("size", um_per_k, &follow.size),
+        ]
+    });
+    checks.collect()
 }
 
 /// Rows of numbers of a text, such as a table for a control.
@@ -273,7 +332,7 @@ mod tests {
             ]),
         };
         let report = json!({"tests": [{"iso230_2": {
-            "accuracy": {"value_mm": 0.011_262}, "reversal": {"value_mm": 0.006_32}, "points": [1, 2], "n_runs": 5,
+            "accuracy": {"value_mm": 0.011_262}, "reversal": {"value_mm": 0.006_32}, "points": [{"target_mm": 1.0}, {"target_mm": 2.0}], "n_runs": 5,
         }}]});
         let exact =
             |a: f64| BTreeMap::from([("A".to_owned(), Some(a)), ("targets".to_owned(), Some(2.0))]);
@@ -297,7 +356,7 @@ mod tests {
 
     fn cause(effect: &str, status: &str, width_um: f64) -> Value {
         json!({"effect": effect, "axis": "X", "status": status,
-            "parameters": [{"name": "width_um", "value": width_um}]})
+            "parameters": [{"name": "width_um", "value": width_um, "low": width_um - 0.3, "high": width_um + 0.3}]})
     }
 
     #[test]
@@ -305,12 +364,13 @@ mod tests {
         let wanted = Diagnose {
             exit: 0,
             says: vec![],
+            follows: vec![],
             must: vec![Must {
                 one_of: vec!["backlash X".to_owned()],
                 sizes: BTreeMap::from([("width_um".to_owned(), right(5.0, 0.5))]),
             }],
-            may: vec!["scale_error".to_owned()],
-            must_not: vec!["cyclic_error".to_owned()],
+            may: vec!["scale_error X".to_owned()],
+            must_not: vec!["cyclic_error *".to_owned()],
         };
         let of = |causes: &[Value]| {
             let report = json!({ "causes": causes });
@@ -321,15 +381,15 @@ mod tests {
         assert_eq!(of(&[play.clone(), cause("scale_error", "named", 0.0)]), "");
         assert_eq!(
             of(&[cause("backlash", "named", 6.0)]),
-            "backlash X width_um"
+            "backlash X width_um; backlash X width_um interval"
         );
         assert_eq!(
             of(&[cause("backlash", "surrogate", 5.0)]),
-            "backlash X; backlash X width_um"
+            "backlash X; backlash X width_um; backlash X width_um interval"
         );
         assert_eq!(
             of(&[play.clone(), cause("cyclic_error", "named", 0.0)]),
-            "not cyclic_error"
+            "not cyclic_error *"
         );
         assert_eq!(
             of(&[play, cause("straightness", "named", 0.0)]),
@@ -338,7 +398,41 @@ mod tests {
         let refused = diagnosis(&wanted, &Value::Null);
         assert_eq!(
             failed(&refused),
-            ["backlash X", "backlash X width_um", "nothing else named"]
+            [
+                "backlash X",
+                "backlash X width_um",
+                "backlash X width_um interval",
+                "nothing else named"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_log_that_goes_with_another_thermometer_or_lag_is_found() {
+        let wanted = [Follow {
+            thermometer: "rear".to_owned(),
+            lag: right(60.0, 5.0),
+            size: right(0.93, 0.05),
+        }];
+        let of = |text: &str| {
+            let checks = follows(&wanted, text);
+            failed(&checks).join("; ")
+        };
+        let first = "length.Z goes with rear lagged by 59.4 min, 0.93 µm/K, and with table without a lag, -3.2 µm/K: on runs";
+        assert_eq!(of(first), "");
+        assert_eq!(
+            of(
+                "a goes with table without a lag, -3.2 µm/K, and with rear lagged by 61.0 min, 0.90 µm/K"
+            ),
+            ""
+        );
+        assert_eq!(
+            of("a goes with rear without a lag, 0.93 µm/K: on"),
+            "follows rear lag"
+        );
+        assert_eq!(
+            of("a goes with front lagged by 60.0 min, 0.93 µm/K"),
+            "follows rear lag; follows rear size"
         );
     }
 

@@ -118,7 +118,10 @@ pub struct Diagnose {
     /// Causes that must be named, or stand in a set with what cannot be told from them.
     #[serde(default)]
     pub must: Vec<Must>,
-    /// Causes that may be named, as `backlash X`. An effect alone stands for any axis.
+    /// Thermometers that the log goes with.
+    #[serde(default)]
+    pub follows: Vec<Follow>,
+    /// Causes that may be named, as `backlash X`; `backlash *` is that of any axis.
     #[serde(default)]
     pub may: Vec<String>,
     /// Causes that were named wrongly at a time; what is listed nowhere must not be named either.
@@ -135,6 +138,18 @@ pub struct Must {
     /// Parameters with their right values.
     #[serde(default)]
     pub sizes: BTreeMap<String, Figure>,
+}
+
+/// A thermometer that a log goes with.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Follow {
+    /// Its name.
+    pub thermometer: String,
+    /// How long the log lags behind it, min.
+    pub lag: Figure,
+    /// Change of the log, µm/K.
+    pub size: Figure,
 }
 
 /// What `abbe export` must write.

@@ -134,8 +134,20 @@ def positioning(found):
     return figures
 
 
+def within_a_second(t, z):
+    """Readings within a second of the first of them are one, their mean, as `abbe report` states them."""
+    groups = []
+    for time, value in zip(t, z):
+        if not groups or time - groups[-1][0] >= 1.0:
+            groups.append((time, []))
+        groups[-1][1].append(value)
+    found = [(time, np.mean(values)) for time, values in groups]
+    return np.array(found).T
+
+
 def drift(t, z):
     """ISO 230-3: drift since the first reading, between readings along a straight line."""
+    t, z = within_a_second(t, z)
     z = z - z[0]
     after = lambda seconds: np.interp(t[0] + seconds, t, z) if t[-1] - t[0] >= seconds else None
     return {"after_1_h": after(3600.0), "after_3_h": after(10800.0), "range": np.ptp(z)}

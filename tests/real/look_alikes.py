@@ -196,7 +196,7 @@ def two_thermometers(folder):
         front = 22.0 + 6.0 * (1 - np.exp(-time / 1500.0)) + 0.5 * np.sin(2 * np.pi * time / 1900.0)
         nose = delayed(rear, 45 * 60, step)
         for k in range(0, time.size, 60):
-            z = 1.2 * (nose[k] - nose[0]) + 0.15 * rng.normal()
+            z = 1.2 * (nose[k] - 20.0) + 0.15 * rng.normal()
             rows.append(f"{run + 1},{run * 86400 + time[k]:.0f},{z:.3f},{front[k] + 0.02 * rng.normal():.2f},{rear[k] + 0.02 * rng.normal():.2f}")
     comment = "growth 1.2 um/K of the rear bearing, lagged by 45 min; the front bearing has a thermostat; noise 0.15 um"
     write(folder, "lagged_rear_bearing", "growth_Z.csv", "run,time_s,growth_um,front,rear", rows, comment)
@@ -210,7 +210,7 @@ def mornings(folder):
         heat = masses(np.full(time.size, 55.0), np.full(time.size, room), [15000, 60000], ([4.0], [1.5, 6.0]), [room] * 2, step, 1)[:, 0]
         nose = delayed(heat, 20 * 60, step)
         for k in range(0, time.size, 30):
-            z = -3.0 * (nose[k] - nose[0]) + 0.1 * rng.normal()
+            z = -3.0 * (nose[k] - 19.2) + 0.1 * rng.normal()
             rows.append(f"{run + 1},{run * 86400 + time[k]:.0f},{z:.3f},{heat[k] + 0.02 * rng.normal():.2f}")
     comment = "-30 um per 10 K of the spindle, lagged by 20 min; five mornings of two hours, nights not recorded, each begins settled; noise 0.1 um"
     write(folder, "five_mornings", "mornings_Z.csv", "run,time_s,z_um,spindle", rows, comment)

@@ -165,6 +165,14 @@ fn diagnosed(wanted: &Diagnose, files: &Files, outcome: &mut Outcome) {
     let report: Value = serde_json::from_str(&text).unwrap_or_default();
     let exit = [Some(wanted.exit), ended.code];
     let mut checks = check::ended("diagnose", exit, &wanted.says, &ended.text);
+    let follows = check::follows(&wanted.follows, &ended.text);
+    let words = { follows.chunks(2) }.zip(&wanted.follows);
+    let words = words.map(|(found, follow)| {
+        let [lag, size] = [0, 1].map(|k| &found[k].found);
+        format!("goes with {}: {lag} min, {size} µm/K", follow.thermometer)
+    });
+    outcome.words.extend(words);
+    checks.extend(follows);
     checks.extend(check::diagnosis(wanted, &report));
     outcome.checks.extend(checks);
     outcome.words.push(if report.is_object() {
