@@ -74,6 +74,9 @@ fn figure(test: &Value, key: &str, name: &str) -> Option<f64> {
         }
         _ => {}
     }
+    if key == "iso230_4" {
+        return number(test, &[&format!("{}/value_mm", of_circle(name)?)]).map(|mm| 1e3 * mm);
+    }
     let (letter, side) = name.split_once('_').unwrap_or((name, ""));
     let quantity = match letter {
         "A" => "accuracy",
@@ -95,6 +98,18 @@ fn figure(test: &Value, key: &str, name: &str) -> Option<f64> {
     let linear = number(test, &[&format!("{place}/value_mm")]).map(|mm| 1e3 * mm);
     let angular = || number(test, &[&format!("{place}/value_rad")]);
     linear.or_else(|| angular().map(|rad| rad * ARCSEC_PER_RAD))
+}
+
+/// Where a figure of a circle stands.
+fn of_circle(name: &str) -> Option<&'static str> {
+    match name {
+        "G_ccw" => Some("/counter_clockwise/circular_error"),
+        "G_cw" => Some("/clockwise/circular_error"),
+        "G" => Some("/both/circular_error"),
+        "D" => Some("/both/mean_radial_deviation"),
+        "H" => Some("/both/hysteresis_1996"),
+        _ => None,
+    }
 }
 
 fn number(value: &Value, places: &[&str]) -> Option<f64> {
@@ -168,16 +183,30 @@ fn is_of(listed: &str, cause: &str) -> bool {
     listed == cause || (effect.is_some() && cause.split(' ').next() == effect)
 }
 
-/// The causes of a status.
+/// The causes of a status, each with those that cannot be told from it.
 pub fn causes(report: &Value, status: &str) -> Vec<String> {
     let all = report["causes"].as_array().into_iter().flatten();
     let those = all.filter(|cause| cause["status"] == status);
-    those.map(cause_name).collect()
+    let with_others = those.map(|cause| {
+        let others = cause["confusable_with"].as_array().into_iter().flatten();
+        let open = others.filter(|other| other["excluded"] == false);
+        let open: Vec<String> = open.map(cause_name).collect();
+        if open.is_empty() {
+            cause_name(cause)
+        } else {
+            format!("{} (or {})", cause_name(cause), open.join(", "))
+        }
+    });
+    with_others.collect()
 }
 
 /// Named causes and sets against those that must, may and must not be named.
 pub fn diagnosis(wanted: &Diagnose, report: &Value) -> Vec<Check> {
-    let named = causes(report, "named");
+    let all = report["causes"].as_array().into_iter().flatten();
+    let named = all
+        .filter(|cause| cause["status"] == "named")
+        .map(cause_name);
+    let named: Vec<String> = named.collect();
     let mut checks: Vec<Check> = vec![];
     for must in &wanted.must {
         checks.extend(must_be_named(must, report));

@@ -1,4 +1,4 @@
-"""Evaluates every table by ISO 230-2 or 230-3 with numpy and writes the figures to the end of its expected.yaml.
+"""Evaluates every table by ISO 230-2, 230-3 or 230-4 with numpy and writes the figures to the end of its expected.yaml.
 
 It shares nothing with the crates: readings are gathered by target and side, whatever the numbers of the runs are.
 Lengths are um, angles arcsec.
@@ -54,6 +54,9 @@ LOGS = {
     "spindle_once": ("spindle_once.csv", "growth_um", None),
     "warm_ups_a": ("a_60rows_pause.csv", "z_um", "run"),
     "warm_ups_b": ("b_60rows_no_pause.csv", "z_um", "run"),
+    "warm_ups_c": ("c_240rows_pause.csv", "z_um", "run"),
+    "warm_ups_d": ("d_240rows_jitter1s.csv", "z_um", "run"),
+    "warm_ups_e": ("e_90rows_jitter1s.csv", "z_um", "run"),
     "warm_ups_f": ("f_last_run_cut.csv", "z_um", "run"),
     "mornings_three": ("lag20.csv", "z_um", "run"),
     "mornings_six": ("lag20_six.csv", "z_um", "run"),
@@ -167,6 +170,39 @@ def instant(cell):
     return datetime.datetime.fromisoformat(cell.replace("Z", "+00:00")).timestamp()
 
 
+def circle_of(points):
+    """Least squares of distances (Gauss and Newton): centre and radius."""
+    x, y = points.T
+    centre, radius = np.zeros(2), np.hypot(x, y).mean()
+    for _ in range(20):
+        dx, dy = x - centre[0], y - centre[1]
+        r = np.hypot(dx, dy)
+        step = np.linalg.lstsq(np.column_stack([dx / r, dy / r, np.ones_like(r)]), r - radius, rcond=None)[0]
+        centre, radius = centre + step[:2], radius + step[2]
+    return centre, radius
+
+
+def circles(name, table, radius_mm):
+    """ISO 230-4 of runs in pairs, the first of each counter-clockwise: G, D and the hysteresis H at equal angles."""
+    every = rows(name, table)
+    numbers = sorted({int(row["run"]) for row in every})
+    for pair in zip(numbers[::2], numbers[1::2]):
+        turns = []
+        for number in pair:
+            those = [row for row in every if int(row["run"]) == number]
+            turn = np.radians([float(row["angle_deg"]) for row in those])
+            r = radius_mm + np.array([float(row["radial_um"]) for row in those]) / 1000.0
+            turns.append((np.column_stack([r * np.cos(turn), r * np.sin(turn)]), turn, r))
+        figures = {}
+        for word, points in (("G_ccw", turns[0][0]), ("G_cw", turns[1][0]), ("G", np.vstack([t[0] for t in turns]))):
+            centre, radius = circle_of(points)
+            figures[word] = 1000.0 * np.ptp(np.hypot(*(points - centre).T))
+        figures["D"] = 1000.0 * (radius - radius_mm)
+        back = np.argsort(turns[1][1])
+        figures["H"] = 1000.0 * abs(turns[0][2] - turns[1][2][back]).max()
+        yield figures
+
+
 def block(tests):
     number = lambda value: "null" if value is None else repr(value if isinstance(value, int) else round(float(value), 9))
     lines = ["  - {" + ", ".join(f"{key}: {number(value)}" for key, value in test.items()) + "}\n" for test in tests]
@@ -178,6 +214,7 @@ def main():
     tests = {name: [positioning(readings(name, *how))] for name, how in POSITIONING.items()}
     tests |= {name: [positioning(wide(name, *how))] for name, how in WIDE.items()}
     tests |= {name: list(logs(name, *how)) for name, how in LOGS.items()}
+    tests["slipped_clamp"] = list(circles("slipped_clamp", "ballbar_XY.csv", 100.0))
     for name, figures in tests.items():
         file = folder / name / "expected.yaml"
         file.parent.mkdir(exist_ok=True)

@@ -138,6 +138,8 @@ fn reported(of: Of, wanted: &Report, recording: &Recording, files: &Files, outco
             let unit = figure.unit.replace("um", "µm");
             if check.found.starts_with("no ") {
                 format!("{name} —")
+            } else if unit.is_empty() {
+                format!("{} {name}", check.found.trim_end_matches(".00"))
             } else {
                 format!("{name} {} {unit}", check.found)
             }
@@ -174,18 +176,43 @@ fn diagnosed(wanted: &Diagnose, files: &Files, outcome: &mut Outcome) {
     outcome.words.extend(words);
     checks.extend(follows);
     checks.extend(check::diagnosis(wanted, &report));
+    outcome.words.push(in_words(&report));
+    outcome.words.extend(sizes(wanted, &checks));
     outcome.checks.extend(checks);
-    outcome.words.push(if report.is_object() {
-        let list = |status: &str| {
-            let found = causes(&report, status);
-            (!found.is_empty()).then(|| found.join(", "))
-        };
-        let named = list("named").unwrap_or_else(|| "nothing".to_owned());
-        let set = list("set").map(|set| format!("; in a set: {set}"));
-        format!("named: {named}{}", set.unwrap_or_default())
-    } else {
-        "diagnose: refused".to_owned()
+}
+
+/// The named causes, and those of sets with what cannot be told from them.
+fn in_words(report: &Value) -> String {
+    if !report.is_object() {
+        return "diagnose: refused".to_owned();
+    }
+    let named = causes(report, "named");
+    let set = causes(report, "set");
+    let mut words = match (named.is_empty(), set.is_empty()) {
+        (true, true) => return "nothing named".to_owned(),
+        (true, false) => String::new(),
+        (false, _) => format!("named: {}", named.join(", ")),
+    };
+    if !set.is_empty() {
+        let lead = if words.is_empty() { "" } else { "; " };
+        words += &format!("{lead}one of a set: {}", set.join(", "));
+    }
+    words
+}
+
+/// The sizes that were compared, each with its interval.
+fn sizes(wanted: &Diagnose, checks: &[Check]) -> Vec<String> {
+    let all = wanted.must.iter().flat_map(|must| {
+        let name = must.one_of.join(" or ");
+        must.sizes.keys().map(move |size| format!("{name} {size}"))
     });
+    let words = all.filter_map(|size| {
+        let of = |name: &str| checks.iter().find(|check| check.name == name);
+        let (value, interval) = (of(&size)?, of(&format!("{size} interval"))?);
+        let is_there = !value.found.starts_with("no ");
+        is_there.then(|| format!("{size} {} ({})", value.found, interval.found))
+    });
+    words.collect()
 }
 
 fn exported(wanted: &Export, files: &Files, outcome: &mut Outcome) {
