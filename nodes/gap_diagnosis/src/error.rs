@@ -44,6 +44,9 @@ pub enum GapError {
     /// An id that the catalogue does not have.
     #[error("left_out: `{id}` is not in the catalogue")]
     LeftOut { id: String },
+    /// A name that a design does not know.
+    #[error("\"{name}\": is no {what}")]
+    Unknown { what: &'static str, name: String },
     /// A rule that the diagnosis does not have.
     #[error(
         "rule \"{name}\": must be one of constancy free_shapes swap_search held_out recalibration"

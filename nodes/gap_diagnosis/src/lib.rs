@@ -20,7 +20,7 @@
 //! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`, `apart` what each effect has of that;
 //! `share_interval` is the interval of a place's share, `unread` the pauses of thermometers; `unrepeated` is the noise floor of a log made once, `thermal` finds the thermometers that a log goes with. `experiment` knows what could
 //! be measured next and `next` which of it would decide. `diagnose` puts the questions in their order,
-//! `preflight` some of them before anything is measured; `regression` is what other methods than these would start
+//! `preflight` some of them before anything is measured, and `design` chooses what to measure; `regression` is what other methods than these would start
 //! from, `problem` the first search as numbers alone, `rule` what of these can be switched off. `stage` is the node's whole computation, `following` its
 //! parameters.
 
@@ -34,6 +34,7 @@ mod confidence;
 pub mod config;
 mod confirm;
 mod description;
+pub mod design;
 mod diagnose;
 pub mod error;
 pub mod experiment;

@@ -50,6 +50,9 @@ use crate::whitener::Autoregression;
 use known::Known;
 use question::{Answer, Question, questions};
 
+pub(crate) use lever::lever;
+pub(crate) use question::DECISION;
+
 /// What experiments are simulated with.
 pub struct Bench<'b> {
     /// The machine.
