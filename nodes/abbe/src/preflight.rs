@@ -14,6 +14,7 @@ use metrology::bound::{Bound, BoundError};
 use metrology::number::number;
 use nalgebra::Vector3;
 
+mod design;
 mod dry_run;
 mod floors;
 mod ideal;
@@ -22,6 +23,7 @@ mod programme;
 mod size;
 mod wanted;
 
+use design::{Means, Mounting};
 use floors::FloorArgument;
 use outcome::Seen;
 use programme::{Planned, Programme};
@@ -42,10 +44,35 @@ const ASKED: Bound = Bound::at_most(100);
 #[derive(Args)]
 pub struct Preflight {
     /// Folder of a scenario, or a plan file.
-    what: PathBuf,
+    #[arg(required_unless_present = "design")]
+    what: Option<PathBuf>,
     /// Machine file; a scenario has its own.
     #[arg(long)]
     machine: Option<PathBuf>,
+    /// Design a programme for the machine file, and write it as a scenario's folder.
+    #[arg(long, requires = "machine", requires = "with", requires = "out", conflicts_with_all = ["what", "want", "head_offset"])]
+    design: bool,
+    /// Minutes that a designed programme may take, set-ups included.
+    #[arg(
+        long,
+        value_name = "MIN",
+        default_value_t = 20.0,
+        allow_negative_numbers = true,
+        requires = "design"
+    )]
+    minutes: f64,
+    /// Instruments at hand for a designed programme: probe, grid, laser, ballbar, scales, thermometers.
+    #[arg(long, value_name = "INSTRUMENTS", value_delimiter = ',', requires = "design", value_parser = design::means)]
+    with: Vec<Means>,
+    /// Minutes that one set-up of an instrument takes; may be repeated.
+    #[arg(long, value_name = "INSTRUMENT=MIN", requires = "design", value_parser = design::mounting)]
+    mounting: Vec<Mounting>,
+    /// File of effects that are likelier than others, with their sizes and weights.
+    #[arg(long, value_name = "FILE", requires = "design")]
+    likely: Option<PathBuf>,
+    /// Folder of the designed programme; new or empty.
+    #[arg(short, long, value_name = "FOLDER", requires = "design")]
+    out: Option<PathBuf>,
     /// Component or coefficient that has to be determined, e.g. `ECY` or `EXX1`; may be repeated.
     #[arg(long, value_name = "NAME")]
     want: Vec<String>,
@@ -92,6 +119,15 @@ impl Preflight {
     /// # Errors
     /// When plan, machine, a wanted name or a number (exit code 2) cannot be used.
     pub fn execute(self) -> Result<ExitCode> {
+        if self.design {
+            return self.execute_design();
+        }
+        let Some(what) = self.what.as_deref() else {
+            return Err(refused(
+                "preflight",
+                "a plan file or the folder of a scenario is needed",
+            ));
+        };
         let u_um = self.station_uncertainty_um;
         if !(u_um > 0.0 && u_um <= GREATEST_NUMBER) {
             let reason = format!(
@@ -111,7 +147,7 @@ impl Preflight {
             return Err(refused("preflight", reason));
         }
         floors::check(&self.floor).map_err(|reason| refused("preflight", reason))?;
-        let plan = Planned::read(&self.what, self.machine.as_deref())?;
+        let plan = Planned::read(what, self.machine.as_deref())?;
         size::check(&plan.plan, &plan.programs, &plan.machine)?;
         let geometry = self.geometry(&plan, u_um * 1e-3)?;
         let run = dry_run::dry_run(
@@ -135,6 +171,27 @@ impl Preflight {
             whole_file::write(path, &html)?;
         }
         self.tell(&plan, &geometry, page)
+    }
+
+    /// As [`design::Wanted::execute`].
+    fn execute_design(&self) -> Result<ExitCode> {
+        floors::check(&self.floor).map_err(|reason| refused("preflight", reason))?;
+        let Some(machine) = self.machine.as_deref() else {
+            return Err(refused("preflight", "--design needs --machine FILE"));
+        };
+        design::Wanted {
+            machine,
+            minutes: self.minutes,
+            with: &self.with,
+            mounting: &self.mounting,
+            likely: self.likely.as_deref(),
+            floors: &|machine: &machine::MachineFile| floors::floors(machine, &self.floor),
+            out: design::needed(self.out.as_ref())?,
+            html: self.html.as_deref(),
+            json: self.json,
+            full: self.full,
+        }
+        .execute()
     }
 
     /// Text or JSON on standard output.
@@ -163,7 +220,7 @@ impl Preflight {
             if let Some(name) = self.want.first() {
                 bail!(
                     "--want {name}: the plan of {} has no grid step, so no error of geometry is looked at",
-                    self.what.display()
+                    plan.what()
                 );
             }
             return Ok(Geometry(None));

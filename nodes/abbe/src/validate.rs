@@ -78,6 +78,16 @@ impl Validate {
     }
 }
 
+/// The mistakes of a scenario's folder.
+///
+/// # Errors
+/// When the folder cannot be looked at.
+pub fn mistakes(folder: &Path) -> Result<Vec<String>> {
+    let mut findings = Findings::default();
+    look(folder, &mut findings)?;
+    Ok(findings.mistakes)
+}
+
 fn counted(n: usize, what: &str) -> String {
     match n {
         1 => format!("1 {what}"),

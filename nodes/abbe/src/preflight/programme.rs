@@ -66,6 +66,11 @@ impl Planned {
         planned.what = what.display().to_string();
         Ok(planned)
     }
+
+    /// Scenario or plan, as the user gave it.
+    pub fn what(&self) -> &str {
+        &self.what
+    }
 }
 
 /// A plan's recordings over a plate, ready to be judged.
@@ -150,7 +155,7 @@ fn of_scenario(folder: &Path, machine: Option<&Path>) -> Result<Planned> {
 }
 
 /// The control of a machine whose scenario has none: it allows twice what the machine's own loops leave at rapid speed.
-fn control(machine: &MachineFile) -> fake_cnc::Config {
+pub fn control(machine: &MachineFile) -> fake_cnc::Config {
     let usual = fake_cnc::Config::default();
     let (mut mm, mut deg) = (
         usual.following_error_limit_mm,

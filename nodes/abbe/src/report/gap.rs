@@ -13,6 +13,7 @@ use crate::diagnose::Diagnosed;
 use crate::diagnose::simulated::Simulated;
 use crate::machine_defaults;
 
+pub mod designed;
 mod drawings;
 mod matrix;
 pub mod planned;

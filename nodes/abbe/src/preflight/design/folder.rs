@@ -1,0 +1,202 @@
+//! The folder of a designed programme: plan, programs, machine, parameters, launch file, and the steps of a person in order.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use gap_diagnosis::design::Rung;
+use metrology::number::number;
+
+use super::instruments::{Means, Shop};
+use super::menu::{Offer, SetUp};
+use super::stand_in::StandIn;
+use crate::whole_file;
+
+/// The name of the launch file.
+const LAUNCH: &str = "designed.launch.xml";
+/// What a person reads first.
+pub const INSTRUCTIONS: &str = "INSTRUCTIONS.md";
+/// First instant of simulated time, s since the epoch.
+const START_S: i64 = 1_767_600_000;
+/// Longest time of the plan over the designed one.
+const LIMIT: f64 = 3.0;
+
+/// One set-up of a programme with its tests, each as often as it is repeated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stand {
+    /// The set-up.
+    pub set_up: SetUp,
+    /// The tests in their order: each once, then those that are repeated once more, and so on.
+    pub tests: Vec<Offer>,
+}
+
+/// The set-ups of a programme in order: probe, grid, laser, ballbar; what warms comes last in its set-up.
+pub fn stands(offers: &[Offer], rung: &Rung) -> Vec<Stand> {
+    let mut by_set_up = BTreeMap::<(Means, String), Vec<(&Offer, usize)>>::new();
+    for (title, repeats) in &rung.tests {
+        if let Some(offer) = offers.iter().find(|offer| offer.title == *title) {
+            let key = (offer.set_up.means, offer.set_up.name.clone());
+            by_set_up.entry(key).or_default().push((offer, *repeats));
+        }
+    }
+    let stand = |mut tests: Vec<(&Offer, usize)>| {
+        tests.sort_by_key(|(offer, _)| offer.heat.is_some());
+        let most = tests.iter().map(|(_, n)| *n).max().unwrap_or(0);
+        let (set_up, _) = tests.first().map(|(offer, n)| (&offer.set_up, n))?;
+        let of_round = |round: usize| tests.iter().filter(move |(_, n)| *n > round);
+        Some(Stand {
+            set_up: set_up.clone(),
+            tests: (0..most)
+                .flat_map(of_round)
+                .map(|(offer, _)| (*offer).clone())
+                .collect(),
+        })
+    };
+    by_set_up.into_values().filter_map(stand).collect()
+}
+
+/// The plan's text.
+pub fn plan(stands: &[Stand], minutes: f64) -> String {
+    let mut text = format!(
+        "title: designed programme of {} min\nsteps:\n",
+        number(minutes)
+    );
+    for step in stands
+        .iter()
+        .flat_map(|stand| &stand.tests)
+        .flat_map(|test| &test.steps)
+    {
+        let _ = writeln!(text, "  - {step}");
+    }
+    text
+}
+
+/// Everything that a folder is written of.
+pub struct Contents<'c> {
+    /// Text of the machine file.
+    pub machine: &'c str,
+    /// Set-ups with their tests.
+    pub stands: &'c [Stand],
+    /// Times of set-ups.
+    pub shop: &'c Shop,
+    /// Places of thermometers, a line each; empty without.
+    pub thermometers: &'c [String],
+    /// The fake machine.
+    pub stand_in: &'c StandIn,
+    /// Minutes that were wanted, and that the programme takes.
+    pub minutes: [f64; 2],
+}
+
+/// Writes the files into a new or empty folder, and returns their paths.
+///
+/// # Errors
+/// When the folder holds files, or one cannot be written.
+pub fn write(folder: &Path, contents: &Contents<'_>) -> Result<Vec<PathBuf>> {
+    check_empty(folder)?;
+    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let mut files = BTreeMap::<String, String>::new();
+    let tests = contents.stands.iter().flat_map(|stand| &stand.tests);
+    for (name, text) in tests.flat_map(|test| &test.programs) {
+        let _ = files.insert(name.clone(), text.clone());
+    }
+    let [wanted_min, used_min] = contents.minutes;
+    let fixed = [
+        ("machine.yaml", contents.machine.to_owned()),
+        ("plan.yaml", plan(contents.stands, wanted_min)),
+        ("scenario.yaml", scenario(wanted_min)),
+        ("sequencer.yaml", SEQUENCER.to_owned()),
+        ("fake_cnc.yaml", contents.stand_in.parameters.clone()),
+        ("plant.yaml", contents.stand_in.plant.clone()),
+        (LAUNCH, LAUNCHED.to_owned()),
+        (INSTRUCTIONS, instructions(folder, contents, used_min)),
+    ];
+    files.extend(fixed.map(|(name, text)| (name.to_owned(), text)));
+    let mut written = Vec::new();
+    for (name, text) in &files {
+        let path = folder.join(name);
+        whole_file::write(&path, text)?;
+        written.push(path);
+    }
+    Ok(written)
+}
+
+/// Refuses a folder with files in it: nothing is overwritten.
+///
+/// # Errors
+/// Names the folder and the remedy.
+pub fn check_empty(folder: &Path) -> Result<()> {
+    if !folder.exists() {
+        return Ok(());
+    }
+    let mut entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+    if entries.next().is_some() {
+        bail!(
+            "-o {}: holds files, and nothing is overwritten: name a new or an empty folder",
+            folder.display()
+        );
+    }
+    Ok(())
+}
+
+const SEQUENCER: &str =
+    "/**:\n  ros__parameters:\n    machine_file: machine.yaml\n    plan_file: plan.yaml\n";
+const LAUNCHED: &str = "<launch>\n  <node pkg=\"abbe\" exec=\"fake_cnc\"><param from=\"$(dirname)/fake_cnc.yaml\"/></node>\n  \
+     <node pkg=\"abbe\" exec=\"sequencer\"><param from=\"$(dirname)/sequencer.yaml\"/></node>\n</launch>\n";
+
+fn scenario(minutes: f64) -> String {
+    format!(
+        "title: designed programme of {} min\nreport: gap\ndiagnose: true\nsimulated_start_s: {START_S}\nlimit_min: {:.1}\n",
+        number(minutes),
+        (LIMIT * minutes).max(60.0)
+    )
+}
+
+/// What a person does, in order, with the steps of the plan that each set-up has.
+fn instructions(folder: &Path, contents: &Contents<'_>, used_min: f64) -> String {
+    let shown = folder.display();
+    let mut text = format!(
+        "# Designed programme\n\nIt takes about {} min, set-ups included. The numbers of steps are those of `plan.yaml`.\n",
+        number((10.0 * used_min).round() / 10.0)
+    );
+    if !contents.thermometers.is_empty() {
+        text.push_str(
+            "\n## Before the first step\n\nRead these thermometers during the whole programme:\n\n",
+        );
+        for line in contents.thermometers {
+            let _ = writeln!(text, "- {line}");
+        }
+    }
+    let mut step = 0;
+    for (k, stand) in contents.stands.iter().enumerate() {
+        let _ = write!(
+            text,
+            "\n## {}. {} ({} min to set up)\n\n{}\n\n",
+            k + 1,
+            stand.set_up.name,
+            number(contents.shop.minutes(stand.set_up.means)),
+            stand.set_up.words
+        );
+        for test in &stand.tests {
+            let first = step + 1;
+            step += test.steps.len();
+            let steps = if first == step {
+                format!("step {first}")
+            } else {
+                format!("steps {first} to {step}")
+            };
+            let _ = writeln!(text, "- {steps}: {}", test.title);
+            if test.heat == Some(super::menu::Heat::Spindle) {
+                text.push_str(
+                    "  (take the probe out before the spindle turns, and put it back afterwards)\n",
+                );
+            }
+        }
+    }
+    let _ = write!(
+        text,
+        "\n## Run it\n\nOn the fake machine: `abbe run {shown}`. On a machine, start the controller's node in place of `fake_cnc` in \
+         `{LAUNCH}`; plan and programs stay as they are. Then:\n\n```sh\nabbe diagnose BAG --machine {shown}/machine.yaml\n```\n"
+    );
+    text
+}

@@ -1,0 +1,119 @@
+//! The file of effects that are likelier than others: `--likely effects.yaml`.
+//!
+//! ```yaml
+//! likely:
+//!   - {effect: backlash, axis: X, size: 3.0, weight: 5.0}
+//!   - {effect: spindle_growth}
+//! ```
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use gap_diagnosis::design::{Likely, MOST_WEIGHT};
+use machine::effects::CATALOGUE;
+use metrology::number::number;
+use metrology::yaml;
+use node_runtime::text_file;
+use serde::Deserialize;
+
+/// Weight of an effect that is listed without one; others count 1.
+const USUAL_WEIGHT: f64 = 3.0;
+/// Most entries.
+const MOST_ENTRIES: usize = 1000;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    likely: Vec<Entry>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    /// Id in the catalogue.
+    effect: String,
+    /// What it acts on; absent: everything that it can act on.
+    #[serde(default)]
+    axis: Option<String>,
+    /// The size to be named, in the unit of the effect's first parameter; absent: its typical one.
+    #[serde(default)]
+    size: Option<f64>,
+    /// How much it counts.
+    #[serde(default = "usual_weight")]
+    weight: f64,
+}
+
+const fn usual_weight() -> f64 {
+    USUAL_WEIGHT
+}
+
+/// Reads the file.
+///
+/// # Errors
+/// With file, place, value and limit.
+pub fn read(path: &Path) -> Result<Vec<Likely>> {
+    let text = text_file::yaml(path).context("likely effects")?;
+    of_text(&text).with_context(|| format!("likely effects {}", path.display()))
+}
+
+fn of_text(text: &str) -> Result<Vec<Likely>> {
+    let file: File = yaml::read_letters(text)?;
+    if file.likely.len() > MOST_ENTRIES {
+        bail!(
+            "likely: {} entries: at most {MOST_ENTRIES}",
+            file.likely.len()
+        );
+    }
+    for (k, entry) in file.likely.iter().enumerate() {
+        if !CATALOGUE.iter().any(|kind| kind.id == entry.effect) {
+            let ids: Vec<&str> = CATALOGUE.iter().map(|kind| kind.id).collect();
+            bail!(
+                "likely[{k}].effect = \"{}\": the catalogue has no such effect, but {}",
+                entry.effect,
+                ids.join(", ")
+            );
+        }
+        if !(0.0..=MOST_WEIGHT).contains(&entry.weight) {
+            bail!(
+                "likely[{k}].weight = {}: must be from 0 to {}",
+                number(entry.weight),
+                number(MOST_WEIGHT)
+            );
+        }
+        if let Some(size) = entry.size.filter(|size| !(*size > 0.0 && size.is_finite())) {
+            bail!("likely[{k}].size = {}: must be above 0", number(size));
+        }
+    }
+    let likely = file.likely.into_iter().map(|entry| Likely {
+        effect: entry.effect,
+        axis: entry.axis,
+        size: entry.size,
+        weight: entry.weight,
+    });
+    Ok(likely.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_entry_that_means_nothing_is_named_with_its_place() {
+        let of = |entry: &str| of_text(&format!("likely:\n  - {entry}\n"));
+        let all = of("{effect: backlash, axis: X, size: 3.0}").unwrap();
+        assert_eq!(all[0].size, Some(3.0));
+        assert!((all[0].weight - USUAL_WEIGHT).abs() < 1e-12);
+        for (entry, words) in [
+            (
+                "{effect: rust}",
+                "likely[0].effect = \"rust\": the catalogue",
+            ),
+            ("{effect: backlash, weight: 200.0}", "from 0 to 100"),
+            ("{effect: backlash, size: -1.0}", "likely[0].size"),
+            ("{effect: backlash, width: 1.0}", "width"),
+        ] {
+            let error = format!("{:#}", of(entry).unwrap_err());
+            assert!(error.contains(words), "{entry}: {error}");
+        }
+    }
+}
