@@ -126,17 +126,18 @@ fn gram(stack: &Stack<'_>, owns: &[Own]) -> DMatrix<f64> {
     let rows = stack.rows.len;
     let mut columns = Vec::<DVector<f64>>::new();
     for own in owns {
+        let parameters = own.instance.kind.parameters;
         let mut values = own.instance.kind.typical();
-        for place in 0..own.instance.kind.parameters.len() {
-            if own.instance.kind.parameters[place].role == Role::Amplitude {
-                values[place] = 0.0;
+        for (value, parameter) in values.iter_mut().zip(parameters) {
+            if parameter.role == Role::Amplitude {
+                *value = 0.0;
             }
         }
         let is_shown = resolved::shows(stack, &own.instance, &values);
         for place in &own.amplitudes {
             let column = is_shown.then(|| {
                 let mut on = values.clone();
-                on[*place] = own.instance.kind.parameters[*place].typical;
+                on[*place] = parameters[*place].typical;
                 stack.signature_of(&own.instance.name(), &on, &*own.instance.effect(&on))
             });
             let finite = column.filter(|column| column.iter().all(|value| value.is_finite()));
