@@ -26,9 +26,11 @@ use crate::whole_file;
 
 pub mod bags;
 mod machine_text;
+mod second_round;
 pub mod simulated;
 
 use bags::Recorded;
+use second_round::Round;
 use simulated::{Beside, Simulated};
 
 /// Arguments of `abbe diagnose`.
@@ -65,6 +67,21 @@ pub struct Diagnose {
     /// recalibration; may be given several times.
     #[arg(long, value_name = "RULE")]
     ablate: Vec<Rule>,
+    /// Write the best small programme for what is still open as a scenario's folder.
+    #[arg(long, requires = "out")]
+    design_next: bool,
+    /// Minutes that this programme may take, set-ups included.
+    #[arg(
+        long,
+        value_name = "MIN",
+        default_value_t = 15.0,
+        allow_negative_numbers = true,
+        requires = "design_next"
+    )]
+    minutes: f64,
+    /// Folder of this programme; new or empty.
+    #[arg(short, long, value_name = "FOLDER", requires = "design_next")]
+    out: Option<PathBuf>,
 }
 
 /// A diagnosis of bags, with what could not be used of them.
@@ -127,6 +144,7 @@ impl Diagnose {
                 path.display()
             );
         }
+        let round = self.round(&name, &text)?;
         let config = GapConfig {
             left_out: self.without.clone(),
             ablated: self.ablate.iter().copied().collect(),
@@ -148,16 +166,49 @@ impl Diagnose {
         } else {
             tell!("{}", page.short(&Room::with_page(self.html.as_deref())));
         }
+        self.write(&page, &json, on_terminal)?;
+        self.write_machine(&diagnosed, &name, &text)?;
+        if let Some(round) = &round {
+            for line in round.write(&diagnosed.diagnosis.report)? {
+                complain!("abbe: {line}");
+            }
+        }
+        for remark in diagnosed.losses().iter().chain(&diagnosed.remarks) {
+            complain!("abbe: {remark}");
+        }
+        Ok(loss::exit_code(diagnosed.losses().is_empty()))
+    }
+
+    /// Where the second round goes, where it is wanted.
+    fn round<'r>(&'r self, name: &'r str, text: &'r str) -> Result<Option<Round<'r>>> {
+        let out = self.out.as_deref().filter(|_| self.design_next);
+        let round = out.map(|out| Round {
+            bags: &self.bags,
+            machine: (name, text),
+            minutes: self.minutes,
+            out,
+        });
+        round.as_ref().map_or(Ok(()), Round::check)?;
+        Ok(round)
+    }
+
+    /// Writes JSON and page.
+    fn write(&self, page: &Report, json: &str, on_terminal: bool) -> Result<()> {
         for (path, contents) in [
-            (self.json.as_ref().filter(|_| !on_terminal), &json),
-            (self.html.as_ref(), &page.html()),
+            (self.json.as_ref().filter(|_| !on_terminal), json),
+            (self.html.as_ref(), page.html().as_str()),
         ] {
             if let Some(path) = path {
                 whole_file::write(path, contents)?;
             }
         }
+        Ok(())
+    }
+
+    /// Writes the machine file with the named effects.
+    fn write_machine(&self, diagnosed: &Diagnosed, name: &str, text: &str) -> Result<()> {
         if let Some(path) = &self.write_machine {
-            let new = machine_text::with_effects(&text, &name, &diagnosed.diagnosis.effects)?;
+            let new = machine_text::with_effects(text, name, &diagnosed.diagnosis.effects)?;
             whole_file::write(path, &new)?;
             let added = diagnosed.diagnosis.effects.len();
             complain!(
@@ -165,10 +216,7 @@ impl Diagnose {
                 path.display()
             );
         }
-        for remark in diagnosed.losses().iter().chain(&diagnosed.remarks) {
-            complain!("abbe: {remark}");
-        }
-        Ok(loss::exit_code(diagnosed.losses().is_empty()))
+        Ok(())
     }
 }
 

@@ -14,7 +14,7 @@ use metrology::bound::{Bound, BoundError};
 use metrology::number::number;
 use nalgebra::Vector3;
 
-mod design;
+pub mod design;
 mod dry_run;
 mod floors;
 mod ideal;

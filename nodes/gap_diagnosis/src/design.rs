@@ -37,6 +37,7 @@ mod ballbar;
 mod forecast;
 mod information;
 mod search;
+mod second_round;
 mod separability;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -44,6 +45,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use machine::MachineFile;
 use machine::effects::{self, Kind, Moment};
 use machine::twin::{Channel, Instrument, Session, Twin};
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::config::GapConfig;
@@ -56,6 +58,7 @@ use search::{Entry, Field};
 use separability::Aim;
 
 pub use ballbar::{Bar, ballbar};
+pub use second_round::second_round;
 
 /// Minutes that a result is printed for beside the wanted ones.
 pub const LADDER_MIN: [f64; 4] = [10.0, 20.0, 40.0, 80.0];
@@ -311,7 +314,7 @@ fn aims(owns: &[Own], order: &Order<'_>) -> Result<Vec<Aim>, GapError> {
             });
         }
     }
-    let aim = |own: &Own| {
+    let aim = |own: &Own| -> Result<Aim, GapError> {
         let likely = order.likely.iter().rev().find(|one| fits(one, own));
         let first = own.first();
         let stated = likely.and_then(|one| one.size).unwrap_or(first.typical);
@@ -334,11 +337,11 @@ fn greatest(kind: &Kind) -> f64 {
 
 fn entries(
     candidates: &[Candidate],
-    grams: Vec<Vec<nalgebra::DMatrix<f64>>>,
+    grams: Vec<Vec<DMatrix<f64>>>,
     order: &Order<'_>,
 ) -> Result<Vec<Entry>, GapError> {
     let set_ups: Vec<(&String, &f64)> = order.set_up_min.iter().collect();
-    let entry = |(candidate, grams): (&Candidate, Vec<nalgebra::DMatrix<f64>>)| {
+    let entry = |(candidate, grams): (&Candidate, Vec<DMatrix<f64>>)| -> Result<Entry, GapError> {
         let known = set_ups
             .iter()
             .position(|(name, _)| **name == candidate.set_up);

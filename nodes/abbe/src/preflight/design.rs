@@ -13,17 +13,18 @@ use metrology::number::number;
 use node_runtime::text_file;
 use sequencer::Plan;
 
-mod folder;
+pub mod folder;
 mod instruments;
 mod likely;
 mod menu;
 mod programs;
-mod stand_in;
+pub mod stand_in;
 mod temperatures;
 
+pub use super::programme::control;
 pub use instruments::{Means, Mounting, means, mounting};
 
-use folder::{Contents, INSTRUCTIONS};
+use folder::{Contents, INSTRUCTIONS, Setting};
 use instruments::Shop;
 use menu::Offer;
 
@@ -164,13 +165,19 @@ impl Wanted<'_> {
             .filter(|_| shop.has(Means::Thermometers))
             .map(|sensor| format!("`{}`, every {} s", sensor.id, number(sensor.period_s)))
             .collect();
-        let contents = Contents {
-            machine: text,
+        let setting = Setting {
             stands: &stands,
             shop,
             thermometers: &thermometers,
+            used_min: rung.used_min,
+        };
+        let contents = Contents {
+            machine: text,
+            plan: folder::plan(&stands, self.minutes),
+            instructions: folder::instructions(self.out, &setting),
+            programs: folder::programs(&stands),
             stand_in: &stand_in,
-            minutes: [self.minutes, rung.used_min],
+            minutes: self.minutes,
         };
         let _ = folder::write(self.out, &contents)?;
         let mistakes = validate::mistakes(self.out)?;

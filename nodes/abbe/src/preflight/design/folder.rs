@@ -76,16 +76,37 @@ pub fn plan(stands: &[Stand], minutes: f64) -> String {
 pub struct Contents<'c> {
     /// Text of the machine file.
     pub machine: &'c str,
-    /// Set-ups with their tests.
-    pub stands: &'c [Stand],
-    /// Times of set-ups.
-    pub shop: &'c Shop,
-    /// Places of thermometers, a line each; empty without.
-    pub thermometers: &'c [String],
+    /// Text of the plan.
+    pub plan: String,
+    /// What a person reads first.
+    pub instructions: String,
+    /// Programs that the plan names, with their texts.
+    pub programs: BTreeMap<String, String>,
     /// The fake machine.
     pub stand_in: &'c StandIn,
-    /// Minutes that were wanted, and that the programme takes.
-    pub minutes: [f64; 2],
+    /// Minutes that were wanted.
+    pub minutes: f64,
+}
+
+/// What the instructions of a designed programme are made of.
+pub struct Setting<'s> {
+    /// Set-ups with their tests.
+    pub stands: &'s [Stand],
+    /// Times of set-ups.
+    pub shop: &'s Shop,
+    /// Places of thermometers, a line each; empty without.
+    pub thermometers: &'s [String],
+    /// Minutes that the programme takes.
+    pub used_min: f64,
+}
+
+/// The programs of all tests, by name.
+pub fn programs(stands: &[Stand]) -> BTreeMap<String, String> {
+    let tests = stands.iter().flat_map(|stand| &stand.tests);
+    let named = tests.flat_map(|test| &test.programs);
+    named
+        .map(|(name, text)| (name.clone(), text.clone()))
+        .collect()
 }
 
 /// Writes the files into a new or empty folder, and returns their paths.
@@ -95,21 +116,16 @@ pub struct Contents<'c> {
 pub fn write(folder: &Path, contents: &Contents<'_>) -> Result<Vec<PathBuf>> {
     check_empty(folder)?;
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let mut files = BTreeMap::<String, String>::new();
-    let tests = contents.stands.iter().flat_map(|stand| &stand.tests);
-    for (name, text) in tests.flat_map(|test| &test.programs) {
-        let _ = files.insert(name.clone(), text.clone());
-    }
-    let [wanted_min, used_min] = contents.minutes;
+    let mut files = contents.programs.clone();
     let fixed = [
         ("machine.yaml", contents.machine.to_owned()),
-        ("plan.yaml", plan(contents.stands, wanted_min)),
-        ("scenario.yaml", scenario(wanted_min)),
+        ("plan.yaml", contents.plan.clone()),
+        ("scenario.yaml", scenario(contents.minutes)),
         ("sequencer.yaml", SEQUENCER.to_owned()),
         ("fake_cnc.yaml", contents.stand_in.parameters.clone()),
         ("plant.yaml", contents.stand_in.plant.clone()),
         (LAUNCH, LAUNCHED.to_owned()),
-        (INSTRUCTIONS, instructions(folder, contents, used_min)),
+        (INSTRUCTIONS, contents.instructions.clone()),
     ];
     files.extend(fixed.map(|(name, text)| (name.to_owned(), text)));
     let mut written = Vec::new();
@@ -153,28 +169,28 @@ fn scenario(minutes: f64) -> String {
 }
 
 /// What a person does, in order, with the steps of the plan that each set-up has.
-fn instructions(folder: &Path, contents: &Contents<'_>, used_min: f64) -> String {
+pub fn instructions(folder: &Path, setting: &Setting<'_>) -> String {
     let shown = folder.display();
     let mut text = format!(
         "# Designed programme\n\nIt takes about {} min, set-ups included. The numbers of steps are those of `plan.yaml`.\n",
-        number((10.0 * used_min).round() / 10.0)
+        number((10.0 * setting.used_min).round() / 10.0)
     );
-    if !contents.thermometers.is_empty() {
+    if !setting.thermometers.is_empty() {
         text.push_str(
             "\n## Before the first step\n\nRead these thermometers during the whole programme:\n\n",
         );
-        for line in contents.thermometers {
+        for line in setting.thermometers {
             let _ = writeln!(text, "- {line}");
         }
     }
     let mut step = 0;
-    for (k, stand) in contents.stands.iter().enumerate() {
+    for (k, stand) in setting.stands.iter().enumerate() {
         let _ = write!(
             text,
             "\n## {}. {} ({} min to set up)\n\n{}\n\n",
             k + 1,
             stand.set_up.name,
-            number(contents.shop.minutes(stand.set_up.means)),
+            number(setting.shop.minutes(stand.set_up.means)),
             stand.set_up.words
         );
         for test in &stand.tests {

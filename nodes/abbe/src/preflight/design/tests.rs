@@ -92,15 +92,21 @@ fn a_written_folder_passes_validate_and_none_is_overwritten() {
     for (name, path, is_own) in [("of_own", &own, true), ("of_stand_in", &alone, false)] {
         let stand_in = stand_in::of(path, &machine, &control).unwrap();
         assert_eq!(stand_in.is_own, is_own);
-        let contents = Contents {
-            machine: &text,
+        let folder = home.path().join(name);
+        let setting = folder::Setting {
             stands: &stands,
             shop: &shop,
             thermometers: &["`bed`".to_owned()],
-            stand_in: &stand_in,
-            minutes: [60.0, 55.0],
+            used_min: 55.0,
         };
-        let folder = home.path().join(name);
+        let contents = Contents {
+            machine: &text,
+            plan: folder::plan(&stands, 60.0),
+            instructions: folder::instructions(&folder, &setting),
+            programs: folder::programs(&stands),
+            stand_in: &stand_in,
+            minutes: 60.0,
+        };
         let written = folder::write(&folder, &contents).unwrap();
         assert!(written.contains(&folder.join(INSTRUCTIONS)));
         assert_eq!(validate::mistakes(&folder).unwrap(), Vec::<String>::new());

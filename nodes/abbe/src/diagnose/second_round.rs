@@ -1,0 +1,182 @@
+//! `abbe diagnose BAG... --design-next`: the best small programme for what is still open, as a scenario's folder.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use gap_diagnosis::design::second_round;
+use gap_diagnosis::report::{GapReport, NextExperiment};
+use machine::MachineFile;
+use metrology::number::number;
+use recorder::Bag;
+use sequencer::Plan;
+use trials::extra_run;
+
+use crate::preflight::design::folder::{self, Contents, INSTRUCTIONS};
+use crate::preflight::design::{control, stand_in};
+use crate::usage::refused;
+use crate::validate;
+
+/// The attachment that holds the plan of a recording.
+const PLAN: &str = "plan.yaml";
+/// Range of the minutes of a second round.
+const MINUTES: [f64; 2] = [1.0, 480.0];
+
+/// What a second round is made of.
+pub struct Round<'r> {
+    /// The bags, the last of which has the plan that was run.
+    pub bags: &'r [PathBuf],
+    /// Name and text of the machine file.
+    pub machine: (&'r str, &'r str),
+    /// Minutes that there are, set-ups included.
+    pub minutes: f64,
+    /// Where the folder is written.
+    pub out: &'r Path,
+}
+
+impl Round<'_> {
+    /// Refuses minutes and a folder that cannot be used, before anything is computed.
+    ///
+    /// # Errors
+    /// With value and limit.
+    pub fn check(&self) -> Result<()> {
+        if !(MINUTES[0]..=MINUTES[1]).contains(&self.minutes) {
+            let reason = format!(
+                "--minutes {}: must be from {} to {} min",
+                number(self.minutes),
+                number(MINUTES[0]),
+                number(MINUTES[1])
+            );
+            return Err(refused("diagnose", reason));
+        }
+        folder::check_empty(self.out)
+    }
+
+    /// Writes the folder, where a test decides something; what was done, a line each.
+    ///
+    /// # Errors
+    /// When the folder cannot be written, or what is written is no scenario.
+    pub fn write(&self, report: &GapReport) -> Result<Vec<String>> {
+        let (name, text) = self.machine;
+        let machine = MachineFile::parse(text, name)?;
+        let next = &report.next_experiments;
+        let done = self.done()?;
+        let mut lines = Vec::new();
+        let mut tests = Vec::<(&NextExperiment, Plan)>::new();
+        for place in second_round(next, self.minutes) {
+            let plan = extra_run(&machine, &done, &next[place].run);
+            match plan.filter(|plan| !plan.steps.is_empty()) {
+                Some(plan) => tests.push((&next[place], plan)),
+                None => lines.push(format!(
+                    "second round: \"{}\" has no steps of a plan: run it by hand",
+                    next[place].run
+                )),
+            }
+        }
+        if tests.is_empty() {
+            lines.push(format!(
+                "second round: no test of up to {} min decides what is left open: no folder is written",
+                number(self.minutes)
+            ));
+            return Ok(lines);
+        }
+        let plan = Plan {
+            title: format!("second round of {} min", number(self.minutes)),
+            steps: tests
+                .iter()
+                .flat_map(|(_, plan)| plan.steps.clone())
+                .collect(),
+        };
+        self.write_folder(&machine, &plan, &tests)?;
+        lines.push(format!(
+            "{}: second round of {} tests, {} min (begin with {INSTRUCTIONS})",
+            self.out.display(),
+            tests.len(),
+            number(
+                tests
+                    .iter()
+                    .map(|(next, _)| next.minutes)
+                    .sum::<f64>()
+                    .round()
+            )
+        ));
+        Ok(lines)
+    }
+
+    fn write_folder(
+        &self,
+        machine: &MachineFile,
+        plan: &Plan,
+        tests: &[(&NextExperiment, Plan)],
+    ) -> Result<()> {
+        let plan_text = serde_saphyr::to_string(plan).context("plan")?;
+        if Plan::from_yaml(&plan_text).context("plan of the second round")? != *plan {
+            bail!(
+                "plan of the second round: cannot be written as text: run the proposed tests by hand"
+            );
+        }
+        let (name, text) = self.machine;
+        let stand_in = stand_in::of(Path::new(name), machine, &control(machine))?;
+        let contents = Contents {
+            machine: text,
+            plan: plan_text,
+            instructions: self.instructions(tests),
+            programs: BTreeMap::new(),
+            stand_in: &stand_in,
+            minutes: self.minutes,
+        };
+        let _ = folder::write(self.out, &contents)?;
+        let mistakes = validate::mistakes(self.out)?;
+        if mistakes.is_empty() {
+            return Ok(());
+        }
+        bail!("{}: {}", self.out.display(), mistakes.join("; "))
+    }
+
+    fn instructions(&self, tests: &[(&NextExperiment, Plan)]) -> String {
+        let mut text = "# Second round\n\nThe numbers of steps are those of `plan.yaml`. Put up what a test names before its first step.\n\n".to_owned();
+        let mut step = 0;
+        for (next, plan) in tests {
+            let first = step + 1;
+            step += plan.steps.len();
+            let _ = writeln!(
+                text,
+                "- steps {first} to {step}: {} ({} min with its set-up): separates {}",
+                next.run,
+                number(next.minutes.round()),
+                next.separates.join(", ")
+            );
+        }
+        let bags: Vec<String> = self
+            .bags
+            .iter()
+            .map(|bag| bag.display().to_string())
+            .collect();
+        let _ = write!(
+            text,
+            "\n```sh\nabbe run {}\nabbe diagnose {} BAG --machine {}/machine.yaml\n```\n",
+            self.out.display(),
+            bags.join(" "),
+            self.out.display()
+        );
+        text
+    }
+
+    /// The plan that the last bag was recorded with; without steps where it has none.
+    fn done(&self) -> Result<Plan> {
+        let nothing = Plan {
+            title: "imported".to_owned(),
+            steps: vec![],
+        };
+        let Some(path) = self.bags.last() else {
+            return Ok(nothing);
+        };
+        let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
+        let Some(attachment) = bag.attachment(PLAN)? else {
+            return Ok(nothing);
+        };
+        let text = String::from_utf8_lossy(&attachment.data);
+        Plan::from_yaml(&text).with_context(|| format!("{PLAN} of {}", path.display()))
+    }
+}
