@@ -10,6 +10,7 @@
 mod bad_plan;
 mod blocks;
 mod cell;
+mod design;
 mod diagonals;
 mod five_axis;
 mod gap_bad_bags;
