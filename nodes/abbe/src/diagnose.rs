@@ -79,6 +79,9 @@ pub struct Diagnose {
         requires = "design_next"
     )]
     minutes: f64,
+    /// Plan that was run, from which touches and the session's own tests are repeated.
+    #[arg(long, value_name = "FILE", requires = "design_next")]
+    plan: Option<PathBuf>,
     /// Folder of this programme; new or empty.
     #[arg(short, long, value_name = "FOLDER", requires = "design_next")]
     out: Option<PathBuf>,
@@ -184,6 +187,7 @@ impl Diagnose {
         let out = self.out.as_deref().filter(|_| self.design_next);
         let round = out.map(|out| Round {
             bags: &self.bags,
+            plan: self.plan.as_deref(),
             machine: (name, text),
             minutes: self.minutes,
             out,

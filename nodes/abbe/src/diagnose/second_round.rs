@@ -9,7 +9,7 @@ use gap_diagnosis::design::second_round;
 use gap_diagnosis::report::{GapReport, NextExperiment};
 use machine::MachineFile;
 use metrology::number::number;
-use recorder::Bag;
+use node_runtime::text_file;
 use sequencer::Plan;
 use trials::extra_run;
 
@@ -18,15 +18,15 @@ use crate::preflight::design::{control, stand_in};
 use crate::usage::refused;
 use crate::validate;
 
-/// The attachment that holds the plan of a recording.
-const PLAN: &str = "plan.yaml";
 /// Range of the minutes of a second round.
 const MINUTES: [f64; 2] = [1.0, 480.0];
 
 /// What a second round is made of.
 pub struct Round<'r> {
-    /// The bags, the last of which has the plan that was run.
+    /// The bags.
     pub bags: &'r [PathBuf],
+    /// The plan that was run: touches and the session's own tests are repeated from it.
+    pub plan: Option<&'r Path>,
     /// Name and text of the machine file.
     pub machine: (&'r str, &'r str),
     /// Minutes that there are, set-ups included.
@@ -69,7 +69,7 @@ impl Round<'_> {
             match plan.filter(|plan| !plan.steps.is_empty()) {
                 Some(plan) => tests.push((&next[place], plan)),
                 None => lines.push(format!(
-                    "second round: \"{}\" has no steps of a plan: run it by hand",
+                    "second round: \"{}\" has no steps of a plan: run it by hand, or name the plan that was run with --plan",
                     next[place].run
                 )),
             }
@@ -163,20 +163,15 @@ impl Round<'_> {
         text
     }
 
-    /// The plan that the last bag was recorded with; without steps where it has none.
+    /// The plan that was run; without steps where it is not given, as a bag does not hold it.
     fn done(&self) -> Result<Plan> {
-        let nothing = Plan {
-            title: "imported".to_owned(),
-            steps: vec![],
+        let Some(path) = self.plan else {
+            return Ok(Plan {
+                title: "not given".to_owned(),
+                steps: vec![],
+            });
         };
-        let Some(path) = self.bags.last() else {
-            return Ok(nothing);
-        };
-        let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
-        let Some(attachment) = bag.attachment(PLAN)? else {
-            return Ok(nothing);
-        };
-        let text = String::from_utf8_lossy(&attachment.data);
-        Plan::from_yaml(&text).with_context(|| format!("{PLAN} of {}", path.display()))
+        let text = text_file::yaml(path).context("plan")?;
+        Plan::from_yaml(&text).with_context(|| format!("plan {}", path.display()))
     }
 }
