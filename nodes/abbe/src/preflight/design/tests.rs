@@ -144,7 +144,7 @@ fn repeats_are_spread_over_a_set_up_and_a_warming_test_comes_last() {
         .map(|test| test.title.as_str())
         .collect();
     let [a, b] = [&*on_grid[0].title, &*on_grid[1].title];
-    assert_eq!(titles, [a, b, &warm.title, a, a]);
+    assert_eq!(titles, [a, b, &*warm.title, a, a]);
 }
 
 #[test]
