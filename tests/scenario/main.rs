@@ -23,6 +23,7 @@ mod gap_simulated;
 mod gap_wear;
 mod grid_truth;
 mod grid_xy;
+mod kept;
 mod lifecycle;
 mod mtconnect_log;
 mod odd_files;

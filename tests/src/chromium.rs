@@ -77,6 +77,22 @@ pub struct Picture {
     pub inked: f64,
 }
 
+/// Whether Chromium can be started; where it cannot, the test's name and the reason are printed.
+///
+/// # Panics
+/// When it cannot and `CI=true`.
+#[must_use]
+pub fn is_there(test: &str) -> bool {
+    let asked = Command::new("chromium").arg("--version").output();
+    let is_there = asked.is_ok_and(|said| said.status.success());
+    if !is_there {
+        let reason = "chromium cannot be started (tests/run installs it)";
+        assert!(std::env::var("CI").as_deref() != Ok("true"), "{reason}");
+        eprintln!("NOT TESTED: {test}: {reason}");
+    }
+    is_there
+}
+
 /// A browser that looks at one page.
 pub struct Browser {
     home: TempDir,
@@ -91,11 +107,7 @@ impl Browser {
     /// When there is none and `CI=true`.
     #[must_use]
     pub fn of(page: &str, test: &str) -> Option<Self> {
-        let asked = Command::new("chromium").arg("--version").output();
-        if !asked.is_ok_and(|said| said.status.success()) {
-            let reason = "chromium cannot be started (tests/run installs it)";
-            assert!(std::env::var("CI").as_deref() != Ok("true"), "{reason}");
-            eprintln!("NOT TESTED: {test}: {reason}");
+        if !is_there(test) {
             return None;
         }
         let home = tempfile::tempdir().unwrap();

@@ -16,9 +16,13 @@ use recorder::Bag;
 use replayer::Reading;
 use sha2::{Digest, Sha256};
 
+use crate::evaluate::budget::Budget;
 use crate::evaluate::test_conditions::TestConditions;
+use crate::history::keep::Keep;
+use crate::history::origin::Origin;
 use crate::loss;
 use crate::machine_defaults;
+use crate::pdf;
 use crate::report::terminal::Room;
 use crate::report::{Report, gap, test_conditions};
 use crate::tell::tell;
@@ -85,6 +89,14 @@ pub struct Diagnose {
     /// Folder of this programme; new or empty.
     #[arg(short, long, value_name = "FOLDER", requires = "design_next")]
     out: Option<PathBuf>,
+    /// Write the page as a PDF of A4 sheets; Chromium prints it.
+    #[arg(long, value_name = "FILE")]
+    pdf: Option<PathBuf>,
+    /// Budget file whose operator, warm-up and instruments stand among the conditions and at the head of the PDF.
+    #[arg(long)]
+    budget: Option<PathBuf>,
+    #[command(flatten)]
+    keep: Keep,
 }
 
 /// A diagnosis of bags, with what could not be used of them.
@@ -139,26 +151,20 @@ impl Diagnose {
             }
             None => bags::machine_text(&self.bags[0])?,
         };
-        // An empty file is a place that was made for it.
-        let holds = |path: &&PathBuf| std::fs::metadata(path).is_ok_and(|file| file.len() > 0);
-        if let Some(path) = self.write_machine.as_ref().filter(holds) {
-            bail!(
-                "--write-machine {}: is there already, and nothing is overwritten: name a new file",
-                path.display()
-            );
-        }
+        self.refuse_overwriting()?;
         let round = self.round(&name, &text)?;
         let config = GapConfig {
             left_out: self.without.clone(),
             ablated: self.ablate.iter().copied().collect(),
             ..GapConfig::default()
         };
+        let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let diagnosed = beside(&self.bags, &self.simulated, &name, &text, &config)?;
         let title = format!("Simulator against machine: {}", listed(&self.bags));
         let mut page = gap::page(&title, &diagnosed, self.explain)?;
         for path in &self.bags {
             let seen = TestConditions::of(&Bag::open(path)?);
-            page.add_conditions(&test_conditions::of(&seen, None, None));
+            page.add_conditions(&test_conditions::of(&seen, budget.as_ref(), None));
         }
         let json = serde_json::to_string_pretty(&diagnosed.json()?)?;
         let on_terminal = self.json.as_deref() == Some(Path::new("-"));
@@ -179,6 +185,8 @@ impl Diagnose {
         for remark in diagnosed.losses().iter().chain(&diagnosed.remarks) {
             complain!("abbe: {remark}");
         }
+        let machine = MachineFile::parse(&text, &name)?.name;
+        self.print_and_keep(&page, &diagnosed, machine)?;
         Ok(loss::exit_code(diagnosed.losses().is_empty()))
     }
 
@@ -217,6 +225,33 @@ impl Diagnose {
             let added = diagnosed.diagnosis.effects.len();
             complain!(
                 "abbe: {}: the machine file with {added} effects added",
+                path.display()
+            );
+        }
+        Ok(())
+    }
+
+    /// The page as a PDF, and its figures in the history, where that is wanted.
+    fn print_and_keep(&self, page: &Report, diagnosed: &Diagnosed, machine: String) -> Result<()> {
+        let conditions = &page.figures["conditions"];
+        if let Some(path) = &self.pdf {
+            let head = pdf::Head::of(Some(&machine), conditions);
+            pdf::write(path, &page.html(), &head)?;
+        }
+        if self.keep.is_wanted() {
+            let origin = Origin::of_bags(&self.bags, Some(machine))?.with_conditions(conditions);
+            self.keep.diagnosis(&diagnosed.json()?, origin)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses a machine file to write that holds something.
+    fn refuse_overwriting(&self) -> Result<()> {
+        // An empty file is a place that was made for it.
+        let holds = |path: &&PathBuf| std::fs::metadata(path).is_ok_and(|file| file.len() > 0);
+        if let Some(path) = self.write_machine.as_ref().filter(holds) {
+            bail!(
+                "--write-machine {}: is there already, and nothing is overwritten: name a new file",
                 path.display()
             );
         }

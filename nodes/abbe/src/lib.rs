@@ -20,6 +20,7 @@ pub mod diagnose;
 mod evaluate;
 mod evidence;
 mod export;
+mod history;
 mod import;
 mod import_map;
 mod import_shift;
@@ -31,6 +32,7 @@ mod machine_defaults;
 mod man;
 mod new_machine;
 mod node;
+mod pdf;
 mod play;
 mod preflight;
 mod progress;
@@ -87,6 +89,8 @@ enum Verb {
     ImportMap(import_map::ImportMap),
     /// Make part programs that load a machine as a logged shift loaded another.
     ImportShift(import_shift::ImportShift),
+    /// Keep figures of reports and diagnoses, and show trends, change points and limits of each machine.
+    History(history::History),
     /// Make compensation tables for a control from what a bag knows.
     Export(export::Export),
     /// Run one node on the ROS graph, with the arguments of any ROS 2 node.
@@ -115,6 +119,7 @@ pub fn execute() -> ExitCode {
         Verb::Import(import) => import.execute(),
         Verb::ImportMap(import) => import.execute(),
         Verb::ImportShift(import) => import.execute(),
+        Verb::History(history) => history.execute(),
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => node.execute(),
         Verb::InstallRos(install) => install.execute(),

@@ -14,8 +14,11 @@ use recorder::Bag;
 use crate::evaluate::budget::Budget;
 use crate::evaluate::limits::Limits;
 use crate::evaluate::{BrokenOff, Tests};
+use crate::history::keep::Keep;
+use crate::history::origin::Origin;
 use crate::loss;
 use crate::machine_defaults;
+use crate::pdf;
 use crate::report::section::Section;
 use crate::report::terminal::{self, Part, Room};
 use crate::report::{self, Report};
@@ -48,6 +51,11 @@ pub struct ReportBag {
     /// Print every table and remark, instead of the answer and three tables in at most 40 lines.
     #[arg(long)]
     full: bool,
+    /// Write the page as a PDF of A4 sheets; Chromium prints it.
+    #[arg(long, value_name = "FILE")]
+    pdf: Option<PathBuf>,
+    #[command(flatten)]
+    keep: Keep,
 }
 
 impl ReportBag {
@@ -56,7 +64,7 @@ impl ReportBag {
     /// # Errors
     /// When bag or budget cannot be read, or the page not written.
     pub fn execute(self) -> Result<ExitCode> {
-        let budget = self.budget.as_deref().map(read_budget).transpose()?;
+        let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let limits = self.limits.as_deref().map(read_limits).transpose()?;
         complain!("Evaluating the tests of {}", self.bag.display());
         let table = from_table::of(&self.bag, self.map.as_deref())?;
@@ -88,13 +96,35 @@ impl ReportBag {
             std::fs::create_dir_all(out).with_context(|| format!("folder {}", out.display()))?;
             report.write(out)?;
         }
+        self.print_and_keep(
+            &report,
+            &tests,
+            table.as_ref().map(|table| table.bag.as_path()),
+        )?;
         Ok(loss::exit_code(tests.reading.is_whole()))
     }
-}
 
-fn read_budget(path: &Path) -> Result<Budget> {
-    let text = text_file::yaml(path).context("budget file")?;
-    Budget::read(&text, path)
+    /// The page as a PDF, and its figures in the history, where that is wanted; `of_table`: the bag that a table was made into.
+    fn print_and_keep(
+        &self,
+        report: &Report,
+        tests: &Tests,
+        of_table: Option<&Path>,
+    ) -> Result<()> {
+        if let Some(path) = &self.pdf {
+            let machine = tests.machine.as_ref().map(|machine| machine.name.as_str());
+            let head = pdf::Head::of(machine, &report.figures["conditions"]);
+            pdf::write(path, &report.html(), &head)?;
+        }
+        if self.keep.is_wanted() {
+            let origin = match of_table {
+                Some(bag) => Origin::of_table(bag, &self.bag)?,
+                None => Origin::of_bag(&self.bag, &self.bag, true)?,
+            };
+            self.keep.report(&report.figures, origin)?;
+        }
+        Ok(())
+    }
 }
 
 fn read_limits(path: &Path) -> Result<Limits> {

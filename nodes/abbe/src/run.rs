@@ -14,6 +14,8 @@ use crate::diagnose;
 use crate::evaluate::Tests;
 use crate::evaluate::test_conditions::TestConditions;
 use crate::evidence::Evidence;
+use crate::history::keep::Keep;
+use crate::history::origin::Origin;
 use crate::loss;
 use crate::report::Report;
 use crate::report::section::Section;
@@ -63,6 +65,8 @@ pub struct Run {
     /// Print every table and remark, instead of the answer and three tables in at most 40 lines; `--explain` does too.
     #[arg(long)]
     full: bool,
+    #[command(flatten)]
+    keep: Keep,
 }
 
 fn renamed(_: &str) -> Result<String, &'static str> {
@@ -225,7 +229,9 @@ impl Run {
             }
         };
         self.tell(&report, &outcome, &bag, page.as_deref());
-        Ok(outcome.end())
+        let kept = self.keep_figures(&report, &outcome, scenario, &bag);
+        let ended = outcome.end();
+        kept.map(|()| ended)
     }
 
     /// The report on the terminal; without a page the whole of it, for then it stands nowhere else.
@@ -245,6 +251,26 @@ impl Run {
             page: Some(page),
         };
         tell!("{}", report.short(&room));
+    }
+
+    /// Keeps the figures of a plan that ran to its end, where that is wanted.
+    fn keep_figures(
+        &self,
+        report: &Report,
+        outcome: &Outcome,
+        scenario: &Scenario,
+        bag: &Path,
+    ) -> Result<()> {
+        if !self.keep.is_wanted() {
+            return Ok(());
+        }
+        if outcome.failure.is_some() || outcome.recorded == 0 {
+            complain!("abbe: --keep: nothing is kept of a plan that did not run to its end");
+            return Ok(());
+        }
+        let machine = scenario.folder.join("machine.yaml");
+        let origin = Origin::of_run(bag, &machine)?;
+        self.keep.report(&report.figures, origin)
     }
 
     fn try_table(

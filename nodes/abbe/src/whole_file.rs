@@ -11,20 +11,28 @@ use anyhow::{Context, Result, anyhow};
 /// # Errors
 /// When it cannot be written.
 pub fn write(path: &Path, text: &str) -> Result<()> {
+    write_bytes(path, text.as_bytes())
+}
+
+/// The same of bytes.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     // A device or a pipe takes what comes; a link stays one.
     let is_special =
         |path: &Path| std::fs::metadata(path).is_ok_and(|it| !it.is_file() && !it.is_dir());
     if is_special(path) {
-        return std::fs::write(path, text).with_context(|| path.display().to_string());
+        return std::fs::write(path, bytes).with_context(|| path.display().to_string());
     }
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    replace(&target, text).with_context(|| path.display().to_string())
+    replace(&target, bytes).with_context(|| path.display().to_string())
 }
 
-fn replace(path: &Path, text: &str) -> std::io::Result<()> {
+fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let new = path.with_file_name(format!(".{name}.new"));
-    let written = std::fs::write(&new, text).and_then(|()| std::fs::rename(&new, path));
+    let written = std::fs::write(&new, bytes).and_then(|()| std::fs::rename(&new, path));
     if written.is_err() {
         // What could not be written whole must not stay beside the old file.
         let _ = std::fs::remove_file(&new);
@@ -32,7 +40,7 @@ fn replace(path: &Path, text: &str) -> std::io::Result<()> {
     match written {
         // A file that may be written in a folder that may not.
         Err(error) if error.kind() == ErrorKind::PermissionDenied && path.is_file() => {
-            std::fs::write(path, text)
+            std::fs::write(path, bytes)
         }
         written => written,
     }

@@ -167,7 +167,11 @@ fn losses(bag: &Bag) -> Vec<String> {
     reading::read(bag, Order::LogTime, &[], |_| ()).lines()
 }
 
-fn hash(bag: &Bag) -> Result<String> {
+/// SHA-256 of the files of a bag, in order.
+///
+/// # Errors
+/// When one cannot be read.
+pub fn hash(bag: &Bag) -> Result<String> {
     let mut hash = Sha256::new();
     for path in bag.files() {
         let mut file = std::fs::File::open(path).with_context(|| format!("{}", path.display()))?;

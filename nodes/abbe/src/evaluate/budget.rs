@@ -5,13 +5,14 @@
 
 use std::path::Path;
 
-use anyhow::{Result, anyhow};
+use anyhow::{Context, Result, anyhow};
 use metrology::iso230::budget::{DeviceUncertainty, Expansion};
 use metrology::iso230::circular::CircularBudget;
 use metrology::iso230::positioning::budget::PositioningBudget;
 use metrology::iso230::positioning::rotary::RotaryBudget;
 use metrology::number::{number, quantity};
 use metrology::yaml;
+use node_runtime::text_file;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -237,6 +238,15 @@ fn greatest(key: &str) -> f64 {
 }
 
 impl Budget {
+    /// Reads a budget file.
+    ///
+    /// # Errors
+    /// When it cannot be opened, or as [`Self::read`].
+    pub fn open(path: &Path) -> Result<Self> {
+        let text = text_file::yaml(path).context("budget file")?;
+        Self::read(&text, path)
+    }
+
     /// Reads the text of a budget file; `place` names it in errors.
     ///
     /// # Errors

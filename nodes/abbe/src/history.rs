@@ -1,0 +1,79 @@
+//! `abbe history`: keeps the figures of reports and diagnoses, and shows how each machine's change over time.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, anyhow};
+use clap::{Args, Subcommand};
+
+mod add;
+mod dates;
+pub mod keep;
+mod machines;
+mod numbers;
+pub mod origin;
+mod overview;
+mod single;
+mod view;
+
+/// Arguments of `abbe history`.
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct History {
+    #[command(subcommand)]
+    action: Option<Action>,
+    #[command(flatten)]
+    view: view::View,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// Keep the figures of bags, folders of runs, and JSON of reports and diagnoses; each once, however often it is added.
+    Add(add::Add),
+}
+
+impl History {
+    /// Adds or shows; exit code 3 when a part of an added bag was lost or left out.
+    ///
+    /// # Errors
+    /// When the store or an input cannot be read or written, or nothing matches.
+    pub fn execute(self) -> Result<ExitCode> {
+        match self.action {
+            Some(Action::Add(add)) => add.execute(),
+            None => self.view.execute(),
+        }
+    }
+}
+
+/// The store at a path, or the usual one: `abbe/history.sqlite` in `$XDG_DATA_HOME` or `~/.local/share`.
+///
+/// # Errors
+/// Where neither is known.
+fn store_path(given: Option<&Path>) -> Result<PathBuf> {
+    if let Some(path) = given {
+        return Ok(path.to_owned());
+    }
+    let absolute = |name: &str| {
+        let folder = std::env::var_os(name).map(PathBuf::from);
+        folder.filter(|folder| folder.is_absolute())
+    };
+    let data = absolute("XDG_DATA_HOME").or_else(|| Some(absolute("HOME")?.join(".local/share")));
+    let data = data.ok_or_else(|| {
+        anyhow!("neither XDG_DATA_HOME nor HOME is an absolute path: name the history with --store")
+    })?;
+    Ok(data.join("abbe/history.sqlite"))
+}
+
+/// Opens a store for writing; its folder is made.
+///
+/// # Errors
+/// When folder or store cannot be made or opened.
+fn open_to_write(given: Option<&Path>) -> Result<(history::Store, PathBuf)> {
+    let path = store_path(given)?;
+    if let Some(folder) = path.parent().filter(|it| !it.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("folder of the history {}", folder.display()))?;
+    }
+    let store = history::Store::open(&path, history::Options::default())?;
+    Ok((store, path))
+}

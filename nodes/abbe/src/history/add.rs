@@ -1,0 +1,149 @@
+//! `abbe history add`: figures of bags, folders of runs, and JSON of reports and diagnoses.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use gap_diagnosis::GapConfig;
+use history::{Kind, Store, gap_figures, report_figures};
+use node_runtime::{complain, complaint};
+use recorder::Bag;
+use serde_json::Value;
+
+use super::dates::{Moment, moment};
+use super::keep::{add, entry};
+use super::open_to_write;
+use super::origin::{Origin, joined, json};
+use crate::diagnose::{self, bags};
+use crate::evaluate::Tests;
+use crate::evaluate::budget::Budget;
+use crate::loss;
+use crate::report_bag;
+use crate::tell::tell;
+
+/// Arguments of `abbe history add`.
+#[derive(Args)]
+pub struct Add {
+    /// Bags, folders of runs (with `report.json` and `bag`), or JSON of `abbe report`, of a run or of `abbe diagnose`.
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// Name of the machine; without it that of the machine file in the bag.
+    #[arg(long)]
+    machine: Option<String>,
+    /// Time of the measurement, for JSON without one: 2026-03-01 or 2026-03-01T12:00:00Z.
+    #[arg(long, value_parser = moment)]
+    at: Option<Moment>,
+    /// Uncertainties for the figures of bags, as `abbe report` takes them.
+    #[arg(long)]
+    budget: Option<PathBuf>,
+    /// Diagnose bags as well, as `abbe diagnose BAG` does.
+    #[arg(long)]
+    diagnose: bool,
+    /// File of the history; without it `~/.local/share/abbe/history.sqlite`.
+    #[arg(long, value_name = "FILE")]
+    store: Option<PathBuf>,
+}
+
+impl Add {
+    /// Adds every input; one that fails leaves the others. Exit code 1 when one failed, 3 when a part of one was lost.
+    ///
+    /// # Errors
+    /// When budget or store cannot be opened.
+    pub fn execute(self) -> Result<ExitCode> {
+        let budget = self.budget.as_deref().map(Budget::open).transpose()?;
+        let (mut store, place) = open_to_write(self.store.as_deref())?;
+        let (mut is_whole, mut n_failed) = (true, 0_usize);
+        for path in &self.inputs {
+            match self.add(path, budget.as_ref(), &mut store) {
+                Ok(whole) => is_whole &= whole,
+                Err(error) => {
+                    n_failed += 1;
+                    complain!("abbe: {}: {}", path.display(), complaint::in_words(&error));
+                }
+            }
+        }
+        tell!("History: {}", place.display());
+        if n_failed > 0 {
+            complain!(
+                "abbe: {n_failed} of {} inputs were not added",
+                self.inputs.len()
+            );
+            return Ok(ExitCode::FAILURE);
+        }
+        Ok(loss::exit_code(is_whole))
+    }
+
+    /// Adds one input; whether it was whole.
+    fn add(&self, path: &Path, budget: Option<&Budget>, store: &mut Store) -> Result<bool> {
+        let report = path.join("report.json");
+        if path.is_dir() && report.is_file() && path.join("bag").exists() {
+            return self.add_run(path, &report, store).map(|()| true);
+        }
+        if path.extension().is_some_and(|ending| ending == "json") {
+            return self.add_json(path, store).map(|()| true);
+        }
+        self.add_bag(path, budget, store)
+    }
+
+    /// Machine and time as given, before those that were found.
+    fn stated(&self, origin: Origin) -> Origin {
+        Origin {
+            machine: self.machine.clone().or(origin.machine),
+            at_s: self.at.map(|at| at.begin_s).or(origin.at_s),
+            ..origin
+        }
+    }
+
+    fn add_run(&self, folder: &Path, report: &Path, store: &mut Store) -> Result<()> {
+        let (_, figures) = json(report)?;
+        let origin = Origin::of_bag(&folder.join("bag"), folder, true)?;
+        self.add_report(&figures, origin, store)
+    }
+
+    fn add_report(&self, figures: &Value, origin: Origin, store: &mut Store) -> Result<()> {
+        let origin = self.stated(origin.with_conditions(&figures["conditions"]));
+        let entry = entry(Kind::Report, report_figures(figures)?, origin)?;
+        tell!("{}: {}", entry.source, add(store, &entry)?);
+        Ok(())
+    }
+
+    fn add_json(&self, path: &Path, store: &mut Store) -> Result<()> {
+        let (text, value) = json(path)?;
+        let origin = Origin::of_text(&text, path);
+        if value.get("schema").is_some() {
+            return self.add_gap(&value, origin, store);
+        }
+        self.add_report(&value, origin, store)
+    }
+
+    fn add_gap(&self, value: &Value, origin: Origin, store: &mut Store) -> Result<()> {
+        let gap = gap_figures(value)?;
+        let mut origin = self.stated(origin);
+        // A diagnosis is recognised by its bags: its text has the time that it took.
+        if !gap.bags.is_empty() {
+            origin.sha256 = joined(&gap.bags);
+        }
+        origin.machine_sha256 = gap.machine_sha256.or(origin.machine_sha256);
+        let entry = entry(Kind::Diagnosis, gap.figures, origin)?;
+        tell!("{}: {}", entry.source, add(store, &entry)?);
+        Ok(())
+    }
+
+    fn add_bag(&self, path: &Path, budget: Option<&Budget>, store: &mut Store) -> Result<bool> {
+        let bag = Bag::open(path)?;
+        let tests = Tests::of(&bag);
+        loss::complain_of(&tests.reading);
+        let page = report_bag::page("", &tests, budget)?;
+        let origin = Origin::of_bag(path, path, true)?;
+        self.add_report(&page.figures, origin.clone(), store)?;
+        if self.diagnose {
+            let (name, text) = bags::machine_text(path)?;
+            let paths = [path.to_owned()];
+            let found =
+                diagnose::of(&paths, &name, &text, &GapConfig::default()).context("diagnosis")?;
+            self.add_gap(&found.json()?, origin, store)?;
+        }
+        Ok(tests.reading.is_whole())
+    }
+}

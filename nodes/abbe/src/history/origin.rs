@@ -1,0 +1,217 @@
+//! Where the figures of an entry are from: machine, time and hashes.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use machine::MachineFile;
+use node_runtime::text_file;
+use recorder::Bag;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+use crate::diagnose::bags;
+use crate::evaluate::test_conditions::TestConditions;
+
+/// The attachment that holds the machine file of a recording.
+const MACHINE: &str = "machine.yaml";
+
+/// Where figures are from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// Name of the machine, where it is known.
+    pub machine: Option<String>,
+    /// SHA-256 of the machine file.
+    pub machine_sha256: Option<String>,
+    /// Begin of the first test, s since 1970, where it is known.
+    pub at_s: Option<i64>,
+    /// SHA-256 of the bags, or of the text.
+    pub sha256: String,
+    /// Path as it was given.
+    pub source: String,
+    /// Instruments, as the report's JSON has them.
+    pub instruments: String,
+    /// Operator, where one is stated.
+    pub operator: String,
+}
+
+impl Origin {
+    /// Of one bag; `source` is its path as it was given. Machine and its hash are those of the machine file in the bag, if `has_machine`.
+    ///
+    /// # Errors
+    /// When the bag cannot be read.
+    pub fn of_bag(path: &Path, source: &Path, has_machine: bool) -> Result<Self> {
+        let bag = Bag::open(path)?;
+        let mut origin = Self {
+            sha256: bags::hash(&bag)?,
+            source: source.display().to_string(),
+            at_s: begin_s(&bag),
+            ..Self::default()
+        };
+        if let Some(attached) = bag.attachment(MACHINE)?.filter(|_| has_machine) {
+            origin.machine_sha256 = Some(hash(&attached.data));
+            origin.machine = std::str::from_utf8(&attached.data)
+                .ok()
+                .and_then(|text| MachineFile::parse(text, MACHINE).ok())
+                .map(|machine| machine.name);
+        }
+        Ok(origin)
+    }
+
+    /// Of a table and the bag that was made of it: the table has the hash, and no machine of its own.
+    ///
+    /// # Errors
+    /// When table or bag cannot be read.
+    pub fn of_table(bag: &Path, table: &Path) -> Result<Self> {
+        let bytes = text_file::bytes(table)?;
+        Ok(Self {
+            sha256: hash(&bytes),
+            ..Self::of_bag(bag, table, false)?
+        })
+    }
+
+    /// Of several bags of one machine; the time is that of the last.
+    ///
+    /// # Errors
+    /// When a bag cannot be read.
+    pub fn of_bags(paths: &[PathBuf], machine: Option<String>) -> Result<Self> {
+        let mut hashes = Vec::new();
+        let mut at_s = None;
+        for path in paths {
+            let bag = Bag::open(path)?;
+            hashes.push(bags::hash(&bag)?);
+            at_s = at_s.max(begin_s(&bag));
+        }
+        let sources: Vec<String> = paths
+            .iter()
+            .map(|path| path.display().to_string())
+            .collect();
+        Ok(Self {
+            machine,
+            at_s,
+            sha256: joined(&hashes),
+            source: shortened(sources),
+            ..Self::default()
+        })
+    }
+
+    /// Of a run, whose machine file is that of its scenario.
+    ///
+    /// # Errors
+    /// When bag or machine file cannot be read.
+    pub fn of_run(bag: &Path, machine: &Path) -> Result<Self> {
+        let text = text_file::yaml(machine).context("machine file")?;
+        let name = machine.display().to_string();
+        let mut origin = Self::of_bag(bag, bag, false)?;
+        origin.machine = Some(MachineFile::parse(&text, &name)?.name);
+        origin.machine_sha256 = Some(hash(text.as_bytes()));
+        Ok(origin)
+    }
+
+    /// Of the text of a report.
+    pub fn of_text(text: &str, source: &Path) -> Self {
+        Self {
+            sha256: hash(text.as_bytes()),
+            source: source.display().to_string(),
+            ..Self::default()
+        }
+    }
+
+    /// With what the conditions of a report state, where it is not known.
+    pub fn with_conditions(mut self, conditions: &Value) -> Self {
+        let stated = |value: &Value| match value {
+            Value::Array(all) if all.is_empty() => String::new(),
+            Value::Null => String::new(),
+            other => other.to_string(),
+        };
+        self.instruments = stated(&conditions["instruments"]);
+        if let Some(operator) = conditions["operator"].as_str() {
+            operator.clone_into(&mut self.operator);
+        }
+        self.at_s = self.at_s.or_else(|| {
+            let begin = conditions["begin"].as_str()?.strip_suffix(" UTC")?;
+            let time = chrono::NaiveDateTime::parse_from_str(begin, "%Y-%m-%d %H:%M:%S").ok()?;
+            Some(time.and_utc().timestamp())
+        });
+        self
+    }
+}
+
+/// Begin of the first test of a bag, s since 1970.
+fn begin_s(bag: &Bag) -> Option<i64> {
+    let (first, _) = TestConditions::of(bag).between?;
+    Some(first.nanos().div_euclid(1_000_000_000))
+}
+
+fn hash(bytes: &[u8]) -> String {
+    format!("{:x}", Sha256::digest(bytes))
+}
+
+/// One hash of the hashes of a diagnosis's bags; that of a single bag stays its own.
+pub fn joined(hashes: &[String]) -> String {
+    match hashes {
+        [one] => one.clone(),
+        several => hash(several.join(",").as_bytes()),
+    }
+}
+
+/// Paths of bags in the length that a store takes.
+fn shortened(sources: Vec<String>) -> String {
+    const MOST: usize = 20;
+    let n = sources.len();
+    let mut text = sources
+        .into_iter()
+        .take(MOST)
+        .collect::<Vec<_>>()
+        .join(", ");
+    if n > MOST {
+        text.push_str(&format!(" and {} more", n - MOST));
+    }
+    text
+}
+
+/// The text of a JSON file.
+///
+/// # Errors
+/// When it cannot be read, or is no JSON.
+pub fn json(path: &Path) -> Result<(String, Value)> {
+    let text = text_file::read(path, text_file::Comments::None)?;
+    match serde_json::from_str(&text) {
+        Ok(value) => Ok((text, value)),
+        Err(error) => bail!("{}:{error}", path.display()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn conditions_state_time_instruments_and_operator() {
+        let conditions = json!({
+            "begin": "2026-03-01 12:00:00 UTC", "operator": "A. B.",
+            "instruments": [{"kind": "length_reference", "serial_number": "12-3"}],
+        });
+        let origin = Origin::of_text("{}", Path::new("report.json")).with_conditions(&conditions);
+        assert_eq!(origin.at_s, Some(1_772_366_400));
+        assert_eq!(origin.operator, "A. B.");
+        assert!(
+            origin.instruments.contains("12-3"),
+            "{}",
+            origin.instruments
+        );
+        assert_eq!(origin.sha256.len(), 64);
+        let nothing = Origin::default().with_conditions(&Value::Null);
+        assert_eq!(nothing, Origin::default());
+    }
+
+    #[test]
+    fn a_single_bag_keeps_its_hash_and_several_have_one_of_all() {
+        let [a, b] = ["a", "b"].map(|text| hash(text.as_bytes()));
+        assert_eq!(joined(std::slice::from_ref(&a)), a);
+        let both = joined(&[a.clone(), b.clone()]);
+        assert_ne!(both, joined(&[b, a]));
+        assert_eq!(both.len(), 64);
+    }
+}

@@ -1,0 +1,304 @@
+//! `abbe history [MACHINE]`: which view is shown, and in which form.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use history::{Limit, Options, Series, SeriesKey, Side, Store, Window};
+use maud::html;
+use serde_json::{Value, json};
+
+use super::dates::{Moment, moment, time};
+use super::{machines, overview, single, store_path};
+use crate::report;
+use crate::report::section::Section;
+use crate::tell::tell;
+use crate::usage::{above_zero, refused};
+use crate::whole_file;
+
+/// Most figures whose trends are shown at once.
+const MOST_TRENDS: usize = 20;
+/// Most names that an error lists.
+const MOST_NAMES: usize = 20;
+
+/// Arguments of `abbe history` without `add`.
+#[derive(Args)]
+pub struct View {
+    /// Name of the machine; without it all machines are listed, or compared by `--figure` or `--effect`.
+    machine: Option<String>,
+    /// Figure whose trend is shown, such as `iso230_2.accuracy`, or the begin of its name before a dot.
+    #[arg(long)]
+    figure: Option<String>,
+    /// Effect of diagnoses whose trend is shown, such as `backlash`.
+    #[arg(long, conflicts_with = "figure")]
+    effect: Option<String>,
+    /// Axis of the effect.
+    #[arg(long, requires = "effect")]
+    axis: Option<String>,
+    /// Only tests whose title has this text.
+    #[arg(long)]
+    test: Option<String>,
+    /// Only values from this date on: 2026-03-01 or 2026-03-01T12:00:00Z.
+    #[arg(long, value_parser = moment)]
+    since: Option<Moment>,
+    /// Only values up to this date.
+    #[arg(long, value_parser = moment)]
+    until: Option<Moment>,
+    /// Show the changes between two dates.
+    #[arg(long, num_args = 2, value_names = ["DATE", "DATE"], value_parser = moment, requires = "machine")]
+    between: Vec<Moment>,
+    /// Limit that the figure must not rise above, in the unit that is shown.
+    #[arg(long, allow_negative_numbers = true, value_parser = finite)]
+    upper: Option<f64>,
+    /// Limit that the figure must not fall below, in the unit that is shown.
+    #[arg(long, allow_negative_numbers = true, value_parser = finite)]
+    lower: Option<f64>,
+    /// Days after which each test is due again; without it the machine's own usual interval.
+    #[arg(long, value_name = "DAYS", value_parser = above_zero)]
+    every_days: Option<f64>,
+    /// Print JSON instead of text.
+    #[arg(long, conflicts_with = "csv")]
+    json: bool,
+    /// Print a table of the values (csv) instead of text.
+    #[arg(long)]
+    csv: bool,
+    /// Write the page as one HTML file.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// File of the history; without it `~/.local/share/abbe/history.sqlite`.
+    #[arg(long, value_name = "FILE")]
+    store: Option<PathBuf>,
+}
+
+/// A view before it is laid out.
+pub struct Page {
+    /// Title.
+    pub title: String,
+    /// Its parts.
+    pub sections: Vec<Section>,
+    /// Its values for a table.
+    pub values: Vec<Line>,
+    /// Its content for machines.
+    pub json: Value,
+}
+
+/// A value in a table: series, point, status and source.
+pub struct Line {
+    /// The series.
+    pub series: Series,
+    /// The value.
+    pub point: history::Point,
+    /// Status of a cause.
+    pub status: String,
+    /// Path of the bag or report; empty: not listed.
+    pub source: String,
+}
+
+/// A finite number.
+fn finite(text: &str) -> Result<f64, &'static str> {
+    let number = text.parse().ok();
+    number
+        .filter(|number: &f64| number.is_finite())
+        .ok_or("must be a finite number")
+}
+
+impl View {
+    /// Shows the view.
+    ///
+    /// # Errors
+    /// When the store cannot be read, nothing matches, or too much does.
+    pub fn execute(self) -> Result<ExitCode> {
+        let path = store_path(self.store.as_deref())?;
+        let store = Store::open_to_read(&path, Options::default())?;
+        if let Some(machine) = &self.machine {
+            is_there(&store, machine)?;
+        }
+        if (self.upper.is_some() || self.lower.is_some()) && self.name().is_none() {
+            let reason =
+                "--upper and --lower: name the figure that they limit with --figure or --effect";
+            return Err(refused("history", reason));
+        }
+        let page = self.page(&store)?;
+        if self.json {
+            tell!("{}", serde_json::to_string_pretty(&page.json)?);
+        } else if self.csv {
+            tell!("{}", table(&page.values)?.trim_end());
+        } else {
+            let parts: Vec<String> = page.sections.iter().map(Section::terminal).collect();
+            tell!("{}\n\n{}", page.title, parts.join("\n").trim_end());
+        }
+        if let Some(path) = &self.html {
+            let body = html! {
+                h1 { (page.title) }
+                @for section in &page.sections { (section.html()) }
+            };
+            whole_file::write(path, &report::html(&page.title, &body))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn page(&self, store: &Store) -> Result<Page> {
+        let key = self.key();
+        match (&self.machine, self.name()) {
+            (None, None) => machines::list(store),
+            (None, Some(name)) => machines::compare(store, &key, &name, self.window()),
+            (Some(machine), _) if !self.between.is_empty() => {
+                overview::changes(store, machine, &key, [self.between[0], self.between[1]])
+            }
+            (Some(machine), None) => {
+                overview::of(store, machine, &key, self.every_days, self.window())
+            }
+            (Some(machine), Some(name)) => self.trends(store, machine, &name, &key),
+        }
+    }
+
+    /// Name of the figure, or its begin.
+    fn name(&self) -> Option<String> {
+        let effect = self
+            .effect
+            .as_ref()
+            .map(|effect| format!("effect.{effect}"));
+        self.figure.clone().or(effect)
+    }
+
+    fn key(&self) -> SeriesKey {
+        SeriesKey {
+            machine: self.machine.clone(),
+            name: self.name(),
+            axis: self.axis.clone(),
+            test: self.test.clone(),
+        }
+    }
+
+    fn window(&self) -> Window {
+        Window {
+            since_s: self.since.map_or(i64::MIN, |moment| moment.begin_s),
+            until_s: self.until.map_or(i64::MAX, |moment| moment.end_s),
+        }
+    }
+
+    fn limits(&self) -> Vec<Limit> {
+        let of = |value: Option<f64>, side| value.map(|value| Limit { value, side });
+        let both = [of(self.upper, Side::Upper), of(self.lower, Side::Lower)];
+        both.into_iter().flatten().collect()
+    }
+
+    fn trends(&self, store: &Store, machine: &str, name: &str, key: &SeriesKey) -> Result<Page> {
+        let all = store.series(key)?;
+        if all.is_empty() {
+            bail!("{}", nothing(store, machine, name)?);
+        }
+        if all.len() > MOST_TRENDS {
+            bail!(
+                "{name}: {} figures match, at most {MOST_TRENDS} are shown at once: choose one with --figure, --axis or --test",
+                all.len()
+            );
+        }
+        let limits = self.limits();
+        let mut page = Page {
+            title: format!("History of {machine}: {name}"),
+            sections: Vec::new(),
+            values: Vec::new(),
+            json: json!({ "schema": SCHEMA, "machine": machine, "series": [] }),
+        };
+        for series in all {
+            let (section, json, values) = single::of(store, &series, self.window(), &limits)?;
+            page.sections.push(section);
+            page.values.extend(values);
+            if let Some(list) = page.json["series"].as_array_mut() {
+                list.push(json);
+            }
+        }
+        Ok(page)
+    }
+}
+
+/// Name and version of the JSON.
+pub const SCHEMA: &str = "abbe.history/1";
+
+/// Refuses a machine that the store does not have.
+fn is_there(store: &Store, machine: &str) -> Result<()> {
+    let all = store.machines()?;
+    if all.iter().any(|known| known.machine == machine) {
+        return Ok(());
+    }
+    let names: Vec<&str> = all.iter().map(|known| known.machine.as_str()).collect();
+    bail!(
+        "{machine}: the history has no such machine, but {}",
+        few(&names)
+    );
+}
+
+/// Why no figure of this name is shown.
+fn nothing(store: &Store, machine: &str, name: &str) -> Result<String> {
+    let of_machine = SeriesKey {
+        machine: Some(machine.to_owned()),
+        ..SeriesKey::default()
+    };
+    let all = store.series(&of_machine)?;
+    let mut names: Vec<&str> = all.iter().map(|series| series.name.as_str()).collect();
+    names.dedup();
+    Ok(format!(
+        "{name}: {machine} has no such figure with this axis and test, but {}",
+        few(&names)
+    ))
+}
+
+/// The first names of a list, and how many more there are.
+fn few(names: &[&str]) -> String {
+    if names.is_empty() {
+        return "none at all".to_owned();
+    }
+    let listed = names
+        .iter()
+        .take(MOST_NAMES)
+        .copied()
+        .collect::<Vec<_>>()
+        .join(", ");
+    let more = names.len().saturating_sub(MOST_NAMES);
+    if more > 0 {
+        format!("{listed} and {more} more")
+    } else {
+        listed
+    }
+}
+
+/// Values as a table, in the units in which they are kept.
+fn table(values: &[Line]) -> Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record([
+        "machine",
+        "test",
+        "figure",
+        "axis",
+        "time",
+        "value",
+        "standard_uncertainty",
+        "unit",
+        "status",
+        "source",
+    ])?;
+    for Line {
+        series,
+        point,
+        status,
+        source,
+    } in values
+    {
+        let uncertainty = point.standard_uncertainty.map(|u| u.to_string());
+        writer.write_record([
+            &series.machine,
+            &series.test,
+            &series.name,
+            &series.axis,
+            &time(point.at_s),
+            &point.value.to_string(),
+            &uncertainty.unwrap_or_default(),
+            &series.unit,
+            status,
+            source,
+        ])?;
+    }
+    Ok(String::from_utf8(writer.into_inner()?)?)
+}

@@ -1,0 +1,172 @@
+//! What is kept: one report or diagnosis with its figures.
+
+use crate::bound;
+use crate::error::HistoryError;
+
+/// The origin of an entry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// A report of tests, or of a run.
+    Report,
+    /// A diagnosis.
+    Diagnosis,
+}
+
+impl Kind {
+    /// Its name in the store.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Report => "report",
+            Self::Diagnosis => "diagnosis",
+        }
+    }
+}
+
+/// A figure of an entry.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// Title of its test, without the numbers of runs; empty for a figure of the whole report.
+    pub test: String,
+    /// Name, such as `iso230_2.accuracy` or `effect.backlash.width_um`.
+    pub name: String,
+    /// Axis, pair or component; empty where the test says it.
+    pub axis: String,
+    /// Value, in `unit`.
+    pub value: f64,
+    /// `mm`, `rad`, `s`, another unit as in `effect.*` names, or empty for a number alone.
+    pub unit: String,
+    /// Standard uncertainty; `None`: not known.
+    pub standard_uncertainty: Option<f64>,
+    /// 95 % interval, where the report has one.
+    pub interval: Option<[f64; 2]>,
+    /// Status of a cause: `named`, `surrogate` or `set`; empty for other figures.
+    pub status: String,
+}
+
+/// One report or diagnosis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// Name of the machine.
+    pub machine: String,
+    /// Time of the measurement, s since 1970 (UTC).
+    pub at_s: i64,
+    /// Its origin.
+    pub kind: Kind,
+    /// SHA-256 by which it is recognised: of the bags, or of the report's text.
+    pub sha256: String,
+    /// SHA-256 of the machine file, where it is known.
+    pub machine_sha256: Option<String>,
+    /// Path of the bag or report, as it was given.
+    pub source: String,
+    /// Instruments with serial numbers and certificates, where they are stated.
+    pub instruments: String,
+    /// Operator, where one is stated.
+    pub operator: String,
+    /// Version of the software that made the figures.
+    pub software: String,
+    /// The figures; each test, name and axis once.
+    pub figures: Vec<Figure>,
+}
+
+impl Entry {
+    /// Refuses what no store takes.
+    ///
+    /// # Errors
+    /// Names key, value and limit of the first text, hash, time or number out of bounds.
+    pub fn check(&self) -> Result<(), HistoryError> {
+        check_text("machine", &self.machine, bound::NAME_BYTES)?;
+        check_text("source", &self.source, bound::TEXT_BYTES)?;
+        check_text("software", &self.software, bound::NAME_BYTES)?;
+        for (key, text) in [
+            ("instruments", &self.instruments),
+            ("operator", &self.operator),
+        ] {
+            check_optional(key, text, bound::TEXT_BYTES)?;
+        }
+        check_hash("sha256", &self.sha256)?;
+        if let Some(hash) = &self.machine_sha256 {
+            check_hash("machine_sha256", hash)?;
+        }
+        if !bound::TIMES_S.contains(&self.at_s) {
+            return Err(HistoryError::BadTime {
+                at_s: self.at_s,
+                least: *bound::TIMES_S.start(),
+                greatest: *bound::TIMES_S.end(),
+            });
+        }
+        let n = self.figures.len();
+        if !(1..=bound::FIGURES).contains(&n) {
+            return Err(HistoryError::BadCount {
+                source_name: self.source.clone(),
+                n,
+                most: bound::FIGURES,
+            });
+        }
+        self.figures.iter().try_for_each(Figure::check)
+    }
+}
+
+impl Figure {
+    fn check(&self) -> Result<(), HistoryError> {
+        check_text("figure", &self.name, bound::NAME_BYTES)?;
+        for (key, text) in [
+            ("test", &self.test),
+            ("axis", &self.axis),
+            ("unit", &self.unit),
+            ("status", &self.status),
+        ] {
+            check_optional(key, text, bound::NAME_BYTES)?;
+        }
+        let interval = self.interval.iter().flatten();
+        let all = std::iter::once(("value", self.value))
+            .chain(
+                self.standard_uncertainty
+                    .map(|u| ("standard_uncertainty", u)),
+            )
+            .chain(interval.map(|end| ("interval", *end)));
+        for (key, value) in all {
+            if !(value.is_finite() && value.abs() <= bound::MAGNITUDE) {
+                return Err(HistoryError::BadNumber {
+                    figure: self.name.clone(),
+                    key,
+                    value,
+                    greatest: bound::MAGNITUDE,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_text(key: &'static str, text: &str, most_bytes: usize) -> Result<(), HistoryError> {
+    if text.trim().is_empty() {
+        return Err(bad_text(key, text, most_bytes));
+    }
+    check_optional(key, text, most_bytes)
+}
+
+fn check_optional(key: &'static str, text: &str, most_bytes: usize) -> Result<(), HistoryError> {
+    if text.len() > most_bytes || text.chars().any(char::is_control) {
+        return Err(bad_text(key, text, most_bytes));
+    }
+    Ok(())
+}
+
+fn bad_text(key: &'static str, text: &str, most_bytes: usize) -> HistoryError {
+    HistoryError::BadText {
+        key,
+        text: text.chars().take(40).collect(),
+        most_bytes,
+    }
+}
+
+fn check_hash(key: &'static str, text: &str) -> Result<(), HistoryError> {
+    if text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+        return Ok(());
+    }
+    Err(HistoryError::BadHash {
+        key,
+        text: text.chars().take(70).collect(),
+    })
+}

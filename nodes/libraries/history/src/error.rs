@@ -1,0 +1,159 @@
+//! Why a history cannot be kept or read.
+
+use std::path::PathBuf;
+
+use metrology::number::number;
+
+/// Errors of entries and stores.
+#[derive(Debug, thiserror::Error)]
+pub enum HistoryError {
+    /// The file cannot be opened or made.
+    #[error("history {path}: cannot be opened: {reason}: check folder and rights, or name another file with --store", path = path.display())]
+    Unopened {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// There is no such file to read.
+    #[error("history {path}: is not there: `abbe history add` or --keep makes it, or name another file with --store", path = path.display())]
+    Absent {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is no SQLite database, or a damaged one.
+    #[error("history {path}: is no database, or a damaged one ({reason}): restore a copy, or name another file with --store", path = path.display())]
+    NoDatabase {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite says.
+        reason: String,
+    },
+    /// The file is a database of another program.
+    #[error("history {path}: is a database of another program (application_id {found}, must be {wanted}): name another file with --store", path = path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// Its application id.
+        found: i64,
+        /// Ours.
+        wanted: i64,
+    },
+    /// A newer version wrote the file.
+    #[error("history {path}: has schema version {found}, this version of abbe reads up to {known}: install the newer abbe", path = path.display())]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: i64,
+        /// The newest known.
+        known: i64,
+    },
+    /// An older version wrote the file, which is opened for reading alone.
+    #[error("history {path}: has schema version {found}, must be {known}: any `abbe history add` brings it up to date", path = path.display())]
+    Older {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: i64,
+        /// The one that is read.
+        known: i64,
+    },
+    /// Another program holds the file.
+    #[error("history {path}: is locked by another program for more than {waited_ms} ms: end that program, or try again", path = path.display())]
+    Locked {
+        /// The file.
+        path: PathBuf,
+        /// How long it was waited for.
+        waited_ms: u32,
+    },
+    /// The file cannot be written.
+    #[error("history {path}: is read-only: allow writing to the file and its folder, or name another file with --store", path = path.display())]
+    ReadOnly {
+        /// The file.
+        path: PathBuf,
+    },
+    /// There is no space left.
+    #[error("history {path}: the disk or the file is full, nothing was added: make space, or name a file on another disk with --store", path = path.display())]
+    Full {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Anything else that SQLite reports.
+    #[error("history {path}: {source}", path = path.display())]
+    Database {
+        /// The file.
+        path: PathBuf,
+        /// The report.
+        source: rusqlite::Error,
+    },
+    /// More rows match than are read.
+    #[error("history {path}: more than {most} {rows}: choose less with --since, --test or --figure", path = path.display())]
+    TooMany {
+        /// The file.
+        path: PathBuf,
+        /// Kind of rows.
+        rows: &'static str,
+        /// The limit.
+        most: usize,
+    },
+    /// A text of an entry is empty or too long, or has a control character.
+    #[error("{key} = {text:?}: must have 1 to {most_bytes} bytes and no control character")]
+    BadText {
+        /// Which.
+        key: &'static str,
+        /// Its begin.
+        text: String,
+        /// The limit.
+        most_bytes: usize,
+    },
+    /// A hash is not one.
+    #[error("{key} = {text:?}: must be a SHA-256 as 64 hexadecimal digits")]
+    BadHash {
+        /// Which.
+        key: &'static str,
+        /// Its begin.
+        text: String,
+    },
+    /// The time of an entry is out of range.
+    #[error("time = {at_s} s since 1970: must be from {least} to {greatest} (1970 to 2106)")]
+    BadTime {
+        /// The time.
+        at_s: i64,
+        /// Least.
+        least: i64,
+        /// Greatest.
+        greatest: i64,
+    },
+    /// A figure is not finite or out of range.
+    #[error(
+        "{figure}: {key} = {value}: must be finite and at most {greatest} in magnitude",
+        value = number(*value),
+        greatest = number(*greatest)
+    )]
+    BadNumber {
+        /// Name of the figure.
+        figure: String,
+        /// Which of its numbers.
+        key: &'static str,
+        /// The number.
+        value: f64,
+        /// The limit.
+        greatest: f64,
+    },
+    /// An entry has no figure, or too many.
+    #[error("{source_name}: {n} figures: must be from 1 to {most}")]
+    BadCount {
+        /// Where the entry is from.
+        source_name: String,
+        /// How many.
+        n: usize,
+        /// The limit.
+        most: usize,
+    },
+    /// A report is none of a known form.
+    #[error(
+        "is no report: must have the key `tests` of `abbe report --json` or of a run, or `schema: abbe.gap/1`"
+    )]
+    NoReport,
+}

@@ -1,0 +1,228 @@
+//! What a store gives back: machines, series, points, last values, times of tests.
+
+use rusqlite::{Params, Row, params};
+
+use super::Store;
+use crate::bound;
+use crate::error::HistoryError;
+use crate::point::Point;
+
+/// A machine of a store.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MachineSummary {
+    /// Its name.
+    pub machine: String,
+    /// Entries.
+    pub entries: i64,
+    /// Time of the first, s since 1970.
+    pub first_s: i64,
+    /// Time of the last, s since 1970.
+    pub last_s: i64,
+}
+
+/// Which series are read; `None` takes all.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SeriesKey {
+    /// The machine's name.
+    pub machine: Option<String>,
+    /// A figure's name, or the begin of it before a dot.
+    pub name: Option<String>,
+    /// The axis.
+    pub axis: Option<String>,
+    /// A part of the test's title.
+    pub test: Option<String>,
+}
+
+/// One figure of one machine over time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Series {
+    /// Its number in the store.
+    pub id: i64,
+    /// The machine's name.
+    pub machine: String,
+    /// Title of the test.
+    pub test: String,
+    /// Name of the figure.
+    pub name: String,
+    /// Axis; empty: none.
+    pub axis: String,
+    /// Unit of its values.
+    pub unit: String,
+}
+
+/// A span of time, both ends included; s since 1970.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Begin.
+    pub since_s: i64,
+    /// End.
+    pub until_s: i64,
+}
+
+impl Window {
+    /// All of time.
+    pub const ALL: Self = Self {
+        since_s: i64::MIN,
+        until_s: i64::MAX,
+    };
+}
+
+/// A value of a series.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kept {
+    /// Time, value and uncertainty.
+    pub point: Point,
+    /// Status of a cause; empty for other figures.
+    pub status: String,
+    /// Path of the bag or report.
+    pub source: String,
+}
+
+/// The last value of a series.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Last {
+    /// The series.
+    pub series: Series,
+    /// Its last value.
+    pub point: Point,
+    /// How many there are.
+    pub n: i64,
+}
+
+/// Condition of a [`SeriesKey`], whose members are parameters 1 to 4.
+const OF_KEY: &str = "(?1 IS NULL OR s.machine = ?1)
+     AND (?2 IS NULL OR s.name = ?2 OR substr(s.name, 1, length(?2) + 1) = ?2 || '.')
+     AND (?3 IS NULL OR s.axis = ?3)
+     AND (?4 IS NULL OR instr(lower(s.test), lower(?4)) > 0)";
+const COLUMNS: &str = "s.id, s.machine, s.test, s.name, s.axis, s.unit";
+
+impl Store {
+    /// All machines by name.
+    ///
+    /// # Errors
+    /// When the store cannot be read, or has too many.
+    pub fn machines(&self) -> Result<Vec<MachineSummary>, HistoryError> {
+        let sql = "SELECT machine, count(*), min(at_s), max(at_s) FROM entry GROUP BY machine ORDER BY machine";
+        self.rows(sql, [], ("machines", bound::ROWS), |row| {
+            Ok(MachineSummary {
+                machine: row.get(0)?,
+                entries: row.get(1)?,
+                first_s: row.get(2)?,
+                last_s: row.get(3)?,
+            })
+        })
+    }
+
+    /// The series of a key, by machine, name, axis and test.
+    ///
+    /// # Errors
+    /// When the store cannot be read, or has too many.
+    pub fn series(&self, key: &SeriesKey) -> Result<Vec<Series>, HistoryError> {
+        let sql = format!(
+            "SELECT {COLUMNS} FROM series s WHERE {OF_KEY} ORDER BY s.machine, s.name, s.axis, s.test, s.unit"
+        );
+        self.rows(&sql, of_key(key), ("series", bound::ROWS), read_series)
+    }
+
+    /// The values of a series in order of time.
+    ///
+    /// # Errors
+    /// When the store cannot be read, or has too many.
+    pub fn points(&self, series: i64, window: Window) -> Result<Vec<Kept>, HistoryError> {
+        let sql = "SELECT f.at_s, f.value, f.standard_uncertainty, f.status, e.source
+             FROM figure f JOIN entry e ON e.id = f.entry
+             WHERE f.series = ?1 AND f.at_s BETWEEN ?2 AND ?3 ORDER BY f.at_s, f.entry";
+        let key = params![series, window.since_s, window.until_s];
+        self.rows(sql, key, ("values of one figure", bound::POINTS), |row| {
+            Ok(Kept {
+                point: read_point(row, 0)?,
+                status: row.get(3)?,
+                source: row.get(4)?,
+            })
+        })
+    }
+
+    /// The last value of each series of a key.
+    ///
+    /// # Errors
+    /// When the store cannot be read, or has too many.
+    pub fn last_values(&self, key: &SeriesKey) -> Result<Vec<Last>, HistoryError> {
+        let sql = format!(
+            "SELECT {COLUMNS}, f.at_s, f.value, f.standard_uncertainty,
+                    (SELECT count(*) FROM figure c WHERE c.series = s.id)
+             FROM series s JOIN figure f ON f.series = s.id
+             WHERE {OF_KEY} AND (f.at_s, f.entry) =
+                   (SELECT l.at_s, l.entry FROM figure l WHERE l.series = s.id
+                    ORDER BY l.at_s DESC, l.entry DESC LIMIT 1)
+             ORDER BY s.machine, s.name, s.axis, s.test, s.unit"
+        );
+        self.rows(&sql, of_key(key), ("series", bound::ROWS), |row| {
+            Ok(Last {
+                series: read_series(row)?,
+                point: read_point(row, 6)?,
+                n: row.get(9)?,
+            })
+        })
+    }
+
+    /// Times at which a machine's tests were made: title and s since 1970, in order.
+    ///
+    /// # Errors
+    /// When the store cannot be read, or has too many.
+    pub fn test_times(&self, machine: &str) -> Result<Vec<(String, i64)>, HistoryError> {
+        let sql = "SELECT DISTINCT s.test, f.at_s FROM series s JOIN figure f ON f.series = s.id
+             WHERE s.machine = ?1 AND s.test <> '' ORDER BY s.test, f.at_s";
+        self.rows(sql, [machine], ("times of tests", bound::POINTS), |row| {
+            Ok((row.get(0)?, row.get(1)?))
+        })
+    }
+
+    /// Rows of a question, at most so many.
+    fn rows<T>(
+        &self,
+        sql: &str,
+        key: impl Params,
+        (name, most): (&'static str, usize),
+        read: impl Fn(&Row<'_>) -> Result<T, rusqlite::Error>,
+    ) -> Result<Vec<T>, HistoryError> {
+        let collect = || {
+            let mut statement = self.connection.prepare(sql)?;
+            let rows = statement.query_map(key, |row| read(row))?;
+            rows.take(most + 1).collect::<Result<Vec<T>, _>>()
+        };
+        let rows = collect().map_err(|error| self.wrong(error))?;
+        if rows.len() > most {
+            return Err(HistoryError::TooMany {
+                path: self.path.clone(),
+                rows: name,
+                most,
+            });
+        }
+        Ok(rows)
+    }
+}
+
+/// Parameters 1 to 4 of [`OF_KEY`].
+fn of_key(key: &SeriesKey) -> [Option<&str>; 4] {
+    [&key.machine, &key.name, &key.axis, &key.test].map(|text| text.as_deref())
+}
+
+fn read_series(row: &Row<'_>) -> Result<Series, rusqlite::Error> {
+    Ok(Series {
+        id: row.get(0)?,
+        machine: row.get(1)?,
+        test: row.get(2)?,
+        name: row.get(3)?,
+        axis: row.get(4)?,
+        unit: row.get(5)?,
+    })
+}
+
+/// Time, value and uncertainty in three columns from `first` on.
+fn read_point(row: &Row<'_>, first: usize) -> Result<Point, rusqlite::Error> {
+    Ok(Point {
+        at_s: row.get::<_, i64>(first)? as f64,
+        value: row.get(first + 1)?,
+        standard_uncertainty: row.get(first + 2)?,
+    })
+}

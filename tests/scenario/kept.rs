@@ -1,0 +1,196 @@
+//! Figures that are kept in a history, and pages as PDF: of a table of an instrument.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use abbe_tests::chromium;
+use abbe_tests::program::{Ended, Process, command, root};
+use serde_json::Value;
+
+/// Width and height of A4, points.
+const A4_PT: [f64; 2] = [595.28, 841.89];
+
+fn table(ending: &str) -> PathBuf {
+    root()
+        .join("tests/import")
+        .join(format!("positioning.{ending}"))
+}
+
+fn ran(arguments: &[&str], more: &[(&str, &Path)]) -> Ended {
+    let mut program = command(0, arguments);
+    for (option, path) in more {
+        program.arg(option).arg(path);
+    }
+    Process::start(program).ended_within(Duration::from_secs(120))
+}
+
+fn report(arguments: &[&str], more: &[(&str, &Path)]) -> Ended {
+    let csv = table("csv");
+    let first = ["report", csv.to_str().unwrap()];
+    let map = table("yaml");
+    let more: Vec<(&str, &Path)> = [("--map", map.as_path())]
+        .into_iter()
+        .chain(more.iter().copied())
+        .collect();
+    ran(&[&first[..], arguments].concat(), &more)
+}
+
+fn json(ended: &Ended) -> Value {
+    let begin = ended
+        .said
+        .find('{')
+        .unwrap_or_else(|| panic!("{}", ended.said));
+    let mut values = serde_json::Deserializer::from_str(&ended.said[begin..]).into_iter();
+    values.next().unwrap().unwrap()
+}
+
+#[test]
+fn scenario_a_report_is_kept_once_and_its_history_shows_its_figures() {
+    let home = tempfile::tempdir().unwrap();
+    let store = home.path().join("history.sqlite");
+    let keep = ["--keep", "--kept-as", "mill_1"];
+    let first = report(&keep, &[("--store", &store)]);
+    assert_eq!(first.status.code(), Some(0), "{}", first.said);
+    assert!(
+        first.said.contains("figures of a report of mill_1"),
+        "{}",
+        first.said
+    );
+    let again = report(&keep, &[("--store", &store)]);
+    assert_eq!(again.status.code(), Some(0), "{}", again.said);
+    assert!(
+        again.said.contains("already, nothing was added"),
+        "{}",
+        again.said
+    );
+    let shown = ran(&["history", "mill_1", "--json"], &[("--store", &store)]);
+    assert_eq!(shown.status.code(), Some(0), "{}", shown.said);
+    let json = json(&shown);
+    let figures = json["figures"].as_array().unwrap();
+    let accuracy = figures
+        .iter()
+        .find(|it| it["figure"].as_str().unwrap().ends_with("accuracy"));
+    let accuracy = accuracy.unwrap_or_else(|| panic!("{json}"));
+    assert_eq!(
+        (&accuracy["values"], &accuracy["unit"]),
+        (&1.into(), &"mm".into())
+    );
+    let unknown = ran(&["history", "mill_2"], &[("--store", &store)]);
+    assert_eq!(unknown.status.code(), Some(1), "{}", unknown.said);
+    assert!(
+        unknown.said.contains("no such machine, but mill_1"),
+        "{}",
+        unknown.said
+    );
+}
+
+#[test]
+fn scenario_a_report_without_a_machine_is_not_kept_and_nothing_is_made_without_keep() {
+    let home = tempfile::tempdir().unwrap();
+    let store = home.path().join("history.sqlite");
+    let nameless = report(&["--keep"], &[("--store", &store)]);
+    assert_eq!(nameless.status.code(), Some(1), "{}", nameless.said);
+    assert!(nameless.said.contains("--kept-as"), "{}", nameless.said);
+    let plain = report(&[], &[]);
+    assert_eq!(plain.status.code(), Some(0), "{}", plain.said);
+    assert!(!store.exists());
+    let absent = ran(&["history"], &[("--store", &store)]);
+    assert_eq!(absent.status.code(), Some(1), "{}", absent.said);
+    assert!(absent.said.contains("is not there"), "{}", absent.said);
+}
+
+#[test]
+fn scenario_five_diagnoses_show_the_trend_of_an_effect_and_when_its_limit_is_reached() {
+    let home = tempfile::tempdir().unwrap();
+    let store = home.path().join("history.sqlite");
+    for (month, width_um) in [(1, 5.0), (2, 6.1), (3, 6.9), (4, 8.0), (5, 9.1)] {
+        let gap = serde_json::json!({
+            "schema": "abbe.gap/1", "inputs": {"bags": [], "machine_sha256": ""},
+            "gap": {"rms_um": width_um, "p95_um": 9.0, "floor_um": 1.0}, "shrink": {},
+            "causes": [{"effect": "backlash", "axis": "X", "status": "named", "parameters":
+                [{"name": "width_um", "value": width_um, "low": width_um - 0.4, "high": width_um + 0.4}]}],
+        });
+        let path = home.path().join(format!("gap_{month}.json"));
+        std::fs::write(&path, gap.to_string()).unwrap();
+        let at = format!("2026-0{month}-01");
+        let given = [
+            "history",
+            "add",
+            path.to_str().unwrap(),
+            "--machine",
+            "mill_1",
+            "--at",
+            &at,
+        ];
+        let added = ran(&given, &[("--store", &store)]);
+        assert_eq!(added.status.code(), Some(0), "{}", added.said);
+    }
+    let asked = [
+        "history", "mill_1", "--effect", "backlash", "--axis", "X", "--upper", "12",
+    ];
+    let page = home.path().join("history.html");
+    let text = ran(&asked, &[("--store", &store), ("--html", &page)]);
+    assert_eq!(text.status.code(), Some(0), "{}", text.said);
+    assert!(
+        text.said
+            .contains("The upper limit of 12 µm is expected on 2026-0"),
+        "{}",
+        text.said
+    );
+    assert!(std::fs::read_to_string(&page).unwrap().contains("<svg"));
+    let json = json(&ran(
+        &[&asked[..], &["--json"]].concat(),
+        &[("--store", &store)],
+    ));
+    let series = &json["series"][0];
+    assert_eq!(series["values"].as_array().unwrap().len(), 5);
+    assert_eq!(series["limits"][0]["verdict"], "expected", "{json}");
+    // 4.1 µm in 120 days.
+    let slope = series["trend"]["slope_per_year"].as_f64().unwrap();
+    assert!((slope - 12.4).abs() < 1.0, "{slope}");
+}
+
+#[test]
+fn scenario_a_page_is_printed_as_a_pdf_of_a4_sheets() {
+    if !chromium::is_there("a PDF of abbe report") {
+        return;
+    }
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("report.pdf");
+    let printed = report(&[], &[("--pdf", &path)]);
+    assert_eq!(printed.status.code(), Some(0), "{}", printed.said);
+    let pdf = std::fs::read(&path).unwrap();
+    assert!(pdf.starts_with(b"%PDF-"));
+    let text = String::from_utf8_lossy(&pdf);
+    let sheets = text.matches("/Type /Page\n").count();
+    let boxes: Vec<&str> = text.split("/MediaBox [").skip(1).collect();
+    assert!(sheets >= 1 && !boxes.is_empty(), "{sheets} sheets");
+    for one in boxes {
+        let numbers = one.split(']').next().unwrap().split_whitespace();
+        let numbers: Vec<f64> = numbers.map(|it| it.parse().unwrap()).collect();
+        assert!((numbers[2] - A4_PT[0]).abs() < 1.0, "{numbers:?}");
+        assert!((numbers[3] - A4_PT[1]).abs() < 1.0, "{numbers:?}");
+    }
+    // Nothing of it stays beside the file.
+    let left: Vec<_> = std::fs::read_dir(home.path()).unwrap().collect();
+    assert_eq!(left.len(), 1, "{left:?}");
+}
+
+#[test]
+fn scenario_without_chromium_a_pdf_is_refused_with_the_remedy() {
+    let home = tempfile::tempdir().unwrap();
+    let csv = table("csv");
+    let mut program = command(0, &["report", csv.to_str().unwrap()]);
+    program.arg("--map").arg(table("yaml"));
+    program.arg("--pdf").arg(home.path().join("report.pdf"));
+    program.env("PATH", home.path());
+    let ended = Process::start(program).ended_within(Duration::from_secs(120));
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+    assert!(
+        ended
+            .said
+            .contains("install one (Debian: `apt install chromium`)"),
+        "{}",
+        ended.said
+    );
+}
