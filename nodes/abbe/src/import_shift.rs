@@ -238,7 +238,7 @@ fn between((first, last): &(Stamp<Machine>, Stamp<Machine>)) -> String {
 mod tests {
     use super::*;
 
-    const MACHINE: &str = include_str!("../../../launch_configs/real_shift/machine.yaml");
+    const MACHINE: &str = include_str!("../../../launch_configs/first_run/machine.yaml");
     const ORDER: &str = include_str!("../../../launch_configs/real_shift/order.yaml");
 
     fn checked(text: &str) -> Result<ShiftOrder> {
