@@ -4,6 +4,7 @@
 //! browser gets a folder of its own for profile and page, at most a minute, and is ended by the number of its process.
 
 use std::fs::File;
+use std::io::Read;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -39,8 +40,10 @@ const ALONE: [&str; 8] = [
 const LONGEST: Duration = Duration::from_secs(60);
 /// How often it is looked at.
 const BETWEEN: Duration = Duration::from_millis(50);
-/// Most bytes of its messages that an error has.
+/// Most letters of its messages that an error has.
 const MOST_MESSAGE: usize = 300;
+/// Most bytes of its messages that are read.
+const MOST_MESSAGES: u64 = 1 << 20;
 /// Most bytes of a PDF.
 const MOST_BYTES: u64 = 256 << 20;
 
@@ -132,7 +135,7 @@ pub fn write(path: &Path, page: &str, head: &Head) -> Result<()> {
             BROWSERS.join(", ")
         );
     };
-    let bytes = print(&browser, page, head, LONGEST)
+    let bytes = print(Command::new(browser), page, head, LONGEST)
         .with_context(|| format!("--pdf {}", path.display()))?;
     whole_file::write_bytes(path, &bytes)
 }
@@ -144,8 +147,9 @@ fn on_path(name: &str) -> Option<PathBuf> {
     all.find(|program| program.is_file())
 }
 
-/// The page as it is printed.
-fn print(browser: &Path, page: &str, head: &Head, longest: Duration) -> Result<Vec<u8>> {
+/// The page as a browser prints it.
+fn print(mut browser: Command, page: &str, head: &Head, longest: Duration) -> Result<Vec<u8>> {
+    let name = browser.get_program().to_string_lossy().into_owned();
     let home = tempfile::Builder::new()
         .prefix("abbe-pdf-")
         .tempdir()
@@ -154,8 +158,7 @@ fn print(browser: &Path, page: &str, head: &Head, longest: Duration) -> Result<V
     let styled = page.replacen("</head>", &format!("{}</head>", head.style()), 1);
     std::fs::write(file("page.html"), styled).context("page for the browser")?;
     let messages = File::create(file("messages")).context("messages of the browser")?;
-    let mut command = Command::new(browser);
-    command
+    browser
         .args(ALONE)
         // Chromium refuses its sandbox to root; the page is our own and runs no script.
         .args(geteuid().is_root().then_some("--no-sandbox"))
@@ -167,32 +170,29 @@ fn print(browser: &Path, page: &str, head: &Head, longest: Duration) -> Result<V
         .stderr(messages)
         // A group of its own, which ends with it.
         .process_group(0);
-    let child = command
-        .spawn()
-        .with_context(|| format!("{}", browser.display()))?;
-    let status = wait(child, longest, browser)?;
+    let child = browser.spawn().with_context(|| name.clone())?;
+    let status = wait(child, longest, &name)?;
     let reason = || last_message(&file("messages"));
     if !status.success() {
-        bail!("{} ended with {status}: {}", browser.display(), reason());
+        bail!("{name} ended with {status}: {}", reason());
     }
     let pdf = file("page.pdf");
     let size = std::fs::metadata(&pdf).map_or(0, |it| it.len());
     if size == 0 || size > MOST_BYTES {
         bail!(
-            "{} wrote {size} bytes, must be 1 to {MOST_BYTES}: {}",
-            browser.display(),
+            "{name} wrote {size} bytes, must be 1 to {MOST_BYTES}: {}",
             reason()
         );
     }
     let bytes = std::fs::read(&pdf).context("the browser's PDF")?;
     if !bytes.starts_with(b"%PDF-") {
-        bail!("{} wrote no PDF: {}", browser.display(), reason());
+        bail!("{name} wrote no PDF: {}", reason());
     }
     Ok(bytes)
 }
 
 /// Waits for the end of a process; one that takes too long is killed with its group.
-fn wait(mut child: Child, longest: Duration, browser: &Path) -> Result<std::process::ExitStatus> {
+fn wait(mut child: Child, longest: Duration, name: &str) -> Result<std::process::ExitStatus> {
     let until = Instant::now() + longest;
     let group = i32::try_from(child.id()).map(Pid::from_raw);
     loop {
@@ -205,8 +205,7 @@ fn wait(mut child: Child, longest: Duration, browser: &Path) -> Result<std::proc
             end(group.as_ref().ok());
             child.wait().context("the browser")?;
             bail!(
-                "{} took more than {} s and was ended: print the HTML page from any browser",
-                browser.display(),
+                "{name} took more than {} s and was ended: print the HTML page from any browser",
                 longest.as_secs()
             );
         }
@@ -221,38 +220,33 @@ fn end(group: Option<&Pid>) {
     }
 }
 
-/// The last line of a file of messages.
+/// The last line of the begin of a file of messages.
 fn last_message(path: &Path) -> String {
-    let bytes = std::fs::read(path).unwrap_or_default();
+    let mut bytes = Vec::new();
+    if let Ok(file) = File::open(path) {
+        // What cannot be read is no message.
+        let _ = file.take(MOST_MESSAGES).read_to_end(&mut bytes);
+    }
     let text = String::from_utf8_lossy(&bytes);
     let line = text.lines().rfind(|line| !line.trim().is_empty());
-    let line: String = line
-        .unwrap_or("no message")
-        .chars()
-        .take(MOST_MESSAGE)
-        .collect();
-    line
+    let line = line.unwrap_or("no message");
+    line.chars().take(MOST_MESSAGE).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use std::os::unix::fs::PermissionsExt;
-
     use super::*;
 
     const PAGE: &str = "<!DOCTYPE html><html><head><title>t</title></head><body>text</body></html>";
 
-    /// A browser that is a shell script.
-    fn script(home: &Path, text: &str) -> PathBuf {
-        let path = home.join("browser");
-        std::fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
-        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
-        path
-    }
-
+    /// Prints with a shell script as the browser.
     fn printed(text: &str, longest: Duration) -> Result<Vec<u8>> {
         let home = tempfile::tempdir().unwrap();
-        print(&script(home.path(), text), PAGE, &Head::default(), longest)
+        let path = home.path().join("browser");
+        std::fs::write(&path, format!("{text}\n")).unwrap();
+        let mut shell = Command::new("sh");
+        shell.arg(path);
+        print(shell, PAGE, &Head::default(), longest)
     }
 
     /// The argument behind `--print-to-pdf=`, for scripts.

@@ -108,11 +108,11 @@ mod tests {
     #[test]
     fn lengths_are_um_and_angles_of_rotary_axes_arcsec() {
         let length = shown(&series("iso230_2.accuracy", "mm"));
-        assert_eq!(length.value(0.012_345, Some(0.0005)), "12.3");
+        assert_eq!(length.value(0.012_347, Some(0.0005)), "12.3");
         assert_eq!(length.expanded(Some(0.0005)), "1.0");
-        assert_eq!(length.with_half_width(0.012_345, 0.0004), "12.35 ± 0.40 µm");
+        assert_eq!(length.with_half_width(0.012_347, 0.0004), "12.35 ± 0.40 µm");
         let rotary = shown(&series("iso230_2_rotary.figures.both.accuracy", "rad"));
-        assert_eq!(rotary.value(1f64.to_radians() / 3600.0, None), "1.000");
+        assert_eq!(rotary.value(5f64.to_radians() / 3600.0, None), "5.000");
         assert_eq!(shown(&series("geometry.EC0Y", "rad")).unit, "µrad");
         assert_eq!(
             shown(&series("effect.backlash.width_um", "um")).value(6.0, None),

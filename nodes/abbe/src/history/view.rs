@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use history::{Limit, Options, Series, SeriesKey, Side, Store, Window};
 use maud::html;
@@ -300,5 +300,6 @@ fn table(values: &[Line]) -> Result<String> {
             source,
         ])?;
     }
-    Ok(String::from_utf8(writer.into_inner()?)?)
+    let bytes = writer.into_inner().map_err(|error| anyhow!("{error}"))?;
+    Ok(String::from_utf8(bytes)?)
 }

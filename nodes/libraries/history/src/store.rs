@@ -147,7 +147,7 @@ impl Store {
     pub fn add(&mut self, entry: &Entry) -> Result<Added, HistoryError> {
         entry.check()?;
         let (path, options) = (self.path.clone(), self.options);
-        let add = |connection: &mut Connection| {
+        let add = |connection: &mut Connection| -> Result<Added, rusqlite::Error> {
             let transaction =
                 connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
             if is_known(&transaction, entry)? {

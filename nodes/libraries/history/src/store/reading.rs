@@ -185,10 +185,10 @@ impl Store {
         (name, most): (&'static str, usize),
         read: impl Fn(&Row<'_>) -> Result<T, rusqlite::Error>,
     ) -> Result<Vec<T>, HistoryError> {
-        let collect = || {
+        let collect = || -> Result<Vec<T>, rusqlite::Error> {
             let mut statement = self.connection.prepare(sql)?;
-            let rows = statement.query_map(key, |row| read(row))?;
-            rows.take(most + 1).collect::<Result<Vec<T>, _>>()
+            let rows = statement.query_map(key, &read)?;
+            rows.take(most + 1).collect()
         };
         let rows = collect().map_err(|error| self.wrong(error))?;
         if rows.len() > most {
