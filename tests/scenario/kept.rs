@@ -49,21 +49,24 @@ fn scenario_a_report_is_kept_once_and_its_history_shows_its_figures() {
     let home = tempfile::tempdir().unwrap();
     let store = home.path().join("history.sqlite");
     let keep = ["--keep", "--kept-as", "mill_1"];
-    let first = report(&keep, &[("--store", &store)]);
+    let first = report(&keep, &[("--store", store.as_path())]);
     assert_eq!(first.status.code(), Some(0), "{}", first.said);
     assert!(
         first.said.contains("figures of a report of mill_1"),
         "{}",
         first.said
     );
-    let again = report(&keep, &[("--store", &store)]);
+    let again = report(&keep, &[("--store", store.as_path())]);
     assert_eq!(again.status.code(), Some(0), "{}", again.said);
     assert!(
         again.said.contains("already, nothing was added"),
         "{}",
         again.said
     );
-    let shown = ran(&["history", "mill_1", "--json"], &[("--store", &store)]);
+    let shown = ran(
+        &["history", "mill_1", "--json"],
+        &[("--store", store.as_path())],
+    );
     assert_eq!(shown.status.code(), Some(0), "{}", shown.said);
     let json = json(&shown);
     let figures = json["figures"].as_array().unwrap();
@@ -75,7 +78,7 @@ fn scenario_a_report_is_kept_once_and_its_history_shows_its_figures() {
         (&accuracy["values"], &accuracy["unit"]),
         (&1.into(), &"mm".into())
     );
-    let unknown = ran(&["history", "mill_2"], &[("--store", &store)]);
+    let unknown = ran(&["history", "mill_2"], &[("--store", store.as_path())]);
     assert_eq!(unknown.status.code(), Some(1), "{}", unknown.said);
     assert!(
         unknown.said.contains("no such machine, but mill_1"),
@@ -88,13 +91,13 @@ fn scenario_a_report_is_kept_once_and_its_history_shows_its_figures() {
 fn scenario_a_report_without_a_machine_is_not_kept_and_nothing_is_made_without_keep() {
     let home = tempfile::tempdir().unwrap();
     let store = home.path().join("history.sqlite");
-    let nameless = report(&["--keep"], &[("--store", &store)]);
+    let nameless = report(&["--keep"], &[("--store", store.as_path())]);
     assert_eq!(nameless.status.code(), Some(1), "{}", nameless.said);
     assert!(nameless.said.contains("--kept-as"), "{}", nameless.said);
     let plain = report(&[], &[]);
     assert_eq!(plain.status.code(), Some(0), "{}", plain.said);
     assert!(!store.exists());
-    let absent = ran(&["history"], &[("--store", &store)]);
+    let absent = ran(&["history"], &[("--store", store.as_path())]);
     assert_eq!(absent.status.code(), Some(1), "{}", absent.said);
     assert!(absent.said.contains("is not there"), "{}", absent.said);
 }
@@ -122,14 +125,17 @@ fn scenario_five_diagnoses_show_the_trend_of_an_effect_and_when_its_limit_is_rea
             "--at",
             &at,
         ];
-        let added = ran(&given, &[("--store", &store)]);
+        let added = ran(&given, &[("--store", store.as_path())]);
         assert_eq!(added.status.code(), Some(0), "{}", added.said);
     }
     let asked = [
         "history", "mill_1", "--effect", "backlash", "--axis", "X", "--upper", "12",
     ];
     let page = home.path().join("history.html");
-    let text = ran(&asked, &[("--store", &store), ("--html", &page)]);
+    let text = ran(
+        &asked,
+        &[("--store", store.as_path()), ("--html", page.as_path())],
+    );
     assert_eq!(text.status.code(), Some(0), "{}", text.said);
     assert!(
         text.said
@@ -140,7 +146,7 @@ fn scenario_five_diagnoses_show_the_trend_of_an_effect_and_when_its_limit_is_rea
     assert!(std::fs::read_to_string(&page).unwrap().contains("<svg"));
     let json = json(&ran(
         &[&asked[..], &["--json"]].concat(),
-        &[("--store", &store)],
+        &[("--store", store.as_path())],
     ));
     let series = &json["series"][0];
     assert_eq!(series["values"].as_array().unwrap().len(), 5);
@@ -157,7 +163,7 @@ fn scenario_a_page_is_printed_as_a_pdf_of_a4_sheets() {
     }
     let home = tempfile::tempdir().unwrap();
     let path = home.path().join("report.pdf");
-    let printed = report(&[], &[("--pdf", &path)]);
+    let printed = report(&[], &[("--pdf", path.as_path())]);
     assert_eq!(printed.status.code(), Some(0), "{}", printed.said);
     let pdf = std::fs::read(&path).unwrap();
     assert!(pdf.starts_with(b"%PDF-"));
