@@ -30,7 +30,7 @@ pub struct LaunchNode {
 }
 
 /// Nodes of a scenario, each with threads and sockets of its own: a cell has some fifteen.
-const NODES: Bound = Bound::at_most(100);
+const NODE_COUNT: Bound = Bound::at_most(100);
 /// Parameters and parameter files of one node, which become its command line.
 const PARAMETERS: Bound = Bound::at_most(1_000);
 
@@ -114,7 +114,7 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<LaunchNode>> {
         );
     }
     let elements = || root.children().filter(roxmltree::Node::is_element);
-    NODES.check_amount(|| "<launch>".to_owned(), "nodes", elements().count())?;
+    NODE_COUNT.check_amount(|| "<launch>".to_owned(), "nodes", elements().count())?;
     let mut nodes = Vec::new();
     for child in elements() {
         let place = document.text_pos_at(child.range().start);

@@ -39,7 +39,7 @@ const ALONE: [&str; 8] = [
 /// Longest time that it may take.
 const LONGEST: Duration = Duration::from_secs(60);
 /// How often it is looked at.
-const BETWEEN: Duration = Duration::from_millis(50);
+const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 /// Most letters of its messages that an error has.
 const MOST_MESSAGE: usize = 300;
 /// Most bytes of its messages that are read.
@@ -209,7 +209,7 @@ fn wait(mut child: Child, longest: Duration, name: &str) -> Result<std::process:
                 longest.as_secs()
             );
         }
-        std::thread::sleep(BETWEEN);
+        std::thread::sleep(BETWEEN_LOOKS);
     }
 }
 

@@ -28,7 +28,7 @@ pub const UNMAPPED_LIMIT: usize = 40;
 pub const VALUE_LIMIT: usize = 65_536;
 
 /// Keys of which something is kept: those of the mapping, and conditions that nobody described up to this many.
-const KEY_LIMIT: usize = 4096;
+const ALARM_KEY_LIMIT: usize = 4096;
 
 /// What is kept of one key of the mapping.
 #[derive(Clone, Debug)]
@@ -241,8 +241,8 @@ impl Values {
             let name = crate::mapping::name_of(&observation.key);
             let machine_at = self.clock.stamp(observation.time, received_at);
             self.told += 1;
-            let has_room =
-                self.channels.len() < KEY_LIMIT || self.channels.contains_key(&observation.key);
+            let has_room = self.channels.len() < ALARM_KEY_LIMIT
+                || self.channels.contains_key(&observation.key);
             let is_kept = has_room && {
                 let channel = self
                     .channels

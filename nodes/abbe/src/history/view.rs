@@ -20,7 +20,7 @@ use crate::whole_file;
 /// Most figures whose trends are shown at once.
 const MOST_TRENDS: usize = 20;
 /// Most names that an error lists.
-const MOST_NAMES: usize = 20;
+const MOST_FIGURE_NAMES: usize = 20;
 
 /// Arguments of `abbe history` without `add`.
 #[derive(Args)]
@@ -252,11 +252,11 @@ fn few(names: &[&str]) -> String {
     }
     let listed = names
         .iter()
-        .take(MOST_NAMES)
+        .take(MOST_FIGURE_NAMES)
         .copied()
         .collect::<Vec<_>>()
         .join(", ");
-    let more = names.len().saturating_sub(MOST_NAMES);
+    let more = names.len().saturating_sub(MOST_FIGURE_NAMES);
     if more > 0 {
         format!("{listed} and {more} more")
     } else {

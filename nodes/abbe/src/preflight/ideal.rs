@@ -22,7 +22,7 @@ const IDEAL_TEMPERATURE_DEGC: f64 = 20.0;
 /// Half the thickness that a wall or plate is given, and half the height of a bore or boss, mm.
 const HALF_WALL_MM: f64 = 5.0;
 /// Distance from a surface within which every period is looked at, mm.
-const MARGIN_MM: f64 = 0.5;
+const IDEAL_MARGIN_MM: f64 = 0.5;
 /// Halvings of the period in which a contact is looked for.
 const HALVINGS: u32 = 24;
 
@@ -222,7 +222,7 @@ impl IdealMachine {
         self.clear_mm = if self.turns {
             0.0
         } else {
-            (gap_mm.abs() - MARGIN_MM).max(0.0)
+            (gap_mm.abs() - IDEAL_MARGIN_MM).max(0.0)
         };
         let closed = gap_mm <= 0.0;
         if closed == self.closed {

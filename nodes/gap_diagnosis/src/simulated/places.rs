@@ -28,7 +28,7 @@ use crate::preflight::ROTARY_ARM_MM;
 /// A place within it of a reading is at the reading, mm.
 const NEAR_MM: f64 = 0.05;
 /// How far a place may be off the way between two readings, share of that way: that of an arc of 14 degrees over its chord.
-const BOW: f64 = 0.03;
+const STEP_BOW: f64 = 0.03;
 /// Readings further apart than this many of the usual spacing have nothing between them.
 const MOST_SPACINGS: f64 = 3.0;
 /// Ways between readings that are tried onwards before all are.
@@ -257,7 +257,7 @@ impl Path {
         let foot = share.clamp(0.0, 1.0);
         let off: [f64; 6] = std::array::from_fn(|k| there[k] - along[k] * foot);
         let off_mm = dot(&off, &off).sqrt();
-        if before_mm.max(beyond_mm) > NEAR_MM || off_mm > NEAR_MM + BOW * way_mm {
+        if before_mm.max(beyond_mm) > NEAR_MM || off_mm > NEAR_MM + STEP_BOW * way_mm {
             return Err(Reason::OffPath);
         }
         let goes = [a, b].map(|end| end.goes_as(place));

@@ -16,7 +16,7 @@ use metrology::{Axis, PerAxis};
 /// Share of the travel of Z below its top at which everything else moves.
 const CLEAR: f64 = 0.05;
 /// Share of the travel that a warming axis leaves at each end.
-const MARGIN: f64 = 0.1;
+const WARMING_MARGIN: f64 = 0.1;
 /// Share of its greatest feed at which an axis warms.
 const WARM: f64 = 0.5;
 /// Share of its greatest speed at which the spindle warms.
@@ -36,7 +36,7 @@ fn lift(machine: &MachineFile) -> String {
 pub fn warm(machine: &MachineFile, axis: Axis) -> Option<String> {
     let entry = machine.linear(axis)?;
     let [low, high] = entry.travel_mm;
-    let margin_mm = MARGIN * (high - low);
+    let margin_mm = WARMING_MARGIN * (high - low);
     let feed_mm_min = WARM * entry.feed_limit_mm_min;
     let (low, high) = (low + margin_mm, high - margin_mm);
     Some(format!(

@@ -13,9 +13,9 @@ use crate::evaluate::circles::plane_axes;
 /// Lengths of a bar, mm; the longest that fits is used.
 const LENGTHS_MM: [f64; 4] = [300.0, 150.0, 100.0, 50.0];
 /// Feeds, mm/min.
-const FEEDS_MM_MIN: [f64; 2] = [1000.0, 3000.0];
+const BAR_FEEDS_MM_MIN: [f64; 2] = [1000.0, 3000.0];
 /// Way that the circle leaves at each end of a travel, mm.
-const MARGIN_MM: f64 = 10.0;
+const BAR_MARGIN_MM: f64 = 10.0;
 
 pub(super) fn offers(machine: &MachineFile) -> Vec<Offer> {
     let planes = [TestPlane::Xy, TestPlane::Yz, TestPlane::Zx];
@@ -37,7 +37,7 @@ fn bar(machine: &MachineFile, plane: TestPlane) -> Option<(String, Bar)> {
             let entry = machine.linear(*axis);
             entry.is_some_and(|entry| {
                 let half_mm = 0.5 * (entry.travel_mm[1] - entry.travel_mm[0]);
-                radius_mm + MARGIN_MM <= half_mm
+                radius_mm + BAR_MARGIN_MM <= half_mm
             })
         })
     };
@@ -79,5 +79,5 @@ fn in_plane(machine: &MachineFile, words: &str, bar: &Bar) -> Vec<Offer> {
         offer.bar = Some(bar);
         Some(offer)
     };
-    FEEDS_MM_MIN.into_iter().filter_map(offer).collect()
+    BAR_FEEDS_MM_MIN.into_iter().filter_map(offer).collect()
 }

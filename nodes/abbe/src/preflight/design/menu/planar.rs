@@ -13,7 +13,7 @@ const MOST_PLACEMENTS: usize = 4;
 /// Radii as shares of the plate's.
 const RADII: [f64; 2] = [0.45, 0.75];
 /// Feeds of circles, mm/min; at all but the first placement the first two.
-const FEEDS_MM_MIN: [f64; 3] = [1500.0, 3000.0, 6000.0];
+const PLANAR_FEEDS_MM_MIN: [f64; 3] = [1500.0, 3000.0, 6000.0];
 /// Feeds of lines, mm/min.
 const LINE_FEEDS_MM_MIN: [f64; 2] = [1000.0, 4000.0];
 /// Half of a line, as a share of the plate's radius.
@@ -53,7 +53,7 @@ fn at(grid: &GridEncoderEntry, placement: &GridPlacement, is_first: bool) -> Vec
     let n_feeds = if is_first { 3 } else { 2 };
     let mut all = Vec::new();
     for radius_mm in RADII.map(|share| (share * grid.radius_mm).round().max(1.0)) {
-        for feed in FEEDS_MM_MIN.into_iter().take(n_feeds) {
+        for feed in PLANAR_FEEDS_MM_MIN.into_iter().take(n_feeds) {
             let title = format!(
                 "circle R{} F{} both senses on the grid at {id}",
                 short(radius_mm),

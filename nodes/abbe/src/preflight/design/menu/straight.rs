@@ -11,9 +11,9 @@ const MOST_BEAMS: usize = 6;
 /// Numbers of targets of a positioning run.
 const TARGETS: [u32; 2] = [9, 21];
 /// Feeds of scans, mm/min.
-const FEEDS_MM_MIN: [f64; 2] = [1000.0, 4000.0];
+const STRAIGHT_FEEDS_MM_MIN: [f64; 2] = [1000.0, 4000.0];
 /// Way of a beam at each end that a run leaves, as a share of it, and at most, mm.
-const MARGIN: (f64, f64) = (0.12, 60.0);
+const END_MARGIN: (f64, f64) = (0.12, 60.0);
 /// How much of that margin the axis overruns its outer targets.
 const OVERRUN: f64 = 0.6;
 
@@ -36,7 +36,7 @@ fn along(beam: &BeamEntry) -> Vec<Offer> {
     };
     let ends = [beam.from_mm[axis.index()], beam.to_mm[axis.index()]];
     let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-    let margin_mm = (MARGIN.0 * (high - low)).min(MARGIN.1);
+    let margin_mm = (END_MARGIN.0 * (high - low)).min(END_MARGIN.1);
     let (from_mm, to_mm) = (low + margin_mm, high - margin_mm);
     let overrun_mm = OVERRUN * margin_mm;
     let run = |what: &str, targets: u32, rest: &str, feed: f64| {
@@ -53,7 +53,7 @@ fn along(beam: &BeamEntry) -> Vec<Offer> {
         let step = run("positioning", targets, "dwell_s: 1.0, ", 3000.0);
         all.push(Offer::new(title, &set_up, step));
     }
-    for feed in FEEDS_MM_MIN {
+    for feed in STRAIGHT_FEEDS_MM_MIN {
         let title = format!(
             "scan {axis} F{} there and back along beam {id}",
             short(feed)
