@@ -4,7 +4,7 @@ use anyhow::Result;
 use gap_diagnosis::design::{Aimed, Design, Remedy, Rung};
 use maud::html;
 
-use super::{maybe, name, section, three};
+use super::{name, section, three};
 use crate::report::Report;
 use crate::report::plot::{self, Plot, Trace};
 use crate::report::section::{Drawing, Section};
@@ -138,10 +138,8 @@ fn sizes(design: &Design) -> Section {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let row = |one: &Aimed| {
         let mut row = vec![name(&one.effect, &one.axis)];
-        row.extend(one.named_from.iter().map(|from| match from {
-            Some(_) => maybe(*from),
-            None => "never".to_owned(),
-        }));
+        let sizes = one.named_from.iter();
+        row.extend(sizes.map(|from| from.map_or_else(|| "never".to_owned(), three)));
         row.extend([three(one.stated), one.parameter.clone()]);
         row
     };

@@ -20,7 +20,7 @@ const BAR_MARGIN_MM: f64 = 10.0;
 pub(super) fn offers(machine: &MachineFile) -> Vec<Offer> {
     let planes = [TestPlane::Xy, TestPlane::Yz, TestPlane::Zx];
     let bars = planes.into_iter().filter_map(|plane| bar(machine, plane));
-    bars.flat_map(|(words, bar)| in_plane(machine, &words, &bar))
+    bars.flat_map(|(words, bar): (String, Bar)| in_plane(machine, &words, &bar))
         .collect()
 }
 
