@@ -288,8 +288,14 @@ mod tests {
     fn more_than_a_hundred_questions_are_refused_before_the_plan_is_read() {
         for (want, offsets, option) in [(101, 1, "--want"), (1, 101, "--head-offset")] {
             let preflight = Preflight {
-                what: "no such plan".into(),
+                what: Some("no such plan".into()),
                 machine: None,
+                design: false,
+                minutes: 20.0,
+                with: Vec::new(),
+                mounting: Vec::new(),
+                likely: None,
+                out: None,
                 want: vec!["EXX".to_owned(); want],
                 head_offset: vec![Vector3::zeros(); offsets],
                 station_uncertainty_um: 0.1,
