@@ -40,7 +40,7 @@ fn val_numpy_polyfit_without_uncertainties() {
     for (value, expected) in [
         (trend.mean_value, 4.8),
         (trend.slope_per_s, 9.215_738_729_757_113e-8),
-        (trend.mean_standard_uncertainty, 0.065_158_839_049_616_84),
+        (trend.mean_standard_uncertainty, 0.065_158_838_969_616_84),
         (
             trend.slope_standard_uncertainty_per_s,
             1.236_306_597_636_898_4e-8,
