@@ -94,6 +94,12 @@ fn scenario_a_report_without_a_machine_is_not_kept_and_nothing_is_made_without_k
     let nameless = report(&["--keep"], &[("--store", store.as_path())]);
     assert_eq!(nameless.status.code(), Some(1), "{}", nameless.said);
     assert!(nameless.said.contains("--kept-as"), "{}", nameless.said);
+    // The table alone has no date: it is asked for, and 1970 is none.
+    let csv = table("csv");
+    let undated = ["report", csv.to_str().unwrap(), "--keep", "--kept-as", "m"];
+    let refused = ran(&undated, &[("--store", store.as_path())]);
+    assert_eq!(refused.status.code(), Some(1), "{}", refused.said);
+    assert!(refused.said.contains("--kept-at"), "{}", refused.said);
     let plain = report(&[], &[]);
     assert_eq!(plain.status.code(), Some(0), "{}", plain.said);
     assert!(!store.exists());

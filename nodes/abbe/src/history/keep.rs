@@ -8,6 +8,7 @@ use history::{Added, Entry, Figure, Kind, Store, gap_figures, report_figures};
 use node_runtime::complain;
 use serde_json::Value;
 
+use super::dates::{Moment, moment};
 use super::open_to_write;
 use super::origin::Origin;
 
@@ -20,6 +21,9 @@ pub struct Keep {
     /// Name of the machine in the history; without it that of its machine file.
     #[arg(long, value_name = "MACHINE", requires = "keep")]
     kept_as: Option<String>,
+    /// Time of the measurement, for a table without one: 2026-03-01 or 2026-03-01T12:00:00Z.
+    #[arg(long, value_name = "DATE", requires = "keep", value_parser = moment)]
+    kept_at: Option<Moment>,
     /// File of the history; without it `~/.local/share/abbe/history.sqlite`.
     #[arg(long, value_name = "FILE", requires = "keep")]
     store: Option<PathBuf>,
@@ -56,6 +60,7 @@ impl Keep {
     fn named(&self, origin: Origin) -> Origin {
         Origin {
             machine: self.kept_as.clone().or(origin.machine),
+            at_s: self.kept_at.map(|at| at.begin_s).or(origin.at_s),
             ..origin
         }
     }
@@ -80,7 +85,9 @@ pub fn entry(kind: Kind, figures: Vec<Figure>, origin: Origin) -> Result<Entry> 
         )
     })?;
     let at_s = origin.at_s.ok_or_else(|| {
-        anyhow!("{source}: has no time of a test: add its report with `abbe history add --at DATE`")
+        anyhow!(
+            "{source}: has no time of a test: state it with --kept-at DATE (`abbe history add`: --at)"
+        )
     })?;
     Ok(Entry {
         machine,

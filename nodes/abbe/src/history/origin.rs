@@ -12,6 +12,8 @@ use sha2::{Digest, Sha256};
 use crate::diagnose::bags;
 use crate::evaluate::test_conditions::TestConditions;
 
+/// A time before 1971 is that of a table whose begin nobody stated, s since 1970.
+const FIRST_DATED_S: i64 = 365 * 86_400;
 /// The attachment that holds the machine file of a recording.
 const MACHINE: &str = "machine.yaml";
 
@@ -118,19 +120,18 @@ impl Origin {
 
     /// With what the conditions of a report state, where it is not known.
     pub fn with_conditions(mut self, conditions: &Value) -> Self {
-        let stated = |value: &Value| match value {
+        self.instruments = match &conditions["instruments"] {
             Value::Array(all) if all.is_empty() => String::new(),
             Value::Null => String::new(),
             other => other.to_string(),
         };
-        self.instruments = stated(&conditions["instruments"]);
         if let Some(operator) = conditions["operator"].as_str() {
             operator.clone_into(&mut self.operator);
         }
         self.at_s = self.at_s.or_else(|| {
             let begin = conditions["begin"].as_str()?.strip_suffix(" UTC")?;
             let time = chrono::NaiveDateTime::parse_from_str(begin, "%Y-%m-%d %H:%M:%S").ok()?;
-            Some(time.and_utc().timestamp())
+            dated(time.and_utc().timestamp())
         });
         self
     }
@@ -139,7 +140,12 @@ impl Origin {
 /// Begin of the first test of a bag, s since 1970.
 fn begin_s(bag: &Bag) -> Option<i64> {
     let (first, _) = TestConditions::of(bag).between?;
-    Some(first.nanos().div_euclid(1_000_000_000))
+    dated(first.nanos().div_euclid(1_000_000_000))
+}
+
+/// A time, unless it only stands in for one that is not known.
+fn dated(at_s: i64) -> Option<i64> {
+    (at_s >= FIRST_DATED_S).then_some(at_s)
 }
 
 fn hash(bytes: &[u8]) -> String {
@@ -202,6 +208,8 @@ mod tests {
             origin.instruments
         );
         assert_eq!(origin.sha256.len(), 64);
+        let undated = json!({"begin": "1970-01-01 00:00:05 UTC"});
+        assert_eq!(Origin::default().with_conditions(&undated).at_s, None);
         let nothing = Origin::default().with_conditions(&Value::Null);
         assert_eq!(nothing, Origin::default());
     }

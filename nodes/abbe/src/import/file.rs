@@ -7,15 +7,14 @@ use anyhow::{Context, Result, bail};
 use calamine::{DataRef, ExcelDateTime, Reader, Xlsx};
 use node_runtime::text_file::{self, Comments};
 
-use super::sheet::Sheet;
+use super::sheet::{MOST_COLUMNS, Sheet};
 
 /// Begin of a ZIP archive, which an xlsx file is.
 const ZIP: &[u8] = b"PK\x03\x04";
 /// Begin of the files of older spreadsheet programs (xls).
 const OLD: &[u8] = &[0xD0, 0xCF, 0x11, 0xE0];
-/// Most rows and columns of a worksheet that are read, and most cells in all.
+/// Most rows of a worksheet that are read, and most cells in all.
 const MAX_WORKSHEET_ROWS: u32 = 1_000_000;
-const MOST_COLUMNS: u32 = 1_000;
 const MOST_CELLS: usize = 8_000_000;
 /// Longest file of a worksheet, bytes: it is packed.
 const MAX_WORKSHEET_BYTES: usize = 32 << 20;

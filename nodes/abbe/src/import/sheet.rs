@@ -2,6 +2,9 @@
 
 use anyhow::{Context, Result, bail};
 
+/// Most columns of a table that are read.
+pub const MOST_COLUMNS: u32 = 1_000;
+
 /// Lines of cells, with the number of each line in its file, from 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sheet {
@@ -29,6 +32,12 @@ impl Sheet {
         for record in reader.records() {
             let record = record?;
             let line = record.position().map_or(0, csv::Position::line);
+            if record.len() > MOST_COLUMNS as usize {
+                bail!(
+                    "line {line}: {} columns: must be at most {MOST_COLUMNS}: take away those that hold no test",
+                    record.len()
+                );
+            }
             lines.push((line, record.iter().map(str::to_owned).collect()));
         }
         if lines.is_empty() {
@@ -61,4 +70,21 @@ impl Sheet {
 
 fn holds(cells: &[String], name: &str) -> bool {
     cells.iter().any(|cell| cell == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_more_columns_than_a_table_has_is_refused_with_its_number() {
+        let line = |columns: usize| vec!["1"; columns].join(",");
+        assert!(Sheet::of_text(&line(1_000), ',').is_ok());
+        let text = format!("a,b\n{}", line(1_001));
+        let refused = Sheet::of_text(&text, ',').unwrap_err().to_string();
+        assert!(
+            refused.starts_with("line 2: 1001 columns: must be at most 1000"),
+            "{refused}"
+        );
+    }
 }

@@ -230,9 +230,9 @@ impl Path {
         let mut lacks = Reason::OffPath;
         for way in ahead.chain(0..ways) {
             match self.between(way, place) {
-                Ok(value) => {
+                Ok(found) => {
                     self.last = way;
-                    return Ok(value);
+                    return Ok(self.nearer(way + 1, place, found));
                 }
                 Err(reason) => lacks = lacks.max(reason),
             }
@@ -240,8 +240,15 @@ impl Path {
         Err(lacks)
     }
 
-    /// (1) between a reading and the next.
-    fn between(&self, way: usize, place: &Point) -> Result<f64, Reason> {
+    /// The value found on a way, or that of the next one where the place is a little beyond the first and not beyond it.
+    fn nearer(&self, next: usize, place: &Point, (value, outside_mm): (f64, f64)) -> f64 {
+        let nearer = self.between(next, place).ok();
+        let nearer = nearer.filter(|(_, of_next_mm)| *of_next_mm < outside_mm);
+        nearer.map_or(value, |(value, _)| value)
+    }
+
+    /// (1) between a reading and the next, and how far outside of their way the place is, mm.
+    fn between(&self, way: usize, place: &Point) -> Result<(f64, f64), Reason> {
         let a = self.points.get(way).ok_or(Reason::OffPath)?;
         let b = self.points.get(way + 1).unwrap_or(a);
         let (along, there) = (a.to(b), a.to(place));
@@ -260,10 +267,12 @@ impl Path {
         if before_mm.max(beyond_mm) > NEAR_MM || off_mm > NEAR_MM + STEP_BOW * way_mm {
             return Err(Reason::OffPath);
         }
+        let outside_mm = before_mm.max(beyond_mm).max(0.0);
         let goes = [a, b].map(|end| end.goes_as(place));
         let is_wide = way_mm > MOST_SPACINGS * self.usual_mm.max(NEAR_MM);
         if goes == [true, true] && a.goes_as(b) && !is_wide {
-            return Ok(a.deviation + (b.deviation - a.deviation) * foot);
+            let value = a.deviation + (b.deviation - a.deviation) * foot;
+            return Ok((value, outside_mm));
         }
         let ends = [
             (foot * way_mm, goes[0], a),
@@ -273,7 +282,7 @@ impl Path {
             .iter()
             .filter(|(off_mm, goes, _)| *goes && *off_mm <= NEAR_MM);
         if let Some((_, _, end)) = near.next() {
-            return Ok(end.deviation);
+            return Ok((end.deviation, outside_mm));
         }
         Err(if goes == [true, true] && is_wide {
             Reason::Hole

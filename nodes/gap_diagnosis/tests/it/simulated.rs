@@ -295,7 +295,8 @@ fn no_run_in_common_is_refused_with_what_it_lacks() {
 #[test]
 fn hardly_a_reading_in_common_is_refused_with_how_many_there_are() {
     let mut simulated = REAL.made();
-    simulated.readings.truncate(FEWEST_READINGS - 2);
+    // The turn ends where it begins: its last reading is at the place of its first.
+    simulated.readings.truncate(FEWEST_READINGS - 3);
     let error = refused(vec![REAL.made()], vec![simulated]);
     let SimulatedError::TooFew { matched, of, why } = error else {
         panic!("{error}");
