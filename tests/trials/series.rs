@@ -10,6 +10,9 @@ use nix::sys::signal::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
 
+/// How long a series may take on a computer that is busy with others: trials compute, and nothing here is about how fast.
+const PATIENCE: Duration = Duration::from_secs(1_200);
+
 /// A folder that the diagnosis may look into, also where it runs as nobody.
 pub fn folder() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -40,7 +43,7 @@ fn series(folder: &Path, arguments: &[&str]) -> Command {
 /// Runs `abbe-trials` in a folder; the table, and what was said.
 pub fn run(folder: &Path, arguments: &[&str]) -> (Value, String) {
     let table = folder.join("table.json");
-    let ended = Process::start(series(folder, arguments)).ended_within(Duration::from_secs(300));
+    let ended = Process::start(series(folder, arguments)).ended_within(PATIENCE);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
     let table = serde_json::from_str(&std::fs::read_to_string(table).unwrap()).unwrap();
     (table, ended.said)
@@ -98,8 +101,7 @@ fn a_series_whose_d_was_of_another_measure_is_neither_gone_on_with_nor_tabulated
             },
         )
         .unwrap();
-        let ended = Process::start(series(folder.path(), &arguments))
-            .ended_within(Duration::from_secs(300));
+        let ended = Process::start(series(folder.path(), &arguments)).ended_within(PATIENCE);
         assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
         assert!(
             ended.said.contains("of the measures 1 and 2"),
@@ -133,9 +135,9 @@ fn a_series_that_was_killed_goes_on_and_judges_no_trial_twice() {
         "3",
     ];
     let process = Process::start(series(folder.path(), &arguments));
-    let end = Instant::now() + Duration::from_secs(120);
+    let end = Instant::now() + PATIENCE;
     while lines(folder.path()) < 1 {
-        assert!(Instant::now() < end, "no trial in two minutes");
+        assert!(Instant::now() < end, "no trial in {PATIENCE:?}");
         std::thread::sleep(Duration::from_millis(50));
     }
     process.signal(Signal::SIGKILL);

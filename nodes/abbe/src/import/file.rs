@@ -223,4 +223,16 @@ mod tests {
         assert!(said.contains("save it as xlsx or as CSV"), "{said}");
         assert!(file("a.xlsx", b"PK\x03\x04 and no archive").is_err());
     }
+
+    #[test]
+    fn a_line_of_more_columns_than_a_table_has_is_refused_with_its_number() {
+        let line = |columns: usize| vec!["1"; columns].join(",");
+        assert!(Sheet::of_text(&line(1_000), ',').is_ok());
+        let text = format!("a,b\n{}", line(1_001));
+        let refused = Sheet::of_text(&text, ',').unwrap_err().to_string();
+        assert!(
+            refused.starts_with("line 2: 1001 columns: must be at most 1000"),
+            "{refused}"
+        );
+    }
 }

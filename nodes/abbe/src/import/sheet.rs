@@ -71,20 +71,3 @@ impl Sheet {
 fn holds(cells: &[String], name: &str) -> bool {
     cells.iter().any(|cell| cell == name)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_line_of_more_columns_than_a_table_has_is_refused_with_its_number() {
-        let line = |columns: usize| vec!["1"; columns].join(",");
-        assert!(Sheet::of_text(&line(1_000), ',').is_ok());
-        let text = format!("a,b\n{}", line(1_001));
-        let refused = Sheet::of_text(&text, ',').unwrap_err().to_string();
-        assert!(
-            refused.starts_with("line 2: 1001 columns: must be at most 1000"),
-            "{refused}"
-        );
-    }
-}
