@@ -24,7 +24,7 @@ const IMPURE: [&str; 12] = [
 ];
 
 /// What nodes share.
-const VOCABULARY: [&str; 3] = ["metrology", "machine", "machine_report"];
+const VOCABULARY: [&str; 2] = ["metrology", "machine"];
 
 /// Who composes nodes.
 const COMPOSERS: [&str; 2] = ["abbe", "abbe_tests"];

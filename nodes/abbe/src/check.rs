@@ -23,11 +23,10 @@ use crate::tell::tell;
 use crate::usage;
 
 /// Nodes whose messages are what a replay puts in.
-const SOURCE_NODES: [&str; 5] = [
+const SOURCE_NODES: [&str; 4] = [
     "fake_cnc",
     "linuxcnc_bridge",
     "mtconnect_bridge",
-    "opcua_bridge",
     "sequencer",
 ];
 
