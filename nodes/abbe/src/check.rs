@@ -52,8 +52,8 @@ impl Check {
     /// log times leap, and nothing differs before that.
     ///
     /// # Errors
-    /// When the bag cannot be read or is none of a run in simulated time; with exit code 2 where there are too many
-    /// `--resume-after`.
+    /// When the bag cannot be read, or was not recorded by a run in simulated time. With exit code 2 for more than 100
+    /// values of `--resume-after`.
     pub fn execute(self) -> Result<ExitCode> {
         let place = || "--resume-after".to_owned();
         RELAYS

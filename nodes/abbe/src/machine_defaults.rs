@@ -108,7 +108,7 @@ pub fn of_diagnosis(
     among(left_out, &used)
 }
 
-/// A sentence that names the defaults in use; none where there are none.
+/// A sentence that names the defaults in use; `None` without defaults.
 #[must_use]
 pub fn in_words(used: &[String]) -> Option<String> {
     let all = used.join(", ");

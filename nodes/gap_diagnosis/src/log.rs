@@ -38,8 +38,8 @@ use metrology::sample::{TestKind, TestSegment};
 
 use crate::rows::{Block, count, time_s};
 
-/// What repeats of a log are taken to differ by where there are none, µm (the repeatability of ISO 230-2 and -4 is 0.2 to
-/// 0.5).
+/// Difference between repeats that is assumed for a log without repeats, µm (the repeatability of ISO 230-2 and -4 is
+/// 0.2 to 0.5).
 pub const ASSUMED_BETWEEN_UM: f64 = 0.35;
 /// Logs that last longer than this repeat each other only where they are heated alike, s.
 pub const LONG_S: f64 = 600.0;

@@ -244,7 +244,7 @@ fn write_secret(path: &Path, bytes: &[u8]) -> Result<()> {
     whole(path, file.write_all(bytes))
 }
 
-/// Removes what could not be written whole: half a key or certificate is none.
+/// Removes what could not be written whole: half a key or certificate cannot be used.
 fn whole(path: &Path, written: std::io::Result<()>) -> Result<()> {
     if written.is_err() {
         let _ = fs::remove_file(path);

@@ -69,7 +69,7 @@ fn moving_in(run: &Run, extents: &PerAxis<[f64; 2]>) -> AxisSet {
     run.motion.axes.iter().filter(moves).collect()
 }
 
-/// Least and greatest position of each axis over the readings of a run that are no touches; nothing where there are none.
+/// Least and greatest position of each axis over the readings of a run, touches left out; +∞ and -∞ without readings.
 fn extents(run: &Run) -> PerAxis<[f64; 2]> {
     let mut all = PerAxis([[f64::INFINITY, f64::NEG_INFINITY]; 6]);
     let along = run.readings.iter();

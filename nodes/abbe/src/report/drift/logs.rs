@@ -99,7 +99,9 @@ fn too_short(recorded_s: f64) -> String {
     )
 }
 
-/// The figures of displacements (s since the first, mm), or why there are none; the parts of U with a budget alone.
+/// The figures of displacements (s since the first, mm), or the reason why they cannot be computed.
+///
+/// The parts of U need a budget.
 fn evaluated(
     log: &DriftLog,
     values: &[(f64, f64)],
