@@ -24,7 +24,13 @@ const IMPURE: [&str; 12] = [
 ];
 
 /// What nodes share.
-const VOCABULARY: [&str; 2] = ["metrology", "machine"];
+const VOCABULARY: [&str; 4] = ["metrology", "machine", "twin", "control_tables"];
+
+/// Libraries that are not for every node, with the only crates that may depend on each.
+const USERS: [(&str, &[&str]); 2] = [
+    ("twin", &["gap_diagnosis", "abbe", "abbe_trials"]),
+    ("control_tables", &["abbe"]),
+];
 
 /// Who composes nodes.
 const COMPOSERS: [&str; 2] = ["abbe", "abbe_tests"];
@@ -161,5 +167,43 @@ fn arch_no_node_depends_on_another_and_only_abbe_on_shells() {
             "nodes/libraries/machine: depends on node probe",
             "nodes/libraries/node_runtime: depends on shell probe_node: only nodes/abbe composes nodes",
         ]
+    );
+}
+
+fn not_for(members: &[Package]) -> Vec<String> {
+    let mut found = Vec::new();
+    for member in members {
+        for (library, users) in USERS {
+            let is_needed = member.needs().any(|need| need == library);
+            if is_needed && !users.contains(&member.name.as_str()) {
+                found.push(format!(
+                    "{}: depends on {library}: only {} may",
+                    member.folder(),
+                    users.join(", ")
+                ));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn arch_libraries_are_used_by_those_they_are_for() {
+    let members = packages::members();
+    for (library, users) in USERS {
+        for user in users {
+            let has = |member: &Package| member.needs().any(|need| need == library);
+            let is_user = |member: &&Package| member.name == *user;
+            assert!(members.iter().find(is_user).is_some_and(has), "{user}");
+        }
+    }
+    check(&not_for(&members));
+    let bad = [
+        packages::example("nodes/libraries/machine", &["twin"]),
+        packages::example("nodes/gap_diagnosis", &["twin"]),
+    ];
+    assert_eq!(
+        not_for(&bad),
+        ["nodes/libraries/machine: depends on twin: only gap_diagnosis, abbe, abbe_trials may"]
     );
 }

@@ -129,7 +129,10 @@ fn arch_topic_names_exist_in_one_file() {
     );
 }
 
-/// What plant and trials may take from `machine`: the file that names its axes, never a formula.
+/// The libraries with a model of the machine.
+const MODELS: [&str; 2] = ["machine::", "twin::"];
+
+/// What plant and trials may take from them: the file that names the machine's axes, never a formula.
 const DATA: [&str; 3] = [
     "machine::MachineFile",
     "machine::MachineFileError",
@@ -140,7 +143,7 @@ fn borrowed_formulas(path: &str, source: &Source) -> Vec<String> {
     let of_machine = source
         .paths
         .iter()
-        .filter(|found| found.text.starts_with("machine::"));
+        .filter(|found| MODELS.iter().any(|model| found.text.starts_with(model)));
     let formulas = of_machine.filter(|found| {
         let is = |data: &&str| found.text == **data || found.text.starts_with(&format!("{data}::"));
         !DATA.iter().any(is)
@@ -167,9 +170,14 @@ fn arch_the_plant_shares_no_formula_with_the_machine() {
             .flat_map(|(path, source)| borrowed_formulas(path, source))
             .collect::<Vec<_>>(),
     );
-    let bad = Source::parse("use machine::{MachineFile, chain::Chain, file::AxisEntry};");
+    let bad = Source::parse(
+        "use machine::{MachineFile, chain::Chain, file::AxisEntry};\nuse twin::effects::backlash;",
+    );
     assert_eq!(
         borrowed_formulas("a.rs", &bad),
-        ["a.rs:1: machine::chain::Chain: the plant has formulas of its own"]
+        [
+            "a.rs:1: machine::chain::Chain: the plant has formulas of its own",
+            "a.rs:2: twin::effects::backlash: the plant has formulas of its own",
+        ]
     );
 }

@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
 /// Crates without clock, file, environment, entropy, log or ROS.
-pub const PURE: [&str; 14] = [
+pub const PURE: [&str; 16] = [
     "metrology",
     "machine",
+    "twin",
+    "control_tables",
     "machine_frames",
     "probe",
     "host_clock",

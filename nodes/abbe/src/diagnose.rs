@@ -11,10 +11,10 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use gap_diagnosis::{Diagnosis, GapConfig, Rule, diagnose};
 use machine::MachineFile;
-use machine::effects::CATALOGUE;
 use recorder::Bag;
 use replayer::Reading;
 use sha2::{Digest, Sha256};
+use twin::effects::CATALOGUE;
 
 use crate::evaluate::budget::Budget;
 use crate::evaluate::test_conditions::TestConditions;

@@ -7,8 +7,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use machine::export::selection::{Selected, Wanted, select};
-use machine::export::{ExportFile, Unestimable};
+use control_tables::selection::{Selected, Wanted, select};
+use control_tables::{ExportFile, Unestimable};
 use metrology::{Axis, AxisSet, PerAxis};
 use recorder::Bag;
 

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use gap_diagnosis::report::GapReport;
 use machine::MachineFile;
-use machine::twin::{Channel, Session};
 use metrology::{Axis, yaml};
 use serde_json::Value;
+use twin::{Channel, Session};
 
 use crate::evaluate::Tests;
 use crate::report::positioning::axes_along;

@@ -14,10 +14,10 @@ use gap_diagnosis::regression::{Regression, regression};
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use gap_diagnosis::{GapConfig, GapReport, Rule, diagnose};
 use machine::MachineFile;
-use machine::twin::Session;
 use node_runtime::text_file;
 use trials::baseline::{self, Names};
 use trials::{Method, Rig, Sample, measure};
+use twin::Session;
 
 use crate::later;
 use abbe::diagnose::bags::Recorded;

@@ -13,9 +13,9 @@
 use anyhow::Result;
 use gap_diagnosis::{GapConfig, diagnose};
 use machine::MachineFile;
-use machine::effects::CATALOGUE;
-use machine::twin::Session;
 use trials::Rig;
+use twin::Session;
+use twin::effects::CATALOGUE;
 
 use crate::blind;
 

@@ -16,8 +16,8 @@
 
 use std::collections::BTreeMap;
 
-use machine::effects::{Parameter, Target};
 use metrology::Axis;
+use twin::effects::{Parameter, Target};
 
 use crate::isolability;
 use crate::normal::Normal;

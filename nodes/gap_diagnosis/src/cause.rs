@@ -7,10 +7,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::effects::{Kind, Moment, Parameter, Role};
 use machine::file::EffectEntry;
-use machine::twin::Channel;
 use nalgebra::DVector;
+use twin::Channel;
+use twin::effects::{Kind, Moment, Parameter, Role};
 
 use crate::aside;
 use crate::config::GapConfig;

@@ -82,7 +82,7 @@ pub fn check(
 mod tests {
     use super::*;
     use crate::families::{Family, Parity};
-    use machine::twin::Channel;
+    use twin::Channel;
 
     fn slot(rows: usize, columns: &[DVector<f64>]) -> Slot {
         let basis = orthonormal(rows, columns.iter().cloned());

@@ -24,10 +24,10 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::Channel;
 use rand::{Rng, SeedableRng};
 use rand_distr::{ChiSquared, Distribution};
 use rand_pcg::Pcg64Mcg;
+use twin::Channel;
 
 use crate::bootstrap;
 use crate::config::GapConfig;

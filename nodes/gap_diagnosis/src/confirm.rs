@@ -23,10 +23,10 @@
 
 use std::collections::BTreeMap;
 
-use machine::effects::Kind;
-use machine::twin::Run;
 use metrology::sample::Sense;
 use nalgebra::{DMatrix, DVector};
+use twin::Run;
+use twin::effects::Kind;
 
 use crate::config::GapConfig;
 use crate::field;
@@ -395,7 +395,7 @@ mod tests {
     fn stamps_may_be_late_by_half_more_or_less_and_a_play_has_one_width() {
         let mut config = GapConfig::default();
         let holds = |config: &GapConfig, id: &str, spread: f64| {
-            Limits::of(config, machine::effects::kind(id).unwrap()).hold(6.0, spread)
+            Limits::of(config, twin::effects::kind(id).unwrap()).hold(6.0, spread)
         };
         assert!(holds(&config, "clock_offset", 0.4));
         assert!(!holds(&config, "clock_offset", 0.6));

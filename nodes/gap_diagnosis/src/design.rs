@@ -43,10 +43,10 @@ mod separability;
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
-use machine::effects::{self, Kind, Moment};
-use machine::twin::{Channel, Instrument, Session, Twin};
 use nalgebra::DMatrix;
 use serde::Serialize;
+use twin::effects::{self, Kind, Moment};
+use twin::{Channel, Instrument, Session, Twin};
 
 use crate::config::GapConfig;
 use crate::diagnose::considered;

@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
-use machine::effects::{self, CATALOGUE, Effect, Kind, Moment};
 use machine::file::EffectEntry;
-use machine::twin::{Channel, Session, Twin, simulate};
+use twin::effects::{self, CATALOGUE, Effect, Kind, Moment};
+use twin::{Channel, Session, Twin, simulate};
 
 use crate::cause::Found;
 use crate::config::GapConfig;

@@ -54,5 +54,5 @@ pub enum GapError {
     Rule { name: String },
     /// The twin cannot simulate it.
     #[error(transparent)]
-    Twin(#[from] machine::twin::TwinError),
+    Twin(#[from] twin::TwinError),
 }

@@ -6,9 +6,9 @@
 pub(crate) mod course;
 pub(crate) mod library;
 
-use machine::twin::Instrument;
 use metrology::Axis;
 use metrology::sample::{Sense, TestPlane};
+use twin::Instrument;
 
 use crate::nuisance::plane_name;
 

@@ -21,11 +21,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::FRAC_PI_2;
 
-use machine::twin::simulate::plate_axes;
-use machine::twin::{Channel, Run};
 use metrology::Axis;
 use metrology::sample::Sense;
 use nalgebra::{DMatrix, DVector};
+use twin::simulate::plate_axes;
+use twin::{Channel, Run};
 
 use crate::field::{self, Place};
 use crate::nuisance::{orthonormal, plane_name};
@@ -289,8 +289,7 @@ fn of_touch(samples: &[Sample<'_>]) -> Vec<Basis> {
         return vec![];
     }
     let angle = |k: usize, turn: f64| -> Vec<f64> {
-        let wave =
-            |t: &machine::twin::Touch| (t.approach.y.atan2(t.approach.x) * count(k) - turn).cos();
+        let wave = |t: &twin::Touch| (t.approach.y.atan2(t.approach.x) * count(k) - turn).cos();
         touches.iter().map(wave).collect()
     };
     let waves = (1..=4)

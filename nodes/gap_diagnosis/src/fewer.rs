@@ -18,7 +18,7 @@
 //! # Holds when
 //! Conditions are few against runs: each keeps three runs.
 
-use machine::twin::Session;
+use twin::Session;
 
 use crate::config::GapConfig;
 use crate::log;

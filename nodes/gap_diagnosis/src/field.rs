@@ -24,10 +24,10 @@
 //! \[1\] ISO 230-4:2022 (repeats of a circular test differ). \[2\] C. E. Rasmussen, C. K. I. Williams,
 //! Gaussian Processes for Machine Learning, MIT Press 2006, 4.2 (squared exponential).
 
-use machine::twin::simulate::plate_axes;
-use machine::twin::{Channel, Run};
 use metrology::Axis;
 use nalgebra::DMatrix;
+use twin::simulate::plate_axes;
+use twin::{Channel, Run};
 
 use crate::rows::{Block, Row, count, position, time_s};
 

@@ -17,8 +17,8 @@
 //! # References
 //! \[1\] J. A. Hausman, Econometrica 46, 1978 (the variance of a difference of two estimates, one efficient).
 
-use machine::effects::Role;
 use nalgebra::DVector;
+use twin::effects::Role;
 
 use crate::refit::{self, Estimate};
 use crate::signature::{Form, Library};

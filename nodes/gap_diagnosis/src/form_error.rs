@@ -39,8 +39,8 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::{Channel, Run, Session};
 use nalgebra::DMatrix;
+use twin::{Channel, Run, Session};
 
 use crate::config::GapConfig;
 use crate::field::{Mode, Smooth};

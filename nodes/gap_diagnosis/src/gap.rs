@@ -13,7 +13,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::twin::Channel;
+use twin::Channel;
 
 use crate::field::{self, Mode};
 use crate::noise::Noise;

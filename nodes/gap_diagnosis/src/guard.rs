@@ -32,8 +32,8 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::Channel;
 use nalgebra::DVector;
+use twin::Channel;
 
 use crate::config::GapConfig;
 use crate::families::Slot;

@@ -19,7 +19,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::effects::Role;
+use twin::effects::Role;
 
 use crate::refit::Estimate;
 use crate::signature::Instance;
@@ -100,8 +100,8 @@ fn sizes(member: usize, instance: &Instance, estimate: &Estimate) -> Vec<Size> {
 
 #[cfg(test)]
 mod tests {
-    use machine::effects::{CATALOGUE, Target};
     use metrology::Axis;
+    use twin::effects::{CATALOGUE, Target};
 
     use super::*;
 

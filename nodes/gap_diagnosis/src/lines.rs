@@ -20,8 +20,8 @@ use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 use machine::MachineFile;
-use machine::effects::{Role, Target};
 use metrology::Axis;
+use twin::effects::{Role, Target};
 
 use crate::families::Slot;
 use crate::rows::{count, position};

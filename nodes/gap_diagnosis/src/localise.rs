@@ -24,11 +24,11 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::Channel;
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use twin::Channel;
 
 use crate::config::GapConfig;
 use crate::families::{Family, Slot};

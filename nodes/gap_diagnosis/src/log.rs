@@ -33,8 +33,8 @@
 //! \[1\] P. J. Rousseeuw, C. Croux, J. Am. Stat. Assoc. 88, 1993 (median absolute deviation, efficiency 37 %). \[2\] T.
 //! Gasser, L. Sroka, C. Jennen-Steinmetz, Biometrika 73, 1986 (variance from neighbours).
 
-use machine::twin::{Channel, Run, Session};
 use metrology::sample::{TestKind, TestSegment};
+use twin::{Channel, Run, Session};
 
 use crate::rows::{Block, count, time_s};
 

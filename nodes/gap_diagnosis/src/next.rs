@@ -34,8 +34,8 @@ mod question;
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
-use machine::twin::{Channel, Session, Twin};
 use nalgebra::DMatrix;
+use twin::{Channel, Session, Twin};
 
 use crate::cause::Found;
 use crate::experiment::{Experiment, library};

@@ -31,9 +31,9 @@ use std::collections::BTreeMap;
 
 use machine::MachineFile;
 use machine::file::AxisEntry;
-use machine::twin::{Channel, Run, Session};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use twin::{Channel, Run, Session};
 
 use crate::config::GapConfig;
 use crate::field::{self, Mode, Smooth};

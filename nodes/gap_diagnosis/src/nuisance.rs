@@ -23,11 +23,11 @@ use std::collections::BTreeMap;
 
 use machine::Kinematics;
 use machine::cycle::FeatureId;
-use machine::twin::simulate::plate_axes;
-use machine::twin::{Channel, Run, Session, Touch, Twin};
 use metrology::Axis;
 use metrology::sample::{TestKind, TestPlane};
 use nalgebra::{DMatrix, DVector};
+use twin::simulate::plate_axes;
+use twin::{Channel, Run, Session, Touch, Twin};
 
 use crate::field::{self, Place};
 use crate::rows::{Block, Rows, position};

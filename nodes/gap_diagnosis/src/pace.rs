@@ -25,8 +25,8 @@
 //! # References
 //! \[1\] G. E. P. Box, G. M. Jenkins, G. C. Reinsel, Time Series Analysis, 4th ed., Wiley 2008, 3.2 (autoregression).
 
-use machine::twin::{Channel, Run};
 use metrology::sample::TestKind;
+use twin::{Channel, Run};
 
 use crate::rows::{Block, count, time_s};
 use crate::whitener::Autoregression;

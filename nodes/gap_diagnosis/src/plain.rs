@@ -67,8 +67,8 @@ fn rank(signatures: &Library, form: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use machine::effects::{self, Target};
     use metrology::Axis;
+    use twin::effects::{self, Target};
 
     use super::*;
     use crate::signature::{Form, Instance};

@@ -28,9 +28,9 @@
 use std::collections::BTreeMap;
 
 use machine::MachineFile;
-use machine::effects::{Kind, Moment};
-use machine::twin::{Channel, Instrument, Session, Twin, simulate};
 use serde::{Deserialize, Serialize};
+use twin::effects::{Kind, Moment};
+use twin::{Channel, Instrument, Session, Twin, simulate};
 
 use crate::config::GapConfig;
 use crate::diagnose::{considered, stations};
@@ -341,7 +341,7 @@ mod tests {
         let split = split::split(&session, config.hold_out);
         let form = FormError::base(&config);
         let stack = Stack::new(&session, &twin, &split.fit, stations, &noise, &form, &zero);
-        let kind = machine::effects::kind("backlash").expect("in the catalogue");
+        let kind = twin::effects::kind("backlash").expect("in the catalogue");
         let mut values = kind.typical();
         values[0] = play.found_from;
         let target = kind.targets_on(&machine).remove(0);

@@ -8,9 +8,9 @@
 //! which sizes physics has.
 
 use machine::MachineFile;
-use machine::effects::Moment;
-use machine::twin::Session;
 use serde::Serialize;
+use twin::Session;
+use twin::effects::Moment;
 
 use crate::config::GapConfig;
 use crate::diagnose::first_stack;

@@ -15,8 +15,8 @@
 //! # References
 //! \[1\] H. White, Econometrica 48, 1980; K.-Y. Liang, S. L. Zeger, Biometrika 73, 1986 (the sandwich).
 
-use machine::effects::{Parameter, Role};
 use nalgebra::{DMatrix, DVector};
+use twin::effects::{Parameter, Role};
 
 use crate::lines;
 use crate::normal::Normal;

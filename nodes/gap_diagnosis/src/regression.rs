@@ -19,15 +19,15 @@
 //! here, so that what differs is the choosing.
 //!
 //! # Holds when
-//! Sizes are in units of each amplitude's typical size (`machine::effects`), so that sqrt(G_kk) is the D that column k
+//! Sizes are in units of each amplitude's typical size (`twin::effects`), so that sqrt(G_kk) is the D that column k
 //! has at its typical size.
 
 use std::ops::Range;
 
 use machine::MachineFile;
-use machine::effects::{Kind, Moment};
-use machine::twin::Session;
 use nalgebra::{DMatrix, DVector};
+use twin::Session;
+use twin::effects::{Kind, Moment};
 
 use crate::config::GapConfig;
 use crate::diagnose;

@@ -21,9 +21,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::twin::{Channel, Run, Session, Touch};
 use metrology::{Axis, PerAxis};
 use nalgebra::DVector;
+use twin::{Channel, Run, Session, Touch};
 
 use crate::log;
 use crate::nuisance::orthonormal;

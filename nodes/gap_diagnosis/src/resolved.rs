@@ -22,10 +22,10 @@
 
 use std::f64::consts::TAU;
 
-use machine::effects::{Role, Target};
-use machine::twin::Channel;
 use metrology::Axis;
 use nalgebra::Matrix2;
+use twin::Channel;
+use twin::effects::{Role, Target};
 
 use crate::rows::{count, position};
 use crate::signature::Instance;

@@ -18,9 +18,9 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::{Channel, Run, Session};
 use metrology::Axis;
 use metrology::sample::TestKind;
+use twin::{Channel, Run, Session};
 
 /// Station of a run: the same for repeats.
 pub type Station = (u32, u32);

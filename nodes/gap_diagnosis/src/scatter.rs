@@ -32,9 +32,9 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use machine::effects::{Kind, Moment, Parameter, Role};
 use machine::file::EffectEntry;
 use nalgebra::DVector;
+use twin::effects::{Kind, Moment, Parameter, Role};
 
 use crate::cause::Scope;
 use crate::judgement::{self, Check, CheckId};

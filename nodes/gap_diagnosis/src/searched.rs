@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use machine::MachineFile;
-use machine::effects::{Effect, Kind};
-use machine::twin::{Channel, Session, Twin};
 use nalgebra::DVector;
+use twin::effects::{Effect, Kind};
+use twin::{Channel, Session, Twin};
 
 use crate::cause::{self, Found, Member, Scope};
 use crate::config::GapConfig;

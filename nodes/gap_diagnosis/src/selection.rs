@@ -18,7 +18,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::effects::Moment;
+use twin::effects::Moment;
 
 use crate::normal::{Fit, Normal};
 use crate::rows::count;
@@ -332,9 +332,9 @@ pub fn without(set: &[usize], form: usize) -> Set {
 
 #[cfg(test)]
 mod tests {
-    use machine::effects::{self, Target};
     use metrology::Axis;
     use nalgebra::DVector;
+    use twin::effects::{self, Target};
 
     use super::*;
     use crate::signature::Instance;

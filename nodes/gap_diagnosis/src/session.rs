@@ -1,7 +1,7 @@
 //! A recorded session as the simulator wants it: runs, commands, and what each instrument read beyond them.
 //!
 //! [`SessionBuilder`] takes the samples of one bag, or of several one after another, in the order in which
-//! they were recorded, and gives a [`machine::twin::Session`] with an [`Account`] of everything that could
+//! they were recorded, and gives a [`twin::Session`] with an [`Account`] of everything that could
 //! not be used. The live node and the command line use the same builder.
 //!
 //! # What a deviation is

@@ -22,8 +22,8 @@ use crate::report::{BeforeAfter, LeftOut, Shrink};
 use crate::rows::{Block, count, position, time_s};
 use crate::split::{Split, title};
 use crate::stack::Stack;
-use machine::effects::Effect;
-use machine::twin::Channel;
+use twin::Channel;
+use twin::effects::Effect;
 
 /// One named effect.
 pub struct Named<'e> {

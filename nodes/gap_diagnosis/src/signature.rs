@@ -19,8 +19,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
-use machine::effects::{Effect, Kind, Role, Target};
 use nalgebra::{DMatrix, DVector};
+use twin::effects::{Effect, Kind, Role, Target};
 
 use crate::normal::Normal;
 use crate::resolved;

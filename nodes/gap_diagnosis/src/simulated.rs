@@ -26,10 +26,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use machine::MachineFile;
-use machine::effects::{self, Effect};
-use machine::twin::{Reading, Run, Session, Twin, TwinError, simulate};
 use metrology::sample::TestSegment;
 use serde::{Deserialize, Serialize};
+use twin::effects::{self, Effect};
+use twin::{Reading, Run, Session, Twin, TwinError, simulate};
 
 use crate::nuisance::plane_name;
 

@@ -9,8 +9,8 @@
 //! condition can be spared and a test was repeated four times, its last quarter is held out: later, if not other. Of one
 //! log that was cut into parts (`log`) the last third is held out.
 
-use machine::twin::{Run, Session};
 use metrology::sample::{Sense, TestSegment};
+use twin::{Run, Session};
 
 use crate::log;
 use crate::nuisance::plane_name;
@@ -165,9 +165,9 @@ pub fn title(segment: &TestSegment) -> String {
 
 #[cfg(test)]
 mod tests {
-    use machine::twin::{Channel, Motion, Reading};
     use metrology::Stamp;
     use metrology::sample::{TestKind, TestPlane};
+    use twin::{Channel, Motion, Reading};
 
     use super::*;
 

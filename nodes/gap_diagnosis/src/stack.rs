@@ -13,9 +13,9 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use machine::effects::Effect;
-use machine::twin::{Channel, Session, Twin};
 use nalgebra::DVector;
+use twin::effects::Effect;
+use twin::{Channel, Session, Twin};
 
 use crate::form_error::FormError;
 use crate::noise::Noise;

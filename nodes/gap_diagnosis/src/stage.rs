@@ -20,10 +20,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
-use machine::twin::{Run, Session};
 use metrology::sample::{GapCause, GapParameter, GapStatus, GapSummary};
 use metrology::stamp::Span;
 use metrology::{Host, Stage, Stamp};
+use twin::{Run, Session};
 
 use crate::config::GapConfig;
 use crate::diagnose::diagnose_against;
@@ -172,7 +172,7 @@ impl GapDiagnosisStage {
     /// # Errors
     /// Parameters out of range, a chain that cannot be read, known effects that the catalogue does not have.
     pub fn new(config: &GapDiagnosisConfig, machine: &MachineFile) -> Result<Self, GapError> {
-        machine::effects::known(machine)?;
+        twin::effects::known(machine)?;
         Ok(Self {
             gap: config.gap_config()?,
             builder: SessionBuilder::new(machine, SessionConfig::default())?,

@@ -27,9 +27,9 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use machine::twin::{Channel, History};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use twin::{Channel, History};
 
 use crate::figures::Note;
 use crate::log;

@@ -14,11 +14,11 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::Channel;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use twin::Channel;
 
 use crate::config::GapConfig;
 use crate::description::describe;

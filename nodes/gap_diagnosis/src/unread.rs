@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use machine::twin::{Reading, Run, Session};
+use twin::{Reading, Run, Session};
 
 use crate::figures::Note;
 use crate::rows::count;

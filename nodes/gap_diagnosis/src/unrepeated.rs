@@ -12,7 +12,7 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::{Channel, Session};
+use twin::{Channel, Session};
 
 use crate::field::Smooth;
 use crate::figures::Note;

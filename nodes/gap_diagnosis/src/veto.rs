@@ -7,10 +7,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use machine::effects::{self, Parameter, Role};
-use machine::twin::Channel;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use twin::Channel;
+use twin::effects::{self, Parameter, Role};
 
 use crate::cause::{Best, Member, Scope};
 use crate::challenge::{self, Cost};

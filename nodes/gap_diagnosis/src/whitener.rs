@@ -20,8 +20,8 @@
 //! \[1\] G. E. P. Box, G. M. Jenkins, G. C. Reinsel, Time Series Analysis, 4th ed., Wiley 2008, 3.2
 //! (autoregression, recursion).
 
-use machine::twin::{Channel, Session};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use twin::{Channel, Session};
 
 use crate::field::{self, Smooth};
 use crate::form_error::{self, FormError};

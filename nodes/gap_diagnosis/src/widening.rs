@@ -15,7 +15,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::effects::Target;
+use twin::effects::Target;
 
 use crate::normal::Normal;
 use crate::resolved;

@@ -8,11 +8,11 @@ use gap_diagnosis::report;
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
 use machine::file::AxisEntry;
-use machine::twin::Session;
 use metrology::text::{self, Comments};
 use recorder::{Bag, Order};
 use replayer::{Reading, Taken, reading};
 use sha2::{Digest, Sha256};
+use twin::Session;
 
 /// The attachment that holds the machine file of a recording.
 const MACHINE: &str = "machine.yaml";

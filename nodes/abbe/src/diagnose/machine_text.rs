@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result};
 use machine::MachineFile;
-use machine::effects;
 use machine::file::EffectEntry;
+use twin::effects;
 
 /// The text of a machine file with more known effects.
 ///

@@ -6,8 +6,8 @@ use anyhow::{Context, Result, bail};
 use gap_diagnosis::report;
 use gap_diagnosis::simulated::{self, Matched, Share};
 use machine::MachineFile;
-use machine::twin::Session;
 use serde::Serialize;
+use twin::Session;
 
 use super::bags::{Recorded, lines};
 

@@ -3,7 +3,7 @@
 //! What is exported is made again without each option in turn, and compared. So nothing has to be known of what an option
 //! is about, and one that is added later only needs its line here.
 
-use machine::export::selection::{Measured, Selected, select};
+use control_tables::selection::{Measured, Selected, select};
 
 use super::{Export, Format};
 

@@ -1,7 +1,7 @@
 //! What a bag has for tables, and why it has nothing.
 
 use abbe_msgs::topics;
-use machine::export::selection::Measured;
+use control_tables::selection::Measured;
 use metrology::sample::PositioningTable;
 use metrology::{Axis, AxisSet, PerAxis};
 use recorder::{Bag, Order};

@@ -4,7 +4,7 @@
 //! the same. The mean over the runs is taken at every target for each direction, as ISO 230-2 does (x-bar up and down).
 
 use abbe_msgs::topics;
-use machine::export::selection::Measured;
+use control_tables::selection::Measured;
 use metrology::sample::{PositioningTable, TestKind};
 use metrology::stamp::Stamp;
 use metrology::{Axis, PerAxis};

@@ -3,11 +3,11 @@
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
-use machine::export::Sign;
-use machine::export::fanuc::Record;
-use machine::export::linuxcnc::FileType;
-use machine::export::selection::{Control, Fanuc, PitchTables, Sinumerik};
-use machine::export::sinumerik::OtherAxes;
+use control_tables::Sign;
+use control_tables::fanuc::Record;
+use control_tables::linuxcnc::FileType;
+use control_tables::selection::{Control, Fanuc, PitchTables, Sinumerik};
+use control_tables::sinumerik::OtherAxes;
 use metrology::{Axis, AxisSet, PerAxis};
 
 use super::Format;

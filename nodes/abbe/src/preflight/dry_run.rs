@@ -6,11 +6,11 @@ use anyhow::{Context, Result, bail};
 use fake_cnc::{Cnc, Outcome};
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
-use machine::twin::Session;
 use metrology::Stage;
 use metrology::sample::PlanState;
 use metrology::stamp::{Host, Span, Stamp};
 use sequencer::{Plan, ProgramEnd, Sequencer};
+use twin::Session;
 
 use super::ideal::IdealMachine;
 

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use gap_diagnosis::preflight::{AssumedFloor, Floors};
 use machine::MachineFile;
-use machine::twin::Instrument;
+use twin::Instrument;
 
 use crate::usage::above_zero;
 

@@ -6,8 +6,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use machine::export::AxisErrors;
-use machine::export::linuxcnc::{FileType, compensation_file};
+use control_tables::AxisErrors;
+use control_tables::linuxcnc::{FileType, compensation_file};
 use node_runtime::Interruption;
 use node_runtime::complain;
 use recorder::Bag;

@@ -1,10 +1,10 @@
 //! A ballbar test as an ideal machine would record it: no node of the suite reads a ballbar, its table is imported.
 
 use machine::MachineFile;
-use machine::twin::{Channel, History, Instrument, Session};
 use metrology::PerAxis;
 use metrology::sample::{Sense, TestPlane};
 use nalgebra::Vector3;
+use twin::{Channel, History, Instrument, Session};
 
 use crate::experiment::Pass;
 use crate::experiment::course::{self, Frame};

@@ -11,9 +11,9 @@
 use std::ops::Range;
 use std::rc::Rc;
 
-use machine::effects::{Kind, Parameter, Role};
-use machine::twin::{Twin, simulate};
 use nalgebra::{DMatrix, DVector};
+use twin::effects::{Kind, Parameter, Role};
+use twin::{Twin, simulate};
 
 use super::{Candidate, Order};
 use crate::diagnose::stations;

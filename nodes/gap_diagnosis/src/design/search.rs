@@ -6,8 +6,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::twin::Channel;
 use nalgebra::DMatrix;
+use twin::Channel;
 
 use super::separability::{Aim, Score, shown};
 use crate::preflight::WANTED_REPEATS;
@@ -280,7 +280,7 @@ impl<'f> Field<'f> {
 
 #[cfg(test)]
 mod tests {
-    use machine::twin::Channel;
+    use twin::Channel;
 
     use super::*;
 

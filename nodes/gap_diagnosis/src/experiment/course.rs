@@ -16,12 +16,12 @@
 //! The control holds the feed between ramps; jerk limits round the ramps' corners only.
 
 use machine::MachineFile;
-use machine::twin::simulate::plate_axes;
-use machine::twin::{Channel, Instrument, Motion, Reading, Run, Touch};
 use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
 use metrology::stamp::Stamp;
 use metrology::{Axis, AxisSet, PerAxis};
 use nalgebra::Vector3;
+use twin::simulate::plate_axes;
+use twin::{Channel, Instrument, Motion, Reading, Run, Touch};
 
 use super::{Pass, PlannedTouch};
 use crate::rows::count;

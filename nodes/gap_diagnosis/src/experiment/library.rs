@@ -19,10 +19,10 @@ mod touches;
 use std::collections::BTreeSet;
 
 use machine::MachineFile;
-use machine::twin::simulate::plate_axes;
-use machine::twin::{Instrument, Session};
 use metrology::Axis;
 use nalgebra::Vector3;
+use twin::simulate::plate_axes;
+use twin::{Instrument, Session};
 
 use super::course::acceleration_mm_s2;
 use super::{Experiment, Pass, short};
@@ -223,8 +223,8 @@ impl<'s> Shop<'s> {
 mod tests {
     use super::*;
     use crate::experiment::course::{self, Frame};
-    use machine::twin::{Channel, Run};
     use metrology::PerAxis;
+    use twin::{Channel, Run};
 
     fn frame(machine: &MachineFile) -> Frame<'_> {
         Frame {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::Channel;
+use twin::Channel;
 
 use super::{Abscissa, Trace};
 use crate::rows::time_s;

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::twin::{Channel, History, Instrument, Run, Session};
 use metrology::PerAxis;
 use nalgebra::Vector3;
+use twin::{Channel, History, Instrument, Run, Session};
 
 use super::Bench;
 use crate::experiment::course::{self, Frame};

@@ -14,9 +14,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::effects::Role;
-use machine::twin::{Channel, Run, Session};
 use nalgebra::DMatrix;
+use twin::effects::Role;
+use twin::{Channel, Run, Session};
 
 use super::Bench;
 use crate::noise::Noise;
@@ -120,7 +120,7 @@ mod tests {
     use crate::preflight::rig::{circles, floors, machine};
     use crate::rows::Rows;
     use crate::signature::Instance;
-    use machine::twin::Twin;
+    use twin::Twin;
 
     /// What three circles in both senses add to what is known of a backlash from the same three, as (1) and by themselves.
     fn added_and_alone(form_error_um: f64) -> [f64; 2] {
@@ -147,7 +147,7 @@ mod tests {
             noise: &noise,
             form: FormError::base(&config),
         };
-        let kind = machine::effects::kind("backlash").unwrap();
+        let kind = twin::effects::kind("backlash").unwrap();
         let instance = Instance::all(&machine, [kind].iter()).remove(0);
         let nothing: Vec<Vec<f64>> =
             (session.runs.iter().map(|run| vec![0.0; run.readings.len()])).collect();

@@ -1,6 +1,6 @@
 //! What else could be changed where no run that a machine can make tells two effects apart.
 
-use machine::effects;
+use twin::effects;
 
 /// Levers outside the program, by what the effect is made of.
 const LEVERS: [(&[&str], &str); 7] = [

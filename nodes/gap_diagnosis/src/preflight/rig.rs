@@ -3,10 +3,10 @@
 use super::{AssumedFloor, Floors};
 use crate::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
-use machine::twin::{Instrument, Session};
 use metrology::sample::{AxisState, GridSample, Sense, TestKind, TestPlane, TestSegment};
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
 use nalgebra::Vector3;
+use twin::{Instrument, Session};
 
 const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
 

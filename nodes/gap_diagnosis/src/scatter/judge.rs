@@ -6,8 +6,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use machine::effects::{Effect, Kind, Parameter};
 use nalgebra::{DMatrix, DVector};
+use twin::effects::{Effect, Kind, Parameter};
 
 use super::squares::Squares;
 use super::{Bench, SHAPE_STEP, Scattered, is_tried, parameters};

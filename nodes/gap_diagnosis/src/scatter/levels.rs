@@ -5,8 +5,8 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::Channel;
 use nalgebra::{DMatrix, DVector};
+use twin::Channel;
 
 use super::squares::{is_touch, passed};
 use crate::cause::Scope;

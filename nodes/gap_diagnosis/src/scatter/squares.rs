@@ -34,9 +34,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use machine::effects::Effect;
-use machine::twin::Channel;
 use nalgebra::{DMatrix, DVector};
+use twin::Channel;
+use twin::effects::Effect;
 
 use super::levels::{Levels, levels, means, positive};
 use crate::cause::Scope;

@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 
 use machine::file::AxisEntry;
-use machine::twin::{Run, Session, simulate};
 use machine::{Kinematics, MachineFile};
 use metrology::bound::TOUCHES_OF_RUN;
 use metrology::sample::{
@@ -12,6 +11,7 @@ use metrology::sample::{
 };
 use metrology::stamp::{Host, Stamp};
 use metrology::{Axis, AxisSet};
+use twin::{Run, Session, simulate};
 
 use super::account::{Account, Reason};
 use super::channels::{Zero, is_test, touches_only};

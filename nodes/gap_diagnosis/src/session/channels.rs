@@ -3,12 +3,12 @@
 use std::ops::Range;
 
 use machine::MachineFile;
-use machine::twin::simulate::plate_axes;
-use machine::twin::{Channel, Motion};
 use metrology::sample::TestKind;
 use metrology::stamp::{Host, Stamp};
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
+use twin::simulate::plate_axes;
+use twin::{Channel, Motion};
 
 use super::account::{Account, Reason};
 use super::record::Record;

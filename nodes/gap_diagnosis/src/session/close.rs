@@ -1,8 +1,8 @@
 //! Makes a run of what was recorded of it.
 
-use machine::twin::{Channel, Motion, Reading, Run, Touch};
 use metrology::sample::{FARTHEST_FROM_NOMINAL, ProbeTrigger, TestSegment};
 use metrology::{Axis, PerAxis};
+use twin::{Channel, Motion, Reading, Run, Touch};
 
 use super::account::Reason;
 use super::builder::SessionBuilder;

@@ -1,9 +1,9 @@
 //! Why a recording is no session of this machine.
 
 use machine::ChainError;
-use machine::twin::TwinError;
 use metrology::Axis;
 use metrology::number::number;
+use twin::TwinError;
 
 /// A recording that cannot be diagnosed at all.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

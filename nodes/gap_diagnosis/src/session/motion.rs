@@ -3,8 +3,8 @@
 //! The motion is differentiated at the full rate of the record and thinned afterwards, so that velocity and
 //! acceleration are those of the control's ticks.
 
-use machine::twin::{Motion, TwinError};
 use metrology::{Axis, AxisSet, PerAxis};
+use twin::{Motion, TwinError};
 
 use super::record::Tick;
 

@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use machine::MachineFile;
-use machine::twin::{History, Rubbing, rubbing::ZONES};
 use metrology::{Axis, AxisSet, PerAxis};
+use twin::{History, Rubbing, rubbing::ZONES};
 
 use crate::rows::count;
 

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use machine::twin::Motion;
-use machine::twin::simulate::plate_axes;
 use metrology::Axis;
 use metrology::sample::{TestKind, TestSegment};
+use twin::Motion;
+use twin::simulate::plate_axes;
 
 use super::channels::Raw;
 

@@ -11,8 +11,8 @@
 
 use machine::MachineFile;
 use machine::file::SensorEntry;
-use machine::twin::Channel;
 use metrology::sample::TemperatureSample;
+use twin::Channel;
 
 use super::channels::{Raw, Scope, Series};
 

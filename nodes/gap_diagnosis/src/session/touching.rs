@@ -10,8 +10,8 @@
 //! and zero: what depends on the feed alone has the touch's own.
 
 use machine::MachineFile;
-use machine::twin::{Motion, Touch, TwinError};
 use metrology::{Axis, AxisSet, PerAxis};
+use twin::{Motion, Touch, TwinError};
 
 /// Least time between two ticks, s.
 const APART_S: f64 = 1e-3;

@@ -17,8 +17,8 @@
 //! Runs that stand are compared at one time since the first reading, there is no other place; touches with those of one
 //! feature from one side, at one feed and place, the k-th with the k-th.
 
-use machine::twin::{Channel, Reading, Run, Touch};
 use metrology::{Axis, AxisSet};
+use twin::{Channel, Reading, Run, Touch};
 
 use super::Reason;
 use super::runs::same_feed;

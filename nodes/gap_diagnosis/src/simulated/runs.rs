@@ -5,9 +5,9 @@
 
 use std::collections::BTreeSet;
 
-use machine::twin::{Channel, Run, Session};
 use metrology::sample::{Sense, TestKind, TestPlane};
 use metrology::{Axis, AxisSet, PerAxis};
+use twin::{Channel, Run, Session};
 
 use super::Reason;
 use super::places::at;

@@ -6,7 +6,6 @@ use gap_diagnosis::report::Status;
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use gap_diagnosis::{GapConfig, Note, diagnose};
 use machine::MachineFile;
-use machine::twin::Session;
 use metrology::sample::{
     AxisState, GridSample, Sense, TemperatureSample, TestKind, TestPlane, TestSegment,
 };
@@ -16,6 +15,7 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use twin::Session;
 
 const MACHINE: &str = include_str!("../../../../launch_configs/grid_xy/machine.yaml");
 /// Circles, and the time from one to the next, s: ten hours.

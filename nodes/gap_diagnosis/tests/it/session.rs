@@ -3,14 +3,15 @@
 use std::f64::consts::TAU;
 
 use gap_diagnosis::session::{Input, Reason, SessionBuilder, SessionConfig, SessionError};
-use machine::twin::{Channel, Session, Twin};
-use machine::{MachineFile, effects};
+use machine::MachineFile;
 use metrology::sample::{
     AxisCompensation, AxisState, BlockMeasurement, CompensationState, FacePosition, GridSample,
     LatencyShare, ProbeTrigger, Sense, TemperatureSample, TestKind, TestPlane, TestSegment,
 };
 use metrology::{Axis, AxisSet, Host, PerAxis, Stamp};
 use nalgebra::Vector3;
+use twin::effects;
+use twin::{Channel, Session, Twin};
 
 mod order;
 

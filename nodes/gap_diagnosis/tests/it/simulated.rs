@@ -3,11 +3,12 @@
 use std::f64::consts::TAU;
 
 use gap_diagnosis::simulated::{FEWEST_READINGS, Matched, Reason, SimulatedError, beside};
-use machine::twin::{Channel, Motion, Reading, Run, Session, Touch, Twin};
-use machine::{MachineFile, effects};
+use machine::MachineFile;
 use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
 use nalgebra::Vector3;
+use twin::effects;
+use twin::{Channel, Motion, Reading, Run, Session, Touch, Twin};
 
 const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
 const RADIUS_MM: f64 = 50.0;

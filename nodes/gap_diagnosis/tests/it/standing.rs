@@ -4,10 +4,10 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use gap_diagnosis::session::{Account, Input, Reason, SessionBuilder, SessionConfig};
 use machine::MachineFile;
-use machine::twin::{Channel, Session};
 use metrology::sample::{AxisState, GridSample, Sense, TestKind, TestPlane, TestSegment};
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
 use nalgebra::Vector3;
+use twin::{Channel, Session};
 
 const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
 const RADIUS_MM: f64 = 50.0;

@@ -9,6 +9,7 @@ mod axes;
 mod certificate;
 mod check;
 mod defaults;
+pub mod effect_ranges;
 mod limits;
 mod read;
 mod reference;

@@ -5,19 +5,17 @@
 //! `frames` where each body of the machine is, and
 //! `orientation` which rotary positions point the probe a given way. `cycle` writes the programs
 //! that touch blocks, planes, bores, bosses and spheres, `poses` plans at which rotary poses a sphere tells
-//! most. `export` turns measured errors into the tables that
-//! other controls load. `volumetric` is the geometric error of the tool tip anywhere in the working
+//! most. `volumetric` is the geometric error of the tool tip anywhere in the working
 //! volume, component by component and all together, and what has to be commanded to undo it.
 //! `trajectory` writes the programs that a grid encoder, a laser or a scale measures; `program_frame` is how all of
 //! them say that their coordinates are the machine's.
-//! `effects` is the catalogue of what can be wrong with a machine, one file each, and `twin` simulates a
-//! recorded session with any of them switched on.
+//!
+//! Libraries of their own stand on it: `twin` has the effects and simulates a recorded session with any of them,
+//! `control_tables` turns measured errors into the tables that other controls load.
 
 pub mod chain;
 pub mod cycle;
-pub mod effects;
 pub mod error;
-pub mod export;
 pub mod file;
 pub mod frames;
 pub mod kinematics;
@@ -25,7 +23,6 @@ pub mod orientation;
 pub mod poses;
 pub mod program_frame;
 pub mod trajectory;
-pub mod twin;
 pub mod volumetric;
 
 pub use chain::{Chain, ChainError};

@@ -5,8 +5,8 @@ use std::fmt;
 
 use gap_diagnosis::preflight::Floors;
 use machine::MachineFile;
-use machine::twin::Instrument;
 use metrology::number::number;
+use twin::Instrument;
 
 /// Something that measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -10,11 +10,11 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use gap_diagnosis::design::{Likely, MOST_WEIGHT};
-use machine::effects::CATALOGUE;
 use metrology::number::number;
 use metrology::yaml;
 use node_runtime::text_file;
 use serde::Deserialize;
+use twin::effects::CATALOGUE;
 
 /// Weight of an effect that is listed without one; others count 1.
 const USUAL_WEIGHT: f64 = 3.0;

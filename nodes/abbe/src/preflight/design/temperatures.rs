@@ -11,8 +11,8 @@
 
 use machine::MachineFile;
 use machine::file::SensorPlace;
-use machine::twin::Session;
 use metrology::Axis;
+use twin::Session;
 
 use super::menu::Heat;
 

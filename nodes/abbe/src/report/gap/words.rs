@@ -1,8 +1,8 @@
 //! What the report calls by ids, in a metrologist's words.
 
 use gap_diagnosis::report::GapReport;
-use machine::effects::{self, Targets};
 use metrology::{ErrorComponent, squareness};
+use twin::effects::{self, Targets};
 
 use crate::report::geometry;
 

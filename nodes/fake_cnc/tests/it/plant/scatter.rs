@@ -2,12 +2,12 @@
 
 use fake_cnc::Plant;
 use fake_cnc::plant::VibrationEntry;
-use machine::effects::{self, Effect};
 use machine::file::EffectEntry;
-use machine::twin::{Channel, Motion, Reading, Run, Session, Touch, Twin};
 use metrology::sample::{TestKind, TestPlane, TestSegment};
 use metrology::{Axis, AxisSet, PerAxis, Stamp};
 use nalgebra::Vector3;
+use twin::effects::{self, Effect};
+use twin::{Channel, Motion, Reading, Run, Session, Touch, Twin};
 
 use crate::plant::rig::{Command, PERIOD, PERIOD_S, Servo, machine, perfect};
 use crate::plant::touch::{before_x_face, touch};

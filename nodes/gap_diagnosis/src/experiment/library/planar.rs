@@ -1,10 +1,10 @@
 //! Circles and lines, where a plate, a ballbar or a beam can read them.
 
-use machine::twin::simulate::plate_axes;
-use machine::twin::{Channel, Instrument};
 use metrology::Axis;
 use metrology::sample::{Sense, TestPlane};
 use nalgebra::Vector3;
+use twin::simulate::plate_axes;
+use twin::{Channel, Instrument};
 
 use super::{SAME_PLACE_MIN, Shop};
 use crate::experiment::{Experiment, Pass, circle_words, short};

@@ -1,8 +1,8 @@
 //! Touches: at three feeds, with another stylus, around an artefact.
 
 use machine::file::ArtefactEntry;
-use machine::twin::Instrument;
 use nalgebra::Vector3;
+use twin::Instrument;
 
 use super::{OTHER_PLACE_MIN, SAME_PLACE_MIN, Shop};
 use crate::experiment::{Experiment, Pass, PlannedTouch, short};

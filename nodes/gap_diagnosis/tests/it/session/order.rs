@@ -1,9 +1,9 @@
 //! Topics that do not arrive in the order of their stamps.
 
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
-use machine::twin::{Channel, Run, Session};
 use metrology::sample::{GridSample, TemperatureSample, TestKind, TestPlane, TestSegment};
 use metrology::{Axis, PerAxis, Stamp};
+use twin::{Channel, Run, Session};
 
 use crate::session::{Rig, compensation, machine, of, segment, state, touch};
 

@@ -3,8 +3,8 @@
 use gap_diagnosis::report::{GapReport, Status};
 use gap_diagnosis::{Diagnosis, GapConfig, Note, diagnose};
 use machine::MachineFile;
-use machine::twin::{History, Session};
 use metrology::PerAxis;
+use twin::{History, Session};
 
 use crate::trials::plant::{Circle, Noise, State, session_of, told};
 

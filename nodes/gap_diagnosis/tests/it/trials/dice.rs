@@ -4,12 +4,12 @@
 use std::f64::consts::TAU;
 
 use gap_diagnosis::report::{Cause, Status};
-use machine::twin::Channel;
 use metrology::Axis;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use twin::Channel;
 
 use crate::trials::plant::{Noise, PROGRAM, diagnosed, names, session_of, told};
 use crate::trials::scatter::{of, touched};

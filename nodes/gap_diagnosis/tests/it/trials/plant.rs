@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 
 use gap_diagnosis::{Diagnosis, GapConfig, diagnose};
 use machine::MachineFile;
-use machine::twin::{Channel, Motion, Reading, Run, Session};
 use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
 use metrology::stamp::Stamp;
 use metrology::{Axis, AxisSet, PerAxis};
@@ -13,6 +12,7 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use twin::{Channel, Motion, Reading, Run, Session};
 
 /// State of the slides at a reading.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,6 @@
 
 use gap_diagnosis::report::{Cause, Status};
 use gap_diagnosis::{Diagnosis, GapConfig, diagnose};
-use machine::twin::{Channel, Motion, Reading, Run, Session, Touch};
 use metrology::sample::{TestKind, TestSegment};
 use metrology::stamp::Stamp;
 use metrology::{Axis, AxisSet, PerAxis};
@@ -10,6 +9,7 @@ use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use twin::{Channel, Motion, Reading, Run, Session, Touch};
 
 use crate::trials::plant::{machine, told};
 

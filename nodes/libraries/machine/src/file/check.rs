@@ -5,12 +5,11 @@ use std::collections::BTreeSet;
 use metrology::{Axis, Bound, leaves};
 
 use super::{
-    ArtefactEntry, AxisEntry, BlockEntry, LinearAxisEntry, MachineFile, PositionFeedback, limits,
-    reference,
+    ArtefactEntry, AxisEntry, BlockEntry, LinearAxisEntry, MachineFile, PositionFeedback,
+    effect_ranges, limits, reference,
 };
 use crate::chain::Chain;
 use crate::cycle::artefact_id;
-use crate::effects::CATALOGUE;
 use crate::error::MachineFileError;
 
 const FINITE: &str = "must be a finite number";
@@ -336,17 +335,14 @@ impl Check<'_> {
     fn effects(&self, file: &MachineFile) -> Result<(), MachineFileError> {
         for (index, effect) in file.effects.iter().enumerate() {
             self.ros_name(&format!("effects[{index}].kind"), &effect.kind)?;
-            let kind = CATALOGUE.iter().find(|kind| kind.id == effect.kind);
-            let known = || {
-                kind.iter()
-                    .flat_map(|kind| kind.parameters.iter().chain(kind.free))
-            };
+            let mut kinds = effect_ranges::RANGES.iter();
+            let kind = kinds.find(|(kind, _)| *kind == effect.kind);
+            let ranges = kind.map_or(&[][..], |(_, rows)| *rows);
             for (name, value) in &effect.parameters {
                 let key = format!("effects[{index}].{name}");
                 self.number(&key, *value, value.is_finite(), FINITE)?;
-                if let Some(parameter) = known().find(|parameter| parameter.name == name) {
-                    let rows = [(parameter.name, parameter.low, parameter.high)];
-                    leaves::check_number(&rows, &key, *value)
+                if ranges.iter().any(|(known, ..)| known == name) {
+                    leaves::check_number(ranges, &key, *value)
                         .map_err(|source| self.bound(source))?;
                 }
             }

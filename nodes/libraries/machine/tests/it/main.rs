@@ -1,8 +1,6 @@
 //! The tests of this crate from outside, in one program.
 
 mod cycles;
-mod effects;
-mod export;
 mod frame_tree;
 mod frames;
 mod machine_file;

@@ -12,10 +12,10 @@ mod session;
 
 use gap_diagnosis::report::{Cause, Status};
 use gap_diagnosis::{GapConfig, diagnose};
-use machine::effects::{self, CATALOGUE, Effect, Kind, Moment, Role, Target};
-use machine::twin::Twin;
 use session::{Recording, recordings};
 use trials::Class;
+use twin::Twin;
+use twin::effects::{self, CATALOGUE, Effect, Kind, Moment, Role, Target};
 
 /// Size that is added, as D on the rows of the recording; less where the greatest physical size is less.
 const WANTED_D: f64 = 40.0;

@@ -7,9 +7,9 @@
 
 use std::path::Path;
 
+use control_tables::linuxcnc::{FileType, compensation_file};
+use control_tables::{AxisErrors, ExportFile};
 use linuxcnc_bridge::run::Outcome;
-use machine::export::linuxcnc::{FileType, compensation_file};
-use machine::export::{AxisErrors, ExportFile};
 use metrology::Axis;
 use metrology::sample::AxisState;
 

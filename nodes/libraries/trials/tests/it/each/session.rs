@@ -7,7 +7,6 @@ use fake_cnc::PlantFile;
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
 use machine::file::{ArtefactEntry, SensorEntry, SensorPlace};
-use machine::twin::{Channel, Run, Session};
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
@@ -15,6 +14,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use sequencer::{Plan, Step};
 use trials::{Arm, Rig, Sample, Trial, measure};
+use twin::{Channel, Run, Session};
 
 const ROTARY: &str = "title: two spheres
 steps:

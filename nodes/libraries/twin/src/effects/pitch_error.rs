@@ -1,0 +1,80 @@
+//! Pitch error: the lead of a screw that differs along it.
+//!
+//! # Model
+//!
+//! Legendre polynomials of the place x within the travel, -1 to 1; the linear part is `scale_error`:
+//!
+//! ```text
+//!   E = sum_n p_n P_n(x)                                                  (1)
+//!   E += sum_k f_k b_k(x),   splines with knots at the sixteenths of the travel        (2)
+//! ```
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | p_n | `p2_um`, `p3_um`, wider form `free_p4_um`, `free_p5_um` | µm |
+//! | f_k | `free_1_of_8_um` .. `free_7_of_8_um`, `free_1_of_16_um`, `free_3_of_16_um` .. `free_15_of_16_um` | µm |
+//!
+//! # Holds when
+//! The error is of the screw, between motor and slide. Not modelled: a period shorter than an eighth of the
+//! travel (see `cyclic_error`).
+//!
+//! # Agreement
+//! `val_a_screw_of_drifting_lead`: of 1.44 µm with a bump 0.1 m long, (1) leaves 0.44, splines at the
+//! eighths 0.065, at the sixteenths 0.003.
+//!
+//! # References
+//! \[1\] ISO 230-2:2014, clause 3 (positioning deviations). \[2\] ISO 3408-3:2006 (travel deviation of
+//! ball screws).
+
+use metrology::Axis;
+
+use super::form::{CURVE_UM, PLACE_SPLINES, Travel, legendre, place_splines};
+use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
+use crate::Response;
+
+/// Entry of the catalogue.
+pub static KIND: Kind = Kind {
+    id: "pitch_error",
+    title: "pitch error",
+    targets: Targets::LinearAxes,
+    parameters: &[
+        Parameter::amplitude("p2_um", 500.0, 4.0),
+        Parameter::amplitude("p3_um", 500.0, 3.0),
+    ],
+    free: CURVE_UM,
+    moment: Moment::Mean,
+    wanders: 0.0,
+    needs: "positions over the axis' travel",
+    build: |target, values| Box::new(PitchError::new(&target, values)),
+};
+
+struct PitchError {
+    axis: Axis,
+    polynomial_mm: [f64; 4],
+    local_mm: [f64; PLACE_SPLINES],
+}
+
+impl PitchError {
+    fn new(target: &Target, values: &[f64]) -> Self {
+        Self {
+            axis: target.axis(),
+            polynomial_mm: std::array::from_fn(|k| values[k] * 1e-3),
+            local_mm: std::array::from_fn(|k| values[4 + k] * 1e-3),
+        }
+    }
+}
+
+impl Effect for PitchError {
+    fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        let travel = Travel::of(scene, self.axis);
+        let is_local = self.local_mm.iter().any(|height| *height != 0.0);
+        let position = &scene.run.motion.position[self.axis];
+        for (sum, here) in response.drive[self.axis].iter_mut().zip(position) {
+            let x = travel.share(*here);
+            *sum += legendre(2, &self.polynomial_mm, x); // (1)
+            if is_local {
+                *sum += place_splines(&self.local_mm, x); // (2)
+            }
+        }
+    }
+}
