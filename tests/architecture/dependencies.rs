@@ -24,10 +24,11 @@ const IMPURE: [&str; 12] = [
 ];
 
 /// What nodes share.
-const VOCABULARY: [&str; 4] = ["metrology", "machine", "twin", "control_tables"];
+const VOCABULARY: [&str; 5] = ["metrology", "iso230", "machine", "twin", "control_tables"];
 
 /// Libraries that are not for every node, with the only crates that may depend on each.
-const USERS: [(&str, &[&str]); 2] = [
+const USERS: [(&str, &[&str]); 3] = [
+    ("iso230", &["abbe"]),
     ("twin", &["gap_diagnosis", "abbe", "abbe_trials"]),
     ("control_tables", &["abbe"]),
 ];

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
 /// Crates without clock, file, environment, entropy, log or ROS.
-pub const PURE: [&str; 16] = [
+pub const PURE: [&str; 17] = [
     "metrology",
+    "iso230",
     "machine",
     "twin",
     "control_tables",

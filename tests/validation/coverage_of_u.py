@@ -4,7 +4,7 @@
 
 Machines, their drift, certificates and temperatures, the figures by the words of ISO 230-2 and ISO 230-10 and their U are
 all made here; nothing of the product is used. The truth is what an exact instrument would have shown of the same runs.
-`nodes/metrology/tests/it/iso230/machines` has the same machines with the product's evaluations, 1000 of each.
+`nodes/libraries/iso230/tests/it/iso230/machines` has the same machines with the product's evaluations, 1000 of each.
 
 Printed with numpy 2.4.6 for 4000 machines, in % (two standard deviations are 0.7 at 95 %, 0.3 at 99 %):
 

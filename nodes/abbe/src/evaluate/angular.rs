@@ -4,8 +4,8 @@
 //! reference; an axis' own encoder says nothing about its positioning. A reference or a control that wraps at a turn does
 //! no harm: deviations are taken without whole turns from the first one.
 
+use iso230::positioning::rotary::within_half_a_turn_rad;
 use metrology::Axis;
-use metrology::iso230::positioning::rotary::within_half_a_turn_rad;
 use metrology::sample::{AngleSample, AxisState, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 

@@ -6,10 +6,10 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow};
-use metrology::iso230::budget::{DeviceUncertainty, Expansion};
-use metrology::iso230::circular::CircularBudget;
-use metrology::iso230::positioning::budget::PositioningBudget;
-use metrology::iso230::positioning::rotary::RotaryBudget;
+use iso230::budget::{DeviceUncertainty, Expansion};
+use iso230::circular::CircularBudget;
+use iso230::positioning::budget::PositioningBudget;
+use iso230::positioning::rotary::RotaryBudget;
 use metrology::number::{number, quantity};
 use metrology::yaml;
 use node_runtime::text_file;

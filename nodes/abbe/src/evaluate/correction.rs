@@ -1,9 +1,9 @@
 //! Whether the lengths of a positioning test, or the radii of a circle, are those at 20 °C, what corrects them, and their uncertainty.
 
+use iso230::budget::{DeviceUncertainty, differential_expansion};
+use iso230::circular::CircularBudget;
+use iso230::positioning::budget::PositioningBudget;
 use metrology::Axis;
-use metrology::iso230::budget::{DeviceUncertainty, differential_expansion};
-use metrology::iso230::circular::CircularBudget;
-use metrology::iso230::positioning::budget::PositioningBudget;
 use serde_json::{Value, json};
 
 use super::Tests;

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use metrology::iso230::thermal::DriftCause;
+use iso230::thermal::DriftCause;
 use metrology::sample::{
     AxisState, LengthSample, MachineValue, Quantity, TemperatureSample, TestKind, TestSegment,
     Verdict,

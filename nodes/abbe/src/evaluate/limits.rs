@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail};
-use metrology::iso230::conformance::Policy;
+use iso230::conformance::Policy;
 use metrology::yaml;
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
+use iso230::thermal::DriftCause;
 use metrology::Axis;
-use metrology::iso230::thermal::DriftCause;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -1,7 +1,7 @@
 //! The motion that a measurement was made with, from the order of its rows.
 
 use anyhow::{Context as _, Result, bail};
-use metrology::iso230::thermal::DriftCause;
+use iso230::thermal::DriftCause;
 use metrology::number::number;
 use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
 use metrology::{Axis, PerAxis, Stamp};

@@ -2,8 +2,8 @@
 
 use abbe_msgs::topics;
 use anyhow::Result;
-use metrology::iso230::positioning::rotary::{self, RotaryBudget, RotaryRemark, RotaryResult};
-use metrology::iso230::{Direction, ExpandedAngle};
+use iso230::positioning::rotary::{self, RotaryBudget, RotaryRemark, RotaryResult};
+use iso230::{Direction, ExpandedAngle};
 
 use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head};

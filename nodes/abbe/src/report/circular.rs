@@ -1,11 +1,11 @@
 //! ISO 230-4 of a bag, and the breakdown of its circles into causes.
 
 use anyhow::Result;
-use metrology::breakdown::{
+use iso230::breakdown::{
     self, Alias, BreakdownConfig, CircularPlane, CircularRecording, CircularSample, CircularSense,
     Needed, PlaneBreakdown, ReferenceLength, RowKey, Unit,
 };
-use metrology::iso230::circular::{CircularResult, CircularTest, CircularTrace, evaluate};
+use iso230::circular::{CircularResult, CircularTest, CircularTrace, evaluate};
 use metrology::sample::{Sense, TestPlane};
 use metrology::squareness::{between, in_words};
 

@@ -1,7 +1,7 @@
 //! ISO 230-3 of a bag: how displacements and the faces of blocks drift, with the temperatures beside them.
 
 use anyhow::Result;
-use metrology::iso230::thermal::DriftCause;
+use iso230::thermal::DriftCause;
 use metrology::sample::BlockMeasurement;
 use metrology::stamp::{Host, Stamp};
 use serde::Serialize;

@@ -3,9 +3,9 @@
 //! The mean deviations of one direction are taken over the longest part of a test whose targets lie at most a quarter of the
 //! lead apart and cover one lead at least. Elsewhere targets alias, and a periodic error of another length would be told.
 
+use iso230::Direction;
+use iso230::positioning::periodic::{self, PeriodicResult, PeriodicRun};
 use metrology::Axis;
-use metrology::iso230::Direction;
-use metrology::iso230::positioning::periodic::{self, PeriodicResult, PeriodicRun};
 use metrology::sample::TestKind;
 use serde::Serialize;
 use serde_json::json;

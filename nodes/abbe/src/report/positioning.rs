@@ -2,13 +2,11 @@
 
 use abbe_msgs::topics;
 use anyhow::Result;
+use iso230::positioning::one_sided::{self, OneSidedPoint, OneSidedResult};
+use iso230::positioning::{PointResult, PositioningRemark, PositioningResult, PositioningRuns};
+use iso230::{Direction, ExpandedLength, positioning};
 use machine::MachineFile;
 use metrology::Axis;
-use metrology::iso230::positioning::one_sided::{self, OneSidedPoint, OneSidedResult};
-use metrology::iso230::positioning::{
-    PointResult, PositioningRemark, PositioningResult, PositioningRuns,
-};
-use metrology::iso230::{Direction, ExpandedLength, positioning};
 use metrology::sample::TestKind;
 
 mod diagonals;

@@ -7,14 +7,12 @@
 
 pub mod axis;
 pub mod bound;
-pub mod breakdown;
 pub mod clock_map;
 pub mod drift;
 pub mod epoch;
 pub mod error_component;
 pub mod fit;
 pub mod homed_gate;
-pub mod iso230;
 pub mod least_squares;
 pub mod leaves;
 pub mod number;

@@ -1,7 +1,7 @@
 //! Budget files that are read, and those that are refused.
 
 use super::*;
-use metrology::iso230::circular::{CircularTest, CircularTrace, evaluate};
+use iso230::circular::{CircularTest, CircularTrace, evaluate};
 
 const WHOLE: &str = "
 grid_encoder: {expanded_uncertainty_um: 0.6, expanded_uncertainty_um_per_m: 1.0, coverage_factor: 2.0}

@@ -16,7 +16,7 @@
 
 use std::f64::consts::TAU;
 
-use metrology::iso230::circular::LONGEST_GAP_RAD;
+use iso230::circular::LONGEST_GAP_RAD;
 use metrology::stamp::{Host, Stamp};
 use serde::Serialize;
 

@@ -1,10 +1,10 @@
 //! A figure of a test, a length or an angle, and what its limits say of it.
 
 use anyhow::{Result, bail};
-use metrology::iso230::conformance::{
+use iso230::conformance::{
     AngularSpecification, Decision, Policy, Specification, decide, decide_angle,
 };
-use metrology::iso230::{ExpandedAngle, ExpandedLength};
+use iso230::{ExpandedAngle, ExpandedLength};
 use serde_json::Value;
 
 use super::Limit;

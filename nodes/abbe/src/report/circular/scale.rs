@@ -9,7 +9,7 @@
 //!
 //! with u_m of the fit and u(ε) of what is not known about temperatures and coefficients of machine and device.
 
-use metrology::breakdown::{PlaneBreakdown, RowKey};
+use iso230::breakdown::{PlaneBreakdown, RowKey};
 use serde_json::{Value, json};
 
 use super::with_unit;

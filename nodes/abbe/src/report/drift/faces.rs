@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
+use iso230::budget::DeviceUncertainty;
+use iso230::thermal::DriftCause;
 use metrology::Axis;
-use metrology::iso230::budget::DeviceUncertainty;
-use metrology::iso230::thermal::DriftCause;
 use metrology::sample::BlockMeasurement;
 use metrology::stamp::{Host, Stamp};
 use serde::Serialize;

@@ -1,11 +1,9 @@
 //! The figures of ISO 230-3 of one displacement over time.
 
+use iso230::budget::DeviceUncertainty;
+use iso230::thermal::{self, DriftBudget, DriftCause, DriftChannel, DriftContributions, DriftTest};
+use iso230::{ExpandedLength, ExpandedRate, Iso230Error};
 use metrology::Axis;
-use metrology::iso230::budget::DeviceUncertainty;
-use metrology::iso230::thermal::{
-    self, DriftBudget, DriftCause, DriftChannel, DriftContributions, DriftTest,
-};
-use metrology::iso230::{ExpandedLength, ExpandedRate, Iso230Error};
 use serde::Serialize;
 
 use super::HOUR_S;

@@ -1,7 +1,7 @@
 //! A log of one displacement and temperatures while the axes stood.
 
 use anyhow::Result;
-use metrology::iso230::thermal::{DriftCause, DriftContributions};
+use iso230::thermal::{DriftCause, DriftContributions};
 use metrology::stamp::{Host, Stamp};
 use serde_json::json;
 

@@ -1,8 +1,8 @@
 //! ISO 230-6: the four space diagonals of a bag.
 
-use metrology::iso230::diagonal;
-use metrology::iso230::diagonal::{DiagonalResult, DiagonalRuns, DiagonalsResult, SpaceDiagonal};
-use metrology::iso230::positioning::{PointResult, PositioningRuns};
+use iso230::diagonal;
+use iso230::diagonal::{DiagonalResult, DiagonalRuns, DiagonalsResult, SpaceDiagonal};
+use iso230::positioning::{PointResult, PositioningRuns};
 use metrology::sample::TestKind;
 
 use super::{LEAST_SHARE, figure, periods_mm, runs, side_of};

@@ -1,10 +1,10 @@
 //! ISO 230-10: form and size of spheres, rings and bosses as the probe finds them, against their certificates.
 
+use iso230::ExpandedLength;
+use iso230::budget::DeviceUncertainty;
+use iso230::probing::{self, Artefact, FormResult, RING_POINTS, SPHERE_POINTS, Side};
 use machine::cycle::FeatureId;
 use machine::file::CertificateEntry;
-use metrology::iso230::ExpandedLength;
-use metrology::iso230::budget::DeviceUncertainty;
-use metrology::iso230::probing::{self, Artefact, FormResult, RING_POINTS, SPHERE_POINTS, Side};
 use metrology::sample::{FeatureKind, ProbedFeature, ProbedPoint, Rejection};
 use metrology::stamp::{Host, Stamp};
 use nalgebra::Vector3;
@@ -268,7 +268,7 @@ mod tests {
 
     /// 25 points with three lobes and noise, evaluated by scipy.
     const REFERENCE: &str =
-        include_str!("../../../../libraries/metrology/tests/data/iso230_reference.json");
+        include_str!("../../../../libraries/iso230/tests/data/iso230_reference.json");
     const MACHINE: &str = include_str!("../../../../../launch_configs/five_axis/machine.yaml");
     const BUDGET: &str = "
 grid_encoder: {expanded_uncertainty_um: 0.6, expanded_uncertainty_um_per_m: 1.0, coverage_factor: 2.0}

@@ -5,9 +5,9 @@
 
 use std::collections::BTreeMap;
 
+use iso230::ExpandedLength;
+use iso230::probing::{REPETITIONS, location};
 use metrology::Axis;
-use metrology::iso230::ExpandedLength;
-use metrology::iso230::probing::{REPETITIONS, location};
 use metrology::sample::{FeatureKind, ProbedFeature, TestSegment};
 use serde::Serialize;
 use serde_json::json;

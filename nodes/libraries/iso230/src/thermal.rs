@@ -1,0 +1,421 @@
+//! Thermal drift between tool and workpiece over a test of hours (ISO 230-3).
+//!
+//! # Model
+//!
+//! Displacements x(t) from t₀ on, at one height or two per axis; heights are counted along Z:
+//!
+//! ```text
+//!   d_t = x(t₀ + t) − x(t₀)                                                           (1)
+//!   range = max x − min x over the whole test                                         (2)
+//!   rate = slope of the line through the last τ of the test                           (3)
+//!   B(t) = [x₂(t) − x₁(t)]/(h₂ − h₁),   A(t) = −[y₂(t) − y₁(t)]/(h₂ − h₁)              (4)
+//! ```
+//!
+//! The minus in (4) is the right-hand rule: turning by +A moves what is above towards −Y.
+//! In a test of environmental temperature variation (2) is ETVE of the channel. (1) to (3) are
+//! taken of the angles too.
+//!
+//! | symbol | here | unit |
+//! |---|---|---|
+//! | t, τ | `drift_after_s`, `rate_window_s` | s |
+//! | h | `height_mm` | mm |
+//! | s | `reading_scatter_mm`, by (7) [`scatter_mm`] | mm |
+//!
+//! Uncertainties, with U₀, U₁ and k of the instrument's certificate, s of the scatter of one reading, and an artefact of
+//! length l and coefficient α whose temperature stays within a range Δθ, so that it may grow or shrink by up to α l Δθ.
+//! d_t and range are differences of two readings: the constant part of the certificate and the scatter enter twice, the part
+//! that grows with the length once, for the length d between the readings:
+//!
+//! ```text
+//!   d_t, range:  u² = [2 U₀² + (U₁ d)²]/k² + 2 s² + (α l Δθ)²/3                        (5)
+//!   an angle:    u² = 4 (U₀²/k² + s²)/(h₂ − h₁)²
+//!   rate:        u² = u_res² + u²(5, s = 0)/τ²,   u_res of the slope by its residuals  (6)
+//!   s² = mean of e_i²/(1 + w_i² + (1 − w_i)²),   e_i = x_i − [w_i x_{i−1} + (1 − w_i) x_{i+1}],
+//!        w_i = (t_{i+1} − t_i)/(t_{i+1} − t_{i−1})                                    (7)
+//! ```
+//!
+//! The second part of (6) is the difference of two readings τ apart: errors of a certificate and growth of the artefact
+//! bend as the drift does, and residuals do not show them. Scatter is in the residuals. (7) takes each reading against the
+//! straight line between its neighbours, whose three variances add to the denominator: a drift that bends between
+//! neighbours makes s greater, never smaller.
+//!
+//! # Holds when
+//! What is sampled is slow beside the samples: between two of them (1) takes a straight line. u_res
+//! holds when residuals are independent; a bend of the curve makes them not so. The
+//! growth of the artefact is one for both heights and leaves the angle.
+//!
+//! # Agreement
+//! Closed form: `val_iso230_3_an_exponential_drift_has_its_closed_form`, d and range below 1e-15 mm,
+//! the rate of 361 samples to 2.5e-4 of that of a continuous recording. No published example was at
+//! hand.
+//!
+//! (5) by hand: `eq5_certificate_scatter_and_artefact_by_hand`; (7): `eq7_scatter_of_noise_on_a_line_by_hand`, and numpy on a
+//! table (`val_a_warm_up_logged_once_is_evaluated_by_iso_230_3`).
+//!
+//! # References
+//! \[1\] ISO 230-3:2020; from the literature, the text was not at hand. \[2\] JCGM 100:2008 (GUM), 4.2, 4.3 and 5.1.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::budget::{DeviceUncertainty, combined, rectangular};
+use super::error::ChannelFault;
+use super::extent::{
+    check_ascending, check_finite, check_length, check_not_negative, check_points, check_positive,
+    range,
+};
+use super::{ExpandedAngle, ExpandedAngularRate, ExpandedLength, ExpandedRate, Iso230Error};
+use metrology::Axis;
+use metrology::fit::fit_line;
+
+/// Samples without which a rate has no uncertainty.
+const MIN_SAMPLES_OF_RATE: usize = 3;
+
+/// What made the machine drift.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DriftCause {
+    /// The surroundings alone.
+    Environment,
+    /// The turning spindle.
+    Spindle,
+    /// A linear axis that moves to and fro.
+    LinearAxis,
+    /// A rotary component that turns.
+    RotaryAxis,
+    /// Several of these at once, or unknown.
+    NotStated,
+}
+
+/// Displacements at one place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriftChannel {
+    /// Along which axis.
+    pub axis: Axis,
+    /// Height above any common level, along Z, mm.
+    pub height_mm: f64,
+    /// Displacements of the tool side relative to the workpiece side at the test's times, mm.
+    pub displacements_mm: Vec<f64>,
+}
+
+/// One test.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriftTest {
+    /// What made the machine drift.
+    pub cause: DriftCause,
+    /// Times of the samples, ascending, s.
+    pub times_s: Vec<f64>,
+    /// Each sensor.
+    pub channels: Vec<DriftChannel>,
+    /// Time after which the drift is read, s; 3600 is usual.
+    pub drift_after_s: f64,
+    /// Length of the window at the end over which the rate is taken, s; 3600 is usual.
+    pub rate_window_s: f64,
+    /// Longest pause between samples that still counts as a recording, s.
+    pub longest_gap_s: f64,
+}
+
+/// What is not known about a drift test.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriftBudget {
+    /// Certificate of the instrument that reads the displacements.
+    pub sensor: DeviceUncertainty,
+    /// Standard deviation of one reading by scatter, which a certificate does not hold; [`scatter_mm`] finds it in a log, mm.
+    pub reading_scatter_mm: f64,
+    /// Length of the artefact between its seat and the sensors, mm.
+    pub artefact_length_mm: f64,
+    /// Coefficient of expansion of the artefact, 1/K.
+    pub artefact_expansion_per_k: f64,
+    /// Range of the artefact's temperature over the test, K.
+    pub artefact_temperature_range_k: f64,
+}
+
+/// Drift of one channel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DisplacementDrift {
+    /// Along which axis.
+    pub axis: Axis,
+    /// At which height, mm.
+    pub height_mm: f64,
+    /// d_t, (1).
+    pub drift_after: ExpandedLength,
+    /// (2): ETVE where the surroundings are the cause.
+    pub range: ExpandedLength,
+    /// (3).
+    pub final_rate: ExpandedRate,
+    /// What the uncertainty of the range consists of.
+    pub contributions: DriftContributions,
+}
+
+/// Standard uncertainties of a difference of two readings, each of one cause: the parts of (5), mm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DriftContributions {
+    /// Certificate of the instrument.
+    pub certificate_mm: f64,
+    /// Scatter of the two readings.
+    pub scatter_mm: f64,
+    /// Growth of the artefact.
+    pub artefact_mm: f64,
+}
+
+impl DriftContributions {
+    /// For two readings that are `difference_mm` apart.
+    fn new(budget: &DriftBudget, difference_mm: f64) -> Self {
+        let constant_mm = budget.sensor.standard_mm(0.0);
+        let by_length_mm = budget.sensor.standard_mm(difference_mm) - constant_mm;
+        let growth_mm = budget.artefact_length_mm
+            * budget.artefact_expansion_per_k
+            * budget.artefact_temperature_range_k;
+        Self {
+            certificate_mm: (2.0 * constant_mm.powi(2) + by_length_mm.powi(2)).sqrt(),
+            scatter_mm: 2.0_f64.sqrt() * budget.reading_scatter_mm,
+            artefact_mm: rectangular(growth_mm),
+        }
+    }
+
+    /// Combined standard uncertainty (5), mm.
+    #[must_use]
+    pub fn combined_mm(&self) -> f64 {
+        combined(&[self.certificate_mm, self.scatter_mm, self.artefact_mm])
+    }
+}
+
+/// Drift of an angle between two heights.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AngularDrift {
+    /// About which axis: A or B.
+    pub axis: Axis,
+    /// Lower and upper height, mm.
+    pub heights_mm: [f64; 2],
+    /// (1) of the angle.
+    pub drift_after: ExpandedAngle,
+    /// (2) of the angle.
+    pub range: ExpandedAngle,
+    /// (3) of the angle.
+    pub final_rate: ExpandedAngularRate,
+}
+
+/// One test, evaluated.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DriftResult {
+    /// What made the machine drift.
+    pub cause: DriftCause,
+    /// Length of the test, s.
+    pub duration_s: f64,
+    /// t of (1), s.
+    pub drift_after_s: f64,
+    /// Each channel.
+    pub displacements: Vec<DisplacementDrift>,
+    /// Each axis with two heights.
+    pub angles: Vec<AngularDrift>,
+}
+
+/// Evaluates a drift test.
+///
+/// # Errors
+/// Times that do not ascend, pauses, a test shorter than what is asked of it, lists that do not fit
+/// together, channels that make no angle, numbers that cannot be used.
+pub fn evaluate(test: &DriftTest, budget: &DriftBudget) -> Result<DriftResult, Iso230Error> {
+    test.check()?;
+    budget.check()?;
+    let displacements = test
+        .channels
+        .iter()
+        .map(|channel| displacement(test, channel, budget))
+        .collect::<Result<_, Iso230Error>>()?;
+    let angles = [Axis::X, Axis::Y]
+        .into_iter()
+        .filter_map(|axis| angle(test, axis, budget).transpose())
+        .collect::<Result<_, _>>()?;
+    Ok(DriftResult {
+        cause: test.cause,
+        duration_s: range(test.times_s.iter().copied()),
+        drift_after_s: test.drift_after_s,
+        displacements,
+        angles,
+    })
+}
+
+/// Standard deviation of one reading by scatter (7), mm, of displacements at ascending times (s).
+///
+/// # Errors
+/// Fewer than three readings, lists that do not fit together, numbers that cannot be used.
+pub fn scatter_mm(times_s: &[f64], displacements_mm: &[f64]) -> Result<f64, Iso230Error> {
+    check_points("times_s", times_s.len(), MIN_SAMPLES_OF_RATE)?;
+    check_length("displacements_mm", 0, displacements_mm.len(), times_s.len())?;
+    check_finite("times_s", 0, times_s)?;
+    check_finite("displacements_mm", 0, displacements_mm)?;
+    check_ascending("times_s", times_s)?;
+    let (mut sum_mm2, mut n) = (0.0, 0.0);
+    for (t, x) in times_s.windows(3).zip(displacements_mm.windows(3)) {
+        let w = (t[2] - t[1]) / (t[2] - t[0]);
+        let apart_mm = x[1] - (w * x[0] + (1.0 - w) * x[2]);
+        sum_mm2 += apart_mm.powi(2) / (1.0 + w * w + (1.0 - w).powi(2)); // (7)
+        n += 1.0;
+    }
+    Ok((sum_mm2 / n).sqrt())
+}
+
+/// The drift of one channel.
+fn displacement(
+    test: &DriftTest,
+    channel: &DriftChannel,
+    budget: &DriftBudget,
+) -> Result<DisplacementDrift, Iso230Error> {
+    let values_mm = &channel.displacements_mm;
+    let of = |value_mm: f64| {
+        let parts = DriftContributions::new(budget, value_mm);
+        (ExpandedLength::new(value_mm, parts.combined_mm()), parts) // (5)
+    };
+    let (drift_after, _) = of(test.drift(values_mm));
+    let (range, contributions) = of(range(values_mm.iter().copied()));
+    let without_scatter = DriftContributions {
+        scatter_mm: 0.0,
+        ..contributions
+    };
+    let (rate_mm_s, u_rate_mm_s) = test.rate(values_mm, without_scatter.combined_mm())?;
+    Ok(DisplacementDrift {
+        axis: channel.axis,
+        height_mm: channel.height_mm,
+        drift_after,
+        range,
+        final_rate: ExpandedRate::new(rate_mm_s, u_rate_mm_s),
+        contributions,
+    })
+}
+
+impl DriftTest {
+    fn check(&self) -> Result<(), Iso230Error> {
+        check_points("times_s", self.times_s.len(), MIN_SAMPLES_OF_RATE)?;
+        check_finite("times_s", 0, &self.times_s)?;
+        check_ascending("times_s", &self.times_s)?;
+        check_positive("drift_after_s", self.drift_after_s)?;
+        check_positive("rate_window_s", self.rate_window_s)?;
+        check_positive("longest_gap_s", self.longest_gap_s)?;
+        for pair in self.times_s.windows(2) {
+            if pair[1] - pair[0] > self.longest_gap_s {
+                return Err(Iso230Error::Gap {
+                    place: "times_s",
+                    gap: pair[1] - pair[0],
+                    at: pair[0],
+                    limit: self.longest_gap_s,
+                });
+            }
+        }
+        let covered = range(self.times_s.iter().copied());
+        let needed = self.drift_after_s.max(self.rate_window_s);
+        if covered < needed {
+            return Err(Iso230Error::TooShort {
+                place: "times_s",
+                covered,
+                needed,
+            });
+        }
+        check_points("channels", self.channels.len(), 1)?;
+        for (row, channel) in self.channels.iter().enumerate() {
+            let values = &channel.displacements_mm;
+            check_length("channels", row, values.len(), self.times_s.len())?;
+            check_finite("channels", row, values)?;
+            check_finite("height_mm", row, &[channel.height_mm])?;
+        }
+        Axis::ALL
+            .into_iter()
+            .try_for_each(|axis| self.check_axis(axis))
+    }
+
+    fn check_axis(&self, axis: Axis) -> Result<(), Iso230Error> {
+        let heights: Vec<f64> = self.of(axis).map(|c| c.height_mm).collect();
+        let reason = match heights[..] {
+            [] => return Ok(()),
+            _ if !axis.is_linear() => ChannelFault::Rotary,
+            [_] => return Ok(()),
+            [_, _] if axis == Axis::Z => ChannelFault::AlongHeight,
+            [a, b] if a.total_cmp(&b).is_eq() => ChannelFault::SameHeight,
+            [_, _] => return Ok(()),
+            _ => ChannelFault::TooMany,
+        };
+        Err(Iso230Error::Channels {
+            axis,
+            n: heights.len(),
+            reason,
+        })
+    }
+
+    fn of(&self, axis: Axis) -> impl Iterator<Item = &DriftChannel> {
+        self.channels.iter().filter(move |c| c.axis == axis)
+    }
+
+    /// (1); the test is known to be long enough.
+    fn drift(&self, values: &[f64]) -> f64 {
+        let at_s = self.times_s[0] + self.drift_after_s;
+        let last = self.times_s.len() - 1;
+        let after = self.times_s.partition_point(|t| *t <= at_s).clamp(1, last);
+        let (t0, t1) = (self.times_s[after - 1], self.times_s[after]);
+        let share = (at_s - t0) / (t1 - t0);
+        values[after - 1] + share * (values[after] - values[after - 1]) - values[0]
+    }
+
+    /// (3) and (6): slope and its standard uncertainty; `u_difference` is (5) without scatter.
+    fn rate(&self, values: &[f64], u_difference: f64) -> Result<(f64, f64), Iso230Error> {
+        let end_s = self.times_s[self.times_s.len() - 1];
+        let begin_s = end_s - self.rate_window_s;
+        let first = self.times_s.partition_point(|t| *t < begin_s);
+        check_points("rate_window_s", values.len() - first, MIN_SAMPLES_OF_RATE)?;
+        // About the end of the window, so that long clocks cost no digits.
+        let times: Vec<f64> = self.times_s[first..].iter().map(|t| t - end_s).collect();
+        let line = fit_line(&times, &values[first..], &vec![1.0; times.len()])?;
+        let scatter2 = line.chi_square / line.degrees_of_freedom as f64;
+        let by_residuals = (scatter2 * line.covariance[(1, 1)]).sqrt();
+        Ok((
+            line.slope,
+            by_residuals.hypot(u_difference / self.rate_window_s),
+        ))
+    }
+}
+
+impl DriftBudget {
+    fn check(&self) -> Result<(), Iso230Error> {
+        self.sensor.check()?;
+        check_not_negative("reading_scatter_mm", self.reading_scatter_mm)?;
+        check_not_negative("artefact_length_mm", self.artefact_length_mm)?;
+        check_not_negative("artefact_expansion_per_k", self.artefact_expansion_per_k)?;
+        check_not_negative(
+            "artefact_temperature_range_k",
+            self.artefact_temperature_range_k,
+        )
+    }
+}
+
+/// The angle that two heights of `axis` make, if there are two.
+fn angle(
+    test: &DriftTest,
+    axis: Axis,
+    budget: &DriftBudget,
+) -> Result<Option<AngularDrift>, Iso230Error> {
+    let mut channels: Vec<&DriftChannel> = test.of(axis).collect();
+    channels.sort_by(|a, b| a.height_mm.total_cmp(&b.height_mm));
+    let [lower, upper] = channels[..] else {
+        return Ok(None);
+    };
+    let (about, sign) = match axis {
+        Axis::X => (Axis::B, 1.0),
+        _ => (Axis::A, -1.0),
+    };
+    let height_mm = upper.height_mm - lower.height_mm;
+    let pairs = lower.displacements_mm.iter().zip(&upper.displacements_mm);
+    let angles: Vec<f64> = pairs.map(|(l, u)| sign * (u - l) / height_mm).collect(); // (4)
+    let certificate_rad = 2.0 * budget.sensor.standard_mm(0.0) / height_mm;
+    let scatter_rad = 2.0 * budget.reading_scatter_mm / height_mm;
+    let u_rad = certificate_rad.hypot(scatter_rad); // (5)
+    let (rate_rad_s, u_rate_rad_s) = test.rate(&angles, certificate_rad)?;
+    Ok(Some(AngularDrift {
+        axis: about,
+        heights_mm: [lower.height_mm, upper.height_mm],
+        drift_after: ExpandedAngle::new(test.drift(&angles), u_rad),
+        range: ExpandedAngle::new(range(angles.iter().copied()), u_rad),
+        final_rate: ExpandedAngularRate::new(rate_rad_s, u_rate_rad_s),
+    }))
+}

@@ -1,0 +1,186 @@
+//! ISO 230-3: hours of drift, read at two heights in the shop that drifts as well.
+
+use std::f64::consts::TAU;
+
+use iso230::budget::DeviceUncertainty;
+use iso230::thermal::{DriftBudget, DriftCause, DriftChannel, DriftResult, DriftTest, evaluate};
+use metrology::axis::Axis;
+use rand_pcg::Pcg64Mcg;
+
+use super::{Held, MACHINES, UM, between, hold, machine, normal, shares};
+
+/// Three hours, a reading a minute.
+const READINGS: u32 = 181;
+const HOUR_S: f64 = 3600.0;
+const HEIGHTS_MM: [f64; 2] = [100.0, 260.0];
+
+/// Warming with two time constants, and the day in the shop.
+fn warming(rng: &mut Pcg64Mcg, times_s: &[f64]) -> Vec<f64> {
+    let part = |rng: &mut Pcg64Mcg, least_s, greatest_s| {
+        [UM * 8.0 * normal(rng), between(rng, least_s, greatest_s)]
+    };
+    let parts = [part(rng, 300.0, 1800.0), part(rng, 2400.0, 9000.0)];
+    let shop = [
+        UM * between(rng, 0.2, 2.0),
+        between(rng, 1200.0, 20_000.0),
+        between(rng, 0.0, TAU),
+    ];
+    let at = |t: &f64| {
+        let warm: f64 = parts
+            .iter()
+            .map(|[a, tau]| a * (1.0 - (-t / tau).exp()))
+            .sum();
+        warm + shop[0] * (TAU * t / shop[1] + shop[2]).sin()
+    };
+    times_s.iter().map(at).collect()
+}
+
+/// What a certified sensor reads: off by a wave over its range with the root mean square of the certificate's u, and noise.
+fn read(rng: &mut Pcg64Mcg, truth_mm: &[f64], standard_mm: f64) -> Vec<f64> {
+    let (wave_mm, phase) = (UM * between(rng, 3.0, 40.0), between(rng, 0.0, TAU));
+    let off_mm = |x: f64| 2.0_f64.sqrt() * standard_mm * (TAU * x / wave_mm + phase).sin();
+    let noise_mm = 0.1 * standard_mm;
+    truth_mm
+        .iter()
+        .map(|x| x + off_mm(*x) + noise_mm * normal(rng))
+        .collect()
+}
+
+/// After an hour, range, and slope of the last hour by the two sums of a regression.
+fn of_truth(times_s: &[f64], values: &[f64]) -> [f64; 3] {
+    let last: Vec<(f64, f64)> = times_s
+        .iter()
+        .zip(values)
+        .map(|(t, x)| (*t, *x))
+        .filter(|(t, _)| *t >= 2.0 * HOUR_S)
+        .collect();
+    let n = last.len() as f64;
+    let (t0, x0) = last
+        .iter()
+        .fold((0.0, 0.0), |(a, b), (t, x)| (a + t / n, b + x / n));
+    let (top, bottom) = last.iter().fold((0.0, 0.0), |(a, b), (t, x)| {
+        (a + (t - t0) * (x - x0), b + (t - t0).powi(2))
+    });
+    [
+        values[60] - values[0],
+        super::linear::range(values),
+        top / bottom,
+    ]
+}
+
+fn tested(seed: u64) -> Vec<Held> {
+    let mut rng = machine(seed, 3);
+    let times_s: Vec<f64> = (0..READINGS).map(|k| f64::from(k) * 60.0).collect();
+    let standard_mm = UM * between(&mut rng, 0.05, 0.3);
+    let range_k = between(&mut rng, 0.1, 1.5);
+    let length_mm = between(&mut rng, 100.0, 300.0);
+    // The artefact warms or cools as the shop does, by its whole range.
+    let tau_s = between(&mut rng, 1200.0, 7200.0);
+    let sense = if normal(&mut rng) > 0.0 { 1.0 } else { -1.0 };
+    let warm = |t: f64| (1.0 - (-t / tau_s).exp()) / (1.0 - (-3.0 * HOUR_S / tau_s).exp());
+    let growth_mm: Vec<f64> = times_s
+        .iter()
+        .map(|t| sense * 11.5e-6 * length_mm * range_k * warm(*t))
+        .collect();
+    let truths: Vec<Vec<f64>> = HEIGHTS_MM
+        .iter()
+        .map(|_| warming(&mut rng, &times_s))
+        .collect();
+    let channel = |(truth_mm, height_mm): (&Vec<f64>, f64)| {
+        let mut displacements_mm = read(&mut rng, truth_mm, standard_mm);
+        displacements_mm
+            .iter_mut()
+            .zip(&growth_mm)
+            .for_each(|(x, g)| *x += g);
+        DriftChannel {
+            axis: Axis::X,
+            height_mm,
+            displacements_mm,
+        }
+    };
+    let test = DriftTest {
+        cause: DriftCause::Spindle,
+        channels: truths.iter().zip(HEIGHTS_MM).map(channel).collect(),
+        drift_after_s: HOUR_S,
+        rate_window_s: HOUR_S,
+        longest_gap_s: 120.0,
+        times_s: times_s.clone(),
+    };
+    let budget = DriftBudget {
+        sensor: DeviceUncertainty {
+            expanded_uncertainty_mm: 2.0 * standard_mm,
+            expanded_uncertainty_per_length: 0.0,
+            coverage_factor: 2.0,
+        },
+        reading_scatter_mm: 0.0,
+        artefact_length_mm: length_mm,
+        artefact_expansion_per_k: 11.5e-6,
+        artefact_temperature_range_k: range_k,
+    };
+    held_of(&evaluate(&test, &budget).unwrap(), &times_s, &truths)
+}
+
+/// Every figure with its interval and what it is for an exact instrument.
+fn held_of(found: &DriftResult, times_s: &[f64], truths: &[Vec<f64>]) -> Vec<Held> {
+    let low = found.displacements[0];
+    let angle = found.angles[0];
+    let apart_mm = HEIGHTS_MM[1] - HEIGHTS_MM[0];
+    let turned: Vec<f64> = truths[0]
+        .iter()
+        .zip(&truths[1])
+        .map(|(low, high)| (high - low) / apart_mm)
+        .collect();
+    let (x, b) = (of_truth(times_s, &truths[0]), of_truth(times_s, &turned));
+    let held = |name, value, expanded, truth| Held {
+        name,
+        value,
+        expanded,
+        truth,
+    };
+    let (d, e) = (low.drift_after, low.range);
+    let (rate, turn) = (low.final_rate, angle.final_rate);
+    vec![
+        held("d", d.value_mm, d.expanded_uncertainty_mm, x[0]),
+        held("range", e.value_mm, e.expanded_uncertainty_mm, x[1]),
+        held(
+            "rate",
+            rate.value_mm_s,
+            rate.expanded_uncertainty_mm_s,
+            x[2],
+        ),
+        held(
+            "d of B",
+            angle.drift_after.value_rad,
+            angle.drift_after.expanded_uncertainty_rad,
+            b[0],
+        ),
+        held(
+            "range of B",
+            angle.range.value_rad,
+            angle.range.expanded_uncertainty_rad,
+            b[1],
+        ),
+        held(
+            "rate of B",
+            turn.value_rad_s,
+            turn.expanded_uncertainty_rad_s,
+            b[2],
+        ),
+    ]
+}
+
+#[test]
+fn iso230_3_u_holds_the_drift_of_the_machine_alone() {
+    let all: Vec<Vec<Held>> = (0..MACHINES).map(tested).collect();
+    hold(
+        &shares("ISO 230-3", &all),
+        &[
+            ("d", 98.5, 100.0),
+            ("range", 93.0, 97.0),
+            ("rate", 99.0, 100.0),
+            ("d of B", 95.0, 98.0),
+            ("range of B", 95.0, 97.5),
+            ("rate of B", 99.0, 100.0),
+        ],
+    );
+}
