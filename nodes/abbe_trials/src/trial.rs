@@ -7,7 +7,8 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use gap_diagnosis::Rule;
 use gap_diagnosis::report::Status;
-use trials::{Arm, Rig, Second, Trial, Truth, Verdict, extra_run, judge, likeness};
+use sequencer::extra_run;
+use trials::{Arm, Rig, Second, Trial, Truth, Verdict, judge, likeness};
 
 use crate::blind::{self, Beside, Diagnosed, Question};
 use crate::seal::Seal;

@@ -9,12 +9,15 @@
 //! A *measuring step* runs trajectories of `machine::trajectory` and keeps account of which plate or beam
 //! is up and when its count was set to zero: every recording's segment says so.
 //!
+//! `extra_run` makes a plan of the run that a diagnosis asks for.
+//!
 //! The sequencer is the only publisher of `test/segment`, which keeps run numbers unique in a bag.
 
 mod bounds;
 pub mod config;
 mod cycle;
 pub mod error;
+mod extra_run;
 mod job;
 pub mod load;
 mod measuring;
@@ -27,6 +30,7 @@ pub mod touch_along;
 
 pub use config::Config;
 pub use error::SequencerError;
+pub use extra_run::extra_run;
 pub use load::{Load, load};
 pub use plan::{
     DiagonalStep, GridStep, GridTrajectory, Plan, PlanError, PositioningStep, Senses, Step,

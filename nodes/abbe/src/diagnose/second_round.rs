@@ -10,8 +10,7 @@ use gap_diagnosis::report::{GapReport, NextExperiment};
 use machine::MachineFile;
 use metrology::number::number;
 use node_runtime::text_file;
-use sequencer::Plan;
-use trials::extra_run;
+use sequencer::{Plan, extra_run};
 
 use crate::preflight::design::folder::{self, Contents, INSTRUCTIONS};
 use crate::preflight::design::{control, stand_in};

@@ -72,9 +72,8 @@ pub mod model;
 pub mod sensitivity;
 mod turn;
 
-pub(crate) use component::lean;
-pub use component::{components_of, has_component};
-pub(crate) use curve::{Alone, check as check_curve, on_line};
+pub use component::{components_of, has_component, lean};
+pub use curve::{Alone, check as check_curve, on_line};
 pub use error::{PoseRefusal, VolumetricError};
 pub use model::VolumetricModel;
 pub use sensitivity::sensitivity;

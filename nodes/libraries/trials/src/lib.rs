@@ -4,7 +4,7 @@
 //! draws a machine with its plant, `own` gives it a programme of its own for classes that the common one does not show, `commissioning` measures what its maker knows of its loops, `programme` is what is measured, `effect` what is hidden in the plant,
 //! `scatter` what no two runs have in common, `trial` puts them together and `measurement` runs the plan on
 //! `fake_cnc`'s plant in simulated time. Its physics is the plant's own: nothing here calls the simulator or its
-//! catalogue, whose ids it only writes down; `extra_run` is the one that a diagnosis asks for. The *diagnoser* is `abbe diagnose`, a process that is given the bag and
+//! catalogue, whose ids it only writes down. The *diagnoser* is `abbe diagnose`, a process that is given the bag and
 //! the machine file. The *judge* is `verdict` for one trial, `tally`, `calibration`, `confusion` and `detection` for all of
 //! them, `covariate` knows what a leftover should go with, `target` says which figures are as good as they should be;
 //! `comparison` puts the methods of `baseline` and diagnoses without one of their rules before the same judge.
@@ -22,7 +22,6 @@ pub mod covariate;
 pub mod detection;
 pub mod effect;
 pub mod error;
-mod extra_run;
 pub mod measurement;
 mod own;
 mod programme;
@@ -42,7 +41,6 @@ pub use arm::Arm;
 pub use baseline::Method;
 pub use effect::Class;
 pub use error::TrialError;
-pub use extra_run::extra_run;
 pub use measurement::{Sample, measure};
 pub use rig::Rig;
 pub use tally::Tally;

@@ -58,7 +58,8 @@ pub fn has_component(chain: &Chain, component: ErrorComponent) -> bool {
 
 /// Way of the tip per rad of a squareness and mm of the axis' position, first order: the axis is turned
 /// about the direction of its first letter.
-pub(crate) fn lean(squareness: ErrorComponent) -> Vector3<f64> {
+#[must_use]
+pub fn lean(squareness: ErrorComponent) -> Vector3<f64> {
     direction_of(squareness.direction).cross(&direction_of(squareness.of))
 }
 

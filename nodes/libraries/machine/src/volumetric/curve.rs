@@ -301,8 +301,10 @@ impl Tables {
     }
 }
 
-/// Straight between ascending points, constant beyond the outer ones; zero without a point.
-pub(crate) fn on_line(position: &[f64], value: &[f64], at: f64) -> f64 {
+/// Straight between ascending points, constant beyond the outer ones; zero without a point. Positions and values in any
+/// units, the result in that of the values; `value` has an entry for each of `position`.
+#[must_use]
+pub fn on_line(position: &[f64], value: &[f64], at: f64) -> f64 {
     let above = position.partition_point(|&point| point <= at);
     let (Some(below), true) = (above.checked_sub(1), above < position.len()) else {
         let end = if above == 0 {
@@ -317,14 +319,15 @@ pub(crate) fn on_line(position: &[f64], value: &[f64], at: f64) -> f64 {
 }
 
 /// One checked curve, ready to be evaluated alone.
-pub(crate) struct Alone {
+pub struct Alone {
     motions: Motions,
     lane: usize,
 }
 
 impl Alone {
     /// Of a curve that [`check`] lets pass.
-    pub(crate) fn new(curve: &ErrorCurve) -> Self {
+    #[must_use]
+    pub fn new(curve: &ErrorCurve) -> Self {
         let mut motions = Motions::NONE;
         motions.add(curve);
         Self {
@@ -334,13 +337,17 @@ impl Alone {
     }
 
     /// Its value at a position, mm or rad; beyond the recorded span that at its end.
-    pub(crate) fn at(&self, position: f64) -> f64 {
+    #[must_use]
+    pub fn at(&self, position: f64) -> f64 {
         self.motions.at(position, Extrapolate::Hold)[self.lane]
     }
 }
 
 /// Whether the numbers of a curve are what its form needs.
-pub(crate) fn check(curve: &ErrorCurve) -> Result<(), VolumetricError> {
+///
+/// # Errors
+/// Names the component and the number, power, knot or span that is wrong.
+pub fn check(curve: &ErrorCurve) -> Result<(), VolumetricError> {
     let component = curve.component;
     if component.is_location && curve.form != CurveForm::Constant {
         return Err(VolumetricError::LocationNotConstant { component });

@@ -7,9 +7,9 @@ use gap_diagnosis::report::{Cause, Status};
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use gap_diagnosis::{Diagnosis, GapConfig, diagnose};
 use machine::MachineFile;
-use sequencer::Plan;
+use sequencer::{Plan, extra_run};
 use trials::effect::Hidden;
-use trials::{Arm, Class, Rig, Sample, Trial, extra_run, measure};
+use trials::{Arm, Class, Rig, Sample, Trial, measure};
 
 /// Circles of one sense at one angular speed: an oval at 45 degrees may be a lean or a lag.
 const ONE_SENSE: &str = "title: one sense

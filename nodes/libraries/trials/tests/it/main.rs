@@ -3,4 +3,5 @@
 mod alone;
 mod both;
 mod each;
+mod extra_run;
 mod left_out;
