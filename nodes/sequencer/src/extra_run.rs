@@ -28,7 +28,7 @@ const OVERRUN_MM: f64 = 40.0;
 /// Share of a plate's radius that a line goes to.
 const REACH: f64 = 0.9;
 /// Stops of a line.
-const STOPS: u32 = 20;
+const LINE_STOPS: u32 = 20;
 /// Rest at each, s.
 const DWELL_S: f64 = 2.0;
 
@@ -163,7 +163,7 @@ fn on_plate(
         (90.0, [0.0, half_mm])
     };
     let pace = if has_stops {
-        format!("stations: {}, dwell_s: {DWELL_S:.1}", 2 * STOPS)
+        format!("stations: {}, dwell_s: {DWELL_S:.1}", 2 * LINE_STOPS)
     } else {
         "on_the_fly: true".to_owned()
     };
@@ -190,7 +190,7 @@ fn along_beam(
     } else {
         ("scan", String::new())
     };
-    let spacing_mm = (to_mm - from_mm) / f64::from(STOPS - 1);
+    let spacing_mm = (to_mm - from_mm) / f64::from(LINE_STOPS - 1);
     Some(format!(
         "{{do: {what}, axis: {axis}, from_mm: {from_mm:.1}, to_mm: {to_mm:.1}, \
          spacing_mm: {spacing_mm:.1}, runs: 1, {rest}feed_mm_min: {feed_mm_min:.1}, \
