@@ -66,9 +66,19 @@ pub fn check_number(rows: &[Row], path: &str, number: f64) -> Result<(), BoundEr
 
 /// Hands every number that is not a count to `take`, with its path, such as `axes.X.travel_mm[1]`.
 pub fn each_number(value: &impl Serialize, take: &mut dyn FnMut(&str, f64)) {
+    each(value, false, take);
+}
+
+/// The same with counts: those beyond 2^53 are rounded.
+pub fn each_number_and_count(value: &impl Serialize, take: &mut dyn FnMut(&str, f64)) {
+    each(value, true, take);
+}
+
+fn each(value: &impl Serialize, with_counts: bool, take: &mut dyn FnMut(&str, f64)) {
     let mut walk = Walk {
         path: String::new(),
         key: String::new(),
+        with_counts,
         take,
     };
     // It fails for no value: nothing is written.
@@ -79,10 +89,18 @@ struct Walk<'t> {
     path: String,
     /// The text that came last: the name of a map's entry.
     key: String,
+    with_counts: bool,
     take: &'t mut dyn FnMut(&str, f64),
 }
 
 impl Walk<'_> {
+    fn count(&mut self, count: f64) -> fmt::Result {
+        if self.with_counts {
+            (self.take)(&self.path, count);
+        }
+        Ok(())
+    }
+
     fn below(&mut self, segment: &str, value: &(impl Serialize + ?Sized)) -> fmt::Result {
         let length = self.path.len();
         if length > 0 && !segment.starts_with('[') {
@@ -114,6 +132,14 @@ macro_rules! passed_over {
     ($($name:ident: $type:ty),*) => {
         $(fn $name(self, _: $type) -> fmt::Result {
             Ok(())
+        })*
+    };
+}
+
+macro_rules! count {
+    ($($name:ident: $type:ty),*) => {
+        $(fn $name(self, count: $type) -> fmt::Result {
+            self.count(f64::from(count))
         })*
     };
 }
@@ -198,18 +224,28 @@ impl<'w, 't> Serializer for &'w mut Walk<'t> {
 
     passed_over!(
         serialize_bool: bool,
-        serialize_i8: i8,
-        serialize_i16: i16,
-        serialize_i32: i32,
-        serialize_i64: i64,
-        serialize_u8: u8,
-        serialize_u16: u16,
-        serialize_u32: u32,
-        serialize_u64: u64,
         serialize_char: char,
         serialize_bytes: &[u8],
         serialize_unit_struct: &'static str
     );
+    count!(
+        serialize_i8: i8,
+        serialize_i16: i16,
+        serialize_i32: i32,
+        serialize_u8: u8,
+        serialize_u16: u16,
+        serialize_u32: u32
+    );
+
+    #[expect(clippy::cast_precision_loss, reason = "a count is compared with limits")]
+    fn serialize_i64(self, count: i64) -> fmt::Result {
+        self.count(count as f64)
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "a count is compared with limits")]
+    fn serialize_u64(self, count: u64) -> fmt::Result {
+        self.count(count as f64)
+    }
 
     fn serialize_f32(self, value: f32) -> fmt::Result {
         self.serialize_f64(f64::from(value))

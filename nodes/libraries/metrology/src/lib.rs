@@ -31,7 +31,7 @@ pub use bound::{Bound, BoundError, Range};
 pub use clock_map::ClockMap;
 pub use error_component::ErrorComponent;
 pub use homed_gate::{GateNews, HomedGate};
-pub use parameter::ParameterDoc;
+pub use parameter::{ParameterDoc, check_between, check_parameters, parameters_of};
 pub use severity::Severity;
 pub use stage::Stage;
 pub use stamp::{Clock, Host, Machine, Reference, Stamp};
