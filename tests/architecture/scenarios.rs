@@ -124,8 +124,8 @@ fn arch_parameter_files_set_only_what_their_node_has() {
         for node in tree::nodes() {
             let path = format!("{FOLDER}/{scenario}/{node}.yaml");
             if let Some(yaml) = tree::text(&path) {
-                let known = parameters::table(&node).into_iter().map(|row| row.name);
-                found.extend(unknown_parameters(&path, &yaml, &known.collect::<Vec<_>>()));
+                let known = parameters::names(&node);
+                found.extend(unknown_parameters(&path, &yaml, &known));
             }
         }
     }

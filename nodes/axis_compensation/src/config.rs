@@ -3,53 +3,70 @@
 use std::collections::BTreeMap;
 
 use machine::MachineFile;
-use metrology::Axis;
 use metrology::drift::Extrapolate;
+use metrology::{Axis, check_between, check_parameters};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::AxisCompensationError;
 use crate::geometric::GeometricConfig;
-use crate::parameters::{ACCELERATION_UM_PER_S2, PARAMETERS, RATE_UM_PER_S, SIZE_UM};
 use crate::positioning::config::PositioningConfig;
 
+/// Limits of an offset's size, µm.
+pub(crate) const SIZE_UM: (f64, f64) = (0.1, 5000.0);
+/// Limits of its rate, µm/s.
+pub(crate) const RATE_UM_PER_S: (f64, f64) = (0.001, 10000.0);
+/// Limits of its acceleration, µm/s².
+pub(crate) const ACCELERATION_UM_PER_S2: (f64, f64) = (0.001, 1e6);
+
 /// All parameters. Those that protect the machine have no default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxisCompensationConfig {
     /// The axes to compensate, with their limits.
+    #[schemars(extend("keys" = ["X", "Y", "Z"]))]
     pub axes: BTreeMap<Axis, AxisLimitConfig>,
-    /// What happens outside the blocks' span: `linear`, `hold` or `refuse`.
+    /// linear, hold or refuse: what happens outside the blocks' span.
     pub extrapolate: Extrapolate,
     /// Fastest drift that heat can make; a model that changes faster is kept back.
+    #[schemars(range(min = 0.01, max = 1000.0))]
     pub physical_rate_um_per_min: f64,
     /// Change between models that is never a jump.
+    #[schemars(range(min = 0.0, max = 1000.0))]
     pub jump_margin_um: f64,
-    /// Greatest expanded uncertainty (k = 2) of a drift at the travel's corners; beyond it the axis is
-    /// refused.
+    /// Greatest expanded uncertainty (k = 2) of a drift at the travel's corners; beyond it the axis is refused.
+    #[schemars(range(min = 0.1, max = 1000.0))]
     pub expanded_uncertainty_limit_um: f64,
     /// How long the last good value is held once the model is refused.
+    #[schemars(range(min = 0.0, max = 3600.0))]
     pub hold_s: f64,
     /// Time in which an offset is faded to zero.
+    #[schemars(range(min = 0.01, max = 3600.0))]
     pub fade_s: f64,
-    /// The same when the node is told to end; the limits of rate and acceleration hold all the same.
+    /// The same when the node is told to end, where that is shorter; the axes' limits of rate and acceleration hold
+    /// all the same.
     #[serde(default = "default_shutdown_fade_s")]
+    #[schemars(range(min = 0.01, max = 60.0))]
     pub shutdown_fade_s: f64,
     /// Silence of the axes' state after which it counts as stale.
     #[serde(default = "default_gap_s")]
+    #[schemars(range(min = 0.001, max = 60.0))]
     pub gap_s: f64,
     /// Whether compensation is on from the start.
     #[serde(default = "default_enabled")]
     pub enabled: bool,
-    /// Whether the node configures and activates itself at its start.
+    /// Whether the node configures and activates itself at its start; otherwise somebody does so (`ros2 lifecycle
+    /// set`).
     #[serde(default = "default_autostart")]
     pub autostart: bool,
     /// Dual loop of the axes that have a scale, or a table of their own.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schemars(extend("keys" = ["X", "Y", "Z"]))]
     pub positioning: BTreeMap<Axis, PositioningConfig>,
     /// What the geometric part needs; without it geometry models are not used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geometry: Option<GeometricConfig>,
-    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    /// Machine file, relative to the parameter file.
     #[serde(default)]
     pub machine_file: String,
 }
@@ -71,14 +88,17 @@ fn default_autostart() -> bool {
 }
 
 /// Limits of one axis' offset.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxisLimitConfig {
-    /// Greatest size.
+    /// Greatest offset of the axis.
+    #[schemars(range(min = SIZE_UM.0, max = SIZE_UM.1))]
     pub size_limit_um: f64,
-    /// Greatest rate.
+    /// Greatest rate of the offset.
+    #[schemars(range(min = RATE_UM_PER_S.0, max = RATE_UM_PER_S.1))]
     pub rate_limit_um_per_s: f64,
-    /// Greatest acceleration.
+    /// Greatest acceleration of the offset.
+    #[schemars(range(min = ACCELERATION_UM_PER_S2.0, max = ACCELERATION_UM_PER_S2.1))]
     pub acceleration_limit_um_per_s2: f64,
 }
 
@@ -88,33 +108,7 @@ impl AxisCompensationConfig {
     /// # Errors
     /// Names the first parameter that is refused, with value and limits.
     pub fn check(&self, machine: &MachineFile) -> Result<(), AxisCompensationError> {
-        let given = [
-            ("physical_rate_um_per_min", self.physical_rate_um_per_min),
-            ("jump_margin_um", self.jump_margin_um),
-            (
-                "expanded_uncertainty_limit_um",
-                self.expanded_uncertainty_limit_um,
-            ),
-            ("hold_s", self.hold_s),
-            ("fade_s", self.fade_s),
-            ("shutdown_fade_s", self.shutdown_fade_s),
-            ("gap_s", self.gap_s),
-        ];
-        for (key, value) in given {
-            let doc = PARAMETERS.iter().find(|doc| doc.name == key);
-            let (lower, upper) = doc
-                .and_then(|doc| doc.range)
-                .expect("a test compares the lists");
-            if !(value >= lower && value <= upper) {
-                return Err(AxisCompensationError::ParameterOutOfRange {
-                    key,
-                    value,
-                    lower,
-                    upper,
-                    unit: doc.map_or("", |doc| doc.unit),
-                });
-            }
-        }
+        check_parameters(self)?;
         if self.axes.is_empty() {
             return Err(AxisCompensationError::NoAxis);
         }
@@ -130,9 +124,7 @@ impl AxisCompensationConfig {
             }
             positioning.check(axis, machine)?;
         }
-        self.geometry
-            .as_ref()
-            .map_or(Ok(()), GeometricConfig::check)
+        Ok(())
     }
 
     /// Longest time from the call to end until every offset is zero, s.
@@ -156,33 +148,9 @@ impl AxisLimitConfig {
     fn check(&self, axis: Axis, gap_s: f64) -> Result<(), AxisCompensationError> {
         // A gap freezes the offset: at full rate it must be able to stop within the gap's own time.
         let least_acceleration = (self.rate_limit_um_per_s / gap_s).max(ACCELERATION_UM_PER_S2.0);
-        let rows = [
-            ("size_limit_um", self.size_limit_um, SIZE_UM, "µm"),
-            (
-                "rate_limit_um_per_s",
-                self.rate_limit_um_per_s,
-                RATE_UM_PER_S,
-                "µm/s",
-            ),
-            (
-                "acceleration_limit_um_per_s2",
-                self.acceleration_limit_um_per_s2,
-                (least_acceleration, ACCELERATION_UM_PER_S2.1),
-                "µm/s²",
-            ),
-        ];
-        for (key, value, (lower, upper), unit) in rows {
-            if !(value >= lower && value <= upper) {
-                return Err(AxisCompensationError::LimitOutOfRange {
-                    axis,
-                    key,
-                    value,
-                    lower,
-                    upper,
-                    unit,
-                });
-            }
-        }
+        let place = format!("axes.{axis}.acceleration_limit_um_per_s2");
+        let limits = (least_acceleration, ACCELERATION_UM_PER_S2.1);
+        check_between(&place, self.acceleration_limit_um_per_s2, limits)?;
         Ok(())
     }
 }
@@ -249,21 +217,5 @@ mod tests {
     fn an_unknown_key_is_refused_by_name() {
         let wrong = serde_saphyr::from_str::<AxisCompensationConfig>(&config(X, "fade_ms: 5.0"));
         assert!(wrong.unwrap_err().to_string().contains("fade_ms"));
-    }
-
-    #[test]
-    fn the_readme_lists_every_parameter_with_unit_and_meaning() {
-        let readme = include_str!("../README.md");
-        for doc in PARAMETERS {
-            let line = readme
-                .lines()
-                .find(|l| l.starts_with(&format!("| `{}` |", doc.name)));
-            let line = line.unwrap_or_else(|| panic!("{} is missing", doc.name));
-            assert!(line.contains(doc.description), "{line}");
-            assert!(
-                line.contains(&format!("| {} |", doc.unit)) || doc.unit.is_empty(),
-                "{line}"
-            );
-        }
     }
 }

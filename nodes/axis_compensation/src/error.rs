@@ -2,43 +2,16 @@
 
 use machine::ChainError;
 use metrology::Axis;
-use metrology::number::number;
+use metrology::bound::BoundError;
 
 use crate::positioning::refusal::PositioningRefusal;
 
 /// A configuration or machine that cannot be compensated safely.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum AxisCompensationError {
-    /// A parameter is outside its limits.
-    #[error("{key} = {value} {unit}: must be from {lower} to {upper} {unit}", value = number(*value), lower = number(*lower), upper = number(*upper))]
-    ParameterOutOfRange {
-        /// The parameter.
-        key: &'static str,
-        /// What was given.
-        value: f64,
-        /// Least value allowed.
-        lower: f64,
-        /// Greatest value allowed.
-        upper: f64,
-        /// Unit of all three.
-        unit: &'static str,
-    },
-    /// A limit of one axis is outside its limits.
-    #[error("axes.{axis}.{key} = {value} {unit}: must be from {lower} to {upper} {unit}", value = number(*value), lower = number(*lower), upper = number(*upper))]
-    LimitOutOfRange {
-        /// The axis.
-        axis: Axis,
-        /// The key.
-        key: &'static str,
-        /// What was given.
-        value: f64,
-        /// Least value allowed.
-        lower: f64,
-        /// Greatest value allowed.
-        upper: f64,
-        /// Unit of all three.
-        unit: &'static str,
-    },
+    /// A parameter outside its limits.
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     /// No axis is to be compensated.
     #[error("axes: no axis is given, at least 1 is needed")]
     NoAxis,
@@ -47,22 +20,6 @@ pub enum AxisCompensationError {
     NotALinearAxis {
         /// The axis.
         axis: Axis,
-    },
-    /// A parameter of an axis' positioning part is outside its limits.
-    #[error("positioning.{axis}.{key} = {value} {unit}: must be from {lower} to {upper} {unit}", value = number(*value), lower = number(*lower), upper = number(*upper))]
-    PositioningOutOfRange {
-        /// The axis.
-        axis: Axis,
-        /// The key.
-        key: &'static str,
-        /// What was given.
-        value: f64,
-        /// Least value allowed.
-        lower: f64,
-        /// Greatest value allowed.
-        upper: f64,
-        /// Unit of all three.
-        unit: &'static str,
     },
     /// A positioning part for an axis that is not compensated.
     #[error("positioning.{axis}: the axis has no limits under `axes`")]

@@ -32,6 +32,7 @@ use metrology::drift::Extrapolate;
 use metrology::sample::GeometryModel;
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use gate::{GeometryGate, GeometryPassage, poses};
@@ -44,43 +45,16 @@ pub(crate) const TOOL_OFFSET_MM: (f64, f64) = (-2000.0, 2000.0);
 pub(crate) const JUMP_LIMIT_UM: (f64, f64) = (0.01, 5000.0);
 
 /// Parameters of the geometric part; none of them has a default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GeometricConfig {
-    /// From the functional point of the machine file to the tip that works.
+    /// From the machine file's functional point to the tip that works, X Y Z; without geometry no geometry model is
+    /// used.
+    #[schemars(inner(range(min = TOOL_OFFSET_MM.0, max = TOOL_OFFSET_MM.1)))]
     pub tool_offset_mm: [f64; 3],
-    /// Greatest change of the tip's error between two models that is not a jump.
+    /// Greatest change of the tip's error between two geometry models that is not a jump.
+    #[schemars(range(min = JUMP_LIMIT_UM.0, max = JUMP_LIMIT_UM.1))]
     pub jump_limit_um: f64,
-}
-
-impl GeometricConfig {
-    /// Checks both numbers against their limits.
-    ///
-    /// # Errors
-    /// Names the first that is outside.
-    pub fn check(&self) -> Result<(), AxisCompensationError> {
-        let offsets = self
-            .tool_offset_mm
-            .map(|value| ("geometry.tool_offset_mm", value, TOOL_OFFSET_MM, "mm"));
-        let jump = (
-            "geometry.jump_limit_um",
-            self.jump_limit_um,
-            JUMP_LIMIT_UM,
-            "µm",
-        );
-        for (key, value, (lower, upper), unit) in offsets.into_iter().chain([jump]) {
-            if !(value >= lower && value <= upper) {
-                return Err(AxisCompensationError::ParameterOutOfRange {
-                    key,
-                    value,
-                    lower,
-                    upper,
-                    unit,
-                });
-            }
-        }
-        Ok(())
-    }
 }
 
 /// Which of the published models.

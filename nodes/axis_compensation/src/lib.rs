@@ -32,7 +32,6 @@ pub mod femtometre;
 pub mod geometric;
 pub mod limiter;
 pub mod model_gate;
-pub mod parameters;
 pub mod parts;
 pub mod positioning;
 pub mod pulses;

@@ -136,16 +136,12 @@ impl AxisCompensationStage {
         let pulse_um = positive(
             "control.pulse_equivalent_um",
             machine.control.pulse_equivalent_um,
-            "µm",
         )?;
         let pulse_mm = pulse_um * 1e-3;
         let train =
             PulseTrain::new(pulse_mm).expect("a pulse from 1e-6 to 1e6 µm was just checked");
-        let servo_period_s = positive(
-            "control.servo_period_ms",
-            machine.control.servo_period_ms,
-            "ms",
-        )? * 1e-3;
+        let servo_period_s =
+            positive("control.servo_period_ms", machine.control.servo_period_ms)? * 1e-3;
         let let_go = LetGo {
             hold_s: config.hold_s,
             fade_s: config.fade_s,
@@ -437,22 +433,9 @@ fn gate_limits(config: &AxisCompensationConfig, machine: &MachineFile) -> GateLi
     }
 }
 
-fn positive(
-    key: &'static str,
-    value: f64,
-    unit: &'static str,
-) -> Result<f64, AxisCompensationError> {
-    let (lower, upper) = (1e-6, 1e6);
-    if value >= lower && value <= upper {
-        return Ok(value);
-    }
-    Err(AxisCompensationError::ParameterOutOfRange {
-        key,
-        value,
-        lower,
-        upper,
-        unit,
-    })
+fn positive(key: &str, value: f64) -> Result<f64, AxisCompensationError> {
+    check_between(key, value, (1e-6, 1e6))?;
+    Ok(value)
 }
 
 impl Stage for AxisCompensationStage {

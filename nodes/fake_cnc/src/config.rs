@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use machine::MachineFile;
 use machine::file::{AxisEntry, Latch};
 use metrology::stamp::Span;
-use metrology::{Axis, PerAxis};
+use metrology::{Axis, PerAxis, check_parameters};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::CncError;
-pub use crate::parameters::PARAMETERS;
 use crate::path::AxisLimits;
 use crate::rs274::Envelope;
 use crate::servo::Gains;
@@ -18,68 +18,94 @@ use crate::servo::Gains;
 const TOOLS: usize = 1000;
 
 /// Operational parameters; none of them is physics, so each has a default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
     /// Machine file, relative to the parameter file.
     pub machine_file: String,
     /// Plant file, relative to the parameter file.
     pub plant_file: String,
-    /// Rate of axis states during touches and `(rate: full)` contours, Hz.
+    /// Rate of axis states during touches and full-rate contours; a whole part of the servo rate.
+    #[schemars(range(min = 1.0, max = 20_000.0))]
     pub state_rate_hz: f64,
-    /// Rate of axis states otherwise, Hz; 0 means `state_rate_hz`.
+    /// Rate of axis states otherwise; 0 means state_rate_hz.
+    #[schemars(range(min = 0.0, max = 20_000.0))]
     pub background_rate_hz: f64,
-    /// Rate of program feedback, Hz; 10 at most.
+    /// Rate of program feedback.
+    #[schemars(range(min = 0.01, max = 10.0))]
     pub feedback_rate_hz: f64,
-    /// Time for which the full rate goes on after a touch, and rest before one, s.
+    /// Rest before a touch, and time for which the full rate goes on after it.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub touch_margin_s: f64,
-    /// Rest after every exact stop, s.
+    /// Rest after every exact stop.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub settle_s: f64,
-    /// Gain of the velocity loops, 1/s.
+    /// Gain of the velocity loops.
+    #[schemars(range(min = 1.0, max = 10_000.0))]
     pub velocity_gain_per_s: f64,
-    /// Integral time of the velocity loops, s.
+    /// Integral time of the velocity loops.
+    #[schemars(range(min = 1e-4, max = 100.0))]
     pub velocity_integral_time_s: f64,
-    /// Greatest acceleration demand over the axis' acceleration limit.
+    /// Greatest acceleration demand over the acceleration limit of the axis.
+    #[schemars(range(min = 1.0, max = 100.0))]
     pub drive_peak_ratio: f64,
-    /// Following error at which a linear axis stops, mm.
+    /// Following error at which a linear axis stops.
+    #[schemars(range(min = 1e-3, max = 100.0))]
     pub following_error_limit_mm: f64,
-    /// Following error at which a rotary axis stops, deg.
+    /// Following error at which a rotary axis stops.
+    #[schemars(range(min = 1e-3, max = 100.0))]
     pub following_error_limit_deg: f64,
-    /// Age at which the last compensation is held no longer, s.
+    /// Silence after which a compensation is held no longer but fades.
+    #[schemars(range(min = 1e-3, max = 3600.0))]
     pub compensation_hold_s: f64,
-    /// Rate at which a stale compensation goes to zero, µm/s.
+    /// Rate at which a stale compensation of a linear axis goes to zero.
+    #[schemars(range(min = 1e-3, max = 1e4))]
     pub compensation_fade_um_s: f64,
-    /// The same of rotary axes, arcsec/s.
+    /// Rate at which a stale compensation of a rotary axis goes to zero.
+    #[schemars(range(min = 1e-3, max = 1e4))]
     pub compensation_fade_arcsec_s: f64,
-    /// Rate at which a compensation is followed at most, µm/s.
+    /// Rate at which a compensation of a linear axis is followed at most.
+    #[schemars(range(min = 1e-3, max = 1e4))]
     pub compensation_rate_limit_um_s: f64,
-    /// The same of rotary axes, arcsec/s.
+    /// Rate at which a compensation of a rotary axis is followed at most.
+    #[schemars(range(min = 1e-3, max = 1e4))]
     pub compensation_rate_limit_arcsec_s: f64,
-    /// Greatest compensation that is accepted, µm.
+    /// Greatest compensation of a linear axis that is accepted.
+    #[schemars(range(min = 1e-3, max = 1e4))]
     pub compensation_limit_um: f64,
-    /// The same of rotary axes, arcsec.
+    /// Greatest compensation of a rotary axis that is accepted.
+    #[schemars(range(min = 1e-3, max = 1e4))]
     pub compensation_limit_arcsec: f64,
-    /// Controller clock minus host clock at the first tick, s.
+    /// Controller clock minus host clock at the first tick.
+    #[schemars(range(min = -1e9, max = 1e9))]
     pub clock_offset_s: f64,
-    /// Rate of the controller clock against the host's, minus one, parts per million.
+    /// Rate of the controller clock against the host's, minus one.
+    #[schemars(range(min = -1000.0, max = 1000.0))]
     pub clock_drift_ppm: f64,
-    /// Jump of the host clock beyond which time is skipped rather than simulated, s.
+    /// Jump of the host clock beyond which time is skipped rather than simulated.
+    #[schemars(range(min = 1e-3, max = 1e6))]
     pub longest_catch_up_s: f64,
-    /// Whether the node configures and activates itself at its start.
+    /// Whether the node configures and activates itself at its start; otherwise somebody does so (`ros2 lifecycle
+    /// set`).
     pub autostart: bool,
-    /// Time that homing takes, at the start and when it is asked for, s; 0: the axes know their zeros.
+    /// Time that homing takes, at the start and when it is asked for; 0: the axes know their zeros.
+    #[schemars(range(min = 0.0, max = 3600.0))]
     pub homing_s: f64,
     /// Whether M1 waits.
     pub optional_stop: bool,
     /// Whether every block waits for the next to be asked for.
     pub single_block: bool,
-    /// Lengths of tools H1, H2 ..., mm.
+    /// Lengths of tools H1, H2 and so on, for G43.
+    #[schemars(inner(range(min = -1000.0, max = 1000.0)))]
     pub tool_lengths_mm: Vec<f64>,
-    /// What closes the position loop of each linear axis, by letter; others: the motor.
+    /// What closes the position loop: motor (semi-closed, also without an entry) or scale (full-closed).
+    #[schemars(extend("keys" = ["X", "Y", "Z"]))]
     pub feedback: BTreeMap<Axis, FeedbackSource>,
-    /// Positions of linear axes at the start, by letter; others start at 0.
+    /// Position at the start, within travel; 0 without an entry.
+    #[schemars(extend("keys" = ["X", "Y", "Z"]))]
     pub start_mm: BTreeMap<Axis, f64>,
-    /// Positions of rotary axes at the start, by letter; others start at 0.
+    /// Position at the start, within travel; 0 without an entry.
+    #[schemars(extend("keys" = ["A", "B", "C"]))]
     pub start_deg: BTreeMap<Axis, f64>,
 }
 
@@ -121,7 +147,7 @@ impl Default for Config {
 }
 
 /// What closes a position loop.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FeedbackSource {
     /// The motor's encoder: semi-closed.
@@ -298,60 +324,9 @@ impl Config {
         linear_s.max(rotary_s) + SLOWING_DOWN_S
     }
 
-    /// Checks every number against the range in [`PARAMETERS`].
+    /// Checks every number against its limits.
     fn check(&self) -> Result<(), CncError> {
-        let numbers = [
-            ("state_rate_hz", self.state_rate_hz),
-            ("background_rate_hz", self.background_rate_hz),
-            ("feedback_rate_hz", self.feedback_rate_hz),
-            ("touch_margin_s", self.touch_margin_s),
-            ("settle_s", self.settle_s),
-            ("velocity_gain_per_s", self.velocity_gain_per_s),
-            ("velocity_integral_time_s", self.velocity_integral_time_s),
-            ("drive_peak_ratio", self.drive_peak_ratio),
-            ("following_error_limit_mm", self.following_error_limit_mm),
-            ("following_error_limit_deg", self.following_error_limit_deg),
-            ("compensation_hold_s", self.compensation_hold_s),
-            ("compensation_fade_um_s", self.compensation_fade_um_s),
-            (
-                "compensation_fade_arcsec_s",
-                self.compensation_fade_arcsec_s,
-            ),
-            (
-                "compensation_rate_limit_um_s",
-                self.compensation_rate_limit_um_s,
-            ),
-            (
-                "compensation_rate_limit_arcsec_s",
-                self.compensation_rate_limit_arcsec_s,
-            ),
-            ("compensation_limit_um", self.compensation_limit_um),
-            ("compensation_limit_arcsec", self.compensation_limit_arcsec),
-            ("clock_offset_s", self.clock_offset_s),
-            ("clock_drift_ppm", self.clock_drift_ppm),
-            ("longest_catch_up_s", self.longest_catch_up_s),
-            ("homing_s", self.homing_s),
-        ];
-        let lengths = self.tool_lengths_mm.iter();
-        let numbers = numbers
-            .into_iter()
-            .chain(lengths.map(|length_mm| ("tool_lengths_mm", *length_mm)));
-        for (name, value) in numbers {
-            let range = PARAMETERS
-                .iter()
-                .find(|doc| doc.name == name)
-                .and_then(|doc| doc.range);
-            if let Some((least, greatest)) =
-                range.filter(|(least, greatest)| !(*least..=*greatest).contains(&value))
-            {
-                return Err(CncError::Range {
-                    name,
-                    value,
-                    least,
-                    greatest,
-                });
-            }
-        }
+        check_parameters(self)?;
         if self.tool_lengths_mm.len() > TOOLS {
             return Err(CncError::TooManyTools {
                 count: self.tool_lengths_mm.len(),

@@ -1,23 +1,15 @@
 //! What the control refuses: a configuration, an input that breaks the contract, or a program.
 
 use metrology::Axis;
+use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 
 /// Why a control cannot be built, or an event cannot be handled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CncError {
-    /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
-    Range {
-        /// Name of the parameter.
-        name: &'static str,
-        /// The value given.
-        value: f64,
-        /// Least value allowed.
-        least: f64,
-        /// Greatest value allowed.
-        greatest: f64,
-    },
+    /// A parameter outside its limits.
+    #[error(transparent)]
+    Bound(#[from] BoundError),
     /// A parameter that breaks a rule.
     #[error("{name} = {value}: must be {rule}", value = quantity(name, *value))]
     Parameter {

@@ -30,14 +30,9 @@ pub enum GapError {
         value: f64,
         low: f64,
     },
-    /// A parameter of the node outside its range.
-    #[error("{name} = {value}: must be within {low} and {high}", value = quantity(name, *value), low = number(*low), high = quantity(name, *high))]
-    Parameter {
-        name: &'static str,
-        value: f64,
-        low: f64,
-        high: f64,
-    },
+    /// A parameter of the node outside its limits.
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     /// The samples are no session of this machine.
     #[error(transparent)]
     Session(#[from] crate::session::SessionError),

@@ -96,7 +96,7 @@ pub use config::GapConfig;
 pub use diagnose::{Diagnosis, diagnose};
 pub use error::GapError;
 pub use figures::{Figures, Note};
-pub use following::{GapDiagnosisConfig, PARAMETERS};
+pub use following::GapDiagnosisConfig;
 pub use report::GapReport;
 pub use rule::Rule;
 pub use stage::{GapDiagnosisStage, Input, Output};

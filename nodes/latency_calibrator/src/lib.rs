@@ -19,7 +19,7 @@ pub mod motion_log;
 pub mod stage;
 pub mod two_feed;
 
-pub use config::{LatencyCalibratorConfig, PARAMETERS};
+pub use config::LatencyCalibratorConfig;
 pub use diagnostic::{Refusal, TouchFault};
 pub use error::LatencyCalibratorError;
 pub use stage::{Input, LatencyCalibratorStage, Output};

@@ -2,29 +2,31 @@
 
 use machine::file::{Latch, MachineFile};
 use metrology::stamp::Span;
-use metrology::{Axis, AxisSet, PerAxis};
+use metrology::{Axis, AxisSet, PerAxis, check_between, check_parameters};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::BridgeError;
-use crate::parameters::PARAMETERS;
 
 /// The parameter file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BridgeConfig {
     /// Machine file, relative to the parameter file.
     pub machine_file: String,
-    /// Axis of each joint, from joint 0.
+    /// Axis letter of each joint, from joint 0; the axes of the machine file.
     pub joints: Vec<Axis>,
-    /// What the bridge does when it finds LinuxCNC freshly started.
+    /// observe: a person releases the emergency stop, powers on and homes; power_on_and_home: the bridge does so when
+    /// no joint is homed (simulated machines only).
     pub prepare: Prepare,
     /// INI file to start, relative to the parameter file; absent: LinuxCNC is started by others.
     #[serde(default)]
     pub start_ini: Option<String>,
-    /// Whether the node configures and activates itself at its start.
+    /// Whether the node configures and activates itself at its start; otherwise somebody does so (`ros2 lifecycle
+    /// set`).
     #[serde(default = "BridgeConfig::default_autostart")]
     pub autostart: bool,
-    /// Ordinary user who owns LinuxCNC's processes and memory.
+    /// Ordinary user who owns LinuxCNC's processes; used when the bridge runs as root.
     #[serde(default = "BridgeConfig::default_user")]
     pub user: String,
     /// The TCP interface.
@@ -35,7 +37,7 @@ pub struct BridgeConfig {
 }
 
 /// What the bridge does when it finds LinuxCNC freshly started (no joint homed).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Prepare {
     /// Nothing: a person at the machine releases the emergency stop, powers on and homes.
@@ -45,26 +47,32 @@ pub enum Prepare {
 }
 
 /// The TCP interface and its times.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConnectionConfig {
-    /// Where `linuxcncrsh` listens.
+    /// Where linuxcncrsh listens.
     pub host: String,
-    /// Its TCP port.
+    /// TCP port of linuxcncrsh.
+    #[schemars(range(min = 1.0, max = 65_535.0))]
     pub port: u16,
-    /// Password of its greeting.
+    /// Password of the greeting.
     pub connect_password: String,
     /// Password that allows commands.
     pub enable_password: String,
     /// Time between looks at the controller's state.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub poll_period_ms: f64,
     /// An answer later than this ends the connection.
+    #[schemars(range(min = 100.0, max = 60_000.0))]
     pub reply_timeout_ms: f64,
     /// Time between attempts to connect.
+    #[schemars(range(min = 10.0, max = 60_000.0))]
     pub reconnect_period_ms: f64,
     /// Homing must be over after this time.
+    #[schemars(range(min = 1.0, max = 3600.0))]
     pub homing_timeout_s: f64,
     /// LinuxCNC must listen this long after its start.
+    #[schemars(range(min = 1.0, max = 600.0))]
     pub start_timeout_s: f64,
 }
 
@@ -85,14 +93,17 @@ impl Default for ConnectionConfig {
 }
 
 /// Limits of the compensation that is passed on; HAL has its own limits behind these.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CompensationConfig {
-    /// Greatest offset of a linear axis.
+    /// Greatest offset of a linear axis; a set with a larger one is refused whole.
+    #[schemars(range(min = 0.1, max = 5000.0))]
     pub limit_um: f64,
     /// Greatest offset of a rotary axis.
+    #[schemars(range(min = 0.1, max = 3600.0))]
     pub limit_arcsec: f64,
     /// Without news for this long the heartbeat stops and HAL fades the offsets out.
+    #[schemars(range(min = 1.0, max = 60_000.0))]
     pub stale_after_ms: f64,
 }
 
@@ -137,26 +148,8 @@ pub struct Settings {
     pub compensation_stale_after: Span,
 }
 
-/// A number within the range that [`PARAMETERS`] states for it.
-fn checked(key: &'static str, value: f64) -> Result<f64, BridgeError> {
-    let doc = PARAMETERS.iter().find(|doc| doc.name == key);
-    let (least, greatest) = doc
-        .and_then(|doc| doc.range)
-        .expect("every number of the configuration has a range in the table");
-    if value >= least && value <= greatest {
-        Ok(value)
-    } else {
-        Err(BridgeError::OutOfRange {
-            key,
-            value,
-            least,
-            greatest,
-        })
-    }
-}
-
-fn span(key: &'static str, value: f64, unit_s: f64) -> Result<Span, BridgeError> {
-    Ok(Span::from_secs_f64(checked(key, value)? * unit_s))
+fn span(value: f64, unit_s: f64) -> Span {
+    Span::from_secs_f64(value * unit_s)
 }
 
 fn word(key: &'static str, value: &str) -> Result<String, BridgeError> {
@@ -180,18 +173,9 @@ fn scaled(joints: &[Axis], machine: &MachineFile) -> Vec<Axis> {
 }
 
 fn servo_period(machine: &MachineFile) -> Result<Span, BridgeError> {
-    let (key, value) = ("control.servo_period_ms", machine.control.servo_period_ms);
-    let (least, greatest) = (0.01, 100.0);
-    if (least..=greatest).contains(&value) {
-        Ok(Span::from_secs_f64(value * 1e-3))
-    } else {
-        Err(BridgeError::OutOfRange {
-            key,
-            value,
-            least,
-            greatest,
-        })
-    }
+    let period_ms = machine.control.servo_period_ms;
+    check_between("control.servo_period_ms", period_ms, (0.01, 100.0))?;
+    Ok(Span::from_secs_f64(period_ms * 1e-3))
 }
 
 impl Settings {
@@ -210,12 +194,11 @@ impl Settings {
         if machine.control.latch != Latch::Polled {
             return Err(BridgeError::LatchIsPolled);
         }
+        check_parameters(config)?;
         let connection = &config.connection;
         let limit = &config.compensation;
-        let linear_mm = checked("compensation.limit_um", limit.limit_um)? / 1000.0;
-        let rotary_rad =
-            (checked("compensation.limit_arcsec", limit.limit_arcsec)? / 3600.0).to_radians();
-        checked("connection.start_timeout_s", connection.start_timeout_s)?;
+        let linear_mm = limit.limit_um / 1000.0;
+        let rotary_rad = (limit.limit_arcsec / 3600.0).to_radians();
         Ok(Self {
             joints: config.joints.clone(),
             scales: scaled(&config.joints, machine),
@@ -224,22 +207,10 @@ impl Settings {
             prepare: config.prepare,
             connect_password: word("connection.connect_password", &connection.connect_password)?,
             enable_password: word("connection.enable_password", &connection.enable_password)?,
-            poll_period: span("connection.poll_period_ms", connection.poll_period_ms, 1e-3)?,
-            reply_timeout: span(
-                "connection.reply_timeout_ms",
-                connection.reply_timeout_ms,
-                1e-3,
-            )?,
-            reconnect_period: span(
-                "connection.reconnect_period_ms",
-                connection.reconnect_period_ms,
-                1e-3,
-            )?,
-            homing_timeout: span(
-                "connection.homing_timeout_s",
-                connection.homing_timeout_s,
-                1.0,
-            )?,
+            poll_period: span(connection.poll_period_ms, 1e-3),
+            reply_timeout: span(connection.reply_timeout_ms, 1e-3),
+            reconnect_period: span(connection.reconnect_period_ms, 1e-3),
+            homing_timeout: span(connection.homing_timeout_s, 1.0),
             compensation_limit: PerAxis::from_fn(|axis| {
                 if axis.is_linear() {
                     linear_mm
@@ -247,11 +218,7 @@ impl Settings {
                     rotary_rad
                 }
             }),
-            compensation_stale_after: span(
-                "compensation.stale_after_ms",
-                limit.stale_after_ms,
-                1e-3,
-            )?,
+            compensation_stale_after: span(limit.stale_after_ms, 1e-3),
         })
     }
 }

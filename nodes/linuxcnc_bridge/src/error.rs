@@ -3,23 +3,15 @@
 use std::path::PathBuf;
 
 use metrology::Axis;
+use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 
 /// Errors of the bridge: its configuration, and starting and reaching LinuxCNC.
 #[derive(Debug, thiserror::Error)]
 pub enum BridgeError {
-    /// A number of the configuration is out of its range.
-    #[error("{key} = {value}: must be from {least} to {greatest}", value = quantity(key, *value), least = number(*least), greatest = quantity(key, *greatest))]
-    OutOfRange {
-        /// Key in the parameter file.
-        key: &'static str,
-        /// What was read, in the key's unit.
-        value: f64,
-        /// Least value that is allowed.
-        least: f64,
-        /// Greatest value that is allowed.
-        greatest: f64,
-    },
+    /// A parameter outside its limits.
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     /// A word that goes over the wire would break the line.
     #[error("{key} = {value:?}: must be one word without white space")]
     NotAWord {

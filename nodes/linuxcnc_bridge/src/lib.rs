@@ -59,7 +59,6 @@ pub mod io;
 pub mod latch;
 pub mod live;
 pub mod modal;
-pub mod parameters;
 pub mod program;
 pub mod protocol;
 pub mod run;
@@ -72,5 +71,4 @@ pub mod work_systems;
 
 pub use config::{BridgeConfig, Settings};
 pub use error::BridgeError;
-pub use parameters::PARAMETERS;
 pub use stage::{BridgeStage, Input, Output};

@@ -1,20 +1,23 @@
 //! Parameters of the machine's frames.
 
-use metrology::ParameterDoc;
+use metrology::check_parameters;
 use metrology::stamp::Span;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::MachineFramesError;
 
 /// Operational parameters; the machine itself comes from the machine file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MachineFramesConfig {
     /// Greatest rate of moving frames; 0: with every position.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub rate_hz: f64,
     /// Time without positions that is reported.
+    #[schemars(range(min = 1.0, max = 3600.0))]
     pub silence_s: f64,
-    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    /// Machine file, relative to the parameter file.
     pub machine_file: String,
 }
 
@@ -28,44 +31,10 @@ impl Default for MachineFramesConfig {
     }
 }
 
-/// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 3] = [
-    ParameterDoc {
-        name: "rate_hz",
-        unit: "Hz",
-        description: "Greatest rate of moving frames; 0: with every position.",
-        range: Some((0.0, 1e3)),
-    },
-    ParameterDoc {
-        name: "silence_s",
-        unit: "s",
-        description: "Time without positions that is reported.",
-        range: Some((1.0, 3600.0)),
-    },
-    ParameterDoc {
-        name: "machine_file",
-        unit: "",
-        description: "Machine file, relative to the parameter file.",
-        range: None,
-    },
-];
-
 impl MachineFramesConfig {
-    /// Checks every value against its range.
+    /// Checks every value against its limits.
     pub(crate) fn check(&self) -> Result<(), MachineFramesError> {
-        for (doc, value) in PARAMETERS.iter().zip([self.rate_hz, self.silence_s]) {
-            if let Some((least, greatest)) = doc.range
-                && !(least..=greatest).contains(&value)
-            {
-                return Err(MachineFramesError::OutOfRange {
-                    name: doc.name,
-                    value,
-                    least,
-                    greatest,
-                });
-            }
-        }
-        Ok(())
+        Ok(check_parameters(self)?)
     }
 
     /// Least time between two moving poses of one frame.

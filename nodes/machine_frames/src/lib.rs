@@ -8,7 +8,7 @@ mod diagnostic;
 mod error;
 mod stage;
 
-pub use config::{MachineFramesConfig, PARAMETERS};
+pub use config::MachineFramesConfig;
 pub use diagnostic::Diagnostic;
 pub use error::MachineFramesError;
 pub use stage::{Input, MachineFramesStage, Output};

@@ -203,7 +203,7 @@ fn a_parameter_out_of_range_is_refused_with_its_limits() {
     };
     let refused = MachineFramesStage::new(&config, &machine(THREE_AXIS), str::to_owned);
     let error = refused.unwrap_err();
-    assert!(matches!(error, MachineFramesError::OutOfRange { .. }));
+    assert!(matches!(error, MachineFramesError::Parameter(_)));
     assert_eq!(
         error.to_string(),
         "rate_hz = -1 Hz: must be from 0 to 1000 Hz"

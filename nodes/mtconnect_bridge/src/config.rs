@@ -1,29 +1,37 @@
 //! Parameters of the bridge, as a person writes them, and the settings that follow from them.
 
 use metrology::stamp::Span;
+use metrology::{check_between, check_parameters};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::BridgeError;
 use crate::mapping::{MapFile, Mapping};
-use crate::parameters::PARAMETERS;
+
+/// Longest time between attempts to connect, s: a day.
+const LONGEST_RECONNECT_S: f64 = 86_400.0;
 
 /// The parameter file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BridgeConfig {
-    /// Who speaks.
+    /// shdr: an adapter, in lines over TCP; agent: an agent, in XML over HTTP; log: a file of an adapter's lines,
+    /// told at its own pace.
     pub source: Source,
     /// Where the adapter or agent listens.
     #[serde(default = "BridgeConfig::default_host")]
     pub host: String,
-    /// Its TCP port.
+    /// TCP port of the adapter (often 7878) or agent (often 5000).
     #[serde(default = "BridgeConfig::default_port")]
+    #[schemars(range(min = 1.0, max = 65535.0))]
     pub port: u16,
-    /// Lines of an adapter that were logged, relative to the parameter file; for the source `log` alone.
+    /// Lines of an adapter that were logged, relative to the parameter file; for the source log alone.
     #[serde(default)]
     pub log_file: Option<String>,
-    /// A longer pause in a log is a leap of the machine's clock.
+    /// A longer pause in a log is taken for a leap of the machine's clock: it is said, and the lines go on without
+    /// it.
     #[serde(default = "BridgeConfig::default_longest_pause_s")]
+    #[schemars(range(min = 60.0, max = 31_622_400.0))]
     pub log_longest_pause_s: f64,
     /// What each key is, relative to the parameter file.
     pub map_file: String,
@@ -36,7 +44,7 @@ pub struct BridgeConfig {
 }
 
 /// Who speaks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
     /// An adapter, in lines over TCP.
@@ -64,16 +72,20 @@ impl BridgeConfig {
 }
 
 /// Times and limits of the connection.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConnectionConfig {
     /// Time to the second attempt to connect; each further one waits twice as long.
+    #[schemars(range(min = 0.05, max = 3600.0))]
     pub reconnect_first_s: f64,
     /// Longest time between attempts.
+    #[schemars(range(min = 0.05, max = LONGEST_RECONNECT_S))]
     pub reconnect_longest_s: f64,
-    /// An answer later than this ends the connection.
+    /// An answer of an agent later than this ends the connection.
+    #[schemars(range(min = 0.1, max = 3600.0))]
     pub reply_timeout_s: f64,
-    /// A longer line of an adapter is refused.
+    /// A longer line of an adapter is refused, with its length.
+    #[schemars(range(min = 64.0, max = 16777216.0))]
     pub line_limit_bytes: u32,
 }
 
@@ -89,16 +101,20 @@ impl Default for ConnectionConfig {
 }
 
 /// What an agent is asked.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AgentConfig {
     /// Device among those of the agent; empty: all.
     pub device: String,
     /// Least time between two parts of its stream.
+    #[schemars(range(min = 0.0, max = 60000.0))]
     pub interval_ms: u32,
-    /// The agent says at least this often that it lives.
+    /// The agent says at least this often that it lives; twice as long and a second without a word ends the
+    /// connection.
+    #[schemars(range(min = 10.0, max = 600000.0))]
     pub heartbeat_ms: u32,
     /// Observations in one part at most.
+    #[schemars(range(min = 1.0, max = 100000.0))]
     pub count: u32,
 }
 
@@ -136,24 +152,6 @@ pub struct Settings {
     pub agent: AgentConfig,
 }
 
-/// A number within the range that [`PARAMETERS`] states for it.
-fn checked(key: &'static str, value: f64) -> Result<f64, BridgeError> {
-    let doc = PARAMETERS.iter().find(|doc| doc.name == key);
-    let (least, greatest) = doc
-        .and_then(|doc| doc.range)
-        .expect("every number of the configuration has a range in the table");
-    if value >= least && value <= greatest {
-        Ok(value)
-    } else {
-        Err(BridgeError::OutOfRange {
-            key,
-            value,
-            least,
-            greatest,
-        })
-    }
-}
-
 fn word(key: &'static str, value: &str) -> Result<(), BridgeError> {
     let is_word = |c: char| c.is_ascii_alphanumeric() || "._-:[]%".contains(c);
     if value.chars().all(is_word) {
@@ -172,28 +170,10 @@ impl Settings {
     /// Values out of range, or a mapping that contradicts itself.
     pub fn new(config: &BridgeConfig, map: &MapFile) -> Result<Self, BridgeError> {
         let connection = &config.connection;
-        let first_s = checked("connection.reconnect_first_s", connection.reconnect_first_s)?;
-        let longest_s = checked(
-            "connection.reconnect_longest_s",
-            connection.reconnect_longest_s,
-        )?;
-        if longest_s < first_s {
-            return Err(BridgeError::OutOfRange {
-                key: "connection.reconnect_longest_s",
-                value: longest_s,
-                least: first_s,
-                greatest: 86_400.0,
-            });
-        }
-        let timeout_s = checked("connection.reply_timeout_s", connection.reply_timeout_s)?;
-        checked(
-            "connection.line_limit_bytes",
-            f64::from(connection.line_limit_bytes),
-        )?;
-        checked("agent.interval_ms", f64::from(config.agent.interval_ms))?;
-        checked("agent.heartbeat_ms", f64::from(config.agent.heartbeat_ms))?;
-        checked("agent.count", f64::from(config.agent.count))?;
-        checked("port", f64::from(config.port))?;
+        check_parameters(config)?;
+        let (first_s, longest_s) = (connection.reconnect_first_s, connection.reconnect_longest_s);
+        let of_longest = (first_s, LONGEST_RECONNECT_S);
+        check_between("connection.reconnect_longest_s", longest_s, of_longest)?;
         if (config.source == Source::Log) != config.log_file.is_some() {
             return Err(BridgeError::LogFile);
         }
@@ -202,14 +182,11 @@ impl Settings {
         Ok(Self {
             source: config.source,
             address: format!("{}:{}", config.host, config.port),
-            longest_pause: Span::from_secs_f64(checked(
-                "log_longest_pause_s",
-                config.log_longest_pause_s,
-            )?),
+            longest_pause: Span::from_secs_f64(config.log_longest_pause_s),
             mapping: Mapping::new(map)?,
             reconnect_first: Span::from_secs_f64(first_s),
             reconnect_longest: Span::from_secs_f64(longest_s),
-            reply_timeout: Span::from_secs_f64(timeout_s),
+            reply_timeout: Span::from_secs_f64(connection.reply_timeout_s),
             line_limit: connection.line_limit_bytes as usize,
             agent: config.agent.clone(),
         })

@@ -2,29 +2,15 @@
 
 use metrology::Axis;
 use metrology::bound::BoundError;
+use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 
 /// Errors of the bridge: its parameters, its mapping, and its thread.
 #[derive(Debug, thiserror::Error)]
 pub enum BridgeError {
-    /// More entries than there may be.
+    /// A parameter outside its limits.
     #[error(transparent)]
-    Bound(#[from] BoundError),
-    /// A number of the configuration is out of its range.
-    #[error(
-        "{key} = {}: must be from {} to {}",
-        quantity(key, *value), number(*least), quantity(key, *greatest)
-    )]
-    OutOfRange {
-        /// Key in the parameter file.
-        key: &'static str,
-        /// What was read, in the key's unit.
-        value: f64,
-        /// Least value that is allowed.
-        least: f64,
-        /// Greatest value that is allowed.
-        greatest: f64,
-    },
+    Parameter(#[from] BoundError),
     /// A word that goes over the wire would break the line.
     #[error("{key} = {value:?}: must be one word without white space")]
     NotAWord {

@@ -35,7 +35,6 @@ pub mod multipart;
 pub mod observation;
 pub mod offer;
 pub mod pacing;
-pub mod parameters;
 pub mod plausibility;
 pub mod positions;
 pub mod possible;
@@ -51,5 +50,4 @@ pub mod xml;
 
 pub use config::{BridgeConfig, Settings};
 pub use error::BridgeError;
-pub use parameters::PARAMETERS;
 pub use stage::{BridgeStage, Input, Output};

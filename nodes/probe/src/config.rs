@@ -1,31 +1,37 @@
 //! Parameters of the probe node; keys carry their units, limits are checked once.
 
 use machine::MachineFile;
-use metrology::ParameterDoc;
+use metrology::check_parameters;
 use metrology::stamp::Span;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::ProbeError;
 
 /// Operational parameters have defaults; a latency has none.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ProbeConfig {
     /// Positions that the coordinate queue holds.
+    #[schemars(range(min = 2.0, max = 1e6))]
     pub queue_samples: usize,
     /// Longest time between two positions that are interpolated.
+    #[schemars(range(min = 0.01, max = 1e3))]
     pub longest_gap_ms: f64,
     /// How long a touch waits for the positions around its instant, and the end of a run for touches.
+    #[schemars(range(min = 0.0, max = 1e4))]
     pub hold_ms: f64,
     /// Whether a touch that the queue cannot answer is corrected with feed times latency.
     pub allow_feed_correction: bool,
     /// Latency until one is calibrated; overrides that of the machine file.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub latency_ms: Option<f64>,
     /// Standard uncertainty of a latency that is given, not calibrated.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub latency_standard_uncertainty_ms: Option<f64>,
-    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    /// Machine file, relative to the parameter file.
     pub machine_file: String,
 }
 
@@ -43,52 +49,6 @@ impl Default for ProbeConfig {
     }
 }
 
-/// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 7] = [
-    ParameterDoc {
-        name: "queue_samples",
-        unit: "",
-        description: "Positions that the coordinate queue holds.",
-        range: Some((2.0, 1e6)),
-    },
-    ParameterDoc {
-        name: "longest_gap_ms",
-        unit: "ms",
-        description: "Longest time between two positions that are interpolated.",
-        range: Some((0.01, 1e3)),
-    },
-    ParameterDoc {
-        name: "hold_ms",
-        unit: "ms",
-        description: "How long a touch waits for the positions around its instant, and the end of a run for touches.",
-        range: Some((0.0, 1e4)),
-    },
-    ParameterDoc {
-        name: "allow_feed_correction",
-        unit: "",
-        description: "Whether a touch that the queue cannot answer is corrected with feed times latency.",
-        range: None,
-    },
-    ParameterDoc {
-        name: "latency_ms",
-        unit: "ms",
-        description: "Latency until one is calibrated; overrides that of the machine file.",
-        range: Some((0.0, 1e3)),
-    },
-    ParameterDoc {
-        name: "latency_standard_uncertainty_ms",
-        unit: "ms",
-        description: "Standard uncertainty of a latency that is given, not calibrated.",
-        range: Some((0.0, 1e3)),
-    },
-    ParameterDoc {
-        name: "machine_file",
-        unit: "",
-        description: "Machine file, relative to the parameter file.",
-        range: None,
-    },
-];
-
 /// A latency that was given rather than calibrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GivenLatency {
@@ -97,30 +57,9 @@ pub(crate) struct GivenLatency {
 }
 
 impl ProbeConfig {
-    /// Checks every value against its range.
+    /// Checks every value against its limits.
     pub(crate) fn check(&self) -> Result<(), ProbeError> {
-        let values = [
-            Some(self.queue_samples as f64),
-            Some(self.longest_gap_ms),
-            Some(self.hold_ms),
-            None,
-            self.latency_ms,
-            self.latency_standard_uncertainty_ms,
-        ];
-        for (doc, value) in PARAMETERS.iter().zip(values) {
-            let (Some((least, greatest)), Some(value)) = (doc.range, value) else {
-                continue;
-            };
-            if !(least..=greatest).contains(&value) {
-                return Err(ProbeError::OutOfRange {
-                    name: doc.name,
-                    value,
-                    least,
-                    greatest,
-                });
-            }
-        }
-        Ok(())
+        Ok(check_parameters(self)?)
     }
 
     /// The latency of the parameters or, failing that, of the machine file.
@@ -152,24 +91,6 @@ impl ProbeConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_readme_lists_every_parameter_with_its_default() {
-        let readme = include_str!("../README.md");
-        let defaults = ["4096", "5.0", "200.0", "false", "none", "none"];
-        for (doc, default) in PARAMETERS.iter().zip(defaults) {
-            let unit = if doc.unit.is_empty() { "-" } else { doc.unit };
-            let row = format!(
-                "| `{}` | {unit} | {default} | {} |",
-                doc.name, doc.description
-            );
-            assert!(readme.contains(&row), "{row}");
-        }
-        let yaml = serde_saphyr::to_string(&ProbeConfig::default()).unwrap();
-        for default in ["4096", "5.0", "200.0", "false"] {
-            assert!(yaml.contains(default), "{yaml}");
-        }
-    }
 
     #[test]
     fn values_out_of_range_are_refused_by_name() {

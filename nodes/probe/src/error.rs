@@ -2,23 +2,15 @@
 
 use machine::ChainError;
 use metrology::Axis;
+use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProbeError {
-    /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
-    OutOfRange {
-        /// Parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Least value.
-        least: f64,
-        /// Greatest value.
-        greatest: f64,
-    },
+    /// A parameter outside its limits.
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     /// A latency without its uncertainty.
     #[error(
         "a latency of {latency_ms} ms is given, but latency_standard_uncertainty_ms is not: a correction needs both", latency_ms = number(*latency_ms))]

@@ -18,7 +18,7 @@ mod run;
 pub mod shape;
 pub mod stage;
 
-pub use config::{PARAMETERS, ProbeConfig};
+pub use config::ProbeConfig;
 pub use diagnostic::Diagnostic;
 pub use error::ProbeError;
 pub use stage::{Input, Output, ProbeStage};

@@ -1,6 +1,7 @@
 //! Parameters of the recorder.
 
-use metrology::ParameterDoc;
+use metrology::parameter::check_parameters_below;
+use metrology::{check_between, check_parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -38,7 +39,7 @@ impl ChunkCompression {
 }
 
 /// What a full queue does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WhenFull {
     /// The sender waits: a composed run in simulated time loses nothing.
@@ -49,24 +50,30 @@ pub enum WhenFull {
 }
 
 /// Parameters of the recorder; every one is operational and has a default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecorderConfig {
-    /// Compression of chunks.
+    /// Inside the chunks: none, lz4 or zstd (level 1).
     pub compression: ChunkCompression,
-    /// A chunk is written when its records reach this many bytes, before compression.
+    /// A chunk is written when its records reach this size, before compression.
+    #[schemars(range(min = 1024.0, max = 67_108_864.0))]
     pub chunk_size_bytes: u64,
-    /// A chunk is written when its messages span this much log time, s.
+    /// A chunk is written when its messages span this much log time, or when nothing came for so long.
+    #[schemars(range(min = SHORTEST_PERIOD_S, max = LONGEST_PERIOD_S))]
     pub flush_period_s: f64,
-    /// `metadata.yaml` is refreshed when this much log time has passed, s.
+    /// metadata.yaml is refreshed when this much log time has passed.
+    #[schemars(range(min = SHORTEST_PERIOD_S, max = LONGEST_PERIOD_S))]
     pub metadata_period_s: f64,
-    /// A new file is begun when the current one reaches this many bytes; 0 means one file.
+    /// A new file is begun at this size; 0: one file.
+    #[schemars(range(min = 0.0, max = 9e18))]
     pub max_file_bytes: u64,
-    /// A new file is begun when the current one spans this much log time, s; 0 means one file.
+    /// A new file is begun when this one spans so much log time; 0: one file.
+    #[schemars(range(min = 0.0, max = 604_800.0))]
     pub max_file_s: f64,
     /// Most bytes that wait for the disk.
+    #[schemars(range(min = 1024.0, max = 9e18))]
     pub queue_limit_bytes: u64,
-    /// What happens to a message that finds the queue full.
+    /// At the limit: count_loss (a live machine does not wait) or wait.
     pub when_full: WhenFull,
 }
 
@@ -86,19 +93,20 @@ impl Default for RecorderConfig {
 }
 
 /// Parameters of the recorder as a node of its own.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NodeConfig {
-    /// Folder of the bag, which must not exist, or with `ring` or `bag_per_start` of the bags, relative to where the
+    /// Folder of the bag, which must not exist, or with ring or bag_per_start of the bags, relative to where the
     /// program was started.
     pub bag: String,
-    /// Each start makes a bag of its own below the folder `bag`, numbered, and leaves those of earlier starts alone.
+    /// Each start makes a bag of its own below the folder bag, numbered, and leaves those of earlier starts alone;
+    /// with ring they always are.
     #[serde(default)]
     pub bag_per_start: bool,
-    /// Absolute names of topics; `*` stands for any run of characters.
+    /// Absolute names of topics to record; * stands for any run of characters.
     #[serde(default = "every_topic")]
     pub topics: Vec<String>,
-    /// Topics of these names are left out, whatever `topics` says.
+    /// Topics of these names are left out, whatever topics says.
     #[serde(default)]
     pub exclude: Vec<String>,
     /// Machine file that goes into every bag, relative to the parameter file.
@@ -133,15 +141,17 @@ impl NodeConfig {
 }
 
 /// What is kept in memory, and when it is saved.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RingConfig {
-    /// How far back it reaches, s of log time.
+    /// Keep so much in memory, and write it when asked; without ring everything is written.
+    #[schemars(range(min = SHORTEST_RING_S, max = LONGEST_SPAN_S))]
     pub window_s: f64,
-    /// Most bytes that are kept; where they do not last for the window, it is shorter.
+    /// Most bytes that are kept; where they do not last for the window, it is shorter, and that is said.
     #[serde(default = "ring_limit_bytes")]
+    #[schemars(range(min = 1024.0, max = 68_719_476_736.0))]
     pub limit_bytes: u64,
-    /// Whether an error on `/diagnostics` saves it.
+    /// Whether an error that begins on /diagnostics saves what is kept.
     #[serde(default)]
     pub save_on_error: bool,
 }
@@ -156,12 +166,7 @@ impl RingConfig {
     /// # Errors
     /// A value out of its range, with the range.
     pub fn checked(&self) -> Result<(), RecorderError> {
-        check_period(
-            "ring.window_s",
-            self.window_s,
-            [SHORTEST_RING_S, LONGEST_SPAN_S],
-        )?;
-        check_size("ring.limit_bytes", self.limit_bytes, LARGEST_RING_BYTES)
+        Ok(check_parameters_below("ring.", self)?)
     }
 
     pub(crate) fn window_nanos(&self) -> i64 {
@@ -173,113 +178,6 @@ impl RingConfig {
 fn every_topic() -> Vec<String> {
     vec!["*".to_owned()]
 }
-
-const fn text(name: &'static str, description: &'static str) -> ParameterDoc {
-    ParameterDoc {
-        name,
-        unit: "",
-        description,
-        range: None,
-    }
-}
-
-const fn number(
-    name: &'static str,
-    unit: &'static str,
-    range: (f64, f64),
-    description: &'static str,
-) -> ParameterDoc {
-    ParameterDoc {
-        name,
-        unit,
-        description,
-        range: Some(range),
-    }
-}
-
-/// What the parameters of the node mean.
-pub const PARAMETERS: &[ParameterDoc] = &[
-    text(
-        "bag",
-        "Folder of the bag, which must not exist, or with ring or bag_per_start of the bags, relative to where the program was started.",
-    ),
-    text(
-        "bag_per_start",
-        "Each start makes a bag of its own below the folder bag, numbered, and leaves those of earlier starts alone; with ring they always are.",
-    ),
-    text(
-        "topics",
-        "Absolute names of topics to record; * stands for any run of characters.",
-    ),
-    text(
-        "exclude",
-        "Topics of these names are left out, whatever topics says.",
-    ),
-    text(
-        "machine_file",
-        "Machine file that goes into every bag, relative to the parameter file.",
-    ),
-    number(
-        "ring.window_s",
-        "s",
-        (SHORTEST_RING_S, LONGEST_SPAN_S),
-        "Keep so much in memory, and write it when asked; without ring everything is written.",
-    ),
-    number(
-        "ring.limit_bytes",
-        "byte",
-        (1024.0, 68_719_476_736.0),
-        "Most bytes that are kept; where they do not last for the window, it is shorter, and that is said.",
-    ),
-    text(
-        "ring.save_on_error",
-        "Whether an error that begins on /diagnostics saves what is kept.",
-    ),
-    text(
-        "writing.compression",
-        "Inside the chunks: none, lz4 or zstd (level 1).",
-    ),
-    number(
-        "writing.chunk_size_bytes",
-        "byte",
-        (1024.0, 67_108_864.0),
-        "A chunk is written when its records reach this size, before compression.",
-    ),
-    number(
-        "writing.flush_period_s",
-        "s",
-        (SHORTEST_PERIOD_S, LONGEST_PERIOD_S),
-        "A chunk is written when its messages span this much log time, or when nothing came for so long.",
-    ),
-    number(
-        "writing.metadata_period_s",
-        "s",
-        (SHORTEST_PERIOD_S, LONGEST_PERIOD_S),
-        "metadata.yaml is refreshed when this much log time has passed.",
-    ),
-    number(
-        "writing.max_file_bytes",
-        "byte",
-        (0.0, 9e18),
-        "A new file is begun at this size; 0: one file.",
-    ),
-    number(
-        "writing.max_file_s",
-        "s",
-        (0.0, 604_800.0),
-        "A new file is begun when this one spans so much log time; 0: one file.",
-    ),
-    number(
-        "writing.queue_limit_bytes",
-        "byte",
-        (1024.0, 9e18),
-        "Most bytes that wait for the disk.",
-    ),
-    text(
-        "writing.when_full",
-        "At the limit: count_loss (a live machine does not wait) or wait.",
-    ),
-];
 
 /// Smallest chunk and queue that make sense: one record of a kilobyte must fit.
 const SMALLEST_BYTES: u64 = 1024;
@@ -296,57 +194,18 @@ const LONGEST_SPAN_S: f64 = 604_800.0;
 /// Largest ring: 64 GiB.
 const LARGEST_RING_BYTES: u64 = 64 << 30;
 
-fn check_period(
-    key: &'static str,
-    value_s: f64,
-    [least_s, most_s]: [f64; 2],
-) -> Result<(), RecorderError> {
-    if (least_s..=most_s).contains(&value_s) {
-        return Ok(());
-    }
-    Err(RecorderError::PeriodOutOfRange {
-        key,
-        value_s,
-        least_s,
-        most_s,
-    })
-}
-
-fn check_size(
-    key: &'static str,
-    value_bytes: u64,
-    largest_bytes: u64,
-) -> Result<(), RecorderError> {
-    if (SMALLEST_BYTES..=largest_bytes).contains(&value_bytes) {
-        return Ok(());
-    }
-    Err(RecorderError::SizeOutOfRange {
-        key,
-        value_bytes,
-        smallest_bytes: SMALLEST_BYTES,
-        largest_bytes,
-    })
-}
-
 impl RecorderConfig {
     /// Checks every value once.
     ///
     /// # Errors
     /// A value out of its range, with the range.
     pub fn checked(&self) -> Result<(), RecorderError> {
-        let period_s = [SHORTEST_PERIOD_S, LONGEST_PERIOD_S];
-        check_period("flush_period_s", self.flush_period_s, period_s)?;
-        check_period("metadata_period_s", self.metadata_period_s, period_s)?;
-        if self.max_file_s.to_bits() != 0 {
-            let span_s = [SHORTEST_PERIOD_S, LONGEST_SPAN_S];
-            check_period("max_file_s", self.max_file_s, span_s)?;
+        check_parameters(self)?;
+        if self.max_file_s > 0.0 {
+            let of_file_s = (SHORTEST_PERIOD_S, LONGEST_SPAN_S);
+            check_between("max_file_s", self.max_file_s, of_file_s)?;
         }
-        check_size(
-            "chunk_size_bytes",
-            self.chunk_size_bytes,
-            LARGEST_WRITTEN_CHUNK_BYTES,
-        )?;
-        check_size("queue_limit_bytes", self.queue_limit_bytes, u64::MAX)
+        Ok(())
     }
 
     /// Longest log time of a file; `None`: any.
@@ -419,7 +278,7 @@ mod tests {
         let text = config.checked().unwrap_err().to_string();
         assert_eq!(
             text,
-            "chunk_size_bytes = 67108865: must lie between 1024 and 67108864"
+            "chunk_size_bytes = 67108865 bytes: must be from 1024 to 67108864 bytes"
         );
     }
 

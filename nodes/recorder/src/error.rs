@@ -174,30 +174,9 @@ pub enum RecorderError {
         /// The time, ns.
         time_nanos: i64,
     },
-    /// A period that is not a time.
-    #[error("{key} = {value_s} s: must lie between {least_s} s and {most_s} s", value_s = number(*value_s), least_s = number(*least_s), most_s = number(*most_s))]
-    PeriodOutOfRange {
-        /// The parameter.
-        key: &'static str,
-        /// Its value, s.
-        value_s: f64,
-        /// The least that it can be, s.
-        least_s: f64,
-        /// The most, s.
-        most_s: f64,
-    },
-    /// A size out of its range.
-    #[error("{key} = {value_bytes}: must lie between {smallest_bytes} and {largest_bytes}")]
-    SizeOutOfRange {
-        /// The parameter.
-        key: &'static str,
-        /// Its value, byte.
-        value_bytes: u64,
-        /// Smallest value, byte.
-        smallest_bytes: u64,
-        /// Largest value, byte.
-        largest_bytes: u64,
-    },
+    /// A parameter outside its limits.
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     /// The plant's truth never enters a bag.
     #[error("{attachment}: key {key} holds the plant's truth, which never enters a bag")]
     PlantTruth {

@@ -35,7 +35,7 @@ mod split;
 
 pub use channel::{Channel, ChannelId, Durability, History, Liveliness, QosProfile, QosTime};
 pub use channel::{Reliability, qos_from_yaml, qos_to_yaml};
-pub use config::{ChunkCompression, NodeConfig, PARAMETERS, RecorderConfig, RingConfig, WhenFull};
+pub use config::{ChunkCompression, NodeConfig, RecorderConfig, RingConfig, WhenFull};
 pub use context::{
     Attached, CALL_RECORD, END_RECORD, MessageOrder, NODES_RECORD, RecordedCall, RecordedRun,
     RunContext, RunNode, verify_attachments,

@@ -35,13 +35,8 @@ pub enum ReplayError {
 #[derive(Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "fields are named in the messages")]
 pub enum PlaybackError {
-    #[error("{key} = {value}: must be {least} to {greatest}", value = quantity(key, *value), least = number(*least), greatest = quantity(key, *greatest))]
-    OutOfRange {
-        key: &'static str,
-        value: f64,
-        least: f64,
-        greatest: f64,
-    },
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     #[error("rate = {rate}: must be 0, or {least} to 1000", rate = number(*rate), least = number(*least))]
     Slow { rate: f64, least: f64 },
     #[error("to_s = {to_s} s is before from_s = {from_s} s: nothing would be played", from_s = number(*from_s), to_s = number(*to_s))]

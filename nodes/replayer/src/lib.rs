@@ -35,6 +35,6 @@ pub use error::{PlaybackError, ReplayError};
 pub use inputs::{is_source, sources_first};
 pub use leap::{Leap, Leaps};
 pub use listening::NotInBag;
-pub use playback::{PARAMETERS, Playback, PlaybackConfig};
+pub use playback::{Playback, PlaybackConfig};
 pub use reading::{Reading, Taken};
 pub use replay::{Compared, Doubtful, Outcome, Relay, check};

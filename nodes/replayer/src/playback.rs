@@ -1,39 +1,45 @@
 //! What is played of a bag, and how: the node's parameters.
 
-use metrology::ParameterDoc;
+use metrology::check_parameters;
 use metrology::stamp::Span;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::PlaybackError;
 
 /// The parameter file of the node that plays.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlaybackConfig {
-    /// Folder of the bag, or one file of it.
+    /// Folder of the bag, or one file of it, relative to where the program was started.
     pub bag: String,
-    /// Absolute names of topics; `*` stands for any run of characters.
+    /// Absolute names of topics to publish; * stands for any run of characters.
     #[serde(default = "PlaybackConfig::every_topic")]
     pub topics: Vec<String>,
-    /// Time of the bag over time; 0: as fast as subscribers acknowledge.
+    /// Time of the bag over time, from 0.001 on; 0: as fast as subscribers acknowledge.
     #[serde(default = "PlaybackConfig::default_rate")]
+    #[schemars(range(min = 0.0, max = 1000.0))]
     pub rate: f64,
-    /// Messages before this are left out, from the bag's first message.
+    /// Messages before this are left out, from the bag's first message; of latched topics the last ones are sent
+    /// first.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = LONGEST_S))]
     pub from_s: f64,
-    /// Messages after this are left out, from the bag's first message; none: to the end.
+    /// Messages after this are left out, from the bag's first message; absent: to the end.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = LONGEST_S))]
     pub to_s: Option<f64>,
     /// Begin again at the end.
     #[serde(default)]
     pub repeat: bool,
-    /// Wait for `replayer/resume` or `replayer/step` before the first message.
+    /// Wait for replayer/resume or replayer/step before the first message.
     #[serde(default)]
     pub start_paused: bool,
     /// Time for subscribers to find the topics before the first message.
     #[serde(default = "PlaybackConfig::default_delay_s")]
+    #[schemars(range(min = 0.0, max = 60.0))]
     pub delay_s: f64,
-    /// Publish `/clock` with the bag's time instead of a recorded one.
+    /// Publish /clock with the bag's time; a recorded /clock is left out then.
     #[serde(default = "PlaybackConfig::default_clock")]
     pub clock: bool,
 }
@@ -43,74 +49,6 @@ const LONGEST_S: f64 = 9e9;
 
 /// Least rate above 0: slower, a second of the bag takes a quarter of an hour.
 const LEAST_RATE: f64 = 1e-3;
-
-/// What the parameters of the node mean.
-pub const PARAMETERS: &[ParameterDoc] = &[
-    text(
-        "bag",
-        "Folder of the bag, or one file of it, relative to where the program was started.",
-    ),
-    text(
-        "topics",
-        "Absolute names of topics to publish; * stands for any run of characters.",
-    ),
-    number(
-        "rate",
-        "",
-        (0.0, 1000.0),
-        "Time of the bag over time, from 0.001 on; 0: as fast as subscribers acknowledge.",
-    ),
-    number(
-        "from_s",
-        "s",
-        (0.0, LONGEST_S),
-        "Messages before this are left out, from the bag's first message; of latched topics the last ones are sent first.",
-    ),
-    number(
-        "to_s",
-        "s",
-        (0.0, LONGEST_S),
-        "Messages after this are left out, from the bag's first message; absent: to the end.",
-    ),
-    text("repeat", "Begin again at the end."),
-    text(
-        "start_paused",
-        "Wait for replayer/resume or replayer/step before the first message.",
-    ),
-    number(
-        "delay_s",
-        "s",
-        (0.0, 60.0),
-        "Time for subscribers to find the topics before the first message.",
-    ),
-    text(
-        "clock",
-        "Publish /clock with the bag's time; a recorded /clock is left out then.",
-    ),
-];
-
-const fn text(name: &'static str, description: &'static str) -> ParameterDoc {
-    ParameterDoc {
-        name,
-        unit: "",
-        description,
-        range: None,
-    }
-}
-
-const fn number(
-    name: &'static str,
-    unit: &'static str,
-    range: (f64, f64),
-    description: &'static str,
-) -> ParameterDoc {
-    ParameterDoc {
-        name,
-        unit,
-        description,
-        range: Some(range),
-    }
-}
 
 /// Checked settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -163,14 +101,14 @@ impl PlaybackConfig {
     /// # Errors
     /// A value out of its range, or a range of time that holds nothing.
     pub fn checked(&self) -> Result<Playback, PlaybackError> {
-        let from_s = within("from_s", self.from_s)?;
-        let to_s = self.to_s.map(|to_s| within("to_s", to_s)).transpose()?;
+        check_parameters(self)?;
+        let (from_s, to_s) = (self.from_s, self.to_s);
         if let Some(to_s) = to_s
             && to_s < from_s
         {
             return Err(PlaybackError::EmptyRange { from_s, to_s });
         }
-        let rate = within("rate", self.rate)?;
+        let rate = self.rate;
         if rate > 0.0 && rate < LEAST_RATE {
             return Err(PlaybackError::Slow {
                 rate,
@@ -181,25 +119,7 @@ impl PlaybackConfig {
             rate: (rate > 0.0).then_some(rate),
             from: Span::from_secs_f64(from_s),
             to: to_s.map(Span::from_secs_f64),
-            delay: Span::from_secs_f64(within("delay_s", self.delay_s)?),
-        })
-    }
-}
-
-/// A number within the range that [`PARAMETERS`] states for it.
-fn within(key: &'static str, value: f64) -> Result<f64, PlaybackError> {
-    let doc = PARAMETERS.iter().find(|doc| doc.name == key);
-    let (least, greatest) = doc
-        .and_then(|doc| doc.range)
-        .expect("every number of the configuration has a range in the table");
-    if value >= least && value <= greatest {
-        Ok(value)
-    } else {
-        Err(PlaybackError::OutOfRange {
-            key,
-            value,
-            least,
-            greatest,
+            delay: Span::from_secs_f64(self.delay_s),
         })
     }
 }
@@ -215,8 +135,11 @@ mod tests {
             change(&mut config);
             config.checked().unwrap_err().to_string()
         };
-        assert_eq!(with(|c| c.rate = -1.0), "rate = -1: must be 0 to 1000");
-        assert_eq!(with(|c| c.rate = f64::NAN), "rate = NaN: must be 0 to 1000");
+        assert_eq!(with(|c| c.rate = -1.0), "rate = -1: must be from 0 to 1000");
+        assert_eq!(
+            with(|c| c.rate = f64::NAN),
+            "rate = NaN: must be from 0 to 1000"
+        );
         for rate in [1e-300, 1e-9, 9.9e-4] {
             let mut config = PlaybackConfig::whole("bag".to_owned());
             config.rate = rate;

@@ -43,6 +43,7 @@ use machine::volumetric::VolumetricModel;
 use metrology::sample::GeometryModel;
 use metrology::{Axis, ErrorComponent};
 use nalgebra::{DMatrix, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::RotaryEstimate;
@@ -53,22 +54,29 @@ use crate::visit::SphereVisit;
 const OF_HARMONIC: [f64; 2] = [0.63, 0.32];
 
 /// Standard uncertainties of what is alike in all visits.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Allowance {
-    /// Place of the probe's ball against the point that works, each direction.
+    /// Place of the probe's ball against the point that works, standard uncertainty in each direction.
+    #[schemars(range(min = 0.0, max = 1000.0))]
     pub setup_um: f64,
-    /// Scale of each linear axis; without a model of them.
+    /// Scale of each linear axis, standard uncertainty; where no model of them is known.
+    #[schemars(range(min = 0.0, max = 1000.0))]
     pub linear_scale_um_per_m: f64,
-    /// Each squareness of the linear axes; without a model of them.
+    /// Each squareness of the linear axes, standard uncertainty; where no model of them is known.
+    #[schemars(range(min = 0.0, max = 1000.0))]
     pub linear_squareness_urad: f64,
-    /// Any other error of the linear axes, each direction; without a model of them.
+    /// Any other error of the linear axes, standard uncertainty in each direction; where no model of them is known.
+    #[schemars(range(min = 0.0, max = 1000.0))]
     pub linear_error_um: f64,
-    /// Distance over which it changes.
+    /// Distance over which that error changes.
+    #[schemars(range(min = 1.0, max = 100_000.0))]
     pub linear_error_length_mm: f64,
     /// Each error motion of a rotary axis, standard deviation over a turn.
+    #[schemars(range(min = 0.0, max = 1000.0))]
     pub motion_um: f64,
-    /// The same of turns.
+    /// Each turning error motion of a rotary axis, standard deviation over a turn.
+    #[schemars(range(min = 0.0, max = 1000.0))]
     pub motion_urad: f64,
 }
 

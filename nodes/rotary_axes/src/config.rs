@@ -1,7 +1,8 @@
 //! Parameters of the rotary-axis calibration; what is physical comes from the machine file.
 
-use metrology::ParameterDoc;
+use metrology::check_parameters;
 use metrology::stamp::Span;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::allowance::Allowance;
@@ -9,22 +10,28 @@ use crate::error::RotaryAxesError;
 use crate::estimate::EstimateRules;
 
 /// Operational parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RotaryAxesConfig {
-    /// Machine file, relative to the parameter file; read by whoever builds the node.
+    /// Machine file, relative to the parameter file.
     pub machine_file: String,
     /// How long the end of a run waits for its last sphere.
+    #[schemars(range(min = 0.0, max = 60_000.0))]
     pub hold_ms: f64,
-    /// Repeatability of a pose: how far the sphere is off when the axes come back, 1 standard deviation.
+    /// How far the sphere is off when the axes come back to a pose, 1 standard deviation.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub pose_repeatability_um: f64,
     /// Greatest order of the harmonics of error motions that are tried; 0: none.
+    #[schemars(range(min = 0.0, max = 4.0))]
     pub harmonic_orders: u8,
     /// Lack of fit is taken for real below this p value.
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub lack_of_fit_limit: f64,
     /// A visit is left out if chance gives its residual with less than this p value in the whole set.
+    #[schemars(range(min = 0.0, max = 0.1))]
     pub doubtful_limit: f64,
-    /// Least merit of the poses; below it a warning is given.
+    /// Merit of the poses below which a warning is given.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub least_merit: f64,
     /// What is alike in all visits and so in no residual; without it uncertainties are those of the noise alone.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -46,131 +53,10 @@ impl Default for RotaryAxesConfig {
     }
 }
 
-/// What each parameter means.
-pub const PARAMETERS: [ParameterDoc; 14] = [
-    ParameterDoc {
-        name: "machine_file",
-        unit: "",
-        description: "Machine file, relative to the parameter file.",
-        range: None,
-    },
-    ParameterDoc {
-        name: "hold_ms",
-        unit: "ms",
-        description: "How long the end of a run waits for its last sphere.",
-        range: Some((0.0, 60_000.0)),
-    },
-    ParameterDoc {
-        name: "pose_repeatability_um",
-        unit: "µm",
-        description: "How far the sphere is off when the axes come back to a pose, 1 standard deviation.",
-        range: Some((0.0, 100.0)),
-    },
-    ParameterDoc {
-        name: "harmonic_orders",
-        unit: "",
-        description: "Greatest order of the harmonics of error motions that are tried; 0: none.",
-        range: Some((0.0, 4.0)),
-    },
-    ParameterDoc {
-        name: "lack_of_fit_limit",
-        unit: "",
-        description: "Lack of fit is taken for real below this p value.",
-        range: Some((0.0, 0.5)),
-    },
-    ParameterDoc {
-        name: "doubtful_limit",
-        unit: "",
-        description: "A visit is left out if chance gives its residual with less than this p value in the whole set.",
-        range: Some((0.0, 0.1)),
-    },
-    ParameterDoc {
-        name: "least_merit",
-        unit: "",
-        description: "Merit of the poses below which a warning is given.",
-        range: Some((0.0, 100.0)),
-    },
-    ParameterDoc {
-        name: "allowance.setup_um",
-        unit: "µm",
-        description: "Place of the probe's ball against the point that works, standard uncertainty in each direction.",
-        range: Some((0.0, 1000.0)),
-    },
-    ParameterDoc {
-        name: "allowance.linear_scale_um_per_m",
-        unit: "µm/m",
-        description: "Scale of each linear axis, standard uncertainty; where no model of them is known.",
-        range: Some((0.0, 1000.0)),
-    },
-    ParameterDoc {
-        name: "allowance.linear_squareness_urad",
-        unit: "µrad",
-        description: "Each squareness of the linear axes, standard uncertainty; where no model of them is known.",
-        range: Some((0.0, 1000.0)),
-    },
-    ParameterDoc {
-        name: "allowance.linear_error_um",
-        unit: "µm",
-        description: "Any other error of the linear axes, standard uncertainty in each direction; where no model of them is known.",
-        range: Some((0.0, 1000.0)),
-    },
-    ParameterDoc {
-        name: "allowance.linear_error_length_mm",
-        unit: "mm",
-        description: "Distance over which that error changes.",
-        range: Some((1.0, 100_000.0)),
-    },
-    ParameterDoc {
-        name: "allowance.motion_um",
-        unit: "µm",
-        description: "Each error motion of a rotary axis, standard deviation over a turn.",
-        range: Some((0.0, 1000.0)),
-    },
-    ParameterDoc {
-        name: "allowance.motion_urad",
-        unit: "µrad",
-        description: "Each turning error motion of a rotary axis, standard deviation over a turn.",
-        range: Some((0.0, 1000.0)),
-    },
-];
-
 impl RotaryAxesConfig {
-    /// Checks every value against its range.
+    /// Checks every value against its limits.
     pub(crate) fn check(&self) -> Result<(), RotaryAxesError> {
-        let values = [
-            f64::NAN,
-            self.hold_ms,
-            self.pose_repeatability_um,
-            f64::from(self.harmonic_orders),
-            self.lack_of_fit_limit,
-            self.doubtful_limit,
-            self.least_merit,
-        ];
-        let allowed = self.allowance.map(|allowance| {
-            [
-                allowance.setup_um,
-                allowance.linear_scale_um_per_m,
-                allowance.linear_squareness_urad,
-                allowance.linear_error_um,
-                allowance.linear_error_length_mm,
-                allowance.motion_um,
-                allowance.motion_urad,
-            ]
-        });
-        let values = values.into_iter().chain(allowed.into_iter().flatten());
-        for (doc, value) in PARAMETERS.iter().zip(values) {
-            if let Some((least, greatest)) = doc.range
-                && !(least..=greatest).contains(&value)
-            {
-                return Err(RotaryAxesError::OutOfRange {
-                    name: doc.name,
-                    value,
-                    least,
-                    greatest,
-                });
-            }
-        }
-        Ok(())
+        Ok(check_parameters(self)?)
     }
 
     pub(crate) fn hold(&self) -> Span {
@@ -189,21 +75,6 @@ impl RotaryAxesConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_readme_lists_every_parameter_with_its_default() {
-        let readme = include_str!("../README.md");
-        let defaults = ["\"\"", "1000.0", "0.0", "2", "0.01", "0.001", "1.0"];
-        let defaults = defaults.into_iter().chain(["none"; 7]);
-        for (doc, default) in PARAMETERS.iter().zip(defaults) {
-            let unit = if doc.unit.is_empty() { "-" } else { doc.unit };
-            let row = format!(
-                "| `{}` | {unit} | {default} | {} |",
-                doc.name, doc.description
-            );
-            assert!(readme.contains(&row), "{row}");
-        }
-    }
 
     #[test]
     fn values_out_of_range_are_refused_by_name() {

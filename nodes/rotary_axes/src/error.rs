@@ -2,23 +2,15 @@
 
 use machine::PoseError;
 use metrology::Axis;
+use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RotaryAxesError {
-    /// A parameter outside its range.
-    #[error("{name} = {value}: must be from {least} to {greatest}", value = quantity(name, *value), least = number(*least), greatest = quantity(name, *greatest))]
-    OutOfRange {
-        /// Parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Least value.
-        least: f64,
-        /// Greatest value.
-        greatest: f64,
-    },
+    /// A parameter outside its limits.
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     /// The machine's rotary axes cannot be calibrated with a sphere.
     #[error("{source}")]
     Machine {

@@ -28,7 +28,7 @@ pub mod verification;
 pub mod visit;
 
 pub use allowance::{Allowance, Known};
-pub use config::{PARAMETERS, RotaryAxesConfig};
+pub use config::RotaryAxesConfig;
 pub use diagnostic::Diagnostic;
 pub use error::RotaryAxesError;
 pub use estimate::{EstimateRules, RotaryEstimate, estimate};

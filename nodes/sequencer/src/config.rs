@@ -1,21 +1,24 @@
 //! Parameters of the sequencer.
 
-use metrology::ParameterDoc;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Parameters; see the README's table.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
     /// Machine file, relative to the parameter file.
     pub machine_file: String,
-    /// Plan file, relative to the parameter file; empty: wait for goals.
+    /// Plan of steps, relative to the parameter file; empty: wait for goals.
     pub plan_file: String,
     /// Wait before the first step, so that a live graph has found itself.
+    #[schemars(range(min = 0.0, max = 3600.0))]
     pub start_delay_s: f64,
-    /// Wait before a goal that no controller took is proposed again.
+    /// Wait before a program that no controller took is proposed again.
+    #[schemars(range(min = 0.01, max = 3600.0))]
     pub retry_delay_s: f64,
-    /// How often a goal is proposed before the step has failed.
+    /// How often a program is proposed before its step has failed.
+    #[schemars(range(min = 1.0, max = 10_000.0))]
     pub attempts: u32,
 }
 
@@ -30,37 +33,3 @@ impl Default for Config {
         }
     }
 }
-
-/// What the parameters mean.
-pub const PARAMETERS: &[ParameterDoc] = &[
-    ParameterDoc {
-        name: "machine_file",
-        unit: "",
-        description: "Machine file, relative to the parameter file.",
-        range: None,
-    },
-    ParameterDoc {
-        name: "plan_file",
-        unit: "",
-        description: "Plan of steps, relative to the parameter file; empty: wait for goals.",
-        range: None,
-    },
-    ParameterDoc {
-        name: "start_delay_s",
-        unit: "s",
-        description: "Wait before the first step, so that a live graph has found itself.",
-        range: Some((0.0, 3600.0)),
-    },
-    ParameterDoc {
-        name: "retry_delay_s",
-        unit: "s",
-        description: "Wait before a program that no controller took is proposed again.",
-        range: Some((0.01, 3600.0)),
-    },
-    ParameterDoc {
-        name: "attempts",
-        unit: "",
-        description: "How often a program is proposed before its step has failed.",
-        range: Some((1.0, 10_000.0)),
-    },
-];

@@ -1,26 +1,16 @@
 //! What is refused when the node starts. A bad measurement is no error: see [`crate::Diagnostic`].
 
 use metrology::Axis;
+use metrology::bound::BoundError;
 use metrology::least_squares::FitError;
 use metrology::number::number;
 
 /// A configuration, machine or geometry from which no thermal model can be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ThermalModelError {
-    /// A parameter is outside its limits.
-    #[error("{key} = {value} {unit}: must be from {lower} to {upper} {unit}", value = number(*value), lower = number(*lower), upper = number(*upper))]
-    ParameterOutOfRange {
-        /// The parameter.
-        key: &'static str,
-        /// What was given.
-        value: f64,
-        /// Least value allowed.
-        lower: f64,
-        /// Greatest value allowed.
-        upper: f64,
-        /// Unit of all three.
-        unit: &'static str,
-    },
+    /// A parameter outside its limits.
+    #[error(transparent)]
+    Parameter(#[from] BoundError),
     /// The method cannot work with the blocks of the machine file.
     #[error("blocks: the machine file has {n_blocks}, the method needs {least} to {most}")]
     BlockCount {

@@ -4,7 +4,6 @@ use abbe_msgs::std_srvs::srv::{SetBoolRequest, SetBoolResponse};
 use abbe_msgs::topics;
 use anyhow::Result;
 use axis_compensation::geometric::GeometrySource;
-use axis_compensation::parameters::PARAMETERS;
 use axis_compensation::{AxisCompensationConfig, AxisCompensationStage, Input, Output};
 use machine::MachineFile;
 use metrology::stamp::Span;
@@ -24,7 +23,7 @@ const BUSY_S: f64 = 1.0;
 /// When a parameter or the machine file is wrong.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: AxisCompensationConfig = setup.config()?;
-    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = AxisCompensationStage::new(&config, &machine)?.inactive();

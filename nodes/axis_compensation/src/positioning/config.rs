@@ -2,6 +2,7 @@
 
 use machine::MachineFile;
 use metrology::Axis;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::deviation_table::{DeviationTable, SPACING_MM};
@@ -12,53 +13,64 @@ use super::refusal::PositioningRefusal;
 use crate::error::AxisCompensationError;
 
 /// Parameters of one axis. How it compensates has no default; how it measures has.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PositioningConfig {
-    /// `refreshed_table` or `weighted_increments`.
+    /// refreshed_table or weighted_increments: which reading of the dual loop compensates; the same keys exist for Y
+    /// and Z.
     pub reading: Reading,
-    /// ω: of a new measurement in the table, or of the table beside what is measured at once.
+    /// Of a new measurement in the table (refreshed_table; 0: never), or of the table beside what is measured at
+    /// once.
+    #[schemars(range(min = WEIGHT.0, max = WEIGHT.1))]
     pub weight: f64,
-    /// `together` or `apart`.
+    /// together: one table as the mean of both directions; apart: one for each.
     pub directions: Directions,
-    /// Whether the thermal part is added too.
+    /// Whether the thermal part is added too; a table that is measured again holds the screw's growth already.
     pub thermal_part: bool,
     /// Greatest difference between a measurement and what is known that is believed.
+    #[schemars(range(min = MEASURED_LIMIT_UM.0, max = MEASURED_LIMIT_UM.1))]
     pub measured_limit_um: f64,
     /// Runs after which a test gives a table.
     #[serde(default = "default_runs")]
+    #[schemars(range(min = RUN_LIMITS.0, max = RUN_LIMITS.1))]
     pub runs: u32,
     /// What is left out of a dwell at its begin.
     #[serde(default = "default_settle_s")]
+    #[schemars(range(min = SETTLE_S.0, max = SETTLE_S.1))]
     pub settle_s: f64,
     /// Least time averaged at a point.
     #[serde(default = "default_dwell_s")]
+    #[schemars(range(min = DWELL_S.0, max = DWELL_S.1))]
     pub dwell_s: f64,
     /// Greatest feed at which is measured while the machine works.
     #[serde(default = "default_measuring_feed_limit_mm_min")]
+    #[schemars(range(min = FEED_MM_MIN.0, max = FEED_MM_MIN.1))]
     pub measuring_feed_limit_mm_min: f64,
-    /// For how long the speed must have been one before a pass counts; 0: any pass below the feed limit.
+    /// For how long the speed must have been one before a pass counts, 0: any below the feed limit.
     #[serde(default)]
+    #[schemars(range(min = STEADY_S.0, max = STEADY_S.1))]
     pub steady_s: f64,
-    /// Whether points that are not passed move with those beside them that are.
+    /// Whether points that are not passed while the machine works move with those beside them that are.
     #[serde(default)]
     pub unpassed_follow: bool,
-    /// The rule of before that: whether ends move with the outermost point from its sixth pass on.
+    /// The rule of before unpassed_follow: whether the ends move with the outermost point from its sixth pass on.
     #[serde(default)]
     pub ends_follow: bool,
-    /// Cycle of the measured loop of `weighted_increments`.
+    /// Cycle of the measured loop of weighted_increments.
     #[serde(default = "default_loop_cycle_s")]
+    #[schemars(range(min = CYCLE_S.0, max = CYCLE_S.1))]
     pub loop_cycle_s: f64,
     /// Cycles until the scale shows what the loop asked for.
     #[serde(default = "default_loop_delay_cycles")]
+    #[schemars(range(min = DELAY_CYCLES.0, max = DELAY_CYCLES.1))]
     pub loop_delay_cycles: u32,
     /// Points of a table to begin with; empty: none until a test gives one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub start_points_mm: Vec<f64>,
-    /// Its deviations xs − xm, upwards where directions are apart.
+    /// Deviations scale minus motor at these points, upwards where directions are apart.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub start_deviations_um: Vec<f64>,
-    /// Its deviations downwards; empty: as upwards.
+    /// The same downwards; empty: as upwards.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub start_deviations_down_um: Vec<f64>,
 }
@@ -117,49 +129,11 @@ impl PositioningConfig {
         }
     }
 
-    /// Checks every number, the loop and the start table.
+    /// Checks the loop and the start table; numbers are checked with all parameters.
     ///
     /// # Errors
     /// Names the first that is refused, with value and limits.
     pub fn check(&self, axis: Axis, machine: &MachineFile) -> Result<(), AxisCompensationError> {
-        let rows = [
-            ("weight", self.weight, WEIGHT, ""),
-            (
-                "measured_limit_um",
-                self.measured_limit_um,
-                MEASURED_LIMIT_UM,
-                "µm",
-            ),
-            ("runs", f64::from(self.runs), RUN_LIMITS, ""),
-            ("settle_s", self.settle_s, SETTLE_S, "s"),
-            ("dwell_s", self.dwell_s, DWELL_S, "s"),
-            ("steady_s", self.steady_s, STEADY_S, "s"),
-            (
-                "measuring_feed_limit_mm_min",
-                self.measuring_feed_limit_mm_min,
-                FEED_MM_MIN,
-                "mm/min",
-            ),
-            ("loop_cycle_s", self.loop_cycle_s, CYCLE_S, "s"),
-            (
-                "loop_delay_cycles",
-                f64::from(self.loop_delay_cycles),
-                DELAY_CYCLES,
-                "",
-            ),
-        ];
-        for (key, value, (lower, upper), unit) in rows {
-            if !(value >= lower && value <= upper) {
-                return Err(AxisCompensationError::PositioningOutOfRange {
-                    axis,
-                    key,
-                    value,
-                    lower,
-                    upper,
-                    unit,
-                });
-            }
-        }
         let linear = machine
             .linear(axis)
             .ok_or(AxisCompensationError::NotALinearAxis { axis })?;

@@ -21,10 +21,11 @@
 //! # Holds when
 //! (3): gain 1 − ω and delay of the axis fulfil `loop_stability`.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Which reading of the lost formulas compensates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reading {
     /// (5) of `positioning`: ω of the table, 1 − ω of what is measured at once.

@@ -44,6 +44,7 @@
 //! The form of the mean is DERIVED, see `positioning`; its moments are those of S. W. Roberts'
 //! geometric moving average.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::deviation_table::DeviationTable;
@@ -54,7 +55,7 @@ use super::steady::Steady;
 use crate::femtometre::FM_PER_MM;
 
 /// Whether both directions of motion share a table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Directions {
     /// One mean of both, as published: lost motion averages away.

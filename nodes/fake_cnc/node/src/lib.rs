@@ -2,7 +2,6 @@
 
 use abbe_msgs::topics;
 use anyhow::{Context, Result, anyhow};
-use fake_cnc::config::PARAMETERS;
 use fake_cnc::{Cnc, Config, Input, Output};
 use machine::MachineFile;
 use metrology::stamp::Span;
@@ -29,7 +28,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
 /// As [`node`].
 pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node>> {
     let config: Config = setup.config()?;
-    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let of_machine = path.display().to_string();
     let machine = MachineFile::parse(&text, &of_machine)?;

@@ -1,11 +1,10 @@
-//! The table of parameters, the configuration and the README say the same.
+//! Parameters that are refused.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use fake_cnc::{Cnc, Config, PARAMETERS, Plant, PlantFile};
+use fake_cnc::{Cnc, Config, Plant, PlantFile};
 use machine::MachineFile;
 
-const README: &str = include_str!("../../README.md");
 const MACHINE: &str = include_str!("../../../../launch_configs/first_run/machine.yaml");
 const PLANT: &str = include_str!("../../../../launch_configs/first_run/plant.yaml");
 
@@ -16,34 +15,6 @@ fn refusal(config: &Config) -> String {
         .map(|_| ())
         .unwrap_err()
         .to_string()
-}
-
-#[test]
-fn readme_and_table_and_defaults_agree() {
-    let defaults = serde_json::to_value(Config::default()).unwrap();
-    let defaults = defaults.as_object().unwrap();
-    for doc in PARAMETERS {
-        let top = doc.name.split('.').next().unwrap();
-        let default = match &defaults[top] {
-            serde_json::Value::Number(number) => format!("{}", number.as_f64().unwrap()),
-            serde_json::Value::String(text) => format!("{text:?}"),
-            serde_json::Value::Bool(truth) => truth.to_string(),
-            serde_json::Value::Array(_) => "[]".to_owned(),
-            _ if top == "feedback" => "motor".to_owned(),
-            _ => "0".to_owned(),
-        };
-        let row = format!(
-            "| `{}` | {} | {default} | {} |",
-            doc.name, doc.unit, doc.description
-        );
-        assert!(README.contains(&row), "{row}");
-    }
-    for name in defaults.keys() {
-        let known = PARAMETERS
-            .iter()
-            .any(|doc| doc.name.split('.').next() == Some(name));
-        assert!(known, "{name}");
-    }
 }
 
 #[test]

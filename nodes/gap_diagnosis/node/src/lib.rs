@@ -5,7 +5,7 @@ use anyhow::Result;
 use gap_diagnosis::session::Input::{
     Block, Compensation, Grid, Length, Segment, State, Temperature, Trigger,
 };
-use gap_diagnosis::{GapDiagnosisConfig, GapDiagnosisStage, Input, Output, PARAMETERS};
+use gap_diagnosis::{GapDiagnosisConfig, GapDiagnosisStage, Input, Output};
 use machine::MachineFile;
 use metrology::stamp::Span;
 use node_runtime::{Diagnostic, Level, Node, Setup, Wiring};
@@ -23,7 +23,7 @@ const TICK: Span = Span::from_nanos(500_000_000);
 /// When a parameter or the machine file is wrong.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: GapDiagnosisConfig = setup.config()?;
-    let parameters = setup.resolved(&config, &PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = GapDiagnosisStage::new(&config, &machine)?;

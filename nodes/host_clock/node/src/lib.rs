@@ -16,7 +16,7 @@ const TELL: Span = Span::from_nanos(1_000_000_000);
 /// When a parameter is wrong.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: HostClockConfig = setup.config()?;
-    let parameters = setup.resolved(&config, &host_clock::PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let stage = HostClockStage::new(&config)?;
     let table = Wiring::new(setup.name(), parameters, stage).keeps_own_time();
     if config.is_reference() {

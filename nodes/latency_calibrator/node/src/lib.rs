@@ -2,9 +2,7 @@
 
 use abbe_msgs::topics;
 use anyhow::Result;
-use latency_calibrator::{
-    Input, LatencyCalibratorConfig, LatencyCalibratorStage, Output, PARAMETERS,
-};
+use latency_calibrator::{Input, LatencyCalibratorConfig, LatencyCalibratorStage, Output};
 use machine::MachineFile;
 use metrology::stamp::Span;
 use node_runtime::{Diagnostic, Level, Node, Setup, Wiring};
@@ -18,7 +16,7 @@ const TICK: Span = Span::from_nanos(10_000_000);
 /// When a parameter or the machine file is wrong.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: LatencyCalibratorConfig = setup.config()?;
-    let parameters = setup.resolved(&config, &PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = LatencyCalibratorStage::new(&config, &machine)?;

@@ -41,6 +41,7 @@ mod at_once;
 mod growth;
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use at_once::at_once;
@@ -53,7 +54,7 @@ use crate::sample::{AxisDrift, DriftGrowth, ThermalModel};
 use crate::stamp::{Host, Stamp};
 
 /// What to do with a position outside the blocks' span.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Extrapolate {
     /// Continue the line.

@@ -237,12 +237,18 @@ impl<'w, 't> Serializer for &'w mut Walk<'t> {
         serialize_u32: u32
     );
 
-    #[expect(clippy::cast_precision_loss, reason = "a count is compared with limits")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "a count is compared with limits"
+    )]
     fn serialize_i64(self, count: i64) -> fmt::Result {
         self.count(count as f64)
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "a count is compared with limits")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "a count is compared with limits"
+    )]
     fn serialize_u64(self, count: u64) -> fmt::Result {
         self.count(count as f64)
     }

@@ -9,8 +9,8 @@
 
 use std::borrow::Cow;
 
-use schemars::generate::SchemaSettings;
 use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -51,6 +51,17 @@ pub fn parameters_of<T: JsonSchema>() -> Vec<ParameterDoc> {
 /// # Errors
 /// Names the parameter with value, limits and unit.
 pub fn check_parameters<T: JsonSchema + Serialize>(config: &T) -> Result<(), BoundError> {
+    check_parameters_below("", config)
+}
+
+/// The same of a part of a configuration, whose names begin with `above`.
+///
+/// # Errors
+/// As [`check_parameters`].
+pub fn check_parameters_below<T: JsonSchema + Serialize>(
+    above: &str,
+    config: &T,
+) -> Result<(), BoundError> {
     let table = parameters_of::<T>();
     let mut first = Ok(());
     leaves::each_number_and_count(config, &mut |path, value| {
@@ -59,8 +70,8 @@ pub fn check_parameters<T: JsonSchema + Serialize>(config: &T) -> Result<(), Bou
         let Some(doc) = table.iter().find(|doc| doc.name == name) else {
             return;
         };
-        if first.is_ok() {
-            first = doc.check(value);
+        if let (Ok(()), Some(range)) = (&first, doc.range) {
+            first = check_between(&format!("{above}{name}"), value, range);
         }
     });
     first
@@ -87,17 +98,6 @@ pub fn check_between(
             .map_or_else(String::new, |unit| format!(" {unit}"))
             .into(),
     })
-}
-
-impl ParameterDoc {
-    /// Refuses a value outside the limits.
-    ///
-    /// # Errors
-    /// Names the parameter with value, limits and unit.
-    pub fn check(&self, value: f64) -> Result<(), BoundError> {
-        self.range
-            .map_or(Ok(()), |range| check_between(&self.name, value, range))
-    }
 }
 
 /// The rows of the fields of a structure whose keys begin with `above`.
@@ -130,10 +130,16 @@ fn one(schema: &Value, field: &Value, name: String, table: &mut Vec<ParameterDoc
         let own = field.get(key).or_else(|| schema.get(key)).or(of_items);
         own.and_then(Value::as_f64)
     };
-    let unit = text("unit").map(str::to_owned).or_else(|| unit_of(&name));
+    let of_map = || unit_of(name.rsplit_once('.')?.0);
+    let named = || unit_of(&name).or_else(of_map);
+    let unit = text("unit").map(str::to_owned).or_else(named);
     table.push(ParameterDoc {
         unit: unit.unwrap_or_default().into(),
-        description: text("description").unwrap_or_default().replace('\n', " ").into(),
+        description: text("description")
+            .unwrap_or_default()
+            .replace('\n', " ")
+            .replace('`', "")
+            .into(),
         range: limit("minimum").zip(limit("maximum")),
         name: name.into(),
     });
@@ -220,7 +226,12 @@ mod tests {
         let table = parameters_of::<Probe>();
         let shown: Vec<String> = table
             .iter()
-            .map(|doc| format!("{}|{}|{}|{:?}", doc.name, doc.unit, doc.description, doc.range))
+            .map(|doc| {
+                format!(
+                    "{}|{}|{}|{:?}",
+                    doc.name, doc.unit, doc.description, doc.range
+                )
+            })
             .collect();
         assert_eq!(
             shown,

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use anyhow::Context;
-use metrology::ParameterDoc;
 use metrology::number::{number, unit_of};
 use metrology::yaml::Place;
+use metrology::{ParameterDoc, parameters_of};
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -392,21 +393,20 @@ impl Setup {
     ///
     /// # Errors
     /// As [`Self::parameters`].
-    pub fn resolved<T: Serialize>(
+    pub fn resolved<T: JsonSchema + Serialize>(
         &self,
         config: &T,
-        docs: &[ParameterDoc],
     ) -> anyhow::Result<Vec<Parameter>> {
+        let docs = parameters_of::<T>();
         let resolved: Tree = serde_json::from_value(
             serde_json::to_value(config).context("parameters of the configuration")?,
         )
         .context("parameters of the configuration")?;
-        let parameters = self.served(&resolved, docs)?;
+        let parameters = self.served(&resolved, &docs)?;
         match &self.asked {
             None => Ok(parameters),
             Some(told) => {
                 // The first answer counts: a node resolves its parameters once.
-                let docs = docs.to_vec();
                 let _ = told.set(Described { docs, parameters });
                 Err(ParametersOnly.into())
             }
@@ -485,8 +485,8 @@ fn describe(origin: &Origin) -> String {
 }
 
 fn describe_doc(doc: &ParameterDoc) -> String {
-    match doc.unit {
-        "" => doc.description.to_owned(),
+    match doc.unit.as_ref() {
+        "" => doc.description.to_string(),
         unit => format!("{} [{unit}]", doc.description),
     }
 }

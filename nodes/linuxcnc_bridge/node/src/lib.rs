@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use abbe_msgs::topics;
 use anyhow::Result;
 use linuxcnc_bridge::live::{LiveBridge, LiveInput};
-use linuxcnc_bridge::{BridgeConfig, Output, PARAMETERS};
+use linuxcnc_bridge::{BridgeConfig, Output};
 use machine::MachineFile;
 use metrology::stamp::Span;
 use node_runtime::{Lifecycle, Node, Setup, Wiring};
@@ -24,7 +24,7 @@ const STOP: Span = Span::from_nanos(60_000_000_000);
 /// When a parameter or the machine file is wrong, or LinuxCNC cannot be started.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: BridgeConfig = setup.config()?;
-    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let folder = match &config.start_ini {

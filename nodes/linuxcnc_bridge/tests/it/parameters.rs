@@ -1,14 +1,12 @@
-//! The table of parameters, the configuration and the README say the same.
+//! Parameters that are refused.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use linuxcnc_bridge::config::{CompensationConfig, ConnectionConfig, Prepare};
-use linuxcnc_bridge::{BridgeConfig, BridgeError, PARAMETERS, Settings};
+use linuxcnc_bridge::{BridgeConfig, BridgeError, Settings};
 use machine::MachineFile;
 use metrology::Axis;
-use serde_json::Value;
 
-const README: &str = include_str!("../../README.md");
 const MACHINE: &str = include_str!("../../../../launch_configs/linuxcnc_latency/machine.yaml");
 
 fn config() -> BridgeConfig {
@@ -31,49 +29,6 @@ fn config() -> BridgeConfig {
 fn refusal(config: &BridgeConfig) -> String {
     let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
     Settings::new(config, &machine).unwrap_err().to_string()
-}
-
-/// Names of all leaves, nested keys joined by dots.
-fn leaves(prefix: &str, value: &Value, names: &mut Vec<String>) {
-    let Value::Object(fields) = value else {
-        return names.push(prefix.to_owned());
-    };
-    for (key, field) in fields {
-        let name = if prefix.is_empty() {
-            key.clone()
-        } else {
-            format!("{prefix}.{key}")
-        };
-        leaves(&name, field, names);
-    }
-}
-
-#[test]
-fn readme_table_defaults_and_configuration_agree() {
-    let connection = serde_json::to_value(ConnectionConfig::default()).unwrap();
-    for doc in PARAMETERS {
-        let default = match doc.name.strip_prefix("connection.") {
-            Some(key) => match &connection[key] {
-                Value::Number(number) => format!(" {} ", number.as_f64().unwrap()),
-                text => format!(" {text} "),
-            },
-            None if doc.name == "user" => " \"nobody\" ".to_owned(),
-            None if doc.name == "start_ini" => " none ".to_owned(),
-            None if doc.name == "autostart" => " true ".to_owned(),
-            None => "  ".to_owned(),
-        };
-        let row = format!(
-            "| `{}` | {} |{default}| {} |",
-            doc.name, doc.unit, doc.description
-        );
-        assert!(README.contains(&row), "{row}");
-    }
-    let mut names = Vec::new();
-    leaves("", &serde_json::to_value(config()).unwrap(), &mut names);
-    names.sort();
-    let mut documented: Vec<_> = PARAMETERS.iter().map(|doc| doc.name.to_owned()).collect();
-    documented.sort();
-    assert_eq!(names, documented);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use abbe_msgs::{topics, transforms};
 use anyhow::Result;
 use machine::MachineFile;
-use machine_frames::{Input, MachineFramesConfig, MachineFramesStage, Output, PARAMETERS};
+use machine_frames::{Input, MachineFramesConfig, MachineFramesStage, Output};
 use metrology::stamp::Span;
 use node_runtime::{Diagnostic, Level, Node, Setup, Wiring};
 
@@ -16,7 +16,7 @@ const TICK: Span = Span::from_nanos(1_000_000_000);
 /// When a parameter or the machine file is wrong.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: MachineFramesConfig = setup.config()?;
-    let parameters = setup.resolved(&config, &PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = MachineFramesStage::new(&config, &machine, |name| setup.frame(name))?;

@@ -9,7 +9,7 @@ use mtconnect_bridge::config::Source;
 use mtconnect_bridge::io::LogFile;
 use mtconnect_bridge::live::{LiveBridge, LiveInput};
 use mtconnect_bridge::mapping::{MapFile, Use};
-use mtconnect_bridge::{BridgeConfig, BridgeError, Output, PARAMETERS, Settings};
+use mtconnect_bridge::{BridgeConfig, BridgeError, Output, Settings};
 use node_runtime::{Node, Setup, Wiring};
 
 mod forms;
@@ -23,7 +23,7 @@ const TICK: Span = Span::from_nanos(10_000_000);
 /// When a parameter or the mapping is wrong.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: BridgeConfig = setup.config()?;
-    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("map_file")?;
     let placed = |error: BridgeError| {
         let file = path.display().to_string();

@@ -1,4 +1,4 @@
-//! The table of parameters, the configuration and the README say the same.
+//! Parameters that are refused.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -6,10 +6,7 @@ use std::collections::BTreeMap;
 
 use mtconnect_bridge::config::{AgentConfig, ConnectionConfig, Source};
 use mtconnect_bridge::mapping::MapFile;
-use mtconnect_bridge::{BridgeConfig, PARAMETERS, Settings};
-use serde_json::Value;
-
-const README: &str = include_str!("../../README.md");
+use mtconnect_bridge::{BridgeConfig, Settings};
 
 fn config() -> BridgeConfig {
     BridgeConfig {
@@ -28,44 +25,6 @@ fn refusal(config: &BridgeConfig) -> String {
     let values = BTreeMap::new();
     let refused = Settings::new(config, &MapFile { values });
     refused.unwrap_err().to_string()
-}
-
-/// Names of all leaves, nested keys joined by dots, with their values.
-fn leaves(prefix: &str, value: &Value, found: &mut BTreeMap<String, String>) {
-    let Value::Object(fields) = value else {
-        let text = match value {
-            Value::Number(number) => number.as_f64().unwrap().to_string(),
-            other => other.to_string(),
-        };
-        found.insert(prefix.to_owned(), text);
-        return;
-    };
-    for (key, field) in fields {
-        let name = match prefix {
-            "" => key.clone(),
-            prefix => format!("{prefix}.{key}"),
-        };
-        leaves(&name, field, found);
-    }
-}
-
-#[test]
-fn readme_table_defaults_and_configuration_agree() {
-    let mut given = BTreeMap::new();
-    leaves("", &serde_json::to_value(config()).unwrap(), &mut given);
-    for doc in PARAMETERS {
-        let default = match doc.name {
-            "log_file" => " none ".to_owned(),
-            "source" | "map_file" => "  ".to_owned(),
-            name => format!(" {} ", given[name]),
-        };
-        let (name, unit, meaning) = (doc.name, doc.unit, doc.description);
-        let row = format!("| `{name}` | {unit} |{default}| {meaning} |");
-        assert!(README.contains(&row), "{row}");
-    }
-    let mut documented: Vec<_> = PARAMETERS.iter().map(|doc| doc.name.to_owned()).collect();
-    documented.sort();
-    assert_eq!(given.into_keys().collect::<Vec<_>>(), documented);
 }
 
 #[test]

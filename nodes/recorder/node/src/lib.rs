@@ -8,7 +8,7 @@ use anyhow::Result;
 use metrology::stamp::Span;
 use node_runtime::names::NodeNames;
 use node_runtime::{Node, Setup, Wiring};
-use recorder::{NodeConfig, PARAMETERS};
+use recorder::NodeConfig;
 
 mod begin;
 mod capture;
@@ -45,7 +45,7 @@ pub fn listen(
     config: &NodeConfig,
     machine: Option<String>,
 ) -> Result<Box<dyn Node>> {
-    let parameters = setup.resolved(config, PARAMETERS)?;
+    let parameters = setup.resolved(config)?;
     let tap = format!("{}_tap", setup.name());
     let work = match config.ring {
         None => Work::Bag(begin::record_by(config, machine, &tap, setup.host_time())?),

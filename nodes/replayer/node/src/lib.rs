@@ -8,7 +8,7 @@ use anyhow::Result;
 use metrology::stamp::Span;
 use node_runtime::environment::Environment;
 use node_runtime::{Node, Setup, Wiring};
-use replayer::{PARAMETERS, PlaybackConfig};
+use replayer::PlaybackConfig;
 
 mod access;
 mod contents;
@@ -39,7 +39,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
 /// # Errors
 /// As [`node`].
 pub fn play(setup: &Setup, config: &PlaybackConfig) -> Result<(Box<dyn Node>, Arc<Desk>)> {
-    let parameters = setup.resolved(config, PARAMETERS)?;
+    let parameters = setup.resolved(config)?;
     let names = access::voice(setup.names());
     let player = Player::start(&Environment::read()?, &names, config)?;
     let desk = player.desk();

@@ -5,7 +5,7 @@ use anyhow::Result;
 use machine::MachineFile;
 use metrology::stamp::Span;
 use node_runtime::{Node, Setup, Wiring};
-use rotary_axes::{Input, Output, PARAMETERS, RotaryAxesConfig, RotaryAxesStage};
+use rotary_axes::{Input, Output, RotaryAxesConfig, RotaryAxesStage};
 
 mod conditions;
 
@@ -18,7 +18,7 @@ const TICK: Span = Span::from_nanos(100_000_000);
 /// When a parameter or the machine file is wrong.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: RotaryAxesConfig = setup.config()?;
-    let parameters = setup.resolved(&config, &PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = RotaryAxesStage::new(&config, &machine)?;

@@ -7,7 +7,6 @@ use anyhow::Result;
 use machine::MachineFile;
 use metrology::stamp::Span;
 use node_runtime::{Node, Setup, Wiring};
-use sequencer::config::PARAMETERS;
 use sequencer::{Config, Input, Sequencer};
 
 mod files;
@@ -24,7 +23,7 @@ const TICK: Span = Span::from_nanos(100_000_000);
 /// When a parameter, the machine file, the plan or a program is wrong.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: Config = setup.config()?;
-    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = if config.plan_file.is_empty() {

@@ -5,7 +5,6 @@ use anyhow::Result;
 use machine::MachineFile;
 use metrology::stamp::Span;
 use node_runtime::{Node, Setup, Wiring};
-use thermal_model::config::PARAMETERS;
 use thermal_model::{Input, Output, ThermalModelConfig, ThermalModelStage};
 
 mod conditions;
@@ -19,7 +18,7 @@ const TICK: Span = Span::from_nanos(1_000_000_000);
 /// When a parameter or the machine file is wrong.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: ThermalModelConfig = setup.config()?;
-    let parameters = setup.resolved(&config, PARAMETERS)?;
+    let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let stage = ThermalModelStage::new(config, &machine)?;

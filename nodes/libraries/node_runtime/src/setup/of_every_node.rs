@@ -1,5 +1,7 @@
 //! The parameters that the runtime gives to every node.
 
+use std::borrow::Cow;
+
 use metrology::stamp::NANOS_PER_S;
 use metrology::{ParameterDoc, Stamp};
 use serde::Deserialize;
@@ -18,33 +20,37 @@ const CLOCK_ERROR: &str = "clock_error";
 /// What the parameters of every node mean, beside those of its own table.
 pub const PARAMETERS_OF_EVERY_NODE: [ParameterDoc; 5] = [
     ParameterDoc {
-        name: USE_SIM_TIME,
-        unit: "",
-        description: "Whether time comes from /clock.",
+        name: Cow::Borrowed(USE_SIM_TIME),
+        unit: Cow::Borrowed(""),
+        description: Cow::Borrowed("Whether time comes from /clock."),
         range: None,
     },
     ParameterDoc {
-        name: CLOCK_HOST,
-        unit: "",
-        description: "Host by whose map of host_clock/map stamps are taken over to the reference's clock.",
+        name: Cow::Borrowed(CLOCK_HOST),
+        unit: Cow::Borrowed(""),
+        description: Cow::Borrowed(
+            "Host by whose map of host_clock/map stamps are taken over to the reference's clock.",
+        ),
         range: None,
     },
     ParameterDoc {
-        name: "clock_error.offset_s",
-        unit: "s",
-        description: "What this node's clock is made to show too much at since_s",
+        name: Cow::Borrowed("clock_error.offset_s"),
+        unit: Cow::Borrowed("s"),
+        description: Cow::Borrowed("What this node's clock is made to show too much at since_s"),
         range: Some((-GREATEST_OFFSET_S, GREATEST_OFFSET_S)),
     },
     ParameterDoc {
-        name: "clock_error.drift_us_per_s",
-        unit: "µs/s",
-        description: "What this node's clock is made to gain",
+        name: Cow::Borrowed("clock_error.drift_us_per_s"),
+        unit: Cow::Borrowed("µs/s"),
+        description: Cow::Borrowed("What this node's clock is made to gain"),
         range: Some((-GREATEST_DRIFT_US_PER_S, GREATEST_DRIFT_US_PER_S)),
     },
     ParameterDoc {
-        name: "clock_error.since_s",
-        unit: "s",
-        description: "When its error is offset_s, in seconds since 1970 by the computer's clock",
+        name: Cow::Borrowed("clock_error.since_s"),
+        unit: Cow::Borrowed("s"),
+        description: Cow::Borrowed(
+            "When its error is offset_s, in seconds since 1970 by the computer's clock",
+        ),
         range: Some((-GREATEST_OFFSET_S, GREATEST_OFFSET_S)),
     },
 ];
@@ -113,7 +119,7 @@ impl OfEveryNode {
         let all = PARAMETERS_OF_EVERY_NODE.iter().zip(values);
         all.filter_map(|(doc, value)| {
             Some(Parameter {
-                name: doc.name.to_owned(),
+                name: doc.name.to_string(),
                 value: value?,
                 description: super::describe_doc(doc),
                 range: None,

@@ -2,15 +2,19 @@
 
 use std::fs;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::*;
 
-#[derive(Debug, Deserialize, Serialize)]
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Config {
+    /// How often.
+    #[schemars(range(min = 1.0, max = 100.0))]
     rate_hz: f64,
     machine_file: String,
+    /// How many.
     #[serde(default = "five")]
     count: u32,
 }
@@ -18,21 +22,6 @@ struct Config {
 const fn five() -> u32 {
     5
 }
-
-const DOCS: [ParameterDoc; 2] = [
-    ParameterDoc {
-        name: "rate_hz",
-        unit: "Hz",
-        description: "How often.",
-        range: Some((1.0, 100.0)),
-    },
-    ParameterDoc {
-        name: "count",
-        unit: "",
-        description: "How many.",
-        range: None,
-    },
-];
 
 fn setup(yaml: &str, more: &[&str]) -> (tempfile::TempDir, Result<Setup, SetupError>) {
     let folder = tempfile::tempdir().unwrap();
@@ -61,7 +50,7 @@ fn file_and_command_line_make_one_configuration() {
         (path, text.as_str()),
         (folder.path().join("machine.yaml"), "name: m")
     );
-    let served = setup.resolved(&config, &DOCS).unwrap();
+    let served = setup.resolved(&config).unwrap();
     let names: Vec<_> = served.iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ["count", "machine_file", "rate_hz", "use_sim_time"]);
     assert_eq!(served[0].value, Value::Integer(5));
@@ -137,7 +126,7 @@ fn a_bad_default_is_said_with_the_file_that_does_not_set_it() {
         machine_file: String::new(),
         count: 5,
     };
-    let refused = |setup: &Setup| setup.resolved(&config, &DOCS).unwrap_err().to_string();
+    let refused = |setup: &Setup| setup.resolved(&config).unwrap_err().to_string();
     let (_folder, setup) = setup("/**:\n  ros__parameters: {count: 5}", &[]);
     let error = refused(&setup.unwrap());
     assert!(

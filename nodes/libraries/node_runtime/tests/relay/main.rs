@@ -11,9 +11,10 @@ use metrology::stamp::{Host, Span};
 use node_runtime::node::{Ports, TopicPort};
 use node_runtime::parameter::Parameter;
 use node_runtime::{Emission, Event, Node, NodeFault, Setup};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-#[derive(Deserialize, Serialize)]
+#[derive(Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[derive(Default)]
 struct Config {
@@ -47,7 +48,7 @@ impl Relay {
             publications: vec![port("out")],
             ..Ports::default()
         };
-        let parameters = setup.resolved(&config, &[])?;
+        let parameters = setup.resolved(&config)?;
         let name = setup.name().to_owned();
         Ok(Box::new(Self {
             name,
