@@ -17,11 +17,14 @@ fn of_table(readme: &str) -> Vec<String> {
     };
     let is_head = |line: &&str| {
         let head = cells(line);
-        ["unit", "default"].iter().all(|name| head.iter().any(|cell| cell == name))
+        ["unit", "default"]
+            .iter()
+            .all(|name| head.iter().any(|cell| cell == name))
     };
     let after_head = readme.lines().skip_while(|line| !is_head(line)).skip(2);
     let rows = after_head.take_while(|line| line.starts_with('|'));
-    rows.filter_map(|line| cells(line).into_iter().next()).collect()
+    rows.filter_map(|line| cells(line).into_iter().next())
+        .collect()
 }
 
 #[test]

@@ -193,22 +193,38 @@ mod tests {
     /// A README with the table of parameters that `rows` make, in the order that it has; new ones come last.
     fn with_table(readme: &str, rows: &[Row]) -> String {
         let lines: Vec<&str> = readme.lines().collect();
-        let is_head = |line: &&str| ["unit", "default"].iter().all(|name| cells(line).contains(name));
+        let is_head = |line: &&str| {
+            ["unit", "default"]
+                .iter()
+                .all(|name| cells(line).contains(name))
+        };
         let head = lines.iter().position(is_head).unwrap();
         let is_row = |line: &&&str| line.starts_with('|');
         let after = head + lines[head..].iter().take_while(is_row).count();
         let place = |row: &&Row| {
             let is_of_row = |line: &&str| cells(line)[0] == row.name;
-            lines[head..after].iter().position(is_of_row).unwrap_or(usize::MAX)
+            lines[head..after]
+                .iter()
+                .position(is_of_row)
+                .unwrap_or(usize::MAX)
         };
         let mut rows: Vec<&Row> = rows.iter().collect();
         rows.sort_by_key(place);
         let mut written = lines[..head].to_vec();
-        written.extend(["| parameter | unit | default | limits | meaning |", "|---|---|---|---|---|"]);
+        written.extend([
+            "| parameter | unit | default | limits | meaning |",
+            "|---|---|---|---|---|",
+        ]);
         let table: Vec<String> = rows
             .iter()
             .map(|row| {
-                let Row { name, unit, default, range, description } = row;
+                let Row {
+                    name,
+                    unit,
+                    default,
+                    range,
+                    description,
+                } = row;
                 format!("| `{name}` | {unit} | {default} | {range} | {description} |")
             })
             .collect();
@@ -231,7 +247,10 @@ mod tests {
                 std::fs::write(&path, &right).unwrap();
             } else if right != readme {
                 let line = right.lines().find(|line| !readme.contains(line));
-                different.push(format!("{exec}: {}", line.unwrap_or("order or an extra row")));
+                different.push(format!(
+                    "{exec}: {}",
+                    line.unwrap_or("order or an extra row")
+                ));
             }
         }
         assert_eq!(different, Vec::<String>::new());

@@ -109,8 +109,11 @@ fn fields(schema: &Value, above: &str, table: &mut Vec<ParameterDoc>) {
         let name = format!("{above}{key}");
         let inner = inner(field);
         if let Some(keys) = field.get("keys").and_then(Value::as_array) {
-            let of_entry = inner.get("additionalProperties").unwrap_or(&Value::Null);
+            // A map whose keys are an enumeration has a property for each, another one the same for all.
+            let of_each = |entry: &str| inner.get("properties").and_then(|all| all.get(entry));
+            let of_all = inner.get("additionalProperties").unwrap_or(&Value::Null);
             for entry in keys.iter().filter_map(Value::as_str) {
+                let of_entry = of_each(entry).unwrap_or(of_all);
                 one(of_entry, field, format!("{name}.{entry}"), table);
             }
         } else {
