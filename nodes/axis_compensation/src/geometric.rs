@@ -29,6 +29,7 @@ mod gate;
 use machine::volumetric::PoseRefusal;
 use machine::{Kinematics, MachineFile};
 use metrology::drift::Extrapolate;
+use metrology::parameter::check_parameters_below;
 use metrology::sample::GeometryModel;
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
@@ -93,7 +94,7 @@ impl Geometric {
         machine: &MachineFile,
         policy: Extrapolate,
     ) -> Result<Self, AxisCompensationError> {
-        config.check()?;
+        check_parameters_below("geometry.", config)?;
         let kinematics =
             Kinematics::new(machine).map_err(|source| AxisCompensationError::Chain { source })?;
         let tool_offset_mm = Vector3::from(config.tool_offset_mm);

@@ -8,7 +8,7 @@ use metrology::sample::{
     AxisCompensation, AxisState, GeometryModel, PositioningTable, TestSegment, ThermalModel,
 };
 use metrology::stamp::Span;
-use metrology::{Axis, AxisSet, Host, Machine, PerAxis, Stage, Stamp};
+use metrology::{Axis, AxisSet, Host, Machine, PerAxis, Stage, Stamp, check_between};
 use nalgebra::Vector3;
 
 use crate::axis_state::{AxisState as Compensated, LetGo, Wanted};

@@ -43,6 +43,7 @@ mod separability;
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
+use metrology::check_between;
 use nalgebra::DMatrix;
 use serde::Serialize;
 use twin::effects::{self, Kind, Moment};
@@ -272,15 +273,7 @@ fn check(candidates: &[Candidate], order: &Order<'_>) -> Result<(), GapError> {
 }
 
 fn within(name: &'static str, value: f64, [low, high]: [f64; 2]) -> Result<(), GapError> {
-    if (low..=high).contains(&value) {
-        return Ok(());
-    }
-    Err(GapError::Parameter {
-        name,
-        value,
-        low,
-        high,
-    })
+    Ok(check_between(name, value, (low, high))?)
 }
 
 fn count(key: &'static str, value: usize, [low, high]: [usize; 2]) -> Result<(), GapError> {

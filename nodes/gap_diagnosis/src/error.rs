@@ -1,6 +1,7 @@
 //! Why a session cannot be diagnosed, and what to record instead.
 
-use metrology::number::{number, quantity};
+use metrology::bound::BoundError;
+use metrology::number::quantity;
 
 /// A session, a machine file or a setting that no diagnosis can be made of.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

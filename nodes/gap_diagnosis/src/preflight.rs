@@ -28,6 +28,7 @@
 use std::collections::BTreeMap;
 
 use machine::MachineFile;
+use metrology::check_between;
 use serde::{Deserialize, Serialize};
 use twin::effects::{Kind, Moment};
 use twin::{Channel, Instrument, Session, Twin, simulate};
@@ -183,16 +184,8 @@ pub fn preflight(
 }
 
 fn check(name: &'static str, value: f64) -> Result<(), GapError> {
-    const LIMITS_UM: [f64; 2] = [1e-4, 1e4];
-    if (LIMITS_UM[0]..=LIMITS_UM[1]).contains(&value) {
-        return Ok(());
-    }
-    Err(GapError::Parameter {
-        name,
-        value,
-        low: LIMITS_UM[0],
-        high: LIMITS_UM[1],
-    })
+    const LIMITS_UM: (f64, f64) = (1e-4, 1e4);
+    Ok(check_between(name, value, LIMITS_UM)?)
 }
 
 /// The floor of a channel, in its own unit: mm, of a rotary axis rad.

@@ -3,7 +3,6 @@
 use machine::ChainError;
 use metrology::Axis;
 use metrology::bound::BoundError;
-use metrology::number::{number, quantity};
 use metrology::sample::TestKind;
 
 /// Why a stage is not built, or an event not taken.

@@ -1,7 +1,7 @@
 //! Parameters that cannot work and inputs that break the stage's contract.
 
 use metrology::bound::BoundError;
-use metrology::number::{number, quantity};
+use metrology::number::number;
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use metrology::Axis;
 use metrology::bound::BoundError;
-use metrology::number::{number, quantity};
+use metrology::number::number;
 
 /// Errors of the bridge: its configuration, and starting and reaching LinuxCNC.
 #[derive(Debug, thiserror::Error)]

@@ -2,7 +2,6 @@
 
 use machine::ChainError;
 use metrology::bound::BoundError;
-use metrology::number::{number, quantity};
 
 /// Why a stage is not built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -2,7 +2,6 @@
 
 use metrology::Axis;
 use metrology::bound::BoundError;
-use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 
 /// Errors of the bridge: its parameters, its mapping, and its thread.

@@ -3,7 +3,7 @@
 use machine::ChainError;
 use metrology::Axis;
 use metrology::bound::BoundError;
-use metrology::number::{number, quantity};
+use metrology::number::number;
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

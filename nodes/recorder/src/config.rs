@@ -56,7 +56,7 @@ pub struct RecorderConfig {
     /// Inside the chunks: none, lz4 or zstd (level 1).
     pub compression: ChunkCompression,
     /// A chunk is written when its records reach this size, before compression.
-    #[schemars(range(min = 1024.0, max = 67_108_864.0))]
+    #[schemars(range(min = SMALLEST_BYTES, max = LARGEST_WRITTEN_CHUNK_BYTES))]
     pub chunk_size_bytes: u64,
     /// A chunk is written when its messages span this much log time, or when nothing came for so long.
     #[schemars(range(min = SHORTEST_PERIOD_S, max = LONGEST_PERIOD_S))]
@@ -68,10 +68,10 @@ pub struct RecorderConfig {
     #[schemars(range(min = 0.0, max = 9e18))]
     pub max_file_bytes: u64,
     /// A new file is begun when this one spans so much log time; 0: one file.
-    #[schemars(range(min = 0.0, max = 604_800.0))]
+    #[schemars(range(min = 0.0, max = LONGEST_SPAN_S))]
     pub max_file_s: f64,
     /// Most bytes that wait for the disk.
-    #[schemars(range(min = 1024.0, max = 9e18))]
+    #[schemars(range(min = SMALLEST_BYTES, max = 9e18))]
     pub queue_limit_bytes: u64,
     /// At the limit: count_loss (a live machine does not wait) or wait.
     pub when_full: WhenFull,
@@ -149,7 +149,7 @@ pub struct RingConfig {
     pub window_s: f64,
     /// Most bytes that are kept; where they do not last for the window, it is shorter, and that is said.
     #[serde(default = "ring_limit_bytes")]
-    #[schemars(range(min = 1024.0, max = 68_719_476_736.0))]
+    #[schemars(range(min = SMALLEST_BYTES, max = LARGEST_RING_BYTES))]
     pub limit_bytes: u64,
     /// Whether an error that begins on /diagnostics saves what is kept.
     #[serde(default)]
@@ -180,9 +180,9 @@ fn every_topic() -> Vec<String> {
 }
 
 /// Smallest chunk and queue that make sense: one record of a kilobyte must fit.
-const SMALLEST_BYTES: u64 = 1024;
+const SMALLEST_BYTES: f64 = 1024.0;
 /// Largest chunk: a reader holds a whole chunk in memory.
-const LARGEST_WRITTEN_CHUNK_BYTES: u64 = 64 << 20;
+const LARGEST_WRITTEN_CHUNK_BYTES: f64 = 64.0 * 1_048_576.0;
 /// Shortest period, s: log times are whole nanoseconds.
 const SHORTEST_PERIOD_S: f64 = 1e-9;
 /// Shortest ring, s.
@@ -192,7 +192,7 @@ const LONGEST_PERIOD_S: f64 = 3600.0;
 /// Longest file and ring, s: a week.
 const LONGEST_SPAN_S: f64 = 604_800.0;
 /// Largest ring: 64 GiB.
-const LARGEST_RING_BYTES: u64 = 64 << 30;
+const LARGEST_RING_BYTES: f64 = 64.0 * 1_073_741_824.0;
 
 impl RecorderConfig {
     /// Checks every value once.

@@ -1,8 +1,9 @@
 //! What can go wrong with a recording.
 
-use metrology::number::number;
 use std::io;
 use std::path::PathBuf;
+
+use metrology::bound::BoundError;
 
 /// Errors of writing and of opening a recording. Damage met while reading is no error but a
 /// [`crate::Loss`].

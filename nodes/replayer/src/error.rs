@@ -1,6 +1,7 @@
 //! Why a bag cannot be replayed or played.
 
-use metrology::number::{number, quantity};
+use metrology::bound::BoundError;
+use metrology::number::number;
 use node_runtime::harness::{ComposeError, SnapshotError};
 
 /// Why a bag cannot be replayed.

@@ -3,7 +3,6 @@
 use machine::PoseError;
 use metrology::Axis;
 use metrology::bound::BoundError;
-use metrology::number::{number, quantity};
 
 /// Why a stage is not built, or an event not taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

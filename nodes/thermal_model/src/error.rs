@@ -3,7 +3,6 @@
 use metrology::Axis;
 use metrology::bound::BoundError;
 use metrology::least_squares::FitError;
-use metrology::number::number;
 
 /// A configuration, machine or geometry from which no thermal model can be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

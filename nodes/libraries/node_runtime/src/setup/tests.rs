@@ -103,14 +103,20 @@ fn what_is_missing_is_named() {
 fn a_value_outside_of_its_range_or_of_a_wrong_kind_is_refused() {
     let (_folder, setup) = setup(GOOD, &["-p", "rate_hz:=1000.0", "-p", "mixed:=[1, a]"]);
     let setup = setup.unwrap();
-    let error = setup.parameters(&DOCS).unwrap_err().to_string();
+    let error = setup
+        .parameters(&parameters_of::<Config>())
+        .unwrap_err()
+        .to_string();
     assert!(
         error.contains("`mixed`") && error.contains("one type"),
         "{error}"
     );
     let mut lone = setup.clone();
     lone.parameters.remove("mixed");
-    let error = lone.parameters(&DOCS).unwrap_err().to_string();
+    let error = lone
+        .parameters(&parameters_of::<Config>())
+        .unwrap_err()
+        .to_string();
     assert!(
         error.contains("`rate_hz` = 1000.0 Hz: must be 1 to 100"),
         "{error}"
