@@ -23,3 +23,4 @@ mod snapshot;
 mod spoiled;
 mod update_requests;
 mod wall_clock;
+mod wrong_stamps;

@@ -65,7 +65,7 @@ impl Reason {
             Self::Stamp => Defect::Stamp.words(),
             Self::OutOfRange => Defect::OutOfRange.words(),
             Self::OtherAxis => "of another axis than its run's",
-            Self::OtherTime => "of another time than its run's",
+            Self::OtherTime => "of another time than the messages beside it",
             Self::Beyond => "too far from its nominal place",
             Self::NoEnd => "of a run without an end",
             Self::NoBegin => "of a run without a begin",

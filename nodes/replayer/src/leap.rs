@@ -110,7 +110,7 @@ pub fn strays(bag: &Bag, start: Stamp<Host>) -> BTreeSet<u64> {
 }
 
 /// The same, from the log times in the order of the file.
-fn strays_of(times: impl Iterator<Item = u64>, start_nanos: u64) -> BTreeSet<u64> {
+pub(crate) fn strays_of(times: impl Iterator<Item = u64>, start_nanos: u64) -> BTreeSet<u64> {
     let mut strays = BTreeSet::new();
     let mut last = start_nanos;
     let mut leaped: Option<(u64, u64)> = None;

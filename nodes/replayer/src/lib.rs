@@ -27,6 +27,7 @@ pub mod pause;
 pub mod playback;
 pub mod reading;
 mod replay;
+mod stamps;
 mod usable;
 
 pub use account::{Account, LeftOut, Place, Reason, TopicAccount};

@@ -10,6 +10,8 @@ use recorder::{Bag, Event, Loss, MessageRef, Order};
 use crate::account::{Account, Place, Reason, TopicAccount};
 use crate::known::{entry_in_any_namespace, unreadable};
 use crate::leap::Leaps;
+use crate::stamps::WrongStamps;
+use crate::usable;
 
 /// What became of a bag that was read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -59,13 +61,19 @@ pub struct Taken<'a> {
 }
 
 /// Reads `bag` in an order and hands on every message of the topics `wanted` (their names in
-/// [`abbe_msgs::topics`]), in whatever namespace they are.
+/// [`abbe_msgs::topics`]), in whatever namespace they are; messages with wrong stamps (`stamps`) are left out and counted.
 pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken<'_>)) -> Reading {
     let mut reading = Reading::default();
     let rows = &mut reading.account.topics;
     let plans: Vec<Plan> = (bag.topics().iter())
         .map(|info| plan(info, wanted, rows))
         .collect();
+    let is_read = |plan: &Plan| matches!(plan, Plan::Read { .. });
+    let wrong_stamps = if plans.iter().any(is_read) {
+        WrongStamps::of(bag)
+    } else {
+        WrongStamps::default()
+    };
     let mut messages = bag.messages(order);
     let mut before = None;
     while let Some(event) = messages.next_event() {
@@ -93,6 +101,11 @@ pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken
             Plan::Read { place, entry } => {
                 let row = &mut rows[*place];
                 row.messages += 1;
+                if let Some(what) = wrong_stamp(&wrong_stamps, &message, entry) {
+                    let first = place_of(row.messages, &message, Some(&row.type_name));
+                    row.leave_out(Reason::OtherTime, first, || what);
+                    continue;
+                }
                 take(Taken {
                     entry,
                     message,
@@ -102,6 +115,18 @@ pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken
         }
     }
     reading
+}
+
+/// What is wrong with the stamp of a message that is right otherwise.
+fn wrong_stamp(
+    wrong_stamps: &WrongStamps,
+    message: &MessageRef<'_>,
+    entry: &Entry,
+) -> Option<String> {
+    let what = wrong_stamps.wrong(message, entry.description.type_name)?;
+    let usable = usable::of_topic(entry.name);
+    let is_right = usable.is_none_or(|usable| usable(message.data).is_ok());
+    is_right.then_some(what)
 }
 
 fn plan(info: &recorder::TopicInfo, wanted: &[&str], rows: &mut Vec<TopicAccount>) -> Plan {
@@ -202,7 +227,7 @@ pub(crate) fn place_of(number: u64, message: &MessageRef<'_>, type_name: Option<
 }
 
 /// The stamp at the begin of a message, where its type has one and the bytes reach so far.
-fn stamp_of(type_name: &str, data: &[u8]) -> Option<(i32, u32)> {
+pub(crate) fn stamp_of(type_name: &str, data: &[u8]) -> Option<(i32, u32)> {
     let FieldParts { nested, .. } = parts_of(type_name)?.fields.first()?;
     if !["std_msgs/msg/Header", "builtin_interfaces/msg/Time"].contains(nested) {
         return None;

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use abbe_msgs::WireError;
 use abbe_msgs::topics::Origin;
 use metrology::stamp::{Host, Stamp};
 use node_runtime::{Harness, Node};
@@ -17,6 +16,7 @@ use crate::known::unreadable;
 use crate::leap::{self, LEAST};
 use crate::listening::{Ear, Listening, NotInBag};
 use crate::reading::{Reading, place_of};
+use crate::stamps::WrongStamps;
 use crate::usable::{self, Usable};
 
 /// Messages of one topic that were held against computed ones.
@@ -104,6 +104,7 @@ struct Replay<'b> {
     harness: Harness,
     listening: Listening,
     roles: Vec<Role>,
+    wrong_stamps: WrongStamps,
     relays: VecDeque<Relay>,
     start: Stamp<Host>,
     stop: Option<Stamp<Host>>,
@@ -151,6 +152,7 @@ pub fn check(
         harness,
         listening,
         roles,
+        wrong_stamps: WrongStamps::of(bag),
         relays: relays.into(),
         start: stamp(run.start_time_nanos),
         stop: run.stop_time_nanos.map(stamp),
@@ -255,7 +257,7 @@ impl Replay<'_> {
             self.hand_over_after(read)?;
             read += 1;
             self.arrive(at, &mut last);
-            self.take(at, &message);
+            self.take(at, &message, is_stray);
         }
         // What a cut file would have gone on with is not known.
         if let (Some(end), true) = (last, self.outcome.reading.losses.is_empty()) {
@@ -274,16 +276,39 @@ impl Replay<'_> {
         }
     }
 
+    /// Why a message cannot be used; a wrong log time says nothing of its stamp.
+    fn defect(
+        &self,
+        message: &MessageRef<'_>,
+        usable: Option<Usable>,
+        is_stray: bool,
+    ) -> Option<(Reason, String)> {
+        let tried = usable.map_or(Ok(()), |usable| usable(message.data));
+        if let Err(error) = tried {
+            return Some((error.defect().into(), error.to_string()));
+        }
+        let info = self.bag.topic(message.topic);
+        let what = self.wrong_stamps.wrong(message, &info.type_name);
+        what.filter(|_| !is_stray)
+            .map(|what| (Reason::OtherTime, what))
+    }
+
     /// Puts in an input, or compares a result; what cannot be used is left out.
-    fn take(&mut self, at: Stamp<Host>, message: &MessageRef<'_>) {
+    fn take(&mut self, at: Stamp<Host>, message: &MessageRef<'_>, is_stray: bool) {
         let topic = message.topic.index();
+        let defect = match &self.roles[topic] {
+            Role::Input { usable, .. } | Role::Result { usable, .. } => {
+                self.defect(message, *usable, is_stray)
+            }
+            Role::LeftOut { .. } | Role::Aside => None,
+        };
         let rows = &mut self.outcome.reading.account.topics;
         match &self.roles[topic] {
-            Role::Input { route, row, usable } => {
+            Role::Input { route, row, .. } => {
                 let row = &mut rows[*row];
                 row.messages += 1;
-                if let Err(error) = usable.map_or(Ok(()), |usable| usable(message.data)) {
-                    leave_out(row, message, &self.bag.topics()[topic], &error);
+                if let Some(defect) = defect {
+                    leave_out(row, message, &self.bag.topics()[topic], defect);
                     self.is_doubtful = true;
                     return;
                 }
@@ -291,10 +316,10 @@ impl Replay<'_> {
                 self.outcome.inputs += 1;
                 self.harness.put(*route, message.data);
             }
-            Role::Result { route, row, usable } => {
+            Role::Result { route, row, .. } => {
                 rows[*row].messages += 1;
-                let (route, row, usable) = (*route, *row, *usable);
-                self.compare(topic, (route, row, usable), at, message);
+                let (route, row) = (*route, *row);
+                self.compare((route, row, defect), at, message);
             }
             Role::LeftOut {
                 row,
@@ -407,8 +432,7 @@ impl Replay<'_> {
     /// Lets the nodes go on until they say something on the recorded message's topic, and compares.
     fn compare(
         &mut self,
-        topic: usize,
-        (route, row, usable): (usize, usize, Option<Usable>),
+        (route, row, defect): (usize, usize, Option<(Reason, String)>),
         at: Stamp<Host>,
         message: &MessageRef<'_>,
     ) {
@@ -419,7 +443,7 @@ impl Replay<'_> {
                 break found;
             }
         };
-        let info = &self.bag.topics()[topic];
+        let info = self.bag.topic(message.topic);
         let discrepancy = match found {
             None => Some(Discrepancy::NotComputed),
             Some((_, said)) if *said.bytes != *recorded => {
@@ -429,10 +453,9 @@ impl Replay<'_> {
             Some(_) => Some(Discrepancy::Order),
         };
         let row = &mut self.outcome.reading.account.topics[row];
-        let unusable = usable.and_then(|usable| usable(recorded).err());
         // What differs because it cannot be read tells nothing of what was computed.
-        if let (Some(_), Some(error)) = (&discrepancy, unusable) {
-            leave_out(row, message, info, &error);
+        if let (Some(_), Some(defect)) = (&discrepancy, defect) {
+            leave_out(row, message, info, defect);
             return;
         }
         row.used += 1;
@@ -481,8 +504,8 @@ fn leave_out(
     row: &mut TopicAccount,
     message: &MessageRef<'_>,
     info: &TopicInfo,
-    error: &WireError,
+    (reason, what): (Reason, String),
 ) {
     let first = place_of(row.messages, message, Some(&info.type_name));
-    row.leave_out(error.defect().into(), first, || error.to_string());
+    row.leave_out(reason, first, || what);
 }

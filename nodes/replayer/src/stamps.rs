@@ -1,0 +1,367 @@
+//! Messages whose own stamp does not fit: one wrong stamp must not move the time of everything that is read behind it.
+//!
+//! Every verb that reads or replays a bag asks here, so that all leave out the same messages. The stamps of a topic are
+//! held against the times at which its messages were recorded:
+//!
+//! ```text
+//!   d = stamp - log time                                                          (1)
+//!   |d_i - d_(i-1)| <= T,  or  0 <= s_i - s_(i-1) <= log_i - log_(i-1) + T        (2)
+//! ```
+//!
+//! Successive messages that fulfil (2) are one group: the clocks go on, or the messages come late. The offsets (1) of a
+//! topic that at least a third as many messages have as the most common one are its clock, whatever its zero is. A group
+//! of another offset is kept where its stamps lie between those before and behind it in its topic; where nothing stands
+//! on one side, between the first stamp of the bag and the time of recording. Otherwise its messages are left out.
+//!
+//! Holds when most stamps of a topic are right. A clock that was set for more than a third of a recording is no wrong stamp.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use abbe_msgs::Durability;
+use abbe_msgs::topics::Entry;
+use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
+use recorder::{Bag, Event, MessageRef, Order};
+
+use crate::known::entry_in_any_namespace;
+use crate::leap::{self, LEAST};
+use crate::reading::stamp_of;
+
+/// T of (2), ns: what a session of a diagnosis takes as the lateness of a sample, too.
+const TOLERANCE_NANOS: i64 = 2 * NANOS_PER_S;
+/// How far outside the bag's own times a stamp may lie where no message of its topic stands beside it, ns: messages of one
+/// test are stamped with its begin, and clocks of two hosts differ.
+const MARGIN_NANOS: i64 = 60 * NANOS_PER_S;
+/// How much older than the bag a latched message may be, ns: ten years. A model is published once and received by every
+/// later subscription.
+const OLDEST_LATCHED_NANOS: i64 = 3_653 * 86_400 * NANOS_PER_S;
+/// A group is of the topic's clock when its offset has at least this part of the messages of the most common one.
+const LEAST_SHARE: u64 = 3;
+
+/// Stamps between which a message of a topic would fit, ns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Limits {
+    low_nanos: i64,
+    high_nanos: i64,
+}
+
+impl Limits {
+    fn holds(self, group: &Group) -> bool {
+        self.low_nanos <= group.stamps.0 && group.stamps.1 <= self.high_nanos
+    }
+}
+
+/// Which message: its topic, its log time and its stamp, ns.
+type Key = (usize, u64, i64);
+
+/// The messages of a bag whose stamps do not fit.
+#[derive(Debug, Default)]
+pub(crate) struct WrongStamps {
+    found: BTreeMap<Key, Limits>,
+}
+
+/// Successive messages of a topic whose stamps go on with its log times (2).
+#[derive(Clone, Copy, Debug)]
+struct Group {
+    /// Number of its first message among all of the bag, from 0.
+    first: u64,
+    messages: u64,
+    /// First and last stamp, ns.
+    stamps: (i64, i64),
+    /// Least and greatest offset (1), ns.
+    offsets: (i64, i64),
+    /// Log time of its last message, ns.
+    log_nanos: i64,
+    /// Whether its offset is of its topic's clock.
+    is_firm: bool,
+}
+
+impl Group {
+    fn new(number: u64, stamp: i64, log: i64) -> Self {
+        let offset = stamp.saturating_sub(log);
+        Self {
+            first: number,
+            messages: 1,
+            stamps: (stamp, stamp),
+            offsets: (offset, offset),
+            log_nanos: log,
+            is_firm: false,
+        }
+    }
+
+    /// Takes the next message of the topic, where it goes on (2).
+    fn take(&mut self, stamp: i64, log: i64) -> bool {
+        let (last, last_log) = (self.stamps.1, self.log_nanos);
+        let offset = stamp.saturating_sub(log);
+        let is_steady =
+            offset.abs_diff(last.saturating_sub(last_log)) <= TOLERANCE_NANOS.unsigned_abs();
+        let (step, passed) = (stamp.saturating_sub(last), log.saturating_sub(last_log));
+        let is_late =
+            step >= 0 && passed <= LEAST.nanos() && step <= passed.saturating_add(TOLERANCE_NANOS);
+        if !is_steady && !is_late {
+            return false;
+        }
+        self.messages += 1;
+        self.stamps.1 = stamp;
+        self.log_nanos = log;
+        self.offsets = (self.offsets.0.min(offset), self.offsets.1.max(offset));
+        true
+    }
+}
+
+/// An offset with the messages that have it.
+#[derive(Clone, Copy, Debug)]
+struct Level {
+    offsets: (i64, i64),
+    messages: u64,
+}
+
+/// Offsets that overlap within the tolerance are one.
+fn levels<'a>(groups: impl Iterator<Item = &'a Group>) -> Vec<Level> {
+    let mut sorted: Vec<&Group> = groups.collect();
+    sorted.sort_by_key(|group| group.offsets);
+    let mut levels = Vec::<Level>::new();
+    for group in sorted {
+        match levels.last_mut() {
+            Some(level) if group.offsets.0 <= level.offsets.1.saturating_add(TOLERANCE_NANOS) => {
+                level.offsets.1 = level.offsets.1.max(group.offsets.1);
+                level.messages += group.messages;
+            }
+            _ => levels.push(Level {
+                offsets: group.offsets,
+                messages: group.messages,
+            }),
+        }
+    }
+    let most = levels.iter().map(|level| level.messages).max().unwrap_or(0);
+    levels.retain(|it| it.messages > 1 && it.messages.saturating_mul(LEAST_SHARE) > most);
+    levels
+}
+
+fn is_of(levels: &[Level], group: &Group) -> bool {
+    let holds = |it: &Level| it.offsets.0 <= group.offsets.0 && group.offsets.1 <= it.offsets.1;
+    levels.iter().any(holds)
+}
+
+/// A topic of ours with its groups, in the order of recording.
+struct TopicStamps {
+    topic: usize,
+    entry: &'static Entry,
+    groups: Vec<Group>,
+}
+
+/// Times of the clock that most messages of a bag have.
+#[derive(Clone, Copy, Debug)]
+struct BagTimes {
+    /// First stamp, ns.
+    first_nanos: i64,
+    /// Greatest offset (1), ns.
+    offset_nanos: i64,
+}
+
+impl BagTimes {
+    /// `None` where no clock has more messages than one.
+    fn of(topics: &[TopicStamps]) -> Option<Self> {
+        let firm = || {
+            let groups = topics.iter().flat_map(|topic| &topic.groups);
+            groups.filter(|group| group.is_firm)
+        };
+        let levels = levels(firm());
+        let of_clock = || firm().filter(|group| is_of(&levels, group));
+        Some(Self {
+            first_nanos: of_clock().map(|group| group.stamps.0).min()?,
+            offset_nanos: of_clock().map(|group| group.offsets.1).max()?,
+        })
+    }
+}
+
+impl WrongStamps {
+    /// Reads the stamps of every message of a topic of ours.
+    pub(crate) fn of(bag: &Bag) -> Self {
+        let entries: Vec<Option<&'static Entry>> = (bag.topics().iter())
+            .map(|info| {
+                let entry = entry_in_any_namespace(&info.topic)?;
+                (entry.description.type_name == info.type_name).then_some(entry)
+            })
+            .collect();
+        let (mut topics, strays) = read(bag, &entries);
+        for topic in &mut topics {
+            let levels = levels(topic.groups.iter());
+            let groups = topic.groups.iter_mut();
+            groups.for_each(|group| group.is_firm = is_of(&levels, group));
+        }
+        let Some(times) = BagTimes::of(&topics) else {
+            return Self::default();
+        };
+        let wrong: BTreeMap<usize, Vec<(Group, Limits)>> = topics
+            .iter()
+            .map(|topic| (topic.topic, judge(topic, times, &strays)))
+            .filter(|(_, wrong)| !wrong.is_empty())
+            .collect();
+        Self::found(bag, &entries, &wrong)
+    }
+
+    /// The messages of the groups that do not fit.
+    fn found(
+        bag: &Bag,
+        entries: &[Option<&'static Entry>],
+        wrong: &BTreeMap<usize, Vec<(Group, Limits)>>,
+    ) -> Self {
+        let mut found = BTreeMap::new();
+        if wrong.is_empty() {
+            return Self { found };
+        }
+        // How many messages of the group at hand are still to come, by topic.
+        let mut open: BTreeMap<usize, (u64, Limits)> = BTreeMap::new();
+        let mut messages = bag.messages(Order::File);
+        let mut number = 0;
+        while let Some(event) = messages.next_event() {
+            let Event::Message(message) = event else {
+                continue;
+            };
+            let topic = message.topic.index();
+            let at = number;
+            number += 1;
+            let Some((groups, key)) = wrong.get(&topic).zip(key(&message, entries)) else {
+                continue;
+            };
+            if let Ok(place) = groups.binary_search_by_key(&at, |(group, _)| group.first) {
+                let (group, limits) = groups[place];
+                open.insert(topic, (group.messages, limits));
+            }
+            if let Some((left @ 1.., limits)) = open.get_mut(&topic) {
+                *left -= 1;
+                found.insert(key, *limits);
+            }
+        }
+        Self { found }
+    }
+
+    /// Whether no message was found.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.found.is_empty()
+    }
+
+    /// What is wrong with the stamp of a message of type `type_name`; `None`: it fits.
+    pub(crate) fn wrong(&self, message: &MessageRef<'_>, type_name: &str) -> Option<String> {
+        if self.is_empty() {
+            return None;
+        }
+        let stamp = nanos_of(stamp_of(type_name, message.data)?);
+        let key = (message.topic.index(), message.log_time_nanos, stamp);
+        let limits = self.found.get(&key)?;
+        Some(format!(
+            "header.stamp = {} s: must be from {} to {} s by the messages beside it; set the clock that stamped it",
+            seconds(stamp),
+            seconds(limits.low_nanos),
+            seconds(limits.high_nanos)
+        ))
+    }
+}
+
+/// Reads the groups of each topic of ours, and which messages have a wrong log time.
+fn read(bag: &Bag, entries: &[Option<&'static Entry>]) -> (Vec<TopicStamps>, BTreeSet<u64>) {
+    let mut groups: Vec<Vec<Group>> = entries.iter().map(|_| Vec::new()).collect();
+    let mut messages = bag.messages(Order::File);
+    let mut number = 0_u64;
+    let times = std::iter::from_fn(|| {
+        loop {
+            let Event::Message(message) = messages.next_event()? else {
+                continue;
+            };
+            let at = number;
+            number += 1;
+            if let Some((topic, log_nanos, stamp)) = key(&message, entries) {
+                let log = i64::try_from(log_nanos).unwrap_or(i64::MAX);
+                let of_topic = &mut groups[topic];
+                if !of_topic.last_mut().is_some_and(|it| it.take(stamp, log)) {
+                    of_topic.push(Group::new(at, stamp, log));
+                }
+            }
+            break Some(message.log_time_nanos);
+        }
+    });
+    let strays = leap::strays_of(times, 0);
+    let topics = groups.into_iter().zip(entries).enumerate();
+    let topics = topics.filter_map(|(topic, (groups, entry))| {
+        Some(TopicStamps {
+            topic,
+            entry: (*entry)?,
+            groups,
+        })
+    });
+    (topics.collect(), strays)
+}
+
+/// The groups of a topic that do not fit, each with the limits of its stamps.
+fn judge(topic: &TopicStamps, times: BagTimes, strays: &BTreeSet<u64>) -> Vec<(Group, Limits)> {
+    let groups = &topic.groups;
+    // First stamp of the next group of the topic's clock behind each.
+    let mut behind = vec![None; groups.len()];
+    let mut next = None;
+    for (place, group) in groups.iter().enumerate().rev() {
+        behind[place] = next;
+        next = if group.is_firm {
+            Some(group.stamps.0)
+        } else {
+            next
+        };
+    }
+    let is_latched = topic.entry.qos.durability == Durability::TransientLocal;
+    let oldest = if is_latched {
+        OLDEST_LATCHED_NANOS
+    } else {
+        MARGIN_NANOS
+    };
+    let own = groups.iter().filter(|group| group.is_firm);
+    let own = own.map(|group| group.offsets.1).max();
+    let offset = own.map_or(times.offset_nanos, |own| own.max(times.offset_nanos));
+    let mut before: Option<i64> = None;
+    let mut wrong = Vec::new();
+    for (group, next) in groups.iter().zip(behind) {
+        // A message whose log time is wrong says nothing of its stamp.
+        let is_kept = group.is_firm || (group.messages == 1 && strays.contains(&group.first));
+        let low = match (before, next) {
+            (Some(before), Some(next)) => before.min(next).saturating_sub(TOLERANCE_NANOS),
+            (Some(before), None) => before.saturating_sub(TOLERANCE_NANOS),
+            (None, _) => times.first_nanos.saturating_sub(oldest).max(0),
+        };
+        let recorded = group.log_nanos.saturating_add(offset);
+        let high = match next {
+            Some(next) => before
+                .map_or(next, |it| it.max(next))
+                .saturating_add(TOLERANCE_NANOS),
+            None => recorded.saturating_add(MARGIN_NANOS),
+        };
+        let limits = Limits {
+            low_nanos: low,
+            high_nanos: high,
+        };
+        if is_kept || limits.holds(group) {
+            before = Some(group.stamps.1);
+        } else {
+            wrong.push((*group, limits));
+        }
+    }
+    wrong
+}
+
+/// Which message it is, where it has a stamp and its topic is one of ours.
+fn key(message: &MessageRef<'_>, entries: &[Option<&'static Entry>]) -> Option<Key> {
+    let topic = message.topic.index();
+    let entry = entries.get(topic).copied().flatten()?;
+    let stamp = stamp_of(entry.description.type_name, message.data)?;
+    Some((topic, message.log_time_nanos, nanos_of(stamp)))
+}
+
+/// A stamp in ns since 1970; its seconds are the bits of an unsigned number.
+fn nanos_of((sec, nanosec): (i32, u32)) -> i64 {
+    i64::from(sec.cast_unsigned()) * NANOS_PER_S + i64::from(nanosec)
+}
+
+fn seconds(nanos: i64) -> String {
+    let span: Span = Stamp::<Host>::from_nanos(nanos) - Stamp::from_nanos(0);
+    format!("{:.3}", span.as_secs_f64())
+}
+
+#[cfg(test)]
+mod tests;
