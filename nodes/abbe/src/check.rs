@@ -17,6 +17,7 @@ use recorder::{Bag, RecordedRun, RunNode, verify_attachments};
 use replayer::{Difference, Discrepancy, Doubtful, NotInBag, Outcome, Relay, ReplayError};
 use serde_json::json;
 
+use crate::diagnose::bags;
 use crate::loss;
 use crate::node;
 use crate::tell::tell;
@@ -79,6 +80,10 @@ impl Check {
 fn of(path: &Path, resume_after: &[u64]) -> Result<Outcome> {
     let bag = Bag::open(path)?;
     verify_attachments(&bag)?;
+    // Where a file was cut, that is said with exit code 3.
+    if bag.message_count() == 0 && bags::losses(&bag).is_empty() {
+        bail!("holds no message: nothing can be computed again; check the whole recording");
+    }
     let run = RecordedRun::of(&bag).ok_or(ReplayError::NoRun)?;
     if run.nodes.is_empty() && run.order == recorder::MessageOrder::Total {
         return Err(ReplayError::NoNodes.into());

@@ -11,6 +11,9 @@ use node_runtime::{complain, text_file};
 
 use crate::tell::tell;
 
+/// What to name as the source.
+const PROBE: &str = "name the agent's probe document, http://HOST:PORT/probe, or a file of it";
+
 /// Arguments of `abbe import-map`.
 #[derive(Args)]
 pub struct ImportMap {
@@ -32,9 +35,13 @@ impl ImportMap {
         } else {
             text_file::bytes(Path::new(&self.source)).context("probe")?
         };
-        let answer = document::read(&text).with_context(|| format!("probe {}", self.source))?;
+        let answer = document::read(&text)
+            .with_context(|| format!("{}: is no MTConnect document; {PROBE}", self.source))?;
         let Answer::Devices { devices, items, .. } = answer else {
-            bail!("{}: no answer to `probe`", self.source);
+            bail!(
+                "{}: is an MTConnect document, but no answer to `probe` (MTConnectDevices); {PROBE}",
+                self.source
+            );
         };
         let items = proposal::of_device(&devices, &items, self.device.as_deref())
             .with_context(|| format!("probe {}", self.source))?;

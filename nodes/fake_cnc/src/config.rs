@@ -337,6 +337,12 @@ impl Config {
     }
 
     fn without_axes(&self, machine: &MachineFile, period_s: f64) -> Result<Settings, CncError> {
+        require(
+            "background_rate_hz",
+            self.background_rate_hz,
+            self.background_rate_hz <= 0.0 || self.background_rate_hz >= LEAST_RATE_HZ,
+            "0 (as state_rate_hz) or at least 0.001 Hz",
+        )?;
         let background_hz = if self.background_rate_hz > 0.0 {
             self.background_rate_hz
         } else {
@@ -401,6 +407,9 @@ fn require(
 fn periods(time_s: f64, period_s: f64) -> u64 {
     (time_s / period_s - 1e-9).ceil() as u64
 }
+
+/// Least rate that is one, Hz: a state in a quarter of an hour.
+const LEAST_RATE_HZ: f64 = 1e-3;
 
 /// Servo periods from one sample to the next.
 fn every(name: &'static str, rate_hz: f64, period_s: f64) -> Result<u64, CncError> {

@@ -52,7 +52,7 @@ use twin::{Channel, Instrument, Session, Twin};
 use crate::config::GapConfig;
 use crate::diagnose::considered;
 use crate::error::GapError;
-use crate::preflight::{Floors, WANTED_REPEATS};
+use crate::preflight::{FLOOR_UM, Floors, WANTED_REPEATS};
 use crate::signature::Instance;
 use information::Own;
 use search::{Entry, Field};
@@ -69,6 +69,8 @@ pub const MINUTES: [f64; 2] = [1.0, 480.0];
 pub const MOST_CANDIDATES: usize = 64;
 /// Greatest weight of an effect.
 pub const MOST_WEIGHT: f64 = 100.0;
+/// Least size of an effect as a share of the greatest.
+const LEAST_SHARE: f64 = 1e-9;
 
 /// A test that could be made.
 #[derive(Clone, Debug)]
@@ -249,8 +251,8 @@ fn check(candidates: &[Candidate], order: &Order<'_>) -> Result<(), GapError> {
     order.config.check()?;
     within("minutes", order.minutes, MINUTES)?;
     for floor in order.floors.values() {
-        within("reading_um", floor.reading_um, [1e-4, 1e4])?;
-        within("between_runs_um", floor.between_runs_um, [1e-4, 1e4])?;
+        within("reading_um", floor.reading_um, FLOOR_UM)?;
+        within("between_runs_um", floor.between_runs_um, FLOOR_UM)?;
     }
     for minutes in order.set_up_min.values() {
         within("set_up_min", *minutes, [0.0, 1e4])?;
@@ -268,6 +270,10 @@ fn check(candidates: &[Candidate], order: &Order<'_>) -> Result<(), GapError> {
             });
         }
         within("weight", one.weight, [0.0, MOST_WEIGHT])?;
+        // Before anything is simulated: it takes a while.
+        if let (Some(size), Some(limits)) = (one.size, size_limits(&one.effect)) {
+            within("size", size, limits)?;
+        }
     }
     Ok(())
 }
@@ -312,7 +318,7 @@ fn aims(owns: &[Own], order: &Order<'_>) -> Result<Vec<Aim>, GapError> {
         let first = own.first();
         let stated = likely.and_then(|one| one.size).unwrap_or(first.typical);
         let greatest = greatest(own.instance.kind);
-        within("size", stated, [1e-9 * greatest, greatest])?;
+        within("size", stated, [LEAST_SHARE * greatest, greatest])?;
         Ok(Aim::new(
             own.columns.clone(),
             stated / first.typical,
@@ -321,6 +327,14 @@ fn aims(owns: &[Own], order: &Order<'_>) -> Result<Vec<Aim>, GapError> {
         ))
     };
     owns.iter().map(aim).collect()
+}
+
+/// Least and greatest size of an effect of the catalogue, in the unit of its first amplitude; `None`: there is none of
+/// this id.
+#[must_use]
+pub fn size_limits(effect: &str) -> Option<[f64; 2]> {
+    let greatest = greatest(effects::kind(effect)?);
+    Some([LEAST_SHARE * greatest, greatest])
 }
 
 /// The greatest physical size of a kind's first amplitude.

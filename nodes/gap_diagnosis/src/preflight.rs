@@ -125,6 +125,9 @@ pub struct Foreseen {
     pub alike: Vec<(String, f64)>,
 }
 
+/// Least and greatest noise of an instrument that is assumed, µm: readings are weighted by its inverse square.
+pub const FLOOR_UM: [f64; 2] = [1e-4, 1e4];
+
 /// Judges a programme by the session that an ideal machine would record of it.
 ///
 /// # Errors
@@ -184,8 +187,7 @@ pub fn preflight(
 }
 
 fn check(name: &'static str, value: f64) -> Result<(), GapError> {
-    const LIMITS_UM: (f64, f64) = (1e-4, 1e4);
-    Ok(check_between(name, value, LIMITS_UM)?)
+    Ok(check_between(name, value, (FLOOR_UM[0], FLOOR_UM[1]))?)
 }
 
 /// The floor of a channel, in its own unit: mm, of a rotary axis rad.

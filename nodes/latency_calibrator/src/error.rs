@@ -33,7 +33,7 @@ pub enum LatencyCalibratorError {
     },
     /// Without repeatability there is no uncertainty.
     #[error(
-        "probe.repeatability_um = {repeatability_um}: the uncertainty of a latency needs a value above 0", repeatability_um = number(*repeatability_um))]
+        "probe.repeatability_um = {repeatability_um} µm: must be from {least} to {greatest} µm, touches are weighted by it", repeatability_um = number(*repeatability_um), least = number(*machine::file::REPEATABILITY_UM.start()), greatest = number(*machine::file::REPEATABILITY_UM.end()))]
     NoRepeatability {
         /// Repeatability of the machine file, µm.
         repeatability_um: f64,

@@ -89,14 +89,15 @@ impl LatencyCalibratorStage {
     /// From parameters and machine file.
     ///
     /// # Errors
-    /// Parameters out of range, a repeatability of zero, a chain that cannot be read.
+    /// Parameters or repeatability out of range, a chain that cannot be read.
     pub fn new(
         config: &LatencyCalibratorConfig,
         file: &MachineFile,
     ) -> Result<Self, LatencyCalibratorError> {
         config.check()?;
         let repeatability_um = file.probe.repeatability_um;
-        if repeatability_um.is_nan() || repeatability_um <= 0.0 {
+        // Touches are weighted by its inverse square.
+        if !machine::file::REPEATABILITY_UM.contains(&repeatability_um) {
             return Err(LatencyCalibratorError::NoRepeatability { repeatability_um });
         }
         check_log(config, file.control.servo_period_ms)?;

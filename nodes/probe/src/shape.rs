@@ -179,7 +179,7 @@ impl Points {
         Self {
             surface_mm: touches.iter().map(surface).collect(),
             ball_mm: touches.iter().map(ball).collect(),
-            // A repeatability of zero is legal in a machine file, a weight without end is not.
+            // Touches of an older bag may have no uncertainty, and a weight has an end.
             independent_mm: touches
                 .iter()
                 .map(|touch| touch.uncertainty.independent_mm.max(LEAST_UNCERTAINTY_MM))

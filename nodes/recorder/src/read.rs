@@ -8,6 +8,7 @@
 
 mod bag;
 mod chunk;
+mod description;
 mod file_order;
 mod foreign;
 mod framing;
@@ -186,6 +187,12 @@ pub enum LossReason {
         saved: u32,
         /// The CRC of what is there.
         calculated: u32,
+    },
+    /// The description beside the files is damaged, or contradicts them.
+    #[error("{what}; messages are read without it: write it anew (`ros2 bag reindex`)")]
+    Description {
+        /// What is wrong, with key, value and what the files hold.
+        what: String,
     },
     /// The index at the end cannot be used; the file was walked through instead.
     #[error("the index is damaged")]

@@ -63,7 +63,10 @@ pub struct Taken<'a> {
 /// Reads `bag` in an order and hands on every message of the topics `wanted` (their names in
 /// [`abbe_msgs::topics`]), in whatever namespace they are; messages with wrong stamps (`stamps`) are left out and counted.
 pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken<'_>)) -> Reading {
-    let mut reading = Reading::default();
+    let mut reading = Reading {
+        losses: bag.description_losses().to_vec(),
+        ..Reading::default()
+    };
     let rows = &mut reading.account.topics;
     let plans: Vec<Plan> = (bag.topics().iter())
         .map(|info| plan(info, wanted, rows))

@@ -370,6 +370,9 @@ impl Replay<'_> {
     }
 
     fn summed_up(mut self) -> Outcome {
+        // No message is lost by a wrong description: it makes no difference doubtful.
+        let description = self.bag.description_losses().iter().cloned();
+        self.outcome.reading.losses.extend(description);
         for (route, sum) in self.listening.sums() {
             self.outcome.not_in_bag.insert(self.name_of(route), sum);
         }

@@ -163,7 +163,7 @@ pub fn machine_text(path: &Path) -> Result<(String, String)> {
 }
 
 /// What of a bag cannot be read, in words.
-fn losses(bag: &Bag) -> Vec<String> {
+pub fn losses(bag: &Bag) -> Vec<String> {
     reading::read(bag, Order::LogTime, &[], |_| ()).lines()
 }
 

@@ -17,6 +17,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail};
 use iso230::conformance::Policy;
+use metrology::number::{number, quantity};
 use metrology::yaml;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -52,6 +53,61 @@ struct Limit {
     upper_arcsec: Option<f64>,
 }
 
+/// Greatest magnitude of a limit of a length, µm: a metre.
+const GREATEST_UM: f64 = 1e6;
+/// Greatest magnitude of a limit of an angle, arcsec: a turn.
+const GREATEST_ARCSEC: f64 = 1_296_000.0;
+/// A probability of no more decides nothing.
+const LEAST_PROBABILITY: f64 = 0.5;
+
+impl Limit {
+    /// Refuses limits that are no numbers of a machine, or leave no zone; `place` is their key.
+    fn check(self, place: &str) -> Result<(), String> {
+        let of_lengths = (self.lower_um, self.upper_um, "um", GREATEST_UM);
+        let of_angles = (
+            self.lower_arcsec,
+            self.upper_arcsec,
+            "arcsec",
+            GREATEST_ARCSEC,
+        );
+        for (lower, upper, unit, greatest) in [of_lengths, of_angles] {
+            for (side, value) in [("lower", lower), ("upper", upper)] {
+                let Some(value) = value else { continue };
+                if !(-greatest..=greatest).contains(&value) {
+                    let key = format!("{place}.{side}_{unit}");
+                    let [value, least, greatest] =
+                        [value, -greatest, greatest].map(|one| quantity(&key, one));
+                    return Err(format!(
+                        "{key} = {value}: must be from {least} to {greatest}"
+                    ));
+                }
+            }
+            if let (Some(lower), Some(upper)) = (lower, upper)
+                && lower >= upper
+            {
+                let key = format!("{place}.lower_{unit}");
+                let [lower, upper] = [lower, upper].map(|one| quantity(&key, one));
+                return Err(format!(
+                    "{key} = {lower}: must be below upper_{unit} = {upper}: exchange them"
+                ));
+            }
+        }
+        let is_there = |lower: Option<f64>, upper: Option<f64>| lower.or(upper).is_some();
+        match (
+            is_there(self.lower_um, self.upper_um),
+            is_there(self.lower_arcsec, self.upper_arcsec),
+        ) {
+            (false, false) => Err(format!(
+                "{place}: has no limit: state lower_um or upper_um, of an angle lower_arcsec or upper_arcsec"
+            )),
+            (true, true) => Err(format!(
+                "{place}: has limits in µm and in arcsec: a figure is a length or an angle, remove one"
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
 impl Limits {
     /// Reads the text of a file of limits; `place` names it in errors.
     ///
@@ -61,10 +117,27 @@ impl Limits {
         let place = place.display();
         let limits: Self =
             yaml::read(text).map_err(|error| anyhow!("limits file {place}:{error}"))?;
+        let file = place.to_string();
+        let wrong = |message: &str| anyhow!("limits file {}", yaml::placed(&file, text, message));
         if limits.limits.is_empty() {
-            bail!("limits file {place}: limits: must name one figure at least");
+            return Err(wrong("limits: must name one figure at least"));
         }
+        limits.check().map_err(|message| wrong(&message))?;
         Ok(limits)
+    }
+
+    /// Refuses limits that no figure can be held against: key, value, limit, remedy.
+    fn check(&self) -> Result<(), String> {
+        if let Policy::Probability { at_least } = self.rule
+            && !(at_least > LEAST_PROBABILITY && at_least < 1.0)
+        {
+            return Err(format!(
+                "rule.probability.at_least = {}: must be above {LEAST_PROBABILITY} and below 1, such as 0.95",
+                number(at_least)
+            ));
+        }
+        let mut limits = self.limits.iter();
+        limits.try_for_each(|(name, limit)| limit.check(&format!("limits.{name}")))
     }
 
     /// Judges the figures of all tests.
@@ -196,6 +269,48 @@ mod tests {
         Limits::read(text, Path::new("limits.yaml"))
     }
 
+    #[test]
+    fn limits_that_no_figure_can_be_held_against_are_refused_with_place_value_and_remedy() {
+        let of = |limit: &str| {
+            let text = format!("rule: simple\nlimits:\n  iso230_2.accuracy: {limit}\n");
+            format!("{:#}", limits(&text).unwrap_err())
+        };
+        for key in ["lower_um", "upper_um", "lower_arcsec", "upper_arcsec"] {
+            for value in [".nan", ".inf", "-.inf", "1e25", "-1e300"] {
+                let said = of(&format!("{{{key}: {value}}}"));
+                let begin = "limits file limits.yaml:3:";
+                assert!(said.starts_with(begin), "{key} {value}: {said}");
+                let place = format!("limits.iso230_2.accuracy.{key} = ");
+                assert!(said.contains(&place), "{key} {value}: {said}");
+                assert!(said.contains("must be from -"), "{key} {value}: {said}");
+            }
+        }
+        for (limit, words) in [
+            (
+                "{lower_um: 5.0, upper_um: 4.0}",
+                "lower_um = 5 µm: must be below upper_um = 4 µm",
+            ),
+            ("{lower_um: 5.0, upper_um: 5.0}", "must be below"),
+            (
+                "{lower_arcsec: 5.0, upper_arcsec: -4.0}",
+                "must be below upper_arcsec",
+            ),
+            ("{}", "has no limit: state lower_um"),
+            ("{upper_um: 5.0, upper_arcsec: 4.0}", "in µm and in arcsec"),
+        ] {
+            let said = of(limit);
+            assert!(said.contains(words), "{limit}: {said}");
+        }
+        for at_least in [".nan", ".inf", "0.5", "1.0", "-1.0", "1e300"] {
+            let text = format!(
+                "rule: {{probability: {{at_least: {at_least}}}}}\nlimits:\n  a.b: {{upper_um: 1.0}}\n"
+            );
+            let said = format!("{:#}", limits(&text).unwrap_err());
+            assert!(said.contains("rule.probability.at_least = "), "{said}");
+            assert!(said.contains("above 0.5 and below 1"), "{said}");
+        }
+    }
+
     fn tests() -> Vec<Value> {
         let length =
             |value: f64| serde_json::json!({"value_mm": value, "expanded_uncertainty_mm": 0.001});
@@ -318,11 +433,6 @@ mod tests {
             wrong.contains("is an angle: lower_arcsec and upper_arcsec"),
             "{wrong}"
         );
-        let crossed = format!(
-            "{:#}",
-            of("{lower_arcsec: 6.0, upper_arcsec: 2.0}").unwrap_err()
-        );
-        assert!(crossed.contains("6 arcsec"), "{crossed}");
         let section = of("{upper_arcsec: 6.0}").unwrap();
         assert!(section.figures[0]["verdict"].is_null(), "{section:?}");
         assert!(
@@ -347,7 +457,10 @@ mod tests {
         assert!(!said.contains("centre_mm"), "{said}");
         let said =
             refused("rule: simple\nlimits:\n  iso230_2.accuracy: {lower_um: 3.0, upper_um: 2.0}\n");
-        assert!(said.starts_with("limits.iso230_2.accuracy: "), "{said}");
+        assert!(
+            said.contains("limits.iso230_2.accuracy.lower_um = "),
+            "{said}"
+        );
         let said = refused("rule: simple\nlimits:\n  iso230_2.accuracy: {upper_um: lots}\n");
         let line =
             "limits.yaml:3:33: limits.iso230_2.accuracy.upper_um = lots: must be a number, in µm";

@@ -12,7 +12,7 @@ use recorder::Bag;
 use serde_json::Value;
 
 use super::dates::{Moment, moment};
-use super::keep::{add, entry};
+use super::keep::{add, complain_of_left_out, entry};
 use super::open_to_write;
 use super::origin::{Origin, joined, json};
 use crate::diagnose::{self, bags};
@@ -46,7 +46,7 @@ pub struct Add {
 }
 
 impl Add {
-    /// Adds every input; one that fails leaves the others. Exit code 1 when one failed, 3 when a part of one was lost.
+    /// Adds every input; one that fails leaves the others. Exit code 1 when one failed, 3 when a part of one was lost or a figure is no finite number.
     ///
     /// # Errors
     /// When budget or store cannot be opened.
@@ -78,10 +78,10 @@ impl Add {
     fn add(&self, path: &Path, budget: Option<&Budget>, store: &mut Store) -> Result<bool> {
         let report = path.join("report.json");
         if path.is_dir() && report.is_file() && path.join("bag").exists() {
-            return self.add_run(path, &report, store).map(|()| true);
+            return self.add_run(path, &report, store);
         }
         if path.extension().is_some_and(|ending| ending == "json") {
-            return self.add_json(path, store).map(|()| true);
+            return self.add_json(path, store);
         }
         self.add_bag(path, budget, store)
     }
@@ -95,20 +95,21 @@ impl Add {
         }
     }
 
-    fn add_run(&self, folder: &Path, report: &Path, store: &mut Store) -> Result<()> {
+    fn add_run(&self, folder: &Path, report: &Path, store: &mut Store) -> Result<bool> {
         let (_, figures) = json(report)?;
         let origin = Origin::of_bag(&folder.join("bag"), folder, true)?;
         self.add_report(&figures, origin, store)
     }
 
-    fn add_report(&self, figures: &Value, origin: Origin, store: &mut Store) -> Result<()> {
+    /// Adds a report; whether each of its figures could be kept.
+    fn add_report(&self, figures: &Value, origin: Origin, store: &mut Store) -> Result<bool> {
         let origin = self.stated(origin.with_conditions(&figures["conditions"]));
         let entry = entry(Kind::Report, report_figures(figures)?, origin)?;
         tell!("{}: {}", entry.source, add(store, &entry)?);
-        Ok(())
+        Ok(complain_of_left_out(figures, &entry.source))
     }
 
-    fn add_json(&self, path: &Path, store: &mut Store) -> Result<()> {
+    fn add_json(&self, path: &Path, store: &mut Store) -> Result<bool> {
         let (text, value) = json(path)?;
         let origin = Origin::of_text(&text, path);
         if value.get("schema").is_some() {
@@ -117,7 +118,7 @@ impl Add {
         self.add_report(&value, origin, store)
     }
 
-    fn add_gap(&self, value: &Value, origin: Origin, store: &mut Store) -> Result<()> {
+    fn add_gap(&self, value: &Value, origin: Origin, store: &mut Store) -> Result<bool> {
         let gap = gap_figures(value)?;
         let mut origin = self.stated(origin);
         // A diagnosis is recognised by its bags: its text has the time that it took.
@@ -127,7 +128,7 @@ impl Add {
         origin.machine_sha256 = gap.machine_sha256.or(origin.machine_sha256);
         let entry = entry(Kind::Diagnosis, gap.figures, origin)?;
         tell!("{}: {}", entry.source, add(store, &entry)?);
-        Ok(())
+        Ok(complain_of_left_out(value, &entry.source))
     }
 
     fn add_bag(&self, path: &Path, budget: Option<&Budget>, store: &mut Store) -> Result<bool> {
@@ -136,14 +137,14 @@ impl Add {
         loss::complain_of(&tests.reading);
         let page = report_bag::page("", &tests, budget)?;
         let origin = Origin::of_bag(path, path, true)?;
-        self.add_report(&page.figures, origin.clone(), store)?;
+        let mut is_whole = self.add_report(&page.figures, origin.clone(), store)?;
         if self.diagnose {
             let (name, text) = bags::machine_text(path)?;
             let paths = [path.to_owned()];
             let found =
                 diagnose::of(&paths, &name, &text, &GapConfig::default()).context("diagnosis")?;
-            self.add_gap(&found.json()?, origin, store)?;
+            is_whole &= self.add_gap(&found.json()?, origin, store)?;
         }
-        Ok(tests.reading.is_whole())
+        Ok(is_whole && tests.reading.is_whole())
     }
 }

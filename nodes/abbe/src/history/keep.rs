@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
-use history::{Added, Entry, Figure, Kind, Store, gap_figures, report_figures};
+use history::{Added, Entry, Figure, Kind, LeftOut, Store, gap_figures, left_out, report_figures};
 use node_runtime::complain;
 use serde_json::Value;
 
@@ -41,6 +41,7 @@ impl Keep {
     /// When machine or time are not known, or the store cannot be written.
     pub fn report(&self, figures: &Value, origin: Origin) -> Result<()> {
         let origin = origin.with_conditions(&figures["conditions"]);
+        complain_of_left_out(figures, &origin.source);
         let entry = entry(Kind::Report, report_figures(figures)?, self.named(origin))?;
         self.add(&entry)
     }
@@ -50,6 +51,7 @@ impl Keep {
     /// # Errors
     /// As [`Self::report`].
     pub fn diagnosis(&self, gap: &Value, origin: Origin) -> Result<()> {
+        complain_of_left_out(gap, &origin.source);
         let gap = gap_figures(gap)?;
         let mut origin = self.named(origin);
         origin.machine_sha256 = origin.machine_sha256.or(gap.machine_sha256);
@@ -71,6 +73,43 @@ impl Keep {
         complain!("abbe: {}: {line}", path.display());
         Ok(())
     }
+}
+
+/// Figures that are named one by one; more are counted.
+const NAMED: usize = 5;
+
+/// Prints how many figures have no finite number and which; whether there is none.
+pub fn complain_of_left_out(figures: &Value, source: &str) -> bool {
+    let left_out = left_out(figures);
+    if let Some(line) = in_words(&left_out) {
+        complain!("abbe: {source}: {line}");
+    }
+    left_out.is_empty()
+}
+
+fn in_words(left_out: &[LeftOut]) -> Option<String> {
+    let first = left_out.iter().take(NAMED).map(|it| {
+        let test = if it.test.is_empty() {
+            String::new()
+        } else {
+            format!("{}: ", it.test)
+        };
+        format!("{test}{} = {}", it.name, it.value)
+    });
+    let first: Vec<String> = first.collect();
+    let more = match left_out.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        n => format!("; {n} more"),
+    };
+    let figures = match left_out.len() {
+        0 => return None,
+        1 => "1 figure".to_owned(),
+        n => format!("{n} figures"),
+    };
+    Some(format!(
+        "{figures} left out, no finite number: {}{more}; measure again, or mend the file",
+        first.join("; ")
+    ))
 }
 
 /// An entry of figures.
@@ -113,4 +152,29 @@ pub fn add(store: &mut Store, entry: &Entry) -> Result<String> {
         Added::New => format!("kept {n} figures of a {kind} of {machine}"),
         Added::Known => format!("has this {kind} of {machine} already, nothing was added"),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn figures_that_are_left_out_are_counted_and_the_first_are_named() {
+        let quantity = json!({"value_mm": null, "expanded_uncertainty_mm": null});
+        let report = |n: usize| {
+            let test = json!({"test": "X", "iso230_2": {"accuracy": quantity}});
+            json!({"tests": vec![test; n]})
+        };
+        assert_eq!(in_words(&left_out(&report(0))), None);
+        assert!(complain_of_left_out(&report(0), "report.json"));
+        assert!(!complain_of_left_out(&report(1), "report.json"));
+        let one = in_words(&left_out(&report(1))).unwrap();
+        let begin = "1 figure left out, no finite number: X: iso230_2.accuracy.value_mm = null;";
+        assert!(one.starts_with(begin), "{one}");
+        let many = in_words(&left_out(&report(12))).unwrap();
+        assert!(many.starts_with("12 figures left out"), "{many}");
+        assert!(many.contains("; 7 more; measure again"), "{many}");
+    }
 }

@@ -124,14 +124,22 @@ pub fn ranges(test: &Test, machine: &MachineFile) -> Vec<Option<Range>> {
     test.columns().iter().map(range).collect()
 }
 
+/// Checks what of a map needs no machine: its start and its numbers.
+///
+/// # Errors
+/// Names the key, its value and the limit.
+pub fn check_alone(map: &Map) -> Result<()> {
+    epoch::whole_seconds::<Host>(map.start_s, times::LONGEST_LOG_S as i64)
+        .map_err(|error| anyhow!("start_s = {error}"))?;
+    numbers(map)
+}
+
 /// Checks a map against the machine: axes, travels and feeds.
 ///
 /// # Errors
 /// Names the key, its value and the limit.
 pub fn check(map: &Map, machine: &MachineFile) -> Result<()> {
-    epoch::whole_seconds::<Host>(map.start_s, times::LONGEST_LOG_S as i64)
-        .map_err(|error| anyhow!("start_s = {error}"))?;
-    numbers(map)?;
+    check_alone(map)?;
     for (axis, at_mm) in &map.at_mm {
         within(machine, &format!("at_mm.{axis}"), *axis, *at_mm)?;
         if map.test.moved().contains(axis) {

@@ -1,11 +1,9 @@
 //! The noise that a forecast assumes, until repeats have shown what it is.
 
 use anyhow::Result;
-use gap_diagnosis::preflight::{AssumedFloor, Floors};
+use gap_diagnosis::preflight::{AssumedFloor, FLOOR_UM, Floors};
 use machine::MachineFile;
 use twin::Instrument;
-
-use crate::usage::above_zero;
 
 /// Instruments with the noise of a reading that is assumed unless something else is said, µm.
 const READING_UM: [(Instrument, f64); 6] = [
@@ -32,8 +30,12 @@ pub struct FloorArgument {
 /// # Errors
 /// Says what of it cannot be read.
 pub fn argument(text: &str) -> Result<FloorArgument, String> {
-    let form =
-        || format!("\"{text}\": INSTRUMENT=READING/BETWEEN in µm is needed, e.g. grid=0.1/0.3");
+    let [least, greatest] = FLOOR_UM;
+    let form = || {
+        format!(
+            "--floor \"{text}\": INSTRUMENT=READING/BETWEEN in µm is needed, each from {least} to {greatest}, e.g. grid=0.1/0.3"
+        )
+    };
     let (name, values) = text.split_once('=').ok_or_else(form)?;
     let (reading, between) = values.split_once('/').ok_or_else(form)?;
     let known = READING_UM.map(|(instrument, _)| instrument);
@@ -42,15 +44,29 @@ pub fn argument(text: &str) -> Result<FloorArgument, String> {
         .find(|instrument| instrument.to_string() == name)
         .ok_or_else(|| {
             let names = known.map(|instrument| instrument.to_string());
-            format!("\"{name}\" is no instrument (known: {})", names.join(", "))
+            format!(
+                "--floor \"{name}\" is no instrument (known: {})",
+                names.join(", ")
+            )
         })?;
-    let number = |part: &str| above_zero(part.trim()).map_err(|rule| format!("\"{part}\": {rule}"));
     Ok(FloorArgument {
         instrument,
         floor: AssumedFloor {
-            reading_um: number(reading)?,
-            between_runs_um: number(between)?,
+            reading_um: micrometres(&format!("{name}, reading"), reading)?,
+            between_runs_um: micrometres(&format!("{name}, between runs"), between)?,
         },
+    })
+}
+
+/// A noise in µm that an instrument can have; readings are weighted by its inverse square.
+fn micrometres(place: &str, part: &str) -> Result<f64, String> {
+    let [least, greatest] = FLOOR_UM;
+    let value = part.trim().parse::<f64>().ok();
+    let value = value.filter(|value| (least..=greatest).contains(value));
+    value.ok_or_else(|| {
+        format!(
+            "--floor {place} = \"{part}\": must be a number from {least} to {greatest} µm, e.g. grid=0.1/0.3"
+        )
     })
 }
 
@@ -108,8 +124,22 @@ mod tests {
             ("grid", "INSTRUMENT=READING/BETWEEN"),
             ("grid=0.2", "INSTRUMENT=READING/BETWEEN"),
             ("plate=0.2/0.5", "known: motor, scale, grid"),
-            ("grid=-1/0.5", "above 0"),
-            ("grid=0.1/x", "above 0"),
+            (
+                "grid=-1/0.5",
+                "--floor grid, reading = \"-1\": must be a number from 0.0001",
+            ),
+            ("grid=0.1/x", "--floor grid, between runs = \"x\""),
+            (
+                "motor=1e-300",
+                "--floor \"motor=1e-300\": INSTRUMENT=READING/BETWEEN",
+            ),
+            (
+                "motor=1e-300/0.1",
+                "reading = \"1e-300\": must be a number from 0.0001 to 10000 µm",
+            ),
+            ("motor=0.1/nan", "between runs = \"nan\""),
+            ("touch=inf/0.1", "touch, reading = \"inf\""),
+            ("touch=1e25/0.1", "touch, reading = \"1e25\""),
         ] {
             let error = argument(text).unwrap_err();
             assert!(error.contains(word), "{text}: {error}");

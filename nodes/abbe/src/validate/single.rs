@@ -175,7 +175,10 @@ fn read(path: &Path, kind: Kind, machine: Option<&MachineFile>) -> Result<()> {
         Kind::ImportMap => {
             let map: Map =
                 yaml::read_letters(&text).map_err(|error| placed("map", &error.to_string()))?;
-            let bounded = machine.map_or(Ok(()), |machine| limits::check(&map, machine));
+            let bounded = match machine {
+                Some(machine) => limits::check(&map, machine),
+                None => limits::check_alone(&map),
+            };
             bounded.map_err(|error| placed("map", &error.to_string()))
         }
         Kind::Mapping => MapFile::from_yaml(&text)

@@ -517,15 +517,28 @@ fn an_end_without_a_begin_is_said() {
 
 #[test]
 fn a_machine_without_repeatability_is_refused() {
-    let text = BENCH.replace("repeatability_um: 0.3", "repeatability_um: 0.0");
-    let file = MachineFile::parse(&text, "bench.yaml").unwrap();
     let config = LatencyCalibratorConfig::default();
-    assert_eq!(
-        LatencyCalibratorStage::new(&config, &file).unwrap_err(),
-        LatencyCalibratorError::NoRepeatability {
-            repeatability_um: 0.0
-        }
-    );
+    for repeatability_um in [
+        0.0,
+        -0.3,
+        1e-150,
+        f64::MIN_POSITIVE,
+        f64::NAN,
+        f64::INFINITY,
+        1e4,
+    ] {
+        let mut file = MachineFile::parse(BENCH, "bench.yaml").unwrap();
+        file.probe.repeatability_um = repeatability_um;
+        let error = LatencyCalibratorStage::new(&config, &file).unwrap_err();
+        assert!(
+            matches!(error, LatencyCalibratorError::NoRepeatability { .. }),
+            "{repeatability_um}: {error}"
+        );
+        assert!(
+            error.to_string().contains("from 0.001 to 1000 µm"),
+            "{error}"
+        );
+    }
 }
 
 #[test]

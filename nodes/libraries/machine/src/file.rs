@@ -21,6 +21,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use certificate::CertificateEntry;
+pub use limits::REPEATABILITY_UM;
 pub use reference::{BeamEntry, GridEncoderEntry, GridPlacement, GridPlane, LengthReferenceEntry};
 
 /// A whole machine file.
@@ -256,7 +257,7 @@ pub struct ProbeEntry {
     pub overtravel_mm: f64,
     /// Feed of an ordinary touch.
     pub feed_mm_min: f64,
-    /// Repeatability of one touch (1 standard deviation), as the maker states it.
+    /// Repeatability of one touch (1 standard deviation), as the maker states it; 0.001 or above.
     pub repeatability_um: f64,
     /// Latency, where it is known; a calibration overrides it.
     #[serde(default)]

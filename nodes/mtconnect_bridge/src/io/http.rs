@@ -120,7 +120,7 @@ fn fetch_within(url: &str, limit: Duration) -> Result<Vec<u8>, BridgeError> {
         reason,
     };
     let plain = url.strip_prefix("http://");
-    let plain = plain.ok_or_else(|| failed("must begin with http://".to_owned()))?;
+    let plain = plain.ok_or_else(|| failed(format!("must begin with http://; {PROBE}")))?;
     let (host, path) = plain.split_once('/').unwrap_or((plain, ""));
     let address = if host.contains(':') {
         host.to_owned()
@@ -134,19 +134,24 @@ fn fetch_within(url: &str, limit: Duration) -> Result<Vec<u8>, BridgeError> {
             action: "starting the event loop",
             source,
         })?;
-    let answer = runtime.block_on(get_within(&address, &format!("/{path}"), limit));
+    let asked = get_within(&address, &format!("/{path}"), limit);
+    let answer = runtime.block_on(asked);
     // A name that is still being looked up is not awaited.
     runtime.shutdown_background();
-    let (status, body) = answer.map_err(failed)?;
+    let (status, body) = answer.map_err(|reason| failed(format!("{reason}; {REACH}")))?;
     if status == 200 {
         Ok(body)
     } else {
-        Err(BridgeError::Ask {
-            url: url.to_owned(),
-            reason: format!("HTTP status {status}"),
-        })
+        Err(failed(format!(
+            "HTTP status {status}: must be 200; {PROBE}"
+        )))
     }
 }
+
+/// What to do where nobody answers.
+const REACH: &str = "name the host and port where the agent listens (usually 5000), and start it";
+/// What to do where something else answers.
+const PROBE: &str = "name the agent's probe document, http://HOST:PORT/probe";
 
 #[cfg(test)]
 mod tests {

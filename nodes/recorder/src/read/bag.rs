@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::{Record, op};
 
+use super::description;
 use super::file_order::FileOrder;
 use super::foreign;
 use super::index::{FileIndex, parse};
@@ -66,6 +67,7 @@ pub struct Bag {
     files: Vec<BagFile>,
     topics: Vec<TopicInfo>,
     absent: Vec<PathBuf>,
+    description: Vec<Loss>,
 }
 
 impl Bag {
@@ -97,12 +99,39 @@ impl Bag {
             files: Vec::new(),
             topics: Vec::new(),
             absent,
+            description: Vec::new(),
         };
         for name in names {
             let mut file = regular::open(&name)?;
             bag.add_file(name, FileIndex::read(&mut file));
         }
+        bag.description = bag.described_wrongly();
         Ok(bag)
+    }
+
+    /// Faults of the description, where there is one.
+    fn described_wrongly(&self) -> Vec<Loss> {
+        let file = self.path.join(METADATA_FILE);
+        if !self.path.is_dir() || !file.is_file() {
+            return Vec::new();
+        }
+        let is_whole = |file: &BagFile| file.index.end_loss.is_none() && !file.index.index_damaged;
+        let is_known = self.absent.is_empty() && self.files.iter().all(is_whole);
+        let text = regular::text(&file);
+        let faults = description::faults(text.as_deref(), is_known.then_some(&self.topics));
+        let loss = |what| Loss {
+            file: file.clone(),
+            at_byte: 0,
+            reason: LossReason::Description { what },
+            messages_read: 0,
+        };
+        faults.into_iter().map(loss).collect()
+    }
+
+    /// What is wrong with the description beside the files; their messages are not lost by it.
+    #[must_use]
+    pub fn description_losses(&self) -> &[Loss] {
+        &self.description
     }
 
     fn add_file(&mut self, path: PathBuf, index: FileIndex) {

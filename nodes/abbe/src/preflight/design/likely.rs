@@ -8,8 +8,8 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
-use gap_diagnosis::design::{Likely, MOST_WEIGHT};
+use anyhow::{Context, Result, anyhow, bail};
+use gap_diagnosis::design::{Likely, MOST_WEIGHT, size_limits};
 use metrology::number::number;
 use metrology::yaml;
 use node_runtime::text_file;
@@ -53,7 +53,11 @@ const fn usual_weight() -> f64 {
 /// With file, place, value and limit.
 pub fn read(path: &Path) -> Result<Vec<Likely>> {
     let text = text_file::yaml(path).context("likely effects")?;
-    of_text(&text).with_context(|| format!("likely effects {}", path.display()))
+    let place = path.display().to_string();
+    of_text(&text).map_err(|error| {
+        let message = format!("{error:#}");
+        anyhow!("likely effects {}", yaml::placed(&place, &text, &message))
+    })
 }
 
 fn of_text(text: &str) -> Result<Vec<Likely>> {
@@ -80,8 +84,16 @@ fn of_text(text: &str) -> Result<Vec<Likely>> {
                 number(MOST_WEIGHT)
             );
         }
-        if let Some(size) = entry.size.filter(|size| !(*size > 0.0 && size.is_finite())) {
-            bail!("likely[{k}].size = {}: must be above 0", number(size));
+        if let (Some(size), Some([least, greatest])) = (entry.size, size_limits(&entry.effect))
+            && !(least..=greatest).contains(&size)
+        {
+            bail!(
+                "likely[{k}].size = {}: must be from {} to {}, the sizes of {}; leave it out for its usual size",
+                number(size),
+                number(least),
+                number(greatest),
+                entry.effect
+            );
         }
     }
     let likely = file.likely.into_iter().map(|entry| Likely {
@@ -115,5 +127,27 @@ mod tests {
             let error = format!("{:#}", of(entry).unwrap_err());
             assert!(error.contains(words), "{entry}: {error}");
         }
+        for size in ["0.0", "-3.0", ".nan", ".inf", "1e25", "1e-300"] {
+            for kind in CATALOGUE.iter() {
+                let entry = format!("{{effect: {}, size: {size}}}", kind.id);
+                let error = format!("{:#}", of(&entry).unwrap_err());
+                assert!(error.starts_with("likely[0].size = "), "{entry}: {error}");
+                assert!(error.contains("must be from "), "{entry}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_is_named_with_line_and_column() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("likely.yaml");
+        let text = "likely:\n  - {effect: spindle_growth}\n  - {effect: backlash, size: 1e25}\n";
+        std::fs::write(&path, text).unwrap();
+        let error = format!("{:#}", read(&path).unwrap_err());
+        assert!(error.contains("likely.yaml:3:"), "{error}");
+        assert!(
+            error.contains("likely[1].size = 1e25: must be from "),
+            "{error}"
+        );
     }
 }

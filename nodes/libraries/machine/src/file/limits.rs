@@ -7,6 +7,9 @@ use metrology::leaves::Row;
 const HALL_MM: f64 = 1e5;
 /// Finest resolution: a picometre.
 const FINEST_UM: f64 = 1e-6;
+/// Scatter of a touch, 1 standard deviation, µm: from a nanometre, below what any probe repeats. Touches are weighted by its
+/// inverse square, which would overflow for far less.
+pub const REPEATABILITY_UM: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 
 /// One row for each key; a key has one meaning in the whole file.
 pub(super) const ROWS: &[Row] = &[
@@ -41,7 +44,11 @@ pub(super) const ROWS: &[Row] = &[
     ("standoff_mm", 1e-3, 1e3),
     ("overtravel_mm", 1e-3, 1e3),
     ("feed_mm_min", 0.01, 1e5),
-    ("repeatability_um", 0.0, 1e3),
+    (
+        "repeatability_um",
+        *REPEATABILITY_UM.start(),
+        *REPEATABILITY_UM.end(),
+    ),
     ("latency_ms", 0.0, 1e3),
     ("corner_mm", -HALL_MM, HALL_MM),
     ("inset_mm", 1e-3, 1e4),

@@ -113,7 +113,22 @@ fn numbers_outside_their_range_are_named_with_value_and_rule() {
         (
             "repeatability_um: 0.3",
             "repeatability_um: -0.3",
-            "m.yaml: probe.repeatability_um = -0.3 µm: must be from 0 to 1000 µm",
+            "m.yaml: probe.repeatability_um = -0.3 µm: must be from 0.001 to 1000 µm",
+        ),
+        (
+            "repeatability_um: 0.3",
+            "repeatability_um: 0.0",
+            "m.yaml: probe.repeatability_um = 0 µm: must be from 0.001 to 1000 µm",
+        ),
+        (
+            "repeatability_um: 0.3",
+            "repeatability_um: 1.0e-150",
+            "m.yaml: probe.repeatability_um = 1e-150 µm: must be from 0.001 to 1000 µm",
+        ),
+        (
+            "repeatability_um: 0.3",
+            "repeatability_um: 4.9e-324",
+            "must be from 0.001 to 1000 µm",
         ),
         (
             "approach_sign: [1, 1, -1]",
@@ -266,7 +281,7 @@ fn numbers_and_lists_beyond_their_bounds_are_refused_by_key_value_and_bound() {
         (
             "repeatability_um: 0.3",
             "repeatability_um: 1.0e13",
-            "probe.repeatability_um = 10000000000000 µm: must be from 0 to 1000 µm",
+            "probe.repeatability_um = 10000000000000 µm: must be from 0.001 to 1000 µm",
         ),
     ] {
         let said = refusal(from, to);
