@@ -28,7 +28,7 @@ pub struct Config {
     /// Rate of axis states during touches and full-rate contours; a whole part of the servo rate.
     #[schemars(range(min = 1.0, max = 20_000.0))]
     pub state_rate_hz: f64,
-    /// Rate of axis states otherwise; 0 means state_rate_hz.
+    /// Rate of axis states otherwise, 0.001 or above; 0 means state_rate_hz.
     #[schemars(range(min = 0.0, max = 20_000.0))]
     pub background_rate_hz: f64,
     /// Rate of program feedback.

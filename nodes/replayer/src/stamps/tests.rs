@@ -146,13 +146,11 @@ fn many_wrong_stamps_and_groups_of_them_are_found() {
 
 #[test]
 fn late_messages_clocks_of_another_zero_and_pauses_are_no_wrong_stamps() {
+    // Nothing arrives for 40 s, and then everything at once.
     let late = |n: i32| {
-        f64::from(n) * 0.01
-            + if (500..1_000).contains(&n) {
-                40.0 - f64::from(n - 500) * 0.08
-            } else {
-                0.0
-            }
+        let at = f64::from(n) * 0.01;
+        let burst = 45.0 + f64::from(n - 500) * 0.001;
+        (if n < 500 { at } else { at.max(burst) }, at)
     };
     let cases: [(&str, Vec<Times>); 6] = [
         ("as they are", states()),
@@ -177,12 +175,7 @@ fn late_messages_clocks_of_another_zero_and_pauses_are_no_wrong_stamps() {
                 .map(|(log, at)| (log, at * 2.0))
                 .collect(),
         ),
-        (
-            "late after a pause",
-            (0..2_000)
-                .map(|n| (late(n).max(f64::from(n) * 0.01), f64::from(n) * 0.01))
-                .collect(),
-        ),
+        ("late after a pause", (0..2_000).map(late).collect()),
         (
             "a clock that was set",
             states()
