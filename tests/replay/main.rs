@@ -6,6 +6,7 @@
 
 mod computed;
 mod contract;
+mod descriptions;
 mod equal_bytes;
 mod frames;
 mod host_clocks;

@@ -484,3 +484,30 @@ impl AxisNumbers {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MACHINE: &str = include_str!("../../../launch_configs/gap_first/machine.yaml");
+
+    #[test]
+    fn a_background_rate_that_is_almost_none_is_refused() {
+        let machine = MachineFile::parse(MACHINE, "m").unwrap();
+        let of = |background_rate_hz| {
+            let config = Config {
+                background_rate_hz,
+                ..Config::default()
+            };
+            Settings::new(&config, &machine)
+        };
+        for rate_hz in [0.0, 1e-3, 10.0] {
+            assert!(of(rate_hz).is_ok(), "{rate_hz}");
+        }
+        for rate_hz in [1e-300, f64::MIN_POSITIVE, 1e-9, 1e-4, f64::NAN, -1.0] {
+            let said = of(rate_hz).err().map(|error| error.to_string());
+            let said = said.unwrap_or_default();
+            assert!(said.contains("background_rate_hz = "), "{rate_hz}: {said}");
+        }
+    }
+}
