@@ -134,8 +134,7 @@ fn fetch_within(url: &str, limit: Duration) -> Result<Vec<u8>, BridgeError> {
             action: "starting the event loop",
             source,
         })?;
-    let asked = get_within(&address, &format!("/{path}"), limit);
-    let answer = runtime.block_on(asked);
+    let answer = runtime.block_on(get_within(&address, &format!("/{path}"), limit));
     // A name that is still being looked up is not awaited.
     runtime.shutdown_background();
     let (status, body) = answer.map_err(|reason| failed(format!("{reason}; {REACH}")))?;
