@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, bail};
 use metrology::bound::Bound;
 use mtconnect_bridge::xml;
 use node_runtime::text_file::{self, Comments};
@@ -29,6 +29,8 @@ pub struct LaunchNode {
     pub ends_within: Option<Duration>,
 }
 
+/// Longest launch file, bytes: one of 100 nodes with 1,000 parameters each has less.
+const MOST_BYTES: usize = 16 << 20;
 /// Nodes of a scenario, each with threads and sockets of its own: a cell has some fifteen.
 const NODE_COUNT: Bound = Bound::at_most(100);
 /// Parameters and parameter files of one node, which become its command line.
@@ -104,8 +106,7 @@ pub fn read(path: &Path) -> Result<Vec<LaunchNode>> {
 }
 
 fn parse(text: &str, folder: &Path) -> Result<Vec<LaunchNode>> {
-    let document =
-        roxmltree::Document::parse(text).map_err(|wrong| anyhow!(xml::in_own_words(&wrong)))?;
+    let document = xml::parse(text, MOST_BYTES)?;
     let root = document.root_element();
     if root.tag_name().name() != "launch" {
         bail!(
@@ -214,6 +215,28 @@ fn substitute(text: &str, folder: &Path) -> Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_launch_file_that_the_parser_takes_long_over_is_refused_with_place_and_limit() {
+        let attributes: String = (0..60_000).map(|k| format!(" a{k}='1'")).collect();
+        for (text, words) in [
+            (
+                format!("<launch>\n<node{attributes}/></launch>"),
+                "2:1: more than 256 attributes",
+            ),
+            (
+                "<a>".repeat(200_000),
+                "more than 128 elements within each other",
+            ),
+            (
+                format!("<launch>{}</launch>", "<![CDATA[&]]>".repeat(101)),
+                "100 sections of raw text",
+            ),
+        ] {
+            let refused = format!("{:#}", parse(&text, Path::new(".")).unwrap_err());
+            assert!(refused.contains(words), "{words}: {refused}");
+        }
+    }
 
     #[test]
     fn a_text_that_is_no_xml_is_refused_in_own_words_with_its_place() {

@@ -10,7 +10,11 @@
 //!   first > n            the oldest that the agent still has, by the head of an answer          (1)
 //!   s_1 > n              the first of a part, when all of the agent is asked                     (2)
 //!   OUT_OF_RANGE         the agent's own word for n < first                                      (3)
+//!   s_k+1 > s_k + 1      within a part, when all of the agent is asked                           (4)
 //! ```
+//!
+//! What (4) shows is asked again once (`sample` from s_k + 1 without an interval), and what came behind it is taken from that
+//! answer; a number that is missing there too is lost. While losses follow each other nothing is asked so.
 //!
 //! The numbers count the observations of all devices. Where one is asked for, the number of its own observations in a gap
 //! is unknown: the condition has no number of losses.
@@ -41,6 +45,8 @@ use crate::offer::Wanted;
 use crate::stage::IoCommand;
 use crate::text;
 
+mod happened;
+
 /// Keys whose last number is remembered; more are no machine's.
 const KEY_LIMIT: usize = 100_000;
 
@@ -54,6 +60,8 @@ enum Asked {
         parts: Option<Parts>,
         body: Vec<u8>,
     },
+    /// What is missing within a part, once.
+    Again,
     /// Nothing; `current` is asked then.
     Pausing {
         until: Stamp<Host>,
@@ -178,7 +186,7 @@ impl AgentLink {
             Asked::Nothing | Asked::Pausing { .. } => "",
             Asked::Probe => "probe",
             Asked::Current => "current",
-            Asked::Sample { .. } => "sample",
+            Asked::Sample { .. } | Asked::Again => "sample",
         })
     }
 
@@ -280,18 +288,20 @@ impl AgentLink {
                     observations,
                     malformed,
                     unstamped,
+                    unread,
                 },
-                Asked::Current | Asked::Sample { .. },
+                Asked::Current | Asked::Sample { .. } | Asked::Again,
             ) => {
                 report(malformed, unstamped, out);
-                if matches!(self.asked, Asked::Current) {
-                    self.holds_now(header, observations, out);
-                } else {
-                    self.happened(at, header, observations, out);
+                match self.asked {
+                    Asked::Current => self.holds_now(header, observations, out),
+                    _ => self.happened(at, header, (observations, &unread), out),
                 }
                 Ok(())
             }
-            (Answer::Error { errors }, Asked::Sample { .. }) if is_out_of_range(&errors) => {
+            (Answer::Error { errors }, Asked::Sample { .. } | Asked::Again)
+                if is_out_of_range(&errors) =>
+            {
                 self.gap_from = self.next.take();
                 self.ask_again(at, out);
                 Ok(())
@@ -506,63 +516,6 @@ impl AgentLink {
             *last = numbered.sequence;
         } else if self.told.len() < KEY_LIMIT {
             self.told.insert(key.clone(), numbered.sequence);
-        }
-    }
-
-    /// A part of the stream.
-    fn happened(
-        &mut self,
-        at: Stamp<Host>,
-        header: Header,
-        observations: Vec<Numbered>,
-        out: &mut Vec<Heard>,
-    ) {
-        self.progress = true;
-        self.unreadable = 0;
-        if self.meet(header.instance_id, out) {
-            return self.ask_again(at, out);
-        }
-        let next = self.next.unwrap_or(header.next_sequence);
-        if header.next_sequence < next {
-            self.went_back(next, header.next_sequence, out);
-            return self.ask_again(at, out);
-        }
-        let begins = observations.first().map(|numbered| numbered.sequence);
-        let is_whole = self.config.device.is_empty();
-        // Behind a part that could not be read the head alone tells of a loss.
-        let passes_over = std::mem::take(&mut self.passes_over);
-        let begins = begins.or(passes_over.then_some(header.next_sequence));
-        let hole = begins.filter(|begins| (is_whole || passes_over) && *begins > next);
-        let lost_to = match header.first_sequence > next {
-            true => Some(header.first_sequence),
-            false => hole,
-        };
-        let follows = !observations.is_empty() && lost_to.is_none();
-        self.tell_new(next, observations, out);
-        self.next = Some(header.next_sequence);
-        if let Some(to) = lost_to {
-            self.gap(next, to, out);
-            // The agent has lost nothing behind such a part.
-            self.resumes = passes_over;
-            return self.ask_again(at, out);
-        }
-        if follows {
-            self.pause = Span::default();
-        }
-    }
-
-    /// Tells the observations of a part from a number on, each once.
-    fn tell_new(&mut self, from: u64, mut observations: Vec<Numbered>, out: &mut Vec<Heard>) {
-        let n_all = observations.len();
-        observations.dedup();
-        observations.retain(|numbered| numbered.sequence >= from);
-        let count = (n_all - observations.len()) as u64;
-        for numbered in observations {
-            self.note(&numbered);
-            out.push(Heard::Observation(numbered.observation));
-        }
-        if count > 0 {
-            out.push(Heard::Repeated { count });
         }
     }
 }

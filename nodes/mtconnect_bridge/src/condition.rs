@@ -426,6 +426,14 @@ pub enum Condition {
         /// Instance now.
         now: u64,
     },
+    /// What was heard and not yet handed on when the bridge was stopped.
+    #[error(
+        "{count} values and conditions were heard and not handed on when the bridge was stopped"
+    )]
+    LeftWaiting {
+        /// How many.
+        count: usize,
+    },
     /// Axes of which only the actual position is told.
     #[error("no commanded position of {axes}: `commanded` of axes/state repeats the actual one")]
     Uncommanded {
@@ -469,6 +477,7 @@ impl Condition {
                 "sequence_gap"
             }
             Self::AgentRestarted { .. } => "agent_restarted",
+            Self::LeftWaiting { .. } => "left_waiting",
             Self::Uncommanded { .. } => "uncommanded",
         };
         plain.to_owned()

@@ -8,16 +8,21 @@
 //! \[1\] MTConnect information model, version 2.4: DeviceInformationModel, ObservationInformationModel, and the
 //! header and error documents of its fundamentals. \[2\] See [`crate::observation`].
 
-use roxmltree::{Document as Xml, Node, ParsingOptions};
+use roxmltree::Node;
 
+use crate::multipart::PART_LIMIT;
 use crate::observation::{
     AlarmLevel, AlarmReport, MachineTime, Observation, Told, UNAVAILABLE, read_stamp,
 };
 use crate::shdr::read_series;
+use crate::xml::XmlFlaw;
+use crate::xml_bounds::Beyond;
 use crate::{text, xml};
 
-/// More nodes than this are no answer of an agent.
-const NODE_LIMIT: u32 = 2_000_000;
+/// Errors of an answer that are read, texts of each, and letters of each text; more are no agent's.
+const ERRORS: usize = 20;
+const ERROR_TEXTS: usize = 20;
+const ERROR_LETTERS: usize = 1_000;
 
 /// What stands at the head of every document of values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -99,6 +104,8 @@ pub enum Answer {
         malformed: usize,
         /// Observations without a stamp that has a place in a message.
         unstamped: usize,
+        /// Numbers of those that could not be read, where they have one.
+        unread: Vec<u64>,
     },
     /// The agent refuses.
     Error {
@@ -116,6 +123,9 @@ pub enum DocumentFlaw {
         /// The parser's words, with line and column.
         reason: String,
     },
+    /// It is beyond a bound.
+    #[error("{0}")]
+    Beyond(Beyond),
     /// It is another document.
     #[error("root element {root:?} is none of MTConnect's")]
     AnotherRoot {
@@ -145,14 +155,11 @@ pub fn read(bytes: &[u8]) -> Result<Answer, DocumentFlaw> {
 /// # Errors
 /// When it is not an agent's answer.
 pub fn read_text(text: &str) -> Result<Answer, DocumentFlaw> {
-    let options = ParsingOptions {
-        nodes_limit: NODE_LIMIT,
-        ..ParsingOptions::default()
-    };
     // A byte order mark and white space before the declaration are no XML, and seen.
     let text = text.trim_start_matches(|c: char| c == '\u{feff}' || c.is_whitespace());
-    let xml = Xml::parse_with_options(text, options).map_err(|error| DocumentFlaw::NotXml {
-        reason: xml::in_own_words(&error),
+    let xml = xml::parse(text, PART_LIMIT).map_err(|flaw| match flaw {
+        XmlFlaw::Beyond(beyond) => DocumentFlaw::Beyond(beyond),
+        XmlFlaw::NotXml(reason) => DocumentFlaw::NotXml { reason },
     })?;
     let root = xml.root_element();
     match root.tag_name().name() {
@@ -205,16 +212,20 @@ fn header_number(root: &Node<'_, '_>, attribute: &'static str) -> Result<u64, Do
 fn errors(root: &Node<'_, '_>) -> Vec<(String, String)> {
     // From 2.6 on the code is the element's own name in some agents; the attribute stays.
     let all = root.descendants().filter(Node::is_element);
-    all.filter_map(|node| {
+    let all = all.filter_map(|node| {
         let code = node.attribute("errorCode")?;
         let said = node.descendants().filter_map(|below| below.text());
-        let words: Vec<_> = said
-            .map(str::trim)
-            .filter(|text| !text.is_empty())
-            .collect();
-        Some((code.to_owned(), words.join(" ")))
-    })
-    .collect()
+        let words = said.map(str::trim).filter(|text| !text.is_empty());
+        let words: Vec<_> = words.take(ERROR_TEXTS).map(begin).collect();
+        Some((begin(code).to_owned(), words.join(" ")))
+    });
+    all.take(ERRORS).collect()
+}
+
+/// The begin of an agent's word.
+fn begin(text: &str) -> &str {
+    let end = text.char_indices().nth(ERROR_LETTERS);
+    &text[..end.map_or(text.len(), |(at, _)| at)]
 }
 
 fn attribute(node: &Node<'_, '_>, name: &str) -> String {
@@ -285,6 +296,7 @@ fn streams(root: &Node<'_, '_>) -> Result<Answer, DocumentFlaw> {
                 .is_some_and(|above| is(&above, "ComponentStream"))
     };
     let (mut observations, mut malformed, mut unstamped) = (Vec::new(), 0, 0);
+    let mut unread = Vec::new();
     for group in root.descendants().filter(is_group) {
         let is_condition = is(&group, "Condition");
         for node in group.children().filter(Node::is_element) {
@@ -293,7 +305,11 @@ fn streams(root: &Node<'_, '_>) -> Result<Answer, DocumentFlaw> {
                     unstamped += usize::from(found.observation.time == MachineTime::Absent);
                     observations.push(found);
                 }
-                None => malformed += 1,
+                None => {
+                    malformed += 1;
+                    let number = node.attribute("sequence");
+                    unread.extend(number.and_then(|number| number.parse::<u64>().ok()));
+                }
             }
         }
     }
@@ -304,6 +320,7 @@ fn streams(root: &Node<'_, '_>) -> Result<Answer, DocumentFlaw> {
         observations,
         malformed,
         unstamped,
+        unread,
     })
 }
 
@@ -412,10 +429,12 @@ mod tests {
                 observations,
                 malformed,
                 unstamped,
+                unread,
             } = answer
             else {
                 panic!("{version}");
             };
+            assert_eq!(unread, [7]);
             assert_eq!(
                 (
                     header.instance_id,

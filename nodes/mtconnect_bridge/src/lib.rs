@@ -47,6 +47,7 @@ pub mod text;
 pub mod unit;
 pub mod values;
 pub mod xml;
+pub mod xml_bounds;
 
 pub use config::{BridgeConfig, Settings};
 pub use error::BridgeError;

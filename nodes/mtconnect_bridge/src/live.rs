@@ -3,15 +3,17 @@
 //! To its driver it is an ordinary stage that wants a tick every few milliseconds; each tick hands over all that
 //! has come from outside since the last, with the instants at which it came.
 
+use std::collections::VecDeque;
 use std::convert::Infallible;
 
 use metrology::Stage;
 use metrology::stamp::{Host, Stamp};
 
+use crate::condition::Condition;
 use crate::config::Settings;
 use crate::error::BridgeError;
 use crate::io::{BridgeIo, LogFile};
-use crate::stage::{BridgeStage, Input, Output};
+use crate::stage::{BridgeStage, Input, IoEvent, Output};
 
 /// What the shell tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +26,10 @@ pub enum LiveInput {
 
 /// Events in one tick at most, so that a machine that floods the bridge leaves it time for others.
 const EVENTS_PER_TICK: usize = 256;
+/// Bytes in one tick after which no further event is taken.
+const BYTES_PER_TICK: usize = 1 << 20;
+/// Outputs in one tick at most; the others wait for the next, and nothing more is heard meanwhile.
+const OUTPUTS_PER_TICK: usize = 1_000;
 
 /// A bridge at work.
 #[derive(Debug)]
@@ -32,6 +38,7 @@ pub struct LiveBridge {
     io: Option<BridgeIo>,
     log: Option<LogFile>,
     said: Vec<Output>,
+    waiting: VecDeque<Output>,
 }
 
 impl LiveBridge {
@@ -45,6 +52,7 @@ impl LiveBridge {
             io: Some(BridgeIo::start(settings.address.clone())?),
             log: None,
             said: Vec::new(),
+            waiting: VecDeque::new(),
         })
     }
 
@@ -56,6 +64,7 @@ impl LiveBridge {
             io: None,
             log: Some(log),
             said: Vec::new(),
+            waiting: VecDeque::new(),
         }
     }
 
@@ -69,12 +78,7 @@ impl LiveBridge {
         }
     }
 
-    fn pass(
-        &mut self,
-        at: Stamp<Host>,
-        input: Input,
-        out: &mut Vec<Output>,
-    ) -> Result<(), Infallible> {
+    fn pass(&mut self, at: Stamp<Host>, input: Input) -> Result<(), Infallible> {
         self.stage.step(at, input, &mut self.said)?;
         for output in self.said.drain(..) {
             match output {
@@ -83,10 +87,39 @@ impl LiveBridge {
                         io.command(command);
                     }
                 }
-                other => out.push(other),
+                other => self.waiting.push_back(other),
             }
         }
         Ok(())
+    }
+
+    /// Hands over what waits, at most so much.
+    fn hand_over(&mut self, most: usize, out: &mut Vec<Output>) {
+        let n = self.waiting.len().min(most);
+        out.extend(self.waiting.drain(..n));
+    }
+
+    /// Takes events until they are many, or have much to say.
+    fn listen(&mut self) -> Result<(), Infallible> {
+        let mut bytes = 0;
+        for _ in 0..EVENTS_PER_TICK {
+            if bytes > BYTES_PER_TICK || self.waiting.len() >= OUTPUTS_PER_TICK {
+                break;
+            }
+            let Some((came_at, event)) = self.io.as_ref().and_then(BridgeIo::event) else {
+                break;
+            };
+            bytes += length(&event);
+            self.pass(came_at, Input::Io(event))?;
+        }
+        Ok(())
+    }
+}
+
+const fn length(event: &IoEvent) -> usize {
+    match event {
+        IoEvent::Received(bytes) | IoEvent::Answered { body: bytes, .. } => bytes.len(),
+        _ => 0,
     }
 }
 
@@ -102,15 +135,68 @@ impl Stage for LiveBridge {
         out: &mut Vec<Output>,
     ) -> Result<(), Infallible> {
         if input == LiveInput::Shutdown {
-            return self.pass(at, Input::Shutdown, out);
+            self.hand_over(OUTPUTS_PER_TICK, out);
+            let count = self.waiting.len();
+            self.waiting.clear();
+            out.extend((count > 0).then_some(Output::Condition(Condition::LeftWaiting { count })));
+            self.pass(at, Input::Shutdown)?;
+            self.hand_over(usize::MAX, out);
+            return Ok(());
         }
         self.read_log(out);
-        for _ in 0..EVENTS_PER_TICK {
-            let Some((came_at, event)) = self.io.as_ref().and_then(BridgeIo::event) else {
-                break;
-            };
-            self.pass(came_at, Input::Io(event), out)?;
+        // While much waits the machine waits too, and is not silent.
+        if self.waiting.is_empty() {
+            self.listen()?;
+            self.pass(at, Input::Tick)?;
         }
-        self.pass(at, Input::Tick, out)
+        self.hand_over(OUTPUTS_PER_TICK, out);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mapping::MapFile;
+    use crate::{BridgeConfig, config};
+
+    fn bridge() -> LiveBridge {
+        let map = MapFile::from_yaml("values:\n  ex: {is: execution}\n").unwrap();
+        let config = BridgeConfig {
+            source: config::Source::Log,
+            host: String::new(),
+            port: 1,
+            log_file: Some(String::new()),
+            log_longest_pause_s: BridgeConfig::default_longest_pause_s(),
+            map_file: String::new(),
+            connection: config::ConnectionConfig::default(),
+            agent: config::AgentConfig::default(),
+        };
+        LiveBridge {
+            stage: BridgeStage::new(&Settings::new(&config, &map).unwrap()),
+            io: None,
+            log: None,
+            said: Vec::new(),
+            waiting: VecDeque::new(),
+        }
+    }
+
+    #[test]
+    fn much_that_a_machine_says_is_handed_over_in_turns_and_never_holds_the_end_up() {
+        let mut bridge = bridge();
+        let one = || Output::Condition(Condition::Offered);
+        bridge
+            .waiting
+            .extend(std::iter::repeat_with(one).take(2_500));
+        let at = Stamp::from_nanos(1_000);
+        let mut said = vec![];
+        bridge.step(at, LiveInput::Tick, &mut said).unwrap();
+        assert_eq!((said.len(), bridge.waiting.len()), (1_000, 1_500));
+        said.clear();
+        bridge.step(at, LiveInput::Shutdown, &mut said).unwrap();
+        let left = Output::Condition(Condition::LeftWaiting { count: 500 });
+        assert!(said.contains(&left), "{:?}", said.last());
+        assert_eq!(said.last(), Some(&Output::Stopped));
+        assert!(said.len() < 1_010, "{}", said.len());
     }
 }

@@ -52,6 +52,10 @@ pub fn boundary(content_type: &str) -> Option<&str> {
 pub struct Parts {
     mark: Vec<u8>,
     bytes: Vec<u8>,
+    /// Bytes that must be there before the next part is whole.
+    least: usize,
+    /// Bytes of its body that have been searched for the next boundary, where its length is not said.
+    searched: usize,
 }
 
 fn find(bytes: &[u8], wanted: &[u8]) -> Option<usize> {
@@ -67,6 +71,8 @@ impl Parts {
         Self {
             mark: format!("--{boundary}").into_bytes(),
             bytes: Vec::new(),
+            least: 0,
+            searched: 0,
         }
     }
 
@@ -76,35 +82,49 @@ impl Parts {
     /// When what comes is no sequence of parts; the connection is then of no more use.
     pub fn receive(&mut self, bytes: &[u8], mut take: impl FnMut(&[u8])) -> Result<(), PartFlaw> {
         self.bytes.extend_from_slice(bytes);
-        while let Some(used) = self.next(&mut take)? {
-            self.bytes.drain(..used);
+        if self.bytes.len() < self.least {
+            return Ok(());
         }
-        Ok(())
+        let mut used = 0;
+        let ended = loop {
+            match self.next(used, &mut take) {
+                Ok(Some(length)) => {
+                    used += length;
+                    (self.least, self.searched) = (0, 0);
+                }
+                Ok(None) => break Ok(()),
+                Err(flaw) => break Err(flaw),
+            }
+        };
+        self.bytes.drain(..used);
+        ended
     }
 
-    /// Hands over the first part where it is whole, and says how many bytes it took.
-    fn next(&self, take: &mut impl FnMut(&[u8])) -> Result<Option<usize>, PartFlaw> {
-        let Some(mark_at) = find(&self.bytes, &self.mark) else {
-            let is_lost = self.bytes.len() > HEADER_LIMIT;
-            return if is_lost {
-                Err(PartFlaw::NoBoundary)
-            } else {
-                Ok(None)
-            };
+    /// Hands over the part that begins at `from` where it is whole, and says how many bytes it took.
+    fn next(
+        &mut self,
+        from: usize,
+        take: &mut impl FnMut(&[u8]),
+    ) -> Result<Option<usize>, PartFlaw> {
+        let bytes = &self.bytes[from..];
+        let lost = |length: usize| match length > HEADER_LIMIT {
+            true => Err(PartFlaw::NoBoundary),
+            false => Ok(None),
+        };
+        let Some(mark_at) = find(bytes, &self.mark) else {
+            return lost(bytes.len());
         };
         let header_at = mark_at + self.mark.len();
-        let behind = &self.bytes[header_at..];
+        let behind = &bytes[header_at..];
         let Some((header_length, body_at)) = header_end(behind) else {
-            let is_lost = behind.len() > HEADER_LIMIT;
-            return if is_lost {
-                Err(PartFlaw::NoBoundary)
-            } else {
-                Ok(None)
-            };
+            return lost(behind.len());
         };
         let body = &behind[body_at..];
         let told = content_length(&behind[..header_length]);
-        let length = told.or_else(|| find(body, &self.mark));
+        // What was searched before is not searched again, but for the begin of a boundary at its end.
+        let searched = self.searched.min(body.len());
+        let found = || find(&body[searched..], &self.mark).map(|at| searched + at);
+        let length = told.or_else(found);
         if let Some(length) = length.filter(|length| *length > PART_LIMIT) {
             return Err(PartFlaw::TooLong { length });
         }
@@ -114,7 +134,13 @@ impl Parts {
                 Ok(Some(header_at + body_at + part.len()))
             }
             None if body.len() > PART_LIMIT => Err(PartFlaw::TooLong { length: body.len() }),
-            None => Ok(None),
+            None => {
+                match told {
+                    Some(length) => self.least = header_at + body_at + length,
+                    None => self.searched = (body.len() + 1).saturating_sub(self.mark.len()),
+                }
+                Ok(None)
+            }
         }
     }
 }
@@ -210,5 +236,33 @@ mod tests {
             let mut stream = Parts::new("-");
             let _ = stream.receive(&bytes, |_| {});
         }
+    }
+
+    /// 4 MiB in pieces of 1 kB, with and without a length, and 5,000 small parts in one piece.
+    #[test]
+    fn bytes_are_searched_once_however_many_pieces_they_come_in() {
+        let body = vec![b'x'; 4 << 20];
+        for length in [format!("Content-length: {}\r\n", body.len()), String::new()] {
+            let mut parts = Parts::new("a1");
+            let mut taken = vec![];
+            let head = format!("--a1\r\n{length}\r\n");
+            let whole = [head.as_bytes(), &body, b"--a1\r\n"].concat();
+            let mut come = 0;
+            for piece in whole.chunks(1_000) {
+                parts.receive(piece, |part| taken.push(part.len())).unwrap();
+                come += piece.len();
+                let is_open = taken.is_empty() && come > head.len();
+                let is_noted = parts.least >= body.len() || parts.searched + head.len() + 8 > come;
+                assert!(!is_open || is_noted, "{come}");
+            }
+            assert_eq!(taken, [body.len()]);
+        }
+        let mut parts = Parts::new("a1");
+        let mut taken = 0;
+        let many = "--a1\r\nContent-length: 2\r\n\r\nab\r\n".repeat(5_000);
+        parts
+            .receive(many.as_bytes(), |part| taken += part.len())
+            .unwrap();
+        assert_eq!((taken, parts.bytes.len()), (10_000, 2));
     }
 }

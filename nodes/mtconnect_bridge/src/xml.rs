@@ -3,6 +3,27 @@
 use metrology::yaml::shown;
 
 use crate::text::REPLACED;
+use crate::xml_bounds::{self, Beyond};
+
+/// Why a text cannot be read as XML.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum XmlFlaw {
+    /// It is beyond a bound.
+    #[error("{0}")]
+    Beyond(Beyond),
+    /// It is no XML: in own words, with line and column.
+    #[error("{0}")]
+    NotXml(String),
+}
+
+/// Parses a text of at most `most_bytes` bytes within the bounds of [`xml_bounds`]. A document type is refused.
+///
+/// # Errors
+/// With line and column, when it is beyond a bound or no XML.
+pub fn parse(text: &str, most_bytes: usize) -> Result<roxmltree::Document<'_>, XmlFlaw> {
+    xml_bounds::check(text, most_bytes).map_err(XmlFlaw::Beyond)?;
+    roxmltree::Document::parse(text).map_err(|error| XmlFlaw::NotXml(in_own_words(&error)))
+}
 
 /// What is wrong with a text that is no XML, after its line and column: `2:7: </b> closes <a>`.
 #[must_use]

@@ -399,7 +399,12 @@ fn a_cut_line_loses_nothing_and_an_agent_that_starts_anew_is_begun_anew() {
         told(streams(7, 1, 15, &[exec(14, "STOPPED"), position(5)])),
         Answer::Parts(
             vec![
-                streams(7, 1, 15, &[exec(12, "FEED_HOLD"), exec(14, "STOPPED")]),
+                streams(
+                    7,
+                    1,
+                    15,
+                    &[exec(12, "FEED_HOLD"), position(13), exec(14, "STOPPED")],
+                ),
                 // Another instance, with numbers from 1.
                 streams(8, 1, 3, &[exec(2, "ACTIVE")]),
             ],

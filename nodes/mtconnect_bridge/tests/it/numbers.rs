@@ -230,6 +230,85 @@ fn what_comes_twice_is_published_once_and_is_in_the_account_with_what_was_lost()
 }
 
 #[test]
+fn what_is_missing_within_a_part_is_asked_again_once_and_published_once() {
+    for missing in [11..13, 11..12, 12..20] {
+        let mut talk = Talk::begun();
+        let word = |number: u64| format!("W{number}");
+        let words: Vec<String> = (10..=missing.end).map(word).collect();
+        let all: Vec<(u64, &str)> = (10..).zip(words.iter().map(String::as_str)).collect();
+        let has = |number: u64| !missing.contains(&number);
+        let told: Vec<_> = all
+            .iter()
+            .copied()
+            .filter(|(number, _)| has(*number))
+            .collect();
+        let next = missing.end + 1;
+        talk.part(&document(7, 1, next, &told));
+        let from = format!("/sample?from={}", missing.start);
+        assert_eq!(talk.asked().last(), Some(&from.as_str()));
+        // What still comes of the stream that was given up is not heard.
+        talk.part(&document(7, 1, next + 1, &[(next, "LATE")]));
+        let behind = all
+            .iter()
+            .copied()
+            .filter(|(number, _)| *number >= missing.start);
+        talk.whole(&document(7, 1, next, &behind.collect::<Vec<_>>()));
+        let wanted: Vec<&str> = ["READY"]
+            .into_iter()
+            .chain(words.iter().map(String::as_str))
+            .collect();
+        assert_eq!(talk.values(), wanted);
+        let from = format!("/sample?from={next}");
+        assert_eq!(talk.asked().last(), Some(&from.as_str()));
+        let lost = talk
+            .conditions()
+            .into_iter()
+            .filter(|one| one.contains("lost"));
+        assert_eq!(lost.count(), 0);
+    }
+}
+
+#[test]
+fn what_an_agent_lost_within_a_part_is_counted_and_not_asked_for_without_end() {
+    let mut talk = Talk::begun();
+    talk.part(&document(7, 1, 14, &[(10, "A"), (13, "D")]));
+    // It has 11 and 12 no more, and lacks 14 and 15 besides.
+    talk.whole(&document(7, 1, 17, &[(13, "D"), (16, "G")]));
+    assert_eq!(talk.values(), ["READY", "A", "D", "G"]);
+    assert_eq!(talk.asked().last(), Some(&"/current"));
+    talk.whole(&document(7, 1, 17, &[(16, "G")]));
+    talk.stream();
+    let so_far = talk.asked().len();
+    talk.part(&document(7, 1, 20, &[(17, "H"), (19, "J")]));
+    assert_eq!(talk.asked().len(), so_far, "asked again without a pause");
+    assert_eq!(talk.values(), ["READY", "A", "D", "G", "H", "J"]);
+    talk.wait(1);
+    talk.whole(&document(7, 1, 20, &[(19, "J")]));
+    assert_eq!(talk.values().len(), 6);
+    talk.wait(61);
+    let said = talk.conditions();
+    let account = said.iter().find(|one| one.contains("answers taken"));
+    let account = account.unwrap();
+    assert!(
+        account.contains("5 observations that the agent lost"),
+        "{account}"
+    );
+}
+
+#[test]
+fn an_observation_that_cannot_be_read_is_not_missing() {
+    let mut talk = Talk::begun();
+    let part = document(7, 1, 13, &[(10, "A"), (11, "B"), (12, "C")]);
+    talk.part(&part.replacen(r#" dataItemId="ex" sequence="11""#, r#" sequence="11""#, 1));
+    assert_eq!(talk.values(), ["READY", "A", "C"]);
+    let lost = talk
+        .conditions()
+        .into_iter()
+        .filter(|one| one.contains("lost"));
+    assert_eq!(lost.count(), 0);
+}
+
+#[test]
 fn an_agent_of_another_instance_with_every_part_is_asked_after_pauses() {
     let mut talk = Talk::begun();
     talk.part(&document(8, 1, 10, &[(9, "ACTIVE")]));
