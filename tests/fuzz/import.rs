@@ -15,6 +15,8 @@ pub mod map;
 pub mod map_schema;
 #[path = "../../nodes/abbe/src/import/motion.rs"]
 pub mod motion;
+#[path = "../../nodes/abbe/src/import/odd.rs"]
+pub mod odd;
 #[path = "../../nodes/abbe/src/import/passes.rs"]
 pub mod passes;
 #[path = "../../nodes/abbe/src/import/runs.rs"]

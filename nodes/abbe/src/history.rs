@@ -64,16 +64,34 @@ fn store_path(given: Option<&Path>) -> Result<PathBuf> {
     Ok(data.join("abbe/history.sqlite"))
 }
 
-/// Opens a store for writing; its folder is made.
+/// Opens a store for writing; its folder is made. The last value: whether the store is new.
 ///
 /// # Errors
 /// When folder or store cannot be made or opened.
-fn open_to_write(given: Option<&Path>) -> Result<(history::Store, PathBuf)> {
+fn open_to_write(given: Option<&Path>) -> Result<(history::Store, PathBuf, bool)> {
     let path = store_path(given)?;
     if let Some(folder) = path.parent().filter(|it| !it.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("folder of the history {}", folder.display()))?;
     }
-    let store = history::Store::open(&path, history::Options::default())?;
-    Ok((store, path))
+    let is_new = !path.exists();
+    match history::Store::open(&path, history::Options::default()) {
+        Ok(store) => Ok((store, path, is_new)),
+        Err(error) => {
+            if is_new {
+                unmake(&path);
+            }
+            Err(error.into())
+        }
+    }
+}
+
+/// Removes a new store that holds nothing, with what the database keeps beside it.
+fn unmake(path: &Path) {
+    for end in ["", "-wal", "-shm", "-journal"] {
+        let mut name = path.as_os_str().to_owned();
+        name.push(end);
+        // What cannot be removed was told by the error that led here.
+        let _ = std::fs::remove_file(name);
+    }
 }

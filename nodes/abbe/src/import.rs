@@ -14,13 +14,16 @@ use machine::MachineFile;
 use metrology::yaml;
 use node_runtime::complain;
 use node_runtime::text_file;
+use recorder::RecorderError;
 
 mod angles;
+mod book;
 mod file;
 pub(crate) mod limits;
 pub(crate) mod map;
 mod map_schema;
 mod motion;
+mod odd;
 mod passes;
 pub(crate) mod propose;
 mod recognise;
@@ -38,7 +41,9 @@ use runs::Runs;
 use table::Table;
 use writer::Writer;
 
+use crate::loss;
 use crate::tell::tell;
+use crate::whole_file::WholeFolder;
 
 /// Arguments of `abbe import`.
 #[derive(Args)]
@@ -98,12 +103,14 @@ pub(crate) struct Imported {
     n_runs: u32,
     n_messages: u64,
     n_rows: usize,
+    /// Cells that cost a row or a reading.
+    pub n_odd: usize,
     /// What a reader should know: rows and columns that were left out, and what the runs were made of.
     pub notes: Vec<String>,
 }
 
 impl Import {
-    /// Writes the bag, or prints a proposal.
+    /// Writes the bag, or prints a proposal; exit code 3 when a cell was left out.
     ///
     /// # Errors
     /// When a file cannot be read, a column is missing, a cell is no number, or the bag not written.
@@ -128,7 +135,7 @@ impl Import {
                 complain!("  {note}");
             }
         }
-        Ok(ExitCode::SUCCESS)
+        Ok(loss::exit_code(imported.n_odd == 0))
     }
 
     fn propose(&self) -> Result<ExitCode> {
@@ -180,44 +187,27 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let stated = map.resolution();
     let stated = stated.map(|(key, value)| format!("{key}: {value:?}\n"));
     let of_machine = (&machine, machine_text);
-    // What was begun is no bag, and would stand in the way of the next attempt.
-    let is_there = output.exists();
-    let unmake = |error: anyhow::Error| {
-        if is_there {
-            error
-        } else {
-            unmade(output, error)
-        }
-    };
-    let mut writer = Writer::begin(output, of_machine, map.start_s, stated).map_err(unmake)?;
-    let n_runs = match motion::write(&map, &runs, &mut writer) {
-        Ok(n_runs) => n_runs,
-        Err(error) => {
-            drop(writer);
-            return Err(unmake(error.context(in_table())));
-        }
-    };
-    let n_messages = writer.finish().map_err(unmake)?;
+    if output.exists() {
+        let path = output.to_owned();
+        return Err(RecorderError::Exists { path }.into());
+    }
+    let folder = WholeFolder::begin(output)?;
+    let mut writer = Writer::begin(folder.path(), of_machine, map.start_s, stated)?;
+    let n_runs = motion::write(&map, &runs, &mut writer).with_context(in_table)?;
+    let n_messages = writer.finish()?;
+    folder.finish()?;
     let mut notes = doubts(&map, &runs);
     notes.extend(table.left_out);
+    let n_odd = table.odd.len();
     let n_rows = runs.runs.iter().map(Vec::len).sum();
     notes.extend(runs.remarks);
     Ok(Imported {
         n_runs,
         n_messages,
         n_rows,
+        n_odd,
         notes,
     })
-}
-
-/// Removes what was begun of a bag.
-fn unmade(output: &Path, error: anyhow::Error) -> anyhow::Error {
-    match std::fs::remove_dir_all(output) {
-        Err(left) if output.exists() => {
-            error.context(format!("{}: not removed: {left}", output.display()))
-        }
-        _ => error,
-    }
 }
 
 /// Asks about deviations that cannot be in the unit that they were read in.

@@ -79,6 +79,13 @@ impl ReportBag {
         for run in &tests.broken_off {
             complain!("abbe: {run}");
         }
+        let n_odd = table.as_ref().map_or(0, |table| table.n_odd);
+        if n_odd > 0 {
+            let shown = self.bag.display();
+            complain!(
+                "abbe: {shown}: {n_odd} cells hold no value of their column and are left out"
+            );
+        }
         let title = format!("Tests in {}", self.bag.display());
         let mut report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;
         if let Some(table) = &table {
@@ -101,7 +108,7 @@ impl ReportBag {
             &tests,
             table.as_ref().map(|table| table.bag.as_path()),
         )?;
-        Ok(loss::exit_code(tests.reading.is_whole()))
+        Ok(loss::exit_code(tests.reading.is_whole() && n_odd == 0))
     }
 
     /// The page as a PDF, and its figures in the history, where that is wanted; `of_table`: the bag that a table was made into.

@@ -2,9 +2,13 @@
 
 use std::fs::File;
 use std::io::{ErrorKind, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
+use node_runtime::complain;
+use node_runtime::interruption::Interruption;
 
 /// Writes a file in the place of the old one; where that fails, the old one stays as it was.
 ///
@@ -87,6 +91,149 @@ pub fn create_all<'a>(
     Ok(())
 }
 
+/// Between two looks at the signals, where nothing else is to be done.
+const LOOK: Duration = Duration::from_secs(3600);
+/// How often what is being filled is removed, and the pause between two attempts.
+const ATTEMPTS: u32 = 20;
+const BETWEEN: Duration = Duration::from_millis(20);
+/// Exit code of a process that SIGINT ended, as shells count it.
+const INTERRUPTED: i32 = 130;
+
+/// Folders that go away when the process ends by SIGINT or SIGTERM.
+static VANISHING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// A folder that goes away with this, and when SIGINT or SIGTERM ends the process.
+#[derive(Debug)]
+pub struct Vanishing {
+    path: PathBuf,
+}
+
+impl Vanishing {
+    /// Takes charge of a folder that is there. From now on SIGINT and SIGTERM end the process without its destructors, after the
+    /// folder is gone.
+    ///
+    /// # Errors
+    /// When the signals cannot be listened to.
+    pub fn of(path: PathBuf) -> Result<Self> {
+        let mut all = VANISHING.lock().unwrap_or_else(PoisonError::into_inner);
+        let own = Self { path: path.clone() };
+        if all.is_empty() {
+            listen()?;
+        }
+        all.push(path);
+        Ok(own)
+    }
+
+    /// A folder among the system's temporary ones.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn temporary() -> Result<Self> {
+        let home = tempfile::Builder::new().prefix("abbe_").tempdir();
+        Self::of(home.context("a temporary folder")?.keep())
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for Vanishing {
+    fn drop(&mut self) {
+        if let Err(error) = std::fs::remove_dir_all(&self.path)
+            && error.kind() != ErrorKind::NotFound
+        {
+            complain!("abbe: {}: not removed: {error}", self.path.display());
+        }
+        let mut all = VANISHING.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|other| *other != self.path);
+        // The listener stays: an entry that is not there keeps a second one from being started.
+        if all.is_empty() {
+            all.push(PathBuf::new());
+        }
+    }
+}
+
+/// Waits for a signal in a thread of its own.
+fn listen() -> Result<()> {
+    let interruption = Interruption::listen("nothing is kept")?;
+    let wait = move || {
+        while !interruption.wait(LOOK) {}
+        let all = VANISHING.lock().unwrap_or_else(PoisonError::into_inner);
+        for path in all.iter().filter(|path| !path.as_os_str().is_empty()) {
+            // The other thread may write one more file meanwhile.
+            for _ in 0..ATTEMPTS {
+                match std::fs::remove_dir_all(path) {
+                    Err(error) if error.kind() != ErrorKind::NotFound => {
+                        std::thread::sleep(BETWEEN);
+                    }
+                    _ => break,
+                }
+            }
+        }
+        complain!("abbe: interrupted: nothing was written");
+        std::process::exit(INTERRUPTED);
+    };
+    let thread = std::thread::Builder::new().name("vanishing".to_owned());
+    thread.spawn(wait).context("thread of the signals")?;
+    Ok(())
+}
+
+/// A folder that is made beside its place, and put there when it is whole.
+#[derive(Debug)]
+pub struct WholeFolder {
+    /// Goes away at the end.
+    _home: Vanishing,
+    /// In it, with the name of its place.
+    path: PathBuf,
+    place: PathBuf,
+}
+
+impl WholeFolder {
+    /// Makes room beside `place`, which must not be there, or be an empty folder.
+    ///
+    /// # Errors
+    /// When something is there, or nothing can be made beside it.
+    pub fn begin(place: &Path) -> Result<Self> {
+        let shown = place.display();
+        let name = place
+            .file_name()
+            .with_context(|| format!("{shown}: no name of a folder"))?;
+        if place.exists() {
+            let mut entries = std::fs::read_dir(place).with_context(|| shown.to_string())?;
+            if entries.next().is_some() {
+                bail!("{shown}: there already, and not overwritten: name another folder");
+            }
+        }
+        let parent = place.parent().unwrap_or(Path::new(""));
+        if !parent.as_os_str().is_empty() {
+            std::fs::create_dir_all(parent).with_context(|| parent.display().to_string())?;
+        }
+        let new = format!(".{}.{}.new", name.to_string_lossy(), std::process::id());
+        let new = place.with_file_name(new);
+        std::fs::create_dir(&new).with_context(|| new.display().to_string())?;
+        Ok(Self {
+            path: new.join(name),
+            _home: Vanishing::of(new)?,
+            place: place.to_owned(),
+        })
+    }
+
+    /// Where it is to be made and filled.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Puts it in its place.
+    ///
+    /// # Errors
+    /// When it cannot be put there; then it is removed.
+    pub fn finish(self) -> Result<()> {
+        let shown = || self.place.display().to_string();
+        std::fs::rename(&self.path, &self.place).with_context(shown)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,5 +278,46 @@ mod tests {
             .collect();
         left.sort();
         assert_eq!(left, ["folder", "page.html"]);
+    }
+
+    #[test]
+    fn a_folder_is_there_whole_or_not_at_all() {
+        let home = tempfile::tempdir().unwrap();
+        let left = || -> Vec<String> {
+            let entries = std::fs::read_dir(home.path()).unwrap();
+            entries
+                .map(|one| one.unwrap().file_name().into_string().unwrap())
+                .collect()
+        };
+        for is_there in [false, true] {
+            let place = home.path().join(if is_there { "empty" } else { "new" });
+            if is_there {
+                std::fs::create_dir(&place).unwrap();
+            }
+            let begun = WholeFolder::begin(&place).unwrap();
+            std::fs::create_dir(begun.path()).unwrap();
+            std::fs::write(begun.path().join("half"), "h").unwrap();
+            assert!(!place.join("half").exists());
+            drop(begun);
+            assert_eq!(
+                left().iter().filter(|name| name.ends_with(".new")).count(),
+                0
+            );
+            let begun = WholeFolder::begin(&place).unwrap();
+            std::fs::create_dir(begun.path()).unwrap();
+            std::fs::write(begun.path().join("whole"), "w").unwrap();
+            begun.finish().unwrap();
+            assert!(place.join("whole").exists());
+            let refused = WholeFolder::begin(&place).unwrap_err().to_string();
+            assert!(refused.contains("there already"), "{refused}");
+        }
+        let mut names = left();
+        names.sort();
+        assert_eq!(names, ["empty", "new"]);
+        let temporary = Vanishing::temporary().unwrap();
+        let path = temporary.path().to_owned();
+        assert!(path.is_dir());
+        drop(temporary);
+        assert!(!path.exists());
     }
 }

@@ -13,8 +13,8 @@ use serde_json::Value;
 
 use super::dates::{Moment, moment};
 use super::keep::{add, complain_of_left_out, entry};
-use super::open_to_write;
 use super::origin::{Origin, joined, json};
+use super::{open_to_write, unmake};
 use crate::diagnose::{self, bags};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
@@ -52,7 +52,7 @@ impl Add {
     /// When budget or store cannot be opened.
     pub fn execute(self) -> Result<ExitCode> {
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
-        let (mut store, place) = open_to_write(self.store.as_deref())?;
+        let (mut store, place, is_new) = open_to_write(self.store.as_deref())?;
         let (mut is_whole, mut n_failed) = (true, 0_usize);
         for path in &self.inputs {
             match self.add(path, budget.as_ref(), &mut store) {
@@ -63,7 +63,12 @@ impl Add {
                 }
             }
         }
-        tell!("History: {}", place.display());
+        drop(store);
+        if is_new && n_failed == self.inputs.len() {
+            unmake(&place);
+        } else {
+            tell!("History: {}", place.display());
+        }
         if n_failed > 0 {
             complain!(
                 "abbe: {n_failed} of {} inputs were not added",

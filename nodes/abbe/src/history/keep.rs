@@ -9,8 +9,8 @@ use node_runtime::complain;
 use serde_json::Value;
 
 use super::dates::{Moment, moment};
-use super::open_to_write;
 use super::origin::Origin;
+use super::{open_to_write, unmake};
 
 /// Arguments of verbs that can keep their figures.
 #[derive(Args, Clone, Debug, Default)]
@@ -68,8 +68,13 @@ impl Keep {
     }
 
     fn add(&self, entry: &Entry) -> Result<()> {
-        let (mut store, path) = open_to_write(self.store.as_deref()).context("--keep")?;
-        let line = add(&mut store, entry).context("--keep")?;
+        let (mut store, path, is_new) = open_to_write(self.store.as_deref()).context("--keep")?;
+        let added = add(&mut store, entry).context("--keep");
+        drop(store);
+        if added.is_err() && is_new {
+            unmake(&path);
+        }
+        let line = added?;
         complain!("abbe: {}: {line}", path.display());
         Ok(())
     }

@@ -7,15 +7,15 @@ use anyhow::{Context, Result, bail};
 use calamine::{DataRef, ExcelDateTime, Reader, Xlsx};
 use node_runtime::text_file::{self, Comments};
 
-use super::sheet::{MOST_COLUMNS, Sheet};
+use super::book;
+use super::sheet::{MOST_CELLS, MOST_COLUMNS, Sheet};
 
 /// Begin of a ZIP archive, which an xlsx file is.
 const ZIP: &[u8] = b"PK\x03\x04";
 /// Begin of the files of older spreadsheet programs (xls).
 const OLD: &[u8] = &[0xD0, 0xCF, 0x11, 0xE0];
-/// Most rows of a worksheet that are read, and most cells in all.
+/// Most rows of a worksheet that are read.
 const MAX_WORKSHEET_ROWS: u32 = 1_000_000;
-const MOST_CELLS: usize = 8_000_000;
 /// Longest file of a worksheet, bytes: it is packed.
 const MAX_WORKSHEET_BYTES: usize = 32 << 20;
 
@@ -65,6 +65,7 @@ fn of_xlsx(bytes: Vec<u8>, form: Form<'_>) -> Result<Sheet> {
             bytes.len()
         );
     }
+    book::check(&bytes)?;
     let mut book = Xlsx::new(Cursor::new(bytes)).context("xlsx")?;
     let names = book.sheet_names();
     let wanted = match form.sheet {
@@ -83,12 +84,6 @@ fn of_xlsx(bytes: Vec<u8>, form: Form<'_>) -> Result<Sheet> {
         }
         let width = lines.iter().map(|(_, cells)| cells.len()).max();
         let width = width.unwrap_or(0);
-        if lines.len() * width > MOST_CELLS {
-            bail!(
-                "worksheet \"{name}\": {} rows of {width} columns: must be at most {MOST_CELLS} cells",
-                lines.len()
-            );
-        }
         for (_, cells) in &mut lines {
             cells.resize(width, String::new());
         }
@@ -108,6 +103,7 @@ fn cells(
 ) -> Result<Vec<(u64, Vec<String>)>> {
     let mut reader = book.worksheet_cells_reader(name)?;
     let mut lines: Vec<(u64, Vec<String>)> = vec![];
+    let mut width = 0;
     while let Some(cell) = reader.next_cell()? {
         let (row, column) = cell.get_position();
         if row >= MAX_WORKSHEET_ROWS || column >= MOST_COLUMNS {
@@ -124,6 +120,13 @@ fn cells(
         let line = u64::from(row) + 1;
         if lines.last().is_none_or(|(last, _)| *last != line) {
             lines.push((line, vec![]));
+        }
+        width = width.max(column as usize + 1);
+        if lines.len() * width > MOST_CELLS {
+            bail!(
+                "row {line}: {} rows of {width} columns: must be at most {MOST_CELLS} cells",
+                lines.len()
+            );
         }
         if let Some((_, cells)) = lines.last_mut() {
             let place = column as usize;
@@ -222,6 +225,85 @@ mod tests {
         );
         assert!(said.contains("save it as xlsx or as CSV"), "{said}");
         assert!(file("a.xlsx", b"PK\x03\x04 and no archive").is_err());
+    }
+
+    /// A workbook with one worksheet of this text.
+    fn workbook(sheet: &str) -> Vec<u8> {
+        use std::io::Write as _;
+        const RELS: &str = "http://schemas.openxmlformats.org/package/2006/relationships";
+        const DOC: &str = "http://schemas.openxmlformats.org/officeDocument/2006/relationships";
+        const MAIN: &str = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
+        let mut writer = zip::ZipWriter::new(Cursor::new(vec![]));
+        let options = zip::write::SimpleFileOptions::default();
+        for (name, text) in [
+            (
+                "_rels/.rels",
+                format!(
+                    "<Relationships xmlns='{RELS}'><Relationship Id='r1' Type='{DOC}/officeDocument' Target='xl/workbook.xml'/></Relationships>"
+                ),
+            ),
+            (
+                "xl/workbook.xml",
+                format!(
+                    "<workbook xmlns='{MAIN}' xmlns:r='{DOC}'><sheets><sheet name='Laser' sheetId='1' r:id='r1'/></sheets></workbook>"
+                ),
+            ),
+            (
+                "xl/_rels/workbook.xml.rels",
+                format!(
+                    "<Relationships xmlns='{RELS}'><Relationship Id='r1' Type='{DOC}/worksheet' Target='worksheets/sheet1.xml'/></Relationships>"
+                ),
+            ),
+            (
+                "xl/worksheets/sheet1.xml",
+                format!("<worksheet xmlns='{MAIN}'>{sheet}</worksheet>"),
+            ),
+        ] {
+            writer.start_file(name, options).unwrap();
+            writer.write_all(text.as_bytes()).unwrap();
+        }
+        writer.finish().unwrap().into_inner()
+    }
+
+    #[test]
+    fn no_reference_of_a_cell_makes_the_reader_fail_and_few_cells_far_apart_take_no_room() {
+        let cell = |reference: &str| {
+            format!("<sheetData><row r='1'><c r='{reference}'><v>1</v></c></row></sheetData>")
+        };
+        let read = |sheet: &str| file("a.xlsx", &workbook(sheet));
+        assert_eq!(
+            read(&cell("B7")).unwrap().lines,
+            [(7, vec![String::new(), "1".to_owned()])]
+        );
+        for reference in [
+            "A99999999999999",
+            "ZZZZZZZZZZZZZZZ1",
+            "A4294967297",
+            "XFE1",
+            "A0",
+            "1",
+            "A",
+            "",
+            "A1:B2",
+            "Á1",
+            "-1",
+        ] {
+            for sheet in [
+                cell(reference),
+                format!("<dimension ref='A1:{reference}'/>{}", cell("A1")),
+                format!("<sheetData><row r='{reference}'><c><v>1</v></c></row></sheetData>"),
+            ] {
+                // Whatever is said of it, it is said by an error or read.
+                if let Err(error) = read(&sheet) {
+                    assert!(!format!("{error:#}").is_empty());
+                }
+            }
+        }
+        let wide = |k: u32| format!("<row r='{k}'><c r='ALL{k}'><v>1</v></c></row>");
+        let wide: String = (1..5_000).map(wide).collect();
+        let refused = read(&format!("<sheetData>{wide}</sheetData>")).unwrap_err();
+        let refused = format!("{refused:#}");
+        assert!(refused.contains("worksheet \"Laser\": row 4001: 4001 rows of 1000 columns: must be at most 4000000 cells"), "{refused}");
     }
 
     #[test]

@@ -22,6 +22,8 @@ const REST_S: f64 = 2.0;
 const READINGS: u32 = 5;
 /// Longest motion that is made up for a table, s: a day.
 const LONGEST_MOTION_S: f64 = 86_400.0;
+/// Most rows of a log, a week of one a second: every row is written, and read again.
+const MOST_LOG_ROWS: usize = 604_800;
 /// Share of a turn that a circle runs ahead of its first row.
 const AHEAD_RAD: f64 = std::f64::consts::FRAC_PI_2;
 /// The shortest arc that is a test of circles, deg.
@@ -40,6 +42,13 @@ pub fn write(map: &Map, runs: &Runs, writer: &mut Writer) -> Result<u32> {
     check_time(&map.test, &runs.runs)?;
     if let Test::Log { run, .. } = &map.test {
         let column = usize::from(run.is_some());
+        let n: usize = runs.runs.iter().map(Vec::len).sum();
+        if n > MOST_LOG_ROWS {
+            bail!(
+                "{n} rows of a log: must be at most {MOST_LOG_ROWS}: keep every {}th row",
+                n / MOST_LOG_ROWS + 1
+            );
+        }
         times::check(runs.runs.iter().flatten().map(|row| row.cells[column]))?;
     }
     for rows in &runs.runs {
@@ -115,10 +124,12 @@ fn check_circle_time(radius_mm: f64, feed_mm_min: f64, runs: &[Vec<Row>]) -> Res
         })
         .sum();
     let way_mm = turned_deg.to_radians() * radius_mm;
-    let time_s = way_mm / (feed_mm_min / 60.0);
+    let n = runs.len() as f64;
+    let way_mm = way_mm + n * AHEAD_RAD * radius_mm;
+    let time_s = way_mm / (feed_mm_min / 60.0) + n * REST_S;
     if time_s.is_nan() || time_s > LONGEST_MOTION_S {
         bail!(
-            "{} mm of arc at feed_mm_min = {feed_mm_min} mm/min of the map take {} s: at most {LONGEST_MOTION_S} s",
+            "{n} runs, {} mm of arc at feed_mm_min = {feed_mm_min} mm/min of the map take {} s: at most {LONGEST_MOTION_S} s",
             number(way_mm),
             number(time_s)
         );

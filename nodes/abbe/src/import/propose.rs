@@ -66,7 +66,7 @@ fn looked_at(path: &Path) -> Result<Option<Recognised>> {
     if file::is_worksheet(path)? {
         return Ok(recognise::of(&file::read(path, form)?, form.decimal));
     }
-    Ok(recognise::of_text(&text_file::read(path, Comments::Csv)?))
+    recognise::of_text(&text_file::read(path, Comments::Csv)?)
 }
 
 /// Kinds of tests.
@@ -344,7 +344,24 @@ impl<'t> Text<'t> {
                 _ => None,
             }
         };
-        let unit = named.or_else(of_epoch).unwrap_or(Unit::Second);
+        let known = named.or_else(of_epoch);
+        if known.is_none() {
+            let likely = times::likely(&time.numbers);
+            let taken = likely.unwrap_or(Unit::Second);
+            let as_seconds = match likely {
+                Some(_) => format!("; {}", times::in_words(&time.numbers, Unit::Second)),
+                None => String::new(),
+            };
+            self.needed.push(format!(
+                "column \"{}\": no unit in its name, read in {}: {}{as_seconds}; correct it where it is another",
+                time.name,
+                taken.name(),
+                times::in_words(&time.numbers, taken),
+            ));
+        }
+        let unit = known
+            .or_else(|| times::likely(&time.numbers))
+            .unwrap_or(Unit::Second);
         let first_s = unit.convert(first, Unit::Second);
         if first_s > 6e8 {
             self.start_s = first_s;

@@ -1,10 +1,12 @@
 //! What the columns of a table are, by their names and their cells.
 
+use anyhow::Result;
 use metrology::Axis;
 
 use super::map::Direction;
 use super::sheet::Sheet;
 use super::table::number_of;
+use super::times;
 use super::units::{Kind, Unit};
 
 /// What a column holds.
@@ -57,6 +59,8 @@ pub struct Recognised {
 
 /// Rows that are looked at for what a column holds.
 const LOOKED_AT: usize = 2000;
+/// Lines of a text from which its separator and decimals are recognised.
+const BEGIN: usize = 20_000;
 /// Rows among which a line of units may stand below the names.
 const UNIT_ROWS: usize = 2;
 
@@ -110,13 +114,18 @@ fn is_instant(cell: &str) -> bool {
 }
 
 /// The best way to cut a text into cells: the one that gives most numbers in columns that have names.
-pub fn of_text(text: &str) -> Option<Recognised> {
+///
+/// # Errors
+/// When the text has more cells or columns than are read.
+pub fn of_text(text: &str) -> Result<Option<Recognised>> {
+    let end = text.match_indices('\n').nth(BEGIN);
+    let begin = end.map_or(text, |(end, _)| &text[..end]);
     let forms = [(';', ','), ('\t', ','), (';', '.'), ('\t', '.'), (',', '.')];
     let looked = forms.into_iter().filter_map(|(separator, decimal)| {
-        let sheet = Sheet::of_text(text, separator).ok()?;
+        let sheet = Sheet::of_text(begin, separator).ok()?;
         of(&sheet, decimal)
     });
-    looked.max_by_key(|found| {
+    let best = looked.max_by_key(|found| {
         let numbers: usize = found
             .columns
             .iter()
@@ -124,12 +133,17 @@ pub fn of_text(text: &str) -> Option<Recognised> {
             .sum();
         // Of ways that give the same cells the plain one: a point as decimal.
         (numbers, found.decimal == '.')
-    })
+    });
+    let Some(best) = best.filter(|_| begin.len() < text.len()) else {
+        return Ok(best);
+    };
+    Ok(of(&Sheet::of_text(text, best.separator)?, best.decimal))
 }
 
 fn known(name: &str, cells: &[&str], decimal: char) -> Known {
     let (words, unit_word) = parts(name);
     let unit = unit_word.as_deref().and_then(Unit::of_word);
+    let unit = unit.or_else(|| times::named_unit(name));
     let degc = ["°c", "degc", "c", "ºc"];
     let is_degc = unit_word.is_some_and(|word| degc.contains(&word.to_lowercase().as_str()));
     let numbers: Vec<f64> = cells
@@ -149,8 +163,15 @@ fn known(name: &str, cells: &[&str], decimal: char) -> Known {
         role,
         unit,
         numbers,
-        first: cells.first().copied().unwrap_or_default().to_owned(),
+        first: first(cells, decimal).to_owned(),
     }
+}
+
+/// The first cell that is a number or an instant; where there is none, the first.
+fn first<'c>(cells: &[&'c str], decimal: char) -> &'c str {
+    let is_value = |cell: &&&str| number_of(cell, decimal).is_some() || is_instant(cell);
+    let value = cells.iter().find(is_value).or(cells.first());
+    value.copied().unwrap_or_default()
 }
 
 /// Whether a column without a unit is that of a thermometer: named by a place, with numbers that are degrees Celsius.
@@ -207,12 +228,18 @@ fn role(
     };
     let is_one = |whole: &[&str]| words.iter().any(|word| whole.contains(&word.as_str()));
     let names_way = has(&["dir", "way", "richt", "approach", "sense"]);
-    let all_ways = !cells.is_empty() && cells.iter().all(|cell| Direction::of_word(cell).is_some());
-    if all_ways && (names_way || !is_numeric) {
+    // One odd cell makes no other column of it.
+    let ways: Vec<Direction> = { cells.iter() }
+        .filter_map(|cell| Direction::of_word(cell))
+        .collect();
+    let all_ways = !cells.is_empty() && ways.len() == cells.len();
+    let has_both = ways.contains(&Direction::Up) && ways.contains(&Direction::Down);
+    let most_ways = 10 * ways.len() >= 9 * cells.len() && (names_way || has_both);
+    if (all_ways || most_ways && !ways.is_empty()) && (names_way || !is_numeric) {
         return Some(Role::Direction);
     }
     let kind = unit.map(Unit::kind);
-    let has_clock = cells.first().is_some_and(|cell| is_instant(cell));
+    let has_clock = 2 * cells.iter().filter(|cell| is_instant(cell)).count() > cells.len();
     if has_clock || kind == Some(Kind::Time) {
         return Some(Role::Time);
     }
@@ -346,7 +373,7 @@ mod tests {
     use super::*;
 
     fn roles(text: &str) -> Vec<(String, Option<Role>)> {
-        let found = of_text(text).expect("a table");
+        let found = of_text(text).unwrap().expect("a table");
         let columns = found.columns.into_iter();
         columns.map(|column| (column.name, column.role)).collect()
     }
@@ -414,20 +441,54 @@ mod tests {
         assert_eq!((found.separator, found.decimal), (';', ','));
         let units: Vec<Option<Unit>> = found.columns.iter().map(|column| column.unit).collect();
         assert_eq!(units, [None, Some(Unit::Mm), Some(Unit::Um)]);
-        let found = of_text("# made\nAxis Y\nn,t,d\n1,0,1.5\n").expect("a table");
+        let found = of_text("# made\nAxis Y\nn,t,d\n1,0,1.5\n")
+            .unwrap()
+            .expect("a table");
         assert_eq!(
             (found.separator, found.decimal, found.head_line),
             (',', '.', 3)
         );
         assert_eq!(found.axis("table"), Some(Axis::Y));
         assert_eq!(
-            of_text("no numbers\nat all\n").map(|found| found.n_rows),
+            of_text("no numbers\nat all\n")
+                .unwrap()
+                .map(|found| found.n_rows),
             None
         );
-        let found = of_text("time_s,z_um\n0,1\n60,2\n").expect("a table");
+        let found = of_text("time_s,z_um\n0,1\n60,2\n")
+            .unwrap()
+            .expect("a table");
         assert_eq!(
             (found.axis("log"), found.axis("lead_X")),
             (Some(Axis::Z), Some(Axis::X))
         );
+    }
+
+    #[test]
+    fn one_odd_cell_makes_no_other_column_of_the_directions_and_times() {
+        for odd in ["x", "?", "north", "0", "n/a"] {
+            for (up, down) in [("up", "down"), ("+", "-"), ("1", "-1"), ("↑", "↓")] {
+                let rows = (0..20).map(|k| {
+                    let way = if k % 2 == 0 { up } else { down };
+                    let way = if k == 7 { odd } else { way };
+                    format!("1,{way},{k},0.5\n")
+                });
+                let rows: String = rows.collect();
+                let found = roles(&format!("run,direction,target_mm,deviation_um\n{rows}"));
+                assert_eq!(found[1].1, Some(Role::Direction), "{odd} {up}");
+            }
+        }
+        let rows: String = (10..40).map(|k| format!("08:{k}:00,0.{k}\n")).collect();
+        let found = of_text(&format!("when,z_um\nbegin,0.1\n{rows}"))
+            .unwrap()
+            .unwrap();
+        let time = found.first(Role::Time).unwrap();
+        assert_eq!(time.first, "08:10:00");
+        // Remarks are no directions.
+        let notes: String = (0..20)
+            .map(|k| format!("{k},0.5,{}\n", if k == 3 { "slow" } else { "-" }))
+            .collect();
+        let found = roles(&format!("target_mm,deviation_um,remark\n{notes}"));
+        assert_eq!(found[2].1, None);
     }
 }

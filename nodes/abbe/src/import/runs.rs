@@ -7,7 +7,7 @@
 //! one ([`same`]), rows without a number of run are counted, and passes that are numbered as runs become cycles
 //! ([`passes`]).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Result, bail};
 use metrology::Axis;
@@ -24,6 +24,11 @@ pub const SAME_TARGET_MM: f64 = 1e-9;
 /// Spacing of the grid on which targets are compared from run to run, mm.
 pub const GRID_MM: f64 = 1e-6;
 
+/// Most runs of a table: a test has some ten, and every one is evaluated.
+pub const MOST_RUNS: usize = 10_000;
+/// Runs and targets that a remark names one by one.
+const NAMED: usize = 10;
+
 /// The runs of a table.
 #[derive(Debug)]
 pub struct Runs {
@@ -39,6 +44,20 @@ pub struct Runs {
 /// Line and remedy where rows contradict their column of the direction, repeat each other, or are in no order from
 /// which the motion follows.
 pub fn of(test: &Test, table: &Table) -> Result<Runs> {
+    let mut runs = ordered(test, table)?;
+    let n = runs.runs.len();
+    if n > MOST_RUNS {
+        let column = test.run().map_or(String::new(), |column| {
+            format!(": does the column \"{column}\" number the runs?")
+        });
+        bail!("{n} runs: must be at most {MOST_RUNS}{column}");
+    }
+    runs.remarks.extend(table.odd.iter().cloned());
+    Ok(runs)
+}
+
+/// The runs in the order of their measurement.
+fn ordered(test: &Test, table: &Table) -> Result<Runs> {
     let Runs {
         mut runs,
         mut remarks,
@@ -115,14 +134,15 @@ fn numbered(test: &Test, table: &Table) -> Result<Runs> {
 
 /// The first row whose number of run was there before another number, with that number.
 fn again<'a>(together: &[&'a [Row]]) -> Option<(&'a Row, f64)> {
-    let mut seen: Vec<f64> = vec![];
+    let mut seen = BTreeSet::new();
+    let mut before = None;
     for rows in together {
         let first = rows.first()?;
         let number = first.cells[0];
-        if seen.iter().any(|known| known.total_cmp(&number).is_eq()) {
-            return Some((first, *seen.last()?));
+        if !seen.insert(number.to_bits()) {
+            return Some((first, before?));
         }
-        seen.push(number);
+        before = Some(number);
     }
     None
 }
@@ -130,12 +150,12 @@ fn again<'a>(together: &[&'a [Row]]) -> Option<(&'a Row, f64)> {
 /// Rows by their number of run, upwards by ascending target, then downwards by descending target.
 pub fn gathered(rows: &[Row]) -> Vec<Vec<Row>> {
     let mut runs: Vec<Vec<Row>> = vec![];
+    let mut places = BTreeMap::new();
     for row in rows {
-        let own = runs.iter_mut().find(|run| {
-            run.iter()
-                .any(|of| of.cells[0].total_cmp(&row.cells[0]).is_eq())
-        });
-        match own {
+        let place = *places
+            .entry(row.cells[0].to_bits())
+            .or_insert_with(|| runs.len());
+        match runs.get_mut(place) {
             Some(run) => run.push(row.clone()),
             None => runs.push(vec![row.clone()]),
         }
@@ -318,19 +338,32 @@ fn check_targets(runs: &[Vec<Row>], units: Units) -> Result<Vec<String>> {
             seen.entry(visit).or_insert((target_mm, vec![])).1.push(k);
         }
     }
-    let mut remarks = vec![];
+    let (mut remarks, mut others) = (vec![], 0);
     for ((_, is_up), (target_mm, has)) in seen {
-        let lacking: Vec<String> = (0..runs.len())
-            .filter(|k| !has.contains(k))
-            .map(|k| runs[k][0].cells[0].to_string())
-            .collect();
-        if !lacking.is_empty() {
-            remarks.push(format!(
-                "target {target_mm} {unit} {} has no row in run {}: an evaluation leaves it out",
-                if is_up { "up" } else { "down" },
-                lacking.join(", ")
-            ));
+        let n = runs.len() - has.len();
+        if n == 0 {
+            continue;
         }
+        if remarks.len() == NAMED {
+            others += 1;
+            continue;
+        }
+        // A run has a target from one side once, and they come in the order of the runs.
+        let lacking = (0..runs.len()).filter(|k| has.binary_search(k).is_err());
+        let named = lacking.take(NAMED);
+        let named: Vec<String> = named.map(|k| runs[k][0].cells[0].to_string()).collect();
+        let more = match n - named.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        remarks.push(format!(
+            "target {target_mm} {unit} {} has no row in run {}{more}: an evaluation leaves it out",
+            if is_up { "up" } else { "down" },
+            named.join(", ")
+        ));
+    }
+    if others > 0 {
+        remarks.push(format!("{others} more targets have no row in every run"));
     }
     Ok(remarks)
 }
@@ -363,6 +396,7 @@ mod tests {
         Table {
             rows: rows.iter().enumerate().map(row).collect(),
             left_out: vec![],
+            odd: vec![],
         }
     }
 
@@ -413,6 +447,31 @@ mod tests {
                 runs.remarks
             );
         }
+    }
+
+    #[test]
+    fn more_runs_than_a_test_has_are_refused_and_as_many_are_read() {
+        for direction in [true, false] {
+            let columns = if direction { 4 } else { 3 };
+            let rows = |n: usize| -> Vec<[f64; 4]> {
+                let two = |k: usize| [0.0, 9.0].map(|target| [k as f64, target, 0.1, UP]);
+                (0..n).flat_map(two).collect()
+            };
+            let of = |n: usize| of(&test(direction), &table(&rows(n), columns));
+            assert_eq!(of(10_000).unwrap().runs.len(), 10_000);
+            let refused = of(300_000).unwrap_err().to_string();
+            assert_eq!(
+                refused,
+                "300000 runs: must be at most 10000: does the column \"n\" number the runs?"
+            );
+        }
+        // Runs that lack a target are named up to ten.
+        let mut rows: Vec<[f64; 4]> = (0..2_000).map(|k| [f64::from(k), 0.0, 0.1, UP]).collect();
+        rows.extend([[0.0, 9.0, 0.1, UP]]);
+        rows.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let remarks = of(&test(true), &table(&rows, 4)).unwrap().remarks;
+        let lacking = remarks.iter().find(|one| one.starts_with("target 9"));
+        assert!(lacking.unwrap().contains(" and 1989 more"), "{remarks:?}");
     }
 
     #[test]

@@ -5,6 +5,9 @@ use anyhow::{Context, Result, bail};
 /// Most columns of a table that are read.
 pub const MOST_COLUMNS: u32 = 1_000;
 
+/// Most cells of a table that are read: a table of 400,000 rows and ten columns.
+pub const MOST_CELLS: usize = 4_000_000;
+
 /// Lines of cells, with the number of each line in its file, from 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sheet {
@@ -29,6 +32,7 @@ impl Sheet {
             .has_headers(false)
             .from_reader(text.as_bytes());
         let mut lines = vec![];
+        let mut n_cells = 0;
         for record in reader.records() {
             let record = record?;
             let line = record.position().map_or(0, csv::Position::line);
@@ -36,6 +40,12 @@ impl Sheet {
                 bail!(
                     "line {line}: {} columns: must be at most {MOST_COLUMNS}: take away those that hold no test",
                     record.len()
+                );
+            }
+            n_cells += record.len();
+            if n_cells > MOST_CELLS {
+                bail!(
+                    "line {line}: more than {MOST_CELLS} cells up to here, the most that is read: split the table, or take away columns that hold no test"
                 );
             }
             lines.push((line, record.iter().map(str::to_owned).collect()));

@@ -6,6 +6,7 @@ use metrology::yaml::shown;
 
 use super::limits::Range;
 use super::map::{Column, Direction, Map, Test, What, units};
+use super::odd::{Cost, Odd, Read};
 use super::sheet::Sheet;
 use super::times;
 use super::units::Unit;
@@ -24,8 +25,10 @@ pub struct Row {
 pub struct Table {
     /// Rows.
     pub rows: Vec<Row>,
-    /// What of the file is in no row, and why.
+    /// What of the file is in no row, and why; and what is doubtful.
     pub left_out: Vec<String>,
+    /// Cells that hold no value of their column, a line each; they cost a row or a reading.
+    pub odd: Vec<String>,
 }
 
 impl Table {
@@ -50,9 +53,11 @@ impl Table {
             ranges,
             n_missing: 0,
             first_missing: None,
+            odd: Odd::default(),
+            is_clock: false,
         };
         let mut rows = vec![];
-        let mut n_empty = 0_u64;
+        let (mut n_empty, mut n_rows) = (0_u64, 0);
         for (k, (line, cells)) in sheet.lines.iter().enumerate().skip(at + 1) {
             if cells.iter().all(String::is_empty) {
                 n_empty += 1;
@@ -63,18 +68,24 @@ impl Table {
                 continue;
             }
             check_length(cells, head.len(), *line)?;
-            rows.push(Row {
-                line: *line,
-                cells: reader.row(cells, *line)?,
-            });
+            n_rows += 1;
+            if let Some(cells) = reader.row(cells, *line)? {
+                rows.push(Row { line: *line, cells });
+            }
         }
+        let odd = std::mem::take(&mut reader.odd).lines(n_rows)?;
         let found = reader.missing(&rows)?;
         left_out.extend(found);
+        left_out.extend(reader.doubt(&rows)?);
         if n_empty > 0 {
             left_out.push(format!("{n_empty} rows: all their cells are empty"));
         }
         let rows = shaped(rows, map);
-        Ok(Self { rows, left_out })
+        Ok(Self {
+            rows,
+            left_out,
+            odd,
+        })
     }
 }
 
@@ -107,6 +118,9 @@ struct Reader<'t> {
     n_missing: u64,
     /// Line and column of the first.
     first_missing: Option<(u64, String)>,
+    odd: Odd,
+    /// Whether a time was no plain number.
+    is_clock: bool,
 }
 
 impl Reader<'_> {
@@ -130,12 +144,13 @@ impl Reader<'_> {
         !words.is_empty() && words.into_iter().all(bare)
     }
 
-    /// The numbers of a row; a reading that is not there is no number (NaN).
-    fn row(&mut self, cells: &[String], line: u64) -> Result<Vec<f64>> {
+    /// The numbers of a row; a reading that is not there is no number (NaN). `None`: a cell holds no value of its column.
+    fn row(&mut self, cells: &[String], line: u64) -> Result<Option<Vec<f64>>> {
         let mut numbers: Vec<f64> = vec![];
         for (k, column) in self.columns.iter().enumerate() {
             let cell = self.cell(cells, k);
-            if column.what.is_reading() && is_missing(cell) {
+            let is_reading = column.what.is_reading();
+            if is_reading && is_missing(cell) {
                 self.n_missing += 1;
                 let first = (line, column.name.to_owned());
                 self.first_missing.get_or_insert(first);
@@ -144,11 +159,35 @@ impl Reader<'_> {
             }
             let range = self.ranges.get(k).and_then(Option::as_ref);
             let before = numbers.last().copied();
-            let number = read_cell(cell, *column, self.map, range, before);
-            numbers
-                .push(number.with_context(|| format!("line {line}, column \"{}\"", column.name))?);
+            let read = read_cell(cell, *column, self.map, range, before);
+            match read.with_context(|| format!("line {line}, column \"{}\"", column.name))? {
+                Read::Number(number) => numbers.push(number),
+                Read::Clock(time_s) => {
+                    self.is_clock = true;
+                    numbers.push(time_s);
+                }
+                Read::Odd(why) => {
+                    let cost = if is_reading { Cost::Reading } else { Cost::Row };
+                    self.odd.note((line, column.name), &why, cost);
+                    if !is_reading {
+                        return Ok(None);
+                    }
+                    numbers.push(f64::NAN);
+                }
+            }
         }
-        Ok(numbers)
+        Ok(Some(numbers))
+    }
+
+    /// What is doubtful about the times of a log that are plain numbers.
+    fn doubt(&self, rows: &[Row]) -> Result<Option<String>> {
+        let place = { self.columns.iter() }.position(|column| column.what == What::Time);
+        let Some(place) = place.filter(|_| !self.is_clock) else {
+            return Ok(None);
+        };
+        let name = self.columns[place].name;
+        let times_s: Vec<f64> = rows.iter().map(|row| row.cells[place]).collect();
+        times::of_column(name, &times_s, self.map.units.contains_key(name))
     }
 
     /// How many readings are not there.
@@ -268,30 +307,31 @@ pub fn number_of(cell: &str, decimal: char) -> Option<f64> {
     number.filter(|number| number.is_finite() && text.contains(is_digit))
 }
 
+/// A cell. Errors are of cells that show a wrong map, or that no instrument reads.
 fn read_cell(
     cell: &str,
     column: Column<'_>,
     map: &Map,
     range: Option<&Range>,
     before: Option<f64>,
-) -> Result<f64> {
+) -> Result<Read> {
     if cell.is_empty() {
-        bail!("the cell is empty: write what was measured, or remove the row");
+        let why = "the cell is empty: write what was measured, or remove the row";
+        return Ok(Read::Odd(why.to_owned()));
     }
     if column.what == What::Direction {
-        return Direction::of_word(cell)
-            .map(Direction::sign)
-            .with_context(|| {
-                format!(
-                    "\"{}\": must be one of up, +, 1, forward, ↑, down, -, -1, reverse, ↓",
-                    shown(cell)
-                )
-            });
+        return Ok(match Direction::of_word(cell) {
+            Some(direction) => Read::Number(direction.sign()),
+            None => Read::Odd(format!(
+                "\"{}\": must be one of up, +, 1, forward, ↑, down, -, -1, reverse, ↓",
+                shown(cell)
+            )),
+        });
     }
     if column.what == What::Time
         && let Some(time_s) = times::of_text(cell)?
     {
-        return Ok(time_s);
+        return Ok(Read::Clock(time_s));
     }
     if map.decimal != '.' && cell.contains('.') {
         bail!(
@@ -301,12 +341,14 @@ fn read_cell(
         );
     }
     let Some(read) = number_of(cell, map.decimal) else {
-        let remedy = if cell.contains(',') && map.decimal == '.' {
-            "; with decimal commas the map needs `decimal: \",\"`"
-        } else {
-            ""
-        };
-        bail!("\"{}\": must be a number{remedy}", shown(cell));
+        let has_digit = cell.contains(|letter: char| letter.is_ascii_digit());
+        if cell.contains(',') && map.decimal == '.' && has_digit {
+            bail!(
+                "\"{}\": must be a number; with decimal commas the map needs `decimal: \",\"`",
+                shown(cell)
+            );
+        }
+        return Ok(Read::Odd(format!("\"{}\": must be a number", shown(cell))));
     };
     let number = converted(read, column, map, before);
     match range.filter(|range| !range.holds(number)) {
@@ -316,7 +358,7 @@ fn read_cell(
             metrology::number::number(number)
         ),
         Some(range) => bail!("{}: must be {range}{}", shown(cell), range.remedy(number)),
-        None => Ok(number),
+        None => Ok(Read::Number(number)),
     }
 }
 

@@ -10,10 +10,20 @@ use metrology::number::number;
 use metrology::yaml::shown;
 use mtconnect_bridge::observation::read_stamp;
 
+use super::units::{Kind, Unit};
+
 /// Longest log or session, s: a leap year.
 pub const LONGEST_LOG_S: f64 = 366.0 * 86_400.0;
 /// Greatest spacing of most of the rows, s: slower, no warm-up is seen.
 const SPACING_S: f64 = 6.0 * 3600.0;
+/// Least spacing of most of the rows, s: no thermometer or dial is read faster, and rows so close look like another unit.
+const LEAST_SPACING_S: f64 = 0.005;
+/// Spacings and lengths of most logs of a machine's drift, s: rows every half second to ten minutes, for a quarter of an hour to
+/// two weeks.
+const USUAL_SPACING_S: [f64; 2] = [0.5, 600.0];
+const USUAL_LENGTH_S: [f64; 2] = [900.0, 14.0 * 86_400.0];
+/// A number beyond it counts from 1970 and shows its unit by itself.
+const EPOCH_S: f64 = 6e8;
 /// The units in which rows are looked for: how many make a second, and what they are called.
 const TIME_UNITS: [(f64, &str); 3] = [
     (1e3, "milliseconds"),
@@ -146,6 +156,127 @@ pub fn check(times_s: impl Iterator<Item = f64>) -> Result<()> {
     Ok(())
 }
 
+/// Median of the steps between rows, and from the first to the last, in the unit of the numbers.
+fn spacing(times: &[f64]) -> Option<(f64, f64)> {
+    let mut steps: Vec<f64> = times
+        .windows(2)
+        .map(|two| (two[1] - two[0]).abs())
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    let length = times.last()? - times.first()?;
+    Some((*steps.get(steps.len() / 2)?, length.abs()))
+}
+
+/// Units in which numbers make a log as most are, the second first; none of times from 1970 on.
+fn usual(times: &[f64]) -> Vec<Unit> {
+    let Some((step, length)) = spacing(times).filter(|_| times[0].abs() < EPOCH_S) else {
+        return vec![];
+    };
+    let is_usual = |unit: &Unit| {
+        let holds = |[low, high]: [f64; 2], number: f64| {
+            let number_s = unit.convert(number, Unit::Second);
+            (low..=high).contains(&number_s)
+        };
+        holds(USUAL_SPACING_S, step) && holds(USUAL_LENGTH_S, length)
+    };
+    let units = [
+        Unit::Second,
+        Unit::Min,
+        Unit::Hour,
+        Unit::Day,
+        Unit::Ms,
+        Unit::Us,
+        Unit::Ns,
+    ];
+    units.into_iter().filter(is_usual).collect()
+}
+
+/// The unit that a column of times without one is likely in, where that is not the second.
+pub fn likely(times: &[f64]) -> Option<Unit> {
+    let first = usual(times).first().copied();
+    first.filter(|unit| *unit != Unit::Second)
+}
+
+/// How long a log is, and how far its rows lie apart, where its numbers are in a unit.
+pub fn in_words(times: &[f64], unit: Unit) -> String {
+    let (step, length) = spacing(times).unwrap_or_default();
+    let of = |value: f64| number(unit.convert(value, Unit::Second));
+    format!(
+        "in {} it lasts {} s with a row every {} s",
+        unit.name(),
+        of(length),
+        of(step)
+    )
+}
+
+/// The unit of a time that a column's name has: in brackets or as its last word, or as its only one of four letters at least.
+pub fn named_unit(name: &str) -> Option<Unit> {
+    let letters = |letter: char| !letter.is_alphanumeric() && letter != 'µ' && letter != 'μ';
+    let words: Vec<&str> = name
+        .split(letters)
+        .filter(|word| !word.is_empty())
+        .collect();
+    let word = match words.as_slice() {
+        [only] if only.chars().count() > 3 => only,
+        [_, .., last] => last,
+        _ => return None,
+    };
+    Unit::of_word(word).filter(|unit| unit.kind() == Kind::Time)
+}
+
+/// What is doubtful about a column of times that are plain numbers, in s as they were read. `is_stated`: the map names
+/// their unit.
+///
+/// # Errors
+/// With column and remedy, where all rows have one time, where the name of the column has another unit, or where rows lie
+/// closer together than anything is read.
+pub fn of_column(name: &str, times_s: &[f64], is_stated: bool) -> Result<Option<String>> {
+    let state = |unit: &str| format!("state `units: {{\"{name}\": {unit}}}` in the map");
+    if let [first_s, _, ..] = times_s
+        && times_s.iter().all(|time_s| time_s == first_s)
+    {
+        bail!(
+            "column \"{name}\": all {} rows have the time {} s: a log needs times that differ: is another column the time?",
+            times_s.len(),
+            number(*first_s)
+        );
+    }
+    let named = named_unit(name);
+    match named {
+        _ if is_stated => return Ok(None),
+        Some(Unit::Second) => return Ok(None),
+        Some(unit) => bail!(
+            "column \"{name}\": its name says {unit}, the map s: {}, or `s` where its name is wrong",
+            state(unit.name()),
+            unit = unit.name()
+        ),
+        None => {}
+    }
+    let usual = usual(times_s);
+    let other = usual.iter().find(|unit| **unit != Unit::Second);
+    let as_seconds = in_words(times_s, Unit::Second);
+    let close = spacing(times_s).filter(|(step_s, _)| *step_s > 0.0 && *step_s < LEAST_SPACING_S);
+    if let Some((step_s, _)) = close {
+        let (likely, unit) = other.map_or((String::new(), "UNIT"), |unit| {
+            (format!("; {}", in_words(times_s, *unit)), unit.name())
+        });
+        bail!(
+            "column \"{name}\": most rows lie {} s apart: must be at least {LEAST_SPACING_S} s{likely}: {}",
+            number(step_s),
+            state(unit)
+        );
+    }
+    Ok(other.map(|unit| {
+        let word = if usual.contains(&Unit::Second) { "possible" } else { "likely" };
+        format!(
+            "column \"{name}\": no unit in its name, read in s: {as_seconds}; {} is {word}: {}; {}, or `s`",
+            unit.name(),
+            in_words(times_s, *unit),
+            state(unit.name())
+        )
+    }))
+}
+
 /// Whether rows lie as far apart as the days, weeks, months or years of a calendar.
 fn is_of_calendar(spacing_s: f64) -> bool {
     let days = spacing_s / 86_400.0;
@@ -256,5 +387,70 @@ mod tests {
             wrong.ends_with("the greatest leap is at row 4, from 120 to 600000000 s"),
             "{wrong}"
         );
+    }
+
+    /// 240 rows, one a minute, as loggers in each unit write them.
+    fn minutes(unit: Unit) -> Vec<f64> {
+        let row = |k: u32| Unit::Second.convert(60.0 * f64::from(k), unit);
+        (0..240).map(row).collect()
+    }
+
+    #[test]
+    fn a_column_of_times_without_a_unit_is_said_to_be_in_the_likely_one_or_refused() {
+        for unit in [Unit::Min, Unit::Hour, Unit::Day] {
+            let times = minutes(unit);
+            assert_eq!(likely(&times), Some(unit));
+            let state = format!("state `units: {{\"time\": {}}}` in the map", unit.name());
+            let said = match of_column("time", &times, false) {
+                Ok(said) => said.unwrap(),
+                Err(refused) => refused.to_string(),
+            };
+            assert!(said.contains(&state), "{said}");
+            assert!(said.contains("14340 s with a row every 60 s"), "{said}");
+            assert_eq!(of_column("time", &times, true).unwrap(), None);
+        }
+        assert!(of_column("time", &minutes(Unit::Day), false).is_err());
+        assert_eq!(likely(&minutes(Unit::Ms)), Some(Unit::Ms));
+        assert_eq!(likely(&minutes(Unit::Second)), None);
+        assert_eq!(
+            of_column("time", &minutes(Unit::Second), false).unwrap(),
+            None
+        );
+        // Every second for an hour, or every minute for two days and a half.
+        let seconds: Vec<f64> = (0..3_600).map(f64::from).collect();
+        let said = of_column("time", &seconds, false).unwrap().unwrap();
+        assert!(said.contains("min is possible"), "{said}");
+        assert_eq!(of_column("time_s", &seconds, false).unwrap(), None);
+    }
+
+    #[test]
+    fn the_unit_in_the_name_of_a_column_must_be_that_of_the_map() {
+        for (name, unit) in [
+            ("time [d]", Unit::Day),
+            ("t (min)", Unit::Min),
+            ("hours", Unit::Hour),
+            ("elapsed_ms", Unit::Ms),
+            ("Zeit/h", Unit::Hour),
+            ("t [µs]", Unit::Us),
+        ] {
+            assert_eq!(named_unit(name), Some(unit), "{name}");
+            let refused = of_column(name, &minutes(Unit::Second), false).unwrap_err();
+            let words = format!("its name says {}, the map s", unit.name());
+            assert!(refused.to_string().contains(&words), "{refused}");
+        }
+        for name in ["time", "t", "h", "d", "time of day", "stamp", ""] {
+            assert_eq!(named_unit(name), None, "{name}");
+        }
+        assert_eq!(named_unit("time_s"), Some(Unit::Second));
+    }
+
+    #[test]
+    fn a_column_with_one_time_alone_is_no_column_of_times() {
+        for (time_s, n) in [(0.0, 240), (29_700.0, 2), (1.767e9, 9)] {
+            let refused = of_column("time_s", &vec![time_s; n], true).unwrap_err();
+            assert!(refused.to_string().contains("need"), "{refused}");
+        }
+        assert_eq!(of_column("t", &[5.0], false).unwrap(), None);
+        assert_eq!(of_column("t", &[], false).unwrap(), None);
     }
 }

@@ -62,6 +62,9 @@ pub enum Unit {
     /// Hour.
     #[serde(rename = "h")]
     Hour,
+    /// Day.
+    #[serde(rename = "d")]
+    Day,
 }
 
 /// What a unit is one of.
@@ -76,7 +79,7 @@ const PER_RAD: f64 = 180.0 / std::f64::consts::PI;
 
 impl Unit {
     /// Every unit.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Nm,
         Self::Um,
         Self::Mm,
@@ -96,6 +99,7 @@ impl Unit {
         Self::Ns,
         Self::Min,
         Self::Hour,
+        Self::Day,
     ];
 
     /// What it is one of.
@@ -110,7 +114,9 @@ impl Unit {
             | Self::Rad
             | Self::Mrad
             | Self::Urad => Kind::Angle,
-            Self::Second | Self::Ms | Self::Us | Self::Ns | Self::Min | Self::Hour => Kind::Time,
+            Self::Second | Self::Ms | Self::Us | Self::Ns | Self::Min | Self::Hour | Self::Day => {
+                Kind::Time
+            }
         }
     }
 
@@ -133,6 +139,7 @@ impl Unit {
             Self::Ns => 1e-9,
             Self::Min => 60.0,
             Self::Hour => 3600.0,
+            Self::Day => 86_400.0,
         }
     }
 
@@ -169,6 +176,7 @@ impl Unit {
             Self::Ns => "ns",
             Self::Min => "min",
             Self::Hour => "h",
+            Self::Day => "d",
         }
     }
 
@@ -191,7 +199,12 @@ impl Unit {
             "sec" | "secs" | "second" | "seconds" => Some(Self::Second),
             "msec" => Some(Self::Ms),
             "minutes" | "minute" => Some(Self::Min),
-            "hour" | "hours" | "hr" | "std" => Some(Self::Hour),
+            "hour" | "hours" | "hr" | "hrs" | "std" | "stunden" => Some(Self::Hour),
+            "day" | "days" | "tag" | "tage" => Some(Self::Day),
+            "mins" | "minuten" => Some(Self::Min),
+            "millisecond" | "milliseconds" => Some(Self::Ms),
+            "microsecond" | "microseconds" => Some(Self::Us),
+            "nanosecond" | "nanoseconds" => Some(Self::Ns),
             _ => None,
         })
     }

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
 use metrology::yaml;
-use tempfile::TempDir;
 
 use crate::import::map::Map;
 use crate::import::{self, Named, propose};
+use crate::whole_file::Vanishing;
 
 /// Ends of names of files that are tables.
 const ENDS: [&str; 6] = ["csv", "tsv", "txt", "dat", "xlsx", "xlsm"];
@@ -15,11 +15,13 @@ const ENDS: [&str; 6] = ["csv", "tsv", "txt", "dat", "xlsx", "xlsm"];
 /// A bag of a table.
 pub struct FromTable {
     /// Its folder, which goes away with this.
-    _home: TempDir,
+    _home: Vanishing,
     /// The bag.
     pub bag: PathBuf,
     /// What was recognised in the table, what it lacks, and what is not in the bag; a line each.
     pub lines: Vec<String>,
+    /// Cells that cost a row or a reading.
+    pub n_odd: usize,
 }
 
 /// Whether a path is a table by its name.
@@ -58,7 +60,7 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
         place: "the machine that is taken where none is stated".to_owned(),
         text: propose::machine_for(&read),
     };
-    let home = TempDir::new().context("a folder for the bag of the table")?;
+    let home = Vanishing::temporary().context("a folder for the bag of the table")?;
     let bag = home.path().join("bag");
     let imported = import::import(path, &named, machine, &bag)?;
     lines.extend(imported.notes);
@@ -66,6 +68,7 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
         _home: home,
         bag,
         lines,
+        n_odd: imported.n_odd,
     }))
 }
 

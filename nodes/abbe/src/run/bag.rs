@@ -54,7 +54,12 @@ pub fn begin(
         .context("bag without a name")?
         .to_string_lossy()
         .into_owned();
-    let mut recording = Recording::begin(Directory::create(path)?, &name, config.clone())?;
+    let directory = Directory::create(path)?;
+    let begun = Recording::begin(directory, &name, config.clone());
+    let mut recording = begun.inspect_err(|_| {
+        // What was begun is no bag; the folder is new.
+        let _ = std::fs::remove_dir_all(path);
+    })?;
     recording.add_context(&RunContext {
         order: if simulated {
             MessageOrder::Total

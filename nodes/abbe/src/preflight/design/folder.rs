@@ -11,7 +11,7 @@ use metrology::number::number;
 use super::instruments::{Means, Shop};
 use super::menu::{Offer, SetUp};
 use super::stand_in::StandIn;
-use crate::whole_file;
+use crate::whole_file::{self, WholeFolder};
 
 /// The name of the launch file.
 const LAUNCH: &str = "designed.launch.xml";
@@ -115,7 +115,8 @@ pub fn programs(stands: &[Stand]) -> BTreeMap<String, String> {
 /// When the folder holds files, or one cannot be written.
 pub fn write(folder: &Path, contents: &Contents<'_>) -> Result<Vec<PathBuf>> {
     check_empty(folder)?;
-    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let whole = WholeFolder::begin(folder)?;
+    std::fs::create_dir(whole.path()).with_context(|| folder.display().to_string())?;
     let mut files = contents.programs.clone();
     let fixed = [
         ("machine.yaml", contents.machine.to_owned()),
@@ -130,10 +131,10 @@ pub fn write(folder: &Path, contents: &Contents<'_>) -> Result<Vec<PathBuf>> {
     files.extend(fixed.map(|(name, text)| (name.to_owned(), text)));
     let mut written = Vec::new();
     for (name, text) in &files {
-        let path = folder.join(name);
-        whole_file::write(&path, text)?;
-        written.push(path);
+        whole_file::write(&whole.path().join(name), text)?;
+        written.push(folder.join(name));
     }
+    whole.finish()?;
     Ok(written)
 }
 
