@@ -71,18 +71,39 @@ impl Keystore {
     pub fn execute(self) -> Result<ExitCode> {
         use authority::{Authority, Validity};
 
+        use crate::whole_file::WholeFolder;
+
         let wanted = enclaves::of(&self.scenario, &self.play)?;
         let validity = Validity::from_now(chrono::Utc::now(), self.days)?;
-        let authority = Authority::open_or_make(&self.folder, &validity)?;
+        let is_new = match std::fs::read_dir(&self.folder) {
+            Ok(mut entries) => entries.next().is_none(),
+            Err(_) => !self.folder.exists(),
+        };
+        // A new keystore is there whole or not at all.
+        let new = is_new.then(|| WholeFolder::begin(&self.folder));
+        let new = new.transpose()?;
+        let keystore = new
+            .as_ref()
+            .map_or(self.folder.as_path(), WholeFolder::path)
+            .to_owned();
+        let authority = Authority::open_or_make(&keystore, &validity)?;
+        let mut lines = vec![];
         for enclave in &wanted {
             let folder = authority.enclave(enclave, &validity)?;
-            tell!(
+            let folder = folder.strip_prefix(&keystore).unwrap_or(&folder);
+            lines.push(format!(
                 "{:32} writes {:3} topics, reads {:3}: {}",
                 enclave.name,
                 enclave.access.publish.len(),
                 enclave.access.subscribe.len(),
-                folder.display()
-            );
+                self.folder.join(folder).display()
+            ));
+        }
+        if let Some(new) = new {
+            new.finish()?;
+        }
+        for line in lines {
+            tell!("{line}");
         }
         tell!(
             "Valid until {}. The nodes use it with\n  export ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce ROS_SECURITY_KEYSTORE={}",

@@ -22,6 +22,7 @@ use openssl::x509::{X509, X509Builder, X509NameBuilder};
 
 use super::documents;
 use super::enclaves::Enclave;
+use crate::whole_file;
 
 /// When credentials hold.
 pub struct Validity {
@@ -154,8 +155,13 @@ impl Authority {
             .join("enclaves")
             .join(enclave.name.trim_start_matches('/'));
         let context = || format!("enclave {}", enclave.name);
-        self.fill(&folder, enclave, validity)
-            .with_context(context)?;
+        let is_new = !folder.exists();
+        let filled = self.fill(&folder, enclave, validity);
+        if filled.is_err() && is_new {
+            // Half an enclave cannot be used; why it is none is told by the error.
+            let _ = fs::remove_dir_all(&folder);
+        }
+        filled.with_context(context)?;
         Ok(folder)
     }
 
@@ -232,7 +238,7 @@ fn certificate(name: &str, key: &PKey<Private>, validity: &Validity) -> Result<X
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    whole(path, fs::write(path, bytes))
+    whole_file::write_bytes(path, bytes).context("writing")
 }
 
 /// Readable by nobody else.

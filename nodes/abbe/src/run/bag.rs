@@ -55,19 +55,22 @@ pub fn begin(
         .to_string_lossy()
         .into_owned();
     let directory = Directory::create(path)?;
-    let begun = Recording::begin(directory, &name, config.clone());
-    let mut recording = begun.inspect_err(|_| {
+    let begin = || -> Result<_> {
+        let mut recording = Recording::begin(directory, &name, config.clone())?;
+        recording.add_context(&RunContext {
+            order: if simulated {
+                MessageOrder::Total
+            } else {
+                MessageOrder::Arrival
+            },
+            nodes: composed.unwrap_or_default(),
+            ..context(scenario, parameters, start_nanos)?
+        })?;
+        Ok(recording)
+    };
+    let recording = begin().inspect_err(|_| {
         // What was begun is no bag; the folder is new.
         let _ = std::fs::remove_dir_all(path);
-    })?;
-    recording.add_context(&RunContext {
-        order: if simulated {
-            MessageOrder::Total
-        } else {
-            MessageOrder::Arrival
-        },
-        nodes: composed.unwrap_or_default(),
-        ..context(scenario, parameters, start_nanos)?
     })?;
     Ok(Recorder::start(recording, &config)?)
 }

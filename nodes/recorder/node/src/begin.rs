@@ -81,10 +81,17 @@ pub(crate) fn record_by(
 ) -> Result<Capture> {
     let (path, directory) = begin(config)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
-    let mut recording = Recording::begin(directory, &file, config.writing.clone())?;
-    if machine.is_some() {
-        recording.add_context(&context(machine))?;
-    }
+    let begin = || -> Result<_> {
+        let mut recording = Recording::begin(directory, &file, config.writing.clone())?;
+        if machine.is_some() {
+            recording.add_context(&context(machine))?;
+        }
+        Ok(recording)
+    };
+    let recording = begin().inspect_err(|_| {
+        // What was begun is no bag; the folder is new.
+        let _ = std::fs::remove_dir_all(&path);
+    })?;
     let recorder = Recorder::start(recording, &config.writing)?;
     let names = NodeNames::new(name, &[])?;
     Capture::start(
