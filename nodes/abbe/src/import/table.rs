@@ -45,7 +45,7 @@ impl Table {
         let place = |name: &&str| place_of(name, head, sheet.separator);
         let places: Vec<usize> = names.iter().map(place).collect::<Result<_>>()?;
         let mut left_out = unnamed(head, &places);
-        left_out.extend(above(&sheet.lines[..at], *head_line));
+        left_out.extend(above(at, *head_line));
         let mut reader = Reader {
             map,
             columns: &columns,
@@ -74,8 +74,7 @@ impl Table {
             }
         }
         let odd = std::mem::take(&mut reader.odd).lines(n_rows)?;
-        let found = reader.missing(&rows)?;
-        left_out.extend(found);
+        left_out.extend(reader.missing(&rows)?);
         left_out.extend(reader.doubt(&rows)?);
         if n_empty > 0 {
             left_out.push(format!("{n_empty} rows: all their cells are empty"));
@@ -90,8 +89,7 @@ impl Table {
 }
 
 /// What stands above the names of the columns.
-fn above(lines: &[(u64, Vec<String>)], head_line: u64) -> Option<String> {
-    let n = lines.len();
+fn above(n: usize, head_line: u64) -> Option<String> {
     (n > 0).then(|| format!("{n} lines above line {head_line}, which has the names of the columns"))
 }
 
@@ -181,8 +179,8 @@ impl Reader<'_> {
 
     /// What is doubtful about the times of a log that are plain numbers.
     fn doubt(&self, rows: &[Row]) -> Result<Option<String>> {
-        let place = { self.columns.iter() }.position(|column| column.what == What::Time);
-        let Some(place) = place.filter(|_| !self.is_clock) else {
+        let mut columns = self.columns.iter().filter(|_| !self.is_clock);
+        let Some(place) = columns.position(|column| column.what == What::Time) else {
             return Ok(None);
         };
         let name = self.columns[place].name;
