@@ -115,13 +115,19 @@ impl Vanishing {
     /// # Errors
     /// When the signals cannot be listened to.
     pub fn of(path: PathBuf) -> Result<Self> {
+        // It is removed where the signals cannot be listened to, after the list is free again.
+        let own = Self { path };
+        own.enlist()?;
+        Ok(own)
+    }
+
+    fn enlist(&self) -> Result<()> {
         let mut all = VANISHING.lock().unwrap_or_else(PoisonError::into_inner);
-        let own = Self { path: path.clone() };
         if all.is_empty() {
             listen()?;
         }
-        all.push(path);
-        Ok(own)
+        all.push(self.path.clone());
+        Ok(())
     }
 
     /// A folder among the system's temporary ones.

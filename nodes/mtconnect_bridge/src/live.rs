@@ -164,9 +164,9 @@ mod tests {
         let map = MapFile::from_yaml("values:\n  ex: {is: execution}\n").unwrap();
         let config = BridgeConfig {
             source: config::Source::Log,
-            host: String::new(),
+            host: "mill".to_owned(),
             port: 1,
-            log_file: Some(String::new()),
+            log_file: Some("mill.log".to_owned()),
             log_longest_pause_s: BridgeConfig::default_longest_pause_s(),
             map_file: String::new(),
             connection: config::ConnectionConfig::default(),

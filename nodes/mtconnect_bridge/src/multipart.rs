@@ -116,8 +116,12 @@ impl Parts {
         };
         let header_at = mark_at + self.mark.len();
         let behind = &bytes[header_at..];
-        let Some((header_length, body_at)) = header_end(behind) else {
-            return lost(behind.len());
+        let head = &behind[..behind.len().min(HEADER_LIMIT)];
+        let Some((header_length, body_at)) = header_end(head) else {
+            return match behind.len() >= HEADER_LIMIT {
+                true => Err(PartFlaw::NoBoundary),
+                false => Ok(None),
+            };
         };
         let body = &behind[body_at..];
         let told = content_length(&behind[..header_length]);

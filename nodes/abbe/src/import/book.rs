@@ -50,8 +50,10 @@ fn check_within(bytes: &[u8], most_bytes: u64) -> Result<()> {
         if unpacked.saturating_add(part.size()) > most_bytes {
             bail!("{}", too_long());
         }
-        let mut tags = Tags::default();
-        tags.is_xml = name.ends_with(".xml");
+        let mut tags = Tags {
+            is_xml: name.ends_with(".xml"),
+            ..Tags::default()
+        };
         let mut piece = vec![0; PIECE_BYTES];
         loop {
             let n = part
@@ -148,8 +150,8 @@ fn attribute(tag: &[u8]) -> Option<(&'static [u8], &[u8])> {
     let (name, rest) = tag.split_at(tag.iter().position(is_blank).unwrap_or(tag.len()));
     let local = name.rsplit(|byte| *byte == b':').next().unwrap_or(name);
     match local {
-        b"c" | b"row" => Some((b"r", rest)),
-        b"dimension" => Some((b"ref", rest)),
+        b"c" | b"row" => Some((&b"r"[..], rest)),
+        b"dimension" => Some((&b"ref"[..], rest)),
         _ => None,
     }
 }

@@ -45,7 +45,9 @@ impl Table {
         let place = |name: &&str| place_of(name, head, sheet.separator);
         let places: Vec<usize> = names.iter().map(place).collect::<Result<_>>()?;
         let mut left_out = unnamed(head, &places);
-        left_out.extend(above(at, *head_line));
+        left_out.extend((at > 0).then(|| {
+            format!("{at} lines above line {head_line}, which has the names of the columns")
+        }));
         let mut reader = Reader {
             map,
             columns: &columns,
@@ -86,11 +88,6 @@ impl Table {
             odd,
         })
     }
-}
-
-/// What stands above the names of the columns.
-fn above(n: usize, head_line: u64) -> Option<String> {
-    (n > 0).then(|| format!("{n} lines above line {head_line}, which has the names of the columns"))
 }
 
 /// Refuses a row of another length than the line with the names; separators at its end do no harm.
@@ -326,10 +323,12 @@ fn read_cell(
             )),
         });
     }
-    if column.what == What::Time
-        && let Some(time_s) = times::of_text(cell)?
-    {
-        return Ok(Read::Clock(time_s));
+    if column.what == What::Time {
+        match times::of_text(cell) {
+            Ok(Some(time_s)) => return Ok(Read::Clock(time_s)),
+            Ok(None) => {}
+            Err(error) => return Ok(Read::Odd(format!("{error:#}"))),
+        }
     }
     if map.decimal != '.' && cell.contains('.') {
         bail!(

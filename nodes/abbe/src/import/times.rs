@@ -218,7 +218,8 @@ pub fn named_unit(name: &str) -> Option<Unit> {
         .collect();
     let word = match words.as_slice() {
         [only] if only.chars().count() > 3 => only,
-        [_, .., last] => last,
+        // A time of day is one of a clock.
+        [.., before, last] if *before != "of" => last,
         _ => return None,
     };
     Unit::of_word(word).filter(|unit| unit.kind() == Kind::Time)
