@@ -215,6 +215,16 @@ fn parts(name: &str) -> (Vec<String>, Option<String>) {
     (words, unit)
 }
 
+/// Whether a column is that of the directions; one odd cell makes no other of it.
+fn is_direction(cells: &[&str], is_named: bool, is_numeric: bool) -> bool {
+    let ways = cells.iter().filter_map(|cell| Direction::of_word(cell));
+    let ways: Vec<Direction> = ways.collect();
+    let has_both = ways.contains(&Direction::Up) && ways.contains(&Direction::Down);
+    let are_all = ways.len() == cells.len();
+    let are_most = 10 * ways.len() >= 9 * cells.len() && (is_named || has_both);
+    !ways.is_empty() && (are_all || are_most) && (is_named || !is_numeric)
+}
+
 fn role(
     name: &str,
     words: &[String],
@@ -228,14 +238,7 @@ fn role(
     };
     let is_one = |whole: &[&str]| words.iter().any(|word| whole.contains(&word.as_str()));
     let names_way = has(&["dir", "way", "richt", "approach", "sense"]);
-    // One odd cell makes no other column of it.
-    let ways: Vec<Direction> = { cells.iter() }
-        .filter_map(|cell| Direction::of_word(cell))
-        .collect();
-    let all_ways = !cells.is_empty() && ways.len() == cells.len();
-    let has_both = ways.contains(&Direction::Up) && ways.contains(&Direction::Down);
-    let most_ways = 10 * ways.len() >= 9 * cells.len() && (names_way || has_both);
-    if (all_ways || most_ways && !ways.is_empty()) && (names_way || !is_numeric) {
+    if is_direction(cells, names_way, is_numeric) {
         return Some(Role::Direction);
     }
     let kind = unit.map(Unit::kind);
