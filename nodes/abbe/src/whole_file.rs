@@ -177,7 +177,7 @@ fn listen() -> Result<()> {
                 }
             }
         }
-        complain!("abbe: interrupted: nothing was written");
+        complain!("abbe: interrupted; what was begun is removed");
         std::process::exit(INTERRUPTED);
     };
     let thread = std::thread::Builder::new().name("vanishing".to_owned());
