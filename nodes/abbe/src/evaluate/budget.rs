@@ -80,6 +80,9 @@ struct Angular {
     coverage_factor: f64,
     /// Range of a reading with the axis at rest, as long as a test takes.
     environmental_drift_arcsec: f64,
+    /// Standard deviation of such readings from one to the next; without it all drift counts as new at every reading.
+    #[serde(default)]
+    environmental_unrest_arcsec: Option<f64>,
 }
 
 /// `budget.yaml`.
@@ -101,6 +104,9 @@ pub struct Budget {
     misalignment_mm: f64,
     /// Range of a reading with the axes at rest, as long as a test takes.
     environmental_drift_um: f64,
+    /// Standard deviation of such readings from one to the next; without it all drift counts as new at every reading.
+    #[serde(default)]
+    environmental_unrest_um: Option<f64>,
     /// For rotary axes; where absent, their figures have no uncertainty.
     #[serde(default)]
     angular_reference: Option<Angular>,
@@ -306,6 +312,9 @@ impl Budget {
     /// The numbers of the parts that may be absent.
     fn numbers_of_parts(&self) -> impl Iterator<Item = (&'static str, f64)> {
         let angular = self.angular_reference.iter();
+        let angular_unrest = self
+            .angular_reference
+            .and_then(|one| one.environmental_unrest_arcsec);
         let of_angles = angular.flat_map(|one| {
             [
                 (
@@ -318,7 +327,12 @@ impl Budget {
                 ),
             ]
         });
+        let unrest_arcsec =
+            angular_unrest.map(|arcsec| ("angular_reference.environmental_unrest_arcsec", arcsec));
+        let unrest_um = self.environmental_unrest_um;
+        let unrest = unrest_um.map(|um| ("environmental_unrest_um", um));
         let plate = self.plate.iter();
+        let of_angles = of_angles.chain(unrest_arcsec).chain(unrest);
         of_angles.chain(plate.flat_map(|plate| {
             [
                 (
@@ -392,6 +406,7 @@ impl Budget {
             expanded_uncertainty_rad: arcsec_rad(one.expanded_uncertainty_arcsec),
             coverage_factor: one.coverage_factor,
             environmental_drift_rad: arcsec_rad(one.environmental_drift_arcsec),
+            environmental_unrest_rad: one.environmental_unrest_arcsec.map(arcsec_rad),
         })
     }
 
@@ -408,6 +423,7 @@ impl Budget {
             machine: self.machine.at(machine),
             device_expansion: self.device.at(device),
             environmental_drift_mm: self.environmental_drift_um * 1e-3,
+            environmental_unrest_mm: self.environmental_unrest_um.map(|um| um * 1e-3),
         }
     }
 
@@ -419,6 +435,7 @@ impl Budget {
         PositioningBudget {
             device: scale.unwrap_or(nothing.length_reference.inner()),
             environmental_drift_mm: self.environmental_drift_um * 1e-3,
+            environmental_unrest_mm: self.environmental_unrest_um.map(|um| um * 1e-3),
             ..nothing.positioning(None, None)
         }
     }
@@ -492,6 +509,7 @@ impl Budget {
             plate: None,
             misalignment_mm: 0.0,
             environmental_drift_um: 0.0,
+            environmental_unrest_um: None,
             angular_reference: None,
             length_corrected_by_instrument: false,
             instruments: Instruments::NONE,

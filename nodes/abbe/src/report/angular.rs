@@ -20,6 +20,7 @@ const NOTHING: RotaryBudget = RotaryBudget {
     expanded_uncertainty_rad: 0.0,
     coverage_factor: 2.0,
     environmental_drift_rad: 0.0,
+    environmental_unrest_rad: None,
 };
 
 /// One part for each test; a test that cannot be evaluated says why.

@@ -32,18 +32,24 @@
 //! reads it, u_T and u_D of temperature and expansion of machine and device over R:
 //!
 //! ```text
-//!   G, G(b), H:  u² = 2 (u_s² + u_V²)                 difference of two readings      (6)
-//!   F:           u² = u_R² + u_V² + u_T² + u_D²                                       (7)
-//!   D:           u² = u_R² + u_V²/2 + u_T² + u_D²     drift of two recordings         (8)
-//!   plate:       u_s = U₀/k,   u_R = (U₀ + U₁ R)/k                                    (9)
-//!   ballbar:     u_R² = u_s² + u_L²,   u_L of its calibrated length                  (10)
+//!   G, G(b):  u² = 2 (u_s² + u_V²)                    difference of two readings      (6)
+//!   H:        u² = 2 u_V²                             of one place, in both senses    (7)
+//!   F:        u² = u_R² + u_V² + u_T² + u_D²                                          (8)
+//!   D:        u² = u_M² + (u_V/2)² + u_T² + u_D²                                      (9)
+//!   plate:    u_s = U₀/k,   u_R = (U₀ + U₁ R)/k,   u_M = (U₀/2 + U₁ R)/k             (10)
+//!   ballbar:  u_M² = u_R² = u_s² + u_L²,   u_L of its calibrated length              (11)
 //! ```
 //!
-//! A plate reads the radius itself, so the constant U₀ of its certificate is in u_R once (9). A ballbar
-//! reads changes of a length that another device calibrated (10).
+//! A plate reads the radius itself, so the constant U₀ of its certificate is in u_R once (10). A ballbar
+//! reads changes of a length that another device calibrated (11).
+//!
+//! (7): both senses are read at the same angle by the same device, whose error there is in both and leaves their difference.
+//! (9): D is the mean of a turn. An error of one axis of the plate that repeats with a length λ leaves of it
+//! √2 u_s J₁(2π R/λ) for both axes; λ ≤ 2R, since what is longer is in U₁, and there |J₁| ≤ 0.346: less than u_s/2. Drift
+//! leaves most where it has one wave a turn: half of each axis, √2 for both axes, 1/√2 for two turns: u_V/2.
 //!
 //! # Holds when
-//! Radii are those at 20 °C ([`CircularTest::corrected_to_20_degc`]): (7) and (8) have what is left then.
+//! Radii are those at 20 °C ([`CircularTest::corrected_to_20_degc`]): (8) and (9) have what is left then.
 //! Each recording goes round the full circle. The circles are those of least squares; the
 //! smallest ring that holds a path can be thinner than G, never thicker.
 //!
@@ -87,7 +93,7 @@ pub struct CircularTest {
 pub struct CircularBudget {
     /// The device that reads the deviations; a plate reads the radius with it too.
     pub displacement: DeviceUncertainty,
-    /// Calibrated length of a ballbar; none: the displacement device reads the radius itself, (9).
+    /// Calibrated length of a ballbar; none: the displacement device reads the radius itself, (10).
     pub length: Option<DeviceUncertainty>,
     /// Temperature and expansion of the machine.
     pub machine: Expansion,
@@ -186,6 +192,7 @@ pub fn evaluate(
 /// Standard uncertainties of the figures, mm.
 struct FigureUncertainties {
     difference_mm: f64,
+    of_one_place_mm: f64,
     radial_mm: f64,
     mean_radial_mm: f64,
 }
@@ -198,11 +205,14 @@ impl CircularBudget {
         check_not_negative("environmental_drift_mm", self.environmental_drift_mm)?;
         let reading_mm = self.displacement.standard_mm(0.0);
         let drift_mm = drift_mm(self.environmental_drift_mm);
-        let read_radius_mm = match &self.length {
-            None => self.displacement.standard_mm(radius_mm), // (9)
+        let [read_radius_mm, read_mean_mm] = match &self.length {
+            None => {
+                let all_mm = self.displacement.standard_mm(radius_mm);
+                [all_mm, all_mm - reading_mm / 2.0] // (10)
+            }
             Some(length) => {
                 length.check()?;
-                reading_mm.hypot(length.standard_mm(radius_mm)) // (10)
+                [reading_mm.hypot(length.standard_mm(radius_mm)); 2] // (11)
             }
         };
         let expansion_mm = self
@@ -211,8 +221,9 @@ impl CircularBudget {
             .hypot(self.device_expansion.standard_mm(radius_mm));
         Ok(FigureUncertainties {
             difference_mm: (2.0_f64).sqrt() * reading_mm.hypot(drift_mm), // (6)
-            radial_mm: combined(&[read_radius_mm, drift_mm, expansion_mm]), // (7)
-            mean_radial_mm: combined(&[read_radius_mm, drift_mm / 2.0_f64.sqrt(), expansion_mm]), // (8)
+            of_one_place_mm: (2.0_f64).sqrt() * drift_mm,                 // (7)
+            radial_mm: combined(&[read_radius_mm, drift_mm, expansion_mm]), // (8)
+            mean_radial_mm: combined(&[read_mean_mm, drift_mm / 2.0, expansion_mm]), // (9)
         })
     }
 }
@@ -266,7 +277,7 @@ impl Frame<'_> {
             radius_mm: circle.radius_mm,
             circular_error: ExpandedLength::new(range(radii), u.difference_mm), // (2)
             mean_radial_deviation: ExpandedLength::new(mean_radial_mm, u.mean_radial_mm),
-            hysteresis_1996: ExpandedLength::new(hysteresis_mm, u.difference_mm),
+            hysteresis_1996: ExpandedLength::new(hysteresis_mm, u.of_one_place_mm),
             hysteresis_angle_rad,
         }
     }

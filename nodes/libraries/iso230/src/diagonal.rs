@@ -14,6 +14,16 @@
 //! standard names. (3) is derived, not of the standard: it keeps what the diagonals differ by, and
 //! needs deviations that are zero at the same corner's end of each.
 //!
+//! E_d and B_d have the uncertainty of the diagonal that has them. Of two means on different diagonals, l₁ and l₂ from
+//! their zeros, one device and one machine have read both: what grows with the length is common to them and counts for
+//! l₁ − l₂, the constant part of the certificate and the alignment, which is new on each diagonal, count twice:
+//!
+//! ```text
+//!   spread:  u² = 2 U₀²/k² + [U₁ (l₁ − l₂)/k]² + u_T²(l₁ − l₂) + u_R²(l₁) + u_R²(l₂) + 2 (2/n) u_V²   (4)
+//! ```
+//!
+//! with u_T of temperatures and coefficients of expansion, u_R of the alignment, u_V of the drift of one reading.
+//!
 //! Squareness makes diagonals unequal: an angle φ between X and Y alone changes P-P by about
 //! +φ X Y/L and N-P by −φ X Y/L, with L the diagonal's length. A scale error makes all of them long
 //! or short alike. The figures do not tell other errors apart.
@@ -30,9 +40,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::extent::{greatest, range};
+use super::budget::combined;
 use super::positioning::budget::PositioningBudget;
-use super::positioning::{self, PositioningResult, PositioningRuns};
+use super::positioning::{self, PointResult, PositioningResult, PositioningRuns};
 use super::{ExpandedLength, Iso230Error};
 
 /// A space diagonal by the sense of X, Y and Z while it is run upwards: positive or negative.
@@ -116,33 +126,82 @@ pub fn evaluate(
                 n: given.len(),
             });
         };
-        Ok(DiagonalResult {
-            diagonal,
-            positioning: positioning::evaluate(&runs.runs, budget)?,
-        })
+        let positioning = positioning::evaluate(&runs.runs, budget)?;
+        let means = means(&runs.runs, &positioning);
+        Ok((
+            means,
+            DiagonalResult {
+                diagonal,
+                positioning,
+            },
+        ))
     };
-    let diagonals: Vec<DiagonalResult> = SpaceDiagonal::ALL
+    let found: Vec<(Vec<Mean>, DiagonalResult)> = SpaceDiagonal::ALL
         .into_iter()
         .map(one)
-        .collect::<Result<_, _>>()?;
+        .collect::<Result<_, Iso230Error>>()?;
+    let (means, diagonals): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    // The diagonal that has the greatest has its uncertainty too.
     let of = |figure: fn(&PositioningResult) -> ExpandedLength| {
-        let figures = || diagonals.iter().map(|d| figure(&d.positioning));
-        ExpandedLength {
-            value_mm: greatest(figures().map(|f| f.value_mm)),
-            expanded_uncertainty_mm: greatest(figures().map(|f| f.expanded_uncertainty_mm)),
-        }
+        let figures = diagonals.iter().map(|d| figure(&d.positioning));
+        let most = figures.max_by(|a, b| a.value_mm.total_cmp(&b.value_mm));
+        most.unwrap_or(ExpandedLength::new(0.0, 0.0))
     };
-    let systematic_error = of(|p| p.systematic_error);
-    let points = diagonals.iter().flat_map(|d| &d.positioning.points);
-    let means = points.flat_map(|p| [p.up.mean_mm, p.down.mean_mm]);
+    let (systematic_error, reversal) = (of(|p| p.systematic_error), of(|p| p.reversal));
     Ok(DiagonalsResult {
         systematic_error,
-        reversal: of(|p| p.reversal),
-        spread: ExpandedLength {
-            value_mm: range(means),
-            // Two means of different diagonals: each with what E has for its own.
-            expanded_uncertainty_mm: 2.0_f64.sqrt() * systematic_error.expanded_uncertainty_mm,
-        },
+        reversal,
+        spread: spread(&means.concat(), budget),
         diagonals,
     })
+}
+
+/// A mean deviation on a diagonal.
+#[derive(Clone, Copy)]
+struct Mean {
+    /// From the zero of the device, mm.
+    length_mm: f64,
+    mean_mm: f64,
+    /// Length over which the beam was aligned, mm.
+    span_mm: f64,
+    n_runs: usize,
+}
+
+/// All means of one diagonal.
+fn means(runs: &PositioningRuns, found: &PositioningResult) -> Vec<Mean> {
+    let sides = |p: &PointResult| {
+        [p.up, p.down].map(|side| Mean {
+            length_mm: p.target_mm - runs.zero_mm,
+            mean_mm: side.mean_mm,
+            span_mm: runs.span_mm(),
+            n_runs: found.n_runs,
+        })
+    };
+    found.points.iter().flat_map(sides).collect()
+}
+
+/// (3) and (4); there is a mean at least.
+fn spread(means: &[Mean], budget: &PositioningBudget) -> ExpandedLength {
+    let by_mean = |a: &&Mean, b: &&Mean| a.mean_mm.total_cmp(&b.mean_mm);
+    let (Some(high), Some(low)) = (means.iter().max_by(by_mean), means.iter().min_by(by_mean))
+    else {
+        return ExpandedLength::new(0.0, 0.0);
+    };
+    let apart = budget.over((high.length_mm - low.length_mm).abs(), high.span_mm);
+    let constant_mm = budget.device.standard_mm(0.0);
+    let aligned = |m: &Mean| budget.over(m.length_mm, m.span_mm).alignment_mm;
+    let drift = |m: &Mean| (2.0 / m.n_runs as f64).sqrt() * apart.drift_mm;
+    let u_mm = combined(&[
+        2.0_f64.sqrt() * constant_mm,
+        apart.device_mm - constant_mm,
+        apart.machine_temperature_mm,
+        apart.machine_expansion_mm,
+        apart.device_temperature_mm,
+        apart.device_expansion_mm,
+        aligned(high),
+        aligned(low),
+        drift(high),
+        drift(low),
+    ]);
+    ExpandedLength::new(high.mean_mm - low.mean_mm, u_mm)
 }

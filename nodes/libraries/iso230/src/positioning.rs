@@ -265,16 +265,19 @@ pub fn evaluate(
     let reversals: Vec<f64> = points.iter().map(|p| p.reversal_mm).collect();
     let greatest_reversal_mm = greatest(reversals.iter().map(|b| b.abs()));
     let repeatability_mm = greatest(points.iter().map(|p| p.repeatability_mm));
-    let means = points.iter().map(|p| [p.target_mm, p.mean_mm, p.mean_mm]);
+    let means = points
+        .iter()
+        .map(|p| [p.target_mm, p.mean_mm, p.mean_mm, 0.0]);
     let means = between(means);
-    let u_means_mm = u(means.apart_mm).mean_systematic_mm;
+    let u_means_mm = u(means.apart_mm).mean_systematic_mm();
+    let u_repeatability_mm = of_repeatability(&points, repeatability_mm, &of_one_place);
     Ok(PositioningResult {
         n_runs,
         up: direction(ups(), &u),
         down: direction(downs(), &u),
-        reversal: ExpandedLength::new(greatest_reversal_mm, of_one_place.reversal_mm),
-        mean_reversal: ExpandedLength::new(mean(&reversals), of_one_place.reversal_mm),
-        repeatability: ExpandedLength::new(repeatability_mm, of_one_place.repeatability_mm),
+        reversal: ExpandedLength::new(greatest_reversal_mm, of_one_place.reversal_mm()),
+        mean_reversal: ExpandedLength::new(mean(&reversals), of_one_place.reversal_mm()),
+        repeatability: ExpandedLength::new(repeatability_mm, u_repeatability_mm),
         systematic_error: systematic(both(), &u),
         mean_systematic_error: ExpandedLength::new(means.range_mm, u_means_mm),
         accuracy: accuracy(both(), &u),
@@ -338,27 +341,43 @@ fn interval(mean_mm: f64, scatter_mm: f64, n: usize, u_length_mm: f64) -> MeanIn
     }
 }
 
+/// Standard uncertainty of R, of the target that has it, mm.
+fn of_repeatability(points: &[PointResult], most_mm: f64, u: &FigureUncertainties) -> f64 {
+    let has_it = |p: &&PointResult| p.repeatability_mm >= most_mm;
+    points.iter().find(has_it).map_or(0.0, |p| {
+        let (up, down) = (p.up.standard_deviation_mm, p.down.standard_deviation_mm);
+        if most_mm > 4.0 * up.max(down) {
+            u.repeatability_mm(up, down)
+        } else {
+            u.repeatability_one_way_mm(up.max(down))
+        }
+    })
+}
+
 /// A highest value less a lowest one.
 struct Between {
     range_mm: f64,
     /// Distance of the places of both, mm.
     apart_mm: f64,
+    /// Standard deviation at the highest and at the lowest, mm.
+    scatter_mm: [f64; 2],
 }
 
-/// Highest less lowest value of points as target, upper and lower value, mm; there is one at least.
-fn between(points: impl Iterator<Item = [f64; 3]>) -> Between {
-    let (mut high, mut low) = ([0.0, f64::NEG_INFINITY], [0.0, f64::INFINITY]);
-    for [target_mm, upper_mm, lower_mm] in points {
+/// Highest less lowest value of points as target, upper value, lower value and standard deviation, mm; there is one at least.
+fn between(points: impl Iterator<Item = [f64; 4]>) -> Between {
+    let (mut high, mut low) = ([0.0, f64::NEG_INFINITY, 0.0], [0.0, f64::INFINITY, 0.0]);
+    for [target_mm, upper_mm, lower_mm, scatter_mm] in points {
         if upper_mm > high[1] {
-            high = [target_mm, upper_mm];
+            high = [target_mm, upper_mm, scatter_mm];
         }
         if lower_mm < low[1] {
-            low = [target_mm, lower_mm];
+            low = [target_mm, lower_mm, scatter_mm];
         }
     }
     Between {
         range_mm: high[1] - low[1],
         apart_mm: (high[0] - low[0]).abs(),
+        scatter_mm: [high[2], low[2]],
     }
 }
 
@@ -367,9 +386,12 @@ fn direction(
     points: impl Iterator<Item = (f64, PointDirection)> + Clone,
     u: &impl Fn(f64) -> FigureUncertainties,
 ) -> DirectionResult {
-    let repeatability_mm = greatest(points.clone().map(|(_, p)| p.repeatability_mm));
+    let scatter_mm = greatest(points.clone().map(|(_, p)| p.standard_deviation_mm));
     DirectionResult {
-        repeatability: ExpandedLength::new(repeatability_mm, u(0.0).repeatability_one_way_mm),
+        repeatability: ExpandedLength::new(
+            4.0 * scatter_mm,
+            u(0.0).repeatability_one_way_mm(scatter_mm),
+        ),
         systematic_error: systematic(points.clone(), u),
         accuracy: accuracy(points, u),
     }
@@ -380,8 +402,8 @@ fn systematic(
     points: impl Iterator<Item = (f64, PointDirection)>,
     u: &impl Fn(f64) -> FigureUncertainties,
 ) -> ExpandedLength {
-    let means = between(points.map(|(target_mm, p)| [target_mm, p.mean_mm, p.mean_mm]));
-    ExpandedLength::new(means.range_mm, u(means.apart_mm).systematic_mm)
+    let means = between(points.map(|(target_mm, p)| [target_mm, p.mean_mm, p.mean_mm, 0.0]));
+    ExpandedLength::new(means.range_mm, u(means.apart_mm).systematic_mm())
 }
 
 /// (7).
@@ -391,7 +413,9 @@ fn accuracy(
 ) -> ExpandedLength {
     let ends = between(points.map(|(target_mm, p)| {
         let two_s_mm = 2.0 * p.standard_deviation_mm;
-        [target_mm, p.mean_mm + two_s_mm, p.mean_mm - two_s_mm]
+        let (upper_mm, lower_mm) = (p.mean_mm + two_s_mm, p.mean_mm - two_s_mm);
+        [target_mm, upper_mm, lower_mm, p.standard_deviation_mm]
     }));
-    ExpandedLength::new(ends.range_mm, u(ends.apart_mm).accuracy_mm)
+    let u_mm = u(ends.apart_mm).accuracy_mm(ends.scatter_mm);
+    ExpandedLength::new(ends.range_mm, u_mm)
 }

@@ -16,15 +16,18 @@
 //! | [`sphere`] | 3-D probing error, P_FTU,3D | 25 points |
 //! | [`location`] | circle or sphere centre location repeatability, R_CIR, R_SPH | 10 features |
 //!
-//! Uncertainties, with u_V of the drift of one touch and the artefact's roundness f:
+//! Uncertainties, with u_V of the drift of one touch and the artefact's roundness f; q is the variance factor of r in the
+//! least-squares fit of p unknowns (3 of a circle, 4 of a sphere) to n touches, (Xᵀ X)⁻¹_rr with rows (direction, 1) of X:
 //!
 //! ```text
-//!   (1):  u² = 2 u_V²;    (2):  u² = 2 u_V² + f²/3 + u_f²                             (5)
-//!   (3):  u² = u_d² + u_T² + 4 u_V²                                                   (6)
+//!   (1):  u² = 2 u_V²;    (2):  u² = 2 u_V² (1 − p/n) + (f² + u_f²)/6                 (5)
+//!   (3):  u² = u_d² + u_T² + 4 q u_V²                                                 (6)
 //!   (4):  u² = 2 u_V²                                                                 (7)
 //! ```
 //!
-//! f²/3 takes the artefact's form as adding or taking away anything up to f.
+//! (f² + u_f²)/6: each of the two touches whose difference is P lies anywhere within the artefact's form, rectangular with the
+//! half width f/2: f²/12 each. 1 − p/n: the fit takes p of n parts of what is new at every touch. (6): 2r is twice the
+//! least-squares radius.
 //!
 //! # Holds when
 //! Diameters are those of one temperature: (3) takes no expansion out, and u_T has what is not known of the scale where the
@@ -39,10 +42,10 @@
 //! # References
 //! \[1\] ISO 230-10:2022; names from the literature, the text was not at hand.
 
-use nalgebra::{SVector, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::budget::{DeviceUncertainty, Expansion, combined, drift_mm, rectangular};
+use super::budget::{DeviceUncertainty, Expansion, combined, drift_mm};
 use super::extent::{
     check_finite, check_not_negative, check_points, check_positive, range, standard_deviation,
 };
@@ -212,17 +215,20 @@ fn form<const D: usize>(
         Side::Outside => -artefact.stylus_radius_mm,
     };
     let size_mm = 2.0 * (round.radius_mm + ball_mm) - artefact.diameter_mm; // (3)
-    let u_form_mm = combined(&[
-        difference_mm,
-        rectangular(artefact.form_mm),
-        artefact.form_standard_uncertainty_mm,
-    ]);
+    let n = points_mm.len() as f64;
+    let left = (1.0 - (D as f64 + 1.0) / n).max(0.0);
+    let of_form_mm = artefact
+        .form_mm
+        .hypot(artefact.form_standard_uncertainty_mm);
+    let u_form_mm = (left.sqrt() * difference_mm).hypot(of_form_mm / 6.0_f64.sqrt());
+    let u_drift_mm = drift_mm(environmental_drift_mm);
+    let q = radius_variance(points_mm, &round.centre_mm).unwrap_or(1.0);
     let u_size_mm = combined(&[
         artefact
             .diameter_uncertainty
             .standard_mm(artefact.diameter_mm),
         artefact.expansion.standard_mm(artefact.diameter_mm),
-        2.0 * drift_mm(environmental_drift_mm),
+        2.0 * q.sqrt() * u_drift_mm,
     ]);
     Ok(FormResult {
         n: points_mm.len(),
@@ -231,6 +237,22 @@ fn form<const D: usize>(
         size_error: ExpandedLength::new(size_mm, u_size_mm),
         unusual_number: unusual(points_mm.len(), usual),
     })
+}
+
+/// q of (6), of points about their centre; `None` where they do not determine it.
+fn radius_variance<const D: usize>(
+    points_mm: &[SVector<f64, D>],
+    centre_mm: &SVector<f64, D>,
+) -> Option<f64> {
+    let mut normal = DMatrix::<f64>::zeros(D + 1, D + 1);
+    for point in points_mm {
+        let apart_mm = point - centre_mm;
+        let direction = apart_mm / apart_mm.norm();
+        let row = DVector::from_fn(D + 1, |i, _| if i < D { direction[i] } else { 1.0 });
+        normal += &row * row.transpose();
+    }
+    let q = normal.try_inverse()?[(D, D)];
+    q.is_finite().then_some(q)
 }
 
 impl Artefact {

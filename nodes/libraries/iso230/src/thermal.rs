@@ -29,20 +29,23 @@
 //! ```text
 //!   d_t, range:  u² = [2 U₀² + (U₁ d)²]/k² + 2 s² + (α l Δθ)²/3                        (5)
 //!   an angle:    u² = 4 (U₀²/k² + s²)/(h₂ − h₁)²
-//!   rate:        u² = u_res² + u²(5, s = 0)/τ²,   u_res of the slope by its residuals  (6)
+//!   rate:        u² = u_res² + [2 U₀² + (U₁ d)²]/(k τ)² + (α l Δθ)²/(3 T²)             (6)
 //!   s² = mean of e_i²/(1 + w_i² + (1 − w_i)²),   e_i = x_i − [w_i x_{i−1} + (1 − w_i) x_{i+1}],
 //!        w_i = (t_{i+1} − t_i)/(t_{i+1} − t_{i−1})                                    (7)
 //! ```
 //!
-//! The second part of (6) is the difference of two readings τ apart: errors of a certificate and growth of the artefact
-//! bend as the drift does, and residuals do not show them. Scatter is in the residuals. (7) takes each reading against the
+//! u_res is that of the slope by its residuals, which have the scatter. The second part of (6) is the certificate's of two
+//! readings τ apart, d that of the range: its errors bend as the drift does, and residuals do not show them. The third is the growth of the
+//! artefact in the last τ of the test of length T: a body that follows the shop or warms up slows down towards the end,
+//! so that at most τ/T of its whole growth is left for the window. (7) takes each reading against the
 //! straight line between its neighbours, whose three variances add to the denominator: a drift that bends between
 //! neighbours makes s greater, never smaller.
 //!
 //! # Holds when
 //! What is sampled is slow beside the samples: between two of them (1) takes a straight line. u_res
 //! holds when residuals are independent; a bend of the curve makes them not so. The
-//! growth of the artefact is one for both heights and leaves the angle.
+//! growth of the artefact is one for both heights and leaves the angle. An artefact that warms up in steps during the test
+//! can grow by more than τ/T in the last τ.
 //!
 //! # Agreement
 //! Closed form: `val_iso230_3_an_exponential_drift_has_its_closed_form`, d and range below 1e-15 mm,
@@ -232,7 +235,7 @@ pub fn evaluate(test: &DriftTest, budget: &DriftBudget) -> Result<DriftResult, I
         .collect::<Result<_, _>>()?;
     Ok(DriftResult {
         cause: test.cause,
-        duration_s: range(test.times_s.iter().copied()),
+        duration_s: test.duration_s(),
         drift_after_s: test.drift_after_s,
         displacements,
         angles,
@@ -272,11 +275,11 @@ fn displacement(
     };
     let (drift_after, _) = of(test.drift(values_mm));
     let (range, contributions) = of(range(values_mm.iter().copied()));
-    let without_scatter = DriftContributions {
-        scatter_mm: 0.0,
-        ..contributions
-    };
-    let (rate_mm_s, u_rate_mm_s) = test.rate(values_mm, without_scatter.combined_mm())?;
+    let share = test.rate_window_s / test.duration_s();
+    let of_window_mm = contributions
+        .certificate_mm
+        .hypot(share * contributions.artefact_mm);
+    let (rate_mm_s, u_rate_mm_s) = test.rate(values_mm, of_window_mm)?;
     Ok(DisplacementDrift {
         axis: channel.axis,
         height_mm: channel.height_mm,
@@ -305,7 +308,7 @@ impl DriftTest {
                 });
             }
         }
-        let covered = range(self.times_s.iter().copied());
+        let covered = self.duration_s();
         let needed = self.drift_after_s.max(self.rate_window_s);
         if covered < needed {
             return Err(Iso230Error::TooShort {
@@ -348,6 +351,11 @@ impl DriftTest {
         self.channels.iter().filter(move |c| c.axis == axis)
     }
 
+    /// T, s.
+    fn duration_s(&self) -> f64 {
+        range(self.times_s.iter().copied())
+    }
+
     /// (1); the test is known to be long enough.
     fn drift(&self, values: &[f64]) -> f64 {
         let at_s = self.times_s[0] + self.drift_after_s;
@@ -358,7 +366,7 @@ impl DriftTest {
         values[after - 1] + share * (values[after] - values[after - 1]) - values[0]
     }
 
-    /// (3) and (6): slope and its standard uncertainty; `u_difference` is (5) without scatter.
+    /// (3) and (6): slope and its standard uncertainty; `u_difference` is what the window is off by from one end to the other.
     fn rate(&self, values: &[f64], u_difference: f64) -> Result<(f64, f64), Iso230Error> {
         let end_s = self.times_s[self.times_s.len() - 1];
         let begin_s = end_s - self.rate_window_s;

@@ -116,6 +116,7 @@ mod tests {
             machine: body,
             device_expansion: body,
             environmental_drift_mm: 1e-4,
+            environmental_unrest_mm: None,
         }
     }
 

@@ -13,8 +13,8 @@
 //! ```
 //!
 //! The line in (1) keeps a lead error or expansion from leaking into the harmonics. u(P) is the
-//! first-order propagation of (4) through the two extremes of (3), beside the drift of one reading
-//! at each.
+//! first-order propagation of (4) through the two extremes of (3). Drift has no term beside it: what of it is slow over a
+//! period is in the line, and what is not is in the residuals of (4).
 //!
 //! # Holds when
 //! Readings scatter independently. On a whole positioning test the harmonics are rarely determined:
@@ -36,7 +36,6 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::budget::PositioningBudget;
-use crate::budget::drift_mm;
 use crate::extent::{check_finite, check_length, check_points, check_positive, mean, range};
 use crate::{ExpandedLength, Iso230Error};
 use metrology::least_squares::{self, WeightedFit};
@@ -108,13 +107,9 @@ pub fn evaluate(
     let (highest, lowest) = extremes(run, &fit.parameters);
     let contrast = highest.1 - lowest.1;
     let of_fit_mm2 = (contrast.transpose() * &covariance * &contrast)[0];
-    let of_drift_mm2 = 2.0 * drift_mm(budget.environmental_drift_mm).powi(2);
     Ok(PeriodicResult {
         period_mm: run.period_mm,
-        periodic_error: ExpandedLength::new(
-            highest.0 - lowest.0,
-            (of_fit_mm2 + of_drift_mm2).sqrt(),
-        ),
+        periodic_error: ExpandedLength::new(highest.0 - lowest.0, of_fit_mm2.max(0.0).sqrt()),
         harmonics,
         slope_mm_per_mm: fit.parameters[1],
         residual_standard_deviation_mm: s2_mm2.sqrt(),
@@ -256,6 +251,7 @@ mod tests {
             machine: none,
             device_expansion: none,
             environmental_drift_mm: 0.0,
+            environmental_unrest_mm: None,
         }
     }
 

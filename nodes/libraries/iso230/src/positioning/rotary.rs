@@ -8,8 +8,8 @@
 //!
 //! ```text
 //!   x_ij = P_ij − P_i + 2π m,   m such that −π < x_ij ≤ π                              (1)
-//!   B: u² = (2/n) u_V²,  R↑: u² = 4² u_V²,  R: u² = (4² + 2/n) u_V²                      (2)
-//!   E↑, E: u² = u_D² + (2/n) u_V²,  M: u² = u_D² + (1/n) u_V²,  A: u² = u_D² + (4² + 2/n) u_V²   (3)
+//!   B, R↑, R: u by (2) to (5) of [`super::budget`]                                                (2)
+//!   E↑, E, M, A: u by (6) to (8) there, with u_D for u_L                                           (3)
 //! ```
 //!
 //! | symbol | here | unit |
@@ -69,6 +69,10 @@ pub struct RotaryBudget {
     pub coverage_factor: f64,
     /// Range of the reading with the axis at rest, as long as a test takes, rad.
     pub environmental_drift_rad: f64,
+    /// Standard deviation of a reading at rest from one moment to the next, rad; none: all drift counts as new at every
+    /// reading.
+    #[serde(default)]
+    pub environmental_unrest_rad: Option<f64>,
 }
 
 /// One target from one side.
@@ -282,7 +286,9 @@ impl RotaryBudget {
     fn check(&self) -> Result<(), Iso230Error> {
         check_not_negative("expanded_uncertainty_rad", self.expanded_uncertainty_rad)?;
         check_positive("coverage_factor", self.coverage_factor)?;
-        check_not_negative("environmental_drift_rad", self.environmental_drift_rad)
+        check_not_negative("environmental_drift_rad", self.environmental_drift_rad)?;
+        let unrest_rad = self.environmental_unrest_rad.unwrap_or(0.0);
+        check_not_negative("environmental_unrest_rad", unrest_rad)
     }
 
     /// The same in a budget of which nothing grows with the angle: (2), (3).
@@ -303,6 +309,7 @@ impl RotaryBudget {
             machine: RIGID,
             device_expansion: RIGID,
             environmental_drift_mm: self.environmental_drift_rad,
+            environmental_unrest_mm: self.environmental_unrest_rad,
         }
     }
 }
@@ -318,6 +325,7 @@ mod tests {
             expanded_uncertainty_rad: 0.6 * ARCSEC,
             coverage_factor: 2.0,
             environmental_drift_rad: 0.0,
+            environmental_unrest_rad: None,
         }
     }
 

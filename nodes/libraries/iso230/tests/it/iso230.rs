@@ -39,6 +39,7 @@ pub const EXACT: PositioningBudget = PositioningBudget {
     machine: RIGID,
     device_expansion: RIGID,
     environmental_drift_mm: 0.0,
+    environmental_unrest_mm: None,
 };
 
 /// The one place where a positioning test is evaluated.

@@ -182,7 +182,7 @@ fn figure_errors(budget: &PositioningBudget) -> Vec<PositioningResult> {
 }
 
 #[test]
-fn eq2_eq5_eq6_of_the_budget_are_the_scatter_of_the_figures() {
+fn eq2_eq6_eq7_of_the_budget_are_the_scatter_of_the_figures() {
     let budget = PositioningBudget {
         device: DeviceUncertainty {
             expanded_uncertainty_per_length: 1.2e-6,
@@ -216,7 +216,7 @@ fn eq2_eq5_eq6_of_the_budget_are_the_scatter_of_the_figures() {
 }
 
 #[test]
-fn eq3_eq4_eq7_of_the_budget_bound_what_drift_adds_to_the_scatter() {
+fn eq4_eq5_eq8_of_the_budget_bound_what_drift_adds_to_the_scatter() {
     let budget = PositioningBudget {
         environmental_drift_mm: 0.004,
         ..EXACT

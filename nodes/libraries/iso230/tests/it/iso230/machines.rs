@@ -116,13 +116,22 @@ impl Drift {
         self.trend_mm * time + waves + self.unrest_mm * normal(rng)
     }
 
-    /// Range of a watch as long as the test, before it.
-    pub fn watched_mm(&self, rng: &mut Pcg64Mcg) -> f64 {
+    /// Range of a watch as long as the test, before it, and the unrest of a reading by the spread about the line between its
+    /// neighbours.
+    pub fn watch(&self, rng: &mut Pcg64Mcg) -> [f64; 2] {
         let read: Vec<f64> = (0..60)
             .map(|k| self.at(f64::from(k) / 60.0 - 1.0, rng))
             .collect();
-        read.iter().copied().fold(f64::MIN, f64::max)
-            - read.iter().copied().fold(f64::MAX, f64::min)
+        let greatest = read.iter().copied().fold(f64::MIN, f64::max);
+        let least = read.iter().copied().fold(f64::MAX, f64::min);
+        let bends = read.windows(3).map(|x| x[1] - (x[0] + x[2]) / 2.0);
+        let squares: f64 = bends.map(|bend| bend * bend / 1.5).sum();
+        [greatest - least, (squares / 58.0).sqrt()]
+    }
+
+    /// Range of such a watch.
+    pub fn watched_mm(&self, rng: &mut Pcg64Mcg) -> f64 {
+        self.watch(rng)[0]
     }
 }
 

@@ -21,7 +21,7 @@ pub struct Laser {
     device: Body,
     misalignment_mm: f64,
     drift: Drift,
-    environmental_drift_mm: f64,
+    watched_mm: [f64; 2],
     scatter_mm: f64,
 }
 
@@ -43,7 +43,7 @@ impl Laser {
             machine: Body::draw(rng, (shop_k, 1.0), alpha),
             device: Body::draw(rng, (shop_k, 0.5), of_gauge),
             misalignment_mm: between(rng, 0.0, 0.3),
-            environmental_drift_mm: drift.watched_mm(rng),
+            watched_mm: drift.watch(rng),
             drift,
             scatter_mm: UM * between(rng, 0.05, 0.6),
         }
@@ -55,7 +55,8 @@ impl Laser {
             misalignment_mm: self.misalignment_mm,
             machine: self.machine.stated,
             device_expansion: self.device.stated,
-            environmental_drift_mm: self.environmental_drift_mm,
+            environmental_drift_mm: self.watched_mm[0],
+            environmental_unrest_mm: Some(self.watched_mm[1]),
         }
     }
 

@@ -102,10 +102,12 @@ fn tested(seed: u64) -> Vec<Held> {
         .collect();
     let size_rad = ARCSEC * between(&mut rng, 0.05, 0.4);
     let drift = Drift::draw(&mut rng, size_rad);
+    let [environmental_drift_rad, unrest_rad] = drift.watch(&mut rng);
     let budget = RotaryBudget {
         expanded_uncertainty_rad: 2.0 * standard_rad,
         coverage_factor: 2.0,
-        environmental_drift_rad: drift.watched_mm(&mut rng),
+        environmental_drift_rad,
+        environmental_unrest_rad: Some(unrest_rad),
     };
     let [truth, [up_rad, down_rad]] =
         recorded(&mut rng, &axis, &targets_rad, (&reference_rad, &drift));
