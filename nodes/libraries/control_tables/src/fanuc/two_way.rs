@@ -99,7 +99,7 @@ pub fn two_way_tables(errors: &AxisErrors, set_up: &PitchTable) -> Result<Pitch,
         negative.0,
         at_down.saturating_neg()
     ));
-    notes.push("meaning of 3605#0 and 3620 to 3626: FANUC Technical Report A-77810E, table (a); how 3627 ends and that the values of the negative direction ascend with the position are NOT from a FANUC page: read both directions on a dial gauge after loading".to_owned());
+    notes.push("meaning of 3605#0 and 3620 to 3626: FANUC Technical Report A-77810E, table (a); FROM MEMORY and NOT from a FANUC page: how the description of 3627 ends, and that the values of the negative direction ascend with the position: read both directions on a dial gauge after loading".to_owned());
     Ok(Pitch {
         file: ExportFile::new(format!("PITCH_{axis}.TXT"), text, notes),
         numbers: vec![positive, negative],
