@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 use super::section::{Rows, Section, head};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, Instrument, NOT_STATED};
-use crate::evaluate::correction::Measured;
+use crate::evaluate::circles::CircleRecording;
+use crate::evaluate::correction::{Measured, MeasuredCircle};
 use crate::evaluate::linear::LinearTest;
 use crate::evaluate::test_conditions::{Readings, TestConditions};
 
@@ -241,20 +242,32 @@ fn instruments_json(seen: &TestConditions, budget: Option<&Budget>) -> Value {
 
 /// Which of the tests have the lengths that they have at 20 °C.
 fn correction_of(tests: Option<&Tests>, budget: Option<&Budget>) -> String {
-    let Some(tests) = tests.filter(|tests| !tests.linear.is_empty()) else {
+    let Some(tests) = tests.filter(|t| !t.linear.is_empty() || !t.circles.is_empty()) else {
         return "not done: lengths, radii and locations are as measured".to_owned();
     };
-    let lacks = |test: &LinearTest| {
+    let of_line = |test: &LinearTest| {
         let about: (&[u32], _, _) = (&test.runs, test.reference, test.axis);
         Measured::of(tests, budget, about).correction.lacks()
     };
-    let all: Vec<Option<String>> = tests.linear.iter().map(lacks).collect();
-    let n_done = all.iter().filter(|why| why.is_none()).count();
-    let done = format!(
-        "done for {n_done} of {} tests of positioning and diagonals",
-        all.len()
-    );
-    match listed(all.into_iter().flatten()) {
+    let of_circle = |circle: &CircleRecording| {
+        let read = tests.conditions.during(&[circle.segment.run]);
+        MeasuredCircle::of(budget, &read, circle.instrument)
+            .correction
+            .lacks()
+    };
+    let lines = tests.linear.iter().map(of_line).collect();
+    let circles = tests.circles.iter().map(of_circle).collect();
+    let parts: [(Vec<Option<String>>, &str); 2] = [
+        (lines, "tests of positioning and diagonals"),
+        (circles, "circles (D and F)"),
+    ];
+    let of_part = |(all, what): &(Vec<Option<String>>, &str)| {
+        let n_done = all.iter().filter(|why| why.is_none()).count();
+        (!all.is_empty()).then(|| format!("{n_done} of {} {what}", all.len()))
+    };
+    let done: Vec<String> = parts.iter().filter_map(of_part).collect();
+    let done = format!("done for {}", done.join(", "));
+    match listed(parts.into_iter().flat_map(|(all, _)| all).flatten()) {
         None => done,
         Some(why) => format!("{done}; {why}"),
     }
