@@ -177,7 +177,7 @@ fn iso230_3_u_holds_the_drift_of_the_machine_alone() {
         &[
             ("d", 98.5, 100.0),
             ("range", 93.0, 97.0),
-            ("rate", 97.0, 100.0),
+            ("rate", 99.0, 100.0),
             ("d of B", 95.0, 98.0),
             ("range of B", 95.0, 97.5),
             ("rate of B", 99.0, 100.0),
