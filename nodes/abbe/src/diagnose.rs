@@ -23,6 +23,7 @@ use crate::history::origin::Origin;
 use crate::loss;
 use crate::machine_defaults;
 use crate::pdf;
+use crate::report::screen::Made;
 use crate::report::terminal::Room;
 use crate::report::{Report, gap, test_conditions};
 use crate::tell::tell;
@@ -162,10 +163,20 @@ impl Diagnose {
         let diagnosed = beside(&self.bags, &self.simulated, &name, &text, &config)?;
         let title = format!("Simulator against machine: {}", listed(&self.bags));
         let mut page = gap::page(&title, &diagnosed, self.explain)?;
+        let mut between = None;
         for path in &self.bags {
             let seen = TestConditions::of(&Bag::open(path)?);
             page.add_conditions(&test_conditions::of(&seen, budget.as_ref(), None));
+            between = joined(between, seen.nanos());
         }
+        let machine = MachineFile::parse(&text, &name)?.name;
+        let first = Bag::open(&self.bags[0])?;
+        page.screen.made = Some(Made::of(
+            &first,
+            &listed(&self.bags),
+            Some(&machine),
+            between,
+        ));
         let json = serde_json::to_string_pretty(&diagnosed.json()?)?;
         let on_terminal = self.json.as_deref() == Some(Path::new("-"));
         if on_terminal {
@@ -185,7 +196,6 @@ impl Diagnose {
         for remark in diagnosed.losses().iter().chain(&diagnosed.remarks) {
             complain!("abbe: {remark}");
         }
-        let machine = MachineFile::parse(&text, &name)?.name;
         self.print_and_keep(&page, &diagnosed, machine)?;
         Ok(loss::exit_code(diagnosed.losses().is_empty()))
     }
@@ -269,6 +279,14 @@ fn effect(text: &str) -> Result<String, String> {
         "the catalogue has no such effect, but {}",
         ids.join(", ")
     ))
+}
+
+/// From the earlier begin to the later end.
+fn joined(a: Option<(i64, i64)>, b: Option<(i64, i64)>) -> Option<(i64, i64)> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),
+        _ => a.or(b),
+    }
 }
 
 fn listed(paths: &[PathBuf]) -> String {

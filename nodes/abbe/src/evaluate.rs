@@ -16,9 +16,11 @@ mod belonging;
 pub mod budget;
 pub mod circles;
 pub mod correction;
+pub mod course;
 pub mod drift;
 pub mod limits;
 pub mod linear;
+pub mod paths;
 pub mod stationwise;
 pub mod stops;
 pub mod test_conditions;
@@ -30,6 +32,7 @@ pub use belonging::BrokenOff;
 use circles::{CircleRecording, Circles};
 use drift::{Drift, Drifts};
 use linear::{LinearRuns, LinearTest};
+use paths::{PathRecording, Paths};
 use stationwise::{StationCircle, Stationwise};
 use stops::{StopRuns, Stops};
 use test_conditions::TestConditions;
@@ -62,6 +65,8 @@ pub struct Tests {
     pub circles: Vec<CircleRecording>,
     /// The circles with stops, for the published separation.
     pub station_circles: Vec<StationCircle>,
+    /// Lines, corners and arcs over a grid encoder.
+    pub paths: Vec<PathRecording>,
     /// Positioning runs and diagonals.
     pub linear: Vec<LinearTest>,
     /// Positioning runs of rotary axes.
@@ -100,6 +105,7 @@ struct Collected {
     tests: Tests,
     circles: Circles,
     stationwise: Stationwise,
+    paths: Paths,
     linear: LinearRuns,
     angular: RotaryRuns,
     drifts: Drifts,
@@ -124,6 +130,7 @@ impl Tests {
         tests.broken_off = collected.belonging.finish(&mut tests.reading.account);
         tests.circles = collected.circles.recordings();
         tests.station_circles = collected.stationwise.circles();
+        tests.paths = collected.paths.recordings();
         tests.linear = collected.linear.tests();
         tests.rotary_positioning = collected.angular.tests();
         tests.drift = collected.drifts.drift();
@@ -153,6 +160,7 @@ impl Collected {
             if let Some(state) = state {
                 self.belonging.axes(&state, taken);
                 self.circles.axes(&state);
+                self.paths.axes(&state);
                 self.linear.axes(&state);
                 self.angular.axes(&state);
                 self.drifts.axes(&state);
@@ -168,6 +176,7 @@ impl Collected {
             let sample = taken.of(&topics::GRID_POSITION);
             if let Some(sample) = sample.filter(|it| self.belonging.grid(it, taken)) {
                 self.circles.grid(&sample);
+                self.paths.grid(&sample);
                 self.stationwise.grid(sample);
             }
         } else if taken.is(&topics::LENGTH_POSITION) && is_under_way {
@@ -195,6 +204,7 @@ impl Collected {
     fn test(&mut self, segment: TestSegment) {
         self.tests.conditions.segment(&segment);
         self.circles.segment(&segment);
+        self.paths.segment(&segment);
         self.stationwise.segment(&segment);
         self.linear.segment(&segment);
         self.angular.segment(&segment);

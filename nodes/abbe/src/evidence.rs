@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use abbe_msgs::{Defect, Message, Wire, WireError, from_cdr, topics};
+use metrology::Axis;
 use metrology::sample::{
     AxisCompensation, BlockMeasurement, GeometryModel, PlanStatus, ProbeLatency, ProbedPoint,
     TestKind, TestSegment, ThermalModel,
@@ -13,6 +14,7 @@ use node_runtime::{Diagnostic, Level};
 
 mod start_up;
 
+use crate::evaluate::course::Course;
 use start_up::StartUp;
 
 /// One pose of a verification: the machine stood still there.
@@ -94,6 +96,8 @@ pub struct Evidence {
     pub begun: Vec<PlanStatus>,
     /// Last compensation.
     pub compensation: Option<AxisCompensation>,
+    /// Offsets of X, Y and Z that were applied, mm.
+    pub offsets: Course<[f64; 3]>,
     /// How well each way of predicting the drift did at each update, values in µm by name.
     pub predictions: Vec<Prediction>,
     /// Conditions above `Ok` in order.
@@ -160,6 +164,10 @@ impl Evidence {
             self.rotary_models.extend(taken);
         } else if topic == topics::COMPENSATION.name {
             let taken = self.decode(&topics::COMPENSATION, (at, bytes));
+            if let Some(taken) = &taken {
+                self.offsets
+                    .add(at, Axis::LINEAR.map(|axis| taken.total[axis]));
+            }
             self.compensation = taken.or(self.compensation.take());
         } else if topic == topics::PLAN_STATUS.name {
             let status = self.decode(&topics::PLAN_STATUS, (at, bytes));

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use maud::Markup;
 
+use screen::{Made, Screen, Tone};
 use terminal::{Part, Room};
 
 use crate::evidence::Evidence;
@@ -21,7 +22,9 @@ pub mod gap;
 pub mod geometry;
 mod latency;
 pub mod lines;
-mod page;
+mod over_time;
+pub mod page;
+pub mod paths;
 pub mod periodic;
 pub mod plot;
 mod pointed;
@@ -29,8 +32,10 @@ pub mod positioning;
 pub mod probing;
 pub mod published;
 mod rotary;
+pub mod screen;
 pub mod section;
 pub mod stops;
+mod svg;
 pub mod terminal;
 pub mod test_conditions;
 mod thermal;
@@ -51,7 +56,9 @@ pub struct Report {
     pub lines: Vec<String>,
     /// Its text for a terminal, part by part.
     pub parts: Vec<Part>,
-    /// The page's body.
+    /// The page's first screen.
+    pub screen: Screen,
+    /// The page's body below it.
     pub body: Markup,
     /// The figures of the sentences, for machines; lengths in mm, times in s.
     pub figures: serde_json::Value,
@@ -75,15 +82,14 @@ impl Report {
     fn of_verifications(title: &str, evidence: &Evidence) -> Self {
         let section = verification::section(&evidence.verifications);
         let seen = section.as_ref();
+        let mut screen = verification::screen(&evidence.verifications);
+        screen.behind.push(conditions::section(evidence));
         Self {
             title: title.to_owned(),
             lines: Vec::new(),
             parts: seen.map(Part::of).into_iter().collect(),
-            body: maud::html! {
-                h1 { (title) }
-                @if let Some(section) = seen { (section.html()) }
-                (conditions::section(evidence))
-            },
+            screen,
+            body: maud::html! { @if let Some(section) = seen { (section.html()) } },
             figures: serde_json::json!({
                 "title": title,
                 "verification": seen.map(|section| &section.figures),
@@ -97,6 +103,7 @@ impl Report {
         self.parts.push(Part::plain("\n"));
         self.parts.extend(tests.parts);
         self.body = maud::html! { (self.body) (tests.body) };
+        self.screen.join(tests.screen);
         for key in [
             "conditions",
             "machine_defaults",
@@ -137,7 +144,7 @@ impl Report {
     pub fn add_conditions(&mut self, conditions: &test_conditions::Conditions) {
         let text = format!("\n{}", conditions.terminal());
         self.parts.push(Part::plain(text));
-        self.body = maud::html! { (self.body) (conditions.section.html()) };
+        self.screen.behind.push(conditions.section.html());
         self.figures["conditions"] = conditions.section.figures.clone();
     }
 
@@ -146,24 +153,45 @@ impl Report {
         let head = format!("\n\n{}", gap.head());
         self.parts.push(Part::answers(head, gap.lines));
         self.parts.extend(gap.parts);
-        self.body = maud::html! { (self.body) (gap.body) };
+        // The diagnosis is what the page is about: it comes before the tests that it rests on.
+        self.body = maud::html! { h2 { (gap.title) } (gap.body) (self.body) };
+        self.screen.join(gap.screen);
         self.figures["gap"] = gap.figures;
     }
 
     /// This report with what was recognised in its table at its beginning; the lines as `table`.
     pub fn begin_with_table(&mut self, lines: &[String]) {
         self.lines.splice(0..0, lines.iter().cloned());
-        self.body = maud::html! {
-            (self.body)
-            h2 { "The table" }
-            ul { @for line in lines { li { (line) } } }
-        };
+        let recognised = maud::html! { ul { @for line in lines { li { (line) } } } };
+        let folded = page::fold("The table", None, false, &recognised);
+        self.screen.behind.insert(0, folded);
         self.figures["table"] = serde_json::json!(lines);
     }
 
-    /// The page as one HTML text.
+    /// States machine, time and software on the first screen, and as `made` of the figures.
+    pub fn made(&mut self, made: Made) {
+        self.figures["made"] = made.as_json();
+        self.screen.made = Some(made);
+    }
+
+    /// States on the first screen what did not go as planned; `failure`: why the plan did not run to its end.
+    pub fn state_shortcomings(&mut self, failure: Option<&str>, shortcomings: Vec<String>) {
+        if let Some(failure) = failure {
+            let sentence = format!("The plan did not run to its end: {failure}.");
+            self.screen.lacks.insert(0, sentence.clone());
+            self.screen.verdict = Some((sentence, Tone::Bad));
+        }
+        self.screen.lacks.extend(shortcomings);
+    }
+
+    /// The page as one HTML text: the first screen, the parts, and at the end under which conditions they were measured.
     pub fn html(&self) -> String {
-        page::page(&self.title, &self.body)
+        let body = maud::html! {
+            (self.screen.html(&self.title))
+            (self.body)
+            @for part in &self.screen.behind { (part) }
+        };
+        page::page(&self.title, &body)
     }
 
     /// Writes `report.html` and `report.json` into `folder`.

@@ -19,11 +19,14 @@ use crate::history::origin::Origin;
 use crate::loss;
 use crate::machine_defaults;
 use crate::pdf;
+use crate::report::page::fold;
+use crate::report::screen::{Made, Screen};
 use crate::report::section::Section;
-use crate::report::terminal::{self, Part, Room};
+use crate::report::terminal::{self, Part, Rank, Room};
 use crate::report::{self, Report};
 use crate::tell::tell;
 
+mod first_screen;
 mod from_table;
 
 /// Arguments of `abbe report`.
@@ -86,11 +89,27 @@ impl ReportBag {
                 "abbe: {shown}: {n_odd} cells hold no value of their column and are left out"
             );
         }
-        let title = format!("Tests in {}", self.bag.display());
+        let title = match &table {
+            // The folders of a table are no part of its name.
+            Some(_) => format!("Tests in the table {}", file_name(&self.bag)),
+            None => format!("Tests in {}", self.bag.display()),
+        };
         let mut report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;
         if let Some(table) = &table {
             report.begin_with_table(&table.lines);
         }
+        let machine = tests.machine.as_ref().map(|machine| machine.name.as_str());
+        let mut made = Made::of(
+            &bag,
+            &self.bag.display().to_string(),
+            machine,
+            tests.conditions.nanos(),
+        );
+        if table.is_some() {
+            // The bag of a table has a machine file that nobody stated.
+            made.machine = None;
+        }
+        report.made(made);
         let page = self.out.as_ref().map(|out| out.join("report.html"));
         if self.json {
             tell!("{}", serde_json::to_string_pretty(&report.figures)?);
@@ -134,10 +153,19 @@ impl ReportBag {
     }
 }
 
+/// Name of a file without its folders.
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
 fn read_limits(path: &Path) -> Result<Limits> {
     let text = text_file::yaml(path).context("limits file")?;
     Limits::read(&text, path)
 }
+
+/// More parts of detail than these stand behind one title.
+const MOST_DETAILS: usize = 4;
 
 /// The page of everything that `tests` hold.
 ///
@@ -173,19 +201,33 @@ fn judged_page(
     }
     let judged = limits.map(|limits| limits.section(&figures)).transpose()?;
     let conformance = judged.as_ref().map(|section| section.figures.clone());
+    let screen = first_screen::of(tests, &sections, judged.as_ref(), budget.is_some());
     sections.extend(judged);
+    let (mut ordered, details): (Vec<&Section>, Vec<&Section>) = sections
+        .iter()
+        .partition(|section| section.rank < Rank::Detail);
+    ordered.sort_by_key(|section| section.rank);
     Ok(Report {
         title: title.to_owned(),
+        screen: Screen {
+            behind: vec![conditions.section.html()],
+            ..screen
+        },
         parts: terminal::apart(
             std::iter::once(Part::plain(conditions.terminal()))
                 .chain(sections.iter().map(Part::of)),
         ),
         body: html! {
-            @if !title.is_empty() { h1 { (title) } }
             @for line in &lines { p.bad[!tests.reading.is_whole()] { (line) } }
             @if let Some(line) = &defaults_line { p { (line) } }
-            (conditions.section.html())
-            @for section in &sections { (section.html()) }
+            @for section in &ordered { (section.html()) }
+            @if details.len() > MOST_DETAILS {
+                (fold(&format!("{} parts of detail", details.len()), None, false, &html! {
+                    @for section in &details { (section.html()) }
+                }))
+            } @else {
+                @for section in &details { (section.html()) }
+            }
         },
         figures: serde_json::json!({
             "title": title,
@@ -248,6 +290,7 @@ fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> {
         budget,
         &tests.conditions,
     )?);
+    sections.extend(report::paths::section(&tests.paths)?);
     for circle in &tests.station_circles {
         sections.extend(report::published::sections(circle, tests.geometry.as_ref()));
     }

@@ -18,6 +18,8 @@ use crate::history::keep::Keep;
 use crate::history::origin::Origin;
 use crate::loss;
 use crate::report::Report;
+use crate::report::page::fold;
+use crate::report::screen::Made;
 use crate::report::section::Section;
 use crate::report::terminal::{MOST_LINES, Room};
 use crate::report::test_conditions;
@@ -194,12 +196,15 @@ impl Run {
         }
         let title = format!("{}: {}", scenario.name, scenario.file.title);
         let mut report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
+        let mut between = None;
         if scenario.file.report == ReportKind::Tests && outcome.recorded > 0 {
             complain!("Evaluating the tests of {}", bag.display());
             let tests = Tests::of(&Bag::open(&bag)?);
+            between = tests.conditions.nanos();
             report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
         } else if outcome.recorded > 0 {
             let seen = TestConditions::of(&Bag::open(&bag)?);
+            between = seen.nanos();
             let budget = scenario.budget()?;
             report.add_conditions(&test_conditions::of(&seen, budget.as_ref(), None));
         }
@@ -217,8 +222,7 @@ impl Run {
                 Err(error) => outcome.fail(format!("{error:#}")),
             }
         }
-        let kept = format!("Bag: {}.", outcome.kept(&bag));
-        report.body = maud::html! { (report.body) h2 { "Recording" } p { (kept) } };
+        state_origin(&mut report, &outcome, &bag, between)?;
         let page = match report.write(folder) {
             Ok(()) => Some(folder.join("report.html")),
             Err(error) => {
@@ -347,6 +351,27 @@ impl Outcome {
             }
         }
     }
+}
+
+/// States machine, time, software, the recording and what did not go as planned.
+fn state_origin(
+    report: &mut Report,
+    outcome: &Outcome,
+    bag: &Path,
+    between: Option<(i64, i64)>,
+) -> Result<()> {
+    let kept = maud::html! { p { "Bag: " (outcome.kept(bag)) "." } };
+    report
+        .screen
+        .behind
+        .push(fold("Recording", None, false, &kept));
+    if outcome.recorded > 0 {
+        let opened = Bag::open(bag)?;
+        // The bag of a run has the machine file of its scenario.
+        report.made(Made::of(&opened, &bag.display().to_string(), None, between));
+    }
+    report.state_shortcomings(outcome.failure.as_deref(), outcome.shortcomings());
+    Ok(())
 }
 
 /// A fresh folder `<out>/<scenario>-<time>`.

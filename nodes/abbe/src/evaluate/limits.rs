@@ -27,7 +27,8 @@ mod judged;
 
 use crate::report::section::{Rows, Section, head};
 use crate::report::terminal::Rank;
-use judged::{CONFORMS, Figure, Judged};
+pub use judged::CONFORMS;
+use judged::{Figure, Judged};
 
 /// `limits.yaml`.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]

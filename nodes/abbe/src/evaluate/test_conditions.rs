@@ -8,6 +8,8 @@ use metrology::stamp::{Host, Span, Stamp};
 use recorder::{Bag, Order};
 use replayer::{Taken, reading};
 
+use super::course::Course;
+
 /// Age of the last reading before a test that still counts for it: thermometers are read every few seconds to minutes.
 const LONGEST_AGE: Span = Span::from_nanos(600_000_000_000);
 /// Feeds closer than this are one, mm/s.
@@ -108,6 +110,8 @@ pub struct TestConditions {
     pub production_before_s: f64,
     /// From the first test to the last one.
     pub thermometers: Thermometers,
+    /// Readings of each thermometer over the whole bag, °C.
+    pub courses: BTreeMap<String, Course<f64>>,
     tests: Vec<Test>,
     latest: BTreeMap<String, (Stamp<Host>, f64)>,
     under_way: Option<TestSegment>,
@@ -135,6 +139,13 @@ impl TestConditions {
         conditions
     }
 
+    /// Begin of the first test and end of the last one, ns since 1970.
+    #[must_use]
+    pub fn nanos(&self) -> Option<(i64, i64)> {
+        let (first, last) = self.between?;
+        Some((first.nanos(), last.nanos()))
+    }
+
     /// Any message but that of a test: what is read, and the readings of thermometers.
     pub fn message(&mut self, taken: &mut Taken<'_>) {
         if taken.is_named(topics::TEMPERATURE.base) {
@@ -158,6 +169,8 @@ impl TestConditions {
     fn read(&mut self, sample: &TemperatureSample) {
         let (name, degc) = (&sample.sensor, sample.temperature_degc);
         self.latest.insert(name.clone(), (sample.at, degc));
+        let course = self.courses.entry(name.clone()).or_default();
+        course.add(sample.at, degc);
         if self.between.is_some() {
             add(&mut self.thermometers, name, degc);
         }

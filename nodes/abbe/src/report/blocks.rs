@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use maud::{Markup, html};
 use metrology::Axis;
 
-use super::page::table;
+use super::page::{fold, table};
 use super::section::{Rows, head};
 use super::terminal::Part;
 use crate::evidence::Evidence;
@@ -51,8 +51,7 @@ pub fn section(evidence: &Evidence) -> Markup {
     let rows = rows(evidence);
     html! {
         @if !rows.is_empty() {
-            h2 { "Blocks" }
-            (table(&BLOCK_COLUMNS, &rows))
+            (fold("Blocks", None, false, &table(&BLOCK_COLUMNS, &rows)))
         }
     }
 }

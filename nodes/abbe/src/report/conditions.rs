@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 use node_runtime::Level;
 
-use super::page::table;
+use super::page::{fold, table};
 use crate::evidence::Evidence;
 
 /// Each condition once, with how often and the last message.
@@ -30,10 +30,10 @@ pub fn section(evidence: &Evidence) -> Markup {
             ]
         })
         .collect();
-    html! {
-        h2 { "Conditions" }
+    let content = html! {
         @if rows.is_empty() && evidence.undecoded.is_empty() { p { "None was reported." } }
         @else { (table(&["node: condition", "level", "times", "last message"], &rows)) }
         @for line in evidence.not_used() { p.bad { "Left out: " (line) "." } }
-    }
+    };
+    fold("Conditions that nodes reported", None, false, &content)
 }

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use maud::{Markup, html};
 use metrology::sample::{Rejection, TestKind};
 
-use super::page::table;
+use super::page::{fold, table};
 use super::section::{Rows, head};
 use super::terminal::Part;
 use crate::evidence::Evidence;
@@ -94,7 +94,7 @@ fn rows(evidence: &Evidence) -> Vec<Vec<String>> {
             vec![
                 format!("{:.0}", feed.feed_mm_min),
                 feed.n.to_string(),
-                format!("{:+.2}", feed.mean_um - mean_um),
+                format!("{:+.2}", feed.mean_um - mean_um).replace("-0.00", "+0.00"),
                 format!("{:.2}", feed.deviation_um),
                 format!("{:.2}", feed.deviation_um / (feed.n as f64).sqrt()),
                 format!("{:.2}", feed.feed_mm_min / 60.0),
@@ -108,9 +108,10 @@ pub fn section(evidence: &Evidence) -> Markup {
     let rows = rows(evidence);
     html! {
         @if !rows.is_empty() {
-            h2 { "Corrected points across feeds" }
+            (fold("Corrected points across feeds", None, true, &html! {
             (table(&FEED_COLUMNS, &rows))
             p.note { "A control that polls its probe input leaves each touch uncertain by up to one servo period's travel; the mean of n touches by that over the square root of 12 n." }
+            }))
         }
     }
 }

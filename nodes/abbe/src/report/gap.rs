@@ -7,7 +7,10 @@ use maud::html;
 use words::{covariate, name, signs};
 
 use super::Report;
+use super::page::fold;
+use super::screen::Screen;
 use super::section::{Rows, Section, head};
+use super::svg::unsigned_zero;
 use super::terminal::{self, Part, Rank};
 use crate::diagnose::Diagnosed;
 use crate::diagnose::simulated::Simulated;
@@ -15,9 +18,11 @@ use crate::machine_defaults;
 
 pub mod designed;
 mod drawings;
+mod first_screen;
 mod matrix;
 pub mod planned;
 mod sentences;
+mod waterfall;
 mod why;
 mod words;
 
@@ -51,23 +56,23 @@ pub fn page(title: &str, diagnosed: &Diagnosed, explain: bool) -> Result<Report>
         .chain(matrix::section(&figures.isolability).as_ref().map(Part::of))
         .chain(remarks(&notes));
     let parts = terminal::apart(parts);
+    let mut screen = first_screen::of(report, &diagnosed.losses());
+    screen.picture = waterfall::picture(report, &figures.apart)?;
+    screen.behind.push(remarks_of_page(report, &notes));
+    let compared = html! { div.traces { @for trace in &traces { (trace) } } };
     Ok(Report {
         title: title.to_owned(),
         parts,
+        screen,
         body: html! {
-            h1 { (title) }
             (matrix::style())
             @for line in &lines { p { (line) } }
-            (matrix::heat(&figures.heat))
-            div.traces { @for trace in &traces { (trace) } }
+            @for section in sections.iter().filter(|one| one.rank < Rank::Detail) { (section.html()) }
+            (fold("Machine minus simulator, before and after", None, true, &compared))
             (why::folded(report))
-            @for section in &sections { (section.html()) }
+            (matrix::heat(&figures.heat))
+            @for section in sections.iter().filter(|one| one.rank == Rank::Detail) { (section.html()) }
             (matrix::isolability(&figures.isolability))
-            @if !notes.is_empty() {
-                h2 { "Remarks" }
-                @for note in &notes { p.note { (note) } }
-            }
-            p.note { (read(report)) }
         },
         figures: diagnosed.json()?,
         lines,
@@ -80,10 +85,23 @@ pub fn without(title: &str, reason: &str) -> Report {
     Report {
         title: title.to_owned(),
         parts: vec![],
-        body: html! { h2 { (title) } p { (line) } },
+        screen: Screen {
+            lacks: vec![line.clone()],
+            ..Screen::default()
+        },
+        body: html! { p { (line) } },
         figures: serde_json::json!({ "refused": reason }),
         lines: vec![line],
     }
+}
+
+/// Remarks, and what was read, at the end of the page.
+fn remarks_of_page(report: &GapReport, notes: &[String]) -> maud::Markup {
+    let content = html! {
+        @for note in notes { p.note { (note) } }
+        p.note { (read(report)) }
+    };
+    fold("Remarks on the diagnosis", None, false, &content)
 }
 
 /// The remarks of a diagnosis, which the whole text has.
@@ -118,7 +136,7 @@ fn notes(diagnosed: &Diagnosed) -> Vec<String> {
 /// A number with three significant digits, a small one with two.
 fn three(value: f64) -> String {
     let size = value.abs();
-    match () {
+    unsigned_zero(match () {
         () if !value.is_finite() => "—".to_owned(),
         () if size >= 100.0 => format!("{value:.0}"),
         () if size >= 10.0 => format!("{value:.1}"),
@@ -129,7 +147,7 @@ fn three(value: f64) -> String {
             format!("{value:.decimals$}")
         }
         () => "0".to_owned(),
-    }
+    })
 }
 
 fn maybe(value: Option<f64>) -> String {

@@ -7,6 +7,8 @@ use metrology::{ErrorComponent, squareness};
 
 use super::section::{Rows, Section, head, rounded, um};
 
+mod curves;
+
 /// Coverage factor of what is printed.
 pub const COVERAGE: f64 = 2.0;
 /// Coefficients that can be listed in a sentence.
@@ -63,6 +65,12 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
         });
     }
     section.figures = figures(title, model, &all);
+    match curves::drawings(model) {
+        Ok(drawings) => section.drawings = drawings,
+        Err(error) => section
+            .lines
+            .push(format!("The curves are not drawn: {error:#}.")),
+    }
     section
 }
 
@@ -345,6 +353,27 @@ pub fn tables(tables: &[PositioningTable]) -> Option<Section> {
     }
     let mut section = Section::new("Positioning tables: scale minus motor");
     for table in tables {
+        let all = || table.deviation_up.iter().chain(&table.deviation_down);
+        let size_mm = all().fold(0.0, |most: f64, mm| {
+            if mm.is_finite() {
+                most.max(mm.abs())
+            } else {
+                most
+            }
+        });
+        let pairs = table.deviation_up.iter().zip(&table.deviation_down);
+        let apart: Vec<f64> = pairs
+            .map(|(up, down)| up - down)
+            .filter(|mm| mm.is_finite())
+            .collect();
+        let reversal_mm = apart.iter().sum::<f64>() / apart.len() as f64;
+        section.answer(format!(
+            "{}: scale and motor are up to {} µm apart; up minus down {} µm on the mean of {} places.",
+            table.axis,
+            um(size_mm),
+            um(reversal_mm),
+            apart.len()
+        ));
         let rows = table.position.iter().enumerate().map(|(place, position)| {
             let of = |values: &[f64]| um(values.get(place).copied().unwrap_or(f64::NAN));
             vec![

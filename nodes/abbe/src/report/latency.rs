@@ -4,8 +4,10 @@ use anyhow::Result;
 use maud::{Markup, html};
 use metrology::sample::{LatencyMethod, ProbeLatency, ProbedPoint, Rejection, TestKind};
 
-use super::page::{figure, table};
+use super::page::{figure, fold, table};
 use super::plot::{Plot, Trace, svg};
+use super::screen::{Screen, Tile, Tone};
+use super::svg::short;
 use super::{Report, conditions};
 use crate::evidence::Evidence;
 
@@ -124,29 +126,95 @@ const TICKS_SHARE: &str = "A control that polls its probe input sees a touch up 
 /// # Errors
 /// When the plot cannot be drawn.
 pub fn section(evidence: &Evidence) -> Result<Markup> {
-    let touches = touches(evidence);
-    let first_mm = touches.first().map_or(0.0, |touch| touch.1);
-    let corrected: Vec<(f64, f64)> = touches
-        .iter()
-        .filter(|(point, _)| point.rejection == Rejection::None)
-        .map(|(point, along_mm)| (point.feed_mm_s * 60.0, (along_mm - first_mm) * 1e3))
+    let picture = picture(evidence)?;
+    let rows = rows(&evidence.latencies);
+    Ok(html! {
+        @if !rows.is_empty() || picture.is_some() {
+            (fold("Probe latency", None, false, &html! {
+                @if let Some(picture) = &picture { (picture) }
+                (table(&LATENCY_COLUMNS, &rows))
+            }))
+        }
+    })
+}
+
+/// Corrected touches over feed, from their mean: (mm/min, µm). A touch that was rejected has no place.
+fn corrected(evidence: &Evidence) -> Vec<(f64, f64)> {
+    let used: Vec<(f64, f64)> = { touches(evidence).into_iter() }
+        .filter(|(point, along_mm)| point.rejection == Rejection::None && along_mm.is_finite())
+        .map(|(point, along_mm)| (point.feed_mm_s * 60.0, along_mm))
         .collect();
-    let any_corrected = !corrected.is_empty();
+    let mean_mm = used.iter().map(|touch| touch.1).sum::<f64>() / used.len().max(1) as f64;
+    let from_mean = |(feed, along_mm): (f64, f64)| (feed, (along_mm - mean_mm) * 1e3);
+    used.into_iter().map(from_mean).collect()
+}
+
+/// Touches over feed; `None` where none was corrected.
+///
+/// # Errors
+/// When the plot cannot be drawn.
+fn picture(evidence: &Evidence) -> Result<Option<Markup>> {
+    let points = corrected(evidence);
+    if points.is_empty() {
+        return Ok(None);
+    }
     let plot = Plot {
         x: "feed at contact / mm/min".to_owned(),
-        y: "corrected surface / µm".to_owned(),
+        y: "corrected surface, from the mean / µm".to_owned(),
         traces: vec![Trace {
             name: "touch".to_owned(),
-            points: corrected,
+            points,
             marks: true,
         }],
     };
-    Ok(html! {
-        h2 { "Probe latency" }
-        (table(&LATENCY_COLUMNS, &rows(&evidence.latencies)))
-        @if any_corrected {
-            (figure(&svg(&plot)?, "Touches of the latency run after correction, along the approach: a slope that is left would be latency that was not taken out"))
+    let caption = "Touches of the latency run after correction, along the approach: a slope that is left would be latency that was not taken out";
+    Ok(Some(figure(&svg(&plot)?, caption)))
+}
+
+/// Expanded uncertainty: coverage factor.
+const COVERAGE: f64 = 2.0;
+/// Standard uncertainties beyond which an estimate and the true value do not agree.
+const AGREES: f64 = 3.0;
+
+/// The first screen: latency with U, and the true value where it is known.
+///
+/// # Errors
+/// When the plot cannot be drawn.
+pub fn screen(evidence: &Evidence) -> Result<Screen> {
+    let Some(latency) = evidence.latencies.last() else {
+        return Ok(Screen {
+            lacks: vec!["Latency: no estimate was made.".to_owned()],
+            ..Screen::default()
+        });
+    };
+    let expanded_s = COVERAGE * latency.standard_uncertainty_s;
+    let value = format!("{} ± {} ms", ms(latency.latency_s), ms(expanded_s));
+    let more = format!(
+        "k = 2; {} touches at {} feeds",
+        latency.n,
+        latency.feeds_mm_s.len()
+    );
+    let (sentence, tone) = match evidence.true_latency_s {
+        Some(truth_s) => {
+            let off = (latency.latency_s - truth_s).abs() / latency.standard_uncertainty_s;
+            let tone = if off <= AGREES { Tone::Good } else { Tone::Bad };
+            let sentence = format!(
+                "Probe latency {value} (k = 2); the plant's is {} ms, {} standard uncertainties away.",
+                ms(truth_s),
+                short(off)
+            );
+            (sentence, tone)
         }
+        None => (
+            format!("Probe latency {value} (k = 2); the true value of this machine is not known."),
+            Tone::Plain,
+        ),
+    };
+    Ok(Screen {
+        verdict: Some((sentence, tone)),
+        tiles: vec![Tile::new("probe latency", value, more)],
+        picture: picture(evidence)?,
+        ..Screen::default()
     })
 }
 
@@ -160,18 +228,70 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         lines.push(TICKS_SHARE.to_owned());
     }
     let body = html! {
-        h1 { (title) }
         @for line in &lines { p { (line) } }
-        (section(evidence)?)
         (super::feeds::section(evidence))
+        (section(evidence)?)
         (super::blocks::section(evidence))
-        (conditions::section(evidence))
     };
+    let mut screen = screen(evidence)?;
+    screen.behind.push(conditions::section(evidence));
     Ok(Report {
+        screen,
         title: title.to_owned(),
         lines,
         parts: vec![super::feeds::part(evidence), super::blocks::part(evidence)],
         body,
         figures: figures(evidence),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evidence::Evidence;
+    use metrology::sample::{Correction, TestSegment};
+    use metrology::stamp::Stamp;
+    use metrology::{AxisSet, PerAxis};
+    use nalgebra::Vector3;
+
+    fn touch(along_mm: f64, rejection: Rejection) -> (u32, ProbedPoint) {
+        let point = ProbedPoint {
+            received_at: Stamp::default(),
+            feature_id: "block".to_owned(),
+            axes_at_contact: PerAxis::default(),
+            axes: AxisSet::default(),
+            point_in_machine_mm: Vector3::new(along_mm, 0.0, 0.0),
+            point_in_workpiece_mm: Vector3::zeros(),
+            applied_latency_s: 0.004,
+            correction: Correction::Queue,
+            standard_uncertainty_mm: 1e-4,
+            approach: Vector3::x(),
+            feed_mm_s: 1.0,
+            rejection,
+            sequence: 1,
+        };
+        (1, point)
+    }
+
+    #[test]
+    fn a_first_touch_that_was_rejected_moves_no_other_to_zero() {
+        let evidence = Evidence {
+            segments: vec![TestSegment::of_kind(TestKind::Latency, 1, Stamp::default())],
+            points: vec![
+                touch(f64::NAN, Rejection::NoLatency),
+                touch(10.0, Rejection::None),
+                touch(10.004, Rejection::None),
+            ],
+            ..Evidence::default()
+        };
+        let found = corrected(&evidence);
+        assert_eq!(found.len(), 2);
+        assert!(
+            (found[0].1 + 2.0).abs() < 1e-6 && (found[1].1 - 2.0).abs() < 1e-6,
+            "{found:?}"
+        );
+        let svg = picture(&evidence).unwrap().unwrap().into_string();
+        assert_eq!(svg.matches("<circle").count(), 2, "{svg}");
+        assert!(!svg.contains("NaN"));
+    }
 }

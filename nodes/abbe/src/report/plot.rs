@@ -1,7 +1,13 @@
 //! Line plots as inline SVG whose colours follow the page's light or dark scheme.
+//!
+//! The title of the vertical axis and the legend stand above the drawing, so that no line runs below them and both are legible on
+//! a phone. A point shows its value while the pointer rests on it.
+
+use std::fmt::Write as _;
 
 use anyhow::{Result, anyhow};
-use plotters::prelude::*;
+
+use super::svg::{Scale, escaped, short, stretches};
 
 /// One line of a plot.
 #[derive(Clone, Debug)]
@@ -12,6 +18,17 @@ pub struct Trace {
     pub points: Vec<(f64, f64)>,
     /// Drawn as separate marks rather than a line.
     pub marks: bool,
+}
+
+/// A band around a line.
+#[derive(Clone, Debug)]
+pub struct Band {
+    /// Name in the legend.
+    pub name: String,
+    /// Place of the line in [`Plot::traces`], whose colour it has.
+    pub of: usize,
+    /// Horizontal place, lower and upper end, in axis units.
+    pub points: Vec<(f64, f64, f64)>,
 }
 
 /// Axis titles and traces of one plot.
@@ -25,149 +42,244 @@ pub struct Plot {
     pub traces: Vec<Trace>,
 }
 
-const WIDTH: u32 = 760;
-const HEIGHT: u32 = 300;
-/// Distinguishable with the common colour deficiencies (Okabe and Ito), on white and on dark grey.
-const CURVE_COLOURS: [RGBColor; 6] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-];
-/// Stands for the text colour; replaced by `currentColor` in the SVG text.
-const INK: RGBColor = RGBColor(1, 2, 3);
+const WIDTH: f64 = 720.0;
+const HEIGHT: f64 = 330.0;
+/// Frame of the drawing: left, right, top, bottom, px.
+const FRAME: [f64; 4] = [84.0, 704.0, 14.0, 262.0];
+/// Colours that the page's style has.
+pub const COLOURS: usize = 6;
+/// Most points of a trace that show their values.
+const MOST_HOVERED: usize = 120;
+/// Margin above and below the lines, as a share of their range.
+const MARGIN: f64 = 0.06;
+/// A range that begins so close to zero begins at zero, as a share of its end.
+const NEAR_ZERO: f64 = 0.1;
 
-fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (least, greatest) = values
-        .filter(|value| value.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| {
-            (a.min(value), b.max(value))
-        });
-    if least > greatest {
-        return (0.0, 1.0);
+fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let finite = values.filter(|value| value.is_finite());
+    let ends = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| {
+        (a.min(value), b.max(value))
+    });
+    (ends.0 <= ends.1).then_some(ends)
+}
+
+/// The same with room about it.
+fn with_margin((least, greatest): (f64, f64)) -> (f64, f64) {
+    let span = greatest - least;
+    if span > 1e-12 * greatest.abs().max(least.abs()) {
+        return (least - MARGIN * span, greatest + MARGIN * span);
     }
-    let margin = ((greatest - least) * 0.06).max(1e-9);
+    let margin = if greatest == 0.0 {
+        0.5
+    } else {
+        0.1 * greatest.abs()
+    };
     (least - margin, greatest + margin)
+}
+
+/// The scale of the horizontal axis.
+fn across(plot: &Plot) -> Scale {
+    let marks_only = plot.traces.iter().all(|trace| trace.marks);
+    let all = plot.traces.iter().flat_map(|trace| &trace.points);
+    let (low, high) = range(all.map(|point| point.0)).unwrap_or((0.0, 1.0));
+    let low = if low > 0.0 && low < NEAR_ZERO * high {
+        0.0
+    } else {
+        low
+    };
+    let (low, high) = if marks_only || high <= low {
+        with_margin((low, high))
+    } else {
+        (low, high)
+    };
+    Scale {
+        low,
+        high,
+        low_px: FRAME[0],
+        high_px: FRAME[1],
+    }
+}
+
+/// The scale of the vertical axis.
+fn upwards(plot: &Plot, bands: &[Band]) -> Scale {
+    let lines = plot.traces.iter().flat_map(|trace| &trace.points);
+    let ends = bands.iter().flat_map(|band| &band.points);
+    let all = lines.map(|point| point.1);
+    let all = all.chain(ends.flat_map(|(_, low, high)| [*low, *high]));
+    let (low, high) = with_margin(range(all).unwrap_or((0.0, 1.0)));
+    Scale {
+        low,
+        high,
+        low_px: FRAME[3],
+        high_px: FRAME[2],
+    }
 }
 
 /// Draws a plot.
 ///
 /// # Errors
-/// When the drawing library fails.
+/// When its text cannot be written.
 pub fn svg(plot: &Plot) -> Result<String> {
-    let mut text = String::new();
-    draw(plot, &mut text).map_err(|error| anyhow!("plot \"{}\": {error}", plot.y))?;
-    Ok(text.replace("#010203", "currentColor").replacen(
-        "<svg ",
-        "<svg class=\"plot\" role=\"img\" ",
-        1,
-    ))
+    banded_svg(plot, &[])
 }
 
-/// Width of the legend, as a share of the plot's.
-const LEGEND_WIDTH: f64 = 0.25;
-/// Height of a line of the legend, as a share of the plot's.
-const LEGEND_LINE: f64 = 0.08;
-/// Places between two points of a line that are looked at.
-const BETWEEN: u32 = 8;
-
-/// The corner in which the fewest points of the traces lie under the legend.
-fn emptiest_corner(plot: &Plot, x: (f64, f64), y: (f64, f64)) -> SeriesLabelPosition {
-    let share = |at: f64, (low, high): (f64, f64)| (at - low) / (high - low);
-    let height = LEGEND_LINE * (plot.traces.len() as f64 + 0.5);
-    let places = || plot.traces.iter().flat_map(places);
-    let under = |(is_left, is_upper): (bool, bool)| {
-        let covered = |(at_x, at_y): &(f64, f64)| {
-            let (from_left, from_below) = (share(*at_x, x), share(*at_y, y));
-            let across = if is_left { from_left } else { 1.0 - from_left };
-            let down = if is_upper {
-                1.0 - from_below
-            } else {
-                from_below
-            };
-            across < LEGEND_WIDTH && down < height
-        };
-        places().filter(covered).count()
-    };
-    let corners = [
-        ((true, true), SeriesLabelPosition::UpperLeft),
-        ((false, true), SeriesLabelPosition::UpperRight),
-        ((false, false), SeriesLabelPosition::LowerRight),
-        ((true, false), SeriesLabelPosition::LowerLeft),
-    ];
-    let emptiest = corners.into_iter().min_by_key(|(corner, _)| under(*corner));
-    emptiest.map_or(SeriesLabelPosition::UpperLeft, |(_, position)| position)
+/// Draws a plot with bands behind its lines.
+///
+/// # Errors
+/// As [`svg`].
+pub fn banded_svg(plot: &Plot, bands: &[Band]) -> Result<String> {
+    drawn(plot, bands).map_err(|error| anyhow!("plot \"{}\": {error}", plot.y))
 }
 
-/// Places that a trace covers.
-fn places(trace: &Trace) -> Vec<(f64, f64)> {
-    let mut all = trace.points.clone();
-    if !trace.marks {
-        for pair in trace.points.windows(2) {
-            let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
-            all.extend((1..BETWEEN).map(|k| {
-                let share = f64::from(k) / f64::from(BETWEEN);
-                (x0 + share * (x1 - x0), y0 + share * (y1 - y0))
-            }));
+fn drawn(plot: &Plot, bands: &[Band]) -> Result<String, std::fmt::Error> {
+    let scales = (across(plot), upwards(plot, bands));
+    let mut text = head(plot, bands);
+    write!(
+        text,
+        "<svg class=\"plot\" role=\"img\" aria-label=\"{} over {}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\">",
+        escaped(&plot.y),
+        escaped(&plot.x)
+    )?;
+    axes(&mut text, plot, &scales)?;
+    for band in bands {
+        draw_band(&mut text, band, &scales)?;
+    }
+    for (place, trace) in plot.traces.iter().enumerate() {
+        draw_trace(&mut text, plot, place, trace, &scales)?;
+    }
+    text.push_str("</svg>");
+    Ok(text)
+}
+
+/// What stands above the drawing: the title of the vertical axis, and what each colour is.
+fn head(plot: &Plot, bands: &[Band]) -> String {
+    let lines = plot.traces.iter().enumerate();
+    let lines: Vec<(usize, &str, &str)> = lines
+        .map(|(place, trace)| {
+            let kind = if trace.marks { "dot" } else { "line" };
+            (place, kind, trace.name.as_str())
+        })
+        .collect();
+    let bands = bands
+        .iter()
+        .map(|band| (band.of, "band", band.name.as_str()));
+    let named: Vec<(usize, &str, &str)> = lines.into_iter().chain(bands).collect();
+    legend(&plot.y, &named)
+}
+
+/// A title, and colour, kind (`line`, `dot` or `band`) and name of everything that is drawn.
+#[must_use]
+pub fn legend(title: &str, named: &[(usize, &str, &str)]) -> String {
+    maud::html! {
+        div.legend {
+            span.of { (title) }
+            @for (place, kind, name) in named {
+                @if !name.is_empty() {
+                    span class=(format!("{kind} c{}", place % COLOURS)) { i {} (name) }
+                }
+            }
         }
     }
-    all
+    .into_string()
 }
 
-fn draw(plot: &Plot, text: &mut String) -> Result<(), Box<dyn std::error::Error>> {
-    let (x0, x1) = range(
-        plot.traces
-            .iter()
-            .flat_map(|t| t.points.iter().map(|p| p.0)),
-    );
-    let (y0, y1) = range(
-        plot.traces
-            .iter()
-            .flat_map(|t| t.points.iter().map(|p| p.1)),
-    );
-    let root = SVGBackend::with_string(text, (WIDTH, HEIGHT)).into_drawing_area();
-    let font = || ("sans-serif", 13).into_font().color(&INK);
-    let mut chart = ChartBuilder::on(&root)
-        .margin(8)
-        .x_label_area_size(36)
-        .y_label_area_size(76)
-        .build_cartesian_2d(x0..x1, y0..y1)?;
-    chart
-        .configure_mesh()
-        .x_desc(plot.x.as_str())
-        .y_desc(plot.y.as_str())
-        .axis_style(INK.mix(0.6))
-        .bold_line_style(INK.mix(0.15))
-        .light_line_style(INK.mix(0.0))
-        .label_style(font())
-        .axis_desc_style(font())
-        .draw()?;
-    for (trace, colour) in plot.traces.iter().zip(CURVE_COLOURS.iter().cycle()) {
-        let style = ShapeStyle {
-            color: colour.to_rgba(),
-            filled: true,
-            stroke_width: 2,
-        };
-        let series = if trace.marks {
-            chart.draw_series(trace.points.iter().map(|&at| Circle::new(at, 3, style)))?
-        } else {
-            chart.draw_series(LineSeries::new(trace.points.iter().copied(), style))?
-        };
-        series
-            .label(trace.name.as_str())
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], style));
+fn axes(text: &mut String, plot: &Plot, (x, y): &(Scale, Scale)) -> std::fmt::Result {
+    let [left, right, top, bottom] = FRAME;
+    for (value, label) in y.ticks() {
+        let at = y.px(value);
+        let strength = if value.abs() < 1e-12 { 0.6 } else { 0.16 };
+        write!(
+            text,
+            "<path stroke=\"currentColor\" stroke-opacity=\"{strength}\" d=\"M{left} {at:.1}H{right}\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
+            left - 8.0,
+            at + 5.0
+        )?;
     }
-    chart
-        .configure_series_labels()
-        .position(emptiest_corner(plot, (x0, x1), (y0, y1)))
-        .label_font(font())
-        .border_style(INK.mix(0.0))
-        .draw()?;
-    drop(chart);
-    root.present()?;
-    drop(root);
+    for (value, label) in x.ticks() {
+        let at = x.px(value);
+        write!(
+            text,
+            "<path stroke=\"currentColor\" stroke-opacity=\"0.16\" d=\"M{at:.1} {top}V{bottom}\"/><text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{label}</text>",
+            bottom + 26.0
+        )?;
+    }
+    write!(
+        text,
+        "<path fill=\"none\" stroke=\"currentColor\" stroke-opacity=\"0.6\" d=\"M{left} {top}V{bottom}H{right}\"/><text x=\"{right}\" y=\"{}\" text-anchor=\"end\">{}</text>",
+        HEIGHT - 8.0,
+        escaped(&plot.x)
+    )
+}
+
+fn draw_band(text: &mut String, band: &Band, (x, y): &(Scale, Scale)) -> std::fmt::Result {
+    let is_finite = |p: &&(f64, f64, f64)| p.0.is_finite() && p.1.is_finite() && p.2.is_finite();
+    let points = || band.points.iter().filter(is_finite);
+    if points().next().is_none() {
+        return Ok(());
+    }
+    write!(
+        text,
+        "<g class=\"c{}\"><polygon fill=\"currentColor\" fill-opacity=\"0.18\" points=\"",
+        band.of % COLOURS
+    )?;
+    for (at, low, _) in points() {
+        write!(text, "{:.1},{:.1} ", x.px(*at), y.px(*low))?;
+    }
+    for (at, _, high) in band.points.iter().rev().filter(is_finite) {
+        write!(text, "{:.1},{:.1} ", x.px(*at), y.px(*high))?;
+    }
+    text.push_str("\"/></g>");
+    Ok(())
+}
+
+fn draw_trace(
+    text: &mut String,
+    plot: &Plot,
+    place: usize,
+    trace: &Trace,
+    (x, y): &(Scale, Scale),
+) -> std::fmt::Result {
+    let stretches = stretches(&trace.points);
+    write!(text, "<g class=\"c{}\">", place % COLOURS)?;
+    if !trace.marks {
+        for stretch in &stretches {
+            text.push_str(
+                "<polyline fill=\"none\" stroke=\"currentColor\" stroke-width=\"2\" points=\"",
+            );
+            for (at, value) in stretch {
+                write!(text, "{:.1},{:.1} ", x.px(*at), y.px(*value))?;
+            }
+            text.push_str("\"/>");
+        }
+    }
+    let all = stretches.iter().flatten();
+    let n: usize = stretches.iter().map(Vec::len).sum();
+    // A single value makes no line.
+    let is_seen = trace.marks || n == 1;
+    if is_seen || n <= MOST_HOVERED {
+        let (radius, fill) = if is_seen { (3.5, 1) } else { (8.0, 0) };
+        for (at, value) in all {
+            write!(
+                text,
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{radius}\" fill=\"currentColor\" fill-opacity=\"{fill}\">",
+                x.px(*at),
+                y.px(*value)
+            )?;
+            if n <= MOST_HOVERED {
+                write!(
+                    text,
+                    "<title>{}: {} {}, {} {}</title>",
+                    escaped(&trace.name),
+                    escaped(&plot.x),
+                    short(*at),
+                    escaped(&plot.y),
+                    short(*value)
+                )?;
+            }
+            text.push_str("</circle>");
+        }
+    }
+    text.push_str("</g>");
     Ok(())
 }
 
@@ -190,14 +302,52 @@ mod tests {
 
     #[test]
     fn the_legend_stands_where_no_line_goes() {
-        let unit = (0.0, 1.0);
-        let corner = |points| emptiest_corner(&plot(points), unit, unit);
-        let rising = corner(vec![(0.0, 0.0), (1.0, 1.0)]);
-        assert!(matches!(rising, SeriesLabelPosition::UpperLeft));
-        let falling = corner(vec![(0.0, 1.0), (1.0, 0.0)]);
-        assert!(matches!(falling, SeriesLabelPosition::UpperRight));
-        // Across the whole top, and down on the right.
-        let over = corner(vec![(0.0, 0.9), (1.0, 0.9), (1.0, 0.0)]);
-        assert!(matches!(over, SeriesLabelPosition::LowerLeft));
+        let text = svg(&plot(vec![(0.0, 0.9), (1.0, 0.9), (1.0, 0.0)])).unwrap();
+        let (before, drawing) = text.split_once("<svg").unwrap();
+        for word in ["drift / µm", "block_1", "block_2"] {
+            assert!(before.contains(word), "{before}");
+        }
+        assert!(!drawing.contains("<text x=\"84\">block_1"), "{drawing}");
+        assert!(drawing.contains("t / h"));
+    }
+
+    #[test]
+    fn values_that_are_missing_are_no_zero_and_the_rest_is_drawn() {
+        let text = svg(&plot(vec![(0.0, f64::NAN), (0.5, 2.0), (1.0, 3.0)])).unwrap();
+        assert!(!text.contains("NaN"), "{text}");
+        assert_eq!(text.matches("<polyline").count(), 2);
+        assert!(text.contains("drift / µm 3.00</title>"), "{text}");
+    }
+
+    #[test]
+    fn a_time_that_begins_near_zero_begins_at_zero() {
+        let scale = across(&plot(vec![(0.004, 1.0), (0.4, 2.0)]));
+        assert!(scale.low.abs() < 1e-12 && (scale.high - 0.4).abs() < 1e-12);
+        let far = across(&plot(vec![(40.0, 1.0), (50.0, 2.0)]));
+        assert!((far.low - 40.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_band_lies_within_the_frame_and_has_its_lines_colour() {
+        let band = Band {
+            name: "±2s".to_owned(),
+            of: 1,
+            points: vec![(0.0, -9.0, 9.0), (1.0, -9.0, 9.0)],
+        };
+        let text = banded_svg(&plot(vec![(0.0, 1.0), (1.0, 2.0)]), &[band]).unwrap();
+        assert!(text.contains("class=\"band c1\""), "{text}");
+        let polygon = text.split("<polygon").nth(1).unwrap();
+        let points = polygon.split("points=\"").nth(1).unwrap();
+        for pair in points.split('"').next().unwrap().split_whitespace() {
+            let y: f64 = pair.split(',').nth(1).unwrap().parse().unwrap();
+            assert!((FRAME[2]..=FRAME[3]).contains(&y), "{pair}");
+        }
+    }
+
+    #[test]
+    fn a_name_from_outside_leaves_no_text() {
+        let mut one = plot(vec![(0.0, 1.0)]);
+        one.traces[0].name = "<script>\"".to_owned();
+        assert!(!svg(&one).unwrap().contains("<script>"));
     }
 }

@@ -6,7 +6,8 @@ use metrology::sample::{ProbedPoint, Rejection};
 use node_runtime::Diagnostic;
 use serde_json::{Value, json};
 
-use super::page::table;
+use super::page::{fold, table};
+use super::svg::unsigned_zero;
 use crate::evidence::Evidence;
 
 /// Head of the table.
@@ -26,9 +27,10 @@ pub fn section(evidence: &Evidence) -> Markup {
     let rows = rows(evidence);
     html! {
         @if !rows.is_empty() {
-            h2 { "Touches along given directions" }
+            (fold("Touches along given directions", None, false, &html! {
             (table(&TOUCH_COLUMNS, &rows))
             p.note { "The probe axis points from the ball to the spindle, in the workpiece frame. A and C follow from it; of the two solutions the nearest inside the travel is taken. At contact: positions as probe/point has them, of the rotary encoders." }
+            }))
         }
     }
 }
@@ -47,11 +49,9 @@ pub fn rows(evidence: &Evidence) -> Vec<Vec<String>> {
                 pair([a_deg, c_deg]),
                 other(pointing),
                 pair(at),
-                format!(
-                    "{:+.2}, {:+.2}",
-                    (at[0] - a_deg) * ARCSEC,
-                    (at[1] - c_deg) * ARCSEC
-                ),
+                [at[0] - a_deg, at[1] - c_deg]
+                    .map(|off_deg| signed(off_deg * ARCSEC))
+                    .join(", "),
             ]
         });
         touches.collect::<Vec<_>>()
@@ -115,8 +115,19 @@ fn other(pointing: &Diagnostic) -> String {
     }
 }
 
-fn pair([a_deg, c_deg]: [f64; 2]) -> String {
-    format!("{a_deg:.4}, {c_deg:.4}")
+fn pair(angles_deg: [f64; 2]) -> String {
+    let text = angles_deg.map(|angle_deg| unsigned_zero(format!("{angle_deg:.4}")));
+    text.join(", ")
+}
+
+/// A difference with its sign; a zero has that of a sum.
+fn signed(value: f64) -> String {
+    let number = unsigned_zero(format!("{value:.2}"));
+    if number.starts_with('-') {
+        number
+    } else {
+        format!("+{number}")
+    }
 }
 
 fn value<'a>(pointing: &'a Diagnostic, key: &str) -> &'a str {

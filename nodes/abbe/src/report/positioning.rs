@@ -2,17 +2,17 @@
 
 use abbe_msgs::topics;
 use anyhow::Result;
-use iso230::positioning::one_sided::{self, OneSidedPoint, OneSidedResult};
-use iso230::positioning::{PointResult, PositioningRemark, PositioningResult, PositioningRuns};
+use iso230::positioning::one_sided::{self, OneSidedResult};
+use iso230::positioning::{PositioningRemark, PositioningResult, PositioningRuns};
 use iso230::{Direction, ExpandedLength, positioning};
 use machine::MachineFile;
 use metrology::Axis;
 use metrology::sample::TestKind;
 
+mod curves;
 mod diagonals;
 
-use super::plot::{self, Plot, Trace};
-use super::section::{Drawing, Rows, Section, head, um};
+use super::section::{Rows, Section, head, um};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
 use crate::evaluate::correction::{BY_OWN_SCALE, Measured};
@@ -37,13 +37,13 @@ pub fn figure(value: &ExpandedLength, stated: bool) -> String {
 /// # Errors
 /// When a plot cannot be drawn.
 pub fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> {
-    let mut sections = Vec::new();
+    // What all four diagonals say together comes before each of them.
+    let mut sections = diagonals::sections(tests, budget);
     for test in &tests.linear {
         let about: (&[u32], _, _) = (&test.runs, test.reference, test.axis);
         let measured = Measured::of(tests, budget, about);
         sections.push(section(tests, test, &measured)?);
     }
-    sections.extend(diagonals::sections(tests, budget));
     Ok(sections)
 }
 
@@ -111,6 +111,9 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
         Some(direction) => one_sided::evaluate(&runs, direction, &measured.budget)
             .map(|result| fill_one_sided(&mut section, test, &result, measured.is_stated)),
     };
+    if section.figures.get("iso230_2").is_some() {
+        section.drawings.push(curves::drawing(&runs)?);
+    }
     match found {
         Ok(filled) => {
             filled?;
@@ -213,11 +216,6 @@ fn fill_one_sided(
         ],
         note: uncertainty_note(stated),
     });
-    let mean = |point: &OneSidedPoint| (point.target_mm, point.side.mean_mm * 1e3);
-    let points = result.points.iter().map(mean).collect();
-    section
-        .drawings
-        .push(drawing(vec![trace(&towards.to_string(), points)])?);
     let mut figures = serde_json::json!({
         "one_sided": towards,
         "n_runs": result.n_runs,
@@ -305,7 +303,6 @@ fn fill(
         of(&result.reversal)
     ));
     section.tables.push(figures(result, stated));
-    section.drawings.push(means(result)?);
     section.figures = serde_json::json!({
         "test": section.title, "iso230_2": result, "left_out": test.left_out,
     });
@@ -351,40 +348,6 @@ fn figures(result: &PositioningResult, stated: bool) -> Rows {
         ],
         note: uncertainty_note(stated),
     }
-}
-
-fn means(result: &PositioningResult) -> Result<Drawing> {
-    let of = |name: &str, value: fn(&PointResult) -> f64| {
-        let points = result.points.iter();
-        trace(
-            name,
-            points.map(|p| (p.target_mm, value(p) * 1e3)).collect(),
-        )
-    };
-    drawing(vec![
-        of("up", |point| point.up.mean_mm),
-        of("down", |point| point.down.mean_mm),
-    ])
-}
-
-fn trace(name: &str, points: Vec<(f64, f64)>) -> Trace {
-    Trace {
-        name: name.to_owned(),
-        points,
-        marks: false,
-    }
-}
-
-fn drawing(traces: Vec<Trace>) -> Result<Drawing> {
-    Ok(Drawing {
-        svg: plot::svg(&Plot {
-            x: "target / mm".to_owned(),
-            y: "mean deviation / µm".to_owned(),
-            traces,
-        })?,
-        caption: "Mean deviation at each target, from each side; the mean of all is taken out."
-            .to_owned(),
-    })
 }
 
 fn remark_in_words(remark: &PositioningRemark) -> String {

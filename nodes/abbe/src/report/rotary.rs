@@ -7,12 +7,15 @@ use anyhow::Result;
 use maud::html;
 use metrology::sample::{CurveForm, ErrorCurve, GeometryModel};
 
-use super::page::table;
+use super::page::{figure, fold, table};
+use super::plot::{self, Plot, Trace};
+use super::screen::{Screen, compensated};
 use super::section::{Rows, head};
+use super::svg::unsigned_zero;
 use super::terminal::Part;
 use super::tool_error::quantile;
 use super::{Report, conditions, latency, pointed};
-use crate::evidence::{Condition, Evidence, Verification};
+use crate::evidence::{Condition, Evidence, PoseError, Verification};
 
 /// The condition of a verification that left more than expected.
 const BEYOND_EXPECTED: &str = "beyond_expected";
@@ -30,21 +33,24 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
     lines.extend(tool_line(evidence));
     let locations = model.map_or_else(Vec::new, location_rows);
     let tools = tool_rows(evidence);
-    let body = html! {
-        h1 { (title) }
-        @for line in &lines { p { (line) } }
-        h2 { "Location errors" }
+    let screen = screen(evidence)?;
+    let locations_part = html! {
         (table(&LOCATION_HEAD, &locations))
         p.note { "ISO 230-1 components: EX0C is where the line of C lies along X, EA0C how it is tilted about X, with all axes at zero. U is the expanded uncertainty, k = 2. What the poses cannot see has none." }
         @if let Some(motions) = model.map(motion_names).filter(|names| !names.is_empty()) {
             p { "Error motions that the readings needed besides: " (motions) "." }
         }
-        h2 { "Tool error at the verification poses" }
+    };
+    let tools_part = html! {
         (table(&TOOL_HEAD, &tools))
         p.note { "Truth of the plant at poses that the machine really went to, all five axes' errors included; no node sees it." }
+    };
+    let body = html! {
+        @for line in &lines { p { (line) } }
+        @if !tools.is_empty() { (fold("Tool error at the verification poses", None, false, &tools_part)) }
+        @if !locations.is_empty() { (fold("Location errors", None, true, &locations_part)) }
         (pointed::section(evidence))
         (latency::section(evidence)?)
-        (conditions::section(evidence))
     };
     let pointed = pointed::rows(evidence);
     let tables = [
@@ -66,9 +72,58 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         title: title.to_owned(),
         lines,
         parts: parts.collect(),
+        screen,
         body,
         figures: figures(evidence),
     })
+}
+
+/// The first screen: the tool error without and with compensation, pose by pose, and what is left beyond the expected.
+fn screen(evidence: &Evidence) -> Result<Screen> {
+    let last = |word: &str| {
+        let mut all = evidence.verifications.iter().rev();
+        all.find(|one| one.label.contains(word) && !one.poses.is_empty())
+    };
+    let mut screen = Screen::default();
+    if let Some((off, on)) = pair(evidence) {
+        let n = last("with compensation").map_or(0, |one| one.poses.len());
+        screen = compensated(off.p95_mm, on.p95_mm, &format!("{n} verification poses"));
+    }
+    let trace = |word: &str, name: &str| {
+        let sizes = last(word)?.poses.iter().enumerate();
+        let size_um = |(k, pose): (usize, &PoseError)| (k as f64 + 1.0, pose.error_mm.norm() * 1e3);
+        Some(Trace {
+            name: name.to_owned(),
+            points: sizes.map(size_um).collect(),
+            marks: true,
+        })
+    };
+    let traces = [
+        trace("without", "without compensation"),
+        trace("with compensation", "with compensation"),
+    ];
+    let traces: Vec<Trace> = traces.into_iter().flatten().collect();
+    if !traces.is_empty() {
+        let plot = Plot {
+            x: "verification pose".to_owned(),
+            y: "tool error / µm".to_owned(),
+            traces,
+        };
+        let caption =
+            "Size of the true error of the tool at each pose, in the order of the program.";
+        screen.picture = Some(figure(&plot::svg(&plot)?, caption));
+    }
+    let is_beyond = |condition: &&Condition| condition.diagnostic.name == BEYOND_EXPECTED;
+    let beyond = evidence.conditions.iter().filter(is_beyond);
+    screen
+        .lacks
+        .extend(beyond.map(|one| format!("Beyond expected: {}.", one.diagnostic.message)));
+    let behind = vec![conditions::section(evidence)];
+    screen.join(Screen {
+        behind,
+        ..latency::screen(evidence)?
+    });
+    Ok(screen)
 }
 
 /// A table, and how it stands in the whole text.
@@ -107,7 +162,7 @@ fn location_rows(model: &GeometryModel) -> Vec<Vec<String>> {
                 .unwrap_or(f64::NAN);
             let (value, expanded) = if seen {
                 (
-                    format!("{:.2}", curve.coefficient[0] * scale),
+                    unsigned_zero(format!("{:.2}", curve.coefficient[0] * scale)),
                     format!("{:.2}", COVERAGE * u * scale),
                 )
             } else {

@@ -6,6 +6,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Wi
 use maud::{Markup, html};
 
 use super::page;
+use super::svg::unsigned_zero;
 use super::terminal::Rank;
 
 /// What warnings of tests without a result have in common.
@@ -126,18 +127,25 @@ impl Section {
         text
     }
 
-    /// For a page.
+    /// For a page: folded, its pictures first; tables stand behind a picture where there is one.
     #[must_use]
     pub fn html(&self) -> Markup {
-        html! {
-            h2 { (self.title) }
-            @for line in &self.lines { p { (line) } }
-            @for rows in &self.tables {
+        let tables = html! {
+            @for rows in self.tables.iter().filter(|table| !table.rows.is_empty()) {
                 (page::table(&rows.head.iter().map(String::as_str).collect::<Vec<_>>(), &rows.rows))
                 @if !rows.note.is_empty() { p.note { (rows.note) } }
             }
+        };
+        let has_tables = self.tables.iter().any(|table| !table.rows.is_empty());
+        let content = html! {
+            @for answer in self.answers.iter().filter(|line| !self.lines.contains(line)) { p { (answer) } }
+            @for line in &self.lines { p { (line) } }
             @for drawing in &self.drawings { (page::figure(&drawing.svg, &drawing.caption)) }
-        }
+            @if has_tables && !self.drawings.is_empty() { (page::all_figures(&tables)) } @else { (tables) }
+        };
+        let answer = self.answers.first().map(String::as_str);
+        let answer = answer.or_else(|| self.warnings.first().map(|warning| warning.line.as_str()));
+        page::fold(&self.title, answer, self.rank == Rank::Answer, &content)
     }
 }
 
@@ -171,11 +179,11 @@ pub(super) fn laid_out(rows: &Rows) -> String {
 #[must_use]
 pub fn rounded(value: f64, uncertainty: f64) -> (String, String) {
     if !(value.is_finite() && uncertainty.is_finite() && uncertainty > 0.0) {
-        return (format!("{value:.2}"), "—".to_owned());
+        return (unsigned_zero(format!("{value:.2}")), "—".to_owned());
     }
     let decimals = (1.0 - uncertainty.log10().floor()).clamp(0.0, 9.0) as usize;
     (
-        format!("{value:.decimals$}"),
+        unsigned_zero(format!("{value:.decimals$}")),
         format!("{uncertainty:.decimals$}"),
     )
 }
@@ -186,7 +194,7 @@ pub fn um(length_mm: f64) -> String {
     if length_mm.is_nan() {
         return "—".to_owned();
     }
-    format!("{:.2}", length_mm * 1e3)
+    unsigned_zero(format!("{:.2}", length_mm * 1e3))
 }
 
 /// Table head from names.
@@ -228,6 +236,9 @@ mod tests {
             ("12.35".to_owned(), "0.12".to_owned())
         );
         assert_eq!(rounded(12.3456, 23.4), ("12".to_owned(), "23".to_owned()));
+        assert_eq!(rounded(-1e-4, 0.1).0, "0.00");
+        assert_eq!(um(-1e-6), "0.00");
+        assert_eq!(um(-1e-5), "-0.01");
         assert_eq!(rounded(1.0, f64::NAN), ("1.00".to_owned(), "—".to_owned()));
     }
 }

@@ -4,11 +4,13 @@ use chrono::DateTime;
 use metrology::stamp::{Host, Stamp};
 use serde_json::{Value, json};
 
-use super::section::{Rows, Section, head};
+use super::plot::{self, Plot, Trace};
+use super::section::{Drawing, Rows, Section, head};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, Instrument, NOT_STATED};
 use crate::evaluate::circles::CircleRecording;
 use crate::evaluate::correction::{Measured, MeasuredCircle};
+use crate::evaluate::course::Course;
 use crate::evaluate::linear::LinearTest;
 use crate::evaluate::test_conditions::{Readings, TestConditions};
 
@@ -107,6 +109,12 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
             note: "From the first test to the last one.".to_owned(),
         });
     }
+    match drawing(seen) {
+        Ok(drawn) => section.drawings.extend(drawn),
+        Err(error) => section
+            .lines
+            .push(format!("Temperatures are not drawn: {error:#}.")),
+    }
     short.push(format!("Correction to 20 °C: {correction}."));
     short.retain(|line| !line.is_empty());
     section.figures = json!({
@@ -121,6 +129,55 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
         "correction_to_20_degc": correction,
     });
     Conditions { section, short }
+}
+
+/// Fewest readings of a thermometer that make a curve.
+const FEWEST_READINGS: usize = 3;
+/// Most thermometers of one drawing.
+const MOST_THERMOMETERS: usize = 12;
+
+/// What the thermometers read over the time of the bag; `None` where none was read often enough.
+fn drawing(seen: &TestConditions) -> anyhow::Result<Option<Drawing>> {
+    let curves = || {
+        seen.courses
+            .iter()
+            .filter(|(_, one)| one.points().len() >= FEWEST_READINGS)
+    };
+    let first = curves()
+        .filter_map(|(_, one)| Some(one.points().first()?.0))
+        .min();
+    let last = curves()
+        .filter_map(|(_, one)| Some(one.points().last()?.0))
+        .max();
+    let (Some(first), Some(last)) = (first, last) else {
+        return Ok(None);
+    };
+    let is_short = (last - first).as_secs_f64() < 3600.0;
+    let (unit, unit_s) = if is_short {
+        ("min", 60.0)
+    } else {
+        ("h", 3600.0)
+    };
+    let trace = |(name, one): (&String, &Course<f64>)| Trace {
+        name: name.clone(),
+        points: { one.points().iter() }
+            .map(|(at, degc)| ((*at - first).as_secs_f64() / unit_s, *degc))
+            .collect(),
+        marks: false,
+    };
+    let left = curves().count().saturating_sub(MOST_THERMOMETERS);
+    let more = match left {
+        0 => String::new(),
+        n => format!(" {n} more are in the table alone."),
+    };
+    Ok(Some(Drawing {
+        svg: plot::svg(&Plot {
+            x: format!("time since the first reading / {unit}"),
+            y: "temperature / °C".to_owned(),
+            traces: curves().take(MOST_THERMOMETERS).map(trace).collect(),
+        })?,
+        caption: format!("Thermometers over the whole bag.{more}"),
+    }))
 }
 
 const NO_THERMOMETER: &str = "Temperatures not stated: no thermometer was read. Name thermometers in temperature_sensors of the machine file, or state temperature_deviation_k in budget.yaml.";

@@ -1,20 +1,19 @@
 //! The page of a warm-up: latency, drift at the blocks, tool error before and after compensation.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use anyhow::Result;
 use maud::{Markup, html};
-use metrology::Axis;
-use metrology::stamp::{Host, Stamp};
 use nalgebra::Vector3;
 
-use super::page::{figure, table};
-use super::plot::{Plot, Trace, svg};
+use super::page::{figure, fold, table};
+use super::plot::{Plot, svg};
+use super::screen::{Screen, compensated};
 use super::section::{Rows, head};
+use super::svg::unsigned_zero;
 use super::terminal::Part;
 use super::tool_error::{self, BlocksSpan, Places, ToolError};
-use super::{Report, blocks, conditions, latency};
+use super::{Report, blocks, conditions, latency, over_time};
 use crate::evidence::{Evidence, Verification};
 
 /// Label prefix of the cold verification in a plan.
@@ -33,36 +32,85 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
     let mut figures = latency::figures(evidence);
     figures["tool_error_in_blocks_span"] = figures_of(&errors, span.as_ref());
     figures["block_heights"] = blocks::remark(evidence).into();
-    let drift = drift_traces(evidence);
     let body = html! {
-        h1 { (title) }
         @for line in &lines { p { (line) } }
-        h2 { "Change of the tool error since cold, in the blocks' span" }
-        (error_table(&errors))
-        p.note { "All in µm. Truth of the plant at poses that the machine really went to; no node sees it." @for line in EXPLAINED { " " (line) } }
-        @if let Some(places) = places(&errors) {
-            h2 { "Change of the tool error since cold, at Z " (places.z_mm) " mm" }
-            (places_table(&errors, &places))
-            p.note { (of_places(&places, span.as_ref())) }
-        }
-        h2 { "Drift at the blocks" }
-        @for axis in Axis::LINEAR {
-            (figure(&svg(&Plot {
-                x: "time since start / h".to_owned(),
-                y: format!("drift of the {axis} reading / µm"),
-                traces: drift.get(&axis).cloned().unwrap_or_default(),
-            })?, &format!("{axis} face of each block")))
-        }
+        (over_time::section(evidence)?)
+        (errors_section(&errors, span.as_ref()))
+        (drift_section(evidence)?)
         (predictions(evidence))
         (latency::section(evidence)?)
-        (conditions::section(evidence))
     };
     Ok(Report {
         title: title.to_owned(),
+        screen: screen(evidence, &errors)?,
         lines,
         parts: parts(&errors, span.as_ref()),
         body,
         figures,
+    })
+}
+
+/// The first screen: the tool error without and with compensation, and its course beside the drift.
+fn screen(evidence: &Evidence, errors: &[ToolError]) -> Result<Screen> {
+    let mut screen = match last_pair(errors) {
+        Some((off, on)) => {
+            let what = format!(
+                "change since cold at {} poses in the blocks' span",
+                on.n_inside
+            );
+            compensated(off.change_p95_mm, on.change_p95_mm, &what)
+        }
+        None => Screen {
+            lacks: vec![
+                "Tool error: no pair of verifications with and without compensation.".to_owned(),
+            ],
+            ..Screen::default()
+        },
+    };
+    screen.picture = over_time::picture(evidence, errors)?;
+    screen.tiles.extend(over_time::greatest_drift(evidence));
+    let behind = vec![conditions::section(evidence)];
+    screen.join(Screen {
+        behind,
+        ..latency::screen(evidence)?
+    });
+    Ok(screen)
+}
+
+/// The tables of the tool error, where there is one.
+fn errors_section(errors: &[ToolError], span: Option<&BlocksSpan>) -> Markup {
+    let content = html! {
+        (error_table(errors))
+        p.note { "All in µm. Truth of the plant at poses that the machine really went to; no node sees it." @for line in EXPLAINED { " " (line) } }
+        @if let Some(places) = places(errors) {
+            h3 { "At Z " (places.z_mm) " mm" }
+            (places_table(errors, &places))
+            p.note { (of_places(&places, span)) }
+        }
+    };
+    html! {
+        @if !errors.is_empty() {
+            (fold("Change of the tool error since cold, in the blocks' span", None, false, &content))
+        }
+    }
+}
+
+/// Drift of each face of the blocks, where any was measured twice.
+fn drift_section(evidence: &Evidence) -> Result<Markup> {
+    let (drift, unit) = over_time::drift(evidence);
+    let mut figures = Vec::new();
+    for (axis, traces) in drift {
+        let plot = Plot {
+            x: format!("time since start / {unit}"),
+            y: format!("drift of the {axis} reading / µm"),
+            traces,
+        };
+        figures.push(figure(&svg(&plot)?, &format!("{axis} face of each block")));
+    }
+    Ok(html! {
+        @if !figures.is_empty() {
+            (fold("Drift at the blocks", None, false, &html! { @for figure in &figures { (figure) } }))
+        }
     })
 }
 
@@ -87,7 +135,7 @@ pub fn last_pair(errors: &[ToolError]) -> Option<(&ToolError, &ToolError)> {
 }
 
 fn um(length_mm: f64) -> String {
-    format!("{:.1}", length_mm * 1e3)
+    unsigned_zero(format!("{:.1}", length_mm * 1e3))
 }
 
 fn headline(errors: &[ToolError], span: Option<&BlocksSpan>) -> Vec<String> {
@@ -231,7 +279,7 @@ fn predictions(evidence: &Evidence) -> Markup {
         .predictions
         .iter()
         .map(|prediction| {
-            let hours = (prediction.at - start(evidence)).as_secs_f64() / 3600.0;
+            let hours = (prediction.at - over_time::start(evidence)).as_secs_f64() / 3600.0;
             let mut row = vec![format!("{hours:.2}")];
             row.extend(PREDICTORS.map(|key| {
                 let value = prediction
@@ -247,57 +295,15 @@ fn predictions(evidence: &Evidence) -> Markup {
         .collect();
     html! {
         @if !rows.is_empty() {
-            h2 { "Prediction between block cycles" }
+            (fold("Prediction between block cycles", None, false, &html! {
             (table(&["time / h", "held", "time constant", "temperatures"], &rows))
             p.note { "Residual at the blocks at each update, root mean square in µm, had the last model been held, extrapolated with its time constant, or moved with the temperatures; a dash: that way was not identifiable or not proven yet." }
+            }))
         }
     }
 }
 
 const PREDICTORS: [&str; 3] = ["hold_um", "relaxation_um", "temperature_um"];
-
-fn start(evidence: &Evidence) -> Stamp<Host> {
-    evidence
-        .segments
-        .first()
-        .map_or_else(Stamp::default, |first| first.at)
-}
-
-/// Drift of each block's face over time, µm over h.
-fn drift_traces(evidence: &Evidence) -> BTreeMap<Axis, Vec<Trace>> {
-    let mut cold = BTreeMap::new();
-    let mut traces: BTreeMap<Axis, BTreeMap<String, Vec<(f64, f64)>>> = BTreeMap::new();
-    let start = start(evidence);
-    for block in &evidence.blocks {
-        for axis in Axis::LINEAR {
-            let Some(face) = block.faces[axis] else {
-                continue;
-            };
-            let key = (block.block_id.clone(), axis);
-            if block.cold {
-                cold.insert(key.clone(), face.position_mm);
-            }
-            if let Some(cold_mm) = cold.get(&key) {
-                let hours = (face.at - start).as_secs_f64() / 3600.0;
-                traces
-                    .entry(axis)
-                    .or_default()
-                    .entry(key.0)
-                    .or_default()
-                    .push((hours, (face.position_mm - cold_mm) * 1e3));
-            }
-        }
-    }
-    let named = |(name, points)| Trace {
-        name,
-        points,
-        marks: false,
-    };
-    traces
-        .into_iter()
-        .map(|(axis, blocks)| (axis, blocks.into_iter().map(named).collect()))
-        .collect()
-}
 
 /// The tables: laid out by hand in the whole text, and once more for the short one.
 fn parts(errors: &[ToolError], span: Option<&BlocksSpan>) -> Vec<Part> {

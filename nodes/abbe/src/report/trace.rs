@@ -4,72 +4,57 @@
 //!   drawn radius = 10 divisions + deviation / division            (1)
 //! ```
 //!
-//! A division is 5 µm, or less where the drawing says so, and more by steps of 1, 2 and 5 where deviations would not
-//! fit on the drawing.
+//! A division is the finest of 1, 2 and 5 times a power of ten µm, 0.1 µm at least, with which every deviation lies within
+//! eight divisions of the nominal circle. Every second ring has its deviation beside it.
+
+use std::fmt::Write as _;
 
 use anyhow::{Result, anyhow};
 use metrology::sample::TestPlane;
-use plotters::prelude::*;
 
+use super::plot::{COLOURS, legend};
+use super::svg::{short, stretches};
 use crate::evaluate::circles::plane_axes;
 
-const SIZE: u32 = 520;
+const SIZE: f64 = 560.0;
 /// Divisions from the centre to the nominal circle.
 const NOMINAL: f64 = 10.0;
 /// Most divisions that a trace may lie from the nominal circle.
 const MAX_DIVISIONS: f64 = 8.0;
-const INK: RGBColor = RGBColor(1, 2, 3);
-const RUN_COLOURS: [RGBColor; 4] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-];
+/// Px from the centre to the outermost ring.
+const REACH_PX: f64 = 262.0;
+/// Points of a trace that show their values.
+const HOVERED: usize = 48;
 
 /// A drawing and what a division of it is.
 pub struct Drawn {
-    /// SVG text.
+    /// Legend and SVG text.
     pub svg: String,
     /// Such as `5 µm a division`.
     pub scale: String,
 }
 
-/// Least division of a circular test, µm.
-const USUAL_UM: f64 = 5.0;
 /// Least division that a drawing may have, µm.
 const FINEST_UM: f64 = 0.1;
 
 /// Draws named traces of (angle in rad, radial deviation in mm).
 ///
 /// # Errors
-/// When the drawing library fails.
+/// When its text cannot be written.
 pub fn svg(traces: &[(String, Vec<(f64, f64)>)], plane: TestPlane) -> Result<Drawn> {
-    drawn(traces, plane, USUAL_UM)
-}
-
-/// The same with divisions as fine as the traces want.
-///
-/// # Errors
-/// When the drawing library fails.
-pub fn fine_svg(traces: &[(String, Vec<(f64, f64)>)], plane: TestPlane) -> Result<Drawn> {
-    drawn(traces, plane, FINEST_UM)
-}
-
-fn drawn(traces: &[(String, Vec<(f64, f64)>)], plane: TestPlane, least_um: f64) -> Result<Drawn> {
     let deviations = traces.iter().flat_map(|(_, points)| points);
-    let greatest_um = deviations.map(|(_, d)| d.abs() * 1e3).fold(0.0, f64::max);
-    let division_um = division_um(greatest_um, least_um);
-    let mut text = String::new();
+    let finite = deviations
+        .map(|(_, d)| d.abs() * 1e3)
+        .filter(|d| d.is_finite());
+    let division_um = division_um(finite.fold(0.0, f64::max), FINEST_UM);
+    let scale = format!("{} µm a division", (division_um * 1e3).round() / 1e3);
+    let named: Vec<(usize, &str, &str)> = { traces.iter().enumerate() }
+        .map(|(place, (name, _))| (place, "line", name.as_str()))
+        .collect();
+    let mut text = legend(&format!("radial deviation, {scale}"), &named);
     draw(traces, plane, division_um, &mut text)
         .map_err(|error| anyhow!("circular trace: {error}"))?;
-    Ok(Drawn {
-        svg: text.replace("#010203", "currentColor").replacen(
-            "<svg ",
-            "<svg class=\"plot\" style=\"max-width:34rem\" role=\"img\" ",
-            1,
-        ),
-        scale: format!("{} µm a division", (division_um * 1e3).round() / 1e3),
-    })
+    Ok(Drawn { svg: text, scale })
 }
 
 fn division_um(greatest_um: f64, least_um: f64) -> f64 {
@@ -84,67 +69,121 @@ fn division_um(greatest_um: f64, least_um: f64) -> f64 {
     last
 }
 
+/// Place on the drawing at an angle (rad) and so many divisions from the centre, px.
+fn place(angle: f64, divisions: f64) -> (f64, f64) {
+    let radius = divisions * REACH_PX / (NOMINAL + MAX_DIVISIONS);
+    let middle = SIZE / 2.0;
+    (middle + radius * angle.cos(), middle - radius * angle.sin())
+}
+
 fn draw(
     traces: &[(String, Vec<(f64, f64)>)],
     plane: TestPlane,
     division_um: f64,
     text: &mut String,
-) -> Result<(), Box<dyn std::error::Error>> {
-    let reach = NOMINAL + MAX_DIVISIONS;
-    let root = SVGBackend::with_string(text, (SIZE, SIZE)).into_drawing_area();
-    let mut chart = ChartBuilder::on(&root)
-        .margin(8)
-        .build_cartesian_2d(-reach..reach, -reach..reach)?;
-    let ring = |radius: f64| {
-        (0..=180).map(move |step| {
-            let angle = f64::from(step) * std::f64::consts::PI / 90.0;
-            (radius * angle.cos(), radius * angle.sin())
-        })
-    };
-    for step in [-8, -6, -4, -2, 2, 4, 6, 8] {
-        chart.draw_series(LineSeries::new(
-            ring(NOMINAL + f64::from(step)),
-            INK.mix(0.15),
-        ))?;
-    }
-    chart.draw_series(LineSeries::new(ring(NOMINAL), INK.mix(0.7)))?;
-    for line in [[(-reach, 0.0), (reach, 0.0)], [(0.0, -reach), (0.0, reach)]] {
-        chart.draw_series(LineSeries::new(line, INK.mix(0.3)))?;
-    }
-    let font = || ("sans-serif", 13).into_font().color(&INK);
+) -> std::fmt::Result {
+    write!(
+        text,
+        "<svg class=\"plot polar\" role=\"img\" aria-label=\"circular traces\" viewBox=\"0 0 {SIZE} {SIZE}\">"
+    )?;
+    rings(text, division_um)?;
     if let Some([u, v]) = plane_axes(plane) {
-        let labels = [
-            (format!("+{u}"), (reach - 1.8, -0.6)),
-            (format!("+{v}"), (0.4, reach - 0.2)),
-        ];
-        chart.draw_series(labels.map(|(label, at)| Text::new(label, at, font())))?;
+        let (right, up) = (SIZE - 6.0, 20.0);
+        let middle = SIZE / 2.0;
+        write!(
+            text,
+            "<text x=\"{right}\" y=\"{}\" text-anchor=\"end\">+{u}</text><text x=\"{}\" y=\"{up}\">+{v}</text>",
+            middle + 22.0,
+            middle + 8.0
+        )?;
     }
-    for ((name, points), colour) in traces.iter().zip(RUN_COLOURS.iter().cycle()) {
-        let style = ShapeStyle {
-            color: colour.to_rgba(),
-            filled: false,
-            stroke_width: 1,
-        };
+    for (number, (name, points)) in traces.iter().enumerate() {
         // (1)
-        let drawn = points.iter().map(|(angle, deviation_mm)| {
-            let radius = NOMINAL + deviation_mm * 1e3 / division_um;
-            (radius * angle.cos(), radius * angle.sin())
-        });
-        chart
-            .draw_series(LineSeries::new(drawn, style))?
-            .label(name.as_str())
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], style));
+        let at = |(angle, deviation_mm): (f64, f64)| {
+            place(angle, NOMINAL + deviation_mm * 1e3 / division_um)
+        };
+        write!(text, "<g class=\"c{}\">", number % COLOURS)?;
+        for stretch in stretches_of_turn(points) {
+            text.push_str(
+                "<polyline fill=\"none\" stroke=\"currentColor\" stroke-width=\"1.5\" points=\"",
+            );
+            for point in stretch {
+                let (x, y) = at(point);
+                write!(text, "{x:.1},{y:.1} ")?;
+            }
+            text.push_str("\"/>");
+        }
+        let every = points.len().div_ceil(HOVERED).max(1);
+        for point in points.iter().step_by(every).filter(|p| p.1.is_finite()) {
+            let (x, y) = at(*point);
+            write!(
+                text,
+                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"7\" fill-opacity=\"0\"><title>{}: {}°, {} µm</title></circle>",
+                super::svg::escaped(name),
+                short(point.0.to_degrees().rem_euclid(360.0)),
+                short(point.1 * 1e3)
+            )?;
+        }
+        text.push_str("</g>");
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::MiddleMiddle)
-        .label_font(font())
-        .border_style(INK.mix(0.0))
-        .draw()?;
-    drop(chart);
-    root.present()?;
-    drop(root);
+    text.push_str("</svg>");
     Ok(())
+}
+
+/// Stretches of a trace by the place of its readings: their angles go round and are in no order.
+fn stretches_of_turn(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
+    let by_number: Vec<(f64, f64)> = { points.iter().enumerate() }
+        .map(|(k, (_, deviation))| (k as f64, *deviation))
+        .collect();
+    let angle = |k: f64| points.get(k as usize).map_or(f64::NAN, |point| point.0);
+    let of = |stretch: Vec<(f64, f64)>| {
+        let all = stretch.into_iter().map(|(k, d)| (angle(k), d));
+        all.collect()
+    };
+    stretches(&by_number).into_iter().map(of).collect()
+}
+
+fn rings(text: &mut String, division_um: f64) -> std::fmt::Result {
+    let middle = SIZE / 2.0;
+    for step in [-8, -6, -4, -2, 0, 2, 4, 6, 8] {
+        let divisions = NOMINAL + f64::from(step);
+        let radius = divisions * REACH_PX / (NOMINAL + MAX_DIVISIONS);
+        let strength = if step == 0 { 0.8 } else { 0.16 };
+        write!(
+            text,
+            "<circle cx=\"{middle}\" cy=\"{middle}\" r=\"{radius:.1}\" fill=\"none\" stroke=\"currentColor\" stroke-opacity=\"{strength}\"/>"
+        )?;
+        if step % 4 == 0 {
+            // Between the axes, where traces of both senses seldom leap.
+            let (x, y) = place(std::f64::consts::FRAC_PI_4, divisions);
+            let deviation_um = f64::from(step) * division_um;
+            let sign = if step > 0 { "+" } else { "" };
+            write!(
+                text,
+                "<text class=\"ring\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{sign}{}</text>",
+                y + 5.0,
+                short_of_ring(deviation_um)
+            )?;
+        }
+    }
+    write!(
+        text,
+        "<path stroke=\"currentColor\" stroke-opacity=\"0.3\" d=\"M{} {middle}H{}M{middle} {}V{}\"/>",
+        middle - REACH_PX,
+        middle + REACH_PX,
+        middle - REACH_PX,
+        middle + REACH_PX
+    )
+}
+
+/// A multiple of four divisions without needless zeros, µm.
+fn short_of_ring(deviation_um: f64) -> String {
+    let rounded = (deviation_um * 1e3).round() / 1e3;
+    if rounded == 0.0 {
+        "0 µm".to_owned()
+    } else {
+        format!("{rounded}")
+    }
 }
 
 #[cfg(test)]
@@ -152,20 +191,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_division_is_five_micrometres_unless_the_trace_would_not_fit() {
+    fn a_division_is_as_fine_as_the_trace_allows() {
         for (greatest_um, wanted_um) in [
-            (0.0, 5.0),
+            (0.0, 0.1),
+            (2.0, 0.5),
             (39.0, 5.0),
             (41.0, 10.0),
             (150.0, 20.0),
             (161.0, 50.0),
         ] {
             assert!(
-                (division_um(greatest_um, USUAL_UM) - wanted_um).abs() < 1e-9,
+                (division_um(greatest_um, FINEST_UM) - wanted_um).abs() < 1e-9,
                 "{greatest_um}"
             );
         }
-        assert!((division_um(1.5, FINEST_UM) - 0.2).abs() < 1e-9);
     }
 
     #[test]
@@ -175,6 +214,21 @@ mod tests {
         for word in ["+Z", "+X", "clockwise", "currentColor"] {
             assert!(drawn.svg.contains(word), "{word}");
         }
-        assert_eq!(drawn.scale, "5 µm a division");
+        assert_eq!(drawn.scale, "1 µm a division");
+        // (1): five divisions beyond the nominal circle, to the right of the centre.
+        let first = drawn.svg.split("points=\"").nth(1).unwrap();
+        let x: f64 = first.split(',').next().unwrap().parse().unwrap();
+        let wanted = 280.0 + 15.0 / 18.0 * REACH_PX;
+        assert!((x - wanted).abs() < 0.06, "{x} {wanted}");
+    }
+
+    #[test]
+    fn rings_have_their_deviation_beside_them() {
+        let round = (0..9).map(|k| (f64::from(k) * 0.7, 0.002)).collect();
+        let drawn = svg(&[("clockwise".to_owned(), round)], TestPlane::Xy).unwrap();
+        for label in [">-4<", ">-2<", ">0 µm<", ">+2<", ">+4<"] {
+            assert!(drawn.svg.contains(label), "{label}");
+        }
+        assert!(drawn.svg.contains("0.5 µm a division"));
     }
 }

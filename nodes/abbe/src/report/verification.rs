@@ -10,6 +10,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use super::screen::{Screen, compensated};
 use super::section::{Rows, Section, head, um};
 use crate::evidence::Verification;
 
@@ -123,6 +124,19 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
     Some(section)
 }
 
+/// The first screen of the last pair of verifications without and with compensation.
+#[must_use]
+pub fn screen(verifications: &[Verification]) -> Screen {
+    let seen = || verifications.iter().filter(|v| !v.poses.is_empty());
+    let find = |word: &str| seen().filter(|v| v.label.contains(word)).last();
+    let (Some(without), Some(with)) = (find("without"), find("with compensation")) else {
+        return Screen::default();
+    };
+    let p95_mm = |verification| quantile_mm(&sizes_mm(verification, false), 0.95);
+    let what = format!("{} poses", with.poses.len());
+    compensated(p95_mm(without), p95_mm(with), &what)
+}
+
 fn figures(verification: &Verification) -> serde_json::Value {
     serde_json::json!({
         "label": verification.label,
@@ -168,8 +182,11 @@ mod tests {
             rigid(p) + Vector3::new(2e-5 * p.x, 0.0, 0.0)
         });
         assert!((quantile_mm(&sizes_mm(&stretched, true), 1.0) - 0.002).abs() < 1e-9);
-        let section = section(&[moved, stretched]).unwrap();
+        let section = section(&[moved.clone(), stretched.clone()]).unwrap();
         assert_eq!(section.lines.len(), 2, "{:?}", section.lines);
+        let screen = super::screen(&[moved.clone(), stretched.clone()]);
+        assert!(screen.verdict.is_some() && screen.tiles.len() == 1);
+        assert!(super::screen(&[moved]).verdict.is_none());
         assert!(super::section(&[]).is_none());
     }
 

@@ -11,7 +11,7 @@ use super::Limit;
 use crate::report::section::um;
 
 /// A decision for a figure, in words.
-pub(super) const CONFORMS: &str = "conforms";
+pub const CONFORMS: &str = "conforms";
 
 /// A figure with its uncertainty.
 #[derive(Clone, Copy, Debug)]

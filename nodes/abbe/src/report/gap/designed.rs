@@ -7,6 +7,7 @@ use maud::html;
 use super::{name, section, three};
 use crate::report::Report;
 use crate::report::plot::{self, Plot, Trace};
+use crate::report::screen::Screen;
 use crate::report::section::{Drawing, Section};
 use crate::report::terminal::{self, Part, Rank};
 
@@ -37,8 +38,8 @@ pub fn page(
     Ok(Report {
         title: title.to_owned(),
         parts: terminal::apart(sections.iter().map(Part::of)),
+        screen: Screen::default(),
         body: html! {
-            h1 { (title) }
             @for line in &lines { p { (line) } }
             @for section in &sections { (section.html()) }
         },

@@ -22,7 +22,7 @@ pub(super) fn traces(traces: &[Trace]) -> Result<Vec<Markup>> {
             ("before".to_owned(), pair(&circle.before_um)),
             ("after".to_owned(), pair(&circle.after_um)),
         ];
-        let drawing = trace::fine_svg(&lines, plane(&circle.title))?;
+        let drawing = trace::svg(&lines, plane(&circle.title))?;
         let caption = format!(
             "Run {}, {}, {}: machine minus simulator, {}; noise {:.2} µm",
             circle.run, circle.title, circle.channel, drawing.scale, circle.floor_um

@@ -4,6 +4,8 @@ use gap_diagnosis::figures::{HeatMap, Isolability};
 use maud::{Markup, PreEscaped, html};
 
 use super::three;
+use super::words::covariate;
+use crate::report::page::fold;
 use crate::report::section::{Rows, Section, head};
 use crate::report::terminal::Rank;
 
@@ -25,7 +27,6 @@ pub(super) fn style() -> Markup {
 .heat th:nth-child(n+2), .matrix th:nth-child(n+4) { writing-mode: vertical-rl; transform: rotate(180deg); text-align: left; white-space: nowrap; padding: .4rem .15rem; }
 .shaded td { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 .traces { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 22rem), 1fr)); gap: 0 1rem; }
-figure { margin: .8rem 0; break-inside: avoid; }
 @media print { .shaded td, .shaded th { font-size: 7.5px; padding: 1px 2px; } }
 ")) }
     }
@@ -57,7 +58,7 @@ pub(super) fn heat(map: &HeatMap) -> Markup {
     let one = |title: &str, values: &[Vec<Option<f64>>]| {
         html! {
             table.shaded.heat {
-                thead { tr { th { (title) } @for k in &order { th { (map.columns[*k].replace('_', " ")) } } } }
+                thead { tr { th { (title) } @for k in &order { th { (covariate(&map.columns[*k])) } } } }
                 tbody {
                     @for (row, cells) in map.rows.iter().zip(values) {
                         tr {
@@ -74,12 +75,14 @@ pub(super) fn heat(map: &HeatMap) -> Markup {
             }
         }
     };
+    let content = html! {
+        (one("before", &map.z))
+        @if !map.z_after.is_empty() { (one("after", &map.z_after)) }
+        p.note { "Standard score; noise alone stays below about 4. Shaded by its logarithm." }
+    };
     html! {
         @if !map.rows.is_empty() {
-            h2 { "Residual by channel and what it goes with" }
-            (one("before", &map.z))
-            @if !map.z_after.is_empty() { (one("after", &map.z_after)) }
-            p.note { "Standard score; noise alone stays below about 4. Shaded by its logarithm." }
+            (fold("Residual by channel and what it goes with", None, false, &content))
         }
     }
 }
@@ -102,9 +105,7 @@ fn detectable(isolability: &Isolability, k: usize) -> String {
 pub(super) fn isolability(isolability: &Isolability) -> Markup {
     let order: Vec<usize> = order(isolability).into_iter().take(MOST_EFFECTS).collect();
     let cos = |a: usize, b: usize| isolability.cos.get(a).and_then(|row| row.get(b)).copied();
-    html! {
-        @if !order.is_empty() {
-            h2 { "What can be told from what" }
+    let content = html! {
             table.shaded.matrix {
                 thead { tr {
                     th { "cosine" } th { "sine alone" } th { "found from" }
@@ -130,7 +131,9 @@ pub(super) fn isolability(isolability: &Isolability) -> Markup {
             @if isolability.names.len() > order.len() {
                 p.note { (isolability.names.len() - order.len()) " effects that stand out better are not shown." }
             }
-        }
+    };
+    html! {
+        @if !order.is_empty() { (fold("What can be told from what", None, false, &content)) }
     }
 }
 

@@ -5,6 +5,7 @@ use maud::html;
 
 use super::{matrix, name, section, three};
 use crate::report::Report;
+use crate::report::screen::Screen;
 use crate::report::section::Section;
 use crate::report::terminal::{self, Part, Rank};
 
@@ -25,6 +26,7 @@ pub fn page(title: &str, forecast: &Preflight, minutes: f64) -> Report {
     Report {
         title: title.to_owned(),
         parts: terminal::apart(sections.iter().map(Part::of)),
+        screen: Screen::default(),
         body: html! {
             h2 { (title) }
             (matrix::style())

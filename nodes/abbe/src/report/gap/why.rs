@@ -35,8 +35,7 @@ pub(super) fn folded(report: &GapReport) -> Markup {
     });
     html! {
         @if !report.causes.is_empty() {
-            h2 { (WHY_TITLE) }
-            @for cause in causes { (cause) }
+            (page::fold(WHY_TITLE, None, false, &html! { @for cause in causes { (cause) } }))
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::evaluate::budget::Budget;
 use crate::evaluate::correction::Measured;
 use crate::evaluate::linear::{LinearTest, Reference};
 use crate::report::section::{NOT_EVALUATED, Rows, Section, head, um};
+use crate::report::terminal::Rank;
 
 /// The space diagonal along which a test ran, and whether it ran it upwards.
 fn space_diagonal(test: &LinearTest) -> Option<(SpaceDiagonal, bool)> {
@@ -110,7 +111,8 @@ fn diagonals_section(
     } else {
         "not compensated"
     };
-    let mut section = Section::new(format!("Space diagonals, ISO 230-6: {state}"));
+    let title = format!("Space diagonals, ISO 230-6: {state}");
+    let mut section = Section::new(title).ranked(Rank::Answer);
     let all = first.iter().flat_map(|(.., test)| &test.runs);
     let all: Vec<u32> = all.copied().collect();
     let measured = Measured::of(tests, budget, (&all, Reference::Length, None));

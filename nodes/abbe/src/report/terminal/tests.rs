@@ -53,6 +53,7 @@ fn report(sections: &[Section]) -> Report {
         title: "made up".to_owned(),
         lines: vec!["Where: everywhere.".to_owned(), "Which: all.".to_owned()],
         parts: apart(sections.iter().map(Part::of)),
+        screen: crate::report::screen::Screen::default(),
         body: maud::html! {},
         figures: serde_json::Value::Null,
     }

@@ -1,0 +1,155 @@
+//! The first screen of the tests of a bag: what was decided, the greatest figures, what was not evaluated.
+
+use std::fmt::Display;
+
+use maud::html;
+
+use crate::evaluate::Tests;
+use crate::evaluate::limits::CONFORMS;
+use crate::loss;
+use crate::report::page::figure;
+use crate::report::screen::{Screen, Tile, Tone};
+use crate::report::section::Section;
+use crate::report::terminal::Rank;
+
+/// Most tiles of answers.
+const MOST_ANSWERS: usize = 4;
+
+/// The screen of these parts; `judged`: the decisions of limits, `stated`: whether a budget was given.
+pub(super) fn of(
+    tests: &Tests,
+    sections: &[Section],
+    judged: Option<&Section>,
+    stated: bool,
+) -> Screen {
+    let answered = || {
+        let mut all: Vec<&Section> = sections
+            .iter()
+            .filter(|one| !one.answers.is_empty())
+            .collect();
+        all.retain(|one| one.rank < Rank::Detail);
+        all.sort_by_key(|one| one.rank);
+        all
+    };
+    let tiles = answered()
+        .into_iter()
+        .take(MOST_ANSWERS)
+        .map(tile)
+        .collect();
+    let drawn = { answered().into_iter() }
+        .chain(sections)
+        .find_map(|one| one.drawings.first());
+    Screen {
+        verdict: verdict(tests, &answered(), judged),
+        tiles,
+        lacks: lacks(tests, sections, stated),
+        picture: drawn.map(|drawing| html! { (figure(&drawing.svg, &drawing.caption)) }),
+        ..Screen::default()
+    }
+}
+
+/// The answer of a part: the first number of its sentence large, the rest below.
+fn tile(section: &Section) -> Tile {
+    let answer = section.answers.first().map_or("", String::as_str);
+    let answer = answer.trim_end_matches('.');
+    let (value, more) = answer.split_once(&[',', ';'][..]).unwrap_or((answer, ""));
+    let title = section.title.split(':').next().unwrap_or_default();
+    Tile::new(title, value, more.trim_start())
+}
+
+fn verdict(
+    tests: &Tests,
+    answered: &[&Section],
+    judged: Option<&Section>,
+) -> Option<(String, Tone)> {
+    if !tests.reading.is_whole() {
+        let line = loss::in_words(&tests.reading).into_iter().next()?;
+        return Some((line, Tone::Bad));
+    }
+    if let Some(broken) = tests.broken_off.first() {
+        return Some((broken.to_string(), Tone::Bad));
+    }
+    if let Some(judged) = judged {
+        let answer = judged.answers.first()?.clone();
+        let rows = judged.tables.first().map_or(&[][..], |table| &table.rows);
+        let mut decisions = rows.iter().filter_map(|row| row.get(4));
+        let all_pass = decisions.all(|decision| decision == CONFORMS);
+        let tone = if all_pass { Tone::Good } else { Tone::Bad };
+        return Some((answer, tone));
+    }
+    let first = answered.first()?;
+    let answer = first.answers.first()?;
+    Some((format!("{}: {answer}", first.title), Tone::Plain))
+}
+
+fn lacks(tests: &Tests, sections: &[Section], stated: bool) -> Vec<String> {
+    let mut lacks: Vec<String> = tests.broken_off.iter().map(as_text).collect();
+    for section in sections {
+        let warnings = section.warnings.iter();
+        lacks.extend(warnings.map(|warning| format!("{}: {}", section.title, warning.line)));
+    }
+    if sections.is_empty() {
+        lacks.push("The bag holds no test that can be evaluated.".to_owned());
+    } else if !stated {
+        lacks.push(
+            "No budget (--budget): expanded uncertainties of ISO 230-2, -4 and -6 are not stated."
+                .to_owned(),
+        );
+    }
+    lacks
+}
+
+fn as_text(one: &impl Display) -> String {
+    one.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn section(title: &str, answer: &str, rank: Rank) -> Section {
+        let mut section = Section::new(title).ranked(rank);
+        if !answer.is_empty() {
+            section.answer(answer.to_owned());
+        }
+        section
+    }
+
+    #[test]
+    fn the_most_important_answer_is_the_verdict_and_each_has_a_tile() {
+        let mut silent = section("Circle XY", "", Rank::Table);
+        silent.not_evaluated("one sense only");
+        let all = [
+            section(
+                "Positioning X, run 1 on: laser",
+                "accuracy A 8.50 ± 0.40 µm, systematic deviation E 5.00 µm.",
+                Rank::Table,
+            ),
+            silent,
+            section(
+                "Space diagonals",
+                "Systematic deviation E_d 12.00 µm.",
+                Rank::Answer,
+            ),
+        ];
+        let screen = of(&Tests::default(), &all, None, true);
+        let (verdict, tone) = screen.verdict.clone().unwrap();
+        assert_eq!(
+            verdict,
+            "Space diagonals: Systematic deviation E_d 12.00 µm."
+        );
+        assert_eq!(tone, Tone::Plain);
+        assert_eq!(screen.tiles[1].name, "Positioning X, run 1 on");
+        assert_eq!(screen.tiles[1].value, "accuracy A 8.50 ± 0.40 µm");
+        assert_eq!(screen.lacks, ["Circle XY: Not evaluated: one sense only."]);
+    }
+
+    #[test]
+    fn without_a_test_and_without_a_budget_that_is_said() {
+        let none = of(&Tests::default(), &[], None, true);
+        assert!(none.verdict.is_none() && none.lacks.len() == 1);
+        let all = [section("Circle XY", "G 3.00 µm.", Rank::Table)];
+        let lacks = of(&Tests::default(), &all, None, false).lacks;
+        assert!(lacks[0].contains("--budget"), "{lacks:?}");
+    }
+}
