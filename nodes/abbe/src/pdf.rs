@@ -156,7 +156,8 @@ fn print(mut browser: Command, page: &str, head: &Head, longest: Duration) -> Re
         .context("folder for the browser")?;
     let file = |name: &str| home.path().join(name);
     // Paper has nothing to fold: every part stands open.
-    let open = page.replace("<details class", "<details open class");
+    let open = page.replace("<details>", "<details open>");
+    let open = open.replace("<details class", "<details open class");
     let styled = open.replacen("</head>", &format!("{}</head>", head.style()), 1);
     std::fs::write(file("page.html"), styled).context("page for the browser")?;
     let messages = File::create(file("messages")).context("messages of the browser")?;

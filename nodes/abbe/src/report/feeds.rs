@@ -1,13 +1,12 @@
 //! Do the corrected points agree across feeds?
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 use maud::{Markup, html};
 use metrology::sample::{Rejection, TestKind};
 
 use super::page::{fold, table};
-use super::section::{Rows, head};
+use super::section::{Rows, head, laid_out};
 use super::terminal::Part;
 use crate::evidence::Evidence;
 
@@ -119,21 +118,15 @@ pub fn section(evidence: &Evidence) -> Markup {
 /// The same for a terminal.
 pub fn part(evidence: &Evidence) -> Part {
     let rows = rows(evidence);
-    let mut text = String::new();
     if rows.is_empty() {
         return Part::default();
     }
-    let head = head(&FEED_COLUMNS);
-    for row in std::iter::once(&head).chain(&rows) {
-        for cell in row {
-            let _ = write!(text, "{cell:>24.24}");
-        }
-        text.push('\n');
-    }
     let rows = Rows {
-        head,
+        head: head(&FEED_COLUMNS),
         rows,
         note: String::new(),
     };
+    // Long heads of columns take two lines, so that none runs into the next.
+    let text = format!("{}\n", laid_out(&rows));
     Part::table("Corrected points across feeds", text, rows)
 }
