@@ -136,11 +136,18 @@ impl Paths {
         let zero = |one: &Current| -> (TestPlane, u32, u32) {
             (one.segment.plane, one.segment.setup_id, one.segment.zero_id)
         };
-        let shift = |one: &Current| {
-            let under_one_zero = self.done.iter().filter(|other| zero(other) == zero(one));
-            shift_mm(&under_one_zero.collect::<Vec<_>>())
+        let mut shifts: Vec<((TestPlane, u32, u32), Vector2<f64>)> = Vec::new();
+        for one in &self.done {
+            if shifts.iter().all(|(known, _)| *known != zero(one)) {
+                let own = self.done.iter().filter(|other| zero(other) == zero(one));
+                shifts.push((zero(one), shift_mm(&own.collect::<Vec<_>>())));
+            }
+        }
+        let recording = |one: &Current| {
+            let (_, shift) = shifts.iter().find(|(known, _)| *known == zero(one))?;
+            Some(one.recording(shift))
         };
-        let all = self.done.iter().map(|one| one.recording(&shift(one)));
+        let all = self.done.iter().filter_map(recording);
         all.filter(|one| !one.points.is_empty()).collect()
     }
 }
@@ -220,8 +227,8 @@ fn shift_mm(paths: &[&Current]) -> Vector2<f64> {
     for _ in 0..ROUNDS {
         let (mut normal_matrix, mut right) = (Matrix2::zeros(), Vector2::zeros());
         for (path, ways_mm) in paths.iter().zip(&ways) {
-            // A twentieth of the readings has all that two unknowns need.
-            for (k, read) in path.read.iter().step_by(1 + path.read.len() / 2000) {
+            // Some hundred readings of a path have all that two unknowns need.
+            for (k, read) in path.read.iter().step_by(1 + path.read.len() / 400) {
                 let place = read + shift;
                 if let Some(near) = path.nearest(ways_mm, *k, &place) {
                     normal_matrix += near.normal * near.normal.transpose();

@@ -38,12 +38,15 @@ pub(super) fn of(
         .collect();
     let drawn = { answered().into_iter() }
         .chain(sections)
-        .find_map(|one| one.drawings.first());
+        .find_map(|one| Some((&one.title, one.drawings.first()?)));
     Screen {
         verdict: verdict(tests, &answered(), judged),
         tiles,
         lacks: lacks(tests, sections, stated),
-        picture: drawn.map(|drawing| html! { (figure(&drawing.svg, &drawing.caption)) }),
+        picture: drawn.map(|(title, drawing)| {
+            let caption = format!("{title}. {}", drawing.caption);
+            html! { (figure(&drawing.svg, &caption)) }
+        }),
         ..Screen::default()
     }
 }
