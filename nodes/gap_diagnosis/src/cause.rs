@@ -28,7 +28,7 @@ use crate::report::{Cause, Confusable, Constancy, ParameterValue, Status};
 use crate::rows::count;
 use crate::rule::Rule;
 use crate::selection::{Limits, Search, Set};
-use crate::signature::{Form, Instance, Library};
+use crate::signature::{Begins, Form, Instance, Library};
 use crate::stack::Stack;
 use crate::thermal;
 use crate::unknown::{self, Leftover};
@@ -108,6 +108,8 @@ pub struct Scope<'s, 'a> {
     pub noise: &'s BTreeMap<Channel, Noise>,
     /// Settings.
     pub config: &'s GapConfig,
+    /// First runs after what changed in the session: effects are tried from each of them on as well.
+    pub begins: &'s [Begins],
 }
 
 pub(crate) struct Best {
@@ -136,6 +138,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let stack = scope.stack;
     let means = kinds.iter().filter(|kind| kind.moment == Moment::Mean);
     let instances = Instance::all(stack.twin.machine(), means);
+    let instances = Instance::with_begins(instances, scope.begins);
     let mut signatures = Library::new(stack, instances);
     lines::add(stack, scope.slots, &mut signatures);
     widening::widen_curves(stack, &mut signatures);

@@ -8,6 +8,7 @@ use twin::effects::{self, CATALOGUE, Effect, Kind, Moment};
 use twin::{Channel, Session, Twin, simulate};
 
 use crate::cause::Found;
+use crate::changes::{self, Change};
 use crate::config::GapConfig;
 use crate::error::GapError;
 use crate::experiment::Experiment;
@@ -20,6 +21,7 @@ use crate::guard;
 use crate::judgement::{Check, CheckId};
 use crate::next::{self, Bench};
 use crate::noise::{self, Noise, Readings};
+use crate::over_session;
 use crate::regression::Regression;
 use crate::report::{GapReport, Inputs, NoiseFloor, NotExcited, SCHEMA};
 use crate::rows::Rows;
@@ -137,12 +139,20 @@ fn prepared<R>(
     if rows.len == 0 {
         return Err(GapError::NoReadings);
     }
+    let changes = if own_noise {
+        changes_of(session, &rows, &residual, config)
+    } else {
+        vec![]
+    };
+    let anew = changes::set_up_anew(session, &changes);
+    let session = anew.as_ref().unwrap_or(session);
     let noise = if own_noise {
-        noise_of(machine, session, stations, &residual, config)
+        let steps: Vec<usize> = changes.iter().map(|change| change.between[1]).collect();
+        noise_of(machine, session, stations, &residual, &steps, config)
     } else {
         simulate::check(quiet)?;
         let residual = residuals(machine, &twin, quiet)?;
-        noise_of(machine, quiet, stations, &residual, config)
+        noise_of(machine, quiet, stations, &residual, &[], config)
     };
     if noise.is_empty() {
         return Err(no_repeats(session, &rows));
@@ -155,6 +165,8 @@ fn prepared<R>(
         noise: &noise,
         residual: &residual,
         listed: listed(machine)?,
+        begins: changes::begins(session, &changes),
+        changes,
     };
     let mut notes = notes(&rows, &noise);
     if session.history.temperature_degc.is_empty() && !machine.temperature_sensors.is_empty() {
@@ -167,12 +179,27 @@ fn prepared<R>(
     Ok(then(&base, notes))
 }
 
-/// Noise of the repeats of a session.
+/// What changed between the repeats of a session.
+fn changes_of(
+    session: &Session,
+    rows: &Rows,
+    residual: &[Vec<f64>],
+    config: &GapConfig,
+) -> Vec<Change> {
+    let mut raw = vec![0.0; rows.len];
+    for (run, residual) in residual.iter().enumerate() {
+        rows.average(run, residual, &mut raw);
+    }
+    changes::find(session, rows, &raw, config)
+}
+
+/// Noise of the repeats of a session, but for what changed at some of its runs.
 fn noise_of(
     machine: &MachineFile,
     session: &Session,
     stations: usize,
     residual: &[Vec<f64>],
+    steps: &[usize],
     config: &GapConfig,
 ) -> BTreeMap<Channel, Noise> {
     let all: Vec<usize> = (0..session.runs.len()).collect();
@@ -187,7 +214,7 @@ fn noise_of(
         rows: &rows,
         residual,
     };
-    noise::noise(readings, &raw, config)
+    noise::noise(readings, &raw, steps, config)
 }
 
 impl<'a> Base<'a> {
@@ -232,7 +259,21 @@ impl<'a> Base<'a> {
         let sizes = gap::by_block(&all, self.noise, &all.floated(all.raw.clone()), &all.runs);
         let floated = stack.floated(stack.raw.clone());
         let (rest, beside) = self.beside_named(&stack, &slots, &found, config);
-        let flagged = reproduced && before.flagged() && beside.flagged();
+        let over_session = over_session::of_named(&stack, &found, &rest, config);
+        let told_all = told(&all, found.named(), &found);
+        let does_not_repeat =
+            over_session::not_repeated(&all, &less(&all.raw, &told_all), &self.changes);
+        notes.extend(over_session::notes(&over_session, &does_not_repeat));
+        let is_held_out = !split.held_out.is_empty();
+        let judged = if is_held_out {
+            &shrunk.held_out[..]
+        } else {
+            &[]
+        };
+        let remainder = over_session::remainder(&mut found, judged, config);
+        let is_left = remainder.is_some();
+        notes.extend(remainder);
+        let flagged = reproduced && before.flagged() && (beside.flagged() || is_left);
         let effects = [found.entries(), scattered.entries()].concat();
         let report = GapReport {
             schema: SCHEMA.to_owned(),
@@ -246,6 +287,8 @@ impl<'a> Base<'a> {
             not_excited: not_excited(&found, &scattered.seen, kinds),
             next_experiments: next.entries,
             runtime_s: 0.0,
+            over_session,
+            does_not_repeat,
         };
         let figures = Figures {
             heat: places::heat_map(&slots, &before.families, &beside.families),

@@ -8,12 +8,14 @@ use twin::effects::{Effect, Kind};
 use twin::{Channel, Session, Twin};
 
 use crate::cause::{self, Found, Member, Scope};
+use crate::changes::Change;
 use crate::config::GapConfig;
 use crate::families::{self, Slot};
 use crate::form_error::FormError;
 use crate::guard;
 use crate::noise::Noise;
 use crate::scatter::{self, Scattered};
+use crate::signature::Begins;
 use crate::split::Split;
 use crate::stack::{Simulated, Stack};
 use crate::unknown::{self, Leftover};
@@ -28,6 +30,10 @@ pub(crate) struct Base<'a> {
     pub(crate) residual: &'a [Vec<f64>],
     /// The effects that the machine file has.
     pub(crate) listed: Vec<Box<dyn Effect>>,
+    /// First runs after what changed in the session.
+    pub(crate) begins: Vec<Begins>,
+    /// What changed between repeats of the session.
+    pub(crate) changes: Vec<Change>,
 }
 
 impl<'a> Base<'a> {
@@ -111,6 +117,7 @@ impl<'a> Base<'a> {
             slots,
             noise: &searched.noise,
             config,
+            begins: &self.begins,
         };
         let of_scatter = |left: &DVector<f64>| {
             let scope = scope(&searched.stack, &searched.slots);
@@ -148,6 +155,7 @@ impl<'a> Base<'a> {
             slots: &searched.slots,
             noise: &searched.noise,
             config,
+            begins: &self.begins,
         };
         scatter::find_within(&scope, kinds, &searched.found.left)
     }
@@ -165,6 +173,7 @@ impl<'a> Base<'a> {
             slots: &slots,
             noise,
             config,
+            begins: &self.begins,
         };
         let before = unknown::leftover(&stack, &slots, noise, &stack.z, &[], config);
         let found = cause::find(&scope, kinds);
