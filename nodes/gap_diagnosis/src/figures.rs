@@ -341,8 +341,8 @@ fn noise_within(
     };
     write!(
         f,
-        "{channel}: no test was repeated on it, so its noise is that of neighbouring readings, {sigma_um:.2} µm; by how \
-         much a second run would differ is not known, {between_um} µm is taken{then}: log the same again, three times in all"
+        "{channel}: no test was repeated on it, so its noise is that within a run, {sigma_um:.2} µm; by how much a second \
+         run would differ is not known, {between_um} µm is taken{then}: record the same again, three times in all"
     )
 }
 

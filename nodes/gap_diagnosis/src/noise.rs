@@ -37,12 +37,14 @@ use twin::{Channel, Run, Session};
 
 use crate::config::GapConfig;
 use crate::field::{self, Mode, Smooth};
-use crate::log::{self, LONG_S};
+use crate::log::LONG_S;
 use crate::pace::{self, Pace, Repeated};
 use crate::repeats::{self, Contrasts};
 use crate::rows::{Block, Rows, count};
 use crate::unrepeated;
 use crate::whitener::Autoregression;
+
+mod within_runs;
 
 /// Noise of one channel.
 #[derive(Clone, Debug)]
@@ -112,16 +114,15 @@ pub struct Readings<'r> {
     pub residual: &'r [Vec<f64>],
 }
 
-/// Noise of every channel that was repeated, and of the logs of the others (of long logs, where anything was repeated); `raw`
-/// is the residual of each row. What changed at `steps` (first runs after each) is no noise. Where nothing at all was repeated
-/// and nothing is a log, noise is what no smooth mode of a run explains (`within_runs`).
+/// Noise of every channel that was repeated, and of the logs of the others (of long logs, where anything was repeated), else of
+/// single runs in motion; `raw` is the residual of each row. What changed at `steps` (first runs after each) is no noise.
 pub fn noise(
     readings: Readings<'_>,
     raw: &[f64],
     steps: &[usize],
     config: &GapConfig,
 ) -> BTreeMap<Channel, Noise> {
-    let repeated = |steps: &[usize]| -> BTreeMap<Channel, Noise> {
+    let beside = |steps: &[usize]| -> BTreeMap<Channel, Noise> {
         let groups = repeats::contrasts(readings.session, readings.rows, raw, steps);
         let of = |(channel, groups): (Channel, Vec<Contrasts>)| {
             let found = of_channel(readings, &groups, config)?;
@@ -130,81 +131,21 @@ pub fn noise(
         groups.into_iter().filter_map(of).collect()
     };
     // Where a channel has no repeats but across the steps, these are in its noise.
-    let mut known = repeated(&[]);
+    let mut repeated = beside(&[]);
     if !steps.is_empty() {
-        known.extend(repeated(steps));
+        repeated.extend(beside(steps));
     }
-    let repeated = known;
     let least_s = if repeated.is_empty() { 0.0 } else { LONG_S };
     let mut all = unrepeated::noise(readings, raw, least_s);
     if all.is_empty() && repeated.is_empty() {
-        all = within_runs(readings, raw, config);
+        all = within_runs::noise(readings, raw, config);
     }
     all.extend(repeated);
     all
 }
 
-/// Noise of single runs in motion: within a run what its smooth modes leave, reversals among it, so that it is rather too great
-/// than too small; between runs what `unrepeated` takes.
-fn within_runs(
-    readings: Readings<'_>,
-    raw: &[f64],
-    config: &GapConfig,
-) -> BTreeMap<Channel, Noise> {
-    let mut blocks = BTreeMap::<Channel, Vec<usize>>::new();
-    for (place, block) in readings.rows.blocks.iter().enumerate() {
-        let is_read = !matches!(block.channel, Channel::Touch | Channel::Thermometer(_));
-        if is_read && !log::is_log(&readings.session.runs[block.run]) {
-            let own = blocks.entry(block.channel.clone()).or_default();
-            own.push(place);
-        }
-    }
-    let of = |(channel, places): (Channel, Vec<usize>)| {
-        let single = |place: &usize| {
-            let block = &readings.rows.blocks[*place];
-            Contrasts {
-                blocks: vec![*place],
-                rows: (0..block.rows.len()).collect(),
-                values: vec![raw[block.range()].to_vec()],
-                one_zero: false,
-            }
-        };
-        let groups: Vec<Contrasts> = places.iter().map(single).collect();
-        let all: Vec<Difference> = groups
-            .iter()
-            .flat_map(|group| differences(readings, group))
-            .filter(|one| one.values.len() >= LEAST_ROWS_OF_A_MODE * one.modes.ncols())
-            .collect();
-        let all: Vec<&Difference> = all.iter().collect();
-        let least_mm2 = resolution_mm(readings.machine, &channel).powi(2) / 12.0;
-        let (within, freedom) = autoregression(&all, config.most_ar, least_mm2)?;
-        let known = places.iter().map(|place| &readings.rows.blocks[*place]);
-        let known: Vec<&Block> = known.collect();
-        let within_row = repeats::within_row_variance(readings.residual, &known);
-        let row_sigma_mm = within.variances[0].sqrt();
-        Some((
-            channel,
-            Noise {
-                within: within.scaled(doubt(freedom)),
-                pace: Pace::default(),
-                between: unrepeated::between_in_motion(),
-                row_sigma_mm,
-                reading_sigma_mm: (row_sigma_mm.powi(2) + within_row).sqrt(),
-                repeats: 1,
-                freedom,
-                field_freedom: 1.0,
-            },
-        ))
-    };
-    blocks.into_iter().filter_map(of).collect()
-}
-
-/// Rows that a single run needs for each smooth mode taken out of it.
-const LEAST_ROWS_OF_A_MODE: usize = 3;
-
 /// Share of the posterior of a variance within runs below what is used.
 const CAUTION_WITHIN: f64 = 0.9;
-
 /// How much greater a variance that is known from so many rows may well be.
 pub fn doubt(freedom: f64) -> f64 {
     let law = ChiSquared::new(freedom.max(1.0)).ok();
