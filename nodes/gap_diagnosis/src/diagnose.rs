@@ -23,7 +23,9 @@ use crate::next::{self, Bench};
 use crate::noise::{self, Noise, Readings};
 use crate::over_session;
 use crate::regression::Regression;
-use crate::report::{GapReport, Inputs, NoiseFloor, NotExcited, SCHEMA};
+use crate::report::{
+    DoesNotRepeat, GapReport, Inputs, NoiseFloor, NotExcited, OverSession, SCHEMA,
+};
 use crate::rows::Rows;
 use crate::searched::{Base, Searched, less, told};
 use crate::shrink::{self, Named, Shrunk};
@@ -259,10 +261,8 @@ impl<'a> Base<'a> {
         let sizes = gap::by_block(&all, self.noise, &all.floated(all.raw.clone()), &all.runs);
         let floated = stack.floated(stack.raw.clone());
         let (rest, beside) = self.beside_named(&stack, &slots, &found, config);
-        let over_session = over_session::of_named(&stack, &found, &rest, config);
-        let told_all = told(&all, found.named(), &found);
-        let does_not_repeat =
-            over_session::not_repeated(&all, &less(&all.raw, &told_all), &self.changes);
+        let (over_session, does_not_repeat) =
+            self.over_session(&stack, &all, &found, &rest, config);
         notes.extend(over_session::notes(&over_session, &does_not_repeat));
         let is_held_out = !split.held_out.is_empty();
         let judged = if is_held_out {
@@ -310,6 +310,21 @@ impl<'a> Base<'a> {
             effects,
             experiments: next.experiments,
         }
+    }
+
+    /// Whether the named effects, which leave `rest` of what was fitted, hold over the session, and what no effect explains of its changes.
+    fn over_session(
+        &self,
+        fitted: &Stack<'_>,
+        all: &Stack<'_>,
+        found: &Found,
+        rest: &[f64],
+        config: &GapConfig,
+    ) -> (Vec<OverSession>, Vec<DoesNotRepeat>) {
+        let over_session = over_session::of_named(fitted, found, rest, config);
+        let left = less(&all.raw, &told(all, found.named(), found));
+        let changes = over_session::not_repeated(all, &left, &self.changes);
+        (over_session, changes)
     }
 
     /// What the named effects leave, before whitening, and its scores.
