@@ -141,16 +141,12 @@ fn prepared<R>(
     if rows.len == 0 {
         return Err(GapError::NoReadings);
     }
-    let changes = if own_noise {
-        changes_of(session, &rows, &residual, config)
-    } else {
-        vec![]
-    };
+    let of_session = own_noise.then(|| changes_of(session, &rows, &residual, config));
+    let changes = of_session.unwrap_or_default();
     let anew = changes::set_up_anew(session, &changes);
     let session = anew.as_ref().unwrap_or(session);
     let noise = if own_noise {
-        let steps: Vec<usize> = changes.iter().map(|change| change.between[1]).collect();
-        noise_of(machine, session, stations, &residual, &steps, config)
+        noise_of(machine, session, stations, &residual, &changes, config)
     } else {
         simulate::check(quiet)?;
         let residual = residuals(machine, &twin, quiet)?;
@@ -201,7 +197,7 @@ fn noise_of(
     session: &Session,
     stations: usize,
     residual: &[Vec<f64>],
-    steps: &[usize],
+    changes: &[Change],
     config: &GapConfig,
 ) -> BTreeMap<Channel, Noise> {
     let all: Vec<usize> = (0..session.runs.len()).collect();
@@ -216,7 +212,8 @@ fn noise_of(
         rows: &rows,
         residual,
     };
-    noise::noise(readings, &raw, steps, config)
+    let steps: Vec<usize> = changes.iter().map(|change| change.between[1]).collect();
+    noise::noise(readings, &raw, &steps, config)
 }
 
 impl<'a> Base<'a> {
@@ -264,17 +261,12 @@ impl<'a> Base<'a> {
         let (over_session, does_not_repeat) =
             self.over_session(&stack, &all, &found, &rest, config);
         notes.extend(over_session::notes(&over_session, &does_not_repeat));
-        let is_held_out = !split.held_out.is_empty();
-        let judged = if is_held_out {
-            &shrunk.held_out[..]
-        } else {
-            &[]
-        };
-        let remainder = over_session::remainder(&mut found, judged, config);
+        let remainder = over_session::remainder(&mut found, &shrunk, config);
         let is_left = remainder.is_some();
         notes.extend(remainder);
         let flagged = reproduced && before.flagged() && (beside.flagged() || is_left);
         let effects = [found.entries(), scattered.entries()].concat();
+        let figures = figures(&stack, &slots, [&before, &beside], &found, &shrunk, config);
         let report = GapReport {
             schema: SCHEMA.to_owned(),
             inputs: Inputs::default(),
@@ -289,19 +281,6 @@ impl<'a> Base<'a> {
             runtime_s: 0.0,
             over_session,
             does_not_repeat,
-        };
-        let figures = Figures {
-            heat: places::heat_map(&slots, &before.families, &beside.families),
-            traces: shrunk.traces,
-            isolability: isolability::isolability(
-                &found.signatures,
-                &found.normal,
-                &found.forms,
-                stack.freedom(),
-            ),
-            held_out: shrunk.held_out,
-            apart: shrunk.apart,
-            share_intervals: share_interval::of_places(&stack, &slots, &before.families, config),
         };
         Diagnosis {
             report,
@@ -393,6 +372,31 @@ impl<'a> Base<'a> {
             })
             .collect();
         shrink::shrink(all, self.noise, split, &named, has_gap, config)
+    }
+}
+
+/// What the pages draw; `scores` are those of the residual before and beside what is named.
+fn figures(
+    stack: &Stack<'_>,
+    slots: &[Slot],
+    scores: [&Leftover; 2],
+    found: &Found,
+    shrunk: &Shrunk,
+    config: &GapConfig,
+) -> Figures {
+    let [before, beside] = scores.map(|score| &score.families);
+    Figures {
+        heat: places::heat_map(slots, before, beside),
+        traces: shrunk.traces.clone(),
+        isolability: isolability::isolability(
+            &found.signatures,
+            &found.normal,
+            &found.forms,
+            stack.freedom(),
+        ),
+        held_out: shrunk.held_out.clone(),
+        apart: shrunk.apart.clone(),
+        share_intervals: share_interval::of_places(stack, slots, before, config),
     }
 }
 

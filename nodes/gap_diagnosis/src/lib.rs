@@ -97,7 +97,7 @@ pub use closed::MIN_RUNS_CLOSED as LEAST_JUDGED_RUNS;
 pub use config::GapConfig;
 pub use diagnose::{Diagnosis, diagnose};
 pub use error::GapError;
-pub use figures::{Figures, Note};
+pub use figures::{Course, Figures, Note};
 pub use following::GapDiagnosisConfig;
 pub use report::GapReport;
 pub use rule::Rule;

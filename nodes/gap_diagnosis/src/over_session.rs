@@ -21,11 +21,12 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::cause::{Found, Member};
 use crate::changes::{self, Change};
 use crate::config::GapConfig;
-use crate::figures::{HeldOut, Note};
+use crate::figures::{Course, HeldOut, Note};
 use crate::nuisance::orthonormal;
 use crate::repeats::same_condition;
 use crate::report::{DoesNotRepeat, OverSession, Status};
 use crate::rows::count;
+use crate::shrink::Shrunk;
 use crate::signature::begin_s;
 use crate::stack::Stack;
 
@@ -215,7 +216,7 @@ pub(crate) fn not_repeated(stack: &Stack<'_>, rest: &[f64], all: &[Change]) -> V
 pub(crate) fn notes(named: &[OverSession], changed: &[DoesNotRepeat]) -> Vec<Note> {
     let title = |own: &OverSession| format!("{} {}", own.effect, own.axis).trim_end().to_owned();
     let begun = named.iter().filter_map(|own| {
-        Some(Note::Begins {
+        Some(Course::Begins {
             effect: title(own),
             run: own.from_run?,
         })
@@ -223,29 +224,30 @@ pub(crate) fn notes(named: &[OverSession], changed: &[DoesNotRepeat]) -> Vec<Not
     let several = named
         .iter()
         .filter(|own| !own.holds)
-        .map(|own| Note::NotOneSize {
+        .map(|own| Course::NotOneSize {
             effect: title(own),
             run: own.changes_from_run,
             share: own.change_share.or(own.growth_share_per_h).unwrap_or(0.0),
         });
-    let changed = changed.iter().map(|own| Note::DoesNotRepeat {
+    let changed = changed.iter().map(|own| Course::DoesNotRepeat {
         channel: own.channel.clone(),
         size_um: own.size_um,
         runs: [own.last_run, own.from_run],
         of_set_up: own.of_set_up,
         chance: own.chance,
     });
-    begun.chain(several).chain(changed).collect()
+    begun
+        .chain(several)
+        .chain(changed)
+        .map(Note::Course)
+        .collect()
 }
 
 /// What the named effects leave of the held-out runs, where it is much more than noise: the confidence of each falls by the
 /// share of the gap that stays.
-pub(crate) fn remainder(
-    found: &mut Found,
-    held_out: &[HeldOut],
-    config: &GapConfig,
-) -> Option<Note> {
-    if held_out.is_empty() || found.named().next().is_none() {
+pub(crate) fn remainder(found: &mut Found, shrunk: &Shrunk, config: &GapConfig) -> Option<Note> {
+    let held_out = &shrunk.held_out;
+    if shrunk.shrink.held_out_runs.is_empty() || found.named().next().is_none() {
         return None;
     }
     let mean = |of: fn(&HeldOut) -> f64| {
@@ -268,13 +270,13 @@ pub(crate) fn remainder(
     let worst = held_out
         .iter()
         .max_by(|a, b| a.after_um.total_cmp(&b.after_um))?;
-    Some(Note::Remainder {
+    Some(Note::Course(Course::Remainder {
         effects,
         size_um: after.sqrt(),
         floor_um: floor.sqrt(),
         run: worst.run,
         worst_um: worst.after_um,
-    })
+    }))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Sessions in which something changes: what begins is named from its run on, what slips is no noise, and what holds is said to.
 
 use gap_diagnosis::report::Status;
-use gap_diagnosis::{Diagnosis, Note};
+use gap_diagnosis::{Course, Diagnosis, Note};
 use machine::twin::Session;
 
 use crate::trials::plant::{Circle, Noise, State, Wrong, diagnosed, go_on, names, soft_play, told};
@@ -59,7 +59,7 @@ fn a_play_that_begins_during_the_session_is_named_from_its_run_on() {
         let width = &cause.expect("a play").parameters[0];
         assert!((width.value - 5.6).abs() < 0.4, "{width:?}");
         assert!(report.does_not_repeat.is_empty(), "{report:?}");
-        let begins = |note: &Note| matches!(note, Note::Begins { run: 16, .. });
+        let begins = |note: &Note| matches!(note, Note::Course(Course::Begins { run: 16, .. }));
         assert!(diagnosis.notes.iter().any(begins));
     }
 }
@@ -140,7 +140,7 @@ fn a_name_that_explains_only_a_part_counts_for_less() {
     };
     let diagnosis = diagnosed(&cycles(30, &[&both, &both]));
     let all = told(&diagnosis);
-    let is_left = |note: &Note| matches!(note, Note::Remainder { .. });
+    let is_left = |note: &Note| matches!(note, Note::Course(Course::Remainder { .. }));
     let named = names(&diagnosis);
     if !named.is_empty() {
         assert!(diagnosis.notes.iter().any(is_left), "{all}");
