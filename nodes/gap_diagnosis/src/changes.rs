@@ -28,9 +28,9 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::{Channel, Session};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use twin::{Channel, Session};
 
 use crate::config::GapConfig;
 use crate::field::{self, Mode};

@@ -14,9 +14,9 @@
 //! # Holds when
 //! A test was repeated at both ends of what changed.
 
-use machine::twin::Session;
 use nalgebra::DVector;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use twin::Session;
 
 use crate::cause::{Found, Member};
 use crate::changes::{self, Change};
@@ -281,12 +281,12 @@ pub(crate) fn remainder(found: &mut Found, shrunk: &Shrunk, config: &GapConfig) 
 
 #[cfg(test)]
 mod tests {
-    use machine::twin::Run;
     use metrology::sample::{TestKind, TestSegment};
     use metrology::{AxisSet, PerAxis, Stamp};
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::Pcg64Mcg;
+    use twin::Run;
 
     use super::*;
 
@@ -294,7 +294,7 @@ mod tests {
     fn session(runs: u32) -> Session {
         let run = |number: u32| {
             let at = Stamp::from_nanos(0);
-            let motion = machine::twin::Motion::new(
+            let motion = twin::Motion::new(
                 vec![180.0 * f64::from(number)],
                 AxisSet::XYZ,
                 PerAxis([vec![0.0], vec![0.0], vec![0.0], vec![], vec![], vec![]]),

@@ -10,7 +10,7 @@
 
 use std::collections::BTreeMap;
 
-use machine::twin::Channel;
+use twin::Channel;
 
 use super::{Difference, Noise, Readings, autoregression, differences, doubt, resolution_mm};
 use crate::config::GapConfig;

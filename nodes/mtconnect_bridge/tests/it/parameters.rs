@@ -8,6 +8,8 @@ use mtconnect_bridge::config::{AgentConfig, ConnectionConfig, Source};
 use mtconnect_bridge::mapping::MapFile;
 use mtconnect_bridge::{BridgeConfig, Settings};
 
+const README: &str = include_str!("../../README.md");
+
 fn config() -> BridgeConfig {
     BridgeConfig {
         source: Source::Shdr,

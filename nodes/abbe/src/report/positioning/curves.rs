@@ -1,7 +1,7 @@
 //! Deviations of a positioning test as they are always drawn: each reading, means up and down, and ±2s about them.
 
 use anyhow::Result;
-use metrology::iso230::positioning::PositioningRuns;
+use iso230::positioning::PositioningRuns;
 
 use crate::report::plot::{self, Band, Plot, Trace};
 use crate::report::section::Drawing;

@@ -2,7 +2,7 @@
 
 use gap_diagnosis::report::Status;
 use gap_diagnosis::{Course, Diagnosis, Note};
-use machine::twin::Session;
+use twin::Session;
 
 use crate::trials::plant::{Circle, Noise, State, Wrong, diagnosed, go_on, names, soft_play, told};
 
