@@ -134,8 +134,9 @@ pub fn of_text(text: &str) -> Result<Option<Recognised>> {
         // Of ways that give the same cells the plain one: a point as decimal.
         (numbers, found.decimal == '.')
     });
-    let Some(best) = best.filter(|_| begin.len() < text.len()) else {
-        return Ok(best);
+    let best = match best {
+        Some(best) if begin.len() < text.len() => best,
+        best => return Ok(best),
     };
     Ok(of(&Sheet::of_text(text, best.separator)?, best.decimal))
 }
@@ -439,8 +440,9 @@ mod tests {
 
     #[test]
     fn separators_decimals_and_units_are_those_of_the_text() {
-        let found =
-            of_text("n;Position [mm];Error [µm]\n1;0,5;-1,25\n1;1,5;2,5\n").expect("a table");
+        let found = of_text("n;Position [mm];Error [µm]\n1;0,5;-1,25\n1;1,5;2,5\n")
+            .unwrap()
+            .expect("a table");
         assert_eq!((found.separator, found.decimal), (';', ','));
         let units: Vec<Option<Unit>> = found.columns.iter().map(|column| column.unit).collect();
         assert_eq!(units, [None, Some(Unit::Mm), Some(Unit::Um)]);
