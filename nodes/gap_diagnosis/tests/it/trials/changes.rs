@@ -67,8 +67,9 @@ fn a_play_that_begins_during_the_session_is_named_from_its_run_on() {
 #[test]
 fn a_plate_that_slips_is_told_and_the_play_beside_it_is_named_all_the_same() {
     let play = soft_play(1, 4e-3);
-    let slipped = |s: &State| {
-        let [u, v] = play(s);
+    let play_too = soft_play(1, 4e-3);
+    let slipped = move |s: &State| {
+        let [u, v] = play_too(s);
         [u + 5e-3, v]
     };
     for seed in 4..6 {
@@ -133,7 +134,7 @@ fn what_changes_without_a_name_does_not_repeat() {
 #[test]
 fn a_name_that_explains_only_a_part_counts_for_less() {
     let play = soft_play(0, 6e-3);
-    let both = |s: &State| {
+    let both = move |s: &State| {
         let [u, v] = play(s);
         let x = s.position[0] / 50.0;
         [u + 3e-3 * s.velocity[1].signum() * x * x, v]
