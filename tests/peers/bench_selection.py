@@ -1,6 +1,6 @@
 """The diagnosis' search for the best set of effects with numpy: the same Gram matrix in, the same set out.
 
-Standard input: the problem as JSON (nodes/gap_diagnosis/src/problem.rs). Standard output: the set, its C, and the seconds of each of `repeats` searches.
+Standard input: the problem as JSON (nodes/gap_diagnosis/src/search/problem.rs). Standard output: the set, its C, and the seconds of each of `repeats` searches.
 """
 
 import json

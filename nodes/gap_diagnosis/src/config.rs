@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::GapError;
 use crate::judgement::Check;
-use crate::rule::Rule;
+use crate::judgement::rule::Rule;
 
 /// Settings of a diagnosis. The defaults are those that the trials were judged with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

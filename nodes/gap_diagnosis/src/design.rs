@@ -53,7 +53,7 @@ use crate::config::GapConfig;
 use crate::diagnose::considered;
 use crate::error::GapError;
 use crate::preflight::{FLOOR_UM, Floors, WANTED_REPEATS};
-use crate::signature::Instance;
+use crate::search::signature::Instance;
 use information::Own;
 use search::{Entry, Field};
 use separability::Aim;

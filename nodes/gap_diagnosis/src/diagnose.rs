@@ -7,32 +7,36 @@ use machine::file::EffectEntry;
 use twin::effects::{self, CATALOGUE, Effect, Kind, Moment};
 use twin::{Channel, Session, Twin, simulate};
 
-use crate::cause::Found;
-use crate::changes::{self, Change};
 use crate::config::GapConfig;
 use crate::error::GapError;
 use crate::experiment::Experiment;
-use crate::families::Slot;
-use crate::fewer::{MIN_STATIONS_KEPT, fewer};
-use crate::figures::{Figures, Note};
-use crate::form_error::FormError;
-use crate::gap;
-use crate::guard;
+use crate::judgement::cause::Found;
+use crate::judgement::guard;
+use crate::judgement::unknown::Leftover;
 use crate::judgement::{Check, CheckId};
+use crate::judgement::{recalibration, unknown};
 use crate::next::{self, Bench};
+use crate::noise::form_error::FormError;
+use crate::noise::stack::Stack;
+use crate::noise::whiteness;
 use crate::noise::{self, Noise, Readings};
-use crate::over_session;
-use crate::regression::Regression;
+use crate::report::figures::{Figures, Note};
 use crate::report::{
     DoesNotRepeat, GapReport, Inputs, NoiseFloor, NotExcited, OverSession, SCHEMA,
 };
-use crate::rows::Rows;
-use crate::searched::{Base, Searched, less, told};
+use crate::report::{localise, places};
+use crate::search::families::Slot;
+use crate::search::isolability;
+use crate::search::regression::Regression;
+use crate::search::rows::Rows;
+use crate::search::searched::{Base, Searched, less, told};
+use crate::session::changes::{self, Change};
+use crate::session::fewer::{MIN_STATIONS_KEPT, fewer};
+use crate::session::over_session;
+use crate::shrink::gap;
+use crate::shrink::share_interval;
+use crate::shrink::split::{self, Split};
 use crate::shrink::{self, Named, Shrunk};
-use crate::split::{self, Split};
-use crate::stack::Stack;
-use crate::unknown::Leftover;
-use crate::{isolability, localise, places, recalibration, share_interval, unknown, whiteness};
 
 /// Fewer held-out runs than this are to be looked at one by one.
 const FEW_HELD_OUT: usize = 6;

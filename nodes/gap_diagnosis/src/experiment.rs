@@ -10,7 +10,7 @@ use metrology::Axis;
 use metrology::sample::{Sense, TestPlane};
 use twin::Instrument;
 
-use crate::nuisance::plane_name;
+use crate::search::nuisance::plane_name;
 
 /// One pass of an experiment.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,10 +3,23 @@
 //! Every rule that speaks for or against a cause yields a [`Check`]: its value, its limit and its verdict. [`status`] is
 //! the only place that decides from them whether a cause is named, one of a set, or a surrogate.
 
+pub(crate) mod aside;
+pub(crate) mod cause;
+pub(crate) mod confidence;
+pub(crate) mod confirm;
+pub(crate) mod form_doubt;
+pub(crate) mod guard;
+pub(crate) mod in_common;
+pub(crate) mod plain;
+pub(crate) mod recalibration;
+pub mod rule;
+pub(crate) mod unknown;
+pub(crate) mod veto;
+
 use serde::{Deserialize, Serialize};
 
+use crate::judgement::veto::Veto;
 use crate::report::{Constancy, Status};
-use crate::veto::Veto;
 
 /// A rule that a cause is checked by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

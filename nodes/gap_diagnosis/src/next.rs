@@ -37,16 +37,16 @@ use machine::MachineFile;
 use nalgebra::DMatrix;
 use twin::{Channel, Session, Twin};
 
-use crate::cause::Found;
 use crate::experiment::{Experiment, library};
-use crate::figures::Note;
-use crate::form_error::FormError;
+use crate::judgement::cause::Found;
 use crate::noise::Noise;
+use crate::noise::form_error::FormError;
+use crate::noise::unrepeated;
+use crate::noise::whitener::Autoregression;
 use crate::report::NextExperiment;
-use crate::signature::{Form, Library};
-use crate::unread;
-use crate::unrepeated;
-use crate::whitener::Autoregression;
+use crate::report::figures::Note;
+use crate::search::signature::{Form, Library};
+use crate::session::unread;
 use known::Known;
 use question::{Answer, Question, questions};
 
@@ -216,7 +216,7 @@ impl Bench<'_> {
         let Some(noisiest) = noisiest else { return all };
         let mut assumed = noisiest.clone();
         assumed.within = Autoregression::white(noisiest.row_sigma_mm.powi(2));
-        assumed.pace = crate::pace::Pace::default();
+        assumed.pace = crate::noise::pace::Pace::default();
         let linear = metrology::Axis::LINEAR.into_iter().map(Channel::Length);
         for channel in [
             Channel::GridU,

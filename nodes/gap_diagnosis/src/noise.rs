@@ -27,6 +27,16 @@
 //! \[1\] G. Schwarz, Ann. Stat. 6, 1978 (BIC). \[2\] H. D. Patterson, R. Thompson, Biometrika 58, 1971
 //! (variances from contrasts). \[3\] JCGM 100:2008 (GUM), F.2.2.1 (resolution of a digital indication).
 
+pub(crate) mod bootstrap;
+pub(crate) mod form_error;
+pub(crate) mod normal;
+pub(crate) mod pace;
+pub(crate) mod repeats;
+pub(crate) mod stack;
+pub(crate) mod unrepeated;
+pub(crate) mod whitener;
+pub(crate) mod whiteness;
+
 use std::collections::BTreeMap;
 
 use machine::MachineFile;
@@ -36,13 +46,12 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twin::{Channel, Run, Session};
 
 use crate::config::GapConfig;
-use crate::field::{self, Mode, Smooth};
-use crate::log::LONG_S;
-use crate::pace::{self, Pace, Repeated};
-use crate::repeats::{self, Contrasts};
-use crate::rows::{Block, Rows, count};
-use crate::unrepeated;
-use crate::whitener::Autoregression;
+use crate::noise::pace::{Pace, Repeated};
+use crate::noise::repeats::Contrasts;
+use crate::noise::whitener::Autoregression;
+use crate::search::field::{self, Mode, Smooth};
+use crate::search::rows::{Block, Rows, count};
+use crate::session::log::LONG_S;
 
 mod within_runs;
 
@@ -298,7 +307,7 @@ impl Difference {
         for mut column in self.open.column_iter_mut() {
             within.filter(column.as_mut_slice());
         }
-        let basis = crate::nuisance::orthonormal(
+        let basis = crate::search::nuisance::orthonormal(
             self.values.len(),
             self.open.column_iter().map(|c| c.into_owned()),
         );
@@ -314,7 +323,7 @@ impl Difference {
             return (self.values.clone(), DMatrix::zeros(rows, 0));
         }
         let modes = self.modes.column_iter().map(|c| c.into_owned());
-        let basis = crate::nuisance::orthonormal(rows, modes);
+        let basis = crate::search::nuisance::orthonormal(rows, modes);
         let rough = &self.values - &basis * basis.tr_mul(&self.values);
         (rough, basis)
     }

@@ -36,19 +36,19 @@ use twin::{Channel, Instrument, Session, Twin, simulate};
 use crate::config::GapConfig;
 use crate::diagnose::{considered, stations};
 use crate::error::GapError;
-use crate::field::Smooth;
-use crate::figures::Isolability;
-use crate::form_error::FormError;
-use crate::isolability::{self, isolability};
 use crate::noise::Noise;
-use crate::pace::Pace;
-use crate::repeats;
+use crate::noise::form_error::FormError;
+use crate::noise::pace::Pace;
+use crate::noise::repeats;
+use crate::noise::stack::Stack;
+use crate::noise::whitener::Autoregression;
 use crate::report::NotExcited;
-use crate::rows::{Rows, count};
-use crate::signature::{Instance, Library};
-use crate::split;
-use crate::stack::Stack;
-use crate::whitener::Autoregression;
+use crate::report::figures::Isolability;
+use crate::search::field::Smooth;
+use crate::search::isolability::{self, isolability};
+use crate::search::rows::{Rows, count};
+use crate::search::signature::{Instance, Library};
+use crate::shrink::split;
 
 /// Noise that is assumed of an instrument's readings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

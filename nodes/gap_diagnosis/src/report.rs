@@ -5,6 +5,11 @@
 //! Keys keep their name and meaning. A key that was added later (`why`) is optional, so that older reports are read. Figures for
 //! pages alone are kept in the type and not written; `None` there is a report that was read.
 
+pub(crate) mod description;
+pub mod figures;
+pub(crate) mod localise;
+pub(crate) mod places;
+
 use serde::{Deserialize, Serialize};
 
 pub use crate::judgement::{Check, CheckId, Side, Verdict};

@@ -36,13 +36,13 @@ use machine::file::EffectEntry;
 use nalgebra::DVector;
 use twin::effects::{Kind, Moment, Parameter, Role};
 
-use crate::cause::Scope;
+use crate::judgement::cause::Scope;
+use crate::judgement::rule::Rule;
 use crate::judgement::{self, Check, CheckId};
-use crate::normal::Normal;
+use crate::noise::normal::Normal;
 use crate::report::{Cause, Status};
-use crate::rule::Rule;
-use crate::selection::{Limits, Search, Set, without};
-use crate::signature::{Form, Instance, Library};
+use crate::search::selection::{Limits, Search, Set, without};
+use crate::search::signature::{Form, Instance, Library};
 
 mod judge;
 mod levels;
@@ -192,7 +192,9 @@ impl<'b, 's, 'a> Bench<'b, 's, 'a> {
             normal,
         };
         for instance in 0..bench.signatures.instances.len() {
-            for values in crate::signature::shapes(bench.signatures.instances[instance].kind) {
+            for values in
+                crate::search::signature::shapes(bench.signatures.instances[instance].kind)
+            {
                 bench.add_forms(instance, &values);
             }
         }

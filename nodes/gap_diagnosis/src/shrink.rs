@@ -8,20 +8,25 @@
 //!
 //! What share of the gap is closed, with its interval, is taken in `closed`.
 
+pub(crate) mod apart;
+pub(crate) mod closed;
+pub(crate) mod gap;
+pub(crate) mod share_interval;
+pub(crate) mod split;
+
 use std::collections::BTreeMap;
 
-use crate::apart::{apart, chosen, remembered};
-use crate::closed;
 use crate::config::GapConfig;
-use crate::field::{self, Place};
-use crate::figures::over_session::over_session;
-use crate::figures::{Abscissa, Apart, HeldOut, Trace};
-use crate::gap::{self, Size};
 use crate::noise::Noise;
+use crate::noise::stack::Stack;
+use crate::report::figures::over_session::over_session;
+use crate::report::figures::{Abscissa, Apart, HeldOut, Trace};
 use crate::report::{BeforeAfter, LeftOut, Shrink};
-use crate::rows::{Block, count, position, time_s};
-use crate::split::{Split, title};
-use crate::stack::Stack;
+use crate::search::field::{self, Place};
+use crate::search::rows::{Block, count, position, time_s};
+use crate::shrink::apart::{apart, chosen, remembered};
+use crate::shrink::gap::Size;
+use crate::shrink::split::{Split, title};
 use twin::Channel;
 use twin::effects::Effect;
 

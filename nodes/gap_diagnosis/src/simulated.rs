@@ -31,7 +31,7 @@ use serde::{Deserialize, Serialize};
 use twin::effects::{self, Effect};
 use twin::{Reading, Run, Session, Twin, TwinError, simulate};
 
-use crate::nuisance::plane_name;
+use crate::search::nuisance::plane_name;
 
 mod places;
 mod runs;

@@ -29,7 +29,7 @@ use crate::config::GapConfig;
 use crate::diagnose::diagnose_against;
 use crate::error::GapError;
 use crate::following::GapDiagnosisConfig;
-use crate::repeats::same_condition;
+use crate::noise::repeats::same_condition;
 use crate::report::{Cause, GapReport, Status};
 use crate::session::{self, SessionBuilder, SessionConfig, SessionError};
 

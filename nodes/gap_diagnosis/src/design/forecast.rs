@@ -7,7 +7,7 @@ use super::search::{Entry, Field, Programme};
 use super::separability::{self, Aim, Shown, between, cos, named, parted, shown};
 use super::{Aimed, Candidate, Design, Hidden, Order, Remedy, Rung, Together};
 use crate::next::lever;
-use crate::rows::count;
+use crate::search::rows::count;
 
 /// Everything that a forecast is made of.
 pub struct Climbed<'c> {
@@ -107,7 +107,7 @@ impl Climbed<'_> {
                 let parts = |gram: &DMatrix<f64>| is_parted(gram, pair);
                 let ids = instances.map(|instance| instance.kind.id);
                 all.push(Together {
-                    effects: instances.map(crate::signature::Instance::name),
+                    effects: instances.map(crate::search::signature::Instance::name),
                     cos: cos(&programme.gram, pair),
                     parted_by: self.remedy(programme, &parts, &ids),
                 });

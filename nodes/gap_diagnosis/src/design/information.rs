@@ -18,13 +18,13 @@ use twin::{Twin, simulate};
 use super::{Candidate, Order};
 use crate::diagnose::stations;
 use crate::error::GapError;
-use crate::form_error::FormError;
-use crate::normal::Normal;
+use crate::noise::form_error::FormError;
+use crate::noise::normal::Normal;
+use crate::noise::stack::{Simulated, Stack};
 use crate::preflight::{AssumedFloor, Floors, assumed};
-use crate::resolved;
-use crate::rows::{Rows, count};
-use crate::signature::Instance;
-use crate::stack::{Simulated, Stack};
+use crate::search::resolved;
+use crate::search::rows::{Rows, count};
+use crate::search::signature::Instance;
 
 /// Most stations of a pass: enough for what the run-to-run field leaves.
 const STATIONS: usize = 80;

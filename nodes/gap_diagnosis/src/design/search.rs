@@ -103,7 +103,7 @@ impl<'f> Field<'f> {
         for (entry, repeats) in self.entries.iter().zip(repeats) {
             if *repeats > 0 {
                 let _ = set_ups.insert(entry.set_up, entry.set_up_min);
-                tests += entry.minutes * crate::rows::count(*repeats);
+                tests += entry.minutes * crate::search::rows::count(*repeats);
             }
         }
         tests + set_ups.values().sum::<f64>()

@@ -5,8 +5,8 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::information::MOST_COLUMNS;
+use crate::judgement::veto::least_d_squared;
 use crate::next::DECISION;
-use crate::veto::least_d_squared;
 
 /// Logarithm of the rows that a form of several columns is priced by: those of a usual session, some 5000.
 const LOG_ROWS: f64 = 8.5;

@@ -24,7 +24,7 @@ use twin::simulate::plate_axes;
 use twin::{Channel, Instrument, Motion, Reading, Run, Touch};
 
 use super::{Pass, PlannedTouch};
-use crate::rows::count;
+use crate::search::rows::count;
 use crate::session::HOLDS_FEED_S;
 
 /// Ticks that a pass is simulated with, at most about.

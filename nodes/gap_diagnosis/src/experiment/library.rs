@@ -26,7 +26,7 @@ use twin::{Instrument, Session};
 
 use super::course::acceleration_mm_s2;
 use super::{Experiment, Pass, short};
-use crate::repeats::same_condition;
+use crate::noise::repeats::same_condition;
 use planar::Stand;
 
 /// Setting up once more where the instrument stands, min.

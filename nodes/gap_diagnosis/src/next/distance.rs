@@ -17,7 +17,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::normal::Normal;
+use crate::noise::normal::Normal;
 
 /// An explanation: its columns among those of the information, their sizes, what is not known of them.
 #[derive(Clone, Debug)]

@@ -10,7 +10,7 @@ use super::Bench;
 use crate::experiment::course::{self, Frame};
 use crate::experiment::{Experiment, Pass};
 use crate::noise::Noise;
-use crate::rows::count;
+use crate::search::rows::count;
 
 /// Between passes, s.
 const PAUSE_S: f64 = 5.0;

@@ -20,9 +20,9 @@ use twin::{Channel, Run, Session};
 
 use super::Bench;
 use crate::noise::Noise;
-use crate::repeats::{self, Label, same_condition};
-use crate::signature::{Form, Library};
-use crate::stack::Stack;
+use crate::noise::repeats::{self, Label, same_condition};
+use crate::noise::stack::Stack;
+use crate::search::signature::{Form, Library};
 
 /// Stations of a pass: enough for what the run-to-run field leaves.
 const STATIONS_OF_PASS: usize = 120;
@@ -115,11 +115,11 @@ fn gram(
 mod tests {
     use super::*;
     use crate::config::GapConfig;
-    use crate::form_error::FormError;
+    use crate::noise::form_error::FormError;
     use crate::preflight::assumed;
     use crate::preflight::rig::{circles, floors, machine};
-    use crate::rows::Rows;
-    use crate::signature::Instance;
+    use crate::search::rows::Rows;
+    use crate::search::signature::Instance;
     use twin::Twin;
 
     /// What three circles in both senses add to what is known of a backlash from the same three, as (1) and by themselves.

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::distance::{Explanation, distance};
-use crate::normal::Normal;
-use crate::signature::Library;
+use crate::noise::normal::Normal;
+use crate::search::signature::Library;
 
 /// The session's information on the columns in question.
 pub struct Known {

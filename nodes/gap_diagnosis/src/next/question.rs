@@ -6,13 +6,13 @@ use statrs::distribution::ContinuousCDF;
 use super::distance::distance;
 use super::known::Known;
 use super::lever;
-use crate::cause::{Found, Member};
-use crate::confidence::ODDS;
-use crate::figures::NoRun;
+use crate::judgement::cause::{Found, Member};
+use crate::judgement::confidence::ODDS;
+use crate::judgement::veto::{Veto, least_d_squared};
 use crate::report::Status;
-use crate::selection::Set;
-use crate::signature::Library;
-use crate::veto::{Veto, least_d_squared};
+use crate::report::figures::NoRun;
+use crate::search::selection::Set;
+use crate::search::signature::Library;
 
 /// Squared distance that decides: three standard deviations.
 pub const DECISION: f64 = 9.0;
@@ -300,7 +300,7 @@ fn greatest<'t>(runs: &[(&'t str, Answer)], of: impl Fn(&Answer) -> f64) -> (&'t
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::veto::MIN_D_TO_NAME;
+    use crate::judgement::veto::MIN_D_TO_NAME;
 
     fn question(d: f64, is_noise: bool) -> Question {
         Question {

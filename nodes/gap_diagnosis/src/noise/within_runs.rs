@@ -14,11 +14,11 @@ use twin::Channel;
 
 use super::{Difference, Noise, Readings, autoregression, differences, doubt, resolution_mm};
 use crate::config::GapConfig;
-use crate::log;
-use crate::pace::Pace;
-use crate::repeats::{self, Contrasts};
-use crate::rows::Block;
-use crate::unrepeated;
+use crate::noise::pace::Pace;
+use crate::noise::repeats::{self, Contrasts};
+use crate::noise::unrepeated;
+use crate::search::rows::Block;
+use crate::session::log;
 
 /// Noise of every channel in motion.
 pub(super) fn noise(

@@ -11,18 +11,18 @@ use twin::effects::{Effect, Kind, Parameter};
 
 use super::squares::Squares;
 use super::{Bench, SHAPE_STEP, Scattered, is_tried, parameters};
-use crate::cause;
-use crate::confidence::Rivals;
-use crate::confirm;
+use crate::judgement::cause;
+use crate::judgement::confidence::Rivals;
+use crate::judgement::confirm;
+use crate::judgement::recalibration::recalibrated;
+use crate::judgement::rule::Rule;
+use crate::judgement::veto;
 use crate::judgement::{self, Check, CheckId};
-use crate::normal::Normal;
-use crate::recalibration::recalibrated;
+use crate::noise::normal::Normal;
 use crate::report::{Cause, Constancy, ParameterValue};
-use crate::rows::count;
-use crate::rule::Rule;
-use crate::selection::Set;
-use crate::signature::{Form, Instance};
-use crate::veto;
+use crate::search::rows::count;
+use crate::search::selection::Set;
+use crate::search::signature::{Form, Instance};
 
 /// A set that was found, with what it is judged by.
 pub(super) struct Judge<'j, 's, 'a> {
@@ -137,7 +137,7 @@ impl Judge<'_, '_, '_> {
 
     /// One form of each instance that could be seen.
     fn one_of_each(&self, set: &Set) -> Vec<usize> {
-        crate::isolability::forms(&self.bench.signatures, &self.bench.normal, set)
+        crate::search::isolability::forms(&self.bench.signatures, &self.bench.normal, set)
     }
 
     fn constancy(

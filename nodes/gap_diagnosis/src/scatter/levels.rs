@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, DVector};
 use twin::Channel;
 
 use super::squares::{is_touch, passed};
-use crate::cause::Scope;
-use crate::normal::Normal;
-use crate::rows::{Row, count};
+use crate::judgement::cause::Scope;
+use crate::noise::normal::Normal;
+use crate::search::rows::{Row, count};
 
 /// The floor of a block of rows that no other has a share in.
 pub(super) struct Levels {

@@ -39,10 +39,10 @@ use twin::Channel;
 use twin::effects::Effect;
 
 use super::levels::{Levels, levels, means, positive};
-use crate::cause::Scope;
-use crate::field;
-use crate::nuisance::orthonormal;
-use crate::rows::{Block, Row, count};
+use crate::judgement::cause::Scope;
+use crate::search::field;
+use crate::search::nuisance::orthonormal;
+use crate::search::rows::{Block, Row, count};
 
 /// Squares beyond this many times what is usual about them count as this.
 const MOST_SQUARE: f64 = 12.0;
@@ -263,7 +263,7 @@ impl Squares {
             return vec![];
         };
         let left = over(&self.squares) - &design * DVector::from_vec(sized.sizes.clone());
-        crate::refit::standard_uncertainties(scope.stack, &design, &left)
+        crate::search::refit::standard_uncertainties(scope.stack, &design, &left)
     }
 
     /// (3) of `scatter`, of what is expected without an effect and with it.

@@ -15,7 +15,7 @@ use machine::MachineFile;
 use metrology::{Axis, AxisSet, PerAxis};
 use twin::{History, Rubbing, rubbing::ZONES};
 
-use crate::rows::count;
+use crate::search::rows::count;
 
 /// Entries of the history: 31 days of 10 s, 110 MB. A machine that runs for longer has long forgotten its first day.
 const MOST_CELLS: usize = 267_840;

@@ -22,8 +22,8 @@ use twin::{Channel, Reading, Run, Touch};
 
 use super::Reason;
 use super::runs::same_feed;
-use crate::log;
 use crate::preflight::ROTARY_ARM_MM;
+use crate::session::log;
 
 /// A place within it of a reading is at the reading, mm.
 const NEAR_MM: f64 = 0.05;
@@ -295,7 +295,7 @@ impl Path {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rows::count;
+    use crate::search::rows::count;
 
     fn point(x_mm: f64, sense: i8, deviation: f64) -> Point {
         let mut point = Point {

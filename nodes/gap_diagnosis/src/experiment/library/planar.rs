@@ -8,7 +8,7 @@ use twin::{Channel, Instrument};
 
 use super::{SAME_PLACE_MIN, Shop};
 use crate::experiment::{Experiment, Pass, circle_words, short};
-use crate::nuisance::plane_name;
+use crate::search::nuisance::plane_name;
 
 /// A place where circles or lines can be read.
 pub(super) struct Stand {

@@ -1,0 +1,115 @@
+//! The noise floor of logs where no test was repeated.
+//!
+//! # Model
+//!
+//! Within a run it is that of neighbouring rows, (3) of `log`, white, greater by what so few rows leave open (`noise`).
+//! Between runs nothing is known, and `log::ASSUMED_BETWEEN_UM` is taken. Where nothing else was repeated a confidence counts [`CONFIDENCE`] of what it
+//! would with repeats: that the noise is white within the run, and how a second run would differ, nobody has seen.
+//!
+//! # Holds when
+//! Logs that stand. A test in motion has an error at every place, which neighbours along the path do not separate from noise:
+//! its noise within a run is what the smooth modes leave (`noise`), and what a second run differs by is [`between_in_motion`].
+
+use std::collections::BTreeMap;
+
+use twin::{Channel, Session};
+
+use crate::noise::pace::Pace;
+use crate::noise::repeats;
+use crate::noise::whitener::Autoregression;
+use crate::noise::{self, Noise, Readings};
+use crate::report::figures::Note;
+use crate::search::field::Smooth;
+use crate::search::rows::Block;
+use crate::session::log::{self, ASSUMED_BETWEEN_UM};
+
+/// Factor of a confidence whose noise floor is from no repeats; stated, not measured.
+pub const CONFIDENCE: f64 = 0.8;
+
+/// Noise of every channel of the logs of a session that last so long.
+pub fn noise(readings: Readings<'_>, raw: &[f64], least_s: f64) -> BTreeMap<Channel, Noise> {
+    let mut blocks = BTreeMap::<Channel, Vec<&Block>>::new();
+    for block in &readings.rows.blocks {
+        let run = &readings.session.runs[block.run];
+        let lasts_s = log::since_s(readings.session, block).last().copied();
+        let is_long = lasts_s.is_some_and(|lasts_s| lasts_s >= least_s);
+        if log::is_log(run) && log::is_read(&block.channel) && is_long {
+            blocks.entry(block.channel.clone()).or_default().push(block);
+        }
+    }
+    let of = |(channel, blocks): (Channel, Vec<&Block>)| {
+        let found = of_channel(readings, &channel, &blocks, raw)?;
+        Some((channel, found))
+    };
+    blocks.into_iter().filter_map(of).collect()
+}
+
+fn of_channel(
+    readings: Readings<'_>,
+    channel: &Channel,
+    blocks: &[&Block],
+    raw: &[f64],
+) -> Option<Noise> {
+    let least_mm2 = noise::resolution_mm(readings.machine, channel).powi(2) / 12.0;
+    let (variance_mm2, freedom) = log::variance_within(readings.session, blocks, raw, least_mm2)?;
+    let within_row = repeats::within_row_variance(readings.residual, blocks);
+    let between_mm = ASSUMED_BETWEEN_UM * 1e-3;
+    Some(Noise {
+        within: Autoregression::white(variance_mm2 * noise::doubt(freedom)),
+        pace: Pace::default(),
+        between: Smooth {
+            offset_mm: between_mm,
+            drift_mm: between_mm,
+            length_rad: 0.5,
+            ..Smooth::default()
+        },
+        row_sigma_mm: variance_mm2.sqrt(),
+        reading_sigma_mm: (variance_mm2 + within_row).sqrt(),
+        repeats: 1,
+        freedom,
+        field_freedom: 1.0,
+    })
+}
+
+/// How a second run of a test in motion would differ: as much over place as in its offset and along the run.
+pub fn between_in_motion() -> Smooth {
+    let between_mm = ASSUMED_BETWEEN_UM * 1e-3;
+    Smooth {
+        place_mm: between_mm,
+        offset_mm: between_mm,
+        drift_mm: between_mm,
+        length_rad: 0.5,
+    }
+}
+
+/// Whether a noise floor is from no repeats.
+pub fn is_assumed(noise: &BTreeMap<Channel, Noise>) -> bool {
+    !noise.is_empty() && noise.values().all(|noise| noise.repeats < 2)
+}
+
+/// What a reader should know of such a floor, and of one log that was cut into parts.
+pub fn notes(session: &Session, noise: &BTreeMap<Channel, Noise>) -> Vec<Note> {
+    let mut notes = vec![];
+    let assumed = noise.iter().filter(|(_, noise)| noise.repeats < 2);
+    notes.extend(assumed.map(|(channel, own)| Note::NoiseWithin {
+        channel: channel.to_string(),
+        sigma_um: 1e3 * own.reading_sigma_mm,
+        between_um: ASSUMED_BETWEEN_UM,
+        lowers: is_assumed(noise),
+    }));
+    let parts = session
+        .runs
+        .iter()
+        .filter(|run| log::part(&run.segment).is_some());
+    let parts: Vec<_> = parts.collect();
+    if let (Some(first), Some(last)) = (parts.first(), parts.last()) {
+        let at_s = |time: Option<f64>| time.unwrap_or(0.0);
+        let begin = first.readings.first().and_then(|one| first.time_of(one));
+        let end = last.readings.last().and_then(|one| last.time_of(one));
+        notes.push(Note::InParts {
+            parts: parts.len(),
+            minutes: (at_s(end) - at_s(begin)) / 60.0 / crate::search::rows::count(parts.len()),
+        });
+    }
+    notes
+}

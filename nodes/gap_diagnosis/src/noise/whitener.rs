@@ -1,0 +1,292 @@
+//! Makes the noise of every row one and independent of the others.
+//!
+//! # Model
+//!
+//! Noise of a block is an autoregression (of which the white part of `form_error` is one more term) plus the
+//! smooth fields of `field` and `form_error`, B Lambda B' in covariance:
+//!
+//! ```text
+//!   x_t = (y_t - sum_j phi_j y_(t-j)) / v_p                               (1)
+//!   W = (I + U S^2 U')^(-1/2) = I - U (1 - 1 / sqrt(1 + S^2)) U'          (2)
+//! ```
+//!
+//! with U S the singular vectors and values of the filtered B Lambda^(1/2). The first rows of a block are
+//! predicted with fewer terms (Levinson's recursion), so that (1) is exact from the first row.
+//!
+//! # Holds when
+//! Rows of a block follow each other at one spacing in time.
+//!
+//! # References
+//! \[1\] G. E. P. Box, G. M. Jenkins, G. C. Reinsel, Time Series Analysis, 4th ed., Wiley 2008, 3.2
+//! (autoregression, recursion).
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use twin::{Channel, Session};
+
+use crate::noise::form_error::{self, FormError};
+use crate::search::field::{self, Smooth};
+use crate::search::rows::{Block, Rows};
+
+/// Autoregression of a channel: predictors of order 0 to p with the variance that each leaves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Autoregression {
+    /// Coefficients of order 0, 1, .. p.
+    pub coefficients: Vec<Vec<f64>>,
+    /// Variance that the predictor of each order leaves, mm2.
+    pub variances: Vec<f64>,
+}
+
+impl Autoregression {
+    /// White noise of a variance.
+    pub fn white(variance_mm2: f64) -> Self {
+        Self {
+            coefficients: vec![vec![]],
+            variances: vec![variance_mm2],
+        }
+    }
+
+    /// Levinson's recursion from autocovariances of lag 0 to p; stops where it would not be stationary.
+    pub fn levinson(autocovariance: &[f64]) -> Self {
+        let mut all = Self::white(autocovariance[0]);
+        for order in 1..autocovariance.len() {
+            let before = &all.coefficients[order - 1];
+            let left = all.variances[order - 1];
+            let told: f64 = before
+                .iter()
+                .enumerate()
+                .map(|(j, phi)| phi * autocovariance[order - 1 - j])
+                .sum();
+            let reflection = (autocovariance[order] - told) / left;
+            if !reflection.is_finite() || reflection.abs() >= 0.999 {
+                break;
+            }
+            let mut next: Vec<f64> = (0..before.len())
+                .map(|j| before[j] - reflection * before[before.len() - 1 - j])
+                .collect();
+            next.push(reflection);
+            all.coefficients.push(next);
+            all.variances.push(left * (1.0 - reflection.powi(2)));
+        }
+        all
+    }
+
+    /// The same noise with white noise beside it, to the order that is wanted.
+    ///
+    /// Where the noise is no white one itself the sum is an autoregression of no finite order; three terms leave
+    /// less than the repeats tell of it.
+    pub fn with_white(&self, variance_mm2: f64, order: usize) -> Self {
+        if variance_mm2 <= 0.0 {
+            return self.clone();
+        }
+        let mut all = vec![self.variances[0]];
+        for lag in 1..=order.max(self.order()) {
+            let told = self.coefficients[lag.min(self.order())].iter().enumerate();
+            all.push(told.map(|(j, phi)| phi * all[lag - 1 - j]).sum());
+        }
+        all[0] += variance_mm2;
+        Self::levinson(&all)
+    }
+
+    /// The same noise with another variance.
+    pub fn scaled(&self, ratio: f64) -> Self {
+        let mut scaled = self.clone();
+        for variance in &mut scaled.variances {
+            *variance *= ratio;
+        }
+        scaled
+    }
+
+    /// Keeps the orders up to one.
+    pub fn up_to(mut self, order: usize) -> Self {
+        self.coefficients.truncate(order + 1);
+        self.variances.truncate(order + 1);
+        self
+    }
+
+    /// Greatest order.
+    pub fn order(&self) -> usize {
+        self.coefficients.len() - 1
+    }
+
+    /// (1), in place.
+    pub fn filter(&self, rows: &mut [f64]) {
+        for t in (0..rows.len()).rev() {
+            let [told, scatter] = self.told(rows, t);
+            rows[t] = (rows[t] - told) / scatter;
+        }
+    }
+
+    /// Undoes [`Self::filter`], in place.
+    pub fn unfilter(&self, rows: &mut [f64]) {
+        for t in 0..rows.len() {
+            let [told, scatter] = self.told(rows, t);
+            rows[t] = rows[t] * scatter + told;
+        }
+    }
+
+    /// What the rows before one tell of it, and the standard deviation about that.
+    fn told(&self, rows: &[f64], t: usize) -> [f64; 2] {
+        let used = self.order().min(t);
+        let before = self.coefficients[used].iter().enumerate();
+        let told = before.map(|(j, phi)| phi * rows[t - 1 - j]).sum();
+        [told, self.variances[used].sqrt()]
+    }
+}
+
+/// Order of an autoregression with white noise beside it.
+const WHITE_ORDER: usize = 3;
+
+/// (2) of every block.
+#[derive(Clone, Debug)]
+pub struct Whitener {
+    blocks: Vec<BlockWhitener>,
+}
+
+#[derive(Clone, Debug)]
+struct BlockWhitener {
+    range: std::ops::Range<usize>,
+    filter: Autoregression,
+    vectors: DMatrix<f64>,
+    shrink: DVector<f64>,
+}
+
+impl Whitener {
+    /// The whitener of a stack; `noise` gives autoregression and field of a block's channel.
+    pub fn new<'n>(
+        session: &Session,
+        rows: &Rows,
+        noise: impl Fn(&Block) -> (Autoregression, &'n Smooth),
+        form: &FormError,
+    ) -> Self {
+        let sharing = form_error::sharing(session, rows);
+        let touched = form_error::touched(session, rows);
+        let of_block = |(block, sharing): (&Block, &f64)| {
+            let run = &session.runs[block.run];
+            let (within, between) = noise(block);
+            let size = form.of(block) * sharing.sqrt();
+            let (kinds, mut columns) = field::modes(run, block);
+            let is_touch = block.channel == Channel::Touch;
+            let (filter, form_field) = if is_touch {
+                (within, Smooth::default())
+            } else {
+                (
+                    within.with_white(
+                        (form_error::ROUGH_STATION_SHARE * size).powi(2),
+                        WHITE_ORDER,
+                    ),
+                    form_error::smooth(size),
+                )
+            };
+            for (kind, mut column) in kinds.iter().zip(columns.column_iter_mut()) {
+                column *= form_error::joined(between, &form_field, *kind);
+            }
+            let of_touches = form_error::touch_columns(run, block, &touched)
+                .into_iter()
+                .map(|(column, repeats)| {
+                    let size = form.of(block) * repeats.sqrt();
+                    column.into_iter().map(|v| v * size).collect::<Vec<f64>>()
+                });
+            let of_edges = form.edges(block).iter().map(|(row, height)| {
+                let mut column = vec![0.0; block.rows.len()];
+                column[*row] = height * sharing.sqrt();
+                column
+            });
+            let more: Vec<Vec<f64>> = of_touches.into_iter().chain(of_edges).collect();
+            let mut columns = form_error::beside(columns, &more);
+            for mut column in columns.column_iter_mut() {
+                filter.filter(column.as_mut_slice());
+            }
+            let (vectors, singular) = singular(&columns);
+            BlockWhitener {
+                range: block.range(),
+                filter,
+                vectors,
+                shrink: singular.map(|s| 1.0 - 1.0 / (1.0 + s * s).sqrt()),
+            }
+        };
+        Self {
+            blocks: rows.blocks.iter().zip(&sharing).map(of_block).collect(),
+        }
+    }
+
+    /// Whitens a stack, in place.
+    pub fn apply(&self, stack: &mut [f64]) {
+        for block in &self.blocks {
+            let part = &mut stack[block.range.clone()];
+            block.filter.filter(part);
+            let mut part = nalgebra::DVectorViewMut::from_slice(part, block.range.len());
+            let mut along = block.vectors.tr_mul(&part);
+            along.component_mul_assign(&block.shrink);
+            part.gemv(-1.0, &block.vectors, &along, 1.0);
+        }
+    }
+
+    /// A whitened stack in mm again, without what the smooth fields took, in place.
+    pub fn unfilter(&self, stack: &mut [f64]) {
+        for block in &self.blocks {
+            block.filter.unfilter(&mut stack[block.range.clone()]);
+        }
+    }
+}
+
+/// Left singular vectors and singular values of a tall matrix, those of size only.
+fn singular(columns: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let eigen = SymmetricEigen::new(columns.tr_mul(columns));
+    let keep: Vec<usize> = (0..eigen.eigenvalues.len())
+        .filter(|k| eigen.eigenvalues[*k] > 1e-6)
+        .collect();
+    let values = DVector::from_iterator(
+        keep.len(),
+        keep.iter().map(|k| eigen.eigenvalues[*k].sqrt()),
+    );
+    let mut vectors = columns * eigen.eigenvectors.select_columns(&keep);
+    for (mut vector, value) in vectors.column_iter_mut().zip(values.iter()) {
+        vector /= *value;
+    }
+    (vectors, values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_noise_beside_white_noise_adds_up() {
+        let both = Autoregression::white(3.0).with_white(1.0, 3);
+        assert!((both.variances[3] - 4.0).abs() < 1e-12);
+        assert!(both.coefficients[3].iter().all(|phi| phi.abs() < 1e-12));
+    }
+
+    #[test]
+    fn eq1_is_undone() {
+        let one = Autoregression::levinson(&[2.0, 1.2, 0.9]);
+        let told = [0.4, -1.0, 2.5, 0.1, 0.0, -0.7];
+        let mut rows = told;
+        one.filter(&mut rows);
+        assert!((rows[3] - told[3]).abs() > 0.1);
+        one.unfilter(&mut rows);
+        for (row, told) in rows.iter().zip(told) {
+            assert!((row - told).abs() < 1e-12, "{rows:?}");
+        }
+    }
+
+    #[test]
+    fn eq1_white_noise_beside_an_autoregression_keeps_its_autocovariances() {
+        // An autoregression of first order with phi 0.6 and variance 1: 0.6^lag.
+        let one = Autoregression::levinson(&[1.0, 0.6]);
+        let both = one.with_white(0.5, 3);
+        // Yule and Walker's equations of the sum, solved by hand for order one: 0.6 / 1.5.
+        assert!((both.coefficients[1][0] - 0.4).abs() < 1e-12);
+        assert!((both.variances[0] - 1.5).abs() < 1e-12);
+        for row in 0..3_usize {
+            let lag = |a: usize| {
+                let far = a.abs_diff(row);
+                0.6_f64.powi(i32::try_from(far).expect("small")) + if far == 0 { 0.5 } else { 0.0 }
+            };
+            let told: f64 = (0..3).map(|j| both.coefficients[3][j] * lag(j)).sum();
+            let expected = 0.6_f64.powi(i32::try_from(row + 1).expect("small"));
+            assert!((told - expected).abs() < 1e-12, "{row}");
+        }
+        assert_eq!(one.with_white(0.0, 3), one);
+    }
+}

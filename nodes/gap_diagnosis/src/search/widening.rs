@@ -1,0 +1,141 @@
+//! Wide forms of the effects that were found, whole and in parts.
+//!
+//! # Model
+//!
+//! A catalogue's form is rarely quite the machine's. The wide form of each member, and of what stood nearly as well in
+//! its place, joins the signatures; and with it the forms that have only those free amplitudes that are worth their
+//! price, taken one after another:
+//!
+//! ```text
+//!   gain of the amplitude beside the others > ln n                        (1)
+//! ```
+//!
+//! once beside all other members, once beside the larger ones only, whose form the smaller ones may stand for. A soft
+//! edge of a play is then one more number for ln n, and not a second cause.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use twin::effects::Target;
+
+use crate::noise::normal::Normal;
+use crate::noise::stack::Stack;
+use crate::search::resolved;
+use crate::search::selection::Set;
+use crate::search::signature::{Instance, Library};
+
+/// Most instances that are widened.
+const MOST_WIDENED: usize = 12;
+/// The effect that is a curve along an axis at the point that is read.
+const CURVE: &str = "pitch_error";
+/// Most free amplitudes that are taken one after another.
+const MOST_PARTS: usize = 6;
+/// The same of a curve through targets.
+const MOST_OF_CURVE: usize = 14;
+/// Sets whose C is worse by this share of what the best one explains stand nearly as well.
+const NEAR_SHARE: f64 = 0.1;
+
+/// Adds the wide forms; `sizes` are the members' D.
+pub fn widen(
+    stack: &Stack<'_>,
+    signatures: &mut Library,
+    set: &Set,
+    sizes: &[f64],
+    visited: &BTreeMap<Set, f64>,
+) {
+    let least = visited[set];
+    let reach = NEAR_SHARE * (stack.z.norm_squared() - least).max(0.0);
+    let near = visited.iter().filter(|(_, score)| **score <= least + reach);
+    let forms: BTreeSet<usize> = near.flat_map(|(set, _)| set.iter().copied()).collect();
+    let mut added = BTreeMap::new();
+    for form in set.iter().copied().chain(forms) {
+        let instance = signatures.forms[form].instance;
+        let has_free = !signatures.instances[instance].kind.free.is_empty();
+        if has_free && added.len() < MOST_WIDENED && !added.contains_key(&instance) {
+            let values = signatures.forms[form].values.clone();
+            let wide = signatures.add(stack, instance, values, true);
+            added.insert(instance, wide);
+        }
+    }
+    let normal = signatures.normal(&stack.z);
+    let log_rows = stack.freedom().ln();
+    for (instance, wide) in added {
+        let Some(wide) = wide else { continue };
+        let of = |form: &usize| signatures.forms[*form].instance;
+        let own = set.iter().position(|form| of(form) == instance);
+        let others = |least: f64| -> Vec<usize> {
+            let larger = set.iter().zip(sizes).filter(|(_, size)| **size > least);
+            larger
+                .map(|(form, _)| *form)
+                .filter(|form| of(form) != instance)
+                .collect()
+        };
+        let mut beside = vec![others(0.0)];
+        beside.extend(own.map(|own| others(sizes[own])));
+        beside.dedup();
+        for others in beside {
+            add_parts(signatures, &normal, &others, wide, (log_rows, MOST_PARTS));
+        }
+    }
+}
+
+/// Adds the curve of any form to the pitch error of every axis that was read at some targets only. Its plain curve may be
+/// absent from the error that the targets show alike upwards and downwards.
+pub fn widen_curves(stack: &Stack<'_>, signatures: &mut Library) {
+    let is_curve = |instance: &Instance| match instance.target {
+        Target::Axis(axis) => instance.kind.id == CURVE && resolved::is_coarse(stack, axis),
+        _ => false,
+    };
+    let curves: Vec<usize> = (0..signatures.instances.len())
+        .filter(|place| is_curve(&signatures.instances[*place]))
+        .collect();
+    let mut added = vec![];
+    for instance in curves {
+        let kind = signatures.instances[instance].kind;
+        let values = vec![0.0; kind.parameters.len() + kind.free.len()];
+        added.extend(signatures.add(stack, instance, values, true));
+        signatures.curves.insert(instance);
+    }
+    if added.is_empty() {
+        return;
+    }
+    let normal = signatures.normal(&stack.z);
+    let log_rows = stack.freedom().ln();
+    for wide in added {
+        add_parts(signatures, &normal, &[], wide, (log_rows, MOST_OF_CURVE));
+    }
+}
+
+/// Adds a wide form with the free amplitudes, so many at most, that hold (1) beside other forms.
+fn add_parts(
+    signatures: &mut Library,
+    normal: &Normal,
+    others: &[usize],
+    wide: usize,
+    (log_rows, most): (f64, usize),
+) {
+    let form = signatures.forms[wide].clone();
+    let own = signatures.instances[form.instance].kind.parameters.len();
+    let others: Vec<usize> = others
+        .iter()
+        .flat_map(|other| signatures.forms[*other].columns.clone())
+        .collect();
+    let all = 0..form.amplitudes.len();
+    let (mut taken, mut open): (Vec<usize>, Vec<usize>) =
+        all.partition(|k| form.amplitudes[*k] < own);
+    if taken.is_empty() {
+        return;
+    }
+    for _ in 0..most {
+        let columns = taken.iter().map(|k| form.columns[*k]);
+        let beside: Vec<usize> = others.iter().copied().chain(columns).collect();
+        let groups = open.iter().map(|k| std::slice::from_ref(&form.columns[*k]));
+        let gains = normal.gains_beside(&beside, groups);
+        let best = gains.into_iter().enumerate();
+        match best.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((place, gain)) if gain > log_rows => taken.push(open.remove(place)),
+            _ => return,
+        }
+        taken.sort_unstable();
+        signatures.add_part(wide, &taken);
+    }
+}

@@ -1,0 +1,340 @@
+//! Which thermometer a log goes with, and with which lag, by what it predicts.
+//!
+//! # Model
+//!
+//! ```text
+//!   y = o + sum_k a_k L(tau_k) T_k + e                                    (1)
+//!   PRESS = sum_f |y_f - X_f b_(f)|^2,   b_(f) from all runs but f        (2)
+//!   share = 1 - PRESS / PRESS of o alone                                  (3)
+//! ```
+//!
+//! T_k is the warming of a thermometer, L(tau) a lag of first order (`History::lagged_temperature`). Every thermometer
+//! that was read is tried alone, at no lag and at the lags of a grid, then every two of them together at fewer lags, then one
+//! beside the best two; the lags of the best set are refined. A larger set is taken where it leaves [`WORTH`] of (2) or
+//! less: two bodies that grow against each other show little of either, and the best thermometer alone is then none of the
+//! two. Nothing is chosen by its fit: a run (or a part of one log) is always predicted from the others.
+//!
+//! This finds what goes with what. Whether it is a cause, and which, is for the effects of the catalogue to show.
+//!
+//! # Holds when
+//! Three runs or more under one zero: that of most of them is looked at. Neighbouring runs of one log share slow noise, so
+//! that (3) is rather too good than too bad.
+//!
+//! # References
+//! \[1\] D. M. Allen, Technometrics 16, 1974 (PRESS). \[2\] ISO 230-3:2020, clauses 5 and 6.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use twin::{Channel, History};
+
+use crate::noise::stack::Stack;
+use crate::report::figures::Note;
+use crate::search::rows::{Block, count, time_s};
+use crate::session::log;
+
+/// One thermometer of (1).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GoesWith {
+    /// Its name in the machine file.
+    pub thermometer: String,
+    /// Size, µm/K.
+    pub um_per_k: f64,
+    /// Lag, min.
+    pub lag_min: f64,
+}
+
+/// How much of a channel thermometers explain.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ThermalFit {
+    /// The best set.
+    pub by: Vec<GoesWith>,
+    /// (3) of it.
+    pub share: f64,
+    /// The best two alone, with (3) of each.
+    pub alone: Vec<(String, f64)>,
+}
+
+/// Part of (2) that one more thermometer may leave.
+const WORTH: f64 = 0.7;
+/// Lags of two thermometers together, min.
+const FEWER_LAGS_MIN: [f64; 8] = [0.0, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0];
+/// Thermometers that are tried in twos.
+const MOST_PAIRED: usize = 12;
+/// Rows that are looked at; of more every so many.
+const MOST_ROWS: usize = 1200;
+/// Least (3) of a reported fit.
+const MIN_SHARE_EXPLAINED: f64 = 0.5;
+/// Lags that are tried beside none: from this, min, in steps of this factor.
+const FIRST_LAG_MIN: f64 = 2.0;
+const LAG_STEP: f64 = 1.3;
+const TRIED_LAGS: i32 = 21;
+/// Factors by which a lag is refined.
+const REFINED: [f64; 3] = [1.12, 1.05, 1.02];
+
+/// A note for every channel of the logs that goes with thermometers.
+pub fn notes(stack: &Stack<'_>) -> Vec<Note> {
+    let mut channels = BTreeMap::<&Channel, Vec<&Block>>::new();
+    for block in &stack.rows.blocks {
+        if log::is_log(&stack.session.runs[block.run]) && log::is_read(&block.channel) {
+            channels.entry(&block.channel).or_default().push(block);
+        }
+    }
+    let of = |(channel, blocks): (&Channel, Vec<&Block>)| {
+        Some(Note::GoesWith {
+            channel: channel.to_string(),
+            found: Search::new(stack, &blocks)?.found()?,
+        })
+    };
+    channels.into_iter().filter_map(of).collect()
+}
+
+/// Lagged temperatures that were computed, by thermometer and the bits of the lag.
+type Columns<'s> = BTreeMap<(&'s str, u64), Rc<[f64]>>;
+
+/// Readings of one channel under one zero.
+struct Search<'s> {
+    history: &'s History,
+    /// Warming of every thermometer that was read, K.
+    warming_k: BTreeMap<&'s str, Vec<f64>>,
+    /// Rows of each run: instant, s, and reading, µm.
+    folds: Vec<Vec<[f64; 2]>>,
+    /// What a thermometer with a lag shows at the rows of all runs, K, by the bits of the lag.
+    columns: RefCell<Columns<'s>>,
+}
+
+/// A thermometer with its lag, s.
+type Term<'s> = (&'s str, f64);
+
+/// Sums of squares and products of one run.
+struct Fold {
+    gram: DMatrix<f64>,
+    along: DVector<f64>,
+    square: f64,
+}
+
+impl<'s> Search<'s> {
+    /// None of too few runs for a prediction.
+    fn new(stack: &'s Stack<'_>, blocks: &[&Block]) -> Option<Self> {
+        let zero = |block: &Block| {
+            let segment = &stack.session.runs[block.run].segment;
+            (segment.setup_id, segment.zero_id)
+        };
+        let mut zeros = BTreeMap::<(u32, u32), Vec<&Block>>::new();
+        for block in blocks {
+            zeros.entry(zero(block)).or_default().push(*block);
+        }
+        let most = zeros.into_values().max_by_key(Vec::len)?;
+        if most.len() < 3 {
+            return None;
+        }
+        let every = most.iter().map(|block| block.rows.len()).sum::<usize>() / MOST_ROWS + 1;
+        let fold = |block: &&Block| -> Vec<[f64; 2]> {
+            let run = &stack.session.runs[block.run];
+            let rows = block.rows.iter().zip(&stack.raw[block.range()]);
+            rows.step_by(every)
+                .map(|(row, mm)| [time_s(run, row), 1e3 * mm])
+                .collect()
+        };
+        let history = &stack.session.history;
+        let ids = history.temperature_degc.keys();
+        Some(Self {
+            history,
+            warming_k: ids
+                .filter_map(|id| Some((id.as_str(), history.warming_k(id)?)))
+                .collect(),
+            folds: most.iter().map(fold).collect(),
+            columns: RefCell::default(),
+        })
+    }
+
+    /// The best set of thermometers; none that explains less than [`MIN_SHARE_EXPLAINED`].
+    fn found(&self) -> Option<ThermalFit> {
+        let nothing = self.press(&[])?.0;
+        let share = |press: f64| 1.0 - press / nothing;
+        let mut alone = self.beside(&[]);
+        alone.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut best = self.refined(vec![alone.first()?.1]);
+        let mut left = self.press(&best)?.0;
+        let larger = self.best_two(&alone).map(|two| self.refined(two));
+        for more in [
+            larger.clone(),
+            larger.and_then(|two| self.with_one_more(two)),
+        ] {
+            let Some(more) = more else { continue };
+            let Some((press, _)) = self.press(&more) else {
+                continue;
+            };
+            if press <= WORTH * left {
+                (best, left) = (more, press);
+            }
+        }
+        let sizes = self.press(&best)?.1;
+        let by = best.iter().zip(sizes.iter().skip(1));
+        let of = |((id, lag_s), size): (&Term<'s>, &f64)| GoesWith {
+            thermometer: (*id).to_owned(),
+            um_per_k: *size,
+            lag_min: lag_s / 60.0,
+        };
+        let named = |(press, (id, _)): &(f64, Term<'s>)| ((*id).to_owned(), share(*press));
+        (share(left) >= MIN_SHARE_EXPLAINED).then(|| ThermalFit {
+            by: by.map(of).collect(),
+            share: share(left),
+            alone: alone.iter().take(2).map(named).collect(),
+        })
+    }
+
+    /// The best two thermometers together, at fewer lags; of many thermometers those that are best alone.
+    fn best_two(&self, alone: &[(f64, Term<'s>)]) -> Option<Vec<Term<'s>>> {
+        let ids: Vec<&'s str> = alone
+            .iter()
+            .take(MOST_PAIRED)
+            .map(|(_, (id, _))| *id)
+            .collect();
+        let mut best: Option<(f64, [Term<'s>; 2])> = None;
+        for (place, one) in ids.iter().enumerate() {
+            for other in &ids[place + 1..] {
+                for lags_min in FEWER_LAGS_MIN
+                    .map(|a| FEWER_LAGS_MIN.map(|b| [a, b]))
+                    .as_flattened()
+                {
+                    let two = [(*one, 60.0 * lags_min[0]), (*other, 60.0 * lags_min[1])];
+                    let Some((press, _)) = self.press(&two) else {
+                        continue;
+                    };
+                    if best.is_none_or(|(least, _)| press < least) {
+                        best = Some((press, two));
+                    }
+                }
+            }
+        }
+        best.map(|(_, two)| two.to_vec())
+    }
+
+    /// Some thermometers with the best one beside them.
+    fn with_one_more(&self, terms: Vec<Term<'s>>) -> Option<Vec<Term<'s>>> {
+        let tried = self.beside(&terms).into_iter();
+        let (_, best) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(self.refined([terms, vec![best]].concat()))
+    }
+
+    /// Every thermometer that is not among some terms, at the lag that is best beside them, with (2).
+    fn beside(&self, terms: &[Term<'s>]) -> Vec<(f64, Term<'s>)> {
+        let is_new = |id: &&&'s str| terms.iter().all(|(own, _)| own != *id);
+        let new = self.warming_k.keys().filter(is_new);
+        new.filter_map(|id| self.at_best_lag(id, terms)).collect()
+    }
+
+    /// A thermometer at the lag that is best beside some terms, with (2).
+    fn at_best_lag(&self, id: &'s str, terms: &[Term<'s>]) -> Option<(f64, Term<'s>)> {
+        let grid = (0..TRIED_LAGS).map(|k| 60.0 * FIRST_LAG_MIN * LAG_STEP.powi(k));
+        let tried = std::iter::once(0.0).chain(grid).filter_map(|lag_s| {
+            let term = (id, lag_s);
+            let (press, _) = self.press(&[terms, &[term]].concat())?;
+            Some((press, term))
+        });
+        tried.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// The terms with each lag in turn at its best.
+    fn refined(&self, mut terms: Vec<Term<'s>>) -> Vec<Term<'s>> {
+        for _ in 0..2 {
+            for place in 0..terms.len() {
+                let mut others = terms.clone();
+                let (id, _) = others.remove(place);
+                if let Some((_, best)) = self.at_best_lag(id, &others) {
+                    terms[place] = best;
+                }
+                for factor in REFINED {
+                    self.step(&mut terms, place, factor);
+                    self.step(&mut terms, place, 1.0 / factor);
+                }
+            }
+        }
+        terms
+    }
+
+    /// Multiplies one lag by a factor as long as that helps.
+    fn step(&self, terms: &mut Vec<Term<'s>>, place: usize, factor: f64) {
+        let press = |terms: &[Term<'s>]| self.press(terms).map_or(f64::INFINITY, |found| found.0);
+        for _ in 0..8 {
+            let mut moved = terms.clone();
+            moved[place].1 *= factor;
+            if press(moved.as_slice()) >= press(terms.as_slice()) {
+                return;
+            }
+            *terms = moved;
+        }
+    }
+
+    /// (2) of some terms, and the sizes from all runs: of the offset, then of each; none where they are not determined.
+    fn press(&self, terms: &[Term<'s>]) -> Option<(f64, DVector<f64>)> {
+        let series: Vec<Rc<[f64]>> = terms.iter().map(|term| self.column(*term)).collect();
+        let mut first = 0;
+        let mut folds = Vec::<Fold>::with_capacity(self.folds.len());
+        for rows in &self.folds {
+            folds.push(fold(rows, first, &series));
+            first += rows.len();
+        }
+        let columns = terms.len() + 1;
+        let mut gram = DMatrix::<f64>::zeros(columns, columns);
+        let mut along = DVector::<f64>::zeros(columns);
+        for fold in &folds {
+            gram += &fold.gram;
+            along += &fold.along;
+        }
+        let mut press = 0.0;
+        for fold in &folds {
+            let sizes = (&gram - &fold.gram)
+                .cholesky()?
+                .solve(&(&along - &fold.along));
+            let told = sizes.dot(&(&fold.gram * &sizes));
+            press += fold.square - 2.0 * sizes.dot(&fold.along) + told;
+        }
+        let sizes = gram.cholesky()?.solve(&along);
+        press.is_finite().then_some((press, sizes))
+    }
+
+    /// What a thermometer with a lag shows at the rows of all runs, K.
+    fn column(&self, (id, lag_s): Term<'s>) -> Rc<[f64]> {
+        let key = (id, lag_s.to_bits());
+        if let Some(known) = self.columns.borrow().get(&key) {
+            return Rc::clone(known);
+        }
+        let warming_k = self.warming_k.get(id).map_or(&[][..], Vec::as_slice);
+        let lagged = if lag_s > 0.0 {
+            self.history.lagged_temperature(warming_k, lag_s)
+        } else {
+            warming_k.to_vec()
+        };
+        let rows = self.folds.iter().flatten();
+        let column: Rc<[f64]> = rows
+            .map(|[at_s, _]| self.history.at(&lagged, *at_s))
+            .collect();
+        let _ = self.columns.borrow_mut().insert(key, Rc::clone(&column));
+        column
+    }
+}
+
+/// Sums of the rows of a run, the first of which is at `first` in the series.
+fn fold(rows: &[[f64; 2]], first: usize, series: &[Rc<[f64]>]) -> Fold {
+    let columns = series.len() + 1;
+    let mut fold = Fold {
+        gram: DMatrix::zeros(columns, columns),
+        along: DVector::zeros(columns),
+        square: 0.0,
+    };
+    // Every run counts alike, however many rows it has.
+    let weight = 1.0 / count(rows.len().max(1));
+    for ([_, um], at) in rows.iter().zip(first..) {
+        let told = series.iter().map(|series| series[at]);
+        let row = DVector::from_iterator(columns, std::iter::once(1.0).chain(told));
+        fold.gram.ger(weight, &row, &row, 1.0);
+        fold.along.axpy(weight * um, &row, 1.0);
+        fold.square += weight * um * um;
+    }
+    fold
+}
