@@ -12,6 +12,7 @@ use trials::target::{Target, targets};
 use trials::{Arm, Tally, Verdict};
 
 use abbe::report::Report;
+use abbe::report::screen::Screen;
 use abbe::report::section::{Rows, Section};
 
 mod arm;
@@ -108,8 +109,8 @@ impl Table {
             title: TITLE.to_owned(),
             lines: vec![],
             parts: vec![],
+            screen: Screen::default(),
             body: html! {
-                h1 { (TITLE) }
                 @for line in &lines { p { (line) } }
                 @for part in &parts {
                     (part.section.html())
