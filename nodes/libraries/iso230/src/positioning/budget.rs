@@ -272,7 +272,7 @@ mod tests {
         near(four.accuracy_mm([s, s]), (25.5e-6 + 8.0 * scatter).sqrt());
         // s² = 2.6 can be drift alone: r² + o² = 1. So can s = 0.5, of which o cannot be more.
         near(four.repeatability_one_way_mm(2.6e-6_f64.sqrt()), 0.004);
-        let little = 1e-6 / 3.0 + 0.25e-6;
+        let little: f64 = 1e-6 / 3.0 + 0.25e-6;
         near(four.repeatability_one_way_mm(0.0005), 4.0 * little.sqrt());
         // Readings of one target from both sides are at most a quarter of the test apart: half of u_V.
         parts.unrest_mm = Some(0.0);
