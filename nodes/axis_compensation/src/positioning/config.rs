@@ -64,7 +64,7 @@ pub struct PositioningConfig {
     #[serde(default = "default_loop_delay_cycles")]
     #[schemars(range(min = DELAY_CYCLES.0, max = DELAY_CYCLES.1))]
     pub loop_delay_cycles: u32,
-    /// Points of a table to begin with; empty: none until a test gives one.
+    /// Points of a table to begin with, 10 to 20 mm apart; empty: none until a test gives one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub start_points_mm: Vec<f64>,
     /// Deviations scale minus motor at these points, upwards where directions are apart.
