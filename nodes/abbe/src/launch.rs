@@ -30,7 +30,7 @@ pub struct LaunchNode {
 }
 
 /// Longest launch file, bytes: one of 100 nodes with 1,000 parameters each has less.
-const MOST_BYTES: usize = 16 << 20;
+const MOST_LAUNCH_BYTES: usize = 16 << 20;
 /// Nodes of a scenario, each with threads and sockets of its own: a cell has some fifteen.
 const NODE_COUNT: Bound = Bound::at_most(100);
 /// Parameters and parameter files of one node, which become its command line.
@@ -106,7 +106,7 @@ pub fn read(path: &Path) -> Result<Vec<LaunchNode>> {
 }
 
 fn parse(text: &str, folder: &Path) -> Result<Vec<LaunchNode>> {
-    let document = xml::parse(text, MOST_BYTES)?;
+    let document = xml::parse(text, MOST_LAUNCH_BYTES)?;
     let root = document.root_element();
     if root.tag_name().name() != "launch" {
         bail!(

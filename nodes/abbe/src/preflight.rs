@@ -311,7 +311,7 @@ mod tests {
         for wrong in ["grid=1e300/0.3", "grid=0.1/inf", "grid=0/0.3"] {
             let refused = floors::argument(wrong).unwrap_err();
             assert!(
-                refused.contains("must be a finite number above 0"),
+                refused.contains("must be a number from 0.0001 to 10000 µm"),
                 "{refused}"
             );
         }

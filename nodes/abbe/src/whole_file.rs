@@ -97,7 +97,7 @@ const LOOK: Duration = Duration::from_secs(3600);
 const ATTEMPTS: u32 = 20;
 const BETWEEN: Duration = Duration::from_millis(20);
 /// Exit code of a process that SIGINT ended, as shells count it.
-const INTERRUPTED: i32 = 130;
+const INTERRUPTED_CODE: i32 = 130;
 
 /// Folders that go away when the process ends by SIGINT or SIGTERM.
 static VANISHING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -178,7 +178,7 @@ fn listen() -> Result<()> {
             }
         }
         complain!("abbe: interrupted; what was begun is removed");
-        std::process::exit(INTERRUPTED);
+        std::process::exit(INTERRUPTED_CODE);
     };
     let thread = std::thread::Builder::new().name("vanishing".to_owned());
     thread.spawn(wait).context("thread of the signals")?;

@@ -3,7 +3,7 @@
 use metrology::stamp::{Host, Span, Stamp};
 
 /// Most points that are kept.
-const MOST_POINTS: usize = 2048;
+const MOST_COURSE_POINTS: usize = 2048;
 /// Least time between two points that are kept.
 const LEAST_STEP: Span = Span::from_nanos(1_000_000_000);
 
@@ -30,7 +30,7 @@ impl<T> Course<T> {
         if last.is_some_and(|(last, _)| (at - *last).nanos() < self.step_nanos) {
             return;
         }
-        if self.points.len() >= MOST_POINTS {
+        if self.points.len() >= MOST_COURSE_POINTS {
             let mut is_kept = false;
             self.points.retain(|_| {
                 is_kept = !is_kept;
@@ -61,7 +61,7 @@ mod tests {
         }
         let points = course.points();
         assert!(
-            (MOST_POINTS / 2..=MOST_POINTS).contains(&points.len()),
+            (MOST_COURSE_POINTS / 2..=MOST_COURSE_POINTS).contains(&points.len()),
             "{}",
             points.len()
         );

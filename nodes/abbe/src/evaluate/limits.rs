@@ -99,7 +99,7 @@ impl Limit {
             is_there(self.lower_arcsec, self.upper_arcsec),
         ) {
             (false, false) => Err(format!(
-                "{place}: has no limit: state lower_um or upper_um, of an angle lower_arcsec or upper_arcsec"
+                "{place}: has no limit: state lower_um or upper_um (µm), of an angle lower_arcsec or upper_arcsec"
             )),
             (true, true) => Err(format!(
                 "{place}: has limits in µm and in arcsec: a figure is a length or an angle, remove one"

@@ -81,7 +81,7 @@ impl Keep {
 }
 
 /// Figures that are named one by one; more are counted.
-const NAMED: usize = 5;
+const LEFT_OUT_NAMED: usize = 5;
 
 /// Prints how many figures have no finite number and which; whether there is none.
 pub fn complain_of_left_out(figures: &Value, source: &str) -> bool {
@@ -93,7 +93,7 @@ pub fn complain_of_left_out(figures: &Value, source: &str) -> bool {
 }
 
 fn in_words(left_out: &[LeftOut]) -> Option<String> {
-    let first = left_out.iter().take(NAMED).map(|it| {
+    let first = left_out.iter().take(LEFT_OUT_NAMED).map(|it| {
         let test = if it.test.is_empty() {
             String::new()
         } else {
@@ -102,7 +102,7 @@ fn in_words(left_out: &[LeftOut]) -> Option<String> {
         format!("{test}{} = {}", it.name, it.value)
     });
     let first: Vec<String> = first.collect();
-    let more = match left_out.len().saturating_sub(NAMED) {
+    let more = match left_out.len().saturating_sub(LEFT_OUT_NAMED) {
         0 => String::new(),
         n => format!("; {n} more"),
     };

@@ -5,7 +5,7 @@ use anyhow::{Result, anyhow};
 /// One row in so many may have such a cell; with more the map or the table is wrong.
 const ONE_IN: usize = 10;
 /// Cells that are named one by one.
-const NAMED: usize = 20;
+const ODD_CELLS_NAMED: usize = 20;
 
 /// Such cells of a table.
 #[derive(Debug, Default)]
@@ -36,7 +36,7 @@ impl Odd {
     /// Notes a cell: line, column, and why it holds no value.
     pub fn note(&mut self, (line, column): (u64, &str), why: &str, cost: Cost) {
         self.n += 1;
-        if self.named.len() < NAMED {
+        if self.named.len() < ODD_CELLS_NAMED {
             let what = match cost {
                 Cost::Row => "row",
                 Cost::Reading => "reading",

@@ -18,7 +18,7 @@ const NAMES: [(TestKind, &str); 6] = [
     (TestKind::TwoArcs, "two arcs"),
 ];
 /// Most paths of a drawing.
-const MOST_DRAWN: usize = 6;
+const MOST_PATHS_DRAWN: usize = 6;
 
 fn name(kind: TestKind) -> &'static str {
     let found = NAMES.iter().find(|(known, _)| *known == kind);
@@ -126,7 +126,7 @@ fn drawing(name: &str, paths: &[&PathRecording]) -> Result<Drawing> {
             .collect(),
         marks: false,
     };
-    let more = match paths.len().saturating_sub(MOST_DRAWN) {
+    let more = match paths.len().saturating_sub(MOST_PATHS_DRAWN) {
         0 => String::new(),
         n => format!(" {n} more are in the table alone."),
     };
@@ -134,7 +134,7 @@ fn drawing(name: &str, paths: &[&PathRecording]) -> Result<Drawing> {
         svg: plot::svg(&Plot {
             x: "way along the path / mm".to_owned(),
             y: format!("{name}: deviation from the path / µm"),
-            traces: paths.iter().take(MOST_DRAWN).map(trace).collect(),
+            traces: paths.iter().take(MOST_PATHS_DRAWN).map(trace).collect(),
         })?,
         caption: format!("Positive to the left of the motion.{more}"),
     })

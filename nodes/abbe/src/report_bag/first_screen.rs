@@ -13,7 +13,7 @@ use crate::report::section::Section;
 use crate::report::terminal::Rank;
 
 /// Most tiles of answers.
-const MOST_ANSWERS: usize = 4;
+const MOST_ANSWERS_ON_TILES: usize = 4;
 
 /// The screen of these parts; `judged`: the decisions of limits, `stated`: whether a budget was given.
 pub(super) fn of(
@@ -33,7 +33,7 @@ pub(super) fn of(
     };
     let tiles = answered()
         .into_iter()
-        .take(MOST_ANSWERS)
+        .take(MOST_ANSWERS_ON_TILES)
         .map(tile)
         .collect();
     let drawn = { answered().into_iter() }

@@ -5,7 +5,7 @@ use serde_json::Value;
 /// Deepest level below a test that is looked at, as for the figures that are kept.
 const DEEPEST: usize = 12;
 /// Keys of a quantity's value and of its expanded uncertainty.
-const QUANTITIES: [(&str, &str); 2] = [
+const LIMITED_QUANTITIES: [(&str, &str); 2] = [
     ("value_mm", "expanded_uncertainty_mm"),
     ("value_rad", "expanded_uncertainty_rad"),
 ];
@@ -57,7 +57,7 @@ fn below(value: &Value, test: &str, name: &str, depth: usize, all: &mut Vec<Left
     let is_quantity = |(value, expanded): &&(&str, &str)| {
         entries.contains_key(*value) && entries.contains_key(*expanded)
     };
-    if let Some((key, expanded)) = QUANTITIES.iter().find(is_quantity) {
+    if let Some((key, expanded)) = LIMITED_QUANTITIES.iter().find(is_quantity) {
         take(entries.get(*key), test, &format!("{name}.{key}"), all);
         // A null is an uncertainty that was not stated.
         if entries.get(*expanded).is_some_and(|value| !value.is_null()) {
