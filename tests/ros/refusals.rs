@@ -174,23 +174,23 @@ fn numbers_out_of_range_on_the_command_line_are_usage_and_nothing_is_begun() {
         (
             &record[..],
             &["--max-file-s", "nan"][..],
-            "= NaN s: must lie between",
+            "= NaN s: must be from",
         ),
-        (&record, &["--max-file-s", "-1"], "= -1 s: must lie between"),
+        (&record, &["--max-file-s", "-1"], "= -1 s: must be from"),
         (
             &record,
             &["--ring", "0"],
-            "ring.window_s = 0 s: must lie between",
+            "ring.window_s = 0 s: must be from",
         ),
         (
             &record,
             &["--ring", "60", "--ring-bytes", "1"],
-            "ring.limit_bytes = 1: must lie between 1024",
+            "ring.limit_bytes = 1 bytes: must be from 1024",
         ),
         (
             &record,
             &["--ring", "0.0005"],
-            "ring.window_s = 0.0005 s: must lie between 0.001 s and 604800 s",
+            "ring.window_s = 0.0005 s: must be from 0.001 to 604800 s",
         ),
         (
             &["diagnose", "bag"],

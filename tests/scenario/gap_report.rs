@@ -284,8 +284,10 @@ fn what_cannot_be_diagnosed_ends_with_1_and_what_to_record_and_a_wrong_question_
             assert!(ended.said.contains(word), "{word}: {}", ended.said);
         }
     };
+    // What was run once has noise within the run alone, which is stated.
     let once = diagnose(&bag, &["--machine", &machine]);
-    cannot(&once, &["no test was repeated", "three times"]);
+    assert_eq!(once.status.code(), Some(0), "{}", once.said);
+    assert!(once.said.contains("within"), "{}", once.said);
     let other = "launch_configs/five_axis/machine.yaml";
     cannot(
         &diagnose(&bag, &["--machine", other]),

@@ -61,12 +61,12 @@ mod tests {
 
     #[test]
     fn a_refusal_shows_the_reason_and_how_the_verb_is_used() {
-        let error = refused("play", "rate = -2: must be 0 to 1000");
+        let error = refused("play", "rate = -2: must be from 0 to 1000");
         let error: clap::Error = error.downcast().unwrap();
         assert_eq!(error.exit_code(), i32::from(USAGE));
         let said = error.to_string();
         assert!(
-            said.starts_with("error: rate = -2: must be 0 to 1000\n"),
+            said.starts_with("error: rate = -2: must be from 0 to 1000\n"),
             "{said}"
         );
         assert!(said.contains("Usage: abbe play [OPTIONS] <BAG>"), "{said}");

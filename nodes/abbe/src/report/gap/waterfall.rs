@@ -22,9 +22,9 @@ use crate::report::svg::{Scale, escaped, short};
 const MOST_BARS: usize = 6;
 const WIDTH: f64 = 720.0;
 /// Height of a bar with its text, px.
-const ROW_PX: f64 = 52.0;
+const ROW_PX: f64 = 60.0;
 /// Left and right end of the bars, px.
-const BARS_PX: [f64; 2] = [8.0, 620.0];
+const BARS_PX: [f64; 2] = [8.0, 712.0];
 
 /// One bar: name, where it begins and where it ends, µm.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,7 +43,7 @@ fn bars(before_um: f64, after_um: f64, causes: &[(String, f64)]) -> Vec<Bar> {
         to_um: um,
         colour,
     };
-    let mut bars = vec![whole("before: machine minus simulator", before_um, 0)];
+    let mut bars = vec![whole("before, machine minus simulator", before_um, 0)];
     let closed = before_um.powi(2) - after_um.powi(2);
     let mut sorted = causes.to_vec();
     sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -118,22 +118,20 @@ fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
         let (a, b) = (scale.px(bar.from_um), scale.px(bar.to_um));
         let (left, width) = (a.min(b), (a - b).abs().max(2.0));
         let change = bar.to_um - bar.from_um;
-        let (sign, size) = match bar.from_um > 0.0 {
-            true if change <= 0.0 => ("−", -change),
-            true => ("+", change),
-            false => ("", change),
+        let size = short(change.abs());
+        let sign = match bar.from_um > 0.0 && size != "0" {
+            true if change <= 0.0 => "−",
+            true => "+",
+            false => "",
         };
         write!(
             text,
-            "<text x=\"{}\" y=\"{:.1}\">{}</text><g class=\"c{}\"><rect x=\"{left:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"18\" fill=\"currentColor\"/></g><text x=\"{:.1}\" y=\"{:.1}\">{sign}{} µm</text>",
+            "<text x=\"{}\" y=\"{:.1}\">{}: {sign}{size} µm</text><g class=\"c{}\"><rect x=\"{left:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"18\" fill=\"currentColor\"/></g>",
             BARS_PX[0],
-            top + 20.0,
+            top + 26.0,
             escaped(&bar.name),
             bar.colour,
-            top + 27.0,
-            left + width + 6.0,
-            top + 42.0,
-            short(size)
+            top + 34.0,
         )?;
     }
     let at = scale.px(floor_um);
