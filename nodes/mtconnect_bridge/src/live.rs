@@ -99,12 +99,14 @@ impl LiveBridge {
         out.extend(self.waiting.drain(..n));
     }
 
-    /// Takes events until they are many, or have much to say.
-    fn listen(&mut self) -> Result<(), Infallible> {
+    /// Takes events until they are many, or have much to say; whether the stage may take the time of the tick.
+    ///
+    /// It may not where what came is cut: a tick ends an instant, whose other positions may be in what was not taken.
+    fn listen(&mut self) -> Result<bool, Infallible> {
         let mut bytes = 0;
         for _ in 0..EVENTS_PER_TICK {
             if bytes > BYTES_PER_TICK || self.waiting.len() >= OUTPUTS_PER_TICK {
-                break;
+                return Ok(false);
             }
             let Some((came_at, event)) = self.io.as_ref().and_then(BridgeIo::event) else {
                 break;
@@ -112,7 +114,7 @@ impl LiveBridge {
             bytes += length(&event);
             self.pass(came_at, Input::Io(event))?;
         }
-        Ok(())
+        Ok(true)
     }
 }
 
@@ -145,8 +147,7 @@ impl Stage for LiveBridge {
         }
         self.read_log(out);
         // While much waits the machine waits too, and is not silent.
-        if self.waiting.is_empty() {
-            self.listen()?;
+        if self.waiting.is_empty() && self.listen()? {
             self.pass(at, Input::Tick)?;
         }
         self.hand_over(OUTPUTS_PER_TICK, out);
