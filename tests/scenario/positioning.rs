@@ -196,11 +196,13 @@ fn least_uncertainty_um(test: &Value, scatters: f64) -> f64 {
     let apart_m: f64 = high.0 - low.0;
     let apart_m = apart_m.abs();
     // k = 1: certificate 0.1 µm + 0.5 µm/m over 2; bed 8 µm/(m K) · 0.5 K over the root of 3, and 0.5 µm/(m K) by its deviation,
-    // which is small; drift of 0.3 µm over twice the root of 3, in two means of five, and in four standard deviations for A.
+    // which is small; drift of 0.3 µm over twice the root of 3, in two means of five; for A also in twice the standard deviation
+    // of both ends, by the root of n - 1 (first order; what drift adds to a standard deviation is above this least).
     let certificate_um = (0.1 + 0.5 * apart_m) / 2.0;
     let bed_um = 8.0 * 0.5 * apart_m / 3.0_f64.sqrt();
     let runs = test["iso230_2"]["n_runs"].as_f64().unwrap();
-    let drift_um = 0.3 / 12.0_f64.sqrt() * (4.0 * scatters * scatters + 2.0 / runs).sqrt();
+    let of_ends = 2.0 * scatters * scatters / (runs - 1.0);
+    let drift_um = 0.3 / 12.0_f64.sqrt() * (of_ends + 2.0 / runs).sqrt();
     2.0 * certificate_um.hypot(bed_um).hypot(drift_um)
 }
 
