@@ -160,15 +160,27 @@ fn a_window_of_a_bag_arrives_whole_from_its_first_message_to_its_last() {
 fn what_cannot_be_played_is_refused_with_the_reason() {
     let path = root().join("bags/cold_reference");
     for (arguments, code, words) in [
-        (&["--rate", "-2"][..], 2, "rate = -2: must be from 0 to 1000"),
+        (
+            &["--rate", "-2"][..],
+            2,
+            "rate = -2: must be from 0 to 1000",
+        ),
         (&["--rate", "nan"], 2, "rate = NaN: must be from 0 to 1000"),
         (
             &["--from", "5", "--to", "4"],
             2,
             "to_s = 4 s is before from_s = 5 s",
         ),
-        (&["--to", "-1"], 2, "to_s = -1 s: must be from 0 to 9000000000 s"),
-        (&["--delay", "inf"], 2, "delay_s = inf s: must be from 0 to 60 s"),
+        (
+            &["--to", "-1"],
+            2,
+            "to_s = -1 s: must be from 0 to 9000000000 s",
+        ),
+        (
+            &["--delay", "inf"],
+            2,
+            "delay_s = inf s: must be from 0 to 60 s",
+        ),
         (&["--", "--ros-args", "-r"], 2, "`-r` needs a value"),
         // The arguments are right, and the bag is not one for them.
         (&["--topics", "/nobody"], 1, "no message of [\"/nobody\"]"),

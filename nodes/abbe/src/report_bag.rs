@@ -191,11 +191,8 @@ fn judged_page(
     if sections.is_empty() {
         lines.push("The bag holds no test that can be evaluated.".to_owned());
     }
-    let mut figures: Vec<serde_json::Value> = sections
-        .iter()
-        .map(|section| section.figures.clone())
-        .filter(|figures| !figures.is_null())
-        .collect();
+    let all = sections.iter().map(|section| section.figures.clone());
+    let mut figures: Vec<serde_json::Value> = all.filter(|figures| !figures.is_null()).collect();
     if budget.is_none() {
         figures.iter_mut().for_each(unstate);
     }

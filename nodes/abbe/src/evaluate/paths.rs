@@ -175,8 +175,9 @@ impl Current {
         let first = about.saturating_sub(WINDOW);
         let last = (about + WINDOW).min(self.commanded_mm.len().checked_sub(1)?);
         let mut found: Option<(f64, Nearest)> = None;
-        for k in first..last {
-            let (a, b) = (self.commanded_mm[k], self.commanded_mm[k + 1]);
+        let pieces = self.commanded_mm[first..=last].windows(2);
+        for (k, (pair, way_mm)) in (first..).zip(pieces.zip(&ways_mm[first..])) {
+            let (a, b) = (pair[0], pair[1]);
             let step = b - a;
             let length_mm = step.norm();
             let share = ((place_mm - a).dot(&step) / length_mm.powi(2)).clamp(0.0, 1.0);
@@ -184,7 +185,7 @@ impl Current {
             let distance_mm = (place_mm - at).norm();
             if found.as_ref().is_none_or(|(least, _)| distance_mm < *least) {
                 let nearest = Nearest {
-                    along_mm: ways_mm[k] + share * length_mm,
+                    along_mm: way_mm + share * length_mm,
                     place_mm: at,
                     normal: Vector2::new(-step.y, step.x) / length_mm,
                 };

@@ -234,7 +234,9 @@ pub fn named_unit(name: &str) -> Option<Unit> {
 pub fn of_column(name: &str, times_s: &[f64], is_stated: bool) -> Result<Option<String>> {
     let state = |unit: &str| format!("state `units: {{\"{name}\": {unit}}}` in the map");
     if let [first_s, _, ..] = times_s
-        && times_s.iter().all(|time_s| time_s == first_s)
+        && times_s
+            .iter()
+            .all(|time_s| time_s.total_cmp(first_s).is_eq())
     {
         bail!(
             "column \"{name}\": all {} rows have the time {} s: a log needs times that differ: is another column the time?",

@@ -74,7 +74,7 @@ pub fn short(value: f64) -> String {
     }
     let size = value.abs();
     let decimals = match () {
-        () if size >= 100.0 || size < 1e-9 => 0,
+        () if !(1e-9..100.0).contains(&size) => 0,
         () if size >= 10.0 => 1,
         () if size >= 1.0 => 2,
         () => (2.0 - size.log10().floor()).min(9.0) as usize,

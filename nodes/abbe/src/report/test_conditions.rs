@@ -64,6 +64,16 @@ impl Condition {
     }
 }
 
+/// Columns of the table of thermometers.
+const THERMOMETER_COLUMNS: [&str; 6] = [
+    "thermometer / °C",
+    "first",
+    "last",
+    "least",
+    "greatest",
+    "range / K",
+];
+
 /// The conditions of a bag; `tests` where they were evaluated.
 #[must_use]
 pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>) -> Conditions {
@@ -97,14 +107,7 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
         let all: Vec<String> = seen.thermometers.iter().map(of).collect();
         short.push(format!("Thermometers, first to last: {}.", all.join(", ")));
         section.tables.push(Rows {
-            head: head(&[
-                "thermometer / °C",
-                "first",
-                "last",
-                "least",
-                "greatest",
-                "range / K",
-            ]),
+            head: head(&THERMOMETER_COLUMNS),
             rows: temperatures,
             note: "From the first test to the last one.".to_owned(),
         });

@@ -128,7 +128,7 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
 #[must_use]
 pub fn screen(verifications: &[Verification]) -> Screen {
     let seen = || verifications.iter().filter(|v| !v.poses.is_empty());
-    let find = |word: &str| seen().filter(|v| v.label.contains(word)).last();
+    let find = |word: &str| seen().rfind(|v| v.label.contains(word));
     let (Some(without), Some(with)) = (find("without"), find("with compensation")) else {
         return Screen::default();
     };

@@ -204,12 +204,9 @@ fn eq6_to_eq10_of_a_circular_budget_by_hand() {
         let both = result.both.unwrap();
         let expanded = |figure: ExpandedLength| figure.expanded_uncertainty_mm;
         let g2 = 2.0 * (0.09 + 0.16);
-        near(
-            "U(G)",
-            expanded(both.circular_error),
-            2e-3 * f64::sqrt(g2),
-            1e-15,
-        );
+        let near =
+            |what: &str, found: f64, right2: f64| near(what, found, 2e-3 * right2.sqrt(), 1e-15);
+        near("U(G)", expanded(both.circular_error), g2);
         // The mean of a turn over a plate: half of its constant, (0.3 + 0.2)/2 = 0.25 µm. A drift of 0.4 µm leaves half.
         let mean_um = if budget.length.is_none() {
             0.25
@@ -221,20 +218,10 @@ fn eq6_to_eq10_of_a_circular_budget_by_hand() {
             mean_um.powi(2) + 0.04 + 1.0 + 0.36,
         );
         let h2: f64 = 2.0 * 0.16;
-        near(
-            "U(H)",
-            expanded(both.hysteresis_1996),
-            2e-3 * h2.sqrt(),
-            1e-15,
-        );
+        near("U(H)", expanded(both.hysteresis_1996), h2);
         let f = result.clockwise.unwrap().greatest_radial_deviation;
-        near("U(F)", expanded(f), 2e-3 * f64::sqrt(f2), 1e-15);
-        near(
-            "U(D)",
-            expanded(both.mean_radial_deviation),
-            2e-3 * f64::sqrt(d2),
-            1e-15,
-        );
+        near("U(F)", expanded(f), f2);
+        near("U(D)", expanded(both.mean_radial_deviation), d2);
     }
 }
 
