@@ -40,8 +40,8 @@ fn reports_of_all_bags_take_forty_lines_and_have_every_part_with_full() {
         ),
         (
             "dual_loop",
-            21,
-            "Positioning X, run 1 on: not compensated, ",
+            22,
+            "Positioning tables: scale minus motor: X: ",
         ),
         ("grid_circles", 200, "Geometric errors of the linear axes: "),
         (

@@ -176,7 +176,7 @@ impl Current {
         let last = (about + WINDOW).min(self.commanded_mm.len().checked_sub(1)?);
         let mut found: Option<(f64, Nearest)> = None;
         let pieces = self.commanded_mm[first..=last].windows(2);
-        for (k, (pair, way_mm)) in (first..).zip(pieces.zip(&ways_mm[first..])) {
+        for (pair, way_mm) in pieces.zip(&ways_mm[first..]) {
             let (a, b) = (pair[0], pair[1]);
             let step = b - a;
             let length_mm = step.norm();
