@@ -107,11 +107,7 @@ mod tests {
 
     fn instance(id: &str, target: Target) -> Instance {
         let kind = CATALOGUE.iter().find(|kind| kind.id == id).unwrap();
-        Instance {
-            kind,
-            target,
-            begins: None,
-        }
+        Instance { kind, target }
     }
 
     fn estimate(instance: &Instance, sizes: &[f64], u: f64) -> Estimate {

@@ -78,7 +78,6 @@ mod tests {
         let instance = |id: &str| Instance {
             kind: effects::kind(id).unwrap(),
             target: Target::Axis(Axis::X),
-            begins: None,
         };
         let form = |instance, wide| Form {
             instance,
