@@ -28,6 +28,8 @@ const KINDS: [TestKind; 6] = [
 const MOST_READINGS: usize = 600_000;
 /// Commands about that of a reading among which its nearest place is sought.
 const WINDOW: usize = 250;
+/// Distance beyond the least at which a way leads away, mm.
+const AWAY_MM: f64 = 0.2;
 /// Shorter steps of the command are a rest, mm.
 const LEAST_STEP_MM: f64 = 1e-5;
 /// Times that (1) and (2) follow each other.
@@ -171,28 +173,45 @@ impl Current {
         ways
     }
 
+    /// The nearest place among the commands about one of them. Each way is followed until it leads away.
     fn nearest(&self, ways_mm: &[f64], about: usize, place_mm: &Vector2<f64>) -> Option<Nearest> {
         let first = about.saturating_sub(WINDOW);
         let last = (about + WINDOW).min(self.commanded_mm.len().checked_sub(1)?);
         let mut found: Option<(f64, Nearest)> = None;
-        let pieces = self.commanded_mm[first..=last].windows(2);
-        for (pair, way_mm) in pieces.zip(&ways_mm[first..]) {
-            let (a, b) = (pair[0], pair[1]);
-            let step = b - a;
-            let length_mm = step.norm();
-            let share = ((place_mm - a).dot(&step) / length_mm.powi(2)).clamp(0.0, 1.0);
-            let at = a + share * step;
-            let distance_mm = (place_mm - at).norm();
-            if found.as_ref().is_none_or(|(least, _)| distance_mm < *least) {
-                let nearest = Nearest {
-                    along_mm: way_mm + share * length_mm,
-                    place_mm: at,
-                    normal: Vector2::new(-step.y, step.x) / length_mm,
-                };
+        let mut leads_away = |k: usize| {
+            let (distance_mm, nearest) = self.on_piece(ways_mm, k, place_mm);
+            let least_mm = found.as_ref().map_or(f64::INFINITY, |(least, _)| *least);
+            if distance_mm < least_mm {
                 found = Some((distance_mm, nearest));
+            }
+            distance_mm > least_mm + AWAY_MM
+        };
+        for k in (first..about.min(last)).rev() {
+            if leads_away(k) {
+                break;
+            }
+        }
+        for k in about..last {
+            if leads_away(k) {
+                break;
             }
         }
         found.map(|(_, nearest)| nearest)
+    }
+
+    /// Distance from a place to one piece of the path, mm, and the nearest place on it.
+    fn on_piece(&self, ways_mm: &[f64], k: usize, place_mm: &Vector2<f64>) -> (f64, Nearest) {
+        let (a, b) = (self.commanded_mm[k], self.commanded_mm[k + 1]);
+        let step = b - a;
+        let length_mm = step.norm();
+        let share = ((place_mm - a).dot(&step) / length_mm.powi(2)).clamp(0.0, 1.0);
+        let at = a + share * step;
+        let nearest = Nearest {
+            along_mm: ways_mm[k] + share * length_mm,
+            place_mm: at,
+            normal: Vector2::new(-step.y, step.x) / length_mm,
+        };
+        ((place_mm - at).norm(), nearest)
     }
 
     fn recording(&self, shift_mm: &Vector2<f64>) -> PathRecording {
