@@ -11,11 +11,12 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use nix::unistd::geteuid;
+use nix::sys::signal::{Signal, killpg};
+use nix::unistd::{Pid, geteuid};
 use serde_json::Value;
 
 use crate::evaluate::budget::NOT_STATED;
-use crate::whole_file::{self, Helpers, Vanishing};
+use crate::whole_file;
 
 /// Names of the program, the first that is there is taken.
 const BROWSERS: [&str; 4] = [
@@ -149,7 +150,10 @@ fn on_path(name: &str) -> Option<PathBuf> {
 /// The page as a browser prints it.
 fn print(mut browser: Command, page: &str, head: &Head, longest: Duration) -> Result<Vec<u8>> {
     let name = browser.get_program().to_string_lossy().into_owned();
-    let home = Vanishing::temporary().context("folder for the browser")?;
+    let home = tempfile::Builder::new()
+        .prefix("abbe-pdf-")
+        .tempdir()
+        .context("folder for the browser")?;
     let file = |name: &str| home.path().join(name);
     // Paper has nothing to fold: every part stands open.
     let open = page.replace("<details>", "<details open>");
@@ -190,17 +194,18 @@ fn print(mut browser: Command, page: &str, head: &Head, longest: Duration) -> Re
     Ok(bytes)
 }
 
-/// Waits for the end of a process; one that takes too long is killed with its group. Helpers of its own may outlive it, and
-/// are killed too.
+/// Waits for the end of a process; one that takes too long is killed with its group.
 fn wait(mut child: Child, longest: Duration, name: &str) -> Result<std::process::ExitStatus> {
     let until = Instant::now() + longest;
-    let helpers = Helpers::of(child.id());
+    let group = i32::try_from(child.id()).map(Pid::from_raw);
     loop {
         if let Some(status) = child.try_wait().context("the browser")? {
+            // Helpers of its own may outlive it.
+            end(group.as_ref().ok());
             return Ok(status);
         }
         if Instant::now() >= until {
-            drop(helpers);
+            end(group.as_ref().ok());
             child.wait().context("the browser")?;
             bail!(
                 "{name} took more than {} s and was ended: print the HTML page from any browser",
@@ -208,6 +213,13 @@ fn wait(mut child: Child, longest: Duration, name: &str) -> Result<std::process:
             );
         }
         std::thread::sleep(BETWEEN_LOOKS);
+    }
+}
+
+fn end(group: Option<&Pid>) {
+    if let Some(group) = group {
+        // A group that has ended already is no fault.
+        let _ = killpg(*group, Signal::SIGKILL);
     }
 }
 

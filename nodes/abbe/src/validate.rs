@@ -11,7 +11,6 @@ use crate::scenario::places;
 use crate::tell::tell;
 
 mod folder;
-mod programs;
 mod single;
 
 /// Arguments of `abbe validate`.

@@ -2,7 +2,7 @@
 
 use metrology::stamp::{Host, Machine, Span, Stamp};
 
-use crate::account::{Account, Reporting};
+use crate::account::Account;
 use crate::condition::Condition;
 use crate::document::DocumentFlaw;
 use crate::framing::Lines;
@@ -14,6 +14,8 @@ use crate::values::Values;
 
 /// An adapter that wants to be asked more or less often than this is not watched, ms.
 const HEARTBEATS_MS: std::ops::RangeInclusive<f64> = 100.0..=3.6e6;
+/// The account of a connection is reported again this long after the last report, where it has changed.
+const ACCOUNT_PERIOD: Span = Span::from_nanos(60_000_000_000);
 
 /// Reads records.
 #[derive(Clone, Debug)]
@@ -24,7 +26,7 @@ pub struct Reader {
     pub account: Account,
     version: u32,
     refused: u64,
-    reporting: Reporting,
+    told: Option<(Stamp<Host>, Account)>,
 }
 
 impl Reader {
@@ -36,23 +38,41 @@ impl Reader {
             account: Account::default(),
             version: 1,
             refused: 0,
-            reporting: Reporting::default(),
+            told: None,
         }
     }
 
     /// The account with what the values count.
     #[must_use]
     pub fn account(&self) -> Account {
-        self.values.account(&self.account)
+        let (told, unmapped) = self.values.counts();
+        let refused = self.values.refused();
+        let n_refused: u64 = refused.iter().map(|(_, left)| left.count).sum();
+        let mut account = Account {
+            told: told.saturating_sub(n_refused),
+            unmapped,
+            keys: self.values.unmapped_keys(),
+            ..self.account.clone()
+        };
+        let refused = refused.into_iter().filter(|(_, left)| left.count > 0);
+        account.left.extend(refused);
+        let leaps = self.values.leaps();
+        if leaps.count > 0 {
+            account.left.insert("leaps of the machine's clock", leaps);
+        }
+        account
     }
 
     /// Reports the account of a connection where it has changed.
     pub fn tell_account(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
-        if self.account.lines == 0 || !self.reporting.is_due(at) {
+        let is_due = |told: &(Stamp<Host>, Account)| at - told.0 >= ACCOUNT_PERIOD;
+        if self.account.lines == 0 || !self.told.as_ref().is_none_or(is_due) {
             return;
         }
         let account = self.account();
-        if self.reporting.is_news(at, &account) {
+        let is_news = self.told.as_ref().is_none_or(|(_, told)| *told != account);
+        self.told = Some((at, account.clone()));
+        if is_news {
             out.push(Output::Condition(Condition::Account { account }));
         }
     }

@@ -26,7 +26,6 @@ pub mod pace;
 pub mod pause;
 pub mod playback;
 pub mod reading;
-mod repeats;
 mod replay;
 mod stamps;
 mod usable;

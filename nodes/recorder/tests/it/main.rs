@@ -9,7 +9,6 @@
 mod damage;
 mod foreign;
 mod full_disk;
-mod machine_file;
 #[cfg(feature = "peers")]
 mod peers;
 mod queue;
