@@ -43,7 +43,7 @@ pub struct AxisCompensationConfig {
     /// Time in which an offset is faded to zero.
     #[schemars(range(min = 0.01, max = 3600.0))]
     pub fade_s: f64,
-    /// The same when the node is told to end, where that is shorter; the axes' limits of rate and acceleration hold
+    /// The same at the end of the node, where that is shorter; the axes' limits of rate and acceleration hold
     /// all the same.
     #[serde(default = "default_shutdown_fade_s")]
     #[schemars(range(min = 0.01, max = 60.0))]

@@ -83,7 +83,7 @@ impl Keep {
 /// Figures that are named one by one; more are counted.
 const LEFT_OUT_NAMED: usize = 5;
 
-/// Prints how many figures have no finite number and which; whether there is none.
+/// Prints the number and names of figures without a finite number; returns whether all have one.
 pub fn complain_of_left_out(figures: &Value, source: &str) -> bool {
     let left_out = left_out(figures);
     if let Some(line) = in_words(&left_out) {

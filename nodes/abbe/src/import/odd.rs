@@ -47,7 +47,7 @@ impl Odd {
         }
     }
 
-    /// The cells in words, the first of them each in a line; none where there are none. `rows`: rows of the table.
+    /// A sentence for each of the first cells; empty without odd cells. `rows`: rows of the table.
     ///
     /// # Errors
     /// The first cell, where more than a tenth of the rows have one.

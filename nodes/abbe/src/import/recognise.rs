@@ -168,7 +168,7 @@ fn known(name: &str, cells: &[&str], decimal: char) -> Known {
     }
 }
 
-/// The first cell that is a number or an instant; where there is none, the first.
+/// The first cell that is a number or an instant; otherwise the first cell.
 fn first<'c>(cells: &[&'c str], decimal: char) -> &'c str {
     let is_value = |cell: &&&str| number_of(cell, decimal).is_some() || is_instant(cell);
     let value = cells.iter().find(is_value).or(cells.first());

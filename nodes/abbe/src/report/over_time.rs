@@ -16,7 +16,7 @@ use crate::evidence::Evidence;
 
 /// Seconds of an hour.
 const HOUR_S: f64 = 3600.0;
-/// A run shorter than this is told in minutes, h.
+/// Length below which times of a run are shown in minutes, h.
 const SHORT_H: f64 = 1.0;
 
 /// Begin of the first test.
@@ -145,7 +145,7 @@ pub fn picture(evidence: &Evidence, errors: &[ToolError]) -> Result<Option<Marku
     Ok(Some(figure(&svg(&plot)?, caption)))
 }
 
-/// The offsets that compensation applied, over time; nothing where there were none.
+/// The offsets that compensation applied, over time; nothing without offsets.
 ///
 /// # Errors
 /// When the plot cannot be drawn.

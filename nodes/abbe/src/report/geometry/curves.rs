@@ -27,7 +27,7 @@ fn value_at(curve: &ErrorCurve, at: f64) -> f64 {
         .sum()
 }
 
-/// The curve over its span: (mm or degrees, µm or µrad); empty where it is none.
+/// Points of the curve over its span: (mm or degrees, µm or µrad); empty without a curve.
 fn points(curve: &ErrorCurve) -> Vec<(f64, f64)> {
     let is_whole = !curve.coefficient.is_empty() && curve.estimable.iter().all(|known| *known);
     let (low, high) = curve.span;
