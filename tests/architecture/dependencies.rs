@@ -24,11 +24,22 @@ const IMPURE: [&str; 12] = [
 ];
 
 /// What nodes share.
-const VOCABULARY: [&str; 5] = ["metrology", "iso230", "machine", "twin", "control_tables"];
+const VOCABULARY: [&str; 6] = [
+    "metrology",
+    "iso230",
+    "machine",
+    "machine_report",
+    "twin",
+    "control_tables",
+];
 
 /// Libraries that are not for every node, with the only crates that may depend on each.
-const USERS: [(&str, &[&str]); 3] = [
+const USERS: [(&str, &[&str]); 4] = [
     ("iso230", &["abbe"]),
+    (
+        "machine_report",
+        &["mtconnect_bridge", "opcua_bridge", "opcua_bridge_node"],
+    ),
     ("twin", &["gap_diagnosis", "abbe", "abbe_trials"]),
     ("control_tables", &["abbe"]),
 ];

@@ -35,7 +35,8 @@ fn metres(path: &str, source: &Source) -> Vec<String> {
 #[test]
 fn arch_metres_exist_only_on_the_wire() {
     let mut found = Vec::new();
-    for name in PURE.iter().chain(&["linuxcnc_bridge", "mtconnect_bridge"]) {
+    let bridges = ["linuxcnc_bridge", "mtconnect_bridge", "opcua_bridge"];
+    for name in PURE.iter().chain(&bridges).chain(&["machine_report"]) {
         let sources = sources(&format!("{}/src", tree::folder_of(name)));
         found.extend(
             sources

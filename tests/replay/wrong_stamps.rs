@@ -117,3 +117,36 @@ fn a_check_leaves_out_an_input_with_a_wrong_stamp() {
         }
     }
 }
+
+#[test]
+fn topics_whose_stamps_are_all_two_hours_off_are_named_by_report_and_diagnosis() {
+    for prefix in ["/temperature/", "/probe/trigger", "/test/segment"] {
+        let change = |messages: &mut Vec<Copied>| {
+            for message in messages
+                .iter_mut()
+                .filter(|it| it.topic.starts_with(prefix))
+            {
+                let sec = message.data[4..8].try_into().unwrap();
+                let sec = i32::from_le_bytes(sec) + 7_200;
+                message.data[4..8].copy_from_slice(&sec.to_le_bytes());
+            }
+        };
+        let bag = changed_of(
+            &root().join("bags/cold_reference"),
+            &Change {
+                messages: Some(&change),
+                ..Change::default()
+            },
+        );
+        let bag = bag.path().display().to_string();
+        let words = "its stamps are 7200 s from those of the other topics, later";
+        for verb in ["report", "diagnose"] {
+            let (code, said) = run(&[verb, &bag]);
+            assert!(said.contains(words), "{verb} {prefix}: {said}");
+            assert_ne!(code, 0, "{verb} {prefix}: {said}");
+            let is_report = verb == "report";
+            assert!(code == 3 || !is_report, "{verb} {prefix}: {said}");
+            assert!(!said.contains("No temperature was recorded"), "{said}");
+        }
+    }
+}

@@ -62,14 +62,21 @@ fn left() -> Stdio {
 
 #[test]
 fn an_interrupted_run_closes_its_bag_and_writes_its_page() {
-    for (more, is_heard) in [(&[][..], true), (&["--separate"], true), (&[], false)] {
+    for (more, is_heard, signal) in [
+        (&[][..], true, Signal::SIGINT),
+        (&["--separate"], true, Signal::SIGINT),
+        (&[], false, Signal::SIGINT),
+        // A terminal that is closed takes the reader of its standard error with it.
+        (&[], false, Signal::SIGHUP),
+        (&["--separate"], true, Signal::SIGHUP),
+    ] {
         let scenario = Scenario::copy_of("short_cell");
         let stderr = if is_heard { Stdio::piped() } else { left() };
         let (graph, run) = heard(&scenario, domain(9), more, stderr);
         let asked = Instant::now();
-        run.signal(Signal::SIGINT);
+        run.signal(signal);
         let ended = run.ended_within(END);
-        eprintln!("{more:?}: SIGINT to exit: {:?}", asked.elapsed());
+        eprintln!("{more:?}: {signal} to exit: {:?}", asked.elapsed());
         assert_eq!(ended.status.code(), Some(130), "{}", ended.said);
         let is_told = ended.said.contains("it was interrupted");
         assert_eq!(is_told, is_heard, "{}", ended.said);
@@ -147,7 +154,7 @@ fn a_node_that_dies_in_a_separate_run_is_named_and_the_plan_ends() {
 }
 
 #[test]
-fn a_recording_ends_with_sigint_and_holds_what_was_said() {
+fn a_recording_ends_with_a_signal_and_holds_what_was_said() {
     let scenario = Scenario::copy_of("short_cell");
     let domain = domain(12);
     let bag = scenario.out().join("recorded");
@@ -159,7 +166,10 @@ fn a_recording_ends_with_sigint_and_holds_what_was_said() {
     let (_graph, run) = started(&runs, domain, &[]);
     run.signal(Signal::SIGTERM);
     let _ = run.ended_within(END);
-    let said = recording.stop();
+    recording.signal(Signal::SIGHUP);
+    let ended = recording.ended_within(END);
+    let said = ended.said;
+    assert_eq!(ended.status.code(), Some(0), "{said}");
     assert!(said.contains("0 lost"), "{said}");
     let counts = whole(&Bag::open(&bag).unwrap());
     eprintln!("{counts:?}");
@@ -181,6 +191,12 @@ fn a_recording_ends_with_sigint_and_holds_what_was_said() {
 
 #[test]
 fn a_simulated_run_that_is_interrupted_closes_its_bag_and_names_the_steps_that_were_skipped() {
+    for signal in [Signal::SIGINT, Signal::SIGHUP] {
+        closes_its_bag_after(signal);
+    }
+}
+
+fn closes_its_bag_after(signal: Signal) {
     let scenario = Scenario::copy_of("short_cell");
     // As the scenario, but in simulated time and no faster than real time.
     scenario.append("scenario.yaml", "simulated_start_s: 1767600000\n");
@@ -191,7 +207,7 @@ fn a_simulated_run_that_is_interrupted_closes_its_bag_and_names_the_steps_that_w
         .arg(scenario.out());
     let run = Process::start(command);
     std::thread::sleep(Duration::from_secs(6));
-    run.signal(Signal::SIGINT);
+    run.signal(signal);
     let ended = run.ended_within(END);
     assert_eq!(ended.status.code(), Some(130), "{}", ended.said);
     assert!(ended.said.contains("it was interrupted"), "{}", ended.said);

@@ -2,6 +2,8 @@
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::sync::mpsc::{Sender, channel};
 use std::time::{Duration, Instant};
 
 use abbe_msgs::{from_cdr, msg, sensor_msgs, topics};
@@ -102,5 +104,123 @@ fn a_machine_is_told_lost_with_its_adapter_and_told_again() {
     graph.condition(NODE, "connection", &["not connected", "closed"], cut);
     graph.condition(NODE, "unavailable/spindle", &["unavailable since"], cut);
     is_heard(&graph, &mut accept(&listener));
+    node.stop();
+}
+
+/// Parameters of a bridge that listens at a port, and its mapping; the path of the file.
+fn parameters(home: &Path, source: &str, port: u16) -> String {
+    std::fs::write(home.join("map.yaml"), MAP).unwrap();
+    let file = home.join("bridge.yaml");
+    let text = format!(
+        "/**:\n  ros__parameters:\n    source: {source}\n    port: {port}\n    map_file: map.yaml\n"
+    );
+    std::fs::write(&file, text).unwrap();
+    file.display().to_string()
+}
+
+/// A bridge of another name and namespace than that of the other tests, on a domain without nodes.
+fn flooded(file: &str, name: &str) -> Process {
+    let arguments = ["--params-file", file, "-r", name, "-r", "__ns:=/flooded"];
+    Process::node(domain(15), NODE, &arguments)
+}
+
+/// Writes the same again and again until the bridge has left.
+fn flood(mut socket: TcpStream, lines: &str) {
+    let many = lines.repeat(1 + 20_000 / lines.len());
+    while socket.write_all(many.as_bytes()).is_ok() {}
+}
+
+#[test]
+fn a_bridge_stops_while_its_machine_speaks_without_pause() {
+    let stamp = "2016-11-29T10:00:00Z";
+    let codes = |k: u32| format!("{stamp}|sc|FAULT|C{k}|1|HIGH|too hot\n");
+    let floods = [
+        format!("{stamp}|Xabs|1|Stemp|43\n"),
+        (0..2_000).map(codes).collect::<String>(),
+        format!("{stamp}|Stemp|--multiline--AB\n"),
+        format!("{stamp}|Stemp|warm|Xabs\n"),
+    ];
+    for (at, lines) in floods.into_iter().enumerate() {
+        let home = tempfile::tempdir().unwrap();
+        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        let port = listener.local_addr().unwrap().port();
+        let file = parameters(home.path(), "shdr", port);
+        let name = format!("__node:=flooded_{at}");
+        let node = flooded(&file, &name);
+        let socket = accept(&listener);
+        let flooding = std::thread::spawn(move || flood(socket, &lines));
+        std::thread::sleep(Duration::from_secs(3));
+        // Within 10 s and with exit code 0.
+        node.stop();
+        flooding.join().unwrap();
+    }
+}
+
+const DEVICES: &str = r#"<MTConnectDevices><Header instanceId="7"/><Devices><Device id="d" name="mill"><DataItems><DataItem id="Xabs" category="SAMPLE" type="POSITION" units="MILLIMETER"/></DataItems></Device></Devices></MTConnectDevices>"#;
+
+/// Positions with the numbers from `first` on.
+fn positions(first: u64, n: u64) -> String {
+    let next = first + n;
+    let one = |k: u64| {
+        format!(
+            r#"<Position dataItemId="Xabs" sequence="{k}" timestamp="2016-11-29T10:00:00Z">{}</Position>"#,
+            k % 100
+        )
+    };
+    let all: String = (first..next).map(one).collect();
+    format!(
+        r#"<MTConnectStreams><Header instanceId="7" firstSequence="1" nextSequence="{next}"/><Streams><DeviceStream name="mill" uuid="m"><ComponentStream component="Linear" name="X" componentId="x"><Samples>{all}</Samples></ComponentStream></DeviceStream></Streams></MTConnectStreams>"#
+    )
+}
+
+/// Answers one question of a bridge; a stream is full parts without pause until the bridge has left.
+fn answer(mut socket: TcpStream, begun: &Sender<()>) {
+    let (mut head, mut byte) = (Vec::new(), [0_u8]);
+    while !head.ends_with(b"\r\n\r\n") && socket.read(&mut byte).unwrap_or(0) == 1 {
+        head.push(byte[0]);
+    }
+    let whole = |text: &str| {
+        let n = text.len();
+        format!("HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\nContent-Length: {n}\r\n\r\n{text}")
+    };
+    let asked = String::from_utf8_lossy(&head);
+    if asked.starts_with("GET /probe") {
+        let _ = socket.write_all(whole(DEVICES).as_bytes());
+    } else if asked.starts_with("GET /current") {
+        let _ = socket.write_all(whole(&positions(1, 1)).as_bytes());
+    } else {
+        let kind = "multipart/x-mixed-replace;boundary=b7";
+        let head = format!("HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\n\r\n");
+        let mut is_open = socket.write_all(head.as_bytes()).is_ok();
+        let mut first = 2;
+        while is_open {
+            let part = positions(first, 1_000);
+            let n = part.len();
+            let part = format!("--b7\r\nContent-length: {n}\r\n\r\n{part}\r\n");
+            is_open = socket.write_all(part.as_bytes()).is_ok();
+            let _ = begun.send(());
+            first += 1_000;
+        }
+    }
+}
+
+#[test]
+fn a_bridge_stops_while_its_agent_sends_full_parts_without_pause() {
+    let home = tempfile::tempdir().unwrap();
+    let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let file = parameters(home.path(), "agent", port);
+    let (begun, parts) = channel();
+    std::thread::spawn(move || {
+        for socket in listener.incoming().map_while(Result::ok) {
+            let begun = begun.clone();
+            std::thread::spawn(move || answer(socket, &begun));
+        }
+    });
+    let name = "__node:=flooded_by_parts";
+    let node = flooded(&file, name);
+    parts.recv_timeout(Duration::from_secs(30)).unwrap();
+    std::thread::sleep(Duration::from_secs(3));
+    // Within 10 s and with exit code 0.
     node.stop();
 }

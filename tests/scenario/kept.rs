@@ -1,10 +1,14 @@
 //! Figures that are kept in a history, and pages as PDF: of a table of an instrument.
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use abbe_tests::chromium;
 use abbe_tests::program::{Ended, Process, command, root};
+use abbe_tests::scenario::Scenario;
+use nix::sys::signal::Signal;
 use serde_json::Value;
 
 /// Width and height of A4, points.
@@ -109,6 +113,44 @@ fn scenario_a_report_without_a_machine_is_not_kept_and_nothing_is_made_without_k
 }
 
 #[test]
+fn scenario_a_plan_whose_bag_holds_nothing_is_not_kept_and_that_is_no_failed_plan() {
+    let home = tempfile::tempdir().unwrap();
+    let store = home.path().join("history.sqlite");
+    let scenario = Scenario::copy_of("cold_reference");
+    scenario.append("scenario.yaml", "recording: {exclude: [\"*\"]}\n");
+    let keep = ["--keep", "--store", store.to_str().unwrap()];
+    let ended = scenario.run_to_end(&keep);
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
+    let words = "--keep: the plan ran to its end, but its bag holds no message";
+    assert!(ended.said.contains(words), "{}", ended.said);
+    assert!(
+        !ended.said.contains("did not run to its end"),
+        "{}",
+        ended.said
+    );
+    assert!(!store.exists());
+}
+
+#[test]
+fn scenario_a_bag_keeps_its_own_date() {
+    let home = tempfile::tempdir().unwrap();
+    let store = home.path().join("history.sqlite");
+    let bag = root().join("bags/cold_reference");
+    let bag = bag.to_str().unwrap();
+    let dated = |given: &[&str]| ran(given, &[("--store", store.as_path())]);
+    for given in [
+        &["report", bag, "--keep", "--kept-at", "2020-01-01"][..],
+        &["history", "add", bag, "--at", "2020-01-01"],
+    ] {
+        let refused = dated(given);
+        assert_eq!(refused.status.code(), Some(1), "{}", refused.said);
+        for words in ["2020-01-01T00:00:00Z", "has a time of its own, 2026-01-05T"] {
+            assert!(refused.said.contains(words), "{}", refused.said);
+        }
+    }
+}
+
+#[test]
 fn scenario_five_diagnoses_show_the_trend_of_an_effect_and_when_its_limit_is_reached() {
     let home = tempfile::tempdir().unwrap();
     let store = home.path().join("history.sqlite");
@@ -205,4 +247,57 @@ fn scenario_without_chromium_a_pdf_is_refused_with_the_remedy() {
         "{}",
         ended.said
     );
+}
+
+/// Ends by a signal while the browser prints: neither it nor its folder stays.
+#[test]
+fn scenario_a_pdf_that_is_called_off_leaves_no_folder_and_no_browser() {
+    for signal in [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP] {
+        let home = tempfile::tempdir().unwrap();
+        let (programs, temporary) = (home.path().join("bin"), home.path().join("tmp"));
+        for folder in [&programs, &temporary] {
+            std::fs::create_dir(folder).unwrap();
+        }
+        let browser = programs.join("chromium");
+        let (began, ended) = (home.path().join("began"), home.path().join("ended"));
+        // It writes its profile again and again, for ten minutes.
+        let script = format!(
+            "#!/bin/sh\nfor a in \"$@\"; do case $a in --user-data-dir=*) p=${{a#*=}};; esac; done\necho $$ > {}\nfor i in $(seq 6000); do mkdir -p \"$p\"; echo x > \"$p/$i\"; sleep 0.1; done\n: > {}\n",
+            began.display(),
+            ended.display()
+        );
+        std::fs::write(&browser, script).unwrap();
+        std::fs::set_permissions(&browser, Permissions::from_mode(0o755)).unwrap();
+        let csv = table("csv");
+        let mut program = command(0, &["report", csv.to_str().unwrap()]);
+        program.arg("--map").arg(table("yaml"));
+        program.arg("--pdf").arg(home.path().join("report.pdf"));
+        let path = std::env::var("PATH").unwrap_or_default();
+        program.env("PATH", format!("{}:{path}", programs.display()));
+        program.env("TMPDIR", &temporary);
+        let printing = Process::start(program);
+        let is_begun = || std::fs::metadata(&began).is_ok_and(|file| file.len() > 0);
+        let deadline = Instant::now() + Duration::from_secs(120);
+        while !is_begun() && Instant::now() < deadline {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        assert!(is_begun(), "the browser was not started");
+        printing.signal(signal);
+        let stopped = printing.ended_within(Duration::from_secs(30));
+        assert_eq!(
+            stopped.status.code(),
+            Some(130),
+            "{signal}: {}",
+            stopped.said
+        );
+        let number = std::fs::read_to_string(&began).unwrap();
+        let process = Path::new("/proc").join(number.trim()).join("cmdline");
+        let runs = || std::fs::read(&process).is_ok_and(|words| !words.is_empty());
+        while runs() && Instant::now() < deadline {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        assert!(!runs() && !ended.exists(), "{signal}: the browser goes on");
+        let left: Vec<_> = std::fs::read_dir(&temporary).unwrap().collect();
+        assert!(left.is_empty(), "{signal}: {left:?}");
+    }
 }

@@ -166,3 +166,30 @@ fn a_log_that_is_no_regular_file_ends_the_bridge_at_once() {
         is_refused(&format!("parameters, {kind}"), &arguments, words);
     }
 }
+
+#[test]
+fn no_output_that_is_no_regular_file_is_waited_for_or_said_to_be_written() {
+    let home = tempfile::tempdir().unwrap();
+    let of = |path: &str| root().join(path).display().to_string();
+    let (bag, table) = (
+        of("bags/cold_reference"),
+        of("tests/import/positioning.csv"),
+    );
+    let keep = ["--keep", "--kept-as", "m", "--kept-at", "2026-01-01"];
+    for (kind, words) in KINDS {
+        let odd: PathBuf = home.path().join(kind);
+        spoil(&odd, kind);
+        let odd = odd.to_str().unwrap();
+        let report = ["report", &table];
+        for arguments in [
+            vec!["history", "--store", odd],
+            vec!["history", "add", &bag, "--store", odd],
+            [&report[..], &keep, &["--store", odd]].concat(),
+            vec!["diagnose", &bag, "--html", odd],
+            vec!["diagnose", &bag, "--json", odd],
+            vec!["diagnose", &bag, "--write-machine", odd],
+        ] {
+            is_refused(&arguments.join(" "), &arguments, words);
+        }
+    }
+}

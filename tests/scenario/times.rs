@@ -238,7 +238,12 @@ fn a_run_begins_in_1970_to_2106_and_is_checked_across_2038() {
     }
     for start_s in ["0", "2147483640", "4200000000"] {
         let scenario = started(start_s);
-        let run = scenario.run();
+        let store = scenario.argument("history.sqlite");
+        let ended = scenario.run_to_end(&["--keep", "--store", &store]);
+        assert_eq!(ended.status.code(), Some(0), "{start_s}: {}", ended.said);
+        let is_kept = ended.said.contains("figures of a report of");
+        assert!(is_kept, "{start_s}: {}", ended.said);
+        let run = scenario.new_run(&[]);
         let [bag, page] = ["bag", "page"].map(|name| run.join(name).display().to_string());
         for verb in ["check", "report"] {
             let mut arguments = vec![verb, bag.as_str()];

@@ -15,7 +15,7 @@ use crate::program::root;
 pub fn interpreter(test: &str) -> Option<PathBuf> {
     let python = std::env::var("ABBE_PYTHON")
         .map_or_else(|_| root().join(".venv/bin/python"), PathBuf::from);
-    let modules = "import cyclonedds, jsonschema, mcap, mcap_ros2, numpy, rosbags, zenoh";
+    let modules = "import asyncua, cyclonedds, jsonschema, mcap, mcap_ros2, numpy, rosbags, zenoh";
     let lack = match Command::new(&python).args(["-c", modules]).output() {
         Ok(output) if output.status.success() => return Some(python),
         Ok(output) => String::from_utf8_lossy(&output.stderr).trim().to_owned(),

@@ -22,12 +22,14 @@ use crate::loss;
 use crate::node;
 use crate::tell::tell;
 use crate::usage;
+use crate::whole_file::Vanishing;
 
 /// Nodes whose messages are what a replay puts in.
-const SOURCE_NODES: [&str; 4] = [
+const SOURCE_NODES: [&str; 5] = [
     "fake_cnc",
     "linuxcnc_bridge",
     "mtconnect_bridge",
+    "opcua_bridge",
     "sequencer",
 ];
 
@@ -88,7 +90,7 @@ fn of(path: &Path, resume_after: &[u64]) -> Result<Outcome> {
     if run.nodes.is_empty() && run.order == recorder::MessageOrder::Total {
         return Err(ReplayError::NoNodes.into());
     }
-    let files = tempfile::tempdir().context("a folder for the bag's parameter files")?;
+    let files = Vanishing::temporary().context("a folder for the bag's parameter files")?;
     if let Some(machine) = bag.attachment("machine.yaml")? {
         std::fs::write(files.path().join("machine.yaml"), machine.data)?;
     }
@@ -162,12 +164,12 @@ fn page(path: &Path, outcome: &Outcome) -> String {
     }
     let compared: u64 = outcome.compared.values().map(|c| c.messages).sum();
     let verdict = match (&outcome.first, &outcome.doubtful) {
-        (None, _) if outcome.compared_nothing() => format!(
+        (None, _) if outcome.compared_nothing() && !outcome.not_in_bag.is_empty() => format!(
             "nothing to compare: the bag has none of the topics that were computed ({})",
             listed(&outcome.not_in_bag)
         ),
         (None, None) if compared == 0 => "nothing to compare: no node of this run computes anything from what was recorded (controllers, \
-             sequencer and recorder are not computed again)"
+             sequencer and recorder are not computed again, and topics are found by the names that they had in the run)"
             .to_owned(),
         (None, Some(Doubtful { messages, first })) => format!(
             "equal up to the first input that was lost or left out, or the first leap of the log times; {messages} messages behind it differ, which may come of that; first {}",
@@ -256,6 +258,26 @@ mod tests {
             words.contains("--resume-after: 101 values: at most 100"),
             "{words}"
         );
+    }
+
+    #[test]
+    fn a_bag_without_a_computed_topic_is_not_equal_and_why_is_said() {
+        let nothing = Outcome::default();
+        assert!(!nothing.is_equal());
+        let words = page(Path::new("bag"), &nothing);
+        assert!(words.contains("nothing to compare: no node"), "{words}");
+        assert_eq!(as_json(Path::new("bag"), &nothing)["equal"], false);
+        let sum = NotInBag {
+            messages: 3,
+            sha256: String::new(),
+        };
+        let not_in_bag = Outcome {
+            not_in_bag: BTreeMap::from([("/latency".to_owned(), sum)]),
+            ..Outcome::default()
+        };
+        assert!(!not_in_bag.is_equal());
+        let words = page(Path::new("bag"), &not_in_bag);
+        assert!(words.contains("were computed (/latency)"), "{words}");
     }
 
     #[test]

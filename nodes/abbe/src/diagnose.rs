@@ -152,7 +152,7 @@ impl Diagnose {
             }
             None => bags::machine_text(&self.bags[0])?,
         };
-        self.refuse_overwriting()?;
+        self.refuse_outputs()?;
         let round = self.round(&name, &text)?;
         let config = GapConfig {
             left_out: self.without.clone(),
@@ -255,8 +255,13 @@ impl Diagnose {
         Ok(())
     }
 
-    /// Refuses a machine file to write that holds something.
-    fn refuse_overwriting(&self) -> Result<()> {
+    /// Refuses outputs that are no files, and a machine file to write that holds something, before the work begins.
+    fn refuse_outputs(&self) -> Result<()> {
+        let json = self.json.as_deref().filter(|path| *path != Path::new("-"));
+        let others = [self.html.as_deref(), self.write_machine.as_deref()];
+        for path in others.into_iter().chain([json]).flatten() {
+            whole_file::can_be_output(path)?;
+        }
         // An empty file is a place that was made for it.
         let holds = |path: &&PathBuf| std::fs::metadata(path).is_ok_and(|file| file.len() > 0);
         if let Some(path) = self.write_machine.as_ref().filter(holds) {

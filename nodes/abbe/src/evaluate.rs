@@ -8,7 +8,7 @@ use metrology::sample::{
     AxisCompensation, BlockMeasurement, GeometryModel, PositioningTable, ProbedFeature,
     ProbedPoint, TestSegment,
 };
-use recorder::{Bag, Order};
+use recorder::{Bag, Loss, LossReason, Order};
 use replayer::{Reading, Taken, reading};
 
 pub mod angular;
@@ -26,6 +26,7 @@ pub mod stops;
 pub mod test_conditions;
 
 use crate::machine_defaults;
+use crate::machine_of_bag;
 use angular::{RotaryRuns, RotaryTest};
 use belonging::Belonging;
 pub use belonging::BrokenOff;
@@ -117,7 +118,13 @@ struct Collected {
 impl Tests {
     /// Reads a bag; what cannot be used is left out and counted.
     pub fn of(bag: &Bag) -> Self {
-        let (machine, left_out) = machine_file(bag).unzip();
+        let machine = machine_of_bag::of(bag);
+        let unreadable = machine.as_ref().err().map(ToString::to_string);
+        let machine = machine.ok().flatten().map(|(machine, text)| {
+            let left_out = machine_defaults::of(&machine, &text);
+            (machine, left_out)
+        });
+        let (machine, left_out) = machine.unzip();
         let mut collected = Collected {
             stationwise: Stationwise::new(machine.as_ref()),
             ..Collected::default()
@@ -127,6 +134,7 @@ impl Tests {
         });
         let mut tests = collected.tests;
         tests.reading = reading;
+        tests.lose_machine(bag, unreadable);
         tests.broken_off = collected.belonging.finish(&mut tests.reading.account);
         tests.circles = collected.circles.recordings();
         tests.station_circles = collected.stationwise.circles();
@@ -134,20 +142,36 @@ impl Tests {
         tests.linear = collected.linear.tests();
         tests.rotary_positioning = collected.angular.tests();
         tests.drift = collected.drifts.drift();
+        tests.drift.temperatures_left_out = temperatures_left_out(&tests.reading);
         tests.stops = collected.stops.stops();
         tests.machine = machine;
         tests.left_out = left_out.unwrap_or_default();
         tests
     }
+
+    /// Counts a machine file that is no machine file; one that the bag itself cannot give is among its losses already.
+    fn lose_machine(&mut self, bag: &Bag, unreadable: Option<String>) {
+        let is_told = |loss: &Loss| matches!(loss.reason, LossReason::Attachment { .. });
+        let losses = &mut self.reading.losses;
+        if let Some(what) = unreadable
+            && !losses.iter().any(is_told)
+        {
+            losses.push(Loss {
+                file: bag.path().to_owned(),
+                at_byte: 0,
+                reason: LossReason::Attachment { what },
+                messages_read: 0,
+            });
+        }
+    }
 }
 
-/// The machine file that a bag holds, where it can be read, and what it leaves to defaults.
-fn machine_file(bag: &Bag) -> Option<(MachineFile, Vec<String>)> {
-    let attached = bag.attachment("machine.yaml").ok().flatten()?;
-    let text = String::from_utf8(attached.data).ok()?;
-    let machine = MachineFile::parse(&text, "machine.yaml of the bag").ok()?;
-    let left_out = machine_defaults::of(&machine, &text);
-    Some((machine, left_out))
+/// Readings of thermometers that are left out.
+fn temperatures_left_out(reading: &Reading) -> u64 {
+    let topics = reading.account.topics.iter();
+    let thermometers = topics.filter(|it| topics::TEMPERATURE.member_of(&it.topic).is_some());
+    let left_out = thermometers.flat_map(|it| &it.left_out);
+    left_out.map(|it| it.messages).sum()
 }
 
 impl Collected {

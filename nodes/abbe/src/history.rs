@@ -6,6 +6,8 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, anyhow};
 use clap::{Args, Subcommand};
 
+use crate::whole_file;
+
 mod add;
 mod dates;
 pub mod keep;
@@ -48,8 +50,14 @@ impl History {
 /// The store at a path, or the usual one: `abbe/history.sqlite` in `$XDG_DATA_HOME` or `~/.local/share`.
 ///
 /// # Errors
-/// Where neither is known.
+/// Where neither is known, or something is there that is no regular file.
 fn store_path(given: Option<&Path>) -> Result<PathBuf> {
+    let path = path_of_store(given)?;
+    whole_file::must_be_regular(&path).context("history")?;
+    Ok(path)
+}
+
+fn path_of_store(given: Option<&Path>) -> Result<PathBuf> {
     if let Some(path) = given {
         return Ok(path.to_owned());
     }

@@ -1,4 +1,4 @@
-//! `abbe import-map SOURCE`: what an MTConnect agent has, as a mapping for `mtconnect_bridge` to go over by hand.
+//! `abbe import-map SOURCE`: what an MTConnect agent or an OPC UA server has, as a mapping to go over by hand.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -17,7 +17,8 @@ const PROBE: &str = "name the agent's probe document, http://HOST:PORT/probe, or
 /// Arguments of `abbe import-map`.
 #[derive(Args)]
 pub struct ImportMap {
-    /// The agent's answer to `probe`: `http://host:port/probe`, or a file that holds it.
+    /// The agent's answer to `probe`: `http://host:port/probe`, or a file that holds it; or an OPC UA server:
+    /// `opc.tcp://host:port`.
     source: String,
     /// Device among those of the agent: its name; needed where there are several.
     #[arg(long)]
@@ -30,6 +31,9 @@ impl ImportMap {
     /// # Errors
     /// When nobody answers, the file cannot be read, the answer is not one to `probe`, or it has several devices.
     pub fn execute(self) -> Result<ExitCode> {
+        if self.source.starts_with("opc.tcp://") {
+            return self.of_server();
+        }
         let text = if self.source.starts_with("http://") {
             io::http::fetch(&self.source)?
         } else {
@@ -54,6 +58,32 @@ impl ImportMap {
             self.source,
             proposal.map.values.len() - ignored,
             items.len(),
+        );
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// Prints the mapping of an OPC UA server.
+    ///
+    /// # Errors
+    /// When a device is named, the server does not answer or let us in, or the program was built without OPC UA.
+    fn of_server(&self) -> Result<ExitCode> {
+        if self.device.is_some() {
+            bail!("--device: belongs to an MTConnect agent; an OPC UA server has no devices");
+        }
+        let survey = opcua_bridge::io::survey(&self.source)?;
+        let proposal = opcua_bridge::proposal::propose(&survey);
+        let text = opcua_bridge::proposal::text_of(&proposal).context("mapping")?;
+        tell!("{}", text.trim_end_matches('\n'));
+        let stopped = survey.stopped.as_ref();
+        let stopped = stopped.map_or_else(String::new, |why| {
+            format!("; the search ended before all was seen: {why}")
+        });
+        complain!(
+            "{}: {} of {} variables have a meaning here, {} are left out (listed at the end); names, units and axes are to be gone over{stopped}",
+            self.source,
+            proposal.map.values.len(),
+            survey.variables.len(),
+            proposal.left_out.len(),
         );
         Ok(ExitCode::SUCCESS)
     }

@@ -29,6 +29,7 @@ mod keystore;
 mod launch;
 mod loss;
 mod machine_defaults;
+mod machine_of_bag;
 mod man;
 mod new_machine;
 mod node;
@@ -85,7 +86,7 @@ enum Verb {
     Play(play::Play),
     /// Make a bag of a table that a laser, a ballbar or a logger wrote.
     Import(import::Import),
-    /// Propose a mapping for mtconnect_bridge from an agent's `probe`.
+    /// Propose a mapping for mtconnect_bridge from an agent's `probe`, or for opcua_bridge from a server.
     ImportMap(import_map::ImportMap),
     /// Make part programs that load a machine as a logged shift loaded another.
     ImportShift(import_shift::ImportShift),

@@ -30,11 +30,16 @@ pub fn complain_of(reading: &Reading) {
 /// The head of a page whose bag is not whole.
 pub fn in_words(reading: &Reading) -> Vec<String> {
     let mut lines = Vec::new();
-    if let Some(last) = reading.losses.last() {
+    let mut losses = reading.losses.iter();
+    if let Some(last) = losses.rfind(|loss| !loss.reason.is_beside_messages()) {
         let n = last.messages_read;
         lines.push(format!(
             "NOT WHOLE: a part of this bag was lost. Everything below comes from what could be read, {n} messages before the last gap; a test that was cut off is missing or has fewer readings."
         ));
+    } else if !reading.losses.is_empty() {
+        lines.push(
+            "NOT WHOLE: what stands beside the messages of this bag is damaged. Every message was read.".to_owned(),
+        );
     }
     lines.extend(reading.losses.iter().map(|loss| format!("Lost: {loss}.")));
     let n = reading.account.left_out();

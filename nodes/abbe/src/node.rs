@@ -27,6 +27,7 @@ pub const NODES: &[(&str, Builder)] = &[
     ("linuxcnc_bridge", linuxcnc_bridge_node::node),
     ("machine_frames", machine_frames_node::node),
     ("mtconnect_bridge", mtconnect_bridge_node::node),
+    ("opcua_bridge", opcua_bridge_node::node),
     ("probe", probe_node::node),
     ("recorder", recorder_node::node),
     ("replayer", replayer_node::node),

@@ -11,12 +11,11 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use nix::sys::signal::{Signal, killpg};
-use nix::unistd::{Pid, geteuid};
+use nix::unistd::geteuid;
 use serde_json::Value;
 
 use crate::evaluate::budget::NOT_STATED;
-use crate::whole_file;
+use crate::whole_file::{self, Helpers, Vanishing};
 
 /// Names of the program, the first that is there is taken.
 const BROWSERS: [&str; 4] = [
@@ -150,10 +149,7 @@ fn on_path(name: &str) -> Option<PathBuf> {
 /// The page as a browser prints it.
 fn print(mut browser: Command, page: &str, head: &Head, longest: Duration) -> Result<Vec<u8>> {
     let name = browser.get_program().to_string_lossy().into_owned();
-    let home = tempfile::Builder::new()
-        .prefix("abbe-pdf-")
-        .tempdir()
-        .context("folder for the browser")?;
+    let home = Vanishing::temporary().context("folder for the browser")?;
     let file = |name: &str| home.path().join(name);
     // Paper has nothing to fold: every part stands open.
     let open = page.replace("<details>", "<details open>");
@@ -194,18 +190,17 @@ fn print(mut browser: Command, page: &str, head: &Head, longest: Duration) -> Re
     Ok(bytes)
 }
 
-/// Waits for the end of a process; one that takes too long is killed with its group.
+/// Waits for the end of a process; one that takes too long is killed with its group. Helpers of its own may outlive it, and
+/// are killed too.
 fn wait(mut child: Child, longest: Duration, name: &str) -> Result<std::process::ExitStatus> {
     let until = Instant::now() + longest;
-    let group = i32::try_from(child.id()).map(Pid::from_raw);
+    let helpers = Helpers::of(child.id());
     loop {
         if let Some(status) = child.try_wait().context("the browser")? {
-            // Helpers of its own may outlive it.
-            end(group.as_ref().ok());
             return Ok(status);
         }
         if Instant::now() >= until {
-            end(group.as_ref().ok());
+            drop(helpers);
             child.wait().context("the browser")?;
             bail!(
                 "{name} took more than {} s and was ended: print the HTML page from any browser",
@@ -213,13 +208,6 @@ fn wait(mut child: Child, longest: Duration, name: &str) -> Result<std::process:
             );
         }
         std::thread::sleep(BETWEEN_LOOKS);
-    }
-}
-
-fn end(group: Option<&Pid>) {
-    if let Some(group) = group {
-        // A group that has ended already is no fault.
-        let _ = killpg(*group, Signal::SIGKILL);
     }
 }
 

@@ -179,6 +179,7 @@ impl Preflight {
         let Some(machine) = self.machine.as_deref() else {
             return Err(refused("preflight", "--design needs --machine FILE"));
         };
+        let floored: Vec<_> = self.floor.iter().map(FloorArgument::instrument).collect();
         design::Wanted {
             machine,
             minutes: self.minutes,
@@ -186,6 +187,7 @@ impl Preflight {
             mounting: &self.mounting,
             likely: self.likely.as_deref(),
             floors: &|machine: &machine::MachineFile| floors::floors(machine, &self.floor),
+            floored: &floored,
             out: design::needed(self.out.as_ref())?,
             html: self.html.as_deref(),
             json: self.json,

@@ -10,6 +10,7 @@ use machine::MachineFile;
 use node_runtime::arguments::Arguments;
 use node_runtime::complain;
 use node_runtime::environment::Environment;
+use node_runtime::tap::Selection;
 use node_runtime::text_file;
 use node_runtime::{Interruption, Setup};
 use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RecorderError, RingConfig};
@@ -137,20 +138,39 @@ impl Record {
         let ranges = ring.map_or(Ok(()), |ring| ring.checked());
         let ranges = ranges.and_then(|()| writing.checked());
         ranges.map_err(|error| refused("record", error))?;
+        let topics = if self.topics.is_empty() {
+            vec!["*".to_owned()]
+        } else {
+            self.topics.clone()
+        };
+        if records_nothing(&topics, &self.exclude) {
+            let reason = format!(
+                "--exclude {}: leaves out every topic of {}, so that nothing would be recorded: exclude less",
+                self.exclude.join(" --exclude "),
+                topics.join(", ")
+            );
+            return Err(refused("record", reason));
+        }
         Ok(NodeConfig {
             bag: bag.to_owned(),
             bag_per_start: false,
             exclude: self.exclude.clone(),
             machine_file: String::new(),
             ring,
-            topics: if self.topics.is_empty() {
-                vec!["*".to_owned()]
-            } else {
-                self.topics.clone()
-            },
+            topics,
             writing,
         })
     }
+}
+
+/// Whether every name that fits one of `topics` fits one of `exclude` as well.
+fn records_nothing(topics: &[String], exclude: &[String]) -> bool {
+    let excluded = Selection::Matching(exclude.to_vec());
+    // A `*` of one pattern fits into a `*` of another; each name begins with /, also where a pattern leaves that open.
+    topics.iter().all(|topic| match topic.strip_prefix('*') {
+        Some(rest) => excluded.takes(&format!("/*{rest}")),
+        None => excluded.takes(topic),
+    })
 }
 
 /// Waits for the end. A recording that cannot go on ends by itself, and an alarm reports it on the graph too where the
@@ -224,6 +244,36 @@ mod tests {
         let record = CommandLine::parse_from(line).record;
         assert_eq!(record.exclude, ["/a", "/c*"]);
         assert_eq!(record.topics, ["/b", "*"]);
+    }
+
+    #[test]
+    fn a_recording_of_nothing_is_refused_and_one_of_a_part_is_not() {
+        let of = |words: &[&str]| {
+            let line = ["record", "-o", "bag"].iter().chain(words);
+            CommandLine::try_parse_from(line).unwrap().record.config()
+        };
+        for nothing in [
+            &["/foo", "--exclude", "/foo"][..],
+            &["/foo", "--exclude", "/f*"],
+            &["--exclude", "/*"],
+            &["--exclude", "*"],
+            &["/a/*", "/b", "--exclude", "/a*", "--exclude", "/b"],
+        ] {
+            let said = of(nothing).unwrap_err().to_string();
+            assert!(
+                said.contains("nothing would be recorded"),
+                "{nothing:?}: {said}"
+            );
+        }
+        for part in [
+            &["/foo"][..],
+            &["/foo", "/bar", "--exclude", "/foo"],
+            &["--exclude", "/foo"],
+            &["/f*", "--exclude", "/foo"],
+            &["--exclude", "/*/b"],
+        ] {
+            assert!(of(part).is_ok(), "{part:?}");
+        }
     }
 
     #[test]

@@ -83,6 +83,8 @@ const INTERRUPTED: &str = "it was interrupted";
 const PACES: RangeInclusive<f64> = 1e-3..=1e6;
 /// Why a plan was called off whose recording failed; the reason follows.
 const NOT_RECORDED: &str = "called off, since the bag cannot be written any more";
+/// Why the figures of a plan that ran to its end are not kept.
+const NOTHING_TO_KEEP: &str = "--keep: the plan ran to its end, but its bag holds no message, so there is no figure to keep: record the topics of its tests (scenario.yaml: recording.exclude)";
 /// Exit code of a plan that was called off and ended in good order: what shells give a program that Ctrl-C ended.
 const CALLED_OFF: u8 = 130;
 
@@ -268,9 +270,12 @@ impl Run {
         if !self.keep.is_wanted() {
             return Ok(());
         }
-        if outcome.failure.is_some() || outcome.recorded == 0 {
+        if outcome.failure.is_some() {
             complain!("abbe: --keep: nothing is kept of a plan that did not run to its end");
             return Ok(());
+        }
+        if outcome.recorded == 0 {
+            bail!(NOTHING_TO_KEEP);
         }
         let machine = scenario.folder.join("machine.yaml");
         let origin = Origin::of_run(bag, &machine)?;

@@ -1,13 +1,17 @@
 //! Results on standard output.
 //!
 //! Whoever reads them may leave before the end (`abbe report BAG | head`): what is left is then not wanted, which is no
-//! failure. Any other failure to write is one, and ends the program with 1: a page that is half told is none.
+//! failure, nor is a terminal that was closed. Any other failure to write is one, and ends the program with 1: a page that is
+//! half told is none.
 
 use metrology::visible::visible;
 use node_runtime::complain;
 
 use std::fmt::Arguments;
-use std::io::{ErrorKind, Write};
+use std::io::{Error, ErrorKind, Write};
+use std::os::unix::fs::FileTypeExt;
+
+use nix::errno::Errno;
 
 /// A line of a result, as `println!` takes it.
 macro_rules! tell {
@@ -19,10 +23,23 @@ pub(crate) use tell;
 
 /// Writes a line to standard output.
 pub fn line(text: Arguments<'_>) {
-    if let Err(error) = to(&mut std::io::stdout().lock(), text) {
+    if let Err(error) = to(&mut std::io::stdout().lock(), text)
+        && !(is_of_closed_terminal(&error) && is_device())
+    {
         complain!("abbe: standard output: {error}");
         std::process::exit(1);
     }
+}
+
+/// Whether a write failed as it does on a terminal that was closed; on a disk that fails it does so as well.
+fn is_of_closed_terminal(error: &Error) -> bool {
+    error.raw_os_error() == Some(Errno::EIO as i32)
+}
+
+/// Whether standard output is a terminal, or another device without blocks. One that was closed no longer says that it is one.
+fn is_device() -> bool {
+    let out = std::fs::metadata("/dev/stdout");
+    out.is_ok_and(|out| out.file_type().is_char_device())
 }
 
 fn to(out: &mut impl Write, text: Arguments<'_>) -> std::io::Result<()> {
@@ -66,6 +83,8 @@ mod tests {
     #[test]
     fn a_reader_who_has_left_is_no_failure_and_a_full_disk_is_one() {
         assert!(to(&mut Gone(ErrorKind::BrokenPipe), format_args!("x")).is_ok());
+        assert!(is_of_closed_terminal(&Error::from_raw_os_error(5)));
+        assert!(!is_of_closed_terminal(&ErrorKind::StorageFull.into()));
         let full = to(&mut Gone(ErrorKind::StorageFull), format_args!("x"));
         assert_eq!(full.unwrap_err().kind(), ErrorKind::StorageFull);
     }

@@ -11,6 +11,7 @@ use crate::scenario::places;
 use crate::tell::tell;
 
 mod folder;
+mod programs;
 mod single;
 
 /// Arguments of `abbe validate`.

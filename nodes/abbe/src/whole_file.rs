@@ -7,13 +7,50 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
-use node_runtime::complain;
+use nix::sys::signal::{Signal, killpg};
+use nix::unistd::Pid;
 use node_runtime::interruption::Interruption;
+use node_runtime::{complain, text_file};
+
+/// Outputs that the caller has opened for this process, whatever they are.
+const OWN_OUTPUTS: [&str; 3] = ["/dev/stdout", "/dev/stderr", "/dev/fd"];
+
+/// Whether a path names an output that the caller has opened, as `>(gzip)` of a shell.
+fn is_own_output(path: &Path) -> bool {
+    OWN_OUTPUTS.iter().any(|own| path.starts_with(own))
+}
+
+/// Refuses a place of an output where something is that is no regular file: a pipe would wait for a reader for ever, and a
+/// device take what nobody reads.
+///
+/// # Errors
+/// With the kind of what is there.
+pub fn must_be_regular(path: &Path) -> Result<()> {
+    let kind = std::fs::metadata(path).map(|there| text_file::kind_of(there.file_type()));
+    match kind {
+        Ok(Some(kind)) => bail!(
+            "{}: is {kind}, must be a regular file, or not be there: name another file",
+            path.display()
+        ),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses the place of an output as [`must_be_regular`], unless the caller has opened it for this process.
+///
+/// # Errors
+/// As [`must_be_regular`].
+pub fn can_be_output(path: &Path) -> Result<()> {
+    if is_own_output(path) {
+        return Ok(());
+    }
+    must_be_regular(path)
+}
 
 /// Writes a file in the place of the old one; where that fails, the old one stays as it was.
 ///
 /// # Errors
-/// When it cannot be written.
+/// When it cannot be written, or something else than a file is there.
 pub fn write(path: &Path, text: &str) -> Result<()> {
     write_bytes(path, text.as_bytes())
 }
@@ -21,14 +58,13 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
 /// The same of bytes.
 ///
 /// # Errors
-/// When it cannot be written.
+/// As [`write`].
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
-    // A device or a pipe takes what comes; a link stays one.
-    let is_special =
-        |path: &Path| std::fs::metadata(path).is_ok_and(|it| !it.is_file() && !it.is_dir());
-    if is_special(path) {
+    if is_own_output(path) {
         return std::fs::write(path, bytes).with_context(|| path.display().to_string());
     }
+    must_be_regular(path)?;
+    // A link stays one.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     replace(&target, bytes).with_context(|| path.display().to_string())
 }
@@ -99,17 +135,45 @@ const BETWEEN: Duration = Duration::from_millis(20);
 /// Exit code of a process that SIGINT ended, as shells count it.
 const INTERRUPTED_CODE: i32 = 130;
 
-/// Folders that go away when the process ends by SIGINT or SIGTERM.
+/// Folders that go away when a signal ends the process.
 static VANISHING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// Groups of processes that are ended before.
+static HELPERS: Mutex<Vec<Pid>> = Mutex::new(Vec::new());
 
-/// A folder that goes away with this, and when SIGINT or SIGTERM ends the process.
+/// A group of processes that is ended with this, and when a signal ends the process while a [`Vanishing`] is there: what
+/// still writes into a folder that goes away would make it again.
+#[derive(Debug)]
+pub struct Helpers {
+    group: Pid,
+}
+
+impl Helpers {
+    /// The group of a process that was started as the first of a group of its own; `None`: its number is none of the system's.
+    pub fn of(process: u32) -> Option<Self> {
+        let group = Pid::from_raw(i32::try_from(process).ok()?);
+        let mut all = HELPERS.lock().unwrap_or_else(PoisonError::into_inner);
+        all.push(group);
+        Some(Self { group })
+    }
+}
+
+impl Drop for Helpers {
+    fn drop(&mut self) {
+        // A group that has ended already is no fault.
+        let _ = killpg(self.group, Signal::SIGKILL);
+        let mut all = HELPERS.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|other| *other != self.group);
+    }
+}
+
+/// A folder that goes away with this, and when SIGINT, SIGTERM or SIGHUP ends the process.
 #[derive(Debug)]
 pub struct Vanishing {
     path: PathBuf,
 }
 
 impl Vanishing {
-    /// Takes charge of a folder that is there. From now on SIGINT and SIGTERM end the process without its destructors, after the
+    /// Takes charge of a folder that is there. From now on these signals end the process without its destructors, after the
     /// folder is gone.
     ///
     /// # Errors
@@ -165,7 +229,13 @@ fn listen() -> Result<()> {
     let interruption = Interruption::listen("nothing is kept")?;
     let wait = move || {
         while !interruption.wait(LOOK) {}
+        // From here on whoever waits for a helper does not come past the end of its folder.
         let all = VANISHING.lock().unwrap_or_else(PoisonError::into_inner);
+        let helpers = HELPERS.lock().unwrap_or_else(PoisonError::into_inner);
+        for group in helpers.iter() {
+            let _ = killpg(*group, Signal::SIGKILL);
+        }
+        drop(helpers);
         for path in all.iter().filter(|path| !path.as_os_str().is_empty()) {
             // The other thread may write one more file meanwhile.
             for _ in 0..ATTEMPTS {
@@ -276,6 +346,10 @@ mod tests {
         std::fs::create_dir_all(taken.join("full")).unwrap();
         let error = write(&taken, "text").unwrap_err();
         assert!(format!("{error:#}").contains("folder"), "{error:#}");
+        assert!(
+            format!("{error:#}").contains("is a folder, must be"),
+            "{error:#}"
+        );
         let missing = write(&home.path().join("no/such/page"), "text");
         assert!(format!("{:#}", missing.unwrap_err()).contains("no/such/page"));
         let mut left: Vec<_> = std::fs::read_dir(home.path())
@@ -284,6 +358,29 @@ mod tests {
             .collect();
         left.sort();
         assert_eq!(left, ["folder", "page.html"]);
+    }
+
+    #[test]
+    fn no_output_goes_into_what_is_no_regular_file() {
+        let home = tempfile::tempdir().unwrap();
+        let (pipe, link) = (home.path().join("pipe"), home.path().join("link"));
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.unwrap().success());
+        std::os::unix::fs::symlink(&pipe, &link).unwrap();
+        for (path, kind) in [
+            (pipe.as_path(), "is a pipe (FIFO)"),
+            (link.as_path(), "is a pipe (FIFO)"),
+            (Path::new("/dev/zero"), "is a device"),
+            (home.path(), "is a folder"),
+        ] {
+            let error = write(path, "text").unwrap_err().to_string();
+            assert!(error.contains(kind), "{error}");
+        }
+        must_be_regular(&home.path().join("new")).unwrap();
+        for own in ["/dev/stdout", "/dev/stderr", "/dev/fd/1"] {
+            can_be_output(Path::new(own)).unwrap();
+        }
+        assert!(can_be_output(Path::new("/dev/zero")).is_err());
     }
 
     #[test]

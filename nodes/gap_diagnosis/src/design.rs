@@ -132,6 +132,8 @@ pub struct Design {
     pub together: Vec<Together>,
     /// Effects that the wanted programme does not show at their stated size.
     pub hidden: Vec<Hidden>,
+    /// Effects that it shows at their stated size and is not sure to name: below (4), by noise or by another effect.
+    pub unsure: Vec<String>,
 }
 
 /// The programme of some minutes.

@@ -1,46 +1,17 @@
 //! Conditions worth reporting, each with the values that belong to it.
 
-use chrono::{DateTime, SecondsFormat};
+use machine_report::condition::place;
+pub use machine_report::condition::{ValueCondition, words};
 use metrology::Severity;
 use metrology::number::number;
-use metrology::stamp::{Clock, Stamp};
 
 use crate::account::Account;
-use crate::alarm::AlarmState;
 use crate::document::DocumentFlaw;
 use crate::multipart::PartFlaw;
-use crate::possible::Possible;
 use crate::shdr::Flaw;
-
-/// A stamp as a person reads it, UTC.
-#[must_use]
-pub fn words<C: Clock>(stamp: Stamp<C>) -> String {
-    DateTime::from_timestamp_nanos(stamp.nanos()).to_rfc3339_opts(SecondsFormat::AutoSi, true)
-}
-
-fn place(line: usize) -> String {
-    match line {
-        0 => String::new(),
-        line => format!("log line {line}: "),
-    }
-}
 
 const fn at_least(is_all: bool) -> &'static str {
     if is_all { "" } else { "at least " }
-}
-
-fn behind(passed_s: Option<f64>) -> String {
-    passed_s.map_or_else(
-        || ": its lines go on without a pause".to_owned(),
-        |passed_s| format!(", while {passed_s} s passed here"),
-    )
-}
-
-fn are_none(wanted: usize) -> String {
-    match wanted {
-        1 => "is no finite number".to_owned(),
-        wanted => format!("is not {wanted} finite numbers"),
-    }
 }
 
 /// Why there is no connection.
@@ -104,6 +75,9 @@ pub enum Lost {
 /// A condition of the bridge or of the machine.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Condition {
+    /// Of a value.
+    #[error(transparent)]
+    Value(#[from] ValueCondition),
     /// The connection stands.
     #[error("connected to {address}")]
     Connected {
@@ -119,87 +93,6 @@ pub enum Condition {
         lost: Lost,
         /// Time to the next attempt, s.
         retry_s: f64,
-    },
-    /// A value is not known.
-    #[error("unavailable since {since}")]
-    Absent {
-        /// Which.
-        name: String,
-        /// By the machine's clock, or the host's when the connection was lost.
-        since: String,
-    },
-    /// It is known (again).
-    #[error("known")]
-    Present {
-        /// Which.
-        name: String,
-    },
-    /// A reading cannot be.
-    #[error(
-        "{value} at {at} between {before} and {after} cannot be: at most {allowed} may lie between two; {count} so far", allowed = number(*allowed))]
-    Impossible {
-        /// Which value.
-        name: String,
-        /// The reading, in the machine's words.
-        value: String,
-        /// The good reading before it.
-        before: String,
-        /// The good reading after it.
-        after: String,
-        /// Greatest change from the one before; inner unit.
-        allowed: f64,
-        /// When, by the machine.
-        at: String,
-        /// How many there were of this value.
-        count: u64,
-    },
-    /// A reading that nothing confirms.
-    #[error(
-        "{value} at {at} differs from its one neighbour by more than it can change; {count} so far"
-    )]
-    Unconfirmed {
-        /// Which value.
-        name: String,
-        /// The reading, in the machine's words.
-        value: String,
-        /// When, by the machine.
-        at: String,
-        /// How many there were of this value.
-        count: u64,
-    },
-    /// A condition of the machine.
-    #[error("{}", .state.words)]
-    Alarm {
-        /// Which.
-        name: String,
-        /// How it stands.
-        state: AlarmState,
-    },
-    /// A stamp of a value lies before the one before.
-    #[error("{key}: the stamp went back by {by_s} s, to {to}; {count} so far", by_s = number(*by_s))]
-    ClockBack {
-        /// Which value.
-        key: String,
-        /// By how much, s.
-        by_s: f64,
-        /// Where to.
-        to: String,
-        /// How many there were.
-        count: u64,
-    },
-    /// The machine's clock leaps.
-    #[error("the machine's clock leaps by {by_s} s, from {from} to {to}{}; {count} so far", behind(*passed_s), by_s = number(*by_s))]
-    ClockLeap {
-        /// The stamp before.
-        from: String,
-        /// The stamp behind.
-        to: String,
-        /// By how much, s.
-        by_s: f64,
-        /// Host's time between both, s; `None`: of a log, whose lines go on without the pause.
-        passed_s: Option<f64>,
-        /// How many there were.
-        count: u64,
     },
     /// A log has been replayed.
     #[error("the log has been told: {account}")]
@@ -304,51 +197,6 @@ pub enum Condition {
         /// How many parts were refused.
         count: u64,
     },
-    /// A value is longer than a message holds.
-    #[error(
-        "{}{key}: a value of {length} bytes, limit {limit}: left out; {count} so far",
-        place(*.line)
-    )]
-    ValueTooLong {
-        /// Number of the log's line; 0: of a connection.
-        line: usize,
-        /// Key of the value.
-        key: String,
-        /// Its length.
-        length: usize,
-        /// The limit.
-        limit: usize,
-        /// How many there were.
-        count: u64,
-    },
-    /// A number beyond the range of its quantity.
-    #[error("{}{key}: {text}: {possible}; {count} so far", place(*.line))]
-    OutOfRange {
-        /// Number of the log's line; 0: of a connection.
-        line: usize,
-        /// Key of the value.
-        key: String,
-        /// What was sent.
-        text: String,
-        /// What it would have to be.
-        possible: Possible,
-        /// Values refused so far.
-        count: u64,
-    },
-    /// A value is no number where one must be.
-    #[error("{}{key}: {text:?} {}; {count} so far", place(*.line), are_none(*.wanted))]
-    NotNumbers {
-        /// Number of the log's line; 0: of a connection.
-        line: usize,
-        /// Which value.
-        key: String,
-        /// What was told.
-        text: String,
-        /// How many numbers it must have.
-        wanted: usize,
-        /// How many there were.
-        count: u64,
-    },
     /// Observations of an answer cannot be read.
     #[error(
         "{count} observations of an answer left out: no number, key or value, or a level that is none"
@@ -364,12 +212,6 @@ pub enum Condition {
     Unstamped {
         /// How many.
         count: usize,
-    },
-    /// The machine tells something that the mapping does not have.
-    #[error("told, and not in the mapping: {keys}")]
-    Unmapped {
-        /// Keys, and how many more.
-        keys: String,
     },
     /// The mapping has something that the agent does not have.
     #[error("in the mapping, and the agent has it not: {keys}")]
@@ -434,12 +276,6 @@ pub enum Condition {
         /// How many.
         count: usize,
     },
-    /// Axes of which only the actual position is told.
-    #[error("no commanded position of {axes}: `commanded` of axes/state repeats the actual one")]
-    Uncommanded {
-        /// Letters.
-        axes: String,
-    },
 }
 
 impl Condition {
@@ -448,18 +284,11 @@ impl Condition {
     pub fn name(&self) -> String {
         let plain = match self {
             Self::Connected { .. } | Self::Disconnected { .. } => "connection",
-            Self::Absent { name, .. } | Self::Present { name } => {
-                return format!("unavailable/{name}");
-            }
-            Self::Impossible { name, .. } => return format!("impossible/{name}"),
-            Self::Unconfirmed { name, .. } => return format!("unconfirmed/{name}"),
-            Self::Alarm { name, .. } => return format!("alarm/{name}"),
+            Self::Value(condition) => return condition.name(),
             Self::UnitDiffers { key, .. } | Self::UnitAgrees { key } => {
                 return format!("unit/{}", crate::mapping::name_of(key));
             }
-            Self::ClockBack { .. } | Self::ClockLeap { .. } | Self::Unstamped { .. } => {
-                "machine_clock"
-            }
+            Self::Unstamped { .. } => "machine_clock",
             Self::LogEnded { .. } | Self::LogLeft { .. } => "log",
             Self::LogUnreadable { .. } => "log_unreadable",
             Self::Account { .. } => "account",
@@ -467,18 +296,13 @@ impl Condition {
             Self::WorkCoordinates { .. } | Self::MachineCoordinates => "work_coordinates",
             Self::Malformed { .. } | Self::LineTooLong { .. } => "refused_line",
             Self::PartLeftOut { .. } => "refused_part",
-            Self::NotNumbers { .. }
-            | Self::ValueTooLong { .. }
-            | Self::OutOfRange { .. }
-            | Self::MalformedObservations { .. } => "refused_value",
-            Self::Unmapped { .. } => "unmapped",
+            Self::MalformedObservations { .. } => "refused_value",
             Self::NotOffered { .. } | Self::Offered => "not_offered",
             Self::SequenceGap { .. } | Self::DeviceGap { .. } | Self::SequenceBack { .. } => {
                 "sequence_gap"
             }
             Self::AgentRestarted { .. } => "agent_restarted",
             Self::LeftWaiting { .. } => "left_waiting",
-            Self::Uncommanded { .. } => "uncommanded",
         };
         plain.to_owned()
     }
@@ -490,13 +314,10 @@ impl Condition {
             Self::LogEnded { account } if account.is_whole() && account.told > 0 => Severity::Info,
             Self::Account { account } if account.is_whole() => Severity::Info,
             Self::Connected { .. }
-            | Self::Present { .. }
             | Self::Offered
             | Self::UnitAgrees { .. }
-            | Self::MachineCoordinates
-            | Self::Unmapped { .. }
-            | Self::Uncommanded { .. } => Severity::Info,
-            Self::Alarm { state, .. } => state.severity,
+            | Self::MachineCoordinates => Severity::Info,
+            Self::Value(condition) => condition.severity(),
             Self::Disconnected { .. } | Self::SequenceGap { .. } | Self::LogUnreadable { .. } => {
                 Severity::Error
             }
@@ -508,19 +329,13 @@ impl Condition {
     #[must_use]
     pub const fn count(&self) -> Option<u64> {
         match self {
-            Self::Impossible { count, .. }
-            | Self::Unconfirmed { count, .. }
-            | Self::ClockBack { count, .. }
-            | Self::ClockLeap { count, .. }
-            | Self::Replaced { count, .. }
+            Self::Value(condition) => condition.count(),
+            Self::Replaced { count, .. }
             | Self::Malformed { count, .. }
             | Self::LineTooLong { count, .. }
             | Self::PartLeftOut { count, .. }
-            | Self::ValueTooLong { count, .. }
-            | Self::NotNumbers { count, .. }
             | Self::DeviceGap { count, .. }
-            | Self::SequenceBack { count, .. }
-            | Self::OutOfRange { count, .. } => Some(*count),
+            | Self::SequenceBack { count, .. } => Some(*count),
             Self::SequenceGap { total, .. } => Some(*total),
             _ => None,
         }

@@ -1,8 +1,7 @@
 //! What can go wrong before or beneath the stage.
 
-use metrology::Axis;
 use metrology::bound::BoundError;
-use metrology::number::{number, quantity};
+use metrology::number::number;
 
 /// Errors of the bridge: its parameters, its mapping, and its thread.
 #[derive(Debug, thiserror::Error)]
@@ -21,60 +20,9 @@ pub enum BridgeError {
     /// A log without the source, or the source without a log.
     #[error("log_file: belongs to source = log, and to no other")]
     LogFile,
-    /// The mapping file is none.
-    #[error("{0}")]
-    MapFile(metrology::yaml::YamlError),
-    /// A unit does not measure what the mapping says.
-    #[error("{key}: {unit} does not measure {what}")]
-    Unit {
-        /// Key of the mapping.
-        key: String,
-        /// Unit in MTConnect's words.
-        unit: &'static str,
-        /// What it was to measure.
-        what: &'static str,
-    },
-    /// A name cannot be a topic's.
-    #[error("{key}: name {name:?}: {reason}")]
-    Name {
-        /// Key of the mapping.
-        key: String,
-        /// The name.
-        name: String,
-        /// Why not.
-        reason: &'static str,
-    },
-    /// Two keys tell the same axis.
-    #[error("{key}: axis {axis} is told by another key")]
-    AxisTwice {
-        /// Second key of the mapping.
-        key: String,
-        /// Axis.
-        axis: Axis,
-    },
-    /// A commanded position without the actual one.
-    #[error("axis {axis}: a commanded position alone")]
-    CommandedAlone {
-        /// Axis.
-        axis: Axis,
-    },
-    /// A number of a rule is out of its range.
-    #[error(
-        "{key}: change.{field} = {}: must be from {} to {}",
-        quantity(field, *value), number(*least), quantity(field, *greatest)
-    )]
-    Change {
-        /// Key of the mapping.
-        key: String,
-        /// Field of `change`.
-        field: &'static str,
-        /// What was read.
-        value: f64,
-        /// Least value that is allowed.
-        least: f64,
-        /// Greatest value that is allowed.
-        greatest: f64,
-    },
+    /// The mapping file is none, or contradicts itself.
+    #[error(transparent)]
+    Mapping(#[from] machine_report::MappingError),
     /// The system has no thread or event queue left.
     #[error("{action}: {source}")]
     Io {

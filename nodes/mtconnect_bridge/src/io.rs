@@ -72,7 +72,9 @@ impl BridgeIo {
         let thread = std::thread::Builder::new()
             .name("mtconnect_io".to_owned())
             .spawn(move || {
-                runtime.block_on(Hands::new(address, event_sender).serve(command_receiver))
+                runtime.block_on(Hands::new(address, event_sender).serve(command_receiver));
+                // A name that is still being looked up is not awaited.
+                runtime.shutdown_background();
             })
             .map_err(failed("starting a thread"))?;
         Ok(Self {

@@ -18,37 +18,31 @@
 //! What the bridge does outside (connect, ask, read) is in [`io`]; everything else is the pure
 //! [`stage::BridgeStage`].
 
-pub mod account;
 pub mod agent;
-pub mod alarm;
 pub mod condition;
 pub mod config;
 pub mod document;
 pub mod error;
 pub mod framing;
 pub mod io;
-pub mod leap;
 pub mod live;
 pub mod logged;
-pub mod mapping;
 pub mod multipart;
-pub mod observation;
 pub mod offer;
 pub mod pacing;
-pub mod plausibility;
-pub mod positions;
-pub mod possible;
 pub mod proposal;
 pub mod reader;
 pub mod shdr;
 pub mod shift;
 pub mod stage;
 pub mod text;
-pub mod unit;
-pub mod values;
 pub mod xml;
 pub mod xml_bounds;
 
 pub use config::{BridgeConfig, Settings};
 pub use error::BridgeError;
+// What all bridges share.
+pub use machine_report::{
+    account, alarm, leap, mapping, observation, plausibility, positions, possible, unit, values,
+};
 pub use stage::{BridgeStage, Input, Output};

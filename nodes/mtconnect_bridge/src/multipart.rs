@@ -10,8 +10,9 @@
 //! # References
 //! \[1\] RFC 2046, 5.1.1.
 
-/// A part over this length is refused, bytes.
-pub const PART_LIMIT: usize = 16 << 20;
+/// A part, or a whole answer, over this length is refused, bytes: reading one takes about a second at most, and 1,000
+/// observations, as asked for by default, have 150 kB.
+pub const PART_LIMIT: usize = 4 << 20;
 /// A header over this length is none, bytes.
 const HEADER_LIMIT: usize = 4096;
 
@@ -19,7 +20,9 @@ const HEADER_LIMIT: usize = 4096;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PartFlaw {
     /// A part is too long.
-    #[error("a part of {length} bytes, limit {PART_LIMIT}")]
+    #[error(
+        "a part of {length} bytes, limit {PART_LIMIT}: ask for fewer observations at a time (agent.count), or for one device (agent.device)"
+    )]
     TooLong {
         /// Its length, or what has come of it.
         length: usize,
@@ -221,6 +224,11 @@ mod tests {
                 length: PART_LIMIT + 1
             })
         );
+        let words = refused.unwrap_err().to_string();
+        assert!(
+            words.contains("limit 4194304") && words.contains("agent.count"),
+            "{words}"
+        );
         let mut stream = Parts::new("b7");
         assert_eq!(
             stream.receive(&[b'x'; 5000], |_| {}),
@@ -242,10 +250,10 @@ mod tests {
         }
     }
 
-    /// 4 MiB in pieces of 1 kB, with and without a length, and 5,000 small parts in one piece.
+    /// 2 MiB in pieces of 1 kB, with and without a length, and 5,000 small parts in one piece.
     #[test]
     fn bytes_are_searched_once_however_many_pieces_they_come_in() {
-        let body = vec![b'x'; 4 << 20];
+        let body = vec![b'x'; 2 << 20];
         for length in [format!("Content-length: {}\r\n", body.len()), String::new()] {
             let mut parts = Parts::new("a1");
             let mut taken = vec![];

@@ -209,27 +209,6 @@ fn taken(told: &mut BTreeMap<Axis, String>, axis: Axis, key: &str) -> Result<(),
     Ok(())
 }
 
-impl Meaning {
-    fn set_name(&mut self, new: String) {
-        match self {
-            Self::Feed(entry)
-            | Self::SpindleSpeed(entry)
-            | Self::Temperature(entry)
-            | Self::Load(entry)
-            | Self::Override(entry) => entry.name = Some(new),
-            Self::Execution(entry)
-            | Self::ControllerMode(entry)
-            | Self::Text(entry)
-            | Self::Message(entry)
-            | Self::Condition(entry) => entry.name = Some(new),
-            Self::Position(_)
-            | Self::CommandedPosition(_)
-            | Self::PathPosition(_)
-            | Self::Ignored(_) => {}
-        }
-    }
-}
-
 fn unit(item: &DataItem) -> Result<Unit, String> {
     let word = plain_unit(&item.units);
     let known = Unit::ALL.into_iter().find(|unit| unit.word() == word);

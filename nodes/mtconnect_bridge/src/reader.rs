@@ -2,7 +2,7 @@
 
 use metrology::stamp::{Host, Machine, Span, Stamp};
 
-use crate::account::Account;
+use crate::account::{Account, Reporting};
 use crate::condition::Condition;
 use crate::document::DocumentFlaw;
 use crate::framing::Lines;
@@ -14,8 +14,6 @@ use crate::values::Values;
 
 /// An adapter that wants to be asked more or less often than this is not watched, ms.
 const HEARTBEATS_MS: std::ops::RangeInclusive<f64> = 100.0..=3.6e6;
-/// The account of a connection is reported again this long after the last report, where it has changed.
-const ACCOUNT_PERIOD: Span = Span::from_nanos(60_000_000_000);
 
 /// Reads records.
 #[derive(Clone, Debug)]
@@ -26,7 +24,7 @@ pub struct Reader {
     pub account: Account,
     version: u32,
     refused: u64,
-    told: Option<(Stamp<Host>, Account)>,
+    reporting: Reporting,
 }
 
 impl Reader {
@@ -38,41 +36,23 @@ impl Reader {
             account: Account::default(),
             version: 1,
             refused: 0,
-            told: None,
+            reporting: Reporting::default(),
         }
     }
 
     /// The account with what the values count.
     #[must_use]
     pub fn account(&self) -> Account {
-        let (told, unmapped) = self.values.counts();
-        let refused = self.values.refused();
-        let n_refused: u64 = refused.iter().map(|(_, left)| left.count).sum();
-        let mut account = Account {
-            told: told.saturating_sub(n_refused),
-            unmapped,
-            keys: self.values.unmapped_keys(),
-            ..self.account.clone()
-        };
-        let refused = refused.into_iter().filter(|(_, left)| left.count > 0);
-        account.left.extend(refused);
-        let leaps = self.values.leaps();
-        if leaps.count > 0 {
-            account.left.insert("leaps of the machine's clock", leaps);
-        }
-        account
+        self.values.account(&self.account)
     }
 
     /// Reports the account of a connection where it has changed.
     pub fn tell_account(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
-        let is_due = |told: &(Stamp<Host>, Account)| at - told.0 >= ACCOUNT_PERIOD;
-        if self.account.lines == 0 || !self.told.as_ref().is_none_or(is_due) {
+        if self.account.lines == 0 || !self.reporting.is_due(at) {
             return;
         }
         let account = self.account();
-        let is_news = self.told.as_ref().is_none_or(|(_, told)| *told != account);
-        self.told = Some((at, account.clone()));
-        if is_news {
+        if self.reporting.is_news(at, &account) {
             out.push(Output::Condition(Condition::Account { account }));
         }
     }

@@ -42,22 +42,10 @@ pub mod block;
 mod fields;
 mod flaw;
 
+pub use crate::observation::Shape;
 pub use block::Record;
 pub use fields::{cut, fields};
 pub use flaw::Flaw;
-
-/// How the fields behind a key are to be read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
-    /// One field: a value.
-    Value,
-    /// Five fields: level, code, severity, qualifier, text.
-    Condition,
-    /// Two fields: code and text.
-    Message,
-    /// Three fields: count, rate, values.
-    Series,
-}
 
 /// What a line was.
 #[derive(Clone, Debug, PartialEq)]

@@ -486,6 +486,14 @@ mod tests {
                 "it reaches from 2026-11-29T09:59:00Z to 2026-11-29T10:00:22Z: correct from and to in the order, with an offset",
             ),
             (
+                "1480413540000|Srpm|600\n1480413550000|Srpm|700\n",
+                "1480413540000 first; as ms since 1970 this is 2016-11-29T09:59:00Z: write the stamps as such dates",
+            ),
+            (
+                "1480413540|Srpm|600\n1480413550|Srpm|700\n",
+                "as s since 1970 this is 2016-11-29T09:59:00Z",
+            ),
+            (
                 other_keys.as_str(),
                 "without a number of the spindle or an axis",
             ),

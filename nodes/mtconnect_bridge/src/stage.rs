@@ -2,12 +2,13 @@
 
 use std::convert::Infallible;
 
+use machine_report::Report;
 use metrology::Stage;
 use metrology::sample::{AxisState, MachineValue, TemperatureSample};
 use metrology::stamp::{Host, Span, Stamp};
 
 use crate::agent::{AgentLink, Heard};
-use crate::condition::{Condition, Lost};
+use crate::condition::{Condition, Lost, ValueCondition};
 use crate::config::{Settings, Source};
 use crate::framing::{Framed, Lines};
 use crate::logged::{Due, Log};
@@ -111,6 +112,17 @@ pub enum Output {
     Io(IoCommand),
     /// The answer to [`Input::Shutdown`].
     Stopped,
+}
+
+impl From<Report> for Output {
+    fn from(report: Report) -> Self {
+        match report {
+            Report::State(state) => Self::State(state),
+            Report::Temperature(sample) => Self::Temperature(sample),
+            Report::Value(value) => Self::Value(value),
+            Report::Condition(condition) => Self::Condition(condition.into()),
+        }
+    }
 }
 
 /// Where the connection is.
@@ -253,7 +265,8 @@ impl BridgeStage {
         if !std::mem::replace(&mut self.greeted, true) && !axes.is_empty() {
             let letters: Vec<_> = axes.iter().map(|axis| axis.letter()).collect();
             let axes = letters.join(" ");
-            out.push(Output::Condition(Condition::Uncommanded { axes }));
+            let condition = ValueCondition::Uncommanded { axes };
+            out.push(Output::Condition(condition.into()));
         }
     }
 
@@ -446,7 +459,7 @@ fn tell_log(log: &mut Log, reader: &mut Reader, at: Stamp<Host>, out: &mut Vec<O
         } = due;
         if let Some(leap) = leap {
             reader.values.at_line(record.line);
-            out.push(reader.values.leap(leap));
+            out.push(reader.values.leap(leap).into());
         }
         reader.take(record, at, dated, out);
     });

@@ -11,12 +11,14 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::error::RecorderError;
-use crate::read::Bag;
+use crate::read::{Attachment, Bag};
 
 /// Name of the metadata record with seed and commit.
 const RUN_RECORD: &str = "abbe.run";
 /// Name of the metadata record with the hashes.
 const HASHES_RECORD: &str = "abbe.attachments";
+/// Name of the attachment that holds the machine file.
+pub(crate) const MACHINE_FILE: &str = "machine.yaml";
 /// Name of the metadata record with the nodes, in the order in which they were composed.
 pub const NODES_RECORD: &str = "abbe.nodes";
 /// Name of the metadata record of each service call.
@@ -112,7 +114,7 @@ impl RunContext {
         attached.extend(
             self.machine_file
                 .iter()
-                .map(|t| yaml("machine.yaml".into(), t)),
+                .map(|t| yaml(MACHINE_FILE.into(), t)),
         );
         attached.extend(
             self.scenario_file
@@ -299,21 +301,41 @@ pub fn verify_attachments(bag: &Bag) -> Result<Vec<String>, RecorderError> {
     let Some(hashes) = bag.metadata(HASHES_RECORD) else {
         return Ok(names);
     };
-    for (name, recorded) in hashes {
-        let found = match bag.attachment(name)? {
-            Some(attachment) => sha256_hex(&attachment.data),
-            None => "absent".to_owned(),
-        };
-        if found != *recorded {
-            return Err(RecorderError::AttachmentHash {
-                name: name.clone(),
-                found,
-                recorded: recorded.clone(),
-            });
-        }
+    for name in hashes.keys() {
+        bag.attachment(name)?;
         names.push(name.clone());
     }
     Ok(names)
+}
+
+/// Compares an attachment, where the bag has it, with the hash recorded beside it, where there is one.
+///
+/// # Errors
+/// It is absent or different.
+pub(crate) fn verify(
+    bag: &Bag,
+    name: &str,
+    found: Option<&Attachment>,
+) -> Result<(), RecorderError> {
+    let hashes = bag.metadata(HASHES_RECORD);
+    let Some(recorded) = hashes.and_then(|hashes| hashes.get(name)) else {
+        return Ok(());
+    };
+    let Some(found) = found else {
+        return Err(RecorderError::AttachmentAbsent {
+            name: name.to_owned(),
+            recorded: recorded.clone(),
+        });
+    };
+    let found = sha256_hex(&found.data);
+    if found == *recorded {
+        return Ok(());
+    }
+    Err(RecorderError::AttachmentHash {
+        name: name.to_owned(),
+        found,
+        recorded: recorded.clone(),
+    })
 }
 
 fn plain_name(name: &str) -> Result<(), RecorderError> {

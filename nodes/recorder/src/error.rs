@@ -216,6 +216,14 @@ pub enum RecorderError {
         /// Hash that was recorded.
         recorded: String,
     },
+    /// An attachment is not in the bag, though its hash is.
+    #[error("{name}: is absent, the bag says that its sha256 is {recorded}")]
+    AttachmentAbsent {
+        /// The attachment.
+        name: String,
+        /// Hash that was recorded.
+        recorded: String,
+    },
     /// The layout could not be written as YAML.
     #[error("cannot write the layout of {path}: {source}")]
     Layout {

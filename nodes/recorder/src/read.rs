@@ -194,6 +194,12 @@ pub enum LossReason {
         /// What is wrong, with key, value and what the files hold.
         what: String,
     },
+    /// The machine file is absent, cannot be read, or is not the one that was recorded.
+    #[error("{what}; the bag is read without it: take an undamaged copy of the bag")]
+    Attachment {
+        /// What is wrong, with name and reason.
+        what: String,
+    },
     /// The index at the end cannot be used; the file was walked through instead.
     #[error("the index is damaged")]
     Index,
@@ -203,6 +209,14 @@ pub enum LossReason {
         /// The system's reason.
         kind: io::ErrorKind,
     },
+}
+
+impl LossReason {
+    /// Whether it is of what stands beside the messages: none of them is lost.
+    #[must_use]
+    pub const fn is_beside_messages(&self) -> bool {
+        matches!(self, Self::Description { .. } | Self::Attachment { .. })
+    }
 }
 
 /// A text or blob of the bag.

@@ -44,7 +44,7 @@ pub fn recover(
     }
     let mut attachments_lost = Vec::new();
     for name in bag.attachment_names() {
-        match bag.attachment(name) {
+        match bag.stored(name) {
             Ok(Some(found)) => recording.attach(&mcap::Attachment {
                 log_time: found.log_time_nanos,
                 create_time: found.create_time_nanos,

@@ -28,6 +28,8 @@ pub enum Reason {
     OtherAxis,
     /// A reading of another time than the messages beside it.
     OtherTime,
+    /// The bag has the same message already.
+    Repeated,
     /// A reading further from its nominal place than any machine is.
     Beyond,
     /// Of a run without an end.
@@ -66,6 +68,7 @@ impl Reason {
             Self::OutOfRange => Defect::OutOfRange.words(),
             Self::OtherAxis => "of another axis than its run's",
             Self::OtherTime => "of another time than the messages beside it",
+            Self::Repeated => "repeated",
             Self::Beyond => "too far from its nominal place",
             Self::NoEnd => "of a run without an end",
             Self::NoBegin => "of a run without a begin",

@@ -26,6 +26,7 @@ pub mod pace;
 pub mod pause;
 pub mod playback;
 pub mod reading;
+mod repeats;
 mod replay;
 mod stamps;
 mod usable;

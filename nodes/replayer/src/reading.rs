@@ -10,6 +10,7 @@ use recorder::{Bag, Event, Loss, MessageRef, Order};
 use crate::account::{Account, Place, Reason, TopicAccount};
 use crate::known::{entry_in_any_namespace, unreadable};
 use crate::leap::Leaps;
+use crate::repeats::{self, Repeats};
 use crate::stamps::WrongStamps;
 use crate::usable;
 
@@ -58,10 +59,13 @@ pub struct Taken<'a> {
     entry: &'static Entry,
     message: MessageRef<'a>,
     row: &'a mut TopicAccount,
+    /// Whether it was decoded and counted: who reads it again counts nothing.
+    is_counted: bool,
 }
 
 /// Reads `bag` in an order and hands on every message of the topics `wanted` (their names in
-/// [`abbe_msgs::topics`]), in whatever namespace they are; messages with wrong stamps (`stamps`) are left out and counted.
+/// [`abbe_msgs::topics`]), in whatever namespace they are; repeated messages (`repeats`) and messages with wrong stamps
+/// (`stamps`) are left out and counted.
 pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken<'_>)) -> Reading {
     let mut reading = Reading {
         losses: bag.description_losses().to_vec(),
@@ -79,6 +83,7 @@ pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken
     };
     let mut messages = bag.messages(order);
     let mut before = None;
+    let mut passed = Repeats::default();
     while let Some(event) = messages.next_event() {
         let message = match event {
             Event::Message(message) => message,
@@ -104,20 +109,36 @@ pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken
             Plan::Read { place, entry } => {
                 let row = &mut rows[*place];
                 row.messages += 1;
-                if let Some(what) = wrong_stamp(&wrong_stamps, &message, entry) {
+                if let Some((reason, what)) = misplaced(&wrong_stamps, &mut passed, &message, entry)
+                {
                     let first = place_of(row.messages, &message, Some(&row.type_name));
-                    row.leave_out(Reason::OtherTime, first, || what);
+                    row.leave_out(reason, first, || what);
                     continue;
                 }
                 take(Taken {
                     entry,
                     message,
                     row,
+                    is_counted: false,
                 });
             }
         }
     }
     reading
+}
+
+/// Why a message that can be read is left out all the same: it is repeated, or of another time.
+fn misplaced(
+    wrong_stamps: &WrongStamps,
+    passed: &mut Repeats,
+    message: &MessageRef<'_>,
+    entry: &Entry,
+) -> Option<(Reason, String)> {
+    if passed.pass(message) {
+        return Some((Reason::Repeated, repeats::WHAT.to_owned()));
+    }
+    let what = wrong_stamp(wrong_stamps, message, entry)?;
+    Some((Reason::OtherTime, what))
 }
 
 /// What is wrong with the stamp of a message that is right otherwise.
@@ -126,7 +147,9 @@ fn wrong_stamp(
     message: &MessageRef<'_>,
     entry: &Entry,
 ) -> Option<String> {
-    let what = wrong_stamps.wrong(message, entry.description.type_name)?;
+    let what = wrong_stamps
+        .other_clock(message.topic)
+        .or_else(|| wrong_stamps.wrong(message, entry.description.type_name))?;
     let usable = usable::of_topic(entry.name);
     let is_right = usable.is_none_or(|usable| usable(message.data).is_ok());
     is_right.then_some(what)
@@ -205,11 +228,13 @@ impl Taken<'_> {
     }
 
     fn inner<M: Message + Wire>(&mut self) -> Option<M::Inner> {
+        let is_counted = std::mem::replace(&mut self.is_counted, true);
         match from_cdr::<M>(self.message.data).and_then(M::into_inner) {
             Ok(inner) => {
-                self.row.used += 1;
+                self.row.used += u64::from(!is_counted);
                 Some(inner)
             }
+            Err(_) if is_counted => None,
             Err(error) => {
                 let first = place_of(self.row.messages, &self.message, Some(M::TYPE_NAME));
                 let reason = error.defect().into();

@@ -16,6 +16,7 @@ use crate::known::unreadable;
 use crate::leap::{self, LEAST};
 use crate::listening::{Ear, Listening, NotInBag};
 use crate::reading::{Reading, place_of};
+use crate::repeats::{self, Repeats};
 use crate::stamps::WrongStamps;
 use crate::usable::{self, Usable};
 
@@ -55,10 +56,10 @@ pub struct Doubtful {
 }
 
 impl Outcome {
-    /// Whether results were computed and the bag had nothing to hold them against.
+    /// Whether nothing that the nodes compute is in the bag, though the whole bag was read.
     #[must_use]
     pub fn compared_nothing(&self) -> bool {
-        self.compared.is_empty() && !self.not_in_bag.is_empty() && self.reading.is_whole()
+        self.compared.is_empty() && self.reading.is_whole()
     }
 
     /// Whether what the bag has was computed again byte for byte, as far as its inputs were there.
@@ -105,6 +106,9 @@ struct Replay<'b> {
     listening: Listening,
     roles: Vec<Role>,
     wrong_stamps: WrongStamps,
+    passed: Repeats,
+    /// Messages that are repeated: those who made the bag did not count them.
+    repeated: u64,
     relays: VecDeque<Relay>,
     start: Stamp<Host>,
     stop: Option<Stamp<Host>>,
@@ -153,6 +157,8 @@ pub fn check(
         listening,
         roles,
         wrong_stamps: WrongStamps::of(bag),
+        passed: Repeats::numbered(),
+        repeated: 0,
         relays: relays.into(),
         start: stamp(run.start_time_nanos),
         stop: run.stop_time_nanos.map(stamp),
@@ -251,8 +257,9 @@ impl Replay<'_> {
             let (before, after) = (now.nanos().unsigned_abs(), message.log_time_nanos);
             self.outcome.reading.leaps.pass(before, after);
             // Where messages were taken out of a bag, the count stands too high and the time tells.
+            let own = read - self.repeated;
             self.put_calls(&mut calls, &mut last, at, |call| {
-                call.after_messages <= read || stamp(call.time_nanos) < at
+                call.after_messages <= own || stamp(call.time_nanos) < at
             });
             self.hand_over_after(read)?;
             read += 1;
@@ -293,9 +300,34 @@ impl Replay<'_> {
             .map(|what| (Reason::OtherTime, what))
     }
 
+    /// Leaves out a message that the bag has already: nothing is lost by that.
+    fn is_repeated(&mut self, message: &MessageRef<'_>) -> bool {
+        let topic = message.topic.index();
+        let (Role::Input { row, .. } | Role::Result { row, .. }) = &self.roles[topic] else {
+            return false;
+        };
+        if !self.passed.pass(message) {
+            return false;
+        }
+        self.repeated += 1;
+        let row = &mut self.outcome.reading.account.topics[*row];
+        row.messages += 1;
+        let what = repeats::WHAT.to_owned();
+        leave_out(
+            row,
+            message,
+            &self.bag.topics()[topic],
+            (Reason::Repeated, what),
+        );
+        true
+    }
+
     /// Puts in an input, or compares a result; what cannot be used is left out.
     fn take(&mut self, at: Stamp<Host>, message: &MessageRef<'_>, is_stray: bool) {
         let topic = message.topic.index();
+        if self.is_repeated(message) {
+            return;
+        }
         let defect = match &self.roles[topic] {
             Role::Input { usable, .. } | Role::Result { usable, .. } => {
                 self.defect(message, *usable, is_stray)

@@ -14,17 +14,20 @@
 //! on one side, between the first stamp of the bag and the time of recording. Otherwise its messages are left out.
 //!
 //! Holds when most stamps of a topic are right. A clock that was set for more than a third of a recording is no wrong stamp.
+//! A topic whose stamps are all of another time than those of the others is found by [`clocks`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use abbe_msgs::Durability;
 use abbe_msgs::topics::Entry;
 use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
-use recorder::{Bag, Event, MessageRef, Order};
+use recorder::{Bag, Event, MessageRef, Order, TopicId};
 
 use crate::known::entry_in_any_namespace;
 use crate::leap::{self, LEAST};
 use crate::reading::stamp_of;
+
+mod clocks;
 
 /// T of (2), ns: what a session of a diagnosis takes as the lateness of a sample, too.
 const TOLERANCE_NANOS: i64 = 2 * NANOS_PER_S;
@@ -57,6 +60,8 @@ type Key = (usize, u64, i64);
 #[derive(Debug, Default)]
 pub(crate) struct WrongStamps {
     found: BTreeMap<Key, Limits>,
+    /// Offset of the stamps of each topic that is of another clock, ns.
+    other_clocks: BTreeMap<usize, i64>,
 }
 
 /// Successive messages of a topic whose stamps go on with its log times (2).
@@ -116,22 +121,28 @@ struct Level {
 }
 
 /// Offsets that overlap within the tolerance are one.
-fn levels<'a>(groups: impl Iterator<Item = &'a Group>) -> Vec<Level> {
-    let mut sorted: Vec<&Group> = groups.collect();
-    sorted.sort_by_key(|group| group.offsets);
+fn merged(mut sorted: Vec<Level>, tolerance_nanos: i64) -> Vec<Level> {
+    sorted.sort_by_key(|level| level.offsets);
     let mut levels = Vec::<Level>::new();
-    for group in sorted {
+    for next in sorted {
         match levels.last_mut() {
-            Some(level) if group.offsets.0 <= level.offsets.1.saturating_add(TOLERANCE_NANOS) => {
-                level.offsets.1 = level.offsets.1.max(group.offsets.1);
-                level.messages += group.messages;
+            Some(level) if next.offsets.0 <= level.offsets.1.saturating_add(tolerance_nanos) => {
+                level.offsets.1 = level.offsets.1.max(next.offsets.1);
+                level.messages += next.messages;
             }
-            _ => levels.push(Level {
-                offsets: group.offsets,
-                messages: group.messages,
-            }),
+            _ => levels.push(next),
         }
     }
+    levels
+}
+
+/// The offsets of a clock: those that have enough messages.
+fn levels<'a>(groups: impl Iterator<Item = &'a Group>) -> Vec<Level> {
+    let each = groups.map(|group| Level {
+        offsets: group.offsets,
+        messages: group.messages,
+    });
+    let mut levels = merged(each.collect(), TOLERANCE_NANOS);
     let most = levels.iter().map(|level| level.messages).max().unwrap_or(0);
     levels.retain(|it| it.messages > 1 && it.messages.saturating_mul(LEAST_SHARE) > most);
     levels
@@ -192,12 +203,16 @@ impl WrongStamps {
         let Some(times) = BagTimes::of(&topics) else {
             return Self::default();
         };
+        let other_clocks = clocks::others(&topics);
         let wrong: BTreeMap<usize, Vec<(Group, Limits)>> = topics
             .iter()
             .map(|topic| (topic.topic, judge(topic, times, &strays)))
             .filter(|(_, wrong)| !wrong.is_empty())
             .collect();
-        Self::found(bag, &entries, &wrong)
+        Self {
+            found: Self::found(bag, &entries, &wrong),
+            other_clocks,
+        }
     }
 
     /// The messages of the groups that do not fit.
@@ -205,10 +220,10 @@ impl WrongStamps {
         bag: &Bag,
         entries: &[Option<&'static Entry>],
         wrong: &BTreeMap<usize, Vec<(Group, Limits)>>,
-    ) -> Self {
+    ) -> BTreeMap<Key, Limits> {
         let mut found = BTreeMap::new();
         if wrong.is_empty() {
-            return Self { found };
+            return found;
         }
         // How many messages of the group at hand are still to come, by topic.
         let mut open: BTreeMap<usize, (u64, Limits)> = BTreeMap::new();
@@ -233,17 +248,23 @@ impl WrongStamps {
                 found.insert(key, *limits);
             }
         }
-        Self { found }
+        found
     }
 
-    /// Whether no message was found.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.found.is_empty()
+    /// What is wrong with all stamps of a topic; `None`: they are of the same time as those of the others.
+    pub(crate) fn other_clock(&self, topic: TopicId) -> Option<String> {
+        let offset_nanos = *self.other_clocks.get(&topic.index())?;
+        let offset = Span::from_nanos(offset_nanos.saturating_abs());
+        let way = if offset_nanos < 0 { "earlier" } else { "later" };
+        Some(format!(
+            "its stamps are {:.0} s from those of the other topics, {way}: set the clock that stamped it",
+            offset.as_secs_f64()
+        ))
     }
 
     /// What is wrong with the stamp of a message of type `type_name`; `None`: it fits.
     pub(crate) fn wrong(&self, message: &MessageRef<'_>, type_name: &str) -> Option<String> {
-        if self.is_empty() {
+        if self.found.is_empty() {
             return None;
         }
         let stamp = nanos_of(stamp_of(type_name, message.data)?);

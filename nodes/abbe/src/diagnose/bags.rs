@@ -39,7 +39,8 @@ impl Recorded {
         let (mut readings, mut hashes, mut ends) = (vec![], vec![], vec![]);
         for path in paths {
             let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
-            if let Some(attachment) = bag.attachment(MACHINE)? {
+            // A damaged one is among the losses of the bag.
+            if let Ok(Some(attachment)) = bag.attachment(MACHINE) {
                 is_of(&attachment.data, machine)
                     .with_context(|| format!("bag {}", path.display()))?;
             }
@@ -151,7 +152,9 @@ fn built(entry: &AxisEntry) -> Vec<(&'static str, f64)> {
 /// When the bag has none.
 pub fn machine_text(path: &Path) -> Result<(String, String)> {
     let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
-    let Some(attachment) = bag.attachment(MACHINE)? else {
+    let attached = bag.attachment(MACHINE);
+    let attached = attached.with_context(|| format!("bag {}", path.display()))?;
+    let Some(attachment) = attached else {
         let none = anyhow!("holds no machine file: name it with --machine");
         let none = not_whole(none, &losses(&bag));
         return Err(none.context(format!("bag {}", path.display())));

@@ -83,6 +83,8 @@ pub struct Drift {
     pub logs: Vec<DriftLog>,
     /// Temperatures by sensor, degC.
     pub temperatures: BTreeMap<String, Series>,
+    /// Readings of thermometers that could not be used.
+    pub temperatures_left_out: u64,
     /// Work.
     pub work: Work,
 }

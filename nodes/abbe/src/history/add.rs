@@ -91,13 +91,9 @@ impl Add {
         self.add_bag(path, budget, store)
     }
 
-    /// Machine and time as given, before those that were found.
-    fn stated(&self, origin: Origin) -> Origin {
-        Origin {
-            machine: self.machine.clone().or(origin.machine),
-            at_s: self.at.map(|at| at.begin_s).or(origin.at_s),
-            ..origin
-        }
+    /// With machine and time as given.
+    fn stated(&self, origin: Origin) -> Result<Origin> {
+        origin.stated(self.machine.clone(), self.at, "--at")
     }
 
     fn add_run(&self, folder: &Path, report: &Path, store: &mut Store) -> Result<bool> {
@@ -108,7 +104,7 @@ impl Add {
 
     /// Adds a report; whether each of its figures could be kept.
     fn add_report(&self, figures: &Value, origin: Origin, store: &mut Store) -> Result<bool> {
-        let origin = self.stated(origin.with_conditions(&figures["conditions"]));
+        let origin = self.stated(origin.with_conditions(&figures["conditions"]))?;
         let entry = entry(Kind::Report, report_figures(figures)?, origin)?;
         tell!("{}: {}", entry.source, add(store, &entry)?);
         Ok(complain_of_left_out(figures, &entry.source))
@@ -125,7 +121,7 @@ impl Add {
 
     fn add_gap(&self, value: &Value, origin: Origin, store: &mut Store) -> Result<bool> {
         let gap = gap_figures(value)?;
-        let mut origin = self.stated(origin);
+        let mut origin = self.stated(origin)?;
         // A diagnosis is recognised by its bags: its text has the time that it took.
         if !gap.bags.is_empty() {
             origin.sha256 = joined(&gap.bags);

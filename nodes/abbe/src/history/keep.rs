@@ -42,7 +42,7 @@ impl Keep {
     pub fn report(&self, figures: &Value, origin: Origin) -> Result<()> {
         let origin = origin.with_conditions(&figures["conditions"]);
         complain_of_left_out(figures, &origin.source);
-        let entry = entry(Kind::Report, report_figures(figures)?, self.named(origin))?;
+        let entry = entry(Kind::Report, report_figures(figures)?, self.named(origin)?)?;
         self.add(&entry)
     }
 
@@ -53,18 +53,14 @@ impl Keep {
     pub fn diagnosis(&self, gap: &Value, origin: Origin) -> Result<()> {
         complain_of_left_out(gap, &origin.source);
         let gap = gap_figures(gap)?;
-        let mut origin = self.named(origin);
+        let mut origin = self.named(origin)?;
         origin.machine_sha256 = origin.machine_sha256.or(gap.machine_sha256);
         let entry = entry(Kind::Diagnosis, gap.figures, origin)?;
         self.add(&entry)
     }
 
-    fn named(&self, origin: Origin) -> Origin {
-        Origin {
-            machine: self.kept_as.clone().or(origin.machine),
-            at_s: self.kept_at.map(|at| at.begin_s).or(origin.at_s),
-            ..origin
-        }
+    fn named(&self, origin: Origin) -> Result<Origin> {
+        origin.stated(self.kept_as.clone(), self.kept_at, "--kept-at")
     }
 
     fn add(&self, entry: &Entry) -> Result<()> {

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use machine::MachineFile;
 use node_runtime::text_file;
-use recorder::Bag;
+use recorder::{Bag, RecordedRun};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
+use super::dates::{Moment, time};
 use crate::diagnose::bags;
 use crate::evaluate::test_conditions::TestConditions;
 
@@ -118,6 +119,28 @@ impl Origin {
         }
     }
 
+    /// With machine and time as they were given; `option` is the name of the time's option.
+    ///
+    /// # Errors
+    /// When there is another time of its own: a time is stated for what has none.
+    pub fn stated(self, machine: Option<String>, at: Option<Moment>, option: &str) -> Result<Self> {
+        if let (Some(own_s), Some(at)) = (self.at_s, at)
+            && !(at.begin_s..=at.end_s).contains(&own_s)
+        {
+            bail!(
+                "{}: {option} {}: it has a time of its own, {}, which is not replaced: leave {option} out",
+                self.source,
+                time(at.begin_s as f64),
+                time(own_s as f64)
+            );
+        }
+        Ok(Self {
+            machine: machine.or(self.machine),
+            at_s: self.at_s.or(at.map(|at| at.begin_s)),
+            ..self
+        })
+    }
+
     /// With what the conditions of a report state, where it is not known.
     pub fn with_conditions(mut self, conditions: &Value) -> Self {
         self.instruments = match &conditions["instruments"] {
@@ -140,7 +163,13 @@ impl Origin {
 /// Begin of the first test of a bag, s since 1970.
 fn begin_s(bag: &Bag) -> Option<i64> {
     let (first, _) = TestConditions::of(bag).between?;
-    dated(first.nanos().div_euclid(1_000_000_000))
+    let is_run = RecordedRun::of(bag).is_some_and(|run| !run.scenario_name.is_empty());
+    begun(first.nanos().div_euclid(1_000_000_000), is_run)
+}
+
+/// The begin of a test. A run has a clock from its first instant on, also one that is simulated from 1970 on.
+fn begun(at_s: i64, is_run: bool) -> Option<i64> {
+    if is_run { Some(at_s) } else { dated(at_s) }
 }
 
 /// A time, unless it only stands in for one that is not known.
@@ -192,6 +221,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::history::dates::moment;
 
     #[test]
     fn conditions_state_time_instruments_and_operator() {
@@ -212,6 +242,51 @@ mod tests {
         assert_eq!(Origin::default().with_conditions(&undated).at_s, None);
         let nothing = Origin::default().with_conditions(&Value::Null);
         assert_eq!(nothing, Origin::default());
+    }
+
+    #[test]
+    fn the_first_second_of_1970_is_a_time_of_a_run_and_none_of_a_table() {
+        for (at_s, is_run, wanted) in [
+            (0, true, Some(0)),
+            (5, true, Some(5)),
+            (0, false, None),
+            (FIRST_DATED_S - 1, false, None),
+            (FIRST_DATED_S, false, Some(FIRST_DATED_S)),
+        ] {
+            assert_eq!(begun(at_s, is_run), wanted, "{at_s} {is_run}");
+        }
+    }
+
+    #[test]
+    fn a_time_is_stated_for_what_has_none_and_replaces_none() {
+        let at = |text: &str| moment(text).ok();
+        let own = || Origin {
+            at_s: Some(1_772_366_400),
+            machine: Some("own".to_owned()),
+            source: "a bag".to_owned(),
+            ..Origin::default()
+        };
+        for given in [None, at("2026-03-01"), at("2026-03-01T12:00:00Z")] {
+            let stated = own().stated(None, given, "--at").unwrap();
+            assert_eq!(stated, own());
+        }
+        for given in ["2020-01-01", "2026-03-01T12:00:01Z", "2026-03-02"] {
+            let refused = own().stated(None, at(given), "--at").unwrap_err();
+            let words = refused.to_string();
+            assert!(words.starts_with("a bag: --at 20"), "{words}");
+            assert!(
+                words.contains("of its own, 2026-03-01T12:00:00Z"),
+                "{words}"
+            );
+        }
+        let machine = Some("given".to_owned());
+        let stated = Origin::default()
+            .stated(machine.clone(), at("2026-03-01"), "--at")
+            .unwrap();
+        assert_eq!(
+            (stated.machine, stated.at_s),
+            (machine, Some(1_772_323_200))
+        );
     }
 
     #[test]

@@ -7,6 +7,7 @@ use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use history::{Limit, Options, Series, SeriesKey, Side, Store, Window};
 use maud::html;
+use metrology::number::number;
 use serde_json::{Value, json};
 
 use super::dates::{Moment, moment, time};
@@ -109,15 +110,13 @@ impl View {
     /// # Errors
     /// When the store cannot be read, nothing matches, or too much does.
     pub fn execute(self) -> Result<ExitCode> {
+        if let Some(reason) = self.without_effect() {
+            return Err(refused("history", reason));
+        }
         let path = store_path(self.store.as_deref())?;
         let store = Store::open_to_read(&path, Options::default())?;
         if let Some(machine) = &self.machine {
             is_there(&store, machine)?;
-        }
-        if (self.upper.is_some() || self.lower.is_some()) && self.name().is_none() {
-            let reason =
-                "--upper and --lower: name the figure that they limit with --figure or --effect";
-            return Err(refused("history", reason));
         }
         let page = self.page(&store)?;
         if self.json {
@@ -136,6 +135,49 @@ impl View {
             whole_file::write(path, &report::html(&page.title, &body))?;
         }
         Ok(ExitCode::SUCCESS)
+    }
+
+    /// Why an option would have no effect, or nothing could be shown; `None`: each has one.
+    fn without_effect(&self) -> Option<String> {
+        let (has_machine, has_name) = (self.machine.is_some(), self.name().is_some());
+        let has_between = !self.between.is_empty();
+        let has_limit = self.upper.is_some() || self.lower.is_some();
+        let has_window = self.since.is_some() || self.until.is_some();
+        let reason = if has_limit && !has_name {
+            "--upper and --lower: name the figure that they limit with --figure or --effect"
+        } else if has_limit && (!has_machine || has_between) {
+            "--upper and --lower: they limit the trend of one machine: name the machine, without --between"
+        } else if self.every_days.is_some() && (!has_machine || has_name || has_between) {
+            "--every-days: it is for the overview of one machine: name the machine, without --figure, --effect and --between"
+        } else if has_window && has_between {
+            "--since and --until: --between has its own dates: leave out one of them"
+        } else if has_window && !has_machine && !has_name {
+            "--since and --until: the list of machines has no dates to choose: name a machine, --figure or --effect"
+        } else if self.test.is_some() && !has_machine && !has_name {
+            "--test: the list of machines has no tests to choose: name a machine, --figure or --effect"
+        } else {
+            return self.reversed();
+        };
+        Some(reason.to_owned())
+    }
+
+    /// Two ends in the wrong order.
+    fn reversed(&self) -> Option<String> {
+        let dates = self.since.zip(self.until);
+        if let Some((since, until)) = dates.filter(|(since, until)| since.begin_s > until.end_s) {
+            return Some(format!(
+                "--since {} is later than --until {}: no value lies between them; exchange them",
+                time(since.begin_s as f64),
+                time(until.end_s as f64)
+            ));
+        }
+        let limits = self.upper.zip(self.lower);
+        let (upper, lower) = limits.filter(|(upper, lower)| upper < lower)?;
+        Some(format!(
+            "--upper {} is below --lower {}: no value is within them; exchange them",
+            number(upper),
+            number(lower)
+        ))
     }
 
     fn page(&self, store: &Store) -> Result<Page> {
@@ -302,4 +344,71 @@ fn table(values: &[Line]) -> Result<String> {
     }
     let bytes = writer.into_inner().map_err(|error| anyhow!("{error}"))?;
     Ok(String::from_utf8(bytes)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct CommandLine {
+        #[command(flatten)]
+        view: View,
+    }
+
+    fn said(words: &[&str]) -> Option<String> {
+        let line = ["history"].iter().chain(words);
+        CommandLine::try_parse_from(line)
+            .unwrap()
+            .view
+            .without_effect()
+    }
+
+    #[test]
+    fn an_option_without_effect_is_refused_by_its_name() {
+        for (words, option) in [
+            (&["--every-days", "5"][..], "--every-days"),
+            (
+                &["m", "--figure", "f", "--every-days", "5"][..],
+                "--every-days",
+            ),
+            (&["m", "--upper", "5"][..], "--upper"),
+            (&["--figure", "f", "--upper", "5"][..], "--upper"),
+            (&["--since", "2026-01-01"][..], "--since"),
+            (&["--test", "t"][..], "--test"),
+            (
+                &[
+                    "m",
+                    "--between",
+                    "2026-01-01",
+                    "2026-02-01",
+                    "--until",
+                    "2026-01-09",
+                ][..],
+                "--until",
+            ),
+            (
+                &["m", "--since", "2026-06-30", "--until", "2026-01-01"][..],
+                "--since 2026-06-30T00:00:00Z is later than --until 2026-01-01T23:59:59Z",
+            ),
+            (
+                &["m", "--figure", "f", "--upper", "1", "--lower", "2"][..],
+                "--upper 1 is below --lower 2",
+            ),
+        ] {
+            let said = said(words).unwrap_or_default();
+            assert!(said.contains(option), "{words:?}: {said:?}");
+        }
+        for words in [
+            &[][..],
+            &["m", "--every-days", "5"],
+            &["m", "--figure", "f", "--upper", "2", "--lower", "2"],
+            &["--figure", "f", "--since", "2026-01-01"],
+            &["m", "--since", "2026-01-01", "--until", "2026-01-01"],
+        ] {
+            assert_eq!(said(words), None, "{words:?}");
+        }
+    }
 }

@@ -454,6 +454,10 @@ mod tests {
             (',', '.', 3)
         );
         assert_eq!(found.axis("table"), Some(Axis::Y));
+        let found = of_text("# made\n# units: mm\n\nn,t,d\n1,0,1.5\n")
+            .unwrap()
+            .expect("a table");
+        assert_eq!(found.head_line, 4, "below two comments and an empty line");
         assert_eq!(
             of_text("no numbers\nat all\n")
                 .unwrap()

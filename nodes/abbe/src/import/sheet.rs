@@ -35,7 +35,7 @@ impl Sheet {
         let mut n_cells = 0;
         for record in reader.records() {
             let record = record?;
-            let line = record.position().map_or(0, csv::Position::line);
+            let line = record.position().map_or(0, |at| line_of(text, at));
             if record.len() > MOST_COLUMNS as usize {
                 bail!(
                     "line {line}: {} columns: must be at most {MOST_COLUMNS}: take away those that hold no test",
@@ -76,6 +76,14 @@ impl Sheet {
         }
         best.map(|(k, _)| k)
     }
+}
+
+/// The line of a record; where it was begun to be read, comments and empty lines may stand before it.
+fn line_of(text: &str, at: &csv::Position) -> u64 {
+    let begin = usize::try_from(at.byte()).unwrap_or(usize::MAX);
+    let rest = text.get(begin..).unwrap_or_default();
+    let is_passed_over = |line: &&str| line.is_empty() || line.starts_with('#');
+    at.line() + rest.lines().take_while(is_passed_over).count() as u64
 }
 
 fn holds(cells: &[String], name: &str) -> bool {

@@ -50,6 +50,13 @@ const SAMPLES: &[(&str, &[(&str, &str)])] = &[
         "mtconnect_bridge",
         &[("source", "shdr"), ("map_file", "map.yaml")],
     ),
+    (
+        "opcua_bridge",
+        &[
+            ("endpoint", "opc.tcp://127.0.0.1:4840"),
+            ("map_file", "map.yaml"),
+        ],
+    ),
     ("recorder", &[("bag", "bag"), ("ring.window_s", "600.0")]),
     ("replayer", &[("bag", "bag")]),
     (

@@ -12,6 +12,7 @@ use machine::MachineFile;
 use metrology::number::number;
 use node_runtime::text_file;
 use sequencer::Plan;
+use twin::Instrument;
 
 pub mod folder;
 mod instruments;
@@ -54,6 +55,8 @@ pub struct Wanted<'w> {
     pub likely: Option<&'w Path>,
     /// Noise of the instruments on a machine.
     pub floors: &'w dyn Fn(&MachineFile) -> Floors,
+    /// Instruments whose noise is stated.
+    pub floored: &'w [Instrument],
     /// Where the folder is written.
     pub out: &'w Path,
     /// Where the page is written.
@@ -119,6 +122,8 @@ impl Wanted<'_> {
                 notes.join(" ")
             );
         }
+        let offered: Vec<Means> = offers.iter().map(|offer| offer.set_up.means).collect();
+        notes.extend(shop.beside(self.mounting, self.floored, &offered));
         let set_up_min: BTreeMap<String, f64> = offers
             .iter()
             .map(|offer| (offer.set_up.name.clone(), shop.minutes(offer.set_up.means)))

@@ -25,6 +25,13 @@ pub struct FloorArgument {
     floor: AssumedFloor,
 }
 
+impl FloorArgument {
+    /// The instrument whose noise it states.
+    pub const fn instrument(&self) -> Instrument {
+        self.instrument
+    }
+}
+
 /// Reads `INSTRUMENT=READING/BETWEEN` in µm.
 ///
 /// # Errors

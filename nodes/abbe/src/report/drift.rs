@@ -82,10 +82,19 @@ fn temperatures(drift: &Drift, from: Stamp<Host>, to: Stamp<Host>) -> Vec<Temper
         .collect()
 }
 
+/// Why there is no temperature beside a drift.
+fn without_temperatures(drift: &Drift) -> String {
+    let why = match drift.temperatures_left_out {
+        0 => "No temperature was recorded meanwhile".to_owned(),
+        n => format!("No temperature can be used ({n} readings of thermometers were left out)"),
+    };
+    format!("{why}: ISO 230-3 asks for those of air, spindle nose and machine.")
+}
+
 /// The table of temperatures, or a sentence that no thermometer was read.
-fn show_temperatures(section: &mut Section, found: &[Temperature]) {
+fn show_temperatures(section: &mut Section, drift: &Drift, found: &[Temperature]) {
     if found.is_empty() {
-        section.lines.push("No temperature was recorded meanwhile: ISO 230-3 asks for those of air, spindle nose and machine.".to_owned());
+        section.lines.push(without_temperatures(drift));
         return;
     }
     let row = |one: &Temperature| {
@@ -111,4 +120,20 @@ fn show_temperatures(section: &mut Section, found: &[Temperature]) {
         rows: found.iter().map(row).collect(),
         note: "While the displacements were read.".to_owned(),
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thermometers_that_were_left_out_are_not_called_unrecorded() {
+        let mut drift = Drift::default();
+        let none = without_temperatures(&drift);
+        assert!(none.starts_with("No temperature was recorded"), "{none}");
+        drift.temperatures_left_out = 28;
+        let left_out = without_temperatures(&drift);
+        assert!(left_out.contains("(28 readings"), "{left_out}");
+        assert!(!left_out.contains("was recorded"), "{left_out}");
+    }
 }

@@ -4,10 +4,11 @@
 //! which [`Screen::join`] makes one of: the first verdict and the first picture stay.
 
 use chrono::DateTime;
-use machine::MachineFile;
 use maud::{Markup, html};
 use recorder::{Bag, RecordedRun};
 use serde_json::{Value, json};
+
+use crate::machine_of_bag;
 
 /// Most tiles.
 const MOST_TILES: usize = 5;
@@ -176,9 +177,7 @@ impl Made {
 
 /// The name in the machine file of a bag.
 fn machine_of(bag: &Bag) -> Option<String> {
-    let attached = bag.attachment("machine.yaml").ok().flatten()?;
-    let text = String::from_utf8(attached.data).ok()?;
-    let machine = MachineFile::parse(&text, "machine.yaml of the bag").ok()?;
+    let (machine, _) = machine_of_bag::of(bag).ok().flatten()?;
     Some(machine.name)
 }
 

@@ -7,15 +7,17 @@ use node_runtime::arguments::Arguments;
 use node_runtime::{Setup, complaint};
 
 use super::Findings;
+use super::programs;
 use super::single::{self, File, Kind};
 use crate::launch::{self, LaunchNode};
 use crate::node;
 use crate::scenario::{SCENARIO_FILE, Scenario};
 
 /// Nodes whose building opens a file, a connection or a program: of these the parameters are read, and no more.
-const OPENING: [&str; 4] = [
+const OPENING: [&str; 5] = [
     "linuxcnc_bridge",
     "mtconnect_bridge",
+    "opcua_bridge",
     "recorder",
     "replayer",
 ];
@@ -77,6 +79,7 @@ pub fn check(folder: &Path, findings: &mut Findings) -> Result<()> {
             findings.mistake(message);
         }
     }
+    programs::check(&launched, findings);
     if !held_up.is_empty() {
         findings.note(format!(
             "{}: looked at as far as the files above permit: {}; mend these, and validate again",

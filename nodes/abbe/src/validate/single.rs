@@ -18,7 +18,7 @@ use crate::evaluate::limits::Limits;
 use crate::import::limits;
 use crate::import::map::Map;
 use crate::import_shift::OrderFile;
-use crate::launch;
+use crate::launch::{self, LaunchNode};
 use crate::machine_defaults;
 use crate::node;
 use crate::scenario::ScenarioFile;
@@ -153,7 +153,7 @@ fn machine_of(path: &Path) -> Result<(MachineFile, String)> {
 
 fn read(path: &Path, kind: Kind, machine: Option<&MachineFile>) -> Result<()> {
     if kind == Kind::Launch {
-        return launch::read(path).map(drop);
+        return launched(path);
     }
     if kind == Kind::Parameters {
         return parameters(path);
@@ -193,6 +193,31 @@ fn read(path: &Path, kind: Kind, machine: Option<&MachineFile>) -> Result<()> {
         }
         Kind::Machine | Kind::Launch | Kind::Parameters => Ok(()),
     }
+}
+
+/// A launch file without its folder: each node is known, has a name of its own, and its parameter files can be read.
+fn launched(path: &Path) -> Result<()> {
+    let nodes = launch::read(path)?;
+    let wrong = |reason: String| anyhow!("launch file {}: {reason}", path.display());
+    for (at, node) in nodes.iter().enumerate() {
+        if node::builder(&node.exec).is_none() {
+            return Err(wrong(format!(
+                "exec=\"{}\": there is no such node (nodes: {})",
+                node.exec,
+                node::names()
+            )));
+        }
+        let is_same =
+            |other: &LaunchNode| other.name == node.name && other.namespace == node.namespace;
+        if nodes[..at].iter().any(is_same) {
+            return Err(wrong(format!(
+                "name=\"{}\": two nodes have it: give one of them another",
+                node.name
+            )));
+        }
+        Setup::new(&node.exec, &Arguments::parse(node.ros_args())?)?;
+    }
+    Ok(())
 }
 
 /// The parameters of one node, without the node: its machine file may stand elsewhere.

@@ -124,6 +124,38 @@ fn a_single_file_is_known_by_its_name_or_its_keys_and_others_are_refused() {
 }
 
 #[test]
+fn a_launch_file_alone_is_refused_for_an_unknown_node_and_for_two_of_one_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cell.launch.xml");
+    let said = |nodes: &str| {
+        std::fs::write(&path, format!("<launch>{nodes}</launch>")).unwrap();
+        found(&path).mistakes.join("\n")
+    };
+    let probe = r#"<node pkg="abbe" exec="probe"/>"#;
+    assert_eq!(said(probe), "");
+    let unknown = said(r#"<node pkg="abbe" exec="../../bin/sh"/>"#);
+    assert!(
+        unknown.contains("cell.launch.xml") && unknown.contains("there is no such node"),
+        "{unknown}"
+    );
+    let twice = said(&probe.repeat(2));
+    assert!(twice.contains("name=\"probe\": two nodes"), "{twice}");
+}
+
+#[test]
+fn a_program_of_the_plan_that_cannot_run_is_a_mistake_with_file_line_and_word() {
+    let folder = spoiled(
+        "first_run",
+        &[("production.ngc", "G1 X180 Y-120 F9000", "QQ1")],
+    );
+    let said = found(folder.path()).mistakes.join("\n");
+    assert!(
+        said.contains("production.ngc: line 7, column 2: word Q"),
+        "{said}"
+    );
+}
+
+#[test]
 fn defaults_in_use_are_noted_with_key_and_value() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("machine.yaml");

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::information::Own;
 use super::search::{Entry, Field, Programme};
-use super::separability::{self, Aim, Shown, between, cos, named, parted, shown};
+use super::separability::{self, Aim, Shown, between, cos, is_named, named, parted, shown};
 use super::{Aimed, Candidate, Design, Hidden, Order, Remedy, Rung, Together};
 use crate::next::lever;
 use crate::search::rows::count;
@@ -36,12 +36,13 @@ pub fn forecast(climbed: &Climbed<'_>) -> Design {
         .collect();
     let is_wanted = |minutes: &&f64| (**minutes - climbed.order.minutes).abs() < 1e-9;
     let wanted = climbed.minutes.iter().take_while(|m| !is_wanted(m)).count();
-    let (together, hidden) = match (climbed.programmes.get(wanted), found.get(wanted)) {
+    let (together, hidden, unsure) = match (climbed.programmes.get(wanted), found.get(wanted)) {
         (Some(programme), Some(shown)) => (
             climbed.together(programme, shown),
             climbed.hidden(programme, shown),
+            climbed.unsure(shown),
         ),
-        _ => (vec![], vec![]),
+        _ => (vec![], vec![], vec![]),
     };
     Design {
         rungs: climbed.rungs(&found),
@@ -49,6 +50,7 @@ pub fn forecast(climbed: &Climbed<'_>) -> Design {
         effects: climbed.effects(&found),
         together,
         hidden,
+        unsure,
     }
 }
 
@@ -134,6 +136,17 @@ impl Climbed<'_> {
             }
         };
         too_small.map(hidden).collect()
+    }
+
+    /// What is neither hidden nor named: together with both, every effect once.
+    fn unsure(&self, found: &[Shown]) -> Vec<String> {
+        let all = self.owns.iter().zip(self.aims).zip(found);
+        let is_unsure = |((_, aim), shown): &((&Own, &Aim), &Shown)| {
+            aim.stated * shown.d >= aim.least_d && !is_named(shown, aim)
+        };
+        all.filter(is_unsure)
+            .map(|((own, _), _)| own.instance.name())
+            .collect()
     }
 
     /// The shortest test that decides, one with an instrument at hand first.

@@ -201,12 +201,15 @@ impl Score {
     }
 }
 
+/// Whether an effect is named at its stated size.
+pub fn is_named(shown: &Shown, aim: &Aim) -> bool {
+    shown.named_from(aim).is_some_and(|from| from <= aim.stated)
+}
+
 /// Effects that are named at their stated size.
 pub fn named(shown: &[Shown], aims: &[Aim]) -> usize {
-    let is_named = |(shown, aim): &(&Shown, &Aim)| {
-        shown.named_from(aim).is_some_and(|from| from <= aim.stated)
-    };
-    shown.iter().zip(aims).filter(is_named).count()
+    let all = shown.iter().zip(aims);
+    all.filter(|(shown, aim)| is_named(shown, aim)).count()
 }
 
 /// Cosine between the first columns of two effects; zero where one shows nothing.

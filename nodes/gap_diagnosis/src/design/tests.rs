@@ -50,6 +50,11 @@ fn a_design_is_the_same_each_time_and_keeps_its_minutes() {
     }
     let mut shown = found.effects.iter().filter_map(|one| one.named_from[0]);
     assert!(shown.next().is_some_and(|from| from > 0.0), "{found:?}");
+    // Every effect is named, hidden or unsure, and no effect is two of these.
+    let sum = found.rungs[0].named + found.hidden.len() + found.unsure.len();
+    assert_eq!(sum, found.effects.len());
+    let is_hidden = |name: &String| found.hidden.iter().any(|one| one.effect == *name);
+    assert!(!found.unsure.iter().any(is_hidden), "{:?}", found.unsure);
     let lobing = found.hidden.iter().find(|one| one.effect == "probe_lobing");
     assert!(lobing.is_some_and(|one| !one.needs.is_empty()));
 }

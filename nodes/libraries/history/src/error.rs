@@ -21,6 +21,12 @@ pub enum HistoryError {
         /// The file.
         path: PathBuf,
     },
+    /// It is a device, a pipe or a socket.
+    #[error("history {path}: is no regular file: name another file with --store", path = path.display())]
+    NotRegular {
+        /// What was named.
+        path: PathBuf,
+    },
     /// The file is no SQLite database, or a damaged one.
     #[error("history {path}: is no database, or a damaged one ({reason}): restore a copy, or name another file with --store", path = path.display())]
     NoDatabase {
@@ -142,7 +148,7 @@ pub enum HistoryError {
         greatest: f64,
     },
     /// An entry has no figure, or too many.
-    #[error("{source_name}: {n} figures: must be from 1 to {most}")]
+    #[error("{source_name}: {n} figures: must be from 1 to {most}{remedy}", remedy = remedy_of_count(*n))]
     BadCount {
         /// Where the entry is from.
         source_name: String,
@@ -156,4 +162,34 @@ pub enum HistoryError {
         "is no report: must have the key `tests` of `abbe report --json` or of a run, or `schema: abbe.gap/1`"
     )]
     NoReport,
+}
+
+/// What to do about a number of figures that is not kept.
+const fn remedy_of_count(n: usize) -> &'static str {
+    if n == 0 {
+        "; a history keeps figures of evaluated tests and causes of diagnoses, and nothing here has one: keep a bag of which `abbe report` shows figures"
+    } else {
+        "; keep the tests in several reports"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_without_a_figure_is_refused_with_the_remedy() {
+        let of = |n| HistoryError::BadCount {
+            source_name: "a_bag".to_owned(),
+            n,
+            most: 10_000,
+        };
+        let none = of(0).to_string();
+        assert!(
+            none.starts_with("a_bag: 0 figures: must be from 1 to 10000; "),
+            "{none}"
+        );
+        assert!(none.contains("abbe report"), "{none}");
+        assert!(of(10_001).to_string().contains("several reports"));
+    }
 }

@@ -105,6 +105,12 @@ impl Store {
     }
 
     fn connect(path: &Path, flags: OpenFlags, options: Options) -> Result<Self, HistoryError> {
+        // Opening a pipe would wait, and a device has no end.
+        if path.exists() && !path.is_file() && !path.is_dir() {
+            return Err(HistoryError::NotRegular {
+                path: path.to_owned(),
+            });
+        }
         let flags = flags | OpenFlags::SQLITE_OPEN_NO_MUTEX;
         let opened = Connection::open_with_flags(path, flags).and_then(|connection| {
             let busy = Duration::from_millis(options.busy_ms.into());

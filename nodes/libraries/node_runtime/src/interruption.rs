@@ -1,13 +1,18 @@
-//! SIGINT and SIGTERM: the first asks for an end in good order, a second SIGINT for one at once.
+//! SIGINT, SIGTERM and SIGHUP: the first asks for an end in good order, a second SIGINT for one at once.
+//!
+//! SIGHUP comes when the terminal or the connection to it is closed. A program that was started with it ignored (`nohup`) goes
+//! on ignoring it.
 
 use crate::complain;
 
+use std::future::pending;
 use std::process;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use anyhow::Context as _;
-use tokio::signal::unix::{SignalKind, signal};
+use procfs::process::Process;
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::Instant;
 
 /// A terminal and a launcher may both pass one Ctrl-C on: what comes within this is the same one.
@@ -45,8 +50,8 @@ pub struct Interruption(Arc<State>);
 impl Interruption {
     /// Begins to listen, for the rest of the process' life.
     ///
-    /// A second SIGINT is said on standard error, and `to_keep` says there what will be saved. A
-    /// process that has not ended 5 s after it exits with code 1.
+    /// SIGHUP is left alone where it was ignored before this process began. A second SIGINT is said on standard error, and
+    /// `to_keep` says there what will be saved. A process that has not ended 5 s after it exits with code 1.
     ///
     /// # Errors
     /// When the signals or a thread cannot be had.
@@ -55,13 +60,11 @@ impl Interruption {
             .enable_all()
             .build()
             .context("tokio runtime")?;
-        let (mut interrupt, mut terminate) = {
+        let (mut interrupt, mut terminate, mut hangup) = {
             let _inside = runtime.enter();
             let interrupt = signal(SignalKind::interrupt()).context("SIGINT")?;
-            (
-                interrupt,
-                signal(SignalKind::terminate()).context("SIGTERM")?,
-            )
+            let terminate = signal(SignalKind::terminate()).context("SIGTERM")?;
+            (interrupt, terminate, hangups()?)
         };
         let interruption = Self::default();
         let told = interruption.clone();
@@ -69,6 +72,7 @@ impl Interruption {
             tokio::select! {
                 _ = interrupt.recv() => {}
                 _ = terminate.recv() => {}
+                () = received(hangup.as_mut()) => {}
             }
             told.ask(Asked::ToEnd);
             let first = Instant::now();
@@ -138,9 +142,45 @@ impl Interruption {
     }
 }
 
+/// Number of SIGHUP.
+const HANGUP: u32 = 1;
+
+/// The signal of a closed terminal; `None`: it was ignored when this process began.
+fn hangups() -> anyhow::Result<Option<Signal>> {
+    let status = Process::myself().and_then(|own| own.status());
+    // Where the system does not say, it is listened to: an end in good order is the safe one.
+    let ignored = status.map_or(0, |status| status.sigign);
+    if is_in(ignored, HANGUP) {
+        return Ok(None);
+    }
+    let hangup = signal(SignalKind::hangup()).context("SIGHUP")?;
+    Ok(Some(hangup))
+}
+
+/// Whether a mask of `/proc` names a signal; its lowest bit is signal 1.
+const fn is_in(mask: u64, number: u32) -> bool {
+    (mask >> (number - 1)) & 1 == 1
+}
+
+/// Waits for a signal; for ever where it is not listened to.
+async fn received(signal: Option<&mut Signal>) {
+    match signal {
+        Some(signal) => {
+            let _ = signal.recv().await;
+        }
+        None => pending().await,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_mask_names_signals_from_its_lowest_bit_on() {
+        assert!(is_in(0x1, HANGUP) && is_in(0x4001, HANGUP) && is_in(0x4001, 15));
+        assert!(!is_in(0x4000, HANGUP) && !is_in(0, HANGUP) && !is_in(0x1, 15));
+    }
 
     #[test]
     fn a_waiter_wakes_when_it_is_asked_and_not_before() {

@@ -496,19 +496,25 @@ fn check_range(value: &Value, range: Option<(f64, f64)>) -> Result<(), String> {
         return Ok(());
     };
     let inside = |number: f64| (least..=greatest).contains(&number);
+    let entry = |at: usize, value: String| format!("entry [{at}] = {value}: ");
     #[expect(clippy::cast_precision_loss, reason = "a limit, far below 2^53")]
-    let fits = match value {
-        Value::Integer(number) => inside(*number as f64),
-        Value::Double(number) => inside(*number),
-        Value::IntegerArray(numbers) => numbers.iter().all(|n| inside(*n as f64)),
-        Value::DoubleArray(numbers) => numbers.iter().all(|n| inside(*n)),
-        _ => true,
+    let outside = match value {
+        Value::Integer(number) => (!inside(*number as f64)).then(String::new),
+        Value::Double(number) => (!inside(*number)).then(String::new),
+        Value::IntegerArray(numbers) => numbers
+            .iter()
+            .position(|n| !inside(*n as f64))
+            .map(|at| entry(at, numbers[at].to_string())),
+        Value::DoubleArray(numbers) => numbers
+            .iter()
+            .position(|n| !inside(*n))
+            .map(|at| entry(at, format!("{:?}", numbers[at]))),
+        _ => None,
     };
-    if fits {
-        Ok(())
-    } else {
-        Err(format!("must be {} to {}", number(least), number(greatest)))
-    }
+    outside.map_or(Ok(()), |place| {
+        let limits = format!("{} to {}", number(least), number(greatest));
+        Err(format!("{place}must be {limits}"))
+    })
 }
 
 /// A leaf as a ROS parameter; `None` where nothing stands.

@@ -148,7 +148,8 @@ pub fn open(path: &Path) -> Result<(File, u64), TextFileError> {
 }
 
 /// The kind of a file that is not regular; `None` for a regular file.
-fn kind_of(kind: FileType) -> Option<&'static str> {
+#[must_use]
+pub fn kind_of(kind: FileType) -> Option<&'static str> {
     if kind.is_file() {
         None
     } else if kind.is_dir() {

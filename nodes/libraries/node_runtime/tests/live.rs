@@ -13,6 +13,7 @@ mod live {
     pub mod processes;
     pub mod puppet;
     pub mod simulated_time;
+    pub mod stopping;
     pub mod tap;
     pub mod topics;
 }

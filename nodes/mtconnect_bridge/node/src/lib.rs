@@ -9,7 +9,7 @@ use mtconnect_bridge::config::Source;
 use mtconnect_bridge::io::LogFile;
 use mtconnect_bridge::live::{LiveBridge, LiveInput};
 use mtconnect_bridge::mapping::{MapFile, Use};
-use mtconnect_bridge::{BridgeConfig, BridgeError, Output, Settings};
+use mtconnect_bridge::{BridgeConfig, Output, Settings};
 use node_runtime::{Node, Setup, Wiring};
 
 mod forms;
@@ -25,12 +25,12 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: BridgeConfig = setup.config()?;
     let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("map_file")?;
-    let placed = |error: BridgeError| {
+    let placed = |error: &dyn std::fmt::Display| {
         let file = path.display().to_string();
         anyhow!("mapping {}", yaml::placed(&file, &text, &error.to_string()))
     };
-    let map = MapFile::from_yaml(&text).map_err(placed)?;
-    let settings = Settings::new(&config, &map).map_err(placed)?;
+    let map = MapFile::from_yaml(&text).map_err(|error| placed(&error))?;
+    let settings = Settings::new(&config, &map).map_err(|error| placed(&error))?;
     let bridge = match settings.source {
         Source::Log => {
             let (file, length) = setup.file_opened("log_file")?;

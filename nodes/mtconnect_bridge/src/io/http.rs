@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use http_body_util::{BodyExt, Empty, Limited};
+use http_body_util::{BodyExt, Empty, LengthLimitError, Limited};
 use hyper::body::{Bytes, Incoming};
 use hyper::client::conn::http1;
 use hyper::{Request, Response};
@@ -80,7 +80,10 @@ async fn get_within(address: &str, path: &str, limit: Duration) -> Result<(u16, 
         let answer = ask(address, path).await?;
         let status = answer.status().as_u16();
         let body = Limited::new(answer.into_body(), PART_LIMIT).collect().await;
-        let body = body.map_err(|error| error.to_string())?;
+        let body = body.map_err(|error| match error.is::<LengthLimitError>() {
+            true => format!("an answer above {PART_LIMIT} bytes: ask for one device (agent.device, or /DEVICE/probe)"),
+            false => error.to_string(),
+        })?;
         Ok((status, body.to_bytes().to_vec()))
     };
     let answer = timeout(limit, whole).await;
@@ -158,6 +161,29 @@ mod tests {
     use std::net::TcpListener;
 
     use super::*;
+
+    #[test]
+    fn an_answer_over_the_limit_is_refused_with_what_to_ask_for() {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        let port = listener.local_addr().unwrap().port();
+        let agent = std::thread::spawn(move || {
+            let (mut socket, _) = listener.accept().unwrap();
+            let mut heard = [0_u8; 512];
+            assert!(socket.read(&mut heard).unwrap() > 0);
+            let length = PART_LIMIT + 1;
+            let head = format!("HTTP/1.1 200 OK\r\nContent-Length: {length}\r\n\r\n");
+            socket.write_all(head.as_bytes()).unwrap();
+            // Nobody reads it to its end.
+            let _ = socket.write_all(&vec![b' '; length]);
+        });
+        let refused = fetch(&format!("http://127.0.0.1:{port}/probe")).unwrap_err();
+        let words = refused.to_string();
+        assert!(
+            words.contains("an answer above 4194304 bytes: ask for one device"),
+            "{words}"
+        );
+        agent.join().unwrap();
+    }
 
     /// It sends a byte now and then and never ends; the answer is given up by the limit and not by the agent.
     #[test]

@@ -45,6 +45,8 @@ struct Reader<'a> {
     pieces: Vec<(Stamp<Machine>, Stamp<Machine>)>,
     /// Numbers of the spindle and the axes up to the order's end.
     numbers: u64,
+    /// The first stamp that is a number and no date, ms.
+    first_count_ms: Option<f64>,
 }
 
 impl Reader<'_> {
@@ -55,6 +57,9 @@ impl Reader<'_> {
         };
         if time == MachineTime::Absent {
             return self.account.leave("values without a time", line);
+        }
+        if let MachineTime::Relative(at_ms) = time {
+            let _ = self.first_count_ms.get_or_insert(at_ms);
         }
         let at = self.clock.stamp(time, Stamp::<Host>::default());
         match self.pieces.last_mut() {
@@ -133,7 +138,7 @@ impl Reader<'_> {
         };
         let reaches = format!("it reaches from {} to {}", words(first), words(last));
         if covered.is_empty() {
-            let remedy = "correct from and to in the order, with an offset such as +01:00 where they are local times: without one they are UTC";
+            let remedy = self.first_count_ms.and_then(since_1970).unwrap_or_else(|| "correct from and to in the order, with an offset such as +01:00 where they are local times: without one they are UTC".to_owned());
             return Some(match self.hole() {
                 Some((last, next)) => format!(
                     "{reaches} and has nothing from {} to {}: {remedy}",
@@ -149,6 +154,22 @@ impl Reader<'_> {
             )
         })
     }
+}
+
+/// What to do about stamps without a date that count from 1970 by their size: ms, or s that were taken for ms.
+fn since_1970(first_ms: f64) -> Option<String> {
+    let (unit, s) = if (1e12..4.29e12).contains(&first_ms) {
+        ("ms", first_ms / 1e3)
+    } else if (1e9..4.29e9).contains(&first_ms) {
+        ("s", first_ms)
+    } else {
+        return None;
+    };
+    let at = Stamp::<Machine>::from_nanos(Span::from_secs_f64(s).nanos());
+    Some(format!(
+        "its stamps are numbers without a date, {first_ms} first; as {unit} since 1970 this is {}: write the stamps as such dates",
+        words(at)
+    ))
 }
 
 /// Whether a value that the programs need is not a number or is out of range.
@@ -184,6 +205,7 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
         },
         pieces: Vec::new(),
         numbers: 0,
+        first_count_ms: None,
     };
     let leaps = read(&log.text, &mut reader);
     let covered = reader.covered();

@@ -4,7 +4,7 @@
 
 use metrology::stamp::{Host, NANOS_PER_S};
 use metrology::{Severity, Stage, Stamp};
-use mtconnect_bridge::condition::Condition;
+use mtconnect_bridge::condition::{Condition, ValueCondition};
 use mtconnect_bridge::config::{AgentConfig, ConnectionConfig, Source};
 use mtconnect_bridge::io::LogFile;
 use mtconnect_bridge::live::{LiveBridge, LiveInput};
@@ -267,10 +267,9 @@ fn a_value_that_no_message_holds_is_left_out_by_its_line_and_not_known() {
     let words: Vec<String> = said.iter().map(ToString::to_string).collect();
     let wanted = "log line 2: prog: a value of 65537 bytes, limit 65536: left out; 1 so far";
     assert!(words.contains(&wanted.to_owned()), "{words:?}");
-    assert!(
-        said.iter()
-            .any(|one| matches!(one, Condition::Absent { name, .. } if name == "prog"))
-    );
+    assert!(said.iter().any(
+        |one| matches!(one, Condition::Value(ValueCondition::Absent { name, .. }) if name == "prog")
+    ));
 }
 
 #[test]
@@ -315,7 +314,7 @@ fn what_stands_before_and_behind_a_block_without_its_end_is_read() {
     );
     let alarm = replayed(MAP, log)
         .into_iter()
-        .any(|one| matches!(one, Condition::Alarm { .. }));
+        .any(|one| matches!(one, Condition::Value(ValueCondition::Alarm { .. })));
     assert!(alarm);
 }
 

@@ -13,7 +13,7 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use metrology::{Severity, Stage};
-use mtconnect_bridge::condition::Condition;
+use mtconnect_bridge::condition::{Condition, ValueCondition};
 use mtconnect_bridge::config::{AgentConfig, ConnectionConfig, Source};
 use mtconnect_bridge::io::host_now;
 use mtconnect_bridge::live::{LiveBridge, LiveInput};
@@ -431,7 +431,7 @@ fn a_cut_line_loses_nothing_and_an_agent_that_starts_anew_is_begun_anew() {
         "{said:#?}"
     );
     // While the line was cut nothing was known.
-    let absent = |output: &Output| matches!(output, Output::Condition(Condition::Absent { name, .. }) if name == "ex");
+    let absent = |output: &Output| matches!(output, Output::Condition(Condition::Value(ValueCondition::Absent { name, .. })) if name == "ex");
     assert_eq!(said.iter().filter(|output| absent(output)).count(), 1);
     let asked = asked(&paths);
     let wanted = [
@@ -561,7 +561,7 @@ fn an_agent_that_always_begins_behind_is_asked_after_growing_pauses_and_no_value
     );
     let absent = conditions(&said)
         .into_iter()
-        .filter(|one| matches!(one, Condition::Absent { .. }));
+        .filter(|one| matches!(one, Condition::Value(ValueCondition::Absent { .. })));
     assert_eq!(absent.count(), 1);
     assert!(asked(&paths).len() >= 9);
 }

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use metrology::{Host, Stage, Stamp};
-use mtconnect_bridge::condition::Condition;
+use mtconnect_bridge::condition::{Condition, ValueCondition};
 use mtconnect_bridge::config::{AgentConfig, ConnectionConfig, Source};
 use mtconnect_bridge::mapping::MapFile;
 use mtconnect_bridge::stage::IoEvent;
@@ -71,7 +71,9 @@ fn a_temperature_is_published_within_its_range_alone() {
         let published: Vec<f64> = published.collect();
         assert_eq!(published.len(), usize::from(is_taken), "{key} {text}");
         let refused = out.iter().find_map(|output| match output {
-            Output::Condition(wrong @ Condition::OutOfRange { .. }) => Some(wrong.to_string()),
+            Output::Condition(wrong @ Condition::Value(ValueCondition::OutOfRange { .. })) => {
+                Some(wrong.to_string())
+            }
             _ => None,
         });
         assert_eq!(refused.is_none(), is_taken, "{key} {text}: {refused:?}");
@@ -127,7 +129,9 @@ fn every_number_is_published_within_the_range_of_its_quantity_alone() {
             let map = if key == "P" { PATH } else { MAP };
             let out = heard(map, &format!("2026-11-26T10:00:00.0Z|{key}|{text}\n"));
             let refused = out.iter().find_map(|output| match output {
-                Output::Condition(wrong @ Condition::OutOfRange { .. }) => Some(wrong.to_string()),
+                Output::Condition(wrong @ Condition::Value(ValueCondition::OutOfRange { .. })) => {
+                    Some(wrong.to_string())
+                }
                 _ => None,
             });
             let wanted = (!is_taken).then(|| format!("{key}: {text}: {words}"));

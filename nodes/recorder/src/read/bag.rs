@@ -9,6 +9,7 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use mcap::records::{Record, op};
+use metrology::text::{self, Comments};
 
 use super::description;
 use super::file_order::FileOrder;
@@ -21,6 +22,7 @@ use super::{
     Attachment, Inner, LARGEST_READ_CHUNK_BYTES, Loss, LossReason, Messages, Order, TopicId,
     TopicInfo,
 };
+use crate::context::{self, MACHINE_FILE};
 use crate::error::RecorderError;
 use crate::layout::{METADATA_FILE, TimeSpan, file_names_of};
 
@@ -106,6 +108,8 @@ impl Bag {
             bag.add_file(name, FileIndex::read(&mut file));
         }
         bag.description = bag.described_wrongly();
+        let attached_wrongly = bag.attached_wrongly();
+        bag.description.extend(attached_wrongly);
         Ok(bag)
     }
 
@@ -128,7 +132,29 @@ impl Bag {
         faults.into_iter().map(loss).collect()
     }
 
-    /// What is wrong with the description beside the files; their messages are not lost by it.
+    /// What is wrong with the machine file: it is not the recorded one, or nobody can read it.
+    fn attached_wrongly(&self) -> Option<Loss> {
+        let what = match self.attachment(MACHINE_FILE) {
+            Ok(None) => return None,
+            Ok(Some(found)) if found.data.trim_ascii().is_empty() => {
+                format!("{MACHINE_FILE}: is empty")
+            }
+            Ok(Some(found)) => match text::decode(&found.data, Comments::Yaml) {
+                Ok(_) => return None,
+                Err(wrong) => format!("{MACHINE_FILE}:{wrong}"),
+            },
+            Err(error) => error.to_string(),
+        };
+        let reason = LossReason::Attachment { what };
+        let place = self.files.iter().find_map(|file| {
+            let mut attached = file.index.attachments.iter();
+            Some((file, attached.find(|it| it.name == MACHINE_FILE)?.at))
+        });
+        let place = place.or_else(|| Some((self.files.first()?, 0)));
+        place.map(|(file, at)| file.loss(at, reason, 0))
+    }
+
+    /// What is wrong with the description beside the files and with the machine file; no message is lost by it.
     #[must_use]
     pub fn description_losses(&self) -> &[Loss] {
         &self.description
@@ -250,11 +276,21 @@ impl Bag {
         places.map(|place| place.name.as_str())
     }
 
-    /// An attachment, `None` where there is none of this name.
+    /// An attachment, `None` where there is none of this name and none was recorded.
+    ///
+    /// # Errors
+    /// It is there and cannot be read, or it is not the one whose hash was recorded.
+    pub fn attachment(&self, name: &str) -> Result<Option<Attachment>, RecorderError> {
+        let found = self.stored(name)?;
+        context::verify(self, name, found.as_ref())?;
+        Ok(found)
+    }
+
+    /// An attachment as it is there, whatever hash was recorded.
     ///
     /// # Errors
     /// It is there and cannot be read.
-    pub fn attachment(&self, name: &str) -> Result<Option<Attachment>, RecorderError> {
+    pub(crate) fn stored(&self, name: &str) -> Result<Option<Attachment>, RecorderError> {
         for file in &self.files {
             if let Some(place) = file.index.attachments.iter().find(|a| a.name == name) {
                 return match read_attachment(file, place.at) {

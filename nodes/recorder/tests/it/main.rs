@@ -9,6 +9,7 @@
 mod damage;
 mod foreign;
 mod full_disk;
+mod machine_file;
 #[cfg(feature = "peers")]
 mod peers;
 mod queue;

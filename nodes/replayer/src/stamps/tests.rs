@@ -1,5 +1,6 @@
 use abbe_msgs::Message;
-use abbe_msgs::msg::{AxisState, GeometryModel, TestSegment};
+use abbe_msgs::msg::{AxisState, GeometryModel, ProbeTrigger, TestSegment};
+use abbe_msgs::sensor_msgs::msg::Temperature;
 use recorder::{Channel, Directory, MessageStamp, RecorderConfig, Recording};
 
 use super::*;
@@ -27,9 +28,11 @@ fn bytes(stamp_nanos: i64) -> Vec<u8> {
     .concat()
 }
 
-/// Numbers, from 0, of each topic's messages that are found in a bag of `topics`.
-fn found(topics: &[(&str, &str, Vec<Times>)]) -> Vec<Vec<usize>> {
-    let home = tempfile::tempdir().unwrap();
+/// A topic, its type, its messages.
+type Of<'t> = (&'t str, &'t str, Vec<Times>);
+
+/// A bag of `topics`.
+fn bag_of(home: &tempfile::TempDir, topics: &[Of<'_>]) -> Bag {
     let path = home.path().join("bag");
     let directory = Directory::create(&path).unwrap();
     let mut recording = Recording::begin(directory, "bag", RecorderConfig::default()).unwrap();
@@ -59,7 +62,13 @@ fn found(topics: &[(&str, &str, Vec<Times>)]) -> Vec<Vec<usize>> {
         recording.write(id, at, &bytes(stamp)).unwrap();
     }
     recording.finish().unwrap();
-    let bag = Bag::open(&path).unwrap();
+    Bag::open(&path).unwrap()
+}
+
+/// Numbers, from 0, of each topic's messages that are found in a bag of `topics`.
+fn found(topics: &[Of<'_>]) -> Vec<Vec<usize>> {
+    let home = tempfile::tempdir().unwrap();
+    let bag = bag_of(&home, topics);
     let wrong = WrongStamps::of(&bag);
     let place = |name: &str| {
         bag.topics()
@@ -67,7 +76,7 @@ fn found(topics: &[(&str, &str, Vec<Times>)]) -> Vec<Vec<usize>> {
             .position(|info| info.topic == name)
             .unwrap()
     };
-    let of = |(topic, _, messages): &(&str, &str, Vec<Times>)| {
+    let of = |(topic, _, messages): &Of<'_>| {
         let is_found = |(log, stamp): &Times| {
             let key = (place(topic), nanos(*log).unsigned_abs(), nanos(*stamp));
             wrong.found.contains_key(&key)
@@ -226,4 +235,126 @@ fn a_wrong_log_time_is_no_wrong_stamp() {
     let mut all = states();
     all[1_999].0 = 10.0 * DAY_S;
     assert_eq!(of_states(all), Vec::<usize>::new());
+}
+
+/// What is said of each topic of a bag whose stamps are all of another time.
+fn other_clocks(topics: &[Of<'_>]) -> Vec<(String, String)> {
+    let home = tempfile::tempdir().unwrap();
+    let bag = bag_of(&home, topics);
+    let wrong = WrongStamps::of(&bag);
+    assert!(wrong.found.is_empty(), "{:?}", wrong.found);
+    let mut messages = bag.messages(Order::File);
+    let mut said = BTreeMap::new();
+    while let Some(Event::Message(message)) = messages.next_event() {
+        if let Some(what) = wrong.other_clock(message.topic) {
+            said.insert(bag.topic(message.topic).topic.clone(), what);
+        }
+    }
+    said.into_iter().collect()
+}
+
+const SESSION: [(&str, &str); 5] = [
+    ("/axes/state", AxisState::TYPE_NAME),
+    ("/probe/trigger", ProbeTrigger::TYPE_NAME),
+    ("/temperature/bed", Temperature::TYPE_NAME),
+    ("/temperature/nut_z", Temperature::TYPE_NAME),
+    ("/test/segment", TestSegment::TYPE_NAME),
+];
+
+/// A session whose topics that begin with one of `names` are stamped `by_s` later.
+fn session(names: &[&str], by_s: f64) -> Vec<Of<'static>> {
+    let every = |s: f64| {
+        let times = (1..).map(move |n| f64::from(n) * s);
+        times.take_while(|at| *at < 20.0).collect::<Vec<f64>>()
+    };
+    let topic = |(name, type_name): (&'static str, &'static str)| {
+        let is_late = names.iter().any(|late| name.starts_with(*late));
+        let by_s = if is_late { by_s } else { 0.0 };
+        let at = match name {
+            "/axes/state" => every(0.01),
+            "/probe/trigger" => every(1.0),
+            _ => every(4.5),
+        };
+        let times: Vec<Times> = at.into_iter().map(|at| (at, at + by_s)).collect();
+        (name, type_name, times)
+    };
+    SESSION.into_iter().map(topic).collect()
+}
+
+#[test]
+fn a_topic_whose_stamps_are_all_of_another_time_than_those_of_the_others_is_named() {
+    for (by_s, words) in [
+        (
+            3_600.0,
+            "its stamps are 3600 s from those of the other topics, later",
+        ),
+        (
+            7_200.0,
+            "its stamps are 7200 s from those of the other topics, later",
+        ),
+        (
+            -90.0,
+            "its stamps are 90 s from those of the other topics, earlier",
+        ),
+        (
+            -DAY_S,
+            "its stamps are 86400 s from those of the other topics, earlier",
+        ),
+    ] {
+        for names in [
+            &["/probe/trigger"][..],
+            &["/test/segment"],
+            &["/axes/state"],
+            &["/temperature/bed"],
+            &["/temperature/nut_z"],
+            &["/temperature/bed", "/temperature/nut_z"],
+        ] {
+            let said = other_clocks(&session(names, by_s));
+            let topics: Vec<&str> = said.iter().map(|(topic, _)| topic.as_str()).collect();
+            assert_eq!(topics, names, "{by_s}");
+            for (topic, what) in &said {
+                assert!(what.starts_with(words), "{topic}: {what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn topics_of_one_clock_and_topics_without_a_steady_offset_are_not_named() {
+    for by_s in [0.0, DAY_S, -DAY_S] {
+        let said = other_clocks(&session(&["/"], by_s));
+        assert!(said.is_empty(), "{by_s}: {said:?}");
+    }
+    // A clock that was set for the second half of every topic; the thermometers begin only then.
+    let mut set = session(&[], 0.0);
+    for (name, _, times) in &mut set {
+        if name.starts_with("/temperature/") {
+            times.retain(|(log, _)| *log >= 10.0);
+        }
+        let late = times.iter_mut().filter(|(log, _)| *log >= 10.0);
+        late.for_each(|(_, stamp)| *stamp += DAY_S);
+    }
+    let said = other_clocks(&set);
+    assert!(said.is_empty(), "{said:?}");
+    // A latched model is as old as it likes to be.
+    let mut latched = session(&[], 0.0);
+    let model = vec![(5.0, -DAY_S), (6.0, 1.0 - DAY_S)];
+    latched.push(("/geometry/model", GeometryModel::TYPE_NAME, model));
+    let said = other_clocks(&latched);
+    assert!(said.is_empty(), "{said:?}");
+}
+
+#[test]
+fn one_wrong_stamp_among_four_readings_of_a_thermometer_is_found() {
+    for by_s in [100.0, 3_600.0, -3_600.0, DAY_S, -DAY_S] {
+        for place in 0..4 {
+            let mut all = session(&[], 0.0);
+            let (name, _, readings) = &mut all[3];
+            assert_eq!((*name, readings.len()), ("/temperature/nut_z", 4));
+            readings[place].1 += by_s;
+            let mut wanted: Vec<Vec<usize>> = vec![vec![]; SESSION.len()];
+            wanted[3] = vec![place];
+            assert_eq!(found(&all), wanted, "{by_s} at {place}");
+        }
+    }
 }

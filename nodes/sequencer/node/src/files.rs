@@ -21,8 +21,11 @@ pub(crate) fn placed(error: &SequencerError, text: &str, path: &Path) -> anyhow:
     anyhow!("plan {}", yaml::placed(&file, text, &error.to_string()))
 }
 
-/// Reads every program of `plan`; paths are relative to the plan's file.
-pub(crate) fn programs(plan: &Plan, plan_path: &Path) -> Result<BTreeMap<String, String>> {
+/// Reads every program of `plan`, by the name that the plan has for it; paths are relative to the plan's file.
+///
+/// # Errors
+/// With the plan's file, the step and why a program cannot be read.
+pub fn programs(plan: &Plan, plan_path: &Path) -> Result<BTreeMap<String, String>> {
     let folder = plan_path.parent().unwrap_or_else(|| Path::new(""));
     let mut programs = BTreeMap::new();
     for (at, step) in plan.steps.iter().enumerate() {

@@ -12,7 +12,7 @@ use sequencer::{Config, Input, Sequencer};
 mod files;
 mod forms;
 
-pub use files::plan as read_plan;
+pub use files::{plan as read_plan, programs as read_programs};
 
 /// Time between two looks at the plan.
 const TICK: Span = Span::from_nanos(100_000_000);

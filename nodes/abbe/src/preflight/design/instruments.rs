@@ -142,6 +142,41 @@ impl Shop {
         self.minutes.get(&means).copied().unwrap_or(0.0)
     }
 
+    /// What is stated of an instrument that is not at hand, and what it then is good for; `floored`: instruments whose noise
+    /// is stated, `offered`: instruments of the tests of this machine.
+    pub fn beside(
+        &self,
+        mountings: &[Mounting],
+        floored: &[Instrument],
+        offered: &[Means],
+    ) -> Vec<String> {
+        let mounted = mountings
+            .iter()
+            .map(|one| (format!("--mounting {}", one.means), one.means));
+        let floors = floored.iter().filter_map(|instrument| {
+            Some((format!("--floor {instrument}"), read_by(*instrument)?))
+        });
+        let of = |(option, means): (String, Means)| {
+            let is_of_a_test = offered.contains(&means);
+            if self.has(means) && (is_of_a_test || option.starts_with("--floor")) {
+                None
+            } else if is_of_a_test {
+                Some(format!(
+                    "{option}: --with does not name {means}: it counts only for tests that other instruments would add."
+                ))
+            } else if self.has(means) {
+                Some(format!(
+                    "{option} has no effect: no test is set up with {means}."
+                ))
+            } else {
+                Some(format!(
+                    "{option} has no effect: --with does not name {means}, and no test of this machine needs it."
+                ))
+            }
+        };
+        mounted.chain(floors).filter_map(of).collect()
+    }
+
     /// Floors of what can be read: motor encoders always, scales where they are at hand, every other instrument for tests
     /// that would need it.
     pub fn read(&self, mut floors: Floors) -> Floors {
@@ -158,6 +193,19 @@ impl Shop {
             equipped.temperature_sensors.clear();
         }
         equipped
+    }
+}
+
+/// What a shop has to have for an instrument of a bag; none: every machine has it.
+const fn read_by(instrument: Instrument) -> Option<Means> {
+    match instrument {
+        Instrument::Motor => None,
+        Instrument::Scale => Some(Means::Scales),
+        Instrument::Grid => Some(Means::Grid),
+        Instrument::Radial => Some(Means::Ballbar),
+        Instrument::Length => Some(Means::Laser),
+        Instrument::Touch => Some(Means::Probe),
+        Instrument::Thermometer => Some(Means::Thermometers),
     }
 }
 
@@ -220,5 +268,26 @@ mod tests {
         let shop = Shop::new(&[Means::Laser], &laser, &machine).unwrap();
         assert!((shop.minutes(Means::Laser) - 12.0).abs() < 1e-12);
         assert!(shop.equipped(&machine).temperature_sensors.is_empty());
+    }
+
+    #[test]
+    fn what_is_stated_of_an_instrument_that_is_not_at_hand_is_reported() {
+        let machine = MachineFile::parse(GAP_FIRST, "machine.yaml").unwrap();
+        let mountings = [mounting("laser=5").unwrap(), mounting("probe=2").unwrap()];
+        let shop = Shop::new(&[Means::Probe], &mountings, &machine).unwrap();
+        let floored = [Instrument::Grid, Instrument::Touch, Instrument::Motor];
+        let said = shop.beside(&mountings, &floored, &[Means::Probe, Means::Grid]);
+        assert_eq!(said.len(), 2, "{said:?}");
+        assert!(
+            said[0].starts_with("--mounting laser has no effect"),
+            "{said:?}"
+        );
+        assert!(
+            said[1].starts_with("--floor grid: --with does not name grid"),
+            "{said:?}"
+        );
+        let scales = mounting("scales=5").unwrap();
+        let none = shop.beside(&[scales], &[], &[Means::Probe]);
+        assert!(none[0].contains("has no effect"), "{none:?}");
     }
 }

@@ -160,6 +160,7 @@ fn minutes_out_of_range_are_refused_before_anything_is_written() {
             mounting: &[],
             likely: None,
             floors: &|machine: &MachineFile| super::super::floors::floors(machine, &[]),
+            floored: &[],
             out: &out,
             html: None,
             json: false,

@@ -226,7 +226,7 @@ pub(super) fn section(
     let at = || faces.values().flatten().map(|reading| reading.at);
     let beside = at().min().zip(at().max());
     let beside = beside.map_or_else(Vec::new, |(from, to)| temperatures(drift, from, to));
-    show_temperatures(&mut section, &beside);
+    show_temperatures(&mut section, drift, &beside);
     section.figures = json!({
         "test": section.title,
         "iso230_3": drifts,

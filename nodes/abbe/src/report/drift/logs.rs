@@ -59,7 +59,7 @@ pub(super) fn section(log: &DriftLog, drift: &Drift, budget: Option<&Budget>) ->
             None
         }
     };
-    show_temperatures(&mut section, &beside);
+    show_temperatures(&mut section, drift, &beside);
     section.drawings = drawings(log, drift, &values, (*from, *to))?;
     section.figures = json!({
         "test": section.title,

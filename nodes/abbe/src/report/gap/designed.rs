@@ -65,13 +65,25 @@ fn sentences(design: &Design) -> Vec<String> {
             three(rung.minutes)
         ),
         format!(
-            "{} of {} effects will be named at their stated size; {} will not show, and {} pairs stay together.",
+            "{} of {} effects will be named at their stated size; {} will not show; {} will show without a sure name{}: too near the noise, or too like another effect. {} pairs of those that show stay together.",
             rung.named,
             design.effects.len(),
             design.hidden.len(),
+            design.unsure.len(),
+            in_brackets(&design.unsure),
             design.together.len()
         ),
     ]
+}
+
+/// The first names, and how many more there are.
+fn in_brackets(names: &[String]) -> String {
+    const LISTED: usize = 5;
+    match names.len().checked_sub(LISTED) {
+        _ if names.is_empty() => String::new(),
+        None | Some(0) => format!(" ({})", names.join(", ")),
+        Some(more) => format!(" ({} and {more} more)", names[..LISTED].join(", ")),
+    }
 }
 
 fn programme(order: Vec<Vec<String>>) -> Section {
@@ -194,5 +206,19 @@ fn words(remedy: &Remedy) -> String {
         }
         Remedy::Beyond(words) if words.is_empty() => "—".to_owned(),
         Remedy::Beyond(words) => format!("no test here; {words}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_in_brackets_are_five_at_most_and_the_others_are_counted() {
+        let names: Vec<String> = (1..=7).map(|k| format!("backlash {k}")).collect();
+        assert_eq!(in_brackets(&[]), "");
+        assert_eq!(in_brackets(&names[..1]), " (backlash 1)");
+        assert!(in_brackets(&names[..5]).ends_with("backlash 5)"));
+        assert!(in_brackets(&names).ends_with("backlash 5 and 2 more)"));
     }
 }

@@ -45,6 +45,22 @@ fn a_file_that_is_no_database_is_refused() {
 }
 
 #[test]
+fn a_device_is_refused_by_its_kind() {
+    let path = Path::new("/dev/zero");
+    for opened in [
+        Store::open(path, IMPATIENT),
+        Store::open_to_read(path, IMPATIENT),
+    ] {
+        let error = opened.unwrap_err();
+        assert!(
+            matches!(error, HistoryError::NotRegular { .. }),
+            "{error:?}"
+        );
+        names(&error, path, "--store");
+    }
+}
+
+#[test]
 fn a_database_of_another_program_is_left_alone() {
     let home = tempfile::tempdir().unwrap();
     let path = home.path().join("songs.sqlite");

@@ -2,8 +2,8 @@
 
 use granit_parser::{Event, Parser, ScalarStyle, Span};
 
-/// Most nodes that are remembered; what comes later has the place of what is around it.
-const MOST_NODES: usize = 200_000;
+/// Most nodes that are remembered, as many as the library reads; what comes later has the place of what is around it.
+const MOST_NODES: usize = 250_000;
 /// Deepest path that is shown.
 const DEEPEST: usize = 64;
 

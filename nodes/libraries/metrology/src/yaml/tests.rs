@@ -60,6 +60,15 @@ pub const LIBRARY_WORDS: [&str; 14] = [
 ];
 
 #[test]
+fn a_file_that_is_too_large_or_too_deep_is_refused_with_its_size_and_the_limit() {
+    let long = read::<Vec<String>>(&"- a\n".repeat(250_001)).unwrap_err();
+    assert!(
+        long.rule.contains("keys and values") && long.rule.contains("at most 250000 are read"),
+        "{long}"
+    );
+}
+
+#[test]
 #[expect(
     clippy::too_many_lines,
     reason = "a table of cases, read from top to bottom"

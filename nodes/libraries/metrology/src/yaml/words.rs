@@ -1,6 +1,7 @@
 //! The YAML library's errors in this product's words.
 
-use serde_saphyr::{Error, Location};
+use serde_saphyr::budget::BudgetBreach;
+use serde_saphyr::{Budget, Error, Location};
 
 use super::homes::home_of;
 use super::places::{Kind, Place, Places};
@@ -355,11 +356,11 @@ fn rule(error: &Error, key: &str) -> String {
         }
         Error::UnknownAnchor { .. } => "the name behind `*` is not defined above by `&`".to_owned(),
         Error::Message { msg, .. } | Error::SerdeVariantId { msg, .. } => own(msg, key),
-        Error::Budget { .. }
-        | Error::AliasReplayLimitExceeded { .. }
+        Error::Budget { breach, .. } => too_large(breach),
+        Error::AliasReplayLimitExceeded { .. }
         | Error::AliasExpansionLimitExceeded { .. }
         | Error::AliasReplayStackDepthExceeded { .. } => {
-            "the file is larger or deeper than any that belongs here: simplify it".to_owned()
+            "the aliases `*` bring more values than any file that belongs here: write the values out".to_owned()
         }
         Error::ExternallyTaggedEnumExpectedScalarOrMapping { .. }
         | Error::ExpectedStringKeyForExternallyTaggedEnum { .. }
@@ -369,6 +370,41 @@ fn rule(error: &Error, key: &str) -> String {
         Error::UnexpectedValueForUnitEnumVariant { .. } => must("a name without values"),
         _ => "is not what belongs here: see the README for what does".to_owned(),
     }
+}
+
+/// A file that is larger or deeper than what is read, with what it has and the limit.
+fn too_large(breach: &BudgetBreach) -> String {
+    let limits = Budget::default();
+    let (value, what, limit) = match breach {
+        BudgetBreach::Nodes { nodes } => (*nodes, "keys and values", limits.max_nodes),
+        BudgetBreach::Events { events } => (*events, "parts", limits.max_events),
+        BudgetBreach::Depth { depth } => (*depth, "levels below each other", limits.max_depth),
+        BudgetBreach::Aliases { aliases } => (*aliases, "aliases `*`", limits.max_aliases),
+        BudgetBreach::Anchors { anchors } => (*anchors, "anchors `&`", limits.max_anchors),
+        BudgetBreach::Documents { documents } => (*documents, "documents", limits.max_documents),
+        BudgetBreach::ScalarBytes { total_scalar_bytes } => (
+            *total_scalar_bytes,
+            "bytes of keys and values",
+            limits.max_total_scalar_bytes,
+        ),
+        BudgetBreach::CommentBytes {
+            total_comment_bytes,
+        } => (
+            *total_comment_bytes,
+            "bytes of comments",
+            limits.max_total_comment_bytes,
+        ),
+        BudgetBreach::MergeKeys { merge_keys } => {
+            (*merge_keys, "merge keys `<<`", limits.max_merge_keys)
+        }
+        _ => {
+            return "the file is larger or deeper than any that belongs here: simplify it"
+                .to_owned();
+        }
+    };
+    format!(
+        "the file has {value} {what} up to here, at most {limit} are read: simplify or split it"
+    )
 }
 
 /// A message of one of our own types; serde's own phrases are turned.

@@ -151,8 +151,10 @@ const DIAGNOSTICS_PAUSE: Duration = Duration::from_millis(100);
 const NOT_TAKEN: &str = "not taken by the node";
 /// Why a sample was refused that another type's publisher sent.
 const FOREIGN_TYPE: &str = "of another type";
-/// Events handled before chores are looked at again.
+/// Events handled before chores and the wish to stop are looked at again.
 const BATCH: usize = 256;
+/// Events are handled for no longer than this before the same; the one at hand is ended.
+const TURN: Duration = Duration::from_millis(20);
 
 fn now() -> Instant {
     Instant::now()
@@ -176,9 +178,11 @@ impl Owner {
         while !self.is_done() {
             let wake = self.wake();
             tokio::select! {
+                // The wish to stop first, however much waits.
+                biased;
+                Ok(()) = stop.changed() => self.told(*stop.borrow_and_update()),
                 Some(incoming) = self.queue.recv() => self.batch(incoming),
                 () = tokio::time::sleep_until(wake) => {}
-                Ok(()) = stop.changed() => self.told(*stop.borrow_and_update()),
             }
             self.chores(now());
             if !self.has_told_parameters && now() >= met_by {
@@ -197,8 +201,12 @@ impl Owner {
     }
 
     fn batch(&mut self, first: Incoming) {
+        let until = now() + TURN;
         self.take(first);
         for _ in 1..BATCH {
+            if now() >= until {
+                return;
+            }
             match self.queue.try_recv() {
                 Ok(incoming) => self.take(incoming),
                 Err(_) => return,

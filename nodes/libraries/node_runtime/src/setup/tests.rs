@@ -126,6 +126,22 @@ fn a_value_outside_of_its_range_or_of_a_wrong_kind_is_refused() {
 }
 
 #[test]
+fn an_entry_of_a_list_outside_of_the_range_is_refused_with_its_place_and_value() {
+    let range = Some((-1000.0, 1000.0));
+    let doubles = Value::DoubleArray(vec![80.0, 1e308]);
+    let integers = Value::IntegerArray(vec![-1001]);
+    assert_eq!(
+        check_range(&doubles, range),
+        Err("entry [1] = 1e308: must be -1000 to 1000".to_owned())
+    );
+    assert_eq!(
+        check_range(&integers, range),
+        Err("entry [0] = -1001: must be -1000 to 1000".to_owned())
+    );
+    assert_eq!(check_range(&Value::DoubleArray(vec![80.0]), range), Ok(()));
+}
+
+#[test]
 fn a_bad_default_is_said_with_the_file_that_does_not_set_it() {
     let config = Config {
         rate_hz: 1000.0,

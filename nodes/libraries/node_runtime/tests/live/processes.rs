@@ -170,6 +170,41 @@ fn a_second_sigint_ends_a_node_that_winds_down_and_is_said() {
     pinging.stop().unwrap();
 }
 
+/// `nohup` and `trap '' HUP` start a program with the signal ignored.
+#[test]
+fn a_closed_terminal_ends_a_node_in_good_order_unless_the_signal_was_ignored_before() {
+    let environment = environment(24);
+    let (pinging, received) = pinger(&environment, 10_000);
+    let process = Process::start(&environment, &[]);
+    wait(&received, "the first echo", Some);
+    process.signal("-HUP");
+    let output = process.output();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+
+    let mut ignoring = Command::new("sh");
+    ignoring
+        .args(["-c", "trap '' HUP; exec \"$0\""])
+        .arg(env!("CARGO_BIN_EXE_relay"))
+        .env_remove("RUST_LOG")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    put_into(&mut ignoring, &environment);
+    // Echoes of the one before.
+    while received.try_recv().is_ok() {}
+    let mut process = Process(Some(ignoring.spawn().unwrap()));
+    wait(&received, "the first echo", Some);
+    process.signal("-HUP");
+    std::thread::sleep(Duration::from_millis(1_000));
+    let ended = process.0.as_mut().unwrap().try_wait().unwrap();
+    assert!(ended.is_none(), "{ended:?}");
+    process.signal("-TERM");
+    let output = process.output();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    pinging.stop().unwrap();
+}
+
 #[test]
 fn arguments_rename_place_and_parametrise_a_program() {
     let environment = environment(11);

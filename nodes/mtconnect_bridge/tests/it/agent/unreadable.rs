@@ -34,7 +34,7 @@ fn a_part_that_cannot_be_read_is_left_out_and_said_and_the_next_is_told() {
     let lost = |one: &&Condition| {
         matches!(
             one,
-            Condition::Disconnected { .. } | Condition::Absent { .. }
+            Condition::Disconnected { .. } | Condition::Value(ValueCondition::Absent { .. })
         )
     };
     assert_eq!(conditions(&said).into_iter().find(lost), None);
@@ -105,7 +105,7 @@ fn after_many_parts_that_cannot_be_read_no_value_is_known_any_more() {
         open(streams(7, 1, 13, &[exec(12, "STOPPED")])),
     ]);
     let said = heard(&mut bridge(port), |output| is_value(output, "STOPPED"));
-    let is_absent = |one: &Condition| matches!(one, Condition::Absent { name, .. } if name == "ex");
+    let is_absent = |one: &Condition| matches!(one, Condition::Value(ValueCondition::Absent { name, .. }) if name == "ex");
     assert!(conditions(&said).into_iter().any(is_absent));
     let left_out = |one: &&Condition| matches!(one, Condition::PartLeftOut { .. });
     assert_eq!(conditions(&said).into_iter().filter(left_out).count(), 3);
@@ -142,7 +142,7 @@ fn a_current_that_stays_unreadable_is_asked_after_growing_pauses_and_each_is_tol
         })
         .collect();
     assert_eq!(pauses_ms, [50.0, 100.0, 200.0]);
-    let is_absent = |one: &Condition| matches!(one, Condition::Absent { name, .. } if name == "ex");
+    let is_absent = |one: &Condition| matches!(one, Condition::Value(ValueCondition::Absent { name, .. }) if name == "ex");
     assert!(conditions(&said).into_iter().any(is_absent));
     assert_eq!(asked(&paths).len(), 11);
 }

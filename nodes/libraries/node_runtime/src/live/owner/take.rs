@@ -77,6 +77,9 @@ impl Owner {
                 }
             }
             Incoming::Timer { timer, missed } => {
+                if let Timers::Host(Some(timers)) = &self.timers {
+                    timers.taken(timer);
+                }
                 self.missed(timer, missed);
                 let at = self.instant(None);
                 self.hand(at, Event::Timer { timer });

@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
+use metrology::stamp::{Host, Span, Stamp};
+
 use crate::values::UNMAPPED_LIMIT;
 
 /// How often something was left out.
@@ -122,6 +124,31 @@ impl Account {
         format!(
             "nothing is published: the mapping has none of the keys {keys}; name them in map_file"
         )
+    }
+}
+
+/// The account of a connection is reported again this long after the last report, where it has changed.
+const PERIOD: Span = Span::from_nanos(60_000_000_000);
+
+/// When an account is reported.
+#[derive(Clone, Debug, Default)]
+pub struct Reporting {
+    told: Option<(Stamp<Host>, Account)>,
+}
+
+impl Reporting {
+    /// Whether it is time to look.
+    #[must_use]
+    pub fn is_due(&self, at: Stamp<Host>) -> bool {
+        let told = self.told.as_ref();
+        told.is_none_or(|(told_at, _)| at - *told_at >= PERIOD)
+    }
+
+    /// Takes what is reported at `at` where it is not what was reported before; whether it is.
+    pub fn is_news(&mut self, at: Stamp<Host>, account: &Account) -> bool {
+        let is_news = self.told.as_ref().is_none_or(|(_, told)| told != account);
+        self.told = Some((at, account.clone()));
+        is_news
     }
 }
 

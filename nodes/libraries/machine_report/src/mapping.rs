@@ -22,10 +22,10 @@ use metrology::stamp::Span;
 use metrology::{Axis, AxisSet};
 use serde::{Deserialize, Serialize};
 
-use crate::error::BridgeError;
+use crate::error::MappingError;
+use crate::observation::Shape;
 use crate::plausibility::Rule;
 use crate::possible::Possible;
-use crate::shdr::Shape;
 use crate::unit::Unit;
 
 /// Keys of a mapping, most of which become topics: a machine with several devices has some hundred.
@@ -115,6 +115,9 @@ pub struct TextEntry {
     /// Name of its topic or condition; absent: the key in small letters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
+    /// What is told in place of which value, such as a number of an enumeration; others are told as they are.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub words: BTreeMap<String, String>,
 }
 
 /// No keys.
@@ -176,6 +179,8 @@ pub enum Use {
         quantity: Quantity,
         /// Whether a code stands before it.
         is_message: bool,
+        /// What is told in place of which value.
+        words: BTreeMap<String, String>,
     },
     /// A condition.
     Alarm {
@@ -197,6 +202,15 @@ impl Use {
                 ..
             } => number * factor + offset,
             _ => number,
+        }
+    }
+
+    /// The text that is told in place of this one.
+    #[must_use]
+    pub fn word(&self, text: String) -> String {
+        match self {
+            Self::Text { words, .. } => words.get(&text).cloned().unwrap_or(text),
+            _ => text,
         }
     }
 
@@ -232,8 +246,8 @@ impl MapFile {
     ///
     /// # Errors
     /// When a key is unknown, missing or of the wrong type; the message has line and column.
-    pub fn from_yaml(text: &str) -> Result<Self, BridgeError> {
-        metrology::yaml::read_letters(text).map_err(BridgeError::MapFile)
+    pub fn from_yaml(text: &str) -> Result<Self, MappingError> {
+        metrology::yaml::read_letters(text).map_err(MappingError::MapFile)
     }
 }
 
@@ -265,13 +279,13 @@ fn is_name(name: &str) -> bool {
     starts_well && name.chars().all(holds_only) && !name.contains("__")
 }
 
-fn rule(key: &str, change: &Change, unit: Unit) -> Result<Rule, BridgeError> {
+fn rule(key: &str, change: &Change, unit: Unit) -> Result<Rule, MappingError> {
     let factor = unit.to_inner().0;
     let checked = |field: &'static str, value: f64, least: f64, greatest: f64| {
         if value >= least && value <= greatest {
             Ok(value)
         } else {
-            Err(BridgeError::Change {
+            Err(MappingError::Change {
                 key: key.to_owned(),
                 field,
                 value,
@@ -295,7 +309,7 @@ impl Mapping {
     /// # Errors
     /// A unit that does not measure what it is said to, a name that is no topic's or told twice, an axis told
     /// twice, a rule out of range, more keys than a machine has.
-    pub fn new(file: &MapFile) -> Result<Self, BridgeError> {
+    pub fn new(file: &MapFile) -> Result<Self, MappingError> {
         let (mut uses, mut units) = (BTreeMap::new(), BTreeMap::new());
         KEYS.check_amount(|| "values".to_owned(), "keys", file.values.len())?;
         for (key, meaning) in &file.values {
@@ -308,7 +322,7 @@ impl Mapping {
         Ok(mapping)
     }
 
-    fn check_names(&self) -> Result<(), BridgeError> {
+    fn check_names(&self) -> Result<(), MappingError> {
         let mut seen = BTreeSet::new();
         for (key, used) in &self.uses {
             let name = match used {
@@ -316,7 +330,7 @@ impl Mapping {
                 Use::Alarm { name } => (name, true),
                 Use::Position { .. } | Use::Nothing => continue,
             };
-            let fault = |reason| BridgeError::Name {
+            let fault = |reason| MappingError::Name {
                 key: key.clone(),
                 name: name.0.clone(),
                 reason,
@@ -333,7 +347,7 @@ impl Mapping {
         Ok(())
     }
 
-    fn check_axes(&self) -> Result<(), BridgeError> {
+    fn check_axes(&self) -> Result<(), MappingError> {
         let (mut actual, mut wanted) = (AxisSet::default(), AxisSet::default());
         for (key, used) in &self.uses {
             let Use::Position {
@@ -345,7 +359,7 @@ impl Mapping {
             let seen = if *commanded { &mut wanted } else { &mut actual };
             for axis in axes {
                 if seen.contains(*axis) {
-                    return Err(BridgeError::AxisTwice {
+                    return Err(MappingError::AxisTwice {
                         key: key.clone(),
                         axis: *axis,
                     });
@@ -354,7 +368,7 @@ impl Mapping {
             }
         }
         match wanted.iter().find(|axis| !actual.contains(*axis)) {
-            Some(axis) => Err(BridgeError::CommandedAlone { axis }),
+            Some(axis) => Err(MappingError::CommandedAlone { axis }),
             None => Ok(()),
         }
     }
@@ -409,6 +423,25 @@ impl Mapping {
 }
 
 impl Meaning {
+    /// Gives it the name of its topic or condition; a position has none.
+    pub fn set_name(&mut self, new: String) {
+        match self {
+            Self::Feed(entry)
+            | Self::SpindleSpeed(entry)
+            | Self::Temperature(entry)
+            | Self::Load(entry)
+            | Self::Override(entry) => entry.name = Some(new),
+            Self::Execution(entry)
+            | Self::ControllerMode(entry)
+            | Self::Text(entry)
+            | Self::Message(entry)
+            | Self::Condition(entry) => entry.name = Some(new),
+            Self::Position(_)
+            | Self::CommandedPosition(_)
+            | Self::PathPosition(_)
+            | Self::Ignored(_) => {}
+        }
+    }
     const fn unit(&self) -> Option<Unit> {
         match self {
             Self::Position(entry) | Self::CommandedPosition(entry) => Some(entry.unit),
@@ -422,12 +455,13 @@ impl Meaning {
         }
     }
 
-    fn checked(&self, key: &str) -> Result<Use, BridgeError> {
+    fn checked(&self, key: &str) -> Result<Use, MappingError> {
         let named = |name: &Option<String>| name.clone().unwrap_or_else(|| name_of(key));
         let text = |entry: &TextEntry, quantity, is_message| Use::Text {
             name: named(&entry.name),
             quantity,
             is_message,
+            words: entry.words.clone(),
         };
         Ok(match self {
             Self::Position(entry) => entry.checked(key, false)?,
@@ -446,6 +480,11 @@ impl Meaning {
             Self::ControllerMode(entry) => text(entry, Quantity::ControllerMode, false),
             Self::Text(entry) => text(entry, Quantity::Text, false),
             Self::Message(entry) => text(entry, Quantity::Text, true),
+            Self::Condition(entry) if !entry.words.is_empty() => {
+                return Err(MappingError::Words {
+                    key: key.to_owned(),
+                });
+            }
             Self::Condition(entry) => Use::Alarm {
                 name: named(&entry.name),
             },
@@ -454,11 +493,11 @@ impl Meaning {
     }
 }
 
-fn position_factor(key: &str, unit: Unit, is_linear: bool) -> Result<f64, BridgeError> {
+fn position_factor(key: &str, unit: Unit, is_linear: bool) -> Result<f64, MappingError> {
     if unit.measures_position(is_linear) {
         Ok(unit.to_inner().0)
     } else {
-        Err(BridgeError::Unit {
+        Err(MappingError::Unit {
             key: key.to_owned(),
             unit: unit.word(),
             what: if is_linear {
@@ -471,7 +510,7 @@ fn position_factor(key: &str, unit: Unit, is_linear: bool) -> Result<f64, Bridge
 }
 
 impl AxisEntry {
-    fn checked(&self, key: &str, commanded: bool) -> Result<Use, BridgeError> {
+    fn checked(&self, key: &str, commanded: bool) -> Result<Use, MappingError> {
         Ok(Use::Position {
             axes: vec![self.axis],
             commanded,
@@ -481,9 +520,9 @@ impl AxisEntry {
 }
 
 impl NumberEntry {
-    fn checked(&self, key: &str, quantity: Quantity) -> Result<Use, BridgeError> {
+    fn checked(&self, key: &str, quantity: Quantity) -> Result<Use, MappingError> {
         if !self.unit.measures(quantity) {
-            return Err(BridgeError::Unit {
+            return Err(MappingError::Unit {
                 key: key.to_owned(),
                 unit: self.unit.word(),
                 what: match quantity {
@@ -509,89 +548,4 @@ impl NumberEntry {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn mapping(values: &str) -> Result<Mapping, String> {
-        let file = MapFile::from_yaml(&format!("values:\n{values}")).map_err(|e| e.to_string())?;
-        Mapping::new(&file).map_err(|error| error.to_string())
-    }
-
-    #[test]
-    fn a_key_is_found_by_id_by_name_and_behind_its_device() {
-        let mapping = mapping("  Yabs: {is: position, axis: Y, unit: MILLIMETER}\n").unwrap();
-        let found = |key, name| mapping.find(key, name).map(|(key, _)| key.to_owned());
-        assert_eq!(found("Yabs", None).as_deref(), Some("Yabs"));
-        assert_eq!(found("mill:Yabs", None).as_deref(), Some("Yabs"));
-        assert_eq!(found("y1", Some("Yabs")).as_deref(), Some("Yabs"));
-        assert_eq!(found("y1", None), None);
-    }
-
-    #[test]
-    fn what_does_not_fit_is_refused_by_key() {
-        for (values, said) in [
-            (
-                "  C: {is: position, axis: C, unit: MILLIMETER}\n",
-                "C: MILLIMETER does not measure a rotary axis",
-            ),
-            (
-                "  F: {is: feed, unit: CELSIUS}\n",
-                "F: CELSIUS does not measure a feed",
-            ),
-            (
-                "  a: {is: position, axis: X, unit: INCH}\n  b: {is: path_position, unit: INCH}\n",
-                "b: axis X is told by another key",
-            ),
-            (
-                "  a: {is: commanded_position, axis: X, unit: INCH}\n",
-                "axis X: a commanded position alone",
-            ),
-            (
-                "  F: {is: text}\n  f: {is: execution}\n",
-                "f: name \"f\": another key has it",
-            ),
-            (
-                "  F: {is: text, name: Feed-1}\n",
-                "F: name \"Feed-1\": must be small letters, digits and single underscores",
-            ),
-            (
-                "  T: {is: temperature, unit: CELSIUS, change: {step: 1.0, rate_limit_per_s: 0.0, sample_period_s: 1.0}}\n",
-                "T: change.rate_limit_per_s = 0 1/s: must be from 1e-9 to 1000000000 1/s",
-            ),
-        ] {
-            assert_eq!(mapping(values).unwrap_err(), said);
-        }
-        let unknown = mapping("  a: {is: text, nam: b}\n").unwrap_err();
-        assert!(unknown.contains("nam"), "{unknown}");
-        let unknown = mapping("  a: {is: wish}\n").unwrap_err();
-        assert!(unknown.contains("wish"), "{unknown}");
-    }
-
-    #[test]
-    fn keys_become_names_that_ros_takes() {
-        for (key, name) in [
-            ("Stemp", "stemp"),
-            ("mill:S2 rpm", "mill_s2_rpm"),
-            ("1st", "v_1st"),
-            ("_x_", "x"),
-        ] {
-            assert_eq!(name_of(key), name);
-            assert!(is_name(name), "{name}");
-        }
-    }
-
-    #[test]
-    fn a_rule_in_fahrenheit_is_one_in_kelvin_inside() {
-        let mapping = mapping("  T: {is: temperature, unit: FAHRENHEIT, change: {step: 1.8, rate_limit_per_s: 9.0, sample_period_s: 1.0}}\n").unwrap();
-        let Some((
-            _,
-            Use::Number {
-                rule: Some(rule), ..
-            },
-        )) = mapping.find("T", None)
-        else {
-            panic!("no rule");
-        };
-        assert!((rule.step - 1.0).abs() < 1e-12 && (rule.rate_limit_per_s - 5.0).abs() < 1e-12);
-    }
-}
+mod tests;

@@ -4,11 +4,11 @@ use metrology::sample::{MachineValue, Quantity, TemperatureSample, Verdict};
 use metrology::stamp::{Machine, Stamp};
 
 use super::Channel;
-use crate::condition::{Condition, words};
+use crate::condition::{ValueCondition, words};
 use crate::mapping::Use;
 use crate::observation::AlarmReport;
 use crate::plausibility::Reading;
-use crate::stage::Output;
+use crate::report::{Report, Sink};
 
 impl Channel {
     pub(super) fn name(&self, key: &str) -> String {
@@ -24,21 +24,21 @@ impl Channel {
         key: &str,
         at: Stamp<Machine>,
         report: AlarmReport,
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) -> bool {
         let name = self.name(key);
         let has_room = self.alarms.has_room(&report);
         let state = self.alarms.hear(at, report);
         self.present = true;
-        out.extend(state.map(|state| Output::Condition(Condition::Alarm { name, state })));
+        out.extend(state.map(|state| Report::Condition(ValueCondition::Alarm { name, state })));
         has_room
     }
 
-    pub(super) fn appear(&mut self, key: &str, out: &mut Vec<Output>) {
+    pub(super) fn appear(&mut self, key: &str, out: &mut impl Sink) {
         self.present = true;
         if std::mem::take(&mut self.absent) {
             let name = self.name(key);
-            out.push(Output::Condition(Condition::Present { name }));
+            out.push(Report::Condition(ValueCondition::Present { name }));
         }
     }
 
@@ -46,7 +46,7 @@ impl Channel {
         &mut self,
         reading: Reading,
         judged: &mut Vec<(Reading, Verdict)>,
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) {
         let before = match &mut self.judge {
             None => {
@@ -67,7 +67,7 @@ impl Channel {
         &mut self,
         judged: &mut Vec<(Reading, Verdict)>,
         before: Option<Reading>,
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) {
         if judged.is_empty() {
             return;
@@ -81,16 +81,16 @@ impl Channel {
         let after = judged.last().map(|(reading, _)| reading.text.clone());
         for (reading, verdict) in judged.drain(..) {
             let condition = self.count(&name, &reading, verdict, before.as_ref(), after.as_deref());
-            out.extend(condition.map(Output::Condition));
+            out.extend(condition.map(Report::Condition));
             if quantity == Quantity::Temperature && verdict == Verdict::Good {
-                out.push(Output::Temperature(TemperatureSample {
+                out.push(Report::Temperature(TemperatureSample {
                     at: reading.received_at,
                     sensor: name.clone(),
                     temperature_degc: reading.value,
                     variance_k2: 0.0,
                 }));
             }
-            out.push(Output::Value(MachineValue {
+            out.push(Report::Value(MachineValue {
                 received_at: reading.received_at,
                 machine_at: reading.machine_at,
                 name: name.clone(),
@@ -109,7 +109,7 @@ impl Channel {
         verdict: Verdict,
         before: Option<&Reading>,
         after: Option<&str>,
-    ) -> Option<Condition> {
+    ) -> Option<ValueCondition> {
         let (name, value, at) = (
             name.to_owned(),
             reading.text.clone(),
@@ -120,7 +120,7 @@ impl Channel {
             Verdict::Impossible => {
                 self.impossible += 1;
                 let judge = self.judge.as_ref();
-                Some(Condition::Impossible {
+                Some(ValueCondition::Impossible {
                     name,
                     value,
                     before: before.map(|before| before.text.clone()).unwrap_or_default(),
@@ -135,7 +135,7 @@ impl Channel {
             Verdict::Unconfirmed => {
                 self.unconfirmed += 1;
                 let count = self.unconfirmed;
-                Some(Condition::Unconfirmed {
+                Some(ValueCondition::Unconfirmed {
                     name,
                     value,
                     at,

@@ -94,6 +94,19 @@ pub enum Told {
     Alarm(AlarmReport),
 }
 
+/// How the fields behind a key are read where values come as lines of an adapter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// One field: a value.
+    Value,
+    /// Five fields: level, code, severity, qualifier, text.
+    Condition,
+    /// Two fields: code and text.
+    Message,
+    /// Three fields: count, rate, values.
+    Series,
+}
+
 /// One observation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observation {

@@ -7,17 +7,18 @@ use metrology::sample::Verdict;
 use metrology::stamp::{Host, Machine, Span, Stamp};
 use metrology::yaml::shown;
 
-use crate::account::Left;
+use crate::account::{Account, Left};
 use crate::alarm::Alarms;
-use crate::condition::{Condition, words};
+use crate::condition::{ValueCondition, words};
 use crate::leap::{Leap, Watch};
 use crate::mapping::{Mapping, Use};
-use crate::observation::{AlarmLevel, AlarmReport, MachineClock, MachineTime, Observation, Told};
+use crate::observation::{
+    AlarmLevel, AlarmReport, MachineClock, MachineTime, Observation, Shape, Told,
+};
 use crate::plausibility::{Judge, Reading};
 use crate::positions::Positions;
 use crate::possible::Possible;
-use crate::shdr::Shape;
-use crate::stage::Output;
+use crate::report::{Report, Sink};
 
 mod channel;
 
@@ -122,15 +123,8 @@ impl Values {
         found.map(|(_, used)| used.shape()).or_else(has_alarmed)
     }
 
-    /// Values that were taken or refused, and values of keys that are not in the mapping.
-    #[must_use]
-    pub const fn counts(&self) -> (u64, u64) {
-        (self.told, self.passed_over)
-    }
-
     /// Values that were refused, by reason.
-    #[must_use]
-    pub const fn refused(&self) -> [(&'static str, Left); 4] {
+    const fn refused(&self) -> [(&'static str, Left); 4] {
         [
             ("values that are no numbers", self.not_numbers),
             ("values over the limit", self.too_long),
@@ -142,10 +136,22 @@ impl Values {
         ]
     }
 
-    /// Leaps of the machine's clock, over each of which the values go on.
+    /// The account of a bridge with what the values count.
     #[must_use]
-    pub const fn leaps(&self) -> Left {
-        self.leaps
+    pub fn account(&self, beside: &Account) -> Account {
+        let refused = self.refused();
+        let n_refused: u64 = refused.iter().map(|(_, left)| left.count).sum();
+        let mut account = Account {
+            told: self.told.saturating_sub(n_refused),
+            unmapped: self.passed_over,
+            keys: self.unmapped.clone(),
+            ..beside.clone()
+        };
+        // Values go on over a leap: it is counted and refuses none.
+        let leaps = ("leaps of the machine's clock", self.leaps);
+        let left = refused.into_iter().chain([leaps]);
+        account.left.extend(left.filter(|(_, left)| left.count > 0));
+        account
     }
 
     /// What is heard next stands in this line of a log; 0: it is of a connection.
@@ -153,18 +159,12 @@ impl Values {
         self.line = line;
     }
 
-    /// The first keys that are not in the mapping.
-    #[must_use]
-    pub fn unmapped_keys(&self) -> BTreeSet<String> {
-        self.unmapped.clone()
-    }
-
     /// Takes an observation that came at `received_at`, and watches the machine's clock by it.
     pub fn hear(
         &mut self,
         observation: Observation,
         received_at: Stamp<Host>,
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) {
         let is_stamped = observation.time != MachineTime::Absent;
         let is_mapped = self
@@ -180,9 +180,9 @@ impl Values {
     }
 
     /// Counts and reports a leap of the machine's clock.
-    pub fn leap(&mut self, leap: Leap) -> Output {
+    pub fn leap(&mut self, leap: Leap) -> Report {
         self.leaps.note(self.line);
-        Output::Condition(Condition::ClockLeap {
+        Report::Condition(ValueCondition::ClockLeap {
             from: words(leap.from),
             to: words(leap.to),
             by_s: (leap.to - leap.from).as_secs_f64(),
@@ -196,7 +196,7 @@ impl Values {
         &mut self,
         observation: Observation,
         received_at: Stamp<Host>,
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) {
         let found = self
             .mapping
@@ -234,7 +234,7 @@ impl Values {
         &mut self,
         observation: Observation,
         received_at: Stamp<Host>,
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) {
         // A condition matters also where nobody has described it.
         if let Told::Alarm(report) = observation.told {
@@ -268,7 +268,7 @@ impl Values {
         if self.unmapped.len() < UNMAPPED_LIMIT && self.unmapped.insert(observation.key) {
             let keys: Vec<_> = self.unmapped.iter().map(String::as_str).collect();
             let keys = keys.join(", ");
-            out.push(Output::Condition(Condition::Unmapped { keys }));
+            out.push(Report::Condition(ValueCondition::Unmapped { keys }));
         }
     }
 
@@ -277,13 +277,13 @@ impl Values {
         key: &str,
         channel: &mut Channel,
         machine_at: Stamp<Machine>,
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) {
         if let Some(before) = channel.stamp.replace(machine_at)
             && machine_at < before
         {
             self.stamps_back += 1;
-            out.push(Output::Condition(Condition::ClockBack {
+            out.push(Report::Condition(ValueCondition::ClockBack {
                 key: key.to_owned(),
                 by_s: (before - machine_at).as_secs_f64(),
                 to: words(machine_at),
@@ -297,7 +297,7 @@ impl Values {
         key: &str,
         channel: &mut Channel,
         machine_at: Stamp<Machine>,
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) {
         match &channel.used {
             Use::Nothing => return,
@@ -318,7 +318,7 @@ impl Values {
             } => {
                 for axis in axes {
                     let whole = self.positions.absent(*axis, *commanded);
-                    out.extend(whole.map(Output::State));
+                    out.extend(whole.map(Report::State));
                 }
             }
             Use::Number { .. } | Use::Text { .. } => {}
@@ -330,7 +330,7 @@ impl Values {
         if !channel.absent {
             channel.absent = true;
             channel.present = false;
-            out.push(Output::Condition(Condition::Absent {
+            out.push(Report::Condition(ValueCondition::Absent {
                 name: channel.name(key),
                 since: words(machine_at),
             }));
@@ -343,7 +343,7 @@ impl Values {
         channel: &mut Channel,
         (machine_at, received_at): (Stamp<Machine>, Stamp<Host>),
         text: String,
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) {
         let wanted = match &channel.used {
             Use::Nothing => return,
@@ -356,6 +356,7 @@ impl Values {
             self.refuse_long(key, text.len(), out);
             return self.absent(key, channel, machine_at, out);
         }
+        let text = channel.used.word(text);
         let numbers = numbers(&text);
         if wanted > 0
             && numbers
@@ -382,7 +383,7 @@ impl Values {
                     let positions = &mut self.positions;
                     let whole =
                         positions.hear(*axis, *commanded, position, machine_at, received_at);
-                    out.extend(whole.map(Output::State));
+                    out.extend(whole.map(Report::State));
                 }
             }
             used => {
@@ -400,9 +401,9 @@ impl Values {
         }
     }
 
-    fn refuse_long(&mut self, key: &str, length: usize, out: &mut Vec<Output>) {
+    fn refuse_long(&mut self, key: &str, length: usize, out: &mut impl Sink) {
         self.too_long.note(self.line);
-        out.push(Output::Condition(Condition::ValueTooLong {
+        out.push(Report::Condition(ValueCondition::ValueTooLong {
             line: self.line,
             key: key.to_owned(),
             length,
@@ -411,9 +412,9 @@ impl Values {
         }));
     }
 
-    fn refuse(&mut self, key: &str, text: String, wanted: usize, out: &mut Vec<Output>) {
+    fn refuse(&mut self, key: &str, text: String, wanted: usize, out: &mut impl Sink) {
         self.not_numbers.note(self.line);
-        out.push(Output::Condition(Condition::NotNumbers {
+        out.push(Report::Condition(ValueCondition::NotNumbers {
             line: self.line,
             key: key.to_owned(),
             text: shown(&text),
@@ -427,10 +428,10 @@ impl Values {
         key: &str,
         text: String,
         possible: Possible,
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) {
         self.not_numbers.note(self.line);
-        out.push(Output::Condition(Condition::OutOfRange {
+        out.push(Report::Condition(ValueCondition::OutOfRange {
             line: self.line,
             key: key.to_owned(),
             text: shown(&text),
@@ -447,7 +448,7 @@ impl Values {
         (machine_at, received_at): (Stamp<Machine>, Stamp<Host>),
         rate_hz: Option<f64>,
         values: &[f64],
-        out: &mut Vec<Output>,
+        out: &mut impl Sink,
     ) {
         let Use::Number { .. } = channel.used else {
             return self.refuse(key, format!("a series of {}", values.len()), 1, out);
@@ -476,8 +477,8 @@ impl Values {
     }
 
     /// Time has passed on the host.
-    pub fn wait(&mut self, now: Stamp<Host>, out: &mut Vec<Output>) {
-        out.extend(self.positions.settled(now).map(Output::State));
+    pub fn wait(&mut self, now: Stamp<Host>, out: &mut impl Sink) {
+        out.extend(self.positions.settled(now).map(Report::State));
         for channel in self.channels.values_mut() {
             if let Some(judge) = &mut channel.judge {
                 judge.wait(now, &mut self.judged);
@@ -487,8 +488,8 @@ impl Values {
     }
 
     /// The bridge stops: what waits is told.
-    pub fn finish(&mut self, out: &mut Vec<Output>) {
-        out.extend(self.positions.take().map(Output::State));
+    pub fn finish(&mut self, out: &mut impl Sink) {
+        out.extend(self.positions.take().map(Report::State));
         for channel in self.channels.values_mut() {
             if let Some(judge) = &mut channel.judge {
                 judge.absent(&mut self.judged);
@@ -498,8 +499,8 @@ impl Values {
     }
 
     /// The connection is lost: nothing is known.
-    pub fn absent_all(&mut self, now: Stamp<Host>, out: &mut Vec<Output>) {
-        out.extend(self.positions.take().map(Output::State));
+    pub fn absent_all(&mut self, now: Stamp<Host>, out: &mut impl Sink) {
+        out.extend(self.positions.take().map(Report::State));
         let keys: Vec<_> = self.channels.keys().cloned().collect();
         for key in keys {
             let Some(mut channel) = self.channels.remove(&key) else {

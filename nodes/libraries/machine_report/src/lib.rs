@@ -1,0 +1,26 @@
+//! What machines report, however they say it: by MTConnect, by OPC UA.
+//!
+//! A bridge makes an [`observation`] of what it hears: a stamp of the machine's clock, a key, and what was told. From
+//! there on this crate does the rest, in one place for all bridges. A [`mapping`] says what a key is in the world of
+//! axes, feeds and temperatures, and in which [`unit`]; [`values`] keeps three things apart that a shop floor mixes: a
+//! value that is *absent* gives no message, a value that *cannot be* gives a message that says so and is not handed on
+//! as a temperature ([`plausibility`], [`possible`]), and a value that is good.
+
+pub mod account;
+pub mod alarm;
+pub mod condition;
+pub mod error;
+pub mod leap;
+pub mod mapping;
+pub mod observation;
+pub mod plausibility;
+pub mod positions;
+pub mod possible;
+pub mod report;
+pub mod unit;
+pub mod values;
+
+pub use condition::ValueCondition;
+pub use error::MappingError;
+pub use mapping::{MapFile, Mapping};
+pub use report::{Report, Sink};

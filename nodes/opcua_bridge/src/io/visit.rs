@@ -1,0 +1,455 @@
+//! One connection, from the choice of the endpoint to its end.
+//!
+//! A break of the connection does not end it: the session is taken up again while the server keeps it, what was missed is
+//! asked for by its number (republish), and what holds is read. A server that has begun anew does not know the session:
+//! then the visit ends, and the next one looks up the namespaces again.
+
+use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use futures::StreamExt;
+use metrology::stamp::{Host, Stamp};
+use opcua::client::{
+    MonitoredItemMap, OnSubscriptionNotificationCore, Session, SessionConnectMode,
+    SessionDropGuard, SessionPollResult,
+};
+use opcua::types::{
+    DataChangeNotification, MonitoredItemCreateRequest, MonitoringMode, MonitoringParameters,
+    NodeId, NotificationMessage, ReadValueId, StatusChangeNotification, StatusCode,
+    TimestampsToReturn,
+};
+use tokio::sync::mpsc::{Receiver, Sender, channel};
+use tokio::task::JoinHandle;
+use tokio::time::Instant;
+
+use super::client::{Clients, Events, duration, host_now};
+use super::convert::{change, words};
+use super::sequence::{Place, Sequence};
+use super::{Credentials, endpoint, nodes};
+use crate::config::Settings;
+use crate::stage::IoEvent;
+use crate::value::Change;
+
+/// Messages of the server that wait at most, each with at most [`CHANGES`].
+const WAITING: usize = 256;
+/// Changes in one message at most.
+const CHANGES: u32 = 1000;
+/// Nodes in one request at most.
+const NODES_CHUNK: usize = 500;
+/// Messages that are asked for again at most, after one break.
+const REPUBLISHED: u64 = 10_000;
+/// The server's subscription lives so many times its keep-alive.
+const LIFETIMES: u32 = 3;
+
+/// A message with the instant at which it came.
+type Note = (Stamp<Host>, NotificationMessage);
+
+/// What is to be given up at the end.
+#[derive(Default)]
+pub(super) struct Held {
+    guard: Option<SessionDropGuard>,
+    pump: Option<JoinHandle<()>>,
+}
+
+impl Held {
+    /// Closes the session, in at most this time.
+    pub(super) async fn leave(self, limit: Duration) {
+        drop(self.guard);
+        if let Some(mut pump) = self.pump
+            && tokio::time::timeout(limit, &mut pump).await.is_err()
+        {
+            pump.abort();
+        }
+    }
+}
+
+/// What the client's loop says of the connection.
+enum Link {
+    Made(SessionConnectMode),
+    Lost(StatusCode),
+    NotMade(StatusCode),
+    Ended(StatusCode),
+}
+
+/// Hands messages over as they come.
+struct Mailbox {
+    notes: Sender<Note>,
+    dropped: Arc<AtomicU64>,
+}
+
+impl OnSubscriptionNotificationCore for Mailbox {
+    fn on_subscription_notification(
+        &mut self,
+        message: NotificationMessage,
+        _: MonitoredItemMap<'_>,
+    ) {
+        // Waiting here would stop the client's loop, which a republish needs.
+        if self.notes.try_send((host_now(), message)).is_err() {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// A subscription at work.
+struct Visit<'a> {
+    session: Arc<Session>,
+    settings: &'a Settings,
+    events: &'a Events,
+    nodes: Vec<(usize, NodeId)>,
+    subscription: u32,
+    sequence: Sequence,
+    notes: Receiver<Note>,
+    dropped: Arc<AtomicU64>,
+    /// Marks of what each item sent last.
+    sent: BTreeMap<usize, u64>,
+}
+
+/// The same for the same value and status.
+fn mark(change: &Change) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    (change.payload.text(), change.status.0).hash(&mut hasher);
+    hasher.finish()
+}
+
+/// Connects, subscribes and hands over; returns why it ended.
+pub(super) async fn visit(
+    clients: &Clients,
+    settings: &Settings,
+    credentials: &Credentials,
+    events: &Events,
+    held: &mut Held,
+) -> IoEvent {
+    let endpoint = match endpoint::choose(&clients.discovery, settings).await {
+        Ok(endpoint) => endpoint,
+        Err(ended) => return ended,
+    };
+    let security = endpoint::security(&endpoint);
+    let built = clients
+        .session
+        .session_builder()
+        .user_identity_token(endpoint::token(&settings.security, credentials))
+        .connect_to_endpoint_directly(endpoint)
+        .and_then(|builder| builder.build(Arc::clone(clients.session.certificate_store())));
+    let (session, event_loop) = match built {
+        Ok(built) => built,
+        Err(error) => return ended(error),
+    };
+    held.guard = Some(session.close_on_drop());
+    let (links, mut link) = channel(WAITING);
+    held.pump = Some(tokio::spawn(async move {
+        let stream = event_loop.enter();
+        tokio::pin!(stream);
+        while let Some(polled) = stream.next().await {
+            let link = match polled {
+                Ok(SessionPollResult::Reconnected(mode)) => Link::Made(mode),
+                Ok(SessionPollResult::ConnectionLost(status)) => Link::Lost(status),
+                Ok(SessionPollResult::ReconnectFailed(status)) => Link::NotMade(status),
+                Ok(_) => continue,
+                Err(status) => Link::Ended(status),
+            };
+            // The visit has ended, or does not look any more: the guard ends this loop.
+            let _ = links.try_send(link);
+        }
+    }));
+    match link.recv().await {
+        Some(Link::Made(_)) => {}
+        Some(Link::NotMade(status) | Link::Lost(status) | Link::Ended(status)) => {
+            return endpoint::not_made(status, credentials);
+        }
+        None => return said("the connection ended before it was made"),
+    }
+    let user = match settings.security.user.as_str() {
+        "" => "anonymous".to_owned(),
+        user => user.to_owned(),
+    };
+    match Visit::begin(session, settings, events, (security, user)).await {
+        Ok(mut visit) => visit.go_on(&mut link).await,
+        Err(ended) => ended,
+    }
+}
+
+fn said(reason: &str) -> IoEvent {
+    let reason = reason.to_owned();
+    IoEvent::Ended { reason }
+}
+
+fn ended(error: impl std::fmt::Display) -> IoEvent {
+    let reason = error.to_string();
+    IoEvent::Ended { reason }
+}
+
+impl<'a> Visit<'a> {
+    /// Looks up the nodes and subscribes to them.
+    async fn begin(
+        session: Arc<Session>,
+        settings: &'a Settings,
+        events: &'a Events,
+        (security, user): (String, String),
+    ) -> Result<Self, IoEvent> {
+        let found = nodes::find(&session, &settings.items)
+            .await
+            .map_err(ended)?;
+        let (notes, receiver) = channel(WAITING);
+        let dropped = Arc::new(AtomicU64::new(0));
+        let mailbox = Mailbox {
+            notes,
+            dropped: Arc::clone(&dropped),
+        };
+        let publishing = Duration::from_millis(settings.subscription.publishing_ms.into());
+        let keep_alives = settings.keep_alive.as_secs_f64() / publishing.as_secs_f64();
+        let keep_alives = (keep_alives.ceil() as u32).max(1);
+        let lives = settings.session.as_secs_f64() / publishing.as_secs_f64();
+        let lifetime = (lives.ceil() as u32).max(keep_alives.saturating_mul(LIFETIMES));
+        let subscription = session
+            .create_subscription(publishing, lifetime, keep_alives, CHANGES, 0, true, mailbox)
+            .await
+            .map_err(ended)?;
+        let mut visit = Visit {
+            session,
+            settings,
+            events,
+            nodes: Vec::new(),
+            subscription,
+            sequence: Sequence::default(),
+            notes: receiver,
+            dropped,
+            sent: BTreeMap::new(),
+        };
+        let mut missing = found.missing;
+        let granted = visit.monitor(found.nodes, &mut missing).await?;
+        missing.sort();
+        let up = IoEvent::Up {
+            security,
+            user,
+            missing,
+            given_ms: granted.map(|(ms, _)| ms),
+            given_queue: granted.map_or(0, |(_, queue)| queue),
+        };
+        events.send(host_now(), up);
+        Ok(visit)
+    }
+
+    /// Subscribes to nodes; returns the longest sampling interval in ms and the shortest queue that were granted.
+    async fn monitor(
+        &mut self,
+        found: Vec<(usize, NodeId)>,
+        missing: &mut Vec<(usize, String)>,
+    ) -> Result<Option<(f64, u32)>, IoEvent> {
+        let mut granted: Option<(f64, u32)> = None;
+        for chunk in found.chunks(NODES_CHUNK) {
+            let requests = chunk.iter().map(|(item, node)| self.request(*item, node));
+            let created = self
+                .session
+                .create_monitored_items(
+                    self.subscription,
+                    TimestampsToReturn::Both,
+                    requests.collect(),
+                )
+                .await
+                .map_err(ended)?;
+            // A server that leaves answers out has not subscribed to what they belong to.
+            for (item, _) in chunk.iter().skip(created.len()) {
+                missing.push((*item, "the server gave no answer".to_owned()));
+            }
+            for ((item, node), created) in chunk.iter().zip(created) {
+                let result = created.result;
+                if result.status_code.is_bad() {
+                    missing.push((*item, words(result.status_code)));
+                    continue;
+                }
+                let (ms, queue) = granted.unwrap_or((0.0, u32::MAX));
+                granted = Some((
+                    ms.max(result.revised_sampling_interval),
+                    queue.min(result.revised_queue_size),
+                ));
+                self.nodes.push((*item, node.clone()));
+            }
+        }
+        Ok(granted)
+    }
+
+    fn request(&self, item: usize, node: &NodeId) -> MonitoredItemCreateRequest {
+        let wanted = &self.settings.subscription;
+        MonitoredItemCreateRequest {
+            item_to_monitor: ReadValueId::from(node.clone()),
+            monitoring_mode: MonitoringMode::Reporting,
+            requested_parameters: MonitoringParameters {
+                // 0 would be replaced by the client.
+                client_handle: u32::try_from(item + 1).unwrap_or(u32::MAX),
+                sampling_interval: f64::from(wanted.sampling_ms),
+                queue_size: wanted.queue,
+                discard_oldest: true,
+                ..MonitoringParameters::default()
+            },
+        }
+    }
+
+    /// Hands over what comes until the end.
+    async fn go_on(&mut self, link: &mut Receiver<Link>) -> IoEvent {
+        let mut broken_at: Option<Instant> = None;
+        loop {
+            let ended = tokio::select! {
+                note = self.notes.recv() => match note {
+                    Some(note) => self.take(note).await,
+                    None => Some(said("the subscription ended")),
+                },
+                news = link.recv() => match news {
+                    Some(Link::Lost(status)) => {
+                        broken_at = broken_at.or_else(|| Some(Instant::now()));
+                        let reason = words(status);
+                        self.send(IoEvent::Broken { reason })
+                    }
+                    Some(Link::NotMade(status)) => {
+                        let since = broken_at.get_or_insert_with(Instant::now).elapsed();
+                        let is_over = since > duration(self.settings.session);
+                        is_over.then(|| said(&words(status)))
+                    }
+                    Some(Link::Made(SessionConnectMode::ReactivatedSession(_))) => {
+                        broken_at = None;
+                        self.resume().await
+                    }
+                    Some(Link::Made(SessionConnectMode::NewSession(_))) => {
+                        Some(said("the server does not know the session any more: it has begun anew, or kept it too short"))
+                    }
+                    Some(Link::Ended(status)) => Some(said(&words(status))),
+                    None => Some(said("closed")),
+                },
+            };
+            if let Some(ended) = ended {
+                return ended;
+            }
+        }
+    }
+
+    /// Hands an event over; the end where nobody listens.
+    fn send(&self, event: IoEvent) -> Option<IoEvent> {
+        let is_heard = self.events.send(host_now(), event);
+        (!is_heard).then(|| said("nobody listens"))
+    }
+
+    /// Takes a message; what is missing before it is asked for again first.
+    async fn take(&mut self, (at, message): Note) -> Option<IoEvent> {
+        let dropped = self.dropped.swap(0, Ordering::Relaxed);
+        if dropped > 0
+            && let Some(ended) = self.send(IoEvent::Dropped { count: dropped })
+        {
+            return Some(ended);
+        }
+        let data = message.notification_data.as_ref();
+        let has_data = data.is_some_and(|data| !data.is_empty());
+        match self.sequence.take(message.sequence_number, has_data) {
+            Place::Known => return None,
+            Place::Next => {}
+            Place::Behind { from, count } => {
+                if let Some(ended) = self.fetch(from, count).await {
+                    return Some(ended);
+                }
+            }
+        }
+        self.hand_over(at, message)
+    }
+
+    /// Asks for messages again, and says which are gone.
+    async fn fetch(&mut self, from: u32, count: u32) -> Option<IoEvent> {
+        let mut lost = 0_u64;
+        for behind in 0..count {
+            if lost >= REPUBLISHED {
+                // The server keeps none of them: the rest is not asked for.
+                lost += u64::from(count - behind);
+                break;
+            }
+            let number = from.wrapping_add(behind);
+            match self.session.republish(self.subscription, number).await {
+                Ok(message) if message.sequence_number == number => {
+                    if let Some(ended) = self.hand_over(host_now(), message) {
+                        return Some(ended);
+                    }
+                }
+                // Some servers send another message, without changes, in place of one that they do not keep.
+                Ok(_) | Err(_) => lost += 1,
+            }
+        }
+        if lost == 0 {
+            return None;
+        }
+        self.send(IoEvent::Lost { from, count: lost })
+    }
+
+    /// The session was taken up again: what was missed is asked for, then what holds is read.
+    async fn resume(&mut self) -> Option<IoEvent> {
+        let mut republished = 0;
+        while republished < REPUBLISHED {
+            let number = self.sequence.expected();
+            match self.session.republish(self.subscription, number).await {
+                Ok(message) if message.sequence_number != number => break,
+                Ok(message) => {
+                    self.sequence.take(number, true);
+                    republished += 1;
+                    if let Some(ended) = self.hand_over(host_now(), message) {
+                        return Some(ended);
+                    }
+                }
+                Err(error) if error.status() == StatusCode::BadMessageNotAvailable => break,
+                Err(error) => return Some(ended(error)),
+            }
+        }
+        // The client asks for no message after a break until it is told to.
+        self.session.trigger_publish_now();
+        if let Some(ended) = self.send(IoEvent::Resumed { republished }) {
+            return Some(ended);
+        }
+        for chunk in self.nodes.chunks(NODES_CHUNK) {
+            let asked: Vec<ReadValueId> = chunk
+                .iter()
+                .map(|(_, node)| ReadValueId::from(node.clone()))
+                .collect();
+            let read = self.session.read(&asked, TimestampsToReturn::Both, 0.0);
+            let values = match read.await {
+                Ok(values) => values,
+                Err(error) => return Some(ended(error)),
+            };
+            let held = chunk.iter().zip(values);
+            let held = held.map(|((item, _), value)| change(*item, value, true));
+            // What is another than was sent last waits in the subscription, and comes in its order.
+            let held = held.filter(|change| self.sent.get(&change.item) == Some(&mark(change)));
+            if let Some(ended) = self.send(IoEvent::Changed(held.collect())) {
+                return Some(ended);
+            }
+        }
+        None
+    }
+
+    /// Hands the changes of a message over.
+    fn hand_over(&mut self, at: Stamp<Host>, message: NotificationMessage) -> Option<IoEvent> {
+        let mut changes: Vec<Change> = Vec::new();
+        for data in message.notification_data.into_iter().flatten() {
+            if let Some(status) = data.inner_as::<StatusChangeNotification>() {
+                return Some(said(&format!(
+                    "the server ended the subscription: {}",
+                    words(status.status)
+                )));
+            }
+            let Some(data) = data.into_inner_as::<DataChangeNotification>() else {
+                continue;
+            };
+            for one in data.monitored_items.into_iter().flatten() {
+                // A handle that was not given out is one behind all items: the stage counts it.
+                let item = usize::try_from(one.client_handle).unwrap_or(usize::MAX);
+                let item = item.checked_sub(1).unwrap_or(usize::MAX);
+                let change = change(item, one.value, false);
+                if item < self.settings.items.len() {
+                    self.sent.insert(item, mark(&change));
+                }
+                changes.push(change);
+            }
+        }
+        if changes.is_empty() {
+            return None;
+        }
+        let is_heard = self.events.send(at, IoEvent::Changed(changes));
+        (!is_heard).then(|| said("nobody listens"))
+    }
+}

@@ -1,0 +1,108 @@
+//! A bag in which messages stand twice, and messages that two readers of one verb decode: each counts once.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use std::path::{Path, PathBuf};
+
+use abbe_msgs::topics;
+use recorder::{
+    Bag, Channel, ChannelId, Directory, Event, MessageStamp, Order, RecorderConfig, Recording,
+};
+use replayer::{Reading, Reason, reading};
+
+/// A copy of a bag of the tree with every message so many times; that of `bad` thermometers is cut.
+fn copied(home: &Path, times: usize, is_bad: fn(&str) -> bool) -> PathBuf {
+    let bags = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../bags");
+    let bag = Bag::open(bags.join("cold_reference")).unwrap();
+    let path = home.join("bag");
+    let directory = Directory::create(&path).unwrap();
+    let mut recording = Recording::begin(directory, "bag", RecorderConfig::default()).unwrap();
+    let ids: Vec<ChannelId> = (bag.topics().iter())
+        .map(|info| {
+            let channel = Channel {
+                topic: info.topic.clone(),
+                type_name: info.type_name.clone(),
+                type_hash: info.type_hash.clone(),
+                definition: info.definition.clone(),
+                qos_yaml: info.qos_yaml.clone(),
+            };
+            recording.add_channel(&channel).unwrap()
+        })
+        .collect();
+    let mut messages = bag.messages(Order::File);
+    while let Some(Event::Message(message)) = messages.next_event() {
+        let stamp = MessageStamp {
+            log_time_nanos: i64::try_from(message.log_time_nanos).unwrap(),
+            publish_time_nanos: i64::try_from(message.publish_time_nanos).unwrap(),
+            sequence: message.sequence,
+        };
+        let is_cut = is_bad(&bag.topic(message.topic).topic);
+        let length = message.data.len() - usize::from(is_cut) * 3;
+        for _ in 0..times {
+            let id = ids[message.topic.index()];
+            recording.write(id, stamp, &message.data[..length]).unwrap();
+        }
+    }
+    recording.finish().unwrap();
+    path
+}
+
+/// Reads states and thermometers, each message as often as a verb with so many readers; what the first reader got.
+fn read(path: &Path, readers: usize) -> (Reading, usize) {
+    let wanted = [topics::AXES_STATE.name, topics::TEMPERATURE.base];
+    let bag = Bag::open(path).unwrap();
+    let mut got = 0;
+    let found = reading::read(&bag, Order::LogTime, &wanted, |mut taken| {
+        for reader in 0..readers {
+            let is_read = if taken.is(&topics::AXES_STATE) {
+                taken.of(&topics::AXES_STATE).is_some()
+            } else {
+                taken.of_member(&topics::TEMPERATURE).is_some()
+            };
+            got += usize::from(is_read && reader == 0);
+        }
+    });
+    (found, got)
+}
+
+#[test]
+fn messages_that_stand_twice_are_left_out_once_and_counted() {
+    let none = |_: &str| false;
+    let home = tempfile::tempdir().unwrap();
+    let (once, got_once) = read(&copied(home.path(), 1, none), 1);
+    assert!(once.is_whole() && got_once > 100, "{once:?}");
+    let home = tempfile::tempdir().unwrap();
+    let (twice, got_twice) = read(&copied(home.path(), 2, none), 1);
+    assert_eq!(got_twice, got_once);
+    assert!(!twice.is_whole());
+    for (one, two) in once.account.topics.iter().zip(&twice.account.topics) {
+        assert_eq!((two.used, two.messages), (one.used, 2 * one.messages));
+        let [left_out] = &two.left_out[..] else {
+            panic!("{two:?}")
+        };
+        assert_eq!(left_out.reason, Reason::Repeated);
+        assert_eq!(left_out.messages, one.messages);
+        assert_eq!(left_out.first.number, 2);
+    }
+    let lines = twice.lines();
+    let words = "messages left out, repeated: the bag has it already";
+    assert!(lines.iter().all(|line| line.contains(words)), "{lines:?}");
+}
+
+#[test]
+fn a_message_that_several_readers_decode_is_counted_once() {
+    let is_bad = |topic: &str| topic.starts_with("/temperature/");
+    let home = tempfile::tempdir().unwrap();
+    let path = copied(home.path(), 1, is_bad);
+    let (alone, _) = read(&path, 1);
+    assert!(!alone.is_whole());
+    for readers in [2, 3] {
+        let (several, _) = read(&path, readers);
+        assert_eq!(several.account, alone.account, "{readers}");
+    }
+    for row in &alone.account.topics {
+        let left_out: u64 = row.left_out.iter().map(|it| it.messages).sum();
+        assert_eq!(row.used + left_out, row.messages, "{row:?}");
+        assert_eq!(left_out > 0, is_bad(&row.topic), "{row:?}");
+    }
+}
