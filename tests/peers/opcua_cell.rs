@@ -220,7 +220,7 @@ fn a_cell_behind_opc_ua_is_recorded_and_its_cause_named() {
     let kept = Bag::open(root().join(BAG)).unwrap();
     let (first, _) = kept.log_times_nanos().unwrap();
     let now = nanos(&abbe_tests::graph::now());
-    let by = Span::from_nanos(now - i64::try_from(first).unwrap()) + LEAD;
+    let by = Span::from_nanos(now - i64::try_from(first).unwrap() + LEAD.nanos());
     let mut rows = Vec::new();
     for (at, moment) in session(&kept, by) {
         let ahead = at - nanos(&abbe_tests::graph::now());

@@ -246,18 +246,6 @@ fn replay_of_a_cut_bag_is_equal_up_to_the_cut_and_says_so() {
 }
 
 #[test]
-fn a_bag_without_a_run_says_what_it_lacks() {
-    let home = tempfile::tempdir().unwrap();
-    let bag = home.path().join("bag");
-    let shelf = recorder::Directory::create(&bag).unwrap();
-    let config = recorder::RecorderConfig::default();
-    let recording = recorder::Recording::begin(shelf, "bag", config).unwrap();
-    recording.finish().unwrap();
-    assert!(said(&bag).contains("abbe.run"), "{}", said(&bag));
-    assert_eq!(check(&bag).0, 1);
-}
-
-#[test]
 fn what_check_cannot_understand_is_usage() {
     for arguments in [
         &["check"][..],

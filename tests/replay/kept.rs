@@ -24,7 +24,8 @@ struct Spoils {
     topic: &'static str,
     /// Which message of it, counted from 0.
     nth: fn(&std::path::Path) -> usize,
-    /// How far behind it the message of that topic is with which it is swapped: those that are averaged together commute.
+    /// How far behind it the message of that topic is with which it is swapped: those that are averaged together
+    /// commute, and a stamp 2 s off is left out.
     behind: usize,
     /// The least change of that message that can be seen in a result.
     least: fn(&mut Vec<u8>),
@@ -61,7 +62,7 @@ const SPOILS: [Spoils; 6] = [
         bag: "grid_circles",
         topic: "/grid/position",
         nth: |_| 2_000,
-        behind: 500,
+        behind: 90,
         least: |data| edited(data, |read: &mut GridSample| read.u_m = read.u_m.next_up()),
         parameter: (
             "params/grid_encoder.yaml",

@@ -166,7 +166,12 @@ impl Scenario {
 /// The one MCAP file of a bag.
 #[must_use]
 pub fn mcap_file(bag: &Path) -> PathBuf {
-    bag.join("bag_0.mcap")
+    let file = bag.join("bag_0.mcap");
+    if file.exists() {
+        return file;
+    }
+    // As rosbag2 names it: after the folder.
+    bag.join(format!("{}_0.mcap", bag.file_name().unwrap().display()))
 }
 
 /// Latency, cold reference, three minutes of production with compensation, blocks again.

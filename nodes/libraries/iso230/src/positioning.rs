@@ -257,7 +257,11 @@ pub fn evaluate(
         .map(|i| point(runs, budget, i))
         .collect();
     let span_mm = runs.span_mm();
-    let u = |length_mm: f64| budget.over(length_mm, span_mm).figures(n_runs);
+    let u = |length_mm: f64| {
+        budget
+            .over(length_mm, span_mm)
+            .figures(n_runs, 2 * points.len())
+    };
     let ups = || points.iter().map(|p| (p.target_mm, p.up));
     let downs = || points.iter().map(|p| (p.target_mm, p.down));
     let both = || ups().chain(downs());

@@ -65,7 +65,8 @@ fn a_machine_file_that_is_absent_empty_no_text_or_another_one_is_named() {
     let (right, other) = (hash(RIGHT), hash(b"name: mill_2\n"));
     let absent = format!("machine.yaml: is absent, the bag says that its sha256 is {right}");
     let another = format!("machine.yaml: sha256 is {other}, the bag says {right}");
-    let cases: [(Option<&[u8]>, Option<&[u8]>, &str); 6] = [
+    type Bytes<'a> = Option<&'a [u8]>;
+    let cases: [(Bytes<'_>, Bytes<'_>, &str); 6] = [
         (None, Some(RIGHT), absent.as_str()),
         (Some(b"name: mill_2\n"), Some(RIGHT), another.as_str()),
         (Some(b""), Some(RIGHT), "the bag says"),

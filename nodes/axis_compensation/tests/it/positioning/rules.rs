@@ -164,11 +164,11 @@ fn what_is_not_safe_or_not_measurable_is_refused_at_the_start() {
     assert_eq!(refused(&one("refreshed_table", 0.3, "")), "");
     assert_eq!(
         refused(&one("refreshed_table", 0.31, "")),
-        "positioning.X.weight = 0.31 : must be from 0 to 0.3 "
+        "positioning.X.weight = 0.31: must be from 0 to 0.3"
     );
     assert_eq!(
         refused(&one("refreshed_table", 0.1, "runs: 9")),
-        "positioning.X.runs = 9 : must be from 10 to 20 "
+        "positioning.X.runs = 9: must be from 10 to 20"
     );
     assert!(
         refused(&one("weighted_increments", 0.3, "loop_delay_cycles: 2"))

@@ -10,7 +10,7 @@
 //!   u_L² = u_device² + u_alignment² + u_machine² + u_device's own expansion²                    (1)
 //!   B, B̄ :  u_B² = (2 u_V/n)² + (2/n) w²,  never more than (2/n) u_V²; w not stated: (2/n) u_V²  (2)
 //!   s    :  r² = u_V²/(n − 1),   v² = u_V² (n − 2)/(n − 1),   o = s − √(s² − v²),
-//!           o = min(s, v) where s² < u_V² χ²(95 %, n − 1)/(n − 1)                               (3)
+//!           o = min(s, v) where s² < u_V² χ²(p, n − 1)/(n − 1),   p = 0.95^(1/k)               (3)
 //!   R↑   :  u² = 4² (r² + o²)                                                                  (4)
 //!   R    :  u² = 2² (2 r² + (o↑ + o↓)²) + u_B²,   or (4) where R_i is that of one side          (5)
 //!   E↑, E:  u² = u_L² + (2/n) u_V²       difference of two means                                (6)
@@ -24,9 +24,10 @@
 //!
 //! (3): drift d between the n runs at a target has n − 1 components beside the machine's own scatter z. The one along z
 //! changes s in the first order, by the law of propagation: ∂s/∂x_j = (x_j − x̄)/((n − 1) s), so r² = u_V²/(n − 1). The
-//! n − 2 others add to it as squares, s² = s_z² + v², always upwards: o is the offset that is then in s. Where drift alone
-//! scatters as much as s in 5 % of tests or more, nothing shows that the machine scatters itself, and o is the greatest that
-//! it can be. It is not taken out of R and A but stands in their U, with the same sign for both sides in (5). r² + o²
+//! n − 2 others add to it as squares, s² = s_z² + v², always upwards: o is the offset that is then in s. R and A are those of
+//! the greatest of k standard deviations, one for each target and side. Where drift alone makes the greatest of k as great
+//! as s in 5 % of tests or more, nothing shows that the machine scatters itself, and o is the greatest that it can be. It
+//! is not taken out of R and A but stands in their U, with the same sign for both sides in (5). r² + o²
 //! is never more than u_V².
 //!
 //! # Holds when
@@ -154,9 +155,11 @@ impl PositioningContributions {
         ])
     }
 
-    pub(super) fn figures(&self, n_runs: usize) -> FigureUncertainties {
+    /// For a test of `n_runs` runs from each side that has `n_scatters` standard deviations, k of (3).
+    pub(super) fn figures(&self, n_runs: usize, n_scatters: usize) -> FigureUncertainties {
         FigureUncertainties {
             n: n_runs as f64,
+            n_scatters: n_scatters as f64,
             length_mm: self.length_part_mm(),
             drift_mm: self.drift_mm,
             unrest_mm: self.unrest_mm,
@@ -167,6 +170,7 @@ impl PositioningContributions {
 /// What the standard uncertainties of the figures are made of; extremes have one distance.
 pub(super) struct FigureUncertainties {
     n: f64,
+    n_scatters: f64,
     length_mm: f64,
     drift_mm: f64,
     unrest_mm: Option<f64>,
@@ -189,13 +193,13 @@ impl FigureUncertainties {
     fn of_scatter_mm(&self, s_mm: f64) -> [f64; 2] {
         let (freedom, u_mm) = (self.n - 1.0, self.drift_mm);
         let added_mm = u_mm * ((freedom - 1.0) / freedom).sqrt();
-        let of_drift_alone = ChiSquared::new(freedom).map_or(f64::INFINITY, |chi2| {
-            chi2.inverse_cdf(DRIFT_ALONE_PROBABILITY) / freedom
-        });
+        let of_each = DRIFT_ALONE_PROBABILITY.powf(1.0 / self.n_scatters);
+        let of_drift_alone = ChiSquared::new(freedom)
+            .map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(of_each) / freedom);
         let offset_mm = if s_mm * s_mm < of_drift_alone * u_mm * u_mm {
             s_mm.min(added_mm)
         } else {
-            // The point of 95 % lies above the mean, so the root is of no negative number.
+            // The point of 95 % and more lies above the mean, so the root is of no negative number.
             s_mm - (s_mm * s_mm - added_mm * added_mm).max(0.0).sqrt()
         };
         [u_mm / freedom.sqrt(), offset_mm]
@@ -257,12 +261,12 @@ mod tests {
         };
         assert!((parts.length_part_mm() - 0.005).abs() < 1e-15);
         let near = |found: f64, by_hand: f64| assert!((found - by_hand).abs() < 1e-15, "{found}");
-        let eight = parts.figures(8);
+        let eight = parts.figures(8, 1);
         near(eight.reversal_mm(), 0.0005);
         near(eight.systematic_mm(), 25.25e-6_f64.sqrt());
         near(eight.mean_systematic_mm(), 25.125e-6_f64.sqrt());
         // n = 4: r² = 1/3, v² = 2/3; χ²(95 %, 3)/3 = 2.605, so that s² = 6 is a scatter of the machine: o = √6 − √(16/3).
-        let four = parts.figures(4);
+        let four = parts.figures(4, 1);
         let s = 6e-6_f64.sqrt();
         let o = s - (16e-6_f64 / 3.0).sqrt();
         let scatter = 1e-6 / 3.0 + o * o;
@@ -274,12 +278,14 @@ mod tests {
         near(four.repeatability_one_way_mm(2.6e-6_f64.sqrt()), 0.004);
         let little: f64 = 1e-6 / 3.0 + 0.25e-6;
         near(four.repeatability_one_way_mm(0.0005), 4.0 * little.sqrt());
+        // The greatest of ten: χ²(95 %^(1/10), 3)/3 = 4.26, so s² = 4 can be drift alone.
+        near(parts.figures(4, 10).repeatability_one_way_mm(0.002), 0.004);
         // Readings of one target from both sides are at most a quarter of the test apart: half of u_V.
         parts.unrest_mm = Some(0.0);
-        near(parts.figures(4).reversal_mm(), 0.0005);
+        near(parts.figures(4, 1).reversal_mm(), 0.0005);
         parts.unrest_mm = Some(0.0005);
-        near(parts.figures(4).reversal_mm(), 0.375e-6_f64.sqrt());
+        near(parts.figures(4, 1).reversal_mm(), 0.375e-6_f64.sqrt());
         parts.unrest_mm = Some(0.1);
-        near(parts.figures(4).reversal_mm(), 0.5e-6_f64.sqrt());
+        near(parts.figures(4, 1).reversal_mm(), 0.5e-6_f64.sqrt());
     }
 }

@@ -61,7 +61,11 @@ pub fn evaluate(
     };
     let points: Vec<OneSidedPoint> = runs.targets_mm.iter().enumerate().map(point).collect();
     let span_mm = runs.span_mm();
-    let u = |length_mm: f64| budget.over(length_mm, span_mm).figures(rows.len());
+    let u = |length_mm: f64| {
+        budget
+            .over(length_mm, span_mm)
+            .figures(rows.len(), points.len())
+    };
     // The remarks count runs of the side that there is.
     let counted = PositioningRuns {
         up_mm: rows.to_vec(),

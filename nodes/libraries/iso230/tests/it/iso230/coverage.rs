@@ -222,17 +222,20 @@ fn eq4_eq5_eq8_of_the_budget_bound_what_drift_adds_to_the_scatter() {
         ..EXACT
     };
     let span_mm = TARGETS_MM[4] - TARGETS_MM[0];
-    let held = figure_errors(&budget).into_iter().filter(|r| {
-        let truths_mm = [
-            (r.up.repeatability, 0.0),
-            (r.repeatability, 0.004),
-            (r.accuracy, 5e-5 * span_mm + 0.004),
-        ];
-        truths_mm.iter().all(|(figure, truth_mm)| {
+    let results = figure_errors(&budget);
+    type Figure = fn(&PositioningResult) -> ExpandedLength;
+    let figures: [(&str, Figure, f64); 3] = [
+        ("R up", |r| r.up.repeatability, 0.0),
+        ("R", |r| r.repeatability, 0.004),
+        ("A", |r| r.accuracy, 5e-5 * span_mm + 0.004),
+    ];
+    for (name, of, truth_mm) in figures {
+        let held = results.iter().filter(|r| {
+            let figure = of(r);
             (figure.value_mm - truth_mm).abs() <= figure.expanded_uncertainty_mm
-        })
-    });
-    let share = held.count() as f64 / SEEDS as f64;
-    eprintln!("R up, R and A: {:.1} %", 100.0 * share);
-    assert!(share >= 0.95, "{share}");
+        });
+        let share = held.count() as f64 / SEEDS as f64;
+        eprintln!("{name}: {:.1} %", 100.0 * share);
+        assert!(share >= 0.93, "{name}: {share}");
+    }
 }
