@@ -268,14 +268,6 @@ pub enum Condition {
         /// Instance now.
         now: u64,
     },
-    /// What was heard and not yet handed on when the bridge was stopped.
-    #[error(
-        "{count} values and conditions were heard and not handed on when the bridge was stopped"
-    )]
-    LeftWaiting {
-        /// How many.
-        count: usize,
-    },
 }
 
 impl Condition {
@@ -302,7 +294,6 @@ impl Condition {
                 "sequence_gap"
             }
             Self::AgentRestarted { .. } => "agent_restarted",
-            Self::LeftWaiting { .. } => "left_waiting",
         };
         plain.to_owned()
     }

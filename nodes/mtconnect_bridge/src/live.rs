@@ -3,9 +3,10 @@
 //! To its driver it is an ordinary stage that wants a tick every few milliseconds; each tick hands over all that
 //! has come from outside since the last, with the instants at which it came.
 
-use std::collections::VecDeque;
 use std::convert::Infallible;
 
+use machine_report::ValueCondition;
+use machine_report::turns::Turns;
 use metrology::Stage;
 use metrology::stamp::{Host, Stamp};
 
@@ -28,8 +29,6 @@ pub enum LiveInput {
 const EVENTS_PER_TICK: usize = 256;
 /// Bytes in one tick after which no further event is taken.
 const BYTES_PER_TICK: usize = 1 << 20;
-/// Outputs in one tick at most; the others wait for the next, and nothing more is heard meanwhile.
-const OUTPUTS_PER_TICK: usize = 1_000;
 
 /// A bridge at work.
 #[derive(Debug)]
@@ -38,7 +37,7 @@ pub struct LiveBridge {
     io: Option<BridgeIo>,
     log: Option<LogFile>,
     said: Vec<Output>,
-    waiting: VecDeque<Output>,
+    waiting: Turns<Output>,
 }
 
 impl LiveBridge {
@@ -52,7 +51,7 @@ impl LiveBridge {
             io: Some(BridgeIo::start(settings.address.clone())?),
             log: None,
             said: Vec::new(),
-            waiting: VecDeque::new(),
+            waiting: Turns::default(),
         })
     }
 
@@ -64,7 +63,7 @@ impl LiveBridge {
             io: None,
             log: Some(log),
             said: Vec::new(),
-            waiting: VecDeque::new(),
+            waiting: Turns::default(),
         }
     }
 
@@ -87,16 +86,10 @@ impl LiveBridge {
                         io.command(command);
                     }
                 }
-                other => self.waiting.push_back(other),
+                other => self.waiting.put(other),
             }
         }
         Ok(())
-    }
-
-    /// Hands over what waits, at most so much.
-    fn hand_over(&mut self, most: usize, out: &mut Vec<Output>) {
-        let n = self.waiting.len().min(most);
-        out.extend(self.waiting.drain(..n));
     }
 
     /// Takes events until they are many, or have much to say; whether the stage may take the time of the tick.
@@ -105,7 +98,7 @@ impl LiveBridge {
     fn listen(&mut self) -> Result<bool, Infallible> {
         let mut bytes = 0;
         for _ in 0..EVENTS_PER_TICK {
-            if bytes > BYTES_PER_TICK || self.waiting.len() >= OUTPUTS_PER_TICK {
+            if bytes > BYTES_PER_TICK || self.waiting.is_full() {
                 return Ok(false);
             }
             let Some((came_at, event)) = self.io.as_ref().and_then(BridgeIo::event) else {
@@ -137,12 +130,11 @@ impl Stage for LiveBridge {
         out: &mut Vec<Output>,
     ) -> Result<(), Infallible> {
         if input == LiveInput::Shutdown {
-            self.hand_over(OUTPUTS_PER_TICK, out);
-            let count = self.waiting.len();
-            self.waiting.clear();
-            out.extend((count > 0).then_some(Output::Condition(Condition::LeftWaiting { count })));
+            let count = self.waiting.end(out);
+            let left = ValueCondition::LeftWaiting { count };
+            out.extend((count > 0).then_some(Output::Condition(left.into())));
             self.pass(at, Input::Shutdown)?;
-            self.hand_over(usize::MAX, out);
+            self.waiting.hand_over(out);
             return Ok(());
         }
         self.read_log(out);
@@ -150,7 +142,7 @@ impl Stage for LiveBridge {
         if self.waiting.is_empty() && self.listen()? {
             self.pass(at, Input::Tick)?;
         }
-        self.hand_over(OUTPUTS_PER_TICK, out);
+        self.waiting.hand_over(out);
         Ok(())
     }
 }
@@ -178,24 +170,24 @@ mod tests {
             io: None,
             log: None,
             said: Vec::new(),
-            waiting: VecDeque::new(),
+            waiting: Turns::default(),
         }
     }
 
     #[test]
     fn much_that_a_machine_says_is_handed_over_in_turns_and_never_holds_the_end_up() {
         let mut bridge = bridge();
-        let one = || Output::Condition(Condition::Offered);
-        bridge
-            .waiting
-            .extend(std::iter::repeat_with(one).take(2_500));
+        for _ in 0..2_500 {
+            bridge.waiting.put(Output::Condition(Condition::Offered));
+        }
         let at = Stamp::from_nanos(1_000);
         let mut said = vec![];
         bridge.step(at, LiveInput::Tick, &mut said).unwrap();
-        assert_eq!((said.len(), bridge.waiting.len()), (1_000, 1_500));
+        assert_eq!(said.len(), 1_000);
         said.clear();
         bridge.step(at, LiveInput::Shutdown, &mut said).unwrap();
-        let left = Output::Condition(Condition::LeftWaiting { count: 500 });
+        let left = ValueCondition::LeftWaiting { count: 500 };
+        let left = Output::Condition(left.into());
         assert!(said.contains(&left), "{:?}", said.last());
         assert_eq!(said.last(), Some(&Output::Stopped));
         assert!(said.len() < 1_010, "{}", said.len());

@@ -5,6 +5,8 @@
 
 use std::convert::Infallible;
 
+use machine_report::ValueCondition;
+use machine_report::turns::Turns;
 use metrology::Stage;
 use metrology::stamp::{Host, Stamp};
 
@@ -31,6 +33,7 @@ pub struct LiveBridge {
     stage: BridgeStage,
     io: BridgeIo,
     said: Vec<Output>,
+    waiting: Turns<Output>,
 }
 
 impl LiveBridge {
@@ -44,23 +47,35 @@ impl LiveBridge {
             stage: BridgeStage::new(settings),
             io: BridgeIo::start(settings, credentials)?,
             said: Vec::new(),
+            waiting: Turns::default(),
         })
     }
 
-    fn pass(
-        &mut self,
-        at: Stamp<Host>,
-        input: Input,
-        out: &mut Vec<Output>,
-    ) -> Result<(), Infallible> {
+    fn pass(&mut self, at: Stamp<Host>, input: Input) -> Result<(), Infallible> {
         self.stage.step(at, input, &mut self.said)?;
         for output in self.said.drain(..) {
             match output {
                 Output::Io(command) => self.io.command(command),
-                other => out.push(other),
+                other => self.waiting.put(other),
             }
         }
         Ok(())
+    }
+
+    /// Takes events until they are many, or have much to say; whether the stage may take the time of the tick.
+    ///
+    /// It may not where what came is cut: a tick ends an instant, whose other positions may be in what was not taken.
+    fn listen(&mut self) -> Result<bool, Infallible> {
+        for _ in 0..EVENTS_PER_TICK {
+            if self.waiting.is_full() {
+                return Ok(false);
+            }
+            let Some((came_at, event)) = self.io.event() else {
+                return Ok(true);
+            };
+            self.pass(came_at, Input::Io(event))?;
+        }
+        Ok(false)
     }
 }
 
@@ -76,14 +91,18 @@ impl Stage for LiveBridge {
         out: &mut Vec<Output>,
     ) -> Result<(), Infallible> {
         if input == LiveInput::Shutdown {
-            return self.pass(at, Input::Shutdown, out);
+            let count = self.waiting.end(out);
+            let left = ValueCondition::LeftWaiting { count };
+            out.extend((count > 0).then_some(Output::Condition(left.into())));
+            self.pass(at, Input::Shutdown)?;
+            self.waiting.hand_over(out);
+            return Ok(());
         }
-        for _ in 0..EVENTS_PER_TICK {
-            let Some((came_at, event)) = self.io.event() else {
-                break;
-            };
-            self.pass(came_at, Input::Io(event), out)?;
+        // While much waits the machine waits too, and is not silent.
+        if self.waiting.is_empty() && self.listen()? {
+            self.pass(at, Input::Tick)?;
         }
-        self.pass(at, Input::Tick, out)
+        self.waiting.hand_over(out);
+        Ok(())
     }
 }

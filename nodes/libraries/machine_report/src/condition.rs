@@ -178,6 +178,14 @@ pub enum ValueCondition {
         /// Letters.
         axes: String,
     },
+    /// The bridge was stopped while values waited to be handed on.
+    #[error(
+        "{count} values and conditions were heard and not handed on when the bridge was stopped"
+    )]
+    LeftWaiting {
+        /// How many.
+        count: usize,
+    },
 }
 
 impl ValueCondition {
@@ -197,6 +205,7 @@ impl ValueCondition {
             }
             Self::Unmapped { .. } => "unmapped",
             Self::Uncommanded { .. } => "uncommanded",
+            Self::LeftWaiting { .. } => "left_waiting",
         };
         plain.to_owned()
     }

@@ -17,6 +17,7 @@ pub mod plausibility;
 pub mod positions;
 pub mod possible;
 pub mod report;
+pub mod turns;
 pub mod unit;
 pub mod values;
 
