@@ -526,7 +526,7 @@ impl Open {
             topics::GRID_POSITION.name,
         ];
         let what = format!(
-            "in run {} no {} came, so nothing tells where it was read: record that topic too",
+            "in run {} no {} came, so it is not known where it was read: record that topic too",
             self.begin.run,
             topics::AXES_STATE.name
         );

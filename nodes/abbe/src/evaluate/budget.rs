@@ -445,6 +445,23 @@ impl Budget {
         (&self.machine, &self.device)
     }
 
+    /// Temperatures that are stated and not read, in words: body, °C, half of its interval.
+    #[must_use]
+    pub fn stated_temperatures(&self) -> Vec<String> {
+        let bodies = [
+            ("machine", Some(&self.machine)),
+            ("device", Some(&self.device)),
+            ("plate", self.plate.as_ref()),
+        ];
+        let words = |(name, body): (&str, Option<&Body>)| {
+            let body = body?;
+            let degc = 20.0 + body.temperature_deviation_k?;
+            let half_width_k = body.temperature_half_width_k;
+            Some(format!("{name} {degc:.2} ± {half_width_k:.2} °C"))
+        };
+        bodies.into_iter().filter_map(words).collect()
+    }
+
     /// Whether temperature and expansion of the plate are stated.
     #[must_use]
     pub const fn has_plate(&self) -> bool {

@@ -30,7 +30,7 @@ const BY_CHANCE: f64 = 0.01;
 const BY_BALLBAR: &str =
     "Read by a ballbar, radially alone: F and D need the calibrated length of the ballbar.";
 /// About which centre each figure is.
-const CENTRES: &str = "G of a sense: about the least-squares centre of that sense. G of both, F, D and H: about that of both senses together, in one frame. F is not about the centre to which the instrument was set up, the standard's other choice: nothing tells how far that is from the programmed one.";
+const CENTRES: &str = "G of a sense: about the least-squares centre of that sense. G of both, F, D and H: about that of both senses together, in one frame. F is not about the centre to which the instrument was set up, the standard's other choice: a recording does not hold how far that is from the programmed one.";
 
 /// One part for each circle (both senses together), then one for the breakdown.
 ///

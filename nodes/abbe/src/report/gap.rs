@@ -462,7 +462,7 @@ fn next(report: &GapReport) -> Section {
     });
     section(
         "What to measure next",
-        &["run", "tells apart", "squared distance", "minutes"],
+        &["run", "separates", "squared distance", "minutes"],
         rows.collect(),
         "A squared distance of 9 or more is a decision. There and back: both ways in one run, with one zero.",
     )

@@ -251,7 +251,7 @@ fn without_places(tests: &Tests, test: &LinearTest) -> Option<String> {
     let came = rows.any(|row| row.topic.ends_with(name) && row.used > 0);
     (nothing_was_read(test) && !came).then(|| {
         format!(
-            "no message of the topic {name} can be used, so nothing tells where the axes were: record it together with {}",
+            "no message of the topic {name} can be used, so it is not known where the axes were: record it together with {}",
             topics::LENGTH_POSITION.name
         )
     })

@@ -93,8 +93,9 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
         .collect();
     let mut short = vec![joined(&run), joined(&instruments)];
     if temperatures.is_empty() {
-        section.lines.push(NO_THERMOMETER.to_owned());
-        short.push(NO_THERMOMETER.to_owned());
+        let words = without_thermometer(budget);
+        section.lines.push(words.clone());
+        short.push(words);
     } else {
         let of = |(name, read): (&String, &Readings)| {
             format!(
@@ -184,6 +185,18 @@ fn drawing(seen: &TestConditions) -> anyhow::Result<Option<Drawing>> {
 }
 
 const NO_THERMOMETER: &str = "Temperatures not stated: no thermometer was read. Name thermometers in temperature_sensors of the machine file, or state temperature_deviation_k in budget.yaml.";
+
+/// What is known of the temperatures where no thermometer was read.
+fn without_thermometer(budget: Option<&Budget>) -> String {
+    let stated = budget.map_or_else(Vec::new, Budget::stated_temperatures);
+    if stated.is_empty() {
+        return NO_THERMOMETER.to_owned();
+    }
+    format!(
+        "Temperatures as the budget states them, no thermometer was read: {}.",
+        stated.join(", ")
+    )
+}
 
 fn joined(conditions: &[Condition]) -> String {
     let all: Vec<String> = conditions.iter().map(Condition::short).collect();
@@ -394,9 +407,16 @@ mod tests {
         assert!(cell(&silent, "operator").starts_with("not stated (operator in budget.yaml"));
         assert!(silent.terminal().contains("Temperatures not stated"));
         assert!(silent.terminal().contains("Correction to 20 °C: not done"));
+        let text = include_str!("../../../../launch_configs/diagonals/budget.yaml");
+        let budget = Budget::read(text, Path::new("budget.yaml")).unwrap();
+        let stated = of(&seen, Some(&budget), None).terminal();
+        assert!(
+            stated.contains("no thermometer was read: machine 2"),
+            "{stated}"
+        );
+        assert!(!stated.contains("Temperatures not stated"), "{stated}");
         seen.thermometers
             .insert("bed".to_owned(), Readings::new(21.5));
-        let text = include_str!("../../../../launch_configs/diagonals/budget.yaml");
         let text = format!(
             "{text}\ninstruments: {{length_reference: {{instrument: a laser, serial_number: 12-3, certificate: K 7 of 2026-01-02}}}}\noperator: A. B.\nwarm_up: an hour of G0 along X\n"
         );

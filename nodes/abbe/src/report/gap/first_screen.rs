@@ -194,7 +194,7 @@ fn lacks(report: &GapReport, losses: &[String]) -> Vec<String> {
 
 fn next(experiment: &NextExperiment) -> Tile {
     let more = format!(
-        "{}; tells apart {}",
+        "{}; separates {}",
         experiment.run,
         experiment.separates.join(" / ")
     );
