@@ -21,14 +21,18 @@ use crate::noise::stack::Stack;
 use crate::noise::whiteness;
 use crate::noise::{self, Noise, Readings};
 use crate::report::figures::{Figures, Note};
-use crate::report::{GapReport, Inputs, NoiseFloor, NotExcited, SCHEMA};
+use crate::report::{
+    DoesNotRepeat, GapReport, Inputs, NoiseFloor, NotExcited, OverSession, SCHEMA,
+};
 use crate::report::{localise, places};
 use crate::search::families::Slot;
 use crate::search::isolability;
 use crate::search::regression::Regression;
 use crate::search::rows::Rows;
 use crate::search::searched::{Base, Searched, less, told};
+use crate::session::changes::{self, Change};
 use crate::session::fewer::{MIN_STATIONS_KEPT, fewer};
+use crate::session::over_session;
 use crate::shrink::gap;
 use crate::shrink::share_interval;
 use crate::shrink::split::{self, Split};
@@ -141,12 +145,16 @@ fn prepared<R>(
     if rows.len == 0 {
         return Err(GapError::NoReadings);
     }
+    let of_session = own_noise.then(|| changes_of(session, &rows, &residual, config));
+    let changes = of_session.unwrap_or_default();
+    let anew = changes::set_up_anew(session, &changes);
+    let session = anew.as_ref().unwrap_or(session);
     let noise = if own_noise {
-        noise_of(machine, session, stations, &residual, config)
+        noise_of(machine, session, stations, &residual, &changes, config)
     } else {
         simulate::check(quiet)?;
         let residual = residuals(machine, &twin, quiet)?;
-        noise_of(machine, quiet, stations, &residual, config)
+        noise_of(machine, quiet, stations, &residual, &[], config)
     };
     if noise.is_empty() {
         return Err(no_repeats(session, &rows));
@@ -159,6 +167,8 @@ fn prepared<R>(
         noise: &noise,
         residual: &residual,
         listed: listed(machine)?,
+        begins: changes::begins(session, &changes),
+        changes,
     };
     let mut notes = notes(&rows, &noise);
     if session.history.temperature_degc.is_empty() && !machine.temperature_sensors.is_empty() {
@@ -171,12 +181,27 @@ fn prepared<R>(
     Ok(then(&base, notes))
 }
 
-/// Noise of the repeats of a session.
+/// What changed between the repeats of a session.
+fn changes_of(
+    session: &Session,
+    rows: &Rows,
+    residual: &[Vec<f64>],
+    config: &GapConfig,
+) -> Vec<Change> {
+    let mut raw = vec![0.0; rows.len];
+    for (run, residual) in residual.iter().enumerate() {
+        rows.average(run, residual, &mut raw);
+    }
+    changes::find(session, rows, &raw, config)
+}
+
+/// Noise of the repeats of a session, but for what changed at some of its runs.
 fn noise_of(
     machine: &MachineFile,
     session: &Session,
     stations: usize,
     residual: &[Vec<f64>],
+    changes: &[Change],
     config: &GapConfig,
 ) -> BTreeMap<Channel, Noise> {
     let all: Vec<usize> = (0..session.runs.len()).collect();
@@ -191,7 +216,8 @@ fn noise_of(
         rows: &rows,
         residual,
     };
-    noise::noise(readings, &raw, config)
+    let steps: Vec<usize> = changes.iter().map(|change| change.between[1]).collect();
+    noise::noise(readings, &raw, &steps, config)
 }
 
 impl<'a> Base<'a> {
@@ -236,8 +262,15 @@ impl<'a> Base<'a> {
         let sizes = gap::by_block(&all, self.noise, &all.floated(all.raw.clone()), &all.runs);
         let floated = stack.floated(stack.raw.clone());
         let (rest, beside) = self.beside_named(&stack, &slots, &found, config);
-        let flagged = reproduced && before.flagged() && beside.flagged();
+        let (over_session, does_not_repeat) =
+            self.over_session(&stack, &all, &found, &rest, config);
+        notes.extend(over_session::notes(&over_session, &does_not_repeat));
+        let remainder = over_session::remainder(&mut found, &shrunk, config);
+        let is_left = remainder.is_some();
+        notes.extend(remainder);
+        let flagged = reproduced && before.flagged() && (beside.flagged() || is_left);
         let effects = [found.entries(), scattered.entries()].concat();
+        let figures = figures(&stack, &slots, [&before, &beside], &found, &shrunk, config);
         let report = GapReport {
             schema: SCHEMA.to_owned(),
             inputs: Inputs::default(),
@@ -250,19 +283,8 @@ impl<'a> Base<'a> {
             not_excited: not_excited(&found, &scattered.seen, kinds),
             next_experiments: next.entries,
             runtime_s: 0.0,
-        };
-        let figures = Figures {
-            heat: places::heat_map(&slots, &before.families, &beside.families),
-            traces: shrunk.traces,
-            isolability: isolability::isolability(
-                &found.signatures,
-                &found.normal,
-                &found.forms,
-                stack.freedom(),
-            ),
-            held_out: shrunk.held_out,
-            apart: shrunk.apart,
-            share_intervals: share_interval::of_places(&stack, &slots, &before.families, config),
+            over_session,
+            does_not_repeat,
         };
         Diagnosis {
             report,
@@ -271,6 +293,21 @@ impl<'a> Base<'a> {
             effects,
             experiments: next.experiments,
         }
+    }
+
+    /// Whether the named effects, which leave `rest` of what was fitted, hold over the session, and what no effect explains of its changes.
+    fn over_session(
+        &self,
+        fitted: &Stack<'_>,
+        all: &Stack<'_>,
+        found: &Found,
+        rest: &[f64],
+        config: &GapConfig,
+    ) -> (Vec<OverSession>, Vec<DoesNotRepeat>) {
+        let over_session = over_session::of_named(fitted, found, rest, config);
+        let left = less(&all.raw, &told(all, found.named(), found));
+        let changes = over_session::not_repeated(all, &left, &self.changes);
+        (over_session, changes)
     }
 
     /// What the named effects leave, before whitening, and its scores.
@@ -339,6 +376,31 @@ impl<'a> Base<'a> {
             })
             .collect();
         shrink::shrink(all, self.noise, split, &named, has_gap, config)
+    }
+}
+
+/// What the pages draw; `scores` are those of the residual before and beside what is named.
+fn figures(
+    stack: &Stack<'_>,
+    slots: &[Slot],
+    scores: [&Leftover; 2],
+    found: &Found,
+    shrunk: &Shrunk,
+    config: &GapConfig,
+) -> Figures {
+    let [before, beside] = scores.map(|score| &score.families);
+    Figures {
+        heat: places::heat_map(slots, before, beside),
+        traces: shrunk.traces.clone(),
+        isolability: isolability::isolability(
+            &found.signatures,
+            &found.normal,
+            &found.forms,
+            stack.freedom(),
+        ),
+        held_out: shrunk.held_out.clone(),
+        apart: shrunk.apart.clone(),
+        share_intervals: share_interval::of_places(stack, slots, before, config),
     }
 }
 

@@ -9,7 +9,7 @@
 //! `session` makes a session of recorded samples. `rows` thins readings to stations; `repeats` finds what was
 //! measured twice, `log` knows runs that stand and are read over time, `field`, `pace` and `noise` make the noise floor of it, `form_error`
 //! adds what every simulator is off by; `whitener` makes every row's noise one,
-//! `nuisance` takes out what set-ups leave open, `stack` keeps both. `signature` asks the twin what each effect of
+//! `changes` finds what changed between repeats, `nuisance` takes out what set-ups leave open, `stack` keeps both. `signature` asks the twin what each effect of
 //! the catalogue would look like, `normal` and `selection` find the set that explains the residual, `widening` gives
 //! its effects forms of their own, `refit` sizes
 //! it, `form_doubt` says what a size owes to its form, `confirm` tries it on runs left out and under every
@@ -18,7 +18,7 @@
 //! what is left is white. `families`, `localise` and `places` say where the gap lies, `guard` whether the
 //! noise is that of the repeats, `unknown` what no effect explains, `isolability` what could be told from what. `gap` is how much there was to explain, `split` and
 //! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`, `apart` what each effect has of that;
-//! `share_interval` is the interval of a place's share, `unread` the pauses of thermometers; `unrepeated` is the noise floor of a log made once, `thermal` finds the thermometers that a log goes with. `experiment` knows what could
+//! `over_session` says whether one size holds over the session; `share_interval` is the interval of a place's share, `unread` the pauses of thermometers; `unrepeated` is the noise floor of a log made once, `thermal` finds the thermometers that a log goes with. `experiment` knows what could
 //! be measured next and `next` which of it would decide. `diagnose` puts the questions in their order,
 //! `preflight` some of them before anything is measured, and `design` chooses what to measure; `regression` is what other methods than these would start
 //! from, `problem` the first search as numbers alone, `rule` what of these can be switched off. `stage` is the node's whole computation, `following` its
@@ -51,7 +51,7 @@ pub use judgement::rule::Rule;
 pub use judgement::veto::Veto;
 pub use report::GapReport;
 pub use report::figures;
-pub use report::figures::{Figures, Note};
+pub use report::figures::{Course, Figures, Note};
 pub use search::problem;
 pub use search::regression;
 pub use session::thermal::{GoesWith, ThermalFit};

@@ -21,7 +21,7 @@
 //!
 //! # Holds when
 //! All runs of a channel have the noise that its repeats have, at their own pace (`pace`). Where nothing was repeated
-//! `unrepeated` has the noise of logs.
+//! `unrepeated` has the noise of logs, and single runs in motion have what their smooth modes leave.
 //!
 //! # References
 //! \[1\] G. Schwarz, Ann. Stat. 6, 1978 (BIC). \[2\] H. D. Patterson, R. Thompson, Biometrika 58, 1971
@@ -52,6 +52,8 @@ use crate::noise::whitener::Autoregression;
 use crate::search::field::{self, Mode, Smooth};
 use crate::search::rows::{Block, Rows, count};
 use crate::session::log::LONG_S;
+
+mod within_runs;
 
 /// Noise of one channel.
 #[derive(Clone, Debug)]
@@ -121,26 +123,38 @@ pub struct Readings<'r> {
     pub residual: &'r [Vec<f64>],
 }
 
-/// Noise of every channel that was repeated, and of the logs of the others (of long logs, where anything was repeated); `raw`
-/// is the residual of each row.
-pub fn noise(readings: Readings<'_>, raw: &[f64], config: &GapConfig) -> BTreeMap<Channel, Noise> {
-    let repeated: BTreeMap<Channel, Noise> =
-        repeats::contrasts(readings.session, readings.rows, raw)
-            .into_iter()
-            .filter_map(|(channel, groups)| {
-                let found = of_channel(readings, &groups, config)?;
-                Some((channel, found))
-            })
-            .collect();
+/// Noise of every channel that was repeated, and of the logs of the others (of long logs, where anything was repeated), else of
+/// single runs in motion; `raw` is the residual of each row. What changed at `steps` (first runs after each) is no noise.
+pub fn noise(
+    readings: Readings<'_>,
+    raw: &[f64],
+    steps: &[usize],
+    config: &GapConfig,
+) -> BTreeMap<Channel, Noise> {
+    let beside = |steps: &[usize]| -> BTreeMap<Channel, Noise> {
+        let groups = repeats::contrasts(readings.session, readings.rows, raw, steps);
+        let of = |(channel, groups): (Channel, Vec<Contrasts>)| {
+            let found = of_channel(readings, &groups, config)?;
+            Some((channel, found))
+        };
+        groups.into_iter().filter_map(of).collect()
+    };
+    // Where a channel has no repeats but across the steps, these are in its noise.
+    let mut repeated = beside(&[]);
+    if !steps.is_empty() {
+        repeated.extend(beside(steps));
+    }
     let least_s = if repeated.is_empty() { 0.0 } else { LONG_S };
     let mut all = unrepeated::noise(readings, raw, least_s);
+    if all.is_empty() && repeated.is_empty() {
+        all = within_runs::noise(readings, raw, config);
+    }
     all.extend(repeated);
     all
 }
 
 /// Share of the posterior of a variance within runs below what is used.
 const CAUTION_WITHIN: f64 = 0.9;
-
 /// How much greater a variance that is known from so many rows may well be.
 pub fn doubt(freedom: f64) -> f64 {
     let law = ChiSquared::new(freedom.max(1.0)).ok();
@@ -536,60 +550,4 @@ fn one_likelihood(difference: &Difference, smooth: &Smooth) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_pcg::Pcg64Mcg;
-
-    /// A difference over the angle of a circle with two dozen modes taken out of a hundred rows.
-    fn difference(phi: f64, random: &mut Pcg64Mcg) -> Difference {
-        let rows = 100;
-        let mut last = 0.0;
-        let values = DVector::from_fn(rows, |_, _| {
-            let draw: f64 = StandardNormal.sample(random);
-            last = phi * last + (1.0 - phi * phi).sqrt() * draw;
-            last
-        });
-        let angle = |row: usize| std::f64::consts::TAU * row as f64 / 100.0;
-        Difference {
-            paced: None,
-            values,
-            kinds: vec![],
-            modes: DMatrix::from_fn(rows, 25, |row, k| {
-                let turn = if k % 2 == 0 { 0.0 } else { 0.25 };
-                (angle(row) * count(k.div_ceil(2)) - std::f64::consts::TAU * turn).cos()
-            }),
-            open: DMatrix::zeros(rows, 0),
-        }
-    }
-
-    /// Repeats of two circles: white noise is told as such, though little is left to tell it by.
-    #[test]
-    fn eq5_few_white_rows_have_no_memory() {
-        let mut random = Pcg64Mcg::seed_from_u64(11);
-        let mut worst = 0.0_f64;
-        for _ in 0..50 {
-            let few: Vec<Difference> = (0..4).map(|_| difference(0.0, &mut random)).collect();
-            let few: Vec<&Difference> = few.iter().collect();
-            let (found, _) = autocovariances(&few, 3);
-            let largest = found[1..].iter().map(|g| (g / found[0]).abs());
-            worst = largest.fold(worst, f64::max);
-        }
-        assert!(worst < 0.3, "{worst}");
-    }
-
-    #[test]
-    fn eq4_modes_that_are_taken_out_do_not_colour_the_noise() {
-        let mut random = Pcg64Mcg::seed_from_u64(7);
-        for phi in [0.0, 0.2, 0.35] {
-            let all: Vec<Difference> = (0..400).map(|_| difference(phi, &mut random)).collect();
-            let all: Vec<&Difference> = all.iter().collect();
-            let (found, freedom) = autocovariances(&all, 3);
-            assert!((freedom - 400.0 * 75.0).abs() < 1.0, "{freedom}");
-            for (lag, wanted) in [1.0, phi, phi * phi].into_iter().enumerate() {
-                assert!((found[lag] - wanted).abs() < 0.08, "{phi} {lag}: {found:?}");
-            }
-        }
-    }
-}
+mod tests;

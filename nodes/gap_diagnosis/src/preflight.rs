@@ -232,7 +232,7 @@ pub(crate) fn assumed(rows: &Rows, floors: &Floors) -> BTreeMap<Channel, Noise> 
 }
 
 fn channels(session: &Session, rows: &Rows, floors: &Floors) -> Vec<PlannedChannel> {
-    let repeats = repeats::contrasts(session, rows, &vec![0.0; rows.len]);
+    let repeats = repeats::contrasts(session, rows, &vec![0.0; rows.len], &[]);
     let mut runs = BTreeMap::<&Channel, usize>::new();
     for block in &rows.blocks {
         *runs.entry(&block.channel).or_default() += 1;

@@ -43,6 +43,52 @@ pub struct GapReport {
     pub next_experiments: Vec<NextExperiment>,
     /// Time the diagnosis took, s; filled in by whoever has a clock.
     pub runtime_s: f64,
+    /// Whether the size of each named effect of the mean holds over the session, in the order of `causes`; absent where none is named.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub over_session: Vec<OverSession>,
+    /// What changed between repeats and no named effect explains; absent where nothing did.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub does_not_repeat: Vec<DoesNotRepeat>,
+}
+
+/// Whether the size of a named effect holds over the session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OverSession {
+    /// Id of the effect.
+    pub effect: String,
+    /// What it acts on.
+    pub axis: String,
+    /// The first run that shows it, where it was not there from the begin.
+    pub from_run: Option<u32>,
+    /// Whether one size holds while it is there.
+    pub holds: bool,
+    /// From which run on it has another size, where a step is found.
+    pub changes_from_run: Option<u32>,
+    /// By how much that is another, as a share of its size.
+    pub change_share: Option<f64>,
+    /// By how much it grows in an hour, as a share of its size, where it grows.
+    pub growth_share_per_h: Option<f64>,
+    /// Chance of as much in noise; absent where too few runs repeat one another.
+    pub chance: Option<f64>,
+}
+
+/// A change between repeats that no named effect explains.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DoesNotRepeat {
+    /// The channel that changed most.
+    pub channel: String,
+    /// By how much, µm.
+    pub size_um: f64,
+    /// The last run before, of those that show it.
+    pub last_run: u32,
+    /// The first run after.
+    pub from_run: u32,
+    /// Whether the set-up moved and nothing else changed.
+    pub of_set_up: bool,
+    /// Chance of as much in noise.
+    pub chance: f64,
 }
 
 /// What was read.

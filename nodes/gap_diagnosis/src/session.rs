@@ -63,8 +63,10 @@
 //! # Holds when
 //! Rotary axes rest at zero during grid and length runs. Positions on a curve are those commanded.
 
+pub(crate) mod changes;
 pub(crate) mod fewer;
 pub(crate) mod log;
+pub(crate) mod over_session;
 pub(crate) mod thermal;
 pub(crate) mod unread;
 

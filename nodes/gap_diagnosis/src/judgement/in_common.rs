@@ -107,7 +107,11 @@ mod tests {
 
     fn instance(id: &str, target: Target) -> Instance {
         let kind = CATALOGUE.iter().find(|kind| kind.id == id).unwrap();
-        Instance { kind, target }
+        Instance {
+            kind,
+            target,
+            begins: None,
+        }
     }
 
     fn estimate(instance: &Instance, sizes: &[f64], u: f64) -> Estimate {

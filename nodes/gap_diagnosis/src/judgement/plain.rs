@@ -78,6 +78,7 @@ mod tests {
         let instance = |id: &str| Instance {
             kind: effects::kind(id).unwrap(),
             target: Target::Axis(Axis::X),
+            begins: None,
         };
         let form = |instance, wide| Form {
             instance,

@@ -10,7 +10,8 @@
 //! ```
 //!
 //! With five repeats and more the weights are also orthogonal to time, with nine to its square, with
-//! thirteen to its cube: what drifts through the session is the machine's, not noise. Touches of one
+//! thirteen to its cube: what drifts through the session is the machine's, not noise; nor is what changed in steps (`changes`),
+//! to which they are orthogonal as well. Touches of one
 //! feature from one side, at one feed and in one pose of the rotary axes are repeats within a run as well.
 //!
 //! Rows of tests in motion are one where they are of one station of the path; those of a log where they are of one time
@@ -55,16 +56,18 @@ pub fn groups(session: &Session, rows: &Rows) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Groups of repeats with their differences, by channel.
+/// Groups of repeats with their differences, by channel; nothing of what changed at `steps` (the first run after each) is in
+/// them.
 pub fn contrasts(
     session: &Session,
     rows: &Rows,
     residual: &[f64],
+    steps: &[usize],
 ) -> BTreeMap<Channel, Vec<Contrasts>> {
     let mut all = BTreeMap::<Channel, Vec<Contrasts>>::new();
     for group in groups(session, rows) {
         let channel = rows.blocks[group[0]].channel.clone();
-        let found = between(session, rows, &group, residual);
+        let found = between(session, rows, &group, residual, steps);
         all.entry(channel).or_default().extend(found);
     }
     all
@@ -119,10 +122,16 @@ fn extent(run: &Run, block: &Block) -> PerAxis<(f64, f64)> {
     })
 }
 
-fn between(session: &Session, rows: &Rows, group: &[usize], residual: &[f64]) -> Vec<Contrasts> {
+fn between(
+    session: &Session,
+    rows: &Rows,
+    group: &[usize],
+    residual: &[f64],
+    steps: &[usize],
+) -> Vec<Contrasts> {
     let blocks: Vec<&Block> = group.iter().map(|k| &rows.blocks[*k]).collect();
     let mut found = Vec::new();
-    if let Some(contrasts) = runs_between(session, group, &blocks, residual) {
+    if let Some(contrasts) = runs_between(session, group, &blocks, residual, steps) {
         found.push(contrasts);
     } else if blocks[0].channel == Channel::Touch {
         for (place, block) in group.iter().zip(blocks) {
@@ -142,6 +151,7 @@ fn runs_between(
     group: &[usize],
     blocks: &[&Block],
     residual: &[f64],
+    steps: &[usize],
 ) -> Option<Contrasts> {
     if blocks.len() < 2 {
         return None;
@@ -168,7 +178,8 @@ fn runs_between(
         .iter()
         .map(|block| time_s(&session.runs[block.run], &block.rows[0]))
         .collect();
-    let values = weights(&times)
+    let runs: Vec<usize> = blocks.iter().map(|block| block.run).collect();
+    let values: Vec<Vec<f64>> = weights_beside(&times, &runs, steps)
         .iter()
         .map(|weight| {
             (0..shared.len())
@@ -179,7 +190,7 @@ fn runs_between(
                 .collect()
         })
         .collect();
-    Some(Contrasts {
+    (!values.is_empty()).then(|| Contrasts {
         blocks: group.to_vec(),
         rows: places[0].clone(),
         values,
@@ -248,6 +259,11 @@ fn log_between(
 
 /// Weights of (1) for repeats at some times.
 fn weights(times: &[f64]) -> Vec<DVector<f64>> {
+    weights_beside(times, &[], &[])
+}
+
+/// The same, orthogonal to steps as well.
+fn weights_beside(times: &[f64], runs: &[usize], steps: &[usize]) -> Vec<DVector<f64>> {
     let n = times.len();
     let (first, last) = (times[0], times[n - 1]);
     let scaled = |t: f64| (t - first) / (last - first).max(f64::MIN_POSITIVE) * 2.0 - 1.0;
@@ -257,8 +273,14 @@ fn weights(times: &[f64]) -> Vec<DVector<f64>> {
         DVector::from_iterator(n, times.iter().map(|t| scaled(*t).powi(power)))
     });
     let unit = (0..n).map(|i| DVector::from_fn(n, |row, _| if row == i { 1.0 } else { 0.0 }));
-    let basis = orthonormal(n, smooth.chain(unit));
-    (powers + 1..basis.ncols())
+    let stepped = steps.iter().map(|step| {
+        let after = runs.iter().map(|run| f64::from(u8::from(run >= step)));
+        DVector::from_iterator(n, after)
+    });
+    let taken = orthonormal(n, smooth.chain(stepped));
+    let own = (0..taken.ncols()).map(|k| taken.column(k).into_owned());
+    let basis = orthonormal(n, own.chain(unit));
+    (taken.ncols()..basis.ncols())
         .map(|k| basis.column(k).into_owned())
         .collect()
 }

@@ -8,7 +8,7 @@
 //!
 //! # Holds when
 //! Logs that stand. A test in motion has an error at every place, which neighbours along the path do not separate from noise:
-//! without repeats it has no noise floor.
+//! its noise within a run is what the smooth modes leave (`noise`), and what a second run differs by is [`between_in_motion`].
 
 use std::collections::BTreeMap;
 
@@ -69,6 +69,17 @@ fn of_channel(
         freedom,
         field_freedom: 1.0,
     })
+}
+
+/// How a second run of a test in motion would differ: as much over place as in its offset and along the run.
+pub fn between_in_motion() -> Smooth {
+    let between_mm = ASSUMED_BETWEEN_UM * 1e-3;
+    Smooth {
+        place_mm: between_mm,
+        offset_mm: between_mm,
+        drift_mm: between_mm,
+        length_rad: 0.5,
+    }
 }
 
 /// Whether a noise floor is from no repeats.

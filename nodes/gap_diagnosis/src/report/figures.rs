@@ -9,9 +9,11 @@ use serde::{Deserialize, Serialize};
 use crate::judgement::veto::Veto;
 use crate::session::thermal::{GoesWith, ThermalFit};
 
+mod course;
 mod no_run;
 pub(crate) mod over_session;
 
+pub use course::Course;
 pub use no_run::NoRun;
 
 /// Everything that is drawn.
@@ -189,6 +191,8 @@ pub enum Note {
     },
     /// Something looks like an effect and is not named, for these reasons.
     OnlyLooksLike { effect: String, why: Vec<Veto> },
+    /// What changed over the session, or is left beside a name.
+    Course(Course),
     /// Of what is left open nothing is proposed.
     NoRun(NoRun),
 }
@@ -278,8 +282,8 @@ fn noise_within(
     };
     write!(
         f,
-        "{channel}: no test was repeated on it, so its noise is that of neighbouring readings, {sigma_um:.2} µm; by how \
-         much a second run would differ is not known, {between_um} µm is taken{then}: log the same again, three times in all"
+        "{channel}: no test was repeated on it, so its noise is that within a run, {sigma_um:.2} µm; by how much a second \
+         run would differ is not known, {between_um} µm is taken{then}: record the same again, three times in all"
     )
 }
 
@@ -393,6 +397,7 @@ impl fmt::Display for Note {
                 write!(f, "{effect} is not named: {}", why.join("; "))
             }
             Self::NoRun(none) => none.fmt(f),
+            Self::Course(course) => course.fmt(f),
         }
     }
 }

@@ -16,6 +16,8 @@ use crate::noise::form_error::FormError;
 use crate::noise::stack::{Simulated, Stack};
 use crate::scatter::{self, Scattered};
 use crate::search::families::{self, Slot};
+use crate::search::signature::Begins;
+use crate::session::changes::Change;
 use crate::shrink::split::Split;
 
 /// What every stack is made of.
@@ -28,6 +30,10 @@ pub(crate) struct Base<'a> {
     pub(crate) residual: &'a [Vec<f64>],
     /// The effects that the machine file has.
     pub(crate) listed: Vec<Box<dyn Effect>>,
+    /// First runs after what changed in the session.
+    pub(crate) begins: Vec<Begins>,
+    /// What changed between repeats of the session.
+    pub(crate) changes: Vec<Change>,
 }
 
 impl<'a> Base<'a> {
@@ -111,6 +117,7 @@ impl<'a> Base<'a> {
             slots,
             noise: &searched.noise,
             config,
+            begins: &self.begins,
         };
         let of_scatter = |left: &DVector<f64>| {
             let scope = scope(&searched.stack, &searched.slots);
@@ -148,6 +155,7 @@ impl<'a> Base<'a> {
             slots: &searched.slots,
             noise: &searched.noise,
             config,
+            begins: &self.begins,
         };
         scatter::find_within(&scope, kinds, &searched.found.left)
     }
@@ -165,6 +173,7 @@ impl<'a> Base<'a> {
             slots: &slots,
             noise,
             config,
+            begins: &self.begins,
         };
         let before = unknown::leftover(&stack, &slots, noise, &stack.z, &[], config);
         let found = cause::find(&scope, kinds);

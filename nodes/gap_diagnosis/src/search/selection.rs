@@ -355,6 +355,7 @@ mod tests {
             instances: vec![Instance {
                 kind: effects::kind("backlash").unwrap(),
                 target: Target::Axis(Axis::X),
+                begins: None,
             }],
             forms: vec![form(&[0], &[0], false), form(&[0, 1], &[0, 1], true)],
             columns: [[1.0, 0.0], [0.0, 1.0]]

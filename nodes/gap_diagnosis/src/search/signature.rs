@@ -20,7 +20,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
 use nalgebra::{DMatrix, DVector};
-use twin::effects::{Effect, Kind, Role, Target};
+use twin::effects::{Effect, Kind, Role, Scene, Target};
+use twin::{Response, Run};
 
 use crate::noise::normal::Normal;
 use crate::noise::stack::Stack;
@@ -33,7 +34,54 @@ pub struct Instance {
     pub kind: &'static Kind,
     /// What it acts on.
     pub target: Target,
+    /// From which run on it acts; none of an effect that was there all the time.
+    pub begins: Option<Begins>,
 }
+
+/// The first run of a part of a session.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Begins {
+    /// Its number.
+    pub run: u32,
+    /// When it begins, seconds since the session's start.
+    pub at_s: f64,
+}
+
+/// An effect that acts from a run on.
+struct From {
+    effect: Box<dyn Effect>,
+    begins: Begins,
+}
+
+impl Effect for From {
+    fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        if begin_s(scene.run).is_some_and(|at_s| at_s >= self.begins.at_s) {
+            self.effect.add_to(scene, response);
+        }
+    }
+}
+
+/// When a run begins, seconds since the session's start; none of a run without motion and touches.
+pub fn begin_s(run: &Run) -> Option<f64> {
+    let moves = run.motion.time_s.first().copied();
+    moves.or_else(|| run.touches.first().map(|touch| touch.time_s))
+}
+
+/// Kinds that go with time or temperature: when they begin is theirs to say.
+const OWN_TIME: [&str; 12] = [
+    "ambient_drift",
+    "clock_drift",
+    "column_bend",
+    "coolant",
+    "homing_shift",
+    "latency_drift",
+    "screw_elongation",
+    "spindle_growth",
+    "thermometer_lag",
+    "thermometer_noise",
+    "thermometer_offset",
+    "workpiece_expansion",
+];
 
 impl Instance {
     /// All instances of some kinds on a machine.
@@ -46,22 +94,47 @@ impl Instance {
             let targets = kind.targets_on(machine);
             targets
                 .into_iter()
-                .map(|target| Self { kind, target })
+                .map(|target| Self {
+                    kind,
+                    target,
+                    begins: None,
+                })
                 .collect()
         };
         kinds.flat_map(of).collect()
     }
 
+    /// The same instances, then each that may begin at some time as it begins there.
+    pub fn with_begins(all: Vec<Self>, begins: &[Begins]) -> Vec<Self> {
+        let may = |own: &&Self| !OWN_TIME.contains(&own.kind.id);
+        let from = |at: &Begins| -> Vec<Self> {
+            let later = |own: &Self| Self {
+                begins: Some(*at),
+                ..own.clone()
+            };
+            all.iter().filter(may).map(later).collect()
+        };
+        let later: Vec<Self> = begins.iter().flat_map(from).collect();
+        [all, later].concat()
+    }
+
     /// E.g. `backlash X`.
     pub fn name(&self) -> String {
-        format!("{} {}", self.kind.id, self.target)
-            .trim_end()
-            .to_owned()
+        let name = format!("{} {}", self.kind.id, self.target);
+        let name = name.trim_end();
+        match self.begins {
+            Some(begins) => format!("{name} from run {} on", begins.run),
+            None => name.to_owned(),
+        }
     }
 
     /// The effect with some values.
     pub fn effect(&self, values: &[f64]) -> Box<dyn Effect> {
-        (self.kind.build)(self.target.clone(), values)
+        let effect = (self.kind.build)(self.target.clone(), values);
+        match self.begins {
+            Some(begins) => Box::new(From { effect, begins }),
+            None => effect,
+        }
     }
 }
 

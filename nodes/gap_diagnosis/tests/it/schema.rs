@@ -27,6 +27,9 @@ const FULL: &str = r#"{
   "leave_one_out": [{"effect": "backlash", "axis": "X", "rms_um_without": 7.9}]},
 "not_excited": [{"effect": "probe_latency", "needs": ""}],
 "next_experiments": [{"run": "", "separates": [""], "delta": 31.0, "minutes": 1.5}],
+"over_session": [{"effect": "backlash", "axis": "X", "from_run": 25, "holds": false, "changes_from_run": 31, "change_share": 0.2,
+  "growth_share_per_h": 0.1, "chance": 0.001}],
+"does_not_repeat": [{"channel": "radial", "size_um": 5.0, "last_run": 3, "from_run": 4, "of_set_up": true, "chance": 1e-6}],
 "runtime_s": 1.3 }"#;
 
 /// The sample by which the form was agreed, to the letter.
@@ -50,7 +53,9 @@ const SAMPLE: &str = r#"{ "schema": "abbe.gap/1",
   "runtime_s": 1.3 }"#;
 
 /// Keys that a report need not have, with their place.
-const OPTIONAL: [(&str, &str); 4] = [
+const OPTIONAL: [(&str, &str); 6] = [
+    ("report", "over_session"),
+    ("report", "does_not_repeat"),
     ("report", "loss"),
     ("report", "machine_defaults"),
     ("report", "simulated"),

@@ -51,7 +51,7 @@ fn place(report: &GapReport) -> String {
 fn cause(report: &GapReport) -> String {
     let of = |status: Status| report.causes.iter().filter(move |c| c.status == status);
     let with_size = |cause: &Cause| {
-        let title = name(&cause.effect, &cause.axis);
+        let title = name(&cause.effect, &cause.axis) + &since(report, cause);
         format!(
             "{title} ({}; confidence {:.2})",
             sizes(cause),
@@ -81,6 +81,15 @@ fn cause(report: &GapReport) -> String {
             alike.join(", ")
         ));
     }
+    parts.extend(report.does_not_repeat.iter().map(|change| {
+        format!(
+            "{} does not repeat: it changed by {} µm between run {} and run {}",
+            change.channel,
+            three(change.size_um),
+            change.last_run,
+            change.from_run
+        )
+    }));
     if report.unknown.flagged {
         parts.push(unknown(report));
     }
@@ -88,6 +97,18 @@ fn cause(report: &GapReport) -> String {
         return "Which: no effect of the catalogue is named.".to_owned();
     }
     format!("Which: {}.", parts.join(". And "))
+}
+
+/// From which run on an effect is there, where it was not from the begin.
+fn since(report: &GapReport, cause: &Cause) -> String {
+    let named = report
+        .causes
+        .iter()
+        .filter(|c| c.status != Status::Surrogate);
+    let mut over_session = named.zip(&report.over_session);
+    let own = over_session.find(|(named, _)| std::ptr::eq(*named, cause));
+    let run = own.and_then(|(_, own)| own.from_run);
+    run.map_or_else(String::new, |run| format!(" from run {run} on"))
 }
 
 /// Most parameters that a sentence holds.

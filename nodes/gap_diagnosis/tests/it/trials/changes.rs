@@ -1,0 +1,152 @@
+//! Sessions in which something changes: what begins is named from its run on, what slips is no noise, and what holds is said to.
+
+use gap_diagnosis::report::Status;
+use gap_diagnosis::{Course, Diagnosis, Note};
+use twin::Session;
+
+use crate::trials::plant::{Circle, Noise, State, Wrong, diagnosed, go_on, names, soft_play, told};
+
+/// One cycle: two feeds, both senses, twice.
+const CYCLE: [Circle; 8] = [
+    (50.0, 1500.0, true, 0),
+    (50.0, 1500.0, false, 0),
+    (50.0, 1500.0, true, 1),
+    (50.0, 1500.0, false, 1),
+    (50.0, 2400.0, true, 0),
+    (50.0, 2400.0, false, 0),
+    (50.0, 2400.0, true, 1),
+    (50.0, 2400.0, false, 1),
+];
+
+/// Cycles one after another, each with its own error.
+fn cycles(seed: u64, wrong: &[&Wrong]) -> Session {
+    let mut session = Session::default();
+    for (cycle, &wrong) in (0..).zip(wrong) {
+        let seed = 100 * seed + cycle;
+        go_on(&mut session, &CYCLE, 1, seed, Noise::default(), wrong);
+    }
+    session
+}
+
+fn nothing(_: &State) -> [f64; 2] {
+    [0.0; 2]
+}
+
+fn changed(diagnosis: &Diagnosis) -> bool {
+    let report = &diagnosis.report;
+    let mut named = report.over_session.iter();
+    !report.does_not_repeat.is_empty() || named.any(|own| own.from_run.is_some())
+}
+
+#[test]
+fn a_play_that_begins_during_the_session_is_named_from_its_run_on() {
+    let worn = soft_play(0, 5.6e-3);
+    for seed in 1..4 {
+        let diagnosis = diagnosed(&cycles(seed, &[&nothing, &nothing, &worn, &worn]));
+        let report = &diagnosis.report;
+        assert_eq!(names(&diagnosis), ["backlash X"], "{}", told(&diagnosis));
+        let own = &report.over_session[0];
+        assert_eq!(
+            (&*own.effect, own.from_run),
+            ("backlash", Some(16)),
+            "{own:?}"
+        );
+        assert!(own.holds, "{own:?}");
+        let cause = report
+            .causes
+            .iter()
+            .find(|cause| cause.status != Status::Surrogate);
+        let width = &cause.expect("a play").parameters[0];
+        assert!((width.value - 5.6).abs() < 0.4, "{width:?}");
+        assert!(report.does_not_repeat.is_empty(), "{report:?}");
+        let begins = |note: &Note| matches!(note, Note::Course(Course::Begins { run: 16, .. }));
+        assert!(diagnosis.notes.iter().any(begins));
+    }
+}
+
+#[test]
+fn a_plate_that_slips_is_told_and_the_play_beside_it_is_named_all_the_same() {
+    let play = soft_play(1, 4e-3);
+    let play_too = soft_play(1, 4e-3);
+    let slipped = move |s: &State| {
+        let [u, v] = play_too(s);
+        [u + 5e-3, v]
+    };
+    for seed in 4..6 {
+        let diagnosis = diagnosed(&cycles(seed, &[&play, &slipped, &slipped]));
+        assert_eq!(names(&diagnosis), ["backlash Y"], "{}", told(&diagnosis));
+        let slips = &diagnosis.report.does_not_repeat;
+        assert_eq!(slips.len(), 1, "{slips:?}");
+        let slip = &slips[0];
+        assert_eq!((slip.last_run, slip.from_run), (7, 8), "{slip:?}");
+        assert!(
+            (slip.size_um - 5.0).abs() < 0.4 && slip.of_set_up,
+            "{slip:?}"
+        );
+        assert_eq!(slip.channel, "grid.u");
+    }
+}
+
+#[test]
+fn what_holds_is_said_to_and_of_nothing_nothing_is_named() {
+    let play = soft_play(0, 4e-3);
+    for seed in 10..14 {
+        let diagnosis = diagnosed(&cycles(seed, &[&nothing, &nothing, &nothing]));
+        let all = told(&diagnosis);
+        assert!(
+            names(&diagnosis).is_empty() && !changed(&diagnosis),
+            "{all}"
+        );
+        assert!(!diagnosis.report.unknown.flagged, "{all}");
+    }
+    for seed in 14..16 {
+        let diagnosis = diagnosed(&cycles(seed, &[&play, &play, &play]));
+        let all = told(&diagnosis);
+        assert_eq!(names(&diagnosis), ["backlash X"], "{all}");
+        assert!(!changed(&diagnosis), "{all}");
+        let own = &diagnosis.report.over_session[0];
+        assert!(own.holds && own.chance.is_some(), "{own:?}");
+    }
+}
+
+#[test]
+fn what_changes_without_a_name_does_not_repeat() {
+    // A product of position and direction, that no catalogue holds, from the second cycle on.
+    let odd = |s: &State| {
+        let [x, y] = s.position;
+        [
+            4e-3 * s.velocity[1].signum() * (x / 50.0).powi(2) * (y / 50.0),
+            0.0,
+        ]
+    };
+    for seed in 20..22 {
+        let diagnosis = diagnosed(&cycles(seed, &[&nothing, &odd, &odd]));
+        let all = told(&diagnosis);
+        let first = diagnosis.report.does_not_repeat.first().expect("a change");
+        assert_eq!((first.last_run, first.from_run), (7, 8), "{first:?} {all}");
+        assert!(
+            !first.of_set_up && diagnosis.report.unknown.flagged,
+            "{all}"
+        );
+    }
+}
+
+#[test]
+fn a_name_that_explains_only_a_part_counts_for_less() {
+    let play = soft_play(0, 6e-3);
+    let both = move |s: &State| {
+        let [u, v] = play(s);
+        let x = s.position[0] / 50.0;
+        [u + 3e-3 * s.velocity[1].signum() * x * x, v]
+    };
+    let diagnosis = diagnosed(&cycles(30, &[&both, &both]));
+    let all = told(&diagnosis);
+    let is_left = |note: &Note| matches!(note, Note::Course(Course::Remainder { .. }));
+    let named = names(&diagnosis);
+    if !named.is_empty() {
+        assert!(diagnosis.notes.iter().any(is_left), "{all}");
+        let mut causes = diagnosis.report.causes.iter();
+        assert!(causes.all(|cause| cause.confidence < 0.9), "{all}");
+    }
+    assert!(diagnosis.report.unknown.flagged, "{all}");
+}
