@@ -147,7 +147,7 @@ fn prepared<R>(
     }
     let of_session = own_noise.then(|| changes_of(session, &rows, &residual, config));
     let changes = of_session.unwrap_or_default();
-    let anew = changes::set_up_anew(session, &changes);
+    let anew = changes::set_up_anew(session, &changes, config);
     let session = anew.as_ref().unwrap_or(session);
     let noise = if own_noise {
         noise_of(machine, session, stations, &residual, &changes, config)

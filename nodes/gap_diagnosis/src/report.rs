@@ -46,7 +46,7 @@ pub struct GapReport {
     /// Whether the size of each named effect of the mean holds over the session, in the order of `causes`; absent where none is named.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub over_session: Vec<OverSession>,
-    /// What changed between repeats and no named effect explains; absent where nothing did.
+    /// What changed between repeats and no named effect explains, or a set-up that moved would make as well; absent where nothing did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub does_not_repeat: Vec<DoesNotRepeat>,
 }
@@ -73,7 +73,7 @@ pub struct OverSession {
     pub chance: Option<f64>,
 }
 
-/// A change between repeats that no named effect explains.
+/// A change between repeats that no named effect explains, or that a set-up that moved would make as well.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DoesNotRepeat {
@@ -85,7 +85,7 @@ pub struct DoesNotRepeat {
     pub last_run: u32,
     /// The first run after.
     pub from_run: u32,
-    /// Whether the set-up moved and nothing else changed.
+    /// Whether nothing else changed than the place of the set-up; a shift of a reference point, which may be named, does the same.
     pub of_set_up: bool,
     /// Chance of as much in noise.
     pub chance: f64,

@@ -195,12 +195,19 @@ fn judged(session: &Session, sizes: &[Sized], config: &GapConfig) -> OverSession
     entry
 }
 
-/// The changes that the named effects do not explain; `rest` is what these leave of the rows of all runs, mm.
+/// The changes that the named effects do not explain, and those that are no other than a set-up that moved; `rest` is what the
+/// effects leave of the rows of all runs, mm.
 pub(crate) fn not_repeated(stack: &Stack<'_>, rest: &[f64], all: &[Change]) -> Vec<DoesNotRepeat> {
     let sizes_mm = changes::left(stack.session, &stack.rows, rest, all);
     let number = |run: usize| stack.session.runs[run].segment.run;
+    let size_mm = |change: &Change, left_mm: f64| {
+        if left_mm > MOST_LEFT * change.size_mm {
+            return Some(left_mm);
+        }
+        change.is_set_up.then_some(change.size_mm)
+    };
     let left = all.iter().zip(sizes_mm);
-    left.filter(|(change, size_mm)| *size_mm > MOST_LEFT * change.size_mm)
+    left.filter_map(|(change, left_mm)| Some((change, size_mm(change, left_mm)?)))
         .map(|(change, size_mm)| DoesNotRepeat {
             channel: change.channel.to_string(),
             size_um: 1e3 * size_mm,

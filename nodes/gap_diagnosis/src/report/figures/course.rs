@@ -17,7 +17,7 @@ pub enum Course {
         run: Option<u32>,
         share: f64,
     },
-    /// Something changed between repeats, and no named effect explains it.
+    /// Something changed between repeats that no named effect explains, or that is no other than a set-up that moved.
     DoesNotRepeat {
         channel: String,
         size_um: f64,
@@ -44,7 +44,7 @@ fn does_not_repeat(
     chance: f64,
 ) -> fmt::Result {
     let what = if of_set_up {
-        "only the place of the set-up changed: look at clamps and holders"
+        "only the place of the set-up changed, or a reference point: look at clamps, holders and returns to the reference"
     } else {
         "no named effect explains it"
     };
