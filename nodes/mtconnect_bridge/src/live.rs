@@ -10,7 +10,6 @@ use machine_report::turns::Turns;
 use metrology::Stage;
 use metrology::stamp::{Host, Stamp};
 
-use crate::condition::Condition;
 use crate::config::Settings;
 use crate::error::BridgeError;
 use crate::io::{BridgeIo, LogFile};
@@ -150,6 +149,7 @@ impl Stage for LiveBridge {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::condition::Condition;
     use crate::mapping::MapFile;
     use crate::{BridgeConfig, config};
 
