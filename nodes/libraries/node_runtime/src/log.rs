@@ -143,7 +143,10 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
     // And, once a clock was set back, of each sample of best effort: that is a condition of the node's.
     // And, when a node ends, of every end that its busy event loop is not told of: the participant is gone a moment later.
     let silent = "rustdds::network::udp_listener=off,rustdds::structure::dds_cache=off,rustdds::dds::pubsub=off";
-    let quiet = format!("rustdds=error,{silent},ros2_client=error,zenoh=error");
+    // The OPC UA client calls it an error that a connection without security has no certificate; what ends a connection is a
+    // condition of the bridge.
+    let opcua = "opcua_client=off,opcua_core=off,opcua_crypto=off";
+    let quiet = format!("rustdds=error,{silent},ros2_client=error,zenoh=error,{opcua}");
     // Where DDS is secured it complains of every message of whoever is not.
     let secured = environment.security.as_ref();
     let strangers = secured.map_or("", |_| ",rustdds::rtps::message_receiver=off");

@@ -85,7 +85,14 @@ fn most_talkative() -> Option<LevelFilter> {
 }
 
 /// Whose lines are not a node's, wherever they are said.
-const FOREIGN: [&str; 3] = ["rustdds", "ros2_client", "mio"];
+const FOREIGN: [&str; 6] = [
+    "rustdds",
+    "ros2_client",
+    "mio",
+    "opcua_client",
+    "opcua_core",
+    "opcua_crypto",
+];
 /// What the names of all of Zenoh's crates begin with.
 const ZENOH: &str = "zenoh";
 
