@@ -98,7 +98,8 @@ impl CompensationPath {
         self.received = None;
     }
 
-    /// Takes new offsets; the whole set is refused when one of them is, and the last good one stays.
+    /// Takes new offsets; the whole set is refused when one of them is, and the last good one stays. An axis that the set
+    /// leaves out has none: otherwise who names other axes alone would keep the last offset of one that fell silent.
     ///
     /// # Errors
     /// An offset that is not finite or too large: a condition to report, nothing else changes.
@@ -124,12 +125,13 @@ impl CompensationPath {
                 });
             }
         }
-        for &axis in self
-            .joints
-            .iter()
-            .filter(|axis| compensation.axes.contains(**axis))
-        {
-            self.wanted[axis] = compensation.total[axis];
+        for &axis in &self.joints {
+            let is_named = compensation.axes.contains(axis);
+            self.wanted[axis] = if is_named {
+                compensation.total[axis]
+            } else {
+                0.0
+            };
         }
         self.received = Some(at);
         Ok(())

@@ -4,15 +4,19 @@ use linuxcnc_bridge::Input;
 use linuxcnc_bridge::condition::Condition;
 use linuxcnc_bridge::config::Prepare;
 use metrology::sample::{AxisCompensation, CompensationState};
-use metrology::{AxisSet, PerAxis, Severity};
+use metrology::{Axis, AxisSet, PerAxis, Severity};
 
 use crate::frame::control::{Control, State};
 use crate::frame::desk::{Desk, at};
 
 fn offsets(now_s: f64, mm: f64) -> Input {
+    offsets_of(AxisSet::XYZ, now_s, mm)
+}
+
+fn offsets_of(axes: AxisSet, now_s: f64, mm: f64) -> Input {
     Input::Compensation(AxisCompensation {
         at: at(now_s),
-        axes: AxisSet::XYZ,
+        axes,
         total: PerAxis([mm; 6]),
         thermal: PerAxis::default(),
         geometric: PerAxis::default(),
@@ -148,5 +152,23 @@ fn compensation_that_somebody_publishes_and_that_never_comes_is_said_once() {
             "{:?}",
             desk.conditions
         );
+    }
+}
+
+#[test]
+fn an_axis_that_a_message_leaves_out_has_no_offset() {
+    let others: [AxisSet; 2] = [
+        [Axis::Y, Axis::A].into_iter().collect(),
+        std::iter::empty().collect(),
+    ];
+    for axes in others {
+        let mut desk = Desk::new(State::usual());
+        with_offsets(&mut desk, 0.5, 0.03);
+        assert_eq!(passed_mm(&mut desk).last(), Some(&0.03));
+        // Who published it has fallen silent; somebody else keeps the heart beating.
+        let now_s = desk.now_s;
+        desk.tell(offsets_of(axes, now_s, 0.02));
+        desk.later(0.05);
+        assert_eq!(passed_mm(&mut desk), [0.0], "{axes:?}");
     }
 }
