@@ -198,6 +198,12 @@ pub enum Condition {
     /// Compensation was refused; the last good one stays.
     #[error("compensation refused: {}", refusal(.0))]
     CompensationRefused(CompensationRefused),
+    /// What was refused comes no more.
+    #[error("no compensation was refused for {limit_s} s", limit_s = number(*limit_s))]
+    CompensationRefusedNoMore {
+        /// The limit, s.
+        limit_s: f64,
+    },
     /// Compensation has stopped coming; HAL fades it out.
     #[error("no compensation for {limit_s} s: fading out", limit_s = number(*limit_s))]
     CompensationStale {
@@ -272,7 +278,9 @@ impl Condition {
             Self::MalformedSample { .. } => "malformed_sample",
             Self::ServoSlip { .. } | Self::ServoInTime => "servo_period",
             Self::TouchUnusable { .. } => "touch_unusable",
-            Self::CompensationRefused(_) => "compensation_refused",
+            Self::CompensationRefused(_) | Self::CompensationRefusedNoMore { .. } => {
+                "compensation_refused"
+            }
             Self::ProgramWaits(_) | Self::ProgramGoesOn => "program_waits",
             Self::Stopped(Trouble::Tripped { .. }) => "probe_tripped",
             Self::Stopped(Trouble::Astray { .. }) => "axis_astray",
@@ -296,6 +304,7 @@ impl Condition {
             | Self::ServoInTime
             | Self::CompensationFresh
             | Self::CompensationHeld
+            | Self::CompensationRefusedNoMore { .. }
             | Self::ProgramGoesOn
             | Self::FrameSet { .. }
             | Self::Estop { on: false }

@@ -20,6 +20,8 @@ pub(super) struct Offsets {
     gate: HomedGate,
     stale_after: Span,
     freshness: Option<Freshness>,
+    /// When the last set was refused, until it is over.
+    refused_at: Option<Stamp<Host>>,
     /// Since when, and by how many, they are published while none has come.
     awaited: Option<(Stamp<Host>, usize)>,
     has_come: bool,
@@ -35,6 +37,7 @@ impl Offsets {
             gate: HomedGate::default(),
             stale_after: settings.compensation_stale_after,
             freshness: None,
+            refused_at: None,
             awaited: None,
             has_come: false,
             is_missed: false,
@@ -61,7 +64,11 @@ impl Offsets {
         compensation: &AxisCompensation,
     ) -> Result<(), CompensationRefused> {
         self.has_come = true;
-        self.path.receive(at, compensation)
+        let taken = self.path.receive(at, compensation);
+        if taken.is_err() {
+            self.refused_at = Some(at);
+        }
+        taken
     }
 
     /// So many publish offsets; an inactive bridge waits for none.
@@ -93,6 +100,7 @@ impl Offsets {
         self.watch_homing(at, was_open, conditions);
         self.watch_freshness(freshness, news, conditions);
         self.watch_silence(at, conditions);
+        self.watch_refusals(at, conditions);
         if !reached {
             return None;
         }
@@ -134,6 +142,22 @@ impl Offsets {
                 conditions.push(Condition::CompensationFresh);
             }
             _ => {}
+        }
+    }
+
+    /// Among good sets a refused one may come again and again: that it is over is said after a while without one.
+    fn watch_refusals(&mut self, at: Stamp<Host>, conditions: &mut Vec<Condition>) {
+        let Some(refused_at) = self.refused_at else {
+            return;
+        };
+        if at - refused_at > self.stale_after {
+            self.refused_at = None;
+            conditions.push(Condition::CompensationRefusedNoMore {
+                limit_s: self.stale_after.as_secs_f64(),
+            });
+        } else {
+            // The clock may be set back.
+            self.refused_at = Some(refused_at.min(at));
         }
     }
 

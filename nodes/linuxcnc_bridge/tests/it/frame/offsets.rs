@@ -172,3 +172,27 @@ fn an_axis_that_a_message_leaves_out_has_no_offset() {
         assert_eq!(passed_mm(&mut desk), [0.0], "{axes:?}");
     }
 }
+
+#[test]
+fn that_offsets_are_refused_ends_when_none_has_been_for_a_while() {
+    let over = |desk: &Desk| {
+        let is_over = |condition: &&Condition| {
+            matches!(condition, Condition::CompensationRefusedNoMore { .. })
+        };
+        desk.conditions.iter().filter(is_over).count()
+    };
+    let mut desk = Desk::new(State::usual());
+    // A bad set among good ones, again and again.
+    for _ in 0..20 {
+        let now_s = desk.now_s;
+        desk.tell(offsets(now_s, 5.0));
+        with_offsets(&mut desk, 0.4, 0.03);
+    }
+    assert!(desk.has("compensation_refused"));
+    assert_eq!(over(&desk), 0, "it comes again");
+    with_offsets(&mut desk, 5.0, 0.03);
+    assert_eq!(over(&desk), 1, "once");
+    let last = desk.conditions.iter().rev();
+    let mut last = last.filter(|condition| condition.name() == "compensation_refused");
+    assert_eq!(last.next().unwrap().severity(), Severity::Info);
+}
