@@ -60,6 +60,34 @@ fn every_node_is_tried() {
     assert_eq!(tried, shells);
 }
 
+#[test]
+fn who_proposes_or_asks_what_cannot_be_read_is_answered() {
+    let start = Stamp::from_nanos(1_700_000_000_000_000_000);
+    for tried in TRIED {
+        let home = tempfile::tempdir().unwrap();
+        let mut driver = Driver::new(tried.node(home.path()), start);
+        let ports = driver.node.ports().clone();
+        // A string that ends before it begins.
+        let bytes = [0, 1, 0, 0, 9];
+        for server in 0..ports.action_servers.len() {
+            let refused = driver.refused;
+            let id = 1 + server as u64;
+            let bytes = &bytes;
+            driver.hand(Event::Goal { server, id, bytes });
+            let action = &ports.action_servers[server].action;
+            assert_eq!(driver.refused, refused + 1, "{}: {action}", tried.exec);
+        }
+        for service in 0..ports.services.len() {
+            let answered = driver.answered;
+            let id = 1_000 + service as u64;
+            let bytes = &bytes;
+            driver.hand(Event::Request { service, id, bytes });
+            let name = &ports.services[service].service;
+            assert_eq!(driver.answered, answered + 1, "{}: {name}", tried.exec);
+        }
+    }
+}
+
 macro_rules! tests {
     ($($name:ident: $place:literal;)*) => {
         $(#[test]

@@ -559,6 +559,10 @@ where
         out: &mut Vec<Emission>,
     ) -> Result<(), NodeFault> {
         let place = Place::of(&event);
+        let goal = match event {
+            Event::Goal { server, id, .. } => Some((server, id)),
+            _ => None,
+        };
         let result = match event {
             Event::Request { service, id, bytes } => self.request(at, (service, id), bytes, out),
             Event::Shutdown if self.shutdown.is_none() => {
@@ -566,7 +570,13 @@ where
                 Ok(())
             }
             event => match self.input(event) {
-                Some(input) => self.step(at, input, out),
+                Some(input) => {
+                    // Who proposes what cannot be read waits for an answer as everybody does.
+                    if let (Err(_), Some((server, id))) = (&input, goal) {
+                        out.push(Emission::RejectGoal { server, id });
+                    }
+                    self.step(at, input, out)
+                }
                 None => Ok(()),
             },
         };

@@ -81,14 +81,20 @@ where
         bytes: &[u8],
         out: &mut Vec<Emission>,
     ) -> Result<(), Refusal> {
+        let mut taken = Ok(());
         let answer = match call {
             Call::ChangeState => {
-                let request: ChangeStateRequest = decode(bytes)?;
-                if let Some(step) = Transition::wanted(self.standing.state, &request.transition) {
+                let request = decode::<ChangeStateRequest>(bytes);
+                let state = self.standing.state;
+                let step = { request.as_ref().ok() }
+                    .and_then(|request| Transition::wanted(state, &request.transition));
+                if let Some(step) = step {
                     self.standing.waiting = Some(by);
                     self.begin(at, step, out);
                     return Ok(());
                 }
+                // What cannot be read is answered as well.
+                taken = request.map(drop);
                 changed(false)
             }
             Call::GetState => encode(&GetStateResponse {
@@ -109,6 +115,6 @@ where
             id,
             bytes: answer,
         });
-        Ok(())
+        taken
     }
 }
