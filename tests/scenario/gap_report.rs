@@ -285,7 +285,7 @@ fn what_cannot_be_diagnosed_ends_with_1_and_what_to_record_and_a_wrong_question_
         }
     };
     // What was run once has noise within the run alone, which is stated.
-    let once = diagnose(&bag, &["--machine", &machine, "--full"]);
+    let once = diagnose(&bag, &["--machine", &machine]);
     assert_eq!(once.status.code(), Some(0), "{}", once.said);
     let words = "no test was repeated on it, so its noise is that within a run";
     assert!(once.said.contains(words), "{}", once.said);
