@@ -30,7 +30,7 @@ fn a_touch_that_never_triggers_ends_the_plan_with_its_place() {
     let bump = "bumped_blocks: [{id: block_1, at_s: 0.0, shift_um: [8000.0, 8000.0, -8000.0]}]";
     let cell = Cell::run(&with_fault(bump), 10);
     cell.expect_failed(&[
-        "line 10",
+        "line 9",
         "touch of \"block_1.x\"",
         "without the probe closed",
     ]);
@@ -41,7 +41,7 @@ fn a_touch_that_never_triggers_ends_the_plan_with_its_place() {
 fn a_dead_probe_ends_the_plan_at_the_first_touch() {
     let cell = Cell::run(&with_fault("probe: {kind: dead, from_s: 0.0}"), 10);
     cell.expect_failed(&[
-        "line 10",
+        "line 9",
         "touch of \"block_1.x\"",
         "without the probe closed",
     ]);
@@ -51,7 +51,7 @@ fn a_dead_probe_ends_the_plan_at_the_first_touch() {
 #[test]
 fn a_probe_stuck_closed_ends_the_plan_before_the_touch() {
     let cell = Cell::run(&with_fault("probe: {kind: stuck_closed, from_s: 0.0}"), 10);
-    cell.expect_failed(&["line 10", "already closed", "\"block_1.x\""]);
+    cell.expect_failed(&["line 9", "already closed", "\"block_1.x\""]);
     no_touch_was_taken(&cell);
 }
 
@@ -64,7 +64,7 @@ fn a_probe_that_sticks_later_spoils_the_cycle_and_not_the_reference() {
         "title: late\nsteps:\n  - {do: blocks, cold: true}\n  - {do: wait, seconds: 120.0}\n  - {do: blocks}\n",
     );
     let cell = Cell::run(&scenario, 10);
-    cell.expect_failed(&["line 10", "already closed", "\"block_1.x\""]);
+    cell.expect_failed(&["line 9", "already closed", "\"block_1.x\""]);
     let blocks = cell.all(&topics::BLOCKS_MEASUREMENT);
     let measured =
         |block: &&metrology::sample::BlockMeasurement| block.faces.0.iter().any(Option::is_some);
@@ -77,7 +77,7 @@ fn a_probe_that_sticks_later_spoils_the_cycle_and_not_the_reference() {
 fn a_missing_block_is_named_and_no_drift_is_made_up_for_it() {
     let cell = Cell::run(&with_fault("missing_blocks: [block_2]"), 10);
     cell.expect_failed(&[
-        "line 28",
+        "line 27",
         "touch of \"block_2.x\"",
         "without the probe closed",
     ]);

@@ -196,7 +196,7 @@ mod tests {
 
     fn turns(task: &Task) -> Vec<String> {
         let lines = task.text.lines().filter(|line| line.starts_with("G0 A"));
-        lines.skip(2).map(str::to_owned).collect()
+        lines.skip(1).map(str::to_owned).collect()
     }
 
     #[test]

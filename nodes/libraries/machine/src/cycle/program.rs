@@ -20,9 +20,6 @@ use crate::program_frame::HEAD;
 /// Distance kept from the top of Z, so that a compensation can still be added to the command, mm.
 pub(crate) const TRAVEL_MARGIN_MM: f64 = 1.0;
 
-/// How far beside zero a rotary axis turns first, deg: more than the backlash of any.
-const ROTARY_OVERSHOOT_DEG: f64 = 1.0;
-
 /// An approach that rises by no more than this leads to a surface that does not reach over its start.
 const LEVEL: f64 = 1e-9;
 
@@ -127,9 +124,8 @@ impl<'a> Program<'a> {
         self.ball_from_slides_mm = design.ball_from_slides_mm(pose_rad);
     }
 
-    /// Turns the rotary axes to zero, each from one side wherever it stood: backlash then shifts every cycle alike.
     fn rotary_to_zero(&mut self) -> Result<(), CycleError> {
-        let (mut beside, mut words) = (String::new(), String::new());
+        let mut words = String::new();
         for axis in Axis::ROTARY {
             let Some(entry) = self.file.rotary_axis(axis) else {
                 continue;
@@ -144,15 +140,9 @@ impl<'a> Program<'a> {
                     greatest,
                 });
             }
-            let _ = write!(
-                beside,
-                " {axis}{}",
-                Number(beside_zero_deg(entry.travel_deg))
-            );
             let _ = write!(words, " {axis}0");
         }
         if !words.is_empty() {
-            self.line(format_args!("G0{beside}"));
             self.line(format_args!("G0{words}"));
         }
         Ok(())
@@ -285,21 +275,6 @@ impl<'a> Program<'a> {
     }
 }
 
-/// From where a rotary axis turns to zero, deg: a degree below, or above where the travel ends within two degrees below;
-/// half of the longer way where it ends so near on both sides.
-fn beside_zero_deg([least, greatest]: [f64; 2]) -> f64 {
-    let room_deg = 2.0 * ROTARY_OVERSHOOT_DEG;
-    if least <= -room_deg {
-        -ROTARY_OVERSHOOT_DEG
-    } else if greatest >= room_deg {
-        ROTARY_OVERSHOOT_DEG
-    } else if -least >= greatest {
-        least / 2.0
-    } else {
-        greatest / 2.0
-    }
-}
-
 /// A coordinate or feed, to 10 nm, without a negative zero.
 pub(crate) struct Number(pub(crate) f64);
 
@@ -318,30 +293,5 @@ impl std::fmt::Display for Words<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self(p) = self;
         write!(f, "X{} Y{} Z{}", Number(p.x), Number(p.y), Number(p.z))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    // Places by hand, from travel alone: below, above, and half of the longer way of a travel of less than two degrees.
-    #[test]
-    fn a_rotary_axis_turns_to_zero_from_one_side_within_its_travel() {
-        for (travel_deg, expected_deg) in [
-            ([-120.0, 30.0], -1.0),
-            ([-360.0, 360.0], -1.0),
-            ([-2.0, 90.0], -1.0),
-            ([0.0, 360.0], 1.0),
-            ([-1.0, 90.0], 1.0),
-            ([-1.5, 0.5], -0.75),
-            ([-0.5, 1.0], 0.5),
-        ] {
-            let beside_deg = beside_zero_deg(travel_deg);
-            assert!(
-                (beside_deg - expected_deg).abs() < 1e-12,
-                "{travel_deg:?}: {beside_deg}"
-            );
-        }
     }
 }

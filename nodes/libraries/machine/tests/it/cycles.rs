@@ -111,7 +111,7 @@ fn blocks_are_touched_on_three_faces_without_a_collision() {
     assert!(
         cycle
             .program
-            .starts_with(&format!("{HEAD}G0 Z439\nG0 A-1 C-1\nG0 A0 C0\n"))
+            .starts_with(&format!("{HEAD}G0 Z439\nG0 A0 C0\n"))
     );
     run(&file, &cycle);
 }

@@ -208,7 +208,6 @@ fn a_program_turns_then_touches_a_hemisphere_at_each_pose() {
     assert_eq!(
         turns,
         [
-            "G0 A-1 C-1",
             "G0 A0 C0",
             "G0 A-45 C20",
             "G0 A15 C-100",
