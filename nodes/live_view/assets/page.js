@@ -27,7 +27,7 @@ function make(tag, text, kind) {
   return element;
 }
 
-/** Fills a section; a table of the same shape is only written over, so that what is marked in it stays. */
+/** Fills a section with a title and what follows. */
 function show(id, title, stale, ...content) {
   const section = byId(id);
   const head = make('h2', title);
@@ -36,7 +36,7 @@ function show(id, title, stale, ...content) {
   section.classList.toggle('stale', Boolean(stale));
 }
 
-/** A cell is a text, or [text, class], or an element. */
+/** A cell is a text, or [text, class, columns that it spans], or an element. */
 function table(head, rows, kind) {
   const built = make('table', undefined, kind);
   const line = built.createTHead().insertRow();
@@ -52,7 +52,7 @@ function table(head, rows, kind) {
     for (const cell of row.cells ?? row) {
       const td = line.insertCell();
       if (cell instanceof Element) td.append(cell);
-      else if (Array.isArray(cell)) [td.textContent, td.className] = cell;
+      else if (Array.isArray(cell)) [td.textContent, td.className, td.colSpan] = [cell[0], cell[1], cell[2] ?? 1];
       else td.textContent = cell;
     }
   }
@@ -103,8 +103,8 @@ const draw = {
     section.classList.toggle('has-error', all.some((one) => one.level === 'error'));
     section.classList.toggle('has-warning', all.length > 0 && all.every((one) => one.level !== 'error'));
     if (!all.length) return show('conditions', 'Conditions', null, make('p', 'None stands.', 'good'));
-    const rows = all.map((one) => [[one.name, 'text'], [one.level, one.level === 'error' ? 'error' : 'warning'], [one.message, 'text'], time(one.since_ms)]);
-    show('conditions', `Conditions: ${all.length}`, null, table([['where', 'text'], ['level'], ['what', 'text'], ['since']], rows));
+    const rows = all.map((one) => [[one.name, 'text'], [one.level, one.level === 'error' ? 'text error' : 'text warning'], [one.message, 'text'], time(one.since_ms)]);
+    show('conditions', `Conditions: ${all.length}`, null, table([['where', 'text'], ['level', 'text'], ['what', 'text'], ['since']], rows));
   },
   axes(state) {
     if (!state) return byId('axes').replaceChildren();
@@ -139,7 +139,7 @@ const draw = {
   touches(all) {
     if (!all) return byId('touches').replaceChildren();
     const rows = all.slice(0, 8).map((one) => one.rejected
-      ? [[one.feature, 'text'], [one.rejected, 'text warning'], '', '', '', time(one.at_ms)]
+      ? [[one.feature, 'text'], [`rejected: ${one.rejected}`, 'text warning', 4], time(one.at_ms)]
       : [[one.feature, 'text'], fixed(one.x_mm, 4), fixed(one.y_mm, 4), fixed(one.z_mm, 4), um(one.standard_uncertainty_mm), time(one.at_ms)]);
     show('touches', 'Last touches', null, table([['feature', 'text'], ['X mm'], ['Y mm'], ['Z mm'], ['u µm'], ['at']], rows));
   },

@@ -151,7 +151,7 @@ fn the_snapshot_has_the_parts_and_the_events_the_changes() {
 }
 
 #[test]
-fn other_names_other_sites_and_bodies_are_refused_and_counted() {
+fn other_names_are_refused() {
     let mut config = config();
     config.host_names = vec!["Mill-3.example".to_owned()];
     let io = serve(&config, None, changing(1, 1));
@@ -182,6 +182,13 @@ fn other_names_other_sites_and_bodies_are_refused_and_counted() {
         &["Host: localhost"],
     );
     assert_eq!(absolute, 421);
+    assert!(io.account().refused["unknown host name"] >= 5);
+}
+
+#[test]
+fn other_sites_and_bodies_are_refused_and_counted() {
+    let io = serve(&config(), None, changing(1, 1));
+    let ask = |lines: &[&str]| status(io.address(), "GET /snapshot.json", lines);
     for line in [
         "Origin: http://evil.example",
         "Origin: null",
