@@ -14,9 +14,8 @@ use crate::node;
 use crate::scenario::{SCENARIO_FILE, Scenario};
 
 /// Nodes whose building opens a file, a connection or a program: of these the parameters are read, and no more.
-const OPENING: [&str; 6] = [
+const OPENING: [&str; 5] = [
     "linuxcnc_bridge",
-    "live_view",
     "mtconnect_bridge",
     "opcua_bridge",
     "recorder",
