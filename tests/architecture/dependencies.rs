@@ -113,13 +113,11 @@ fn arch_pure_crates_reach_no_ros_runtime_log_or_entropy() {
         "nodes/probe",
         &["rand", "serde", "tracing"],
     )];
-    assert_eq!(
-        impure(&bad),
-        [
-            "nodes/probe: reaches tracing",
-            "nodes/probe: rand with entropy"
-        ]
-    );
+    let found = impure(&bad);
+    for words in ["reaches tracing", "rand with entropy"] {
+        let words = format!("nodes/probe: {words}");
+        assert!(found.contains(&words), "{found:?}");
+    }
 }
 
 /// The form of a bag is the recorder's library: whoever replays reads it there.
