@@ -414,8 +414,8 @@ fn flood(graph: &Graph, stranger: &mut Stranger) {
 /// What only the bridge may say; who listens names it.
 fn speaks_for_the_bridge(graph: &Graph, stranger: &mut Stranger) {
     let since = Instant::now();
-    let recent = since.checked_sub(Duration::from_secs(1)).unwrap();
-    let mut state = states(graph, recent).pop().unwrap();
+    let is_its_own = |state: &AxisState| state.header.frame_id != FRAME;
+    let mut state = graph.next(&topics::AXES_STATE, since, is_its_own);
     FRAME.clone_into(&mut state.header.frame_id);
     state.commanded[0] = 0.1;
     state.motor[0] = 0.1;
