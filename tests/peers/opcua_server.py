@@ -101,7 +101,7 @@ class Types:
     async def read(self, folder: Path) -> None:
         for name in NODESETS:
             text = gzip.decompress((folder / f"{name}.gz").read_bytes()).decode()
-            # Some of their structures are none for asyncua; no node below is of such a type.
+            # asyncua cannot make some of their structures; no node below is of such a type.
             await self.server.import_xml(xmlstring=text, strict_mode=False)
         await self.look_below(self.server.nodes.base_object_type)
 

@@ -7,7 +7,6 @@
 )]
 #![expect(clippy::print_stderr, reason = "what is not tested is said")]
 
-pub mod asker;
 pub mod chromium;
 pub mod computer_clock;
 pub mod cyclone;

@@ -151,10 +151,10 @@ impl Tests {
 
     /// Counts a machine file that is no machine file; one that the bag itself cannot give is among its losses already.
     fn lose_machine(&mut self, bag: &Bag, unreadable: Option<String>) {
-        let is_told = |loss: &Loss| matches!(loss.reason, LossReason::Attachment { .. });
+        let is_counted = |loss: &Loss| matches!(loss.reason, LossReason::Attachment { .. });
         let losses = &mut self.reading.losses;
         if let Some(what) = unreadable
-            && !losses.iter().any(is_told)
+            && !losses.iter().any(is_counted)
         {
             losses.push(Loss {
                 file: bag.path().to_owned(),

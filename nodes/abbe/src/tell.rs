@@ -2,7 +2,7 @@
 //!
 //! Whoever reads them may leave before the end (`abbe report BAG | head`): what is left is then not wanted, which is no
 //! failure, nor is a terminal that was closed. Any other failure to write is one, and ends the program with 1: a page that is
-//! half told is none.
+//! printed only in part must not look whole.
 
 use metrology::visible::visible;
 use node_runtime::complain;
@@ -31,12 +31,12 @@ pub fn line(text: Arguments<'_>) {
     }
 }
 
-/// Whether a write failed as it does on a terminal that was closed; on a disk that fails it does so as well.
+/// Whether a write failed as on a closed terminal; a failing disk gives the same error.
 fn is_of_closed_terminal(error: &Error) -> bool {
     error.raw_os_error() == Some(Errno::EIO as i32)
 }
 
-/// Whether standard output is a terminal, or another device without blocks. One that was closed no longer says that it is one.
+/// Whether standard output is a terminal, or another device without blocks. A closed one is no longer recognised as one.
 fn is_device() -> bool {
     let out = std::fs::metadata("/dev/stdout");
     out.is_ok_and(|out| out.file_type().is_char_device())

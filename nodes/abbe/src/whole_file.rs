@@ -148,7 +148,7 @@ pub struct Helpers {
 }
 
 impl Helpers {
-    /// The group of a process that was started as the first of a group of its own; `None`: its number is none of the system's.
+    /// The group of a process that was started as the first of its own group; `None`: no process can have this number.
     pub fn of(process: u32) -> Option<Self> {
         let group = Pid::from_raw(i32::try_from(process).ok()?);
         let mut all = HELPERS.lock().unwrap_or_else(PoisonError::into_inner);

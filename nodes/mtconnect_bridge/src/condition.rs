@@ -207,7 +207,7 @@ pub enum Condition {
     },
     /// Observations of an answer without a stamp of 1970 to 2106.
     #[error(
-        "{count} observations of an answer have no stamp of 1970 to 2106: told with the time of receipt"
+        "{count} observations of an answer have no stamp of 1970 to 2106: published with the time of receipt"
     )]
     Unstamped {
         /// How many.

@@ -20,7 +20,7 @@ pub enum BridgeError {
     /// A log without the source, or the source without a log.
     #[error("log_file: belongs to source = log, and to no other")]
     LogFile,
-    /// The mapping file is none, or contradicts itself.
+    /// The mapping file cannot be read as a mapping, or contradicts itself.
     #[error(transparent)]
     Mapping(#[from] machine_report::MappingError),
     /// The system has no thread or event queue left.

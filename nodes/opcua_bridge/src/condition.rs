@@ -139,7 +139,7 @@ pub enum Condition {
         total: u64,
     },
     /// Values without a stamp of 1970 to 2106.
-    #[error("{key}: no stamp of 1970 to 2106: told with the time of receipt; {count} so far")]
+    #[error("{key}: no stamp of 1970 to 2106: published with the time of receipt; {count} so far")]
     Unstamped {
         /// Key of the mapping.
         key: String,

@@ -122,7 +122,7 @@ pub struct ConnectionConfig {
     /// Longest time between attempts.
     #[schemars(range(min = 0.05, max = LONGEST_RECONNECT_S))]
     pub reconnect_longest_s: f64,
-    /// An answer later than this is none.
+    /// A later answer counts as missing.
     #[schemars(range(min = 0.1, max = 3600.0))]
     pub reply_timeout_s: f64,
     /// The server is asked this often whether it runs; two answers missing end the connection.
@@ -171,7 +171,7 @@ pub struct Settings {
     pub reconnect_first: Span,
     /// Longest time between attempts.
     pub reconnect_longest: Span,
-    /// An answer later than this is none.
+    /// A later answer counts as missing.
     pub reply_timeout: Span,
     /// Time between two questions whether the server runs.
     pub keep_alive: Span,
@@ -182,7 +182,7 @@ pub struct Settings {
 /// A URL of the binary protocol.
 ///
 /// # Errors
-/// When it is none.
+/// When the text is no such URL.
 pub fn checked_endpoint(endpoint: &str) -> Result<String, BridgeError> {
     let rest = endpoint.strip_prefix("opc.tcp://");
     let host = rest.map(|rest| rest.split(['/', ':']).next().unwrap_or_default());
@@ -231,7 +231,7 @@ impl Settings {
     /// Checks a configuration.
     ///
     /// # Errors
-    /// Values out of range, an endpoint that is none, a password that could be read, a key that is no node, or a mapping
+    /// Values out of range, an endpoint that is no address, a password that could be read, a key that is no node, or a mapping
     /// that contradicts itself.
     pub fn new(config: &BridgeConfig, map: &MapFile) -> Result<Self, BridgeError> {
         let connection = &config.connection;

@@ -37,7 +37,7 @@ pub enum BridgeError {
     /// A user without a password, or the reverse.
     #[error("security.user and security.password_file belong together: one is empty")]
     HalfUser,
-    /// The mapping is none, or contradicts itself.
+    /// The mapping cannot be read, or contradicts itself.
     #[error(transparent)]
     Mapping(#[from] machine_report::MappingError),
     /// A key of the mapping is no node.

@@ -1,6 +1,6 @@
 //! The bridge's sockets: the only part that does something itself.
 //!
-//! It is built with the feature `opcua`; without it a bridge cannot be opened, and says how it is built.
+//! It is built with the feature `opcua`; without it a bridge cannot be opened, and the error names the build command.
 
 use std::fmt;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! A machine that only reports, heard through OPC UA, on the same topics as a controller.
+//! A machine that only reports, read by OPC UA, on the same topics as a controller.
 //!
 //! A server has *nodes*, each with an identifier in a namespace. The bridge subscribes to those of its mapping, by the
 //! namespace's URI and the identifier ([`node_key`]) or by browse names from `Objects` on: a namespace's index may be

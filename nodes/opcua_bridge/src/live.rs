@@ -15,7 +15,7 @@ use crate::error::BridgeError;
 use crate::io::{BridgeIo, Credentials};
 use crate::stage::{BridgeStage, Input, Output};
 
-/// What the shell tells.
+/// Events from the shell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LiveInput {
     /// Time has passed.

@@ -67,7 +67,7 @@ pub enum NodeKey {
     Path(Vec<Step>),
 }
 
-/// Why a key is none.
+/// Why a text is no node key.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum KeyFlaw {
     /// Too long.
@@ -87,19 +87,19 @@ pub enum KeyFlaw {
     /// Neither an identifier nor a path.
     #[error("must be nsu=URI;s=TEXT (or i=, g=, b=), or a path /NAME/NAME from Objects on")]
     Form,
-    /// A number that is none.
+    /// The numeric identifier is no number.
     #[error("{text:?} must be a number from 0 to 4294967295")]
     Number {
         /// What stands there.
         text: String,
     },
-    /// A GUID that is none.
+    /// The identifier is no GUID.
     #[error("{text:?} must be a GUID such as 72962b91-fa75-4ae6-8d28-b404dc7daf63")]
     Guid {
         /// What stands there.
         text: String,
     },
-    /// Base64 that is none.
+    /// The identifier is no base64.
     #[error("{text:?} must be bytes in Base64")]
     Bytes {
         /// What stands there.

@@ -176,7 +176,7 @@ fn axis_of(variable: &Variable) -> Option<Axis> {
     })
 }
 
-/// The meaning with a name that no other has; `None`: its axis is told by another.
+/// The meaning with a name that no other has; `None`: another key reports its axis.
 fn unique(
     mut meaning: Meaning,
     variable: &Variable,

@@ -16,7 +16,7 @@ mod taking;
 
 use taking::Taking;
 
-/// What the bridge is told.
+/// Inputs of the bridge.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Input {
     /// Time has passed.
@@ -88,14 +88,14 @@ pub enum IoCommand {
     Disconnect,
 }
 
-/// What the bridge says.
+/// Outputs of the bridge.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Output {
     /// Positions of all axes that are known.
     State(AxisState),
     /// A temperature that can be.
     Temperature(TemperatureSample),
-    /// A value as it was told, with a verdict.
+    /// A value as it was reported, with a verdict.
     Value(MachineValue),
     /// A condition worth reporting.
     Condition(Condition),

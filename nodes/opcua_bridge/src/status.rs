@@ -10,7 +10,7 @@
 
 use std::fmt;
 
-/// What a status says of a value, by (1).
+/// Quality of a value by its status, (1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quality {
     /// It can be used.

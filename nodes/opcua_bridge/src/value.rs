@@ -55,7 +55,7 @@ impl Payload {
         }))
     }
 
-    /// Whether a condition stands: true, a number other than 0, or a text. `None`: it says neither.
+    /// Whether a condition stands: true, a number other than 0, or a text. `None`: not decided by the value.
     #[must_use]
     pub fn is_alarm(&self) -> Option<bool> {
         match self {
@@ -76,7 +76,7 @@ pub struct Change {
     pub payload: Payload,
     /// Its status.
     pub status: Status,
-    /// When it was, by its source, else by the server; `None`: neither says, or outside 1970 to 2106.
+    /// When it was, by its source, else by the server; `None`: neither gives a stamp, or it is outside 1970 to 2106.
     pub machine_at: Option<Stamp<Machine>>,
     /// Whether it is what holds, read after a break, and its stamp may be of long ago.
     pub is_held: bool,

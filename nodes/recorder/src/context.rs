@@ -18,7 +18,7 @@ const RUN_RECORD: &str = "abbe.run";
 /// Name of the metadata record with the hashes.
 const HASHES_RECORD: &str = "abbe.attachments";
 /// Name of the attachment that holds the machine file.
-pub(crate) const MACHINE_FILE: &str = "machine.yaml";
+pub const MACHINE_FILE: &str = "machine.yaml";
 /// Name of the metadata record with the nodes, in the order in which they were composed.
 pub const NODES_RECORD: &str = "abbe.nodes";
 /// Name of the metadata record of each service call.

@@ -37,8 +37,8 @@ pub use channel::{Channel, ChannelId, Durability, History, Liveliness, QosProfil
 pub use channel::{Reliability, qos_from_yaml, qos_to_yaml};
 pub use config::{ChunkCompression, NodeConfig, RecorderConfig, RingConfig, WhenFull};
 pub use context::{
-    Attached, CALL_RECORD, END_RECORD, MessageOrder, NODES_RECORD, RecordedCall, RecordedRun,
-    RunContext, RunNode, verify_attachments,
+    Attached, CALL_RECORD, END_RECORD, MACHINE_FILE, MessageOrder, NODES_RECORD, RecordedCall,
+    RecordedRun, RunContext, RunNode, verify_attachments,
 };
 pub use dump::dump_json;
 pub use error::RecorderError;

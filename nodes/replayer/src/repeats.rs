@@ -14,7 +14,7 @@ const MOST: usize = 65_536;
 /// Which message: its topic, its publish time, its number where that counts, length and hash (64 bits) of its bytes.
 type Key = (usize, u64, Option<u32>, usize, u64);
 
-/// What is said of a message that is repeated.
+/// Why a repeated message is left out.
 pub(crate) const WHAT: &str =
     "the bag has it already, with equal times and bytes; record each topic with one recorder";
 

@@ -9,13 +9,10 @@ use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
 use machine::file::AxisEntry;
 use metrology::text::{self, Comments};
-use recorder::{Bag, Order};
+use recorder::{Bag, MACHINE_FILE, Order};
 use replayer::{Reading, Taken, reading};
 use sha2::{Digest, Sha256};
 use twin::Session;
-
-/// The attachment that holds the machine file of a recording.
-const MACHINE: &str = "machine.yaml";
 
 /// What bags hold, as one session.
 pub struct Recorded {
@@ -40,7 +37,7 @@ impl Recorded {
         for path in paths {
             let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
             // A damaged one is among the losses of the bag.
-            if let Ok(Some(attachment)) = bag.attachment(MACHINE) {
+            if let Ok(Some(attachment)) = bag.attachment(MACHINE_FILE) {
                 is_of(&attachment.data, machine)
                     .with_context(|| format!("bag {}", path.display()))?;
             }
@@ -105,7 +102,7 @@ const EQUAL_VALUES: f64 = 1e-9;
 /// Whether a machine file may be that of the machine which another one, of the recording, describes: what is built
 /// into a machine is the same in both. One that cannot be read, as of an older format, tells nothing.
 fn is_of(recorded: &[u8], machine: &MachineFile) -> Result<()> {
-    let parse = |text| MachineFile::parse(text, MACHINE).ok();
+    let parse = |text| MachineFile::parse(text, MACHINE_FILE).ok();
     let Some(recorded) = std::str::from_utf8(recorded).ok().and_then(parse) else {
         return Ok(());
     };
@@ -152,7 +149,7 @@ fn built(entry: &AxisEntry) -> Vec<(&'static str, f64)> {
 /// When the bag has none.
 pub fn machine_text(path: &Path) -> Result<(String, String)> {
     let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
-    let attached = bag.attachment(MACHINE);
+    let attached = bag.attachment(MACHINE_FILE);
     let attached = attached.with_context(|| format!("bag {}", path.display()))?;
     let Some(attachment) = attached else {
         let none = anyhow!("holds no machine file: name it with --machine");

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use machine::MachineFile;
 use node_runtime::text_file;
-use recorder::{Bag, RecordedRun};
+use recorder::{Bag, MACHINE_FILE, RecordedRun};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
@@ -15,8 +15,6 @@ use crate::evaluate::test_conditions::TestConditions;
 
 /// A time before 1971 is that of a table whose begin nobody stated, s since 1970.
 const FIRST_DATED_S: i64 = 365 * 86_400;
-/// The attachment that holds the machine file of a recording.
-const MACHINE: &str = "machine.yaml";
 
 /// Where figures are from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -50,11 +48,11 @@ impl Origin {
             at_s: begin_s(&bag),
             ..Self::default()
         };
-        if let Some(attached) = bag.attachment(MACHINE)?.filter(|_| has_machine) {
+        if let Some(attached) = bag.attachment(MACHINE_FILE)?.filter(|_| has_machine) {
             origin.machine_sha256 = Some(hash(&attached.data));
             origin.machine = std::str::from_utf8(&attached.data)
                 .ok()
-                .and_then(|text| MachineFile::parse(text, MACHINE).ok())
+                .and_then(|text| MachineFile::parse(text, MACHINE_FILE).ok())
                 .map(|machine| machine.name);
         }
         Ok(origin)

@@ -25,7 +25,7 @@ fn difference(phi: f64, random: &mut Pcg64Mcg) -> Difference {
     }
 }
 
-/// Repeats of two circles: white noise is told as such, though little is left to tell it by.
+/// Repeats of two circles: white noise is recognised as white, though few residuals are left to show it.
 #[test]
 fn eq5_few_white_rows_have_no_memory() {
     let mut random = Pcg64Mcg::seed_from_u64(11);

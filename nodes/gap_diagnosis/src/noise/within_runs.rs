@@ -3,7 +3,7 @@
 //! # Model
 //!
 //! Within a run it is what its own smooth modes (`field`) leave, sharp places such as reversals among it: rather too great than
-//! too small. How a second run would differ nobody has seen; `unrepeated` says what is taken, and lowers confidences.
+//! too small. How a second run would differ was not measured; `unrepeated` states what is assumed, and lowers confidences.
 //!
 //! # Holds when
 //! A run has three rows for each mode that is taken out of it; channels without such runs have no noise floor.

@@ -2,7 +2,7 @@
 //!
 //! # Model
 //!
-//! Every block in motion is told by the coefficients c of a few smooth patterns (`field`): offset, drift along the run, and
+//! Every block in motion is described by the coefficients c of a few smooth patterns (`field`): offset, drift along the run, and
 //! harmonics over its place. Repeats of one test have one coefficient each; over the session it may have steps,
 //!
 //! ```text
@@ -203,7 +203,7 @@ fn series(session: &Session, rows: &Rows, raw: &[f64]) -> Vec<Series> {
         .collect()
 }
 
-/// Least squares; none where the rows do not tell the columns apart.
+/// Least squares; `None` where the rows do not separate the columns.
 fn solved(columns: &DMatrix<f64>, values: &DVector<f64>) -> Option<DVector<f64>> {
     if columns.nrows() < 2 * columns.ncols() || values.iter().any(|v| !v.is_finite()) {
         return None;

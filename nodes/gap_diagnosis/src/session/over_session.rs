@@ -32,7 +32,7 @@ use crate::shrink::Shrunk;
 
 /// Chance in noise above which one size holds.
 const MOST_CHANCE: f64 = 0.01;
-/// D of an effect in a run that says something of its size there.
+/// D of an effect in a run that determines its size.
 const LEAST_D_OF_A_RUN: f64 = 3.0;
 /// Fewest such runs that show whether one size holds.
 const FEWEST_RUNS: usize = 5;

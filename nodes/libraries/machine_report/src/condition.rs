@@ -159,20 +159,20 @@ pub enum ValueCondition {
         line: usize,
         /// Which value.
         key: String,
-        /// What was told.
+        /// What was reported.
         text: String,
         /// How many numbers it must have.
         wanted: usize,
         /// How many there were.
         count: u64,
     },
-    /// The machine tells something that the mapping does not have.
-    #[error("told, and not in the mapping: {keys}")]
+    /// The machine reports something that the mapping does not have.
+    #[error("reported, and not in the mapping: {keys}")]
     Unmapped {
         /// Keys, and how many more.
         keys: String,
     },
-    /// Axes of which only the actual position is told.
+    /// Axes of which only the actual position is reported.
     #[error("no commanded position of {axes}: `commanded` of axes/state repeats the actual one")]
     Uncommanded {
         /// Letters.

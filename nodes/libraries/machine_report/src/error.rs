@@ -10,10 +10,10 @@ pub enum MappingError {
     /// More keys than there may be.
     #[error(transparent)]
     Bound(#[from] BoundError),
-    /// The mapping file is none.
+    /// The mapping file cannot be read as a mapping.
     #[error("{0}")]
     MapFile(metrology::yaml::YamlError),
-    /// A unit does not measure what the mapping says.
+    /// A unit that does not fit the quantity of the mapping.
     #[error("{key}: {unit} does not measure {what}")]
     Unit {
         /// Key of the mapping.
@@ -33,14 +33,14 @@ pub enum MappingError {
         /// Why not.
         reason: &'static str,
     },
-    /// Words where no text is told.
+    /// Words for a value that is no text.
     #[error("{key}: a condition has no words")]
     Words {
         /// Key of the mapping.
         key: String,
     },
-    /// Two keys tell the same axis.
-    #[error("{key}: axis {axis} is told by another key")]
+    /// Two keys report the same axis.
+    #[error("{key}: axis {axis} is reported by another key")]
     AxisTwice {
         /// Second key of the mapping.
         key: String,

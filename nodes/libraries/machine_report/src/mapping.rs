@@ -115,7 +115,7 @@ pub struct TextEntry {
     /// Name of its topic or condition; absent: the key in small letters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// What is told in place of which value, such as a number of an enumeration; others are told as they are.
+    /// The text that replaces a value, such as a number of an enumeration; other values stay as they are.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub words: BTreeMap<String, String>,
 }
@@ -179,7 +179,7 @@ pub enum Use {
         quantity: Quantity,
         /// Whether a code stands before it.
         is_message: bool,
-        /// What is told in place of which value.
+        /// The text that replaces a value.
         words: BTreeMap<String, String>,
     },
     /// A condition.
@@ -205,7 +205,7 @@ impl Use {
         }
     }
 
-    /// The text that is told in place of this one.
+    /// The text that replaces this one.
     #[must_use]
     pub fn word(&self, text: String) -> String {
         match self {

@@ -1,4 +1,4 @@
-//! What becomes of what a machine tells.
+//! What a bridge makes of the values that a machine reports.
 
 use metrology::sample::{AxisState, MachineValue, TemperatureSample};
 
@@ -11,7 +11,7 @@ pub enum Report {
     State(AxisState),
     /// A temperature that can be.
     Temperature(TemperatureSample),
-    /// A value as it was told, with a verdict.
+    /// A value as it was reported, with a verdict.
     Value(MachineValue),
     /// A condition worth reporting.
     Condition(ValueCondition),

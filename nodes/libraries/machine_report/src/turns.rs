@@ -1,4 +1,4 @@
-//! Handing over in turns: a machine that says much at once leaves time for everything else.
+//! Handing over in turns: a machine that reports much at once leaves time for everything else.
 
 use std::collections::VecDeque;
 
@@ -31,7 +31,7 @@ impl<T> Turns<T> {
         self.waiting.is_empty()
     }
 
-    /// Whether a whole turn waits: nothing more should be heard before it is handed over.
+    /// Whether a whole turn waits: nothing more should be taken before it is handed over.
     #[must_use]
     pub fn is_full(&self) -> bool {
         self.waiting.len() >= PER_TURN

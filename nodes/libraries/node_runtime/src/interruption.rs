@@ -50,8 +50,8 @@ pub struct Interruption(Arc<State>);
 impl Interruption {
     /// Begins to listen, for the rest of the process' life.
     ///
-    /// SIGHUP is left alone where it was ignored before this process began. A second SIGINT is said on standard error, and
-    /// `to_keep` says there what will be saved. A process that has not ended 5 s after it exits with code 1.
+    /// SIGHUP is left alone where it was ignored before this process began. A second SIGINT is reported on standard error, and
+    /// `to_keep` names there what will be saved. A process that has not ended 5 s after it exits with code 1.
     ///
     /// # Errors
     /// When the signals or a thread cannot be had.

@@ -145,7 +145,7 @@ impl Offsets {
         }
     }
 
-    /// Among good sets a refused one may come again and again: that it is over is said after a while without one.
+    /// Refused sets may come among good ones again and again: the condition ends after a while without one.
     fn watch_refusals(&mut self, at: Stamp<Host>, conditions: &mut Vec<Condition>) {
         let Some(refused_at) = self.refused_at else {
             return;

@@ -158,18 +158,26 @@ const PROBE: &str = "name the agent's probe document, http://HOST:PORT/probe";
 #[cfg(test)]
 mod tests {
     use std::io::{Read as _, Write as _};
-    use std::net::TcpListener;
+    use std::net::{TcpListener, TcpStream};
+    use std::thread::JoinHandle;
 
     use super::*;
 
-    #[test]
-    fn an_answer_over_the_limit_is_refused_with_what_to_ask_for() {
+    /// An agent on loopback: its port, and the first connection to it after its request was read.
+    fn agent(answer: impl FnOnce(TcpStream) + Send + 'static) -> (u16, JoinHandle<()>) {
         let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
         let port = listener.local_addr().unwrap().port();
-        let agent = std::thread::spawn(move || {
+        let thread = std::thread::spawn(move || {
             let (mut socket, _) = listener.accept().unwrap();
-            let mut heard = [0_u8; 512];
-            assert!(socket.read(&mut heard).unwrap() > 0);
+            assert!(socket.read(&mut [0_u8; 512]).unwrap() > 0);
+            answer(socket);
+        });
+        (port, thread)
+    }
+
+    #[test]
+    fn an_answer_over_the_limit_is_refused_with_what_to_ask_for() {
+        let (port, agent) = agent(|mut socket| {
             let length = PART_LIMIT + 1;
             let head = format!("HTTP/1.1 200 OK\r\nContent-Length: {length}\r\n\r\n");
             socket.write_all(head.as_bytes()).unwrap();
@@ -188,19 +196,14 @@ mod tests {
     /// It sends a byte now and then and never ends; the answer is given up by the limit and not by the agent.
     #[test]
     fn an_agent_that_trickles_is_given_up_with_the_limit() {
-        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
-        let port = listener.local_addr().unwrap().port();
-        let agent = std::thread::spawn(move || {
-            let (mut socket, _) = listener.accept().unwrap();
-            let mut heard = [0_u8; 512];
-            assert!(socket.read(&mut heard).unwrap() > 0);
+        let (port, agent) = agent(|mut socket| {
             let head = b"HTTP/1.1 200 OK\r\nContent-Length: 1000000\r\n\r\n";
             socket.write_all(head).unwrap();
             let pause = Some(Duration::from_millis(5));
             socket.set_read_timeout(pause).unwrap();
             // It ends when nobody listens any more.
             while socket.write_all(b" ").is_ok() {
-                if socket.read(&mut heard).is_ok_and(|n| n == 0) {
+                if socket.read(&mut [0_u8; 512]).is_ok_and(|n| n == 0) {
                     break;
                 }
             }

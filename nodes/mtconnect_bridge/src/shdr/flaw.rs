@@ -8,7 +8,7 @@ pub enum Flaw {
     NoFields,
     /// The stamp is invalid.
     #[error(
-        "stamp {text:?}: must be a date of 1970 to 2106, milliseconds or empty; told with the time of receipt, in a log with the stamp of the line beside it"
+        "stamp {text:?}: must be a date of 1970 to 2106, milliseconds or empty; published with the time of receipt, in a log with the stamp of the line beside it"
     )]
     Stamp {
         /// What stands there.

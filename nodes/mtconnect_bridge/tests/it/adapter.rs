@@ -269,14 +269,14 @@ fn what_cannot_be_read_is_refused_with_its_reason_and_the_rest_goes_on() {
     ));
     let first = [
         "refused_line: line of 100 bytes refused, limit 64; 1 so far",
-        "refused_line: stamp \"yesterday\": must be a date of 1970 to 2106, milliseconds or empty; told with the time of receipt, in a log with the stamp of the line beside it; 2 so far",
+        "refused_line: stamp \"yesterday\": must be a date of 1970 to 2106, milliseconds or empty; published with the time of receipt, in a log with the stamp of the line beside it; 2 so far",
         "refused_value: Fact: \"fast\" is no finite number; 1 so far",
         // What it is instead nobody knows.
         "unavailable/feed: unavailable since 1970-01-01T00:16:40Z",
         "refused_value: Fact: \"nan\" is no finite number; 2 so far",
         "refused_value: Xabs: \"1 2\" is no finite number; 3 so far",
         "unavailable/xabs: unavailable since 1970-01-01T00:16:40Z",
-        "unmapped: told, and not in the mapping: new",
+        "unmapped: reported, and not in the mapping: new",
         "unavailable/feed: known",
     ];
     assert_eq!(conditions(&said), first);

@@ -286,7 +286,7 @@ fn what_was_read_before_a_flaw_is_kept_and_the_flaw_is_said() {
         (
             "yesterday|t|1",
             "t=1",
-            "stamp \"yesterday\": must be a date of 1970 to 2106, milliseconds or empty; told with the time of receipt, in a log with the stamp of the line beside it",
+            "stamp \"yesterday\": must be a date of 1970 to 2106, milliseconds or empty; published with the time of receipt, in a log with the stamp of the line beside it",
         ),
         (
             "|c|FAULT|A1|1|HIGH|axis X | limit",

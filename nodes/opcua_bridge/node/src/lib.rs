@@ -42,7 +42,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
             || LiveInput::Shutdown,
             |output| matches!(output, Output::Stopped),
         );
-    // Without an axis in its mapping it may stand beside a controller that tells them.
+    // Without an axis in its mapping it may stand beside a controller that publishes them.
     if settings.mapping.has_axes() {
         wiring = wiring
             .publish_in(

@@ -67,7 +67,7 @@ pub struct BridgeIo {
 }
 
 impl BridgeIo {
-    /// Starts the thread; it does nothing until it is told.
+    /// Starts the thread; it does nothing before the first command.
     ///
     /// # Errors
     /// When the certificates cannot be read or made, or the system has no thread left.

@@ -21,7 +21,7 @@ const BRANCHES: usize = 256;
 pub(super) struct Found {
     /// Item and node.
     pub nodes: Vec<(usize, NodeId)>,
-    /// Item and why there is none.
+    /// Item, and why it has no node.
     pub missing: Vec<(usize, String)>,
 }
 

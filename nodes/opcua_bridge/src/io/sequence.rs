@@ -54,7 +54,7 @@ impl Sequence {
             1 => u32::MAX,
             number => number - 1,
         };
-        // Of the very first message nothing can be missing, and number 0 is none.
+        // Nothing can be missing before the very first message, and no message has number 0.
         self.last = if has_data {
             number
         } else if number == 1 && self.last == 0 {

@@ -99,7 +99,7 @@ async fn asked(settings: &Settings) -> Result<Survey, BridgeError> {
         Ok(Err(error)) => survey.stopped = Some(error.to_string()),
         Err(_) => survey.stopped = Some("10 s have passed".to_owned()),
     }
-    // The server ends a session that says no goodbye by itself.
+    // The server ends a session that is not closed.
     let _ = tokio::time::timeout(Duration::from_secs(1), session.disconnect()).await;
     pump.abort();
     Ok(survey)

@@ -66,7 +66,7 @@ impl Held {
     }
 }
 
-/// What the client's loop says of the connection.
+/// What the client's loop reports of the connection.
 enum Link {
     Made(SessionConnectMode),
     Lost(StatusCode),
@@ -352,7 +352,7 @@ impl<'a> Visit<'a> {
         self.hand_over(at, message)
     }
 
-    /// Asks for messages again, and says which are gone.
+    /// Asks for messages again, and reports which are gone.
     async fn fetch(&mut self, from: u32, count: u32) -> Option<IoEvent> {
         let mut lost = 0_u64;
         for behind in 0..count {
@@ -396,7 +396,7 @@ impl<'a> Visit<'a> {
                 Err(error) => return Some(ended(error)),
             }
         }
-        // The client asks for no message after a break until it is told to.
+        // The client asks for no message after a break before this command.
         self.session.trigger_publish_now();
         if let Some(ended) = self.send(IoEvent::Resumed { republished }) {
             return Some(ended);

@@ -40,7 +40,7 @@ pub(super) struct Taking {
 }
 
 impl Taking {
-    /// Of a machine that has told nothing yet; `keys` in the order of the items.
+    /// Of a machine that has reported nothing yet; `keys` in the order of the items.
     pub(super) fn new(values: Values, keys: Vec<String>) -> Self {
         let node = |key: String| {
             let used = values.mapping().find(&key, None).map(|(_, used)| used);
@@ -117,7 +117,7 @@ impl Taking {
         }
     }
 
-    /// Counts values that are not good, and says where the quality has changed.
+    /// Counts values that are not good, and reports where the quality has changed.
     fn watch_quality(&mut self, item: usize, status: Status, out: &mut Vec<Output>) {
         let node = &mut self.nodes[item];
         let quality = status.quality();
@@ -161,7 +161,7 @@ impl Taking {
         }
     }
 
-    /// What was told: a bad status is absence, whatever value stands beside it.
+    /// The value that was reported: a bad status is absence, whatever value stands beside it.
     fn told(
         &mut self,
         key: &str,
@@ -180,7 +180,7 @@ impl Taking {
             payload => payload.text().map(|text| text.map(Told::Value)),
         };
         match read {
-            Ok(Some(told)) => told,
+            Ok(Some(reported)) => reported,
             Ok(None) => Told::Unavailable,
             Err(what) => {
                 self.unreadable += 1;
@@ -213,7 +213,7 @@ impl Taking {
         self.values.absent_all(at, out);
         for node in &mut self.nodes {
             if node.status.quality() != Quality::Good {
-                // What it is now is said by `unavailable`.
+                // The condition `unavailable` reports what it is now.
                 node.status = Status::default();
                 out.push(
                     Condition::Quality {

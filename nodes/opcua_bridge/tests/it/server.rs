@@ -56,7 +56,7 @@ fn open_as(config: &BridgeConfig, map: &str, password: Option<&str>) -> LiveBrid
     LiveBridge::open(&settings, credentials).unwrap()
 }
 
-/// What the bridge says until `until` holds for one of its outputs.
+/// Outputs of the bridge until `until` holds for one of its outputs.
 fn heard(bridge: &mut LiveBridge, mut until: impl FnMut(&Output) -> bool) -> Vec<Output> {
     let (mut said, end) = (Vec::new(), Instant::now() + PATIENCE);
     let mut looked = 0;

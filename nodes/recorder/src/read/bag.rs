@@ -276,7 +276,7 @@ impl Bag {
         places.map(|place| place.name.as_str())
     }
 
-    /// An attachment, `None` where there is none of this name and none was recorded.
+    /// An attachment; `None` where the bag has no such name and its list of attachments neither.
     ///
     /// # Errors
     /// It is there and cannot be read, or it is not the one whose hash was recorded.

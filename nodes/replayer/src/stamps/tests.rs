@@ -237,7 +237,7 @@ fn a_wrong_log_time_is_no_wrong_stamp() {
     assert_eq!(of_states(all), Vec::<usize>::new());
 }
 
-/// What is said of each topic of a bag whose stamps are all of another time.
+/// The words for each topic of a bag whose stamps are all of another time.
 fn other_clocks(topics: &[Of<'_>]) -> Vec<(String, String)> {
     let home = tempfile::tempdir().unwrap();
     let bag = bag_of(&home, topics);

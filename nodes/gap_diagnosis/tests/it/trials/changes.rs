@@ -1,4 +1,4 @@
-//! Sessions in which something changes: what begins is named from its run on, what slips is no noise, and what holds is said to.
+//! Sessions in which something changes: an effect that begins is named from its run on, a slip is not counted as noise, and an effect that stays is reported as constant.
 
 use gap_diagnosis::report::Status;
 use gap_diagnosis::{Course, Diagnosis, Note};

@@ -30,7 +30,7 @@ fn what_does_not_fit_is_refused_by_key() {
         ),
         (
             "  a: {is: position, axis: X, unit: INCH}\n  b: {is: path_position, unit: INCH}\n",
-            "b: axis X is told by another key",
+            "b: axis X is reported by another key",
         ),
         (
             "  a: {is: commanded_position, axis: X, unit: INCH}\n",

@@ -79,7 +79,7 @@ fn a_link_that_falls_silent_is_noticed_by_the_keep_alive() {
     heard(&mut bridge, |output| is_text(output, "20"));
 }
 
-/// Values of each node ascend without a gap, whatever was cut between; what holds may be said again after the break.
+/// Values of each node ascend without a gap, whatever was cut between; a value may be published again after the break.
 #[test]
 fn a_link_that_is_cut_in_the_middle_of_a_flood_loses_nothing_and_keeps_the_order() {
     const COUNT: usize = 10_000;

@@ -14,7 +14,7 @@ fn ready_mappings_read_machines_of_the_published_node_sets() {
     let port = free_port();
     let more = json!({"nodesets": root().join("tests/peers/nodesets")});
     let _machine = Machine::start(&python, port, &["urn:abbe:machine"], &more);
-    // What each mapping reads, and nodes that this machine has not or says nothing of.
+    // Values that each mapping reads, and nodes that this machine lacks or leaves empty.
     let wanted = [
         (
             "ready:machine_tool",

@@ -28,7 +28,7 @@ pub fn free_port() -> u16 {
     listener.local_addr().unwrap().port()
 }
 
-/// The interpreter that has `asyncua`: `ABBE_PYTHON`, else `.venv/bin/python`. Where there is none the test says so and ends,
+/// The interpreter that has `asyncua`: `ABBE_PYTHON`, else `.venv/bin/python`. Without it the test reports that and ends,
 /// which with `CI=true` is a failure.
 pub fn interpreter(test: &str) -> Option<PathBuf> {
     let python = std::env::var("ABBE_PYTHON")
