@@ -127,7 +127,6 @@ const CERTAIN: CircularBudget = CircularBudget {
     machine: RIGID,
     device_expansion: RIGID,
     environmental_drift_mm: 0.0,
-    environmental_unrest_mm: None,
 };
 
 #[test]
