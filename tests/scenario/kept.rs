@@ -290,6 +290,7 @@ fn scenario_a_pdf_that_is_called_off_leaves_no_folder_and_no_browser() {
             "{signal}: {}",
             stopped.said
         );
+        let deadline = Instant::now() + Duration::from_secs(60);
         let number = std::fs::read_to_string(&began).unwrap();
         let process = Path::new("/proc").join(number.trim()).join("cmdline");
         let runs = || std::fs::read(&process).is_ok_and(|words| !words.is_empty());

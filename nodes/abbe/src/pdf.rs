@@ -5,7 +5,6 @@
 
 use std::fs::File;
 use std::io::Read;
-use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -166,11 +165,9 @@ fn print(mut browser: Command, page: &str, head: &Head, longest: Duration) -> Re
         .arg(format!("file://{}", file("page.html").display()))
         .stdin(Stdio::null())
         .stdout(Stdio::null())
-        .stderr(messages)
-        // A group of its own, which ends with it.
-        .process_group(0);
-    let child = browser.spawn().with_context(|| name.clone())?;
-    let status = wait(child, longest, &name)?;
+        .stderr(messages);
+    let browser = Helpers::start(&mut browser).with_context(|| name.clone())?;
+    let status = wait(browser, longest, &name)?;
     let reason = || last_message(&file("messages"));
     if !status.success() {
         bail!("{name} ended with {status}: {}", reason());
@@ -192,9 +189,12 @@ fn print(mut browser: Command, page: &str, head: &Head, longest: Duration) -> Re
 
 /// Waits for the end of a process; one that takes too long is killed with its group. Helpers of its own may outlive it, and
 /// are killed too.
-fn wait(mut child: Child, longest: Duration, name: &str) -> Result<std::process::ExitStatus> {
+fn wait(
+    (mut child, helpers): (Child, Helpers),
+    longest: Duration,
+    name: &str,
+) -> Result<std::process::ExitStatus> {
     let until = Instant::now() + longest;
-    let helpers = Helpers::of(child.id());
     loop {
         if let Some(status) = child.try_wait().context("the browser")? {
             return Ok(status);

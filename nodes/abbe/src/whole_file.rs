@@ -2,7 +2,9 @@
 
 use std::fs::File;
 use std::io::{ErrorKind, Write as _};
+use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
@@ -148,12 +150,16 @@ pub struct Helpers {
 }
 
 impl Helpers {
-    /// The group of a process that was started as the first of its own group; `None`: no process can have this number.
-    pub fn of(process: u32) -> Option<Self> {
-        let group = Pid::from_raw(i32::try_from(process).ok()?);
+    /// Starts a process as the first of a group of its own. No signal comes between its start and its entry in the list.
+    ///
+    /// # Errors
+    /// When it cannot be started.
+    pub fn start(command: &mut Command) -> Result<(Child, Self)> {
         let mut all = HELPERS.lock().unwrap_or_else(PoisonError::into_inner);
+        let child = command.process_group(0).spawn()?;
+        let group = Pid::from_raw(i32::try_from(child.id())?);
         all.push(group);
-        Some(Self { group })
+        Ok((child, Self { group }))
     }
 }
 
@@ -229,13 +235,12 @@ fn listen() -> Result<()> {
     let interruption = Interruption::listen("nothing is kept")?;
     let wait = move || {
         while !interruption.wait(LOOK) {}
-        // From here on whoever waits for a helper does not come past the end of its folder.
+        // From here on whoever waits for a helper does not come past the end of its folder, and no helper is started.
         let all = VANISHING.lock().unwrap_or_else(PoisonError::into_inner);
         let helpers = HELPERS.lock().unwrap_or_else(PoisonError::into_inner);
         for group in helpers.iter() {
             let _ = killpg(*group, Signal::SIGKILL);
         }
-        drop(helpers);
         for path in all.iter().filter(|path| !path.as_os_str().is_empty()) {
             // The other thread may write one more file meanwhile.
             for _ in 0..ATTEMPTS {
@@ -313,6 +318,21 @@ impl WholeFolder {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_helper_starts_while_the_helpers_are_being_ended() {
+        let home = tempfile::tempdir().unwrap();
+        let began = home.path().join("began");
+        let ending = HELPERS.lock().unwrap();
+        let mut shell = Command::new("sh");
+        shell.arg("-c").arg(format!(": > {}", began.display()));
+        let starts = std::thread::spawn(move || Helpers::start(&mut shell).unwrap().0.wait());
+        std::thread::sleep(Duration::from_millis(300));
+        assert!(!began.exists(), "started, and in no list");
+        drop(ending);
+        assert!(starts.join().unwrap().unwrap().success());
+        assert!(began.exists());
+    }
 
     #[test]
     fn new_files_are_written_all_or_none_and_none_is_overwritten() {

@@ -2,9 +2,9 @@
 //!
 //! A bridge makes an [`observation`] of what it receives: a stamp of the machine's clock, a key, and the value. From
 //! there on this crate does the rest, in one place for all bridges. A [`mapping`] states what a key is in the world of
-//! axes, feeds and temperatures, and in which [`unit`]; [`values`] keeps three things apart that a shop floor mixes: a
-//! value that is *absent* gives no message, a value that *cannot be* is reported as a condition and is not handed on
-//! as a temperature ([`plausibility`], [`possible`]), and a value that is good.
+//! axes, feeds and temperatures, and in which [unit](mod@unit). [`values`] keeps three things apart that a shop floor
+//! mixes: a value that is *absent* gives no message, a value that *cannot be* is reported as a condition and is not
+//! handed on as a temperature ([`plausibility`], [`possible`]), and a value that is good.
 
 pub mod account;
 pub mod alarm;
