@@ -494,6 +494,7 @@ impl Budget {
             machine: self.machine.at(machine),
             device_expansion: self.device.at(device),
             environmental_drift_mm: self.environmental_drift_um * 1e-3,
+            environmental_unrest_mm: self.environmental_unrest_um.map(|um| um * 1e-3),
         }
     }
 

@@ -28,25 +28,50 @@
 //! | D | `mean_radial_deviation` | mm |
 //! | H | `hysteresis_1996`, of the edition of 1996; later ones print G(b) in its place | mm |
 //!
-//! Uncertainties, with u_s of one displacement reading, u_V of its drift, u_R of the radius as the device
-//! reads it, u_T and u_D of temperature and expansion of machine and device over R:
+//! Uncertainties, with u_V of the drift of one reading, u_T and u_D of temperature and expansion of machine and device over
+//! R, and u_R, u_M, u_G of a radius, of the mean radius and of a radius against another as the device reads them:
 //!
 //! ```text
-//!   G, G(b):  u² = 2 (u_s² + u_V²)                    difference of two readings      (6)
-//!   H:        u² = 2 u_V²                             of one place, in both senses    (7)
+//!   G, G(b):  u² = 2 (u_G² + u_V²)                    difference of two readings      (6)
+//!   H:        u² = 2 u_V² + 4 w² ln n/3               of one place, in both senses    (7)
 //!   F:        u² = u_R² + u_V² + u_T² + u_D²                                          (8)
 //!   D:        u² = u_M² + (u_V/2)² + u_T² + u_D²                                      (9)
-//!   plate:    u_s = U₀/k,   u_R = (U₀ + U₁ R)/k,   u_M = (U₀/2 + U₁ R)/k             (10)
-//!   ballbar:  u_M² = u_R² = u_s² + u_L²,   u_L of its calibrated length              (11)
+//!   plate:    k² u_R² = 0.867 U₀² + 0.468 · 2 U₀ U₁ R + (U₁ R)²
+//!             k² u_M² = 0.037 U₀² + 0.270 · 2 U₀ U₁ R + (U₁ R)²
+//!             k² u_G² = 0.830 U₀² + 0.198 · 2 U₀ U₁ R                                (10)
+//!   ballbar:  u_G = u_s,   u_M² = u_R² = u_s² + u_L²,   u_L of its calibrated length   (11)
 //! ```
 //!
-//! A plate reads the radius itself, so the constant U₀ of its certificate is in u_R once (10). A ballbar
-//! reads changes of a length that another device calibrated (11).
+//! (10): a plate reads the radius itself. Its certificate states U₀ + U₁ L for a length L from any zero, whose square has
+//! three parts, each with its own law along the axis:
+//!
+//! ```text
+//!   (U₀ + U₁ L)² = U₀²             the same for every length: local, waves of lengths λ over the plate
+//!                + 2 U₀ U₁ L       variance that grows as the length: steps that add up at random along the axis
+//!                + (U₁ L)²         error that grows as the length: the scale
+//! ```
+//!
+//! The centre of the fitted circle takes out of each what looks like a shift, and F does not see it; D sees what looks like a
+//! radius, and G neither of them. The scale is a radius. With κ = 2π R/λ, a wave of any direction and phase, by the law of
+//! propagation through the least-squares circle:
+//!
+//! ```text
+//!   shift:   ⟨J₀²(κ) + J₂²(κ)⟩ = 0.133,   radius: ⟨J₁²(κ)⟩ = 0.037     of U₀²                (12)
+//!   steps W, cov(W(x), W(x′)) = min(|x|, |x′|) on one side of the centre, else 0,
+//!   read along both axes, cos θ W_x(R cos θ) + sin θ W_y(R sin θ):
+//!            all 8/(3π) = 0.849,   shift 0.381,   radius 0.270           of 2 U₀ U₁ R           (13)
+//! ```
+//!
+//! ⟨ ⟩ is the mean over λ, of which nothing is known but 0 < λ ≤ 2R, so that each is as probable: what is longer is in the
+//! other two parts. `tests/validation/coverage_of_circles.py` integrates (12) and (13).
 //!
 //! (7): both senses are read at the same angle by the same device, whose error there is in both and leaves their difference.
-//! (9): D is the mean of a turn. An error of one axis of the plate that repeats with a length λ leaves of it
-//! √2 u_s J₁(2π R/λ) for both axes; λ ≤ 2R, since what is longer is in U₁, and there |J₁| ≤ 0.346: less than u_s/2. Drift
-//! leaves most where it has one wave a turn: half of each axis, √2 for both axes, 1/√2 for two turns: u_V/2.
+//! w is the unrest of a reading at rest from one moment to the next, where it is stated, else 0. H is the greatest of n
+//! differences, one for each reading of a sense, and each has √2 w of unrest, which lifts the greatest by no more than
+//! √2 w √(2 ln n), the expectation's bound for n normal values; by nothing where one difference stands out. Anything between
+//! is as probable, and it is not taken out of H (GUM F.2.4.5): 4 w² ln n/3 about H.
+//! (9): drift leaves most of a mean where it has one wave a turn: half of each axis, √2 for both axes, 1/√2 for two
+//! turns: u_V/2. (11): a ballbar reads changes of a length that another device calibrated; u_s = U₀/k of one reading.
 //!
 //! # Holds when
 //! Radii are those at 20 °C ([`CircularTest::corrected_to_20_degc`]): (8) and (9) have what is left then.
@@ -67,13 +92,18 @@ mod trace;
 
 use serde::{Deserialize, Serialize};
 
-use super::budget::{DeviceUncertainty, Expansion, combined, drift_mm};
+use super::budget::{DeviceUncertainty, Expansion, combined, drift_mm, rectangular};
 use super::extent::{check_not_negative, check_positive, greatest, least, range};
 use super::{ExpandedLength, Iso230Error};
 use metrology::fit::{CircleFit, fit_round};
 use nalgebra::Vector2;
 pub use trace::{CircularTrace, LONGEST_GAP_RAD};
 use trace::{Polar, polar};
+
+/// Shares of the variance of waves over a plate that a fitted circle takes for a shift and for a radius, (12).
+const SHARES_OF_WAVES: [f64; 2] = [0.133, 0.037];
+/// Shares of 2 U₀ U₁ R that steps along both axes make of a radial reading: all, a shift, a radius, (13).
+const SHARES_OF_STEPS: [f64; 3] = [0.849, 0.381, 0.270];
 
 /// One circular test.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -99,8 +129,11 @@ pub struct CircularBudget {
     pub machine: Expansion,
     /// Temperature and expansion of the device; coefficient 0 for one that does not expand.
     pub device_expansion: Expansion,
-    /// Range of the reading with the axes at rest, as long as a recording takes, mm.
+    /// Range of the reading with the axes at rest, as long as a test takes, mm.
     pub environmental_drift_mm: f64,
+    /// Standard deviation of a reading at rest from one moment to the next, mm; none: nothing for it in U of H.
+    #[serde(default)]
+    pub environmental_unrest_mm: Option<f64>,
 }
 
 /// One sense of rotation.
@@ -157,7 +190,6 @@ pub fn evaluate(
     budget: &CircularBudget,
 ) -> Result<CircularResult, Iso230Error> {
     check_positive("nominal_radius_mm", test.nominal_radius_mm)?;
-    let u = budget.standard(test.nominal_radius_mm)?;
     let points = |trace: &Option<CircularTrace>, place| {
         let points = trace
             .as_ref()
@@ -166,6 +198,9 @@ pub fn evaluate(
     };
     let clockwise = points(&test.clockwise, "clockwise")?;
     let counter_clockwise = points(&test.counter_clockwise, "counter_clockwise")?;
+    let n_points = |points: &Option<Vec<_>>| points.as_ref().map_or(0, Vec::len);
+    let n_readings = n_points(&clockwise).max(n_points(&counter_clockwise));
+    let u = budget.standard(test.nominal_radius_mm, n_readings)?;
     let circle = match (&clockwise, &counter_clockwise) {
         (None, None) => return Err(Iso230Error::NoTrace),
         (Some(cw), Some(ccw)) => common_circle(cw, ccw)?,
@@ -197,22 +232,70 @@ struct FigureUncertainties {
     mean_radial_mm: f64,
 }
 
+/// What a device makes of radii: standard uncertainties, mm.
+struct Read {
+    /// u_R.
+    radius_mm: f64,
+    /// u_M.
+    mean_mm: f64,
+    /// u_G.
+    difference_mm: f64,
+}
+
+impl Read {
+    /// (10) of a plate.
+    fn by_plate(plate: &DeviceUncertainty, radius_mm: f64) -> Self {
+        let local_mm = plate.standard_mm(0.0);
+        let scale_mm = plate.standard_mm(radius_mm) - local_mm;
+        let (local2, steps2) = (local_mm.powi(2), 2.0 * local_mm * scale_mm);
+        let root = |of_local: f64, of_steps: f64, of_scale: f64| {
+            (of_local * local2 + of_steps * steps2 + of_scale * scale_mm.powi(2)).sqrt()
+        };
+        let [local_shift, local_radius] = SHARES_OF_WAVES;
+        let [steps, steps_shift, steps_radius] = SHARES_OF_STEPS;
+        Self {
+            radius_mm: root(1.0 - local_shift, steps - steps_shift, 1.0),
+            mean_mm: root(local_radius, steps_radius, 1.0),
+            difference_mm: root(
+                1.0 - local_shift - local_radius,
+                steps - steps_shift - steps_radius,
+                0.0,
+            ),
+        }
+    }
+
+    /// (11) of a ballbar.
+    fn by_ballbar(reading_mm: f64, length_mm: f64) -> Self {
+        let radius_mm = reading_mm.hypot(length_mm);
+        Self {
+            radius_mm,
+            mean_mm: radius_mm,
+            difference_mm: reading_mm,
+        }
+    }
+}
+
 impl CircularBudget {
-    fn standard(&self, radius_mm: f64) -> Result<FigureUncertainties, Iso230Error> {
+    /// Of a test with at most `n_readings` in a sense.
+    fn standard(
+        &self,
+        radius_mm: f64,
+        n_readings: usize,
+    ) -> Result<FigureUncertainties, Iso230Error> {
         self.displacement.check()?;
         self.machine.check()?;
         self.device_expansion.check()?;
         check_not_negative("environmental_drift_mm", self.environmental_drift_mm)?;
-        let reading_mm = self.displacement.standard_mm(0.0);
         let drift_mm = drift_mm(self.environmental_drift_mm);
-        let [read_radius_mm, read_mean_mm] = match &self.length {
-            None => {
-                let all_mm = self.displacement.standard_mm(radius_mm);
-                [all_mm, all_mm - reading_mm / 2.0] // (10)
-            }
+        let unrest_mm = self.environmental_unrest_mm.unwrap_or(0.0);
+        check_not_negative("environmental_unrest_mm", unrest_mm)?;
+        let lift_mm = rectangular(2.0 * unrest_mm * (n_readings.max(1) as f64).ln().sqrt());
+        let read = match &self.length {
+            None => Read::by_plate(&self.displacement, radius_mm),
             Some(length) => {
                 length.check()?;
-                [reading_mm.hypot(length.standard_mm(radius_mm)); 2] // (11)
+                let reading_mm = self.displacement.standard_mm(0.0);
+                Read::by_ballbar(reading_mm, length.standard_mm(radius_mm))
             }
         };
         let expansion_mm = self
@@ -220,10 +303,10 @@ impl CircularBudget {
             .standard_mm(radius_mm)
             .hypot(self.device_expansion.standard_mm(radius_mm));
         Ok(FigureUncertainties {
-            difference_mm: (2.0_f64).sqrt() * reading_mm.hypot(drift_mm), // (6)
-            of_one_place_mm: (2.0_f64).sqrt() * drift_mm,                 // (7)
-            radial_mm: combined(&[read_radius_mm, drift_mm, expansion_mm]), // (8)
-            mean_radial_mm: combined(&[read_mean_mm, drift_mm / 2.0, expansion_mm]), // (9)
+            difference_mm: (2.0_f64).sqrt() * read.difference_mm.hypot(drift_mm), // (6)
+            of_one_place_mm: lift_mm.hypot((2.0_f64).sqrt() * drift_mm),          // (7)
+            radial_mm: combined(&[read.radius_mm, drift_mm, expansion_mm]),       // (8)
+            mean_radial_mm: combined(&[read.mean_mm, drift_mm / 2.0, expansion_mm]), // (9)
         })
     }
 }

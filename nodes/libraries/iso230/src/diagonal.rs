@@ -15,11 +15,14 @@
 //! needs deviations that are zero at the same corner's end of each.
 //!
 //! E_d and B_d have the uncertainty of the diagonal that has them. Of two means on different diagonals, l₁ and l₂ from
-//! their zeros, one device and one machine have read both: what grows with the length is common to them and counts for
-//! l₁ − l₂, the constant part of the certificate and the alignment, which is new on each diagonal, count twice:
+//! their zeros, one device and one machine have read both. The certificate states (U₀ + U₁ l)² = U₀² + 2 U₀ U₁ l + (U₁ l)² of
+//! each length. The last is the error that grows as the length, the scale's: common to both, it counts for l₁ − l₂. The two
+//! others and the alignment are new on each diagonal:
 //!
 //! ```text
-//!   spread:  u² = 2 U₀²/k² + [U₁ (l₁ − l₂)/k]² + u_T²(l₁ − l₂) + u_R²(l₁) + u_R²(l₂) + 2 (2/n) u_V²   (4)
+//!   spread:  u² = u_C² + u_T²(l₁ − l₂) + u_R²(l₁) + u_R²(l₂) + 2 (2/n) u_V²                           (4)
+//!            k² u_C² = 2 U₀² + 2 U₀ U₁ (l₁ + l₂) + [U₁ (l₁ − l₂)]²
+//!            k² u_C² = [U₀ + U₁ |l₁ − l₂|]² on one diagonal, where u_R is that of l₁ − l₂ and drift counts once
 //! ```
 //!
 //! with u_T of temperatures and coefficients of expansion, u_R of the alignment, u_V of the drift of one reading.
@@ -127,7 +130,7 @@ pub fn evaluate(
             });
         };
         let positioning = positioning::evaluate(&runs.runs, budget)?;
-        let means = means(&runs.runs, &positioning);
+        let means = means(runs, &positioning);
         Ok((
             means,
             DiagonalResult {
@@ -159,6 +162,7 @@ pub fn evaluate(
 /// A mean deviation on a diagonal.
 #[derive(Clone, Copy)]
 struct Mean {
+    diagonal: SpaceDiagonal,
     /// From the zero of the device, mm.
     length_mm: f64,
     mean_mm: f64,
@@ -168,9 +172,11 @@ struct Mean {
 }
 
 /// All means of one diagonal.
-fn means(runs: &PositioningRuns, found: &PositioningResult) -> Vec<Mean> {
+fn means(of: &DiagonalRuns, found: &PositioningResult) -> Vec<Mean> {
+    let runs = &of.runs;
     let sides = |p: &PointResult| {
         [p.up, p.down].map(|side| Mean {
+            diagonal: of.diagonal,
             length_mm: p.target_mm - runs.zero_mm,
             mean_mm: side.mean_mm,
             span_mm: runs.span_mm(),
@@ -188,20 +194,31 @@ fn spread(means: &[Mean], budget: &PositioningBudget) -> ExpandedLength {
         return ExpandedLength::new(0.0, 0.0);
     };
     let apart = budget.over((high.length_mm - low.length_mm).abs(), high.span_mm);
+    let drift_mm = (2.0 / high.n_runs as f64).sqrt() * apart.drift_mm;
+    let value_mm = high.mean_mm - low.mean_mm;
+    if high.diagonal == low.diagonal {
+        return ExpandedLength::new(value_mm, apart.length_part_mm().hypot(drift_mm));
+    }
     let constant_mm = budget.device.standard_mm(0.0);
+    let scale_mm = |length_mm: f64| budget.device.standard_mm(length_mm) - constant_mm;
+    // New on each diagonal: U₀² + 2 U₀ U₁ l.
+    let own = |m: &Mean| {
+        let steps2 = 2.0 * constant_mm * scale_mm(m.length_mm);
+        (constant_mm * constant_mm + steps2).sqrt()
+    };
     let aligned = |m: &Mean| budget.over(m.length_mm, m.span_mm).alignment_mm;
-    let drift = |m: &Mean| (2.0 / m.n_runs as f64).sqrt() * apart.drift_mm;
     let u_mm = combined(&[
-        2.0_f64.sqrt() * constant_mm,
-        apart.device_mm - constant_mm,
+        own(high),
+        own(low),
+        scale_mm(apart.length_mm),
         apart.machine_temperature_mm,
         apart.machine_expansion_mm,
         apart.device_temperature_mm,
         apart.device_expansion_mm,
         aligned(high),
         aligned(low),
-        drift(high),
-        drift(low),
+        drift_mm,
+        (2.0 / low.n_runs as f64).sqrt() * apart.drift_mm,
     ]);
-    ExpandedLength::new(high.mean_mm - low.mean_mm, u_mm)
+    ExpandedLength::new(value_mm, u_mm)
 }

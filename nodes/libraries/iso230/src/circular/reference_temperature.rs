@@ -96,6 +96,7 @@ mod tests {
                 ..steel
             },
             environmental_drift_mm: 0.0,
+            environmental_unrest_mm: None,
         };
         let radial = CircularTrace::Radial {
             angles_rad: (0..360).map(|k| f64::from(k).to_radians()).collect(),

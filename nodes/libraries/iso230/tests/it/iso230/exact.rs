@@ -18,6 +18,7 @@ const CERTAIN: CircularBudget = CircularBudget {
     machine: RIGID,
     device_expansion: RIGID,
     environmental_drift_mm: 0.0,
+    environmental_unrest_mm: None,
 };
 
 fn radial(deviation_mm: impl Fn(f64) -> f64) -> CircularTrace {
@@ -188,6 +189,7 @@ fn eq6_to_eq10_of_a_circular_budget_by_hand() {
             ..RIGID
         },
         environmental_drift_mm: 0.0008 * root3,
+        environmental_unrest_mm: Some(0.0001 * root3),
     };
     let ballbar = CircularBudget {
         length: Some(DeviceUncertainty {
@@ -196,28 +198,26 @@ fn eq6_to_eq10_of_a_circular_budget_by_hand() {
         }),
         ..plate
     };
-    // u_s = 0.6/2 = 0.3 µm. The plate reads R with (0.6 + 2 × 0.1)/2 = 0.4 µm, its constant once. The ballbar: 0.3 µm of
-    // the reading and 0.8/2 = 0.4 µm of its length, together 0.5 µm.
-    for (budget, read_um) in [(plate, 0.4_f64), (ballbar, 0.5)] {
+    // The plate over R: U₀² = 0.36, 2 U₀ U₁ R = 0.24, (U₁ R)² = 0.04 µm², each by its share and by k² = 4. The ballbar: 0.3 µm
+    // of the reading and 0.8/2 = 0.4 µm of its length, together 0.5 µm.
+    let by_plate = [
+        (0.867 * 0.36 + 0.468 * 0.24 + 0.04) / 4.0,
+        (0.037 * 0.36 + 0.270 * 0.24 + 0.04) / 4.0,
+        (0.830 * 0.36 + 0.198 * 0.24) / 4.0,
+    ];
+    for (budget, [radius2, mean2, apart2]) in [(plate, by_plate), (ballbar, [0.25, 0.25, 0.09])] {
         let test = circle(radial(|_| 0.0), radial(|_| 0.0));
         let result = circular::evaluate(&test, &budget).unwrap();
         let both = result.both.unwrap();
         let expanded = |figure: ExpandedLength| figure.expanded_uncertainty_mm;
-        let g2 = 2.0 * (0.09 + 0.16);
+        let g2 = 2.0 * (apart2 + 0.16);
         let near =
             |what: &str, found: f64, right2: f64| near(what, found, 2e-3 * right2.sqrt(), 1e-15);
         near("U(G)", expanded(both.circular_error), g2);
-        // The mean of a turn over a plate: half of its constant, (0.3 + 0.2)/2 = 0.25 µm. A drift of 0.4 µm leaves half.
-        let mean_um = if budget.length.is_none() {
-            0.25
-        } else {
-            read_um
-        };
-        let (f2, d2) = (
-            read_um.powi(2) + 0.16 + 1.0 + 0.36,
-            mean_um.powi(2) + 0.04 + 1.0 + 0.36,
-        );
-        let h2: f64 = 2.0 * 0.16;
+        // Of a mean, a drift of 0.4 µm leaves half.
+        let (f2, d2) = (radius2 + 0.16 + 1.0 + 0.36, mean2 + 0.04 + 1.0 + 0.36);
+        // 4 w² ln n/3 with w² = 0.03 µm².
+        let h2 = 2.0 * 0.16 + 0.04 * 720.0_f64.ln();
         near("U(H)", expanded(both.hysteresis_1996), h2);
         let f = result.clockwise.unwrap().greatest_radial_deviation;
         near("U(F)", expanded(f), f2);

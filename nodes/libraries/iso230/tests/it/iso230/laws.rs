@@ -154,6 +154,7 @@ fn both(cw: &[Vector2<f64>], ccw: &[Vector2<f64>]) -> BothSenses {
         machine: RIGID,
         device_expansion: RIGID,
         environmental_drift_mm: 0.0,
+        environmental_unrest_mm: None,
     };
     circular::evaluate(&test, &budget).unwrap().both.unwrap()
 }

@@ -127,6 +127,7 @@ const CERTAIN: CircularBudget = CircularBudget {
     machine: RIGID,
     device_expansion: RIGID,
     environmental_drift_mm: 0.0,
+    environmental_unrest_mm: None,
 };
 
 #[test]

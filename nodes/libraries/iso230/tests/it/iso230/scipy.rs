@@ -160,6 +160,7 @@ fn val_iso230_4_scipy() {
         machine: RIGID,
         device_expansion: RIGID,
         environmental_drift_mm: 0.0,
+        environmental_unrest_mm: None,
     };
     let result = circular::evaluate(&test, &budget).unwrap();
     compare_sense("clockwise", &result.clockwise.unwrap());

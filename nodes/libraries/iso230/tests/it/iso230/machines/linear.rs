@@ -60,6 +60,23 @@ impl Laser {
         }
     }
 
+    /// Error of each target without the scale's, from the first one on. With the scale's, the error between any two targets L
+    /// apart has u = (U₀ + U₁ L)/k, as the certificate states: k² u² = U₀², half of it of each target, 2 U₀ U₁ L of steps that add
+    /// up along the line, and (U₁ L)² of the scale.
+    fn constant_mm(&self, rng: &mut Pcg64Mcg, targets_mm: &[f64]) -> Vec<f64> {
+        let standard_mm = self.certificate.standard_mm(0.0);
+        let scale = self.certificate.standard_mm(1.0) - standard_mm;
+        let (mut steps_mm, mut before_mm) = (0.0, targets_mm[0]);
+        let mut at = |target_mm: &f64| {
+            let variance = 2.0 * standard_mm * scale * (target_mm - before_mm);
+            steps_mm += variance.sqrt() * normal(rng);
+            before_mm = *target_mm;
+            steps_mm + standard_mm / 2.0_f64.sqrt() * normal(rng)
+        };
+        let all_mm: Vec<f64> = targets_mm.iter().map(&mut at).collect();
+        all_mm.iter().map(|error_mm| error_mm - all_mm[0]).collect()
+    }
+
     /// Runs as read, at 20 °C as the product corrects them, and as they truly were there; `truly_mm` has the place of a
     /// target from the first one and the side.
     pub fn runs(
@@ -71,11 +88,7 @@ impl Laser {
         let certificate = &self.certificate;
         let zero_mm = targets_mm[0];
         let span_mm = targets_mm[targets_mm.len() - 1] - zero_mm;
-        // The certificate's constant part: each length from zero has its own error.
-        let constant_mm: Vec<f64> = targets_mm
-            .iter()
-            .map(|_| certificate.expanded_uncertainty_mm / 2.0 * normal(rng))
-            .collect();
+        let constant_mm = self.constant_mm(rng, targets_mm);
         let lateral_mm = self.misalignment_mm * between(rng, 0.0, 1.0);
         let per_length = certificate.expanded_uncertainty_per_length / 2.0 * self.scale
             + self.machine.growth
@@ -90,11 +103,10 @@ impl Laser {
                     let time = ((2 * run + leg) * m + step) as f64 / (2 * RUNS * m) as f64;
                     let from_zero_mm = targets_mm[i] - zero_mm;
                     let moved_mm = truly_mm(from_zero_mm, side) + self.scatter_mm * normal(rng);
-                    let constant_mm = if i == 0 { 0.0 } else { constant_mm[i] };
                     rows[0][i] = moved_mm;
                     rows[1][i] = moved_mm
                         + per_length * from_zero_mm
-                        + constant_mm
+                        + constant_mm[i]
                         + self.drift.at(time, rng);
                 }
                 let [of_truth, of_read] = rows;
