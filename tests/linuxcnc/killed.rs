@@ -21,24 +21,24 @@ use serde_json::Value;
 use crate::{ONE_AT_A_TIME, installed, root};
 
 /// What is asked for on X, mm.
-const OFFSET_MM: f64 = 0.030;
+pub const OFFSET_MM: f64 = 0.030;
 /// HAL's rate, mm/s, and its servo period, s.
-const RATE_MM_S: f64 = 0.02;
+pub const RATE_MM_S: f64 = 0.02;
 const PERIOD_S: f64 = 0.001;
 /// The heartbeat is missed after 2 s.
 const MISSED: Duration = Duration::from_secs(2);
 /// How long before the kill the last heartbeat may have been.
 const SLACK: Duration = Duration::from_millis(500);
 /// An offset of nothing. Homing under a moving offset shifts the zero by the drive's lag, 0.02 mm/s over 60 per second: 0.33 um.
-const NONE_MM: f64 = 0.1e-3;
+pub const NONE_MM: f64 = 0.1e-3;
 /// LinuxCNC, a bridge and its positions.
-const START: Duration = Duration::from_secs(90);
+pub const START: Duration = Duration::from_secs(90);
 /// X goes there and back for half a minute and more.
 const PROGRAM: &str = "G21 G90\nG1 X0 Y0 Z10 F3000\nG1 X100 F300\nG1 X0 F300\nM2\n";
 const SHORT: &str = "G21 G90\nG1 X5 F600\nM2\n";
 
 /// LinuxCNC as others start it; its owner ends it.
-fn controller() -> Controller {
+pub fn controller() -> Controller {
     let folder = root().join("launch_configs/linuxcnc_latency");
     let text = std::fs::read_to_string(folder.join("linuxcnc_bridge.yaml")).unwrap();
     let file: Value = serde_saphyr::from_str(&text).unwrap();
@@ -58,19 +58,20 @@ fn controller() -> Controller {
     }
 }
 
-struct Desk {
+pub struct Desk {
     scenario: Scenario,
-    domain: u16,
-    graph: Graph,
-    voice: Voice,
+    pub domain: u16,
+    pub graph: Graph,
+    pub voice: Voice,
 }
 
 impl Desk {
-    fn new() -> Self {
+    /// In the domain of the test of this number.
+    pub fn new(test: u16) -> Self {
         let scenario = Scenario::copy_of("linuxcnc_latency");
         let start = "    start_ini: controller/latency.ini\n";
         scenario.replace("linuxcnc_bridge.yaml", start, "");
-        let domain = domain(18);
+        let domain = domain(test);
         let graph = Graph::join(domain);
         let voice = graph.voice(&[port(&topics::COMPENSATION)]);
         Self {
@@ -81,13 +82,13 @@ impl Desk {
         }
     }
 
-    fn node(&self, name: &str) -> Process {
+    pub fn node(&self, name: &str) -> Process {
         let file = self.scenario.argument(&format!("{name}.yaml"));
         Process::node(self.domain, name, &["--params-file", &file])
     }
 
     /// A sequencer that has one program run.
-    fn running(&self, program: &str) -> Process {
+    pub fn running(&self, program: &str) -> Process {
         let plan = "title: one program\nsteps:\n  - {do: run, program: part.ngc}\n";
         self.scenario.write("plan.yaml", plan);
         self.scenario.write("part.ngc", program);
@@ -106,7 +107,7 @@ impl Desk {
     }
 
     /// How a plan ended.
-    fn ended(&self, since: Instant) -> PlanStatus {
+    pub fn ended(&self, since: Instant) -> PlanStatus {
         self.graph.wait_longer(START, "the end of a plan", |graph| {
             let all = graph.since(&topics::PLAN_STATUS, since);
             let is_over = |status: &PlanStatus| status.state >= PlanStatus::STATE_DONE;
@@ -115,16 +116,16 @@ impl Desk {
     }
 }
 
-fn offset_mm(state: &AxisState) -> f64 {
+pub fn offset_mm(state: &AxisState) -> f64 {
     (state.motor[0] - state.commanded[0]) * 1e3
 }
 
 /// Motor minus command in motion lags behind it: what is asked for shows at rest.
-fn stands(state: &AxisState) -> bool {
+pub fn stands(state: &AxisState) -> bool {
     state.velocity[0].abs() < 1e-6
 }
 
-fn pin(controller: &Controller, name: &str) -> f64 {
+pub fn pin(controller: &Controller, name: &str) -> f64 {
     let told = controller.command("halcmd", &["getp", name]).unwrap();
     let number = told.trim().parse();
     number.unwrap_or_else(|_| panic!("{name}: {told:?}"))
@@ -186,7 +187,7 @@ fn a_bridge_killed_in_mid_program_leaves_an_offset_that_hal_fades_and_the_next_o
         .lock()
         .unwrap_or_else(std::sync::PoisonError::into_inner);
     let controller = controller();
-    let mut desk = Desk::new();
+    let mut desk = Desk::new(18);
     let began = Instant::now();
     let bridge = desk.node("linuxcnc_bridge");
     let settled = |state: &AxisState| stands(state) && offset_mm(state) > OFFSET_MM - NONE_MM;

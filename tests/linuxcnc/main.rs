@@ -25,6 +25,7 @@ use recorder::{Bag, Event, Order};
 use serde_json::Value;
 
 mod killed;
+mod strangers;
 
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 

@@ -7,6 +7,7 @@
 )]
 #![expect(clippy::print_stderr, reason = "what is not tested is said")]
 
+pub mod asker;
 pub mod chromium;
 pub mod computer_clock;
 pub mod cyclone;

@@ -6,15 +6,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use abbe_msgs::Service;
 use abbe_msgs::rcl_interfaces::srv::{DescribeParameters, GetParameters, SetParameters};
+use abbe_tests::asker::service;
 use abbe_tests::graph::Graph;
 use abbe_tests::namespace;
 use abbe_tests::program::{Process, domain};
 use metrology::stamp::{Host, Span, Stamp};
 use nix::sys::signal::Signal;
 use node_runtime::arguments::Arguments;
-use node_runtime::node::{Ports, ServiceEvents, ServicePort};
+use node_runtime::node::Ports;
 use node_runtime::parameter::Parameter;
 use node_runtime::{Emission, Event, Node, NodeFault, Setup, launch};
 use rand::{Rng as _, SeedableRng as _};
@@ -43,9 +43,10 @@ struct Stranger {
 impl Stranger {
     fn of(name: &str, node: &Ports) -> Self {
         let mut clients = node.services.clone();
-        clients.push(service::<GetParameters>(name, "get_parameters"));
-        clients.push(service::<DescribeParameters>(name, "describe_parameters"));
-        clients.push(service::<SetParameters>(name, "set_parameters"));
+        let own = |service: &str| format!("/{name}/{service}");
+        clients.push(service::<GetParameters>(&own("get_parameters")));
+        clients.push(service::<DescribeParameters>(&own("describe_parameters")));
+        clients.push(service::<SetParameters>(&own("set_parameters")));
         Self {
             ports: Ports {
                 publications: node.subscriptions.clone(),
@@ -74,14 +75,6 @@ impl Stranger {
 
     fn hears(&self, name: &str) {
         self.answered.lock().unwrap().insert(name.to_owned());
-    }
-}
-
-fn service<V: Service>(node: &str, name: &str) -> ServicePort {
-    ServicePort {
-        service: format!("/{node}/{name}"),
-        type_name: V::TYPE_NAME,
-        events: ServiceEvents::of::<V>(),
     }
 }
 

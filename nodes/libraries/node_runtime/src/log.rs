@@ -146,7 +146,9 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
     // The OPC UA client calls it an error that a connection without security has no certificate; what ends a connection is a
     // condition of the bridge.
     let opcua = "opcua_client=off,opcua_core=off,opcua_crypto=off";
-    let quiet = format!("rustdds=error,{silent},ros2_client=error,zenoh=error,{opcua}");
+    // Reading CDR it warns of every text that lacks its end, of every message: what becomes of such a message the node says.
+    let quiet =
+        format!("rustdds=error,{silent},ros2_client=error,cdr_encoding=error,zenoh=error,{opcua}");
     // Where DDS is secured it complains of every message of whoever is not.
     let secured = environment.security.as_ref();
     let strangers = secured.map_or("", |_| ",rustdds::rtps::message_receiver=off");
