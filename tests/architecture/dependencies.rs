@@ -34,13 +34,14 @@ const VOCABULARY: [&str; 6] = [
 ];
 
 /// Libraries that are not for every node, with the only crates that may depend on each.
-const USERS: [(&str, &[&str]); 4] = [
-    ("iso230", &["abbe"]),
+const USERS: [(&str, &[&str]); 5] = [
+    ("iso230", &["reports", "abbe"]),
     (
         "machine_report",
         &["mtconnect_bridge", "opcua_bridge", "opcua_bridge_node"],
     ),
-    ("twin", &["gap_diagnosis", "abbe", "abbe_trials"]),
+    ("twin", &["gap_diagnosis", "reports", "abbe", "abbe_trials"]),
+    ("reports", &["abbe", "abbe_trials"]),
     ("control_tables", &["abbe"]),
 ];
 

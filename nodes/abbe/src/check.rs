@@ -15,14 +15,14 @@ use node_runtime::arguments::Arguments;
 use node_runtime::{Node, Setup};
 use recorder::{Bag, RecordedRun, RunNode, verify_attachments};
 use replayer::{Difference, Discrepancy, Doubtful, NotInBag, Outcome, Relay, ReplayError};
+use reports::loss;
+use reports::whole_file::Vanishing;
 use serde_json::json;
 
 use crate::diagnose::bags;
-use crate::loss;
 use crate::node;
 use crate::tell::tell;
 use crate::usage;
-use crate::whole_file::Vanishing;
 
 /// Nodes whose messages are what a replay puts in.
 const SOURCE_NODES: [&str; 5] = [

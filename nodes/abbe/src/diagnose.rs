@@ -2,6 +2,15 @@
 
 use node_runtime::complain;
 use node_runtime::text_file;
+use reports::evaluate::budget::Budget;
+use reports::evaluate::test_conditions::TestConditions;
+use reports::gap::diagnosed::Diagnosed;
+use reports::loss;
+use reports::machine_defaults;
+use reports::screen::Made;
+use reports::terminal::Room;
+use reports::whole_file;
+use reports::{Report, gap, test_conditions};
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -9,25 +18,17 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use gap_diagnosis::{Diagnosis, GapConfig, Rule, diagnose};
+use gap_diagnosis::{GapConfig, Rule, diagnose};
 use machine::MachineFile;
 use recorder::Bag;
-use replayer::Reading;
 use sha2::{Digest, Sha256};
 use twin::effects::CATALOGUE;
 
-use crate::evaluate::budget::Budget;
-use crate::evaluate::test_conditions::TestConditions;
+use crate::SOFTWARE;
 use crate::history::keep::Keep;
 use crate::history::origin::Origin;
-use crate::loss;
-use crate::machine_defaults;
 use crate::pdf;
-use crate::report::screen::Made;
-use crate::report::terminal::Room;
-use crate::report::{Report, gap, test_conditions};
 use crate::tell::tell;
-use crate::whole_file;
 
 pub mod bags;
 mod machine_text;
@@ -36,7 +37,7 @@ pub mod simulated;
 
 use bags::Recorded;
 use second_round::Round;
-use simulated::{Beside, Simulated};
+use simulated::Beside;
 
 /// Arguments of `abbe diagnose`.
 #[derive(Args)]
@@ -100,45 +101,6 @@ pub struct Diagnose {
     keep: Keep,
 }
 
-/// A diagnosis of bags, with what could not be used of them.
-pub struct Diagnosed {
-    /// What was found.
-    pub diagnosis: Diagnosis,
-    /// What was left out, in words.
-    pub remarks: Vec<String>,
-    /// What of each bag was read, lost and left out.
-    pub readings: Vec<Reading>,
-    /// Defaults of the machine file that the diagnosis uses, as `axes.X.lead_mm = 10.0`.
-    pub defaults: Vec<String>,
-    /// The simulator that the machine was compared with, where it is not the machine file's own.
-    pub simulated: Option<Simulated>,
-}
-
-impl Diagnosed {
-    /// What was lost or left out, in words.
-    pub fn losses(&self) -> Vec<String> {
-        bags::lines(&self.readings)
-    }
-
-    /// The report as JSON. What was lost or left out is a key of its own, where there is any, and so are defaults in use.
-    ///
-    /// # Errors
-    /// When a number has no place in JSON.
-    pub fn json(&self) -> Result<serde_json::Value> {
-        let mut report = serde_json::to_value(&self.diagnosis.report)?;
-        if self.readings.iter().any(|reading| !reading.is_whole()) {
-            report["loss"] = self.readings.iter().map(loss::as_json).collect();
-        }
-        if !self.defaults.is_empty() {
-            report["machine_defaults"] = self.defaults.as_slice().into();
-        }
-        if let Some(simulated) = &self.simulated {
-            report["simulated"] = serde_json::to_value(simulated)?;
-        }
-        Ok(report)
-    }
-}
-
 impl Diagnose {
     /// Diagnoses; exit code 3 when a part of a bag was lost or left out.
     ///
@@ -172,6 +134,7 @@ impl Diagnose {
         let machine = MachineFile::parse(&text, &name)?.name;
         let first = Bag::open(&self.bags[0])?;
         page.screen.made = Some(Made::of(
+            SOFTWARE,
             &first,
             &listed(&self.bags),
             Some(&machine),
@@ -327,7 +290,7 @@ fn beside(
     let beside = simulated::beside(simulated, &machine, &recorded)?;
     let session = beside.as_ref().map_or(&recorded.session, |it| &it.session);
     let mut diagnosis = diagnose(&machine, session, config)
-        .map_err(|error| bags::not_whole(error.into(), &bags::lines(&recorded.readings)))?;
+        .map_err(|error| bags::not_whole(error.into(), &loss::lines(&recorded.readings)))?;
     diagnosis.report.inputs.bags = recorded.bags;
     diagnosis.report.inputs.machine_sha256 = format!("{:x}", Sha256::digest(machine_text));
     diagnosis.report.runtime_s = began.elapsed().as_secs_f64();

@@ -1,6 +1,9 @@
 //! `abbe export BAG --format CONTROL`: what a bag knew last of a machine's errors, as tables for a control.
 
 use node_runtime::complain;
+use reports::evaluate::Tests;
+use reports::loss;
+use reports::whole_file;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -12,11 +15,8 @@ use control_tables::{ExportFile, Unestimable};
 use metrology::{Axis, AxisSet, PerAxis};
 use recorder::Bag;
 
-use crate::evaluate::Tests;
-use crate::loss;
 use crate::tell::tell;
 use crate::usage::{USAGE, above_zero, refused};
-use crate::whole_file;
 
 mod counting;
 mod effect;

@@ -5,8 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, anyhow};
 use clap::{Args, Subcommand};
-
-use crate::whole_file;
+use reports::whole_file;
 
 mod add;
 mod dates;

@@ -15,6 +15,8 @@ use metrology::yaml;
 use node_runtime::complain;
 use node_runtime::text_file;
 use recorder::RecorderError;
+use reports::loss;
+use reports::whole_file::WholeFolder;
 
 mod angles;
 mod book;
@@ -41,9 +43,7 @@ use runs::Runs;
 use table::Table;
 use writer::Writer;
 
-use crate::loss;
 use crate::tell::tell;
-use crate::whole_file::WholeFolder;
 
 /// Arguments of `abbe import`.
 #[derive(Args)]

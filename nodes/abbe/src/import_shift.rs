@@ -15,13 +15,13 @@ use mtconnect_bridge::mapping::{MapFile, Mapping};
 use mtconnect_bridge::observation::read_stamp;
 use mtconnect_bridge::shift::{self, Shift, ShiftOrder};
 use node_runtime::text_file;
+use reports::loss;
+use reports::whole_file;
 use serde::Deserialize;
 
 use node_runtime::complain;
 
-use crate::loss;
 use crate::tell::tell;
-use crate::whole_file;
 
 /// Lines of all programs: a day in seconds.
 const LINES: Bound = Bound::at_most(100_000).with_remedy("; take longer bin_s or a shorter range");

@@ -71,7 +71,7 @@ impl Keystore {
     pub fn execute(self) -> Result<ExitCode> {
         use authority::{Authority, Validity};
 
-        use crate::whole_file::WholeFolder;
+        use reports::whole_file::WholeFolder;
 
         let wanted = enclaves::of(&self.scenario, &self.play)?;
         let validity = Validity::from_now(chrono::Utc::now(), self.days)?;

@@ -12,13 +12,12 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use node_runtime::complain;
 use node_runtime::complaint;
+use reports::screen::Software;
 
 mod alarm;
 mod check;
 mod completions;
 pub mod diagnose;
-mod evaluate;
-mod evidence;
 mod export;
 mod history;
 mod import;
@@ -27,9 +26,6 @@ mod import_shift;
 mod install_ros;
 mod keystore;
 mod launch;
-mod loss;
-mod machine_defaults;
-mod machine_of_bag;
 mod man;
 mod new_machine;
 mod node;
@@ -38,7 +34,6 @@ mod play;
 mod preflight;
 mod progress;
 mod record;
-pub mod report;
 mod report_bag;
 mod run;
 mod scenario;
@@ -47,12 +42,16 @@ pub mod tell;
 mod truth;
 mod usage;
 mod validate;
-mod whole_file;
 #[cfg(test)]
 mod wrong_files;
 
 /// Commit that this program was built from; `unknown` outside a clone.
 pub const COMMIT: &str = env!("ABBE_COMMIT");
+/// This program, for its reports.
+const SOFTWARE: Software = Software {
+    version: env!("CARGO_PKG_VERSION"),
+    commit: COMMIT,
+};
 
 /// Measures a CNC machine, models its errors, compensates its axes and records every run.
 #[derive(Parser)]

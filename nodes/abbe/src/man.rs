@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::{Args, CommandFactory};
+use reports::whole_file;
 
 use crate::tell::tell;
-use crate::whole_file;
 
 /// Arguments of `abbe man`.
 #[derive(Args)]

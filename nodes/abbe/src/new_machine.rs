@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Args;
+use reports::whole_file;
 
 use crate::tell::tell;
-use crate::whole_file;
 
 /// The template; a line `# key: value` that is commented out states the value that the key has without it.
 const TEMPLATE: &str = include_str!("new_machine/machine.yaml");
@@ -52,9 +52,9 @@ mod tests {
         let stated = MachineFile::parse(&text, "machine.yaml").unwrap();
         assert_eq!(stated, as_written);
         // Every number that has a default is stated, for every axis.
-        let left_out = crate::machine_defaults::of(&stated, &text);
+        let left_out = reports::machine_defaults::of(&stated, &text);
         assert_eq!(left_out, Vec::<String>::new());
-        assert!(crate::machine_defaults::of(&as_written, TEMPLATE).len() > 20);
+        assert!(reports::machine_defaults::of(&as_written, TEMPLATE).len() > 20);
     }
 
     #[test]

@@ -11,10 +11,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use nix::unistd::geteuid;
+use reports::evaluate::budget::NOT_STATED;
+use reports::whole_file::{self, Helpers, Vanishing};
 use serde_json::Value;
-
-use crate::evaluate::budget::NOT_STATED;
-use crate::whole_file::{self, Helpers, Vanishing};
 
 /// Names of the program, the first that is there is taken.
 const BROWSERS: [&str; 4] = [

@@ -15,8 +15,8 @@ use node_runtime::{Interruption, Setup};
 use recorder::Bag;
 use replayer::PlaybackConfig;
 use replayer_node::{Desk, Played};
+use reports::loss;
 
-use crate::loss;
 use crate::tell::tell;
 use crate::usage::{refused, topics};
 

@@ -13,6 +13,11 @@ use gap_diagnosis::preflight::preflight;
 use metrology::bound::{Bound, BoundError};
 use metrology::number::number;
 use nalgebra::Vector3;
+use reports::gap::planned;
+use reports::section::Section;
+use reports::terminal::{self, Part, Room};
+use reports::whole_file;
+use reports::{self, Report};
 
 pub mod design;
 mod dry_run;
@@ -29,13 +34,8 @@ use outcome::Seen;
 use programme::{Planned, Programme};
 use wanted::Proposal;
 
-use crate::report::gap::planned;
-use crate::report::section::Section;
-use crate::report::terminal::{self, Part, Room};
-use crate::report::{self, Report};
 use crate::tell::tell;
 use crate::usage::{GREATEST_NUMBER, refused};
-use crate::whole_file;
 
 /// Components that are wanted, and offsets tried for each: every pair is a fit.
 const ASKED: Bound = Bound::at_most(100);
@@ -167,7 +167,7 @@ impl Preflight {
                 (page.body)
                 @for section in &sections { (section.html()) }
             };
-            let html = report::html(&title, &body);
+            let html = reports::html(&title, &body);
             whole_file::write(path, &html)?;
         }
         self.tell(&plan, &geometry, page)

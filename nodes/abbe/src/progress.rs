@@ -1,6 +1,7 @@
 //! The live display of a run: a bar on a terminal, a line per step elsewhere.
 
 use node_runtime::complain;
+use reports::evidence::Evidence;
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -10,8 +11,6 @@ use metrology::Axis;
 use metrology::sample::PlanStatus;
 use metrology::stamp::{Host, Span, Stamp};
 use metrology::visible::visible;
-
-use crate::evidence::Evidence;
 
 /// Time between two looks of a person.
 const PERIOD: Duration = Duration::from_millis(120);

@@ -15,9 +15,9 @@ use node_runtime::text_file;
 use node_runtime::{Interruption, Setup};
 use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RecorderError, RingConfig};
 use recorder_node::Capture;
+use reports::loss;
 
 use crate::alarm::Alarm;
-use crate::loss;
 use crate::tell::tell;
 use crate::usage::{refused, topics};
 

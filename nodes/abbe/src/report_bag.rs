@@ -2,6 +2,16 @@
 
 use node_runtime::complain;
 use node_runtime::text_file;
+use reports::evaluate::budget::{Budget, unstate};
+use reports::evaluate::limits::Limits;
+use reports::evaluate::{BrokenOff, Tests};
+use reports::loss;
+use reports::machine_defaults;
+use reports::page::fold;
+use reports::screen::{Made, Screen};
+use reports::section::Section;
+use reports::terminal::{self, Part, Rank, Room};
+use reports::{self, Report};
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -11,19 +21,10 @@ use clap::Args;
 use maud::html;
 use recorder::Bag;
 
-use crate::evaluate::budget::Budget;
-use crate::evaluate::limits::Limits;
-use crate::evaluate::{BrokenOff, Tests};
+use crate::SOFTWARE;
 use crate::history::keep::Keep;
 use crate::history::origin::Origin;
-use crate::loss;
-use crate::machine_defaults;
 use crate::pdf;
-use crate::report::page::fold;
-use crate::report::screen::{Made, Screen};
-use crate::report::section::Section;
-use crate::report::terminal::{self, Part, Rank, Room};
-use crate::report::{self, Report};
 use crate::tell::tell;
 
 mod first_screen;
@@ -100,6 +101,7 @@ impl ReportBag {
         }
         let machine = tests.machine.as_ref().map(|machine| machine.name.as_str());
         let mut made = Made::of(
+            SOFTWARE,
             &bag,
             &self.bag.display().to_string(),
             machine,
@@ -182,7 +184,7 @@ fn judged_page(
     budget: Option<&Budget>,
     limits: Option<&Limits>,
 ) -> Result<Report> {
-    let conditions = report::test_conditions::of(&tests.conditions, budget, Some(tests));
+    let conditions = reports::test_conditions::of(&tests.conditions, budget, Some(tests));
     let defaults = machine_defaults::of_tests(tests);
     let defaults_line = machine_defaults::in_words(&defaults);
     let mut sections = sections(tests, budget)?;
@@ -259,50 +261,36 @@ fn uncertainty(stated: bool) -> serde_json::Value {
     }
 }
 
-/// Figures that had no budget to be computed from have no expanded uncertainty, not one of zero.
-pub fn unstate(figures: &mut serde_json::Value) {
-    match figures {
-        serde_json::Value::Object(entries) => {
-            for (key, value) in entries {
-                if key.starts_with("expanded_uncertainty") {
-                    *value = serde_json::Value::Null;
-                } else {
-                    unstate(value);
-                }
-            }
-        }
-        serde_json::Value::Array(values) => values.iter_mut().for_each(unstate),
-        _ => {}
-    }
-}
-
 fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> {
-    let mut sections = report::positioning::sections(tests, budget)?;
-    sections.extend(report::periodic::section(tests, budget));
-    sections.extend(report::angular::sections(tests, budget)?);
-    sections.extend(report::stops::section(&tests.stops));
-    sections.extend(report::geometry::tables(&tests.tables));
-    sections.extend(report::circular::sections(
+    let mut sections = reports::positioning::sections(tests, budget)?;
+    sections.extend(reports::periodic::section(tests, budget));
+    sections.extend(reports::angular::sections(tests, budget)?);
+    sections.extend(reports::stops::section(&tests.stops));
+    sections.extend(reports::geometry::tables(&tests.tables));
+    sections.extend(reports::circular::sections(
         &tests.circles,
         budget,
         &tests.conditions,
     )?);
-    sections.extend(report::paths::section(&tests.paths)?);
+    sections.extend(reports::paths::section(&tests.paths)?);
     for circle in &tests.station_circles {
-        sections.extend(report::published::sections(circle, tests.geometry.as_ref()));
+        sections.extend(reports::published::sections(
+            circle,
+            tests.geometry.as_ref(),
+        ));
     }
     for (name, model) in [
         ("Geometric errors of the linear axes", &tests.geometry),
         ("Geometric errors of the rotary axes", &tests.rotary),
     ] {
         sections.extend(model.as_ref().map(|model| {
-            let mut section = report::geometry::section(name, model);
-            report::lines::state(&mut section, tests, model);
+            let mut section = reports::geometry::section(name, model);
+            reports::lines::state(&mut section, tests, model);
             section
         }));
     }
-    sections.extend(report::probing::sections(tests, budget));
-    sections.extend(report::drift::sections(
+    sections.extend(reports::probing::sections(tests, budget));
+    sections.extend(reports::drift::sections(
         &tests.blocks,
         &tests.drift,
         budget,

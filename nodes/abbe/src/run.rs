@@ -9,22 +9,24 @@ use clap::Args;
 use node_runtime::Interruption;
 use node_runtime::complain;
 use recorder::Bag;
+use reports::Report;
+use reports::ReportKind;
+use reports::evaluate::Tests;
+use reports::evaluate::test_conditions::TestConditions;
+use reports::evidence::Evidence;
+use reports::loss;
+use reports::page::fold;
+use reports::screen::Made;
+use reports::section::Section;
+use reports::terminal::{MOST_LINES, Room};
+use reports::test_conditions;
 
+use crate::SOFTWARE;
 use crate::diagnose;
-use crate::evaluate::Tests;
-use crate::evaluate::test_conditions::TestConditions;
-use crate::evidence::Evidence;
 use crate::history::keep::Keep;
 use crate::history::origin::Origin;
-use crate::loss;
-use crate::report::Report;
-use crate::report::page::fold;
-use crate::report::screen::Made;
-use crate::report::section::Section;
-use crate::report::terminal::{MOST_LINES, Room};
-use crate::report::test_conditions;
 use crate::report_bag;
-use crate::scenario::{ReportKind, Scenario, places};
+use crate::scenario::{Scenario, places};
 use crate::tell::tell;
 use crate::usage::refused;
 
@@ -373,7 +375,13 @@ fn state_origin(
     if outcome.recorded > 0 {
         let opened = Bag::open(bag)?;
         // The bag of a run has the machine file of its scenario.
-        report.made(Made::of(&opened, &bag.display().to_string(), None, between));
+        report.made(Made::of(
+            SOFTWARE,
+            &opened,
+            &bag.display().to_string(),
+            None,
+            between,
+        ));
     }
     report.state_shortcomings(outcome.failure.as_deref(), outcome.shortcomings());
     Ok(())

@@ -7,10 +7,11 @@ use metrology::number::number;
 use metrology::{Axis, Host, epoch, yaml};
 use node_runtime::text_file;
 use recorder::ChunkCompression;
+use reports::ReportKind;
+use reports::evaluate::budget::Budget;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::evaluate::budget::Budget;
 use crate::launch::{self, LaunchNode};
 use crate::usage::topics;
 
@@ -106,24 +107,6 @@ pub struct LinuxcncTable {
     pub axis: Axis,
     /// The file that its INI file names, of type 0, below the scenario's folder.
     pub loads: PathBuf,
-}
-
-/// Which page a run ends with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ReportKind {
-    /// Latency, drift at the blocks, tool error against the truth.
-    Thermal,
-    /// Latency and corrected points per feed.
-    Latency,
-    /// Block cycles.
-    Blocks,
-    /// Location errors of the rotary axes, tool error before and after their compensation.
-    Rotary,
-    /// The diagnosis of simulator against machine alone (with `diagnose`).
-    Gap,
-    /// Every test that the bag holds, and the tool error where it was verified.
-    Tests,
 }
 
 /// A scenario, read.

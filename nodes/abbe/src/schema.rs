@@ -7,12 +7,12 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use machine::MachineFile;
+use reports::evaluate::budget::Budget;
+use reports::evaluate::limits::Limits;
 use schemars::schema_for;
 use sequencer::plan::Plan;
 use serde_json::{Value, json};
 
-use crate::evaluate::budget::Budget;
-use crate::evaluate::limits::Limits;
 use crate::import::map::Map;
 use crate::scenario::ScenarioFile;
 use crate::tell::tell;

@@ -6,8 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use fake_cnc_node::Witness;
 use metrology::PerAxis;
 use metrology::stamp::{Host, Span, Stamp};
-
-use crate::evidence::PoseError;
+use reports::evidence::PoseError;
 
 /// Rest after which the machine has settled at a pose of the verification.
 const REST: Span = Span::from_nanos(400_000_000);

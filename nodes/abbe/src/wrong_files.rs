@@ -10,10 +10,10 @@ use metrology::yaml::{self, Place, Places};
 use mtconnect_bridge::mapping::MapFile;
 use node_runtime::Setup;
 use node_runtime::arguments::Arguments;
+use reports::evaluate::budget::Budget;
+use reports::evaluate::limits::Limits;
 use sequencer::Plan;
 
-use crate::evaluate::budget::Budget;
-use crate::evaluate::limits::Limits;
 use crate::import::map::Map;
 use crate::node;
 use crate::scenario::Scenario;

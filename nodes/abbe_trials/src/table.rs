@@ -5,15 +5,14 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use maud::html;
+use reports::Report;
+use reports::screen::Screen;
+use reports::section::{Rows, Section};
 use serde::Serialize;
 use trials::comparison::{MethodLine, ablations};
 use trials::tally::{Figure, unknown_auroc};
 use trials::target::{Target, targets};
 use trials::{Arm, Tally, Verdict};
-
-use abbe::report::Report;
-use abbe::report::screen::Screen;
-use abbe::report::section::{Rows, Section};
 
 mod arm;
 mod confusion;

@@ -11,6 +11,7 @@ use machine::file::AxisEntry;
 use metrology::text::{self, Comments};
 use recorder::{Bag, MACHINE_FILE, Order};
 use replayer::{Reading, Taken, reading};
+use reports::loss;
 use sha2::{Digest, Sha256};
 use twin::Session;
 
@@ -57,7 +58,7 @@ impl Recorded {
         }
         let (session, account) = builder
             .finish()
-            .map_err(|error| not_whole(error.into(), &lines(&readings)))?;
+            .map_err(|error| not_whole(error.into(), &loss::lines(&readings)))?;
         let mut from = 0;
         let bags = paths
             .iter()
@@ -89,11 +90,6 @@ pub fn not_whole(lacking: anyhow::Error, losses: &[String]) -> anyhow::Error {
         return lacking;
     }
     lacking.context(format!("a part was lost: {}", losses.join("; ")))
-}
-
-/// What of bags was lost or left out, in words.
-pub fn lines(readings: &[Reading]) -> Vec<String> {
-    readings.iter().flat_map(Reading::lines).collect()
 }
 
 /// Lengths and angles of two machine files that differ by less are one.

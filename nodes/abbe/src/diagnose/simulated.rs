@@ -3,53 +3,13 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
-use gap_diagnosis::report;
-use gap_diagnosis::simulated::{self, Matched, Share};
+use gap_diagnosis::simulated;
 use machine::MachineFile;
-use serde::Serialize;
+use reports::gap::simulated::Simulated;
+use reports::loss;
 use twin::Session;
 
-use super::bags::{Recorded, lines};
-
-/// What a recording was compared with, as the JSON has it.
-#[derive(Clone, Debug, Serialize)]
-pub struct Simulated {
-    /// The simulator's bags.
-    pub bags: Vec<report::Bag>,
-    /// What of the recording has a match in them.
-    #[serde(flatten)]
-    pub matched: Matched,
-}
-
-impl Simulated {
-    /// What was compared and what was not, for the head of a page.
-    pub fn in_words(&self) -> Vec<String> {
-        let Matched {
-            runs,
-            readings,
-            stood_in,
-            unmatched,
-        } = &self.matched;
-        let bags: Vec<&str> = self.bags.iter().map(|bag| bag.path.as_str()).collect();
-        let of = |share: &Share| format!("{} of {}", share.matched, share.of);
-        let mut all = vec![format!(
-            "Simulator: {} in the place of the machine file's own; {} runs and {} readings are compared with it at equal places of their paths.",
-            bags.join(", "),
-            of(runs),
-            of(readings)
-        )];
-        if !unmatched.is_empty() {
-            let left_out: Vec<String> = unmatched.iter().map(ToString::to_string).collect();
-            all.push(format!("Not compared: {}.", left_out.join("; ")));
-        }
-        if *stood_in > 0 {
-            all.push(format!(
-                "{stood_in} of these runs have no repeat of their own in the simulator; its last run of the test stands in, and noise of that run, if any, counts as gap."
-            ));
-        }
-        all
-    }
-}
+use super::bags::Recorded;
 
 /// A session to diagnose with its simulator.
 pub struct Beside {
@@ -74,9 +34,9 @@ pub fn beside(
         return Ok(None);
     }
     let read = Recorded::read(paths, machine).context("--simulated")?;
-    if let Some(loss) = lines(&read.readings).first() {
+    if let Some(lost) = loss::lines(&read.readings).first() {
         bail!(
-            "--simulated: {loss}: a simulator's bag is used whole or not at all, let the simulator write it again"
+            "--simulated: {lost}: a simulator's bag is used whole or not at all, let the simulator write it again"
         );
     }
     for bag in &read.bags {

@@ -6,9 +6,9 @@ use metrology::sample::PositioningTable;
 use metrology::{Axis, AxisSet, PerAxis};
 use recorder::{Bag, Order};
 use replayer::{Reading, reading};
+use reports::evaluate::stops::Stops;
 
 use super::origin::{GEOMETRY, Origin, ROTARY, Said, THERMAL, Which};
-use crate::evaluate::stops::Stops;
 
 /// What a bag has for an export.
 #[derive(Default)]
@@ -157,7 +157,7 @@ pub(super) fn looked_for(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::stops::Stop;
+    use reports::evaluate::stops::Stop;
 
     fn stops(axis: Axis, slope: f64, compensated: bool) -> Stops {
         let places = (0..10).map(|k| f64::from(k) * 15.0);

@@ -9,10 +9,9 @@ use metrology::sample::{PositioningTable, TestKind};
 use metrology::stamp::Stamp;
 use metrology::{Axis, PerAxis};
 use recorder::Bag;
-
-use crate::evaluate::Tests;
-use crate::evaluate::angular::RotaryTest;
-use crate::evaluate::linear::{LinearTest, Reference};
+use reports::evaluate::Tests;
+use reports::evaluate::angular::RotaryTest;
+use reports::evaluate::linear::{LinearTest, Reference};
 
 use super::found::is;
 

@@ -9,6 +9,9 @@ use gap_diagnosis::GapConfig;
 use history::{Kind, Store, gap_figures, report_figures};
 use node_runtime::{complain, complaint};
 use recorder::Bag;
+use reports::evaluate::Tests;
+use reports::evaluate::budget::Budget;
+use reports::loss;
 use serde_json::Value;
 
 use super::dates::{Moment, moment};
@@ -16,9 +19,6 @@ use super::keep::{add, complain_of_left_out, entry};
 use super::origin::{Origin, joined, json};
 use super::{open_to_write, unmake};
 use crate::diagnose::{self, bags};
-use crate::evaluate::Tests;
-use crate::evaluate::budget::Budget;
-use crate::loss;
 use crate::report_bag;
 use crate::tell::tell;
 

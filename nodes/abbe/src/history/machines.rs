@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
 use history::{Fleet, LEAST_MACHINES, Last, SeriesKey, Store, Window, fleet};
+use reports::section::{Rows, Section, head};
 use serde_json::json;
 
 use super::dates::{date, time};
 use super::numbers::{shown, title};
 use super::view::{Line, Page, SCHEMA};
-use crate::report::section::{Rows, Section, head};
 
 /// The list of all machines.
 ///

@@ -1,8 +1,7 @@
 //! Figures in the units in which people read them.
 
 use history::Series;
-
-use crate::report::section;
+use reports::section;
 
 /// A unit for people.
 #[derive(Clone, Debug, PartialEq)]

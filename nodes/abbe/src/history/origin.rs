@@ -6,12 +6,12 @@ use anyhow::{Context, Result, bail};
 use machine::MachineFile;
 use node_runtime::text_file;
 use recorder::{Bag, MACHINE_FILE, RecordedRun};
+use reports::evaluate::test_conditions::TestConditions;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use super::dates::{Moment, time};
 use crate::diagnose::bags;
-use crate::evaluate::test_conditions::TestConditions;
 
 /// A time before 1971 is that of a table whose begin nobody stated, s since 1970.
 const FIRST_DATED_S: i64 = 365 * 86_400;

@@ -7,12 +7,12 @@ use history::{
     Difference, Due, Point, Series, SeriesKey, Store, Trend, Verdict, Window, YEAR_S, difference,
     due, latest_until,
 };
+use reports::section::{Rows, Section, head};
 use serde_json::{Value, json};
 
 use super::dates::{DAY_S, Moment, date, time};
 use super::numbers::{shown, title};
 use super::view::{Line, Page, SCHEMA};
-use crate::report::section::{Rows, Section, head};
 
 /// Most figures of an overview: each is read.
 const MOST_FIGURES: usize = 2_000;

@@ -5,13 +5,13 @@ use history::{
     ChangePoint, Crossing, Kept, Limit, Point, SURE, Series, Side, Store, Trend, Window, YEAR_S,
     change_points, crossing, since_last_change,
 };
+use reports::plot::{self, Plot, Trace};
+use reports::section::{Drawing, Rows, Section, head};
 use serde_json::{Value, json};
 
 use super::dates::{DAY_S, date, time};
 use super::numbers::{Shown, shown, title};
 use super::view::Line;
-use crate::report::plot::{self, Plot, Trace};
-use crate::report::section::{Drawing, Rows, Section, head};
 
 /// Most rows of the table; the plot and the JSON have all values.
 const MOST_ROWS: usize = 50;

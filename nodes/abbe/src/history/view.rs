@@ -8,15 +8,14 @@ use clap::Args;
 use history::{Limit, Options, Series, SeriesKey, Side, Store, Window};
 use maud::html;
 use metrology::number::number;
+use reports::section::Section;
+use reports::whole_file;
 use serde_json::{Value, json};
 
 use super::dates::{Moment, moment, time};
 use super::{machines, overview, single, store_path};
-use crate::report;
-use crate::report::section::Section;
 use crate::tell::tell;
 use crate::usage::{above_zero, refused};
-use crate::whole_file;
 
 /// Most figures whose trends are shown at once.
 const MOST_TRENDS: usize = 20;
@@ -132,7 +131,7 @@ impl View {
                 h1 { (page.title) }
                 @for section in &page.sections { (section.html()) }
             };
-            whole_file::write(path, &report::html(&page.title, &body))?;
+            whole_file::write(path, &reports::html(&page.title, &body))?;
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -372,7 +372,7 @@ fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
     all
 }
 
-/// What a log is of: its axis and, where it was said, the cause of the drift, as [`crate::evaluate::drift`] reads them.
+/// What a log is of: its axis and, where it was said, the cause of the drift, as [`reports::evaluate::drift`] reads them.
 fn named(axis: Axis, cause: Option<DriftCause>) -> Vec<String> {
     let cause = match cause {
         None | Some(DriftCause::NotStated) => None,

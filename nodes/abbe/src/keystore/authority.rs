@@ -19,10 +19,10 @@ use openssl::pkey::{PKey, Private};
 use openssl::stack::Stack;
 use openssl::x509::extension::{BasicConstraints, KeyUsage};
 use openssl::x509::{X509, X509Builder, X509NameBuilder};
+use reports::whole_file;
 
 use super::documents;
 use super::enclaves::Enclave;
-use crate::whole_file;
 
 /// When credentials hold.
 pub struct Validity {

@@ -11,6 +11,9 @@ use gap_diagnosis::preflight::Floors;
 use machine::MachineFile;
 use metrology::number::number;
 use node_runtime::text_file;
+use reports::Report;
+use reports::gap::designed;
+use reports::terminal::Room;
 use sequencer::Plan;
 use twin::Instrument;
 
@@ -31,9 +34,6 @@ use menu::Offer;
 
 use super::dry_run;
 use super::programme;
-use crate::report::Report;
-use crate::report::gap::designed;
-use crate::report::terminal::Room;
 use crate::tell::tell;
 use crate::usage::refused;
 use crate::validate;

@@ -7,10 +7,10 @@ use grid_encoder::preflight::preflight_of;
 use grid_encoder::spectrum::Visibility;
 use metrology::sample::GeometryModel;
 use metrology::stamp::Stamp;
+use reports::geometry::{COVERAGE, MAX_READABLE_MEMBERS, coefficients, sums};
+use reports::section::{Rows, Section, head, rounded};
 
 use super::programme::Programme;
-use crate::report::geometry::{COVERAGE, MAX_READABLE_MEMBERS, coefficients, sums};
-use crate::report::section::{Rows, Section, head, rounded};
 
 /// The verdict on a plan.
 pub struct Seen {
@@ -88,7 +88,7 @@ impl Seen {
         if short.is_empty() && long.is_empty() {
             return;
         }
-        let row = |sum: &crate::report::geometry::Sum| {
+        let row = |sum: &reports::geometry::Sum| {
             let u = COVERAGE * sum.standard_uncertainty_mm * 1e3;
             let (_, u) = rounded(0.0, u);
             vec![
@@ -121,7 +121,7 @@ impl Seen {
                 "standard_uncertainty": found.estimate(idx).map(|(_, u)| u),
             })
         };
-        let sum = |sum: &crate::report::geometry::Sum| {
+        let sum = |sum: &reports::geometry::Sum| {
             serde_json::json!({
                 "sum": sum.in_words(),
                 "members": sum.members,

@@ -11,10 +11,10 @@ use machine::file::{AxisEntry, GridEncoderEntry};
 use metrology::sample::TestPlane;
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
+use reports::evaluate::circles::plane_axes;
+use reports::section::{Rows, Section, head};
 
 use super::programme::Programme;
-use crate::evaluate::circles::plane_axes;
-use crate::report::section::{Rows, Section, head};
 
 /// Heights at which a plate is tried, as shares of the travel.
 const PLATE_HEIGHTS: [f64; 3] = [-0.6, 0.0, 0.6];

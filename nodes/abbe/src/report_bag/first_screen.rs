@@ -3,14 +3,13 @@
 use std::fmt::Display;
 
 use maud::html;
-
-use crate::evaluate::Tests;
-use crate::evaluate::limits::CONFORMS;
-use crate::loss;
-use crate::report::page::figure;
-use crate::report::screen::{Screen, Tile, Tone};
-use crate::report::section::Section;
-use crate::report::terminal::Rank;
+use reports::evaluate::Tests;
+use reports::evaluate::limits::CONFORMS;
+use reports::loss;
+use reports::page::figure;
+use reports::screen::{Screen, Tile, Tone};
+use reports::section::Section;
+use reports::terminal::Rank;
 
 /// Most tiles of answers.
 const MOST_ANSWERS_ON_TILES: usize = 4;

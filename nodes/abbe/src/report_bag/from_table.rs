@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
 use metrology::yaml;
+use reports::whole_file::Vanishing;
 
 use crate::import::map::Map;
 use crate::import::{self, Named, propose};
-use crate::whole_file::Vanishing;
 
 /// Ends of names of files that are tables.
 const ENDS: [&str; 6] = ["csv", "tsv", "txt", "dat", "xlsx", "xlsm"];

@@ -540,7 +540,7 @@ fn a_map_for_a_bag_is_refused_and_a_folder_is_a_bag() {
 
 #[test]
 fn a_rotary_axis_without_a_reference_says_why_it_has_no_figures() {
-    let test = crate::evaluate::angular::RotaryTest {
+    let test = reports::evaluate::angular::RotaryTest {
         axis: metrology::Axis::C,
         first_run: 3,
         targets_rad: vec![],

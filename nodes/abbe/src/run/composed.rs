@@ -20,11 +20,11 @@ use node_runtime::{Diagnostic, Harness, Interruption, Level, Node, Setup, compla
 use recorder::{
     CALL_RECORD, ChannelId, MessageStamp, RecordedCall, Recorder, RecorderSink, RunNode,
 };
+use reports::evidence::Evidence;
 
 use super::mirror::Mirror;
 use super::{INTERRUPTED, NOT_RECORDED, Outcome, bag};
 use crate::alarm;
-use crate::evidence::Evidence;
 use crate::launch::LaunchNode;
 use crate::node;
 use crate::progress::Progress;

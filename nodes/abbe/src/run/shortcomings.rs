@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use metrology::sample::{PlanState, Rejection, TestKind};
 use node_runtime::Level;
-
-use crate::evidence::Evidence;
+use reports::evidence::Evidence;
 
 /// Conditions that are named; the page has all.
 const MAX_CONDITIONS: usize = 12;

@@ -11,12 +11,12 @@ use control_tables::linuxcnc::{FileType, compensation_file};
 use node_runtime::Interruption;
 use node_runtime::complain;
 use recorder::Bag;
+use reports::evaluate::Tests;
+use reports::evaluate::stops::Stops;
+use reports::section::Section;
+use reports::stops;
 
 use super::live;
-use crate::evaluate::Tests;
-use crate::evaluate::stops::Stops;
-use crate::report::section::Section;
-use crate::report::stops;
 use crate::scenario::{LinuxcncTable, Scenario};
 
 const TRIAL_TITLE: &str = "The exported table on the control itself";

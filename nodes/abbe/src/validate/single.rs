@@ -10,16 +10,16 @@ use mtconnect_bridge::mapping::{MapFile, Mapping};
 use node_runtime::arguments::Arguments;
 use node_runtime::text_file::{self, Comments};
 use node_runtime::{Setup, complaint};
+use reports::evaluate::budget::Budget;
+use reports::evaluate::limits::Limits;
+use reports::machine_defaults;
 use sequencer_node::read_plan;
 
 use super::Findings;
-use crate::evaluate::budget::Budget;
-use crate::evaluate::limits::Limits;
 use crate::import::limits;
 use crate::import::map::Map;
 use crate::import_shift::OrderFile;
 use crate::launch::{self, LaunchNode};
-use crate::machine_defaults;
 use crate::node;
 use crate::scenario::ScenarioFile;
 

@@ -1,13 +1,13 @@
 //! One arm of the table: rates, figures, classes, other methods, what was named falsely and how surely.
 
 use anyhow::Result;
+use reports::section::{Rows, Section, head};
 use trials::Tally;
 use trials::comparison::MethodLine;
 use trials::proportion::Proportion;
 use trials::tally::{ClassLine, D_BINS, Figure, bin_name};
 
 use super::reliability;
-use abbe::report::section::{Rows, Section, head};
 
 /// Everything of an arm but who was taken for whom.
 ///

@@ -4,10 +4,9 @@
 use std::collections::BTreeSet;
 
 use maud::{Markup, html};
+use reports::section::{Rows, head};
 use trials::confusion::{ALIKE, NOTHING, NOTICED, Pair, UNKNOWN};
 use trials::{Class, Tally};
-
-use abbe::report::section::{Rows, head};
 
 /// Some thirty columns have to go beside each other; what was hidden stays in sight where they do not.
 const TABLE: &str = "font-size: .7rem; line-height: 1.3";

@@ -1,11 +1,11 @@
 //! The protocol's targets beside what was reached, and what each rule of the diagnosis is worth.
 
+use reports::section::{Rows, Section};
 use trials::Arm;
 use trials::comparison::MethodLine;
 use trials::target::Target;
 
 use super::arm::methods;
-use abbe::report::section::{Rows, Section};
 
 /// Targets, met and missed.
 pub fn section(targets: &[Target]) -> Section {

@@ -1,10 +1,9 @@
 //! How often names were right, by the confidence they were given: as a table and as a diagram.
 
 use anyhow::Result;
+use reports::plot::{self, Plot, Trace};
+use reports::section::{Drawing, Rows, head};
 use trials::Tally;
-
-use abbe::report::plot::{self, Plot, Trace};
-use abbe::report::section::{Drawing, Rows, head};
 
 /// Bin by bin of confidence.
 pub fn rows(tally: &Tally) -> Rows {

@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use gap_diagnosis::design::Rung;
 use metrology::number::number;
+use reports::whole_file::{self, WholeFolder};
 
 use super::instruments::{Means, Shop};
 use super::menu::{Offer, SetUp};
 use super::stand_in::StandIn;
-use crate::whole_file::{self, WholeFolder};
 
 /// The name of the launch file.
 const LAUNCH: &str = "designed.launch.xml";

@@ -7,8 +7,7 @@ use abbe_msgs::{from_cdr, topics};
 use metrology::stamp::{Host, Stamp};
 use node_runtime::tap::Tapped;
 use node_runtime::{Diagnostic, Level};
-
-use crate::evidence::Evidence;
+use reports::evidence::Evidence;
 
 /// Gathers evidence from what a tap hears.
 #[derive(Default)]

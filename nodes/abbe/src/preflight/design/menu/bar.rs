@@ -4,11 +4,11 @@ use gap_diagnosis::design::Bar;
 use machine::MachineFile;
 use metrology::Axis;
 use metrology::sample::TestPlane;
+use reports::evaluate::circles::plane_axes;
 
 use super::super::instruments::Means;
 use super::super::programs;
 use super::{Offer, SetUp, short};
-use crate::evaluate::circles::plane_axes;
 
 /// Lengths of a bar, mm; the longest that fits is used.
 const LENGTHS_MM: [f64; 4] = [300.0, 150.0, 100.0, 50.0];

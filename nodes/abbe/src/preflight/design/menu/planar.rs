@@ -3,10 +3,10 @@
 use machine::MachineFile;
 use machine::file::{GridEncoderEntry, GridPlacement};
 use metrology::sample::TestPlane;
+use reports::evaluate::circles::plane_axes;
 
 use super::super::instruments::Means;
 use super::{Offer, SetUp, short};
-use crate::evaluate::circles::plane_axes;
 
 /// Placements that are looked at: one of each plane first.
 const MOST_PLACEMENTS: usize = 4;

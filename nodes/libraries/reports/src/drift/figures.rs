@@ -1,0 +1,175 @@
+//! The figures of ISO 230-3 of one displacement over time.
+
+use iso230::budget::DeviceUncertainty;
+use iso230::thermal::{self, DriftBudget, DriftCause, DriftChannel, DriftContributions, DriftTest};
+use iso230::{ExpandedLength, ExpandedRate, Iso230Error};
+use metrology::Axis;
+use serde::Serialize;
+
+use super::HOUR_S;
+use crate::positioning::figure;
+use crate::section::um;
+
+/// Hours after which the drift is stated.
+pub(super) const AFTER_H: [f64; 2] = [1.0, 3.0];
+/// Longest pause between readings across which a straight line is taken, s.
+pub(super) const LONGEST_PAUSE_S: f64 = HOUR_S;
+/// Readings without which a rate has no uncertainty.
+const LEAST_OF_RATE: usize = 3;
+
+/// One displacement, evaluated.
+#[derive(Debug, Serialize)]
+pub(super) struct Figures {
+    /// Drift after one hour; `None`: not recorded so long.
+    pub after_1_h: Option<ExpandedLength>,
+    /// Drift after three hours; `None`: not recorded so long.
+    pub after_3_h: Option<ExpandedLength>,
+    /// Greatest minus least displacement of the whole test.
+    pub range: ExpandedLength,
+    /// Slope of the line through the end of the test.
+    pub final_rate: ExpandedRate,
+    /// Length of that end, s.
+    pub rate_window_s: f64,
+    /// What the uncertainty of the range consists of, where it is stated by causes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contributions: Option<DriftContributions>,
+}
+
+/// Standard deviation of one of these readings (s since the first, mm) by scatter, mm; zero where they are too few.
+pub(super) fn scatter_mm(values: &[(f64, f64)]) -> f64 {
+    let (times_s, displacements_mm): (Vec<f64>, Vec<f64>) = values.iter().copied().unzip();
+    thermal::scatter_mm(&times_s, &displacements_mm).unwrap_or(0.0)
+}
+
+/// Evaluates displacements (s since the first, mm) of an instrument with a certificate, whose readings scatter.
+///
+/// # Errors
+/// As [`thermal::evaluate`].
+pub(super) fn of(
+    axis: Axis,
+    cause: DriftCause,
+    values: &[(f64, f64)],
+    sensor: DeviceUncertainty,
+    reading_scatter_mm: f64,
+) -> Result<Figures, Iso230Error> {
+    let recorded_s = values.last().map_or(0.0, |(time_s, _)| *time_s);
+    let in_last_hour = values.iter().rev();
+    let in_last_hour = in_last_hour.take_while(|(time_s, _)| *time_s >= recorded_s - HOUR_S);
+    let rate_window_s = if recorded_s >= HOUR_S && in_last_hour.count() >= LEAST_OF_RATE {
+        HOUR_S
+    } else {
+        recorded_s
+    };
+    let evaluated = |drift_after_s: f64| {
+        let test = DriftTest {
+            cause,
+            times_s: values.iter().map(|(time_s, _)| *time_s).collect(),
+            channels: vec![DriftChannel {
+                axis,
+                height_mm: 0.0,
+                displacements_mm: values.iter().map(|(_, mm)| *mm).collect(),
+            }],
+            drift_after_s,
+            rate_window_s,
+            longest_gap_s: LONGEST_PAUSE_S,
+        };
+        let budget = DriftBudget {
+            sensor,
+            reading_scatter_mm,
+            artefact_length_mm: 0.0,
+            artefact_expansion_per_k: 0.0,
+            artefact_temperature_range_k: 0.0,
+        };
+        let result = thermal::evaluate(&test, &budget)?;
+        let one = result.displacements.first().copied();
+        one.ok_or(Iso230Error::TooFewPoints {
+            place: "displacements",
+            n: 0,
+            least: 1,
+        })
+    };
+    let whole = evaluated(recorded_s.max(f64::MIN_POSITIVE))?;
+    let after = |hours: f64| {
+        let reaches = recorded_s >= hours * HOUR_S;
+        let found = reaches.then(|| evaluated(hours * HOUR_S));
+        found.transpose().map(|one| one.map(|one| one.drift_after))
+    };
+    let [one, three] = AFTER_H;
+    Ok(Figures {
+        after_1_h: after(one)?,
+        after_3_h: after(three)?,
+        range: whole.range,
+        final_rate: whole.final_rate,
+        rate_window_s,
+        contributions: Some(whole.contributions),
+    })
+}
+
+impl Figures {
+    /// Cells of a table: drift after one and three hours, range, rate in the last hour.
+    pub(super) fn cells(&self, stated: bool) -> [String; 4] {
+        let or_dash = |value: &Option<ExpandedLength>| {
+            value
+                .as_ref()
+                .map_or_else(|| um(f64::NAN), |value| figure(value, stated))
+        };
+        [
+            or_dash(&self.after_1_h),
+            or_dash(&self.after_3_h),
+            figure(&self.range, stated),
+            format!("{:.2}", self.final_rate.value_mm_s * HOUR_S * 1e3),
+        ]
+    }
+}
+
+/// Names of those cells.
+pub(super) const FIGURE_NAMES: [&str; 4] = [
+    "after 1 h / µm",
+    "after 3 h / µm",
+    "range / µm",
+    "last rate / µm/h",
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EXACT: DeviceUncertainty = DeviceUncertainty {
+        expanded_uncertainty_mm: 0.0,
+        expanded_uncertainty_per_length: 0.0,
+        coverage_factor: 2.0,
+    };
+
+    fn found(values: &[(f64, f64)]) -> Result<Figures, Iso230Error> {
+        of(Axis::Z, DriftCause::NotStated, values, EXACT, 0.0)
+    }
+
+    #[test]
+    fn drift_is_told_after_an_hour_and_after_three_and_over_all_by_hand() {
+        let values = [
+            (0.0, 10.0),
+            (1800.0, 9.999),
+            (3700.0, 10.0085),
+            (7200.0, 10.002),
+            (10_800.0, 10.004),
+        ];
+        let found = found(&values).unwrap();
+        // 3600 s lies 1800/1900 of the way from 9.999 to 10.0085.
+        let after = found.after_1_h.unwrap().value_mm;
+        assert!((after - 0.008).abs() < 1e-12, "{after}");
+        assert!((found.after_3_h.unwrap().value_mm - 0.004).abs() < 1e-12);
+        assert!((found.range.value_mm - 0.0095).abs() < 1e-12);
+        // Two readings lie in the last hour: the rate is that of the whole.
+        assert!((found.rate_window_s - 10_800.0).abs() < 1e-9);
+        let short = self::found(&values[..3]).unwrap();
+        assert!(short.after_1_h.is_some() && short.after_3_h.is_none());
+    }
+
+    #[test]
+    fn what_says_nothing_is_refused_with_the_reason() {
+        let two = found(&[(0.0, 1.0), (60.0, 1.001)]).unwrap_err().to_string();
+        assert!(two.contains("2 points"), "{two}");
+        let pause = found(&[(0.0, 1.0), (60.0, 1.0), (4000.0, 1.0)]).unwrap_err();
+        assert!(matches!(pause, Iso230Error::Gap { .. }), "{pause}");
+    }
+}

@@ -1,0 +1,556 @@
+//! What is stated about the measurements of a bag: `budget.yaml`, in the units of data sheets.
+//!
+//! Nothing uncertain in it has a default: a term that is left out would be an uncertainty of zero. Temperatures may be
+//! stated or read from thermometers of the bag; without them lengths are not corrected to 20 °C.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow};
+use iso230::budget::{DeviceUncertainty, Expansion};
+use iso230::circular::CircularBudget;
+use iso230::positioning::budget::PositioningBudget;
+use iso230::positioning::rotary::RotaryBudget;
+use metrology::number::{number, quantity};
+use metrology::yaml;
+use node_runtime::text_file;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::Value;
+
+mod statement;
+#[cfg(test)]
+mod tests;
+
+use super::circles;
+use super::test_conditions::{Readings, Thermometers};
+pub use statement::{Instrument, Instruments, NOT_STATED};
+
+/// Figures that had no budget to be computed from have no expanded uncertainty, not one of zero.
+pub fn unstate(figures: &mut Value) {
+    match figures {
+        Value::Object(entries) => {
+            for (key, value) in entries {
+                if key.starts_with("expanded_uncertainty") {
+                    *value = Value::Null;
+                } else {
+                    unstate(value);
+                }
+            }
+        }
+        Value::Array(values) => values.iter_mut().for_each(unstate),
+        _ => {}
+    }
+}
+
+/// Temperature at which lengths are defined, °C.
+const REFERENCE_DEGC: f64 = 20.0;
+/// Farthest from it that a machine is measured, K.
+const FARTHEST_K: f64 = 100.0;
+/// The largest that can be stated, by the unit that a key ends with: the longest first. Beyond it the unit is mistaken.
+const GREATEST: [(&str, f64); 6] = [
+    ("_um_per_m_k", 100.0),
+    ("_um_per_m", 1e4),
+    ("_um", 1e4),
+    ("_mm", 100.0),
+    ("_arcsec", 3600.0),
+    ("_k", FARTHEST_K),
+];
+/// Coverage factors: 1 of a standard uncertainty, 12.7 of one degree of freedom at 95 % (GUM, table G.2).
+const FACTORS: [f64; 2] = [1.0, 13.0];
+
+/// Uncertainty of a measuring device, as its certificate states it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Device {
+    /// Constant part.
+    expanded_uncertainty_um: f64,
+    /// Part that grows with the length.
+    expanded_uncertainty_um_per_m: f64,
+    /// Coverage factor of both.
+    coverage_factor: f64,
+}
+
+/// Temperature and expansion of a body.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// Temperature minus 20 °C, where it is stated.
+    #[serde(default)]
+    temperature_deviation_k: Option<f64>,
+    /// Thermometers of the bag whose mean is its temperature, where it is read.
+    #[serde(default)]
+    thermometers: Vec<String>,
+    /// Half of the interval in which the temperature lies.
+    temperature_half_width_k: f64,
+    /// Coefficient of expansion.
+    expansion_um_per_m_k: f64,
+    /// Half of the interval in which the coefficient lies.
+    expansion_half_width_um_per_m_k: f64,
+}
+
+/// Angular reference of rotary axes, as its certificate states it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Angular {
+    /// Expanded uncertainty.
+    expanded_uncertainty_arcsec: f64,
+    /// Its coverage factor.
+    coverage_factor: f64,
+    /// Range of a reading with the axis at rest, as long as a test takes.
+    environmental_drift_arcsec: f64,
+    /// Standard deviation of such readings from one to the next; without it all drift counts as new at every reading.
+    #[serde(default)]
+    environmental_unrest_arcsec: Option<f64>,
+}
+
+/// `budget.yaml`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Budget {
+    /// Plate and head, for circles.
+    grid_encoder: Device,
+    /// Interferometer, tracker or step gauge, or the scales where they measured.
+    length_reference: Device,
+    /// The machine, or the workpiece that lengths are corrected to.
+    machine: Body,
+    /// The device's own body; coefficient 0 for an interferometer.
+    device: Body,
+    /// The plate of the grid encoder; where absent, radii of its circles are not corrected to 20 °C.
+    #[serde(default)]
+    plate: Option<Body>,
+    /// By how much beam and axis can part sideways over the measured length.
+    misalignment_mm: f64,
+    /// Range of a reading with the axes at rest, as long as a test takes.
+    environmental_drift_um: f64,
+    /// Standard deviation of such readings from one to the next; without it all drift counts as new at every reading.
+    #[serde(default)]
+    environmental_unrest_um: Option<f64>,
+    /// For rotary axes; where absent, their figures have no uncertainty.
+    #[serde(default)]
+    angular_reference: Option<Angular>,
+    /// Whether the length reference corrects its own readings to 20 °C: material compensation on.
+    #[serde(default)]
+    pub length_corrected_by_instrument: bool,
+    /// The instruments and their certificates.
+    #[serde(default)]
+    pub instruments: Instruments,
+    /// Who measured.
+    #[serde(default)]
+    pub operator: Option<String>,
+    /// What the machine did before.
+    #[serde(default)]
+    pub warm_up: Option<String>,
+}
+
+impl Device {
+    fn inner(&self) -> DeviceUncertainty {
+        DeviceUncertainty {
+            expanded_uncertainty_mm: self.expanded_uncertainty_um * 1e-3,
+            expanded_uncertainty_per_length: self.expanded_uncertainty_um_per_m * 1e-6,
+            coverage_factor: self.coverage_factor,
+        }
+    }
+}
+
+/// Temperature of a body during a test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyTemperature {
+    /// Temperature minus 20 °C, K.
+    pub deviation_k: f64,
+    /// Half of the interval in which it lies, K.
+    pub half_width_k: f64,
+    /// Greatest minus least reading during the test, K; none where it is stated.
+    pub range_k: Option<f64>,
+    /// Where it is from.
+    pub source: String,
+}
+
+impl Body {
+    /// What stands under `temperature_deviation_k`, or the mean of the thermometers over a test; the half width grows by half
+    /// the range of their mean, as a root of squares.
+    ///
+    /// All runs of a test have this one temperature: a run of its own would bring the scatter of its thermometers into the
+    /// repeatability of the axis.
+    ///
+    /// # Errors
+    /// Why it is unknown.
+    pub fn temperature(&self, read: &Thermometers) -> Result<BodyTemperature, String> {
+        let stated = |source: &str, deviation_k| BodyTemperature {
+            deviation_k,
+            half_width_k: self.temperature_half_width_k,
+            range_k: None,
+            source: source.to_owned(),
+        };
+        if let Some(deviation_k) = self.temperature_deviation_k {
+            return Ok(stated("stated in the budget", deviation_k));
+        }
+        if !self.expands() {
+            return Ok(stated("does not expand", 0.0));
+        }
+        if self.thermometers.is_empty() {
+            return Err("has neither temperature_deviation_k nor thermometers".to_owned());
+        }
+        let mut all = Vec::new();
+        for name in &self.thermometers {
+            let silent = || format!("thermometer {name} has no reading during this test");
+            all.push(read.get(name).ok_or_else(silent)?);
+        }
+        let n = all.len() as f64;
+        let mean = |of: fn(&Readings) -> f64| all.iter().map(|one| of(one)).sum::<f64>() / n;
+        let range_k = mean(|one| one.range_k());
+        Ok(BodyTemperature {
+            deviation_k: mean(|one| one.mean_degc()) - REFERENCE_DEGC,
+            half_width_k: self.temperature_half_width_k.hypot(range_k / 2.0),
+            range_k: Some(range_k),
+            source: format!("read by {}", self.thermometers.join(", ")),
+        })
+    }
+
+    fn expands(&self) -> bool {
+        self.expansion_um_per_m_k > 0.0 || self.expansion_half_width_um_per_m_k > 0.0
+    }
+
+    /// Refuses a temperature out of range, or one from two sources: key and rule.
+    fn check(&self) -> Result<(), (&'static str, String)> {
+        let Some(deviation_k) = self.temperature_deviation_k else {
+            return Ok(());
+        };
+        let key = "temperature_deviation_k";
+        if !deviation_k.is_finite() || deviation_k.abs() > FARTHEST_K {
+            let value = quantity(key, deviation_k);
+            return Err((
+                key,
+                format!(" = {value}: must be from -{FARTHEST_K} to {FARTHEST_K} K"),
+            ));
+        }
+        if !self.thermometers.is_empty() {
+            let rule = ": leave it out where thermometers are named, they read it".to_owned();
+            return Err((key, rule));
+        }
+        Ok(())
+    }
+
+    /// Coefficient of expansion, 1/K.
+    pub fn expansion_per_k(&self) -> f64 {
+        self.expansion_um_per_m_k * 1e-6
+    }
+
+    /// With its temperature, where that is known.
+    pub fn at(&self, temperature: Option<&BodyTemperature>) -> Expansion {
+        let inner = self.inner();
+        temperature.map_or(inner, |known| Expansion {
+            temperature_deviation_k: known.deviation_k,
+            temperature_half_width_k: known.half_width_k,
+            ..inner
+        })
+    }
+
+    fn inner(&self) -> Expansion {
+        Expansion {
+            temperature_deviation_k: self.temperature_deviation_k.unwrap_or(0.0),
+            temperature_half_width_k: self.temperature_half_width_k,
+            expansion_per_k: self.expansion_um_per_m_k * 1e-6,
+            expansion_half_width_per_k: self.expansion_half_width_um_per_m_k * 1e-6,
+        }
+    }
+}
+
+/// The largest value of a key; none where its unit has no limit.
+fn greatest(key: &str) -> f64 {
+    let of_unit = GREATEST.iter().find(|(unit, _)| key.ends_with(unit));
+    of_unit.map_or(f64::MAX, |(_, greatest)| *greatest)
+}
+
+impl Budget {
+    /// Reads a budget file.
+    ///
+    /// # Errors
+    /// When it cannot be opened, or as [`Self::read`].
+    pub fn open(path: &Path) -> Result<Self> {
+        let text = text_file::yaml(path).context("budget file")?;
+        Self::read(&text, path)
+    }
+
+    /// Reads the text of a budget file; `place` names it in errors.
+    ///
+    /// # Errors
+    /// With key and value where one is missing, unknown or no number above zero where it must be.
+    pub fn read(text: &str, place: &Path) -> Result<Self> {
+        let file = place.display().to_string();
+        let wrong = |message: &str| anyhow!("budget file {}", yaml::placed(&file, text, message));
+        let budget: Self = yaml::read(text).map_err(|error| wrong(&error.to_string()))?;
+        let angular = budget.angular_reference.as_ref();
+        let factors = [
+            ("grid_encoder", Some(budget.grid_encoder.coverage_factor)),
+            (
+                "length_reference",
+                Some(budget.length_reference.coverage_factor),
+            ),
+            ("angular_reference", angular.map(|one| one.coverage_factor)),
+        ];
+        for (key, factor) in factors {
+            let factor = factor.unwrap_or(1.0);
+            let [least, greatest] = FACTORS;
+            if !(least..=greatest).contains(&factor) {
+                let factor = number(factor);
+                let key = format!("{key}.coverage_factor");
+                return Err(wrong(&format!(
+                    "{key} = {factor}: must be from {least} to {greatest}"
+                )));
+            }
+        }
+        for (key, value) in budget.numbers() {
+            let greatest = greatest(key);
+            if !(0.0..=greatest).contains(&value) {
+                let [value, greatest] = [value, greatest].map(|one| quantity(key, one));
+                return Err(wrong(&format!(
+                    "{key} = {value}: must be from 0 to {greatest}"
+                )));
+            }
+        }
+        let plate = budget.plate.as_ref().map(|plate| ("plate", plate));
+        let bodies = [("machine", &budget.machine), ("device", &budget.device)];
+        for (key, body) in bodies.into_iter().chain(plate) {
+            body.check()
+                .map_err(|(name, rule)| wrong(&format!("{key}.{name}{rule}")))?;
+        }
+        for (key, text) in budget.texts() {
+            statement::check(&key, text).map_err(|message| wrong(&message))?;
+        }
+        Ok(budget)
+    }
+
+    fn texts(&self) -> Vec<(String, &str)> {
+        let own = [("operator", &self.operator), ("warm_up", &self.warm_up)];
+        let own = own.map(|(key, text)| (key.to_owned(), text.as_deref()));
+        let all = own.into_iter().chain(self.instruments.texts());
+        all.filter_map(|(key, text)| Some((key, text?))).collect()
+    }
+
+    /// The numbers of the parts that may be absent.
+    fn numbers_of_parts(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        let angular = self.angular_reference.iter();
+        let angular_unrest = self
+            .angular_reference
+            .and_then(|one| one.environmental_unrest_arcsec);
+        let of_angles = angular.flat_map(|one| {
+            [
+                (
+                    "angular_reference.expanded_uncertainty_arcsec",
+                    one.expanded_uncertainty_arcsec,
+                ),
+                (
+                    "angular_reference.environmental_drift_arcsec",
+                    one.environmental_drift_arcsec,
+                ),
+            ]
+        });
+        let unrest_arcsec =
+            angular_unrest.map(|arcsec| ("angular_reference.environmental_unrest_arcsec", arcsec));
+        let unrest_um = self.environmental_unrest_um;
+        let unrest = unrest_um.map(|um| ("environmental_unrest_um", um));
+        let plate = self.plate.iter();
+        let of_angles = of_angles.chain(unrest_arcsec).chain(unrest);
+        of_angles.chain(plate.flat_map(|plate| {
+            [
+                (
+                    "plate.temperature_half_width_k",
+                    plate.temperature_half_width_k,
+                ),
+                ("plate.expansion_um_per_m_k", plate.expansion_um_per_m_k),
+                (
+                    "plate.expansion_half_width_um_per_m_k",
+                    plate.expansion_half_width_um_per_m_k,
+                ),
+            ]
+        }))
+    }
+
+    fn numbers(&self) -> Vec<(&'static str, f64)> {
+        let Self {
+            grid_encoder: grid,
+            length_reference: length,
+            machine,
+            device,
+            ..
+        } = self;
+        let mut numbers = vec![
+            (
+                "grid_encoder.expanded_uncertainty_um",
+                grid.expanded_uncertainty_um,
+            ),
+            (
+                "grid_encoder.expanded_uncertainty_um_per_m",
+                grid.expanded_uncertainty_um_per_m,
+            ),
+            (
+                "length_reference.expanded_uncertainty_um",
+                length.expanded_uncertainty_um,
+            ),
+            (
+                "length_reference.expanded_uncertainty_um_per_m",
+                length.expanded_uncertainty_um_per_m,
+            ),
+            (
+                "machine.temperature_half_width_k",
+                machine.temperature_half_width_k,
+            ),
+            ("machine.expansion_um_per_m_k", machine.expansion_um_per_m_k),
+            (
+                "machine.expansion_half_width_um_per_m_k",
+                machine.expansion_half_width_um_per_m_k,
+            ),
+            (
+                "device.temperature_half_width_k",
+                device.temperature_half_width_k,
+            ),
+            ("device.expansion_um_per_m_k", device.expansion_um_per_m_k),
+            (
+                "device.expansion_half_width_um_per_m_k",
+                device.expansion_half_width_um_per_m_k,
+            ),
+            ("misalignment_mm", self.misalignment_mm),
+            ("environmental_drift_um", self.environmental_drift_um),
+        ];
+        numbers.extend(self.numbers_of_parts());
+        numbers
+    }
+
+    /// For rotary axes by ISO 230-2; `None` where the budget says nothing of an angular reference.
+    #[must_use]
+    pub fn rotary(&self) -> Option<RotaryBudget> {
+        let arcsec_rad = |arcsec: f64| (arcsec / 3600.0).to_radians();
+        self.angular_reference.map(|one| RotaryBudget {
+            expanded_uncertainty_rad: arcsec_rad(one.expanded_uncertainty_arcsec),
+            coverage_factor: one.coverage_factor,
+            environmental_drift_rad: arcsec_rad(one.environmental_drift_arcsec),
+            environmental_unrest_rad: one.environmental_unrest_arcsec.map(arcsec_rad),
+        })
+    }
+
+    /// For ISO 230-2 and 230-6, with the temperatures of machine and device where they are known.
+    #[must_use]
+    pub fn positioning(
+        &self,
+        machine: Option<&BodyTemperature>,
+        device: Option<&BodyTemperature>,
+    ) -> PositioningBudget {
+        PositioningBudget {
+            device: self.length_reference.inner(),
+            misalignment_mm: self.misalignment_mm,
+            machine: self.machine.at(machine),
+            device_expansion: self.device.at(device),
+            environmental_drift_mm: self.environmental_drift_um * 1e-3,
+            environmental_unrest_mm: self.environmental_unrest_um.map(|um| um * 1e-3),
+        }
+    }
+
+    /// For what the machine's own scale read, with the scale's uncertainty where it is known: nothing is aligned, and nothing
+    /// is corrected to another temperature.
+    #[must_use]
+    pub fn of_scale(&self, scale: Option<DeviceUncertainty>) -> PositioningBudget {
+        let nothing = Self::nothing();
+        PositioningBudget {
+            device: scale.unwrap_or(nothing.length_reference.inner()),
+            environmental_drift_mm: self.environmental_drift_um * 1e-3,
+            environmental_unrest_mm: self.environmental_unrest_um.map(|um| um * 1e-3),
+            ..nothing.positioning(None, None)
+        }
+    }
+
+    /// The machine, and the device's own body.
+    pub fn bodies(&self) -> (&Body, &Body) {
+        (&self.machine, &self.device)
+    }
+
+    /// Temperatures that are stated and not read, in words: body, °C, half of its interval.
+    #[must_use]
+    pub fn stated_temperatures(&self) -> Vec<String> {
+        let bodies = [
+            ("machine", Some(&self.machine)),
+            ("device", Some(&self.device)),
+            ("plate", self.plate.as_ref()),
+        ];
+        let words = |(name, body): (&str, Option<&Body>)| {
+            let body = body?;
+            let degc = 20.0 + body.temperature_deviation_k?;
+            let half_width_k = body.temperature_half_width_k;
+            Some(format!("{name} {degc:.2} ± {half_width_k:.2} °C"))
+        };
+        bodies.into_iter().filter_map(words).collect()
+    }
+
+    /// Whether temperature and expansion of the plate are stated.
+    #[must_use]
+    pub const fn has_plate(&self) -> bool {
+        self.plate.is_some()
+    }
+
+    /// With the certificate and the body of what read a circle in place of the grid encoder's and the device's.
+    #[must_use]
+    pub fn of_circles(&self, read_by: circles::Instrument) -> Self {
+        let mut budget = self.clone();
+        match (read_by, &self.plate) {
+            (circles::Instrument::Ballbar, _) => budget.grid_encoder = self.length_reference,
+            (circles::Instrument::GridEncoder, Some(plate)) => budget.device = plate.clone(),
+            (circles::Instrument::GridEncoder, None) => {}
+        }
+        budget
+    }
+
+    /// For ISO 230-4: one device, plate and head, reads deviations and radius; with the temperatures of machine and device
+    /// where they are known.
+    #[must_use]
+    pub fn circular(
+        &self,
+        machine: Option<&BodyTemperature>,
+        device: Option<&BodyTemperature>,
+    ) -> CircularBudget {
+        CircularBudget {
+            displacement: self.grid_encoder.inner(),
+            length: None,
+            machine: self.machine.at(machine),
+            device_expansion: self.device.at(device),
+            environmental_drift_mm: self.environmental_drift_um * 1e-3,
+            environmental_unrest_mm: self.environmental_unrest_um.map(|um| um * 1e-3),
+        }
+    }
+
+    /// Standard uncertainty of a radius as the plate's certificate states it, mm.
+    #[must_use]
+    pub fn radius_standard_mm(&self, radius_mm: f64) -> f64 {
+        self.grid_encoder.inner().standard_mm(radius_mm)
+    }
+
+    /// A budget without any term, for figures whose uncertainty is not stated.
+    #[must_use]
+    pub const fn nothing() -> Self {
+        const DEVICE: Device = Device {
+            expanded_uncertainty_um: 0.0,
+            expanded_uncertainty_um_per_m: 0.0,
+            coverage_factor: 2.0,
+        };
+        const BODY: Body = Body {
+            temperature_deviation_k: None,
+            thermometers: Vec::new(),
+            temperature_half_width_k: 0.0,
+            expansion_um_per_m_k: 0.0,
+            expansion_half_width_um_per_m_k: 0.0,
+        };
+        Self {
+            grid_encoder: DEVICE,
+            length_reference: DEVICE,
+            machine: BODY,
+            device: BODY,
+            plate: None,
+            misalignment_mm: 0.0,
+            environmental_drift_um: 0.0,
+            environmental_unrest_um: None,
+            angular_reference: None,
+            length_corrected_by_instrument: false,
+            instruments: Instruments::NONE,
+            operator: None,
+            warm_up: None,
+        }
+    }
+}

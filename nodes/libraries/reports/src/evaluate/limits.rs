@@ -1,0 +1,476 @@
+//! Which figures of a bag conform to their limits (ISO 14253-1): `limits.yaml`, lengths in µm, angles in
+//! seconds of arc.
+//!
+//! ```yaml
+//! rule: guard_band                        # or simple, or {probability: {at_least: 0.95}}
+//! limits:
+//!   iso230_2.accuracy: {upper_um: 20.0}
+//!   iso230_4.both.circular_error: {upper_um: 12.0}
+//!   iso230_2_rotary.figures.both.accuracy: {upper_arcsec: 8.0}
+//! ```
+//!
+//! A figure is named as `abbe report --json` has it below each test. Every test that has it is judged, but those that cannot
+//! be: lengths that are not those at 20 °C, and what the machine's own scale read.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, bail};
+use iso230::conformance::Policy;
+use metrology::number::{number, quantity};
+use metrology::yaml;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::Value;
+
+mod judged;
+
+use crate::section::{Rows, Section, head};
+use crate::terminal::Rank;
+pub use judged::CONFORMS;
+use judged::{Figure, Judged};
+
+/// `limits.yaml`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// How the uncertainty of a figure is taken into account.
+    rule: Policy,
+    /// Limits by the name of a figure, as `abbe report --json` has it below each test.
+    limits: BTreeMap<String, Limit>,
+}
+
+/// Limits of one figure; at least one.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Limit {
+    /// Least length that conforms.
+    lower_um: Option<f64>,
+    /// Greatest length that conforms.
+    upper_um: Option<f64>,
+    /// Least angle that conforms.
+    lower_arcsec: Option<f64>,
+    /// Greatest angle that conforms.
+    upper_arcsec: Option<f64>,
+}
+
+/// Greatest magnitude of a limit of a length, µm: a metre.
+const GREATEST_UM: f64 = 1e6;
+/// Greatest magnitude of a limit of an angle, arcsec: a turn.
+const GREATEST_ARCSEC: f64 = 1_296_000.0;
+/// A probability of no more decides nothing.
+const LEAST_PROBABILITY: f64 = 0.5;
+
+impl Limit {
+    /// Refuses limits that are no numbers of a machine, or leave no zone; `place` is their key.
+    fn check(self, place: &str) -> Result<(), String> {
+        let of_lengths = (self.lower_um, self.upper_um, "um", GREATEST_UM);
+        let of_angles = (
+            self.lower_arcsec,
+            self.upper_arcsec,
+            "arcsec",
+            GREATEST_ARCSEC,
+        );
+        for (lower, upper, unit, greatest) in [of_lengths, of_angles] {
+            for (side, value) in [("lower", lower), ("upper", upper)] {
+                let Some(value) = value else { continue };
+                if !(-greatest..=greatest).contains(&value) {
+                    let key = format!("{place}.{side}_{unit}");
+                    let [value, least, greatest] =
+                        [value, -greatest, greatest].map(|one| quantity(&key, one));
+                    return Err(format!(
+                        "{key} = {value}: must be from {least} to {greatest}"
+                    ));
+                }
+            }
+            if let (Some(lower), Some(upper)) = (lower, upper)
+                && lower >= upper
+            {
+                let key = format!("{place}.lower_{unit}");
+                let [lower, upper] = [lower, upper].map(|one| quantity(&key, one));
+                return Err(format!(
+                    "{key} = {lower}: must be below upper_{unit} = {upper}: exchange them"
+                ));
+            }
+        }
+        let is_there = |lower: Option<f64>, upper: Option<f64>| lower.or(upper).is_some();
+        match (
+            is_there(self.lower_um, self.upper_um),
+            is_there(self.lower_arcsec, self.upper_arcsec),
+        ) {
+            (false, false) => Err(format!(
+                "{place}: has no limit: state lower_um or upper_um (µm), of an angle lower_arcsec or upper_arcsec"
+            )),
+            (true, true) => Err(format!(
+                "{place}: has limits in µm and in arcsec: a figure is a length or an angle, remove one"
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Limits {
+    /// Reads the text of a file of limits; `place` names it in errors.
+    ///
+    /// # Errors
+    /// With the key where one is missing or unknown, or where there is no limit at all.
+    pub fn read(text: &str, place: &Path) -> Result<Self> {
+        let place = place.display();
+        let limits: Self =
+            yaml::read(text).map_err(|error| anyhow!("limits file {place}:{error}"))?;
+        let file = place.to_string();
+        let wrong = |message: &str| anyhow!("limits file {}", yaml::placed(&file, text, message));
+        if limits.limits.is_empty() {
+            return Err(wrong("limits: must name one figure at least"));
+        }
+        limits.check().map_err(|message| wrong(&message))?;
+        Ok(limits)
+    }
+
+    /// Refuses limits that no figure can be held against: key, value, limit, remedy.
+    fn check(&self) -> Result<(), String> {
+        if let Policy::Probability { at_least } = self.rule
+            && !(at_least > LEAST_PROBABILITY && at_least < 1.0)
+        {
+            return Err(format!(
+                "rule.probability.at_least = {}: must be above {LEAST_PROBABILITY} and below 1, such as 0.95",
+                number(at_least)
+            ));
+        }
+        let mut limits = self.limits.iter();
+        limits.try_for_each(|(name, limit)| limit.check(&format!("limits.{name}")))
+    }
+
+    /// Judges the figures of all tests.
+    ///
+    /// # Errors
+    /// When no test has a figure that is named, or its limits leave no zone.
+    pub fn section(&self, tests: &[Value]) -> Result<Section> {
+        let mut section = Section::new("Conformance, ISO 14253-1").ranked(Rank::Answer);
+        let mut verdicts = Vec::new();
+        let mut table = Rows {
+            head: head(&["figure", "test", "value", "limits", "decision", "P"]),
+            note: format!(
+                "{} P: probability that the true value is within its limits.",
+                rule_in_words(self.rule)
+            ),
+            ..Rows::default()
+        };
+        for (name, limit) in &self.limits {
+            let found: Vec<(&Value, Figure)> = tests
+                .iter()
+                .filter_map(|test| Some((test, Figure::of(test, name)?)))
+                .collect();
+            if found.is_empty() {
+                let known: BTreeSet<String> = tests.iter().flat_map(names).collect();
+                bail!("limits.{name}: no test has such a figure; there are {known:?}");
+            }
+            for (test, figure) in found {
+                let judged = Judged::of(figure, *limit, self.rule)
+                    .with_context(|| format!("limits.{name}"))?;
+                let why = no_verdict(test, name).or_else(|| figure.lacks());
+                table
+                    .rows
+                    .push(judged.row((name, title(test)), *limit, why.is_some()));
+                let mut entry = serde_json::json!({ "figure": name, "test": title(test) });
+                if let Some(why) = why {
+                    let about = format!("{name}, {}", title(test));
+                    section.warn(
+                        "Nothing is decided",
+                        format!("{about}: nothing is decided, {why}."),
+                    );
+                    entry["verdict"] = Value::Null;
+                    entry["no_verdict"] = why.into();
+                } else {
+                    entry["verdict"] = judged.verdict;
+                }
+                verdicts.push(entry);
+            }
+        }
+        section.answers.push(in_short(&table.rows));
+        section.tables.push(table);
+        section.figures = verdicts.into();
+        Ok(section)
+    }
+}
+
+/// The decisions of a table of figures in one sentence; each figure that does not conform is named.
+fn in_short(rows: &[Vec<String>]) -> String {
+    let mut by_decision: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for row in rows {
+        if let [figure, test, _, _, decision, ..] = row.as_slice() {
+            let named = by_decision.entry(decision).or_default();
+            named.push(format!("{figure} of {test}"));
+        }
+    }
+    let counts = by_decision.iter().map(|(decision, figures)| {
+        let n = figures.len();
+        if *decision == CONFORMS {
+            format!("{decision}: {n}")
+        } else {
+            format!("{decision}: {n} ({})", figures.join("; "))
+        }
+    });
+    let counts: Vec<String> = counts.collect();
+    format!("figures judged: {}; {}.", rows.len(), counts.join("; "))
+}
+
+fn title(test: &Value) -> &str {
+    test["test"].as_str().unwrap_or_default()
+}
+
+/// Figures of circles that are lengths from the nominal radius.
+const RADIAL: [&str; 3] = [
+    "mean_radial_deviation",
+    "greatest_radial_deviation",
+    "least_radial_deviation",
+];
+
+/// Why nothing is decided about a figure of a test; none: it is decided.
+fn no_verdict(test: &Value, name: &str) -> Option<String> {
+    let last = name.rsplit('.').next().unwrap_or(name);
+    let key = match last {
+        radial if RADIAL.contains(&radial) => "no_verdict_on_radii",
+        "size_error" => "no_verdict_on_size",
+        _ => "no_verdict",
+    };
+    test[key].as_str().map(str::to_owned)
+}
+
+/// Names of all figures with uncertainty that a test has, those of its single points left out.
+fn names(test: &Value) -> Vec<String> {
+    let Some(entries) = test.as_object() else {
+        return Vec::new();
+    };
+    let below = |(name, value): (&String, &Value)| -> Vec<String> {
+        if Figure::read(value).is_some() {
+            return vec![name.clone()];
+        }
+        let further = names(value).into_iter();
+        further.map(|rest| format!("{name}.{rest}")).collect()
+    };
+    entries.iter().flat_map(below).collect()
+}
+
+fn rule_in_words(rule: Policy) -> String {
+    match rule {
+        Policy::Simple => "The value alone decides.".to_owned(),
+        Policy::GuardBand => {
+            "A guard band of the expanded uncertainty (k = 2) on either side of a limit.".to_owned()
+        }
+        Policy::Probability { at_least } => format!("Decided with a probability of {at_least}."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn limits(text: &str) -> Result<Limits> {
+        Limits::read(text, Path::new("limits.yaml"))
+    }
+
+    #[test]
+    fn limits_that_no_figure_can_be_held_against_are_refused_with_place_value_and_remedy() {
+        let of = |limit: &str| {
+            let text = format!("rule: simple\nlimits:\n  iso230_2.accuracy: {limit}\n");
+            format!("{:#}", limits(&text).unwrap_err())
+        };
+        for key in ["lower_um", "upper_um", "lower_arcsec", "upper_arcsec"] {
+            for value in [".nan", ".inf", "-.inf", "1e25", "-1e300"] {
+                let said = of(&format!("{{{key}: {value}}}"));
+                let begin = "limits file limits.yaml:3:";
+                assert!(said.starts_with(begin), "{key} {value}: {said}");
+                let place = format!("limits.iso230_2.accuracy.{key} = ");
+                assert!(said.contains(&place), "{key} {value}: {said}");
+                assert!(said.contains("must be from -"), "{key} {value}: {said}");
+            }
+        }
+        for (limit, words) in [
+            (
+                "{lower_um: 5.0, upper_um: 4.0}",
+                "lower_um = 5 µm: must be below upper_um = 4 µm",
+            ),
+            ("{lower_um: 5.0, upper_um: 5.0}", "must be below"),
+            (
+                "{lower_arcsec: 5.0, upper_arcsec: -4.0}",
+                "must be below upper_arcsec",
+            ),
+            ("{}", "has no limit: state lower_um"),
+            ("{upper_um: 5.0, upper_arcsec: 4.0}", "in µm and in arcsec"),
+        ] {
+            let said = of(limit);
+            assert!(said.contains(words), "{limit}: {said}");
+        }
+        for at_least in [".nan", ".inf", "0.5", "1.0", "-1.0", "1e300"] {
+            let text = format!(
+                "rule: {{probability: {{at_least: {at_least}}}}}\nlimits:\n  a.b: {{upper_um: 1.0}}\n"
+            );
+            let said = format!("{:#}", limits(&text).unwrap_err());
+            assert!(said.contains("rule.probability.at_least = "), "{said}");
+            assert!(said.contains("above 0.5 and below 1"), "{said}");
+        }
+    }
+
+    fn tests() -> Vec<Value> {
+        let length =
+            |value: f64| serde_json::json!({"value_mm": value, "expanded_uncertainty_mm": 0.001});
+        vec![
+            serde_json::json!({"test": "X", "iso230_2": {"accuracy": length(0.0085), "n_runs": 5, "centre_mm": [0.1, 0.2], "up": {"accuracy": length(0.0095)}}}),
+            serde_json::json!({"test": "Y", "iso230_2": {"accuracy": length(0.0115)}}),
+        ]
+    }
+
+    #[test]
+    fn a_guard_band_of_the_expanded_uncertainty_leaves_what_cannot_be_decided() {
+        let text = "rule: guard_band\nlimits:\n  iso230_2.accuracy: {upper_um: 10.0}\n  iso230_2.up.accuracy: {upper_um: 10.0}\n";
+        let section = limits(text).unwrap().section(&tests()).unwrap();
+        let said: Vec<[&str; 3]> = section.tables[0]
+            .rows
+            .iter()
+            .map(|row| [row[0].as_str(), row[1].as_str(), row[4].as_str()])
+            .collect();
+        assert_eq!(
+            said,
+            [
+                ["iso230_2.accuracy", "X", "conforms"],
+                ["iso230_2.accuracy", "Y", "does not conform"],
+                ["iso230_2.up.accuracy", "X", "cannot be decided"],
+            ]
+        );
+        assert_eq!(
+            section.figures[1]["verdict"]["decision"],
+            "does_not_conform"
+        );
+        assert_eq!(section.figures[0]["verdict"]["guard_band_mm"], 0.001);
+    }
+
+    #[test]
+    fn nothing_is_decided_of_lengths_that_are_not_those_at_20_degc() {
+        let length =
+            |value: f64| serde_json::json!({"value_mm": value, "expanded_uncertainty_mm": 0.001});
+        let why = "not corrected to 20 °C: no budget was given (--budget)";
+        let all = vec![
+            serde_json::json!({"test": "X", "iso230_2": {"accuracy": length(0.0085)}, "no_verdict": why}),
+            serde_json::json!({"test": "Y", "iso230_2": {"accuracy": {"value_mm": 0.0115, "expanded_uncertainty_mm": null}}, "no_verdict": "read by the machine's scale"}),
+            serde_json::json!({"test": "circle", "no_verdict_on_radii": why, "iso230_4": {"mean_radial_deviation": length(0.001), "circular_error": length(0.001)}}),
+        ];
+        let text = "rule: guard_band\nlimits:\n  iso230_2.accuracy: {upper_um: 10.0}\n  iso230_4.mean_radial_deviation: {upper_um: 10.0}\n  iso230_4.circular_error: {upper_um: 10.0}\n";
+        let section = limits(text).unwrap().section(&all).unwrap();
+        let decisions: Vec<&str> = section.tables[0]
+            .rows
+            .iter()
+            .map(|row| row[4].as_str())
+            .collect();
+        let none = "not decided";
+        assert_eq!(decisions, [none, none, "conforms", none], "{section:?}");
+        assert!(section.figures[0]["verdict"].is_null());
+        assert_eq!(section.figures[0]["no_verdict"], why);
+        assert!(section.lines[0].contains(why), "{:?}", section.lines);
+        assert_eq!(section.lines.len(), 3, "{:?}", section.lines);
+    }
+
+    #[test]
+    fn nothing_is_decided_of_a_size_that_is_not_that_at_20_degc() {
+        let length = serde_json::json!({"value_mm": 0.001, "expanded_uncertainty_mm": 0.000_5});
+        let why = "not corrected to 20 °C: the artefact's temperature is not stated";
+        let probing = serde_json::json!({"test": "spheres", "no_verdict_on_size": why, "iso230_10_errors": [{"size_error": length, "probing_error": length}]});
+        let text = "rule: guard_band\nlimits:\n  iso230_10_errors.0.probing_error: {upper_um: 2.0}\n  iso230_10_errors.0.size_error: {upper_um: 2.0}\n";
+        let section = limits(text).unwrap().section(&[probing]).unwrap();
+        assert_eq!(section.figures[0]["verdict"]["decision"], "conforms");
+        assert!(section.figures[1]["verdict"].is_null());
+        assert_eq!(section.figures[1]["no_verdict"], why);
+    }
+
+    #[test]
+    fn radii_of_a_circle_at_20_degc_are_judged() {
+        let length = serde_json::json!({"value_mm": 0.001, "expanded_uncertainty_mm": 0.000_5});
+        let circle = serde_json::json!({"test": "circle", "no_verdict_on_radii": null, "iso230_4": {"mean_radial_deviation": length}});
+        let text = "rule: guard_band\nlimits:\n  iso230_4.mean_radial_deviation: {upper_um: 2.0}\n";
+        let section = limits(text).unwrap().section(&[circle]).unwrap();
+        assert_eq!(section.figures[0]["verdict"]["decision"], "conforms");
+    }
+
+    #[test]
+    fn an_angle_is_judged_in_seconds_of_arc_by_hand() {
+        // With U = 1.5'' against 6'': 4 + 1.5 < 6 conforms; 5 + 1.5 > 6 > 5 - 1.5 is open; 8 - 1.5 > 6 does not.
+        let arcsec = |arcsec: f64| (arcsec / 3600.0).to_radians();
+        let test = |value: f64| {
+            serde_json::json!({"test": format!("C {value}"), "iso230_2_rotary": {"figures": {"both": {
+            "accuracy": {"value_rad": arcsec(value), "expanded_uncertainty_rad": arcsec(1.5)}}}}})
+        };
+        let text = "rule: guard_band\nlimits:\n  iso230_2_rotary.figures.both.accuracy: {upper_arcsec: 6.0}\n";
+        let all = [test(4.0), test(5.0), test(8.0)];
+        let section = limits(text).unwrap().section(&all).unwrap();
+        let rows = &section.tables[0].rows;
+        let said: Vec<[&str; 3]> = rows
+            .iter()
+            .map(|row| [2, 3, 4].map(|i| row[i].as_str()))
+            .collect();
+        assert_eq!(
+            said,
+            [
+                ["4.00 ± 1.50 arcsec", "≤ 6 arcsec", "conforms"],
+                ["5.00 ± 1.50 arcsec", "≤ 6 arcsec", "cannot be decided"],
+                ["8.00 ± 1.50 arcsec", "≤ 6 arcsec", "does not conform"],
+            ]
+        );
+        let guard_rad = section.figures[0]["verdict"]["guard_band_rad"]
+            .as_f64()
+            .unwrap();
+        assert!((guard_rad - arcsec(1.5)).abs() < 1e-18);
+    }
+
+    #[test]
+    fn a_limit_in_the_wrong_unit_and_an_angle_without_uncertainty_are_told() {
+        let angle = serde_json::json!({"value_rad": 1e-5, "expanded_uncertainty_rad": null});
+        let tests = [serde_json::json!({"test": "C", "iso230_2_rotary": {"accuracy": angle}})];
+        let of = |limit: &str| {
+            let text = format!("rule: guard_band\nlimits:\n  iso230_2_rotary.accuracy: {limit}\n");
+            limits(&text).unwrap().section(&tests)
+        };
+        let wrong = format!("{:#}", of("{upper_um: 6.0}").unwrap_err());
+        assert!(
+            wrong.contains("is an angle: lower_arcsec and upper_arcsec"),
+            "{wrong}"
+        );
+        let section = of("{upper_arcsec: 6.0}").unwrap();
+        assert!(section.figures[0]["verdict"].is_null(), "{section:?}");
+        assert!(
+            section.lines[0].contains("angular_reference"),
+            "{:?}",
+            section.lines
+        );
+    }
+
+    #[test]
+    fn what_no_test_has_and_what_is_no_zone_are_refused_by_name() {
+        let refused = |text: &str| {
+            let error = limits(text).and_then(|limits| limits.section(&tests()));
+            format!("{:#}", error.unwrap_err())
+        };
+        let said = refused("rule: simple\nlimits:\n  iso230_2.acuracy: {upper_um: 10.0}\n");
+        assert!(
+            said.starts_with("limits.iso230_2.acuracy: no test has such a figure"),
+            "{said}"
+        );
+        assert!(said.contains("\"iso230_2.up.accuracy\""), "{said}");
+        assert!(!said.contains("centre_mm"), "{said}");
+        let said =
+            refused("rule: simple\nlimits:\n  iso230_2.accuracy: {lower_um: 3.0, upper_um: 2.0}\n");
+        assert!(
+            said.contains("limits.iso230_2.accuracy.lower_um = "),
+            "{said}"
+        );
+        let said = refused("rule: simple\nlimits:\n  iso230_2.accuracy: {upper_um: lots}\n");
+        let line =
+            "limits.yaml:3:33: limits.iso230_2.accuracy.upper_um = lots: must be a number, in µm";
+        assert!(said.ends_with(line), "{said}");
+        let said = refused("rule: simple\nlimits: {}\n");
+        assert!(said.contains("must name one figure at least"), "{said}");
+        let said = refused(
+            "rule: {probability: {at_least: 0.4}}\nlimits:\n  iso230_2.accuracy: {upper_um: 2.0}\n",
+        );
+        assert!(said.contains("0.4"), "{said}");
+    }
+}

@@ -1,0 +1,290 @@
+//! The first screen of a diagnosis: verdict, gap closed, largest cause, what is open, what to measure next.
+
+use gap_diagnosis::report::{Cause, GapReport, NextExperiment, Status};
+
+use super::words::name;
+use super::{NOT_DETERMINED, spoken, three, told};
+use crate::screen::{Screen, Tile, Tone};
+use crate::svg::short;
+
+/// Share of the gap that is closed from which on a diagnosis is done.
+const MOSTLY_CLOSED: f64 = 0.5;
+
+/// The screen without its picture.
+pub(super) fn of(report: &GapReport, losses: &[String]) -> Screen {
+    Screen {
+        verdict: Some(verdict(report)),
+        tiles: [closed(report), Some(largest(report))]
+            .into_iter()
+            .flatten()
+            .collect(),
+        lacks: lacks(report, losses),
+        next: report.next_experiments.first().map(next),
+        ..Screen::default()
+    }
+}
+
+/// The named cause without which most of the gap comes back, or the surest one.
+fn main_cause(report: &GapReport) -> Option<&Cause> {
+    let named = || {
+        report
+            .causes
+            .iter()
+            .filter(|cause| cause.status != Status::Surrogate)
+    };
+    let without = |cause: &Cause| {
+        let mut all = report.shrink.leave_one_out.iter();
+        let own = all.find(|out| out.effect == cause.effect && out.axis == cause.axis);
+        own.map_or(0.0, |out| out.rms_um_without)
+    };
+    let largest = named().max_by(|a, b| without(a).total_cmp(&without(b)));
+    if report.shrink.leave_one_out.is_empty() {
+        return named().next();
+    }
+    largest
+}
+
+/// The size of a cause with its uncertainty, such as `width_mm 0.0041 ± 0.0002`.
+fn size(cause: &Cause) -> String {
+    let Some(first) = told(cause).next() else {
+        return String::new();
+    };
+    if first.determined == Some(false) {
+        return format!("{} {NOT_DETERMINED}", spoken(&first.name));
+    }
+    let half = (first.high - first.low) / 2.0;
+    // Lengths of the machine file in mm are µm for people.
+    let (label, factor, unit) = match first.name.strip_suffix("_mm") {
+        Some(name) => (spoken(name), 1e3, " µm"),
+        None => match first.name.strip_suffix("_um") {
+            Some(name) => (spoken(name), 1.0, " µm"),
+            None => (spoken(&first.name), 1.0, ""),
+        },
+    };
+    format!(
+        "{} {} ± {}{unit}",
+        label.replace('_', " "),
+        short(first.value * factor),
+        short(half * factor)
+    )
+}
+
+fn verdict(report: &GapReport) -> (String, Tone) {
+    let gap = &report.gap;
+    if !gap.above_floor {
+        let line = format!(
+            "Machine and simulator agree within noise: {} µm rms, noise alone gives {} µm.",
+            three(gap.rms_um),
+            three(gap.floor_um)
+        );
+        return (line, Tone::Good);
+    }
+    let share = report.shrink.gap_closed;
+    let Some(cause) = main_cause(report) else {
+        let line = format!(
+            "Machine and simulator differ by {} µm rms (noise {} µm), and no cause is named.",
+            three(gap.rms_um),
+            three(gap.floor_um)
+        );
+        return (line, Tone::Bad);
+    };
+    let title = name(&cause.effect, &cause.axis);
+    let rest = match report
+        .causes
+        .iter()
+        .filter(|c| c.status != Status::Surrogate)
+        .count()
+    {
+        0 | 1 => String::new(),
+        n => format!(" and {} more", n - 1),
+    };
+    match share {
+        Some(share) => (
+            format!(
+                "{title}{rest} close {:.0} % of the gap between machine and simulator ({} to {} µm rms).",
+                100.0 * share.value,
+                super::maybe(report.shrink.rms_um.before),
+                super::maybe(report.shrink.rms_um.after)
+            ),
+            if share.low > MOSTLY_CLOSED {
+                Tone::Good
+            } else {
+                Tone::Plain
+            },
+        ),
+        None => (
+            format!(
+                "Machine and simulator differ by {} µm rms; {title}{rest} is named as the cause.",
+                three(gap.rms_um)
+            ),
+            Tone::Plain,
+        ),
+    }
+}
+
+fn closed(report: &GapReport) -> Option<Tile> {
+    let rms = &report.shrink.rms_um;
+    let (before, after) = (rms.before?, rms.after?);
+    let more = format!(
+        "{} → {} µm rms on held-out runs, floor {} µm",
+        three(before),
+        three(after),
+        three(report.gap.floor_um)
+    );
+    Some(match report.shrink.gap_closed {
+        Some(share) => {
+            let value = format!("{:.0} %", 100.0 * share.value);
+            let interval = format!(
+                "95 %: {:.0} to {:.0} %. {more}",
+                100.0 * share.low,
+                100.0 * share.high
+            );
+            let is_good = share.low > MOSTLY_CLOSED;
+            Tile::new("gap closed", value, interval).toned(if is_good {
+                Tone::Good
+            } else {
+                Tone::Plain
+            })
+        }
+        None => Tile::new("gap closed", "not known", more),
+    })
+}
+
+fn largest(report: &GapReport) -> Tile {
+    match main_cause(report) {
+        Some(cause) => {
+            let doubt = match cause.status {
+                Status::Set => ", or one that looks alike",
+                _ => "",
+            };
+            let more = format!("{}; confidence {:.2}{doubt}", size(cause), cause.confidence);
+            Tile::new("largest cause", name(&cause.effect, &cause.axis), more)
+        }
+        None => Tile::new("largest cause", "none named", "see what to measure next"),
+    }
+}
+
+fn lacks(report: &GapReport, losses: &[String]) -> Vec<String> {
+    let mut lacks = losses.to_vec();
+    if report.unknown.flagged {
+        lacks.push(format!(
+            "A rest that no known effect explains (score {} over {}).",
+            three(report.unknown.score),
+            three(report.unknown.threshold)
+        ));
+    }
+    let surrogates = report
+        .causes
+        .iter()
+        .filter(|cause| cause.status == Status::Surrogate);
+    lacks.extend(surrogates.map(|cause| {
+        format!(
+            "Something looks like {} but fails a check of it.",
+            name(&cause.effect, &cause.axis)
+        )
+    }));
+    if !report.not_excited.is_empty() {
+        lacks.push(format!(
+            "{} effects could not show in this recording.",
+            report.not_excited.len()
+        ));
+    }
+    lacks
+}
+
+fn next(experiment: &NextExperiment) -> Tile {
+    let more = format!(
+        "{}; separates {}",
+        experiment.run,
+        experiment.separates.join(" / ")
+    );
+    Tile::new(
+        "next step",
+        format!("{} min", three(experiment.minutes)),
+        more,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn cause(effect: &str, axis: &str, key: &str, value: f64) -> Value {
+        json!({
+            "effect": effect, "axis": axis, "status": "named", "confidence": 0.97, "D": 40.0,
+            "parameters": [{"name": key, "value": value, "low": 0.95 * value, "high": 1.05 * value, "at_bound": false}],
+            "constancy": {"passed": true, "worst_z": 0.0, "split_by": ""},
+            "confusable_with": [],
+        })
+    }
+
+    fn report(above_floor: bool, causes: Value, shrink: Value) -> GapReport {
+        let value = json!({
+            "schema": "abbe.gap/1",
+            "inputs": {"bags": [], "machine_sha256": ""},
+            "noise_floor": [],
+            "gap": {"rms_um": 3.0, "p95_um": 6.0, "floor_um": 0.4, "above_floor": above_floor, "per_channel": []},
+            "where": [],
+            "causes": causes,
+            "unknown": {"flagged": false, "score": 0.0, "threshold": 1.0, "description": {
+                "covariate": "", "parity": "", "period": "", "feed_exponent": null, "time_constant_s": null}},
+            "shrink": shrink,
+            "not_excited": [],
+            "next_experiments": [{"run": "circle XY", "separates": ["a", "b"], "delta": 12.0, "minutes": 4.0}],
+            "runtime_s": 0.0,
+        });
+        serde_json::from_value(value).unwrap()
+    }
+
+    fn shrink(gap_closed: Value, leave_one_out: Value) -> Value {
+        json!({
+            "fit_runs": [1], "held_out_runs": [2], "rms_um": {"before": 3.0, "after": 0.8},
+            "p95_um": {"before": 6.0, "after": 1.6}, "gap_closed": gap_closed, "leave_one_out": leave_one_out,
+        })
+    }
+
+    #[test]
+    fn the_largest_cause_is_the_one_that_the_gap_misses_most() {
+        let causes = json!([
+            cause("backlash", "X", "width_mm", 0.004),
+            cause("squareness", "XY", "angle_urad", 40.0),
+        ]);
+        let without = json!([
+            {"effect": "backlash", "axis": "X", "rms_um_without": 1.0},
+            {"effect": "squareness", "axis": "XY", "rms_um_without": 2.5},
+        ]);
+        let closed = json!({"value": 0.93, "low": 0.9, "high": 0.95});
+        let report = report(true, causes, shrink(closed, without));
+        let screen = of(&report, &[]);
+        let (verdict, tone) = screen.verdict.unwrap();
+        assert!(
+            verdict.contains("squareness XY (EC0Y) and 1 more close 93 %"),
+            "{verdict}"
+        );
+        assert_eq!(tone, Tone::Good);
+        assert_eq!(size(&report.causes[0]), "width 4.00 ± 0.200 µm");
+        assert_eq!(screen.tiles[0].value, "93 %");
+        assert_eq!(screen.next.unwrap().value, "4.00 min");
+    }
+
+    #[test]
+    fn no_gap_is_good_and_a_loss_is_lacking() {
+        let report = report(false, json!([]), shrink(Value::Null, json!([])));
+        let screen = of(&report, &["file cut".to_owned()]);
+        let (verdict, tone) = screen.verdict.unwrap();
+        assert!(verdict.contains("agree within noise"), "{verdict}");
+        assert_eq!(
+            (tone, screen.lacks),
+            (Tone::Good, vec!["file cut".to_owned()])
+        );
+    }
+
+    #[test]
+    fn a_gap_without_a_named_cause_is_no_success() {
+        let report = report(true, json!([]), shrink(Value::Null, json!([])));
+        let (verdict, tone) = of(&report, &[]).verdict.unwrap();
+        assert!(verdict.contains("no cause is named"), "{verdict}");
+        assert_eq!(tone, Tone::Bad);
+    }
+}

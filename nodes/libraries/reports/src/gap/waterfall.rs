@@ -1,0 +1,185 @@
+//! The waterfall of a gap: before, minus each cause, the rest, the floor.
+//!
+//! Squares of causes add up where their sizes do not. What all effects close together is therefore divided by the shares s_k of
+//! the squares, and a bar ends where the root mean square stands once the causes before it are in the simulator:
+//!
+//! ```text
+//!   r_0 = before,   r_k^2 = r_(k-1)^2 - s_k (before^2 - after^2)            (1)
+//! ```
+
+use std::fmt::Write as _;
+
+use anyhow::{Result, anyhow};
+use gap_diagnosis::figures::Apart;
+use gap_diagnosis::report::GapReport;
+use maud::Markup;
+
+use super::words::name;
+use crate::page;
+use crate::svg::{Scale, escaped, short};
+
+/// Most causes with a bar of their own; the others share one.
+const MOST_BARS: usize = 6;
+const WIDTH: f64 = 720.0;
+/// Height of a bar with its text, px.
+const ROW_PX: f64 = 60.0;
+/// Left and right end of the bars, px.
+const BARS_PX: [f64; 2] = [8.0, 712.0];
+
+/// One bar: name, where it begins and where it ends, µm.
+#[derive(Clone, Debug, PartialEq)]
+struct Bar {
+    name: String,
+    from_um: f64,
+    to_um: f64,
+    colour: usize,
+}
+
+/// The bars from top to bottom; none without two numbers to go between.
+fn bars(before_um: f64, after_um: f64, causes: &[(String, f64)]) -> Vec<Bar> {
+    let whole = |name: &str, um: f64, colour| Bar {
+        name: name.to_owned(),
+        from_um: 0.0,
+        to_um: um,
+        colour,
+    };
+    let mut bars = vec![whole("before, machine minus simulator", before_um, 0)];
+    let closed = before_um.powi(2) - after_um.powi(2);
+    let mut sorted = causes.to_vec();
+    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
+    if sorted.len() > MOST_BARS {
+        let rest = sorted.split_off(MOST_BARS - 1);
+        let share = rest.iter().map(|(_, share)| share).sum();
+        sorted.push((format!("{} more causes", rest.len()), share));
+    }
+    let mut left_um = before_um;
+    for (name, share) in sorted {
+        // (1)
+        let next_um = (left_um.powi(2) - share * closed).max(0.0).sqrt();
+        bars.push(Bar {
+            name,
+            from_um: left_um,
+            to_um: next_um,
+            colour: if next_um <= left_um { 2 } else { 1 },
+        });
+        left_um = next_um;
+    }
+    bars.push(whole("rest, not explained", after_um, 1));
+    bars
+}
+
+/// Shares of the causes that were added, which sum to 1; a single one closes all.
+fn shares(report: &GapReport, apart: &[Apart]) -> Vec<(String, f64)> {
+    let of = |one: &Apart| Some((name(&one.effect, &one.axis), one.share?));
+    let known: Vec<(String, f64)> = apart.iter().filter_map(of).collect();
+    if !known.is_empty() {
+        return known;
+    }
+    let without = &report.shrink.leave_one_out;
+    match without.as_slice() {
+        [one] => vec![(name(&one.effect, &one.axis), 1.0)],
+        [] => vec![],
+        several => vec![(format!("{} causes together", several.len()), 1.0)],
+    }
+}
+
+/// The picture of a diagnosis; `None` without held-out runs.
+///
+/// # Errors
+/// When its text cannot be written.
+pub(super) fn picture(report: &GapReport, apart: &[Apart]) -> Result<Option<Markup>> {
+    let rms = &report.shrink.rms_um;
+    let (Some(before_um), Some(after_um)) = (rms.before, rms.after) else {
+        return Ok(None);
+    };
+    let bars = bars(before_um, after_um, &shares(report, apart));
+    let svg = drawn(&bars, report.gap.floor_um)
+        .map_err(|error| anyhow!("waterfall of the gap: {error}"))?;
+    let caption = "Root mean square of machine minus simulator on the held-out runs, as each cause is added to the simulator. Dashed: noise floor of the whole recording.";
+    Ok(Some(page::figure(&svg, caption)))
+}
+
+fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
+    let height = ROW_PX * bars.len() as f64 + 34.0;
+    let greatest = bars
+        .iter()
+        .fold(floor_um, |most, bar| most.max(bar.to_um).max(bar.from_um));
+    let scale = Scale {
+        low: 0.0,
+        high: greatest.max(1e-9),
+        low_px: BARS_PX[0],
+        high_px: BARS_PX[1],
+    };
+    let mut text = format!(
+        "<svg class=\"plot\" role=\"img\" aria-label=\"waterfall of the gap\" viewBox=\"0 0 {WIDTH} {height}\">"
+    );
+    for (row, bar) in bars.iter().enumerate() {
+        let top = row as f64 * ROW_PX;
+        let (a, b) = (scale.px(bar.from_um), scale.px(bar.to_um));
+        let (left, width) = (a.min(b), (a - b).abs().max(2.0));
+        let change = bar.to_um - bar.from_um;
+        let size = short(change.abs());
+        let sign = match bar.from_um > 0.0 && size != "0" {
+            true if change <= 0.0 => "−",
+            true => "+",
+            false => "",
+        };
+        write!(
+            text,
+            "<text x=\"{}\" y=\"{:.1}\">{}: {sign}{size} µm</text><g class=\"c{}\"><rect x=\"{left:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"18\" fill=\"currentColor\"/></g>",
+            BARS_PX[0],
+            top + 26.0,
+            escaped(&bar.name),
+            bar.colour,
+            top + 34.0,
+        )?;
+    }
+    let at = scale.px(floor_um);
+    let bottom = ROW_PX * bars.len() as f64;
+    write!(
+        text,
+        "<path stroke=\"currentColor\" stroke-dasharray=\"5 4\" d=\"M{at:.1} 26V{:.1}\"/><text x=\"{:.1}\" y=\"{:.1}\">floor {} µm</text></svg>",
+        bottom + 6.0,
+        at.min(WIDTH - 220.0),
+        bottom + 28.0,
+        short(floor_um)
+    )?;
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eq1_the_causes_lead_from_before_to_the_rest() {
+        let causes = [("b".to_owned(), 0.25), ("a".to_owned(), 0.75)];
+        let bars = bars(5.0, 3.0, &causes);
+        let names: Vec<&str> = bars.iter().map(|bar| bar.name.as_str()).collect();
+        assert_eq!(names[1..3], ["a", "b"]);
+        // 25 - 0.75 * 16 = 13, 13 - 0.25 * 16 = 9.
+        assert!((bars[1].to_um - 13.0_f64.sqrt()).abs() < 1e-12);
+        assert!((bars[2].to_um - 3.0).abs() < 1e-12);
+        assert!((bars[3].to_um - 3.0).abs() < 1e-12);
+        let text = drawn(&bars, 0.4).unwrap();
+        for words in ["−1.39 µm", "5.00 µm", "3.00 µm", "floor 0.400 µm"] {
+            assert!(text.contains(words), "{words}: {text}");
+        }
+    }
+
+    #[test]
+    fn many_causes_share_the_last_bar() {
+        let causes: Vec<(String, f64)> = (0..10).map(|k| (format!("c{k}"), 0.1)).collect();
+        let bars = bars(4.0, 1.0, &causes);
+        assert_eq!(bars.len(), MOST_BARS + 2);
+        assert_eq!(bars[MOST_BARS].name, "5 more causes");
+        assert!((bars[MOST_BARS].to_um - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_gap_that_grew_is_drawn_as_one() {
+        let bars = bars(2.0, 3.0, &[("a".to_owned(), 1.0)]);
+        assert!((bars[1].to_um - 3.0).abs() < 1e-12);
+        assert!(drawn(&bars, 0.1).unwrap().contains("+1.00 µm"));
+    }
+}

@@ -1,0 +1,130 @@
+//! What the report calls by ids, in a metrologist's words.
+
+use gap_diagnosis::report::GapReport;
+use metrology::{ErrorComponent, squareness};
+use twin::effects::{self, Targets};
+
+use crate::geometry;
+
+/// Name of an effect with what it acts on, components by their symbols of ISO 230-1.
+pub(super) fn name(effect: &str, axis: &str) -> String {
+    let Some(kind) = effects::kind(effect) else {
+        return format!("{effect} {axis}").trim_end().to_owned();
+    };
+    let place = match kind.targets {
+        Targets::Across
+        | Targets::Turning
+        | Targets::Sagging
+        | Targets::RotaryLocations
+        | Targets::RotaryMotions => format!("E{axis}"),
+        Targets::LinearPairs => {
+            between(axis).map_or_else(|| axis.to_owned(), |symbol| format!("{axis} ({symbol})"))
+        }
+        _ => axis.to_owned(),
+    };
+    format!("{} {place}", kind.title).trim_end().to_owned()
+}
+
+/// The angle between two linear axes such as `XY`.
+fn between(pair: &str) -> Option<ErrorComponent> {
+    let one = pair.get(..1)?.parse().ok()?;
+    squareness::between(one, pair.get(1..)?.parse().ok()?)
+}
+
+/// The sign of every squareness among effects and what they act on.
+pub(super) fn signs<'a>(effects: impl Iterator<Item = (&'a str, &'a str)>) -> Option<String> {
+    let is_pair = |effect: &str| {
+        let kind = effects::kind(effect);
+        kind.is_some_and(|kind| matches!(kind.targets, Targets::LinearPairs))
+    };
+    let pairs = effects.filter(|(effect, _)| is_pair(effect));
+    geometry::signs(pairs.filter_map(|(_, axis)| between(axis)))
+}
+
+/// A covariate of a report.
+pub(super) fn covariate(id: &str) -> String {
+    let axis = |letter: &str| letter.to_uppercase();
+    if let Some(letter) = id.strip_prefix("position_") {
+        return format!("the position of {}", axis(letter));
+    }
+    if let Some(letter) = id.strip_prefix("velocity_") {
+        return format!("the velocity of {}", axis(letter));
+    }
+    if let Some(letter) = id.strip_prefix("sense*log_distance_since_reversal_") {
+        return format!(
+            "the way since {} turned round, its sign with the direction of motion",
+            axis(letter)
+        );
+    }
+    if let Some(thermometer) = id.strip_prefix("temperature_") {
+        return format!("thermometer {thermometer}");
+    }
+    match id {
+        "angle" => "the angle on the circle".to_owned(),
+        "sense*angle" => "the angle on the circle, its sign with the sense of rotation".to_owned(),
+        "approach_angle" => "the direction of approach".to_owned(),
+        "feed" => "the feed of the touch".to_owned(),
+        "stylus" => "the stylus".to_owned(),
+        other => other.to_owned(),
+    }
+}
+
+/// Where most of the gap is.
+pub(super) fn place(report: &GapReport) -> Option<String> {
+    let place = report.r#where.first()?;
+    let share = |part: f64| {
+        if part < 0.005 {
+            "hardly any".to_owned()
+        } else {
+            format!("{:.0} %", 100.0 * part)
+        }
+    };
+    Some(format!(
+        "most of it is in {} (direction {}) and goes with {}; of the gap's structure {} goes with that and nothing else, {} with it or others alike",
+        place.channel,
+        place.direction,
+        covariate(&place.covariate),
+        share(place.share_unique),
+        share(place.share_shared)
+    ))
+}
+
+/// A power of the feed.
+pub(super) fn feed_exponent(exponent: f64) -> String {
+    let rounded = (exponent * 10.0).round() / 10.0;
+    if rounded.abs() < 0.25 {
+        "does not depend on feed".to_owned()
+    } else {
+        format!("changes with feed to the power {rounded:.1}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn components_have_their_symbols_and_covariates_are_words() {
+        assert_eq!(name("straightness", "YX"), "straightness EYX");
+        assert_eq!(name("squareness", "XY"), "squareness XY (EC0Y)");
+        assert_eq!(name("backlash", "X"), "backlash X");
+        assert_eq!(signs([("backlash", "X")].into_iter()), None);
+        let pairs = [
+            ("squareness", "XZ"),
+            ("squareness", "XY"),
+            ("backlash", "X"),
+        ];
+        assert_eq!(
+            signs(pairs.into_iter()).as_deref(),
+            Some(
+                "EB0Z above 0: X+ and Z+ enclose less than 90° (ISO 230-1). EC0Y above 0: X+ and Y+ enclose more than 90° (ISO 230-1)."
+            )
+        );
+        assert_eq!(name("probe_latency", ""), "latency of the probe signal");
+        assert_eq!(covariate("position_y"), "the position of Y");
+        assert!(covariate("sense*log_distance_since_reversal_x").contains("since X turned"));
+        assert_eq!(covariate("time"), "time");
+        assert_eq!(feed_exponent(-0.04), "does not depend on feed");
+        assert!(feed_exponent(0.96).contains("1.0"));
+    }
+}

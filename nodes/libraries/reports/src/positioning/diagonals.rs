@@ -1,0 +1,223 @@
+//! ISO 230-6: the four space diagonals of a bag.
+
+use iso230::diagonal;
+use iso230::diagonal::{DiagonalResult, DiagonalRuns, DiagonalsResult, SpaceDiagonal};
+use iso230::positioning::{PointResult, PositioningRuns};
+use metrology::sample::TestKind;
+
+use super::{LEAST_SHARE, figure, periods_mm, runs, side_of};
+use crate::evaluate::Tests;
+use crate::evaluate::budget::Budget;
+use crate::evaluate::correction::Measured;
+use crate::evaluate::linear::{LinearTest, Reference};
+use crate::section::{NOT_EVALUATED, Rows, Section, head, um};
+use crate::terminal::Rank;
+
+/// The space diagonal along which a test ran, and whether it ran it upwards.
+fn space_diagonal(test: &LinearTest) -> Option<(SpaceDiagonal, bool)> {
+    let along = test.direction;
+    if test.kind != TestKind::Diagonal || along.iter().any(|share| share.abs() < LEAST_SHARE) {
+        return None;
+    }
+    let positive = along.map(|share| share > 0.0);
+    // A diagonal and its reverse are one: the one with at most one negative axis names it.
+    let upwards = positive.iter().filter(|p| **p).count() >= 2;
+    let [x, y, z] = [positive.x, positive.y, positive.z].map(|p| p == upwards);
+    let diagonal = match (x, y, z) {
+        (false, _, _) => SpaceDiagonal::Npp,
+        (_, false, _) => SpaceDiagonal::Pnp,
+        (_, _, false) => SpaceDiagonal::Ppn,
+        _ => SpaceDiagonal::Ppp,
+    };
+    Some((diagonal, upwards))
+}
+
+/// The runs as they are upwards along the diagonal, positions counted from its lower end.
+fn upwards(mut runs: PositioningRuns, is_upwards: bool) -> PositioningRuns {
+    if is_upwards {
+        return runs;
+    }
+    let last_mm = runs.targets_mm.last().copied().unwrap_or(0.0);
+    let reversed = runs.targets_mm.iter().rev();
+    runs.targets_mm = reversed.map(|at| last_mm - at).collect();
+    // Seen from the other end a deviation along the line is of the other sign, and up is down.
+    let turned = |all: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let turn = |run: &Vec<f64>| run.iter().rev().map(|deviation| -deviation).collect();
+        all.iter().map(turn).collect()
+    };
+    (runs.up_mm, runs.down_mm) = (turned(&runs.down_mm), turned(&runs.up_mm));
+    runs.zero_mm = runs.targets_mm.first().copied().unwrap_or(0.0);
+    runs
+}
+
+/// Deviations from the mean at the lower end, so that diagonals of one corner can be compared.
+fn from_lower_end(runs: &mut PositioningRuns) {
+    let all = || runs.up_mm.iter().chain(&runs.down_mm);
+    let first: Vec<f64> = all().filter_map(|run| run.first().copied()).collect();
+    let mean_mm = first.iter().sum::<f64>() / first.len().max(1) as f64;
+    for deviation in runs.up_mm.iter_mut().chain(&mut runs.down_mm).flatten() {
+        *deviation -= mean_mm;
+    }
+}
+
+/// Names the diagonals whose targets were approached from one side only.
+fn one_way(tests: &[LinearTest]) -> Option<Section> {
+    let is_one_way = |test: &&LinearTest| space_diagonal(test).is_some() && side_of(test).is_some();
+    let one_way = tests.iter().filter(is_one_way);
+    let names: Vec<&str> = one_way.map(|test| test.name.as_str()).collect();
+    if names.is_empty() {
+        return None;
+    }
+    let mut section = Section::new("Space diagonals, ISO 230-6");
+    let line = format!(
+        "Not evaluated with {}: their targets were approached from one side alone (one-way); the figures of ISO 230-6 need both.",
+        names.join(", ")
+    );
+    section.warn(NOT_EVALUATED, line);
+    Some(section)
+}
+
+/// ISO 230-6, for each state in which the four space diagonals are there.
+pub fn sections(tests: &Tests, budget: Option<&Budget>) -> Vec<Section> {
+    let mut sections = Vec::new();
+    sections.extend(one_way(&tests.linear));
+    for compensated in [false, true] {
+        let mut first: Vec<(SpaceDiagonal, bool, &LinearTest)> = Vec::new();
+        let evaluable = |test: &&LinearTest| {
+            let has_targets = !test.targets_mm.is_empty() && side_of(test).is_none();
+            test.compensated == compensated && has_targets
+        };
+        for test in tests.linear.iter().filter(evaluable) {
+            if let Some((diagonal, is_upwards)) = space_diagonal(test)
+                && first.iter().all(|(known, ..)| *known != diagonal)
+            {
+                first.push((diagonal, is_upwards, test));
+            }
+        }
+        if first.len() == SpaceDiagonal::ALL.len() {
+            sections.push(diagonals_section(tests, &first, budget));
+        }
+    }
+    sections
+}
+
+fn diagonals_section(
+    tests: &Tests,
+    first: &[(SpaceDiagonal, bool, &LinearTest)],
+    budget: Option<&Budget>,
+) -> Section {
+    let state = if first.iter().any(|(.., test)| test.compensated) {
+        "compensated"
+    } else {
+        "not compensated"
+    };
+    let title = format!("Space diagonals, ISO 230-6: {state}");
+    let mut section = Section::new(title).ranked(Rank::Answer);
+    let all = first.iter().flat_map(|(.., test)| &test.runs);
+    let all: Vec<u32> = all.copied().collect();
+    let measured = Measured::of(tests, budget, (&all, Reference::Length, None));
+    let of = |(diagonal, is_upwards, test): &(SpaceDiagonal, bool, &LinearTest)| {
+        let periods_mm = periods_mm(test, tests.machine.as_ref());
+        let mut runs = upwards(runs(test, periods_mm, &measured), *is_upwards);
+        from_lower_end(&mut runs);
+        DiagonalRuns {
+            diagonal: *diagonal,
+            runs,
+        }
+    };
+    let all: Vec<DiagonalRuns> = first.iter().map(of).collect();
+    let span_mm = all.iter().map(|one| one.runs.span_mm()).fold(0.0, f64::max);
+    match diagonal::evaluate(&all, &measured.budget) {
+        Ok(result) => {
+            let stated = measured.is_stated;
+            section.answer(format!(
+                "Systematic deviation E_d {} µm, reversal B_d {} µm; the diagonals differ by {} µm.",
+                figure(&result.systematic_error, stated),
+                figure(&result.reversal, stated),
+                figure(&result.spread, stated)
+            ));
+            section.lines.push(measured.correction.in_words(span_mm));
+            section.tables.push(of_diagonals(&result, stated));
+            section.figures = serde_json::json!({
+                "test": section.title,
+                "iso230_6": result,
+                "correction_to_20_degc": measured.correction.as_json(),
+                "no_verdict": measured.correction.lacks(),
+            });
+        }
+        Err(error) => section.not_evaluated(error),
+    }
+    section
+}
+
+fn of_diagonals(result: &DiagonalsResult, stated: bool) -> Rows {
+    let row = |one: &DiagonalResult| {
+        let (points, found) = (&one.positioning.points, &one.positioning);
+        let mean = |point: Option<&PointResult>| {
+            point.map_or(f64::NAN, |p| f64::midpoint(p.up.mean_mm, p.down.mean_mm))
+        };
+        vec![
+            one.diagonal.name().to_owned(),
+            um(mean(points.last()) - mean(points.first())),
+            figure(&found.systematic_error, stated),
+            figure(&found.reversal, stated),
+            figure(&found.repeatability, stated),
+            figure(&found.accuracy, stated),
+        ]
+    };
+    Rows {
+        head: head(&["diagonal / µm", "too long by", "E", "B", "R", "A"]),
+        rows: result.diagonals.iter().map(row).collect(),
+        note: if stated {
+            "± expanded uncertainty, k = 2. All too long alike: a scale error; unlike: squareness."
+        } else {
+            "Without --budget no uncertainty is stated. All too long alike: a scale error; unlike: squareness."
+        }
+        .to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::test;
+    use super::*;
+
+    #[test]
+    fn a_diagonal_is_known_by_its_direction_and_not_by_its_place_in_the_plan() {
+        for (direction, wanted) in [
+            ([2.0, 1.0, 1.5], (SpaceDiagonal::Ppp, true)),
+            ([-2.0, 1.0, 1.5], (SpaceDiagonal::Npp, true)),
+            ([2.0, -1.0, 1.5], (SpaceDiagonal::Pnp, true)),
+            ([2.0, 1.0, -1.5], (SpaceDiagonal::Ppn, true)),
+            ([-2.0, -1.0, 1.5], (SpaceDiagonal::Ppn, false)),
+            ([-2.0, -1.0, -1.5], (SpaceDiagonal::Ppp, false)),
+        ] {
+            assert_eq!(
+                space_diagonal(&test(direction)),
+                Some(wanted),
+                "{direction:?}"
+            );
+        }
+        assert_eq!(space_diagonal(&test([1.0, 1.0, 0.0])), None);
+    }
+
+    #[test]
+    fn a_diagonal_that_is_run_from_its_upper_end_is_as_long_and_has_the_same_reversal() {
+        let read = test([-1.0, -1.0, 1.0]);
+        let as_read = PositioningRuns {
+            zero_mm: 0.0,
+            targets_mm: read.targets_mm,
+            up_mm: read.up_mm,
+            down_mm: read.down_mm,
+            periods_mm: vec![],
+        };
+        let turned = upwards(as_read, false);
+        assert_eq!(turned.targets_mm, [0.0, 200.0, 300.0]);
+        assert_eq!(turned.up_mm, [vec![-0.005, -0.003, -0.002]]);
+        assert_eq!(turned.down_mm, [vec![-0.003, -0.001, -0.0]]);
+        let mut levelled = turned;
+        from_lower_end(&mut levelled);
+        assert!((levelled.up_mm[0][0] + 0.001).abs() < 1e-12);
+        assert!((levelled.down_mm[0][0] - 0.001).abs() < 1e-12);
+    }
+}

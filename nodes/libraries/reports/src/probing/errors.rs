@@ -1,0 +1,405 @@
+//! ISO 230-10: form and size of spheres, rings and bosses as the probe finds them, against their certificates.
+
+use iso230::ExpandedLength;
+use iso230::budget::DeviceUncertainty;
+use iso230::probing::{self, Artefact, FormResult, RING_POINTS, SPHERE_POINTS, Side};
+use machine::cycle::FeatureId;
+use machine::file::CertificateEntry;
+use metrology::sample::{FeatureKind, ProbedFeature, ProbedPoint, Rejection};
+use metrology::stamp::{Host, Stamp};
+use nalgebra::Vector3;
+use serde::Serialize;
+use serde_json::json;
+
+use super::{drift_mm, kind, pose};
+use crate::evaluate::Tests;
+use crate::evaluate::budget::Budget;
+use crate::evaluate::correction::Measured;
+use crate::evaluate::linear::Reference;
+use crate::positioning::figure;
+use crate::section::{NOT_EVALUATED, Rows, Section, head, um};
+
+/// Why no conformance is decided of a size.
+const NOT_AT_20_DEGC: &str =
+    "not corrected to 20 °C: temperature and expansion of the artefact are not stated";
+
+/// One round shape, evaluated.
+#[derive(Serialize)]
+struct Found {
+    feature: String,
+    run: u32,
+    kind: &'static str,
+    pose: String,
+    points: usize,
+    usual_points: usize,
+    /// P_FTU,2D or P_FTU,3D; without a certificate the artefact's own form is in it and not in its uncertainty.
+    probing_error_mm: f64,
+    probing_error: Option<ExpandedLength>,
+    size_error: Option<ExpandedLength>,
+    certificate: Option<String>,
+    not_evaluated: Option<String>,
+}
+
+/// The part, where a round shape was touched.
+pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
+    let mut before: Vec<(&ProbedFeature, Stamp<Host>)> = vec![];
+    let mut found = vec![];
+    for feature in tests
+        .features
+        .iter()
+        .filter(|f| f.kind != FeatureKind::Plane)
+    {
+        let same = |(known, _): &&(&ProbedFeature, Stamp<Host>)| {
+            known.run == feature.run && known.feature_id == feature.feature_id
+        };
+        let since = before.iter().rev().find(same).map(|(_, at)| *at);
+        found.push(evaluated(tests, feature, since, budget));
+        before.push((feature, feature.at));
+    }
+    (!found.is_empty()).then(|| {
+        let mut section = Section::new("Probing errors of form and size, ISO 230-10");
+        for (is_warning, line) in reasons(&found, tests.machine.is_some()) {
+            if is_warning {
+                section.warn(NOT_EVALUATED, line);
+            } else {
+                section.lines.push(line);
+            }
+        }
+        section.tables.push(Rows {
+            head: head(&[
+                "feature",
+                "points",
+                "usual",
+                "P_FTU / µm",
+                "size error / µm",
+                "certificate",
+            ]),
+            rows: found.iter().map(|one| one.row(budget.is_some())).collect(),
+            note: note(budget.is_some()),
+        });
+        section.figures = json!({
+            "test": section.title, "iso230_10_errors": found, "no_verdict_on_size": NOT_AT_20_DEGC,
+        });
+        section
+    })
+}
+
+fn note(stated: bool) -> String {
+    let uncertainty = if stated {
+        " ± expanded uncertainty, k = 2: certificate, drift, and temperature and expansion of `machine` of the budget."
+    } else {
+        " Without --budget no uncertainty is stated."
+    };
+    format!(
+        "P_FTU,3D of a sphere, P_FTU,2D of a bore or boss: greatest minus least distance from the fitted centre. Size error: measured diameter minus that of the certificate, {NOT_AT_20_DEGC}; no conformance of it is decided.{uncertainty}"
+    )
+}
+
+/// What has no figure, each reason once, with whether the whole test has none.
+fn reasons(found: &[Found], has_machine: bool) -> Vec<(bool, String)> {
+    let mut lines: Vec<(bool, String)> = vec![];
+    let mut add = |is_warning: bool, line: String| {
+        if !lines.iter().any(|(_, known)| *known == line) {
+            lines.push((is_warning, line));
+        }
+    };
+    for one in found {
+        match &one.not_evaluated {
+            Some(why) => add(
+                true,
+                format!("{}, run {}: not evaluated: {why}.", one.feature, one.run),
+            ),
+            None if one.certificate.is_none() => {
+                let where_missing = if has_machine {
+                    "the machine file has no certificate of it (certificates)"
+                } else {
+                    "the bag has no machine file, which would have its certificate"
+                };
+                add(
+                    false,
+                    format!(
+                        "{}: {where_missing}: no size error, and its own form is in P_FTU.",
+                        one.feature
+                    ),
+                );
+            }
+            None => {}
+        }
+        if one.points != one.usual_points {
+            let line = format!(
+                "{}, a {}: {} points; the standard asks for {}.",
+                one.feature, one.kind, one.points, one.usual_points
+            );
+            add(false, line);
+        }
+    }
+    lines
+}
+
+/// The used touches of one shape: those of its run and name since the shape before.
+fn points(tests: &Tests, feature: &ProbedFeature, since: Option<Stamp<Host>>) -> Vec<Vector3<f64>> {
+    let is_of = |point: &ProbedPoint| {
+        let owner = FeatureId::parse(&point.feature_id).map(|id| id.owner() == feature.feature_id);
+        owner == Some(true)
+            && point.rejection == Rejection::None
+            && point.received_at <= feature.at
+            && since.is_none_or(|since| point.received_at > since)
+    };
+    let touches = tests.touches.iter();
+    touches
+        .filter(|(segment, point)| segment.run == feature.run && is_of(point))
+        .map(|(_, point)| point.point_in_machine_mm)
+        .collect()
+}
+
+/// The artefact as its certificate states it; without one, as large as it was found.
+fn artefact(
+    tests: &Tests,
+    feature: &ProbedFeature,
+    certificate: Option<&CertificateEntry>,
+    budget: Option<&Budget>,
+) -> Artefact {
+    let about = (&[feature.run][..], Reference::Length, None);
+    let expansion = Measured::of(tests, budget, about).budget.machine;
+    let device = |expanded_um: f64, coverage_factor: f64| DeviceUncertainty {
+        expanded_uncertainty_mm: expanded_um * 1e-3,
+        expanded_uncertainty_per_length: 0.0,
+        coverage_factor,
+    };
+    let mut artefact = Artefact {
+        diameter_mm: 2.0 * feature.radius_mm,
+        diameter_uncertainty: device(0.0, 1.0),
+        form_mm: 0.0,
+        form_standard_uncertainty_mm: 0.0,
+        expansion,
+        // Points are of the surface: the probe has taken the ball off.
+        stylus_radius_mm: 0.0,
+        side: if feature.kind == FeatureKind::Bore {
+            Side::Inside
+        } else {
+            Side::Outside
+        },
+    };
+    if let Some(stated) = certificate {
+        artefact.diameter_mm = stated.diameter_mm;
+        artefact.diameter_uncertainty =
+            device(stated.expanded_uncertainty_um, stated.coverage_factor);
+        artefact.form_mm = stated.form_um * 1e-3;
+        artefact.form_standard_uncertainty_mm =
+            stated.form_expanded_uncertainty_um * 1e-3 / stated.coverage_factor;
+    }
+    artefact
+}
+
+fn evaluated(
+    tests: &Tests,
+    feature: &ProbedFeature,
+    since: Option<Stamp<Host>>,
+    budget: Option<&Budget>,
+) -> Found {
+    let points = points(tests, feature, since);
+    let machine = tests.machine.as_ref();
+    let certificate = machine.and_then(|file| file.certificate(&feature.feature_id));
+    let is_sphere = feature.kind == FeatureKind::Sphere;
+    let artefact = artefact(tests, feature, certificate, budget);
+    let drift_mm = drift_mm(budget);
+    let result = if is_sphere {
+        probing::sphere(&points, &artefact, drift_mm)
+    } else {
+        let flat: Vec<_> = points.iter().map(Vector3::xy).collect();
+        probing::ring(&flat, &artefact, drift_mm)
+    };
+    let (why, result) = match result {
+        Ok(result) => (None, Some(result)),
+        Err(error) => (Some(error.to_string()), None),
+    };
+    let stated = |of: fn(&FormResult) -> ExpandedLength| {
+        let known = certificate.and(result.as_ref());
+        known.map(of)
+    };
+    Found {
+        feature: feature.feature_id.clone(),
+        run: feature.run,
+        kind: kind(feature),
+        pose: pose(feature),
+        points: points.len(),
+        usual_points: if is_sphere {
+            SPHERE_POINTS
+        } else {
+            RING_POINTS
+        },
+        probing_error_mm: { result.as_ref() }.map_or(f64::NAN, |one| one.form_error.value_mm),
+        probing_error: stated(|one| one.form_error),
+        size_error: stated(|one| one.size_error),
+        certificate: certificate.map(|one| one.number.clone().unwrap_or_default()),
+        not_evaluated: why,
+    }
+}
+
+impl Found {
+    fn row(&self, stated: bool) -> Vec<String> {
+        let size = self.size_error.as_ref();
+        let form = self.probing_error.as_ref();
+        vec![
+            format!("{}, run {}{}", self.feature, self.run, self.pose),
+            self.points.to_string(),
+            self.usual_points.to_string(),
+            form.map_or_else(|| um(self.probing_error_mm), |one| figure(one, stated)),
+            size.map_or_else(|| um(f64::NAN), |one| figure(one, stated)),
+            match self.certificate.as_deref() {
+                None => "none".to_owned(),
+                Some("") => "without number".to_owned(),
+                Some(number) => number.to_owned(),
+            },
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use machine::MachineFile;
+    use metrology::sample::{Correction, TestKind, TestSegment};
+    use metrology::{AxisSet, PerAxis};
+    use nalgebra::Matrix3;
+
+    use super::*;
+
+    /// 25 points with three lobes and noise, evaluated by scipy.
+    const REFERENCE: &str =
+        include_str!("../../../../libraries/iso230/tests/data/iso230_reference.json");
+    const MACHINE: &str = include_str!("../../../../../launch_configs/five_axis/machine.yaml");
+    const BUDGET: &str = "
+grid_encoder: {expanded_uncertainty_um: 0.6, expanded_uncertainty_um_per_m: 1.0, coverage_factor: 2.0}
+length_reference: {expanded_uncertainty_um: 0.1, expanded_uncertainty_um_per_m: 0.5, coverage_factor: 2.0}
+machine: {temperature_deviation_k: 0.5, temperature_half_width_k: 0.5, expansion_um_per_m_k: 11.0, expansion_half_width_um_per_m_k: 1.0}
+device: {temperature_deviation_k: 0.0, temperature_half_width_k: 0.1, expansion_um_per_m_k: 0.0, expansion_half_width_um_per_m_k: 0.0}
+misalignment_mm: 0.1
+environmental_drift_um: 0.6
+";
+
+    fn reference(name: &str) -> serde_json::Value {
+        let all: serde_json::Value = serde_json::from_str(REFERENCE).unwrap();
+        all["sphere"][name].clone()
+    }
+
+    fn segment() -> TestSegment {
+        TestSegment {
+            feed_mm_s: 2.0,
+            zero_id: 1,
+            setup_id: 1,
+            features: vec!["high".to_owned()],
+            completed: false,
+            ..TestSegment::of_kind(TestKind::Sphere, 4, Stamp::from_nanos(0))
+        }
+    }
+
+    fn touch(index: usize, point_mm: [f64; 3]) -> ProbedPoint {
+        ProbedPoint {
+            received_at: Stamp::from_nanos(index as i64 + 1),
+            feature_id: format!("high.{}", index + 1),
+            axes_at_contact: PerAxis::default(),
+            axes: AxisSet::XYZ,
+            point_in_machine_mm: point_mm.into(),
+            point_in_workpiece_mm: Vector3::zeros(),
+            applied_latency_s: 0.0,
+            correction: Correction::None,
+            standard_uncertainty_mm: 0.0,
+            approach: -Vector3::z(),
+            feed_mm_s: 2.0,
+            rejection: Rejection::None,
+            sequence: 0,
+        }
+    }
+
+    /// A bag with the 25 touches, two of another sphere and one that was rejected.
+    fn tests(certificate: &str) -> Tests {
+        let points: Vec<[f64; 3]> = serde_json::from_value(reference("points_mm")).unwrap();
+        let n = points.len();
+        let mut touches: Vec<ProbedPoint> = { points.into_iter().enumerate() }
+            .map(|(index, point)| touch(index, point))
+            .collect();
+        let mut rejected = touch(0, [99.0; 3]);
+        rejected.rejection = Rejection::Gap;
+        let mut other = touch(1, [50.0; 3]);
+        other.feature_id = "low.1".to_owned();
+        touches.extend([rejected, other]);
+        let radius_mm: f64 = serde_json::from_value(reference("radius_mm")).unwrap();
+        let feature = ProbedFeature {
+            at: Stamp::from_nanos(n as i64),
+            feature_id: "high".to_owned(),
+            kind: FeatureKind::Sphere,
+            centre_mm: Vector3::zeros(),
+            centre_covariance_mm2: Matrix3::zeros(),
+            normal: Vector3::zeros(),
+            normal_standard_uncertainty_rad: f64::NAN,
+            radius_mm,
+            radius_standard_uncertainty_mm: 0.0,
+            form_mm: 0.0,
+            n: n as u32,
+            n_rejected: 1,
+            run: 4,
+            rotary_axes: AxisSet::default(),
+            rotary_rad: PerAxis::default(),
+        };
+        let large = MACHINE.replacen("radius_mm: 12.5", "radius_mm: 15.0", 1);
+        let machine = MachineFile::parse(&format!("{large}{certificate}"), "machine.yaml").unwrap();
+        Tests {
+            touches: touches.into_iter().map(|one| (segment(), one)).collect(),
+            features: vec![feature],
+            machine: Some(machine),
+            ..Tests::default()
+        }
+    }
+
+    #[test]
+    fn val_form_and_size_of_25_touches_are_those_of_scipy_with_the_certificates_uncertainty() {
+        let certificate = "certificates:\n  - {artefact: high, diameter_mm: 30.0006, expanded_uncertainty_um: 0.4, form_um: 0.3, form_expanded_uncertainty_um: 0.1, coverage_factor: 2.0, number: K-17}\n";
+        let budget = Budget::read(BUDGET, Path::new("budget.yaml")).unwrap();
+        let section = section(&tests(certificate), Some(&budget)).unwrap();
+        let why = section.figures["no_verdict_on_size"].as_str().unwrap();
+        assert!(why.starts_with("not corrected to 20 °C"), "{why}");
+        assert!(section.tables[0].note.contains(why), "{:?}", section.tables);
+        let one = &section.figures["iso230_10_errors"][0];
+        let value = |key: &str, of: &str| one[key][of].as_f64().unwrap() * 1e3;
+        let by_scipy = |name: &str| reference(name).as_f64().unwrap();
+        let near =
+            |found: f64, wanted: f64| assert!((found - wanted).abs() < 1e-6, "{found} {wanted}");
+        near(
+            value("probing_error", "value_mm"),
+            by_scipy("form_mm") * 1e3,
+        );
+        let size_um = (2.0 * by_scipy("radius_mm") - 30.0006) * 1e3;
+        near(value("size_error", "value_mm"), size_um);
+        // By hand, µm: one touch drifts by ±0.3 (rectangular), form 0.3 with 0.05; 30 mm with 11 µm/m/K to 0.5 K and
+        // 0.5 K with 1 µm/m/K.
+        let drift2 = 0.3 * 0.3 / 3.0;
+        // The fit of 4 unknowns takes its part of 25 touches; each of two touches lies anywhere within the form.
+        let form = 2.0 * f64::sqrt(2.0 * drift2 * 21.0 / 25.0 + (0.3 * 0.3 + 0.05 * 0.05) / 6.0);
+        near(value("probing_error", "expanded_uncertainty_mm"), form);
+        let warm2 = (0.03_f64 * 11.0 * 0.5).powi(2) / 3.0 + (0.03_f64 * 0.5).powi(2) / 3.0;
+        // Variance factor of the radius, numpy: inverse of the normal matrix of (direction, 1) at the scipy centre.
+        let of_radius = 0.107_400_375_8;
+        let size = 2.0 * f64::sqrt(0.2 * 0.2 + warm2 + 4.0 * of_radius * drift2);
+        let stated = value("size_error", "expanded_uncertainty_mm");
+        assert!((stated - size).abs() < 1e-5, "{stated} {size}");
+        assert!(
+            section.terminal().contains("K-17"),
+            "{}",
+            section.terminal()
+        );
+        assert_eq!(section.lines, [""; 0]);
+    }
+
+    #[test]
+    fn without_a_certificate_there_is_the_form_and_the_reason_why_there_is_no_size() {
+        let section = section(&tests(""), None).unwrap();
+        let one = &section.figures["iso230_10_errors"][0];
+        assert!(one["size_error"].is_null() && one["probing_error"].is_null());
+        let form = one["probing_error_mm"].as_f64().unwrap();
+        assert!((form - reference("form_mm").as_f64().unwrap()).abs() < 1e-9);
+        let why = "high: the machine file has no certificate of it (certificates): no size error, and its own form is in P_FTU.";
+        assert_eq!(section.lines, [why]);
+    }
+}
