@@ -60,7 +60,7 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
 /// The same of bytes.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     if is_own_output(path) {
         return std::fs::write(path, bytes).with_context(|| path.display().to_string());

@@ -3,7 +3,7 @@
 //! The grid counts from where it was zeroed, which nothing states. All circles under one zero are therefore shifted
 //! alike: by the mean of commanded minus read place over all of them. A sense that is shifted alone would lose what
 //! the senses differ by, and G(b), D and H compare them.
-//! [`turn`] has the rules by which run-in and run-out are left out.
+//! The module `turn` has the rules by which run-in and run-out are left out.
 //!
 //! A length that is read during a circle is that of a ballbar, from the centre: it lies at the angle of the command, and
 //! counts from the centre of its mount, for nothing tells where that is. Where the plate was read too, the plate counts.
