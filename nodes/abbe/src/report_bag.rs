@@ -3,7 +3,7 @@
 use node_runtime::complain;
 use node_runtime::text_file;
 use reports::evaluate::budget::{Budget, unstate};
-use reports::evaluate::limits::Limits;
+use reports::evaluate::limits::{Limits, state_traceability};
 use reports::evaluate::{BrokenOff, Tests};
 use reports::loss;
 use reports::machine_defaults;
@@ -198,7 +198,8 @@ fn judged_page(
     if budget.is_none() {
         figures.iter_mut().for_each(unstate);
     }
-    let judged = limits.map(|limits| limits.section(&figures)).transpose()?;
+    let judge = |limits: &Limits| judged_by(limits, &figures, &conditions.section.figures);
+    let judged = limits.map(judge).transpose()?;
     let conformance = judged.as_ref().map(|section| section.figures.clone());
     let screen = first_screen::of(tests, &sections, judged.as_ref(), budget.is_some());
     sections.extend(judged);
@@ -242,6 +243,17 @@ fn judged_page(
         }),
         lines: lines.into_iter().chain(defaults_line).collect(),
     })
+}
+
+/// The decisions on figures that were measured under these conditions.
+fn judged_by(
+    limits: &Limits,
+    figures: &[serde_json::Value],
+    conditions: &serde_json::Value,
+) -> Result<Section> {
+    let mut section = limits.section(figures)?;
+    state_traceability(&mut section, conditions);
+    Ok(section)
 }
 
 /// The runs that the machine did not complete, for machines.

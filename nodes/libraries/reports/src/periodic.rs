@@ -8,13 +8,13 @@ use iso230::positioning::periodic::{self, PeriodicResult, PeriodicRun};
 use metrology::Axis;
 use metrology::sample::TestKind;
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::positioning::figure;
 use super::section::{NOT_EVALUATED, Rows, Section, head, um};
 use crate::evaluate::Tests;
-use crate::evaluate::budget::Budget;
-use crate::evaluate::correction::Measured;
+use crate::evaluate::budget::{Budget, unstate};
+use crate::evaluate::correction::{BY_OWN_SCALE, Measured};
 use crate::evaluate::linear::LinearTest;
 
 /// Share of a period by which targets may be apart.
@@ -33,6 +33,11 @@ struct Found {
     from_mm: f64,
     to_mm: f64,
     targets: usize,
+    /// Why it is no figure of the standard.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    label: Option<&'static str>,
+    #[serde(skip)]
+    is_stated: bool,
     result: PeriodicResult,
 }
 
@@ -61,7 +66,7 @@ pub fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
         return None;
     }
     if !found.is_empty() {
-        let stated = budget.is_some();
+        let stated = found.iter().any(|one| one.is_stated);
         section.tables.push(Rows {
             head: head(&[
                 "test",
@@ -72,7 +77,7 @@ pub fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
                 "p of the 1st",
                 "rest, s / µm",
             ]),
-            rows: found.iter().map(|one| one.row(stated)).collect(),
+            rows: found.iter().map(Found::row).collect(),
             note: format!(
                 "P: greatest minus least value of what repeats with the lead, a straight line taken out; its shape is that of the harmonics whose amplitudes are told, sharper ones are not in it. A probability p above {SIGNIFICANT} says that scatter alone shows as much.{}",
                 if stated { " ± expanded uncertainty, k = 2, of the fit and of drift." } else { "" }
@@ -82,7 +87,8 @@ pub fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
             .lines
             .extend(found.iter().filter_map(Found::unclear));
     }
-    section.figures = json!({ "test": section.title, "iso230_2_periodic": found });
+    let all: Vec<Value> = found.iter().map(Found::as_json).collect();
+    section.figures = json!({ "test": section.title, "iso230_2_periodic": all });
     Some(section)
 }
 
@@ -102,7 +108,7 @@ fn evaluated(
     let (first, last) = dense(&test.targets_mm, period_mm)?;
     let targets_mm = &test.targets_mm[first..=last];
     let about: (&[u32], _, _) = (&test.runs, test.reference, test.axis);
-    let used = Measured::of(tests, budget, about).budget;
+    let measured = Measured::of(tests, budget, about);
     let greatest_step_mm =
         { targets_mm.windows(2) }.fold(0.0, |step: f64, two| step.max(two[1] - two[0]));
     let n_harmonics = harmonics(targets_mm.len(), greatest_step_mm / period_mm);
@@ -119,7 +125,8 @@ fn evaluated(
             period_mm,
             n_harmonics,
         };
-        let result = periodic::evaluate(&run, &used).map_err(|error| error.to_string())?;
+        let result =
+            periodic::evaluate(&run, &measured.budget).map_err(|error| error.to_string())?;
         Ok(Found {
             name: test.name.clone(),
             first_run: test.first_run,
@@ -127,11 +134,14 @@ fn evaluated(
             from_mm: targets_mm[0],
             to_mm: targets_mm[targets_mm.len() - 1],
             targets: targets_mm.len(),
+            label: measured.is_by_own_scale.then_some(BY_OWN_SCALE),
+            // What a scale is off by within a lead no certificate states.
+            is_stated: measured.is_stated && !measured.is_by_own_scale,
             result,
         })
     };
-    let measured = sides.into_iter().filter(|(_, rows)| !rows.is_empty());
-    measured.map(one).collect()
+    let read = sides.into_iter().filter(|(_, rows)| !rows.is_empty());
+    read.map(one).collect()
 }
 
 /// As many harmonics as the steps (in periods) show without aliasing, and with twice as many targets as parameters.
@@ -168,7 +178,7 @@ fn dense(targets_mm: &[f64], period_mm: f64) -> Result<(usize, usize), String> {
 }
 
 impl Found {
-    fn row(&self, stated: bool) -> Vec<String> {
+    fn row(&self) -> Vec<String> {
         let result = &self.result;
         let amplitudes: Vec<String> = result
             .harmonics
@@ -177,17 +187,33 @@ impl Found {
             .collect();
         let p = result.harmonics.first().and_then(|first| first.p_value);
         vec![
-            format!(
-                "{}, run {} on, {}",
-                self.name, self.first_run, self.direction
-            ),
+            self.test(),
             format!("{:.2} to {:.2}", self.from_mm, self.to_mm),
             format!("{}", result.period_mm),
-            figure(&result.periodic_error, stated),
+            figure(&result.periodic_error, self.is_stated),
             amplitudes.join(", "),
             p.map_or_else(|| "—".to_owned(), |p| format!("{p:.3}")),
             um(result.residual_standard_deviation_mm),
         ]
+    }
+
+    fn test(&self) -> String {
+        let label = self
+            .label
+            .map_or_else(String::new, |why| format!(" ({why})"));
+        format!(
+            "{}, run {} on, {}{label}",
+            self.name, self.first_run, self.direction
+        )
+    }
+
+    /// For machines.
+    fn as_json(&self) -> Value {
+        let mut entry = json!(self);
+        if !self.is_stated {
+            unstate(&mut entry);
+        }
+        entry
     }
 
     fn unclear(&self) -> Option<String> {
@@ -203,7 +229,14 @@ impl Found {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+    use std::path::Path;
+
+    use machine::MachineFile;
+    use nalgebra::Vector3;
+
     use super::*;
+    use crate::evaluate::linear::Reference;
 
     #[test]
     fn the_longest_part_of_short_steps_is_taken_and_targets_that_alias_are_refused() {
@@ -218,6 +251,54 @@ mod tests {
         assert!(said.starts_with("targets lie 10.000 mm apart"), "{said}");
         assert!(said.contains("at most 2.500 mm"), "{said}");
         assert!(dense(&[], 10.0).is_err());
+    }
+
+    #[test]
+    fn a_periodic_error_that_the_machines_scale_read_is_labelled_and_has_no_uncertainty() {
+        let machine = include_str!("../../../../launch_configs/full_closed/machine.yaml");
+        let budget = include_str!("../../../../launch_configs/full_closed/budget.yaml");
+        let budget = Budget::read(budget, Path::new("budget.yaml")).unwrap();
+        let targets_mm: Vec<f64> = (0..17).map(|k| 1.25 * f64::from(k)).collect();
+        let wave = |at: &f64| 2e-3 * (TAU * at / 10.0).sin();
+        let run: Vec<f64> = targets_mm.iter().map(wave).collect();
+        for (reference, is_own) in [(Reference::Scale, true), (Reference::Length, false)] {
+            let test = LinearTest {
+                kind: TestKind::Positioning,
+                axis: Some(Axis::X),
+                name: "X".to_owned(),
+                first_run: 3,
+                runs: vec![3],
+                feed_mm_s: 100.0,
+                reference,
+                direction: Vector3::x(),
+                targets_mm: targets_mm.clone(),
+                up_mm: vec![run.clone(); 5],
+                down_mm: vec![run.clone(); 5],
+                left_out: vec![],
+                compensated: false,
+                longest_rest: None,
+            };
+            let tests = Tests {
+                linear: vec![test],
+                machine: Some(MachineFile::parse(machine, "machine.yaml").unwrap()),
+                ..Tests::default()
+            };
+            let section = section(&tests, Some(&budget)).unwrap();
+            let entry = &section.figures["iso230_2_periodic"][0];
+            let stated = &entry["result"]["periodic_error"];
+            assert!(
+                (stated["value_mm"].as_f64().unwrap() - 4e-3).abs() < 2e-4,
+                "{entry}"
+            );
+            assert_eq!(entry["label"] == BY_OWN_SCALE, is_own, "{entry}");
+            assert_eq!(
+                stated["expanded_uncertainty_mm"].is_null(),
+                is_own,
+                "{entry}"
+            );
+            let row = &section.tables[0].rows[0];
+            assert_eq!(row[0].contains(BY_OWN_SCALE), is_own, "{row:?}");
+        }
     }
 
     #[test]

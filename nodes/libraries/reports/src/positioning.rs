@@ -11,10 +11,13 @@ use metrology::sample::TestKind;
 
 mod curves;
 mod diagonals;
+#[cfg(test)]
+mod tests;
+mod uncertainty;
 
 use super::section::{Rows, Section, head, um};
 use crate::evaluate::Tests;
-use crate::evaluate::budget::{Budget, unstate};
+use crate::evaluate::budget::{Budget, unstate, unstate_named};
 use crate::evaluate::correction::{BY_OWN_SCALE, Measured};
 use crate::evaluate::linear::{LinearTest, Reference, STOP_SETTLE, level};
 
@@ -106,9 +109,9 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
     let runs = runs(test, periods_mm(test, tests.machine.as_ref()), measured);
     let found = match side_of(test) {
         None => positioning::evaluate(&runs, &measured.budget)
-            .map(|result| fill(&mut section, test, &result, measured.is_stated)),
+            .map(|result| fill(&mut section, test, &result, measured)),
         Some(direction) => one_sided::evaluate(&runs, direction, &measured.budget)
-            .map(|result| fill_one_sided(&mut section, test, &result, measured.is_stated)),
+            .map(|result| fill_one_sided(&mut section, test, &result, measured)),
     };
     if section.figures.get("iso230_2").is_some() {
         section.drawings.push(curves::drawing(&runs)?);
@@ -141,9 +144,7 @@ fn state_reference(section: &mut Section, test: &LinearTest, measured: &Measured
     section.figures["dwell_s"] = test.longest_rest.map(|rest| rest.as_secs_f64()).into();
     section.figures["correction_to_20_degc"] = correction.as_json();
     if test.reference == Reference::Scale {
-        section
-            .lines
-            .insert(0, format!("{}.", capital(BY_OWN_SCALE)));
+        section.warn_first(OWN_SCALE, format!("{}.", capital(BY_OWN_SCALE)));
         if !measured.is_stated {
             section.lines.insert(1, SCALE_NOT_STATED.to_owned());
         }
@@ -154,10 +155,19 @@ fn state_reference(section: &mut Section, test: &LinearTest, measured: &Measured
     }
     if !measured.is_stated {
         unstate(&mut section.figures);
+    } else if !measured.are_lengths_stated {
+        unstate_named(&mut section.figures, &LENGTHS);
     }
-    section.lines.push(correction.in_words(span_mm));
+    measured.state_correction(section, span_mm);
     section.figures["no_verdict"] = no_verdict.into();
 }
+
+/// Figures that are lengths of the machine, and change with its temperature.
+const LENGTHS: [&str; 3] = ["accuracy", "systematic_error", "mean_systematic_error"];
+/// What warnings of figures that a machine read itself have in common.
+const OWN_SCALE: &str = "Read by the machine's scale";
+/// What warnings of tests have in common that are not those of the standard.
+const DEVIATES: &str = "Deviates from ISO 230-2";
 
 const SCALE_NOT_STATED: &str = "The scale's uncertainty is not stated: scale_expanded_uncertainty_um and scale_expanded_uncertainty_um_per_m of the axis in the machine file, and a budget (--budget).";
 
@@ -180,7 +190,7 @@ fn fill_one_sided(
     section: &mut Section,
     test: &LinearTest,
     result: &OneSidedResult,
-    stated: bool,
+    measured: &Measured,
 ) -> Result<()> {
     let towards = result.direction;
     section.lines.push(format!(
@@ -190,31 +200,39 @@ fn fill_one_sided(
         test.targets_mm.last().copied().unwrap_or(f64::NAN),
         result.n_runs
     ));
-    section
-        .lines
-        .extend(result.remarks.iter().map(remark_in_words));
+    state_remarks(section, &result.remarks);
+    let (stated, lengths_stated) = (measured.is_stated, measured.are_lengths_stated);
     let arrow = match towards {
         Direction::Up => "↑",
         Direction::Down => "↓",
     };
-    let row =
-        |name: &str, value: &ExpandedLength| vec![format!("{name}{arrow}"), figure(value, stated)];
+    let row = |name: &str, value: &ExpandedLength, stated: bool| {
+        vec![format!("{name}{arrow}"), figure(value, stated)]
+    };
     let of = &result.result;
     section.answers.push(format!(
-        "one way: accuracy A{arrow} {} µm, systematic deviation E{arrow} {} µm, repeatability R{arrow} {} µm.",
-        figure(&of.accuracy, stated),
-        figure(&of.systematic_error, stated),
-        figure(&of.repeatability, stated)
+        "{}one way: accuracy A{arrow} {} µm, systematic deviation E{arrow} {} µm, repeatability R{arrow} {} µm{}.",
+        measured.reservation(),
+        figure(&of.accuracy, lengths_stated),
+        figure(&of.systematic_error, lengths_stated),
+        figure(&of.repeatability, stated),
+        measured.coverage()
     ));
     section.tables.push(Rows {
         head: head(&["ISO 230-2, one side / µm", &towards.to_string()]),
         rows: vec![
-            row("accuracy A", &of.accuracy),
-            row("systematic deviation E", &of.systematic_error),
-            row("repeatability R", &of.repeatability),
+            row("accuracy A", &of.accuracy, lengths_stated),
+            row(
+                "systematic deviation E",
+                &of.systematic_error,
+                lengths_stated,
+            ),
+            row("repeatability R", &of.repeatability, stated),
         ],
-        note: uncertainty_note(stated),
+        note: measured.uncertainty_note().to_owned(),
     });
+    let terms = uncertainty::table(&result.contributions, measured);
+    section.tables.extend(terms);
     let mut figures = serde_json::json!({
         "one_sided": towards,
         "n_runs": result.n_runs,
@@ -228,14 +246,6 @@ fn fill_one_sided(
         "test": section.title, "iso230_2": figures, "left_out": test.left_out,
     });
     Ok(())
-}
-
-fn uncertainty_note(stated: bool) -> String {
-    if stated {
-        "± expanded uncertainty, k = 2.".to_owned()
-    } else {
-        "No uncertainty is stated: without --budget, or without the scale's certificate.".to_owned()
-    }
 }
 
 /// Whether no place has a reading.
@@ -282,7 +292,7 @@ fn fill(
     section: &mut Section,
     test: &LinearTest,
     result: &PositioningResult,
-    stated: bool,
+    measured: &Measured,
 ) -> Result<()> {
     section.lines.push(format!(
         "{} targets from {:.3} to {:.3} mm, {} runs up and down.",
@@ -291,28 +301,30 @@ fn fill(
         test.targets_mm.last().copied().unwrap_or(f64::NAN),
         result.n_runs
     ));
-    let remarks = result.remarks.iter().map(remark_in_words);
-    section.lines.extend(remarks);
-    let of = |value: &ExpandedLength| figure(value, stated);
+    state_remarks(section, &result.remarks);
     section.answers.push(format!(
-        "accuracy A {} µm, systematic deviation E {} µm, repeatability R {} µm, reversal B {} µm.",
-        of(&result.accuracy),
-        of(&result.systematic_error),
-        of(&result.repeatability),
-        of(&result.reversal)
+        "{}accuracy A {} µm, systematic deviation E {} µm, repeatability R {} µm, reversal B {} µm{}.",
+        measured.reservation(),
+        figure(&result.accuracy, measured.are_lengths_stated),
+        figure(&result.systematic_error, measured.are_lengths_stated),
+        figure(&result.repeatability, measured.is_stated),
+        figure(&result.reversal, measured.is_stated),
+        measured.coverage()
     ));
-    section.tables.push(figures(result, stated));
+    section.tables.push(figures(result, measured));
+    let terms = uncertainty::table(&result.contributions, measured);
+    section.tables.extend(terms);
     section.figures = serde_json::json!({
         "test": section.title, "iso230_2": result, "left_out": test.left_out,
     });
     Ok(())
 }
 
-fn figures(result: &PositioningResult, stated: bool) -> Rows {
-    let of = |value: &ExpandedLength| figure(value, stated);
-    let row = |name: &str, up: String, down: String, both: &ExpandedLength| {
-        vec![name.to_owned(), up, down, of(both)]
-    };
+fn figures(result: &PositioningResult, measured: &Measured) -> Rows {
+    let of = |value: &ExpandedLength| figure(value, measured.is_stated);
+    let length = |value: &ExpandedLength| figure(value, measured.are_lengths_stated);
+    let row =
+        |name: &str, up: String, down: String, both: String| vec![name.to_owned(), up, down, both];
     let dash = || "—".to_owned();
     let (up, down) = (&result.up, &result.down);
     Rows {
@@ -320,32 +332,39 @@ fn figures(result: &PositioningResult, stated: bool) -> Rows {
         rows: vec![
             row(
                 "accuracy A",
-                of(&up.accuracy),
-                of(&down.accuracy),
-                &result.accuracy,
+                length(&up.accuracy),
+                length(&down.accuracy),
+                length(&result.accuracy),
             ),
             row(
                 "systematic deviation E",
-                of(&up.systematic_error),
-                of(&down.systematic_error),
-                &result.systematic_error,
+                length(&up.systematic_error),
+                length(&down.systematic_error),
+                length(&result.systematic_error),
             ),
             row(
                 "repeatability R",
                 of(&up.repeatability),
                 of(&down.repeatability),
-                &result.repeatability,
+                of(&result.repeatability),
             ),
-            row("reversal B", dash(), dash(), &result.reversal),
-            row("mean reversal", dash(), dash(), &result.mean_reversal),
+            row("reversal B", dash(), dash(), of(&result.reversal)),
+            row("mean reversal", dash(), dash(), of(&result.mean_reversal)),
             row(
                 "range of means M",
                 dash(),
                 dash(),
-                &result.mean_systematic_error,
+                length(&result.mean_systematic_error),
             ),
         ],
-        note: uncertainty_note(stated),
+        note: measured.uncertainty_note().to_owned(),
+    }
+}
+
+/// What of a test is not as the standard has it, each a warning.
+fn state_remarks(section: &mut Section, remarks: &[PositioningRemark]) {
+    for remark in remarks {
+        section.warn(DEVIATES, remark_in_words(remark));
     }
 }
 
@@ -373,175 +392,5 @@ fn remark_in_words(remark: &PositioningRemark) -> String {
         } => format!(
             "All targets lie within {phase_spread_rad:.2} rad of one phase of the {period_mm:.3} mm period: an error of that period is not seen. Choose targets that are no multiples of it."
         ),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use metrology::stamp::Span;
-    use nalgebra::Vector3;
-    use std::path::Path;
-
-    pub(super) fn test(direction: [f64; 3]) -> LinearTest {
-        LinearTest {
-            kind: TestKind::Diagonal,
-            axis: None,
-            name: String::new(),
-            first_run: 1,
-            runs: vec![1],
-            feed_mm_s: 100.0,
-            reference: Reference::Length,
-            direction: Vector3::from(direction).normalize(),
-            targets_mm: vec![0.0, 100.0, 300.0],
-            up_mm: vec![vec![0.0, 0.001, 0.003]],
-            down_mm: vec![vec![0.002, 0.003, 0.005]],
-            left_out: vec![],
-            compensated: false,
-            longest_rest: None,
-        }
-    }
-
-    fn tests_of(test: LinearTest) -> Tests {
-        Tests {
-            linear: vec![test],
-            ..Tests::default()
-        }
-    }
-
-    #[test]
-    fn stops_that_were_too_short_are_told_with_their_dwell_and_the_limit() {
-        let mut short = test([1.0, 0.0, 0.0]);
-        short.longest_rest = Some(Span::from_nanos(200_000_000));
-        short.targets_mm.clear();
-        (short.up_mm, short.down_mm) = (vec![vec![]], vec![vec![]]);
-        let section = &sections(&tests_of(short.clone()), None).unwrap()[0];
-        let words =
-            "the command rested for 0.20 s at most, and readings of a stop count from 0.3 s on";
-        assert!(section.lines[0].contains(words), "{:?}", section.lines);
-        short.longest_rest = Some(STOP_SETTLE);
-        assert_eq!(too_short(&short), None);
-    }
-
-    const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
-
-    /// A positioning test of X of a machine of which only its length changed: 400 mm at 22 °C, 11 µm/(m K), and 0.05 µm of its own.
-    fn warm(reference: Reference, targets_mm: &[f64]) -> Tests {
-        let deviation = |target: &f64| 22e-6 * target + if *target > 399.0 { 5e-5 } else { 0.0 };
-        let run: Vec<f64> = targets_mm.iter().map(deviation).collect();
-        let mut warm = test([1.0, 0.0, 0.0]);
-        (warm.kind, warm.axis, warm.reference) = (TestKind::Positioning, Some(Axis::X), reference);
-        warm.targets_mm = targets_mm.to_vec();
-        warm.up_mm = vec![run; 5];
-        warm.down_mm = warm.up_mm.clone();
-        let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
-        Tests {
-            machine: Some(machine),
-            ..tests_of(warm)
-        }
-    }
-
-    const UNEVEN_MM: [f64; 5] = [0.0, 103.1, 196.3, 301.7, 400.0];
-
-    fn budget() -> Budget {
-        let text = "
-grid_encoder: {expanded_uncertainty_um: 0.4, expanded_uncertainty_um_per_m: 2.0, coverage_factor: 2.0}
-length_reference: {expanded_uncertainty_um: 0.1, expanded_uncertainty_um_per_m: 0.5, coverage_factor: 2.0}
-machine: {temperature_deviation_k: 2.0, temperature_half_width_k: 0.2, expansion_um_per_m_k: 11.0, expansion_half_width_um_per_m_k: 1.0}
-device: {temperature_deviation_k: 0.0, temperature_half_width_k: 0.1, expansion_um_per_m_k: 0.0, expansion_half_width_um_per_m_k: 0.0}
-misalignment_mm: 0.1
-environmental_drift_um: 0.0
-";
-        Budget::read(text, Path::new("budget.yaml")).unwrap()
-    }
-
-    fn um_of(figure: &serde_json::Value, key: &str) -> f64 {
-        figure[key].as_f64().unwrap() * 1e3
-    }
-
-    #[test]
-    fn an_axis_of_400_mm_at_22_degc_has_its_figures_at_20_degc() {
-        let tests = warm(Reference::Length, &UNEVEN_MM);
-        let section = &sections(&tests, Some(&budget())).unwrap()[0];
-        let found = &section.figures["iso230_2"]["systematic_error"];
-        assert!((um_of(found, "value_mm") - 0.05).abs() < 1e-6, "{found}");
-        // By hand, k = 2, rectangular: 11 µm/(m K) 0.2 K 0.4 m, 2 K 1 µm/(m K) 0.4 m, beam (0.1 mm)²/(4 · 400 mm); device 0.3 µm.
-        let squares = (0.88_f64.powi(2) + 0.8_f64.powi(2) + 0.006_25_f64.powi(2)) / 3.0;
-        let by_hand_um = 2.0 * (squares + 0.15_f64.powi(2)).sqrt();
-        let stated_um = um_of(found, "expanded_uncertainty_mm");
-        assert!(
-            (stated_um - by_hand_um).abs() < 1e-6,
-            "{stated_um} {by_hand_um}"
-        );
-        assert!(
-            section
-                .lines
-                .iter()
-                .any(|line| line.contains("8.80 µm taken out over 400 mm"))
-        );
-        assert!(section.figures["no_verdict"].is_null(), "{section:?}");
-        assert_eq!(section.figures["correction_to_20_degc"]["done"], true);
-        let without = &sections(&tests, None).unwrap()[0];
-        let found = &without.figures["iso230_2"]["systematic_error"];
-        assert!((um_of(found, "value_mm") - 8.85).abs() < 1e-6, "{found}");
-        assert!(
-            without
-                .lines
-                .iter()
-                .any(|line| line.starts_with("Not corrected to 20 °C: "))
-        );
-    }
-
-    #[test]
-    fn what_the_machines_own_scale_read_is_labelled_and_has_the_scales_uncertainty_or_none() {
-        let mut tests = warm(Reference::Scale, &UNEVEN_MM);
-        let of = |tests: &Tests| sections(tests, Some(&budget())).unwrap().remove(0);
-        let section = of(&tests);
-        assert_eq!(
-            section.lines[0],
-            "Not ISO 230-2: read by the machine's scale."
-        );
-        assert!(
-            section.lines[1].contains("scale_expanded_uncertainty_um"),
-            "{section:?}"
-        );
-        assert_eq!(section.figures["no_verdict"], BY_OWN_SCALE);
-        assert!(section.figures["iso230_2"]["accuracy"]["expanded_uncertainty_mm"].is_null());
-        let text = MACHINE.replacen(
-            "encoder_resolution_um: 0.05",
-            "encoder_resolution_um: 0.05, scale_resolution_um: 0.05, scale_expanded_uncertainty_um: 0.6, scale_expanded_uncertainty_um_per_m: 3.0",
-            1,
-        );
-        tests.machine = Some(MachineFile::parse(&text, "machine.yaml").unwrap());
-        let section = of(&tests);
-        // 0.6 µm and 3 µm/m over 0.4 m; the laser's and the temperatures' parts are none of the scale's.
-        let stated_um = um_of(
-            &section.figures["iso230_2"]["systematic_error"],
-            "expanded_uncertainty_mm",
-        );
-        assert!((stated_um - 1.8).abs() < 1e-6, "{stated_um}");
-        assert_eq!(section.figures["label"], BY_OWN_SCALE);
-    }
-
-    #[test]
-    fn targets_on_whole_leads_of_the_machine_file_are_warned_of() {
-        let on_leads = [0.0, 100.0, 190.0, 310.0, 400.0];
-        for (targets_mm, warned) in [(on_leads, true), (UNEVEN_MM, false)] {
-            let tests = warm(Reference::Length, &targets_mm);
-            let section = &sections(&tests, None).unwrap()[0];
-            let remark = |line: &String| line.contains("one phase of the 10.000 mm period");
-            assert_eq!(
-                section.lines.iter().any(remark),
-                warned,
-                "{:?}",
-                section.lines
-            );
-        }
-        let text = MACHINE.replacen("lead_mm: 10.0", "lead_mm: 10.0, periods_mm: [51.55]", 1);
-        let mut tests = warm(Reference::Length, &[0.0, 103.1, 206.2, 309.3, 412.4]);
-        tests.machine = Some(MachineFile::parse(&text, "machine.yaml").unwrap());
-        let section = &sections(&tests, None).unwrap()[0];
-        let remark = |line: &String| line.contains("the 51.550 mm period");
-        assert!(section.lines.iter().any(remark), "{:?}", section.lines);
     }
 }

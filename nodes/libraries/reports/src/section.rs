@@ -95,6 +95,12 @@ impl Section {
         self.warnings.push(Warning { kind, line });
     }
 
+    /// A warning of this kind that is read before everything else of the part.
+    pub fn warn_first(&mut self, kind: &'static str, line: String) {
+        self.lines.insert(0, line.clone());
+        self.warnings.push(Warning { kind, line });
+    }
+
     /// The line of a test that has no result, with the reason.
     pub fn not_evaluated(&mut self, why: impl Display) {
         self.warn(NOT_EVALUATED, format!("Not evaluated: {why}."));

@@ -79,7 +79,7 @@ const THERMOMETER_COLUMNS: [&str; 6] = [
 pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>) -> Conditions {
     let mut section = Section::new("Conditions of the measurement");
     let run = run_of(seen, budget, tests);
-    let instruments = instruments_of(seen, budget);
+    let instruments = instruments_of(seen, budget, tests);
     let correction = correction_of(tests, budget);
     let rows = run.iter().chain(&instruments).map(Condition::row);
     let last = vec!["correction to 20 °C".to_owned(), correction.clone()];
@@ -128,7 +128,7 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
         "production_before_s": seen.production_before_s,
         "warm_up": budget.and_then(|budget| budget.warm_up.clone()),
         "operator": budget.and_then(|budget| budget.operator.clone()),
-        "instruments": instruments_json(seen, budget),
+        "instruments": instruments_json(seen, budget, tests),
         "thermometers": seen.thermometers.iter().map(temperature_json).collect::<Vec<Value>>(),
         "correction_to_20_degc": correction,
     });
@@ -217,8 +217,13 @@ fn run_of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
             .iter()
             .map(|feed| format!("{:.0}", feed * 60.0)),
     );
-    let dwells = tests.into_iter().flat_map(|tests| &tests.linear);
-    let dwells = dwells.filter_map(|test| test.longest_rest);
+    let of_lines = tests.into_iter().flat_map(|tests| &tests.linear);
+    let of_rotary = tests
+        .into_iter()
+        .flat_map(|tests| &tests.rotary_positioning);
+    let dwells = of_lines
+        .filter_map(|test| test.longest_rest)
+        .chain(of_rotary.filter_map(|test| test.longest_rest));
     let dwells = listed(dwells.map(|rest| format!("{:.1}", rest.as_secs_f64())));
     let stated = |text: fn(&Budget) -> &Option<String>| budget.and_then(|one| text(one).clone());
     let before_min = seen.production_before_s / 60.0;
@@ -264,9 +269,12 @@ fn listed(texts: impl Iterator<Item = String>) -> Option<String> {
 }
 
 /// Instruments that were read, by the name of their key and in words.
-fn read_by(seen: &TestConditions) -> Vec<(&'static str, &'static str)> {
+fn read_by(seen: &TestConditions, tests: Option<&Tests>) -> Vec<(&'static str, &'static str)> {
+    let has_angles =
+        tests.is_some_and(|tests| tests.rotary_positioning.iter().any(|one| one.has_readings));
     [
         (seen.has_length, "length_reference", "length reference"),
+        (has_angles, "angular_reference", "angular reference"),
         (seen.has_grid, "grid_encoder", "grid encoder"),
         (seen.has_touches, "touch_probe", "touch probe"),
     ]
@@ -280,14 +288,19 @@ fn stated(budget: Option<&Budget>, key: &str) -> Instrument {
     let all = all.unwrap_or_default();
     match key {
         "length_reference" => all.length_reference,
+        "angular_reference" => all.angular_reference,
         "grid_encoder" => all.grid_encoder,
         _ => all.touch_probe,
     }
 }
 
-fn instruments_of(seen: &TestConditions, budget: Option<&Budget>) -> Vec<Condition> {
+fn instruments_of(
+    seen: &TestConditions,
+    budget: Option<&Budget>,
+    tests: Option<&Tests>,
+) -> Vec<Condition> {
     let mut all = Vec::new();
-    for (key, name) in read_by(seen) {
+    for (key, name) in read_by(seen, tests) {
         for (what, text) in stated(budget, key).texts() {
             let place = format!("instruments.{key}.{what} in budget.yaml");
             let name = match what {
@@ -300,7 +313,11 @@ fn instruments_of(seen: &TestConditions, budget: Option<&Budget>) -> Vec<Conditi
     all
 }
 
-fn instruments_json(seen: &TestConditions, budget: Option<&Budget>) -> Value {
+fn instruments_json(
+    seen: &TestConditions,
+    budget: Option<&Budget>,
+    tests: Option<&Tests>,
+) -> Value {
     let of = |(key, _): (&str, &str)| {
         let instrument = stated(budget, key);
         json!({
@@ -310,7 +327,7 @@ fn instruments_json(seen: &TestConditions, budget: Option<&Budget>) -> Value {
             "certificate": instrument.certificate,
         })
     };
-    read_by(seen).into_iter().map(of).collect()
+    read_by(seen, tests).into_iter().map(of).collect()
 }
 
 /// Which of the tests have the lengths that they have at 20 °C.
@@ -378,7 +395,44 @@ fn temperature_json((name, read): (&String, &Readings)) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluate::angular::RotaryTest;
+    use metrology::Axis;
+    use metrology::stamp::Span;
     use std::path::Path;
+
+    #[test]
+    fn a_rotary_test_has_its_reference_and_its_dwell_among_the_conditions() {
+        let tests = Tests {
+            rotary_positioning: vec![RotaryTest {
+                axis: Axis::C,
+                first_run: 1,
+                targets_rad: vec![0.0, 1.0],
+                up_rad: vec![],
+                down_rad: vec![],
+                left_out: vec![],
+                longest_rest: Some(Span::from_nanos(2_000_000_000)),
+                has_readings: true,
+            }],
+            ..Tests::default()
+        };
+        let text = include_str!("../../../../launch_configs/diagonals/budget.yaml");
+        let text = format!(
+            "{text}\ninstruments: {{angular_reference: {{instrument: an encoder, certificate: K 9 of 2026-01-02}}}}\n"
+        );
+        let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
+        let found = of(&TestConditions::default(), Some(&budget), Some(&tests));
+        let rows = &found.section.tables[0].rows;
+        for (name, value) in [
+            ("dwell", "2.0 s"),
+            ("angular reference", "an encoder"),
+            ("angular reference, certificate", "K 9 of 2026-01-02"),
+        ] {
+            let row = rows.iter().find(|row| row[0] == name);
+            assert_eq!(row.map(|row| row[1].as_str()), Some(value), "{rows:?}");
+        }
+        let kinds = &found.section.figures["instruments"];
+        assert_eq!(kinds[0]["kind"], "angular_reference", "{kinds}");
+    }
 
     #[test]
     fn what_is_not_stated_is_named_with_where_to_state_it() {

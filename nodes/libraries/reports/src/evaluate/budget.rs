@@ -42,6 +42,27 @@ pub fn unstate(figures: &mut Value) {
     }
 }
 
+/// The same for the figures of these names alone.
+pub fn unstate_named(figures: &mut Value, names: &[&str]) {
+    match figures {
+        Value::Object(entries) => {
+            for (key, value) in entries {
+                if names.contains(&key.as_str()) {
+                    unstate(value);
+                } else {
+                    unstate_named(value, names);
+                }
+            }
+        }
+        Value::Array(values) => {
+            for value in values {
+                unstate_named(value, names);
+            }
+        }
+        _ => {}
+    }
+}
+
 /// Temperature at which lengths are defined, °C.
 const REFERENCE_DEGC: f64 = 20.0;
 /// Farthest from it that a machine is measured, K.
@@ -192,7 +213,8 @@ impl Body {
         }
         let mut all = Vec::new();
         for name in &self.thermometers {
-            let silent = || format!("thermometer {name} has no reading during this test");
+            let silent =
+                || format!("names the thermometer {name}, which has no reading during this test");
             all.push(read.get(name).ok_or_else(silent)?);
         }
         let n = all.len() as f64;

@@ -11,6 +11,7 @@ use super::budget::{BodyTemperature, Budget};
 use super::circles::Instrument;
 use super::linear::Reference;
 use super::test_conditions::Thermometers;
+use crate::section::Section;
 
 /// What makes the lengths of a test those at 20 °C.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +41,10 @@ pub struct Measured {
     pub budget: PositioningBudget,
     /// Whether expanded uncertainties can be stated.
     pub is_stated: bool,
+    /// Whether those of lengths can be, too: not where the lengths should be those at 20 °C and are not.
+    pub are_lengths_stated: bool,
+    /// Whether the machine's own scale was read.
+    pub is_by_own_scale: bool,
     /// What makes its lengths those at 20 °C.
     pub correction: Correction,
 }
@@ -65,6 +70,8 @@ impl Measured {
             return Self {
                 budget: used.of_scale(scale),
                 is_stated: budget.is_some() && scale.is_some(),
+                are_lengths_stated: budget.is_some() && scale.is_some(),
+                is_by_own_scale: true,
                 correction: Correction::Missing {
                     reason: "the machine's own scale was read".to_owned(),
                 },
@@ -72,10 +79,60 @@ impl Measured {
         }
         let known = Known::of(budget, &tests.conditions.during(runs));
         let corrects_itself = used.length_corrected_by_instrument;
+        let uncertainties =
+            used.positioning(known.machine.as_ref().ok(), known.device.as_ref().ok());
+        let correction = known.correction(budget, corrects_itself);
         Self {
-            budget: used.positioning(known.machine.as_ref().ok(), known.device.as_ref().ok()),
+            budget: uncertainties,
             is_stated: budget.is_some(),
-            correction: known.correction(budget, corrects_itself),
+            are_lengths_stated: budget.is_some() && correction.lacks().is_none(),
+            is_by_own_scale: false,
+            correction,
+        }
+    }
+}
+
+/// What warnings of lengths that are not those at 20 °C have in common.
+pub const NOT_AT_20_DEGC: &str = "Not corrected to 20 °C";
+
+impl Measured {
+    /// What must be known of its figures before any of them, for the begin of a sentence; empty: nothing.
+    #[must_use]
+    pub fn reservation(&self) -> &'static str {
+        match (self.is_by_own_scale, &self.correction) {
+            (true, _) => "not ISO 230-2, read by the machine's scale: ",
+            (false, Correction::Missing { .. }) => "as measured, not at 20 °C: ",
+            (false, Correction::Here { .. } | Correction::ByInstrument) => "",
+        }
+    }
+
+    /// The uncertainties of a sentence; empty where none is stated.
+    #[must_use]
+    pub fn coverage(&self) -> &'static str {
+        if self.is_stated { " (± U, k = 2)" } else { "" }
+    }
+
+    /// Says what corrects the lengths of a test over `span_mm`, as a warning where nothing does.
+    pub fn state_correction(&self, section: &mut Section, span_mm: f64) {
+        let line = self.correction.in_words(span_mm);
+        if self.is_by_own_scale || self.correction.lacks().is_none() {
+            section.lines.push(line);
+        } else {
+            section.warn(NOT_AT_20_DEGC, line);
+        }
+    }
+
+    /// What a reader of a table must know of its uncertainties.
+    #[must_use]
+    pub fn uncertainty_note(&self) -> &'static str {
+        match (self.is_stated, self.are_lengths_stated) {
+            (true, true) => "± expanded uncertainty, k = 2.",
+            (true, false) => {
+                "± expanded uncertainty, k = 2. A, E and M have none: the lengths are not those at 20 °C."
+            }
+            (false, _) => {
+                "No uncertainty is stated: without --budget, or without the scale's certificate."
+            }
         }
     }
 }
@@ -141,8 +198,8 @@ impl Known {
             return Correction::ByInstrument;
         }
         let (of_machine, of_device) = match (self.machine, self.device) {
-            (Err(why), _) => return missing(format!("machine of the budget file {why}")),
-            (_, Err(why)) => return missing(format!("device of the budget file {why}")),
+            (Err(why), _) => return missing(format!("the budget file's `machine` {why}")),
+            (_, Err(why)) => return missing(format!("the budget file's `device` {why}")),
             (Ok(of_machine), Ok(of_device)) => (of_machine, of_device),
         };
         let (machine, device) = budget.bodies();

@@ -169,9 +169,12 @@ impl Limits {
                 let judged = Judged::of(figure, *limit, self.rule)
                     .with_context(|| format!("limits.{name}"))?;
                 let why = no_verdict(test, name).or_else(|| figure.lacks());
-                table
-                    .rows
-                    .push(judged.row((name, title(test)), *limit, why.is_some()));
+                let deviations = deviations(test, name);
+                let mut row = judged.row((name, title(test)), *limit, why.is_some());
+                if !deviations.is_empty() && why.is_none() {
+                    row[DECISION].push_str(WITH_DEVIATIONS);
+                }
+                table.rows.push(row);
                 let mut entry = serde_json::json!({ "figure": name, "test": title(test) });
                 if let Some(why) = why {
                     let about = format!("{name}, {}", title(test));
@@ -183,6 +186,7 @@ impl Limits {
                     entry["no_verdict"] = why.into();
                 } else {
                     entry["verdict"] = judged.verdict;
+                    entry["deviations_from_iso230_2"] = deviations.into();
                 }
                 verdicts.push(entry);
             }
@@ -225,6 +229,54 @@ const RADIAL: [&str; 3] = [
     "greatest_radial_deviation",
     "least_radial_deviation",
 ];
+
+/// Place of the decision in a row of the table.
+const DECISION: usize = 4;
+/// What a decision of a test has that was not made by the programme of the standard.
+const WITH_DEVIATIONS: &str = ", with deviations from ISO 230-2";
+
+/// How the test of a figure of ISO 230-2 deviates from the programme of the standard.
+fn deviations(test: &Value, name: &str) -> Vec<Value> {
+    let (of_positioning, _) = name.split_once('.').unwrap_or((name, ""));
+    let remarks = test[of_positioning]["remarks"].as_array();
+    let is_of_standard = of_positioning.starts_with("iso230_2");
+    { remarks.into_iter().flatten() }
+        .filter(|_| is_of_standard)
+        .cloned()
+        .collect()
+}
+
+/// Names what of the decisions no certificate supports; `conditions` are those of the report.
+pub fn state_traceability(section: &mut Section, conditions: &Value) {
+    let without = |entry: &&Value| {
+        let certificate = entry["certificate"].as_str().unwrap_or("none");
+        certificate.trim().eq_ignore_ascii_case("none")
+    };
+    let instruments = conditions["instruments"].as_array();
+    let names = { instruments.into_iter().flatten() }
+        .filter(without)
+        .filter_map(|entry| entry["kind"].as_str())
+        .map(|kind| kind.replace('_', " "));
+    let names: Vec<String> = names.collect();
+    if !names.is_empty()
+        && section
+            .figures
+            .as_array()
+            .is_some_and(|all| has_verdict(all))
+    {
+        section.warn(
+            "Traceability is not stated",
+            format!(
+                "Traceability is not stated: {} without a certificate (instruments in budget.yaml); the decisions rest on the uncertainty that the budget states.",
+                names.join(", ")
+            ),
+        );
+    }
+}
+
+fn has_verdict(entries: &[Value]) -> bool {
+    entries.iter().any(|entry| !entry["verdict"].is_null())
+}
 
 /// Why nothing is decided about a figure of a test; none: it is decided.
 fn no_verdict(test: &Value, name: &str) -> Option<String> {
@@ -309,6 +361,35 @@ mod tests {
             let said = format!("{:#}", limits(&text).unwrap_err());
             assert!(said.contains("rule.probability.at_least = "), "{said}");
             assert!(said.contains("above 0.5 and below 1"), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_decision_says_how_its_test_deviates_and_which_instrument_has_no_certificate() {
+        let text = "rule: simple\nlimits:\n  iso230_2.accuracy: {upper_um: 10.0}\n";
+        let mut all = tests();
+        all[0]["iso230_2"]["remarks"] =
+            serde_json::json!([{"kind": "few_runs", "n_runs": 3, "required": 5}]);
+        let mut section = limits(text).unwrap().section(&all).unwrap();
+        let of = |row: usize| section.tables[0].rows[row][DECISION].clone();
+        assert_eq!(of(0), "conforms, with deviations from ISO 230-2");
+        assert_eq!(of(1), "does not conform");
+        let deviations = &section.figures[0]["deviations_from_iso230_2"];
+        assert_eq!(deviations[0]["kind"], "few_runs");
+        assert!(section.answers[0].contains("iso230_2.accuracy of X"));
+        let conditions = |certificate: Value| {
+            serde_json::json!({"instruments": [
+                {"kind": "length_reference", "certificate": certificate},
+                {"kind": "touch_probe", "certificate": "K 7 of 2026-01-02"},
+            ]})
+        };
+        state_traceability(&mut section, &conditions("K 8 of 2026-01-02".into()));
+        assert!(section.warnings.is_empty());
+        for none in [Value::Null, "none".into()] {
+            let mut section = limits(text).unwrap().section(&all).unwrap();
+            state_traceability(&mut section, &conditions(none));
+            let line = &section.warnings[0].line;
+            assert!(line.contains("length reference without"), "{line}");
         }
     }
 

@@ -5,9 +5,9 @@ use iso230::diagonal::{DiagonalResult, DiagonalRuns, DiagonalsResult, SpaceDiago
 use iso230::positioning::{PointResult, PositioningRuns};
 use metrology::sample::TestKind;
 
-use super::{LEAST_SHARE, figure, periods_mm, runs, side_of};
+use super::{LEAST_SHARE, LENGTHS, capital, figure, periods_mm, runs, side_of};
 use crate::evaluate::Tests;
-use crate::evaluate::budget::Budget;
+use crate::evaluate::budget::{Budget, unstate_named};
 use crate::evaluate::correction::Measured;
 use crate::evaluate::linear::{LinearTest, Reference};
 use crate::section::{NOT_EVALUATED, Rows, Section, head, um};
@@ -129,51 +129,69 @@ fn diagonals_section(
     let span_mm = all.iter().map(|one| one.runs.span_mm()).fold(0.0, f64::max);
     match diagonal::evaluate(&all, &measured.budget) {
         Ok(result) => {
-            let stated = measured.is_stated;
-            section.answer(format!(
-                "Systematic deviation E_d {} µm, reversal B_d {} µm; the diagonals differ by {} µm.",
-                figure(&result.systematic_error, stated),
-                figure(&result.reversal, stated),
-                figure(&result.spread, stated)
-            ));
-            section.lines.push(measured.correction.in_words(span_mm));
-            section.tables.push(of_diagonals(&result, stated));
+            let lengths_stated = measured.are_lengths_stated;
+            section.answer(capital(&format!(
+                "{}systematic deviation E_d {} µm, reversal B_d {} µm; the lengths of the diagonals differ by {} µm, and all mean deviations lie within {} µm{}.",
+                measured.reservation(),
+                figure(&result.systematic_error, lengths_stated),
+                figure(&result.reversal, measured.is_stated),
+                um(range_of_lengths_mm(&result)),
+                figure(&result.spread, lengths_stated),
+                measured.coverage()
+            )));
+            measured.state_correction(&mut section, span_mm);
+            section.tables.push(of_diagonals(&result, &measured));
             section.figures = serde_json::json!({
                 "test": section.title,
                 "iso230_6": result,
                 "correction_to_20_degc": measured.correction.as_json(),
                 "no_verdict": measured.correction.lacks(),
             });
+            if measured.is_stated && !lengths_stated {
+                unstate_named(&mut section.figures, &LENGTHS);
+                unstate_named(&mut section.figures, &["spread"]);
+            }
         }
         Err(error) => section.not_evaluated(error),
     }
     section
 }
 
-fn of_diagonals(result: &DiagonalsResult, stated: bool) -> Rows {
+/// By how much a diagonal is too long, mm: the mean of both directions at its end less that at its begin.
+fn too_long_mm(one: &DiagonalResult) -> f64 {
+    let points = &one.positioning.points;
+    let mean = |point: Option<&PointResult>| {
+        point.map_or(f64::NAN, |p| f64::midpoint(p.up.mean_mm, p.down.mean_mm))
+    };
+    mean(points.last()) - mean(points.first())
+}
+
+/// The longest diagonal less the shortest one, mm.
+fn range_of_lengths_mm(result: &DiagonalsResult) -> f64 {
+    let all = || result.diagonals.iter().map(too_long_mm);
+    all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
+}
+
+fn of_diagonals(result: &DiagonalsResult, measured: &Measured) -> Rows {
+    let (stated, lengths_stated) = (measured.is_stated, measured.are_lengths_stated);
     let row = |one: &DiagonalResult| {
-        let (points, found) = (&one.positioning.points, &one.positioning);
-        let mean = |point: Option<&PointResult>| {
-            point.map_or(f64::NAN, |p| f64::midpoint(p.up.mean_mm, p.down.mean_mm))
-        };
+        let found = &one.positioning;
         vec![
             one.diagonal.name().to_owned(),
-            um(mean(points.last()) - mean(points.first())),
-            figure(&found.systematic_error, stated),
+            um(too_long_mm(one)),
+            figure(&found.systematic_error, lengths_stated),
             figure(&found.reversal, stated),
             figure(&found.repeatability, stated),
-            figure(&found.accuracy, stated),
+            figure(&found.accuracy, lengths_stated),
         ]
     };
     Rows {
         head: head(&["diagonal / µm", "too long by", "E", "B", "R", "A"]),
         rows: result.diagonals.iter().map(row).collect(),
-        note: if stated {
-            "± expanded uncertainty, k = 2. All too long alike: a scale error; unlike: squareness."
-        } else {
-            "Without --budget no uncertainty is stated. All too long alike: a scale error; unlike: squareness."
-        }
-        .to_owned(),
+        note: format!(
+            "{} All too long alike: a scale error; unlike: squareness.",
+            measured.uncertainty_note()
+        ),
     }
 }
 
@@ -219,5 +237,33 @@ mod tests {
         from_lower_end(&mut levelled);
         assert!((levelled.up_mm[0][0] + 0.001).abs() < 1e-12);
         assert!((levelled.down_mm[0][0] - 0.001).abs() < 1e-12);
+    }
+
+    #[test]
+    fn lengths_of_diagonals_are_compared_apart_from_the_range_of_all_means() {
+        // The four are alike: 3 µm too long, of 2 µm reversal and more.
+        let four = [
+            [1.0, 1.0, 1.0],
+            [-1.0, 1.0, 1.0],
+            [1.0, -1.0, 1.0],
+            [1.0, 1.0, -1.0],
+        ];
+        let tests = Tests {
+            linear: four.map(test).to_vec(),
+            ..Tests::default()
+        };
+        let answer = sections(&tests, None).remove(0).answers.remove(0);
+        assert!(
+            answer.starts_with("As measured, not at 20 °C: systematic"),
+            "{answer}"
+        );
+        // Means are 0 to 3 µm up and 2 to 5 µm down.
+        let words = "the lengths of the diagonals differ by 0.00 µm, and all mean deviations lie within 5.00 µm";
+        assert!(answer.contains(words), "{answer}");
+        let mut longer = tests;
+        longer.linear[1].up_mm[0][2] = 0.013;
+        longer.linear[1].down_mm[0][2] = 0.015;
+        let answer = sections(&longer, None).remove(0).answers.remove(0);
+        assert!(answer.contains("differ by 10.00 µm"), "{answer}");
     }
 }

@@ -30,6 +30,9 @@ pub struct Instruments {
     /// Interferometer, tracker, ballbar or step gauge.
     #[serde(default)]
     pub length_reference: Instrument,
+    /// Encoder, autocollimator with polygon, or indexing table.
+    #[serde(default)]
+    pub angular_reference: Instrument,
     /// Plate and head.
     #[serde(default)]
     pub grid_encoder: Instrument,
@@ -59,6 +62,7 @@ impl Instruments {
     /// None is stated.
     pub const NONE: Self = Self {
         length_reference: Instrument::NONE,
+        angular_reference: Instrument::NONE,
         grid_encoder: Instrument::NONE,
         touch_probe: Instrument::NONE,
     };
@@ -67,6 +71,7 @@ impl Instruments {
     pub(super) fn texts(&self) -> Vec<(String, Option<&str>)> {
         let all = [
             ("length_reference", &self.length_reference),
+            ("angular_reference", &self.angular_reference),
             ("grid_encoder", &self.grid_encoder),
             ("touch_probe", &self.touch_probe),
         ];
