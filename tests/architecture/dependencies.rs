@@ -219,6 +219,8 @@ fn arch_libraries_are_used_by_those_they_are_for() {
     ];
     assert_eq!(
         not_for(&bad),
-        ["nodes/libraries/machine: depends on twin: only gap_diagnosis, abbe, abbe_trials may"]
+        [
+            "nodes/libraries/machine: depends on twin: only gap_diagnosis, reports, abbe, abbe_trials may"
+        ]
     );
 }

@@ -1,9 +1,5 @@
 //! Reports: what bags hold, evaluated, and laid out for a terminal and as one self-contained HTML file.
 #![cfg_attr(not(test), warn(clippy::print_stderr))]
-#![expect(
-    clippy::disallowed_methods,
-    reason = "reports are read from files and written to files"
-)]
 
 use std::path::Path;
 
