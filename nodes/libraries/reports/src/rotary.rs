@@ -36,7 +36,7 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
     let screen = screen(evidence)?;
     let locations_part = html! {
         (table(&LOCATION_HEAD, &locations))
-        p.note { "ISO 230-1 components: EX0C is where the line of C lies along X, EA0C how it is tilted about X, with all axes at zero. U is the expanded uncertainty, k = 2. What the poses cannot see has none." }
+        p.note { "ISO 230-1 components: EX0C is where the line of C lies along X, EA0C how it is tilted about X, with all axes at zero; above 0 it is turned about X by the right-hand rule. U is the expanded uncertainty, k = 2. What the poses cannot see has none." }
         @if let Some(motions) = model.map(motion_names).filter(|names| !names.is_empty()) {
             p { "Error motions that the readings needed besides: " (motions) "." }
         }

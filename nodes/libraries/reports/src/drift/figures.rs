@@ -117,8 +117,20 @@ impl Figures {
             or_dash(&self.after_1_h),
             or_dash(&self.after_3_h),
             figure(&self.range, stated),
-            format!("{:.2}", self.final_rate.value_mm_s * HOUR_S * 1e3),
+            rate_cell(self.final_rate, stated),
         ]
+    }
+}
+
+/// A rate and, where it is stated, its expanded uncertainty, µm/h.
+fn rate_cell(rate: ExpandedRate, stated: bool) -> String {
+    let um_h = |mm_s: f64| mm_s * HOUR_S * 1e3;
+    let value_um_h = um_h(rate.value_mm_s);
+    if stated {
+        let expanded_um_h = um_h(rate.expanded_uncertainty_mm_s);
+        format!("{value_um_h:.2} ± {expanded_um_h:.2}")
+    } else {
+        format!("{value_um_h:.2}")
     }
 }
 
@@ -163,6 +175,16 @@ mod tests {
         assert!((found.rate_window_s - 10_800.0).abs() < 1e-9);
         let short = self::found(&values[..3]).unwrap();
         assert!(short.after_1_h.is_some() && short.after_3_h.is_none());
+    }
+
+    #[test]
+    fn a_rate_has_its_uncertainty_where_one_is_stated() {
+        let rate = ExpandedRate {
+            value_mm_s: 1e-3 / HOUR_S,
+            expanded_uncertainty_mm_s: 0.25e-3 / HOUR_S,
+        };
+        assert_eq!(rate_cell(rate, true), "1.00 ± 0.25");
+        assert_eq!(rate_cell(rate, false), "1.00");
     }
 
     #[test]
