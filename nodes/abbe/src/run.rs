@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use live_view_node::View;
 use node_runtime::Interruption;
 use node_runtime::complain;
 use recorder::Bag;
@@ -32,9 +33,11 @@ mod bag;
 mod composed;
 mod live;
 mod mirror;
+mod served;
 mod shortcomings;
 mod table_trial;
 
+use served::Served;
 use table_trial::TableTrial;
 
 /// Arguments of `abbe run`.
@@ -67,6 +70,8 @@ pub struct Run {
     /// Print every table and remark, instead of the answer and three tables in at most 40 lines; `--explain` does too.
     #[arg(long)]
     full: bool,
+    #[command(flatten)]
+    served: Served,
     #[command(flatten)]
     keep: Keep,
 }
@@ -159,8 +164,9 @@ impl Run {
             complain!("abbe: {line}");
         }
         let interruption = Interruption::listen("the bag is closed, no page is written")?;
+        let view = self.served.open(&scenario)?;
         let folder = new_folder(&self.runs, &scenario.name)?;
-        let ended = self.run_into(&folder, &scenario, &interruption);
+        let ended = self.run_into(&folder, &scenario, view.as_ref(), &interruption);
         if ended.is_err() {
             // Where nothing came into it, it tells nothing; one that holds something is not taken away.
             let _ = std::fs::remove_dir(&folder);
@@ -177,19 +183,22 @@ impl Run {
         &self,
         folder: &Path,
         scenario: &Scenario,
+        view: Option<&View>,
         interruption: &Interruption,
     ) -> Result<ExitCode> {
         let bag = folder.join("bag");
+        let feed = view.map(View::feed);
         let mut outcome = match scenario.file.simulated_start_s {
             Some(start_s) if self.is_composed(scenario) => {
                 let how = composed::How {
                     pace: self.pace,
                     on_dds: !self.no_dds,
+                    feed: feed.as_ref(),
                     interruption,
                 };
                 composed::run(scenario, start_s, &bag, how)?
             }
-            _ => live::run(scenario, &bag, self.separate, interruption)?,
+            _ => live::run(scenario, &bag, self.separate, feed, interruption)?,
         };
         if interruption.is_forced() {
             tell!("Bag:  {}", outcome.kept(&bag));

@@ -1,0 +1,138 @@
+//! Parameters of the live view, and their checked form.
+
+use std::net::SocketAddr;
+
+use metrology::check_parameters;
+use metrology::stamp::Span;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::error::LiveViewError;
+
+/// Where the page is unless another place is given.
+pub const DEFAULT_ADDRESS: &str = "127.0.0.1:8642";
+/// Fewest characters of a token: 20 of 64 letters are 120 bits.
+const SHORTEST_TOKEN: usize = 20;
+/// Most characters of a token.
+const LONGEST_TOKEN: usize = 256;
+
+/// Parameters of the node.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct LiveViewConfig {
+    /// Address and port of the page, by number; port 0: any that is free.
+    pub address: String,
+    /// File with the token that browsers must have, relative to the parameter file; required where the address is not
+    /// that of this computer alone.
+    pub token_file: String,
+    /// Names by which browsers reach the page, beside `localhost` and numbers.
+    pub host_names: Vec<String>,
+    /// Parameter file of axis_compensation, relative to the parameter file, whose limits are shown.
+    pub compensation_file: String,
+    /// Most browsers at once.
+    #[schemars(range(min = 1.0, max = 200.0))]
+    pub most_browsers: u32,
+    /// Changes are sent this often.
+    #[schemars(range(min = 0.2, max = 20.0))]
+    pub rate_hz: f64,
+    /// Silence of a periodic topic after which its value is shown as stale.
+    #[schemars(range(min = 0.5, max = 3600.0))]
+    pub stale_after_s: f64,
+    /// A request that is not complete by then is ended.
+    #[schemars(range(min = 0.1, max = 60.0))]
+    pub request_timeout_s: f64,
+    /// A browser that takes nothing for so long is dropped.
+    #[schemars(range(min = 0.1, max = 600.0))]
+    pub stall_timeout_s: f64,
+}
+
+impl Default for LiveViewConfig {
+    fn default() -> Self {
+        Self {
+            address: DEFAULT_ADDRESS.to_owned(),
+            token_file: String::new(),
+            host_names: Vec::new(),
+            compensation_file: String::new(),
+            most_browsers: 20,
+            rate_hz: 5.0,
+            stale_after_s: 5.0,
+            request_timeout_s: 5.0,
+            stall_timeout_s: 10.0,
+        }
+    }
+}
+
+/// Checked settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Where the page is.
+    pub address: SocketAddr,
+    /// Names by which browsers may ask for it, in small letters.
+    pub host_names: Vec<String>,
+    /// Most browsers at once.
+    pub most_browsers: u32,
+    /// Between two looks.
+    pub period: Span,
+    /// Silence after which a periodic value is stale.
+    pub stale_after: Span,
+    /// A request that is not complete by then is ended.
+    pub request_timeout: Span,
+    /// A browser that takes nothing for so long is dropped.
+    pub stall_timeout: Span,
+}
+
+fn is_of_a_name(letter: char) -> bool {
+    letter.is_ascii_alphanumeric() || matches!(letter, '-' | '.' | '_')
+}
+
+impl Settings {
+    /// Checks a configuration.
+    ///
+    /// # Errors
+    /// A value out of range, an address or a name that is none, or an address that others reach without a token.
+    pub fn new(config: &LiveViewConfig) -> Result<Self, LiveViewError> {
+        check_parameters(config)?;
+        let address: SocketAddr = config.address.parse().map_err(|_| LiveViewError::Address {
+            address: config.address.clone(),
+        })?;
+        if !address.ip().is_loopback() && config.token_file.is_empty() {
+            return Err(LiveViewError::Open { address });
+        }
+        let mut host_names = Vec::with_capacity(config.host_names.len());
+        for name in &config.host_names {
+            if name.is_empty() || !name.chars().all(is_of_a_name) {
+                let name = name.clone();
+                return Err(LiveViewError::HostName { name });
+            }
+            host_names.push(name.to_ascii_lowercase());
+        }
+        Ok(Self {
+            address,
+            host_names,
+            most_browsers: config.most_browsers,
+            period: Span::from_secs_f64(1.0 / config.rate_hz),
+            stale_after: Span::from_secs_f64(config.stale_after_s),
+            request_timeout: Span::from_secs_f64(config.request_timeout_s),
+            stall_timeout: Span::from_secs_f64(config.stall_timeout_s),
+        })
+    }
+}
+
+/// The token in the text of its file: the one line, of letters that stand in an address as they are.
+///
+/// # Errors
+/// When it is too short or too long, or has another letter. The error never has the token.
+pub fn checked_token(file: &str, text: &str) -> Result<String, LiveViewError> {
+    let token = text.trim();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_' | '~');
+    let letters = token.chars().count();
+    if token.chars().all(is_plain) && (SHORTEST_TOKEN..=LONGEST_TOKEN).contains(&letters) {
+        return Ok(token.to_owned());
+    }
+    Err(LiveViewError::Token {
+        file: file.to_owned(),
+        letters,
+        least: SHORTEST_TOKEN,
+        greatest: LONGEST_TOKEN,
+    })
+}

@@ -1,0 +1,312 @@
+//! The thread that serves the page.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::{Request, State};
+use axum::http::header::{
+    CACHE_CONTROL, CONNECTION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue,
+    REFERRER_POLICY, RETRY_AFTER, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+};
+use axum::middleware::{self, Next};
+use axum::response::Response;
+use axum::routing::get;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use metrology::Stage;
+use metrology::stamp::Span;
+use socket2::SockRef;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{Semaphore, oneshot};
+use tokio::time::{MissedTickBehavior, interval, sleep};
+
+use super::document::Document;
+use super::gate::{Gate, Refusal};
+use super::hub::Hub;
+use super::patience::Patient;
+use super::{Account, Source};
+use crate::config::Settings;
+use crate::error::LiveViewError;
+use crate::page::ms;
+use crate::stage::{Input, LiveViewStage};
+
+/// Connections beside those of browsers that look: pages being loaded.
+const SPARE_CONNECTIONS: usize = 32;
+/// A request's first line and headers, bytes.
+const MOST_HEADER_BYTES: usize = 8 << 10;
+const MOST_HEADERS: usize = 64;
+/// What waits in the system for a browser, bytes.
+const MOST_WAITING_BYTES: usize = 64 << 10;
+/// A browser hears at least this often that the connection stands.
+const BEAT: Duration = Duration::from_secs(1);
+/// Before the next connection is taken where the system refused one.
+const AFTER_REFUSAL: Duration = Duration::from_millis(100);
+
+/// What every request needs.
+struct Site {
+    document: Document,
+    policy: HeaderValue,
+    gate: Gate,
+    hub: Arc<Hub>,
+    places: Arc<Semaphore>,
+    most_browsers: usize,
+}
+
+/// A server at work; dropped, it ends.
+pub struct LiveViewIo {
+    address: SocketAddr,
+    site: Arc<Site>,
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+fn duration(span: Span) -> Duration {
+    Duration::from_nanos(span.nanos().max(0).cast_unsigned())
+}
+
+impl LiveViewIo {
+    /// Takes its address, and serves from then on.
+    ///
+    /// # Errors
+    /// When the address is taken or none of this computer's, or the system has no thread left.
+    pub fn start(
+        settings: &Settings,
+        token: Option<String>,
+        stage: LiveViewStage,
+        source: Source,
+    ) -> Result<Self, LiveViewError> {
+        let io = |action| move |source| LiveViewError::Io { action, source };
+        let address = settings.address;
+        let listen = |source| LiveViewError::Listen { address, source };
+        let listener = std::net::TcpListener::bind(address).map_err(listen)?;
+        let address = listener.local_addr().map_err(listen)?;
+        listener.set_nonblocking(true).map_err(listen)?;
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .map_err(io("the server's event queue"))?;
+        let site = Arc::new(Site::new(settings, token.as_deref())?);
+        let (stop, stopped) = oneshot::channel();
+        let (settings, of_thread) = (settings.clone(), Arc::clone(&site));
+        let serve = move || {
+            runtime.block_on(async {
+                // The listener was made by the system a moment ago: tokio takes every such one.
+                let Ok(listener) = TcpListener::from_std(listener) else {
+                    return;
+                };
+                let looking = look(Arc::clone(&of_thread.hub), settings.period, stage, source);
+                tokio::select! {
+                    _ = stopped => {}
+                    () = looking => {}
+                    () = accept(listener, &settings, of_thread) => {}
+                }
+            });
+        };
+        let thread = std::thread::Builder::new()
+            .name("live_view".to_owned())
+            .spawn(serve)
+            .map_err(io("the server's thread"))?;
+        Ok(Self {
+            address,
+            site,
+            stop: Some(stop),
+            thread: Some(thread),
+        })
+    }
+
+    /// Where the page is.
+    #[must_use]
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// What it has done so far.
+    #[must_use]
+    pub fn account(&self) -> Account {
+        let site = &self.site;
+        Account {
+            browsers: site.most_browsers - site.places.available_permits().min(site.most_browsers),
+            refused: site.gate.refused(),
+        }
+    }
+}
+
+impl Drop for LiveViewIo {
+    fn drop(&mut self) {
+        if let Some(stop) = self.stop.take() {
+            let _ = stop.send(());
+        }
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Hands what was heard to the stage, and what has changed to the browsers.
+async fn look(hub: Arc<Hub>, period: Span, mut stage: LiveViewStage, mut source: Source) {
+    let period = duration(period);
+    let mut ticks = interval(period);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let (mut heard, mut silent) = (Vec::new(), Duration::ZERO);
+    loop {
+        ticks.tick().await;
+        let now = source(&mut heard);
+        let mut changed = Vec::new();
+        let events = heard.drain(..).chain([(now, Input::Look)]);
+        for (at, input) in events {
+            // A page takes every event.
+            let Ok(()) = stage.step(at, input, &mut changed);
+        }
+        silent += period;
+        let is_beat = silent >= BEAT;
+        if is_beat || !changed.is_empty() {
+            silent = Duration::ZERO;
+        }
+        hub.publish(ms(now), changed, is_beat);
+    }
+}
+
+async fn accept(listener: TcpListener, settings: &Settings, site: Arc<Site>) {
+    let connections = site.most_browsers.saturating_add(SPARE_CONNECTIONS);
+    let connections = Arc::new(Semaphore::new(connections));
+    let mut http = http1::Builder::new();
+    http.keep_alive(false)
+        .timer(TokioTimer::new())
+        .header_read_timeout(duration(settings.request_timeout))
+        .max_buf_size(MOST_HEADER_BYTES)
+        .max_headers(MOST_HEADERS);
+    let router = router(site);
+    let most = duration(settings.stall_timeout);
+    loop {
+        // Where all are taken, new ones wait in the system until one is free.
+        let Ok(place) = Arc::clone(&connections).acquire_owned().await else {
+            return;
+        };
+        let Ok((stream, _)) = listener.accept().await else {
+            sleep(AFTER_REFUSAL).await;
+            continue;
+        };
+        let (http, router) = (http.clone(), router.clone());
+        tokio::spawn(async move {
+            let _place = place;
+            // A connection that ends early is the browser's affair.
+            let _ = http
+                .serve_connection(patient(stream, most), TowerToHyperService::new(router))
+                .await;
+        });
+    }
+}
+
+fn patient(stream: TcpStream, most: Duration) -> TokioIo<Patient> {
+    // Where the system has other buffers, a browser that stalls is found later.
+    let _ = SockRef::from(&stream).set_send_buffer_size(MOST_WAITING_BYTES);
+    let _ = stream.set_nodelay(true);
+    TokioIo::new(Patient::new(stream, most))
+}
+
+fn router(site: Arc<Site>) -> Router {
+    Router::new()
+        .route("/", get(page))
+        .route("/snapshot.json", get(snapshot))
+        .route("/events", get(events))
+        .layer(middleware::from_fn_with_state(Arc::clone(&site), guard))
+        .with_state(site)
+}
+
+impl Site {
+    fn new(settings: &Settings, token: Option<&str>) -> Result<Self, LiveViewError> {
+        let document = Document::new();
+        let policy =
+            HeaderValue::from_str(&document.policy).map_err(|error| LiveViewError::Io {
+                action: "the page's policy",
+                source: std::io::Error::other(error),
+            })?;
+        let most_browsers = settings.most_browsers as usize;
+        let period_ms = settings.period.nanos() / 1_000_000;
+        Ok(Self {
+            document,
+            policy,
+            gate: Gate::new(token, &settings.host_names),
+            hub: Arc::new(Hub::new(period_ms)),
+            places: Arc::new(Semaphore::new(most_browsers)),
+            most_browsers,
+        })
+    }
+}
+
+fn answer(kind: &'static str, body: Body) -> Response {
+    let mut response = Response::new(body);
+    let headers = response.headers_mut();
+    headers.insert(CONTENT_TYPE, HeaderValue::from_static(kind));
+    response
+}
+
+fn refuse(refusal: Refusal) -> Response {
+    let mut response = answer("text/plain; charset=utf-8", refusal.sentence().into());
+    *response.status_mut() = refusal.status();
+    let more: Option<(HeaderName, &str)> = match refusal {
+        Refusal::Token => Some((WWW_AUTHENTICATE, "Bearer")),
+        Refusal::Full => Some((RETRY_AFTER, "10")),
+        _ => None,
+    };
+    if let Some((name, value)) = more {
+        let value = HeaderValue::from_static(value);
+        response.headers_mut().insert(name, value);
+    }
+    response
+}
+
+/// Refuses what is not to come in, and puts the same limits on every answer.
+async fn guard(State(site): State<Arc<Site>>, request: Request, next: Next) -> Response {
+    let mut response = match site.gate.check(request.uri(), request.headers()) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => refuse(refusal),
+    };
+    let headers = response.headers_mut();
+    headers.insert(CONTENT_SECURITY_POLICY, site.policy.clone());
+    for (name, value) in [
+        (CACHE_CONTROL, "no-store"),
+        (CONNECTION, "close"),
+        (REFERRER_POLICY, "no-referrer"),
+        (X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (X_FRAME_OPTIONS, "DENY"),
+        (
+            HeaderName::from_static("cross-origin-resource-policy"),
+            "same-origin",
+        ),
+        (
+            HeaderName::from_static("cross-origin-opener-policy"),
+            "same-origin",
+        ),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+async fn page(State(site): State<Arc<Site>>) -> Response {
+    answer(
+        "text/html; charset=utf-8",
+        site.document.html.clone().into(),
+    )
+}
+
+async fn snapshot(State(site): State<Arc<Site>>) -> Response {
+    answer("application/json", site.hub.since(None).1.into())
+}
+
+async fn events(State(site): State<Arc<Site>>) -> Response {
+    let Ok(place) = Arc::clone(&site.places).try_acquire_owned() else {
+        site.gate.count(Refusal::Full);
+        return refuse(Refusal::Full);
+    };
+    answer(
+        "text/event-stream",
+        Body::from_stream(site.hub.events(place)),
+    )
+}
