@@ -33,11 +33,11 @@ mod bag;
 mod composed;
 mod live;
 mod mirror;
-mod served;
+mod serve;
 mod shortcomings;
 mod table_trial;
 
-use served::Served;
+use serve::ServeOptions;
 use table_trial::TableTrial;
 
 /// Arguments of `abbe run`.
@@ -71,7 +71,7 @@ pub struct Run {
     #[arg(long)]
     full: bool,
     #[command(flatten)]
-    served: Served,
+    served: ServeOptions,
     #[command(flatten)]
     keep: Keep,
 }

@@ -15,16 +15,16 @@ const NODE: &str = "live_view";
 /// Arguments of `abbe serve`.
 #[derive(Args)]
 pub struct Serve {
-    /// Address and port of the page, by number; port 0: any that is free.
+    /// IP address and port of the page; port 0: any free port.
     #[arg(long, default_value = DEFAULT_ADDRESS)]
     address: String,
-    /// File with the token that browsers must have; required where other computers reach the address.
+    /// File with the token that browsers need; required for addresses other than loopback.
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
-    /// Name by which browsers reach the page, beside `localhost` and numbers; may be given several times.
+    /// Host name of the page, beside `localhost` and IP addresses; repeatable.
     #[arg(long = "host-name", value_name = "NAME")]
     host_names: Vec<String>,
-    /// Parameter file of axis_compensation, whose limits are shown.
+    /// Parameter file of axis_compensation with the limits to show.
     #[arg(long, value_name = "FILE")]
     compensation_file: Option<PathBuf>,
     /// Namespace of the cell's topics, such as `/mill_3`.
@@ -33,7 +33,7 @@ pub struct Serve {
 }
 
 impl Serve {
-    /// The same as arguments of the node.
+    /// Arguments of the node.
     fn arguments(&self) -> Vec<String> {
         let path = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
         let mut given = vec![("address", json!(self.address))];
@@ -56,7 +56,7 @@ impl Serve {
         arguments
     }
 
-    /// Serves until it is stopped.
+    /// Serves until stopped.
     ///
     /// # Errors
     /// When the program has no such node.
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_given_reaches_the_node_as_its_parameters() {
+    fn options_reach_the_node_as_its_parameters() {
         let words = "abbe --address [::1]:0 --token-file token --host-name mill --host-name cell --namespace /mill_3";
         let line = Line::parse_from(words.split(' '));
         let arguments = Arguments::parse(line.serve.arguments()).unwrap();

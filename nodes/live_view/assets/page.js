@@ -2,7 +2,7 @@
 const parts = {};
 const query = location.search;
 let newest = 0;
-let heard = performance.now();
+let received = performance.now();
 let isCut = false;
 
 const byId = (id) => document.getElementById(id);
@@ -27,7 +27,7 @@ function make(tag, text, kind) {
   return element;
 }
 
-/** Fills a section with a title and what follows. */
+/** Fills a section with a title and its content. */
 function show(id, title, stale, ...content) {
   const section = byId(id);
   const head = make('h2', title);
@@ -59,7 +59,7 @@ function table(head, rows, kind) {
   return built;
 }
 
-const words = { off: 'off', active: 'active', holding: 'holding the last', fading: 'fading to zero', limited: 'at its limit' };
+const words = { off: 'off', active: 'active', holding: 'holding its last value', fading: 'fading to zero', limited: 'at its limit' };
 
 function meter(x, limit_um) {
   const size = Math.abs(x) * 1000;
@@ -93,7 +93,7 @@ const draw = {
     }
     if (test) {
       const ended = test.completed ? 'complete' : 'not complete';
-      row.append(make('span', `test ${test.kind}, run ${test.run}: ${test.is_running ? 'runs' : ended}`, 'quiet'));
+      row.append(make('span', `test ${test.kind}, run ${test.run}: ${test.is_running ? 'running' : ended}`, 'quiet'));
     }
     show('plan', 'Plan', null, row, ...(plan && plan.steps ? [bar] : []));
   },
@@ -102,9 +102,9 @@ const draw = {
     if (!all) return section.replaceChildren();
     section.classList.toggle('has-error', all.some((one) => one.level === 'error'));
     section.classList.toggle('has-warning', all.length > 0 && all.every((one) => one.level !== 'error'));
-    if (!all.length) return show('conditions', 'Conditions', null, make('p', 'None stands.', 'good'));
-    const rows = all.map((one) => [[one.name, 'text'], [one.level, one.level === 'error' ? 'text error' : 'text warning'], [one.message, 'text'], time(one.since_ms)]);
-    show('conditions', `Conditions: ${all.length}`, null, table([['where', 'text'], ['level', 'text'], ['what', 'text'], ['since']], rows));
+    if (!all.length) return show('conditions', 'Conditions', null, make('p', 'No condition is in force.', 'good'));
+    const rows = all.map((one) => [[one.name, 'text'], [one.level, one.level === 'error' ? 'text word error' : 'text word warning'], [one.message, 'text'], time(one.since_ms)]);
+    show('conditions', `Conditions: ${all.length}`, null, table([['node and condition', 'text'], ['level', 'text'], ['message', 'text'], ['since']], rows));
   },
   axes(state) {
     if (!state) return byId('axes').replaceChildren();
@@ -116,9 +116,9 @@ const draw = {
   },
   offsets(state) {
     if (!state) return byId('offsets').replaceChildren();
-    const head = [['axis'], ['applied'], ['of limit'], ['thermal'], ['geometric'], ['positioning'], ['state', 'text']];
-    const rows = state.axes.map((one) => [`${one.axis} ${one.unit === 'mm' ? 'µm' : '″'}`, small(one.total, one.unit), one.unit === 'mm' ? meter(one.total, one.limit_um) : '–',
-      small(one.thermal, one.unit), small(one.geometric, one.unit), small(one.positioning, one.unit), [words[one.state] ?? one.state, `text ${one.state}`]]);
+    const head = [['axis'], ['applied'], ['state', 'text word'], ['of limit'], ['thermal'], ['geometric'], ['positioning']];
+    const rows = state.axes.map((one) => [`${one.axis} ${one.unit === 'mm' ? 'µm' : '″'}`, small(one.total, one.unit), [words[one.state] ?? one.state, `text word ${one.state}`],
+      one.unit === 'mm' ? meter(one.total, one.limit_um) : '–', small(one.thermal, one.unit), small(one.geometric, one.unit), small(one.positioning, one.unit)]);
     show('offsets', 'Offsets applied now', state.stale_since_ms, table(head, rows, 'big'));
   },
   drift(model) {
@@ -126,7 +126,7 @@ const draw = {
     const head = [['axis'], ['drift µm'], ['u µm'], ['slope µm/m'], ['touched']];
     const rows = model.axes.map((one) => [one.axis, um(one.k0_mm), um(one.standard_uncertainty_mm), fixed(one.slope_mm_per_mm === null ? NaN : one.slope_mm_per_mm * 1e6, 1), time(one.measured_ms)]);
     const notes = [`model ${model.sequence} from ${model.blocks} blocks at ${time(model.at_ms)}`];
-    if (model.is_over) notes.push('its time is over');
+    if (model.is_over) notes.push('expired');
     if (model.quarantined) notes.push('a jump awaits a second measurement');
     const bad = model.is_over || model.quarantined;
     show('drift', 'Drift of the readings since cold', null, table(head, rows, 'big'), make('p', notes.join(', '), bad ? 'note warning' : 'note'));
@@ -165,30 +165,38 @@ const draw = {
       [one.parameters.map((p) => `${p.name} ${Number(p.value.toPrecision(4))}`).join(', '), 'text']]);
     const content = [make('p', line)];
     if (rows.length) content.push(table([['cause', 'text'], ['status'], ['chance'], ['size', 'text']], rows));
-    if (report.has_unknown) content.push(make('p', 'A part has no known cause.', 'note warning'));
+    if (report.has_unknown) content.push(make('p', 'Part of the gap has no known cause.', 'note warning'));
     if (report.next_experiment) content.push(make('p', `next: ${report.next_experiment}`, 'note'));
     show('gap', `Gap report of ${time(report.at_ms)}`, null, ...content);
   },
   values(all) {
     if (!all) return byId('values').replaceChildren();
     const rows = all.map((one) => [[one.name, 'text'], isNumber(one.value) ? String(Number(one.value.toPrecision(6))) : one.text, [one.verdict, one.verdict === 'Good' ? '' : 'warning'], `${one.silent_s} s`]);
-    show('values', 'The machine’s own values, SI', null, table([['value', 'text'], ['is'], ['verdict'], ['silent for']], rows));
+    show('values', 'The machine’s own values, SI', null, table([['value', 'text'], ['figure'], ['verdict'], ['silent for']], rows));
   },
   nodes(all) {
     if (!all) return byId('nodes').replaceChildren();
-    const rows = all.map((one) => [[one.name, 'text'], one.stale_since_ms ? [`silent since ${time(one.stale_since_ms)}`, 'bad'] : ['at work', 'good']]);
+    const rows = all.map((one) => [[one.name, 'text'], one.stale_since_ms ? [`silent since ${time(one.stale_since_ms)}`, 'bad'] : ['alive', 'good']]);
     show('nodes', 'Nodes', null, table([['node', 'text'], ['state']], rows));
   },
   trouble(trouble) {
     if (!trouble) return byId('trouble').replaceChildren();
     const rows = trouble.refused.map((one) => [[one.topic, 'text'], String(one.messages), [one.reason, 'text']]);
     const content = rows.length ? [table([['topic', 'text'], ['messages'], ['reason', 'text']], rows)] : [];
-    if (trouble.left_out) content.push(make('p', `${trouble.left_out} messages or names were left out: too many at once`, 'note warning'));
-    show('trouble', 'What could not be shown', null, ...content);
+    if (trouble.left_out) content.push(make('p', `${trouble.left_out} messages or names were dropped: too many at once`, 'note warning'));
+    show('trouble', 'Not shown', null, ...content);
   },
 };
 
-/** Which sections a part is drawn in. */
+/** The server's time and, in a simulated run, that of the cell. */
+function clock() {
+  const date = (at) => new Date(at).toLocaleString('sv-SE');
+  const cell = parts.axes?.at_ms;
+  const isOther = isNumber(cell) && Math.abs(cell - newest) > 3600e3;
+  return isOther ? `simulated ${date(cell)}, now ${date(newest)}` : date(newest);
+}
+
+/** Section of each part with another name. */
 const inSection = { plan: 'plan', test: 'plan', latency: 'models', geometry: 'models', rotary: 'models', positioning: 'models' };
 
 function redraw(changed) {
@@ -198,7 +206,7 @@ function redraw(changed) {
   }
 }
 
-function tell(kind, text) {
+function setLink(kind, text) {
   const link = byId('link');
   if (link.textContent !== text) link.textContent = text;
   link.className = kind;
@@ -206,7 +214,7 @@ function tell(kind, text) {
   document.body.classList.toggle('cut', isCut);
 }
 
-/** Why the server gave no events. */
+/** The server's reason for no events. */
 async function why() {
   try {
     const answer = await fetch('snapshot.json' + query);
@@ -221,28 +229,28 @@ function listen() {
   let isFirst = true;
   events.onopen = () => { isFirst = true; };
   events.onmessage = (event) => {
-    const news = JSON.parse(event.data);
-    [newest, heard] = [news.now_ms, performance.now()];
+    const update = JSON.parse(event.data);
+    [newest, received] = [update.now_ms, performance.now()];
     const gone = isFirst ? Object.keys(parts) : [];
     for (const part of gone) delete parts[part];
-    Object.assign(parts, news.parts);
+    Object.assign(parts, update.parts);
     isFirst = false;
-    redraw([...gone, ...Object.keys(news.parts)]);
-    byId('clock').textContent = new Date(newest).toLocaleString([], { hour12: false });
-    tell('live', 'live');
+    redraw([...gone, ...Object.keys(update.parts)]);
+    byId('clock').textContent = clock();
+    setLink('live', 'live');
   };
   events.onerror = async () => {
     if (events.readyState !== EventSource.CLOSED) return;
     const reason = await why();
-    if (reason) tell('cut', reason);
+    if (reason) setLink('cut', reason);
     setTimeout(listen, 5000);
   };
 }
 
 setInterval(() => {
-  const silent_s = (performance.now() - heard) / 1000;
+  const silent_s = (performance.now() - received) / 1000;
   if (silent_s < 3 || (isCut && !byId('link').textContent.startsWith('stale'))) return;
-  tell('cut', newest ? `stale since ${time(Date.now() - 1000 * silent_s)}` : 'no answer from the server');
+  setLink('cut', newest ? `stale since ${time(Date.now() - 1000 * silent_s)}` : 'no answer from the server');
 }, 500);
 
 byId('snapshot').href = 'snapshot.json' + query;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::LiveViewError;
 
-/// Where the page is unless another place is given.
+/// Default address of the page.
 pub const DEFAULT_ADDRESS: &str = "127.0.0.1:8642";
 /// Fewest characters of a token: 20 of 64 letters are 120 bits.
 const SHORTEST_TOKEN: usize = 20;
@@ -20,28 +20,28 @@ const LONGEST_TOKEN: usize = 256;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LiveViewConfig {
-    /// Address and port of the page, by number; port 0: any that is free.
+    /// Address and port of the page, by number; port 0: any free port.
     pub address: String,
-    /// File with the token that browsers must have, relative to the parameter file; required where the address is not
-    /// that of this computer alone.
+    /// File with the token that browsers need, relative to the parameter file; required for addresses other than
+    /// loopback.
     pub token_file: String,
-    /// Names by which browsers reach the page, beside `localhost` and numbers.
+    /// Host names of the page, beside `localhost` and IP addresses.
     pub host_names: Vec<String>,
-    /// Parameter file of axis_compensation, relative to the parameter file, whose limits are shown.
+    /// Parameter file of axis_compensation with the limits to show, relative to the parameter file.
     pub compensation_file: String,
     /// Most browsers at once.
     #[schemars(range(min = 1.0, max = 200.0))]
     pub most_browsers: u32,
-    /// Changes are sent this often.
+    /// Rate of updates to browsers.
     #[schemars(range(min = 0.2, max = 20.0))]
     pub rate_hz: f64,
-    /// Silence of a periodic topic after which its value is shown as stale.
+    /// Silence of a periodic topic after which its value is stale.
     #[schemars(range(min = 0.5, max = 3600.0))]
     pub stale_after_s: f64,
-    /// A request that is not complete by then is ended.
+    /// Time within which a request must be complete.
     #[schemars(range(min = 0.1, max = 60.0))]
     pub request_timeout_s: f64,
-    /// A browser that takes nothing for so long is dropped.
+    /// A browser that reads nothing for this time is dropped.
     #[schemars(range(min = 0.1, max = 600.0))]
     pub stall_timeout_s: f64,
 }
@@ -65,19 +65,19 @@ impl Default for LiveViewConfig {
 /// Checked settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Where the page is.
+    /// Address of the page.
     pub address: SocketAddr,
-    /// Names by which browsers may ask for it, in small letters.
+    /// Host names of the page, in lower case.
     pub host_names: Vec<String>,
     /// Most browsers at once.
     pub most_browsers: u32,
-    /// Between two looks.
+    /// Time between two updates.
     pub period: Span,
     /// Silence after which a periodic value is stale.
     pub stale_after: Span,
-    /// A request that is not complete by then is ended.
+    /// Time within which a request must be complete.
     pub request_timeout: Span,
-    /// A browser that takes nothing for so long is dropped.
+    /// A browser that reads nothing for this time is dropped.
     pub stall_timeout: Span,
 }
 
@@ -89,7 +89,7 @@ impl Settings {
     /// Checks a configuration.
     ///
     /// # Errors
-    /// A value out of range, an address or a name that is none, or an address that others reach without a token.
+    /// A value out of range, a malformed address or name, or an address other than loopback without a token.
     pub fn new(config: &LiveViewConfig) -> Result<Self, LiveViewError> {
         check_parameters(config)?;
         let address: SocketAddr = config.address.parse().map_err(|_| LiveViewError::Address {
@@ -118,10 +118,10 @@ impl Settings {
     }
 }
 
-/// The token in the text of its file: the one line, of letters that stand in an address as they are.
+/// The token in the text of its file: one line of characters that need no escape in a URL.
 ///
 /// # Errors
-/// When it is too short or too long, or has another letter. The error never has the token.
+/// When it is too short or too long, or has another character. The error never shows the token.
 pub fn checked_token(file: &str, text: &str) -> Result<String, LiveViewError> {
     let token = text.trim();
     let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_' | '~');

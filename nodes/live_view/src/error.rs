@@ -1,4 +1,4 @@
-//! What can go wrong before the page is served.
+//! Errors before the page is served.
 
 use std::net::SocketAddr;
 
@@ -10,31 +10,31 @@ pub enum LiveViewError {
     /// A parameter outside its limits.
     #[error(transparent)]
     Parameter(#[from] BoundError),
-    /// The address is none.
+    /// The address is malformed.
     #[error(
-        "address = {address:?}: must be a number and a port, such as 127.0.0.1:8642 or [::1]:8642"
+        "address = {address:?}: must be an IP address and a port, such as 127.0.0.1:8642 or [::1]:8642"
     )]
     Address {
-        /// What was read.
+        /// Value of the parameter.
         address: String,
     },
-    /// Others could look at the cell.
+    /// Other computers reach the address, and there is no token.
     #[error(
-        "address = {address}: other computers reach it: give token_file, a file that holds a token, or take 127.0.0.1"
+        "address = {address}: other computers reach it: set token_file to a file with a token, or use 127.0.0.1"
     )]
     Open {
         /// The address.
         address: SocketAddr,
     },
-    /// A name that cannot stand in a request.
+    /// A malformed host name.
     #[error(
         "host_names: {name:?}: must be a name of letters, digits, `-`, `_` and dots, without a port"
     )]
     HostName {
-        /// What was read.
+        /// Value of the parameter.
         name: String,
     },
-    /// The token is too easy to guess, or cannot stand in an address.
+    /// The token is too short, too long, or needs escapes in a URL.
     #[error(
         "{file}: the token has {letters} characters: must be one line of {least} to {greatest} letters, digits, `-`, `.`, `_` and `~`, such as `openssl rand -hex 32` prints"
     )]
@@ -53,20 +53,20 @@ pub enum LiveViewError {
         "this program was built without the live view: build it with `cargo build --release --features serve`"
     )]
     NotBuilt,
-    /// The address cannot be listened on.
-    #[error("address = {address}: {source}; give another port, or port 0 for one that is free")]
+    /// The server cannot listen on the address.
+    #[error("address = {address}: {source}; use another port, or port 0 for any free one")]
     Listen {
-        /// Where.
+        /// Address.
         address: SocketAddr,
-        /// The system's word.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// The system has no thread or event queue left.
     #[error("{action}: {source}")]
     Io {
-        /// What was tried.
+        /// Failed action.
         action: &'static str,
-        /// The system's word.
+        /// Error of the system.
         source: std::io::Error,
     },
 }

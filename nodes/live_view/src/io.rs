@@ -1,6 +1,4 @@
-//! The server: the only part that does something itself.
-//!
-//! It is built with the feature `serve`; without it nothing is served, and it is said how it is built.
+//! The server, built with the feature `serve`. Without it, a start ends with the command that builds it.
 
 use std::collections::BTreeMap;
 
@@ -18,8 +16,6 @@ mod hub;
 #[cfg(not(feature = "serve"))]
 mod none;
 #[cfg(feature = "serve")]
-mod patience;
-#[cfg(feature = "serve")]
 mod server;
 
 #[cfg(not(feature = "serve"))]
@@ -27,17 +23,14 @@ pub use none::LiveViewIo;
 #[cfg(feature = "serve")]
 pub use server::LiveViewIo;
 
-/// Whether the program has the server.
-pub const IS_BUILT: bool = cfg!(feature = "serve");
-
-/// Hands over what was heard since the last call, each with its instant, and says what time it is.
+/// Appends the inputs since the last call, each with its instant, and returns the time.
 pub type Source = Box<dyn FnMut(&mut Vec<(Stamp<Host>, Input)>) -> Stamp<Host> + Send>;
 
-/// What the server has done so far.
+/// Browsers and refused requests of a server.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Account {
-    /// Browsers that look now.
+    /// Browsers connected now.
     pub browsers: usize,
-    /// Requests that were refused since the start, by reason.
+    /// Requests refused since the start, by reason.
     pub refused: BTreeMap<&'static str, u64>,
 }

@@ -1,8 +1,8 @@
 //! A page of a cell as it is now, for browsers.
 //!
-//! `stage` takes what the topics carry and says, at each look, which part of the page has changed: the latest value of
-//! each, as JSON. It has no clock: when a value was heard, and when it is looked at, comes with the event. `io` is the
-//! server, built with the feature `serve`; `config` holds the parameters and what they allow.
+//! `stage` takes the messages of the topics; at each look it outputs the parts of the page that changed, as JSON. It reads
+//! no clock: every event brings its instant. `io` is the server, built with the feature `serve`. `config` has the
+//! parameters and their limits.
 
 mod config;
 mod error;
@@ -12,5 +12,5 @@ mod stage;
 
 pub use config::{DEFAULT_ADDRESS, LiveViewConfig, Settings, checked_token};
 pub use error::LiveViewError;
-pub use page::{Condition, MOST_CONDITIONS, MOST_NAMES, MOST_TOUCHES};
+pub use page::{Condition, MOST_NAMES, MOST_TOUCHES};
 pub use stage::{Input, LiveViewStage, Output};

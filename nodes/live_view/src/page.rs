@@ -1,7 +1,7 @@
-//! What is shown: the latest of each value with when it was heard, and its form as JSON.
+//! The latest of each value with its time of receipt, and its form as JSON.
 //!
-//! Lengths in it are mm, angles rad, times seconds or, with `_ms`, milliseconds since 1970; a number that is not known is
-//! `null`. What a person reads, in µm and seconds of arc, the page in the browser makes of it.
+//! Lengths in it are mm, angles rad, times seconds or, with `_ms`, milliseconds since 1970; an unknown number is
+//! `null`. The browser's page converts them to µm and seconds of arc.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -21,29 +21,27 @@ mod motion;
 mod progress;
 
 pub use conditions::Condition;
-use conditions::Standing;
+use conditions::ConditionState;
 use progress::StepBegin;
 
 /// Touches that are kept.
 pub const MOST_TOUCHES: usize = 20;
-/// Conditions that are kept; one more is counted.
-pub const MOST_CONDITIONS: usize = 200;
-/// Sensors, values, nodes and refusing topics that are kept, each; one more is counted.
+/// Sensors, values, nodes, conditions and topics that are kept, each; one more is counted.
 pub const MOST_NAMES: usize = 256;
 /// Longest text of a message that is shown, characters.
 const LONGEST_TEXT: usize = 1000;
 
-/// A value and when it was heard.
+/// A value and its time of receipt.
 #[derive(Clone, Debug)]
-struct Heard<T> {
+struct Latest<T> {
     at: Stamp<Host>,
     value: T,
 }
 
-type Last<T> = Option<Heard<T>>;
+type Last<T> = Option<Latest<T>>;
 
 /// The latest of everything.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Page {
     stale_after: Span,
     limits_um: BTreeMap<Axis, f64>,
@@ -53,27 +51,27 @@ pub(crate) struct Page {
     step: Option<StepBegin>,
     test: Last<TestSegment>,
     drift: Last<Box<ThermalModel>>,
-    temperatures: BTreeMap<String, Heard<TemperatureSample>>,
+    temperatures: BTreeMap<String, Latest<TemperatureSample>>,
     touches: VecDeque<ProbedPoint>,
     latency: Last<ProbeLatency>,
     geometry: Option<Value>,
     rotary: Option<Value>,
     positioning: BTreeMap<Axis, Value>,
     gap: Option<Value>,
-    values: BTreeMap<String, Heard<MachineValue>>,
+    values: BTreeMap<String, Latest<MachineValue>>,
     nodes: BTreeMap<String, Stamp<Host>>,
-    conditions: BTreeMap<String, Standing>,
+    conditions: BTreeMap<String, ConditionState>,
     refused: BTreeMap<String, (u64, String)>,
-    /// Names beyond what is kept, and messages beyond what is looked at.
+    /// Names and messages beyond the limits.
     left_out: u64,
 }
 
-/// An instant as the page has it.
+/// An instant in the JSON.
 pub(crate) fn ms(at: Stamp<Host>) -> i64 {
     at.nanos().div_euclid(1_000_000)
 }
 
-/// A text that fits on the page; what is cut is counted in it.
+/// A text cut to its longest; the cut characters are counted.
 fn short(text: &str) -> String {
     let letters = text.chars().count();
     if letters <= LONGEST_TEXT {
@@ -88,45 +86,28 @@ impl Page {
         Self {
             stale_after,
             limits_um,
-            axes: None,
-            offsets: None,
-            plan: None,
-            step: None,
-            test: None,
-            drift: None,
-            temperatures: BTreeMap::new(),
-            touches: VecDeque::new(),
-            latency: None,
-            geometry: None,
-            rotary: None,
-            positioning: BTreeMap::new(),
-            gap: None,
-            values: BTreeMap::new(),
-            nodes: BTreeMap::new(),
-            conditions: BTreeMap::new(),
-            refused: BTreeMap::new(),
-            left_out: 0,
+            ..Self::default()
         }
     }
 
-    /// Takes what was heard `at` an instant.
-    pub fn hear(&mut self, at: Stamp<Host>, input: Input) {
+    /// Takes an input received `at` an instant.
+    pub fn take(&mut self, at: Stamp<Host>, input: Input) {
         match input {
-            Input::Axes(value) => self.axes = Some(Heard { at, value }),
-            Input::Offsets(value) => self.offsets = Some(Heard { at, value }),
-            Input::Plan(value) => self.hear_plan(at, value),
+            Input::Axes(value) => self.axes = Some(Latest { at, value }),
+            Input::Offsets(value) => self.offsets = Some(Latest { at, value }),
+            Input::Plan(value) => self.take_plan(at, value),
             Input::Test(mut value) => {
                 value.features.clear();
-                self.test = Some(Heard { at, value });
+                self.test = Some(Latest { at, value });
             }
-            Input::Drift(value) => self.drift = Some(Heard { at, value }),
+            Input::Drift(value) => self.drift = Some(Latest { at, value }),
             Input::Temperature(value) => {
                 let name = value.sensor.clone();
                 keep(
                     &mut self.temperatures,
                     &mut self.left_out,
                     name,
-                    Heard { at, value },
+                    Latest { at, value },
                 );
             }
             Input::Touch(mut value) => {
@@ -134,7 +115,7 @@ impl Page {
                 self.touches.push_front(value);
                 self.touches.truncate(MOST_TOUCHES);
             }
-            Input::Latency(value) => self.latency = Some(Heard { at, value }),
+            Input::Latency(value) => self.latency = Some(Latest { at, value }),
             Input::Geometry(model) => self.geometry = Some(models::geometry(&model)),
             Input::Rotary(model) => self.rotary = Some(models::geometry(&model)),
             Input::Positioning(table) => {
@@ -149,18 +130,18 @@ impl Page {
                     &mut self.values,
                     &mut self.left_out,
                     name,
-                    Heard { at, value },
+                    Latest { at, value },
                 );
             }
             Input::Node(name) => keep(&mut self.nodes, &mut self.left_out, name, at),
-            Input::Condition(condition) => self.hear_condition(at, condition),
-            Input::Refused { topic, reason } => self.hear_refused(topic, reason),
+            Input::Condition(condition) => self.take_condition(at, condition),
+            Input::Refused { topic, reason } => self.take_refused(topic, reason),
             Input::LeftOut(messages) => self.left_out = self.left_out.saturating_add(messages),
             Input::Look => {}
         }
     }
 
-    fn hear_refused(&mut self, topic: String, reason: String) {
+    fn take_refused(&mut self, topic: String, reason: String) {
         match self.refused.get_mut(&topic) {
             Some((messages, last)) => {
                 *messages = messages.saturating_add(1);
@@ -170,14 +151,14 @@ impl Page {
         }
     }
 
-    /// The instant to which the newest positions belong: the time of the cell, which is simulated or real.
+    /// Time of the newest positions: the time of the cell, simulated or real.
     fn time_of_the_cell(&self) -> Option<Stamp<Host>> {
-        self.axes.as_ref().map(|heard| heard.value.received_at)
+        self.axes.as_ref().map(|latest| latest.value.received_at)
     }
 
-    /// Since when a periodic value is stale, as the page has it.
-    fn stale_since(&self, now: Stamp<Host>, heard: Stamp<Host>) -> Option<i64> {
-        (now - heard > self.stale_after).then(|| ms(heard))
+    /// Last receipt of a periodic value that is stale, in the JSON.
+    fn stale_since(&self, now: Stamp<Host>, latest: Stamp<Host>) -> Option<i64> {
+        (now - latest > self.stale_after).then(|| ms(latest))
     }
 
     /// Every part that has something to show.
@@ -210,20 +191,20 @@ impl Page {
     }
 
     fn temperatures_part(&self, now: Stamp<Host>) -> Option<Value> {
-        let one = |(name, heard): (&String, &Heard<TemperatureSample>)| {
+        let one = |(name, latest): (&String, &Latest<TemperatureSample>)| {
             json!({
                 "name": name,
-                "degc": heard.value.temperature_degc,
-                "at_ms": ms(heard.value.at),
-                "stale_since_ms": self.stale_since(now, heard.at),
+                "degc": latest.value.temperature_degc,
+                "at_ms": ms(latest.value.at),
+                "stale_since_ms": self.stale_since(now, latest.at),
             })
         };
         list(self.temperatures.iter().map(one).collect())
     }
 
     fn values_part(&self, now: Stamp<Host>) -> Option<Value> {
-        let one = |(name, heard): (&String, &Heard<MachineValue>)| {
-            let value = &heard.value;
+        let one = |(name, latest): (&String, &Latest<MachineValue>)| {
+            let value = &latest.value;
             json!({
                 "name": name,
                 "quantity": format!("{:?}", value.quantity),
@@ -231,18 +212,18 @@ impl Page {
                 "value": value.value,
                 "text": value.text,
                 "at_ms": ms(value.received_at),
-                "silent_s": (now - heard.at).as_secs_f64().max(0.0).round(),
+                "silent_s": (now - latest.at).as_secs_f64().max(0.0).round(),
             })
         };
         list(self.values.iter().map(one).collect())
     }
 
     fn nodes_part(&self, now: Stamp<Host>) -> Option<Value> {
-        let one = |(name, &heard): (&String, &Stamp<Host>)| json!({"name": name, "stale_since_ms": self.stale_since(now, heard)});
+        let one = |(name, &latest): (&String, &Stamp<Host>)| json!({"name": name, "stale_since_ms": self.stale_since(now, latest)});
         list(self.nodes.iter().map(one).collect())
     }
 
-    /// What the page itself could not use; none: everything.
+    /// Messages that could not be shown; `None`: there are none.
     fn trouble_part(&self) -> Option<Value> {
         let one = |(topic, (messages, reason)): (&String, &(u64, String))| json!({"topic": topic, "messages": messages, "reason": short(reason)});
         let refused: Vec<Value> = self.refused.iter().map(one).collect();

@@ -12,7 +12,7 @@ use metrology::{Axis, Stage, Stamp};
 
 use crate::page::{Condition, Page};
 
-/// What is heard.
+/// Inputs of the page.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Input {
     /// Positions of the axes.
@@ -37,35 +37,35 @@ pub enum Input {
     Rotary(GeometryModel),
     /// Positioning deviations of an axis.
     Positioning(PositioningTable),
-    /// Where simulator and machine differ.
+    /// Report of a diagnosis.
     Gap(GapSummary),
-    /// What a machine reports of itself.
+    /// A value that a machine reports.
     Value(MachineValue),
-    /// A node is at work, by its full name.
+    /// A node is alive, by its full name.
     Node(String),
     /// A condition of a node, or its end.
     Condition(Condition),
     /// A message of a topic could not be used.
     Refused {
-        /// Which topic.
+        /// Topic.
         topic: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// So many messages came faster than they could be looked at.
+    /// Number of messages beyond the limits.
     LeftOut(u64),
-    /// The page is looked at.
+    /// Output the changed parts.
     Look,
 }
 
-/// What is said.
+/// Outputs of the page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Output {
-    /// A part of the page is another than before.
+    /// A part of the page changed.
     Changed {
-        /// Which part.
+        /// Name of the part.
         part: &'static str,
-        /// What it is now, as JSON.
+        /// The part as JSON.
         json: String,
     },
 }
@@ -74,24 +74,24 @@ pub enum Output {
 #[derive(Clone, Debug)]
 pub struct LiveViewStage {
     page: Page,
-    told: BTreeMap<&'static str, String>,
+    sent: BTreeMap<&'static str, String>,
 }
 
 impl LiveViewStage {
-    /// A page on which nothing has been heard; `limits_um` are the greatest offsets of the axes where they are known.
+    /// An empty page; `limits_um` are the greatest offsets of the axes where known.
     #[must_use]
     pub fn new(stale_after: Span, limits_um: BTreeMap<Axis, f64>) -> Self {
         Self {
             page: Page::new(stale_after, limits_um),
-            told: BTreeMap::new(),
+            sent: BTreeMap::new(),
         }
     }
 
     fn look(&mut self, now: Stamp<Host>, out: &mut Vec<Output>) {
         for (part, value) in self.page.parts(now) {
             let json = value.to_string();
-            if self.told.get(part) != Some(&json) {
-                self.told.insert(part, json.clone());
+            if self.sent.get(part) != Some(&json) {
+                self.sent.insert(part, json.clone());
                 out.push(Output::Changed { part, json });
             }
         }
@@ -112,7 +112,7 @@ impl Stage for LiveViewStage {
         if input == Input::Look {
             self.look(at, out);
         } else {
-            self.page.hear(at, input);
+            self.page.take(at, input);
         }
         Ok(())
     }

@@ -23,7 +23,7 @@ use recorder::{
 };
 
 use super::mirror::Mirror;
-use super::{INTERRUPTED, NOT_RECORDED, Outcome, bag, served};
+use super::{INTERRUPTED, NOT_RECORDED, Outcome, bag, serve};
 use crate::alarm;
 use crate::evidence::Evidence;
 use crate::launch::LaunchNode;
@@ -78,7 +78,7 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
         None
     };
     if let Some(feed) = how.feed {
-        served::feed(&mut harness, feed);
+        serve::feed(&mut harness, feed);
     }
     let evidence = gather(&mut harness, &truth);
     let watched = Watched {

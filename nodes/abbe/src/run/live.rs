@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail};
-use live_view_node::{Feed, Hearing};
+use live_view_node::{Feed, Receiver};
 use metrology::sample::PlanState;
 use metrology::stamp::{Host, Stamp};
 use node_runtime::arguments::Arguments;
@@ -56,7 +56,7 @@ pub fn run(
     let recorder = begin_bag(scenario, bag_path, &prepared)?;
     let evidence = Arc::<Mutex<GraphEvidence>>::default();
     let seen = Arc::clone(&evidence);
-    let mut hearing = feed.map(|feed| Hearing::new("/", feed, HostTime::default()));
+    let mut receiver = feed.map(|feed| Receiver::new("/", feed, HostTime::default()));
     let capture = Capture::start(
         &environment,
         &NodeNames::new(TAP, &[])?,
@@ -65,8 +65,8 @@ pub fn run(
         HostTime::default(),
         move |event| {
             if let TapEvent::Sample(sample) = event {
-                if let Some(hearing) = &mut hearing {
-                    hearing.take(sample);
+                if let Some(receiver) = &mut receiver {
+                    receiver.take(sample);
                 }
                 lock(&seen).take(sample);
             }

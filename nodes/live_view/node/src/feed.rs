@@ -1,4 +1,4 @@
-//! Where messages wait for the next look: of most topics the latest alone, so that a thousand a second cost no decoding.
+//! Messages that wait for the next update: of most topics only the latest, so that 1 kHz topics cost no decoding.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,74 +9,74 @@ use metrology::Stamp;
 use metrology::stamp::Host;
 use node_runtime::Bytes;
 
-use crate::ears::{EARS, Family};
+use crate::decoders::{DECODERS, Family};
 
-/// Messages of topics of which every one counts, between two looks; the oldest beyond are left out and counted.
+/// Most messages between two updates of topics whose every message counts; older ones are dropped and counted.
 const MOST_WAITING: usize = 1_000;
-/// Members of families that are listened to.
+/// Most topics.
 const MOST_MEMBERS: usize = 512;
-/// Longest message that is looked at, bytes.
+/// Longest decoded message, bytes.
 const MOST_BYTES: usize = 16 << 20;
-/// The same of a topic of which every one counts.
+/// The same of a topic whose every message counts.
 const MOST_BYTES_OF_EACH: usize = 64 << 10;
 
-/// A topic that is listened to.
+/// A subscribed topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Slot(Ear);
+pub struct Slot(Key);
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Ear {
-    /// Place in [`EARS`].
+enum Key {
+    /// Place in [`DECODERS`].
     One(usize),
     Temperature(Arc<str>),
     Machine(Arc<str>),
 }
 
 struct Sample {
-    ear: Ear,
+    key: Key,
     at: Stamp<Host>,
     bytes: Bytes,
 }
 
 #[derive(Default)]
 struct Waiting {
-    latest: BTreeMap<Ear, (Stamp<Host>, Bytes)>,
+    latest: BTreeMap<Key, (Stamp<Host>, Bytes)>,
     each: VecDeque<Sample>,
     left_out: u64,
 }
 
-/// What takes messages from wherever they come, and hands over what they say. Its copies are one feed.
+/// Takes messages and hands them over decoded. Clones share one feed.
 #[derive(Clone, Default)]
 pub struct Feed(Arc<Mutex<Waiting>>);
 
-impl Ear {
+impl Key {
     fn is_each(&self) -> bool {
-        matches!(self, Self::One(place) if EARS.get(*place).is_some_and(|ear| ear.is_each))
+        matches!(self, Self::One(place) if DECODERS.get(*place).is_some_and(|key| key.is_each))
     }
 
-    fn hear(&self, bytes: &[u8]) -> Result<Vec<Input>, WireError> {
+    fn decode(&self, bytes: &[u8]) -> Result<Vec<Input>, WireError> {
         match self {
-            Self::One(place) => EARS
+            Self::One(place) => DECODERS
                 .get(*place)
-                .map_or_else(|| Ok(Vec::new()), |ear| (ear.hear)(bytes)),
-            Self::Temperature(member) => Family::Temperature.hear(member, bytes),
-            Self::Machine(member) => Family::Machine.hear(member, bytes),
+                .map_or_else(|| Ok(Vec::new()), |key| (key.decode)(bytes)),
+            Self::Temperature(member) => Family::Temperature.decode(member, bytes),
+            Self::Machine(member) => Family::Machine.decode(member, bytes),
         }
     }
 
     fn topic(&self) -> String {
         match self {
-            Self::One(place) => EARS
+            Self::One(place) => DECODERS
                 .get(*place)
-                .map_or_else(String::new, |ear| ear.topic.to_owned()),
+                .map_or_else(String::new, |key| key.topic.to_owned()),
             Self::Temperature(member) => format!("{}{member}", Family::Temperature.base()),
             Self::Machine(member) => format!("{}{member}", Family::Machine.base()),
         }
     }
 
-    /// What a message says, or that it cannot be used.
+    /// Inputs of a message, or its refusal.
     fn inputs(&self, bytes: &[u8]) -> Vec<Input> {
-        self.hear(bytes).unwrap_or_else(|error| {
+        self.decode(bytes).unwrap_or_else(|error| {
             let (topic, reason) = (self.topic(), error.to_string());
             vec![Input::Refused { topic, reason }]
         })
@@ -88,52 +88,52 @@ impl Feed {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The slot of a topic by its relative name; `None`: the page does not show it.
+    /// The slot of a topic by its relative name; `None`: it is not shown.
     #[must_use]
     pub fn slot(topic: &str) -> Option<Slot> {
-        if let Some(place) = EARS.iter().position(|ear| ear.topic == topic) {
-            return Some(Slot(Ear::One(place)));
+        if let Some(place) = DECODERS.iter().position(|key| key.topic == topic) {
+            return Some(Slot(Key::One(place)));
         }
         let (family, member) = Family::of(topic)?;
         Some(Slot(match family {
-            Family::Temperature => Ear::Temperature(member.into()),
-            Family::Machine => Ear::Machine(member.into()),
+            Family::Temperature => Key::Temperature(member.into()),
+            Family::Machine => Key::Machine(member.into()),
         }))
     }
 
-    /// Takes a message that came `at` an instant.
+    /// Takes a message received `at` an instant.
     pub fn take(&self, slot: &Slot, at: Stamp<Host>, bytes: &Bytes) {
-        let ear = &slot.0;
+        let key = &slot.0;
         let mut waiting = self.waiting();
-        let most = if ear.is_each() {
+        let most = if key.is_each() {
             MOST_BYTES_OF_EACH
         } else {
             MOST_BYTES
         };
-        let is_new = !waiting.latest.contains_key(ear);
+        let is_new = !waiting.latest.contains_key(key);
         if bytes.len() > most || (is_new && waiting.latest.len() >= MOST_MEMBERS) {
             waiting.left_out += 1;
-        } else if !ear.is_each() {
-            waiting.latest.insert(ear.clone(), (at, Arc::clone(bytes)));
+        } else if !key.is_each() {
+            waiting.latest.insert(key.clone(), (at, Arc::clone(bytes)));
         } else {
             if waiting.each.len() >= MOST_WAITING {
                 waiting.each.pop_front();
                 waiting.left_out += 1;
             }
-            let (ear, bytes) = (ear.clone(), Arc::clone(bytes));
-            waiting.each.push_back(Sample { ear, at, bytes });
+            let (key, bytes) = (key.clone(), Arc::clone(bytes));
+            waiting.each.push_back(Sample { key, at, bytes });
         }
     }
 
-    /// Hands over what has come since the last call, with when it came.
+    /// Appends the inputs since the last call, each with its time of receipt.
     pub fn hand_over(&self, now: Stamp<Host>, out: &mut Vec<(Stamp<Host>, Input)>) {
         let waited = std::mem::take(&mut *self.waiting());
         for sample in waited.each {
-            let inputs = sample.ear.inputs(&sample.bytes).into_iter();
+            let inputs = sample.key.inputs(&sample.bytes).into_iter();
             out.extend(inputs.map(|input| (sample.at, input)));
         }
-        for (ear, (at, bytes)) in waited.latest {
-            out.extend(ear.inputs(&bytes).into_iter().map(|input| (at, input)));
+        for (key, (at, bytes)) in waited.latest {
+            out.extend(key.inputs(&bytes).into_iter().map(|input| (at, input)));
         }
         if waited.left_out > 0 {
             out.push((now, Input::LeftOut(waited.left_out)));
@@ -154,7 +154,7 @@ mod tests {
         Stamp::from_nanos(nanos)
     }
 
-    fn heard(feed: &Feed) -> Vec<(Stamp<Host>, Input)> {
+    fn received(feed: &Feed) -> Vec<(Stamp<Host>, Input)> {
         let mut out = Vec::new();
         feed.hand_over(at(9), &mut out);
         out
@@ -185,8 +185,8 @@ mod tests {
             sensor: "bed".to_owned(),
             ..reading(22.5)
         };
-        assert_eq!(heard(&feed), [(at(1), Input::Temperature(expected))]);
-        assert_eq!(heard(&feed), []);
+        assert_eq!(received(&feed), [(at(1), Input::Temperature(expected))]);
+        assert_eq!(received(&feed), []);
     }
 
     #[test]
@@ -205,7 +205,7 @@ mod tests {
         for _ in 0..MOST_WAITING + 2 {
             feed.take(&slot, at(1), &bytes(&message));
         }
-        let all = heard(&feed);
+        let all = received(&feed);
         assert_eq!(all.len(), 2 * MOST_WAITING + 1);
         assert_eq!(all[0].1, Input::Node("/probe".to_owned()));
         assert!(matches!(&all[1].1, Input::Condition(one) if one.name == "/probe: old"));
@@ -213,11 +213,11 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_said_and_what_is_not_shown_is_not_kept() {
+    fn a_damaged_message_is_reported_and_a_topic_that_is_not_shown_has_no_slot() {
         let feed = Feed::default();
         let slot = Feed::slot(topics::AXES_STATE.name).unwrap();
         feed.take(&slot, at(1), &Bytes::from([0, 1, 0, 0, 7]));
-        let all = heard(&feed);
+        let all = received(&feed);
         let refused = |input: &Input| matches!(input, Input::Refused { topic, .. } if topic == topics::AXES_STATE.name);
         assert!(all.len() == 1 && refused(&all[0].1), "{all:?}");
         for other in [topics::TF.name, topics::TEMPERATURE.base, "x/y"] {

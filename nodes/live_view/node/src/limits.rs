@@ -1,4 +1,4 @@
-//! The limits of the offsets, where they stand: in the parameters of axis_compensation.
+//! Limits of the offsets, from the parameters of axis_compensation.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,10 +9,10 @@ use node_runtime::Setup;
 use node_runtime::arguments::Arguments;
 use node_runtime::parameter::Value;
 
-/// The node whose parameters they are.
+/// Node with the parameters.
 const NODE: &str = "axis_compensation";
 
-/// The axis whose limit a parameter is.
+/// Axis of a limit's parameter.
 fn axis(parameter: &str) -> Option<Axis> {
     let name = parameter
         .strip_prefix("axes.")?
@@ -39,7 +39,7 @@ pub fn limits_of(compensation: &Setup) -> Result<BTreeMap<Axis, f64>> {
     Ok(limits_um)
 }
 
-/// The same out of a parameter file.
+/// The same from a parameter file.
 ///
 /// # Errors
 /// When it cannot be read or has no limit.
@@ -49,7 +49,7 @@ pub(crate) fn limits_in(path: &Path) -> Result<BTreeMap<Axis, f64>> {
     let limits_um = limits_of(&Setup::new(NODE, &Arguments::parse(words)?)?)?;
     anyhow::ensure!(
         !limits_um.is_empty(),
-        "compensation_file: {file}: no axes.AXIS.size_limit_um for {NODE} in it"
+        "compensation_file: {file}: no axes.AXIS.size_limit_um of {NODE}"
     );
     Ok(limits_um)
 }

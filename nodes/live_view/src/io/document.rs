@@ -1,4 +1,4 @@
-//! The page that a browser loads: one document with its style and program in it, and what it may do.
+//! The page as one document with its style and program, and its content security policy.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -8,7 +8,7 @@ const FRAME: &str = include_str!("../../assets/page.html");
 const STYLE: &str = include_str!("../../assets/page.css");
 const PROGRAM: &str = include_str!("../../assets/page.js");
 
-/// The document, and the policy under which a browser shows it.
+/// The document and its content security policy.
 #[derive(Clone, Debug)]
 pub(super) struct Document {
     pub html: String,
@@ -20,7 +20,7 @@ fn hash(text: &str) -> String {
 }
 
 impl Document {
-    /// Nothing but this style and this program runs, and it asks nobody but its own server.
+    /// The policy allows this style, this program and connections to the own server only.
     pub fn new() -> Self {
         let html = FRAME
             .replace("/*STYLE*/", STYLE)

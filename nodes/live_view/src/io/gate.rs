@@ -1,7 +1,7 @@
-//! Who may ask: by the name under which the page was asked for, the page that asks, and the token.
+//! Checks of requests: host name, origin, body and token.
 //!
-//! A page of another site can send requests to this computer. It cannot read the answers, for nothing here allows it to;
-//! one whose own name was made to lead here (DNS rebinding) could, and is known by that name.
+//! A page of another site can send requests to this computer, but cannot read the answers: there is no CORS header. A site
+//! whose name resolves to this computer (DNS rebinding) could; its `Host` is refused.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
@@ -42,36 +42,34 @@ impl Refusal {
         }
     }
 
-    /// For the one who asked.
+    /// Text of the answer.
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::Host => {
-                "The page is not known by this name: ask for it by number or localhost, or list the name in host_names.\n"
+                "Unknown host name: use an IP address or localhost, or list the name in host_names.\n"
             }
-            Self::CrossSite => "Pages of other sites get nothing here.\n",
+            Self::CrossSite => "Requests from other sites are refused.\n",
             Self::Token => {
-                "A token is needed: Authorization: Bearer TOKEN, or ?token=TOKEN behind the address.\n"
+                "Missing or wrong token: use ?token=TOKEN or the header Authorization: Bearer TOKEN.\n"
             }
-            Self::Body => "A request here has no body.\n",
-            Self::Full => {
-                "As many browsers look as may (most_browsers): close one, or wait for one to go.\n"
-            }
+            Self::Body => "Requests must have no body.\n",
+            Self::Full => "Too many browsers (most_browsers): close one and reload.\n",
         }
     }
 
-    /// For the account.
+    /// Key in the account.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Host => "unknown host name",
-            Self::CrossSite => "cross-site",
-            Self::Token => "wrong token",
-            Self::Body => "with a body",
-            Self::Full => "too many browsers",
+            Self::Host => "refused_host_name",
+            Self::CrossSite => "refused_cross_site",
+            Self::Token => "refused_token",
+            Self::Body => "refused_body",
+            Self::Full => "refused_too_many",
         }
     }
 }
 
-/// What is let through, and how many requests were not.
+/// The checks, and the number of refused requests.
 pub(super) struct Gate {
     token: Option<[u8; 32]>,
     host_names: Vec<String>,
@@ -82,7 +80,7 @@ const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 const FETCH_MODE: HeaderName = HeaderName::from_static("sec-fetch-mode");
 const FETCH_DEST: HeaderName = HeaderName::from_static("sec-fetch-dest");
 
-/// The one value of a header; `None`: there is none, there are several, or it is no text.
+/// The only value of a header; `None`: it is absent, repeated or not text.
 fn one<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
     let mut all = headers.get_all(name).iter();
     let first = all.next()?.to_str().ok()?;
@@ -122,7 +120,7 @@ impl Gate {
         !is_user_given && (is_number || host == "localhost" || self.host_names.contains(&host))
     }
 
-    /// Whether another site's page asks; the page itself may be linked to.
+    /// Whether another site sent the request; links to the page are allowed.
     fn is_cross_site(uri: &Uri, headers: &HeaderMap, host: &str) -> bool {
         if headers.contains_key(ORIGIN) {
             let origin = one(headers, &ORIGIN).and_then(|origin| origin.split_once("://"));
@@ -144,7 +142,7 @@ impl Gate {
         let Some(right) = &self.token else {
             return true;
         };
-        // Digests are as long for every token, and are compared to their ends.
+        // Digests have one length; the comparison takes constant time.
         token(uri, headers).is_some_and(|given| digest(given).ct_eq(right).into())
     }
 
@@ -167,10 +165,10 @@ impl Gate {
         Ok(())
     }
 
-    /// Whether a request is let through.
+    /// Checks a request.
     ///
     /// # Errors
-    /// Why not; it is counted.
+    /// The refusal, which is counted.
     pub fn check(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), Refusal> {
         self.judge(uri, headers)
             .inspect_err(|&refusal| self.count(refusal))
@@ -180,7 +178,7 @@ impl Gate {
         self.refused[refusal as usize].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// How many requests were refused, by reason.
+    /// Number of refused requests, by reason.
     pub fn refused(&self) -> BTreeMap<&'static str, u64> {
         let count = |refusal: &Refusal| self.refused[*refusal as usize].load(Ordering::Relaxed);
         let all = Refusal::ALL.iter().map(|one| (one.name(), count(one)));

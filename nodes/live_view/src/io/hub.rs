@@ -1,7 +1,7 @@
-//! From one stage to many browsers: the latest of each part, and which of it a browser has not seen.
+//! Distributes the parts of the page to browsers.
 //!
-//! Nothing waits for a browser. Each has a number up to which it has seen the parts; when its connection takes more, it
-//! gets the parts that changed since, as they are by then. One that stalls skips what was in between.
+//! Nothing waits for a browser. Each has the version it received last; when its connection accepts more, it gets the
+//! latest of the parts that changed since. A browser that stalls skips the versions between.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -20,7 +20,7 @@ struct Board {
     parts: BTreeMap<&'static str, (u64, Arc<str>)>,
 }
 
-/// The parts, and who waits for them.
+/// The parts, and the signal to browsers.
 pub(super) struct Hub {
     board: Mutex<Board>,
     period_ms: i64,
@@ -40,7 +40,7 @@ impl Hub {
         self.board.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes what has changed, and the time; `is_beat`: browsers are to hear of it even where nothing has.
+    /// Stores changed parts and the time; `is_beat`: sends an event even without a change.
     pub fn publish(&self, now_ms: i64, changed: Vec<Output>, is_beat: bool) {
         let is_new = !changed.is_empty();
         let mut board = self.board();
@@ -56,7 +56,7 @@ impl Hub {
         }
     }
 
-    /// The parts later than `seen` as one JSON object, and the number up to which they are.
+    /// The parts newer than version `seen` as one JSON object, and their version.
     pub fn since(&self, seen: Option<u64>) -> (u64, String) {
         let (now_ms, version, parts) = {
             let board = self.board();
@@ -77,7 +77,7 @@ impl Hub {
         (version, text)
     }
 
-    /// Server-sent events for one browser, whose place is free again when they end.
+    /// Server-sent events for one browser; its place is free when they end.
     pub fn events(
         self: &Arc<Self>,
         place: OwnedSemaphorePermit,

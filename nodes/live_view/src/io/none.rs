@@ -7,12 +7,12 @@ use crate::config::Settings;
 use crate::error::LiveViewError;
 use crate::stage::LiveViewStage;
 
-/// Nothing: the server was not built, and none is ever made.
+/// Never constructed: the server was not built.
 #[derive(Debug)]
 pub struct LiveViewIo(std::convert::Infallible);
 
 impl LiveViewIo {
-    /// Says how the server is built.
+    /// Returns the error with the command that builds the server.
     ///
     /// # Errors
     /// Always.
@@ -25,13 +25,13 @@ impl LiveViewIo {
         Err(LiveViewError::NotBuilt)
     }
 
-    /// Nothing.
+    /// Unreachable.
     #[must_use]
     pub const fn address(&self) -> SocketAddr {
         match self.0 {}
     }
 
-    /// Nothing.
+    /// Unreachable.
     #[must_use]
     pub fn account(&self) -> Account {
         match self.0 {}

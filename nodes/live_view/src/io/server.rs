@@ -28,26 +28,25 @@ use tokio::time::{MissedTickBehavior, interval, sleep};
 use super::document::Document;
 use super::gate::{Gate, Refusal};
 use super::hub::Hub;
-use super::patience::Patient;
 use super::{Account, Source};
 use crate::config::Settings;
 use crate::error::LiveViewError;
 use crate::page::ms;
 use crate::stage::{Input, LiveViewStage};
 
-/// Connections beside those of browsers that look: pages being loaded.
+/// Connections beside those of event streams.
 const SPARE_CONNECTIONS: usize = 32;
 /// A request's first line and headers, bytes.
 const MOST_HEADER_BYTES: usize = 8 << 10;
 const MOST_HEADERS: usize = 64;
-/// What waits in the system for a browser, bytes.
+/// Send buffer of a connection, bytes.
 const MOST_WAITING_BYTES: usize = 64 << 10;
-/// A browser hears at least this often that the connection stands.
+/// Longest time between two events.
 const BEAT: Duration = Duration::from_secs(1);
-/// Before the next connection is taken where the system refused one.
+/// Pause after a failed accept.
 const AFTER_REFUSAL: Duration = Duration::from_millis(100);
 
-/// What every request needs.
+/// State shared by requests.
 struct Site {
     document: Document,
     policy: HeaderValue,
@@ -57,7 +56,7 @@ struct Site {
     most_browsers: usize,
 }
 
-/// A server at work; dropped, it ends.
+/// A running server; it stops when dropped.
 pub struct LiveViewIo {
     address: SocketAddr,
     site: Arc<Site>,
@@ -70,10 +69,10 @@ fn duration(span: Span) -> Duration {
 }
 
 impl LiveViewIo {
-    /// Takes its address, and serves from then on.
+    /// Binds the address and starts serving.
     ///
     /// # Errors
-    /// When the address is taken or none of this computer's, or the system has no thread left.
+    /// When the address cannot be bound, or the system has no thread left.
     pub fn start(
         settings: &Settings,
         token: Option<String>,
@@ -95,7 +94,7 @@ impl LiveViewIo {
         let (settings, of_thread) = (settings.clone(), Arc::clone(&site));
         let serve = move || {
             runtime.block_on(async {
-                // The listener was made by the system a moment ago: tokio takes every such one.
+                // A listening socket in non-blocking mode is always accepted.
                 let Ok(listener) = TcpListener::from_std(listener) else {
                     return;
                 };
@@ -119,13 +118,13 @@ impl LiveViewIo {
         })
     }
 
-    /// Where the page is.
+    /// Address of the page.
     #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// What it has done so far.
+    /// Browsers and refused requests so far.
     #[must_use]
     pub fn account(&self) -> Account {
         let site = &self.site;
@@ -147,19 +146,19 @@ impl Drop for LiveViewIo {
     }
 }
 
-/// Hands what was heard to the stage, and what has changed to the browsers.
+/// Passes new inputs to the stage and changed parts to the browsers.
 async fn look(hub: Arc<Hub>, period: Span, mut stage: LiveViewStage, mut source: Source) {
     let period = duration(period);
     let mut ticks = interval(period);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let (mut heard, mut silent) = (Vec::new(), Duration::ZERO);
+    let (mut inputs, mut silent) = (Vec::new(), Duration::ZERO);
     loop {
         ticks.tick().await;
-        let now = source(&mut heard);
+        let now = source(&mut inputs);
         let mut changed = Vec::new();
-        let events = heard.drain(..).chain([(now, Input::Look)]);
+        let events = inputs.drain(..).chain([(now, Input::Look)]);
         for (at, input) in events {
-            // A page takes every event.
+            // The error type is Infallible.
             let Ok(()) = stage.step(at, input, &mut changed);
         }
         silent += period;
@@ -181,9 +180,9 @@ async fn accept(listener: TcpListener, settings: &Settings, site: Arc<Site>) {
         .max_buf_size(MOST_HEADER_BYTES)
         .max_headers(MOST_HEADERS);
     let router = router(site);
-    let most = duration(settings.stall_timeout);
+    let stall = duration(settings.stall_timeout);
     loop {
-        // Where all are taken, new ones wait in the system until one is free.
+        // Further connections wait in the system's backlog.
         let Ok(place) = Arc::clone(&connections).acquire_owned().await else {
             return;
         };
@@ -194,19 +193,22 @@ async fn accept(listener: TcpListener, settings: &Settings, site: Arc<Site>) {
         let (http, router) = (http.clone(), router.clone());
         tokio::spawn(async move {
             let _place = place;
-            // A connection that ends early is the browser's affair.
+            // A browser may close its connection at any time.
             let _ = http
-                .serve_connection(patient(stream, most), TowerToHyperService::new(router))
+                .serve_connection(limited(stream, stall), TowerToHyperService::new(router))
                 .await;
         });
     }
 }
 
-fn patient(stream: TcpStream, most: Duration) -> TokioIo<Patient> {
-    // Where the system has other buffers, a browser that stalls is found later.
-    let _ = SockRef::from(&stream).set_send_buffer_size(MOST_WAITING_BYTES);
-    let _ = stream.set_nodelay(true);
-    TokioIo::new(Patient::new(stream, most))
+/// A connection that the system ends when the browser reads nothing for `stall`.
+fn limited(stream: TcpStream, stall: Duration) -> TokioIo<TcpStream> {
+    let socket = SockRef::from(&stream);
+    // If the system refuses one of these, a stalled browser is dropped later.
+    let _ = socket.set_send_buffer_size(MOST_WAITING_BYTES);
+    let _ = socket.set_tcp_user_timeout(Some(stall));
+    let _ = socket.set_tcp_nodelay(true);
+    TokioIo::new(stream)
 }
 
 fn router(site: Arc<Site>) -> Router {
@@ -261,7 +263,7 @@ fn refuse(refusal: Refusal) -> Response {
     response
 }
 
-/// Refuses what is not to come in, and puts the same limits on every answer.
+/// Checks each request, and adds the security headers to each answer.
 async fn guard(State(site): State<Arc<Site>>, request: Request, next: Next) -> Response {
     let mut response = match site.gate.check(request.uri(), request.headers()) {
         Ok(()) => next.run(request).await,

@@ -1,24 +1,24 @@
-//! Conditions that stand.
+//! Conditions in force.
 
 use metrology::stamp::{Host, Stamp};
 use serde_json::{Value, json};
 
-use super::{MOST_CONDITIONS, Page, ms, short};
+use super::{Page, keep, ms, short};
 
-/// A condition as `/diagnostics` has it.
+/// A condition from `/diagnostics`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Condition {
     /// Node and condition.
     pub name: String,
-    /// 0: it is over; 1: a warning; 2: an error; 3: stale.
+    /// 0: over; 1: a warning; 2: an error; 3: stale.
     pub level: u8,
-    /// In words.
+    /// Text of the condition.
     pub message: String,
 }
 
-/// A condition that stands.
+/// A condition in force.
 #[derive(Clone, Debug)]
-pub(super) struct Standing {
+pub(super) struct ConditionState {
     since: Stamp<Host>,
     level: u8,
     message: String,
@@ -34,40 +34,32 @@ const fn word(level: u8) -> &'static str {
 }
 
 impl Page {
-    pub(super) fn hear_condition(&mut self, at: Stamp<Host>, condition: Condition) {
-        let Condition {
-            name,
-            level,
-            message,
-        } = condition;
-        let (name, message) = (short(&name), short(&message));
+    pub(super) fn take_condition(&mut self, at: Stamp<Host>, condition: Condition) {
+        let (name, level) = (short(&condition.name), condition.level);
         if level == 0 {
             self.conditions.remove(&name);
-        } else if let Some(standing) = self.conditions.get_mut(&name) {
-            (standing.level, standing.message) = (level, message);
-        } else if self.conditions.len() >= MOST_CONDITIONS {
-            self.left_out = self.left_out.saturating_add(1);
-        } else {
-            let since = at;
-            let standing = Standing {
-                since,
-                level,
-                message,
-            };
-            self.conditions.insert(name, standing);
+            return;
         }
+        let since = self.conditions.get(&name).map_or(at, |state| state.since);
+        let message = short(&condition.message);
+        let state = ConditionState {
+            since,
+            level,
+            message,
+        };
+        keep(&mut self.conditions, &mut self.left_out, name, state);
     }
 
-    /// The worst first; an empty list is shown too, for it is good news.
+    /// The worst first; an empty list is shown too.
     pub(super) fn conditions_part(&self) -> Value {
         let mut all: Vec<_> = self.conditions.iter().collect();
-        all.sort_by_key(|(_, standing)| std::cmp::Reverse(standing.level));
-        let one = |(name, standing): (&String, &Standing)| {
+        all.sort_by_key(|(_, state)| std::cmp::Reverse(state.level));
+        let one = |(name, state): (&String, &ConditionState)| {
             json!({
                 "name": name,
-                "level": word(standing.level),
-                "message": standing.message,
-                "since_ms": ms(standing.since),
+                "level": word(state.level),
+                "message": state.message,
+                "since_ms": ms(state.since),
             })
         };
         all.into_iter().map(one).collect()

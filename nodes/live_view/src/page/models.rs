@@ -1,4 +1,4 @@
-//! What was measured and fitted: touches, latency, drift, geometry, positioning, the gap.
+//! Measurements and models: touches, latency, drift, geometry, positioning, the gap.
 
 use metrology::Axis;
 use metrology::sample::{
@@ -10,19 +10,20 @@ use serde_json::{Value, json};
 use super::motion::unit;
 use super::{Page, list, ms, short};
 
-/// Causes of a gap that are shown; the report has all.
+/// Causes of a gap, and parameters of each, that are shown; the report has all.
 const MOST_CAUSES: usize = 10;
+const MOST_PARAMETERS: usize = 20;
 
 fn reason(rejection: Rejection) -> Option<&'static str> {
     Some(match rejection {
         Rejection::None => return None,
-        Rejection::BeforeQueue => "older than the positions that are kept",
-        Rejection::AfterQueue => "newer than the positions that came",
+        Rejection::BeforeQueue => "older than the kept positions",
+        Rejection::AfterQueue => "newer than the received positions",
         Rejection::Gap => "positions are missing at the contact",
-        Rejection::NotFinite => "a number is none",
+        Rejection::NotFinite => "a number is not finite",
         Rejection::ClockWentBack => "the controller's clock went back",
         Rejection::StandoffTooShort => "the stand-off is too short for the feed",
-        Rejection::NoLatency => "no latency is known",
+        Rejection::NoLatency => "the probe latency is unknown",
     })
 }
 
@@ -50,14 +51,14 @@ pub(super) fn geometry(model: &GeometryModel) -> Value {
 
 /// The last report of the diagnosis, without its whole text.
 pub(super) fn gap(report: &GapSummary) -> Value {
-    let parameter = |one: &GapParameter| json!({"name": one.name, "value": one.value, "low": one.low, "high": one.high});
+    let parameter = |one: &GapParameter| json!({"name": short(&one.name), "value": one.value, "low": one.low, "high": one.high});
     let cause = |one: &GapCause| {
         json!({
-            "effect": one.effect,
-            "axis": one.axis,
+            "effect": short(&one.effect),
+            "axis": short(&one.axis),
             "status": status(one.status),
             "confidence": one.confidence,
-            "parameters": one.parameters.iter().map(parameter).collect::<Vec<_>>(),
+            "parameters": one.parameters.iter().take(MOST_PARAMETERS).map(parameter).collect::<Vec<_>>(),
         })
     };
     let causes = report.causes.iter().take(MOST_CAUSES).map(cause);

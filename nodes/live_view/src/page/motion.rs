@@ -1,4 +1,4 @@
-//! Positions of the axes, and what is added to them.
+//! Positions of the axes, and their offsets.
 
 use metrology::sample::CompensationState;
 use metrology::stamp::Host;
@@ -24,8 +24,8 @@ const fn word(state: CompensationState) -> &'static str {
 
 impl Page {
     pub(super) fn axes_part(&self, now: Stamp<Host>) -> Option<Value> {
-        let heard = self.axes.as_ref()?;
-        let state = &heard.value;
+        let latest = self.axes.as_ref()?;
+        let state = &latest.value;
         let one = |axis: Axis| {
             json!({
                 "axis": axis.letter(),
@@ -38,14 +38,14 @@ impl Page {
         };
         Some(json!({
             "at_ms": ms(state.received_at),
-            "stale_since_ms": self.stale_since(now, heard.at),
+            "stale_since_ms": self.stale_since(now, latest.at),
             "axes": state.axes.iter().map(one).collect::<Vec<_>>(),
         }))
     }
 
     pub(super) fn offsets_part(&self, now: Stamp<Host>) -> Option<Value> {
-        let heard = self.offsets.as_ref()?;
-        let offsets = &heard.value;
+        let latest = self.offsets.as_ref()?;
+        let offsets = &latest.value;
         let one = |axis: Axis| {
             json!({
                 "axis": axis.letter(),
@@ -60,7 +60,7 @@ impl Page {
         };
         Some(json!({
             "at_ms": ms(offsets.at),
-            "stale_since_ms": self.stale_since(now, heard.at),
+            "stale_since_ms": self.stale_since(now, latest.at),
             "axes": offsets.axes.iter().map(one).collect::<Vec<_>>(),
         }))
     }

@@ -1,4 +1,4 @@
-//! How far the plan is.
+//! Progress of the plan.
 //!
 //! ```text
 //!   time left of the step = time since it began * (1 - progress) / progress    (1)
@@ -9,12 +9,12 @@ use metrology::sample::{PlanState, PlanStatus};
 use metrology::stamp::Host;
 use serde_json::{Value, json};
 
-use super::{Heard, Page, ms, short};
+use super::{Latest, Page, ms, short};
 
-/// Below this share of a step (1) says nothing.
+/// Below this share of a step (1) is too uncertain.
 const LEAST_PROGRESS: f64 = 0.02;
 
-/// When a step was first heard of, by the time of its messages.
+/// First message of a step, by the time of its messages.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StepBegin {
     step: u32,
@@ -31,7 +31,7 @@ const fn word(state: PlanState) -> &'static str {
 }
 
 impl Page {
-    pub(super) fn hear_plan(&mut self, at: Stamp<Host>, mut value: PlanStatus) {
+    pub(super) fn take_plan(&mut self, at: Stamp<Host>, mut value: PlanStatus) {
         value.activity = short(&value.activity);
         value.message = short(&value.message);
         let is_new = |begin: StepBegin| begin.step != value.step || value.at < begin.at;
@@ -41,10 +41,10 @@ impl Page {
                 at: value.at,
             });
         }
-        self.plan = Some(Heard { at, value });
+        self.plan = Some(Latest { at, value });
     }
 
-    /// (1) in seconds; `None`: not known yet, or nothing runs.
+    /// (1) in seconds; `None`: unknown yet, or no step runs.
     fn step_left_s(&self) -> Option<f64> {
         let plan = &self.plan.as_ref()?.value;
         let begin = self.step?;

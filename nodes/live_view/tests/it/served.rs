@@ -182,7 +182,7 @@ fn other_names_are_refused() {
         &["Host: localhost"],
     );
     assert_eq!(absolute, 421);
-    assert!(io.account().refused["unknown host name"] >= 5);
+    assert!(io.account().refused["refused_host_name"] >= 5);
 }
 
 #[test]
@@ -222,8 +222,8 @@ fn other_sites_and_bodies_are_refused_and_counted() {
         404
     );
     let refused = io.account().refused;
-    assert_eq!(refused["cross-site"], 5);
-    assert_eq!(refused["with a body"], 2);
+    assert_eq!(refused["refused_cross_site"], 5);
+    assert_eq!(refused["refused_body"], 2);
 }
 
 #[test]
@@ -258,7 +258,7 @@ fn a_token_is_asked_for_and_only_the_right_one_lets_in() {
         "Authorization: Bearer x",
     );
     assert_eq!(both, 401);
-    assert_eq!(io.account().refused["wrong token"], 13);
+    assert_eq!(io.account().refused["refused_token"], 13);
 }
 
 #[test]
@@ -299,7 +299,7 @@ fn one_browser_more_than_may_be_is_refused_until_another_goes() {
         head.to_ascii_lowercase().contains("retry-after: 10"),
         "{head}"
     );
-    assert_eq!(io.account().refused["too many browsers"], 1);
+    assert_eq!(io.account().refused["refused_too_many"], 1);
     drop(all.pop());
     until(|| io.account().browsers == 2);
     let (_stream, head) = browser(io.address());
@@ -339,5 +339,5 @@ fn an_address_that_is_taken_is_refused_with_the_remedy() {
     let Err(error) = LiveViewIo::start(&settings, None, stage, changing(1, 1)) else {
         panic!("two servers at {}", io.address());
     };
-    assert!(error.to_string().contains("give another port"), "{error}");
+    assert!(error.to_string().contains("use another port"), "{error}");
 }

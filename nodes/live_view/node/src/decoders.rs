@@ -1,4 +1,4 @@
-//! From the bytes of each topic to what the page takes.
+//! Decodes the messages of each topic to inputs of the page.
 
 use abbe_msgs::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus};
 use abbe_msgs::msg::MachineValue;
@@ -7,16 +7,16 @@ use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Wire, WireError, from_cdr};
 use live_view::{Condition, Input};
 
-/// What a message says.
-type Hear = fn(&[u8]) -> Result<Vec<Input>, WireError>;
+/// Decodes a message.
+type Decode = fn(&[u8]) -> Result<Vec<Input>, WireError>;
 
-/// A topic that is listened to.
-pub(crate) struct Ear {
+/// A subscribed topic.
+pub(crate) struct Decoder {
     /// Its relative name, or the absolute one of `/diagnostics`.
     pub topic: &'static str,
     /// Whether every message counts, rather than the latest alone.
     pub is_each: bool,
-    pub hear: Hear,
+    pub decode: Decode,
 }
 
 /// One message as one input.
@@ -29,13 +29,13 @@ fn one<M: Wire>(
     Ok(vec![input(message.into_inner()?)])
 }
 
-/// What stands between a node's name and a condition's in a status.
+/// Separator of node and condition in a status.
 const OF_NODE: &str = ": ";
 
 fn diagnostics(bytes: &[u8]) -> Result<Vec<Input>, WireError> {
     let message: DiagnosticArray = from_cdr(bytes)?;
     let input = |status: DiagnosticStatus| {
-        // Each node of the suite says its own state first, without a condition.
+        // Each node of the suite reports its own state first, without a condition.
         let is_node = status.name.starts_with('/') && !status.name.contains(OF_NODE);
         if is_node {
             return Input::Node(status.name);
@@ -49,65 +49,38 @@ fn diagnostics(bytes: &[u8]) -> Result<Vec<Input>, WireError> {
     Ok(message.status.into_iter().map(input).collect())
 }
 
-/// A topic whose latest message is enough.
-const fn latest(topic: &'static str, hear: Hear) -> Ear {
-    Ear {
-        topic,
-        is_each: false,
-        hear,
-    }
+/// A topic with the decoder of its messages.
+macro_rules! decoder {
+    ($topic:ident, $input:expr, is_each: $is_each:literal) => {
+        Decoder {
+            topic: topics::$topic.name,
+            is_each: $is_each,
+            decode: |bytes| one(&topics::$topic, bytes, $input),
+        }
+    };
 }
 
-/// A topic of which every message counts.
-const fn each(topic: &'static str, hear: Hear) -> Ear {
-    Ear {
-        topic,
+/// Topics with one name.
+pub(crate) const DECODERS: &[Decoder] = &[
+    decoder!(AXES_STATE, Input::Axes, is_each: false),
+    decoder!(COMPENSATION, Input::Offsets, is_each: false),
+    decoder!(PLAN_STATUS, Input::Plan, is_each: true),
+    decoder!(TEST_SEGMENT, Input::Test, is_each: false),
+    decoder!(THERMAL_MODEL, |model| Input::Drift(Box::new(model)), is_each: false),
+    decoder!(PROBE_POINT, Input::Touch, is_each: true),
+    decoder!(LATENCY, Input::Latency, is_each: false),
+    decoder!(GEOMETRY_MODEL, Input::Geometry, is_each: false),
+    decoder!(GEOMETRY_ROTARY, Input::Rotary, is_each: false),
+    decoder!(POSITIONING_TABLE, Input::Positioning, is_each: true),
+    decoder!(GAP_REPORT, Input::Gap, is_each: false),
+    Decoder {
+        topic: topics::DIAGNOSTICS.name,
         is_each: true,
-        hear,
-    }
-}
-
-/// Every topic but the families.
-pub(crate) const EARS: &[Ear] = &[
-    latest(topics::AXES_STATE.name, |bytes| {
-        one(&topics::AXES_STATE, bytes, Input::Axes)
-    }),
-    latest(topics::COMPENSATION.name, |bytes| {
-        one(&topics::COMPENSATION, bytes, Input::Offsets)
-    }),
-    each(topics::PLAN_STATUS.name, |bytes| {
-        one(&topics::PLAN_STATUS, bytes, Input::Plan)
-    }),
-    latest(topics::TEST_SEGMENT.name, |bytes| {
-        one(&topics::TEST_SEGMENT, bytes, Input::Test)
-    }),
-    latest(topics::THERMAL_MODEL.name, |bytes| {
-        one(&topics::THERMAL_MODEL, bytes, |model| {
-            Input::Drift(Box::new(model))
-        })
-    }),
-    each(topics::PROBE_POINT.name, |bytes| {
-        one(&topics::PROBE_POINT, bytes, Input::Touch)
-    }),
-    latest(topics::LATENCY.name, |bytes| {
-        one(&topics::LATENCY, bytes, Input::Latency)
-    }),
-    latest(topics::GEOMETRY_MODEL.name, |bytes| {
-        one(&topics::GEOMETRY_MODEL, bytes, Input::Geometry)
-    }),
-    latest(topics::GEOMETRY_ROTARY.name, |bytes| {
-        one(&topics::GEOMETRY_ROTARY, bytes, Input::Rotary)
-    }),
-    each(topics::POSITIONING_TABLE.name, |bytes| {
-        one(&topics::POSITIONING_TABLE, bytes, Input::Positioning)
-    }),
-    latest(topics::GAP_REPORT.name, |bytes| {
-        one(&topics::GAP_REPORT, bytes, Input::Gap)
-    }),
-    each(topics::DIAGNOSTICS.name, diagnostics),
+        decode: diagnostics,
+    },
 ];
 
-/// Messages of a family, by the name of their topic.
+/// Topics with a member's name at their end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Family {
     Temperature,
@@ -115,7 +88,7 @@ pub(crate) enum Family {
 }
 
 impl Family {
-    /// What stands before the names of its members.
+    /// Prefix of its members.
     pub const fn base(self) -> &'static str {
         match self {
             Self::Temperature => topics::TEMPERATURE.base,
@@ -131,8 +104,8 @@ impl Family {
         named.find(|(_, member)| !member.is_empty() && !member.contains('/'))
     }
 
-    /// What a message of a member says; the topic's name counts, for a frame has a namespace in front.
-    pub fn hear(self, member: &str, bytes: &[u8]) -> Result<Vec<Input>, WireError> {
+    /// Decodes a member's message; its name is that of the topic, since a frame has the namespace in front.
+    pub fn decode(self, member: &str, bytes: &[u8]) -> Result<Vec<Input>, WireError> {
         let input = match self {
             Self::Temperature => {
                 let mut sample = from_cdr::<Temperature>(bytes)?.into_inner()?;

@@ -1,4 +1,4 @@
-//! The network as the page hears it.
+//! Samples of the network for the page.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use node_runtime::names::NodeNames;
 use node_runtime::tap::{Selection, TapEvent, Tapped};
 use node_runtime::{HostTime, RawTap, Setup};
 
-use crate::ears::{EARS, Family};
+use crate::decoders::{DECODERS, Family};
 use crate::feed::{Feed, Slot};
 
 /// The namespace with a slash at its end.
@@ -26,8 +26,9 @@ fn patterns(front: &str) -> Vec<String> {
         }
     };
     let families = [Family::Temperature, Family::Machine].map(|one| format!("{}*", one.base()));
-    let ears = EARS.iter().map(|ear| absolute(ear.topic));
-    ears.chain(families.iter().map(|base| absolute(base)))
+    let decoders = DECODERS.iter().map(|decoder| absolute(decoder.topic));
+    decoders
+        .chain(families.iter().map(|base| absolute(base)))
         .collect()
 }
 
@@ -36,16 +37,16 @@ fn slot(front: &str, topic: &str) -> Option<Slot> {
     Feed::slot(topic).or_else(|| Feed::slot(topic.strip_prefix(front)?))
 }
 
-/// Samples of the network on their way to the page.
-pub struct Hearing {
+/// Passes samples of the network to a feed.
+pub struct Receiver {
     front: String,
     feed: Feed,
     time: HostTime,
     slots: BTreeMap<String, Option<Slot>>,
 }
 
-impl Hearing {
-    /// Of the topics of a namespace, with receipts by the clock `time`.
+impl Receiver {
+    /// Takes the topics of a namespace; times of receipt are by the clock `time`.
     #[must_use]
     pub fn new(namespace: &str, feed: Feed, time: HostTime) -> Self {
         Self {
@@ -69,18 +70,18 @@ impl Hearing {
     }
 }
 
-/// Listens until the tap is stopped; topics are those of the node's namespace.
+/// Subscribes to the topics of the node's namespace until the tap is stopped.
 ///
 /// # Errors
 /// When there is no network.
 pub(crate) fn listen(setup: &Setup, feed: Feed) -> Result<RawTap> {
-    let mut hearing = Hearing::new(setup.namespace(), feed, setup.host_time());
+    let mut receiver = Receiver::new(setup.namespace(), feed, setup.host_time());
     let names = NodeNames::new(&format!("{}_tap", setup.name()), &[])?;
-    let selection = Selection::Matching(patterns(&hearing.front));
+    let selection = Selection::Matching(patterns(&receiver.front));
     RawTap::start(&Environment::read()?, &names, selection, move |event| {
         // Other types of a topic are reported by the nodes that use it.
         if let TapEvent::Sample(sample) = event {
-            hearing.take(&sample);
+            receiver.take(&sample);
         }
     })
 }
@@ -92,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn topics_of_the_own_namespace_and_the_conditions_of_all_are_heard() {
+    fn topics_of_the_own_namespace_and_conditions_of_all_are_received() {
         let front = front("/mill_3");
         let selection = Selection::Matching(patterns(&front));
         let axes = format!("/mill_3/{}", topics::AXES_STATE.name);
