@@ -80,8 +80,12 @@ impl Stage for Watch {
             })),
             Input::Shutdown => {
                 self.view = None;
-                if let Some(Err(error)) = self.tap.take().map(RawTap::stop) {
-                    out.push(Output::TapFailed(format!("{error:#}")));
+                // A tap has a runtime of its own, which cannot stop on a thread of the node's.
+                let stop = |tap: RawTap| std::thread::spawn(move || tap.stop()).join();
+                match self.tap.take().map(stop) {
+                    Some(Ok(Err(error))) => out.push(Output::TapFailed(format!("{error:#}"))),
+                    Some(Err(_)) => out.push(Output::TapFailed("its thread panicked".to_owned())),
+                    Some(Ok(Ok(()))) | None => {}
                 }
                 out.push(Output::Stopped);
             }
