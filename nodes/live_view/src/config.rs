@@ -69,16 +69,8 @@ pub struct Settings {
     pub address: SocketAddr,
     /// Host names of the page, in lower case.
     pub host_names: Vec<String>,
-    /// Most browsers at once.
-    pub most_browsers: u32,
-    /// Time between two updates.
-    pub period: Span,
-    /// Silence after which a periodic value is stale.
-    pub stale_after: Span,
-    /// Time within which a request must be complete.
-    pub request_timeout: Span,
-    /// A browser that reads nothing for this time is dropped.
-    pub stall_timeout: Span,
+    /// The parameters, within their limits.
+    pub config: LiveViewConfig,
 }
 
 fn is_of_a_name(letter: char) -> bool {
@@ -109,12 +101,14 @@ impl Settings {
         Ok(Self {
             address,
             host_names,
-            most_browsers: config.most_browsers,
-            period: Span::from_secs_f64(1.0 / config.rate_hz),
-            stale_after: Span::from_secs_f64(config.stale_after_s),
-            request_timeout: Span::from_secs_f64(config.request_timeout_s),
-            stall_timeout: Span::from_secs_f64(config.stall_timeout_s),
+            config: config.clone(),
         })
+    }
+
+    /// Silence after which a periodic value is stale.
+    #[must_use]
+    pub fn stale_after(&self) -> Span {
+        Span::from_secs_f64(self.config.stale_after_s)
     }
 }
 

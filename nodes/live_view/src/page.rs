@@ -103,12 +103,8 @@ impl Page {
             Input::Drift(value) => self.drift = Some(Latest { at, value }),
             Input::Temperature(value) => {
                 let name = value.sensor.clone();
-                keep(
-                    &mut self.temperatures,
-                    &mut self.left_out,
-                    name,
-                    Latest { at, value },
-                );
+                let latest = Latest { at, value };
+                keep(&mut self.temperatures, &mut self.left_out, name, latest);
             }
             Input::Touch(mut value) => {
                 value.feature_id = short(&value.feature_id);
@@ -126,12 +122,8 @@ impl Page {
             Input::Value(mut value) => {
                 value.text = short(&value.text);
                 let name = value.name.clone();
-                keep(
-                    &mut self.values,
-                    &mut self.left_out,
-                    name,
-                    Latest { at, value },
-                );
+                let latest = Latest { at, value };
+                keep(&mut self.values, &mut self.left_out, name, latest);
             }
             Input::Node(name) => keep(&mut self.nodes, &mut self.left_out, name, at),
             Input::Condition(condition) => self.take_condition(at, condition),

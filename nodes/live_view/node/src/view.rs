@@ -63,7 +63,7 @@ impl View {
             .map(|(file, text)| checked_token(file, text))
             .transpose()?;
         let has_token = token.is_some();
-        let stage = LiveViewStage::new(settings.stale_after, options.limits_um);
+        let stage = LiveViewStage::new(settings.stale_after(), options.limits_um);
         let feed = Feed::default();
         let (fed, time) = (feed.clone(), options.time);
         let source: Source = Box::new(move |out| {

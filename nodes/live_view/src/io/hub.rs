@@ -23,12 +23,12 @@ struct Board {
 /// The parts, and the signal to browsers.
 pub(super) struct Hub {
     board: Mutex<Board>,
-    period_ms: i64,
+    period_ms: u128,
     beat: watch::Sender<u64>,
 }
 
 impl Hub {
-    pub fn new(period_ms: i64) -> Self {
+    pub fn new(period_ms: u128) -> Self {
         Self {
             board: Mutex::default(),
             period_ms,

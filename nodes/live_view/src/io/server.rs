@@ -19,7 +19,6 @@ use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use metrology::Stage;
-use metrology::stamp::Span;
 use socket2::SockRef;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, oneshot};
@@ -64,8 +63,9 @@ pub struct LiveViewIo {
     thread: Option<JoinHandle<()>>,
 }
 
-fn duration(span: Span) -> Duration {
-    Duration::from_nanos(span.nanos().max(0).cast_unsigned())
+/// Time between two updates.
+fn period(settings: &Settings) -> Duration {
+    Duration::from_secs_f64(1.0 / settings.config.rate_hz)
 }
 
 impl LiveViewIo {
@@ -98,7 +98,7 @@ impl LiveViewIo {
                 let Ok(listener) = TcpListener::from_std(listener) else {
                     return;
                 };
-                let looking = look(Arc::clone(&of_thread.hub), settings.period, stage, source);
+                let looking = look(Arc::clone(&of_thread.hub), period(&settings), stage, source);
                 tokio::select! {
                     _ = stopped => {}
                     () = looking => {}
@@ -147,8 +147,7 @@ impl Drop for LiveViewIo {
 }
 
 /// Passes new inputs to the stage and changed parts to the browsers.
-async fn look(hub: Arc<Hub>, period: Span, mut stage: LiveViewStage, mut source: Source) {
-    let period = duration(period);
+async fn look(hub: Arc<Hub>, period: Duration, mut stage: LiveViewStage, mut source: Source) {
     let mut ticks = interval(period);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let (mut inputs, mut silent) = (Vec::new(), Duration::ZERO);
@@ -176,11 +175,11 @@ async fn accept(listener: TcpListener, settings: &Settings, site: Arc<Site>) {
     let mut http = http1::Builder::new();
     http.keep_alive(false)
         .timer(TokioTimer::new())
-        .header_read_timeout(duration(settings.request_timeout))
+        .header_read_timeout(Duration::from_secs_f64(settings.config.request_timeout_s))
         .max_buf_size(MOST_HEADER_BYTES)
         .max_headers(MOST_HEADERS);
     let router = router(site);
-    let stall = duration(settings.stall_timeout);
+    let stall = Duration::from_secs_f64(settings.config.stall_timeout_s);
     loop {
         // Further connections wait in the system's backlog.
         let Ok(place) = Arc::clone(&connections).acquire_owned().await else {
@@ -228,13 +227,12 @@ impl Site {
                 action: "the page's policy",
                 source: std::io::Error::other(error),
             })?;
-        let most_browsers = settings.most_browsers as usize;
-        let period_ms = settings.period.nanos() / 1_000_000;
+        let most_browsers = settings.config.most_browsers as usize;
         Ok(Self {
             document,
             policy,
             gate: Gate::new(token, &settings.host_names),
-            hub: Arc::new(Hub::new(period_ms)),
+            hub: Arc::new(Hub::new(period(settings).as_millis())),
             places: Arc::new(Semaphore::new(most_browsers)),
             most_browsers,
         })

@@ -45,7 +45,7 @@ fn changing(conditions: usize, letters: usize) -> Source {
 
 fn serve(config: &LiveViewConfig, token: Option<&str>, source: Source) -> LiveViewIo {
     let settings = Settings::new(config).unwrap();
-    let stage = LiveViewStage::new(settings.stale_after, Default::default());
+    let stage = LiveViewStage::new(settings.stale_after(), Default::default());
     LiveViewIo::start(&settings, token.map(str::to_owned), stage, source).unwrap()
 }
 
@@ -335,7 +335,7 @@ fn an_address_that_is_taken_is_refused_with_the_remedy() {
         ..config()
     };
     let settings = Settings::new(&second).unwrap();
-    let stage = LiveViewStage::new(settings.stale_after, Default::default());
+    let stage = LiveViewStage::new(settings.stale_after(), Default::default());
     let Err(error) = LiveViewIo::start(&settings, None, stage, changing(1, 1)) else {
         panic!("two servers at {}", io.address());
     };
