@@ -179,6 +179,28 @@ impl Run {
         scenario.file.simulated_start_s.is_some() && !self.separate
     }
 
+    /// Runs the nodes of a scenario until its plan ends, and records them.
+    fn record(
+        &self,
+        scenario: &Scenario,
+        bag: &Path,
+        view: Option<&View>,
+        interruption: &Interruption,
+    ) -> Result<Outcome> {
+        let feed = view.map(View::feed);
+        let start_s = scenario.file.simulated_start_s;
+        let Some(start_s) = start_s.filter(|_| self.is_composed(scenario)) else {
+            return live::run(scenario, bag, self.separate, feed, interruption);
+        };
+        let how = composed::How {
+            pace: self.pace,
+            on_dds: !self.no_dds,
+            feed: feed.as_ref(),
+            interruption,
+        };
+        composed::run(scenario, start_s, bag, how)
+    }
+
     fn run_into(
         &self,
         folder: &Path,
@@ -187,19 +209,7 @@ impl Run {
         interruption: &Interruption,
     ) -> Result<ExitCode> {
         let bag = folder.join("bag");
-        let feed = view.map(View::feed);
-        let mut outcome = match scenario.file.simulated_start_s {
-            Some(start_s) if self.is_composed(scenario) => {
-                let how = composed::How {
-                    pace: self.pace,
-                    on_dds: !self.no_dds,
-                    feed: feed.as_ref(),
-                    interruption,
-                };
-                composed::run(scenario, start_s, &bag, how)?
-            }
-            _ => live::run(scenario, &bag, self.separate, feed, interruption)?,
-        };
+        let mut outcome = self.record(scenario, &bag, view, interruption)?;
         if interruption.is_forced() {
             tell!("Bag:  {}", outcome.kept(&bag));
             complain!("abbe: the end was forced: no page was written");
