@@ -3,7 +3,7 @@
 use anyhow::Result;
 use live_view::LiveViewConfig;
 use metrology::stamp::Span;
-use node_runtime::{Node, Setup, Wiring};
+use node_runtime::{Node, Setup, Wiring, complain};
 
 mod decoders;
 mod feed;
@@ -21,7 +21,7 @@ use watch::{Input, Output, Watch};
 /// Time between two reports of the server's account.
 const TICK: Span = Span::from_nanos(1_000_000_000);
 
-/// Builds the node and serves the page at once.
+/// Builds the node, serves the page at once and prints its address.
 ///
 /// # Errors
 /// When a parameter is wrong, the address is taken, there is no network, or the program was built without the server.
@@ -30,6 +30,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(&config)?;
     let view = View::open(&config, ViewOptions::of(setup, &config)?)?;
     let tap = receiver::listen(setup, view.feed())?;
+    complain!("{}: {}", setup.name(), view.sentence());
     Ok(Wiring::new(setup.name(), parameters, Watch::new(view, tap))
         .every(TICK, || Input::Tick)
         .diagnose(Output::diagnostic)
