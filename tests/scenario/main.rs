@@ -25,6 +25,7 @@ mod grid_truth;
 mod grid_xy;
 mod kept;
 mod lifecycle;
+mod live_view;
 mod mtconnect_log;
 mod odd_files;
 mod odd_logs;

@@ -55,7 +55,13 @@ tried! {
 
 /// Nodes that hear no topic of ours and offer at most calls without a field. What the recorder listens to it does not read;
 /// what an MTConnect machine sends is tried by `tests/fuzz`.
-pub const WITHOUT_EARS: [&str; 4] = ["mtconnect_bridge", "opcua_bridge", "recorder", "replayer"];
+pub const WITHOUT_EARS: [&str; 5] = [
+    "live_view",
+    "mtconnect_bridge",
+    "opcua_bridge",
+    "recorder",
+    "replayer",
+];
 
 const WITHOUT_A_PLAN: &str = "
 /**:

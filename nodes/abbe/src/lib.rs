@@ -38,6 +38,7 @@ mod report_bag;
 mod run;
 mod scenario;
 mod schema;
+mod serve;
 pub mod tell;
 mod truth;
 mod usage;
@@ -95,6 +96,8 @@ enum Verb {
     Export(export::Export),
     /// Run one node on the ROS graph, with the arguments of any ROS 2 node.
     Node(node::NodeVerb),
+    /// Serve a live view of a cell to browsers, from its topics; it moves nothing.
+    Serve(serve::Serve),
     /// Install the nodes and scenarios as a ROS 2 package, for `ros2 run` and `ros2 launch`.
     InstallRos(install_ros::InstallRos),
     /// Make credentials of DDS Security for the nodes of scenarios.
@@ -122,6 +125,7 @@ pub fn execute() -> ExitCode {
         Verb::History(history) => history.execute(),
         Verb::Export(export) => export.execute(),
         Verb::Node(node) => node.execute(),
+        Verb::Serve(serve) => serve.execute(),
         Verb::InstallRos(install) => install.execute(),
         Verb::Keystore(keystore) => keystore.execute(),
         Verb::Validate(validate) => validate.execute(),

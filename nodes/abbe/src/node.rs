@@ -25,6 +25,7 @@ pub const NODES: &[(&str, Builder)] = &[
     ("host_clock", host_clock_node::node),
     ("latency_calibrator", latency_calibrator_node::node),
     ("linuxcnc_bridge", linuxcnc_bridge_node::node),
+    ("live_view", live_view_node::node),
     ("machine_frames", machine_frames_node::node),
     ("mtconnect_bridge", mtconnect_bridge_node::node),
     ("opcua_bridge", opcua_bridge_node::node),

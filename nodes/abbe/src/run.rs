@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use live_view_node::View;
 use node_runtime::Interruption;
 use node_runtime::complain;
 use recorder::Bag;
@@ -34,9 +35,11 @@ mod bag;
 mod composed;
 mod live;
 mod mirror;
+mod serve;
 mod shortcomings;
 mod table_trial;
 
+use serve::ServeOptions;
 use table_trial::TableTrial;
 
 /// Arguments of `abbe run`.
@@ -69,6 +72,8 @@ pub struct Run {
     /// Print every table and remark, instead of the answer and three tables in at most 40 lines; `--explain` does too.
     #[arg(long)]
     full: bool,
+    #[command(flatten)]
+    served: ServeOptions,
     #[command(flatten)]
     keep: Keep,
 }
@@ -161,8 +166,9 @@ impl Run {
             complain!("abbe: {line}");
         }
         let interruption = Interruption::listen("the bag is closed, no page is written")?;
+        let view = self.served.open(&scenario)?;
         let folder = new_folder(&self.runs, &scenario.name)?;
-        let ended = self.run_into(&folder, &scenario, &interruption);
+        let ended = self.run_into(&folder, &scenario, view.as_ref(), &interruption);
         if ended.is_err() {
             // Where nothing came into it, it tells nothing; one that holds something is not taken away.
             let _ = std::fs::remove_dir(&folder);
@@ -175,24 +181,37 @@ impl Run {
         scenario.file.simulated_start_s.is_some() && !self.separate
     }
 
+    /// Runs the nodes of a scenario until its plan ends, and records them.
+    fn record(
+        &self,
+        scenario: &Scenario,
+        bag: &Path,
+        view: Option<&View>,
+        interruption: &Interruption,
+    ) -> Result<Outcome> {
+        let feed = view.map(View::feed);
+        let start_s = scenario.file.simulated_start_s;
+        let Some(start_s) = start_s.filter(|_| self.is_composed(scenario)) else {
+            return live::run(scenario, bag, self.separate, feed, interruption);
+        };
+        let how = composed::How {
+            pace: self.pace,
+            on_dds: !self.no_dds,
+            feed: feed.as_ref(),
+            interruption,
+        };
+        composed::run(scenario, start_s, bag, how)
+    }
+
     fn run_into(
         &self,
         folder: &Path,
         scenario: &Scenario,
+        view: Option<&View>,
         interruption: &Interruption,
     ) -> Result<ExitCode> {
         let bag = folder.join("bag");
-        let mut outcome = match scenario.file.simulated_start_s {
-            Some(start_s) if self.is_composed(scenario) => {
-                let how = composed::How {
-                    pace: self.pace,
-                    on_dds: !self.no_dds,
-                    interruption,
-                };
-                composed::run(scenario, start_s, &bag, how)?
-            }
-            _ => live::run(scenario, &bag, self.separate, interruption)?,
-        };
+        let mut outcome = self.record(scenario, &bag, view, interruption)?;
         if interruption.is_forced() {
             tell!("Bag:  {}", outcome.kept(&bag));
             complain!("abbe: the end was forced: no page was written");

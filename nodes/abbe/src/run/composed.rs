@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use abbe_msgs::{SERVICE_EVENT_SUFFIX, topics};
 use anyhow::{Context, Result, bail};
+use live_view_node::Feed;
 use metrology::epoch;
 use metrology::sample::PlanState;
 use metrology::stamp::{Host, Span, Stamp};
@@ -23,7 +24,7 @@ use recorder::{
 use reports::evidence::Evidence;
 
 use super::mirror::Mirror;
-use super::{INTERRUPTED, NOT_RECORDED, Outcome, bag};
+use super::{INTERRUPTED, NOT_RECORDED, Outcome, bag, serve};
 use crate::alarm;
 use crate::launch::LaunchNode;
 use crate::node;
@@ -47,6 +48,8 @@ pub struct How<'a> {
     pub pace: f64,
     /// Whether its topics are shown on DDS.
     pub on_dds: bool,
+    /// The live view that is shown, if any.
+    pub feed: Option<&'a Feed>,
     /// Whether it is to end before its plan does.
     pub interruption: &'a Interruption,
 }
@@ -74,6 +77,9 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
     } else {
         None
     };
+    if let Some(feed) = how.feed {
+        serve::feed(&mut harness, feed);
+    }
     let evidence = gather(&mut harness, &truth);
     let watched = Watched {
         evidence: &evidence,

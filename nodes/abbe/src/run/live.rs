@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail};
+use live_view_node::{Feed, Receiver};
 use metrology::sample::PlanState;
 use metrology::stamp::{Host, Stamp};
 use node_runtime::arguments::Arguments;
@@ -47,6 +48,7 @@ pub fn run(
     scenario: &Scenario,
     bag_path: &Path,
     separate: bool,
+    feed: Option<Feed>,
     interruption: &Interruption,
 ) -> Result<Outcome> {
     let environment = Environment::read()?;
@@ -54,6 +56,7 @@ pub fn run(
     let recorder = begin_bag(scenario, bag_path, &prepared)?;
     let evidence = Arc::<Mutex<GraphEvidence>>::default();
     let seen = Arc::clone(&evidence);
+    let mut receiver = feed.map(|feed| Receiver::new("/", feed, HostTime::default()));
     let capture = Capture::start(
         &environment,
         &NodeNames::new(TAP, &[])?,
@@ -62,6 +65,9 @@ pub fn run(
         HostTime::default(),
         move |event| {
             if let TapEvent::Sample(sample) = event {
+                if let Some(receiver) = &mut receiver {
+                    receiver.take(sample);
+                }
                 lock(&seen).take(sample);
             }
         },

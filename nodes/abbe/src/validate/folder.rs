@@ -14,8 +14,9 @@ use crate::node;
 use crate::scenario::{SCENARIO_FILE, Scenario};
 
 /// Nodes whose building opens a file, a connection or a program: of these the parameters are read, and no more.
-const OPENING: [&str; 5] = [
+const OPENING: [&str; 6] = [
     "linuxcnc_bridge",
+    "live_view",
     "mtconnect_bridge",
     "opcua_bridge",
     "recorder",
