@@ -177,19 +177,19 @@ mod tests {
     #[test]
     fn much_that_a_machine_says_is_handed_over_in_turns_and_never_holds_the_end_up() {
         let mut bridge = bridge();
-        for _ in 0..250 {
+        for _ in 0..2_500 {
             bridge.waiting.put(Output::Condition(Condition::Offered));
         }
         let at = Stamp::from_nanos(1_000);
         let mut said = vec![];
         bridge.step(at, LiveInput::Tick, &mut said).unwrap();
-        assert_eq!(said.len(), 100);
+        assert_eq!(said.len(), 1_000);
         said.clear();
         bridge.step(at, LiveInput::Shutdown, &mut said).unwrap();
-        let left = ValueCondition::LeftWaiting { count: 50 };
+        let left = ValueCondition::LeftWaiting { count: 500 };
         let left = Output::Condition(left.into());
         assert!(said.contains(&left), "{:?}", said.last());
         assert_eq!(said.last(), Some(&Output::Stopped));
-        assert!(said.len() < 110, "{}", said.len());
+        assert!(said.len() < 1_010, "{}", said.len());
     }
 }

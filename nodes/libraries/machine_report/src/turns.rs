@@ -2,9 +2,8 @@
 
 use std::collections::VecDeque;
 
-/// How much is handed over in one turn at most. A socket that nobody empties meanwhile holds about 200 messages of 300 bytes
-/// (Linux's 208 KiB, which counts a kilobyte for each); what it drops must be sent again, at a time that has no room for it.
-pub const PER_TURN: usize = 100;
+/// How much is handed over in one turn at most.
+pub const PER_TURN: usize = 1_000;
 
 /// What waits to be handed over, in its order.
 #[derive(Debug)]
@@ -60,14 +59,14 @@ mod tests {
     #[test]
     fn much_is_handed_over_in_turns_in_its_order_and_the_end_waits_for_one() {
         let mut turns = Turns::default();
-        (0..250).for_each(|one| turns.put(one));
+        (0..2_500).for_each(|one| turns.put(one));
         assert!(turns.is_full());
         let mut out = vec![];
         turns.hand_over(&mut out);
-        assert_eq!(out, (0..100).collect::<Vec<_>>());
+        assert_eq!(out, (0..1_000).collect::<Vec<_>>());
         out.clear();
-        assert_eq!(turns.end(&mut out), 50);
-        assert_eq!(out, (100..200).collect::<Vec<_>>());
+        assert_eq!(turns.end(&mut out), 500);
+        assert_eq!(out, (1_000..2_000).collect::<Vec<_>>());
         assert!(turns.is_empty());
     }
 }
