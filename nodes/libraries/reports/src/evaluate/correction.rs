@@ -442,7 +442,7 @@ environmental_drift_um: 0.3
         let silent = BUDGET.replacen("temperature_deviation_k: 2.0", "thermometers: [bed]", 1);
         let why = lacks(Some(&silent), Reference::Length);
         assert!(
-            why.contains("machine of the budget file thermometer bed has no reading"),
+            why.contains("`machine` names the thermometer bed, which has no reading"),
             "{why}"
         );
         let own = measured(Some(BUDGET), Reference::Scale);

@@ -239,6 +239,15 @@ mod tests {
         assert!((levelled.down_mm[0][0] - 0.001).abs() < 1e-12);
     }
 
+    fn five_runs(direction: [f64; 3]) -> LinearTest {
+        let one = test(direction);
+        LinearTest {
+            up_mm: one.up_mm.repeat(5),
+            down_mm: one.down_mm.repeat(5),
+            ..one
+        }
+    }
+
     #[test]
     fn lengths_of_diagonals_are_compared_apart_from_the_range_of_all_means() {
         // The four are alike: 3 µm too long, of 2 µm reversal and more.
@@ -249,7 +258,7 @@ mod tests {
             [1.0, 1.0, -1.0],
         ];
         let tests = Tests {
-            linear: four.map(test).to_vec(),
+            linear: four.map(five_runs).to_vec(),
             ..Tests::default()
         };
         let answer = sections(&tests, None).remove(0).answers.remove(0);
@@ -261,8 +270,10 @@ mod tests {
         let words = "the lengths of the diagonals differ by 0.00 µm, and all mean deviations lie within 5.00 µm";
         assert!(answer.contains(words), "{answer}");
         let mut longer = tests;
-        longer.linear[1].up_mm[0][2] = 0.013;
-        longer.linear[1].down_mm[0][2] = 0.015;
+        let one = &mut longer.linear[1];
+        for run in one.up_mm.iter_mut().chain(&mut one.down_mm) {
+            run[2] += 0.01;
+        }
         let answer = sections(&longer, None).remove(0).answers.remove(0);
         assert!(answer.contains("differ by 10.00 µm"), "{answer}");
     }

@@ -20,7 +20,7 @@ use crate::positioning::figure;
 use crate::section::{NOT_EVALUATED, Rows, Section, head, um};
 
 /// Why no conformance is decided of a size.
-const NOT_AT_20_DEGC: &str =
+const SIZE_NOT_AT_20_DEGC: &str =
     "not corrected to 20 °C: temperature and expansion of the artefact are not stated";
 
 /// One round shape, evaluated.
@@ -78,7 +78,7 @@ pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section>
             note: note(budget.is_some()),
         });
         section.figures = json!({
-            "test": section.title, "iso230_10_errors": found, "no_verdict_on_size": NOT_AT_20_DEGC,
+            "test": section.title, "iso230_10_errors": found, "no_verdict_on_size": SIZE_NOT_AT_20_DEGC,
         });
         section
     })
@@ -91,7 +91,7 @@ fn note(stated: bool) -> String {
         " Without --budget no uncertainty is stated."
     };
     format!(
-        "P_FTU,3D of a sphere, P_FTU,2D of a bore or boss: greatest minus least distance from the fitted centre. Size error: measured diameter minus that of the certificate, {NOT_AT_20_DEGC}; no conformance of it is decided.{uncertainty}"
+        "P_FTU,3D of a sphere, P_FTU,2D of a bore or boss: greatest minus least distance from the fitted centre. Size error: measured diameter minus that of the certificate, {SIZE_NOT_AT_20_DEGC}; no conformance of it is decided.{uncertainty}"
     )
 }
 

@@ -47,7 +47,10 @@ fn a_body_is_as_warm_as_it_is_stated_or_as_its_thermometers_read_during_the_test
     );
     let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
     let why = budget.machine.temperature(&nothing).unwrap_err();
-    assert!(why.contains("thermometer bed has no reading"), "{why}");
+    assert!(
+        why.contains("thermometer bed, which has no reading"),
+        "{why}"
+    );
     // Means 22.3 and 22.7; ranges 0.6 and 1.8, so 0.6 beside the stated 0.5.
     let read = Thermometers::from([
         ("bed".to_owned(), readings(&[22.0, 22.6])),
