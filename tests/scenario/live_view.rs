@@ -148,5 +148,5 @@ fn a_state_of_the_plan_that_a_cell_has_published_is_served_beside_it() {
     let sentence = format!("live view: http://{address}/");
     assert!(said.contains(&sentence), "{said}");
     voice.stop();
-    graph.stop();
+    drop(graph);
 }

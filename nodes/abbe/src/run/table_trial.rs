@@ -79,7 +79,7 @@ impl TableTrial<'_> {
         let copied = Scenario::read(&folder)?;
         let bag = folder.join("bag");
         complain!("Running again, {name}: {}", loaded.display());
-        let outcome = live::run(&copied, &bag, self.separate, self.interruption)?;
+        let outcome = live::run(&copied, &bag, self.separate, None, self.interruption)?;
         if let Some(reason) = outcome.failure {
             bail!("run {name}: {reason}");
         }

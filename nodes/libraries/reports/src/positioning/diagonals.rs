@@ -242,8 +242,8 @@ mod tests {
     fn five_runs(direction: [f64; 3]) -> LinearTest {
         let one = test(direction);
         LinearTest {
-            up_mm: one.up_mm.repeat(5),
-            down_mm: one.down_mm.repeat(5),
+            up_mm: vec![one.up_mm[0].clone(); 5],
+            down_mm: vec![one.down_mm[0].clone(); 5],
             ..one
         }
     }
