@@ -1,6 +1,6 @@
 //! `--keep` of `run`, `report` and `diagnose`: their figures into the history.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -33,6 +33,11 @@ impl Keep {
     /// Whether figures are kept.
     pub const fn is_wanted(&self) -> bool {
         self.keep
+    }
+
+    /// The file of the history, where one is named.
+    pub fn store(&self) -> Option<&Path> {
+        self.store.as_deref()
     }
 
     /// Keeps the figures of a report.
