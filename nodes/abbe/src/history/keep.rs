@@ -212,7 +212,7 @@ mod tests {
             for words in [
                 "table.csv: ",
                 "of m1 at 2026-06-30T00:00:00Z",
-                &format!("not of {machine} at {date}"),
+                format!("not of {machine} at {date}").as_str(),
                 "--store",
             ] {
                 assert!(refused.contains(words), "{refused}");

@@ -51,10 +51,9 @@ mod tests {
     fn a_time_counts_once_however_often_it_is_told() {
         let at = Stamp::<Machine>::from_nanos;
         let mut once = Once::default();
-        let mut tell = |from, to| {
+        let mut tell = |from, to| -> Vec<(i64, i64)> {
             let new = once.tell(at(from), at(to));
-            let new: Vec<_> = new.iter().map(|(a, b)| (a.nanos(), b.nanos())).collect();
-            new
+            new.iter().map(|(a, b)| (a.nanos(), b.nanos())).collect()
         };
         assert_eq!(tell(10, 20), [(10, 20)]);
         assert_eq!(tell(20, 30), [(20, 30)]);

@@ -34,7 +34,7 @@ pub(super) struct BadCell {
 }
 
 /// The cells of a row.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct Cells<'r, 's> {
     row: &'r Row<'s>,
     table: &'static str,
@@ -149,7 +149,7 @@ fn shown(value: ValueRef<'_>) -> String {
     match value {
         ValueRef::Null => "nothing".to_owned(),
         ValueRef::Integer(number) => number.to_string(),
-        ValueRef::Real(number) => number.to_string(),
+        ValueRef::Real(number) => metrology::number::number(number),
         ValueRef::Blob(bytes) => format!("{} bytes that are no text", bytes.len()),
         ValueRef::Text(bytes) => {
             let begin = bytes.get(..SHOWN_BYTES).unwrap_or(bytes);
