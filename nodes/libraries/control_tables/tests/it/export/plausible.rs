@@ -86,7 +86,7 @@ fn an_outlier_is_refused_with_axis_place_value_and_limit() {
         (
             |t| t.deviation_up[3] = 0.4,
             &[
-                "changes by 0.428 mm",
+                "changes by 0.426 mm",
                 "-260 mm and -240 mm",
                 "at most 0.3125 mm",
                 "spacing",
@@ -123,13 +123,12 @@ fn an_outlier_is_refused_with_axis_place_value_and_limit() {
 
 #[test]
 fn a_rotary_axis_has_its_own_limits() {
-    let c = |change| {
+    let c = |change: fn(&mut PositioningTable)| {
         let mut c = table(Axis::C, |t| {
             for values in [&mut t.deviation_up, &mut t.deviation_down] {
                 values.iter_mut().for_each(|e| *e *= 1e-3);
             }
         });
-        let change: fn(&mut PositioningTable) = change;
         change(&mut c);
         selected(c, Travels::default(), &Control::LinuxCnc(FileType::Offset))
     };
