@@ -3,6 +3,8 @@
 //! The interface files know no limits, and a limit in them would change every type hash. So the limits
 //! stand here, far above what any node of ours writes. Numbers have [`crate::wire`]'s own bound.
 
+use metrology::bound::Range;
+
 /// Bytes of a name: of a feature, a sensor, a stylus, a host.
 pub(crate) const NAME_BYTES: usize = 255;
 /// Names in a list: the features of a test.
@@ -21,6 +23,16 @@ pub(crate) const WEIGHTS: usize = 1_000_000;
 pub(crate) const POWER: u8 = 20;
 /// Points of a positioning table: what a control takes is below 10,000.
 pub(crate) const TABLE_POINTS: usize = 100_000;
+/// Position in a positioning table: the longest machines have some 100 m of travel.
+pub(crate) const POSITION_M: Range = Range::new(-1_000.0, 1_000.0, " m");
+/// The same of a rotary axis: some 160 turns.
+pub(crate) const POSITION_RAD: Range = Range::new(-1_000.0, 1_000.0, " rad");
+/// Deviation in a positioning table: a scale and a motor encoder that differ by more do not watch one axis.
+pub(crate) const DEVIATION_M: Range = Range::new(-0.1, 0.1, " m");
+/// The same of a rotary axis.
+pub(crate) const DEVIATION_RAD: Range = Range::new(-1.0, 1.0, " rad");
+/// Weight of a new measurement in a positioning table, as its interface file says.
+pub(crate) const TABLE_WEIGHT: Range = Range::new(0.0, 0.3, "");
 /// Causes of a gap, parameters of one, runs that were looked at.
 pub(crate) const CAUSES: usize = 1_000;
 /// Runs that a report names.

@@ -289,21 +289,26 @@ impl Wire for PositioningTable {
         read.at_most("position", len, bounds::TABLE_POINTS)?;
         read.length("deviation_up", self.deviation_up.len(), len)?;
         read.length("deviation_down", self.deviation_down.len(), len)?;
-        let from_wire = |field, values: &[f64]| -> Result<Vec<f64>, WireError> {
+        let (places, deviations) = if axis.is_linear() {
+            (bounds::POSITION_M, bounds::DEVIATION_M)
+        } else {
+            (bounds::POSITION_RAD, bounds::DEVIATION_RAD)
+        };
+        let from_wire = |field, values: &[f64], range| -> Result<Vec<f64>, WireError> {
             let each = values.iter().enumerate().map(|(idx, value)| {
-                let value = read.number(field, Place::Entry(idx), *value, Allowed::Finite)?;
-                Ok(position_from_wire(axis, value))
+                read.inside(field, Place::Entry(idx), *value, range)
+                    .map(|value| position_from_wire(axis, value))
             });
             each.collect()
         };
         Ok(sample::PositioningTable {
             at: read.stamp("header.stamp", Place::Whole, &self.header.stamp)?,
             axis,
-            position: from_wire("position", &self.position)?,
-            deviation_up: from_wire("deviation_up", &self.deviation_up)?,
-            deviation_down: from_wire("deviation_down", &self.deviation_down)?,
+            position: from_wire("position", &self.position, places)?,
+            deviation_up: from_wire("deviation_up", &self.deviation_up, deviations)?,
+            deviation_down: from_wire("deviation_down", &self.deviation_down, deviations)?,
             n_runs: self.n_runs,
-            weight: read.finite("weight", self.weight)?,
+            weight: read.inside("weight", Place::Whole, self.weight, bounds::TABLE_WEIGHT)?,
             sequence: self.sequence,
         })
     }

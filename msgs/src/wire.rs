@@ -25,7 +25,7 @@
 //! REP 103 for the units of the wire; OMG DDS 1.4, 2.3.2 for the invalid time; `rclcpp/src/rclcpp/time.cpp`,
 //! `convert_rcl_time_to_sec_nanos`, for (3).
 
-use metrology::bound::TEMPERATURE;
+use metrology::bound::{Range, TEMPERATURE};
 use metrology::stamp::NANOS_PER_S;
 use metrology::{Axis, AxisSet, Clock, PerAxis, Stamp};
 use nalgebra::Vector3;
@@ -268,6 +268,29 @@ impl Reader {
         let value = self.finite(field, value)?;
         let place = || "temperature".to_owned();
         match TEMPERATURE.check(place, value) {
+            Ok(()) => Ok(value),
+            Err(source) => Err(WireError::Quantity {
+                message: self.message,
+                field,
+                source,
+            }),
+        }
+    }
+
+    /// A finite number in the range of its quantity, in the unit of the wire.
+    pub(crate) fn inside(
+        self,
+        field: &'static str,
+        place: Place,
+        value: f64,
+        range: Range,
+    ) -> Result<f64, WireError> {
+        let value = self.number(field, place, value, Allowed::Finite)?;
+        let entry = || match place {
+            Place::Entry(idx) => format!("entry {idx}"),
+            _ => "value".to_owned(),
+        };
+        match range.check(entry, value) {
             Ok(()) => Ok(value),
             Err(source) => Err(WireError::Quantity {
                 message: self.message,

@@ -151,3 +151,50 @@ fn a_temperature_that_no_thermometer_reads_is_refused_with_value_and_range() {
     let words = "temperature: temperature = -500 °C: must be from -200 to 1600 °C";
     assert!(shown.contains(words), "{shown}");
 }
+
+#[test]
+fn a_positioning_table_is_refused_beyond_what_its_interface_file_and_a_machine_have() {
+    let table = |axis: &str, change: fn(&mut PositioningTable)| {
+        let mut table = PositioningTable {
+            axis: axis.to_owned(),
+            position: vec![0.0, 0.1],
+            deviation_up: vec![0.0, 1e-5],
+            deviation_down: vec![0.0, 1e-5],
+            weight: 0.3,
+            ..PositioningTable::default()
+        };
+        change(&mut table);
+        table
+    };
+    for axis in ["X", "C"] {
+        assert!(table(axis, |_| ()).into_inner().is_ok(), "{axis}");
+        let far = said(table(axis, |t| t.position[1] = 1_000.1));
+        assert!(far.contains("position: entry 1 = 1000.1"), "{far}");
+    }
+    for (of, words) in [
+        (
+            table("X", |t| t.weight = 7.0),
+            "weight: value = 7: must be from 0 to 0.3",
+        ),
+        (table("X", |t| t.weight = -0.1), "weight: value = -0.1"),
+        (
+            table("X", |t| t.deviation_up[0] = 1_000.0),
+            "deviation_up: entry 0 = 1000 m: must be from -0.1 to 0.1 m",
+        ),
+        (
+            table("X", |t| t.deviation_down[1] = -0.11),
+            "deviation_down: entry 1 = -0.11 m",
+        ),
+        (
+            table("C", |t| t.deviation_up[1] = 1.1),
+            "deviation_up: entry 1 = 1.1 rad: must be from -1 to 1 rad",
+        ),
+        (
+            table("C", |t| t.deviation_up[1] = f64::NAN),
+            "deviation_up[1]",
+        ),
+    ] {
+        let refused = said(of);
+        assert!(refused.contains(words), "{refused}");
+    }
+}

@@ -9,7 +9,7 @@ use reports::loss;
 use reports::machine_defaults;
 use reports::screen::Made;
 use reports::terminal::Room;
-use reports::whole_file;
+use reports::whole_file::{self, Form, Output, check_outputs};
 use reports::{Report, gap, test_conditions};
 
 use std::path::{Path, PathBuf};
@@ -107,6 +107,7 @@ impl Diagnose {
     /// # Errors
     /// When a bag or the machine file cannot be read, nothing was repeated, or the bag is another machine's.
     pub fn execute(self) -> Result<ExitCode> {
+        self.refuse_outputs()?;
         let (name, text) = match &self.machine {
             Some(path) => {
                 let file = text_file::yaml_file(path).context("machine file")?;
@@ -114,7 +115,6 @@ impl Diagnose {
             }
             None => bags::machine_text(&self.bags[0])?,
         };
-        self.refuse_outputs()?;
         let round = self.round(&name, &text)?;
         let config = GapConfig {
             left_out: self.without.clone(),
@@ -218,13 +218,25 @@ impl Diagnose {
         Ok(())
     }
 
-    /// Refuses outputs that are no files, and a machine file to write that holds something, before the work begins.
+    /// Refuses outputs that are no files, or over inputs or what is no page, and a machine file to write that holds something,
+    /// before the work begins.
     fn refuse_outputs(&self) -> Result<()> {
-        let json = self.json.as_deref().filter(|path| *path != Path::new("-"));
-        let others = [self.html.as_deref(), self.write_machine.as_deref()];
-        for path in others.into_iter().chain([json]).flatten() {
-            whole_file::can_be_output(path)?;
-        }
+        let json = self.json.as_ref().filter(|path| *path != Path::new("-"));
+        let all = [
+            ("--json", json, Form::Json),
+            ("--html", self.html.as_ref(), Form::Html),
+            ("--pdf", self.pdf.as_ref(), Form::Pdf),
+            ("--write-machine", self.write_machine.as_ref(), Form::Any),
+        ];
+        let outputs = all.into_iter().filter_map(|(option, path, form)| {
+            path.map(|path| Output::new(option, path.clone(), form))
+        });
+        let outputs: Vec<Output> = outputs.collect();
+        let files = [&self.machine, &self.plan, &self.budget];
+        let files = files.into_iter().filter_map(|file| file.as_deref());
+        let bags = self.bags.iter().chain(&self.simulated);
+        let inputs = bags.map(PathBuf::as_path).chain(files);
+        check_outputs(&outputs, inputs.chain(self.keep.store()))?;
         // An empty file is a place that was made for it.
         let holds = |path: &&PathBuf| std::fs::metadata(path).is_ok_and(|file| file.len() > 0);
         if let Some(path) = self.write_machine.as_ref().filter(holds) {

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use control_tables::selection::{Selected, Wanted, select};
-use control_tables::{ExportFile, Unestimable};
+use control_tables::{ExportFile, Travels, Unestimable};
 use metrology::{Axis, AxisSet, PerAxis};
 use recorder::Bag;
 
@@ -24,6 +24,7 @@ mod found;
 mod origin;
 mod references;
 mod set_up;
+mod travel;
 
 use counting::Counting;
 use found::{Found, looked_for, read, tables_of_stops};
@@ -131,7 +132,8 @@ pub struct Export {
 }
 
 impl Export {
-    /// Exit code 0: every file is written; 1: there was nothing to write, or it failed; 3: written, but a part of the bag was lost or left out.
+    /// Exit code 0: every file is written; 1: there was nothing to write, or it failed; 3: written, but a part of the bag was lost or left out, or an
+    /// error that no machine has was refused.
     ///
     /// # Errors
     /// The bag cannot be read, a file cannot be written, or a named reference point is beyond the errors (exit code 2).
@@ -160,7 +162,7 @@ impl Export {
                 origin.of_stops = tables_of_stops(&tests.stops, &mut measured);
             }
         }
-        let wanted = self.wanted();
+        let wanted = self.wanted(travel::of(&bag, &mut losses));
         let selected = select(&measured, &wanted, &self.set_up.control(format));
         let mut without_effect = self.without_effect(format, &origin);
         without_effect.extend(effect::without_effect(&self, format, &measured, &selected));
@@ -169,9 +171,18 @@ impl Export {
             .iter()
             .map(|left| format!("left out: {}: {}", left.what, left.why))
             .collect();
-        for line in &left_out {
-            tell!("{line}");
+        let said = selected.left_out.iter().zip(&left_out);
+        for (left, line) in said {
+            if left.why.is_implausible() {
+                complain!("abbe: {line}");
+            } else {
+                tell!("{line}");
+            }
         }
+        let all_plausible = !selected
+            .left_out
+            .iter()
+            .any(|left| left.why.is_implausible());
         if let Some(leaps) = reading.leaps.line() {
             complain!("abbe: {leaps}");
         }
@@ -216,7 +227,7 @@ impl Export {
                 "abbe: the bag was not read whole, a table may be missing or an older one: {loss}"
             );
         }
-        Ok(loss::exit_code(losses.is_empty()))
+        Ok(loss::exit_code(losses.is_empty() && all_plausible))
     }
 
     /// Refuses options that can do nothing, whatever the bag holds.
@@ -296,7 +307,7 @@ impl Export {
         }
     }
 
-    fn wanted(&self) -> Wanted {
+    fn wanted(&self, travels: Travels) -> Wanted {
         let mut reference = PerAxis::default();
         for (axis, value) in &self.reference {
             reference[*axis] = inner(*axis, *value);
@@ -312,6 +323,7 @@ impl Export {
             } else {
                 Unestimable::Refuse
             },
+            travels,
         }
     }
 

@@ -1,6 +1,6 @@
 //! `abbe import-shift LOG`: a logged shift of an MTConnect machine as part programs that load another one alike.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, anyhow, ensure};
@@ -68,11 +68,11 @@ pub struct OrderFile {
     clear_mm: f64,
 }
 
-fn text(path: &std::path::Path) -> Result<String> {
+fn text(path: &Path) -> Result<String> {
     Ok(text_file::yaml(path)?)
 }
 
-fn machine_file(path: &std::path::Path) -> Result<MachineFile> {
+fn machine_file(path: &Path) -> Result<MachineFile> {
     let file = text_file::yaml_file(path)?;
     Ok(MachineFile::parse(
         &file.text,
@@ -141,6 +141,12 @@ impl OrderFile {
             "clear_mm = {} mm: must be within the travel of Z, {least} to {greatest} mm",
             self.clear_mm
         );
+        let top = self.z_mm.1;
+        ensure!(
+            self.clear_mm >= top,
+            "clear_mm = {} mm: must be at or above the top of z_mm, {top} mm: programs go there in G0 before X and Y move",
+            self.clear_mm
+        );
         let mut window_mm = PerAxis::default();
         for (axis, window) in Axis::LINEAR.into_iter().zip(windows) {
             window_mm[axis] = window;
@@ -154,6 +160,10 @@ impl OrderFile {
             window_mm,
             clear_mm: self.clear_mm,
             feed_limit_mm_s: feed_limit_mm_min / 60.0,
+            spindle_limit_rpm: machine
+                .spindle
+                .as_ref()
+                .map_or(0.0, |spindle| spindle.max_speed_rpm),
         })
     }
 }
@@ -194,10 +204,7 @@ impl ImportShift {
         })?;
         let programs = shift::programs(&shift.bins, &file.title, &order)?;
         std::fs::create_dir_all(&self.output).with_context(|| place(&self.output))?;
-        for (n, program) in programs.iter().enumerate() {
-            let path = self.output.join(format!("shift_{n:02}.ngc"));
-            whole_file::write(&path, program)?;
-        }
+        write(&self.output, &programs)?;
         tell!("{}: {} programs", self.output.display(), programs.len());
         self.account(&shift, &order);
         Ok(loss::exit_code(shift.is_whole))
@@ -226,6 +233,34 @@ impl ImportShift {
         complain!("{log}: {}", shift.account);
     }
 }
+
+/// Writes all programs or none into a folder that has none of another shift: its parts would be run with those of this one.
+fn write(folder: &Path, programs: &[String]) -> Result<()> {
+    let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+    for entry in entries {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let number = name.strip_prefix("shift_");
+        let number = number.and_then(|rest| rest.strip_suffix(".ngc"));
+        ensure!(
+            number.is_none_or(
+                |number| number.is_empty() || number.contains(|c: char| !c.is_ascii_digit())
+            ),
+            "{}: there already, and not overwritten: {OTHER_FOLDER}",
+            path.display()
+        );
+    }
+    let named = programs.iter().enumerate();
+    let files: Vec<(PathBuf, &String)> = named
+        .map(|(n, program)| (folder.join(format!("shift_{n:02}.ngc")), program))
+        .collect();
+    let files = files
+        .iter()
+        .map(|(path, text)| (path.as_path(), text.as_str()));
+    whole_file::create_all(files, OTHER_FOLDER)
+}
+
+const OTHER_FOLDER: &str = "name another folder with -o";
 
 /// Leaps that are named at most.
 const LEAPS_SHOWN: usize = 10;
@@ -274,6 +309,13 @@ mod tests {
                 "within the travel of Z",
             ),
             (
+                "clear_mm: 240.0",
+                "clear_mm: 199.9",
+                "at or above the top of z_mm, 200 mm",
+            ),
+            ("clear_mm: 240.0", "clear_mm: -50.0", "clear_mm = -50 mm"),
+            ("clear_mm: 240.0", "clear_mm: 70.0", "clear_mm = 70 mm"),
+            (
                 "title: a shift",
                 "title: a) G0 Z-60 (shift",
                 "title: must have no brackets",
@@ -288,6 +330,25 @@ mod tests {
             assert_ne!(text, ORDER, "{of}");
             let refused = format!("{:#}", checked(&text).expect_err(spoiled));
             assert!(refused.contains(words), "{spoiled}: {refused}");
+        }
+    }
+
+    #[test]
+    fn programs_are_written_all_or_none_and_never_over_or_beside_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let programs = ["a\n".to_owned(), "b\n".to_owned()];
+        std::fs::write(folder.path().join("shift_notes.ngc"), "mine").unwrap();
+        write(folder.path(), &programs).unwrap();
+        for there in ["shift_00.ngc", "shift_05.ngc"] {
+            let folder = tempfile::tempdir().unwrap();
+            std::fs::write(folder.path().join(there), "old").unwrap();
+            let refused = format!("{:#}", write(folder.path(), &programs).unwrap_err());
+            for words in [there, "not overwritten", "-o"] {
+                assert!(refused.contains(words), "{refused}");
+            }
+            let left = std::fs::read_dir(folder.path()).unwrap().count();
+            assert_eq!(left, 1);
+            assert_eq!(std::fs::read(folder.path().join(there)).unwrap(), b"old");
         }
     }
 }

@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 use reports::gap::planned;
 use reports::section::Section;
 use reports::terminal::{self, Part, Room};
-use reports::whole_file;
+use reports::whole_file::{self, Form, Output, check_outputs};
 use reports::{self, Report};
 
 pub mod design;
@@ -119,6 +119,11 @@ impl Preflight {
     /// # Errors
     /// When plan, machine, a wanted name or a number (exit code 2) cannot be used.
     pub fn execute(self) -> Result<ExitCode> {
+        let html = self.html.iter();
+        let html = html.map(|page| Output::new("--html", page.clone(), Form::Html));
+        let inputs = [&self.what, &self.machine, &self.likely];
+        let inputs = inputs.into_iter().filter_map(|input| input.as_deref());
+        check_outputs(&html.collect::<Vec<_>>(), inputs)?;
         if self.design {
             return self.execute_design();
         }

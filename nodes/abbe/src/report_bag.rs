@@ -11,6 +11,7 @@ use reports::page::fold;
 use reports::screen::{Made, Screen};
 use reports::section::Section;
 use reports::terminal::{self, Part, Rank, Room};
+use reports::whole_file::{Form, Output, check_outputs};
 use reports::{self, Report};
 
 use std::path::{Path, PathBuf};
@@ -68,6 +69,7 @@ impl ReportBag {
     /// # Errors
     /// When bag or budget cannot be read, or the page not written.
     pub fn execute(self) -> Result<ExitCode> {
+        self.check_outputs()?;
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let limits = self.limits.as_deref().map(read_limits).transpose()?;
         complain!("Evaluating the tests of {}", self.bag.display());
@@ -130,6 +132,21 @@ impl ReportBag {
             table.as_ref().map(|table| table.bag.as_path()),
         )?;
         Ok(loss::exit_code(tests.reading.is_whole() && n_odd == 0))
+    }
+
+    /// Refuses outputs over inputs and over what is no page, before the work begins.
+    fn check_outputs(&self) -> Result<()> {
+        let of_folder = self.out.iter().flat_map(|out| {
+            [("report.html", Form::Html), ("report.json", Form::Json)]
+                .map(|(name, form)| Output::new("--out", out.join(name), form))
+        });
+        let pdf = self.pdf.iter();
+        let pdf = pdf.map(|path| Output::new("--pdf", path.clone(), Form::Pdf));
+        let outputs: Vec<Output> = of_folder.chain(pdf).collect();
+        let files = [&self.map, &self.budget, &self.limits];
+        let files = files.into_iter().filter_map(|file| file.as_deref());
+        let inputs = files.chain([self.bag.as_path()]).chain(self.keep.store());
+        check_outputs(&outputs, inputs)
     }
 
     /// The page as a PDF, and its figures in the history, where that is wanted; `of_table`: the bag that a table was made into.

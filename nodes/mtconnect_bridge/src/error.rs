@@ -104,6 +104,19 @@ pub enum BridgeError {
         /// The limit.
         limit_mm_min: f64,
     },
+    /// A part of a shift turns the spindle faster than the other machine can.
+    #[error(
+        "at {} s: S{rpm}, limit {} 1/min (spindle.max_speed_rpm of the machine file; 0: it has no spindle): correct the log or the unit in the mapping, or take another range",
+        number(*at_s), number(*limit_rpm)
+    )]
+    SpindleTooFast {
+        /// Time from the shift's begin, s.
+        at_s: f64,
+        /// The speed, 1/min.
+        rpm: i64,
+        /// The limit, 1/min.
+        limit_rpm: f64,
+    },
     /// More lines than programs may have.
     #[error(
         "the travels of the log need {lines:.0} lines within the windows of the order, limit {limit}: widen the windows or shorten the range"

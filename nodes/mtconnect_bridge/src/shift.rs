@@ -8,7 +8,8 @@
 //!   F     = √(d_X² + d_Y² + d_Z²) / Δ          feed                                            (3)
 //! ```
 //!
-//! A value holds until the next is told. A spindle that is absent is taken to stand, an axis that is absent not to
+//! A value holds until the next is told. A time that a log tells twice, since its clock goes back, counts as it was told first, so
+//! that (1) is never above the greatest reading. A spindle that is absent is taken to stand, an axis that is absent not to
 //! move. Each axis goes its travel to and fro within a window of the other machine, so heat from nuts, guides and
 //! motors comes in as it did; where the axis stood is not followed. Nothing moves: a dwell.
 //!
@@ -27,8 +28,10 @@ use crate::error::BridgeError;
 use crate::mapping::Use;
 use crate::observation::Told;
 
+mod once;
 mod reading;
 
+use once::Once;
 pub use reading::{Shift, bins};
 
 /// A spindle that turns more slowly than this stands, 1/s.
@@ -60,6 +63,8 @@ pub struct ShiftOrder {
     pub clear_mm: f64,
     /// Greatest feed of the other machine, mm/s.
     pub feed_limit_mm_s: f64,
+    /// Greatest speed of the other machine's spindle, 1/min; 0: it has none.
+    pub spindle_limit_rpm: f64,
 }
 
 impl ShiftOrder {
@@ -91,6 +96,16 @@ pub struct Bin {
     pub travel_mm: PerAxis<f64>,
 }
 
+impl Bin {
+    /// Whole turns in a minute; 0: it stands.
+    fn rpm(&self) -> i64 {
+        if self.spindle_rad_s < STANDS_RAD_S {
+            return 0;
+        }
+        (self.spindle_rad_s * 30.0 / std::f64::consts::PI).round() as i64
+    }
+}
+
 /// One value of the log that matters here.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Event {
@@ -106,6 +121,11 @@ struct Cutter {
     bins: Vec<Bin>,
     spindle: Option<(Stamp<Machine>, f64)>,
     position_mm: PerAxis<Option<f64>>,
+    /// When the position of each axis was told last; none: not since the clock leapt.
+    axis_told: PerAxis<Option<Stamp<Machine>>>,
+    /// Times in which the spindle, and each axis, was told of.
+    turned: Once,
+    travelled: PerAxis<Once>,
 }
 
 impl Cutter {
@@ -118,6 +138,9 @@ impl Cutter {
             bins: vec![Bin::default(); n as usize],
             spindle: None,
             position_mm: PerAxis::default(),
+            axis_told: PerAxis::default(),
+            turned: Once::default(),
+            travelled: PerAxis::from_fn(|_| Once::default()),
         }
     }
 
@@ -145,24 +168,44 @@ impl Cutter {
         }
     }
 
-    fn take(&mut self, at: Stamp<Machine>, event: Event) {
+    /// Whether all of it is new: nothing of a time that was told before.
+    fn take(&mut self, at: Stamp<Machine>, event: Event) -> bool {
         match event {
             Event::Spindle(speed_rad_s) => {
                 let now = speed_rad_s.map(|speed_rad_s| (at, speed_rad_s));
-                if let Some((since, before_rad_s)) = std::mem::replace(&mut self.spindle, now) {
-                    self.turn(since, at, before_rad_s);
+                let Some((since, before_rad_s)) = std::mem::replace(&mut self.spindle, now) else {
+                    return true;
+                };
+                let new = self.turned.tell(since, at);
+                for (first, last) in &new {
+                    self.turn(*first, *last, before_rad_s);
                 }
+                at == since || new == [(since, at)]
             }
             Event::Axis(axis, position_mm) => {
                 let before = std::mem::replace(&mut self.position_mm[axis], position_mm);
                 let travel_mm = position_mm
                     .zip(before)
                     .map(|(now, before)| (now - before).abs());
+                let is_new = !self.travelled[axis].has(at);
+                if let Some(since) = self.axis_told[axis].replace(at) {
+                    self.travelled[axis].tell(since, at);
+                }
                 let bin = self.place(at).and_then(|place| self.bins.get_mut(place));
-                if let (Some(bin), Some(travel_mm)) = (bin, travel_mm) {
+                if let (Some(bin), Some(travel_mm), true) = (bin, travel_mm, is_new) {
                     bin.travel_mm[axis] += travel_mm;
                 }
+                is_new
             }
+        }
+    }
+
+    /// The clock leaps: a speed holds to the last stamp before it, and from the first one behind it.
+    fn leap(&mut self, from: Stamp<Machine>, to: Stamp<Machine>) {
+        self.axis_told = PerAxis::default();
+        if let Some((_, speed_rad_s)) = self.spindle {
+            self.take(from, Event::Spindle(None));
+            self.spindle = Some((to, speed_rad_s));
         }
     }
 }
@@ -238,12 +281,7 @@ impl Writer<'_> {
     }
 
     fn bin(&mut self, bin: &Bin) {
-        let rpm = (bin.spindle_rad_s * 30.0 / std::f64::consts::PI).round() as i64;
-        let rpm = if bin.spindle_rad_s < STANDS_RAD_S {
-            0
-        } else {
-            rpm
-        };
+        let rpm = bin.rpm();
         if rpm != self.rpm {
             let line = if rpm == 0 {
                 "M5".to_owned()
@@ -302,9 +340,16 @@ fn round(position_mm: f64) -> f64 {
 /// One program for each slice; the last may be shorter.
 ///
 /// # Errors
-/// When a bin needs a feed that the other machine has not, or the travels more lines than a control takes.
+/// When a bin needs a feed or a speed of the spindle that the other machine has not, or the travels more lines than a control takes.
 pub fn programs(bins: &[Bin], title: &str, order: &ShiftOrder) -> Result<Vec<String>, BridgeError> {
     for (at, bin) in bins.iter().enumerate() {
+        if bin.rpm() as f64 > order.spindle_limit_rpm {
+            return Err(BridgeError::SpindleTooFast {
+                at_s: at as f64 * order.bin_s,
+                rpm: bin.rpm(),
+                limit_rpm: order.spindle_limit_rpm,
+            });
+        }
         let feed_mm_s = bin.travel_mm.xyz().norm() / order.bin_s;
         if feed_mm_s > order.feed_limit_mm_s {
             return Err(BridgeError::FeedTooHigh {
@@ -360,6 +405,7 @@ mod tests {
             window_mm: PerAxis::from_fn(|_| (0.0, 100.0)),
             clear_mm: 240.0,
             feed_limit_mm_s: 200.0,
+            spindle_limit_rpm: 12_000.0,
         }
     }
 
@@ -427,12 +473,42 @@ mod tests {
             refused.contains("limit 1000000: widen the windows"),
             "{refused}"
         );
+        for (limit_rpm, words) in [
+            (1199.0, "at 10 s: S1200, limit 1199 1/min"),
+            (0.0, "at 0 s: S900, limit 0 1/min"),
+        ] {
+            let mut small = order();
+            small.spindle_limit_rpm = limit_rpm;
+            let refused = programs(&bins, "a", &small).unwrap_err().to_string();
+            assert!(refused.starts_with(words), "{refused}");
+            assert!(refused.contains("spindle.max_speed_rpm"), "{refused}");
+        }
         slow.spindle = "main".to_owned();
         let refused = super::bins(LOG.join("\n").as_bytes(), &mapping(), &slow).unwrap_err();
         assert_eq!(
             refused.to_string(),
             "the mapping has no spindle speed \"main\": give one that name, or name another as spindle in the order"
         );
+    }
+
+    /// A clock that is set back, far or by less than a leap, and a log that is there twice: each time counts once.
+    #[test]
+    fn a_time_that_is_told_twice_counts_as_it_was_told_first() {
+        let wanted = bins(LOG.join("\n").as_bytes(), &mapping(), &order());
+        let wanted = wanted.unwrap().bins;
+        let twice = [LOG.join("\n"), LOG.join("\n")].join("\n");
+        // By hand: 1/min and mm of the first bin that no pass alone has.
+        let back = "2016-11-29T09:59:00Z|Srpm|600|Xabs|5\n2016-11-29T10:00:04Z|Xabs|35\n2016-11-29T10:00:05Z|Srpm|1200\n2016-11-29T10:00:06Z|Xabs|5\n2016-11-29T10:00:20Z|Srpm|UNAVAILABLE|Xabs|5\n2016-11-29T10:00:02Z|Srpm|1200|Xabs|99\n2016-11-29T10:00:09Z|Srpm|1200|Xabs|5\n2016-11-29T10:00:20Z|Srpm|UNAVAILABLE|Xabs|5\n";
+        for log in [twice.as_str(), back] {
+            let shift = bins(log.as_bytes(), &mapping(), &order()).unwrap();
+            assert_eq!(shift.bins, wanted, "{log}");
+            assert!(!shift.is_whole, "{log}");
+            let account = shift.account.to_string();
+            assert!(
+                account.contains("values of a time told before"),
+                "{account}"
+            );
+        }
     }
 
     /// What is missing of a log and its leaps, as a person sees them.

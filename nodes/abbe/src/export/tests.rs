@@ -350,6 +350,32 @@ fn a_bag_that_was_cut_is_exported_with_a_code_of_its_own() {
 }
 
 #[test]
+fn an_outlier_in_a_table_is_refused_and_the_other_axes_are_written_with_a_code_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    // 20 mm, which a message may have and no machine; 5 mm at one point, of slope 0.25.
+    let far: fn(&mut PositioningTable) = |t| t.deviation_up[0] = 20.0;
+    let jump: fn(&mut PositioningTable) = |t| t.deviation_down[5] = 4.9;
+    for (n, change) in [far, jump].into_iter().enumerate() {
+        let mut x = table(Axis::X, 1e-4);
+        change(&mut x);
+        let home = folder.path().join(n.to_string());
+        std::fs::create_dir(&home).unwrap();
+        let bag = bag(&home, &[table(Axis::Y, 1e-4), x], false);
+        for format in ["linuxcnc", "sinumerik", "csv"] {
+            let out = home.join(format);
+            let done = execute(&bag, &out, &["--format", format]);
+            assert_eq!(code(done), format!("{:?}", ExitCode::from(3)), "{format}");
+            let notes = std::fs::read_to_string(out.join(NOTES)).unwrap();
+            let left_out = "left out: positioning of X: axis X: ";
+            assert!(notes.contains(left_out), "{format}: {notes}");
+            assert!(!out.join("x.comp").exists());
+        }
+        let alone = execute(&bag, &home.join("x"), &["--format", "csv", "--axis", "X"]);
+        assert_eq!(code(alone), format!("{:?}", ExitCode::FAILURE));
+    }
+}
+
+#[test]
 fn an_argument_that_is_none_is_a_matter_of_usage() {
     for wrong in [
         &["--format", "okuma"][..],

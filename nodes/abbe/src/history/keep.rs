@@ -1,14 +1,14 @@
 //! `--keep` of `run`, `report` and `diagnose`: their figures into the history.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use history::{Added, Entry, Figure, Kind, LeftOut, Store, gap_figures, left_out, report_figures};
 use node_runtime::complain;
 use serde_json::Value;
 
-use super::dates::{Moment, moment};
+use super::dates::{Moment, moment, time};
 use super::origin::Origin;
 use super::{open_to_write, unmake};
 
@@ -33,6 +33,11 @@ impl Keep {
     /// Whether figures are kept.
     pub const fn is_wanted(&self) -> bool {
         self.keep
+    }
+
+    /// The file of the history, where one is named.
+    pub fn store(&self) -> Option<&Path> {
+        self.store.as_deref()
     }
 
     /// Keeps the figures of a report.
@@ -146,12 +151,21 @@ pub fn entry(kind: Kind, figures: Vec<Figure>, origin: Origin) -> Result<Entry> 
 /// Adds an entry; what became of it, in words.
 ///
 /// # Errors
-/// When the store cannot be written.
+/// When the store cannot be written, or has it under another machine or time.
 pub fn add(store: &mut Store, entry: &Entry) -> Result<String> {
     let (n, kind, machine) = (entry.figures.len(), entry.kind.name(), &entry.machine);
     Ok(match store.add(entry)? {
         Added::New => format!("kept {n} figures of a {kind} of {machine}"),
         Added::Known => format!("has this {kind} of {machine} already, nothing was added"),
+        Added::Otherwise {
+            machine: other,
+            at_s,
+        } => bail!(
+            "{}: the history has this {kind} already, of {other} at {}, and not of {machine} at {}: nothing was added; state what it has, or keep it in another file with --store",
+            entry.source,
+            time(at_s as f64),
+            time(entry.at_s as f64)
+        ),
     })
 }
 
@@ -160,6 +174,51 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+
+    #[test]
+    fn figures_of_another_machine_or_date_are_refused_with_those_that_they_stand_under() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("s.sqlite");
+        let mut store = Store::open(&path, history::Options::default()).unwrap();
+        let figure = Figure {
+            test: "X".to_owned(),
+            name: "iso230_2.accuracy".to_owned(),
+            axis: String::new(),
+            value: 0.01,
+            unit: "mm".to_owned(),
+            standard_uncertainty: None,
+            interval: None,
+            status: String::new(),
+        };
+        let mut kept = |machine: &str, date: &str| {
+            let origin = Origin {
+                sha256: "0".repeat(64),
+                source: "table.csv".to_owned(),
+                ..Origin::default()
+            };
+            let origin = origin.stated(Some(machine.to_owned()), moment(date).ok(), "--kept-at")?;
+            let one = entry(Kind::Report, vec![figure.clone()], origin)?;
+            add(&mut store, &one)
+        };
+        assert!(kept("m1", "2026-06-30").unwrap().starts_with("kept 1"));
+        let again = kept("m1", "2026-06-30T12:00:00Z").unwrap();
+        assert!(again.contains("already, nothing was added"), "{again}");
+        for (machine, date) in [
+            ("m2", "2026-06-30"),
+            ("m1", "2026-01-01"),
+            ("m2", "2026-01-01"),
+        ] {
+            let refused = format!("{:#}", kept(machine, date).unwrap_err());
+            for words in [
+                "table.csv: ",
+                "of m1 at 2026-06-30T00:00:00Z",
+                format!("not of {machine} at {date}").as_str(),
+                "--store",
+            ] {
+                assert!(refused.contains(words), "{refused}");
+            }
+        }
+    }
 
     #[test]
     fn figures_that_are_left_out_are_counted_and_the_first_are_named() {

@@ -9,7 +9,7 @@ use history::{Limit, Options, Series, SeriesKey, Side, Store, Window};
 use maud::html;
 use metrology::number::number;
 use reports::section::Section;
-use reports::whole_file;
+use reports::whole_file::{self, Form, Output, check_outputs};
 use serde_json::{Value, json};
 
 use super::dates::{Moment, moment, time};
@@ -113,6 +113,9 @@ impl View {
             return Err(refused("history", reason));
         }
         let path = store_path(self.store.as_deref())?;
+        let html = self.html.iter();
+        let html = html.map(|page| Output::new("--html", page.clone(), Form::Html));
+        check_outputs(&html.collect::<Vec<_>>(), [path.as_path()])?;
         let store = Store::open_to_read(&path, Options::default())?;
         if let Some(machine) = &self.machine {
             is_there(&store, machine)?;

@@ -14,6 +14,7 @@ use node_runtime::text_file;
 use reports::Report;
 use reports::gap::designed;
 use reports::terminal::Room;
+use reports::whole_file;
 use sequencer::Plan;
 use twin::Instrument;
 
@@ -200,7 +201,7 @@ impl Wanted<'_> {
         let title = format!("Designed programme: {}", self.out.display());
         let page = designed::page(&title, &designed.design, order_of(&stands), &notes)?;
         if let Some(path) = self.html {
-            std::fs::write(path, page.html()).with_context(|| path.display().to_string())?;
+            whole_file::write(path, &page.html())?;
         }
         Ok(page)
     }

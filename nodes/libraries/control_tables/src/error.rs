@@ -129,6 +129,44 @@ pub enum ExportError {
         /// Greatest measured position, mm or rad.
         greatest: f64,
     },
+    /// An error that no machine has.
+    #[error(
+        "axis {axis}: error {} in direction {direction} at {}: at most {} is an error of a machine: \
+         look for an outlier or another unit in the readings there, and measure again",
+        along(*direction, *error), along(*axis, *position), along(*direction, *limit)
+    )]
+    Implausible {
+        /// The axis.
+        axis: Axis,
+        /// Direction of the error.
+        direction: Axis,
+        /// Where, mm or rad.
+        position: f64,
+        /// The error, mm or rad.
+        error: f64,
+        /// Its greatest size, mm or rad.
+        limit: f64,
+    },
+    /// An error that changes so much between neighbours that it is one of the recording.
+    #[error(
+        "axis {axis}: the error in direction {direction} changes by {} between the points {} and {}: at most {} (1/64 of the way): \
+         look for an outlier in the readings there, measure again, or take a greater spacing",
+        along(*direction, *change), along(*axis, *from), along(*axis, *to), along(*direction, *limit)
+    )]
+    TooSteep {
+        /// The axis.
+        axis: Axis,
+        /// Direction of the error.
+        direction: Axis,
+        /// Change of the error, mm or rad.
+        change: f64,
+        /// One point, mm or rad.
+        from: f64,
+        /// The next, mm or rad.
+        to: f64,
+        /// The greatest size of the change, mm or rad.
+        limit: f64,
+    },
     /// A value beyond what the control takes.
     #[error(
         "axis {axis}: value {} {unit} at {}: {control} takes at most {} {unit}",

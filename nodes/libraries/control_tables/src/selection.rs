@@ -14,6 +14,7 @@ use super::cross_errors::{CrossErrors, Unestimable};
 use super::error::ExportError;
 use super::file::ExportFile;
 use super::grid::Grid;
+use super::plausible::{self, Travels};
 
 pub use controls::{Control, Fanuc, PitchTables, Sinumerik};
 
@@ -52,6 +53,8 @@ pub struct Wanted {
     pub relative_to_reference: bool,
     /// What to do with components that are not estimable.
     pub unestimable: Unestimable,
+    /// Travel of each axis by the machine file; no point of a table may lie outside. None: not known.
+    pub travels: Travels,
 }
 
 /// Something measured that is in no file.
@@ -93,6 +96,22 @@ pub enum Reason {
     /// No other error of the axis tells its span.
     #[error("no recorded error of the axis says over which span it holds")]
     NoSpan,
+}
+
+impl Reason {
+    /// Whether what was measured cannot be true of the machine.
+    #[must_use]
+    pub fn is_implausible(&self) -> bool {
+        let Self::Refused(error) = self else {
+            return false;
+        };
+        matches!(
+            error,
+            ExportError::Implausible { .. }
+                | ExportError::TooSteep { .. }
+                | ExportError::OutsideTravel { .. }
+        )
+    }
 }
 
 /// Files and what is in none of them.
@@ -186,10 +205,12 @@ fn positioning(
         }),
         (None, None) => return None,
     };
-    match errors {
-        Ok(errors) if wanted.relative_to_reference => {
-            Some(errors.relative_to(wanted.reference[axis]))
-        }
+    let counted = errors.and_then(|errors| {
+        let errors = counted_from(&errors, wanted);
+        plausible::positioning(&errors, &wanted.travels)?;
+        Ok(errors)
+    });
+    match counted {
         Ok(errors) => Some(errors),
         Err(why) => {
             selected.leave_out(format!("positioning of {axis}"), why);
@@ -198,8 +219,19 @@ fn positioning(
     }
 }
 
+/// Counted from the reference point, or as they are.
+fn counted_from(errors: &AxisErrors, wanted: &Wanted) -> AxisErrors {
+    if wanted.relative_to_reference {
+        errors.relative_to(wanted.reference[errors.axis()])
+    } else {
+        errors.clone()
+    }
+}
+
 fn from_table(table: &PositioningTable, wanted: &Wanted) -> Result<AxisErrors, Reason> {
     let errors = AxisErrors::from_table(table)?;
+    // An outlier between two points of the grid is in no file, and says that the others may be wrong too.
+    plausible::sizes_of(&counted_from(&errors, wanted))?;
     let grid = Grid::inside(table.axis, spacing(wanted, table.axis), errors.span())?;
     Ok(errors.on_grid(&grid)?)
 }
@@ -279,13 +311,9 @@ fn cross(
         }
         let sampled = span(model, axis, &parts).map_or(Err(Reason::NoSpan), |span| {
             let grid = Grid::inside(axis, spacing(wanted, axis), span)?;
-            Ok(CrossErrors::sample(
-                model,
-                &parts,
-                direction,
-                &grid,
-                wanted.unestimable,
-            )?)
+            let sampled = CrossErrors::sample(model, &parts, direction, &grid, wanted.unestimable)?;
+            plausible::cross(&sampled, &wanted.travels)?;
+            Ok(sampled)
         });
         match sampled {
             Ok(sampled) => errors.cross.push(sampled),

@@ -135,6 +135,10 @@ impl Figure {
                 });
             }
         }
+        if let Some(value) = self.standard_uncertainty.filter(|u| *u < 0.0) {
+            let figure = self.name.clone();
+            return Err(HistoryError::BadUncertainty { figure, value });
+        }
         Ok(())
     }
 }

@@ -93,6 +93,22 @@ pub enum HistoryError {
         /// The report.
         source: rusqlite::Error,
     },
+    /// A row holds what this program never writes.
+    #[error("history {path}: table {table}, {row}: {column} = {found}: must be {must}: another program changed it; restore a copy, or mend or delete this row with sqlite3", path = path.display())]
+    BadRow {
+        /// The file.
+        path: PathBuf,
+        /// The table.
+        table: &'static str,
+        /// Which row.
+        row: String,
+        /// The column.
+        column: &'static str,
+        /// Its value, or the begin of it.
+        found: String,
+        /// The bound.
+        must: String,
+    },
     /// More rows match than are read.
     #[error("history {path}: more than {most} {rows}: choose less with --since, --test or --figure", path = path.display())]
     TooMany {
@@ -146,6 +162,14 @@ pub enum HistoryError {
         value: f64,
         /// The limit.
         greatest: f64,
+    },
+    /// An uncertainty below zero.
+    #[error("{figure}: standard_uncertainty = {value}: must not be below 0", value = number(*value))]
+    BadUncertainty {
+        /// Name of the figure.
+        figure: String,
+        /// The uncertainty.
+        value: f64,
     },
     /// An entry has no figure, or too many.
     #[error("{source_name}: {n} figures: must be from 1 to {most}{remedy}", remedy = remedy_of_count(*n))]

@@ -12,6 +12,7 @@ use crate::entry::{Entry, Figure};
 use crate::error::HistoryError;
 use crate::schema;
 
+mod cells;
 mod reading;
 
 pub use reading::{Kept, Last, MachineSummary, Series, SeriesKey, Window};
@@ -36,13 +37,23 @@ impl Default for Options {
 }
 
 /// What became of an entry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Added {
     /// It was added.
     New,
     /// The store has it already: the same kind and hash. Nothing was changed.
     Known,
+    /// The store has it under another machine or time. Nothing was changed.
+    Otherwise {
+        /// The machine that it stands under.
+        machine: String,
+        /// Its time there, s since 1970.
+        at_s: i64,
+    },
 }
+
+/// Seconds of a day.
+const DAY_S: i64 = 86_400;
 
 /// A store of entries.
 #[derive(Debug)]
@@ -146,7 +157,8 @@ impl Store {
         Ok(found)
     }
 
-    /// Adds an entry, unless one of its kind and hash is there.
+    /// Adds an entry, unless one of its kind and hash is there. A time at midnight is that of a date alone: it agrees with
+    /// every time of its day.
     ///
     /// # Errors
     /// When the entry is out of bounds, or the file cannot be written; nothing of it is kept then.
@@ -156,8 +168,15 @@ impl Store {
         let add = |connection: &mut Connection| -> Result<Added, rusqlite::Error> {
             let transaction =
                 connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-            if is_known(&transaction, entry)? {
-                return Ok(Added::Known);
+            if let Some((machine, at_s)) = known(&transaction, entry)? {
+                let is_date = at_s % DAY_S == 0 || entry.at_s % DAY_S == 0;
+                let is_day = is_date && at_s.div_euclid(DAY_S) == entry.at_s.div_euclid(DAY_S);
+                let is_same = machine == entry.machine && (at_s == entry.at_s || is_day);
+                return Ok(if is_same {
+                    Added::Known
+                } else {
+                    Added::Otherwise { machine, at_s }
+                });
             }
             insert(&transaction, entry)?;
             transaction.commit()?;
@@ -171,12 +190,16 @@ impl Store {
     }
 }
 
-fn is_known(transaction: &Transaction<'_>, entry: &Entry) -> Result<bool, rusqlite::Error> {
-    let sql = "SELECT count(*) FROM entry WHERE kind = ?1 AND sha256 = ?2";
-    let n: i64 = transaction.query_row(sql, params![entry.kind.name(), entry.sha256], |row| {
-        row.get(0)
-    })?;
-    Ok(n > 0)
+/// Machine and time of the entry of the same kind and hash, where there is one.
+fn known(
+    transaction: &Transaction<'_>,
+    entry: &Entry,
+) -> Result<Option<(String, i64)>, rusqlite::Error> {
+    let sql = "SELECT machine, at_s FROM entry WHERE kind = ?1 AND sha256 = ?2";
+    let key = params![entry.kind.name(), entry.sha256];
+    let mut statement = transaction.prepare(sql)?;
+    let mut rows = statement.query_map(key, |row| Ok((row.get(0)?, row.get(1)?)))?;
+    rows.next().transpose()
 }
 
 fn insert(transaction: &Transaction<'_>, entry: &Entry) -> Result<(), rusqlite::Error> {
@@ -235,6 +258,18 @@ fn insert(transaction: &Transaction<'_>, entry: &Entry) -> Result<(), rusqlite::
 /// What SQLite reports, in words that name the remedy.
 fn wrong(path: &Path, options: Options, error: rusqlite::Error) -> HistoryError {
     let path = path.to_owned();
+    // Tables or columns that are gone, and values of another type than the schema's.
+    let is_schema = error.to_string().starts_with("no such ");
+    let is_value = matches!(
+        error,
+        rusqlite::Error::InvalidColumnType(..)
+            | rusqlite::Error::FromSqlConversionFailure(..)
+            | rusqlite::Error::IntegralValueOutOfRange(..)
+    );
+    if is_schema || is_value {
+        let reason = error.to_string();
+        return HistoryError::NoDatabase { path, reason };
+    }
     match error.sqlite_error_code() {
         Some(ErrorCode::CannotOpen | ErrorCode::PermissionDenied) => HistoryError::Unopened {
             path,

@@ -18,6 +18,10 @@ use nix::unistd::Pid;
 use node_runtime::interruption::Interruption;
 use node_runtime::{complain, text_file};
 
+mod output;
+
+pub use output::{Form, Output, check_outputs};
+
 /// Outputs that the caller has opened for this process, whatever they are.
 const OWN_OUTPUTS: [&str; 3] = ["/dev/stdout", "/dev/stderr", "/dev/fd"];
 

@@ -89,16 +89,15 @@ impl Reader<'_> {
         if let Some(event) = event {
             let is_number = matches!(event, Event::Spindle(Some(_)) | Event::Axis(_, Some(_)));
             self.numbers += u64::from(is_number && at <= self.order.to);
-            self.cutter.take(at, event);
+            if !self.cutter.take(at, event) {
+                self.account.leave("values of a time told before", line);
+            }
         }
     }
 
-    /// The machine's clock leaps: a speed holds to the last stamp before it, and from the first one behind it.
+    /// The machine's clock leaps.
     fn leap(&mut self, leap: &Leap) {
-        if let Some((_, speed_rad_s)) = self.cutter.spindle {
-            self.cutter.take(leap.from, Event::Spindle(None));
-            self.cutter.spindle = Some((leap.to, speed_rad_s));
-        }
+        self.cutter.leap(leap.from, leap.to);
         // It may go back to where it was before.
         let goes_on = |(_, last): &(Stamp<Machine>, Stamp<Machine>)| {
             *last - DISORDER <= leap.to && leap.to <= *last + LONGEST_PAUSE

@@ -1,5 +1,6 @@
 //! What each control takes of the errors of a machine.
 
+use metrology::sample::ThermalModel;
 use metrology::{Axis, PerAxis};
 
 use super::super::axis_errors::AxisErrors;
@@ -8,6 +9,7 @@ use super::super::error::ExportError;
 use super::super::file::ExportFile;
 use super::super::grid::Grid;
 use super::super::linuxcnc::FileType;
+use super::super::plausible;
 use super::super::sign::Sign;
 use super::super::sinumerik::{
     CrossTable, EncoderTable, OtherAxes, Temperature, cross_table, direction_tables, encoder_table,
@@ -181,9 +183,16 @@ fn say_what_has_no_place(
             };
             selected.take(
                 &format!("drift of {axis}"),
-                temperature(model, axis, &set_up),
+                plausible_drift(model, axis).and_then(|()| temperature(model, axis, &set_up)),
             );
         }
+    }
+}
+
+fn plausible_drift(model: &ThermalModel, axis: Axis) -> Result<(), ExportError> {
+    match &model.axes[axis] {
+        Some(drift) => plausible::drift(axis, drift),
+        None => Ok(()),
     }
 }
 
@@ -321,7 +330,9 @@ fn csv_file(errors: &Errors, measured: &Measured, wanted: &Wanted, selected: &mu
             if wanted.axes.contains(curve.component.of) {
                 let spacing = super::spacing(wanted, curve.component.of);
                 let covariance = csv::covariance_of(model, index);
-                match known.add_curve(curve, covariance.as_ref(), spacing) {
+                let added = plausible::curve(curve, spacing, &wanted.travels)
+                    .and_then(|()| known.add_curve(curve, covariance.as_ref(), spacing));
+                match added {
                     Ok(()) => selected.list(curve.component),
                     Err(why) => selected.leave_out(curve.component.to_string(), why),
                 }
@@ -330,7 +341,8 @@ fn csv_file(errors: &Errors, measured: &Measured, wanted: &Wanted, selected: &mu
     }
     if let Some(model) = &measured.thermal {
         for axis in wanted.axes.iter().filter(|a| model.axes[*a].is_some()) {
-            if let Err(why) = known.add_drift(model, axis) {
+            let added = plausible_drift(model, axis).and_then(|()| known.add_drift(model, axis));
+            if let Err(why) = added {
                 selected.leave_out(format!("drift of {axis}"), why);
             }
         }

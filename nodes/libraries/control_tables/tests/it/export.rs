@@ -12,6 +12,7 @@ mod csv;
 mod fanuc;
 mod heidenhain;
 mod linuxcnc;
+mod plausible;
 mod refusals;
 mod selection;
 mod sinumerik;

@@ -1,8 +1,9 @@
 //! What a store gives back: machines, series, points, last values, times of tests.
 
-use rusqlite::{Params, Row, params};
+use rusqlite::{Params, params};
 
 use super::Store;
+use super::cells::{Cells, Fault};
 use crate::bound;
 use crate::error::HistoryError;
 use crate::point::Point;
@@ -103,12 +104,12 @@ impl Store {
     /// When the store cannot be read, or has too many.
     pub fn machines(&self) -> Result<Vec<MachineSummary>, HistoryError> {
         let sql = "SELECT machine, count(*), min(at_s), max(at_s) FROM entry GROUP BY machine ORDER BY machine";
-        self.rows(sql, [], ("machines", bound::ROWS), |row| {
+        self.rows(sql, [], ("entry", "machines", bound::ROWS), |cells| {
             Ok(MachineSummary {
-                machine: row.get(0)?,
-                entries: row.get(1)?,
-                first_s: row.get(2)?,
-                last_s: row.get(3)?,
+                machine: cells.text(0, "machine", bound::NAME_BYTES)?,
+                entries: cells.whole(1, "entries")?,
+                first_s: cells.time(2, "at_s")?,
+                last_s: cells.time(3, "at_s")?,
             })
         })
     }
@@ -121,7 +122,8 @@ impl Store {
         let sql = format!(
             "SELECT {COLUMNS} FROM series s WHERE {OF_KEY} ORDER BY s.machine, s.name, s.axis, s.test, s.unit"
         );
-        self.rows(&sql, of_key(key), ("series", bound::ROWS), read_series)
+        let of = ("series", "series", bound::ROWS);
+        self.rows(&sql, of_key(key), of, read_series)
     }
 
     /// The values of a series in order of time.
@@ -129,15 +131,19 @@ impl Store {
     /// # Errors
     /// When the store cannot be read, or has too many.
     pub fn points(&self, series: i64, window: Window) -> Result<Vec<Kept>, HistoryError> {
-        let sql = "SELECT f.at_s, f.value, f.standard_uncertainty, f.status, e.source
-             FROM figure f JOIN entry e ON e.id = f.entry
-             WHERE f.series = ?1 AND f.at_s BETWEEN ?2 AND ?3 ORDER BY f.at_s, f.entry";
+        // A time that is no number lies in no window, and an entry that is gone in no row: both are read, and refused.
+        let sql = "SELECT f.at_s, f.value, f.standard_uncertainty, f.status, e.source, f.entry
+             FROM figure f LEFT JOIN entry e ON e.id = f.entry
+             WHERE f.series = ?1 AND (f.at_s BETWEEN ?2 AND ?3 OR typeof(f.at_s) <> 'integer')
+             ORDER BY f.at_s, f.entry";
         let key = params![series, window.since_s, window.until_s];
-        self.rows(sql, key, ("values of one figure", bound::POINTS), |row| {
+        let of = ("figure", "values of one figure", bound::POINTS);
+        self.rows(sql, key, of, |cells| {
+            let cells = cells.of(series, Some(cells.whole(5, "entry")?));
             Ok(Kept {
-                point: read_point(row, 0)?,
-                status: row.get(3)?,
-                source: row.get(4)?,
+                point: read_point(&cells, 0)?,
+                status: cells.text(3, "status", bound::NAME_BYTES)?,
+                source: cells.text(4, "source of its entry", bound::TEXT_BYTES)?,
             })
         })
     }
@@ -156,11 +162,14 @@ impl Store {
                     ORDER BY l.at_s DESC, l.entry DESC LIMIT 1)
              ORDER BY s.machine, s.name, s.axis, s.test, s.unit"
         );
-        self.rows(&sql, of_key(key), ("series", bound::ROWS), |row| {
+        let of = ("figure", "series", bound::ROWS);
+        self.rows(&sql, of_key(key), of, |cells| {
+            let series = read_series(cells)?;
+            let cells = cells.of(series.id, None);
             Ok(Last {
-                series: read_series(row)?,
-                point: read_point(row, 6)?,
-                n: row.get(9)?,
+                point: read_point(&cells, 6)?,
+                n: cells.whole(9, "values")?,
+                series,
             })
         })
     }
@@ -172,8 +181,10 @@ impl Store {
     pub fn test_times(&self, machine: &str) -> Result<Vec<(String, i64)>, HistoryError> {
         let sql = "SELECT DISTINCT s.test, f.at_s FROM series s JOIN figure f ON f.series = s.id
              WHERE s.machine = ?1 AND s.test <> '' ORDER BY s.test, f.at_s";
-        self.rows(sql, [machine], ("times of tests", bound::POINTS), |row| {
-            Ok((row.get(0)?, row.get(1)?))
+        let of = ("figure", "times of tests", bound::POINTS);
+        self.rows(sql, [machine], of, |cells| {
+            let test = cells.text(0, "test", bound::NAME_BYTES)?;
+            Ok((test, cells.time(1, "at_s")?))
         })
     }
 
@@ -182,15 +193,32 @@ impl Store {
         &self,
         sql: &str,
         key: impl Params,
-        (name, most): (&'static str, usize),
-        read: impl Fn(&Row<'_>) -> Result<T, rusqlite::Error>,
+        (table, name, most): (&'static str, &'static str, usize),
+        read: impl Fn(&Cells<'_, '_>) -> Result<T, Fault>,
     ) -> Result<Vec<T>, HistoryError> {
-        let collect = || -> Result<Vec<T>, rusqlite::Error> {
+        let collect = || -> Result<Vec<T>, Fault> {
             let mut statement = self.connection.prepare(sql)?;
-            let rows = statement.query_map(key, &read)?;
-            rows.take(most + 1).collect()
+            let mut rows = statement.query(key)?;
+            let mut all = Vec::new();
+            while let Some(row) = rows.next()? {
+                all.push(read(&Cells::new(row, table))?);
+                if all.len() > most {
+                    break;
+                }
+            }
+            Ok(all)
         };
-        let rows = collect().map_err(|error| self.wrong(error))?;
+        let rows = collect().map_err(|fault| match fault {
+            Fault::Sqlite(error) => self.wrong(error),
+            Fault::Row(bad) => HistoryError::BadRow {
+                path: self.path.clone(),
+                table: bad.table,
+                row: bad.row,
+                column: bad.column,
+                found: bad.found,
+                must: bad.must,
+            },
+        })?;
         if rows.len() > most {
             return Err(HistoryError::TooMany {
                 path: self.path.clone(),
@@ -207,22 +235,25 @@ fn of_key(key: &SeriesKey) -> [Option<&str>; 4] {
     [&key.machine, &key.name, &key.axis, &key.test].map(|text| text.as_deref())
 }
 
-fn read_series(row: &Row<'_>) -> Result<Series, rusqlite::Error> {
+fn read_series(cells: &Cells<'_, '_>) -> Result<Series, Fault> {
+    let id = cells.whole(0, "id")?;
+    let cells = cells.of(id, None);
+    let text = |place, column| cells.text(place, column, bound::NAME_BYTES);
     Ok(Series {
-        id: row.get(0)?,
-        machine: row.get(1)?,
-        test: row.get(2)?,
-        name: row.get(3)?,
-        axis: row.get(4)?,
-        unit: row.get(5)?,
+        id,
+        machine: text(1, "machine")?,
+        test: text(2, "test")?,
+        name: text(3, "name")?,
+        axis: text(4, "axis")?,
+        unit: text(5, "unit")?,
     })
 }
 
 /// Time, value and uncertainty in three columns from `first` on.
-fn read_point(row: &Row<'_>, first: usize) -> Result<Point, rusqlite::Error> {
+fn read_point(cells: &Cells<'_, '_>, first: usize) -> Result<Point, Fault> {
     Ok(Point {
-        at_s: row.get::<_, i64>(first)? as f64,
-        value: row.get(first + 1)?,
-        standard_uncertainty: row.get(first + 2)?,
+        at_s: cells.time(first, "at_s")? as f64,
+        value: cells.number(first + 1, "value")?,
+        standard_uncertainty: cells.uncertainty(first + 2, "standard_uncertainty")?,
     })
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use history::{Added, HistoryError, Options, Store, VERSION};
+use history::{Added, HistoryError, Options, SeriesKey, Store, VERSION, Window};
 use rusqlite::Connection;
 
 use crate::example::{entry, figure};
@@ -185,5 +185,122 @@ fn a_damaged_store_is_an_error_and_no_panic() {
             let _ = store.add(&entry("m", 5, 500, 5.0));
             let _ = store.last_values(&history::SeriesKey::default());
         }
+    }
+}
+
+/// Everything that is read of a store, or the first error.
+fn all_read(path: &Path) -> Result<usize, HistoryError> {
+    let store = Store::open_to_read(path, IMPATIENT)?;
+    store.machines()?;
+    store.test_times("m")?;
+    store.last_values(&SeriesKey::default())?;
+    let mut n = 0;
+    for series in store.series(&SeriesKey::default())? {
+        n += store.points(series.id, Window::ALL)?.len();
+    }
+    Ok(n)
+}
+
+#[test]
+fn a_row_that_this_program_never_writes_is_refused_with_table_column_and_remedy() {
+    let home = tempfile::tempdir().unwrap();
+    for (n, (sql, words)) in [
+        (
+            "UPDATE entry SET machine = hex(zeroblob(50000))",
+            "machine = \"0000",
+        ),
+        (
+            "UPDATE entry SET source = hex(zeroblob(50000))",
+            "100000 bytes",
+        ),
+        ("UPDATE entry SET machine = 'm' || char(27)", "control"),
+        (
+            "UPDATE entry SET machine = x'ff'",
+            "1 bytes that are no text",
+        ),
+        (
+            "UPDATE entry SET at_s = 9223372036854775807",
+            "at_s = 9223372036854775807",
+        ),
+        (
+            "UPDATE series SET name = hex(zeroblob(200))",
+            "name = \"0000",
+        ),
+        (
+            "UPDATE figure SET value = 1e999 WHERE entry = 1",
+            "series 1: value = inf",
+        ),
+        (
+            "UPDATE figure SET value = 1e305 WHERE entry = 2",
+            "value = 1",
+        ),
+        (
+            "UPDATE figure SET value = 'abc' WHERE entry = 2",
+            "value = \"abc\" (3 bytes)",
+        ),
+        (
+            "UPDATE figure SET at_s = 'x' WHERE entry = 1",
+            "at_s = \"x\"",
+        ),
+        ("UPDATE figure SET at_s = -1", "at_s = -1"),
+        (
+            "UPDATE figure SET standard_uncertainty = -1e-6",
+            "must be 0 or more",
+        ),
+        (
+            "UPDATE figure SET standard_uncertainty = 'x'",
+            "standard_uncertainty = \"x\"",
+        ),
+        (
+            "DELETE FROM entry WHERE id = 2",
+            "entry 2: source of its entry = nothing",
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let path = home.path().join(format!("{n}.sqlite"));
+        let mut store = Store::open(&path, IMPATIENT).unwrap();
+        for (number, at_s) in [(1, 200), (2, 100)] {
+            store.add(&entry("m", number, at_s, 1.0)).unwrap();
+        }
+        drop(store);
+        assert_eq!(all_read(&path).unwrap(), 2);
+        let other = Connection::open(&path).unwrap();
+        other.execute_batch("PRAGMA foreign_keys = OFF").unwrap();
+        other.execute_batch(sql).unwrap();
+        drop(other);
+        let error = all_read(&path).expect_err(sql);
+        assert!(
+            matches!(error, HistoryError::BadRow { .. }),
+            "{sql}: {error:?}"
+        );
+        names(&error, &path, "restore a copy");
+        let text = error.to_string();
+        assert!(text.contains(words), "{sql}: {text}");
+        assert!(text.len() < 500, "{sql}: {text}");
+    }
+}
+
+#[test]
+fn a_store_without_a_table_or_a_column_is_a_damaged_one() {
+    let home = tempfile::tempdir().unwrap();
+    for (n, sql) in [
+        "DROP TABLE figure",
+        "DROP TABLE schema_version",
+        "ALTER TABLE series RENAME COLUMN axis TO axes",
+        "UPDATE figure SET entry = 'x'",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let path = home.path().join(format!("{n}.sqlite"));
+        made(&path);
+        let other = Connection::open(&path).unwrap();
+        other.execute_batch("PRAGMA foreign_keys = OFF").unwrap();
+        other.execute_batch(sql).unwrap();
+        drop(other);
+        let error = all_read(&path).expect_err(sql);
+        names(&error, &path, "restore a copy");
     }
 }

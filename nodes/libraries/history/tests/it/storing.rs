@@ -59,6 +59,31 @@ fn an_entry_is_added_once_by_kind_and_hash() {
 }
 
 #[test]
+fn an_entry_of_another_machine_or_time_is_named_and_not_added() {
+    let home = tempfile::tempdir().unwrap();
+    let mut store = store(home.path());
+    let day_s = 20_000 * 86_400;
+    let stands = Added::Otherwise {
+        machine: "m1".to_owned(),
+        at_s: day_s + 3_600,
+    };
+    let mut add = |machine, at_s| store.add(&entry(machine, 1, at_s, 1.0)).unwrap();
+    assert_eq!(add("m1", day_s + 3_600), Added::New);
+    for (machine, at_s, wanted) in [
+        ("m1", day_s + 3_600, &Added::Known),
+        // A date alone, of the same day.
+        ("m1", day_s, &Added::Known),
+        ("m2", day_s + 3_600, &stands),
+        ("m1", day_s + 3_601, &stands),
+        ("m1", day_s - 86_400, &stands),
+        ("m1", day_s + 86_400, &stands),
+    ] {
+        assert_eq!(&add(machine, at_s), wanted, "{machine} {at_s}");
+    }
+    assert_eq!(store.machines().unwrap()[0].entries, 1);
+}
+
+#[test]
 fn series_are_chosen_by_machine_name_axis_and_test() {
     let home = tempfile::tempdir().unwrap();
     let mut store = store(home.path());

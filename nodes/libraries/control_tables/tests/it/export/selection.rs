@@ -68,6 +68,7 @@ fn wanted() -> Wanted {
         reference: PerAxis::default(),
         relative_to_reference: true,
         unestimable: Unestimable::Refuse,
+        travels: PerAxis::default(),
     }
 }
 
