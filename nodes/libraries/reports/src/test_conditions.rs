@@ -8,8 +8,9 @@ use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, Instrument, NOT_STATED};
-use crate::evaluate::circles::CircleRecording;
-use crate::evaluate::correction::{Measured, MeasuredCircle};
+use crate::evaluate::circle_reading::CircleReading;
+use crate::evaluate::circles::{self, CircleRecording};
+use crate::evaluate::correction::Measured;
 use crate::evaluate::course::Course;
 use crate::evaluate::linear::LinearTest;
 use crate::evaluate::test_conditions::{Readings, TestConditions};
@@ -79,7 +80,7 @@ const THERMOMETER_COLUMNS: [&str; 6] = [
 pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>) -> Conditions {
     let mut section = Section::new("Conditions of the measurement");
     let run = run_of(seen, budget, tests);
-    let instruments = instruments_of(seen, budget);
+    let instruments = instruments_of(seen, budget, tests);
     let correction = correction_of(tests, budget);
     let rows = run.iter().chain(&instruments).map(Condition::row);
     let last = vec!["correction to 20 °C".to_owned(), correction.clone()];
@@ -128,7 +129,7 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
         "production_before_s": seen.production_before_s,
         "warm_up": budget.and_then(|budget| budget.warm_up.clone()),
         "operator": budget.and_then(|budget| budget.operator.clone()),
-        "instruments": instruments_json(seen, budget),
+        "instruments": instruments_json(seen, budget, tests),
         "thermometers": seen.thermometers.iter().map(temperature_json).collect::<Vec<Value>>(),
         "correction_to_20_degc": correction,
     });
@@ -264,9 +265,15 @@ fn listed(texts: impl Iterator<Item = String>) -> Option<String> {
 }
 
 /// Instruments that were read, by the name of their key and in words.
-fn read_by(seen: &TestConditions) -> Vec<(&'static str, &'static str)> {
+fn read_by(seen: &TestConditions, tests: Option<&Tests>) -> Vec<(&'static str, &'static str)> {
+    let is_by_ballbar =
+        |circle: &CircleRecording| circle.instrument == circles::Instrument::Ballbar;
+    let has_ballbar = tests.is_some_and(|tests| tests.circles.iter().any(is_by_ballbar));
+    let has_line = tests.is_some_and(|tests| !tests.linear.is_empty());
+    let has_reference = seen.has_length && (has_line || !has_ballbar);
     [
-        (seen.has_length, "length_reference", "length reference"),
+        (has_reference, "length_reference", "length reference"),
+        (has_ballbar, "ballbar", "ballbar"),
         (seen.has_grid, "grid_encoder", "grid encoder"),
         (seen.has_touches, "touch_probe", "touch probe"),
     ]
@@ -280,14 +287,19 @@ fn stated(budget: Option<&Budget>, key: &str) -> Instrument {
     let all = all.unwrap_or_default();
     match key {
         "length_reference" => all.length_reference,
+        "ballbar" => all.ballbar,
         "grid_encoder" => all.grid_encoder,
         _ => all.touch_probe,
     }
 }
 
-fn instruments_of(seen: &TestConditions, budget: Option<&Budget>) -> Vec<Condition> {
+fn instruments_of(
+    seen: &TestConditions,
+    budget: Option<&Budget>,
+    tests: Option<&Tests>,
+) -> Vec<Condition> {
     let mut all = Vec::new();
-    for (key, name) in read_by(seen) {
+    for (key, name) in read_by(seen, tests) {
         for (what, text) in stated(budget, key).texts() {
             let place = format!("instruments.{key}.{what} in budget.yaml");
             let name = match what {
@@ -300,7 +312,11 @@ fn instruments_of(seen: &TestConditions, budget: Option<&Budget>) -> Vec<Conditi
     all
 }
 
-fn instruments_json(seen: &TestConditions, budget: Option<&Budget>) -> Value {
+fn instruments_json(
+    seen: &TestConditions,
+    budget: Option<&Budget>,
+    tests: Option<&Tests>,
+) -> Value {
     let of = |(key, _): (&str, &str)| {
         let instrument = stated(budget, key);
         json!({
@@ -310,7 +326,7 @@ fn instruments_json(seen: &TestConditions, budget: Option<&Budget>) -> Value {
             "certificate": instrument.certificate,
         })
     };
-    read_by(seen).into_iter().map(of).collect()
+    read_by(seen, tests).into_iter().map(of).collect()
 }
 
 /// Which of the tests have the lengths that they have at 20 °C.
@@ -324,9 +340,8 @@ fn correction_of(tests: Option<&Tests>, budget: Option<&Budget>) -> String {
     };
     let of_circle = |circle: &CircleRecording| {
         let read = tests.conditions.during(&[circle.segment.run]);
-        MeasuredCircle::of(budget, &read, circle.instrument)
-            .correction
-            .lacks()
+        let reading = CircleReading::of(budget, &read, circle.instrument);
+        reading.no_verdict_on_radii()
     };
     let lines = tests.linear.iter().map(of_line).collect();
     let circles = tests.circles.iter().map(of_circle).collect();

@@ -27,9 +27,12 @@ pub struct Instrument {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Instruments {
-    /// Interferometer, tracker, ballbar or step gauge.
+    /// Interferometer, tracker or step gauge.
     #[serde(default)]
     pub length_reference: Instrument,
+    /// Ballbar.
+    #[serde(default)]
+    pub ballbar: Instrument,
     /// Plate and head.
     #[serde(default)]
     pub grid_encoder: Instrument,
@@ -59,6 +62,7 @@ impl Instruments {
     /// None is stated.
     pub const NONE: Self = Self {
         length_reference: Instrument::NONE,
+        ballbar: Instrument::NONE,
         grid_encoder: Instrument::NONE,
         touch_probe: Instrument::NONE,
     };
@@ -67,6 +71,7 @@ impl Instruments {
     pub(super) fn texts(&self) -> Vec<(String, Option<&str>)> {
         let all = [
             ("length_reference", &self.length_reference),
+            ("ballbar", &self.ballbar),
             ("grid_encoder", &self.grid_encoder),
             ("touch_probe", &self.touch_probe),
         ];
