@@ -3,7 +3,7 @@
     circular_reference.py BAG_DIRECTORY
 
 Shares nothing with the crates: the bag is read by PyPI `mcap`, the evaluated turn is taken from the commanded place
-alone (the whole turn that the control recorded at its full rate), circles are fitted by Gauss and Newton's iteration.
+alone (one turn, 360 degrees, from where the control began to record at its full rate), circles are fitted by Gauss and Newton's iteration.
 Both senses stand in the frame of the plate, whose readings are used as they are. Only circles that were run through
 and recorded with a change of the rate are evaluated.
 
@@ -73,7 +73,10 @@ def turns(segment, states, readings):
     longest = np.argmax(time[ends] - time[starts])
     begin_s, end_s = time[starts[longest]], time[ends[longest]]
     at = readings[:, 0]
-    marked = readings[(at >= begin_s) & (at <= end_s), 1:]
+    # The control switches its rate late: one turn of the command, no more.
+    angle = np.unwrap(np.arctan2(place[:, 1], place[:, 0]))
+    swept = abs(angle - angle[starts[longest]])[np.maximum(np.searchsorted(time, at, side="right") - 1, 0)]
+    marked = readings[(at >= begin_s) & (at <= end_s) & (swept < 2 * np.pi - 1e-6), 1:]
     on = np.flatnonzero(good)
     whole = readings[(at >= time[on[0]]) & (at <= time[on[-1]]), 1:]
     return marked, whole

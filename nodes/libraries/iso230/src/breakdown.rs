@@ -70,6 +70,7 @@ mod cyclic;
 mod distinguish;
 mod drift;
 mod error;
+mod instrument;
 mod lateral;
 mod maximum;
 mod noise;
@@ -94,6 +95,7 @@ mod tone;
 pub use config::{AxisPitch, BreakdownConfig, Pitch};
 pub use cross_check::CrossCheck;
 pub use error::BreakdownError;
+pub use instrument::Instrument;
 pub use recording::{
     CircularPlane, CircularRecording, CircularSample, CircularSense, ReferenceLength,
 };
@@ -111,7 +113,26 @@ pub fn evaluate(
     recordings: &[CircularRecording],
     config: &BreakdownConfig,
 ) -> Result<Breakdown, BreakdownError> {
+    evaluate_with(recordings, &[], config)
+}
+
+/// The same with the errors of what read each recording in the uncertainties of the rows; no instruments: of the fit alone.
+///
+/// # Errors
+/// As [`evaluate`], and another number of instruments than of recordings.
+pub fn evaluate_with(
+    recordings: &[CircularRecording],
+    instruments: &[Instrument],
+    config: &BreakdownConfig,
+) -> Result<Breakdown, BreakdownError> {
     config.check()?;
+    if !instruments.is_empty() && instruments.len() != recordings.len() {
+        let (n, recordings) = (instruments.len(), recordings.len());
+        return Err(BreakdownError::InstrumentCount { n, recordings });
+    }
+    for (index, instrument) in instruments.iter().enumerate() {
+        instrument.check(index)?;
+    }
     if recordings.is_empty() {
         return Err(BreakdownError::NoRecordings);
     }
@@ -128,7 +149,7 @@ pub fn evaluate(
             (plane, of_plane.collect::<Vec<_>>())
         })
         .filter(|(_, of_plane)| !of_plane.is_empty())
-        .map(|(plane, of_plane)| plane::evaluate(plane, &of_plane, config))
+        .map(|(plane, of_plane)| plane::evaluate(plane, &of_plane, instruments, config))
         .collect::<Result<Vec<_>, _>>()?;
     Ok(Breakdown { planes })
 }

@@ -33,13 +33,13 @@
 //!
 //! ```text
 //!   G, G(b):  u² = 2 (u_G² + u_V²)                    difference of two readings      (6)
-//!   H:        u² = 2 u_V² + 4 w² ln n/3               of one place, in both senses    (7)
+//!   H:        u² = 2 (u_H² + u_V²) + 4 w² ln n/3      of one place, in both senses    (7)
 //!   F:        u² = u_R² + u_V² + u_T² + u_D²                                          (8)
 //!   D:        u² = u_M² + (u_V/2)² + u_T² + u_D²                                      (9)
 //!   plate:    k² u_R² = 0.867 U₀² + 0.468 · 2 U₀ U₁ R + (U₁ R)²
 //!             k² u_M² = 0.037 U₀² + 0.270 · 2 U₀ U₁ R + (U₁ R)²
-//!             k² u_G² = 0.830 U₀² + 0.198 · 2 U₀ U₁ R                                (10)
-//!   ballbar:  u_G = u_s,   u_M² = u_R² = u_s² + u_L²,   u_L of its calibrated length   (11)
+//!             k² u_G² = 0.830 U₀² + 0.198 · 2 U₀ U₁ R,   u_H = 0                     (10)
+//!   ballbar:  u_G = u_H = u_s,   u_M² = u_R² = u_s² + u_L²,   u_L of its calibrated length   (11)
 //! ```
 //!
 //! (10): a plate reads the radius itself. Its certificate states U₀ + U₁ L for a length L from any zero, whose square has
@@ -65,7 +65,8 @@
 //! ⟨ ⟩ is the mean over λ, of which nothing is known but 0 < λ ≤ 2R, so that each is as probable: what is longer is in the
 //! other two parts. `tests/validation/coverage_of_circles.py` integrates (12) and (13).
 //!
-//! (7): both senses are read at the same angle by the same device, whose error there is in both and leaves their difference.
+//! (7): a plate is read at the same place in both senses, its error there is in both and leaves their difference. The error of a
+//! ballbar belongs to no place: H is the difference of two of its readings, as G is.
 //! w is the unrest of a reading at rest from one moment to the next, where it is stated, else 0. H is the greatest of n
 //! differences, one for each reading of a sense, and each has √2 w of unrest, which lifts the greatest by no more than
 //! √2 w √(2 ln n), the expectation's bound for n normal values; by nothing where one difference stands out. Anything between
@@ -240,6 +241,8 @@ struct Read {
     mean_mm: f64,
     /// u_G.
     difference_mm: f64,
+    /// u_H.
+    of_one_place_mm: f64,
 }
 
 impl Read {
@@ -261,6 +264,7 @@ impl Read {
                 steps - steps_shift - steps_radius,
                 0.0,
             ),
+            of_one_place_mm: 0.0,
         }
     }
 
@@ -271,6 +275,7 @@ impl Read {
             radius_mm,
             mean_mm: radius_mm,
             difference_mm: reading_mm,
+            of_one_place_mm: reading_mm,
         }
     }
 }
@@ -304,8 +309,8 @@ impl CircularBudget {
             .hypot(self.device_expansion.standard_mm(radius_mm));
         Ok(FigureUncertainties {
             difference_mm: (2.0_f64).sqrt() * read.difference_mm.hypot(drift_mm), // (6)
-            of_one_place_mm: lift_mm.hypot((2.0_f64).sqrt() * drift_mm),          // (7)
-            radial_mm: combined(&[read.radius_mm, drift_mm, expansion_mm]),       // (8)
+            of_one_place_mm: lift_mm.hypot((2.0_f64).sqrt() * read.of_one_place_mm.hypot(drift_mm)), // (7)
+            radial_mm: combined(&[read.radius_mm, drift_mm, expansion_mm]), // (8)
             mean_radial_mm: combined(&[read.mean_mm, drift_mm / 2.0, expansion_mm]), // (9)
         })
     }

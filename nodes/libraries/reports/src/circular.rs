@@ -2,33 +2,35 @@
 
 use anyhow::Result;
 use iso230::breakdown::{
-    self, Alias, BreakdownConfig, CircularPlane, CircularRecording, CircularSample, CircularSense,
-    Needed, PlaneBreakdown, ReferenceLength, RowKey, Unit,
+    self, BreakdownConfig, CircularPlane, CircularRecording, CircularSample, CircularSense,
 };
 use iso230::circular::{CircularResult, CircularTest, CircularTrace, evaluate};
 use metrology::sample::{Sense, TestPlane};
-use metrology::squareness::{between, in_words};
 
 use super::positioning::figure;
-use super::section::{Drawing, Rows, Section, head, rounded, um};
+use super::section::{Drawing, Rows, Section, head};
 use super::trace;
-use crate::evaluate::budget::Budget;
+use crate::evaluate::budget::{Budget, unstate};
+use crate::evaluate::circle_reading::CircleReading;
 use crate::evaluate::circles::{CircleRecording, Instrument, plane_axes};
-use crate::evaluate::correction::{Correction, MeasuredCircle};
+use crate::evaluate::correction::Correction;
 use crate::evaluate::test_conditions::TestConditions;
+use causes::Read;
 use scale::Expansion;
 
+mod causes;
 mod scale;
 mod turn;
-
-/// Coverage factor of what is printed.
-const COVERAGE: f64 = 2.0;
-/// Probability above which a row may be chance.
-const BY_CHANCE: f64 = 0.01;
 
 /// What a ballbar cannot tell.
 const BY_BALLBAR: &str =
     "Read by a ballbar, radially alone: F and D need the calibrated length of the ballbar.";
+/// Warnings of a circle, by what they have in common.
+const NOT_CORRECTED: &str = "Not corrected to 20 °C";
+const NO_UNCERTAINTY: &str = "No uncertainty";
+/// What U of H lacks without a figure of the unrest at rest.
+const NO_UNREST: &str =
+    "U of H has nothing for the unrest of readings: the budget states no environmental_unrest_um.";
 /// About which centre each figure is.
 const CENTRES: &str = "G of a sense: about the least-squares centre of that sense. G of both, F, D and H: about that of both senses together, in one frame. F is not about the centre to which the instrument was set up, the standard's other choice: a recording does not hold how far that is from the programmed one.";
 
@@ -42,14 +44,17 @@ pub fn sections(
     conditions: &TestConditions,
 ) -> Result<Vec<Section>> {
     let mut sections = Vec::new();
+    let mut errors = Vec::new();
     for group in groups(circles) {
         let runs: Vec<u32> = group.iter().map(|circle| circle.segment.run).collect();
         let read = conditions.during(&runs);
-        let measured = MeasuredCircle::of(budget, &read, group[0].instrument);
-        sections.push(section(&group, &measured, budget.is_some())?);
+        let reading = CircleReading::of(budget, &read, group[0].instrument);
+        let (section, result) = section(&group, &reading)?;
+        sections.push(section);
+        errors.extend(result.map(|result| Evaluated::of(group[0], &result)));
     }
     if !circles.is_empty() {
-        sections.extend(breakdowns(circles, budget, conditions));
+        sections.extend(breakdowns(circles, budget, conditions, &errors));
     }
     Ok(sections)
 }
@@ -77,7 +82,30 @@ fn groups(circles: &[CircleRecording]) -> Vec<Vec<&CircleRecording>> {
     groups
 }
 
-fn section(group: &[&CircleRecording], measured: &MeasuredCircle, stated: bool) -> Result<Section> {
+/// The greatest circular error of one circle's senses.
+struct Evaluated {
+    plane: TestPlane,
+    compensated: bool,
+    error_mm: f64,
+}
+
+impl Evaluated {
+    fn of(circle: &CircleRecording, result: &CircularResult) -> Self {
+        let senses = [result.clockwise, result.counter_clockwise];
+        let errors = senses.into_iter().flatten();
+        let errors_mm = errors.map(|sense| sense.circular_error.value_mm);
+        Self {
+            plane: circle.segment.plane,
+            compensated: circle.compensated,
+            error_mm: errors_mm.fold(0.0, f64::max),
+        }
+    }
+}
+
+fn section(
+    group: &[&CircleRecording],
+    reading: &CircleReading,
+) -> Result<(Section, Option<CircularResult>)> {
     let segment = &group[0].segment;
     let state = if group[0].compensated {
         "compensated"
@@ -94,28 +122,18 @@ fn section(group: &[&CircleRecording], measured: &MeasuredCircle, stated: bool) 
         segment.centre_mm.y,
         segment.centre_mm.z
     ));
-    if group[0].instrument == Instrument::Ballbar {
+    if reading.instrument == Instrument::Ballbar {
         section.lines.push(BY_BALLBAR.to_owned());
     }
     section.lines.extend(turn::lines(group));
-    let test = at_20_degc(group, &measured.correction);
-    let mut centre_mm = [0.0; 2];
-    match evaluate(&test, &measured.budget) {
-        Ok(result) => {
-            section.answers.push(in_short(&result, stated));
-            section.tables.push(figures(&result, stated));
-            section.lines.push(radii_in_words(measured, &test));
-            section.figures = serde_json::json!({
-                "test": section.title,
-                "iso230_4": result,
-                "turns": turn::figures(group),
-                "correction_to_20_degc": measured.correction.as_json(),
-                "no_verdict_on_radii": no_verdict(group[0].instrument, &measured.correction),
-            });
-            centre_mm = centre(&result);
-        }
+    let test = at_20_degc(group, &reading.measured.correction);
+    let evaluated = evaluate(&test, &reading.measured.budget);
+    match &evaluated {
+        Ok(result) => state_figures(&mut section, (group, reading), &test, result)?,
         Err(error) => section.not_evaluated(error),
     }
+    let result = evaluated.ok();
+    let centre_mm = result.as_ref().map_or([0.0; 2], centre);
     let drawn = trace::svg(&traces(group, &test, centre_mm), segment.plane)?;
     section.drawings.push(Drawing {
         svg: drawn.svg,
@@ -124,7 +142,64 @@ fn section(group: &[&CircleRecording], measured: &MeasuredCircle, stated: bool) 
             drawn.scale
         ),
     });
-    Ok(section)
+    Ok((section, result))
+}
+
+/// The figures of a circle: answer, table, what they lack, and for machines.
+fn state_figures(
+    section: &mut Section,
+    (group, reading): (&[&CircleRecording], &CircleReading),
+    test: &CircularTest,
+    result: &CircularResult,
+) -> Result<()> {
+    section.answers.push(in_short(result, reading.is_stated()));
+    section.tables.push(figures(result, reading));
+    let correction = &reading.measured.correction;
+    let line = format!("F and D: {}", correction.in_words(test.nominal_radius_mm));
+    if correction.lacks().is_some() {
+        section.warn(NOT_CORRECTED, line);
+    } else {
+        section.lines.push(line);
+    }
+    // That there is no budget is stated once for the whole page.
+    let is_of_ballbar = reading.instrument == Instrument::Ballbar && !reading.has_no_budget();
+    if let Some(why) = reading.unstated.filter(|_| is_of_ballbar) {
+        section.warn(NO_UNCERTAINTY, format!("No figure has a U: {why}."));
+    }
+    section.figures = serde_json::json!({
+        "test": section.title,
+        "iso230_4": as_json(result, reading)?,
+        "turns": turn::figures(group),
+        "correction_to_20_degc": correction.as_json(),
+        "no_verdict": reading.unstated,
+        "no_verdict_on_radii": reading.no_verdict_on_radii(),
+    });
+    Ok(())
+}
+
+/// Figures that are lengths from the nominal radius.
+const RADIAL_POINTERS: [&str; 3] = [
+    "/clockwise/greatest_radial_deviation",
+    "/clockwise/least_radial_deviation",
+    "/both/mean_radial_deviation",
+];
+
+/// The figures for machines; those without an uncertainty have null for it.
+fn as_json(result: &CircularResult, reading: &CircleReading) -> Result<serde_json::Value> {
+    let mut all = serde_json::to_value(result)?;
+    if !reading.is_stated() {
+        unstate(&mut all);
+    } else if !reading.are_radii_stated() {
+        let other = RADIAL_POINTERS.map(|name| name.replace("/clockwise", "/counter_clockwise"));
+        let names = RADIAL_POINTERS
+            .iter()
+            .copied()
+            .chain(other.iter().map(String::as_str));
+        for name in names {
+            all.pointer_mut(name).into_iter().for_each(unstate);
+        }
+    }
+    Ok(all)
 }
 
 /// The recordings of a circle, with its radii at 20 °C where they are corrected here.
@@ -141,19 +216,6 @@ fn at_20_degc(group: &[&CircleRecording], correction: &Correction) -> CircularTe
         counter_clockwise: of(Sense::CounterClockwise),
     };
     as_read.corrected_to_20_degc(correction.differential_expansion())
-}
-
-/// At which temperature the radii of F and D are.
-fn radii_in_words(measured: &MeasuredCircle, test: &CircularTest) -> String {
-    let words = measured.correction.in_words(test.nominal_radius_mm);
-    format!("F and D: {words}")
-}
-
-/// Why nothing is decided of F and D; none: they are the radii at 20 °C.
-fn no_verdict(instrument: Instrument, correction: &Correction) -> Option<String> {
-    let without_length = "the calibrated length of the ballbar is not stated";
-    let by_ballbar = (instrument == Instrument::Ballbar).then(|| without_length.to_owned());
-    by_ballbar.or_else(|| correction.lacks())
 }
 
 /// Angle and radial deviation of every reading about a centre, of each sense as it was recorded, rad and mm.
@@ -207,9 +269,10 @@ fn centre(result: &CircularResult) -> [f64; 2] {
 
 /// The circular error of both senses, or of each that was recorded.
 fn in_short(result: &CircularResult, stated: bool) -> String {
+    let coverage = if stated { " (k = 2)" } else { "" };
     if let Some(both) = &result.both {
         let error = figure(&both.circular_error, stated);
-        return format!("circular error G of both senses {error} µm.");
+        return format!("circular error G of both senses {error} µm{coverage}.");
     }
     let senses = [
         ("clockwise", &result.clockwise),
@@ -222,10 +285,11 @@ fn in_short(result: &CircularResult, stated: bool) -> String {
             errors.push(format!("{name} {error} µm"));
         }
     }
-    format!("circular error G, {}.", errors.join(", "))
+    format!("circular error G, {}{coverage}.", errors.join(", "))
 }
 
-fn figures(result: &CircularResult, stated: bool) -> Rows {
+fn figures(result: &CircularResult, reading: &CircleReading) -> Rows {
+    let (stated, radial) = (reading.is_stated(), reading.are_radii_stated());
     let mut rows = Vec::new();
     for (name, sense) in [
         ("clockwise", &result.clockwise),
@@ -235,8 +299,8 @@ fn figures(result: &CircularResult, stated: bool) -> Rows {
             rows.push(vec![
                 name.to_owned(),
                 figure(&sense.circular_error, stated),
-                figure(&sense.greatest_radial_deviation, stated),
-                figure(&sense.least_radial_deviation, stated),
+                figure(&sense.greatest_radial_deviation, radial),
+                figure(&sense.least_radial_deviation, radial),
                 "—".to_owned(),
                 "—".to_owned(),
             ]);
@@ -248,47 +312,74 @@ fn figures(result: &CircularResult, stated: bool) -> Rows {
             figure(&both.circular_error, stated),
             "—".to_owned(),
             "—".to_owned(),
-            figure(&both.mean_radial_deviation, stated),
+            figure(&both.mean_radial_deviation, radial),
             figure(&both.hysteresis_1996, stated),
         ]);
     }
     Rows {
         head: head(&["ISO 230-4 / µm", "G", "F max", "F min", "D", "H (1996)"]),
         rows,
-        note: if stated {
-            format!("± expanded uncertainty, k = 2. {CENTRES}")
-        } else {
-            format!("Without --budget no uncertainty is stated. {CENTRES}")
-        },
+        note: note(result, reading),
     }
+}
+
+/// What the uncertainties of the figures are, and what they lack.
+fn note(result: &CircularResult, reading: &CircleReading) -> String {
+    let mut sentences = vec![];
+    match reading.unstated {
+        None => sentences.push("± expanded uncertainty, k = 2."),
+        Some(_) if reading.has_no_budget() => {
+            sentences.push("Without --budget no uncertainty is stated.");
+        }
+        Some(_) => sentences.push("The budget states no ballbar: no uncertainty is stated."),
+    }
+    if reading.is_stated() && !reading.are_radii_stated() {
+        sentences.push("F and D have no uncertainty: the budget states no ballbar.length.");
+    }
+    let unrest = reading.measured.budget.environmental_unrest_mm;
+    if reading.is_stated() && result.both.is_some() && unrest.is_none() {
+        sentences.push(NO_UNREST);
+    }
+    sentences.push(CENTRES);
+    sentences.join(" ")
 }
 
 fn breakdowns(
     circles: &[CircleRecording],
     budget: Option<&Budget>,
     conditions: &TestConditions,
+    evaluated: &[Evaluated],
 ) -> Vec<Section> {
     let mut sections = Vec::new();
     for compensated in [false, true] {
-        let recordings: Vec<CircularRecording> = circles
-            .iter()
-            .filter(|circle| circle.compensated == compensated)
-            .filter_map(|circle| recording(circle, budget))
+        let own = circles.iter().filter(|one| one.compensated == compensated);
+        let recordings: Vec<CircularRecording> = own
+            .clone()
+            .filter_map(|circle| recording(circle, &reading_of(circle, budget, conditions)))
             .collect();
         if recordings.is_empty() {
             continue;
         }
+        let read = Read::of(own.filter(|circle| is_broken_down(circle)).map(|circle| {
+            let reading = reading_of(circle, budget, conditions);
+            (circle.segment.plane, reading)
+        }));
         let state = if compensated {
             "compensated"
         } else {
             "not compensated"
         };
-        match breakdown::evaluate(&recordings, &BreakdownConfig::default()) {
+        let config = BreakdownConfig::default();
+        match breakdown::evaluate_with(&recordings, read.errors(), &config) {
             Ok(found) => {
                 sections.extend(found.planes.iter().map(|plane| {
                     let own = (circles, compensated);
                     let expansion = Expansion::of(plane, own, budget, conditions);
-                    plane_section(plane, state, &expansion)
+                    let evaluated = evaluated.iter().filter(|one| {
+                        one.compensated == compensated && plane_axes(one.plane) == Some(plane.axes)
+                    });
+                    let greatest_mm = evaluated.map(|one| one.error_mm).reduce(f64::max);
+                    causes::section(plane, (state, greatest_mm), &expansion, &read)
                 }));
             }
             Err(error) => {
@@ -301,7 +392,21 @@ fn breakdowns(
     sections
 }
 
-fn recording(circle: &CircleRecording, budget: Option<&Budget>) -> Option<CircularRecording> {
+fn reading_of(
+    circle: &CircleRecording,
+    budget: Option<&Budget>,
+    conditions: &TestConditions,
+) -> CircleReading {
+    let read = conditions.during(&[circle.segment.run]);
+    CircleReading::of(budget, &read, circle.instrument)
+}
+
+/// Whether a recording has a plane and a sense.
+fn is_broken_down(circle: &CircleRecording) -> bool {
+    circle.segment.sense != Sense::None && circle.segment.plane != TestPlane::None
+}
+
+fn recording(circle: &CircleRecording, reading: &CircleReading) -> Option<CircularRecording> {
     let segment = &circle.segment;
     let plane = match segment.plane {
         TestPlane::Xy => CircularPlane::Xy,
@@ -327,137 +432,10 @@ fn recording(circle: &CircleRecording, budget: Option<&Budget>) -> Option<Circul
         sense,
         setup_id: segment.setup_id,
         zero_id: segment.zero_id,
-        reference: match (circle.instrument, budget) {
-            (Instrument::GridEncoder, Some(budget)) => ReferenceLength::Calibrated {
-                standard_uncertainty_mm: budget.radius_standard_mm(segment.radius_mm),
-            },
-            _ => ReferenceLength::Free,
-        },
+        reference: reading.reference(segment.radius_mm),
         samples: samples.collect(),
     })
 }
 
-fn plane_section(plane: &PlaneBreakdown, state: &str, expansion: &Expansion) -> Section {
-    let [u, v] = plane.axes;
-    let mut section = Section::new(format!("Causes in {u}{v}, {state}"));
-    section.answer(format!(
-        "{} recordings, worst circularity {} µm; what no row explains has {:.2} µm standard deviation.",
-        plane.recordings.len(),
-        um(plane.worst_circularity_mm),
-        plane.noise.residual_mm * 1e3
-    ));
-    let (lines, scale_at_20_degc) = expansion.state(plane);
-    section.lines.extend(lines);
-    let rows = plane.rows.iter().map(|row| {
-        vec![
-            row.name.clone(),
-            with_unit(row.value, row.standard_uncertainty, row.unit),
-            um(row.peak_to_peak_mm),
-            format!("{:.1}", row.share_percent),
-            format!("{:.1}", row.variance_share_percent),
-            um(row.worst_circularity_without_mm),
-        ]
-    });
-    section.tables.push(Rows {
-        head: head(&[
-            "cause",
-            "value ± U (k = 2)",
-            "span / µm",
-            "share / %",
-            "of variance / %",
-            "G without / µm",
-        ]),
-        rows: rows.collect(),
-        note: format!(
-            "Span: greatest minus least deviation that the cause alone makes on one circle. G without: the greatest circular error that would be left. {}{}",
-            squareness(plane),
-            needed(plane)
-        ),
-    });
-    section.tables.extend(where_to_look(plane));
-    section.figures = serde_json::json!({
-        "test": section.title,
-        "breakdown": plane,
-        "scale_at_20_degc": scale_at_20_degc,
-    });
-    section
-}
-
-/// The sign of the squareness, where there is a row of it.
-fn squareness(plane: &PlaneBreakdown) -> String {
-    let [u, v] = plane.axes;
-    let row = plane.row(&RowKey::Squareness);
-    let words = row.and_then(|_| in_words(between(u, v)?));
-    words.map_or_else(String::new, |words| format!("{words} "))
-}
-
-/// Where to look, for the causes that chance does not explain.
-fn where_to_look(plane: &PlaneBreakdown) -> Option<Rows> {
-    let (seen, not_seen): (Vec<_>, Vec<_>) =
-        plane.rows.iter().partition(|row| row.chance < BY_CHANCE);
-    let note = match not_seen.as_slice() {
-        [] => String::new(),
-        rows => {
-            let names: Vec<&str> = rows.iter().map(|row| row.name.as_str()).collect();
-            format!("Not beyond chance: {}.", names.join(", "))
-        }
-    };
-    (!seen.is_empty()).then(|| Rows {
-        head: head(&["cause", "look at"]),
-        rows: seen
-            .iter()
-            .map(|row| vec![row.name.clone(), row.cause.clone()])
-            .collect(),
-        note,
-    })
-}
-
-fn needed(plane: &PlaneBreakdown) -> String {
-    let tied = plane
-        .rows
-        .iter()
-        .flat_map(|row| &row.aliases)
-        .chain(&plane.unseen);
-    let words: Vec<String> = tied.map(asks).collect();
-    if words.is_empty() {
-        "Every row is told apart from the others.".to_owned()
-    } else {
-        words.join(" ")
-    }
-}
-
-fn asks(alias: &Alias) -> String {
-    let word = |needed: &Needed| match needed {
-        Needed::OtherSense => "the other sense",
-        Needed::OtherFeed => "another feed",
-        Needed::OtherRadius => "another radius",
-        Needed::OtherRadiusSameZero => "another radius under the same zero",
-        Needed::FullCircle => "a full circle",
-        Needed::CalibratedReference => "a calibrated reference length",
-    };
-    let ways = alias.needed.iter().map(|way| {
-        let words: Vec<&str> = way.iter().map(word).collect();
-        words.join(" and ")
-    });
-    format!(
-        "{} is told apart by {}.",
-        alias.name,
-        ways.collect::<Vec<_>>().join(", or by ")
-    )
-}
-
-fn with_unit(value: f64, standard_uncertainty: f64, unit: Unit) -> String {
-    let (factor, name) = match unit {
-        Unit::Mm => (1e3, "µm"),
-        Unit::MmPerMm => (1e6, "µm/m"),
-        Unit::Rad => (1e6, "µrad"),
-        Unit::S => (1e3, "ms"),
-        Unit::S2 => (1e6, "ms²"),
-        Unit::PerMm => (1e6, "µm/(m mm)"),
-        Unit::MmPerS => (1e3, "µm/s"),
-        Unit::Hz => (1.0, "Hz"),
-        Unit::LobesPerTurn => (1.0, "per turn"),
-    };
-    let (value, u) = rounded(value * factor, COVERAGE * standard_uncertainty * factor);
-    format!("{value} ± {u} {name}")
-}
+#[cfg(test)]
+mod tests;

@@ -14,6 +14,7 @@ use replayer::{Reading, Taken, reading};
 pub mod angular;
 mod belonging;
 pub mod budget;
+pub mod circle_reading;
 pub mod circles;
 pub mod correction;
 pub mod course;

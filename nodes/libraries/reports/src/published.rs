@@ -14,7 +14,7 @@ use super::terminal::Rank;
 use crate::evaluate::circles::plane_axes;
 use crate::evaluate::stationwise::StationCircle;
 
-/// Every element of the other U, mm at the radius.
+/// Every element of the other arbitrary vector, U of the source, mm at the radius.
 const OTHER_MM: f64 = 0.005;
 /// Coverage factor of what is printed.
 const COVERAGE: f64 = 2.0;
@@ -74,14 +74,14 @@ fn comparison(
     let n = found.unknowns.len();
     let seen = found.unknowns.iter().filter(|c| is_seen(c)).count();
     section.lines.push(format!(
-        "{} stations of {:.0} readings each give the published equations rank {} for {n} unknowns: their solution has {} arbitrary numbers U.",
+        "{} stations of {:.0} readings each give the published equations rank {} for {n} unknowns: their solution has {} arbitrary numbers, the source's vector U, here a (it is no uncertainty).",
         found.n_stations,
         found.readings_per_station,
         found.rank,
         n - found.rank
     ));
     section.lines.push(format!(
-        "U = 0 and U = {:.0} µm draw one and the same trace ({:.0e} µm apart, {} µm rms from the readings) with different errors. Of the {n} the circle determines {seen}; the others, marked ×, are numbers of the method and not of the machine.",
+        "a = 0 and a = {:.0} µm draw one and the same trace ({:.0e} µm apart, {} µm rms from the readings) with different errors. Of the {n} the circle determines {seen}; the others, marked ×, are numbers of the method and not of the machine.",
         OTHER_MM * 1e3,
         found.apart_mm * 1e3,
         um(found.left_mm)
@@ -110,8 +110,8 @@ fn comparison(
     section.tables.push(Rows {
         head: head(&[
             "µm at the radius",
-            "published, U = 0",
-            "published, other U",
+            "published, a = 0",
+            "published, other a",
             "14 stations",
             "14 others",
             "this circle",

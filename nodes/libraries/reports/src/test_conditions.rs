@@ -8,8 +8,9 @@ use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, Instrument, NOT_STATED};
-use crate::evaluate::circles::CircleRecording;
-use crate::evaluate::correction::{Measured, MeasuredCircle};
+use crate::evaluate::circle_reading::CircleReading;
+use crate::evaluate::circles::{self, CircleRecording};
+use crate::evaluate::correction::Measured;
 use crate::evaluate::course::Course;
 use crate::evaluate::linear::LinearTest;
 use crate::evaluate::test_conditions::{Readings, TestConditions};
@@ -272,9 +273,15 @@ fn listed(texts: impl Iterator<Item = String>) -> Option<String> {
 fn read_by(seen: &TestConditions, tests: Option<&Tests>) -> Vec<(&'static str, &'static str)> {
     let has_angles =
         tests.is_some_and(|tests| tests.rotary_positioning.iter().any(|one| one.has_readings));
+    let is_by_ballbar =
+        |circle: &CircleRecording| circle.instrument == circles::Instrument::Ballbar;
+    let has_ballbar = tests.is_some_and(|tests| tests.circles.iter().any(is_by_ballbar));
+    let has_line = tests.is_some_and(|tests| !tests.linear.is_empty());
+    let has_reference = seen.has_length && (has_line || !has_ballbar);
     [
-        (seen.has_length, "length_reference", "length reference"),
+        (has_reference, "length_reference", "length reference"),
         (has_angles, "angular_reference", "angular reference"),
+        (has_ballbar, "ballbar", "ballbar"),
         (seen.has_grid, "grid_encoder", "grid encoder"),
         (seen.has_touches, "touch_probe", "touch probe"),
     ]
@@ -289,6 +296,7 @@ fn stated(budget: Option<&Budget>, key: &str) -> Instrument {
     match key {
         "length_reference" => all.length_reference,
         "angular_reference" => all.angular_reference,
+        "ballbar" => all.ballbar,
         "grid_encoder" => all.grid_encoder,
         _ => all.touch_probe,
     }
@@ -341,9 +349,8 @@ fn correction_of(tests: Option<&Tests>, budget: Option<&Budget>) -> String {
     };
     let of_circle = |circle: &CircleRecording| {
         let read = tests.conditions.during(&[circle.segment.run]);
-        MeasuredCircle::of(budget, &read, circle.instrument)
-            .correction
-            .lacks()
+        let reading = CircleReading::of(budget, &read, circle.instrument);
+        reading.no_verdict_on_radii()
     };
     let lines = tests.linear.iter().map(of_line).collect();
     let circles = tests.circles.iter().map(of_circle).collect();

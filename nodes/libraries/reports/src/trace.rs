@@ -5,7 +5,7 @@
 //! ```
 //!
 //! A division is the finest of 1, 2 and 5 times a power of ten µm, 0.1 µm at least, with which every deviation lies within
-//! eight divisions of the nominal circle. Every second ring has its deviation beside it.
+//! eight divisions of the nominal circle. There is a ring at every division; every fourth has its deviation beside it.
 
 use std::fmt::Write as _;
 
@@ -21,6 +21,8 @@ const SIZE: f64 = 560.0;
 const NOMINAL: f64 = 10.0;
 /// Most divisions that a trace may lie from the nominal circle.
 const MAX_DIVISIONS: f64 = 8.0;
+/// Rings on either side of the nominal circle, one at each division.
+const RINGS: i32 = 8;
 /// Px from the centre to the outermost ring.
 const REACH_PX: f64 = 262.0;
 /// Points of a trace that show their values.
@@ -145,10 +147,14 @@ fn stretches_of_turn(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
 
 fn rings(text: &mut String, division_um: f64) -> std::fmt::Result {
     let middle = SIZE / 2.0;
-    for step in [-8, -6, -4, -2, 0, 2, 4, 6, 8] {
+    for step in -RINGS..=RINGS {
         let divisions = NOMINAL + f64::from(step);
         let radius = divisions * REACH_PX / (NOMINAL + MAX_DIVISIONS);
-        let strength = if step == 0 { 0.8 } else { 0.16 };
+        let strength = match step {
+            0 => 0.8,
+            labelled if labelled % 4 == 0 => 0.24,
+            _ => 0.12,
+        };
         write!(
             text,
             "<circle cx=\"{middle}\" cy=\"{middle}\" r=\"{radius:.1}\" fill=\"none\" stroke=\"currentColor\" stroke-opacity=\"{strength}\"/>"
@@ -230,5 +236,25 @@ mod tests {
             assert!(drawn.svg.contains(label), "{label}");
         }
         assert!(drawn.svg.contains("0.5 µm a division"));
+    }
+
+    #[test]
+    fn rings_are_one_division_apart_as_the_caption_says() {
+        let round = (0..9).map(|k| (f64::from(k) * 0.7, 0.005)).collect();
+        let drawn = svg(&[("clockwise".to_owned(), round)], TestPlane::Xy).unwrap();
+        assert_eq!(drawn.scale, "1 µm a division");
+        let rings = drawn
+            .svg
+            .split("<circle cx=\"280\" cy=\"280\" r=\"")
+            .skip(1);
+        let mut radii: Vec<f64> = rings
+            .map(|rest| rest.split('"').next().unwrap().parse().unwrap())
+            .collect();
+        radii.sort_by(f64::total_cmp);
+        // From 2 to 18 divisions of 262/18 px.
+        assert_eq!(radii.len(), 17, "{radii:?}");
+        for pair in radii.windows(2) {
+            assert!((pair[1] - pair[0] - 262.0 / 18.0).abs() < 0.11, "{radii:?}");
+        }
     }
 }

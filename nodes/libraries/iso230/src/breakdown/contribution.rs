@@ -20,7 +20,7 @@
 //! # References
 //! \[1\] L. S. Shapley, in: Contributions to the Theory of Games II, Princeton 1953, 307-317.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::cause;
 use super::distinguish;
@@ -47,7 +47,8 @@ struct Part {
     trace_mm: DVector<f64>,
 }
 
-pub(super) fn rows(input: &Input, scene: &Scene, found: &Found) -> Rows {
+/// The rows of a fit; `covariance` of its parameters, with the errors of the instruments.
+pub(super) fn rows(input: &Input, scene: &Scene, found: &Found, covariance: &DMatrix<f64>) -> Rows {
     let fit = &found.fit;
     let parts = parts(scene, fit);
     let observed = scene.rows().map(|(_, point)| point.observed_mm);
@@ -57,7 +58,7 @@ pub(super) fn rows(input: &Input, scene: &Scene, found: &Found) -> Rows {
     }
     let mut made: Vec<Row> = parts
         .iter()
-        .map(|part| row(input, scene, found, part, &deviations_mm))
+        .map(|part| row(input, scene, (found, covariance), part, &deviations_mm))
         .collect();
     let is_machine = |row: &&Row| !row.key.is_setting_up();
     let spans: f64 = made
@@ -112,12 +113,13 @@ fn parts(scene: &Scene, fit: &Fit) -> Vec<Part> {
 fn row(
     input: &Input,
     scene: &Scene,
-    found: &Found,
+    (found, covariance): (&Found, &DMatrix<f64>),
     part: &Part,
     deviations_mm: &DVector<f64>,
 ) -> Row {
     let fit = &found.fit;
-    let (value, standard_uncertainty, details) = value(scene, found, part);
+    let (_, of_fit, _) = value(scene, (found, &fit.covariance), part);
+    let (value, standard_uncertainty, details) = value(scene, (found, covariance), part);
     let aliases = aliases(input, scene, fit, part);
     let (square, chance) = wald(fit, &part.columns);
     let dot = |a: &DVector<f64>, b: &DVector<f64>| {
@@ -144,6 +146,7 @@ fn row(
         name: cause::name_with(&cause::name(&part.key, scene), &aliases),
         value,
         standard_uncertainty,
+        standard_uncertainty_of_fit: of_fit,
         unit: cause::unit(&part.key),
         details,
         cause: causes(&part.key, value, &aliases, scene),
@@ -169,13 +172,17 @@ fn causes(key: &RowKey, value: f64, aliases: &[Alias], scene: &Scene) -> String 
 }
 
 /// Value, standard uncertainty and what belongs to them.
-fn value(scene: &Scene, found: &Found, part: &Part) -> (f64, f64, Vec<Detail>) {
+fn value(
+    scene: &Scene,
+    (found, covariance): (&Found, &DMatrix<f64>),
+    part: &Part,
+) -> (f64, f64, Vec<Detail>) {
     let fit = &found.fit;
     let searched = nonlinear_uncertainty(&found.chosen, scene, part.key);
-    let single = |at: usize| (fit.parameters[at], fit.covariance[(at, at)].max(0.0).sqrt());
+    let single = |at: usize| (fit.parameters[at], covariance[(at, at)].max(0.0).sqrt());
     match (part.columns.as_slice(), part.key) {
         ([sine, cosine], RowKey::Cyclic { .. }) => {
-            let (a, u, phase, u_phase) = amplitude(fit, *sine, *cosine);
+            let (a, u, phase, u_phase) = amplitude(fit, covariance, *sine, *cosine);
             let phase = detail("phase at axis position 0", phase, Some(u_phase), Unit::Rad);
             (a, u, vec![phase])
         }
@@ -185,7 +192,7 @@ fn value(scene: &Scene, found: &Found, part: &Part) -> (f64, f64, Vec<Detail>) {
         ) => {
             let pairs = columns
                 .chunks_exact(2)
-                .map(|pair| amplitude(fit, pair[0], pair[1]));
+                .map(|pair| amplitude(fit, covariance, pair[0], pair[1]));
             let greatest = pairs.max_by(|a, b| a.0.total_cmp(&b.0));
             let (a, u, ..) = greatest.unwrap_or((0.0, f64::INFINITY, 0.0, 0.0));
             (a, u, tone_details(part.key, searched))
@@ -234,9 +241,14 @@ fn detail(name: &str, value: f64, standard_uncertainty: Option<f64>, unit: Unit)
 }
 
 /// Amplitude with (6), phase of a sin(· + ψ) and its uncertainty.
-fn amplitude(fit: &Fit, sine: usize, cosine: usize) -> (f64, f64, f64, f64) {
+fn amplitude(
+    fit: &Fit,
+    covariance: &DMatrix<f64>,
+    sine: usize,
+    cosine: usize,
+) -> (f64, f64, f64, f64) {
     let (p, q) = (fit.parameters[sine], fit.parameters[cosine]);
-    let c = |i: usize, j: usize| fit.covariance[(i, j)];
+    let c = |i: usize, j: usize| covariance[(i, j)];
     let a = p.hypot(q);
     let along = p * p * c(sine, sine) + 2.0 * p * q * c(sine, cosine) + q * q * c(cosine, cosine);
     let across = q * q * c(sine, sine) - 2.0 * p * q * c(sine, cosine) + p * p * c(cosine, cosine);

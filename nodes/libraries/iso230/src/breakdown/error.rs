@@ -15,6 +15,9 @@ pub enum BreakdownError {
     /// Nothing was given.
     #[error("no circular recording was given")]
     NoRecordings,
+    /// Instruments of some recordings alone.
+    #[error("{n} instruments for {recordings} recordings: state one for each, or none")]
+    InstrumentCount { n: usize, recordings: usize },
     /// Too few samples.
     #[error("recording {recording}: {n} samples, at least {least} are needed")]
     TooFewSamples {

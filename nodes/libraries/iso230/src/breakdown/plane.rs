@@ -1,11 +1,12 @@
 //! The breakdown of one plane: make ready, fit and search, divide up, cross-check.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::config::BreakdownConfig;
 use super::contribution::{self, Rows, circularity_mm};
 use super::cross_check::{cross_check, squareness_rad};
 use super::error::BreakdownError;
+use super::instrument::{self, Instrument};
 use super::noise;
 use super::recording::{CircularPlane, CircularRecording, CircularSense};
 use super::report::{Noise, PlaneBreakdown, RecordingSummary};
@@ -22,9 +23,11 @@ pub(super) struct Input<'a> {
     pub config: &'a BreakdownConfig,
 }
 
+/// `instruments` by the caller's list of recordings, or none.
 pub(super) fn evaluate(
     plane: CircularPlane,
     recordings: &[(usize, &CircularRecording)],
+    instruments: &[Instrument],
     config: &BreakdownConfig,
 ) -> Result<PlaneBreakdown, BreakdownError> {
     let input = Input {
@@ -35,12 +38,13 @@ pub(super) fn evaluate(
     let scene = Scene::new(plane, recordings);
     let found = search(&input, &scene)?;
     let fit = &found.fit;
+    let covariance = &fit.covariance + instrument::covariance(&scene, fit, instruments);
     let Rows {
         setting_up,
         machine,
         unseen,
         deviations_mm,
-    } = contribution::rows(&input, &scene, &found);
+    } = contribution::rows(&input, &scene, &found, &covariance);
     let checks: Vec<_> = scene
         .traces
         .iter()
@@ -70,7 +74,7 @@ pub(super) fn evaluate(
         cross_checks: checks,
         worst_circularity_mm: worst,
     };
-    breakdown.scales = scales(&scene, fit, &breakdown);
+    breakdown.scales = scales(&scene, fit, &covariance, &breakdown);
     Ok(breakdown)
 }
 
@@ -111,7 +115,12 @@ fn noise_of(scene: &Scene, fit: &Fit) -> Noise {
 }
 
 /// s₁ = m + q/2 and s₂ = m − q/2, where both m and q stand alone.
-fn scales(scene: &Scene, fit: &Fit, breakdown: &PlaneBreakdown) -> Option<[(f64, f64); 2]> {
+fn scales(
+    scene: &Scene,
+    fit: &Fit,
+    covariance: &DMatrix<f64>,
+    breakdown: &PlaneBreakdown,
+) -> Option<[(f64, f64); 2]> {
     let alone = |key: RowKey| {
         breakdown
             .row(&key)
@@ -129,9 +138,8 @@ fn scales(scene: &Scene, fit: &Fit, breakdown: &PlaneBreakdown) -> Option<[(f64,
         place(RowKey::ScalingMismatch)?,
     );
     Some([0.5, -0.5].map(|half| {
-        let variance = fit.covariance[(m, m)]
-            + 2.0 * half * fit.covariance[(m, q)]
-            + half * half * fit.covariance[(q, q)];
+        let variance =
+            covariance[(m, m)] + 2.0 * half * covariance[(m, q)] + half * half * covariance[(q, q)];
         (
             fit.parameters[m] + half * fit.parameters[q],
             variance.max(0.0).sqrt(),

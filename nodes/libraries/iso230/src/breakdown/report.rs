@@ -93,9 +93,11 @@ pub struct Row {
     pub name: String,
     /// Value; of a combination value of `key` + Σ coefficient × alias.
     pub value: f64,
-    /// Standard uncertainty of the value.
+    /// Standard uncertainty of the value: of the fit, with the errors of the instruments where they are stated.
     pub standard_uncertainty: f64,
-    /// Unit of both.
+    /// That of the fit alone.
+    pub standard_uncertainty_of_fit: f64,
+    /// Unit of all three.
     pub unit: Unit,
     /// Phase, decay and the like.
     pub details: Vec<Detail>,

@@ -50,6 +50,8 @@ pub(super) struct Fit {
     pub parameters: DVector<f64>,
     /// (4)
     pub covariance: DMatrix<f64>,
+    /// (XᵀWX)⁻¹.
+    pub inverse: DMatrix<f64>,
     /// Of every sample, also of those left out, mm.
     pub residuals_mm: Vec<f64>,
     /// 0 where a sample is left out.
@@ -116,6 +118,7 @@ pub(super) fn fit(
         gram: system.gram,
         reduction,
         parameters,
+        inverse: covariance.clone(),
         covariance,
         residuals_mm,
         weights,

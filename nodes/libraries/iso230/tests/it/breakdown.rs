@@ -1,9 +1,11 @@
 //! Breakdown of circles against a machine simulated in time.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot evaluate has failed")]
+#![expect(clippy::print_stderr, reason = "figures that module headers quote")]
 
 mod alone;
 mod coverage;
+mod instrument;
 mod machine;
 mod props;
 mod robust;

@@ -7,15 +7,15 @@
 //!   m at 20 °C = m − ε,   u² = u_m² + u²(ε)                                                   (1)
 //! ```
 //!
-//! with u_m of the fit and u(ε) of what is not known about temperatures and coefficients of machine and device.
+//! with u_m of the fit and the instrument, and u(ε) of what is not known about temperatures and coefficients of machine and device.
 
 use iso230::breakdown::{PlaneBreakdown, RowKey};
 use serde_json::{Value, json};
 
-use super::with_unit;
+use super::causes::with_unit;
 use crate::evaluate::budget::Budget;
+use crate::evaluate::circle_reading::CircleReading;
 use crate::evaluate::circles::{CircleRecording, plane_axes};
-use crate::evaluate::correction::MeasuredCircle;
 use crate::evaluate::test_conditions::TestConditions;
 
 /// What every page of causes begins with.
@@ -43,7 +43,7 @@ impl Expansion {
         });
         for circle in own {
             let read = conditions.during(&[circle.segment.run]);
-            let measured = MeasuredCircle::of(budget, &read, circle.instrument);
+            let measured = CircleReading::of(budget, &read, circle.instrument).measured;
             if let Some(why) = measured.correction.lacks() {
                 return Self { known: Err(why) };
             }
@@ -181,7 +181,7 @@ environmental_drift_um: 0.0
     #[test]
     fn eq1_the_scale_of_both_axes_loses_the_nominal_expansion_by_hand() {
         let budget = Budget::read(BUDGET, Path::new("budget.yaml")).unwrap();
-        let sections = breakdowns(&circles(), Some(&budget), &TestConditions::default());
+        let sections = breakdowns(&circles(), Some(&budget), &TestConditions::default(), &[]);
         let found = &sections[0].figures["scale_at_20_degc"];
         let of = |key: &str| found[key].as_f64().unwrap();
         assert!(
@@ -210,7 +210,7 @@ environmental_drift_um: 0.0
     fn without_a_temperature_the_scale_stays_as_measured_and_the_page_says_why() {
         let silent = BUDGET.replacen("plate:", "# plate:", 1);
         let budget = Budget::read(&silent, Path::new("budget.yaml")).unwrap();
-        let sections = breakdowns(&circles(), Some(&budget), &TestConditions::default());
+        let sections = breakdowns(&circles(), Some(&budget), &TestConditions::default(), &[]);
         assert!(sections[0].figures["scale_at_20_degc"].is_null());
         let line = &sections[0].lines[2];
         assert!(

@@ -4,6 +4,9 @@ use serde_json::{Value, json};
 
 use crate::evaluate::circles::{CircleRecording, EvaluatedTurn, SETTLING_S, TurnBy};
 
+/// Time at feed that is stated, s: below it lies the time between two readings.
+const LATE_S: f64 = 0.1;
+
 /// One sentence or two for each recording.
 pub fn lines(circles: &[&CircleRecording]) -> Vec<String> {
     let line = |circle: &&CircleRecording| in_words(circle.segment.run, &circle.turn);
@@ -36,6 +39,10 @@ fn in_words(run: u32, turn: &EvaluatedTurn) -> String {
         TurnBy::FullRate => {
             "evaluated is the turn that the control recorded at its full rate, as (rate: full) of the program asks".to_owned()
         }
+        TurnBy::Settling if turn.left_out_s > SETTLING_S + LATE_S => format!(
+            "evaluated is one turn from {:.2} s after the feed was reached; the position loops have settled after {SETTLING_S} s",
+            turn.left_out_s
+        ),
         TurnBy::Settling => format!(
             "evaluated is one turn from {SETTLING_S} s after the feed was reached, when the position loops have settled"
         ),
@@ -43,7 +50,14 @@ fn in_words(run: u32, turn: &EvaluatedTurn) -> String {
             "evaluated is the last turn, and its first readings may be unsettled: no whole turn follows {SETTLING_S} s after the feed was reached"
         ),
     };
-    let left_out = if turn.n_left_out == 0 {
+    let has_unread = turn.left_out_s > LATE_S;
+    let left_out = if turn.n_left_out == 0 && has_unread {
+        format!(
+            "No reading was left out: {:.2} s and {:.1}° at feed before it have none.",
+            turn.left_out_s,
+            turn.left_out_rad.to_degrees()
+        )
+    } else if turn.n_left_out == 0 {
         "No reading was left out.".to_owned()
     } else {
         format!(
@@ -78,9 +92,22 @@ mod tests {
         };
         assert!(in_words(5, &short).contains("may be unsettled"));
         let whole = EvaluatedTurn {
+            left_out_s: 0.0,
+            left_out_rad: 0.0,
             n_left_out: 0,
             ..turn
         };
         assert!(in_words(5, &whole).ends_with("No reading was left out."));
+        // An instrument that began to read 9.40 s after the feed was reached: 0.2 rad/s, 107.7°.
+        let late = EvaluatedTurn {
+            left_out_s: 9.40,
+            left_out_rad: 1.88,
+            n_left_out: 0,
+            ..turn
+        };
+        assert_eq!(
+            in_words(5, &late),
+            "Run 5: evaluated is one turn from 9.40 s after the feed was reached; the position loops have settled after 0.5 s. No reading was left out: 9.40 s and 107.7° at feed before it have none."
+        );
     }
 }

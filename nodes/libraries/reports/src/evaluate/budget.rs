@@ -17,12 +17,14 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Value;
 
+mod ballbar;
 mod statement;
 #[cfg(test)]
 mod tests;
 
 use super::circles;
 use super::test_conditions::{Readings, Thermometers};
+pub use ballbar::Ballbar;
 pub use statement::{Instrument, Instruments, NOT_STATED};
 
 /// Figures that had no budget to be computed from have no expanded uncertainty, not one of zero.
@@ -68,12 +70,13 @@ const REFERENCE_DEGC: f64 = 20.0;
 /// Farthest from it that a machine is measured, K.
 const FARTHEST_K: f64 = 100.0;
 /// The largest that can be stated, by the unit that a key ends with: the longest first. Beyond it the unit is mistaken.
-const GREATEST: [(&str, f64); 6] = [
+const GREATEST: [(&str, f64); 7] = [
     ("_um_per_m_k", 100.0),
     ("_um_per_m", 1e4),
     ("_um", 1e4),
     ("_mm", 100.0),
     ("_arcsec", 3600.0),
+    ("_urad", 1000.0),
     ("_k", FARTHEST_K),
 ];
 /// Coverage factors: 1 of a standard uncertainty, 12.7 of one degree of freedom at 95 % (GUM, table G.2).
@@ -132,6 +135,9 @@ pub struct Budget {
     grid_encoder: Device,
     /// Interferometer, tracker or step gauge, or the scales where they measured.
     length_reference: Device,
+    /// Ballbar, for circles; where absent, what it read has no uncertainty.
+    #[serde(default)]
+    ballbar: Option<Ballbar>,
     /// The machine, or the workpiece that lengths are corrected to.
     machine: Body,
     /// The device's own body; coefficient 0 for an interferometer.
@@ -139,6 +145,9 @@ pub struct Budget {
     /// The plate of the grid encoder; where absent, radii of its circles are not corrected to 20 °C.
     #[serde(default)]
     plate: Option<Body>,
+    /// Expanded uncertainty (k = 2) of the angle between the plate's axes; where absent, U of a squareness lacks it.
+    #[serde(default)]
+    plate_squareness_urad: Option<f64>,
     /// By how much beam and axis can part sideways over the measured length.
     misalignment_mm: f64,
     /// Range of a reading with the axes at rest, as long as a test takes.
@@ -310,7 +319,8 @@ impl Budget {
             ),
             ("angular_reference", angular.map(|one| one.coverage_factor)),
         ];
-        for (key, factor) in factors {
+        let of_ballbar = budget.ballbar.iter().flat_map(Ballbar::factors);
+        for (key, factor) in factors.into_iter().chain(of_ballbar) {
             let factor = factor.unwrap_or(1.0);
             let [least, greatest] = FACTORS;
             if !(least..=greatest).contains(&factor) {
@@ -332,7 +342,9 @@ impl Budget {
         }
         let plate = budget.plate.as_ref().map(|plate| ("plate", plate));
         let bodies = [("machine", &budget.machine), ("device", &budget.device)];
-        for (key, body) in bodies.into_iter().chain(plate) {
+        let ballbar = budget.ballbar.as_ref().and_then(Ballbar::body);
+        let own = ballbar.map(|body| ("ballbar.body", body));
+        for (key, body) in bodies.into_iter().chain(plate).chain(own) {
             body.check()
                 .map_err(|(name, rule)| wrong(&format!("{key}.{name}{rule}")))?;
         }
@@ -435,6 +447,9 @@ impl Budget {
             ("environmental_drift_um", self.environmental_drift_um),
         ];
         numbers.extend(self.numbers_of_parts());
+        numbers.extend(self.ballbar.iter().flat_map(Ballbar::numbers));
+        let squareness = self.plate_squareness_urad;
+        numbers.extend(squareness.map(|urad| ("plate_squareness_urad", urad)));
         numbers
     }
 
@@ -564,7 +579,9 @@ impl Budget {
             length_reference: DEVICE,
             machine: BODY,
             device: BODY,
+            ballbar: None,
             plate: None,
+            plate_squareness_urad: None,
             misalignment_mm: 0.0,
             environmental_drift_um: 0.0,
             environmental_unrest_um: None,

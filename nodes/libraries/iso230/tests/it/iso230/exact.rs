@@ -205,7 +205,10 @@ fn eq6_to_eq10_of_a_circular_budget_by_hand() {
         (0.037 * 0.36 + 0.270 * 0.24 + 0.04) / 4.0,
         (0.830 * 0.36 + 0.198 * 0.24) / 4.0,
     ];
-    for (budget, [radius2, mean2, apart2]) in [(plate, by_plate), (ballbar, [0.25, 0.25, 0.09])] {
+    // A plate reads one place in both senses, of a ballbar these are two readings.
+    for (budget, [radius2, mean2, apart2], place2) in
+        [(plate, by_plate, 0.0), (ballbar, [0.25, 0.25, 0.09], 0.09)]
+    {
         let test = circle(radial(|_| 0.0), radial(|_| 0.0));
         let result = circular::evaluate(&test, &budget).unwrap();
         let both = result.both.unwrap();
@@ -217,7 +220,7 @@ fn eq6_to_eq10_of_a_circular_budget_by_hand() {
         // Of a mean, a drift of 0.4 µm leaves half.
         let (f2, d2) = (radius2 + 0.16 + 1.0 + 0.36, mean2 + 0.04 + 1.0 + 0.36);
         // 4 w² ln n/3 with w² = 0.03 µm².
-        let h2 = 2.0 * 0.16 + 0.04 * 720.0_f64.ln();
+        let h2 = 2.0 * (place2 + 0.16) + 0.04 * 720.0_f64.ln();
         near("U(H)", expanded(both.hysteresis_1996), h2);
         let f = result.clockwise.unwrap().greatest_radial_deviation;
         near("U(F)", expanded(f), f2);

@@ -27,12 +27,15 @@ pub struct Instrument {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Instruments {
-    /// Interferometer, tracker, ballbar or step gauge.
+    /// Interferometer, tracker or step gauge.
     #[serde(default)]
     pub length_reference: Instrument,
     /// Encoder, autocollimator with polygon, or indexing table.
     #[serde(default)]
     pub angular_reference: Instrument,
+    /// Ballbar.
+    #[serde(default)]
+    pub ballbar: Instrument,
     /// Plate and head.
     #[serde(default)]
     pub grid_encoder: Instrument,
@@ -63,6 +66,7 @@ impl Instruments {
     pub const NONE: Self = Self {
         length_reference: Instrument::NONE,
         angular_reference: Instrument::NONE,
+        ballbar: Instrument::NONE,
         grid_encoder: Instrument::NONE,
         touch_probe: Instrument::NONE,
     };
@@ -72,6 +76,7 @@ impl Instruments {
         let all = [
             ("length_reference", &self.length_reference),
             ("angular_reference", &self.angular_reference),
+            ("ballbar", &self.ballbar),
             ("grid_encoder", &self.grid_encoder),
             ("touch_probe", &self.touch_probe),
         ];

@@ -113,7 +113,7 @@ fn a_circular_budget_counts_the_plates_constant_once_and_its_expansion_too() {
 #[test]
 fn every_number_has_a_largest_value_and_one_beyond_it_is_refused_with_both() {
     let text = format!(
-        "{WHOLE}angular_reference: {{expanded_uncertainty_arcsec: 0.4, coverage_factor: 2.0, environmental_drift_arcsec: 0.2}}\n"
+        "{WHOLE}angular_reference: {{expanded_uncertainty_arcsec: 0.4, coverage_factor: 2.0, environmental_drift_arcsec: 0.2}}\nplate_squareness_urad: 2.0\n"
     );
     let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
     for (key, value) in budget.numbers() {
@@ -170,4 +170,52 @@ fn a_wrong_budget_is_refused_with_key_and_value() {
         refusal("coverage_factor: 2.0", "coverage_factor: 0.0")
             .contains("grid_encoder.coverage_factor = 0")
     );
+}
+
+const BALLBAR: &str = "ballbar: {expanded_uncertainty_um: 1.0, expanded_uncertainty_um_per_m: 0.0, coverage_factor: 2.0, length: {expanded_uncertainty_um: 0.5, expanded_uncertainty_um_per_m: 1.0, coverage_factor: 2.0}, body: {temperature_half_width_k: 0.1, expansion_um_per_m_k: 1.2, expansion_half_width_um_per_m_k: 0.5}}\n";
+
+#[test]
+fn numbers_of_a_ballbar_have_limits_too() {
+    let whole = format!("{WHOLE}{BALLBAR}");
+    let budget = Budget::read(&whole, Path::new("budget.yaml")).unwrap();
+    let length = budget.ballbar_length().unwrap();
+    assert!((length.standard_mm(1000.0) - 0.75e-3).abs() < 1e-15);
+    for (from, to, words) in [
+        (
+            "_um: 1.0",
+            "_um: -1.0",
+            "ballbar.expanded_uncertainty_um = -1",
+        ),
+        (
+            "_um: 0.5",
+            "_um: 1e9",
+            "ballbar.length.expanded_uncertainty_um = ",
+        ),
+        (
+            "factor: 2.0, length",
+            "factor: 0.5, length",
+            "ballbar.coverage_factor = 0.5",
+        ),
+        (
+            "factor: 2.0}, body",
+            "factor: 50.0}, body",
+            "ballbar.length.coverage_factor = 50",
+        ),
+        (
+            "m_k: 1.2",
+            "m_k: 1200.0",
+            "ballbar.body.expansion_um_per_m_k = ",
+        ),
+        (
+            "body: {",
+            "body: {temperature_deviation_k: 200.0, ",
+            "ballbar.body.temperature_deviation_k = ",
+        ),
+    ] {
+        assert!(BALLBAR.contains(from), "{from}");
+        let text = format!("{WHOLE}{}", BALLBAR.replacen(from, to, 1));
+        let error = Budget::read(&text, Path::new("budget.yaml")).unwrap_err();
+        let error = format!("{error:#}");
+        assert!(error.contains(words), "{error}");
+    }
 }

@@ -122,6 +122,8 @@ struct Recording {
     off_mm: [f64; 2],
     sense: Sense,
     run: u32,
+    /// How long the states come closer, as an angle.
+    marked_rad: f64,
 }
 
 impl Recording {
@@ -152,7 +154,7 @@ impl Recording {
                 v_mm: radius_mm * sin + self.off_mm[1],
                 zero_id: 7,
             });
-            let is_turn = (-1e-9..TAU).contains(&turn_rad);
+            let is_turn = (-1e-9..self.marked_rad).contains(&turn_rad);
             time_s += self.rates_s[usize::from(is_turn)];
         }
         circles.segment(&segment(false, self.run, self.sense));
@@ -172,6 +174,7 @@ const MARKED: Recording = Recording {
     off_mm: [3.0, -1.0],
     sense: Sense::CounterClockwise,
     run: 1,
+    marked_rad: TAU,
 };
 
 #[test]
@@ -195,6 +198,30 @@ fn the_full_rate_marks_the_turn_and_the_run_in_before_it_is_left_out() {
     // 5 µm e^(-12) = 3e-5 µm is left of the settling; the readings at feed before the turn begin 3.4 µm inside.
     let [greatest, least] = extremes_mm(&circle);
     assert!(greatest - least < 1e-6, "{greatest} {least}");
+}
+
+/// Angle from the first point to the last one, rad.
+fn spanned_rad(circle: &CircleRecording) -> f64 {
+    let pairs = circle.points.windows(2).map(|pair| {
+        let ([u, v], [u1, v1]) = (pair[0].at_mm, pair[1].at_mm);
+        (u * v1 - v * u1).atan2(u * u1 + v * v1)
+    });
+    pairs.sum::<f64>().abs()
+}
+
+#[test]
+fn a_marked_turn_that_is_longer_than_360_degrees_is_trimmed_to_one_turn() {
+    // 365.5 degrees, as a control that switches its rate late marks them.
+    let circle = alone(&Recording {
+        marked_rad: 365.5_f64.to_radians(),
+        ..MARKED
+    });
+    assert_eq!(circle.turn.by, TurnBy::FullRate);
+    let spanned_rad = spanned_rad(&circle);
+    // Points 1 mrad apart; the first one is that of the last sparse state, 20 mrad before.
+    assert!((TAU - 0.021..TAU).contains(&spanned_rad), "{spanned_rad}");
+    // It begins where the mark does.
+    assert!((circle.turn.left_out_rad - 0.58).abs() < 0.021);
 }
 
 #[test]

@@ -5,7 +5,8 @@
 //!
 //! 1. *Full rate.* A measuring program writes `(rate: full)` before the turn and `(rate: background)` behind it, and a
 //!    control that reads these comments publishes its axis states closer during the turn. The turn is the longest stretch
-//!    of close states, where it goes all round and sparse states of the same feed come before it.
+//!    of close states, where it goes all round and sparse states of the same feed come before it. The control switches some
+//!    states late, so that the stretch is a few degrees longer: what it has beyond 360° at its end is left out.
 //! 2. *Settling.* Otherwise the turn begins [`SETTLING_S`] after the command reached its feed.
 //! 3. *Too short.* Where the recording does not go on for a whole turn from there, its last turn is evaluated. Its first
 //!    readings may be unsettled, and the page warns.
@@ -81,14 +82,18 @@ pub struct EvaluatedTurn {
 /// What belongs to the turn.
 #[derive(Clone, Copy, Debug)]
 enum Part {
-    Time(Stamp<Host>, Stamp<Host>),
+    /// From one stamp to another, and of that a turn from an angle on.
+    Marked(Stamp<Host>, Stamp<Host>, f64),
     Swept(f64, f64),
 }
 
 impl Part {
     fn contains(self, reading: &AtFeed) -> bool {
         match self {
-            Self::Time(from, until) => reading.at >= from && reading.at <= until,
+            Self::Marked(from, until, from_rad) => {
+                let is_of_turn = reading.tick.swept_rad < from_rad + TAU - SAME_RAD;
+                reading.at >= from && reading.at <= until && is_of_turn
+            }
             Self::Swept(from_rad, until_rad) => {
                 let swept_rad = reading.tick.swept_rad;
                 swept_rad >= from_rad - SAME_RAD && swept_rad <= until_rad + SAME_RAD
@@ -100,7 +105,7 @@ impl Part {
 /// The readings of the evaluated turn, and which it is.
 pub(super) fn evaluated(ticks: &[Tick], readings: Vec<AtFeed>) -> (Vec<AtFeed>, EvaluatedTurn) {
     let (by, part) = match full_rate(ticks) {
-        Some((from, until)) => (TurnBy::FullRate, Part::Time(from, until)),
+        Some(marked) => (TurnBy::FullRate, marked),
         None => settled(&readings),
     };
     let n = readings.len();
@@ -117,7 +122,7 @@ pub(super) fn evaluated(ticks: &[Tick], readings: Vec<AtFeed>) -> (Vec<AtFeed>, 
 }
 
 /// The longest stretch of close states behind sparse ones, where it goes all round.
-fn full_rate(ticks: &[Tick]) -> Option<(Stamp<Host>, Stamp<Host>)> {
+fn full_rate(ticks: &[Tick]) -> Option<Part> {
     let usual_s = median(ticks.iter().map(|tick| tick.step_s))?;
     if usual_s <= 0.0 {
         return None;
@@ -134,7 +139,7 @@ fn full_rate(ticks: &[Tick]) -> Option<(Stamp<Host>, Stamp<Host>)> {
     let begin = ticks[first_close - 1];
     let end = stretch.last()?;
     let is_whole = end.swept_rad - begin.swept_rad > TAU - LONGEST_GAP_RAD;
-    is_whole.then_some((begin.at, end.at))
+    is_whole.then_some(Part::Marked(begin.at, end.at, begin.swept_rad))
 }
 
 /// The turn from the settled reading on, or the last one.
