@@ -165,7 +165,12 @@ impl Export {
         let wanted = self.wanted(travel::of(&bag, &mut losses));
         let selected = select(&measured, &wanted, &self.set_up.control(format));
         let mut without_effect = self.without_effect(format, &origin);
-        without_effect.extend(effect::without_effect(&self, format, &measured, &selected));
+        without_effect.extend(effect::without_effect(
+            &self,
+            format,
+            (&measured, &wanted.travels),
+            &selected,
+        ));
         let left_out: Vec<String> = selected
             .left_out
             .iter()

@@ -3,6 +3,7 @@
 //! What is exported is made again without each option in turn, and compared. So nothing has to be known of what an option
 //! is about, and one that is added later only needs its line here.
 
+use control_tables::Travels;
 use control_tables::selection::{Measured, Selected, select};
 
 use super::{Export, Format};
@@ -58,11 +59,15 @@ fn line(option: &str) -> String {
 pub(super) fn without_effect(
     export: &Export,
     format: Format,
-    measured: &Measured,
+    (measured, travels): (&Measured, &Travels),
     selected: &Selected,
 ) -> Vec<String> {
     let is_same = |other: &Export| {
-        let again = select(measured, &other.wanted(), &other.set_up.control(format));
+        let again = select(
+            measured,
+            &other.wanted(*travels),
+            &other.set_up.control(format),
+        );
         again.files == selected.files && again.left_out == selected.left_out
     };
     let given = OPTIONS.iter().filter(|(_, is_given, _)| is_given(export));

@@ -7,6 +7,7 @@ use metrology::stamp::Stamp;
 use recorder::{Channel, Directory, MessageStamp, RecorderConfig, Recording};
 
 use super::*;
+use control_tables::Travels;
 
 #[derive(Parser)]
 struct CommandLine {
@@ -432,9 +433,14 @@ fn every_option_that_changes_no_file_is_told_of_and_no_other() {
         let export = CommandLine::parse_from(words.chain(line.split(' '))).export;
         let format = export.format.unwrap();
         let Found { measured, .. } = read(&bag, Which::default());
-        let selected = select(&measured, &export.wanted(), &export.set_up.control(format));
+        let selected = select(
+            &measured,
+            &export.wanted(Travels::default()),
+            &export.set_up.control(format),
+        );
         assert!(!selected.files.is_empty(), "{line}");
-        let told = effect::without_effect(&export, format, &measured, &selected);
+        let told =
+            effect::without_effect(&export, format, (&measured, &Travels::default()), &selected);
         let is_told = |option: &str| {
             told.iter()
                 .any(|one| one.starts_with(&format!("{option} has no effect")))

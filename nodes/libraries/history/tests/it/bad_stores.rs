@@ -201,64 +201,64 @@ fn all_read(path: &Path) -> Result<usize, HistoryError> {
     Ok(n)
 }
 
+/// What another program did to a store, and words of the refusal.
+const DAMAGES: [(&str, &str); 14] = [
+    (
+        "UPDATE entry SET machine = hex(zeroblob(50000))",
+        "machine = \"0000",
+    ),
+    (
+        "UPDATE entry SET source = hex(zeroblob(50000))",
+        "100000 bytes",
+    ),
+    ("UPDATE entry SET machine = 'm' || char(27)", "control"),
+    (
+        "UPDATE entry SET machine = x'ff'",
+        "1 bytes that are no text",
+    ),
+    (
+        "UPDATE entry SET at_s = 9223372036854775807",
+        "at_s = 9223372036854775807",
+    ),
+    (
+        "UPDATE series SET name = hex(zeroblob(200))",
+        "name = \"0000",
+    ),
+    (
+        "UPDATE figure SET value = 1e999 WHERE entry = 1",
+        "series 1: value = inf",
+    ),
+    (
+        "UPDATE figure SET value = 1e305 WHERE entry = 2",
+        "value = 1",
+    ),
+    (
+        "UPDATE figure SET value = 'abc' WHERE entry = 2",
+        "value = \"abc\" (3 bytes)",
+    ),
+    (
+        "UPDATE figure SET at_s = 'x' WHERE entry = 1",
+        "at_s = \"x\"",
+    ),
+    ("UPDATE figure SET at_s = -1", "at_s = -1"),
+    (
+        "UPDATE figure SET standard_uncertainty = -1e-6",
+        "must be 0 or more",
+    ),
+    (
+        "UPDATE figure SET standard_uncertainty = 'x'",
+        "standard_uncertainty = \"x\"",
+    ),
+    (
+        "DELETE FROM entry WHERE id = 2",
+        "entry 2: source of its entry = nothing",
+    ),
+];
+
 #[test]
 fn a_row_that_this_program_never_writes_is_refused_with_table_column_and_remedy() {
     let home = tempfile::tempdir().unwrap();
-    for (n, (sql, words)) in [
-        (
-            "UPDATE entry SET machine = hex(zeroblob(50000))",
-            "machine = \"0000",
-        ),
-        (
-            "UPDATE entry SET source = hex(zeroblob(50000))",
-            "100000 bytes",
-        ),
-        ("UPDATE entry SET machine = 'm' || char(27)", "control"),
-        (
-            "UPDATE entry SET machine = x'ff'",
-            "1 bytes that are no text",
-        ),
-        (
-            "UPDATE entry SET at_s = 9223372036854775807",
-            "at_s = 9223372036854775807",
-        ),
-        (
-            "UPDATE series SET name = hex(zeroblob(200))",
-            "name = \"0000",
-        ),
-        (
-            "UPDATE figure SET value = 1e999 WHERE entry = 1",
-            "series 1: value = inf",
-        ),
-        (
-            "UPDATE figure SET value = 1e305 WHERE entry = 2",
-            "value = 1",
-        ),
-        (
-            "UPDATE figure SET value = 'abc' WHERE entry = 2",
-            "value = \"abc\" (3 bytes)",
-        ),
-        (
-            "UPDATE figure SET at_s = 'x' WHERE entry = 1",
-            "at_s = \"x\"",
-        ),
-        ("UPDATE figure SET at_s = -1", "at_s = -1"),
-        (
-            "UPDATE figure SET standard_uncertainty = -1e-6",
-            "must be 0 or more",
-        ),
-        (
-            "UPDATE figure SET standard_uncertainty = 'x'",
-            "standard_uncertainty = \"x\"",
-        ),
-        (
-            "DELETE FROM entry WHERE id = 2",
-            "entry 2: source of its entry = nothing",
-        ),
-    ]
-    .into_iter()
-    .enumerate()
-    {
+    for (n, (sql, words)) in DAMAGES.into_iter().enumerate() {
         let path = home.path().join(format!("{n}.sqlite"));
         let mut store = Store::open(&path, IMPATIENT).unwrap();
         for (number, at_s) in [(1, 200), (2, 100)] {
