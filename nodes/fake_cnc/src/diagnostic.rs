@@ -1,7 +1,7 @@
 //! Conditions that the control reports without being asked.
 
-use metrology::Axis;
 use metrology::number::{along, number};
+use metrology::{Author, Axis};
 
 pub use metrology::Severity;
 
@@ -23,6 +23,12 @@ pub enum Diagnostic {
     CompensationTooLarge { axis: Axis, value: f64, limit: f64 },
     #[error("no compensation for {silent_periods} servo periods: fading")]
     CompensationStale { silent_periods: u64 },
+    #[error(
+        "two publishers of compensation are heard ({one} and {other}): offsets fade to zero and no program that touches runs; end one of them (`ros2 topic info --verbose /compensation` lists both)"
+    )]
+    CompensationContested { one: Author, other: Author },
+    #[error("one publisher of compensation is heard: it is followed")]
+    CompensationUncontested,
     #[error("compensation is followed again")]
     CompensationFollowed,
     #[error(
@@ -71,6 +77,9 @@ impl Diagnostic {
             | Self::CompensationTooLarge { .. }
             | Self::CompensationStale { .. }
             | Self::CompensationFollowed => "compensation_input",
+            Self::CompensationContested { .. } | Self::CompensationUncontested => {
+                "compensation_publishers"
+            }
             Self::FollowingError { .. } | Self::ProbeTripped { .. } | Self::FaultCleared => {
                 "motion_fault"
             }
@@ -89,6 +98,7 @@ impl Diagnostic {
     pub const fn severity(&self) -> Severity {
         match self {
             Self::CompensationFollowed
+            | Self::CompensationUncontested
             | Self::CompensationReleased
             | Self::WaitsNoLonger
             | Self::FaultCleared
@@ -101,6 +111,7 @@ impl Diagnostic {
             | Self::TimeSetBack { .. } => Severity::Warn,
             Self::CompensationNotFinite { .. }
             | Self::CompensationTooLarge { .. }
+            | Self::CompensationContested { .. }
             | Self::FollowingError { .. }
             | Self::ProbeTripped { .. }
             | Self::TimeWentBack { .. } => Severity::Error,
@@ -126,6 +137,10 @@ mod tests {
                 why: Wait::Stop,
             },
             Diagnostic::CompensationHeldBack,
+            Diagnostic::CompensationContested {
+                one: Author([1; 16]),
+                other: Author([2; 16]),
+            },
         ];
         let well = [
             Diagnostic::CompensationFollowed,
@@ -133,6 +148,7 @@ mod tests {
             Diagnostic::TimePasses,
             Diagnostic::WaitsNoLonger,
             Diagnostic::CompensationReleased,
+            Diagnostic::CompensationUncontested,
         ];
         for (wrong, well) in wrong.iter().zip(&well) {
             assert_eq!(wrong.name(), well.name());

@@ -4,6 +4,8 @@ use metrology::Axis;
 use metrology::bound::BoundError;
 use metrology::number::{number, quantity};
 
+use crate::diagnostic::Diagnostic;
+
 /// Why a control cannot be built, or an event cannot be handled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CncError {
@@ -251,6 +253,8 @@ pub enum ProgramError {
         text: String,
         rule: &'static str,
     },
+    #[error("line {line} touches: {why}")]
+    Contested { line: u32, why: Box<Diagnostic> },
     #[error("line {line}: more than {limit} lines")]
     TooLong { line: u32, limit: u32 },
     #[error("line {line}: longer than {limit} characters")]
@@ -269,6 +273,7 @@ impl ProgramError {
     pub const fn line(&self) -> u32 {
         match self {
             Self::EndMissing { line }
+            | Self::Contested { line, .. }
             | Self::TooLong { line, .. }
             | Self::LineTooLong { line, .. }
             | Self::TooMany { line, .. } => *line,

@@ -13,6 +13,7 @@ pub struct ProgramText {
     features: Vec<(u32, String)>,
     stops: Stops,
     is_machine_frame: bool,
+    touches: bool,
     shifting: Option<(u32, ShiftingWord)>,
 }
 
@@ -51,6 +52,7 @@ impl ProgramText {
         for line in text.lines() {
             program.lines = program.lines.saturating_add(1);
             program.stops.line(program.lines, line);
+            program.touches |= touches(line);
             if program.shifting.is_none() {
                 program.shifting = shifting_word(line).map(|word| (program.lines, word));
             }
@@ -79,6 +81,12 @@ impl ProgramText {
         self.is_machine_frame
     }
 
+    /// Whether a line of it touches; a file that it calls is not looked into.
+    #[must_use]
+    pub fn touches(&self) -> bool {
+        self.touches
+    }
+
     /// The first word that would shift the coordinates of a program of the machine frame, and its line.
     #[must_use]
     pub fn breaks_frame(&self) -> Option<(u32, ShiftingWord)> {
@@ -105,6 +113,25 @@ impl ProgramText {
             f64::from(line.min(self.lines)) / f64::from(self.lines)
         }
     }
+}
+
+/// Whether a line has G38.2 to G38.5 outside comments, among whatever else.
+fn touches(line: &str) -> bool {
+    let mut words = String::new();
+    let mut in_comment = false;
+    for character in line.chars() {
+        match character {
+            '(' => in_comment = true,
+            ')' => in_comment = false,
+            ';' if !in_comment => break,
+            _ if in_comment || character.is_whitespace() => {}
+            _ => words.push(character.to_ascii_uppercase()),
+        }
+    }
+    words.split('G').skip(1).any(|behind| {
+        let number = behind.trim_start_matches('0');
+        number.starts_with("38.")
+    })
 }
 
 /// Name in the last feature comment of one line.
@@ -167,6 +194,33 @@ mod tests {
             );
             let own = ProgramText::new(&format!("G21\n{word}\nM2\n"));
             assert_eq!(own.breaks_frame(), None, "{word}");
+        }
+    }
+
+    #[test]
+    fn programs_that_touch_are_known() {
+        for line in [
+            "G38.2 Z-5 F60",
+            "n10g 38.3z0",
+            "G91G038.4X[#1+2]",
+            "o1 if [#2] G38.5 X1",
+        ] {
+            assert!(
+                ProgramText::new(&format!("G21\n{line}\nM2\n")).touches(),
+                "{line}"
+            );
+        }
+        for line in [
+            "G1 X38.2 F60",
+            "(G38.2 Z0)",
+            "G0 X1 ; G38.2 Z0",
+            "G3 X8.2 Y0 I1",
+            "G380",
+        ] {
+            assert!(
+                !ProgramText::new(&format!("G21\n{line}\nM2\n")).touches(),
+                "{line}"
+            );
         }
     }
 

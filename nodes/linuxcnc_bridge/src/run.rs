@@ -1,7 +1,7 @@
 //! The life of one program on the controller, from its text to its outcome.
 
-use metrology::AxisSet;
 use metrology::stamp::{Host, Stamp};
+use metrology::{Author, AxisSet};
 
 use crate::condition::Condition;
 use crate::fault::{FaultKind, classify};
@@ -270,6 +270,18 @@ impl Run {
         self.faults.push((kind, trouble.to_string()));
         self.conditions.push(Condition::Stopped(trouble));
         client.ask_first(Request::Set(Setting::Abort));
+    }
+
+    /// Something that has nothing to do with the program ends it, as soon as LinuxCNC can be told.
+    pub fn stop(&mut self, why: String, client: &mut Client) {
+        let is_said = self.faults.iter().any(|(_, said)| *said == why);
+        if is_said || !matches!(self.phase, Phase::Opening { .. } | Phase::Running) {
+            return;
+        }
+        self.faults.push((FaultKind::Other, why));
+        if self.phase == Phase::Running {
+            client.ask_first(Request::Set(Setting::Abort));
+        }
     }
 
     /// Records are missing.
@@ -557,6 +569,9 @@ pub enum Refusal {
     /// There is nothing in it.
     #[error("the program is empty")]
     Empty,
+    /// It touches while two publish offsets.
+    #[error("{}", contested(*.0, *.1))]
+    TwoPublishers(Author, Author),
     /// Its coordinates are the machine's, and it would shift them.
     #[error(
         "line {line}: {word} shifts coordinates, and those of a program with (frame: machine) are the machine's: take one of both out"
@@ -567,6 +582,10 @@ pub enum Refusal {
         /// The word.
         word: ShiftingWord,
     },
+}
+
+fn contested(one: Author, other: Author) -> Condition {
+    Condition::CompensationContested { one, other }
 }
 
 impl Refusal {
