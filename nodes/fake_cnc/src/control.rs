@@ -91,6 +91,8 @@ pub struct Control<H> {
     waits: bool,
     /// Whether the probe may still lean on what it touched.
     leans: bool,
+    /// Whether it stands that a count was to be zero that nothing mounted has.
+    zeroed_nothing: bool,
     /// Two publishers of offsets: nothing is touched meanwhile.
     contested: Option<(Author, Author)>,
 }
@@ -125,6 +127,7 @@ impl<H: Hardware> Control<H> {
             step_wanted: false,
             waits: false,
             leans: false,
+            zeroed_nothing: false,
             contested: None,
             settings,
         }

@@ -64,6 +64,12 @@ pub enum Diagnostic {
     TimeJumped { by_s: f64, limit_s: f64 },
     #[error("time passes as it should again")]
     TimePasses,
+    #[error(
+        "line {line}: (zero: {what}) with nothing mounted that has a count: nothing is set to zero and nothing is read; mount it before, (mount: NAME) with a name of the machine file"
+    )]
+    NothingToZero { line: u32, what: &'static str },
+    #[error("what is mounted has a count, which is set to zero")]
+    CountZeroed,
     #[error("there is no program {goal} to cancel")]
     NothingToCancel { goal: u64 },
 }
@@ -89,6 +95,7 @@ impl Diagnostic {
             | Self::TimeSetBack { .. }
             | Self::TimeJumped { .. }
             | Self::TimePasses => "time",
+            Self::NothingToZero { .. } | Self::CountZeroed => "nothing_mounted",
             Self::NothingToCancel { .. } => "cancel",
         }
     }
@@ -103,9 +110,11 @@ impl Diagnostic {
             | Self::WaitsNoLonger
             | Self::FaultCleared
             | Self::TimePasses
+            | Self::CountZeroed
             | Self::NothingToCancel { .. } => Severity::Info,
             Self::CompensationStale { .. }
             | Self::CompensationHeldBack
+            | Self::NothingToZero { .. }
             | Self::Waiting { .. }
             | Self::TimeJumped { .. }
             | Self::TimeSetBack { .. } => Severity::Warn,
@@ -141,6 +150,10 @@ mod tests {
                 one: Author([1; 16]),
                 other: Author([2; 16]),
             },
+            Diagnostic::NothingToZero {
+                line: 1,
+                what: "grid",
+            },
         ];
         let well = [
             Diagnostic::CompensationFollowed,
@@ -149,6 +162,7 @@ mod tests {
             Diagnostic::WaitsNoLonger,
             Diagnostic::CompensationReleased,
             Diagnostic::CompensationUncontested,
+            Diagnostic::CountZeroed,
         ];
         for (wrong, well) in wrong.iter().zip(&well) {
             assert_eq!(wrong.name(), well.name());

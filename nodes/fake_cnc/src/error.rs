@@ -1,7 +1,7 @@
 //! What the control refuses: a configuration, an input that breaks the contract, or a program.
 
 use metrology::Axis;
-use metrology::bound::BoundError;
+use metrology::bound::{BoundError, NAME_BYTES};
 use metrology::number::{number, quantity};
 
 use crate::diagnostic::Diagnostic;
@@ -253,6 +253,14 @@ pub enum ProgramError {
         text: String,
         rule: &'static str,
     },
+    #[error(
+        "{at}: the name in the {what} comment has {bytes} bytes, at most {NAME_BYTES}: shorten it"
+    )]
+    NameTooLong {
+        at: Place,
+        what: &'static str,
+        bytes: usize,
+    },
     #[error("line {line} touches: {why}")]
     Contested { line: u32, why: Box<Diagnostic> },
     #[error("line {line}: more than {limit} lines")]
@@ -307,6 +315,7 @@ impl ProgramError {
             | Self::RotaryTouch { at, .. }
             | Self::TouchWithoutLength { at }
             | Self::AfterEnd { at, .. }
+            | Self::NameTooLong { at, .. }
             | Self::CommentValue { at, .. } => at.line,
         }
     }

@@ -2,6 +2,7 @@
 //! stop, and which words would shift the machine's coordinates.
 
 use machine::program_frame::is_machine_frame;
+use metrology::bound::NAME_BYTES;
 
 use crate::waiting::Stops;
 use crate::watch::{plain_words, tenths};
@@ -79,6 +80,13 @@ impl ProgramText {
     #[must_use]
     pub fn is_machine_frame(&self) -> bool {
         self.is_machine_frame
+    }
+
+    /// The first feature whose name is longer than a message may have it: line and bytes.
+    #[must_use]
+    pub fn long_name(&self) -> Option<(u32, usize)> {
+        let mut lengths = self.features.iter().map(|(line, name)| (*line, name.len()));
+        lengths.find(|(_, bytes)| *bytes > NAME_BYTES)
     }
 
     /// Whether a line of it touches; a file that it calls is not looked into.
@@ -221,6 +229,19 @@ mod tests {
                 !ProgramText::new(&format!("G21\n{line}\nM2\n")).touches(),
                 "{line}"
             );
+        }
+    }
+
+    #[test]
+    fn a_name_of_a_feature_that_no_message_may_have_is_found() {
+        for (name, found) in [
+            ("a".repeat(255), None),
+            ("a".repeat(256), Some((2, 256))),
+            ("ä".repeat(128), Some((2, 256))),
+            ("b".repeat(9_000), Some((2, 9_000))),
+        ] {
+            let text = format!("G21 (feature: x)\n(Feature: {name} )\nG38.2 Z0\n");
+            assert_eq!(ProgramText::new(&text).long_name(), found);
         }
     }
 

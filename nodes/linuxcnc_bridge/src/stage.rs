@@ -253,6 +253,8 @@ impl BridgeStage {
             Some(Refusal::Empty)
         } else if let Some((line, word)) = ProgramText::new(program).breaks_frame() {
             Some(Refusal::ShiftsFrame { line, word })
+        } else if let Some((line, bytes)) = ProgramText::new(program).long_name() {
+            Some(Refusal::LongName(line, bytes))
         } else if let (Some((one, other)), true) = (
             self.offsets.contested(),
             ProgramText::new(program).touches(),
