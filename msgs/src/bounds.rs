@@ -6,7 +6,7 @@
 use metrology::bound::Range;
 
 /// Bytes of a name: of a feature, a sensor, a stylus, a host.
-pub(crate) const NAME_BYTES: usize = 255;
+pub(crate) use metrology::bound::NAME_BYTES;
 /// Names in a list: the features of a test.
 pub(crate) const NAMES: usize = 1_000;
 /// Bytes of a sentence: what a machine reports in words.

@@ -242,7 +242,10 @@ fn faulty_offsets(graph: &Graph, voice: &mut Voice, other: &mut Voice) {
     });
     let words = ["/compensation", "more than one publisher"];
     graph.condition("fake_cnc", "second_publisher", &words, since);
-    keep_saying(FAULT, |_| voice.say(0, &compensation(&now(), 20e-6)));
+    let words = ["two publishers", "fade to zero"];
+    graph.condition("fake_cnc", "compensation_publishers", &words, since);
+    // One has been alone for 2 s: it is followed, so that its silence is one afterwards.
+    keep_saying(2 * FAULT, |_| voice.say(0, &compensation(&now(), 20e-6)));
 }
 
 /// Fastest change of motor minus commanded in 0.1 s, and its greatest value, m.

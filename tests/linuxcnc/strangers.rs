@@ -1,8 +1,9 @@
 //! A bridge at work on LinuxCNC among strangers: others on the graph who say, ask and flood what no good node does.
 //!
 //! A program moves Y, and an author's offset is on X, which stands: whatever X's motor does is an offset, in every servo
-//! period. What the bridge is told by strangers it refuses, or follows at HAL's rate, and names on `/diagnostics`; no
-//! stranger moves an axis, ends the program or keeps the offset of an author who fell silent.
+//! period. What the bridge is told by strangers it refuses and names on `/diagnostics`. While a stranger publishes offsets
+//! beside the author, nobody is followed: the offset fades at HAL's rate, and is there again when the author is alone. No
+//! stranger moves an axis beyond that, ends the program or keeps the offset of an author who fell silent.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -309,7 +310,7 @@ fn cut_requests(graph: &Graph, stranger: &mut Stranger) {
 /// Offsets that are refused, each named by what is wrong with it.
 fn bad_offsets(graph: &Graph, stranger: &mut Stranger) {
     type Spoil = fn(&mut AxisCompensation);
-    let faults: [(&str, &[&str], Spoil); 9] = [
+    let faults: [(&str, &[&str], Spoil); 8] = [
         ("input_refused", &["total[X]", "NaN"], |m| {
             m.total[0] = f64::NAN;
         }),
@@ -318,9 +319,6 @@ fn bad_offsets(graph: &Graph, stranger: &mut Stranger) {
         }),
         ("input_refused", &["total[X]", "in magnitude"], |m| {
             m.total[0] = -1e300;
-        }),
-        ("compensation_refused", &["axis X", "limit 0.2 mm"], |m| {
-            m.total[0] = 0.1;
         }),
         ("input_refused", &["axis \"Q\""], |m| {
             m.axis[0] = "Q".to_owned();
@@ -359,13 +357,34 @@ fn bad_offsets(graph: &Graph, stranger: &mut Stranger) {
     }
 }
 
-/// Offsets that nothing is wrong with but their author.
+/// An offset beyond the limit of one who is alone; beside another author nobody's offsets are looked at.
+fn too_large_offset(graph: &Graph, stranger: &mut Stranger) {
+    let words = ["axis X", "limit 0.2 mm"];
+    stranger.until_named(graph, ("compensation_refused", &words), |voice| {
+        let mut said = compensation(&now(), WANTED_M);
+        said.total[0] = 0.1;
+        voice.say(OFFSETS, &said);
+    });
+}
+
+/// Offsets that nothing is wrong with but their author: the offset of the one before fades, and none of theirs is taken.
 fn anothers_offsets(graph: &Graph, stranger: &mut Stranger) {
     let words = ["/compensation", "more than one publisher"];
     let mut sign = 1.0;
     stranger.until_named(graph, ("second_publisher", &words), |voice| {
         sign = -sign;
         voice.say(OFFSETS, &compensation(&now(), sign * WANTED_M));
+    });
+    let words = ["two publishers", "fade to zero"];
+    stranger.until_named(graph, ("compensation_publishers", &words), |voice| {
+        sign = -sign;
+        voice.say(OFFSETS, &compensation(&now(), sign * WANTED_M));
+    });
+    settles(graph, 0.0, || {
+        for _ in 0..2 {
+            let said = compensation(&now(), WANTED_M);
+            stranger.voice.say(OFFSETS, &said);
+        }
     });
     for (later_s, frame, axis) in [
         (-HOUR_S, "", "X"),
@@ -547,6 +566,7 @@ fn strangers_neither_move_a_machine_nor_step_its_offsets_nor_end_its_program() {
         said.axis[0] = "A".to_owned();
         stranger.voice.say(OFFSETS, &said);
     });
+    too_large_offset(graph, &mut stranger);
     let author = Author::of(graph);
     settles(graph, OFFSET_MM, || {});
     judge(&states(graph, began));

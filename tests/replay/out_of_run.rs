@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use abbe_msgs::msg::{AngleSample, LengthSample, TestSegment};
+use abbe_msgs::msg::{AngleSample, AxisState, LengthSample, TestSegment};
 use abbe_tests::program::root;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -163,6 +163,33 @@ fn readings_of_a_clock_that_is_an_hour_off_are_all_left_out() {
     let words = "its stamps are 3600 s from those of the other topics, later";
     assert!(found.said.contains(words), "{}", found.said);
     assert!(found.json["tests"][0]["iso230_2"].is_null());
+}
+
+#[test]
+fn states_far_outside_the_travel_are_left_out_and_told_and_the_rest_is_evaluated() {
+    let home = imported();
+    let whole = report(&home.path().join("bag"));
+    assert_eq!(whole.code, 0, "{}", whole.said);
+    // Of a second machine: one, and as many as a third of all.
+    for (every, far_m) in [(usize::MAX, 100.0), (3, 100.0), (3, -1e6)] {
+        let strange = changed(&home, &|messages| {
+            let states = places(messages, STATE);
+            let every = every.min(states.len() / 2);
+            for place in states.into_iter().step_by(every).skip(1).rev() {
+                let mut far = messages[place].clone();
+                edited(&mut far.data, |it: &mut AxisState| it.commanded[0] = far_m);
+                messages.insert(place + 1, far);
+            }
+        });
+        let found = report(strange.path());
+        assert_eq!(found.code, 3, "{every} {far_m}: {}", found.said);
+        let (reason, n) = told(&found.json, STATE);
+        assert_eq!(reason, "other_machine", "{every} {far_m}");
+        assert_eq!(row(&found.json, STATE)["left_out"], n);
+        let words = "axis X was commanded to";
+        assert!(found.said.contains(words), "{}", found.said);
+        assert_eq!(found.json["tests"], whole.json["tests"], "{every} {far_m}");
+    }
 }
 
 /// The same of an angle.

@@ -355,6 +355,12 @@ impl Outcome {
         n + usize::from(n > 0) + usize::from(self.failure.is_some())
     }
 
+    /// Whether a node kept something back that its readers could not have taken.
+    fn lacks_outputs(&self) -> bool {
+        let mut conditions = self.evidence.conditions.iter();
+        conditions.any(|it| it.diagnostic.name.starts_with("output_refused/"))
+    }
+
     /// Says what did not work; the exit code.
     fn end(self) -> ExitCode {
         let shortcomings = self.shortcomings();
@@ -365,7 +371,7 @@ impl Outcome {
             complain!("abbe:   {line}");
         }
         match self.failure {
-            None => loss::exit_code(self.trouble.is_none()),
+            None => loss::exit_code(self.trouble.is_none() && !self.lacks_outputs()),
             // Also where the table's own run was.
             Some(reason) if reason.ends_with(INTERRUPTED) => {
                 complain!("abbe: the plan did not run to its end: {reason}");

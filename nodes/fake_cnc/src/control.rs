@@ -23,7 +23,7 @@ mod verification;
 mod waiting;
 
 use metrology::stamp::Span;
-use metrology::{Axis, Machine, PerAxis, Stamp};
+use metrology::{Author, Axis, Machine, PerAxis, Stamp};
 
 use crate::config::{FeedbackSource, Settings};
 use crate::diagnostic::Diagnostic;
@@ -91,6 +91,10 @@ pub struct Control<H> {
     waits: bool,
     /// Whether the probe may still lean on what it touched.
     leans: bool,
+    /// Whether it stands that a count was to be zero that nothing mounted has.
+    zeroed_nothing: bool,
+    /// Two publishers of offsets: nothing is touched meanwhile.
+    contested: Option<(Author, Author)>,
 }
 
 impl<H: Hardware> Control<H> {
@@ -123,6 +127,8 @@ impl<H: Hardware> Control<H> {
             step_wanted: false,
             waits: false,
             leans: false,
+            zeroed_nothing: false,
+            contested: None,
             settings,
         }
     }
@@ -231,6 +237,11 @@ impl<H: Hardware> Control<H> {
                 });
             }
         }
+        if let (Some((one, other)), Some(line)) = (self.contested, program.first_touch()) {
+            let why = Diagnostic::CompensationContested { one, other };
+            let why = Box::new(why);
+            return Err(ProgramError::Contested { line, why });
+        }
         self.leans = self.hardware.probe_closed();
         self.chain.reserve(program.longest_chain().max(1));
         self.run = Some(Run {
@@ -243,6 +254,21 @@ impl<H: Hardware> Control<H> {
         });
         self.phase = Phase::Settling { left: 0 };
         Ok(())
+    }
+
+    /// Two publishers of offsets speak, or one alone again: what is applied fades, and a program that touches ends.
+    pub fn contest(&mut self, contested: Option<(Author, Author)>) {
+        self.contested = contested;
+        let Some((one, other)) = contested else {
+            return;
+        };
+        self.offset.release();
+        let touches = { self.run.as_ref() }.is_some_and(|run| run.program.first_touch().is_some());
+        if touches && !self.phase.ending() {
+            let line = self.progress().0;
+            let diagnostic = Diagnostic::CompensationContested { one, other };
+            self.stop(Ending::Fault { line, diagnostic });
+        }
     }
 
     /// Slows down along the path and ends the program.

@@ -1,7 +1,7 @@
 //! Conditions that the control reports without being asked.
 
-use metrology::Axis;
 use metrology::number::{along, number};
+use metrology::{Author, Axis};
 
 pub use metrology::Severity;
 
@@ -23,6 +23,12 @@ pub enum Diagnostic {
     CompensationTooLarge { axis: Axis, value: f64, limit: f64 },
     #[error("no compensation for {silent_periods} servo periods: fading")]
     CompensationStale { silent_periods: u64 },
+    #[error(
+        "two publishers of compensation are heard ({one} and {other}): offsets fade to zero and no program that touches runs; end one of them (`ros2 topic info --verbose /compensation` lists both)"
+    )]
+    CompensationContested { one: Author, other: Author },
+    #[error("one publisher of compensation is heard: it is followed")]
+    CompensationUncontested,
     #[error("compensation is followed again")]
     CompensationFollowed,
     #[error(
@@ -58,6 +64,12 @@ pub enum Diagnostic {
     TimeJumped { by_s: f64, limit_s: f64 },
     #[error("time passes as it should again")]
     TimePasses,
+    #[error(
+        "line {line}: (zero: {what}) with nothing mounted that has a count: nothing is set to zero and nothing is read; mount it before, (mount: NAME) with a name of the machine file"
+    )]
+    NothingToZero { line: u32, what: &'static str },
+    #[error("what is mounted has a count, which is set to zero")]
+    CountZeroed,
     #[error("there is no program {goal} to cancel")]
     NothingToCancel { goal: u64 },
 }
@@ -71,6 +83,9 @@ impl Diagnostic {
             | Self::CompensationTooLarge { .. }
             | Self::CompensationStale { .. }
             | Self::CompensationFollowed => "compensation_input",
+            Self::CompensationContested { .. } | Self::CompensationUncontested => {
+                "compensation_publishers"
+            }
             Self::FollowingError { .. } | Self::ProbeTripped { .. } | Self::FaultCleared => {
                 "motion_fault"
             }
@@ -80,6 +95,7 @@ impl Diagnostic {
             | Self::TimeSetBack { .. }
             | Self::TimeJumped { .. }
             | Self::TimePasses => "time",
+            Self::NothingToZero { .. } | Self::CountZeroed => "nothing_mounted",
             Self::NothingToCancel { .. } => "cancel",
         }
     }
@@ -89,18 +105,22 @@ impl Diagnostic {
     pub const fn severity(&self) -> Severity {
         match self {
             Self::CompensationFollowed
+            | Self::CompensationUncontested
             | Self::CompensationReleased
             | Self::WaitsNoLonger
             | Self::FaultCleared
             | Self::TimePasses
+            | Self::CountZeroed
             | Self::NothingToCancel { .. } => Severity::Info,
             Self::CompensationStale { .. }
             | Self::CompensationHeldBack
+            | Self::NothingToZero { .. }
             | Self::Waiting { .. }
             | Self::TimeJumped { .. }
             | Self::TimeSetBack { .. } => Severity::Warn,
             Self::CompensationNotFinite { .. }
             | Self::CompensationTooLarge { .. }
+            | Self::CompensationContested { .. }
             | Self::FollowingError { .. }
             | Self::ProbeTripped { .. }
             | Self::TimeWentBack { .. } => Severity::Error,
@@ -126,6 +146,14 @@ mod tests {
                 why: Wait::Stop,
             },
             Diagnostic::CompensationHeldBack,
+            Diagnostic::CompensationContested {
+                one: Author([1; 16]),
+                other: Author([2; 16]),
+            },
+            Diagnostic::NothingToZero {
+                line: 1,
+                what: "grid",
+            },
         ];
         let well = [
             Diagnostic::CompensationFollowed,
@@ -133,6 +161,8 @@ mod tests {
             Diagnostic::TimePasses,
             Diagnostic::WaitsNoLonger,
             Diagnostic::CompensationReleased,
+            Diagnostic::CompensationUncontested,
+            Diagnostic::CountZeroed,
         ];
         for (wrong, well) in wrong.iter().zip(&well) {
             assert_eq!(wrong.name(), well.name());

@@ -1,8 +1,10 @@
 //! What the control refuses: a configuration, an input that breaks the contract, or a program.
 
 use metrology::Axis;
-use metrology::bound::BoundError;
+use metrology::bound::{BoundError, NAME_BYTES};
 use metrology::number::{number, quantity};
+
+use crate::diagnostic::Diagnostic;
 
 /// Why a control cannot be built, or an event cannot be handled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -251,6 +253,16 @@ pub enum ProgramError {
         text: String,
         rule: &'static str,
     },
+    #[error(
+        "{at}: the name in the {what} comment has {bytes} bytes, at most {NAME_BYTES}: shorten it"
+    )]
+    NameTooLong {
+        at: Place,
+        what: &'static str,
+        bytes: usize,
+    },
+    #[error("line {line} touches: {why}")]
+    Contested { line: u32, why: Box<Diagnostic> },
     #[error("line {line}: more than {limit} lines")]
     TooLong { line: u32, limit: u32 },
     #[error("line {line}: longer than {limit} characters")]
@@ -269,6 +281,7 @@ impl ProgramError {
     pub const fn line(&self) -> u32 {
         match self {
             Self::EndMissing { line }
+            | Self::Contested { line, .. }
             | Self::TooLong { line, .. }
             | Self::LineTooLong { line, .. }
             | Self::TooMany { line, .. } => *line,
@@ -302,6 +315,7 @@ impl ProgramError {
             | Self::RotaryTouch { at, .. }
             | Self::TouchWithoutLength { at }
             | Self::AfterEnd { at, .. }
+            | Self::NameTooLong { at, .. }
             | Self::CommentValue { at, .. } => at.line,
         }
     }

@@ -29,6 +29,14 @@ pub trait Hardware {
     fn zero_grid(&mut self) {}
     /// Sets the count of the length reference to zero.
     fn zero_length(&mut self) {}
+    /// Whether a grid plate is mounted.
+    fn has_grid(&self) -> bool {
+        false
+    }
+    /// Whether a beam is mounted.
+    fn has_length(&self) -> bool {
+        false
+    }
     /// Reads the grid encoder; `None` without a count.
     fn grid_reading(&mut self) -> Option<GridReading> {
         None
@@ -78,6 +86,14 @@ impl Hardware for Plant {
 
     fn zero_length(&mut self) {
         Self::zero_length(self);
+    }
+
+    fn has_grid(&self) -> bool {
+        Self::has_grid(self)
+    }
+
+    fn has_length(&self) -> bool {
+        Self::has_length(self)
     }
 
     fn grid_reading(&mut self) -> Option<GridReading> {

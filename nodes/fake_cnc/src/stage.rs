@@ -5,7 +5,7 @@ use metrology::sample::{
     AxisCompensation, AxisState, GridSample, LengthSample, ProbeTrigger, TemperatureSample,
 };
 use metrology::stamp::Span;
-use metrology::{Host, Stage, Stamp};
+use metrology::{Author, AuthorNews, Host, SoleAuthor, Stage, Stamp};
 
 use crate::clock::Clocks;
 use crate::config::{Config, Settings};
@@ -134,6 +134,7 @@ pub struct Cnc<H = Plant> {
     control: Control<H>,
     clocks: Clocks,
     sensors: Vec<Sensor>,
+    authors: SoleAuthor,
     last_tick: Option<Stamp<Host>>,
     activity: Activity,
     touches: u32,
@@ -161,6 +162,7 @@ impl<H: Hardware> Cnc<H> {
             clocks: Clocks::new(settings.period, settings.clock_offset, settings.clock_drift),
             control: Control::new(settings, hardware),
             sensors,
+            authors: SoleAuthor::default(),
             last_tick: None,
             activity: Activity::Active,
             touches: 0,
@@ -210,6 +212,27 @@ impl<H: Hardware> Cnc<H> {
     /// Whether every axis is homed.
     pub const fn is_homed(&self) -> bool {
         self.control.is_homed()
+    }
+
+    /// The offsets that come next are of this publisher, whether they can be read or not.
+    pub fn hears(&mut self, at: Stamp<Host>, author: Author) {
+        self.authors.hear(at, author);
+    }
+
+    /// Nobody is followed while two publishers speak.
+    fn watch_authors(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        let diagnostic = match self.authors.tick(at) {
+            Some(AuthorNews::Contested(one, other)) => {
+                self.control.contest(Some((one, other)));
+                Diagnostic::CompensationContested { one, other }
+            }
+            Some(AuthorNews::Alone) => {
+                self.control.contest(None);
+                Diagnostic::CompensationUncontested
+            }
+            None => return,
+        };
+        out.push(Output::Diagnostic(diagnostic));
     }
 
     fn run_program(&mut self, goal: u64, text: &str, out: &mut Vec<Output>) {
@@ -472,12 +495,16 @@ impl<H: Hardware> Stage for Cnc<H> {
             Input::Pause | Input::Resume | Input::StepBlock | Input::Home => {
                 self.serve(&input, out);
             }
-            Input::Compensation(_) if self.activity != Activity::Active => {}
+            Input::Compensation(_)
+                if self.activity != Activity::Active || !self.authors.follows_last() => {}
             Input::Compensation(message) => {
                 let told = self.control.offset_mut().receive(&message);
                 out.extend(told.map(Output::Diagnostic));
             }
-            Input::Tick => self.pass_time(at, out),
+            Input::Tick => {
+                self.watch_authors(at, out);
+                self.pass_time(at, out);
+            }
         }
         Ok(())
     }

@@ -88,7 +88,7 @@ mod time;
 mod touching;
 
 pub use account::{Account, Reason};
-pub use builder::{Input, SessionBuilder};
+pub use builder::{Input, SessionBuilder, outside_travel};
 pub use config::SessionConfig;
 pub use error::SessionError;
 pub(crate) use select::HOLDS_FEED_S;

@@ -98,6 +98,12 @@ impl CompensationPath {
         self.received = None;
     }
 
+    /// HAL is given zero, and its heart goes on beating: what it has fades at its own rate.
+    pub fn want_zero(&mut self, at: Stamp<Host>) {
+        self.wanted = PerAxis::default();
+        self.received = Some(at);
+    }
+
     /// Takes new offsets; the whole set is refused when one of them is, and the last good one stays. An axis that the set
     /// leaves out has none: otherwise who names other axes alone would keep the last offset of one that fell silent.
     ///

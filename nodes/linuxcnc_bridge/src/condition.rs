@@ -1,7 +1,7 @@
 //! Conditions worth reporting, each with the values that belong to it.
 
-use metrology::Axis;
 use metrology::number::number;
+use metrology::{Author, Axis};
 
 use crate::compensation::CompensationRefused;
 use crate::fault::FaultKind;
@@ -213,6 +213,19 @@ pub enum Condition {
     /// Compensation comes.
     #[error("compensation is passed on")]
     CompensationFresh,
+    /// Two publish compensation: nobody is followed.
+    #[error(
+        "two publishers of compensation are heard ({one} and {other}): offsets fade to zero and no program that touches runs; end one of them (`ros2 topic info --verbose /compensation` lists both)"
+    )]
+    CompensationContested {
+        /// One of them.
+        one: Author,
+        /// The other.
+        other: Author,
+    },
+    /// One has been alone for a while.
+    #[error("one publisher of compensation is heard: it is followed")]
+    CompensationUncontested,
     /// Compensation waits for homing; what HAL had of it fades.
     #[error("compensation is held back until every axis is homed")]
     CompensationHeld,
@@ -281,6 +294,9 @@ impl Condition {
             Self::CompensationRefused(_) | Self::CompensationRefusedNoMore { .. } => {
                 "compensation_refused"
             }
+            Self::CompensationContested { .. } | Self::CompensationUncontested => {
+                "compensation_publishers"
+            }
             Self::ProgramWaits(_) | Self::ProgramGoesOn => "program_waits",
             Self::Stopped(Trouble::Tripped { .. }) => "probe_tripped",
             Self::Stopped(Trouble::Astray { .. }) => "axis_astray",
@@ -305,6 +321,7 @@ impl Condition {
             | Self::CompensationFresh
             | Self::CompensationHeld
             | Self::CompensationRefusedNoMore { .. }
+            | Self::CompensationUncontested
             | Self::ProgramGoesOn
             | Self::FrameSet { .. }
             | Self::Estop { on: false }

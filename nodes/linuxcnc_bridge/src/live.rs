@@ -7,9 +7,9 @@ use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 
 use machine::MachineFile;
-use metrology::Stage;
 use metrology::sample::AxisCompensation;
 use metrology::stamp::{Host, Stamp};
+use metrology::{Author, Stage};
 
 use crate::config::{BridgeConfig, Settings};
 use crate::error::BridgeError;
@@ -151,6 +151,13 @@ impl LiveBridge {
     /// So many publish offsets; the stage gets the number at the next tick.
     pub fn sees_publishers(&mut self, publishers: usize) {
         self.publishers = Some(publishers);
+    }
+
+    /// The offsets that come next are of this publisher.
+    pub fn hears(&mut self, at: Stamp<Host>, author: Author) {
+        if let Some(work) = &mut self.work {
+            work.stage.hears(at, author);
+        }
     }
 
     /// Leaves LinuxCNC, and ends it where it was started here.

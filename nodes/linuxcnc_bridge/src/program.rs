@@ -2,6 +2,7 @@
 //! stop, and which words would shift the machine's coordinates.
 
 use machine::program_frame::is_machine_frame;
+use metrology::bound::NAME_BYTES;
 
 use crate::waiting::Stops;
 use crate::watch::{plain_words, tenths};
@@ -13,6 +14,7 @@ pub struct ProgramText {
     features: Vec<(u32, String)>,
     stops: Stops,
     is_machine_frame: bool,
+    touches: bool,
     shifting: Option<(u32, ShiftingWord)>,
 }
 
@@ -51,6 +53,7 @@ impl ProgramText {
         for line in text.lines() {
             program.lines = program.lines.saturating_add(1);
             program.stops.line(program.lines, line);
+            program.touches |= touches(line);
             if program.shifting.is_none() {
                 program.shifting = shifting_word(line).map(|word| (program.lines, word));
             }
@@ -79,6 +82,19 @@ impl ProgramText {
         self.is_machine_frame
     }
 
+    /// The first feature whose name is longer than a message may have it: line and bytes.
+    #[must_use]
+    pub fn long_name(&self) -> Option<(u32, usize)> {
+        let mut lengths = self.features.iter().map(|(line, name)| (*line, name.len()));
+        lengths.find(|(_, bytes)| *bytes > NAME_BYTES)
+    }
+
+    /// Whether a line of it touches; a file that it calls is not looked into.
+    #[must_use]
+    pub fn touches(&self) -> bool {
+        self.touches
+    }
+
     /// The first word that would shift the coordinates of a program of the machine frame, and its line.
     #[must_use]
     pub fn breaks_frame(&self) -> Option<(u32, ShiftingWord)> {
@@ -105,6 +121,25 @@ impl ProgramText {
             f64::from(line.min(self.lines)) / f64::from(self.lines)
         }
     }
+}
+
+/// Whether a line has G38.2 to G38.5 outside comments, among whatever else.
+fn touches(line: &str) -> bool {
+    let mut words = String::new();
+    let mut in_comment = false;
+    for character in line.chars() {
+        match character {
+            '(' => in_comment = true,
+            ')' => in_comment = false,
+            ';' if !in_comment => break,
+            _ if in_comment || character.is_whitespace() => {}
+            _ => words.push(character.to_ascii_uppercase()),
+        }
+    }
+    words.split('G').skip(1).any(|behind| {
+        let number = behind.trim_start_matches('0');
+        number.starts_with("38.")
+    })
 }
 
 /// Name in the last feature comment of one line.
@@ -167,6 +202,46 @@ mod tests {
             );
             let own = ProgramText::new(&format!("G21\n{word}\nM2\n"));
             assert_eq!(own.breaks_frame(), None, "{word}");
+        }
+    }
+
+    #[test]
+    fn programs_that_touch_are_known() {
+        for line in [
+            "G38.2 Z-5 F60",
+            "n10g 38.3z0",
+            "G91G038.4X[#1+2]",
+            "o1 if [#2] G38.5 X1",
+        ] {
+            assert!(
+                ProgramText::new(&format!("G21\n{line}\nM2\n")).touches(),
+                "{line}"
+            );
+        }
+        for line in [
+            "G1 X38.2 F60",
+            "(G38.2 Z0)",
+            "G0 X1 ; G38.2 Z0",
+            "G3 X8.2 Y0 I1",
+            "G380",
+        ] {
+            assert!(
+                !ProgramText::new(&format!("G21\n{line}\nM2\n")).touches(),
+                "{line}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_name_of_a_feature_that_no_message_may_have_is_found() {
+        for (name, found) in [
+            ("a".repeat(255), None),
+            ("a".repeat(256), Some((2, 256))),
+            ("ä".repeat(128), Some((2, 256))),
+            ("b".repeat(9_000), Some((2, 9_000))),
+        ] {
+            let text = format!("G21 (feature: x)\n(Feature: {name} )\nG38.2 Z0\n");
+            assert_eq!(ProgramText::new(&text).long_name(), found);
         }
     }
 

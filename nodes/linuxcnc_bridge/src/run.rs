@@ -6,12 +6,16 @@ use metrology::stamp::{Host, Stamp};
 use crate::condition::Condition;
 use crate::fault::{FaultKind, classify};
 use crate::frame::{Frame, FrameNews};
-use crate::program::{ProgramText, ShiftingWord};
+use crate::program::ProgramText;
 use crate::protocol::{Client, Mode, ProgramStatus, Query, Reply, Request, Setting, Signal};
 use crate::samples::Record;
 use crate::session::ControllerState;
 use crate::waiting::{Standstill, Wait};
 use crate::watch::{Trouble, Watch};
+
+mod refusal;
+
+pub use refusal::Refusal;
 
 /// Error messages that are asked for after a program has ended. LinuxCNC hands out one message of
 /// any kind at a time and an error may stand behind messages of the program itself.
@@ -272,6 +276,18 @@ impl Run {
         client.ask_first(Request::Set(Setting::Abort));
     }
 
+    /// Something that has nothing to do with the program ends it, as soon as LinuxCNC can be told.
+    pub fn stop(&mut self, why: String, client: &mut Client) {
+        let is_said = self.faults.iter().any(|(_, said)| *said == why);
+        if is_said || !matches!(self.phase, Phase::Opening { .. } | Phase::Running) {
+            return;
+        }
+        self.faults.push((FaultKind::Other, why));
+        if self.phase == Phase::Running {
+            client.ask_first(Request::Set(Setting::Abort));
+        }
+    }
+
     /// Records are missing.
     pub fn gap(&mut self) {
         self.watch.gap();
@@ -525,58 +541,4 @@ fn frame_comment_end(text: &str) -> Option<usize> {
         }
     }
     None
-}
-
-/// Why a program is not begun.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Refusal {
-    /// One runs already.
-    #[error("another program is running")]
-    Busy,
-    /// The bridge is not active.
-    #[error("the bridge is not active")]
-    Inactive,
-    /// There is no connection.
-    #[error("not connected to the controller")]
-    NotConnected,
-    /// The emergency stop is on, or its state is not known.
-    #[error("emergency stop is on")]
-    EmergencyStop,
-    /// The drives are off.
-    #[error("drives are off")]
-    DrivesOff,
-    /// Not every axis is homed.
-    #[error("not homed")]
-    NotHomed,
-    /// Positions do not come, touches would be lost.
-    #[error("no positions come from the sampler")]
-    NoPositions,
-    /// The interpreter runs something that was not started here.
-    #[error("the controller is running something else")]
-    ControllerBusy,
-    /// There is nothing in it.
-    #[error("the program is empty")]
-    Empty,
-    /// Its coordinates are the machine's, and it would shift them.
-    #[error(
-        "line {line}: {word} shifts coordinates, and those of a program with (frame: machine) are the machine's: take one of both out"
-    )]
-    ShiftsFrame {
-        /// Line of the word.
-        line: u32,
-        /// The word.
-        word: ShiftingWord,
-    },
-}
-
-impl Refusal {
-    /// The ending of a program that is not begun.
-    #[must_use]
-    pub fn ending(self) -> Ending {
-        Ending {
-            outcome: Outcome::Refused,
-            message: self.to_string(),
-            line: 0,
-        }
-    }
 }

@@ -2,9 +2,9 @@
 
 use std::convert::Infallible;
 
-use metrology::Stage;
 use metrology::sample::{AxisCompensation, AxisState, ProbeTrigger};
 use metrology::stamp::{Host, Machine, Span, Stamp};
+use metrology::{Author, Stage};
 
 use crate::clock::SampleClock;
 use crate::condition::{Condition, Lost};
@@ -215,6 +215,25 @@ impl BridgeStage {
         self
     }
 
+    /// The offsets that come next are of this publisher, whether they can be read or not.
+    pub fn hears(&mut self, at: Stamp<Host>, author: Author) {
+        self.offsets.hears(at, author);
+    }
+
+    /// Stops a program that touches while two publishers of offsets speak.
+    fn watch_authors(&mut self) {
+        let Some((one, other)) = self.offsets.contested() else {
+            return;
+        };
+        let is_probing = self.motion_type == PROBING;
+        if let Some(run) = &mut self.run
+            && (is_probing || run.program.touches())
+        {
+            let why = Condition::CompensationContested { one, other };
+            run.stop(why.to_string(), &mut self.session.client);
+        }
+    }
+
     fn act(&mut self, active: bool, out: &mut Vec<Output>) {
         self.active = active;
         self.resting = !active;
@@ -234,6 +253,13 @@ impl BridgeStage {
             Some(Refusal::Empty)
         } else if let Some((line, word)) = ProgramText::new(program).breaks_frame() {
             Some(Refusal::ShiftsFrame { line, word })
+        } else if let Some((line, bytes)) = ProgramText::new(program).long_name() {
+            Some(Refusal::LongName(line, bytes))
+        } else if let (Some((one, other)), true) = (
+            self.offsets.contested(),
+            ProgramText::new(program).touches(),
+        ) {
+            Some(Refusal::TwoPublishers(one, other))
         } else if !self.session.is_up() {
             Some(Refusal::NotConnected)
         } else if state.estop != Some(false) {
@@ -429,6 +455,7 @@ impl BridgeStage {
         let reached = matches!(self.sampling, Sampling::Flowing { .. });
         let lines = self.offsets.tick(at, homed, reached, &mut self.conditions);
         out.extend(lines.map(|lines| Output::Io(IoCommand::Hal(lines))));
+        self.watch_authors();
         self.tell_news(out);
     }
 

@@ -2,6 +2,7 @@
 
 use machine_report::ValueCondition;
 use machine_report::account::Account;
+use machine_report::mapping::name_of;
 use metrology::Severity;
 use metrology::number::number;
 
@@ -92,6 +93,24 @@ pub enum Condition {
     /// All of the mapping is there.
     #[error("the server has all of the mapping")]
     Offered,
+    /// The server shows a number in another unit than the mapping.
+    #[error(
+        "{key}: the mapping has {mapped}, the server's EngineeringUnits {offered}: published as the mapping says; correct the mapping or the server"
+    )]
+    UnitDiffers {
+        /// Key of the mapping.
+        key: String,
+        /// The mapping's unit.
+        mapped: &'static str,
+        /// The server's unit.
+        offered: String,
+    },
+    /// It does not any more.
+    #[error("{key}: the server's EngineeringUnits are the mapping's unit")]
+    UnitAgrees {
+        /// Key of the mapping.
+        key: String,
+    },
     /// The server looks less often, or keeps less, than it was asked to.
     #[error(
         "asked to look every {asked_ms} ms and to keep {asked_queue} changes, the server looks every {given_ms} ms at some nodes and keeps {given_queue}",
@@ -161,6 +180,9 @@ impl Condition {
         let plain = match self {
             Self::Value(condition) => return condition.name(),
             Self::Quality { name, .. } => return format!("quality/{name}"),
+            Self::UnitDiffers { key, .. } | Self::UnitAgrees { key } => {
+                return format!("unit/{}", name_of(key));
+            }
             Self::Connected { .. }
             | Self::Disconnected { .. }
             | Self::Broken { .. }
@@ -184,9 +206,11 @@ impl Condition {
             Self::Value(condition) => condition.severity(),
             Self::Account { account } if account.is_whole() => Severity::Info,
             Self::Quality { status, .. } if status.quality() == Quality::Good => Severity::Info,
-            Self::Connected { .. } | Self::Resumed { .. } | Self::Offered | Self::AsAsked => {
-                Severity::Info
-            }
+            Self::Connected { .. }
+            | Self::Resumed { .. }
+            | Self::Offered
+            | Self::UnitAgrees { .. }
+            | Self::AsAsked => Severity::Info,
             Self::Disconnected { .. }
             | Self::Broken { .. }
             | Self::Refused { .. }

@@ -16,6 +16,7 @@
 
 pub mod condition;
 pub mod config;
+pub mod engineering_unit;
 pub mod error;
 pub mod io;
 pub mod live;

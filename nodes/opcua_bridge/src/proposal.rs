@@ -46,7 +46,7 @@ pub struct Proposal {
 const LISTED: usize = 500;
 
 /// Units as servers show them, with ours.
-const UNITS: [(&str, Unit); 14] = [
+pub(crate) const UNITS: [(&str, Unit); 14] = [
     ("mm", Unit::Millimeter),
     ("in", Unit::Inch),
     ("°", Unit::Degree),

@@ -1,5 +1,6 @@
 //! The bridge without its sockets.
 
+use std::collections::BTreeSet;
 use std::convert::Infallible;
 
 use machine_report::Report;
@@ -10,6 +11,7 @@ use metrology::stamp::{Host, Span, Stamp};
 
 use crate::condition::Condition;
 use crate::config::Settings;
+use crate::engineering_unit::ShownUnit;
 use crate::value::Change;
 
 mod taking;
@@ -38,6 +40,8 @@ pub enum IoEvent {
         user: String,
         /// Nodes that the server has not, or does not give: item and reason.
         missing: Vec<(usize, String)>,
+        /// Units that the server shows, by item.
+        units: Vec<(usize, ShownUnit)>,
         /// Longest sampling interval that was granted, ms; `None`: no node is subscribed to.
         given_ms: Option<f64>,
         /// Shortest queue that was granted.
@@ -143,6 +147,8 @@ pub struct BridgeStage {
     taking: Taking,
     stopping: bool,
     greeted: bool,
+    /// Items that the server showed in another unit than the mapping.
+    other_units: BTreeSet<usize>,
 }
 
 impl BridgeStage {
@@ -156,6 +162,7 @@ impl BridgeStage {
             taking: Taking::new(Values::new(settings.mapping.clone()), keys.collect()),
             stopping: false,
             greeted: false,
+            other_units: BTreeSet::new(),
             settings: settings.clone(),
         }
     }
@@ -206,6 +213,7 @@ impl BridgeStage {
                 security,
                 user,
                 missing,
+                units,
                 given_ms,
                 given_queue,
             } => {
@@ -218,6 +226,7 @@ impl BridgeStage {
                 };
                 out.push(connected.into());
                 self.offered(&missing, out);
+                self.compare_units(&units, out);
                 self.granted(given_ms, given_queue, out);
             }
             IoEvent::Changed(changes) => self.taking.take_all(changes, at, out),
@@ -270,6 +279,31 @@ impl BridgeStage {
             keys.push_str(&format!(" and {} more", missing.len() - NODES_NAMED));
         }
         out.push(Condition::NotOffered { keys }.into());
+    }
+
+    /// Says which numbers the server shows in another unit than the mapping, and which no more.
+    fn compare_units(&mut self, units: &[(usize, ShownUnit)], out: &mut Vec<Output>) {
+        for (at, item) in self.settings.items.iter().enumerate() {
+            let Some(mapped) = self.settings.mapping.unit(&item.key) else {
+                continue;
+            };
+            let shown = units.iter().find(|(of, _)| *of == at).map(|(_, unit)| unit);
+            let other = shown.filter(|shown| shown.is(mapped) == Some(false));
+            let differed = self.other_units.remove(&at);
+            let key = item.key.clone();
+            if let Some(other) = other {
+                self.other_units.insert(at);
+                let (mapped, offered) = (mapped.word(), other.shown());
+                let differs = Condition::UnitDiffers {
+                    key,
+                    mapped,
+                    offered,
+                };
+                out.push(differs.into());
+            } else if differed {
+                out.push(Condition::UnitAgrees { key }.into());
+            }
+        }
     }
 
     /// Says whether the server looks as often, and keeps as much, as it was asked to.

@@ -32,6 +32,8 @@ pub enum Reason {
     Repeated,
     /// A reading further from its nominal place than any machine is.
     Beyond,
+    /// Axis states of other axes than the machine file's, or far outside its travel.
+    OtherMachine,
     /// Of a run without an end.
     NoEnd,
     /// Of a run without a begin.
@@ -70,6 +72,7 @@ impl Reason {
             Self::OtherTime => "of another time than the messages beside it",
             Self::Repeated => "repeated",
             Self::Beyond => "too far from its nominal place",
+            Self::OtherMachine => "not of the machine of the machine file",
             Self::NoEnd => "of a run without an end",
             Self::NoBegin => "of a run without a begin",
             Self::NoPlace => "of a run without places of the axes",

@@ -10,7 +10,7 @@ use machine::MachineFile;
 use machine::file::AxisEntry;
 use metrology::text::{self, Comments};
 use recorder::{Bag, MACHINE_FILE, Order};
-use replayer::{Reading, Taken, reading};
+use replayer::{Reading, Reason, Taken, reading};
 use reports::loss;
 use sha2::{Digest, Sha256};
 use twin::Session;
@@ -182,7 +182,13 @@ fn messages(bag: &Bag, builder: &mut SessionBuilder) -> Reading {
     reading::read(bag, Order::LogTime, &wanted, |mut taken| {
         let of_topic = WANTED.iter().find(|(name, _)| taken.is_named(name));
         let input = of_topic.and_then(|(_, input)| input(&mut taken));
-        input.into_iter().for_each(|input| builder.take(input));
+        let Some(input) = input else { return };
+        if let Input::State(state) = &input
+            && let Some(why) = builder.why_not_of_machine(state)
+        {
+            taken.leave_out(Reason::OtherMachine, || why.to_string());
+        }
+        builder.take(input);
     })
 }
 

@@ -317,6 +317,14 @@ impl Hardware for IdealMachine {
         self.length_zero = (self.length_zero.0 + 1, self.position.xyz());
     }
 
+    fn has_grid(&self) -> bool {
+        matches!(self.mounted, Some(Device::Plate { .. }))
+    }
+
+    fn has_length(&self) -> bool {
+        matches!(self.mounted, Some(Device::Beam { .. }))
+    }
+
     fn grid_reading(&mut self) -> Option<GridReading> {
         let Some(Device::Plate {
             plane,

@@ -44,6 +44,7 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
     let wiring = Wiring::new(setup.name(), parameters, Witnessed { cnc, witness })
         .every(period, || Input::Tick)
         .on(&topics::COMPENSATION, Input::Compensation)
+        .authors_of(&topics::COMPENSATION, Witnessed::hears)
         .publish_in(
             &topics::AXES_STATE,
             setup.frame(""),

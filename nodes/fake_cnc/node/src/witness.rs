@@ -1,7 +1,7 @@
 //! A scenario's look at the plant's truth; it reaches no topic and no node.
 
 use fake_cnc::{Cnc, CncError, Input, Output};
-use metrology::{Host, Stage, Stamp};
+use metrology::{Author, Host, Stage, Stamp};
 
 /// Called after every step in which time passed.
 pub type Witness = Box<dyn FnMut(Stamp<Host>, &Cnc) + Send>;
@@ -10,6 +10,13 @@ pub type Witness = Box<dyn FnMut(Stamp<Host>, &Cnc) + Send>;
 pub(crate) struct Witnessed {
     pub cnc: Cnc,
     pub witness: Option<Witness>,
+}
+
+impl Witnessed {
+    /// The offsets that come next are of this publisher.
+    pub fn hears(&mut self, at: Stamp<Host>, author: Author) {
+        self.cnc.hears(at, author);
+    }
 }
 
 impl Stage for Witnessed {

@@ -4,6 +4,7 @@ use metrology::PerAxis;
 
 use super::waiting::Then;
 use super::{Control, Event, Run};
+use crate::diagnostic::Diagnostic;
 use crate::hardware::Hardware;
 use crate::lookahead::Command;
 use crate::outcome::{Ending, ProgramState};
@@ -237,10 +238,12 @@ impl<H: Hardware> Control<H> {
             }
             Action::ZeroGrid => {
                 self.hardware.zero_grid();
+                self.note_zero("grid", self.hardware.has_grid(), events);
                 return false;
             }
             Action::ZeroLength => {
                 self.hardware.zero_length();
+                self.note_zero("length", self.hardware.has_length(), events);
                 return false;
             }
             Action::Set(_) => {
@@ -250,6 +253,18 @@ impl<H: Hardware> Control<H> {
             }
         }
         true
+    }
+
+    /// Says once that nothing is mounted whose count could be set to zero, and once that something is.
+    fn note_zero(&mut self, what: &'static str, is_mounted: bool, events: &mut Vec<Event>) {
+        if std::mem::replace(&mut self.zeroed_nothing, !is_mounted) == is_mounted {
+            let line = self.progress().0;
+            events.push(Event::Noted(if is_mounted {
+                Diagnostic::CountZeroed
+            } else {
+                Diagnostic::NothingToZero { line, what }
+            }));
+        }
     }
 
     fn mount(&mut self, device: usize) {

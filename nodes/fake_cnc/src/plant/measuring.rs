@@ -39,6 +39,16 @@ impl Plant {
         }
     }
 
+    /// Whether a grid plate is mounted.
+    pub fn has_grid(&self) -> bool {
+        self.plate.as_ref().is_some_and(|plate| plate.is_mounted())
+    }
+
+    /// Whether a beam of the length reference is mounted.
+    pub fn has_length(&self) -> bool {
+        self.laser.as_ref().is_some_and(|laser| laser.is_mounted())
+    }
+
     /// Reads the grid encoder; `None` where it is not mounted or has no count.
     pub fn grid_reading(&mut self) -> Option<GridReading> {
         if !self.plate.as_ref()?.is_mounted() {

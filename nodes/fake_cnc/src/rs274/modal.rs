@@ -1,5 +1,6 @@
 //! Reads a program block by block: what each changes, does, and what it may not.
 
+use metrology::bound::NAME_BYTES;
 use metrology::{AxisSet, PerAxis};
 
 use super::block::{Block, Mode, NonModal, Said, Stop};
@@ -182,7 +183,11 @@ impl Reader<'_> {
         let Some((key, value)) = comment.text.split_once(':') else {
             return Ok(());
         };
+        let bytes = value.trim().len();
+        let too_long = |what| ProgramError::NameTooLong { at, what, bytes };
         match (key.trim(), value.trim()) {
+            ("feature", _) if bytes > NAME_BYTES => return Err(too_long("feature")),
+            ("mount", _) if bytes > NAME_BYTES => return Err(too_long("mount")),
             ("feature", "") => return refuse("feature", "followed by a name"),
             ("feature", name) => {
                 self.feature = self.program.features.len();

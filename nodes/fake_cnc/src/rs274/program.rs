@@ -208,6 +208,14 @@ pub struct Program {
 }
 
 impl Program {
+    /// Line of the first touch.
+    #[must_use]
+    pub fn first_touch(&self) -> Option<u32> {
+        let mut steps = self.steps.iter();
+        let touch = steps.find(|step| matches!(step.action, Action::Touch(..)))?;
+        Some(touch.line)
+    }
+
     /// Most motions that follow each other without a stop in between.
     #[must_use]
     pub fn longest_chain(&self) -> usize {

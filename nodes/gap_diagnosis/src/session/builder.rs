@@ -47,8 +47,8 @@ pub enum Input {
 /// How far beyond the travel of the machine file a command may go, share of the travel.
 const BEYOND_TRAVEL: f64 = 0.01;
 
-/// Of so many axis states one may be of another machine; where more are, the recording is another machine's.
-const STATES_PER_STRANGER: usize = 100;
+/// Where one of so many axis states, or more, is of another machine, the recording is another machine's.
+const STATES_PER_STRANGER: usize = 2;
 
 /// Most runs that have ended and are not closed yet.
 const MOST_ENDED: usize = 4;
@@ -215,7 +215,7 @@ impl SessionBuilder {
         self.end_bag();
         let strangers = self.account.count(Reason::OtherMachine);
         if let Some(error) = self.other_machine.take()
-            && strangers.saturating_mul(STATES_PER_STRANGER) > self.states
+            && strangers.saturating_mul(STATES_PER_STRANGER) >= self.states
         {
             return Err(error);
         }
@@ -306,6 +306,12 @@ impl SessionBuilder {
         self.account.note(Reason::OtherMachine);
         self.other_machine.get_or_insert(error);
         true
+    }
+
+    /// Why an axis state is not of this machine; [`Self::take`] leaves it out.
+    #[must_use]
+    pub fn why_not_of_machine(&self, state: &AxisState) -> Option<SessionError> {
+        other_machine(&self.machine, self.axes, state)
     }
 
     /// Why the first axis state was refused that is of another machine.
@@ -469,6 +475,8 @@ impl SessionBuilder {
     }
 }
 
+/// Why an axis state with these axes cannot be of the machine whose file this is: it has other axes, or
+/// [`outside_travel`].
 fn other_machine(machine: &MachineFile, axes: AxisSet, state: &AxisState) -> Option<SessionError> {
     if state.axes != axes {
         let letters = |set: AxisSet| set.iter().map(Axis::letter).collect::<String>();
@@ -477,7 +485,14 @@ fn other_machine(machine: &MachineFile, axes: AxisSet, state: &AxisState) -> Opt
             wanted: letters(axes),
         });
     }
-    axes.iter().find_map(|axis| {
+    outside_travel(machine, state)
+}
+
+/// Why an axis state is of no use to the machine whose file this is: an axis that both have was commanded further beyond
+/// its travel than 1 % of it. The one rule of every verb that reads axis states.
+#[must_use]
+pub fn outside_travel(machine: &MachineFile, state: &AxisState) -> Option<SessionError> {
+    state.axes.iter().find_map(|axis| {
         let ([low, high], position, unit) = match machine.axes.get(&axis)? {
             AxisEntry::Linear(entry) => (entry.travel_mm, state.commanded[axis], "mm"),
             AxisEntry::Rotary(entry) => {
@@ -493,4 +508,45 @@ fn other_machine(machine: &MachineFile, axes: AxisSet, state: &AxisState) -> Opt
             high,
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use metrology::PerAxis;
+
+    use super::*;
+
+    const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
+
+    #[test]
+    fn a_state_far_outside_the_travel_is_known_by_one_rule() {
+        let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
+        let AxisEntry::Linear(entry) = &machine.axes[&Axis::X] else {
+            panic!("X is a linear axis");
+        };
+        let [low, high] = entry.travel_mm;
+        let slack = 0.01 * (high - low);
+        for (x_mm, is_outside) in [
+            (low, false),
+            (high + 0.99 * slack, false),
+            (high + 1.01 * slack, true),
+            (low - 1.01 * slack, true),
+            (1e5, true),
+            (-1e300, true),
+        ] {
+            let mut place = PerAxis::default();
+            place[Axis::X] = x_mm;
+            let state = AxisState {
+                received_at: Stamp::from_nanos(1_000_000_000),
+                controller_at: Stamp::from_nanos(1_000_000_000),
+                axes: AxisSet::XYZ,
+                commanded: place,
+                motor: place,
+                scale: place,
+                velocity: PerAxis::default(),
+            };
+            let found = outside_travel(&machine, &state);
+            assert_eq!(found.is_some(), is_outside, "{x_mm}");
+        }
+    }
 }

@@ -16,6 +16,9 @@ use std::fmt::Write as _;
 
 use crate::number::{number, quantity, unit_of};
 
+/// Bytes of a name in a message: of a feature, a sensor, a stylus, a host.
+pub const NAME_BYTES: usize = 255;
+
 /// Touches of one run: what a sequencer lets a cycle make, and what those who evaluate it hold. A program of so many stays
 /// below the 1,000,000 lines that a control takes.
 pub const TOUCHES_OF_RUN: usize = 100_000;

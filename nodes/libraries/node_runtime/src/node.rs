@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use abbe_msgs::service_msgs::msg::ServiceEventInfo;
 use abbe_msgs::{Defect, Description, Qos, Service, ServiceEvent, WireError, from_cdr, to_cdr};
+use metrology::Author;
 use metrology::stamp::{Host, Span, Stamp};
 
 use crate::diagnostic::Diagnostic;
@@ -328,6 +329,10 @@ pub trait Node: Send {
     /// So many publishers of a subscription's topic are on the graph, looked at once a second. The harness, where
     /// everybody is known, never says it.
     fn sees_publishers(&mut self, _subscription: usize, _publishers: usize) {}
+
+    /// A message of a subscription comes from this publisher, whether it can be read or not; told before the message. The
+    /// harness, where each topic has one publisher, never says it.
+    fn hears_from(&mut self, _at: Stamp<Host>, _subscription: usize, _author: Author) {}
 
     /// Copies everything that what it will say depends on; `None`: it cannot, or not now.
     fn save(&self) -> Option<Saved> {

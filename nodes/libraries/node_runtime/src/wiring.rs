@@ -20,8 +20,8 @@ use std::sync::Arc;
 
 use abbe_msgs::topics::{ServiceName, Topic, TopicFamily};
 use abbe_msgs::{Message, Qos, Service, Wire, WireError, from_cdr, to_cdr};
-use metrology::Stage;
 use metrology::stamp::{Host, Span, Stamp};
+use metrology::{Author, Stage};
 
 use crate::diagnostic::Diagnostic;
 use crate::node::{
@@ -31,6 +31,7 @@ use crate::node::{
 use crate::parameter::Parameter;
 
 mod action;
+mod heard;
 mod managed;
 mod outgoing;
 mod snapshot;
@@ -76,6 +77,7 @@ pub struct Wiring<S: Stage> {
     own_time: bool,
     live: Option<Told<S>>,
     publishers: Vec<(String, Counted<S>)>,
+    authors: Vec<(String, heard::Heard<S>)>,
     snapshots: Option<snapshot::Snapshots<S>>,
     outputs: Vec<S::Output>,
 }
@@ -136,6 +138,7 @@ where
             own_time: false,
             live: None,
             publishers: Vec::new(),
+            authors: Vec::new(),
             snapshots: None,
             outputs: Vec::new(),
         }
@@ -541,6 +544,10 @@ where
                 told(&mut self.stage, publishers);
             }
         }
+    }
+
+    fn hears_from(&mut self, at: Stamp<Host>, subscription: usize, author: Author) {
+        self.hear_from(at, subscription, author);
     }
 
     fn save(&self) -> Option<Saved> {

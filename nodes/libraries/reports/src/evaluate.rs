@@ -3,13 +3,14 @@
 //! A bag is read once, in the order of time; what is kept is no more than the readings of its tests.
 
 use abbe_msgs::topics;
+use gap_diagnosis::session::outside_travel;
 use machine::MachineFile;
 use metrology::sample::{
-    AxisCompensation, BlockMeasurement, GeometryModel, PositioningTable, ProbedFeature,
+    AxisCompensation, AxisState, BlockMeasurement, GeometryModel, PositioningTable, ProbedFeature,
     ProbedPoint, TestSegment,
 };
 use recorder::{Bag, Loss, LossReason, Order};
-use replayer::{Reading, Taken, reading};
+use replayer::{Reading, Reason, Taken, reading};
 
 pub mod angular;
 mod belonging;
@@ -130,6 +131,7 @@ impl Tests {
             stationwise: Stationwise::new(machine.as_ref()),
             ..Collected::default()
         };
+        collected.tests.machine = machine;
         let reading = reading::read(bag, Order::LogTime, &WANTED, |mut taken| {
             collected.message(&mut taken);
         });
@@ -145,7 +147,6 @@ impl Tests {
         tests.drift = collected.drifts.drift();
         tests.drift.temperatures_left_out = temperatures_left_out(&tests.reading);
         tests.stops = collected.stops.stops();
-        tests.machine = machine;
         tests.left_out = left_out.unwrap_or_default();
         tests
     }
@@ -181,7 +182,7 @@ impl Collected {
         self.tests.conditions.message(taken);
         if taken.is(&topics::AXES_STATE) {
             let is_needed = is_under_way || self.stationwise.listens();
-            let state = is_needed.then(|| taken.of(&topics::AXES_STATE)).flatten();
+            let state = is_needed.then(|| self.state(taken)).flatten();
             if let Some(state) = state {
                 self.belonging.axes(&state, taken);
                 self.circles.axes(&state);
@@ -224,6 +225,17 @@ impl Collected {
         } else {
             self.result(taken);
         }
+    }
+
+    /// An axis state; one that the machine of the machine file cannot be in is left out and counted.
+    fn state(&self, taken: &mut Taken<'_>) -> Option<AxisState> {
+        let state = taken.of(&topics::AXES_STATE)?;
+        let machine = self.tests.machine.as_ref();
+        let Some(why) = machine.and_then(|machine| outside_travel(machine, &state)) else {
+            return Some(state);
+        };
+        taken.leave_out(Reason::OtherMachine, || why.to_string());
+        None
     }
 
     fn test(&mut self, segment: TestSegment) {

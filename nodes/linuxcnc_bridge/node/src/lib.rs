@@ -43,6 +43,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         .every(TICK, || LiveInput::Tick)
         .on(&topics::COMPENSATION, LiveInput::Compensation)
         .publishers_of(&topics::COMPENSATION, LiveBridge::sees_publishers)
+        .authors_of(&topics::COMPENSATION, LiveBridge::hears)
         .publish_in(
             &topics::AXES_STATE,
             setup.frame(""),

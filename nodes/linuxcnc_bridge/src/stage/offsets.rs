@@ -2,7 +2,7 @@
 
 use metrology::sample::AxisCompensation;
 use metrology::stamp::{Host, Span, Stamp};
-use metrology::{GateNews, HomedGate};
+use metrology::{Author, AuthorNews, GateNews, HomedGate, SoleAuthor};
 
 use crate::compensation::{CompensationPath, CompensationRefused, Freshness};
 use crate::condition::Condition;
@@ -18,6 +18,7 @@ const FADED_AFTER: Span = Span::from_nanos(10_000_000_000);
 pub(super) struct Offsets {
     path: CompensationPath,
     gate: HomedGate,
+    authors: SoleAuthor,
     stale_after: Span,
     freshness: Option<Freshness>,
     /// When the last set was refused, until it is over.
@@ -35,6 +36,7 @@ impl Offsets {
         Self {
             path: CompensationPath::new(settings),
             gate: HomedGate::default(),
+            authors: SoleAuthor::default(),
             stale_after: settings.compensation_stale_after,
             freshness: None,
             refused_at: None,
@@ -58,12 +60,25 @@ impl Offsets {
         self.shut = None;
     }
 
+    /// The offsets that come next are of this publisher, whether they can be read or not.
+    pub(super) fn hears(&mut self, at: Stamp<Host>, author: Author) {
+        self.authors.hear(at, author);
+    }
+
+    /// Two publishers that speak: nobody is followed.
+    pub(super) fn contested(&self) -> Option<(Author, Author)> {
+        self.authors.contested()
+    }
+
     pub(super) fn receive(
         &mut self,
         at: Stamp<Host>,
         compensation: &AxisCompensation,
     ) -> Result<(), CompensationRefused> {
         self.has_come = true;
+        if !self.authors.follows_last() {
+            return Ok(());
+        }
         let taken = self.path.receive(at, compensation);
         if taken.is_err() {
             self.refused_at = Some(at);
@@ -90,7 +105,9 @@ impl Offsets {
         conditions: &mut Vec<Condition>,
     ) -> Option<String> {
         let was_open = self.gate.is_open();
-        let freshness = self.path.freshness(at);
+        self.watch_authors(at, conditions);
+        let is_contested = self.contested().is_some();
+        let freshness = self.path.freshness(at).filter(|_| !is_contested);
         let news = self
             .gate
             .step(every_axis_homed, freshness == Some(Freshness::Fresh));
@@ -105,6 +122,23 @@ impl Offsets {
             return None;
         }
         self.path.due(at, self.gate.is_open())
+    }
+
+    /// While two publishers speak HAL is given zero, towards which it fades what it has; the next offsets are of one alone.
+    fn watch_authors(&mut self, at: Stamp<Host>, conditions: &mut Vec<Condition>) {
+        match self.authors.tick(at) {
+            Some(AuthorNews::Contested(one, other)) => {
+                conditions.push(Condition::CompensationContested { one, other });
+            }
+            Some(AuthorNews::Alone) => {
+                self.path.release();
+                conditions.push(Condition::CompensationUncontested);
+            }
+            None => {}
+        }
+        if self.contested().is_some() {
+            self.path.want_zero(at);
+        }
     }
 
     fn watch_homing(&mut self, at: Stamp<Host>, was_open: bool, conditions: &mut Vec<Condition>) {

@@ -2,12 +2,14 @@
 
 use opcua::client::Session;
 use opcua::types::{
-    BrowseDescription, BrowseDirection, Error, NodeClass, NodeId, ObjectId, ReadValueId,
-    ReferenceDescription, ReferenceTypeId, StatusCode, TimestampsToReturn, VariableId, Variant,
+    BrowseDescription, BrowseDirection, EUInformation, Error, NodeClass, NodeId, ObjectId,
+    ReadValueId, ReferenceDescription, ReferenceTypeId, StatusCode, TimestampsToReturn, VariableId,
+    Variant,
 };
 
 use super::convert::node_id;
 use crate::config::Item;
+use crate::engineering_unit::ShownUnit;
 use crate::node_key::{NodeKey, Step};
 
 /// Namespaces of a server at most.
@@ -143,4 +145,60 @@ pub(super) async fn children(
     }
     all.truncate(REFERENCES);
     Ok(all)
+}
+
+/// Nodes in one request for units at most.
+const UNITS_CHUNK: usize = 100;
+
+/// The `EngineeringUnits` of nodes that have any.
+pub(super) async fn units(
+    session: &Session,
+    nodes: &[(usize, NodeId)],
+) -> Result<Vec<(usize, ShownUnit)>, Error> {
+    let mut units = Vec::new();
+    for chunk in nodes.chunks(UNITS_CHUNK) {
+        let asked: Vec<_> = chunk.iter().map(|(_, node)| properties_of(node)).collect();
+        let found = session.browse(&asked, 100, None).await?;
+        let mut holders = Vec::new();
+        for ((item, _), result) in chunk.iter().zip(found) {
+            let of_unit = |property: &ReferenceDescription| {
+                let name: &str = property.browse_name.name.as_ref();
+                name == "EngineeringUnits"
+            };
+            let mut properties = result.references.into_iter().flatten();
+            if let Some(property) = properties.find(of_unit) {
+                holders.push((*item, property.node_id.node_id));
+            }
+        }
+        let asked: Vec<ReadValueId> = holders
+            .iter()
+            .map(|(_, node)| ReadValueId::from(node.clone()))
+            .collect();
+        if asked.is_empty() {
+            continue;
+        }
+        let read = session.read(&asked, TimestampsToReturn::Neither, 0.0);
+        for ((item, _), value) in holders.iter().zip(read.await?) {
+            let Some(Variant::ExtensionObject(object)) = value.value else {
+                continue;
+            };
+            if let Some(unit) = object.inner_as::<EUInformation>() {
+                let text = unit.display_name.text.as_ref().to_owned();
+                let code = unit.unit_id;
+                units.push((*item, ShownUnit { text, code }));
+            }
+        }
+    }
+    Ok(units)
+}
+
+fn properties_of(node: &NodeId) -> BrowseDescription {
+    BrowseDescription {
+        node_id: node.clone(),
+        browse_direction: BrowseDirection::Forward,
+        reference_type_id: ReferenceTypeId::HasProperty.into(),
+        include_subtypes: true,
+        node_class_mask: NodeClass::Variable as u32,
+        result_mask: 0x3F,
+    }
 }

@@ -30,6 +30,7 @@ use super::convert::{change, words};
 use super::sequence::{Place, Sequence};
 use super::{Credentials, endpoint, nodes};
 use crate::config::Settings;
+use crate::engineering_unit::ShownUnit;
 use crate::stage::IoEvent;
 use crate::value::Change;
 
@@ -221,10 +222,12 @@ impl<'a> Visit<'a> {
         let mut missing = found.missing;
         let granted = visit.monitor(found.nodes, &mut missing).await?;
         missing.sort();
+        let units = visit.units().await;
         let up = IoEvent::Up {
             security,
             user,
             missing,
+            units,
             given_ms: granted.map(|(ms, _)| ms),
             given_queue: granted.map_or(0, |(_, queue)| queue),
         };
@@ -269,6 +272,20 @@ impl<'a> Visit<'a> {
             }
         }
         Ok(granted)
+    }
+
+    /// What the server says of the units of the numbers; one that does not let itself be asked says nothing.
+    async fn units(&self) -> Vec<(usize, ShownUnit)> {
+        let mapping = &self.settings.mapping;
+        let has_unit = |item: usize| {
+            let item = self.settings.items.get(item);
+            item.is_some_and(|item| mapping.unit(&item.key).is_some())
+        };
+        let numbers = self.nodes.iter().filter(|(item, _)| has_unit(*item));
+        let numbers: Vec<_> = numbers.cloned().collect();
+        nodes::units(&self.session, &numbers)
+            .await
+            .unwrap_or_default()
     }
 
     fn request(&self, item: usize, node: &NodeId) -> MonitoredItemCreateRequest {

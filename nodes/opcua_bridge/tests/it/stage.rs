@@ -6,6 +6,7 @@ use metrology::Stage;
 use metrology::sample::Verdict;
 use metrology::stamp::{Host, Machine, Span, Stamp};
 use opcua_bridge::config::{ConnectionConfig, Mode, SecurityConfig, SubscriptionConfig};
+use opcua_bridge::engineering_unit::ShownUnit;
 use opcua_bridge::stage::{IoCommand, IoEvent};
 use opcua_bridge::status::Status;
 use opcua_bridge::value::{Change, Payload};
@@ -99,6 +100,7 @@ fn up() -> IoEvent {
         security: "None None".to_owned(),
         user: "anonymous".to_owned(),
         missing: Vec::new(),
+        units: Vec::new(),
         given_ms: Some(100.0),
         given_queue: 100,
     }
@@ -418,6 +420,7 @@ fn nodes_that_are_not_there_and_a_slower_server_are_named() {
         security: "Basic256Sha256 SignAndEncrypt".to_owned(),
         user: "operator".to_owned(),
         missing: vec![(1, "no namespace urn:m".to_owned())],
+        units: Vec::new(),
         given_ms: Some(1000.0),
         given_queue: 1,
     }));
@@ -520,4 +523,36 @@ proptest! {
         prop_assert!(said.contains(&Output::Stopped));
         prop_assert!(bridge.step(Input::Tick).is_empty());
     }
+}
+
+#[test]
+fn a_server_that_shows_another_unit_than_the_mapping_is_named_until_it_agrees() {
+    let mut bridge = Bridge::up();
+    let mut again = |shown: &[(usize, &str, i32)]| {
+        let reason = String::new();
+        bridge.io(IoEvent::Ended { reason });
+        bridge.now_s += 31.0;
+        bridge.step(Input::Tick);
+        let mut event = up();
+        if let IoEvent::Up { units, .. } = &mut event {
+            units.extend(shown.iter().map(|(item, text, code)| {
+                let (text, code) = ((*text).to_owned(), *code);
+                (*item, ShownUnit { text, code })
+            }));
+        }
+        let mut said = conditions(&bridge.io(event));
+        said.retain(|line| line.starts_with("unit/"));
+        said
+    };
+    assert!(again(&[(SPINDLE, "°C", 4_408_652), (PATH, "mm", -1)]).is_empty());
+    let said = again(&[(SPINDLE, "°F", 4_604_232), (PATH, "inch", 0)]);
+    assert_eq!(said.len(), 2, "{said:?}");
+    assert!(
+        said[1].ends_with("nsu=urn:m;s=T: the mapping has CELSIUS, the server's EngineeringUnits \"°F\": published as the mapping says; correct the mapping or the server"),
+        "{said:?}"
+    );
+    assert_eq!(again(&[(PATH, "µm", 0), (EXECUTION, "mm", 0)]).len(), 2);
+    let said = again(&[]);
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(said[0].ends_with("are the mapping's unit"), "{said:?}");
 }

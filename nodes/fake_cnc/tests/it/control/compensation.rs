@@ -65,3 +65,97 @@ fn a_compensation_that_is_not_a_number_is_refused_and_told() {
     };
     assert!(value.is_nan());
 }
+
+const AUTHORS: [metrology::Author; 2] = [metrology::Author([1; 16]), metrology::Author([2; 16])];
+
+/// Offsets of each author, at most `seconds_s` long.
+fn two_publish(shop: &mut Shop<Bench>, seconds_s: u32, wanted_mm: [Option<f64>; 2]) {
+    for _ in 0..seconds_s * 50 {
+        for (author, wanted_mm) in AUTHORS.iter().zip(wanted_mm) {
+            if let Some(wanted_mm) = wanted_mm {
+                shop.cnc.hears(shop.now, *author);
+                shop.tell(offsets(wanted_mm));
+            }
+        }
+        shop.pass_ms(20);
+    }
+}
+
+fn publishers(shop: &Shop<Bench>) -> Vec<String> {
+    let of_them = { shop.diagnostics().into_iter() }
+        .filter(|diagnostic| diagnostic.name() == "compensation_publishers");
+    of_them.map(|diagnostic| diagnostic.to_string()).collect()
+}
+
+#[test]
+fn offsets_of_two_publishers_fade_and_one_alone_is_followed_again() {
+    for other_mm in [0.03, -0.03, 0.0, 0.49, f64::NAN] {
+        let mut shop = shop(Bench::open());
+        two_publish(&mut shop, 1, [Some(0.02), None]);
+        assert!((shop.cnc.offset()[Axis::X] - 0.02).abs() < 1e-12);
+        let before = shop.states().len();
+        two_publish(&mut shop, 6, [Some(0.02), Some(other_mm)]);
+        assert!(shop.cnc.offset()[Axis::X].abs() <= 0.0, "{other_mm}");
+        // Towards zero alone, whatever the other one wants.
+        let motor = |state: &AxisState| state.motor[Axis::X];
+        let states = shop.states();
+        let after = || states[before..].iter().map(motor);
+        assert!(after().all(|x| (-1e-4..0.0202).contains(&x)), "{other_mm}");
+        let told = publishers(&shop);
+        let [told] = &told[..] else {
+            panic!("{told:?}")
+        };
+        for author in AUTHORS {
+            assert!(told.contains(&author.to_string()), "{told}");
+        }
+        two_publish(&mut shop, 3, [Some(0.02), None]);
+        assert!((shop.cnc.offset()[Axis::X] - 0.02).abs() < 1e-12);
+        assert_eq!(publishers(&shop).len(), 2);
+    }
+}
+
+#[test]
+fn who_takes_over_is_followed_without_a_condition() {
+    for silent_ms in [0, 300, 900] {
+        let mut shop = shop(Bench::open());
+        two_publish(&mut shop, 1, [Some(0.02), None]);
+        shop.pass_ms(silent_ms);
+        two_publish(&mut shop, 2, [None, Some(0.01)]);
+        assert!((shop.cnc.offset()[Axis::X] - 0.01).abs() < 1e-12);
+        let told = shop.diagnostics();
+        assert!(told.is_empty(), "{silent_ms} ms: {told:?}");
+    }
+}
+
+#[test]
+fn what_touches_is_refused_or_stopped_while_two_publish() {
+    let touching = "G0 X5\nF60 G38.2 Z-8\nM2";
+    let moving = "F600 G1 X50\nG1 X0\nM2";
+    let mut shop = shop(Bench::new(-3.0, 0.001));
+    two_publish(&mut shop, 1, [Some(0.02), Some(-0.02)]);
+    let (outcome, message, line) = shop.run(touching);
+    assert_eq!((outcome, line), (Outcome::Refused, 2), "{message}");
+    assert!(message.contains("two publishers"), "{message}");
+    shop.request(moving);
+    two_publish(&mut shop, 5, [Some(0.02), Some(-0.02)]);
+    let (outcome, message, _) = shop.finish();
+    assert_eq!((outcome, message), done());
+    two_publish(&mut shop, 3, [None, Some(-0.02)]);
+    shop.request(touching);
+    two_publish(&mut shop, 1, [None, Some(-0.02)]);
+    assert!(!shop.cnc.idle());
+    two_publish(&mut shop, 1, [Some(0.02), Some(-0.02)]);
+    let ending = { shop.out.iter().rev() }.find_map(|output| match output {
+        Output::Finished {
+            outcome, message, ..
+        } => Some((*outcome, message.clone())),
+        _ => None,
+    });
+    let (outcome, message) = ending.unwrap();
+    assert_eq!(outcome, Outcome::Fault, "{message}");
+    assert!(message.contains("two publishers"), "{message}");
+    assert!(shop.triggers().is_empty());
+    two_publish(&mut shop, 3, [None, Some(-0.02)]);
+    let (outcome, message, _) = shop.run(touching);
+    assert_eq!((outcome, message), done());
+}

@@ -137,3 +137,45 @@ fn a_probe_that_closes_in_another_motion_is_a_fault_but_retracting_is_not() {
     assert!(z < -3.0 && z > -7.0, "{z}");
     assert_eq!(shop.run("G0 Z5\nM2").0, Outcome::Done);
 }
+
+#[test]
+fn a_name_that_no_message_may_have_is_refused_with_line_length_and_limit() {
+    let mut shop = shop(Bench::new(-3.0, 0.001));
+    for (key, name) in [
+        ("feature", "a".repeat(256)),
+        ("feature", "ä".repeat(128)),
+        ("feature", "b".repeat(900)),
+        ("mount", "c".repeat(256)),
+    ] {
+        let bytes = name.len();
+        let text = format!("G21\n(feature: x)\n({key}: {name})\nF600 G38.2 Z-8\nM2");
+        let (outcome, message, line) = shop.run(&text);
+        assert_eq!((outcome, line), (Outcome::Refused, 3), "{message}");
+        let wanted = format!("the {key} comment has {bytes} bytes, at most 255: shorten it");
+        assert!(message.starts_with("line 3, column "), "{message}");
+        assert!(message.contains(&wanted), "{message}");
+    }
+    let longest = "a".repeat(255);
+    let (outcome, message, _) = shop.run(&format!("(feature: {longest})\nF600 G38.2 Z-8\nM2"));
+    assert_eq!((outcome, message), done());
+    assert_eq!(shop.triggers()[0].feature_id, longest);
+}
+
+#[test]
+fn a_zero_without_anything_mounted_is_said() {
+    let mut shop = shop(Bench::open());
+    for what in ["grid", "length"] {
+        let text = format!("G21 G90\n({what})\n(zero: {what})\n(zero: {what})\nG0 Z1\nM2");
+        let (outcome, message, _) = shop.run(&text);
+        assert_eq!((outcome, message), done());
+    }
+    // It stands from the first one on.
+    let said = shop.diagnostics();
+    assert_eq!(
+        said,
+        [Diagnostic::NothingToZero {
+            line: 3,
+            what: "grid"
+        }]
+    );
+}

@@ -13,8 +13,8 @@ use std::collections::VecDeque;
 
 use abbe_msgs::lifecycle_msgs::msg::TransitionEvent;
 use abbe_msgs::{Durability, Qos};
-use metrology::Stage;
 use metrology::stamp::{Host, Span, Stamp};
+use metrology::{Author, Stage};
 
 use super::{Satisfied, Wiring, topic_port};
 use crate::lifecycle::{Ending, State, Transition};
@@ -247,6 +247,12 @@ where
     fn sees_publishers(&mut self, subscription: usize, publishers: usize) {
         if self.hears() {
             self.wiring.sees_publishers(subscription, publishers);
+        }
+    }
+
+    fn hears_from(&mut self, at: Stamp<Host>, subscription: usize, author: Author) {
+        if self.hears() {
+            self.wiring.hear_from(at, subscription, author);
         }
     }
 

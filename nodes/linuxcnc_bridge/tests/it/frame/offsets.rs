@@ -3,8 +3,9 @@
 use linuxcnc_bridge::Input;
 use linuxcnc_bridge::condition::Condition;
 use linuxcnc_bridge::config::Prepare;
+use linuxcnc_bridge::run::Outcome;
 use metrology::sample::{AxisCompensation, CompensationState};
-use metrology::{Axis, AxisSet, PerAxis, Severity};
+use metrology::{Author, Axis, AxisSet, PerAxis, Severity};
 
 use crate::frame::control::{Control, State};
 use crate::frame::desk::{Desk, at};
@@ -195,4 +196,84 @@ fn that_offsets_are_refused_ends_when_none_has_been_for_a_while() {
     let last = desk.conditions.iter().rev();
     let mut last = last.filter(|condition| condition.name() == "compensation_refused");
     assert_eq!(last.next().unwrap().severity(), Severity::Info);
+}
+
+/// Offsets of each author, 20 times a second.
+fn two_publish(desk: &mut Desk, seconds_s: f64, wanted_mm: [Option<f64>; 2]) {
+    let end_s = desk.now_s + seconds_s;
+    while desk.now_s < end_s {
+        for (author, mm) in [Author([1; 16]), Author([2; 16])]
+            .into_iter()
+            .zip(wanted_mm)
+        {
+            if let Some(mm) = mm {
+                let now_s = desk.now_s;
+                desk.stage.hears(at(now_s), author);
+                desk.tell(offsets(now_s, mm));
+            }
+        }
+        desk.later(0.05);
+    }
+}
+
+fn publishers(desk: &Desk) -> Vec<Severity> {
+    let of_them = { desk.conditions.iter() }
+        .filter(|condition| condition.name() == "compensation_publishers");
+    of_them.map(Condition::severity).collect()
+}
+
+#[test]
+fn hal_is_given_zero_while_two_publish_and_one_alone_is_followed_again() {
+    for other_mm in [0.02, -0.03, 0.0, 5.0] {
+        let mut desk = Desk::new(State::usual());
+        two_publish(&mut desk, 1.0, [Some(0.03), None]);
+        assert_eq!(passed_mm(&mut desk), [0.03]);
+        two_publish(&mut desk, 5.0, [Some(0.03), Some(other_mm)]);
+        assert_eq!(passed_mm(&mut desk), [0.0], "{other_mm}");
+        assert_eq!(publishers(&desk), [Severity::Error]);
+        assert!(!desk.has("compensation_refused"));
+        two_publish(&mut desk, 3.0, [Some(0.03), None]);
+        assert_eq!(passed_mm(&mut desk), [0.03], "{other_mm}");
+        assert_eq!(publishers(&desk), [Severity::Error, Severity::Info]);
+    }
+    // Who was started anew takes over.
+    let mut desk = Desk::new(State::usual());
+    two_publish(&mut desk, 1.0, [Some(0.03), None]);
+    two_publish(&mut desk, 2.0, [None, Some(0.02)]);
+    assert_eq!(passed_mm(&mut desk), [0.03, 0.02]);
+    assert!(publishers(&desk).is_empty());
+}
+
+#[test]
+fn what_touches_is_refused_or_stopped_while_two_publish() {
+    let touching = "G21 G90\nG0 X5\nG38.2 Z-8 F60\nM2\n";
+    let mut desk = Desk::new(State::usual());
+    two_publish(&mut desk, 1.0, [Some(0.03), Some(-0.03)]);
+    desk.begin(touching);
+    // Nobody has spoken for 4 s by then, but it was refused before.
+    let (outcome, message) = desk.ending();
+    assert_eq!(outcome, Outcome::Refused);
+    assert!(
+        message.contains("two publishers of compensation"),
+        "{message}"
+    );
+    desk.endings.clear();
+    desk.begin("G21 G90\nG1 X5 F60\nM2\n");
+    two_publish(&mut desk, 1.0, [Some(0.03), Some(-0.03)]);
+    assert!(desk.control.running, "what does not touch runs on");
+    desk.run_out();
+    assert_eq!(desk.ending().0, Outcome::Done);
+    desk.endings.clear();
+    desk.begin(touching);
+    assert!(desk.control.running);
+    desk.sample(1.0, 0, 1, 2);
+    two_publish(&mut desk, 1.0, [Some(0.03), Some(-0.03)]);
+    desk.control.running = false;
+    two_publish(&mut desk, 4.0, [Some(0.03), Some(-0.03)]);
+    let (outcome, message) = desk.ending();
+    assert_eq!(outcome, Outcome::Fault, "{message}");
+    assert!(
+        message.contains("two publishers of compensation"),
+        "{message}"
+    );
 }

@@ -2,8 +2,8 @@
 
 use abbe_msgs::action_msgs::srv::CancelGoalRequest;
 use abbe_msgs::{Defect, Reliability, WireError, from_cdr};
-use metrology::Stamp;
 use metrology::stamp::Host;
+use metrology::{Author, Stamp};
 use tokio::time::Instant;
 
 use super::{ClientUse, FOREIGN_TYPE, Owner, Reply, ServerUse, Timers, now};
@@ -35,6 +35,7 @@ impl Owner {
                     let name = ("input_refused", port.as_str());
                     return self.refuse(name, FOREIGN_TYPE, at, &what);
                 }
+                self.node.hears_from(at, subscription, Author(writer));
                 let bytes = &bytes;
                 let event = Event::Message {
                     subscription,
