@@ -134,19 +134,7 @@ impl OrderFile {
             );
             feed_limit_mm_min = linear.feed_limit_mm_min.min(feed_limit_mm_min);
         }
-        let clear = machine.linear(Axis::Z).context("machine file: no axis Z")?;
-        let [least, greatest] = clear.travel_mm;
-        ensure!(
-            (least..=greatest).contains(&self.clear_mm),
-            "clear_mm = {} mm: must be within the travel of Z, {least} to {greatest} mm",
-            self.clear_mm
-        );
-        let top = self.z_mm.1;
-        ensure!(
-            self.clear_mm >= top,
-            "clear_mm = {} mm: must be at or above the top of z_mm, {top} mm: programs go there in G0 before X and Y move",
-            self.clear_mm
-        );
+        self.check_clear(machine)?;
         let mut window_mm = PerAxis::default();
         for (axis, window) in Axis::LINEAR.into_iter().zip(windows) {
             window_mm[axis] = window;
@@ -165,6 +153,24 @@ impl OrderFile {
                 .as_ref()
                 .map_or(0.0, |spindle| spindle.max_speed_rpm),
         })
+    }
+
+    /// Refuses a height of rapid motion from which the ball would come down upon what was used.
+    fn check_clear(&self, machine: &MachineFile) -> Result<()> {
+        let clear = machine.linear(Axis::Z).context("machine file: no axis Z")?;
+        let [least, greatest] = clear.travel_mm;
+        ensure!(
+            (least..=greatest).contains(&self.clear_mm),
+            "clear_mm = {} mm: must be within the travel of Z, {least} to {greatest} mm",
+            self.clear_mm
+        );
+        let top = self.z_mm.1;
+        ensure!(
+            self.clear_mm >= top,
+            "clear_mm = {} mm: must be at or above the top of z_mm, {top} mm: programs go there in G0 before X and Y move",
+            self.clear_mm
+        );
+        Ok(())
     }
 }
 
