@@ -24,7 +24,7 @@ pub struct Map {
     /// Before the decimals; a point by default.
     #[serde(default = "point")]
     pub decimal: char,
-    /// Worksheet of an xlsx file; without it the first that holds anything.
+    /// Worksheet of an xlsx file; without it the one that is shown and has the columns.
     #[serde(default)]
     pub sheet: Option<String>,
     /// When the measurement began, s since the epoch.
@@ -32,8 +32,7 @@ pub struct Map {
     /// Where the axes stand that the test does not move, mm.
     #[serde(default)]
     pub at_mm: BTreeMap<Axis, f64>,
-    /// Units of the columns that are not in the unit that their key ends with; where it states one, the column's name does not
-    /// count.
+    /// Units of the columns that are not in the unit that their key ends with.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, String>")]
     pub units: BTreeMap<String, Unit>,
