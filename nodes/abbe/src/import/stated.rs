@@ -304,7 +304,7 @@ fn in_words(text: &str) -> Stated {
     }
     let is_clear = |word: &str| {
         let word = plain(word);
-        CLEAR.contains(&word.as_str()) || (word == "rad" && begins(&ANGLES))
+        CLEAR.contains(&word.as_str()) || (word == "rad" && begins(ANGLES))
     };
     // `100 mm bar` is no unit of the column.
     let is_numbered = |k: usize| k > 0 && is_digits(words[k - 1].1);
