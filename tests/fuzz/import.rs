@@ -7,6 +7,8 @@
     )
 )]
 
+#[path = "../../nodes/abbe/src/import/beside.rs"]
+pub mod beside;
 #[path = "../../nodes/abbe/src/import/limits.rs"]
 pub mod limits;
 #[path = "../../nodes/abbe/src/import/map.rs"]
@@ -25,6 +27,8 @@ pub mod runs;
 pub mod same;
 #[path = "../../nodes/abbe/src/import/sheet.rs"]
 pub mod sheet;
+#[path = "../../nodes/abbe/src/import/stated.rs"]
+pub mod stated;
 #[path = "../../nodes/abbe/src/import/table.rs"]
 pub mod table;
 #[path = "../../nodes/abbe/src/import/times.rs"]

@@ -19,6 +19,7 @@ use reports::loss;
 use reports::whole_file::WholeFolder;
 
 mod angles;
+mod beside;
 mod book;
 mod file;
 pub(crate) mod limits;
@@ -32,6 +33,7 @@ mod recognise;
 mod runs;
 mod same;
 mod sheet;
+mod stated;
 mod table;
 mod times;
 mod units;
@@ -172,8 +174,10 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
         decimal: map.decimal,
         sheet: map.sheet.as_deref(),
     };
-    let sheet = file::read(csv, form).with_context(in_table)?;
-    let table = Table::of(&sheet, &map, &ranges).with_context(in_table)?;
+    let columns = map.test.columns();
+    let is_table = |sheet: &sheet::Sheet| columns.iter().all(|column| sheet.has(column.name));
+    let cells = file::read(csv, form, &is_table).with_context(in_table)?;
+    let table = Table::of(&cells.sheet, &map, &ranges).with_context(in_table)?;
     angles::check(&map, &table).with_context(in_table)?;
     let mut runs = runs::of(&map.test, &table).with_context(in_table)?;
     if let map::Test::Positioning {
@@ -197,6 +201,7 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let n_messages = writer.finish()?;
     folder.finish()?;
     let mut notes = doubts(&map, &runs);
+    notes.extend(cells.note);
     notes.extend(table.left_out);
     let n_odd = table.odd.len();
     let n_rows = runs.runs.iter().map(Vec::len).sum();
@@ -210,24 +215,34 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     })
 }
 
-/// Asks about deviations that cannot be in the unit that they were read in.
+/// Asks about deviations that cannot be in the unit that they were read in, where the map does not state it.
 fn doubts(map: &Map, runs: &Runs) -> Vec<String> {
-    let map::Test::Positioning { axis, .. } = &map.test else {
-        return vec![];
-    };
     let columns = map.test.columns();
-    let read = { columns.iter() }.find(|column| matches!(column.what, What::Deviation(_)));
-    let [_, unit] = map::units(*axis).of_cells;
-    let likely = if axis.is_linear() { "mm" } else { "deg" };
-    let numbers = runs.runs.iter().flatten().map(|row| row.cells[2]);
-    let numbers: Vec<f64> = numbers.filter(|number| number.is_finite()).collect();
-    let name = read.map(|column| column.name);
-    let small = name.and_then(|name| propose::doubt(&numbers, name, [unit.name(), likely]));
-    let targets = runs.runs.iter().flatten().map(|row| row.cells[1]);
-    let targets: Vec<f64> = targets.filter(|_| axis.is_linear()).collect();
-    let target = columns
-        .iter()
-        .find(|column| matches!(column.what, What::Place(_)));
-    let near = target.and_then(|target| propose::doubt_of_targets(&targets, target.name));
+    let is_open = |name: &str| !map.units.contains_key(name);
+    // Rows of a positioning test have one shape, whatever their table had.
+    let (place, likely, is_linear) = match &map.test {
+        map::Test::Positioning { axis, .. } if !axis.is_linear() => (Some(2), "deg", false),
+        map::Test::Positioning { .. } => (Some(2), "mm", true),
+        map::Test::Circle { .. } | map::Test::Log { .. } => {
+            let is_read = |column: &map::Column<'_>| matches!(column.what, What::Deviation(_));
+            (columns.iter().position(is_read), "mm", false)
+        }
+    };
+    let of_rows = |k: usize| -> Vec<f64> {
+        let rows = runs.runs.iter().flatten();
+        let numbers = rows.filter_map(|row| row.cells.get(k).copied());
+        numbers.filter(|number| number.is_finite()).collect()
+    };
+    let read = columns.iter().find_map(|column| match column.what {
+        What::Deviation(unit) if is_open(column.name) => Some((column.name, unit.name())),
+        _ => None,
+    });
+    let small = read
+        .zip(place)
+        .and_then(|((name, unit), place)| propose::doubt(&of_rows(place), name, [unit, likely]));
+    let is_target = |column: &&map::Column<'_>| matches!(column.what, What::Place(_));
+    let target = columns.iter().find(is_target);
+    let target = target.filter(|column| is_linear && is_open(column.name));
+    let near = target.and_then(|target| propose::doubt_of_targets(&of_rows(1), target.name));
     small.into_iter().chain(near).collect()
 }

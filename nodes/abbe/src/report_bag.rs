@@ -100,6 +100,7 @@ impl ReportBag {
         let mut report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;
         if let Some(table) = &table {
             report.begin_with_table(&table.lines);
+            report.state_shortcomings(None, table.assumed());
         }
         let machine = tests.machine.as_ref().map(|machine| machine.name.as_str());
         let mut made = Made::of(

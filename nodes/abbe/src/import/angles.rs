@@ -1,7 +1,7 @@
 //! Whether a column of angles can be one of degrees.
 //!
-//! A turn has 360 deg, 400 gon and 2 pi rad. A map may state the unit; where it does not, the column's name or a turn that
-//! closes at another number shows that it is not the degree, and the table is refused with what to state.
+//! A turn has 360 deg, 400 gon and 2 pi rad. A map may state the unit, or the column's name ([`super::stated`]); where they do
+//! not, a turn that closes at another number shows that it is not the degree, and the table is refused with what to state.
 
 use anyhow::{Result, bail};
 use metrology::Axis;
@@ -10,19 +10,6 @@ use metrology::number::number;
 use super::map::{Map, Test};
 use super::table::Table;
 
-/// Words of a column's name that are units of angles, lower case, with what they are called.
-const WORDS: [(&str, &str); 10] = [
-    ("gon", "gon"),
-    ("gons", "gon"),
-    ("gradian", "gon"),
-    ("gradians", "gon"),
-    ("mgon", "mgon"),
-    ("rad", "rad"),
-    ("radian", "rad"),
-    ("radians", "rad"),
-    ("mrad", "mrad"),
-    ("urad", "µrad"),
-];
 /// A turn, gon.
 const TURN_GON: f64 = 400.0;
 /// Turns in gon after which a run may end.
@@ -39,25 +26,13 @@ pub fn check(map: &Map, table: &Table) -> Result<()> {
     match &map.test {
         Test::Circle { angle_deg, .. } if is_open(angle_deg) => circle(angle_deg, table),
         Test::Positioning {
-            axis,
-            target_mm,
-            deviation_um,
-            ..
-        } if !axis.is_linear() => {
-            if let Some(column) = deviation_um.as_deref().filter(|column| is_open(column)) {
-                named(column, "arcsec")?;
-            }
-            if is_open(target_mm) {
-                targets(*axis, target_mm, table)?;
-            }
-            Ok(())
-        }
+            axis, target_mm, ..
+        } if !axis.is_linear() && is_open(target_mm) => targets(*axis, target_mm, table),
         _ => Ok(()),
     }
 }
 
 fn circle(column: &str, table: &Table) -> Result<()> {
-    named(column, "deg")?;
     if says_deg(column) {
         return Ok(());
     }
@@ -78,7 +53,6 @@ fn circle(column: &str, table: &Table) -> Result<()> {
 }
 
 fn targets(axis: Axis, column: &str, table: &Table) -> Result<()> {
-    named(column, "deg")?;
     let targets: Vec<f64> = table.rows.iter().map(|row| row.cells[1]).collect();
     match turn_of_targets(&targets) {
         Some((unit, span)) if !says_deg(column) => bail!(
@@ -92,33 +66,6 @@ fn targets(axis: Axis, column: &str, table: &Table) -> Result<()> {
 
 fn remedy(column: &str, unit: &str) -> String {
     format!("state `units: {{\"{column}\": {unit}}}` in the map, or `deg` where they are degrees")
-}
-
-/// Refuses a column that has another unit in its name than it is read in.
-fn named(column: &str, read_in: &str) -> Result<()> {
-    match unit_of(column) {
-        Some(unit @ ("gon" | "rad" | "mrad" | "µrad")) => {
-            let key = if unit == "µrad" { "urad" } else { unit };
-            bail!(
-                "column \"{column}\": its name says {unit}, the map {read_in}: \
-                 state `units: {{\"{column}\": {key}}}` in the map, or `{read_in}` where its name is wrong"
-            )
-        }
-        Some(unit) => bail!(
-            "column \"{column}\": its name says {unit}, the map {read_in}: convert the column"
-        ),
-        None => Ok(()),
-    }
-}
-
-/// The unit of angles in a column's name, other than the degree.
-fn unit_of(column: &str) -> Option<&'static str> {
-    let lower = column.to_lowercase().replace(['µ', 'μ'], "u");
-    let mut words = lower.split(|letter: char| !letter.is_alphanumeric());
-    words.find_map(|word| {
-        let known = WORDS.iter().find(|(name, _)| *name == word);
-        known.map(|(_, unit)| *unit)
-    })
 }
 
 fn says_deg(column: &str) -> bool {
@@ -197,6 +144,7 @@ mod tests {
             text.push_str(&format!("1,{angle},0\n"));
         }
         let table = Table::of(&sheet(&text), &map, &[None, None, None])?;
+        map.check_columns()?;
         check(&map, &table).map(|()| table)
     }
 
@@ -275,15 +223,10 @@ mod tests {
         let deviations = STOPS
             .replace("arcsec: r", "arcsec: d_mgon")
             .replace("COLUMN", "t");
-        let map = map(&deviations, "{}");
-        let table = Table::of(&sheet("n,t,d_mgon\n1,0,0\n"), &map, &[None, None, None]);
-        let shown = check(&map, &table.expect("a row"))
-            .expect_err("mgon")
-            .to_string();
-        assert!(
-            shown.contains("the map arcsec: convert the column"),
-            "{shown}"
-        );
+        let shown = map(&deviations, "{}").check_columns().expect_err("mgon");
+        let shown = shown.to_string();
+        let words = "says \"mgon\", which is no unit that is known, and the map arcsec";
+        assert!(shown.contains(words), "{shown}");
     }
 
     #[test]

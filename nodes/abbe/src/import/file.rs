@@ -3,8 +3,8 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
-use calamine::{DataRef, ExcelDateTime, Reader, Xlsx};
+use anyhow::{Context, Result, anyhow, bail};
+use calamine::{DataRef, ExcelDateTime, Reader, SheetVisible, Xlsx};
 use node_runtime::text_file::{self, Comments};
 
 use super::book;
@@ -39,26 +39,43 @@ pub fn is_worksheet(path: &Path) -> Result<bool> {
     Ok(bytes.starts_with(ZIP) || bytes.starts_with(OLD))
 }
 
-/// Reads the cells of a file.
+/// The cells of a file, and which of its worksheets they are.
+#[derive(Debug)]
+pub struct Cells {
+    /// The cells.
+    pub sheet: Sheet,
+    /// Name of the worksheet, where the file has several that hold anything.
+    pub name: Option<String>,
+    /// Which worksheet was read and which were not; nothing of a file with one.
+    pub note: Option<String>,
+}
+
+/// Reads the cells of a file. Of several worksheets it is the one that `is_table`, of those that are shown.
 ///
 /// # Errors
-/// When the file cannot be read, is no table of a kind that is known, or has no such worksheet.
-pub fn read(path: &Path, form: Form<'_>) -> Result<Sheet> {
+/// When the file cannot be read, is no table of a kind that is known, has no such worksheet, or several are tables, or a
+/// hidden one alone is.
+pub fn read(path: &Path, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) -> Result<Cells> {
     let bytes = text_file::bytes(path)?;
     if bytes.starts_with(OLD) {
         bail!("a worksheet of the older kind (xls): save it as xlsx or as CSV");
     }
     if bytes.starts_with(ZIP) {
-        return of_xlsx(bytes, form);
+        return of_xlsx(bytes, form, is_table);
     }
     if let Some(name) = form.sheet {
         bail!("sheet = {name}: does nothing, the file is a text: remove it");
     }
-    Sheet::of_text(&text_file::read(path, Comments::Csv)?, form.separator)
+    let sheet = Sheet::of_text(&text_file::read(path, Comments::Csv)?, form.separator)?;
+    Ok(Cells {
+        sheet,
+        name: None,
+        note: None,
+    })
 }
 
 /// The cells of a worksheet of an xlsx file.
-fn of_xlsx(bytes: Vec<u8>, form: Form<'_>) -> Result<Sheet> {
+fn of_xlsx(bytes: Vec<u8>, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) -> Result<Cells> {
     if bytes.len() > MAX_WORKSHEET_BYTES {
         bail!(
             "a worksheet of {} bytes: must be at most {MAX_WORKSHEET_BYTES}: save it as CSV",
@@ -68,31 +85,109 @@ fn of_xlsx(bytes: Vec<u8>, form: Form<'_>) -> Result<Sheet> {
     book::check(&bytes)?;
     let mut book = Xlsx::new(Cursor::new(bytes)).context("xlsx")?;
     let names = book.sheet_names();
-    let wanted = match form.sheet {
-        Some(name) if !names.iter().any(|known| known == name) => bail!(
-            "sheet = {name}: the file has no such worksheet, it has {}",
-            names.join(", ")
-        ),
-        Some(name) => vec![name.to_owned()],
-        None => names,
-    };
-    for name in wanted {
-        let mut lines = cells(&mut book, &name, form.decimal)
-            .with_context(|| format!("worksheet \"{name}\""))?;
-        if lines.is_empty() {
-            continue;
+    if let Some(name) = form.sheet {
+        if !names.iter().any(|known| known == name) {
+            bail!(
+                "sheet = {name}: the file has no such worksheet, it has {}",
+                names.join(", ")
+            );
         }
-        let width = lines.iter().map(|(_, cells)| cells.len()).max();
-        let width = width.unwrap_or(0);
-        for (_, cells) in &mut lines {
-            cells.resize(width, String::new());
-        }
-        return Ok(Sheet {
-            lines,
-            separator: None,
+        let sheet = worksheet(&mut book, name, form.decimal)?;
+        let sheet = sheet.with_context(|| format!("sheet = {name}: the worksheet is empty"))?;
+        let others = book.sheets_metadata().iter();
+        let others = others.filter(|other| other.name != name).map(|other| {
+            let is_shown = other.visible == SheetVisible::Visible;
+            format!("{}{}", other.name, if is_shown { "" } else { " (hidden)" })
+        });
+        let others: Vec<String> = others.collect();
+        return Ok(Cells {
+            sheet,
+            name: Some(name.to_owned()),
+            note: note(name, &others),
         });
     }
-    bail!("the file has no line with the names of columns: its worksheets are empty")
+    chosen(&mut book, form.decimal, is_table)
+}
+
+fn note(name: &str, others: &[String]) -> Option<String> {
+    let others = (!others.is_empty()).then(|| others.join(", "))?;
+    Some(format!("worksheet {name} was read, and not {others}"))
+}
+
+/// Looks at every worksheet and keeps one at a time.
+fn chosen(
+    book: &mut Xlsx<Cursor<Vec<u8>>>,
+    decimal: char,
+    is_table: &dyn Fn(&Sheet) -> bool,
+) -> Result<Cells> {
+    let all = book.sheets_metadata().iter();
+    let all = all.map(|sheet| (sheet.name.clone(), sheet.visible == SheetVisible::Visible));
+    let all: Vec<(String, bool)> = all.collect();
+    let mut kept: Option<(String, Sheet)> = None;
+    let (mut tables, mut hidden, mut others, mut failed) = (vec![], vec![], vec![], None);
+    for (name, is_shown) in all {
+        let sheet = match worksheet(book, &name, decimal) {
+            Ok(Some(sheet)) => sheet,
+            Ok(None) => continue,
+            Err(error) => {
+                others.push(format!("{name} (it cannot be read)"));
+                failed = failed.or(Some(error));
+                continue;
+            }
+        };
+        let is_one = is_table(&sheet);
+        if !is_shown {
+            others.push(format!("{name} (hidden)"));
+            hidden.extend(is_one.then_some(name));
+            continue;
+        }
+        if is_one {
+            tables.push(name.clone());
+        }
+        // The first that is shown, until there is a table.
+        if kept.is_none() || (is_one && tables.len() == 1) {
+            others.extend(kept.take().map(|(name, _)| name));
+            kept = Some((name, sheet));
+        } else {
+            others.push(name);
+        }
+    }
+    let state = "state `sheet: NAME` in a map, or save the one that is meant as CSV";
+    if tables.len() > 1 {
+        bail!("worksheets {} are tables: {state}", tables.join(", "));
+    }
+    if let (true, Some(name)) = (tables.is_empty(), hidden.first()) {
+        bail!("the worksheet {name} alone is a table, and it is hidden: {state}, or show it");
+    }
+    let Some((name, sheet)) = kept else {
+        return Err(failed.unwrap_or_else(|| {
+            anyhow!(
+                "the file has no line with the names of columns: its worksheets that are shown are empty"
+            )
+        }));
+    };
+    let note = note(&name, &others);
+    Ok(Cells {
+        sheet,
+        name: note.is_some().then_some(name),
+        note,
+    })
+}
+
+/// A worksheet; nothing where it is empty.
+fn worksheet(book: &mut Xlsx<Cursor<Vec<u8>>>, name: &str, decimal: char) -> Result<Option<Sheet>> {
+    let mut lines = cells(book, name, decimal).with_context(|| format!("worksheet \"{name}\""))?;
+    let width = lines.iter().map(|(_, cells)| cells.len()).max();
+    let Some(width) = width else {
+        return Ok(None);
+    };
+    for (_, cells) in &mut lines {
+        cells.resize(width, String::new());
+    }
+    Ok(Some(Sheet {
+        lines,
+        separator: None,
+    }))
 }
 
 /// Lines of a worksheet that hold anything.
@@ -185,7 +280,15 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let path = home.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        read(&path, form('.'))
+        super::read(&path, form('.'), &any).map(|cells| cells.sheet)
+    }
+
+    fn any(_: &Sheet) -> bool {
+        true
+    }
+
+    fn read(path: &Path, form: Form<'_>) -> Result<Sheet> {
+        super::read(path, form, &any).map(|cells| cells.sheet)
     }
 
     #[test]
@@ -229,40 +332,142 @@ mod tests {
 
     /// A workbook with one worksheet of this text.
     fn workbook(sheet: &str) -> Vec<u8> {
+        workbook_of(&[("Laser", "visible", sheet)])
+    }
+
+    /// A workbook with worksheets: name, state, text.
+    fn workbook_of(sheets: &[(&str, &str, &str)]) -> Vec<u8> {
         use std::io::Write as _;
         const RELS: &str = "http://schemas.openxmlformats.org/package/2006/relationships";
         const DOC: &str = "http://schemas.openxmlformats.org/officeDocument/2006/relationships";
         const MAIN: &str = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
-        let mut writer = zip::ZipWriter::new(Cursor::new(vec![]));
-        let options = zip::write::SimpleFileOptions::default();
-        for (name, text) in [
+        let (mut listed, mut related, mut parts) = (String::new(), String::new(), vec![]);
+        for (k, (name, state, text)) in (1..).zip(sheets) {
+            listed += &format!("<sheet name='{name}' state='{state}' sheetId='{k}' r:id='r{k}'/>");
+            related += &format!(
+                "<Relationship Id='r{k}' Type='{DOC}/worksheet' Target='worksheets/sheet{k}.xml'/>"
+            );
+            let text = format!("<worksheet xmlns='{MAIN}'>{text}</worksheet>");
+            parts.push((format!("xl/worksheets/sheet{k}.xml"), text));
+        }
+        parts.extend([
             (
-                "_rels/.rels",
+                "_rels/.rels".to_owned(),
                 format!(
                     "<Relationships xmlns='{RELS}'><Relationship Id='r1' Type='{DOC}/officeDocument' Target='xl/workbook.xml'/></Relationships>"
                 ),
             ),
             (
-                "xl/workbook.xml",
+                "xl/workbook.xml".to_owned(),
                 format!(
-                    "<workbook xmlns='{MAIN}' xmlns:r='{DOC}'><sheets><sheet name='Laser' sheetId='1' r:id='r1'/></sheets></workbook>"
+                    "<workbook xmlns='{MAIN}' xmlns:r='{DOC}'><sheets>{listed}</sheets></workbook>"
                 ),
             ),
             (
-                "xl/_rels/workbook.xml.rels",
-                format!(
-                    "<Relationships xmlns='{RELS}'><Relationship Id='r1' Type='{DOC}/worksheet' Target='worksheets/sheet1.xml'/></Relationships>"
-                ),
+                "xl/_rels/workbook.xml.rels".to_owned(),
+                format!("<Relationships xmlns='{RELS}'>{related}</Relationships>"),
             ),
-            (
-                "xl/worksheets/sheet1.xml",
-                format!("<worksheet xmlns='{MAIN}'>{sheet}</worksheet>"),
-            ),
-        ] {
+        ]);
+        let mut writer = zip::ZipWriter::new(Cursor::new(vec![]));
+        let options = zip::write::SimpleFileOptions::default();
+        for (name, text) in parts {
             writer.start_file(name, options).unwrap();
             writer.write_all(text.as_bytes()).unwrap();
         }
         writer.finish().unwrap().into_inner()
+    }
+
+    /// A worksheet with one number; from 10 on it is a table here, and a note before.
+    fn numbered(number: u32) -> String {
+        format!("<sheetData><row r='1'><c r='A1'><v>{number}</v></c></row></sheetData>")
+    }
+
+    fn chosen_of(sheets: &[(&str, &str, &str)], sheet: Option<&str>) -> Result<Cells, String> {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("a.xlsx");
+        std::fs::write(&path, workbook_of(sheets)).unwrap();
+        let form = Form { sheet, ..form('.') };
+        let is_table = |sheet: &Sheet| sheet.lines[0].1[0].len() > 1;
+        super::read(&path, form, &is_table).map_err(|error| format!("{error:#}"))
+    }
+
+    #[test]
+    fn of_several_worksheets_the_shown_table_is_read() {
+        let [note, a, b] = [1, 10, 11].map(numbered);
+        let (shown, hidden) = ("visible", "hidden");
+        for (sheets, wanted, name, note) in [
+            (
+                [("H", hidden, &a), ("S", shown, &b)],
+                None,
+                Some("S"),
+                "not H (hidden)",
+            ),
+            (
+                [("S", shown, &a), ("H", "veryHidden", &b)],
+                None,
+                Some("S"),
+                "not H (hidden)",
+            ),
+            (
+                [("N", shown, &note), ("S", shown, &b)],
+                None,
+                Some("S"),
+                "S was read, and not N",
+            ),
+            (
+                [("S", shown, &b), ("N", shown, &note)],
+                None,
+                Some("S"),
+                "S was read, and not N",
+            ),
+            (
+                [("A", shown, &a), ("B", shown, &b)],
+                Some("B"),
+                Some("B"),
+                "not A",
+            ),
+            (
+                [("H", hidden, &a), ("N", shown, &note)],
+                Some("H"),
+                Some("H"),
+                "not N",
+            ),
+            (
+                [("N", shown, &note), ("M", shown, &note)],
+                None,
+                Some("N"),
+                "not M",
+            ),
+        ] {
+            let sheets = sheets.map(|(name, state, text)| (name, state, text.as_str()));
+            let cells = chosen_of(&sheets, wanted).unwrap();
+            assert_eq!(cells.name.as_deref(), name, "{sheets:?}");
+            let said = cells.note.unwrap_or_default();
+            assert!(
+                said.contains(note) && said.is_empty() == note.is_empty(),
+                "{said}"
+            );
+        }
+    }
+
+    #[test]
+    fn two_tables_and_a_hidden_one_alone_are_refused_with_the_way_to_choose() {
+        let [note, a] = [1, 10].map(numbered);
+        let (shown, hidden) = ("visible", "hidden");
+        let two = [("A", shown, a.as_str()), ("B", shown, a.as_str())];
+        let said = chosen_of(&two, None).unwrap_err();
+        assert!(
+            said.contains("worksheets A, B are tables: state `sheet: NAME`"),
+            "{said}"
+        );
+        let none = [("H", hidden, a.as_str()), ("N", shown, note.as_str())];
+        let said = chosen_of(&none, None).unwrap_err();
+        assert!(
+            said.contains("the worksheet H alone is a table, and it is hidden"),
+            "{said}"
+        );
+        let one = chosen_of(&[("S", shown, a.as_str())], None).unwrap();
+        assert_eq!((one.name, one.note), (None, None));
     }
 
     #[test]

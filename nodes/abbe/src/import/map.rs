@@ -1,6 +1,7 @@
 //! What a table holds: the map file.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use anyhow::{Result, bail};
 use iso230::thermal::DriftCause;
@@ -9,6 +10,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::map_schema::{with_arcsec, with_other_names};
+use super::stated;
 use super::units::Unit;
 
 /// A map file.
@@ -22,7 +24,7 @@ pub struct Map {
     /// Before the decimals; a point by default.
     #[serde(default = "point")]
     pub decimal: char,
-    /// Worksheet of an xlsx file; without it the first that holds anything.
+    /// Worksheet of an xlsx file; without it the one that is shown and has the columns.
     #[serde(default)]
     pub sheet: Option<String>,
     /// When the measurement began, s since the epoch.
@@ -204,7 +206,8 @@ impl What {
         match self {
             Self::Place(unit) | Self::Deviation(unit) | Self::Measured(unit) => Some(unit),
             Self::Time => Some(Unit::Second),
-            Self::Run | Self::Direction | Self::Temperature => None,
+            Self::Temperature => Some(Unit::Degc),
+            Self::Run | Self::Direction => None,
         }
     }
 
@@ -278,6 +281,16 @@ pub enum Plane {
     Yz,
     #[serde(rename = "ZX")]
     Zx,
+}
+
+impl fmt::Display for Plane {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Xy => "XY",
+            Self::Yz => "YZ",
+            Self::Zx => "ZX",
+        })
+    }
 }
 
 impl Test {
@@ -419,6 +432,7 @@ impl Map {
                 None => bail!("units: the column \"{name}\" has no unit that could be another"),
             }
         }
+        stated::check_names(self)?;
         self.check_readings()
     }
 

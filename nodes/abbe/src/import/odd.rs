@@ -23,6 +23,14 @@ pub enum Read {
     Odd(String),
 }
 
+/// Whether a cell stands for a missing reading.
+pub fn is_missing(cell: &str) -> bool {
+    let words = [
+        "", "nan", "n/a", "na", "#n/a", "null", "none", "-", "--", "---",
+    ];
+    words.contains(&cell.to_lowercase().as_str())
+}
+
 /// What a cell costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cost {

@@ -10,6 +10,56 @@ use anyhow::{Result, bail};
 use super::runs::{GRID_MM, gathered, ways};
 use super::table::Row;
 
+/// Runs that are named one by one.
+const NAMED: usize = 10;
+
+fn n_read(rows: &[Row]) -> usize {
+    rows.iter().filter(|row| row.cells[2].is_finite()).count()
+}
+
+/// Leaves out runs in which nothing was read, where others have readings; which they are.
+pub fn without_readings(runs: &mut Vec<Vec<Row>>) -> Vec<String> {
+    if runs.iter().all(|rows| n_read(rows) == 0) {
+        return vec![];
+    }
+    let is_empty = |rows: &Vec<Row>| n_read(rows) == 0;
+    let remarks = runs.iter().filter(|rows| is_empty(rows)).map(|rows| {
+        let first = rows.first();
+        format!(
+            "run {}, line {} on: none of its {} rows has a reading: the run is left out",
+            first.map_or(0.0, |row| row.cells[0]),
+            first.map_or(0, |row| row.line),
+            rows.len()
+        )
+    });
+    let mut remarks: Vec<String> = remarks.collect();
+    let others = remarks.len().saturating_sub(NAMED);
+    remarks.truncate(NAMED);
+    remarks.extend(
+        (others > 0).then(|| format!("{others} more runs have no reading: they are left out")),
+    );
+    runs.retain(|rows| !is_empty(rows));
+    remarks
+}
+
+/// Names runs with less than half of the readings of the fullest: what they lack, no evaluation has.
+pub fn broken_off(runs: &[Vec<Row>]) -> Vec<String> {
+    let most = runs.iter().map(|rows| n_read(rows)).max().unwrap_or(0);
+    let few = runs.iter().filter(|rows| 2 * n_read(rows) < most);
+    few.filter_map(|rows| {
+        let first = rows.first()?;
+        Some(format!(
+            "run {}, line {} on: {} readings where another run has {most}: every target that it lacks is left out of the evaluation: \
+             remove the rows of this run where it was broken off",
+            first.cells[0],
+            first.line,
+            n_read(rows)
+        ))
+    })
+    .take(NAMED)
+    .collect()
+}
+
 /// Makes cycles of runs that hold one direction each, the k-th up with the k-th down; what was done.
 pub fn pair(runs: &mut Vec<Vec<Row>>) -> Option<String> {
     let sides: Vec<f64> = runs.iter().map(|rows| side(rows)).collect::<Option<_>>()?;
@@ -145,6 +195,35 @@ mod tests {
     fn readings(runs: &[Vec<Row>]) -> Vec<Vec<f64>> {
         let run = |rows: &Vec<Row>| rows.iter().map(|row| row.cells[2]).collect();
         runs.iter().map(run).collect()
+    }
+
+    #[test]
+    fn a_run_without_a_reading_is_left_out_and_one_broken_off_is_named() {
+        let good = || vec![pass(1.0, 1.0, true), pass(2.0, 1.0, true)];
+        let blank = |n: usize| {
+            let rows = pass(3.0, 1.0, true).into_iter().take(n);
+            let empty = |mut row: Row| {
+                row.cells[2] = f64::NAN;
+                row
+            };
+            rows.map(empty).collect::<Vec<_>>()
+        };
+        for n in [1, 2, 3] {
+            let mut runs = good();
+            runs.push(blank(n));
+            let said = without_readings(&mut runs);
+            assert_eq!(runs.len(), 2);
+            let words = format!("run 3, line 2 on: none of its {n} rows has a reading");
+            assert!(said[0].starts_with(&words), "{said:?}");
+        }
+        let mut runs = vec![blank(3)];
+        assert!(without_readings(&mut runs).is_empty() && runs.len() == 1);
+        assert!(broken_off(&good()).is_empty());
+        let mut runs = good();
+        runs.push(pass(3.0, 1.0, true).into_iter().take(1).collect());
+        let said = broken_off(&runs);
+        let words = "run 3, line 2 on: 1 readings where another run has 3";
+        assert!(said.len() == 1 && said[0].starts_with(words), "{said:?}");
     }
 
     #[test]

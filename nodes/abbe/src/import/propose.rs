@@ -5,19 +5,17 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use metrology::Axis;
-use metrology::number::number;
 use node_runtime::text_file::{self, Comments};
 
 use super::file::{self, Form};
-use super::map::{Direction, Map, Test, units};
+use super::map::{Direction, Map, Plane, Test, units};
 use super::recognise::{self, Known, Recognised, Role};
+use super::sheet::Sheet;
+use super::stated::{in_one_line, quoted};
 use super::times;
 use super::units::{Kind, Unit};
-
-/// Deviations below this are no micrometres (seconds of arc), greatest of a table.
-const LEAST_UM: f64 = 0.05;
-/// Targets that reach less far are no millimetres.
-const LEAST_MM: f64 = 2.0;
+pub use likely::{doubt, doubt_of_targets};
+use likely::{likely_deviation, likely_target};
 
 /// A map with what it rests on.
 #[derive(Debug)]
@@ -35,12 +33,17 @@ pub struct Proposal {
 /// # Errors
 /// When the file cannot be read, or none of its columns is recognised.
 pub fn of(path: &Path) -> Result<Proposal> {
-    let found = looked_at(path)?.with_context(|| {
+    let (found, sheet) = looked_at(path)?;
+    let found = found.with_context(|| {
         "no line with the names of columns that has rows of numbers below it was found: write a map (docs/reference/scenario.md#import-map)"
     })?;
     let stem = path.file_stem().map(|stem| stem.to_string_lossy());
     let axis = found.axis(&stem.unwrap_or_default());
     let mut text = Text::new(&found, path);
+    if let Some(name) = sheet {
+        let _ = writeln!(text.head, "sheet: {}", quoted(&name));
+        text.recognised.push(format!("sheet: \"{name}\""));
+    }
     match kind(&found) {
         Some(Of::Positioning) => text.positioning(axis)?,
         Some(Of::Log) => text.log(axis)?,
@@ -57,16 +60,23 @@ pub fn of(path: &Path) -> Result<Proposal> {
     })
 }
 
-fn looked_at(path: &Path) -> Result<Option<Recognised>> {
+/// What is in a file, and the name of its worksheet where it has several.
+fn looked_at(path: &Path) -> Result<(Option<Recognised>, Option<String>)> {
     let form = Form {
         separator: ',',
         decimal: '.',
         sheet: None,
     };
-    if file::is_worksheet(path)? {
-        return Ok(recognise::of(&file::read(path, form)?, form.decimal));
+    if !file::is_worksheet(path)? {
+        let found = recognise::of_text(&text_file::read(path, Comments::Csv)?)?;
+        return Ok((found, None));
     }
-    recognise::of_text(&text_file::read(path, Comments::Csv)?)
+    let is_table = |sheet: &Sheet| {
+        let found = recognise::of(sheet, form.decimal);
+        found.is_some_and(|found| kind(&found).is_some())
+    };
+    let cells = file::read(path, form, &is_table)?;
+    Ok((recognise::of(&cells.sheet, form.decimal), cells.name))
 }
 
 /// Kinds of tests.
@@ -94,11 +104,6 @@ fn kind(found: &Recognised) -> Option<Of> {
 fn names(found: &Recognised) -> Vec<&str> {
     let columns = found.columns.iter();
     columns.map(|column| column.name.as_str()).collect()
-}
-
-/// A word as YAML takes any.
-fn quoted(word: &str) -> String {
-    format!("\"{}\"", word.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
 /// A map on its way.
@@ -130,7 +135,7 @@ impl<'t> Text<'t> {
             found,
             head: format!(
                 "# Proposed by abbe for {}. NEEDED marks what the table lacks: state it.\nseparator: {}\ndecimal: {}\n",
-                path.display(),
+                in_one_line(&path.display().to_string()),
                 if found.separator == '\t' {
                     "\"\\t\"".to_owned()
                 } else {
@@ -163,6 +168,14 @@ impl<'t> Text<'t> {
 
     /// States the unit of a column that is read in `wanted`; of one without a unit that cannot be right the `likely` one.
     fn unit(&mut self, column: &Known, wanted: Unit, likely: Option<Unit>) -> Result<()> {
+        if let Some(word) = &column.unknown {
+            self.needed.push(format!(
+                "column \"{}\": its unit \"{word}\" is not known: state it in units as one of {}",
+                column.name,
+                wanted.kind().units()
+            ));
+            return Ok(());
+        }
         let unit = match (column.unit, likely) {
             (Some(unit), _) if unit.kind() != wanted.kind() => bail!(
                 "column \"{}\": its unit {} cannot be that of a quantity in {}: write a map",
@@ -172,9 +185,9 @@ impl<'t> Text<'t> {
             ),
             (_, Some(likely)) => {
                 let why = format!(
-                    "column \"{}\": its numbers are too small for {}; {} is likely, correct it where it is another",
+                    "column \"{}\": no unit in its name, and its numbers are too small for {}; {} is likely, and it is read so: correct it where it is another",
                     column.name,
-                    column.unit.unwrap_or(wanted).name(),
+                    wanted.name(),
                     likely.name()
                 );
                 self.needed.push(why);
@@ -202,11 +215,22 @@ impl<'t> Text<'t> {
     fn positioning(&mut self, told: Option<Axis>) -> Result<()> {
         let found = self.found;
         let target = found.first(Role::Target).context("no column of targets")?;
-        let is_angle = target.unit.is_some_and(|unit| unit.kind() == Kind::Angle);
+        let stated = found.axis_stated();
+        let is_rotary = stated.is_some_and(|axis| !axis.is_linear());
+        let is_angle = target
+            .unit
+            .map_or(is_rotary, |unit| unit.kind() == Kind::Angle);
+        if let Some(axis) = stated.filter(|axis| axis.is_linear() == is_angle) {
+            bail!(
+                "the table says axis {axis}, and its targets (column \"{}\") are {}: correct one of them, or write a map",
+                target.name,
+                if is_angle { "angles" } else { "lengths" }
+            );
+        }
         let axis = told.filter(|axis| axis.is_linear() != is_angle);
         let taken = axis.unwrap_or(if is_angle { Axis::C } else { Axis::X });
         let units = units(taken);
-        let [place, deviation] = units.of_cells;
+        let [place, _] = units.of_cells;
         let is_linear = taken.is_linear();
         let key =
             |linear: &'static str, rotary: &'static str| if is_linear { linear } else { rotary };
@@ -230,10 +254,33 @@ impl<'t> Text<'t> {
         );
         self.column(key("target_mm", "target_deg"), target);
         self.unit(target, place, likely_target(target, place))?;
+        if self.readings(taken)? {
+            return Ok(());
+        }
+        if let Some(run) = found.first(Role::Run) {
+            self.column("run", run);
+        }
+        if let Some(direction) = found.first(Role::Direction) {
+            self.column("direction", direction);
+        } else {
+            self.needed.push(
+                "no column of directions: the side of approach follows from the order of the rows, which must be that of the measurement".to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    /// Names the columns of the deviations; whether there is one for each pass.
+    fn readings(&mut self, axis: Axis) -> Result<bool> {
+        let found = self.found;
+        let [place, deviation] = units(axis).of_cells;
+        let key = |linear: &'static str, rotary: &'static str| {
+            if axis.is_linear() { linear } else { rotary }
+        };
         let passes = found.passes();
         if !passes.is_empty() {
             self.passes(&passes, key("passes_um", "passes_arcsec"), deviation)?;
-            return Ok(());
+            return Ok(true);
         }
         match (found.first(Role::Deviation), found.first(Role::Measured)) {
             (Some(read), _) => {
@@ -247,17 +294,7 @@ impl<'t> Text<'t> {
             }
             (None, None) => bail!("no column of deviations"),
         }
-        if let Some(run) = found.first(Role::Run) {
-            self.column("run", run);
-        }
-        if let Some(direction) = found.first(Role::Direction) {
-            self.column("direction", direction);
-        } else {
-            self.needed.push(
-                "no column of directions: the side of approach follows from the order of the rows, which must be that of the measurement".to_owned(),
-            );
-        }
-        Ok(())
+        Ok(false)
     }
 
     fn passes(&mut self, passes: &[(&Known, Direction)], key: &str, wanted: Unit) -> Result<()> {
@@ -283,6 +320,9 @@ impl<'t> Text<'t> {
         if told.is_some() {
             let _ = writeln!(self.test, "    axis: {taken}");
             self.recognised.push(format!("axis {taken}"));
+            if let Some((name, _)) = &self.found.axis_column {
+                self.used.push(name.clone());
+            }
         } else {
             self.stated("axis", taken.letter(), "which axis moved");
         }
@@ -294,6 +334,9 @@ impl<'t> Text<'t> {
         let read = found.first(Role::Displacement);
         let read = read.or_else(|| found.first(Role::Deviation));
         let read = read.context("no column of displacements")?;
+        if let Some(axis) = found.axis_stated().filter(|axis| !axis.is_linear()) {
+            bail!("the table says axis {axis}: a log is of a length along X, Y or Z: write a map");
+        }
         let axis = told.filter(|axis| axis.is_linear());
         let taken = axis.unwrap_or(Axis::Z);
         self.test.push_str("  log:\n");
@@ -321,6 +364,7 @@ impl<'t> Text<'t> {
             self.used.push(column.name.clone());
             self.recognised
                 .push(format!("temperature_degc.{id}: column \"{}\"", column.name));
+            self.unit(column, Unit::Degc, None)?;
             sensors.push(id);
         }
         if !sensors.is_empty() {
@@ -333,6 +377,9 @@ impl<'t> Text<'t> {
 
     /// The unit of times that are numbers: named, or that of an epoch.
     fn time_unit(&mut self, time: &Known) -> Result<()> {
+        if time.unknown.is_some() {
+            return self.unit(time, Unit::Second, None);
+        }
         let first = time.numbers.first().copied().unwrap_or(0.0);
         let named = time.unit.filter(|unit| unit.kind() == Kind::Time);
         let of_epoch = || {
@@ -376,20 +423,33 @@ impl<'t> Text<'t> {
     fn circle(&mut self) -> Result<()> {
         let found = self.found;
         let angle = found.first(Role::Angle).context("no column of angles")?;
-        let read = found.first(Role::Radial);
-        let read = read.or_else(|| found.first(Role::Deviation));
-        let read = read.context("no column of radial deviations")?;
+        let (read, nominal) = radial::columns(found)?;
         let run = found.first(Role::Run);
         let run =
             run.context("no column of the run: a circle needs one that numbers the circles")?;
         self.test.push_str("  circle:\n");
-        self.stated("plane", "XY", "plane of the circles");
+        match &found.plane_column {
+            Some((name, plane)) => {
+                let _ = writeln!(self.test, "    plane: {plane}");
+                self.recognised.push(format!("plane {plane}"));
+                self.used.push(name.clone());
+            }
+            None => self.stated("plane", &Plane::Xy.to_string(), "plane of the circles"),
+        }
         self.stated("centre_mm", "[0.0, 0.0, 0.0]", "centre of the circles");
-        self.stated(
-            "radius_mm",
-            "100.0",
-            "nominal radius; lengths that follow from it (scale, squareness) depend on it",
-        );
+        match nominal {
+            Some((column, radius_mm)) => {
+                let _ = writeln!(self.test, "    radius_mm: {radius_mm:?}");
+                self.recognised
+                    .push(format!("radius_mm: column \"{}\"", column.name));
+                self.used.push(column.name.clone());
+            }
+            None => self.stated(
+                "radius_mm",
+                "100.0",
+                "nominal radius; lengths that follow from it (scale, squareness) depend on it",
+            ),
+        }
         self.stated(
             "feed_mm_min",
             "1000.0",
@@ -418,7 +478,7 @@ impl<'t> Text<'t> {
         }
         for line in &self.needed {
             if line.starts_with("column") {
-                let _ = writeln!(map, "# NEEDED: {line}");
+                let _ = writeln!(map, "# NEEDED: {}", in_one_line(line));
             }
         }
         let others: Vec<&str> = names(self.found)
@@ -431,32 +491,13 @@ impl<'t> Text<'t> {
                 others.join(", ")
             ));
         }
+        for line in self.recognised.iter_mut().chain(&mut self.needed) {
+            *line = in_one_line(line);
+        }
         map.push_str("test:\n");
         map.push_str(&self.test);
         map
     }
-}
-
-fn greatest(numbers: &[f64]) -> f64 {
-    numbers
-        .iter()
-        .fold(0.0, |most: f64, number| most.max(number.abs()))
-}
-
-/// Metres, where targets reach less far than any test in mm.
-fn likely_target(column: &Known, wanted: Unit) -> Option<Unit> {
-    let most = greatest(&column.numbers);
-    let is_bare = column.unit.is_none_or(|unit| unit == Unit::Mm);
-    (wanted == Unit::Mm && is_bare && most > 0.0 && most < LEAST_MM).then_some(Unit::Metre)
-}
-
-/// Millimetres, where all deviations are below what any machine has in µm.
-fn likely_deviation(columns: &[&Known], wanted: Unit) -> Option<Unit> {
-    let most = columns.iter().map(|column| greatest(&column.numbers));
-    let most = most.fold(0.0, f64::max);
-    let is_bare = |column: &&Known| column.unit.is_none_or(|unit| unit == Unit::Um);
-    let is_small = most > 0.0 && most < LEAST_UM;
-    (wanted == Unit::Um && columns.iter().all(is_bare) && is_small).then_some(Unit::Mm)
 }
 
 /// A thermometer's name from that of its column.
@@ -510,29 +551,7 @@ pub fn machine_for(map: &Map) -> String {
     text
 }
 
-/// Asks about deviations that are too small for the unit that they are read in; `likely` is the one that they could be in.
-pub fn doubt(numbers: &[f64], name: &str, [unit, likely]: [&str; 2]) -> Option<String> {
-    let most = greatest(numbers);
-    (most > 0.0 && most < LEAST_UM).then(|| {
-        format!(
-            "column \"{name}\": all its numbers are at most {} {unit}, below what machines have: are they {likely}? Then the map needs `units: {{{}: {likely}}}`",
-            number(most),
-            quoted(name)
-        )
-    })
-}
-
-/// Asks about targets of a linear axis, mm, that all lie closer to zero than any but the shortest test has them.
-pub fn doubt_of_targets(targets_mm: &[f64], name: &str) -> Option<String> {
-    let most = greatest(targets_mm);
-    (most > 0.0 && most < LEAST_MM).then(|| {
-        format!(
-            "column \"{name}\": its targets reach to {} mm alone: are they m? Then the map needs `units: {{{}: m}}`",
-            number(most),
-            quoted(name)
-        )
-    })
-}
-
+mod likely;
+mod radial;
 #[cfg(test)]
 mod tests;

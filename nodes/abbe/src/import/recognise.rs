@@ -3,8 +3,10 @@
 use anyhow::Result;
 use metrology::Axis;
 
-use super::map::Direction;
+use super::beside;
+use super::map::{Direction, Plane};
 use super::sheet::Sheet;
+use super::stated::{self, Stated};
 use super::table::number_of;
 use super::times;
 use super::units::{Kind, Unit};
@@ -32,8 +34,10 @@ pub struct Known {
     pub name: String,
     /// What it holds; nothing that is known.
     pub role: Option<Role>,
-    /// The unit in its name.
+    /// The unit in its name, or below it.
     pub unit: Option<Unit>,
+    /// A word that stands for a unit and is none that is known.
+    pub unknown: Option<String>,
     /// Its cells that are numbers.
     pub numbers: Vec<f64>,
     /// Its first cell.
@@ -55,6 +59,12 @@ pub struct Recognised {
     pub n_rows: usize,
     /// Words above the names.
     pub above: String,
+    /// Words of the comments above the names.
+    pub comments: String,
+    /// A column that says the axis, with the first that it says.
+    pub axis_column: Option<(String, Axis)>,
+    /// A column that says the plane, with the first that it says.
+    pub plane_column: Option<(String, Plane)>,
 }
 
 /// Rows that are looked at for what a column holds.
@@ -87,6 +97,12 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
         .filter(|cells| n_numbers(cells) > 0)
         .take(LOOKED_AT)
         .collect();
+    let below = lines.get(at + 1).map_or(&[][..], |(_, cells)| cells);
+    let units = below
+        .iter()
+        .map(String::as_str)
+        .filter(|cell| !cell.is_empty());
+    let units = if stated::is_row(units) { below } else { &[] };
     let columns = head.iter().enumerate().filter(|(_, name)| !name.is_empty());
     let columns = columns.map(|(k, name)| {
         let cells: Vec<&str> = rows
@@ -95,7 +111,10 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
             .map(String::as_str)
             .filter(|cell| !cell.is_empty())
             .collect();
-        known(name, &cells, decimal)
+        let unit = units
+            .get(k)
+            .map_or(Stated::Nothing, |cell| stated::of_cell(cell));
+        known(name, unit, &cells, decimal)
     });
     let above = lines[..at].iter().map(|(_, cells)| cells.join(" "));
     Some(Recognised {
@@ -105,6 +124,9 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
         columns: columns.collect(),
         n_rows: lines.len() - at - 1,
         above: above.collect::<Vec<_>>().join(" "),
+        comments: String::new(),
+        axis_column: beside::axis(head, &lines[at + 1..]),
+        plane_column: beside::plane(head, &lines[at + 1..]),
     })
 }
 
@@ -121,11 +143,18 @@ pub fn of_text(text: &str) -> Result<Option<Recognised>> {
     let end = text.match_indices('\n').nth(BEGIN);
     let begin = end.map_or(text, |(end, _)| &text[..end]);
     let forms = [(';', ','), ('\t', ','), (';', '.'), ('\t', '.'), (',', '.')];
-    let looked = forms.into_iter().filter_map(|(separator, decimal)| {
-        let sheet = Sheet::of_text(begin, separator).ok()?;
-        of(&sheet, decimal)
-    });
-    let best = looked.max_by_key(|found| {
+    let mut failed = None;
+    let mut looked = vec![];
+    for (separator, decimal) in forms {
+        match Sheet::of_text(begin, separator) {
+            Ok(sheet) => looked.extend(of(&sheet, decimal)),
+            Err(error) => failed = Some(error),
+        }
+    }
+    if let (true, Some(error)) = (looked.is_empty(), failed) {
+        return Err(error);
+    }
+    let best = looked.into_iter().max_by_key(|found| {
         let numbers: usize = found
             .columns
             .iter()
@@ -135,34 +164,59 @@ pub fn of_text(text: &str) -> Result<Option<Recognised>> {
         (numbers, found.decimal == '.')
     });
     let best = match best {
-        Some(best) if begin.len() < text.len() => best,
-        best => return Ok(best),
+        Some(best) if begin.len() < text.len() => {
+            of(&Sheet::of_text(text, best.separator)?, best.decimal)
+        }
+        best => best,
     };
-    Ok(of(&Sheet::of_text(text, best.separator)?, best.decimal))
+    Ok(best.map(|best| {
+        let above = usize::try_from(best.head_line).unwrap_or(usize::MAX);
+        let lines = text
+            .lines()
+            .take(above)
+            .filter(|line| line.starts_with('#'));
+        let comments = lines.collect::<Vec<_>>().join(" ");
+        Recognised { comments, ..best }
+    }))
 }
 
-fn known(name: &str, cells: &[&str], decimal: char) -> Known {
+/// What is stated by a name and by the cell below it; two units are one that is not known.
+fn both(name: Stated, below: Stated) -> Stated {
+    match (name, below) {
+        (Stated::Nothing, stated) | (stated, Stated::Nothing) => stated,
+        (name, below) if name.unit() == below.unit() => name,
+        (Stated::Unit(_, a) | Stated::Unknown(a), Stated::Unit(_, b) | Stated::Unknown(b)) => {
+            Stated::Unknown(format!("{a}, {b}"))
+        }
+    }
+}
+
+fn known(name: &str, below: Stated, cells: &[&str], decimal: char) -> Known {
     let (words, unit_word) = parts(name);
-    let unit = unit_word.as_deref().and_then(Unit::of_word);
+    let stated = both(stated::of(name), below);
+    let unit = stated.unit();
     let unit = unit.or_else(|| times::named_unit(name));
-    let degc = ["°c", "degc", "c", "ºc"];
-    let is_degc = unit_word.is_some_and(|word| degc.contains(&word.to_lowercase().as_str()));
+    let unknown = stated.unknown();
+    let is_letter = unit_word.is_some_and(|word| word == "C" || word == "c");
+    let is_degree = is_letter || unit.is_some_and(|unit| unit.kind() == Kind::Temperature);
     let numbers: Vec<f64> = cells
         .iter()
         .filter_map(|cell| number_of(cell, decimal))
         .collect();
     let is_numeric = 2 * numbers.len() > cells.len();
-    let role = if is_degc {
+    let role = if is_degree {
         Some(Role::Temperature)
     } else {
         role(name, &words, unit, (cells, is_numeric))
     };
-    let role =
-        role.or_else(|| (is_numeric && is_warm(&words, &numbers)).then_some(Role::Temperature));
+    let is_bare = unit.is_none() && unknown.is_none();
+    let is_place = || is_bare && is_numeric && is_warm(&words, &numbers);
+    let role = role.or_else(|| is_place().then_some(Role::Temperature));
     Known {
         name: name.to_owned(),
         role,
         unit,
+        unknown,
         numbers,
         first: first(cells, decimal).to_owned(),
     }
@@ -209,7 +263,7 @@ fn parts(name: &str) -> (Vec<String>, Option<String>) {
     if unit.is_none()
         && words.len() > 1
         && let Some(last) = words.last()
-        && (Unit::of_word(last).is_some() || last == "degc" || last == "°c")
+        && Unit::of_word(last).is_some()
     {
         unit = words.pop();
     }
@@ -312,6 +366,11 @@ fn way_of(name: &str, words: &[String]) -> Option<Direction> {
     told.next().or_else(by_sign)
 }
 
+/// The axis of a word that is its letter.
+fn letter(word: &str) -> Option<Axis> {
+    word.parse::<Axis>().ok().filter(|_| word.len() == 1)
+}
+
 impl Recognised {
     /// The first column of a role.
     pub fn first(&self, role: Role) -> Option<&Known> {
@@ -336,9 +395,37 @@ impl Recognised {
             .collect()
     }
 
+    /// The axis that a column says, or the lines above the table.
+    pub fn axis_stated(&self) -> Option<Axis> {
+        let beside = |text: &str, is_prose: bool| {
+            let words: Vec<&str> = text
+                .split(|letter: char| !letter.is_alphanumeric())
+                .filter(|word| !word.is_empty())
+                .collect();
+            let names = |word: &str| matches!(word.to_uppercase().as_str(), "AXIS" | "ACHSE");
+            // In a sentence "a axis" names none.
+            let axis = |word: &str| {
+                let word = if is_prose {
+                    word.to_owned()
+                } else {
+                    word.to_uppercase()
+                };
+                letter(&word)
+            };
+            words.windows(2).find_map(|two| match two {
+                [name, other] if names(name) && axis(other).is_some() => axis(other),
+                [other, name] if names(name) => axis(other),
+                _ => None,
+            })
+        };
+        let column = self.axis_column.as_ref().map(|(_, axis)| *axis);
+        column
+            .or_else(|| beside(&self.above, false))
+            .or_else(|| beside(&self.comments, true))
+    }
+
     /// The axis that is named by the file, the lines above the table, or a column.
     pub fn axis(&self, stem: &str) -> Option<Axis> {
-        let letter = |word: &str| word.parse::<Axis>().ok().filter(|_| word.len() == 1);
         let split = |text: &str| -> Vec<String> {
             let words = text.split(|letter: char| !letter.is_alphanumeric());
             words
@@ -346,15 +433,6 @@ impl Recognised {
                 .map(str::to_uppercase)
                 .collect()
         };
-        let above = split(&self.above);
-        let beside = above.windows(2).find_map(|two| {
-            let names = |word: &str| word == "AXIS" || word == "ACHSE";
-            match two {
-                [name, axis] if names(name) => letter(axis),
-                [axis, name] if names(name) => letter(axis),
-                _ => None,
-            }
-        });
         // Of a name of a file a capital alone: `c.csv` is no axis.
         let of_name = || {
             let mut words = stem.split(|letter: char| !letter.is_alphanumeric());
@@ -368,7 +446,7 @@ impl Recognised {
                 letter(first)
             })
         };
-        beside.or_else(of_name).or_else(of_column)
+        self.axis_stated().or_else(of_name).or_else(of_column)
     }
 }
 

@@ -82,8 +82,10 @@ fn ordered(test: &Test, table: &Table) -> Result<Runs> {
         runs = counted;
         remarks.push(remark);
     }
+    remarks.extend(passes::without_readings(&mut runs));
     remarks.extend(passes::pair(&mut runs));
     check_directions(&runs, units)?;
+    remarks.extend(passes::broken_off(&runs));
     remarks.extend(check_targets(&runs, units)?);
     Ok(Runs { runs, remarks })
 }

@@ -61,6 +61,11 @@ impl Sheet {
         })
     }
 
+    /// Whether a line has a cell with a name.
+    pub fn has(&self, name: &str) -> bool {
+        self.lines.iter().any(|(_, cells)| holds(cells, name))
+    }
+
     /// The first line that holds every one of some names; otherwise the first of those that hold most of them.
     pub fn head(&self, names: &[&str]) -> Option<usize> {
         let held = |cells: &[String]| names.iter().filter(|name| holds(cells, name)).count();

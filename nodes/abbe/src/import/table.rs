@@ -4,12 +4,13 @@ use anyhow::{Context, Result, bail};
 
 use metrology::yaml::shown;
 
+use super::beside;
 use super::limits::Range;
 use super::map::{Column, Direction, Map, Test, What, units};
-use super::odd::{Cost, Odd, Read};
+use super::odd::{Cost, Odd, Read, is_missing};
 use super::sheet::Sheet;
+use super::stated;
 use super::times;
-use super::units::Unit;
 
 /// One row.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +45,7 @@ impl Table {
         let (head_line, head) = &sheet.lines[at];
         let place = |name: &&str| place_of(name, head, sheet.separator);
         let places: Vec<usize> = names.iter().map(place).collect::<Result<_>>()?;
-        let mut left_out = unnamed(head, &places);
+        let mut left_out = beside::unnamed(head, &places);
         left_out.extend((at > 0).then(|| {
             format!("{at} lines above line {head_line}, which has the names of the columns")
         }));
@@ -65,7 +66,7 @@ impl Table {
                 n_empty += 1;
                 continue;
             }
-            if k == at + 1 && reader.is_units(cells) {
+            if k == at + 1 && reader.is_units(cells)? {
                 left_out.push(format!("line {line}: units alone"));
                 continue;
             }
@@ -81,6 +82,7 @@ impl Table {
         if n_empty > 0 {
             left_out.push(format!("{n_empty} rows: all their cells are empty"));
         }
+        beside::check(map, head, &sheet.lines[at + 1..], &rows)?;
         let rows = shaped(rows, map);
         Ok(Self {
             rows,
@@ -127,16 +129,21 @@ impl Reader<'_> {
     }
 
     /// Whether a line below the names has units.
-    fn is_units(&self, cells: &[String]) -> bool {
-        let words: Vec<&str> = (0..self.columns.len())
-            .map(|k| self.cell(cells, k))
-            .filter(|word| !word.is_empty())
-            .collect();
-        let bare = |word: &str| {
-            let brackets = ['[', ']', '(', ')'];
-            Unit::of_word(word.trim_matches(brackets)).is_some()
+    ///
+    /// # Errors
+    /// As [`stated::check_row`].
+    fn is_units(&self, cells: &[String]) -> Result<bool> {
+        let words = (0..self.columns.len()).map(|k| (self.columns[k], self.cell(cells, k)));
+        let stated = || {
+            words
+                .clone()
+                .filter(|(column, _)| column.what.unit().is_some())
         };
-        !words.is_empty() && words.into_iter().all(bare)
+        if !stated::is_row(stated().map(|(_, word)| word)) {
+            return Ok(false);
+        }
+        stated().try_for_each(|(column, word)| stated::check_row(self.map, column, word))?;
+        Ok(true)
     }
 
     /// The numbers of a row; a reading that is not there is no number (NaN). `None`: a cell holds no value of its column.
@@ -265,23 +272,6 @@ fn place_of(name: &str, head: &[String], separator: Option<char>) -> Result<usiz
     Ok(place)
 }
 
-/// The columns that no key of the map names.
-fn unnamed(head: &[String], places: &[usize]) -> Vec<String> {
-    let others = head.iter().enumerate();
-    let others = others.filter(|(place, name)| !places.contains(place) && !name.is_empty());
-    others
-        .map(|(_, name)| format!("column \"{name}\": the map does not name it"))
-        .collect()
-}
-
-/// Whether a cell stands for a missing reading.
-fn is_missing(cell: &str) -> bool {
-    let words = [
-        "", "nan", "n/a", "na", "#n/a", "null", "none", "-", "--", "---",
-    ];
-    words.contains(&cell.to_lowercase().as_str())
-}
-
 /// A number as a person or a program writes it: with a typographic minus, and spaces that mark thousands.
 pub fn number_of(cell: &str, decimal: char) -> Option<f64> {
     let mut text: String = cell
@@ -353,6 +343,12 @@ fn read_cell(
             "{}: lies {} beside its target: must be {range}",
             shown(cell),
             metrology::number::number(number)
+        ),
+        Some(range) if number.total_cmp(&read).is_ne() => bail!(
+            "{}, {} here: must be {range}{}",
+            shown(cell),
+            metrology::number::number(number),
+            range.remedy(number)
         ),
         Some(range) => bail!("{}: must be {range}{}", shown(cell), range.remedy(number)),
         None => Ok(Read::Number(number)),

@@ -10,6 +10,7 @@ use metrology::number::number;
 use metrology::yaml::shown;
 use mtconnect_bridge::observation::read_stamp;
 
+use super::stated;
 use super::units::{Kind, Unit};
 
 /// Longest log or session, s: a leap year.
@@ -253,7 +254,7 @@ pub fn of_column(name: &str, times_s: &[f64], is_stated: bool) -> Result<Option<
             state(unit.name()),
             unit = unit.name()
         ),
-        None => {}
+        None => stated::check_time(name)?,
     }
     let usual = usual(times_s);
     let other = usual.iter().find(|unit| **unit != Unit::Second);

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-/// A unit of a length, an angle or a time.
+/// A unit of a length, an angle, a time or a temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 pub enum Unit {
     /// Nanometre.
@@ -14,12 +14,21 @@ pub enum Unit {
     /// Millimetre.
     #[serde(rename = "mm")]
     Mm,
+    /// Centimetre.
+    #[serde(rename = "cm")]
+    Cm,
     /// Metre.
     #[serde(rename = "m")]
     Metre,
     /// Inch, 25.4 mm.
     #[serde(rename = "inch", alias = "in")]
     Inch,
+    /// A thousandth of an inch, 25.4 µm; `mil` is none: it is an angle and a millimetre too.
+    #[serde(rename = "thou")]
+    Thou,
+    /// A millionth of an inch, 25.4 nm.
+    #[serde(rename = "uin", alias = "µin", alias = "μin")]
+    Uin,
     /// Degree.
     #[serde(rename = "deg", alias = "°")]
     Deg,
@@ -65,6 +74,15 @@ pub enum Unit {
     /// Day.
     #[serde(rename = "d")]
     Day,
+    /// Degree Celsius.
+    #[serde(rename = "degC", alias = "degc", alias = "°C", alias = "C")]
+    Degc,
+    /// Degree Fahrenheit.
+    #[serde(rename = "degF", alias = "degf", alias = "°F", alias = "F")]
+    Degf,
+    /// Kelvin.
+    #[serde(rename = "K", alias = "kelvin")]
+    Kelvin,
 }
 
 /// What a unit is one of.
@@ -73,18 +91,34 @@ pub enum Kind {
     Length,
     Angle,
     Time,
+    Temperature,
 }
 
+impl Kind {
+    /// Names of its units, as a map takes them.
+    pub fn units(self) -> String {
+        let own = Unit::ALL.into_iter().filter(|unit| unit.kind() == self);
+        own.map(Unit::name).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// 0 degC in K, and in degF with the size of a kelvin in it.
+const ZERO_K: f64 = 273.15;
+const ZERO_DEGF: f64 = 32.0;
+const DEGF_PER_K: f64 = 1.8;
 const PER_RAD: f64 = 180.0 / std::f64::consts::PI;
 
 impl Unit {
     /// Every unit.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 26] = [
         Self::Nm,
         Self::Um,
         Self::Mm,
+        Self::Cm,
         Self::Metre,
         Self::Inch,
+        Self::Thou,
+        Self::Uin,
         Self::Deg,
         Self::Gon,
         Self::Turn,
@@ -100,12 +134,23 @@ impl Unit {
         Self::Min,
         Self::Hour,
         Self::Day,
+        Self::Degc,
+        Self::Degf,
+        Self::Kelvin,
     ];
 
     /// What it is one of.
     pub const fn kind(self) -> Kind {
         match self {
-            Self::Nm | Self::Um | Self::Mm | Self::Metre | Self::Inch => Kind::Length,
+            Self::Nm
+            | Self::Um
+            | Self::Mm
+            | Self::Cm
+            | Self::Metre
+            | Self::Inch
+            | Self::Thou
+            | Self::Uin => Kind::Length,
+            Self::Degc | Self::Degf | Self::Kelvin => Kind::Temperature,
             Self::Deg
             | Self::Gon
             | Self::Turn
@@ -120,14 +165,18 @@ impl Unit {
         }
     }
 
-    /// One of it in mm, deg or s.
+    /// One of it in mm, deg, s or K.
     pub const fn size(self) -> f64 {
         match self {
             Self::Nm => 1e-6,
             Self::Um | Self::Ms => 1e-3,
-            Self::Mm | Self::Deg | Self::Second => 1.0,
+            Self::Mm | Self::Deg | Self::Second | Self::Degc | Self::Kelvin => 1.0,
+            Self::Cm => 10.0,
             Self::Metre => 1e3,
             Self::Inch => 25.4,
+            Self::Thou => 25.4e-3,
+            Self::Uin => 25.4e-6,
+            Self::Degf => 1.0 / DEGF_PER_K,
             Self::Gon => 0.9,
             Self::Turn => 360.0,
             Self::Arcmin => 1.0 / 60.0,
@@ -145,6 +194,9 @@ impl Unit {
 
     /// `number` of this unit in another one of the same kind.
     pub fn convert(self, number: f64, to: Self) -> f64 {
+        if self.kind() == Kind::Temperature {
+            return to.of_degc(self.degc(number));
+        }
         let (size, wanted) = (self.size(), to.size());
         if size < wanted {
             // 3.5 µm in mm and back are 3.5 µm: the quotient of sizes is whole or nearly so.
@@ -154,14 +206,33 @@ impl Unit {
         }
     }
 
+    fn degc(self, number: f64) -> f64 {
+        match self {
+            Self::Degf => (number - ZERO_DEGF) / DEGF_PER_K,
+            Self::Kelvin => number - ZERO_K,
+            _ => number,
+        }
+    }
+
+    fn of_degc(self, degc: f64) -> f64 {
+        match self {
+            Self::Degf => degc * DEGF_PER_K + ZERO_DEGF,
+            Self::Kelvin => degc + ZERO_K,
+            _ => degc,
+        }
+    }
+
     /// As a map names it.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Nm => "nm",
             Self::Um => "um",
             Self::Mm => "mm",
+            Self::Cm => "cm",
             Self::Metre => "m",
             Self::Inch => "inch",
+            Self::Thou => "thou",
+            Self::Uin => "uin",
             Self::Deg => "deg",
             Self::Gon => "gon",
             Self::Turn => "turn",
@@ -177,6 +248,9 @@ impl Unit {
             Self::Min => "min",
             Self::Hour => "h",
             Self::Day => "d",
+            Self::Degc => "degC",
+            Self::Degf => "degF",
+            Self::Kelvin => "K",
         }
     }
 
@@ -189,7 +263,12 @@ impl Unit {
             "micron" | "microns" | "micrometer" | "micrometre" | "mue" => Some(Self::Um),
             "millimeter" | "millimetre" => Some(Self::Mm),
             "meter" | "metre" => Some(Self::Metre),
+            "centimeter" | "centimetre" => Some(Self::Cm),
             "in" | "inches" | "zoll" => Some(Self::Inch),
+            "uinch" | "microinch" | "microinches" => Some(Self::Uin),
+            "°c" | "ºc" | "degc" | "celsius" => Some(Self::Degc),
+            "°f" | "ºf" | "degf" | "fahrenheit" => Some(Self::Degf),
+            "°k" | "degk" | "kelvin" => Some(Self::Kelvin),
             "°" | "degree" | "degrees" | "grad" => Some(Self::Deg),
             "gons" | "gradian" | "gradians" => Some(Self::Gon),
             "turns" | "rev" => Some(Self::Turn),
@@ -234,6 +313,12 @@ mod tests {
             (0.25, Unit::Metre, Unit::Mm, 250.0),
             (1.0, Unit::Rad, Unit::Arcsec, 206_264.806_247_096),
             (0.5, Unit::Deg, Unit::Arcsec, 1800.0),
+            (250.0, Unit::Uin, Unit::Um, 6.35),
+            (0.5, Unit::Thou, Unit::Um, 12.7),
+            (2.5, Unit::Cm, Unit::Mm, 25.0),
+            (68.0, Unit::Degf, Unit::Degc, 20.0),
+            (293.15, Unit::Kelvin, Unit::Degc, 20.0),
+            (-40.0, Unit::Degf, Unit::Degc, -40.0),
             (100.0, Unit::Gon, Unit::Deg, 90.0),
             (0.25, Unit::Turn, Unit::Deg, 90.0),
             (10.0, Unit::Urad, Unit::Arcsec, 2.062_648_062_47),
@@ -267,7 +352,7 @@ mod tests {
         ] {
             assert!(is_taken(word, Some(unit)), "{word}");
         }
-        for word in ["", "target", "um/m", "C"] {
+        for word in ["", "target", "um/m", "C", "mil", "K", "F"] {
             assert!(is_taken(word, None), "{word}");
         }
     }

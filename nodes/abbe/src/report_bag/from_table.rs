@@ -12,6 +12,9 @@ use crate::import::{self, Named, propose};
 /// Ends of names of files that are tables.
 const ENDS: [&str; 6] = ["csv", "tsv", "txt", "dat", "xlsx", "xlsm"];
 
+/// Begin of a line with what was assumed of a column.
+const ASSUMED: &str = "warning, column ";
+
 /// A bag of a table.
 pub struct FromTable {
     /// Its folder, which goes away with this.
@@ -22,6 +25,15 @@ pub struct FromTable {
     pub lines: Vec<String>,
     /// Cells that cost a row or a reading.
     pub n_odd: usize,
+}
+
+impl FromTable {
+    /// What was assumed of columns.
+    pub fn assumed(&self) -> Vec<String> {
+        let lines = self.lines.iter();
+        let assumed = lines.filter(|line| line.starts_with(ASSUMED));
+        assumed.cloned().collect()
+    }
 }
 
 /// Whether a path is a table by its name.
@@ -76,8 +88,13 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
 fn proposed(path: &Path) -> Result<(Named, Vec<String>)> {
     let proposal = propose::of(path).with_context(|| format!("table {}", path.display()))?;
     let mut lines: Vec<String> = proposal.recognised;
+    // What was assumed of a column is not folded with what the table lacks.
     let needed = proposal.needed.into_iter();
-    lines.extend(needed.map(|line| format!("not in the table: {line}")));
+    lines.extend(needed.map(|line| match line.strip_prefix("column ") {
+        Some(rest) => format!("{ASSUMED}{rest}"),
+        None => format!("not in the table: {line}"),
+    }));
+    lines.sort_by_key(|line| !line.starts_with(ASSUMED));
     let named = Named {
         place: "proposed for the table (abbe import --propose prints it)".to_owned(),
         text: proposal.map,

@@ -98,3 +98,167 @@ fn a_table_of_nothing_known_names_its_columns() {
     let said = format!("{:#}", of(&path).unwrap_err());
     assert!(said.contains("columns colour, weight"), "{said}");
 }
+
+#[test]
+fn a_unit_in_a_name_or_below_it_holds_whatever_the_numbers_are() {
+    for (head, units) in [
+        ("target_mm,deviation_um\n", vec![]),
+        (
+            "target (mm),deviation [nm]\n",
+            vec![("deviation [nm]", Unit::Nm)],
+        ),
+        ("target,deviation\nmm,um\n", vec![]),
+        (
+            "target,deviation\n[inch],[µin]\n",
+            vec![("target", Unit::Inch), ("deviation", Unit::Uin)],
+        ),
+        (
+            "target [cm],deviation [cm]\n",
+            vec![("deviation [cm]", Unit::Cm), ("target [cm]", Unit::Cm)],
+        ),
+    ] {
+        let (proposal, map) = proposed(
+            "a.csv",
+            &format!("{head}0,0.001\n0.12,-0.004\n0.24,0.003\n"),
+        );
+        let found: Vec<(&str, Unit)> = map
+            .units
+            .iter()
+            .map(|(name, unit)| (name.as_str(), *unit))
+            .collect();
+        let mut wanted = units;
+        wanted.sort_by_key(|(name, _)| *name);
+        assert_eq!(found, wanted, "{}", proposal.map);
+        assert!(
+            !proposal.needed.join("\n").contains("too small"),
+            "{:?}",
+            proposal.needed
+        );
+        map.check_columns().unwrap();
+    }
+}
+
+#[test]
+fn a_unit_that_is_not_known_is_in_no_map_that_is_taken() {
+    for head in [
+        "target_mm,Deviation (mil)",
+        "target_mm,Abweichung [1/100 mm]",
+        "target (ft),deviation_um",
+        "target_mm,error [V]",
+        "angle_deg,run,radial (mil)",
+        "time_s,x_um,temp [mV]",
+    ] {
+        let row = |k: u32| format!("{},{},{}\n", 40 * k, k, 20 + k);
+        let rows: String = (0..4).map(row).collect();
+        let (proposal, map) = proposed("a.csv", &format!("{head}\n{rows}"));
+        let said = map.check_columns().expect_err(head).to_string();
+        assert!(said.contains("no unit that is known"), "{said}");
+        assert!(
+            proposal.needed.join("\n").contains("is not known"),
+            "{:?}",
+            proposal.needed
+        );
+    }
+}
+
+#[test]
+fn temperatures_in_fahrenheit_and_kelvin_have_their_unit() {
+    for (name, unit) in [
+        ("spindle_temperature_degF", Unit::Degf),
+        ("Temp (°F)", Unit::Degf),
+        ("spindle [K]", Unit::Kelvin),
+        ("Temp (°C)", Unit::Degc),
+    ] {
+        let (_, map) = proposed(
+            "a.csv",
+            &format!("time_s,z_um,{name}\n0,1,68\n60,2,69\n120,3,70\n"),
+        );
+        let wanted = (unit != Unit::Degc).then_some(&unit);
+        assert_eq!(map.units.get(name), wanted, "{name}");
+        assert!(map.test.columns().iter().any(|column| column.name == name));
+    }
+    // A load in percent is no temperature.
+    let (_, map) = proposed(
+        "a.csv",
+        "time_s,z_um,spindle [%]\n0,1,68\n60,2,69\n120,3,70\n",
+    );
+    assert_eq!(map.test.columns().len(), 2);
+}
+
+#[test]
+fn the_axis_and_the_plane_are_those_that_a_column_or_a_comment_says() {
+    for (text, axis) in [
+        ("target_mm,deviation_um,axis\n0,1,Y\n40,2,Y\n", Axis::Y),
+        (
+            "target_mm,deviation_um,Achse\n0,1,z axis\n40,2,z axis\n",
+            Axis::Z,
+        ),
+        ("target,deviation,axis\n0,1,C\n40,2,C\n", Axis::C),
+        ("# Axis: Y\ntarget_mm,deviation_um\n0,1\n40,2\n", Axis::Y),
+        (
+            "# measured along a axis\ntarget_mm,deviation_um\n0,1\n40,2\n",
+            Axis::X,
+        ),
+        ("time_s,displacement_um,axis\n0,1,X\n40,2,X\n", Axis::X),
+    ] {
+        let (proposal, map) = proposed("t.csv", text);
+        let (Test::Positioning { axis: found, .. } | Test::Log { axis: found, .. }) = map.test
+        else {
+            panic!("{text}");
+        };
+        assert_eq!(found, axis, "{text}: {}", proposal.map);
+    }
+    let (_, map) = proposed(
+        "c.csv",
+        "run,plane,radius_mm,angle_deg,radial_um\n1,YZ,150,0,2\n1,YZ,150,10,3\n",
+    );
+    let Test::Circle {
+        plane,
+        radius_mm,
+        radial_um,
+        ..
+    } = map.test
+    else {
+        panic!("no circle");
+    };
+    assert_eq!(
+        (plane, radius_mm, radial_um.as_str()),
+        (Plane::Yz, 150.0, "radial_um")
+    );
+}
+
+#[test]
+fn names_with_line_breaks_and_quotes_give_a_map_that_is_read() {
+    for name in [
+        "target\n(mm)",
+        "target\r\n(mm)",
+        "target \"\"x\"\" mm",
+        "target\\ mm",
+        "target\t[mm]",
+    ] {
+        let text = format!("run,direction,\"{name}\",deviation\n1,up,0,1\n1,up,40,2\n");
+        let (_, map) = proposed("a.csv", &text);
+        let Test::Positioning { target_mm, .. } = &map.test else {
+            panic!("{name}");
+        };
+        assert_eq!(*target_mm, name.replace("\"\"", "\""));
+        map.check_columns().unwrap();
+    }
+}
+
+#[test]
+fn a_table_of_too_many_columns_is_refused_with_number_and_limit() {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("a.csv");
+    for n in [1_001, 1_500] {
+        let head: String = (0..n - 2).map(|k| format!(",c{k}")).collect();
+        let row = |k: u32| format!("{},{k}{}\n", 40 * k, ",1".repeat(n - 2));
+        let rows: String = (0..3).map(row).collect();
+        std::fs::write(&path, format!("target_mm,deviation_um{head}\n{rows}")).unwrap();
+        let said = format!("{:#}", of(&path).unwrap_err());
+        assert!(
+            said.contains(&format!("{n} columns: must be at most 1000")),
+            "{said}"
+        );
+    }
+}
