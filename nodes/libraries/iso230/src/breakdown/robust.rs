@@ -106,11 +106,8 @@ pub(super) fn fit(
         covariance,
         residuals_mm,
     } = system.solved(&weights)?;
-    let sum: f64 = residuals_mm
-        .iter()
-        .zip(&weights)
-        .map(|(r, w)| w * r * r)
-        .sum();
+    let weighted = residuals_mm.iter().zip(&weights);
+    let sum: f64 = weighted.map(|(r, w)| w * r * r).sum();
     let degrees_of_freedom = n - n_parameters;
     let mut fit = Fit {
         terms,

@@ -50,7 +50,7 @@ fn added(plane: &PlaneBreakdown, key: RowKey) -> f64 {
 
 fn near(what: &str, found: f64, by_hand: f64, share: f64) {
     assert!(
-        (found - by_hand).abs() <= share * by_hand.abs() + 1e-10,
+        (found - by_hand).abs() <= share * by_hand.abs() + 1e-9,
         "{what}: found {found:e}, by hand {by_hand:e}"
     );
 }
