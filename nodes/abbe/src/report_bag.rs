@@ -63,6 +63,14 @@ pub struct ReportBag {
     keep: Keep,
 }
 
+/// Prints what was lost, left out or not completed.
+fn complain_of(tests: &Tests) {
+    loss::complain_of(&tests.reading);
+    for run in &tests.broken_off {
+        complain!("abbe: {run}");
+    }
+}
+
 impl ReportBag {
     /// Evaluates the bag; exit code 3 when a part of it was lost or left out.
     ///
@@ -81,10 +89,7 @@ impl ReportBag {
             tests.machine = None;
             tests.left_out.clear();
         }
-        loss::complain_of(&tests.reading);
-        for run in &tests.broken_off {
-            complain!("abbe: {run}");
-        }
+        complain_of(&tests);
         let n_odd = table.as_ref().map_or(0, |table| table.n_odd);
         if n_odd > 0 {
             let shown = self.bag.display();

@@ -52,8 +52,8 @@ impl ShownUnit {
             return None;
         }
         let lower = text.to_lowercase();
-        let is_so_called = UNITS.iter().any(|known| *known == (text, unit))
-            || NAMES.iter().any(|known| *known == (lower.as_str(), unit))
+        let is_so_called = UNITS.contains(&(text, unit))
+            || NAMES.contains(&(lower.as_str(), unit))
             || unit.word().to_lowercase() == lower;
         Some(is_so_called || by_code.is_some_and(|(_, known)| *known == unit))
     }
