@@ -25,10 +25,14 @@
 //! REP 103 for the units of the wire; OMG DDS 1.4, 2.3.2 for the invalid time; `rclcpp/src/rclcpp/time.cpp`,
 //! `convert_rcl_time_to_sec_nanos`, for (3).
 
+mod allowed;
+
 use metrology::bound::{Range, TEMPERATURE};
 use metrology::stamp::NANOS_PER_S;
 use metrology::{Axis, AxisSet, Clock, PerAxis, Stamp};
 use nalgebra::Vector3;
+
+pub(crate) use allowed::Allowed;
 
 use crate::builtin_interfaces::msg::Time;
 use crate::geometry_msgs::msg::{Point, Vector3 as WireVector};
@@ -159,43 +163,6 @@ pub(crate) fn set_positions(out: &mut Vec<f64>, axes: AxisSet, values: &PerAxis<
             values[axis]
         }
     }));
-}
-
-/// What a number may be.
-#[derive(Clone, Copy)]
-pub(crate) enum Allowed {
-    /// NaN and the infinities are refused.
-    Finite,
-    /// NaN has a meaning.
-    OrNan,
-    /// Plus infinity has a meaning.
-    OrInfinite,
-    /// Nobody may use the number.
-    Anything,
-}
-
-impl Allowed {
-    fn takes(self, value: f64) -> bool {
-        match self {
-            Self::Finite => value.is_finite(),
-            Self::OrNan => !value.is_infinite(),
-            Self::OrInfinite => value.is_finite() || value == f64::INFINITY,
-            Self::Anything => true,
-        }
-    }
-
-    const fn is_unused(self) -> bool {
-        matches!(self, Self::Anything)
-    }
-
-    const fn words(self) -> &'static str {
-        match self {
-            Self::Finite => "a finite number",
-            Self::OrNan => "a finite number or NaN",
-            Self::OrInfinite => "a finite number or +inf",
-            Self::Anything => "anything",
-        }
-    }
 }
 
 /// The axes of a message in the order of its arrays.

@@ -10,7 +10,7 @@ use node_runtime::Composition;
 use serde_json::json;
 
 /// The node, by the name of its folder.
-const NODE: &str = "live_view";
+const LIVE_VIEW: &str = "live_view";
 
 /// Arguments of `abbe serve`.
 #[derive(Args)]
@@ -61,9 +61,9 @@ impl Serve {
     /// # Errors
     /// When the program has no such node.
     pub fn execute(self) -> Result<ExitCode> {
-        let build = crate::node::builder(NODE).context(NODE)?;
+        let build = crate::node::builder(LIVE_VIEW).context(LIVE_VIEW)?;
         Ok(node_runtime::run_composed(vec![Composition {
-            name: NODE.to_owned(),
+            name: LIVE_VIEW.to_owned(),
             arguments: self.arguments(),
             build: Box::new(build),
         }]))
@@ -90,7 +90,7 @@ mod tests {
         let words = "abbe --address [::1]:0 --token-file token --host-name mill --host-name cell --namespace /mill_3";
         let line = Line::parse_from(words.split(' '));
         let arguments = Arguments::parse(line.serve.arguments()).unwrap();
-        let setup = Setup::new(NODE, &arguments).unwrap();
+        let setup = Setup::new(LIVE_VIEW, &arguments).unwrap();
         let expected = LiveViewConfig {
             address: "[::1]:0".to_owned(),
             token_file: "token".to_owned(),

@@ -20,7 +20,7 @@ const CODES: [(&[u8], Unit); 11] = [
 ];
 
 /// Units by their names in words.
-const NAMES: [(&str, Unit); 10] = [
+const UNIT_NAMES: [(&str, Unit); 10] = [
     ("millimetre", Unit::Millimeter),
     ("inch", Unit::Inch),
     ("degree", Unit::Degree),
@@ -53,7 +53,7 @@ impl ShownUnit {
         }
         let lower = text.to_lowercase();
         let is_so_called = UNITS.contains(&(text, unit))
-            || NAMES.contains(&(lower.as_str(), unit))
+            || UNIT_NAMES.contains(&(lower.as_str(), unit))
             || unit.word().to_lowercase() == lower;
         Some(is_so_called || by_code.is_some_and(|(_, known)| *known == unit))
     }

@@ -68,12 +68,12 @@ const FOREIGN: &[&str] = &[
     "fringe",
 ];
 /// Units that hold in the middle of a name too: no other word is written so.
-const CLEAR: &[&str] = &[
+const CLEAR_UNITS: &[&str] = &[
     "nm", "um", "mm", "uin", "inch", "inches", "micron", "microns", "arcsec", "arcmin", "urad",
     "mrad", "gon", "degc", "degf",
 ];
 /// Short words in brackets that are no unit.
-const NOTES: &[&str] = &[
+const NOTE_WORDS: &[&str] = &[
     "abs", "rel", "avg", "raw", "ist", "max", "act", "cmd", "dev", "opt", "cw", "ccw", "lh", "rh",
     "1st", "2nd", "3rd", "mid", "top", "utc", "gmt", "cet", "mez", "sum", "ref", "iso", "low",
     "uni", "bi", "old", "new", "all", "any", "c",
@@ -246,7 +246,7 @@ fn is_note(word: &str) -> bool {
         .unwrap_or(numbered);
     let is_sign = |letter: char| !letter.is_alphanumeric() && !"%°'\"′″‰".contains(letter);
     let is_axis = |letter: char| ('X'..='Z').contains(&letter) || ('A'..='C').contains(&letter);
-    NOTES.contains(&lower.as_str())
+    NOTE_WORDS.contains(&lower.as_str())
         || Direction::of_word(word).is_some()
         || is_digits(numbered.trim_matches([' ', '.', '#', '_']))
         || word.chars().all(is_sign)
@@ -304,7 +304,7 @@ fn in_words(text: &str) -> Stated {
     }
     let is_clear = |word: &str| {
         let word = plain(word);
-        CLEAR.contains(&word.as_str()) || (word == "rad" && begins(ANGLES))
+        CLEAR_UNITS.contains(&word.as_str()) || (word == "rad" && begins(ANGLES))
     };
     // `100 mm bar` is no unit of the column.
     let is_numbered = |k: usize| k > 0 && is_digits(words[k - 1].1);

@@ -241,7 +241,9 @@ fn names_with_line_breaks_and_quotes_give_a_map_that_is_read() {
         let Test::Positioning { target_mm, .. } = &map.test else {
             panic!("{name}");
         };
-        assert_eq!(*target_mm, name.replace("\"\"", "\""));
+        // A line break is one character of the name, however the table writes it.
+        let one_break = name.replace("\r\n", "\n");
+        assert_eq!(*target_mm, one_break.replace("\"\"", "\""));
         map.check_columns().unwrap();
     }
 }
