@@ -311,7 +311,7 @@ fn what_cannot_be_diagnosed_ends_with_1_and_what_to_record_and_a_wrong_question_
     );
     cannot(
         &diagnose(&bag, &["--machine", &machine, "--write-machine", &machine]),
-        &["machine.yaml: is there already"],
+        &["machine.yaml: is read as an input"],
     );
     let nothing = scenario.out().join("nothing");
     cannot(&diagnose(&nothing, &["--machine", &machine]), &["nothing"]);
