@@ -215,7 +215,7 @@ impl Page {
         list(self.nodes.iter().map(one).collect())
     }
 
-    /// Messages that could not be shown; `None`: there are none.
+    /// Messages that could not be shown; `None`: all were shown.
     fn trouble_part(&self) -> Option<Value> {
         let one = |(topic, (messages, reason)): (&String, &(u64, String))| json!({"topic": topic, "messages": messages, "reason": short(reason)});
         let refused: Vec<Value> = self.refused.iter().map(one).collect();

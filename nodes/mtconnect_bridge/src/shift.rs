@@ -8,7 +8,7 @@
 //!   F     = √(d_X² + d_Y² + d_Z²) / Δ          feed                                            (3)
 //! ```
 //!
-//! A value holds until the next is told. A time that a log tells twice, since its clock goes back, counts as it was told first, so
+//! A value holds until the next one. A time that a log has twice, since its clock goes back, counts as it came first, so
 //! that (1) is never above the greatest reading. A spindle that is absent is taken to stand, an axis that is absent not to
 //! move. Each axis goes its travel to and fro within a window of the other machine, so heat from nuts, guides and
 //! motors comes in as it did; where the axis stood is not followed. Nothing moves: a dwell.
@@ -123,9 +123,9 @@ struct Cutter {
     bins: Vec<Bin>,
     spindle: Option<(Stamp<Machine>, f64)>,
     position_mm: PerAxis<Option<f64>>,
-    /// When the position of each axis was told last; none: not since the clock leapt.
+    /// Time of the last position of each axis; `None`: not since the clock leapt.
     axis_told: PerAxis<Option<Stamp<Machine>>>,
-    /// Times in which the spindle, and each axis, was told of.
+    /// Times of which the log has the spindle, and each axis.
     turned: Once,
     travelled: PerAxis<Once>,
 }

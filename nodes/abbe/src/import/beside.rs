@@ -201,7 +201,7 @@ mod tests {
     const STOPS: &str = "positioning: {axis: X, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 1.0, run: n, target_mm: t, deviation_um: d}";
     const CIRCLE: &str = "circle: {plane: XY, centre_mm: [0.0, 0.0, 0.0], radius_mm: 100.0, feed_mm_min: 1000.0, run: n, angle_deg: t, radial_um: d}";
 
-    /// What is said of a table of one run in six rows, 60 deg (mm) apart, with another column.
+    /// The remarks on a table of one run in six rows, 60 deg (mm) apart, with another column.
     fn said(test: &str, name: &str, cells: [&str; 6], step: f64) -> String {
         let map: Map =
             serde_saphyr::from_str(&format!("start_s: 0\ntest:\n  {test}\n")).expect("a map");

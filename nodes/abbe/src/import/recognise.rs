@@ -36,7 +36,7 @@ pub struct Known {
     pub role: Option<Role>,
     /// The unit in its name, or below it.
     pub unit: Option<Unit>,
-    /// A word that stands for a unit and is none that is known.
+    /// A word in the place of a unit that Abbe does not know.
     pub unknown: Option<String>,
     /// Its cells that are numbers.
     pub numbers: Vec<f64>,

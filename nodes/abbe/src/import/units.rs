@@ -23,7 +23,7 @@ pub enum Unit {
     /// Inch, 25.4 mm.
     #[serde(rename = "inch", alias = "in")]
     Inch,
-    /// A thousandth of an inch, 25.4 µm; `mil` is none: it is an angle and a millimetre too.
+    /// A thousandth of an inch, 25.4 µm; `mil` is refused: it is an angle and a millimetre too.
     #[serde(rename = "thou")]
     Thou,
     /// A millionth of an inch, 25.4 nm.

@@ -105,7 +105,7 @@ pub enum Instrument {
 }
 
 impl Instrument {
-    /// Refuses uncertainties that are none.
+    /// Refuses uncertainties below zero and values without a number.
     pub(super) fn check(&self, recording: usize) -> Result<(), BreakdownError> {
         let named = match *self {
             Self::Plate {
