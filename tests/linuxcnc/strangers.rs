@@ -1,7 +1,7 @@
 //! A bridge at work on LinuxCNC among strangers: others on the graph who say, ask and flood what no good node does.
 //!
 //! A program moves Y, and an author's offset is on X, which stands: whatever X's motor does is an offset, in every servo
-//! period. What the bridge is told by strangers it refuses and names on `/diagnostics`. While a stranger publishes offsets
+//! period. The bridge refuses what strangers ask for, and names it on `/diagnostics`. While a stranger publishes offsets
 //! beside the author, nobody is followed: the offset fades at HAL's rate, and is there again when the author is alone. No
 //! stranger moves an axis beyond that, ends the program or keeps the offset of an author who fell silent.
 
@@ -224,7 +224,7 @@ fn judge(states: &[AxisState]) {
     assert!(greatest_mm > 0.9 * OFFSET_MM && greatest_mm < LIMIT_MM);
 }
 
-/// No axis was told to move since `since`.
+/// No axis was commanded to move since `since`.
 fn stood(graph: &Graph, since: Instant) {
     let states = states(graph, since);
     assert!(states.len() > 100, "{}", states.len());

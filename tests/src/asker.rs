@@ -130,7 +130,7 @@ impl Asker {
     /// The answer to a request, where it has come.
     ///
     /// # Panics
-    /// When it is none of `V`.
+    /// When its bytes are no answer of `V`.
     #[must_use]
     pub fn answer<V: Service>(&self, id: RequestId) -> Option<V::Response> {
         let post = self.post.lock().unwrap();

@@ -276,7 +276,7 @@ impl Run {
         client.ask_first(Request::Set(Setting::Abort));
     }
 
-    /// Something that has nothing to do with the program ends it, as soon as LinuxCNC can be told.
+    /// Something that has nothing to do with the program ends it, as soon as LinuxCNC takes commands.
     pub fn stop(&mut self, why: String, client: &mut Client) {
         let is_said = self.faults.iter().any(|(_, said)| *said == why);
         if is_said || !matches!(self.phase, Phase::Opening { .. } | Phase::Running) {

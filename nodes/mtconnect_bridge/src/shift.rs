@@ -170,7 +170,7 @@ impl Cutter {
         }
     }
 
-    /// Whether all of it is new: nothing of a time that was told before.
+    /// Whether all of it is new: nothing of a time that the log had before.
     fn take(&mut self, at: Stamp<Machine>, event: Event) -> bool {
         match event {
             Event::Spindle(speed_rad_s) => {

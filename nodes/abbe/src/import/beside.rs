@@ -28,12 +28,12 @@ const SENSE_NAMES: &[&str] = &[
     "way",
 ];
 
-/// The axis that a column says first, with the column.
+/// The first axis in a column, with the column.
 pub fn axis(head: &[String], lines: &Lines) -> Option<(String, Axis)> {
     first(head, lines, AXIS_NAMES, axis_of)
 }
 
-/// The plane that a column says first, with the column.
+/// The first plane in a column, with the column.
 pub fn plane(head: &[String], lines: &Lines) -> Option<(String, Plane)> {
     first(head, lines, PLANE_NAMES, plane_of)
 }

@@ -61,9 +61,9 @@ pub struct Recognised {
     pub above: String,
     /// Words of the comments above the names.
     pub comments: String,
-    /// A column that says the axis, with the first that it says.
+    /// A column of axes, with the first of them.
     pub axis_column: Option<(String, Axis)>,
-    /// A column that says the plane, with the first that it says.
+    /// A column of planes, with the first of them.
     pub plane_column: Option<(String, Plane)>,
 }
 
@@ -395,7 +395,7 @@ impl Recognised {
             .collect()
     }
 
-    /// The axis that a column says, or the lines above the table.
+    /// The axis that a column or the lines above the table state.
     pub fn axis_stated(&self) -> Option<Axis> {
         let beside = |text: &str, is_prose: bool| {
             let words: Vec<&str> = text

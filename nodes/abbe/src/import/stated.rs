@@ -1,7 +1,7 @@
 //! The unit that a column's name, or a line of units below the names, states.
 //!
 //! A stated unit holds. One that is not known, or that is not the one of the map's key, is refused with what to state: only
-//! `units` of the map says that a name is wrong. In brackets stands a unit or a note; without them the last word may be a
+//! `units` of the map states that a name is wrong. In brackets stands a unit or a note; without them the last word may be a
 //! unit, or a clear one before it.
 
 use anyhow::{Result, bail};

@@ -230,7 +230,7 @@ fn counted_from(errors: &AxisErrors, wanted: &Wanted) -> AxisErrors {
 
 fn from_table(table: &PositioningTable, wanted: &Wanted) -> Result<AxisErrors, Reason> {
     let errors = AxisErrors::from_table(table)?;
-    // An outlier between two points of the grid is in no file, and says that the others may be wrong too.
+    // An outlier between two points of the grid is in no file, but the others may be wrong too.
     plausible::sizes_of(&counted_from(&errors, wanted))?;
     let grid = Grid::inside(table.axis, spacing(wanted, table.axis), errors.span())?;
     Ok(errors.on_grid(&grid)?)

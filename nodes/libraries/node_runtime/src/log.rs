@@ -146,7 +146,7 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
     // The OPC UA client calls it an error that a connection without security has no certificate; what ends a connection is a
     // condition of the bridge.
     let opcua = "opcua_client=off,opcua_core=off,opcua_crypto=off";
-    // Reading CDR it warns of every text that lacks its end, of every message: what becomes of such a message the node says.
+    // Reading CDR it warns of every text that lacks its end, of every message: the node reports what becomes of such a message.
     let quiet =
         format!("rustdds=error,{silent},ros2_client=error,cdr_encoding=error,zenoh=error,{opcua}");
     // Where DDS is secured it complains of every message of whoever is not.

@@ -330,8 +330,8 @@ pub trait Node: Send {
     /// everybody is known, never says it.
     fn sees_publishers(&mut self, _subscription: usize, _publishers: usize) {}
 
-    /// A message of a subscription comes from this publisher, whether it can be read or not; told before the message. The
-    /// harness, where each topic has one publisher, never says it.
+    /// A message of a subscription comes from this publisher, whether it can be read or not; this comes before the message. The
+    /// harness, where each topic has one publisher, never sends it.
     fn hears_from(&mut self, _at: Stamp<Host>, _subscription: usize, _author: Author) {}
 
     /// Copies everything that what it will say depends on; `None`: it cannot, or not now.

@@ -1,18 +1,18 @@
-//! Times that a log has told of: where its clock goes back, it tells of some a second time, and the first counts.
+//! Times that a log has covered: where its clock goes back, it covers some a second time, and the first counts.
 
 use metrology::stamp::{Machine, Stamp};
 
 /// First and last instant.
 pub(super) type Piece = (Stamp<Machine>, Stamp<Machine>);
 
-/// Times that were told, as disjoint pieces in order.
+/// Times that were covered, as disjoint pieces in order.
 #[derive(Debug, Default)]
 pub(super) struct Once {
     pieces: Vec<Piece>,
 }
 
 impl Once {
-    /// Whether `at` lies before the end of a piece that was told.
+    /// Whether `at` lies in a piece that was covered, its end left out.
     pub fn has(&self, at: Stamp<Machine>) -> bool {
         let place = self.pieces.partition_point(|(_, last)| *last <= at);
         self.pieces
@@ -20,7 +20,7 @@ impl Once {
             .is_some_and(|(first, _)| *first <= at)
     }
 
-    /// Notes a piece as told; what of it is new.
+    /// Notes a piece as covered; returns what of it is new.
     pub fn tell(&mut self, from: Stamp<Machine>, to: Stamp<Machine>) -> Vec<Piece> {
         if to <= from {
             return Vec::new();

@@ -102,12 +102,12 @@ mod tests {
     use std::f64::consts::TAU;
     use std::path::Path;
 
-    use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
-    use metrology::stamp::Stamp;
+    use metrology::sample::Sense;
 
     use super::super::breakdowns;
+    use super::super::tests::recording;
     use super::*;
-    use crate::evaluate::circles::{CirclePoint, EvaluatedTurn, Instrument, TurnBy};
+    use crate::evaluate::circles::{CirclePoint, Instrument};
 
     const RADIUS_MM: f64 = 50.0;
     /// Scale of both axes that the machine has at 20 °C, and what 2 K of 11 µm/(m K) less 1 K of 5 µm/(m K) add.
@@ -140,27 +140,9 @@ environmental_drift_um: 0.0
                 time_s: angle * RADIUS_MM / feed_mm_s,
             }
         };
-        CircleRecording {
-            points: (0..720).map(point).collect(),
-            segment: TestSegment {
-                plane: TestPlane::Xy,
-                radius_mm: RADIUS_MM,
-                feed_mm_s,
-                sense,
-                zero_id: 1,
-                setup_id: 1,
-                completed: false,
-                ..TestSegment::of_kind(TestKind::Circle, run, Stamp::from_nanos(0))
-            },
-            turn: EvaluatedTurn {
-                by: TurnBy::FullRate,
-                left_out_s: 0.0,
-                left_out_rad: 0.0,
-                n_left_out: 0,
-            },
-            compensated: false,
-            instrument: Instrument::GridEncoder,
-        }
+        let points = (0..720).map(point).collect();
+        let nominal = (RADIUS_MM, feed_mm_s);
+        recording(points, (run, sense), nominal, Instrument::GridEncoder)
     }
 
     fn circles() -> Vec<CircleRecording> {

@@ -39,12 +39,27 @@ fn circle(run: u32, sense: Sense, instrument: Instrument) -> CircleRecording {
             time_s: turned,
         }
     };
+    recording(
+        (0..720).map(point).collect(),
+        (run, sense),
+        (RADIUS_MM, RADIUS_MM),
+        instrument,
+    )
+}
+
+/// A recording of these points: number and sense of its run, nominal radius in mm and feed in mm/s.
+pub(super) fn recording(
+    points: Vec<CirclePoint>,
+    (run, sense): (u32, Sense),
+    (radius_mm, feed_mm_s): (f64, f64),
+    instrument: Instrument,
+) -> CircleRecording {
     CircleRecording {
-        points: (0..720).map(point).collect(),
+        points,
         segment: TestSegment {
             plane: TestPlane::Xy,
-            radius_mm: RADIUS_MM,
-            feed_mm_s: RADIUS_MM,
+            radius_mm,
+            feed_mm_s,
             sense,
             zero_id: 1,
             setup_id: 1,
