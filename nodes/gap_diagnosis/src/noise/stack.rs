@@ -125,10 +125,14 @@ impl<'a> Stack<'a> {
     pub fn simulate(&self, effects: &[&dyn Effect]) -> Vec<f64> {
         let mut stack = vec![0.0; self.rows.len];
         for &run in &self.runs {
-            let readings = self
-                .twin
-                .predict(self.session, &self.session.runs[run], effects);
-            self.rows.average(run, &readings, &mut stack);
+            let recorded = &self.session.runs[run];
+            let response = self.twin.respond(self.session, recorded, effects);
+            let reader = self.twin.reader(recorded, &response);
+            for block in self.rows.blocks.iter().filter(|block| block.run == run) {
+                for (row, mean) in block.rows.iter().zip(&mut stack[block.range()]) {
+                    *mean = reader.mean(&block.channel, &row.readings);
+                }
+            }
         }
         stack
     }

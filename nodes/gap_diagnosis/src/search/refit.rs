@@ -157,16 +157,14 @@ fn refine_shapes(
     }
     for place in members[index].active.clone() {
         let member = &members[index];
-        let left = |value: f64| scaled(stack, member, place, value, &rest).1;
+        let at = |value: f64| scaled(stack, member, place, value, &rest);
         let Some([low, high]) = near(stack, member, place) else {
             continue;
         };
-        let at = member.values[place];
-        let best = golden(low, high, left);
+        let [best, here] = [golden(low, high, at), at(member.values[place])];
         // Between two points of a grid a shape may have more than one least.
-        let best = if left(best) < left(at) { best } else { at };
-        let (values, _) = scaled(stack, &members[index], place, best, &rest);
-        members[index].values = values;
+        let better = if best.1 < here.1 { best } else { here };
+        members[index].values = better.0;
     }
     parts[index] = members[index].signature(stack);
 }
@@ -226,8 +224,8 @@ fn scaled(
     (values, rest.norm_squared() - fit.gain)
 }
 
-/// Least of a function between two points, in their logarithm where both are positive.
-fn golden(low: f64, high: f64, mut left: impl FnMut(f64) -> f64) -> f64 {
+/// What a function gives where its square is least between two points, in their logarithm where both are positive.
+fn golden(low: f64, high: f64, at: impl Fn(f64) -> (Vec<f64>, f64)) -> (Vec<f64>, f64) {
     let log = low > 0.0;
     let (mut a, mut b) = if log {
         (low.ln(), high.ln())
@@ -237,19 +235,19 @@ fn golden(low: f64, high: f64, mut left: impl FnMut(f64) -> f64) -> f64 {
     let back = |x: f64| if log { x.exp() } else { x };
     let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
     let (mut c, mut d) = (b - ratio * (b - a), a + ratio * (b - a));
-    let (mut at_c, mut at_d) = (left(back(c)), left(back(d)));
+    let (mut at_c, mut at_d) = (at(back(c)), at(back(d)));
     for _ in 0..10 {
-        if at_c < at_d {
+        if at_c.1 < at_d.1 {
             (b, d, at_d) = (d, c, at_c);
             c = b - ratio * (b - a);
-            at_c = left(back(c));
+            at_c = at(back(c));
         } else {
             (a, c, at_c) = (c, d, at_d);
             d = a + ratio * (b - a);
-            at_d = left(back(d));
+            at_d = at(back(d));
         }
     }
-    back(if at_c < at_d { c } else { d })
+    if at_c.1 < at_d.1 { at_c } else { at_d }
 }
 
 /// J of all active values, in the order of members.

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::error::TwinError;
 use super::response::Response;
+use super::series::Series;
 use super::session::{Channel, Reading, Run, Session};
 use crate::effects::{Effect, Scene};
 use machine::file::MachineFile;
@@ -73,6 +74,12 @@ impl<'a> Twin<'a> {
             .collect()
     }
 
+    /// Reads a response of a run as its instruments would.
+    #[must_use]
+    pub fn reader<'r>(&self, run: &'r Run, response: &'r Response) -> Reader<'r> {
+        Reader::new(run, response, self.axes)
+    }
+
     /// Variance that each of the run's readings should show because of effects of random phase, mm2.
     #[must_use]
     pub fn variance(&self, session: &Session, run: &Run, effects: &[&dyn Effect]) -> Vec<f64> {
@@ -124,7 +131,8 @@ pub fn plate_axes(plane: TestPlane) -> Option<[Axis; 2]> {
     }
 }
 
-struct Reader<'a> {
+/// What each instrument reads of a response.
+pub struct Reader<'a> {
     run: &'a Run,
     response: &'a Response,
     axes: AxisSet,
@@ -144,6 +152,87 @@ impl<'a> Reader<'a> {
             axes,
             beams: PerAxis::from_fn(beam_of),
         }
+    }
+
+    /// Mean deviation that some readings of one channel should show, places in the run's list, mm (K, rad); NaN of no reading.
+    #[must_use]
+    pub fn mean(&self, channel: &Channel, rows: &[usize]) -> f64 {
+        let of = |row: &usize| (*row, &self.run.readings[*row]);
+        let total: f64 = match self.series_of(channel) {
+            // An effect writes to one or two series: the others are empty and need no look at each reading.
+            Some(series) => match series.map(|one| !one.is_empty()) {
+                [false, false, false, false] => self.beside(rows),
+                [true, false, false, false] => self.sum(rows, [series[0]]),
+                [false, true, false, false] => self.sum(rows, [series[1]]),
+                [false, false, true, false] => self.sum(rows, [series[2]]),
+                [false, false, false, true] => self.sum(rows, [series[3]]),
+                _ => self.sum(rows, series),
+            },
+            None => rows
+                .iter()
+                .map(of)
+                .map(|(row, reading)| self.deviation(row, reading))
+                .sum(),
+        };
+        total / count(rows.len())
+    }
+
+    /// The series that a channel shows the sum of; none of one that reads along directions.
+    fn series_of(&self, channel: &Channel) -> Option<[&'a [f64]; 4]> {
+        let r = self.response;
+        let tip = |axis: Axis, more: &'a Series| {
+            let is_slide = self.axes.contains(axis);
+            let of_slide = |series: &'a PerAxis<Series>| -> &'a [f64] {
+                if is_slide { &series[axis] } else { &[] }
+            };
+            [
+                &r.tip_mm[axis.index()],
+                of_slide(&r.drive),
+                of_slide(&r.servo),
+                more,
+            ]
+        };
+        let on_plate = |coordinate: usize| {
+            let axes = plate_axes(self.run.segment.plane)?;
+            Some(tip(axes[coordinate], &r.grid_reading_mm[coordinate]))
+        };
+        match channel {
+            Channel::Motor(axis) => Some([&r.servo[*axis], &r.motor_reading[*axis], &[], &[]]),
+            Channel::Scale(axis) => Some([
+                &r.servo[*axis],
+                &r.drive[*axis],
+                &r.scale_reading[*axis],
+                &[],
+            ]),
+            Channel::GridU => on_plate(0),
+            Channel::GridV => on_plate(1),
+            Channel::Length(axis)
+                if self.run.segment.kind != TestKind::Diagonal && axis.is_linear() =>
+            {
+                Some(tip(*axis, &r.length_reading_mm))
+            }
+            _ => None,
+        }
+    }
+
+    /// Sum over some readings of what series show at them and what the instrument itself adds.
+    fn sum<const N: usize>(&self, rows: &[usize], series: [&[f64]; N]) -> f64 {
+        rows.iter()
+            .map(|row| {
+                let reading = &self.run.readings[*row];
+                let shown: f64 = series.iter().map(|one| interpolate(one, reading)).sum();
+                shown + self.response.reading.get(*row).copied().unwrap_or(0.0)
+            })
+            .sum()
+    }
+
+    /// Sum over some readings of what the instrument itself adds.
+    fn beside(&self, rows: &[usize]) -> f64 {
+        let added = &self.response.reading;
+        if added.is_empty() {
+            return 0.0;
+        }
+        rows.iter().filter_map(|row| added.get(*row)).sum()
     }
 
     fn deviation(&self, row: usize, reading: &Reading) -> f64 {
@@ -291,6 +380,12 @@ fn unit(axis: Axis) -> Vector3<f64> {
         direction[axis.index()] = 1.0;
     }
     direction
+}
+
+/// A count as a real number.
+#[expect(clippy::cast_precision_loss, reason = "counts are far below 2^52")]
+fn count(n: usize) -> f64 {
+    n as f64
 }
 
 fn interpolate(series: &[f64], reading: &Reading) -> f64 {

@@ -18,6 +18,8 @@ const SILENCE: Duration = Duration::from_millis(500);
 const CUT_OFF: Duration = Duration::from_secs(1);
 /// So long nobody may have an answer before the samples count as lost.
 const LOSS_TIMEOUT: Duration = Duration::from_secs(2);
+/// A writer that is heard and does not answer at all is busy, or its answers wait behind those of other topics.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(6);
 
 /// A question that is open, by the numbers of the first and last sample.
 struct Asked {
@@ -50,7 +52,9 @@ pub(super) struct Order<T> {
     asked: Option<Asked>,
     questions: u64,
     again_at: Option<Instant>,
+    /// Since when answers have ended without samples, and since when questions have had no answer at all.
     unanswered_since: Option<Instant>,
+    silent_since: Option<Instant>,
     /// When the writer last said something new.
     heard_at: Option<Instant>,
     /// What can be handed on, in order.
@@ -72,6 +76,7 @@ impl<T> Order<T> {
             questions: 0,
             again_at: None,
             unanswered_since: None,
+            silent_since: None,
             heard_at: None,
             ready: Vec::new(),
         }
@@ -93,7 +98,7 @@ impl<T> Order<T> {
         self.newest = self.newest.max(number);
         let before = self.heard_at.replace(now);
         if before.is_some_and(|before| now.duration_since(before) > CUT_OFF) {
-            self.unanswered_since = None;
+            self.has_patience();
         }
     }
 
@@ -131,8 +136,13 @@ impl<T> Order<T> {
             *next += 1;
         }
         if !self.has_gap() {
-            (self.again_at, self.unanswered_since) = (None, None);
+            self.has_patience();
         }
+    }
+
+    /// Patience with what is missing begins anew.
+    fn has_patience(&mut self) {
+        (self.again_at, self.unanswered_since, self.silent_since) = (None, None, None);
     }
 
     fn skip_to(&mut self, number: i64) {
@@ -144,7 +154,7 @@ impl<T> Order<T> {
     /// Gives up what is missing before the first sample that waits.
     fn skip_gap(&mut self) {
         let first = self.waiting.first_key_value().map(|(number, _)| *number);
-        (self.again_at, self.unanswered_since) = (None, None);
+        self.has_patience();
         self.skip_to(first.unwrap_or(self.newest + 1));
     }
 
@@ -168,7 +178,9 @@ impl<T> Order<T> {
             if now.duration_since(asked.heard_at) < SILENCE {
                 return None;
             }
-            self.ended(asked.id, now);
+            let id = asked.id;
+            let since = *self.silent_since.get_or_insert(asked.heard_at);
+            self.is_over(id, now, now.duration_since(since) >= BUSY_TIMEOUT);
         }
         if self.again_at.is_some_and(|at| now < at) {
             return None;
@@ -196,16 +208,26 @@ impl<T> Order<T> {
 
     /// Nothing more is to come of a question.
     pub fn ended(&mut self, id: u64, now: Instant) {
+        let is_empty = |asked: &Asked| asked.id == id && !asked.is_answered;
+        let mut is_lost = false;
+        if self.asked.as_ref().is_some_and(is_empty) {
+            let since = *self.unanswered_since.get_or_insert(now);
+            is_lost = now.duration_since(since) >= LOSS_TIMEOUT;
+        }
+        self.is_over(id, now, is_lost);
+    }
+
+    /// A question is no longer waited for; where nothing of it came it is asked again, or what is missing is given up.
+    fn is_over(&mut self, id: u64, now: Instant, is_lost: bool) {
         let Some(asked) = self.asked.take_if(|asked| asked.id == id) else {
             return;
         };
         if asked.is_answered {
-            (self.again_at, self.unanswered_since) = (None, None);
+            self.has_patience();
             return;
         }
-        let since = *self.unanswered_since.get_or_insert(now);
         self.again_at = Some(now + AGAIN);
-        if now.duration_since(since) >= LOSS_TIMEOUT {
+        if is_lost {
             self.skip_gap();
         }
     }
@@ -285,6 +307,36 @@ mod tests {
         assert_eq!(asks(&mut order, again), None, "the new one is open");
         order.take(2, 2, again);
         assert_eq!(asks(&mut order, again + SILENCE), Some((3, 3)));
+    }
+
+    #[test]
+    fn a_busy_writer_is_waited_for_longer_than_one_that_has_nothing() {
+        let mut order = begun(1, 100);
+        order.take(4, 4, now());
+        let begin = now();
+        let mut at = begin;
+        let mut asked = vec![];
+        // Heard all the time, and no answer: silence is no loss yet.
+        while at < begin + 2 * LOSS_TIMEOUT {
+            asked.extend(asks(&mut order, at));
+            order.told(4, at);
+            at += AGAIN;
+        }
+        assert!(asked.len() > 4, "{asked:?}");
+        assert!(asked.iter().all(|one| *one == (2, 3)), "{asked:?}");
+        assert!(order.ready.is_empty());
+        order.take(2, 2, at);
+        order.take(3, 3, at);
+        assert_eq!(std::mem::take(&mut order.ready), [2, 3, 4]);
+        // Nor is it for ever.
+        order.take(6, 6, at);
+        let begin = at;
+        while order.ready.is_empty() && at < begin + 3 * BUSY_TIMEOUT {
+            asks(&mut order, at);
+            at += AGAIN;
+        }
+        assert_eq!(order.ready, [6]);
+        assert!(at >= begin + BUSY_TIMEOUT);
     }
 
     #[test]

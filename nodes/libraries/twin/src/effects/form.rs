@@ -28,6 +28,9 @@ pub(super) const WAY_HATS: usize = 6;
 
 /// Hats over the decimal logarithm of the way since a reversal, at 0.01, 0.03, 0.1, 0.3, 1 and 3 mm.
 pub(super) fn way_hats(heights: &[f64; WAY_HATS], way_mm: f64) -> f64 {
+    if heights.iter().all(|height| *height == 0.0) {
+        return 0.0;
+    }
     hats(-2.0, 0.5, heights, way_mm.max(1e-9).log10())
 }
 

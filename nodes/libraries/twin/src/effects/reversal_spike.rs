@@ -162,8 +162,11 @@ struct Friction(f64);
 impl Friction {
     /// A tick of even speed over so many l in the direction `sign`; gives the mean of z in it.
     fn turn(&mut self, sign: f64, lengths: f64) -> f64 {
-        let lost = -(-lengths).exp_m1();
         let off = self.0 - sign;
+        if off == 0.0 {
+            return sign;
+        }
+        let lost = -(-lengths).exp_m1();
         self.0 = sign + off * (1.0 - lost);
         if lengths < 1e-9 {
             self.0
@@ -189,8 +192,13 @@ impl Lags {
 
     /// A tick of so many w at a level.
     fn follow(&mut self, level: f64, widths: f64) {
-        let kept = (-widths).exp();
         let off = self.lagging - level;
+        // What is left of a peak of 1 is below what a sum of floats can show.
+        if off == 0.0 && self.behind.abs() < 1e-24 {
+            self.behind = 0.0;
+            return;
+        }
+        let kept = (-widths).exp();
         self.behind = kept * (self.behind - 0.5 * E * off * widths);
         self.lagging = level + off * kept;
     }
