@@ -498,7 +498,7 @@ impl<H: Hardware> Stage for Cnc<H> {
             Input::Compensation(_)
                 if self.activity != Activity::Active || !self.authors.follows_last() => {}
             Input::Compensation(message) => {
-                let told = self.control.offset_mut().receive(&message);
+                let told = self.control.offset_mut().receive(at, &message);
                 out.extend(told.map(Output::Diagnostic));
             }
             Input::Tick => {

@@ -507,10 +507,8 @@ impl Stage for BridgeStage {
             Input::Publishers(publishers) => self.offsets.publishers(at, publishers, self.active),
             Input::Compensation(_) if !self.active => {}
             Input::Compensation(compensation) => {
-                if let Err(refused) = self.offsets.receive(at, &compensation) {
-                    self.conditions
-                        .push(Condition::CompensationRefused(refused));
-                }
+                let refused = self.offsets.receive(at, &compensation);
+                self.conditions.extend(refused);
             }
             Input::Tick => self.tick(at, out),
             Input::Io(event) => self.handle_io(at, event, out),
