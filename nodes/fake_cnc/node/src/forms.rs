@@ -184,9 +184,9 @@ fn condition(output: &Output) -> Option<Diagnostic> {
     let level = Level::from(condition.severity());
     let told = Diagnostic::new(level, condition.name(), condition.to_string());
     Some(match condition {
-        fake_cnc::Diagnostic::CompensationRefused { fault, times } => told
-            .with("reason", fault.reason())
-            .with("refused", times),
+        fake_cnc::Diagnostic::CompensationRefused { fault, times } => {
+            told.with("reason", fault.reason()).with("refused", times)
+        }
         _ => told,
     })
 }

@@ -187,8 +187,9 @@ impl OffsetRule {
         let pulse_mm = self.pulse_mm;
         let value = message.total[axis];
         let split = message.pulses[axis] as f64 * pulse_mm + message.remainder[axis];
-        // Also refused: what is not a number.
-        if axis.is_linear() && !((value - split).abs() <= pulse_mm) {
+        // False for what is not a number.
+        let is_whole = (value - split).abs() <= pulse_mm;
+        if axis.is_linear() && !is_whole {
             return Err(OffsetFault::Split {
                 axis,
                 value,

@@ -98,9 +98,9 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
     let level = Level::from(condition.severity());
     let told = Diagnostic::new(level, condition.name(), condition.to_string());
     Some(match condition {
-        Condition::CompensationRefused { fault, times } => told
-            .with("reason", fault.reason())
-            .with("refused", times),
+        Condition::CompensationRefused { fault, times } => {
+            told.with("reason", fault.reason()).with("refused", times)
+        }
         _ => told,
     })
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use abbe_msgs::{Durability, Reliability};
 use anyhow::Context as _;
 use metrology::Stamp;
 use metrology::stamp::Host;
@@ -11,11 +12,12 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio::time::Instant;
 
+use super::rivals::{self, Rival};
 use super::{ACKNOWLEDGEMENT, TappedTopic, runtime};
 use crate::clock;
 use crate::environment::Environment;
 use crate::names::{self, NodeNames};
-use crate::network::{Participant, PublishError, Writer};
+use crate::network::{Participant, PublishError, Remote, Role, Writer};
 use crate::node::{Bytes, TopicPort};
 
 /// Between tries to find room for a sample.
@@ -79,8 +81,11 @@ enum Outgoing {
 /// dropped and counted.
 pub struct RawPublisher {
     runtime: Runtime,
+    participant: Participant,
+    /// Our ends of the topics.
+    own: Vec<Remote>,
     queue: mpsc::Sender<Outgoing>,
-    publishing: JoinHandle<(Participant, Vec<Writer>, Unsents)>,
+    publishing: JoinHandle<(Vec<Writer>, Unsents)>,
     patience: Duration,
     dropped: Unsents,
 }
@@ -158,45 +163,30 @@ impl RawPublisher {
             tracing::warn!("{warning}");
         }
         let mut writers = Vec::with_capacity(topics.len());
+        let mut own = Vec::with_capacity(topics.len());
         for topic in topics {
             let name = names.resolve(&topic.name)?;
             let dds_type = names::dds_type(&topic.type_name);
-            writers.push(participant.writer(&name, &dds_type, topic.qos)?);
+            let writer = participant.writer(&name, &dds_type, topic.qos)?;
+            own.push(Remote {
+                guid: writer.guid(),
+                node: names.fully_qualified(),
+                role: Role::Message,
+                name,
+                dds_type,
+                type_hash: None,
+                reliable: topic.qos.reliability == Reliability::Reliable,
+                latched: topic.qos.durability == Durability::TransientLocal,
+            });
+            writers.push(writer);
         }
         participant.announce()?;
-        let (queue, mut outgoing) = mpsc::channel::<Outgoing>(queue_len.max(1));
-        let publishing = runtime.spawn(async move {
-            let mut refused = Unsents::new();
-            // A reader that stands still costs one patience, not one for each sample that waits behind.
-            let mut full = BTreeSet::new();
-            while let Some(next) = outgoing.recv().await {
-                match next {
-                    Outgoing::Sample(sample) => {
-                        let place = sample.place;
-                        let publish = || match writers.get(place) {
-                            Some(writer) => writer.publish(&sample.bytes, sample.source),
-                            None => Err(PublishError::Broken("no such topic".to_owned())),
-                        };
-                        let own = patience_for(&full, place, patience);
-                        let sent = once_there_is_room(publish, own).await;
-                        note_room(&mut full, place, &sent);
-                        if let Err(error) = sent {
-                            *refused.entry((place, error.kind())).or_default() += 1;
-                        }
-                    }
-                    Outgoing::Settle(patience, answer) => {
-                        let all =
-                            futures::future::join_all(writers.iter().map(Writer::acknowledged));
-                        let settled = tokio::time::timeout(patience, all).await.is_ok();
-                        // Who asked may have gone.
-                        let _ = answer.send(settled);
-                    }
-                }
-            }
-            (participant, writers, refused)
-        });
+        let (queue, outgoing) = mpsc::channel::<Outgoing>(queue_len.max(1));
+        let publishing = runtime.spawn(send(outgoing, writers, patience));
         Ok(Self {
             runtime,
+            participant,
+            own,
             queue,
             publishing,
             patience,
@@ -234,6 +224,13 @@ impl RawPublisher {
         asked.is_ok() && settled.blocking_recv().unwrap_or(false)
     }
 
+    /// Others who publish on these topics, and controllers whose axes move by them, as far as they have been met.
+    #[must_use]
+    pub fn rivals(&self) -> Vec<Rival> {
+        let (writers, readers) = (self.participant.writers(), self.participant.readers());
+        rivals::find(&self.own, &writers, &readers)
+    }
+
     /// How many samples find room in the queue now.
     #[must_use]
     pub fn room(&self) -> usize {
@@ -266,8 +263,9 @@ impl RawPublisher {
     /// When the publishing thread panicked.
     pub fn stop(self) -> anyhow::Result<PublishReport> {
         drop(self.queue);
-        self.runtime.block_on(async {
-            let (participant, writers, refused) = self.publishing.await.context("publisher")?;
+        let participant = self.participant;
+        self.runtime.block_on(async move {
+            let (writers, refused) = self.publishing.await.context("publisher")?;
             let all = futures::future::join_all(writers.iter().map(Writer::acknowledged));
             let _ = tokio::time::timeout(ACKNOWLEDGEMENT, all).await;
             let _ = participant.withdraw();
@@ -285,6 +283,41 @@ impl RawPublisher {
             })
         })
     }
+}
+
+/// Sends what comes out of the queue until it is closed; with the writers what was refused.
+async fn send(
+    mut outgoing: mpsc::Receiver<Outgoing>,
+    writers: Vec<Writer>,
+    patience: Duration,
+) -> (Vec<Writer>, Unsents) {
+    let mut refused = Unsents::new();
+    // A reader that stands still costs one patience, not one for each sample that waits behind.
+    let mut full = BTreeSet::new();
+    while let Some(next) = outgoing.recv().await {
+        match next {
+            Outgoing::Sample(sample) => {
+                let place = sample.place;
+                let publish = || match writers.get(place) {
+                    Some(writer) => writer.publish(&sample.bytes, sample.source),
+                    None => Err(PublishError::Broken("no such topic".to_owned())),
+                };
+                let own = patience_for(&full, place, patience);
+                let sent = once_there_is_room(publish, own).await;
+                note_room(&mut full, place, &sent);
+                if let Err(error) = sent {
+                    *refused.entry((place, error.kind())).or_default() += 1;
+                }
+            }
+            Outgoing::Settle(patience, answer) => {
+                let all = futures::future::join_all(writers.iter().map(Writer::acknowledged));
+                let settled = tokio::time::timeout(patience, all).await.is_ok();
+                // Who asked may have gone.
+                let _ = answer.send(settled);
+            }
+        }
+    }
+    (writers, refused)
 }
 
 #[cfg(test)]
