@@ -198,6 +198,7 @@ mod tests {
             compensation_limit: PerAxis([0.2; 6]),
             compensation_stale_after: second,
             pulse_mm: 1e-4,
+            mark: None,
         })
     }
 

@@ -149,6 +149,8 @@ pub struct Settings {
     pub compensation_stale_after: Span,
     /// Pulse equivalent of the linear axes, mm.
     pub pulse_mm: f64,
+    /// The mark of the machine file ([`machine::program_machine`]).
+    pub mark: Option<u64>,
 }
 
 fn span(value: f64, unit_s: f64) -> Span {
@@ -223,6 +225,7 @@ impl Settings {
             }),
             compensation_stale_after: span(limit.stale_after_ms, 1e-3),
             pulse_mm: machine.control.pulse_equivalent_um * 1e-3,
+            mark: machine::program_machine::mark_of(machine),
         })
     }
 

@@ -116,7 +116,7 @@ fn first_difference(
         "" => name.to_owned(),
         key => format!("{key}.{name}"),
     };
-    let found = match (one, other) {
+    match (one, other) {
         (Value::Object(one), Value::Object(other)) => {
             let names: BTreeSet<&String> = one.keys().chain(other.keys()).collect();
             let value = |map: &serde_json::Map<String, Value>, name: &str| {
@@ -134,8 +134,7 @@ fn first_difference(
             })
         }
         _ => Some((key.to_owned(), [one, other].map(|value| shown(key, value)))),
-    };
-    found
+    }
 }
 
 /// A value as a message shows it: a number with the unit of its key, a long text cut.

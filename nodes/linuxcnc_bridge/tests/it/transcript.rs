@@ -252,6 +252,7 @@ impl Desk {
             compensation_limit: PerAxis([0.2; 6]),
             compensation_stale_after: Span::from_nanos(SECOND),
             pulse_mm: 1e-4,
+            mark: None,
         };
         Self {
             stage: BridgeStage::new(&settings),
