@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use node_runtime::tap::Rival;
 
 /// Until everybody who was there before has been met.
-const MEETING: Duration = Duration::from_secs(1);
+pub const MEETING: Duration = Duration::from_secs(1);
 /// Between two looks at the graph.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 /// Rivals that a message names.
@@ -29,14 +29,16 @@ impl GraphWatch {
         }
     }
 
-    /// What is waited before the first message, in pieces after each of which the graph is looked at: `delay`, and long
-    /// enough to meet who is there.
+    /// The delay before the first message, in pieces after each of which the graph is looked at.
     pub fn waits(&self, delay: Duration) -> Vec<Duration> {
-        if self.is_off {
-            return vec![delay];
+        let longest = if self.is_off { delay } else { LOOK_PERIOD };
+        let (mut waits, mut left) = (vec![], delay);
+        while !left.is_zero() {
+            let wait = left.min(longest);
+            waits.push(wait);
+            left -= wait;
         }
-        let pieces = delay.max(MEETING).as_nanos() / LOOK_PERIOD.as_nanos() + 1;
-        vec![LOOK_PERIOD; usize::try_from(pieces).unwrap_or(usize::MAX)]
+        waits
     }
 
     /// Whether somebody else is there; `sent`: how many messages went out until now.
@@ -48,7 +50,8 @@ impl GraphWatch {
         let is_due = self.looked.is_none_or(|at| at.elapsed() >= LOOK_PERIOD);
         if !self.is_off && self.reason.is_none() && is_due {
             self.looked = Some(Instant::now());
-            self.reason = reason(&rivals(), sent);
+            let rivals = rivals();
+            self.reason = (!rivals.is_empty()).then(|| refusal(&rivals, sent));
         }
         self.reason.is_some()
     }
@@ -59,19 +62,17 @@ impl GraphWatch {
     }
 }
 
-fn reason(rivals: &[Rival], sent: u64) -> Option<String> {
-    if rivals.is_empty() {
-        return None;
-    }
+/// Why a bag is not played among these, of which so many messages `sent` went out.
+pub fn refusal(rivals: &[Rival], sent: u64) -> String {
     let shown: Vec<String> = rivals.iter().take(SHOWN).map(Rival::to_string).collect();
     let more = match rivals.len().saturating_sub(SHOWN) {
         0 => String::new(),
         n => format!(", and {n} more"),
     };
-    Some(format!(
+    format!(
         "it is not played among nodes at work: {}{more}; {sent} messages were sent; end these nodes, play on another ROS_DOMAIN_ID, leave these topics out (--topics), or ask for it (--onto-a-running-graph)",
         shown.join(", ")
-    ))
+    )
 }
 
 #[cfg(test)]
@@ -114,13 +115,14 @@ mod tests {
     }
 
     #[test]
-    fn the_graph_is_met_before_the_first_message_however_short_the_delay() {
-        let whole = |is_off, delay_s| {
-            let waits = GraphWatch::new(is_off).waits(Duration::from_secs_f64(delay_s));
-            waits.iter().sum::<Duration>().as_secs_f64()
-        };
-        assert!(whole(true, 0.0) < 1e-9);
-        assert!(whole(false, 0.0) >= 1.0);
-        assert!((8.0..8.3).contains(&whole(false, 8.0)));
+    fn the_delay_is_waited_in_pieces_that_are_short_where_the_graph_is_watched() {
+        for (delay_ms, pieces) in [(0, 0), (40, 1), (100, 1), (250, 3), (8_000, 80)] {
+            let delay = Duration::from_millis(delay_ms);
+            for (is_off, pieces) in [(true, pieces.min(1)), (false, pieces)] {
+                let waits = GraphWatch::new(is_off).waits(delay);
+                assert_eq!(waits.iter().sum::<Duration>(), delay);
+                assert_eq!(waits.len(), pieces, "{delay_ms} ms");
+            }
+        }
     }
 }

@@ -19,7 +19,7 @@ use replayer::{Account, Place, Playback, PlaybackConfig, Reason, TopicAccount};
 
 use crate::contents::{Contents, Plan};
 use crate::desk::{Desk, Next};
-use crate::graph_watch::GraphWatch;
+use crate::graph_watch::{GraphWatch, MEETING, refusal};
 use crate::latched::Latched;
 
 /// Messages between the reader and the network.
@@ -63,8 +63,7 @@ impl Player {
         let playback = config.checked()?;
         let bag = Bag::open(Path::new(&config.bag))?;
         let contents = Contents::of(&bag, config, &playback, names)?;
-        let publisher =
-            RawPublisher::of_found(environment, names, &contents.offered, QUEUE_LEN, PATIENCE)?;
+        let publisher = voice(environment, names, &contents, config)?;
         let mut playing = Playing::new(bag, contents, publisher, config, &playback);
         let desk = Arc::clone(&playing.desk);
         let delay = Duration::from_nanos(u64::try_from(playback.delay.nanos()).unwrap_or(0));
@@ -92,6 +91,22 @@ impl Player {
         let ended = self.thread.join();
         ended.map_err(|_| anyhow!("the thread that plays panicked"))
     }
+}
+
+/// Joins the network to speak on the topics of the bag, where it may.
+fn voice(
+    environment: &Environment,
+    names: &NodeNames,
+    contents: &Contents,
+    config: &PlaybackConfig,
+) -> Result<RawPublisher> {
+    let topics = &contents.offered;
+    if config.onto_a_running_graph {
+        return RawPublisher::of_found(environment, names, topics, QUEUE_LEN, PATIENCE);
+    }
+    let how = (QUEUE_LEN, PATIENCE);
+    RawPublisher::where_alone(environment, names, topics, how, MEETING)?
+        .map_err(|rivals| anyhow!("{}: {}", config.bag, refusal(&rivals, 0)))
 }
 
 /// What speaks on the topics of a bag.

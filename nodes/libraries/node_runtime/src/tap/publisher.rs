@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use abbe_msgs::{Durability, Reliability};
+use abbe_msgs::{Durability, Qos, Reliability};
 use anyhow::Context as _;
 use metrology::Stamp;
 use metrology::stamp::Host;
@@ -17,11 +17,14 @@ use super::{ACKNOWLEDGEMENT, TappedTopic, runtime};
 use crate::clock;
 use crate::environment::Environment;
 use crate::names::{self, NodeNames};
-use crate::network::{Participant, PublishError, Remote, Role, Writer};
+use crate::network::{Guid, Participant, PublishError, Remote, Role, Writer};
 use crate::node::{Bytes, TopicPort};
 
 /// Between tries to find room for a sample.
 const RETRY: Duration = Duration::from_micros(200);
+
+/// Between looks at who is on the network.
+const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
 /// Tries until there is room for a sample, for `patience` at most: on a busy computer the library's own thread may not have
 /// sent yet what came before.
@@ -153,31 +156,56 @@ impl RawPublisher {
         queue_len: usize,
         patience: Duration,
     ) -> anyhow::Result<Self> {
-        let runtime = runtime()?;
-        let (mut participant, warning) = {
-            let _inside = runtime.enter();
-            Participant::join(environment, names)?
-        };
-        participant.wait_for_room();
-        if let Some(warning) = warning {
-            tracing::warn!("{warning}");
+        let planned = planned(names, topics)?;
+        let (runtime, participant) = join(environment, names)?;
+        Self::speak(runtime, participant, planned, (queue_len, patience))
+    }
+
+    /// The same where nobody is met within `meeting` who publishes on the topics or moves axes by them, else who; nothing
+    /// is offered before that.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub fn where_alone(
+        environment: &Environment,
+        names: &NodeNames,
+        topics: &[TappedTopic],
+        (queue_len, patience): (usize, Duration),
+        meeting: Duration,
+    ) -> anyhow::Result<Result<Self, Vec<Rival>>> {
+        let planned = planned(names, topics)?;
+        let (runtime, participant) = join(environment, names)?;
+        let own: Vec<Remote> = planned.iter().map(|(end, _)| end.clone()).collect();
+        let until = Instant::now() + meeting;
+        loop {
+            let rivals = rivals::find(&own, &participant.writers(), &participant.readers());
+            if !rivals.is_empty() {
+                let _inside = runtime.enter();
+                let _ = participant.withdraw();
+                drop(participant);
+                return Ok(Err(rivals));
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                break;
+            }
+            std::thread::park_timeout(left.min(LOOK_PERIOD));
         }
-        let mut writers = Vec::with_capacity(topics.len());
-        let mut own = Vec::with_capacity(topics.len());
-        for topic in topics {
-            let name = names.resolve(&topic.name)?;
-            let dds_type = names::dds_type(&topic.type_name);
-            let writer = participant.writer(&name, &dds_type, topic.qos)?;
-            own.push(Remote {
-                guid: writer.guid(),
-                node: names.fully_qualified(),
-                role: Role::Message,
-                name,
-                dds_type,
-                type_hash: None,
-                reliable: topic.qos.reliability == Reliability::Reliable,
-                latched: topic.qos.durability == Durability::TransientLocal,
-            });
+        Self::speak(runtime, participant, planned, (queue_len, patience)).map(Ok)
+    }
+
+    fn speak(
+        runtime: Runtime,
+        participant: Participant,
+        planned: Vec<(Remote, Qos)>,
+        (queue_len, patience): (usize, Duration),
+    ) -> anyhow::Result<Self> {
+        let mut writers = Vec::with_capacity(planned.len());
+        let mut own = Vec::with_capacity(planned.len());
+        for (mut end, qos) in planned {
+            let writer = participant.writer(&end.name, &end.dds_type, qos)?;
+            end.guid = writer.guid();
+            own.push(end);
             writers.push(writer);
         }
         participant.announce()?;
@@ -283,6 +311,38 @@ impl RawPublisher {
             })
         })
     }
+}
+
+/// Joins the network for a thread that speaks from now on.
+fn join(environment: &Environment, names: &NodeNames) -> anyhow::Result<(Runtime, Participant)> {
+    let runtime = runtime()?;
+    let (mut participant, warning) = {
+        let _inside = runtime.enter();
+        Participant::join(environment, names)?
+    };
+    participant.wait_for_room();
+    if let Some(warning) = warning {
+        tracing::warn!("{warning}");
+    }
+    Ok((runtime, participant))
+}
+
+/// Ends of topics that are not made yet.
+fn planned(names: &NodeNames, topics: &[TappedTopic]) -> anyhow::Result<Vec<(Remote, Qos)>> {
+    let end = |topic: &TappedTopic| -> anyhow::Result<(Remote, Qos)> {
+        let end = Remote {
+            guid: Guid::default(),
+            node: names.fully_qualified(),
+            role: Role::Message,
+            name: names.resolve(&topic.name)?,
+            dds_type: names::dds_type(&topic.type_name),
+            type_hash: None,
+            reliable: topic.qos.reliability == Reliability::Reliable,
+            latched: topic.qos.durability == Durability::TransientLocal,
+        };
+        Ok((end, topic.qos))
+    };
+    topics.iter().map(end).collect()
 }
 
 /// Sends what comes out of the queue until it is closed; with the writers what was refused.
