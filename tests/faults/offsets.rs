@@ -249,9 +249,12 @@ fn faulty_offsets(graph: &Graph, voice: &mut Voice, other: &mut Voice) {
     keep_saying(2 * FAULT, |_| voice.say(0, &compensation(&now(), 20e-6)));
 }
 
+/// Spoils a message.
+type Spoil = fn(&mut AxisCompensation);
+
 /// Offsets that contradict themselves or are not of now, each with the words that it brings.
 fn unsound_offsets(graph: &Graph, voice: &mut Voice) {
-    let unsound: [(fn(&mut AxisCompensation), [&str; 2]); 4] = [
+    let unsound: [(Spoil, [&str; 2]); 4] = [
         (
             |said| said.state[0] = AxisCompensation::STATE_OFF,
             ["axis X is 0.02 mm with STATE_OFF", "limit 0"],

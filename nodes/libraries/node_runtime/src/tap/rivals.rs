@@ -157,9 +157,9 @@ mod tests {
         let other_type = end(3, 1, "/shop", of("/axes/state"), "std_msgs/msg/String");
         let elsewhere = end(4, 1, "/m2/fake_cnc", of("/m2/axes/state"), STATE);
         let service = end(5, 1, "/x", (Role::Reply, "/axes/state"), STATE);
-        let shared = own()[2..].iter().map(|mine| Remote {
+        let shared = own().into_iter().skip(2).map(|mine| Remote {
             guid: [7; 16],
-            ..mine.clone()
+            ..mine
         });
         let mut writers = vec![cnc.clone(), cnc, unnamed, other_type, elsewhere, service];
         writers.extend(shared);
