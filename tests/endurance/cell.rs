@@ -41,7 +41,7 @@ const MORE: [(&str, &str); 6] = [
     ),
     (
         "replayer",
-        "bag: bags/grid_circles, topics: [/grid/position], repeat: true, clock: false",
+        "bag: bags/grid_circles, topics: [/grid/position], repeat: true, clock: false, onto_a_running_graph: true",
     ),
 ];
 

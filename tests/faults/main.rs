@@ -1,5 +1,5 @@
 //! Faults from outside: full disks, messages that are doubled, out of order, stale or senseless, clocks that step, second
-//! publishers, more participants than find each other. Each in a network of its own.
+//! publishers, bags that are played among them, more participants than find each other. Each in a network of its own.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 #![expect(
     clippy::disallowed_methods,
@@ -13,6 +13,7 @@ mod crowd;
 mod disk;
 mod messages;
 mod offsets;
+mod played;
 mod said;
 mod stepped_cell;
 mod tables;

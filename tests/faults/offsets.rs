@@ -235,6 +235,7 @@ fn faulty_offsets(graph: &Graph, voice: &mut Voice, other: &mut Voice) {
         });
         graph.condition("fake_cnc", condition, &words, since);
     }
+    unsound_offsets(graph, voice);
     let since = Instant::now();
     keep_saying(2 * FAULT, |_| {
         voice.say(0, &compensation(&now(), ASKED_M));
@@ -246,6 +247,42 @@ fn faulty_offsets(graph: &Graph, voice: &mut Voice, other: &mut Voice) {
     graph.condition("fake_cnc", "compensation_publishers", &words, since);
     // One has been alone for 2 s: it is followed, so that its silence is one afterwards.
     keep_saying(2 * FAULT, |_| voice.say(0, &compensation(&now(), 20e-6)));
+}
+
+/// Spoils a message.
+type Spoil = fn(&mut AxisCompensation);
+
+/// Offsets that contradict themselves or are not of now, each with the words that it brings.
+fn unsound_offsets(graph: &Graph, voice: &mut Voice) {
+    let unsound: [(Spoil, [&str; 2]); 4] = [
+        (
+            |said| said.state[0] = AxisCompensation::STATE_OFF,
+            ["axis X is 0.02 mm with STATE_OFF", "limit 0"],
+        ),
+        (
+            |said| said.pulses[0] = 4_900,
+            ["its pulses and remainder are", "one pulse"],
+        ),
+        (
+            |said| said.header.stamp.sec -= 30_000_000,
+            ["s ago", "limit 1 s"],
+        ),
+        (
+            |said| said.header.stamp.sec += 300_000_000,
+            ["s in the future", "limit 1 s"],
+        ),
+    ];
+    for (spoil, words) in unsound {
+        let since = Instant::now();
+        keep_saying(FAULT / 3, |beat| {
+            let mut said = compensation(&now(), 20e-6);
+            if beat % 4 == 2 {
+                spoil(&mut said);
+            }
+            voice.say(0, &said);
+        });
+        graph.condition("fake_cnc", "compensation_input", &words, since);
+    }
 }
 
 /// Fastest change of motor minus commanded in 0.1 s, and its greatest value, m.

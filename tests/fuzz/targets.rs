@@ -175,6 +175,8 @@ pub fn linuxcnc(data: &[u8]) {
         homing_timeout: Span::from_nanos(60 * SECOND_NANOS),
         compensation_limit: PerAxis([0.2; 6]),
         compensation_stale_after: Span::from_nanos(SECOND_NANOS),
+        pulse_mm: 1e-4,
+        mark: None,
     });
     let mut out = Vec::new();
     let mut tell = |at: i64, input: Input| {

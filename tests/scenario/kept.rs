@@ -117,7 +117,12 @@ fn scenario_a_plan_whose_bag_holds_nothing_is_not_kept_and_that_is_no_failed_pla
     let home = tempfile::tempdir().unwrap();
     let store = home.path().join("history.sqlite");
     let scenario = Scenario::copy_of("cold_reference");
-    scenario.append("scenario.yaml", "recording: {exclude: [\"*\"]}\n");
+    // One that leaves out everything at once is refused.
+    let all: Vec<String> = ('a'..='z')
+        .map(|letter| format!("\"/{letter}*\""))
+        .collect();
+    let recording = format!("recording: {{exclude: [{}]}}\n", all.join(", "));
+    scenario.append("scenario.yaml", &recording);
     let keep = ["--keep", "--store", store.to_str().unwrap()];
     let ended = scenario.run_to_end(&keep);
     assert_eq!(ended.status.code(), Some(1), "{}", ended.said);

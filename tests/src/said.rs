@@ -13,8 +13,9 @@ pub fn compensation(at: &Time, x_m: f64) -> AxisCompensation {
     message.thermal = vec![x_m, 0.0, 0.0];
     message.geometric = vec![0.0; 3];
     message.positioning = vec![0.0; 3];
+    // Of whatever pulse equivalent the machine is.
     message.pulses = vec![0; 3];
-    message.remainder = vec![0.0; 3];
+    message.remainder = vec![x_m, 0.0, 0.0];
     message.state = vec![AxisCompensation::STATE_ACTIVE; 3];
     message
 }

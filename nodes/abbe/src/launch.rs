@@ -98,11 +98,31 @@ pub fn find(folder: &Path) -> Result<PathBuf> {
 /// Reads a launch file.
 ///
 /// # Errors
-/// With line and column, when the file is not a launch file or uses what this reader does not know.
+/// With line and column, when the file is not a launch file or uses what this reader does not know; two nodes of one name.
 pub fn read(path: &Path) -> Result<Vec<LaunchNode>> {
     let text = text_file::read(path, Comments::Xml).context("launch file")?;
     let folder = path.parent().unwrap_or_else(|| Path::new("."));
-    parse(&text, folder).with_context(|| format!("launch file {}", path.display()))
+    let nodes = parse(&text, folder).and_then(of_own_names);
+    nodes.with_context(|| format!("launch file {}", path.display()))
+}
+
+/// The nodes, where each has a name of its own in its namespace.
+fn of_own_names(nodes: Vec<LaunchNode>) -> Result<Vec<LaunchNode>> {
+    let name = |node: &LaunchNode| {
+        (
+            node.namespace.trim_matches('/').to_owned(),
+            node.name.clone(),
+        )
+    };
+    for (at, node) in nodes.iter().enumerate() {
+        if nodes[..at].iter().any(|other| name(other) == name(node)) {
+            bail!(
+                "name=\"{}\": two nodes have it: give one of them another",
+                node.name
+            );
+        }
+    }
+    Ok(nodes)
 }
 
 fn parse(text: &str, folder: &Path) -> Result<Vec<LaunchNode>> {
@@ -299,6 +319,39 @@ mod tests {
             refused.contains("<node>: 1001 parameters: at most 1000"),
             "{refused}"
         );
+    }
+
+    #[test]
+    fn two_nodes_of_one_name_are_refused_wherever_a_launch_file_is_read() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("cell.launch.xml");
+        let read = |nodes: &str| {
+            std::fs::write(&path, format!("<launch>{nodes}</launch>")).unwrap();
+            read(&path)
+        };
+        let node = |words: &str| format!("<node pkg='abbe' {words}/>");
+        let probe = node("exec='probe'");
+        for twice in [
+            node("exec='probe'"),
+            node("exec='fake_cnc' name='probe'"),
+            node("exec='probe' namespace='/'"),
+        ] {
+            let error = format!("{:#}", read(&format!("{probe}{twice}")).unwrap_err());
+            for word in ["cell.launch.xml", "name=\"probe\": two nodes have it"] {
+                assert!(error.contains(word), "{twice}: {error}");
+            }
+        }
+        for other in [
+            node("exec='fake_cnc'"),
+            node("exec='probe' name='probe_2'"),
+            node("exec='probe' namespace='/m2'"),
+        ] {
+            assert_eq!(
+                read(&format!("{probe}{other}")).unwrap().len(),
+                2,
+                "{other}"
+            );
+        }
     }
 
     #[test]

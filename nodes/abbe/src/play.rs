@@ -49,6 +49,9 @@ pub struct Play {
     /// Do not publish `/clock`; one that was recorded is played as it is.
     #[arg(long)]
     no_clock: bool,
+    /// Play also where other nodes publish the same topics, or a controller follows the bag's offsets.
+    #[arg(long)]
+    onto_a_running_graph: bool,
     /// Rules as of any ROS 2 node: `--ros-args -r FROM:=TO …`.
     #[arg(last = true)]
     ros: Vec<String>,
@@ -59,7 +62,7 @@ pub const PLAYER_NAME: &str = "replayer";
 /// Between two looks at how far it is.
 const PROGRESS_PERIOD: Duration = Duration::from_millis(100);
 impl Play {
-    /// Plays to the end or to SIGINT; exit code 3 when something was lost.
+    /// Plays to the end or to SIGINT; exit code 3 when something was lost, 1 where others use the topics.
     ///
     /// # Errors
     /// When a number is out of its range (exit code 2), the bag cannot be opened, holds nothing of what is asked for, or there is no network.
@@ -74,6 +77,7 @@ impl Play {
             start_paused: self.paused,
             delay_s: self.delay,
             clock: !self.no_clock,
+            onto_a_running_graph: self.onto_a_running_graph,
             topics: if self.topics.is_empty() {
                 vec!["*".to_owned()]
             } else {

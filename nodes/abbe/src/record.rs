@@ -95,7 +95,7 @@ impl Record {
         let alarm = watch(&capture, &interruption)?;
         let captured = capture.finish()?;
         alarm.into_iter().for_each(Alarm::end);
-        for word in &captured.unrecorded {
+        for word in captured.unrecorded.iter().chain(&captured.unmatched) {
             complain!("abbe: {word}");
         }
         let lost = captured.stats.messages_lost + captured.lost_on_network;
@@ -143,7 +143,7 @@ impl Record {
         } else {
             self.topics.clone()
         };
-        if records_nothing(&topics, &self.exclude) {
+        if Selection::leaves_nothing(&topics, &self.exclude) {
             let reason = format!(
                 "--exclude {}: leaves out every topic of {}, so that nothing would be recorded: exclude less",
                 self.exclude.join(" --exclude "),
@@ -161,16 +161,6 @@ impl Record {
             writing,
         })
     }
-}
-
-/// Whether every name that fits one of `topics` fits one of `exclude` as well.
-fn records_nothing(topics: &[String], exclude: &[String]) -> bool {
-    let excluded = Selection::Matching(exclude.to_vec());
-    // A `*` of one pattern fits into a `*` of another; each name begins with /, also where a pattern leaves that open.
-    topics.iter().all(|topic| match topic.strip_prefix('*') {
-        Some(rest) => excluded.takes(&format!("/*{rest}")),
-        None => excluded.takes(topic),
-    })
 }
 
 /// Waits for the end. A recording that cannot go on ends by itself, and an alarm reports it on the graph too where the

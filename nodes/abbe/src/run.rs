@@ -27,7 +27,7 @@ use crate::diagnose;
 use crate::history::keep::Keep;
 use crate::history::origin::Origin;
 use crate::report_bag;
-use crate::scenario::{Scenario, places};
+use crate::scenario::{Scenario, check_machines, places};
 use crate::tell::tell;
 use crate::usage::refused;
 
@@ -165,6 +165,8 @@ impl Run {
         for line in scenario.without_effect()? {
             complain!("abbe: {line}");
         }
+        check_machines(&scenario.folder, &scenario.nodes)
+            .with_context(|| format!("scenario {}", scenario.folder.display()))?;
         let interruption = Interruption::listen("the bag is closed, no page is written")?;
         let view = self.served.open(&scenario)?;
         let folder = new_folder(&self.runs, &scenario.name)?;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, anyhow, bail};
 use metrology::number::number;
 use metrology::{Axis, Host, epoch, yaml};
+use node_runtime::tap::Selection;
 use node_runtime::text_file;
 use recorder::ChunkCompression;
 use reports::ReportKind;
@@ -15,6 +16,7 @@ use serde::Deserialize;
 use crate::launch::{self, LaunchNode};
 use crate::usage::topics;
 
+mod machines;
 pub mod places;
 mod without_effect;
 
@@ -76,6 +78,12 @@ impl ScenarioFile {
                 bail!("recording.exclude[{k}] = \"{pattern}\": {rule}");
             }
         }
+        let exclude = &self.recording.exclude;
+        if Selection::leaves_nothing(&["*".to_owned()], exclude) {
+            bail!(
+                "recording.exclude = {exclude:?}: leaves out every topic, so that nothing would be recorded: exclude less"
+            );
+        }
         if let Some(start_s) = self.simulated_start_s {
             let room_s = (limit_min * 60.0).ceil() as i64 + AFTER_PLAN_S;
             epoch::whole_seconds::<Host>(start_s, room_s)
@@ -120,6 +128,14 @@ pub struct Scenario {
     pub file: ScenarioFile,
     /// Nodes of the launch file.
     pub nodes: Vec<LaunchNode>,
+}
+
+/// Refuses nodes of one cell that are about different machines; see [`machines::check`].
+///
+/// # Errors
+/// The two nodes, their files, and the first key that differs with both values.
+pub fn check_machines(folder: &Path, nodes: &[LaunchNode]) -> Result<()> {
+    machines::check(folder, nodes)
 }
 
 impl Scenario {
@@ -271,6 +287,31 @@ mod tests {
                 near.clone()
             };
             assert!(error.ends_with(&end), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_recording_of_nothing_is_refused_and_one_of_a_part_is_not() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join(SCENARIO_FILE);
+        let read = |exclude: &str| {
+            let recording = format!("recording: {{exclude: {exclude}}}\n");
+            let text = format!("title: a\nreport: blocks\nlimit_min: 1.0\n{recording}");
+            std::fs::write(&path, text).unwrap();
+            ScenarioFile::read(&path)
+        };
+        for nothing in [r#"["*"]"#, r#"["/*"]"#, r#"["/tf", "*"]"#, r#"["**"]"#] {
+            let error = format!("{:#}", read(nothing).unwrap_err());
+            for word in [
+                "scenario.yaml:4",
+                "recording.exclude",
+                "nothing would be recorded",
+            ] {
+                assert!(error.contains(word), "{nothing}: {error}");
+            }
+        }
+        for part in ["[]", "[/tf]", r#"["/a*", "*state"]"#, r#"["/*/*"]"#] {
+            assert!(read(part).is_ok(), "{part}");
         }
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use machine::MachineFile;
 use machine::file::{AxisEntry, Latch};
 use metrology::stamp::Span;
-use metrology::{Axis, PerAxis, check_parameters};
+use metrology::{Axis, OffsetRule, PerAxis, check_parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -55,7 +55,8 @@ pub struct Config {
     /// Following error at which a rotary axis stops.
     #[schemars(range(min = 1e-3, max = 100.0))]
     pub following_error_limit_deg: f64,
-    /// Silence after which a compensation is held no longer but fades.
+    /// Silence after which a compensation is held no longer but fades; one that is stamped earlier or later than now by
+    /// more is refused.
     #[schemars(range(min = 1e-3, max = 3600.0))]
     pub compensation_hold_s: f64,
     /// Rate at which a stale compensation of a linear axis goes to zero.
@@ -185,6 +186,8 @@ pub struct Settings {
     pub(crate) touch_margin: u64,
     pub(crate) settle: u64,
     pub(crate) compensation_hold: u64,
+    pub(crate) compensation_age: Span,
+    pub(crate) pulse_mm: f64,
     pub(crate) homing: u64,
     pub(crate) optional_stop: bool,
     pub(crate) single_block: bool,
@@ -234,6 +237,16 @@ impl Settings {
     #[must_use]
     pub const fn envelope(&self) -> &Envelope {
         &self.envelope
+    }
+
+    /// Which offsets are followed.
+    pub(crate) fn offset_rule(&self) -> OffsetRule {
+        OffsetRule {
+            axes: self.limits.axes,
+            size_limit: PerAxis::from_fn(|axis| self.offset[axis].size),
+            pulse_mm: self.pulse_mm,
+            age_limit: self.compensation_age,
+        }
     }
 
     /// Servo periods in `time_s`, rounded up.
@@ -374,6 +387,8 @@ impl Config {
             touch_margin: periods(self.touch_margin_s, period_s),
             settle: periods(self.settle_s, period_s),
             compensation_hold: periods(self.compensation_hold_s, period_s),
+            compensation_age: Span::from_secs_f64(self.compensation_hold_s),
+            pulse_mm: machine.control.pulse_equivalent_um * 1e-3,
             homing: periods(self.homing_s, period_s),
             optional_stop: self.optional_stop,
             single_block: self.single_block,

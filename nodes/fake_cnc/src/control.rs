@@ -110,7 +110,7 @@ impl<H: Hardware> Control<H> {
             },
             servos: PerAxis::from_fn(|axis| Servo::new(settings.gains[axis])),
             offset: OffsetInput::new(
-                settings.limits.axes,
+                settings.offset_rule(),
                 settings.offset,
                 settings.compensation_hold,
             ),

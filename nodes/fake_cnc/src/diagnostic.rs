@@ -1,7 +1,7 @@
 //! Conditions that the control reports without being asked.
 
 use metrology::number::{along, number};
-use metrology::{Author, Axis};
+use metrology::{Author, Axis, OffsetFault};
 
 pub use metrology::Severity;
 
@@ -14,13 +14,8 @@ use crate::rs274::program::Wait;
     reason = "the sentence of each variant is its documentation"
 )]
 pub enum Diagnostic {
-    #[error("compensation of axis {axis} is {value}: refused", value = number(*value))]
-    CompensationNotFinite { axis: Axis, value: f64 },
-    #[error(
-        "compensation of axis {axis} is {}, limit {}: refused",
-        along(*axis, *value), along(*axis, *limit)
-    )]
-    CompensationTooLarge { axis: Axis, value: f64, limit: f64 },
+    #[error("{fault}")]
+    CompensationRefused { fault: OffsetFault, times: u64 },
     #[error("no compensation for {silent_periods} servo periods: fading")]
     CompensationStale { silent_periods: u64 },
     #[error(
@@ -79,8 +74,7 @@ impl Diagnostic {
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
-            Self::CompensationNotFinite { .. }
-            | Self::CompensationTooLarge { .. }
+            Self::CompensationRefused { .. }
             | Self::CompensationStale { .. }
             | Self::CompensationFollowed => "compensation_input",
             Self::CompensationContested { .. } | Self::CompensationUncontested => {
@@ -112,14 +106,15 @@ impl Diagnostic {
             | Self::TimePasses
             | Self::CountZeroed
             | Self::NothingToCancel { .. } => Severity::Info,
+            // Until the clocks of two hosts are related, stamps of the other differ: a start, not a fault.
+            Self::CompensationRefused { fault, .. } if fault.is_of_time() => Severity::Warn,
             Self::CompensationStale { .. }
             | Self::CompensationHeldBack
             | Self::NothingToZero { .. }
             | Self::Waiting { .. }
             | Self::TimeJumped { .. }
             | Self::TimeSetBack { .. } => Severity::Warn,
-            Self::CompensationNotFinite { .. }
-            | Self::CompensationTooLarge { .. }
+            Self::CompensationRefused { .. }
             | Self::CompensationContested { .. }
             | Self::FollowingError { .. }
             | Self::ProbeTripped { .. }

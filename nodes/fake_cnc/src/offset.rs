@@ -7,13 +7,14 @@
 //!   o ← o - sign(o) min(|o|, ȯ_fade T)       after `compensation_hold_s` without one     (2)
 //! ```
 //!
-//! o* is the last accepted offset. Until it is stale it is held. Before every axis is homed, o* counts as zero and
+//! o* is the last offset that [`OffsetRule`] accepts. Until it is stale it is held. Before every axis is homed, o* counts as zero and
 //! what is applied fades by (2): the machine's zero must not have an offset in it. Because (1) holds for the first
 //! message as for any other, a compensation that starts, stops, restarts or jumps moves the axis at
 //! ȯ_max and no faster.
 
 use metrology::sample::AxisCompensation;
-use metrology::{AxisSet, GateNews, HomedGate, PerAxis};
+use metrology::stamp::Host;
+use metrology::{GateNews, HomedGate, OffsetRule, OffsetsRefused, PerAxis, Stamp};
 
 use crate::config::OffsetLimits;
 use crate::diagnostic::Diagnostic;
@@ -21,7 +22,7 @@ use crate::diagnostic::Diagnostic;
 /// State of the compensation input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OffsetInput {
-    axes: AxisSet,
+    rule: OffsetRule,
     limits: PerAxis<OffsetLimits>,
     hold: u64,
     wanted: PerAxis<f64>,
@@ -30,6 +31,7 @@ pub struct OffsetInput {
     stale: bool,
     resting: bool,
     complained: bool,
+    refused: OffsetsRefused,
     gate: HomedGate,
     /// Whether it was reported that offsets are held back.
     told_held: bool,
@@ -38,11 +40,11 @@ pub struct OffsetInput {
 impl OffsetInput {
     /// Nothing applied, and nothing held back; `hold` is in servo periods.
     #[must_use]
-    pub fn new(axes: AxisSet, limits: PerAxis<OffsetLimits>, hold: u64) -> Self {
+    pub fn new(rule: OffsetRule, limits: PerAxis<OffsetLimits>, hold: u64) -> Self {
         let mut gate = HomedGate::default();
         gate.step(true, false);
         Self {
-            axes,
+            rule,
             limits,
             hold,
             wanted: PerAxis::default(),
@@ -51,6 +53,7 @@ impl OffsetInput {
             stale: true,
             resting: true,
             complained: false,
+            refused: OffsetsRefused::default(),
             gate,
             told_held: false,
         }
@@ -76,43 +79,27 @@ impl OffsetInput {
         &self.applied
     }
 
-    /// Takes a message, or refuses it as a whole; tells what became worse, or well again.
-    pub fn receive(&mut self, message: &AxisCompensation) -> Option<Diagnostic> {
-        match self.wanted_by(message) {
-            Ok(wanted) => {
-                self.wanted = wanted;
-                self.silent = 0;
-                self.stale = false;
-                self.resting = false;
-                std::mem::take(&mut self.complained).then_some(Diagnostic::CompensationFollowed)
-            }
-            Err(refusal) => {
-                self.complained = true;
-                Some(refusal)
-            }
+    /// Takes a message that comes `at`, or refuses it as a whole; tells what became worse, or well again.
+    pub fn receive(&mut self, at: Stamp<Host>, message: &AxisCompensation) -> Option<Diagnostic> {
+        if let Err(fault) = self.rule.check(at, message) {
+            self.complained = true;
+            let times = self.refused.count(&fault);
+            return Some(Diagnostic::CompensationRefused { fault, times });
         }
+        self.wanted = PerAxis::default();
+        for axis in { self.rule.axes.iter() }.filter(|axis| message.axes.contains(*axis)) {
+            self.wanted[axis] = message.total[axis];
+        }
+        self.silent = 0;
+        self.stale = false;
+        self.resting = false;
+        std::mem::take(&mut self.complained).then_some(Diagnostic::CompensationFollowed)
     }
 
     /// Lets go of what is applied, as if it were stale; a new message takes it up again.
     pub fn release(&mut self) {
         self.stale = true;
         self.wanted = PerAxis::default();
-    }
-
-    fn wanted_by(&self, message: &AxisCompensation) -> Result<PerAxis<f64>, Diagnostic> {
-        let mut wanted = PerAxis::default();
-        for axis in self.axes.iter().filter(|axis| message.axes.contains(*axis)) {
-            let value = message.total[axis];
-            let limit = self.limits[axis].size;
-            if !value.is_finite() {
-                return Err(Diagnostic::CompensationNotFinite { axis, value });
-            }
-            if value.abs() > limit {
-                return Err(Diagnostic::CompensationTooLarge { axis, value, limit });
-            }
-            wanted[axis] = value;
-        }
-        Ok(wanted)
     }
 
     /// One servo period; tells once when the compensation becomes stale.
@@ -133,7 +120,7 @@ impl OffsetInput {
             }
         }
         let mut moved = false;
-        for axis in self.axes.iter() {
+        for axis in self.rule.axes.iter() {
             let limits = &self.limits[axis];
             let is_held = !self.gate.is_open();
             let step = if self.stale || is_held {
@@ -159,7 +146,8 @@ impl OffsetInput {
 mod tests {
     use super::*;
     use metrology::sample::CompensationState;
-    use metrology::{Axis, Stamp};
+    use metrology::stamp::Span;
+    use metrology::{Axis, AxisSet};
     use proptest::prelude::*;
 
     const LIMITS: OffsetLimits = OffsetLimits {
@@ -172,20 +160,30 @@ mod tests {
         let mut total = PerAxis::default();
         total[Axis::X] = x_mm;
         AxisCompensation {
-            at: Stamp::default(),
+            at: now(),
             axes: AxisSet::XYZ,
             total,
             thermal: total,
             geometric: PerAxis::default(),
             positioning: PerAxis::default(),
             pulses: PerAxis::default(),
-            remainder: PerAxis::default(),
+            remainder: total,
             state: PerAxis::from_fn(|_| CompensationState::Active),
         }
     }
 
+    fn now() -> Stamp<Host> {
+        Stamp::from_nanos(1_700_000_000_000_000_000)
+    }
+
     fn input() -> OffsetInput {
-        OffsetInput::new(AxisSet::XYZ, PerAxis::from_fn(|_| LIMITS), 100)
+        let rule = OffsetRule {
+            axes: AxisSet::XYZ,
+            size_limit: PerAxis::from_fn(|_| LIMITS.size),
+            pulse_mm: 1e-4,
+            age_limit: Span::from_secs_f64(0.1),
+        };
+        OffsetInput::new(rule, PerAxis::from_fn(|_| LIMITS), 100)
     }
 
     #[test]
@@ -193,7 +191,7 @@ mod tests {
         let mut input = input();
         let mut last = 0.0;
         for target in [0.02, -0.02] {
-            assert_eq!(input.receive(&message(target)), None);
+            assert_eq!(input.receive(now(), &message(target)), None);
             for _ in 0..90 {
                 assert_eq!(input.advance(), None);
                 let now = input.applied()[Axis::X];
@@ -207,7 +205,7 @@ mod tests {
     #[test]
     fn eq2_stale_offset_is_held_then_fades_to_exactly_zero() {
         let mut input = input();
-        assert_eq!(input.receive(&message(0.001)), None);
+        assert_eq!(input.receive(now(), &message(0.001)), None);
         let mut stale_at = None;
         for period in 1..=400 {
             if input.advance().is_some() {
@@ -221,15 +219,15 @@ mod tests {
         }
         assert_eq!(stale_at, Some(101));
         assert!(input.applied()[Axis::X].abs() <= 0.0);
-        let again = input.receive(&message(0.001));
+        let again = input.receive(now(), &message(0.001));
         assert_eq!(again, Some(Diagnostic::CompensationFollowed));
-        assert_eq!(input.receive(&message(0.001)), None);
+        assert_eq!(input.receive(now(), &message(0.001)), None);
     }
 
     #[test]
     fn what_is_released_fades_without_a_step_and_is_taken_up_again_at_the_rate_limit() {
         let mut input = input();
-        assert_eq!(input.receive(&message(0.001)), None);
+        assert_eq!(input.receive(now(), &message(0.001)), None);
         (0..20).for_each(|_| assert_eq!(input.advance(), None));
         input.release();
         let mut last = 0.001;
@@ -239,7 +237,7 @@ mod tests {
             assert!((last - now - LIMITS.fade_step).abs() < 1e-15);
             last = now;
         }
-        assert_eq!(input.receive(&message(0.001)), None);
+        assert_eq!(input.receive(now(), &message(0.001)), None);
         assert_eq!(input.advance(), None);
         assert!(input.applied()[Axis::X] - last <= LIMITS.step);
         input.release();
@@ -250,7 +248,7 @@ mod tests {
     #[test]
     fn what_is_held_back_fades_to_zero_and_rises_again_without_a_step() {
         let mut input = input();
-        assert_eq!(input.receive(&message(0.001)), None);
+        assert_eq!(input.receive(now(), &message(0.001)), None);
         (0..20).for_each(|_| assert_eq!(input.advance(), None));
         assert_eq!(
             input.hold_back(true),
@@ -258,7 +256,7 @@ mod tests {
         );
         let mut last = input.applied()[Axis::X];
         for _ in 0..400 {
-            assert_eq!(input.receive(&message(0.001)), None);
+            assert_eq!(input.receive(now(), &message(0.001)), None);
             assert_eq!(input.hold_back(true), None);
             input.advance();
             let now = input.applied()[Axis::X];
@@ -322,7 +320,7 @@ mod tests {
             for event in events {
                 let periods = match event {
                     Event::Told(value) => {
-                        input.receive(&message(value));
+                        input.receive(now(), &message(value));
                         1
                     }
                     Event::Released => {
@@ -349,17 +347,71 @@ mod tests {
     #[test]
     fn refused_messages_change_nothing() {
         let mut input = input();
-        assert_eq!(input.receive(&message(0.001)), None);
+        assert_eq!(input.receive(now(), &message(0.001)), None);
         (0..20).for_each(|_| assert_eq!(input.advance(), None));
         let before = (input.wanted, input.silent);
-        let nan = input.receive(&message(f64::NAN)).unwrap();
+        let nan = input.receive(now(), &message(f64::NAN)).unwrap();
         assert_eq!(nan.to_string(), "compensation of axis X is NaN: refused");
-        assert!(input.receive(&message(f64::INFINITY)).is_some());
-        let large = input.receive(&message(0.7)).unwrap();
+        assert!(input.receive(now(), &message(f64::INFINITY)).is_some());
+        let large = input.receive(now(), &message(0.7)).unwrap();
         assert_eq!(
             large.to_string(),
             "compensation of axis X is 0.7 mm, limit 0.5 mm: refused"
         );
         assert_eq!((input.wanted, input.silent), before);
+    }
+
+    /// Messages that contradict themselves or are not of now, each with its reason.
+    fn unsound() -> [(AxisCompensation, &'static str); 6] {
+        let mut all = [(); 6].map(|()| (message(0.4), ""));
+        all[0].0.state[Axis::X] = CompensationState::Off;
+        all[1].0.pulses[Axis::X] = 4_900;
+        all[2].0.remainder[Axis::X] = 0.0;
+        all[3].0.remainder[Axis::Y] = 1e-3;
+        all[4].0.at = now() - Span::from_secs_f64(3e7);
+        all[5].0.at = now() + Span::from_secs_f64(0.2);
+        let split = "pulses of another offset";
+        let reasons = [
+            "off with an offset",
+            split,
+            split,
+            split,
+            "old",
+            "in the future",
+        ];
+        for ((_, of_this), reason) in all.iter_mut().zip(reasons) {
+            *of_this = reason;
+        }
+        all
+    }
+
+    #[test]
+    fn what_contradicts_itself_or_is_not_of_now_is_refused_and_the_offset_held_then_faded() {
+        for (bad, reason) in unsound() {
+            let mut input = input();
+            assert_eq!(input.receive(now(), &message(0.001)), None);
+            let (mut stale_at, mut refused) = (None, 0);
+            for period in 1..=400 {
+                match input.receive(now(), &bad) {
+                    Some(Diagnostic::CompensationRefused { fault, times }) => {
+                        refused += 1;
+                        assert_eq!((fault.reason(), times), (reason, refused));
+                    }
+                    other => panic!("{other:?}"),
+                }
+                if input.advance().is_some() {
+                    stale_at = Some(period);
+                }
+                let applied = input.applied()[Axis::X];
+                assert!(applied <= 0.001 + 1e-15, "{reason}");
+                if (11..=100).contains(&period) {
+                    assert!((applied - 0.001).abs() < 1e-15, "{reason}: held");
+                }
+            }
+            assert_eq!(stale_at, Some(101), "{reason}");
+            assert!(input.applied()[Axis::X].abs() <= 0.0, "{reason}: faded");
+            let again = input.receive(now(), &message(0.001));
+            assert_eq!(again, Some(Diagnostic::CompensationFollowed));
+        }
     }
 }

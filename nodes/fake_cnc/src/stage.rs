@@ -1,6 +1,6 @@
 //! The node's computation: programs, compensation and time in; states, touches and readings out.
 
-use machine::MachineFile;
+use machine::{MachineFile, program_machine};
 use metrology::sample::{
     AxisCompensation, AxisState, GridSample, LengthSample, ProbeTrigger, TemperatureSample,
 };
@@ -137,6 +137,8 @@ pub struct Cnc<H = Plant> {
     authors: SoleAuthor,
     last_tick: Option<Stamp<Host>>,
     activity: Activity,
+    /// The mark of the machine file, by which programs name the one that they are made for.
+    mark: Option<u64>,
     touches: u32,
     faulted: bool,
     time_disturbed: bool,
@@ -165,6 +167,7 @@ impl<H: Hardware> Cnc<H> {
             authors: SoleAuthor::default(),
             last_tick: None,
             activity: Activity::Active,
+            mark: program_machine::mark_of(machine),
             touches: 0,
             faulted: false,
             time_disturbed: false,
@@ -251,6 +254,15 @@ impl<H: Hardware> Cnc<H> {
             return;
         }
         out.push(Output::Accepted { goal });
+        if let Err(other) = program_machine::check(text, self.mark) {
+            out.push(Output::Finished {
+                goal,
+                outcome: Outcome::Refused,
+                line: 1,
+                message: other.to_string(),
+            });
+            return;
+        }
         match self.control.start(goal, text) {
             Ok(()) => {
                 if std::mem::take(&mut self.faulted) {
@@ -498,7 +510,7 @@ impl<H: Hardware> Stage for Cnc<H> {
             Input::Compensation(_)
                 if self.activity != Activity::Active || !self.authors.follows_last() => {}
             Input::Compensation(message) => {
-                let told = self.control.offset_mut().receive(&message);
+                let told = self.control.offset_mut().receive(at, &message);
                 out.extend(told.map(Output::Diagnostic));
             }
             Input::Tick => {

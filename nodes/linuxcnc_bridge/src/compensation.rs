@@ -16,7 +16,7 @@ use std::fmt::Write as _;
 
 use metrology::sample::AxisCompensation;
 use metrology::stamp::{Host, Span, Stamp};
-use metrology::{Axis, PerAxis};
+use metrology::{Axis, OffsetFault, OffsetRule, PerAxis};
 
 use crate::config::Settings;
 
@@ -26,25 +26,6 @@ const LEAST_CHANGE: f64 = 1e-5;
 const LEAST_PERIOD: Span = Span::from_nanos(10_000_000);
 /// Time between two beats.
 const BEAT: Span = Span::from_nanos(100_000_000);
-
-/// Why compensation was not passed on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum CompensationRefused {
-    /// Not a finite number.
-    NotFinite {
-        /// Axis.
-        axis: Axis,
-    },
-    /// Larger than the bridge's limit; mm or rad.
-    TooLarge {
-        /// Axis.
-        axis: Axis,
-        /// What was asked, mm or rad.
-        offset: f64,
-        /// The limit, mm or rad.
-        limit: f64,
-    },
-}
 
 /// What is to be said once, when it changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +40,7 @@ pub enum Freshness {
 #[derive(Clone, Debug)]
 pub struct CompensationPath {
     joints: Vec<Axis>,
-    limit: PerAxis<f64>,
+    rule: OffsetRule,
     stale_after: Span,
     received: Option<Stamp<Host>>,
     wanted: PerAxis<f64>,
@@ -75,7 +56,7 @@ impl CompensationPath {
     pub fn new(settings: &Settings) -> Self {
         Self {
             joints: settings.joints.clone(),
-            limit: settings.compensation_limit,
+            rule: settings.offset_rule(),
             stale_after: settings.compensation_stale_after,
             received: None,
             wanted: PerAxis::default(),
@@ -108,29 +89,13 @@ impl CompensationPath {
     /// leaves out has none: otherwise who names other axes alone would keep the last offset of one that fell silent.
     ///
     /// # Errors
-    /// An offset that is not finite or too large: a condition to report, nothing else changes.
+    /// Offsets that [`OffsetRule`] refuses: a condition to report, nothing else changes.
     pub fn receive(
         &mut self,
         at: Stamp<Host>,
         compensation: &AxisCompensation,
-    ) -> Result<(), CompensationRefused> {
-        for &axis in self
-            .joints
-            .iter()
-            .filter(|axis| compensation.axes.contains(**axis))
-        {
-            let (offset, limit) = (compensation.total[axis], self.limit[axis]);
-            if !offset.is_finite() {
-                return Err(CompensationRefused::NotFinite { axis });
-            }
-            if offset.abs() > limit {
-                return Err(CompensationRefused::TooLarge {
-                    axis,
-                    offset,
-                    limit,
-                });
-            }
-        }
+    ) -> Result<(), OffsetFault> {
+        self.rule.check(at, compensation)?;
         for &axis in &self.joints {
             let is_named = compensation.axes.contains(axis);
             self.wanted[axis] = if is_named {
@@ -232,6 +197,8 @@ mod tests {
             homing_timeout: second,
             compensation_limit: PerAxis([0.2; 6]),
             compensation_stale_after: second,
+            pulse_mm: 1e-4,
+            mark: None,
         })
     }
 
@@ -244,7 +211,7 @@ mod tests {
             geometric: PerAxis::default(),
             positioning: PerAxis::default(),
             pulses: PerAxis::default(),
-            remainder: PerAxis::default(),
+            remainder: PerAxis([0.01; 6]),
             state: PerAxis([CompensationState::Active; 6]),
         }
     }

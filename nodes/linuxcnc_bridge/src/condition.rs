@@ -1,9 +1,8 @@
 //! Conditions worth reporting, each with the values that belong to it.
 
 use metrology::number::number;
-use metrology::{Author, Axis};
+use metrology::{Author, Axis, OffsetFault};
 
-use crate::compensation::CompensationRefused;
 use crate::fault::FaultKind;
 use crate::latch::NoTouch;
 use crate::protocol::JointLimit;
@@ -196,8 +195,13 @@ pub enum Condition {
         left: String,
     },
     /// Compensation was refused; the last good one stays.
-    #[error("compensation refused: {}", refusal(.0))]
-    CompensationRefused(CompensationRefused),
+    #[error("{fault}")]
+    CompensationRefused {
+        /// Why.
+        fault: OffsetFault,
+        /// How many were for this reason since the start.
+        times: u64,
+    },
     /// What was refused comes no more.
     #[error("no compensation was refused for {limit_s} s", limit_s = number(*limit_s))]
     CompensationRefusedNoMore {
@@ -258,20 +262,6 @@ pub enum Condition {
     },
 }
 
-fn refusal(refused: &CompensationRefused) -> String {
-    match refused {
-        CompensationRefused::NotFinite { axis } => format!("axis {axis}: not a finite number"),
-        CompensationRefused::TooLarge {
-            axis,
-            offset,
-            limit,
-        } => {
-            let unit = if axis.is_linear() { "mm" } else { "rad" };
-            format!("axis {axis}: {offset} {unit}, limit {limit} {unit}")
-        }
-    }
-}
-
 impl Condition {
     /// Which condition it is, snake case; the same name with [`Severity::Info`] clears it.
     #[must_use]
@@ -291,7 +281,7 @@ impl Condition {
             Self::MalformedSample { .. } => "malformed_sample",
             Self::ServoSlip { .. } | Self::ServoInTime => "servo_period",
             Self::TouchUnusable { .. } => "touch_unusable",
-            Self::CompensationRefused(_) | Self::CompensationRefusedNoMore { .. } => {
+            Self::CompensationRefused { .. } | Self::CompensationRefusedNoMore { .. } => {
                 "compensation_refused"
             }
             Self::CompensationContested { .. } | Self::CompensationUncontested => {
@@ -350,7 +340,7 @@ impl Condition {
             | Self::ServoSlip { .. }
             | Self::StoodStill { .. }
             | Self::TouchUnusable { .. }
-            | Self::CompensationRefused(_)
+            | Self::CompensationRefused { .. }
             | Self::CompensationStale { .. } => Severity::Warn,
             _ => Severity::Error,
         }

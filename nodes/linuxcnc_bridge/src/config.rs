@@ -2,7 +2,7 @@
 
 use machine::file::{Latch, MachineFile};
 use metrology::stamp::Span;
-use metrology::{Axis, AxisSet, PerAxis, check_between, check_parameters};
+use metrology::{Axis, AxisSet, OffsetRule, PerAxis, check_between, check_parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -102,7 +102,8 @@ pub struct CompensationConfig {
     /// Greatest offset of a rotary axis.
     #[schemars(range(min = 0.1, max = 3600.0))]
     pub limit_arcsec: f64,
-    /// Without news for this long the heartbeat stops and HAL fades the offsets out.
+    /// Without news for this long the heartbeat stops and HAL fades the offsets out; a set that is stamped earlier or
+    /// later than now by more is refused.
     #[schemars(range(min = 1.0, max = 60_000.0))]
     pub stale_after_ms: f64,
 }
@@ -146,6 +147,10 @@ pub struct Settings {
     pub compensation_limit: PerAxis<f64>,
     /// Age at which compensation is stale.
     pub compensation_stale_after: Span,
+    /// Pulse equivalent of the linear axes, mm.
+    pub pulse_mm: f64,
+    /// The mark of the machine file ([`machine::program_machine`]).
+    pub mark: Option<u64>,
 }
 
 fn span(value: f64, unit_s: f64) -> Span {
@@ -219,6 +224,19 @@ impl Settings {
                 }
             }),
             compensation_stale_after: span(limit.stale_after_ms, 1e-3),
+            pulse_mm: machine.control.pulse_equivalent_um * 1e-3,
+            mark: machine::program_machine::mark_of(machine),
         })
+    }
+
+    /// Which offsets are passed on.
+    #[must_use]
+    pub const fn offset_rule(&self) -> OffsetRule {
+        OffsetRule {
+            axes: self.axes,
+            size_limit: self.compensation_limit,
+            pulse_mm: self.pulse_mm,
+            age_limit: self.compensation_stale_after,
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::convert::Infallible;
 
+use machine::program_machine;
 use metrology::sample::{AxisCompensation, AxisState, ProbeTrigger};
 use metrology::stamp::{Host, Machine, Span, Stamp};
 use metrology::{Author, Stage};
@@ -251,6 +252,8 @@ impl BridgeStage {
             Some(Refusal::Inactive)
         } else if program.trim().is_empty() {
             Some(Refusal::Empty)
+        } else if let Err(other) = program_machine::check(program, self.settings.mark) {
+            Some(Refusal::OtherMachine(other))
         } else if let Some((line, word)) = ProgramText::new(program).breaks_frame() {
             Some(Refusal::ShiftsFrame { line, word })
         } else if let Some((line, bytes)) = ProgramText::new(program).long_name() {
@@ -507,10 +510,8 @@ impl Stage for BridgeStage {
             Input::Publishers(publishers) => self.offsets.publishers(at, publishers, self.active),
             Input::Compensation(_) if !self.active => {}
             Input::Compensation(compensation) => {
-                if let Err(refused) = self.offsets.receive(at, &compensation) {
-                    self.conditions
-                        .push(Condition::CompensationRefused(refused));
-                }
+                let refused = self.offsets.receive(at, &compensation);
+                self.conditions.extend(refused);
             }
             Input::Tick => self.tick(at, out),
             Input::Io(event) => self.handle_io(at, event, out),

@@ -278,6 +278,16 @@ pub enum RecorderError {
         /// The name.
         name: String,
     },
+    /// Every topic to record is left out.
+    #[error(
+        "exclude = {exclude:?}: leaves out every topic of {topics:?}, so that nothing would be recorded: exclude less"
+    )]
+    NothingToRecord {
+        /// Patterns of topics to record.
+        topics: Vec<String>,
+        /// Patterns of topics to leave out.
+        exclude: Vec<String>,
+    },
     /// A message that its definition does not describe.
     #[error("topic {topic}, message {message} at {log_time_nanos} ns: {source}")]
     Decode {

@@ -42,6 +42,9 @@ pub struct PlaybackConfig {
     /// Publish /clock with the bag's time; a recorded /clock is left out then.
     #[serde(default = "PlaybackConfig::default_clock")]
     pub clock: bool,
+    /// Play also where other nodes publish the same topics, or a controller follows the bag's offsets.
+    #[serde(default)]
+    pub onto_a_running_graph: bool,
 }
 
 /// Longest way into a bag, s: from a first message that was recorded before the clock was set to any later one.
@@ -93,6 +96,7 @@ impl PlaybackConfig {
             start_paused: false,
             delay_s: Self::default_delay_s(),
             clock: Self::default_clock(),
+            onto_a_running_graph: false,
         }
     }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::convert::Infallible;
 
-use machine::MachineFile;
+use machine::{MachineFile, program_machine};
 use metrology::Stage;
 use metrology::number::number;
 use metrology::sample::{
@@ -149,6 +149,8 @@ impl Production {
 pub struct Sequencer {
     config: Config,
     machine: MachineFile,
+    /// The mark of the machine file, for controllers.
+    mark: Option<u64>,
     programs: BTreeMap<String, String>,
     plan: Option<Plan>,
     state: PlanState,
@@ -188,6 +190,7 @@ impl Sequencer {
         }
         Ok(Self {
             config,
+            mark: program_machine::mark_of(&machine),
             machine,
             programs,
             state: PlanState::Waiting,
@@ -417,7 +420,11 @@ impl Sequencer {
             job.program = id;
             job.attempts += 1;
             job.retry_at = None;
-            let (name, text) = (job.task.name.clone(), job.task.text.clone());
+            let (name, text) = (job.task.name.clone(), &job.task.text);
+            let text = match self.mark {
+                Some(mark) => program_machine::marked(text, mark),
+                None => text.clone(),
+            };
             out.push(Output::SendProgram { id, name, text });
         }
     }

@@ -71,7 +71,7 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
     let start_nanos = start.nanos().cast_unsigned();
     let mut harness = Harness::compose(nodes, start)?;
     let recorder = bag::begin(bag_path, scenario, parameters, start_nanos, Some(ran))?;
-    record(&mut harness, &recorder, &scenario.file.recording.exclude)?;
+    let unmatched = record(&mut harness, &recorder, &scenario.file.recording.exclude)?;
     let mirror = if how.on_dds {
         Mirror::start(&mut harness)?
     } else {
@@ -103,6 +103,9 @@ pub fn run(scenario: &Scenario, start_s: i64, bag_path: &Path, how: How<'_>) -> 
     let evidence = Rc::try_unwrap(evidence)
         .map_err(|_| anyhow::anyhow!("an observer outlived its harness"))?
         .into_inner();
+    for pattern in &unmatched {
+        complain!("abbe: {}", recorder_node::unmatched(pattern));
+    }
     let (failure, trouble) = bag::ended(failure, finished.err());
     Ok(Outcome {
         evidence,
@@ -190,10 +193,14 @@ enum Place {
     Nowhere,
 }
 
-/// Writes every publication into the bag, in total order.
-fn record(harness: &mut Harness, recorder: &Recorder, exclude: &[String]) -> Result<()> {
+/// Writes every publication into the bag, in total order; gives the patterns that leave out no topic.
+fn record(harness: &mut Harness, recorder: &Recorder, exclude: &[String]) -> Result<Vec<String>> {
     let sink: RecorderSink = recorder.sink();
     let picked = Selection::All.without(exclude.to_vec());
+    let topics: Vec<String> = { harness.topics() }
+        .map(|port| bag::full_name(&port.topic))
+        .collect();
+    let unmatched = picked.unmatched(topics.iter().map(String::as_str));
     let mut places = Vec::new();
     let mut names = Vec::new();
     for port in harness.topics() {
@@ -233,7 +240,7 @@ fn record(harness: &mut Harness, recorder: &Recorder, exclude: &[String]) -> Res
         };
         sink.push(channel, stamp, published.bytes);
     }));
-    Ok(())
+    Ok(unmatched)
 }
 
 /// Keeps what the report needs.

@@ -104,6 +104,7 @@ pub fn run(
 
 fn capture_words(captured: &recorder_node::Captured) -> Vec<String> {
     let mut words = captured.unrecorded.clone();
+    words.extend(captured.unmatched.iter().cloned());
     if captured.lost_on_network > 0 {
         words.push(format!(
             "{} messages were lost on their way to the recorder",

@@ -11,7 +11,7 @@ use super::programs;
 use super::single::{self, File, Kind};
 use crate::launch::{self, LaunchNode};
 use crate::node;
-use crate::scenario::{SCENARIO_FILE, Scenario};
+use crate::scenario::{SCENARIO_FILE, Scenario, check_machines};
 
 /// Nodes whose building opens a file, a connection or a program: of these the parameters are read, and no more.
 const OPENING: [&str; 6] = [
@@ -79,6 +79,9 @@ pub fn check(folder: &Path, findings: &mut Findings) -> Result<()> {
         } else {
             findings.mistake(message);
         }
+    }
+    if let Err(error) = check_machines(folder, &launched) {
+        findings.mistake(complaint::in_words(&error));
     }
     programs::check(&launched, findings);
     if !held_up.is_empty() {

@@ -19,7 +19,7 @@ use super::Findings;
 use crate::import::limits;
 use crate::import::map::Map;
 use crate::import_shift::OrderFile;
-use crate::launch::{self, LaunchNode};
+use crate::launch;
 use crate::node;
 use crate::scenario::ScenarioFile;
 
@@ -199,20 +199,12 @@ fn read(path: &Path, kind: Kind, machine: Option<&MachineFile>) -> Result<()> {
 fn launched(path: &Path) -> Result<()> {
     let nodes = launch::read(path)?;
     let wrong = |reason: String| anyhow!("launch file {}: {reason}", path.display());
-    for (at, node) in nodes.iter().enumerate() {
+    for node in nodes {
         if node::builder(&node.exec).is_none() {
             return Err(wrong(format!(
                 "exec=\"{}\": there is no such node (nodes: {})",
                 node.exec,
                 node::names()
-            )));
-        }
-        let is_same =
-            |other: &LaunchNode| other.name == node.name && other.namespace == node.namespace;
-        if nodes[..at].iter().any(is_same) {
-            return Err(wrong(format!(
-                "name=\"{}\": two nodes have it: give one of them another",
-                node.name
             )));
         }
         Setup::new(&node.exec, &Arguments::parse(node.ros_args())?)?;

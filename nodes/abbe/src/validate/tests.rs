@@ -169,3 +169,48 @@ fn defaults_in_use_are_noted_with_key_and_value() {
     assert!(!notes.contains("axes.X.lead_mm"), "{notes}");
     assert!(!notes.contains(".travel_mm"), "{notes}");
 }
+
+#[test]
+fn nodes_of_one_scenario_with_different_machine_files_are_a_mistake() {
+    for (file, from, to, key) in [
+        (
+            "sequencer.yaml",
+            "corner_mm: [-220.0, -180.0, 20.0]",
+            "corner_mm: [-220.0, -180.0, 15.0]",
+            "blocks[0].corner_mm[2]",
+        ),
+        (
+            "probe.yaml",
+            "radius_mm: 3.0, length",
+            "radius_mm: 2.9, length",
+            "probe.styli.ruby_6.radius_mm",
+        ),
+    ] {
+        let other = ("machine_file: machine.yaml", "machine_file: m2.yaml");
+        let folder = spoiled("first_run", &[(file, other.0, other.1)]);
+        let text = std::fs::read_to_string(folder.path().join("machine.yaml")).unwrap();
+        std::fs::write(folder.path().join("m2.yaml"), text.replace(from, to)).unwrap();
+        let said = found(folder.path()).mistakes.join("\n");
+        for word in ["machine files differ", key, "m2.yaml", "machine.yaml"] {
+            assert!(said.contains(word), "{file}: {word}: {said}");
+        }
+        let node = format!("node {}", file.trim_end_matches(".yaml"));
+        assert!(said.contains(&node), "{said}");
+    }
+}
+
+#[test]
+fn a_scenario_of_two_nodes_of_one_name_or_of_an_empty_bag_is_a_mistake() {
+    let node = r#"<node pkg="abbe" exec="probe""#;
+    let twice = r#"<node pkg="abbe" exec="fake_cnc" name="probe"/><node pkg="abbe" exec="probe""#;
+    let launch = ("first_run.launch.xml", node, twice);
+    let nothing = ("scenario.yaml", "exclude: [/tf]", "exclude: [\"*\"]");
+    for (change, words) in [
+        (launch, "name=\"probe\": two nodes have it"),
+        (nothing, "nothing would be recorded"),
+    ] {
+        let folder = spoiled("first_run", &[change]);
+        let said = found(folder.path()).mistakes.join("\n");
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}

@@ -182,11 +182,13 @@ fn condition(output: &Output) -> Option<Diagnostic> {
         return None;
     };
     let level = Level::from(condition.severity());
-    Some(Diagnostic::new(
-        level,
-        condition.name(),
-        condition.to_string(),
-    ))
+    let told = Diagnostic::new(level, condition.name(), condition.to_string());
+    Some(match condition {
+        fake_cnc::Diagnostic::CompensationRefused { fault, times } => {
+            told.with("reason", fault.reason()).with("refused", times)
+        }
+        _ => told,
+    })
 }
 
 #[cfg(test)]

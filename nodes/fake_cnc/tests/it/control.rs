@@ -170,7 +170,13 @@ impl<H: Hardware> Shop<H> {
         shop
     }
 
-    fn tell(&mut self, input: Input) {
+    /// Offsets without a stamp are of now.
+    fn tell(&mut self, mut input: Input) {
+        if let Input::Compensation(message) = &mut input
+            && message.at == Stamp::default()
+        {
+            message.at = self.now;
+        }
         self.cnc.step(self.now, input, &mut self.out).unwrap();
     }
 
@@ -276,7 +282,7 @@ fn offsets(x_mm: f64) -> Input {
         geometric: PerAxis::default(),
         positioning: PerAxis::default(),
         pulses: PerAxis::default(),
-        remainder: PerAxis::default(),
+        remainder: total,
         state: PerAxis::from_fn(|_| CompensationState::Active),
     })
 }

@@ -22,6 +22,7 @@ pub mod kinematics;
 pub mod orientation;
 pub mod poses;
 pub mod program_frame;
+pub mod program_machine;
 pub mod trajectory;
 pub mod volumetric;
 

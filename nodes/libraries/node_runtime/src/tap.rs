@@ -22,9 +22,11 @@ use crate::node::Bytes;
 
 mod ending;
 mod publisher;
+mod rivals;
 
 use ending::{End, LONGEST, Reading};
 pub use publisher::{PublishReport, RawPublisher, Unsent};
+pub use rivals::{Rival, Use};
 
 /// A topic that was found on the network.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,6 +86,11 @@ pub enum TapEvent {
         /// How long before the end the last sample that was handed over had been sent.
         behind: Span,
     },
+    /// At the end: a pattern of the selection fits no topic that was on the network.
+    Unmatched {
+        /// The pattern.
+        pattern: String,
+    },
 }
 
 /// Which topics a tap listens to.
@@ -114,6 +121,37 @@ impl Selection {
     #[must_use]
     pub fn without(self, patterns: Vec<String>) -> Self {
         Self::Without(Box::new(self), patterns)
+    }
+
+    /// Its patterns that fit none of these topics, as one with a typing error.
+    pub fn unmatched<'t>(&self, topics: impl IntoIterator<Item = &'t str>) -> Vec<String> {
+        let mut patterns = self.patterns();
+        for topic in topics {
+            patterns.retain(|pattern| !fits(pattern, topic));
+        }
+        patterns
+    }
+
+    /// Whether every name that fits one of `topics` fits one of `exclude` as well.
+    #[must_use]
+    pub fn leaves_nothing(topics: &[String], exclude: &[String]) -> bool {
+        // A `*` of one pattern fits into a `*` of another; each name begins with /, also where a pattern leaves that open.
+        topics.iter().all(|topic| match topic.strip_prefix('*') {
+            Some(rest) => fits_any(exclude, &format!("/*{rest}")),
+            None => fits_any(exclude, topic),
+        })
+    }
+
+    fn patterns(&self) -> Vec<String> {
+        match self {
+            Self::All => vec![],
+            Self::Matching(patterns) => patterns.clone(),
+            Self::Without(selection, patterns) => {
+                let mut all = selection.patterns();
+                all.extend(patterns.iter().cloned());
+                all
+            }
+        }
     }
 }
 
@@ -224,8 +262,11 @@ async fn look(
     let mut found: BTreeMap<String, (Arc<TappedTopic>, Vec<String>)> = BTreeMap::new();
     let mut readers = tokio::task::JoinSet::new();
     let (ending, end) = watch::channel(None);
+    let mut unmatched = selection.patterns();
     loop {
-        for (name, writers) in offered(&participant.writers(), &selection) {
+        let writers = participant.writers();
+        unmatched.retain(|pattern| !is_met(pattern, &writers));
+        for (name, writers) in offered(&writers, &selection) {
             let Some(first) = writers.first() else {
                 continue;
             };
@@ -269,6 +310,7 @@ async fn look(
             () = tokio::time::sleep(TOPIC_PERIOD) => {}
         }
     }
+    tell_unmatched(unmatched, &queue).await;
     ending.send_replace(Some(End {
         asked: clock::host_now(),
         latest: Instant::now() + LONGEST,
@@ -276,6 +318,19 @@ async fn look(
     // Each ends by itself, as soon as the callback has room for its last sample.
     while readers.join_next().await.is_some() {}
     participant
+}
+
+async fn tell_unmatched(patterns: Vec<String>, queue: &mpsc::Sender<TapEvent>) {
+    for pattern in patterns {
+        // Who listened may have gone.
+        let _ = queue.send(TapEvent::Unmatched { pattern }).await;
+    }
+}
+
+/// Whether a pattern fits a topic of messages.
+fn is_met(pattern: &str, writers: &[Remote]) -> bool {
+    let mut topics = writers.iter().filter(|it| it.role == Role::Message);
+    topics.any(|writer| fits(pattern, &writer.name))
 }
 
 /// Selected topics of messages with their writers.
@@ -328,6 +383,23 @@ mod tests {
         let less = some.without(vec!["/cell/*".to_owned()]);
         assert!(less.takes("/axes/state") && !less.takes("/cell/axes/state"));
         assert!(!less.takes("/latency"));
+    }
+
+    #[test]
+    fn patterns_that_fit_no_topic_are_found() {
+        let words = |words: &[&str]| -> Vec<String> { words.iter().map(|&w| w.into()).collect() };
+        let topics = ["/axes/state", "/compensation", "/tf"];
+        for (include, exclude, unmatched) in [
+            (&["*"][..], &[][..], &[][..]),
+            (&["*"], &["/compensatoin", "/tf"], &["/compensatoin"]),
+            (&["/axes/*", "/axis/*"], &["/t*"], &["/axis/*"]),
+            (&["/nope"], &["/neither", "*state"], &["/nope", "/neither"]),
+        ] {
+            let picked = Selection::Matching(words(include)).without(words(exclude));
+            assert_eq!(picked.unmatched(topics), words(unmatched), "{exclude:?}");
+        }
+        assert_eq!(Selection::All.unmatched(topics), words(&[]));
+        assert_eq!(Selection::All.without(words(&["*"])).unmatched([]), ["*"]);
     }
 
     #[test]

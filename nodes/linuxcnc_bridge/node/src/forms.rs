@@ -6,6 +6,7 @@ use abbe_msgs::action::{RunProgram, RunProgramFeedback, RunProgramGoal, RunProgr
 use abbe_msgs::joint_state;
 use abbe_msgs::sensor_msgs::msg::JointState;
 use linuxcnc_bridge::Output;
+use linuxcnc_bridge::condition::Condition;
 use linuxcnc_bridge::live::LiveInput;
 use linuxcnc_bridge::run::{Ending, Outcome};
 use metrology::sample::{AxisState, ProbeTrigger};
@@ -95,11 +96,13 @@ pub(crate) fn condition(output: &Output) -> Option<Diagnostic> {
         return None;
     };
     let level = Level::from(condition.severity());
-    Some(Diagnostic::new(
-        level,
-        condition.name(),
-        condition.to_string(),
-    ))
+    let told = Diagnostic::new(level, condition.name(), condition.to_string());
+    Some(match condition {
+        Condition::CompensationRefused { fault, times } => {
+            told.with("reason", fault.reason()).with("refused", times)
+        }
+        _ => told,
+    })
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Programs that are not begun.
 
+use machine::program_machine::OtherMachine;
 use metrology::Author;
 use metrology::bound::NAME_BYTES;
 
@@ -43,6 +44,9 @@ pub enum Refusal {
     /// The name of a feature has more bytes than a message of its touches may have.
     #[error("line {0}: the feature's name has {1} bytes, at most {NAME_BYTES}: shorten it")]
     LongName(u32, usize),
+    /// Its approaches are those of another machine file.
+    #[error(transparent)]
+    OtherMachine(#[from] OtherMachine),
     /// Its coordinates are the machine's, and it would shift them.
     #[error(
         "line {line}: {word} shifts coordinates, and those of a program with (frame: machine) are the machine's: take one of both out"

@@ -2,9 +2,9 @@
 
 use metrology::sample::AxisCompensation;
 use metrology::stamp::{Host, Span, Stamp};
-use metrology::{Author, AuthorNews, GateNews, HomedGate, SoleAuthor};
+use metrology::{Author, AuthorNews, GateNews, HomedGate, OffsetsRefused, SoleAuthor};
 
-use crate::compensation::{CompensationPath, CompensationRefused, Freshness};
+use crate::compensation::{CompensationPath, Freshness};
 use crate::condition::Condition;
 use crate::config::Settings;
 
@@ -21,6 +21,7 @@ pub(super) struct Offsets {
     authors: SoleAuthor,
     stale_after: Span,
     freshness: Option<Freshness>,
+    refused: OffsetsRefused,
     /// When the last set was refused, until it is over.
     refused_at: Option<Stamp<Host>>,
     /// Since when, and by how many, they are published while none has come.
@@ -39,6 +40,7 @@ impl Offsets {
             authors: SoleAuthor::default(),
             stale_after: settings.compensation_stale_after,
             freshness: None,
+            refused: OffsetsRefused::default(),
             refused_at: None,
             awaited: None,
             has_come: false,
@@ -70,20 +72,20 @@ impl Offsets {
         self.authors.contested()
     }
 
+    /// Takes offsets, or says why they are refused.
     pub(super) fn receive(
         &mut self,
         at: Stamp<Host>,
         compensation: &AxisCompensation,
-    ) -> Result<(), CompensationRefused> {
+    ) -> Option<Condition> {
         self.has_come = true;
         if !self.authors.follows_last() {
-            return Ok(());
+            return None;
         }
-        let taken = self.path.receive(at, compensation);
-        if taken.is_err() {
-            self.refused_at = Some(at);
-        }
-        taken
+        let fault = self.path.receive(at, compensation).err()?;
+        self.refused_at = Some(at);
+        let times = self.refused.count(&fault);
+        Some(Condition::CompensationRefused { fault, times })
     }
 
     /// So many publish offsets; an inactive bridge waits for none.

@@ -251,6 +251,8 @@ impl Desk {
             homing_timeout: Span::from_nanos(60 * SECOND),
             compensation_limit: PerAxis([0.2; 6]),
             compensation_stale_after: Span::from_nanos(SECOND),
+            pulse_mm: 1e-4,
+            mark: None,
         };
         Self {
             stage: BridgeStage::new(&settings),

@@ -20,6 +20,7 @@ use recorder::{
 pub(crate) struct Troubles {
     lost_on_network: AtomicU64,
     topics: Mutex<Vec<String>>,
+    unmatched: Mutex<Vec<String>>,
 }
 
 impl Troubles {
@@ -33,9 +34,26 @@ impl Troubles {
         std::mem::take(&mut *self.topics())
     }
 
-    fn topics(&self) -> MutexGuard<'_, Vec<String>> {
-        self.topics.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Patterns that fitted no topic until the end, a sentence each.
+    pub fn unmatched(&self) -> Vec<String> {
+        std::mem::take(&mut *lock(&self.unmatched))
     }
+
+    fn topics(&self) -> MutexGuard<'_, Vec<String>> {
+        lock(&self.topics)
+    }
+}
+
+fn lock(words: &Mutex<Vec<String>>) -> MutexGuard<'_, Vec<String>> {
+    words.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What is to be said of a pattern that picks or leaves out topics and fits none.
+#[must_use]
+pub fn unmatched(pattern: &str) -> String {
+    format!(
+        "warning: the pattern {pattern:?} of what to record or to exclude matched no topic: compare it with the names of the topics (`ros2 topic list`)"
+    )
 }
 
 /// A recording of the network that goes on.
@@ -56,6 +74,8 @@ pub struct Captured {
     pub lost_on_network: u64,
     /// Topics that could not be recorded, a sentence each.
     pub unrecorded: Vec<String>,
+    /// Patterns that fitted no topic, a sentence each.
+    pub unmatched: Vec<String>,
 }
 
 /// The topic's own quality of service, where it is one of ours; what was found has the tap's depth.
@@ -137,6 +157,9 @@ impl Scribe {
                     "{name}: the computer was too busy at the end: what was sent in the last {behind_s:.1} s is not recorded, {samples} messages of it are known"
                 );
                 self.troubles.topics().push(word);
+            }
+            TapEvent::Unmatched { pattern } => {
+                lock(&self.troubles.unmatched).push(unmatched(pattern));
             }
             TapEvent::Unreadable { topic, reason } => {
                 self.lose(1);
@@ -251,6 +274,7 @@ impl Capture {
             stats: sink.stats(),
             lost_on_network: self.troubles.lost_on_network(),
             unrecorded: self.troubles.unrecorded(),
+            unmatched: self.troubles.unmatched(),
         })
     }
 }

@@ -7,8 +7,9 @@ use abbe_msgs::topics;
 use anyhow::Result;
 use metrology::stamp::Span;
 use node_runtime::names::NodeNames;
+use node_runtime::tap::Selection;
 use node_runtime::{Node, Setup, Wiring};
-use recorder::NodeConfig;
+use recorder::{NodeConfig, RecorderError};
 
 mod begin;
 mod capture;
@@ -17,7 +18,7 @@ mod watch;
 
 pub use begin::record;
 use begin::{context, selection};
-pub use capture::{Capture, Captured};
+pub use capture::{Capture, Captured, unmatched};
 use ring::RingCapture;
 use watch::{Input, Output, Watch, Work};
 
@@ -31,6 +32,13 @@ const TICK: Span = Span::from_nanos(500_000_000);
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: NodeConfig = setup.config()?;
     config.check_names()?;
+    if Selection::leaves_nothing(&config.topics, &config.exclude) {
+        let nothing = RecorderError::NothingToRecord {
+            topics: config.topics,
+            exclude: config.exclude,
+        };
+        anyhow::bail!("{}", setup.placed(&nothing.to_string()));
+    }
     let machine = (!config.machine_file.is_empty()).then(|| setup.file_text("machine_file"));
     let machine = machine.transpose()?.map(|(_, text)| text);
     listen(setup, &config, machine)

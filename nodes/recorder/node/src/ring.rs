@@ -156,11 +156,12 @@ impl RingCapture {
         ended.into_iter().map(outcome).collect()
     }
 
-    /// Leaves the network.
+    /// Leaves the network; patterns that fitted no topic, a sentence each.
     ///
     /// # Errors
     /// When the listener panicked.
-    pub fn finish(self) -> Result<()> {
-        self.tap.stop().map(drop)
+    pub fn finish(self) -> Result<Vec<String>> {
+        self.tap.stop()?;
+        Ok(self.troubles.unmatched())
     }
 }

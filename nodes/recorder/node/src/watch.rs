@@ -124,7 +124,12 @@ impl Watch {
             Some(Work::Ring(mut ring)) => {
                 out.extend(ring.ended(true).into_iter().map(told));
                 let finished = std::thread::spawn(move || ring.finish()).join();
-                finished.map(|finished| finished.map(|()| None))
+                finished.map(|finished| {
+                    finished.map(|unmatched| {
+                        out.extend(unmatched.into_iter().map(odd_pattern));
+                        None
+                    })
+                })
             }
         };
         match outcome {
@@ -139,6 +144,7 @@ impl Watch {
     fn finished(&mut self, captured: Captured, out: &mut Vec<Output>) -> Option<RecorderError> {
         let lost = (captured.stats.messages_lost, captured.lost_on_network);
         self.report_losses(lost, captured.unrecorded, out);
+        out.extend(captured.unmatched.into_iter().map(odd_pattern));
         captured.bag.err()
     }
 
@@ -153,6 +159,10 @@ impl Watch {
         };
         out.push(Output::Answer(answer));
     }
+}
+
+fn odd_pattern(message: String) -> Output {
+    Output::Condition(Diagnostic::new(Level::Warn, "pattern_unmatched", message))
 }
 
 /// Begins to save, and says where or why not.

@@ -13,6 +13,7 @@ use replayer::PlaybackConfig;
 mod access;
 mod contents;
 mod desk;
+mod graph_watch;
 mod latched;
 mod player;
 mod watch;

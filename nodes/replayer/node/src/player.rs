@@ -11,6 +11,7 @@ use anyhow::{Context, Result, anyhow};
 use metrology::stamp::{Host, Span, Stamp};
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
+use node_runtime::tap::Rival;
 use node_runtime::{Bytes, RawPublisher};
 use recorder::{Bag, Event, MessageRef, Order};
 use replayer::pause::Pause;
@@ -18,6 +19,7 @@ use replayer::{Account, Place, Playback, PlaybackConfig, Reason, TopicAccount};
 
 use crate::contents::{Contents, Plan};
 use crate::desk::{Desk, Next};
+use crate::graph_watch::{GraphWatch, MEETING, refusal};
 use crate::latched::Latched;
 
 /// Messages between the reader and the network.
@@ -61,8 +63,7 @@ impl Player {
         let playback = config.checked()?;
         let bag = Bag::open(Path::new(&config.bag))?;
         let contents = Contents::of(&bag, config, &playback, names)?;
-        let publisher =
-            RawPublisher::of_found(environment, names, &contents.offered, QUEUE_LEN, PATIENCE)?;
+        let publisher = voice(environment, names, &contents, config)?;
         let mut playing = Playing::new(bag, contents, publisher, config, &playback);
         let desk = Arc::clone(&playing.desk);
         let delay = Duration::from_nanos(u64::try_from(playback.delay.nanos()).unwrap_or(0));
@@ -92,6 +93,22 @@ impl Player {
     }
 }
 
+/// Joins the network to speak on the topics of the bag, where it may.
+fn voice(
+    environment: &Environment,
+    names: &NodeNames,
+    contents: &Contents,
+    config: &PlaybackConfig,
+) -> Result<RawPublisher> {
+    let topics = &contents.offered;
+    if config.onto_a_running_graph {
+        return RawPublisher::of_found(environment, names, topics, QUEUE_LEN, PATIENCE);
+    }
+    let how = (QUEUE_LEN, PATIENCE);
+    RawPublisher::where_alone(environment, names, topics, how, MEETING)?
+        .map_err(|rivals| anyhow!("{}: {}", config.bag, refusal(&rivals, 0)))
+}
+
 /// What speaks on the topics of a bag.
 trait Voice {
     /// Says `data` on the topic at `place`.
@@ -99,6 +116,9 @@ trait Voice {
 
     /// Waits until what was said has been acknowledged; false when that took too long.
     fn settle(&self) -> bool;
+
+    /// Others on the graph among whom nothing may be said.
+    fn rivals(&self) -> Vec<Rival>;
 }
 
 impl Voice for RawPublisher {
@@ -109,6 +129,10 @@ impl Voice for RawPublisher {
 
     fn settle(&self) -> bool {
         self.settle(PATIENCE)
+    }
+
+    fn rivals(&self) -> Vec<Rival> {
+        self.rivals()
     }
 }
 
@@ -132,6 +156,7 @@ struct Playing<V> {
     rate: Option<f64>,
     /// Times that subscribers did not acknowledge in time.
     unsettled: u64,
+    watch: GraphWatch,
 }
 
 /// Whether the bag goes on.
@@ -160,6 +185,7 @@ impl<V: Voice> Playing<V> {
             before: contents.from,
             rate: playback.rate,
             unsettled: 0,
+            watch: GraphWatch::new(config.onto_a_running_graph),
             bag: Arc::new(bag),
             contents,
             desk: Arc::new(desk),
@@ -174,7 +200,12 @@ impl<V: Voice> Playing<V> {
     }
 
     fn run(&mut self, delay: Duration) {
-        std::thread::park_timeout(delay);
+        for wait in self.watch.waits(delay) {
+            std::thread::park_timeout(wait);
+            if self.is_disturbed() {
+                return;
+            }
+        }
         while self.round() == Goes::On && self.repeat {
             self.is_first_round = false;
             self.before = self.contents.from;
@@ -220,6 +251,9 @@ impl<V: Voice> Playing<V> {
         }
         self.tell_pause(at);
         loop {
+            if self.is_disturbed() {
+                return Goes::Out;
+            }
             match self.desk.next(at, CLOCK_PERIOD) {
                 Next::Stop => return Goes::Out,
                 Next::TellTime(now) => self.tell_time(now),
@@ -259,6 +293,12 @@ impl<V: Voice> Playing<V> {
         }
         self.played.lost += 1;
         None
+    }
+
+    /// Whether somebody is on the graph among whom the bag may not be played.
+    fn is_disturbed(&mut self) -> bool {
+        let (voice, sent) = (&self.voice, self.played.messages);
+        self.watch.is_disturbed(sent, || voice.rivals())
     }
 
     /// Says that nothing was recorded for long before the message of time `at`.
@@ -320,6 +360,7 @@ impl Playing<RawPublisher> {
             account,
             contents,
             unsettled,
+            watch,
             ..
         } = self;
         played.losses.extend(account.lines());
@@ -341,7 +382,11 @@ impl Playing<RawPublisher> {
             }));
             played
         });
-        self.desk.end(ended.map_err(|error| format!("{error:#}")));
+        let ended = ended.map_err(|error| format!("{error:#}"));
+        self.desk.end(match watch.into_reason() {
+            Some(reason) => Err(reason),
+            None => ended,
+        });
     }
 }
 
@@ -369,6 +414,7 @@ fn unplayable(message: &MessageRef<'_>) -> Option<(Reason, String)> {
 mod tests {
     use abbe_msgs::from_cdr;
     use metrology::stamp::NANOS_PER_S;
+    use node_runtime::tap::Use;
     use recorder::{
         Channel, ChannelId, Directory, Durability, MessageStamp, QosProfile, RecorderConfig,
         Recording, Reliability, qos_to_yaml,
@@ -442,9 +488,9 @@ mod tests {
         Bag::open(&path).unwrap()
     }
 
-    /// A voice that nobody hears: what it said.
+    /// A voice that nobody hears: what it said, and after how much of it somebody else speaks.
     #[derive(Default)]
-    struct Said(Vec<(usize, Bytes)>);
+    struct Said(Vec<(usize, Bytes)>, Option<usize>);
 
     impl Voice for Said {
         fn say(&mut self, place: usize, data: Bytes) {
@@ -453,6 +499,16 @@ mod tests {
 
         fn settle(&self) -> bool {
             true
+        }
+
+        fn rivals(&self) -> Vec<Rival> {
+            let rival = Rival {
+                topic: "/state".to_owned(),
+                uses: Use::Publishes,
+                node: "/fake_cnc".to_owned(),
+            };
+            let comes = self.1.is_some_and(|after| self.0.len() >= after);
+            comes.then_some(rival).into_iter().collect()
         }
     }
 
@@ -504,6 +560,42 @@ mod tests {
         let (said, times) = played((2.0, Some(2.0)), 0.0);
         assert_eq!(said, [&OWED[..], &[8]].concat());
         assert_eq!(times, [FROM]);
+    }
+
+    #[test]
+    fn a_bag_is_not_played_among_others_before_or_after_its_first_message_unless_it_is_asked_for() {
+        for (comes_after, is_allowed) in [(0, false), (3, false), (0, true), (3, true)] {
+            let home = tempfile::tempdir().unwrap();
+            let bag = bag(home.path());
+            let config = PlaybackConfig {
+                clock: false,
+                rate: 10.0,
+                onto_a_running_graph: is_allowed,
+                ..PlaybackConfig::whole(String::new())
+            };
+            let playback = config.checked().unwrap();
+            let names = NodeNames::new("player", &[]).unwrap();
+            let contents = Contents::of(&bag, &config, &playback, &names).unwrap();
+            let voice = Said(vec![], Some(comes_after));
+            let mut playing = Playing::new(bag, contents, voice, &config, &playback);
+            playing.run(Duration::ZERO);
+            let said = playing.voice.0.len();
+            let reason = playing.watch.into_reason();
+            assert_eq!(reason.is_none(), is_allowed, "{reason:?}");
+            if is_allowed {
+                assert_eq!(said, MESSAGES.len());
+                continue;
+            }
+            assert!((comes_after..MESSAGES.len()).contains(&said), "{said}");
+            let reason = reason.unwrap();
+            for words in [
+                "/fake_cnc publishes /state",
+                &format!("{said} messages were sent"),
+                "--onto-a-running-graph",
+            ] {
+                assert!(reason.contains(words), "{words}: {reason}");
+            }
+        }
     }
 
     #[test]

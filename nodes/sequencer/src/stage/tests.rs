@@ -180,6 +180,40 @@ fn an_update_request_is_served_between_two_parts() {
 }
 
 #[test]
+fn a_generated_program_names_its_machine_file_and_that_of_an_author_stays_as_it_is() {
+    let other = MACHINE.replacen("-180.0, 20.0]", "-180.0, 15.0]", 1);
+    let step = |cold| Step::Blocks {
+        blocks: vec![],
+        cold,
+    };
+    let run = || Step::Run {
+        program: "part.ngc".to_owned(),
+    };
+    for (text, first, is_marked) in [
+        (MACHINE, step(false), true),
+        (&other, step(true), true),
+        (MACHINE, run(), false),
+    ] {
+        let machine = MachineFile::parse(text, "machine.yaml").unwrap();
+        let own = program_machine::mark_of(&machine).filter(|_| is_marked);
+        let plan = Plan {
+            title: "test".to_owned(),
+            steps: vec![first],
+        };
+        let programs = BTreeMap::from([("part.ngc".to_owned(), "G0 X1\nM2\n".to_owned())]);
+        let config = Config::default();
+        let mut sequencer = Sequencer::new(config, machine, Some(plan), programs).unwrap();
+        let mut out = give(&mut sequencer, 0.0, Input::Tick);
+        out.extend(give(&mut sequencer, 1.0, Input::Tick));
+        let text = out.iter().find_map(|output| match output {
+            Output::SendProgram { text, .. } => Some(text.as_str()),
+            _ => None,
+        });
+        assert_eq!(program_machine::mark_in(text.unwrap()), own, "{text:?}");
+    }
+}
+
+#[test]
 fn a_program_that_nobody_takes_is_proposed_again_and_fails_in_the_end() {
     let mut sequencer = sequencer(vec![Step::Run {
         program: "part.ngc".to_owned(),

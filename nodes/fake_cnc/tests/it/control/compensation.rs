@@ -54,16 +54,62 @@ fn a_compensation_that_is_not_a_number_is_refused_and_told() {
     shop.tell(offsets(f64::NAN));
     shop.pass_ms(50);
     assert!((shop.cnc.offset()[Axis::X] - 0.001).abs() < 1e-15);
-    let [
-        Diagnostic::CompensationNotFinite {
-            axis: Axis::X,
-            value,
-        },
-    ] = shop.diagnostics()[..]
-    else {
-        panic!("{:?}", shop.diagnostics());
-    };
-    assert!(value.is_nan());
+    let told = shop.diagnostics();
+    let told: Vec<String> = told.iter().map(ToString::to_string).collect();
+    assert_eq!(told, ["compensation of axis X is NaN: refused"]);
+}
+
+/// Spoils a message that comes at this time.
+type Spoil = fn(&mut AxisCompensation, Stamp<metrology::Host>);
+
+#[test]
+fn offsets_that_contradict_themselves_or_are_not_of_now_are_refused_then_fade() {
+    let bad: [(Spoil, &str); 6] = [
+        (
+            |sent, _| sent.state[Axis::X] = CompensationState::Off,
+            "STATE_OFF",
+        ),
+        (
+            |sent, _| sent.pulses[Axis::X] = 4_900,
+            "pulses and remainder",
+        ),
+        (|sent, _| sent.remainder[Axis::Z] = -0.01, "axis Z"),
+        (
+            |sent, now| sent.at = now - Span::from_secs_f64(3e7),
+            "30000000 s ago",
+        ),
+        (
+            |sent, now| sent.at = now - Span::from_secs_f64(1.1),
+            "1.1 s ago",
+        ),
+        (
+            |sent, now| sent.at = now + Span::from_secs_f64(3e8),
+            "in the future",
+        ),
+    ];
+    for (spoil, word) in bad {
+        let mut shop = shop(Bench::open());
+        two_publish(&mut shop, 1, [Some(0.001), None]);
+        for _ in 0..100 {
+            let Input::Compensation(mut sent) = offsets(0.4) else {
+                unreachable!()
+            };
+            sent.at = shop.now;
+            spoil(&mut sent, shop.now);
+            shop.tell(Input::Compensation(sent));
+            shop.pass_ms(20);
+            assert!(shop.cnc.offset()[Axis::X] <= 0.001 + 1e-12, "{word}");
+        }
+        assert!(shop.cnc.offset()[Axis::X].abs() <= 0.0, "{word}: faded");
+        let told = shop.diagnostics();
+        let is_of_input = |told: &&Diagnostic| told.name() == "compensation_input";
+        let refused = told.iter().filter(is_of_input);
+        let refused = refused.filter(|told| told.to_string().contains(word));
+        assert_eq!(refused.count(), 100, "{word}");
+        let last = |shop: &Shop<Bench>| shop.diagnostics().pop();
+        shop.tell(offsets(0.001));
+        assert_eq!(last(&shop), Some(Diagnostic::CompensationFollowed));
+    }
 }
 
 const AUTHORS: [metrology::Author; 2] = [metrology::Author([1; 16]), metrology::Author([2; 16])];

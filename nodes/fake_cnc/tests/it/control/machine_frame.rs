@@ -330,3 +330,24 @@ fn refusals_name_the_offset_and_what_to_do() {
         assert!(message.contains("changes the coordinates"), "{message}");
     }
 }
+
+#[test]
+fn a_program_for_another_machine_file_is_refused_before_anything_moves() {
+    let own = machine::program_machine::mark_of(&machine()).unwrap();
+    let text = "(frame: machine)\nG0 X1\nM2";
+    for (mark, is_own) in [(own, true), (own ^ 1, false), (0, false), (u64::MAX, false)] {
+        let mut shop = shop(Bench::open());
+        let before = *shop.cnc.commanded();
+        let marked = machine::program_machine::marked(text, mark);
+        let (outcome, message, _) = shop.run(&marked);
+        let expected = if is_own {
+            Outcome::Done
+        } else {
+            Outcome::Refused
+        };
+        assert_eq!(outcome, expected, "{message}");
+        assert_eq!(*shop.cnc.commanded() == before, !is_own);
+        let is_said = message.contains("another machine file");
+        assert_eq!(is_said, !is_own, "{message}");
+    }
+}

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use abbe_msgs::{Durability, Qos, Reliability};
 use anyhow::Context as _;
 use metrology::Stamp;
 use metrology::stamp::Host;
@@ -11,15 +12,19 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio::time::Instant;
 
+use super::rivals::{self, Rival};
 use super::{ACKNOWLEDGEMENT, TappedTopic, runtime};
 use crate::clock;
 use crate::environment::Environment;
 use crate::names::{self, NodeNames};
-use crate::network::{Participant, PublishError, Writer};
+use crate::network::{Guid, Participant, PublishError, Remote, Role, Writer};
 use crate::node::{Bytes, TopicPort};
 
 /// Between tries to find room for a sample.
 const RETRY: Duration = Duration::from_micros(200);
+
+/// Between looks at who is on the network.
+const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
 /// Tries until there is room for a sample, for `patience` at most: on a busy computer the library's own thread may not have
 /// sent yet what came before.
@@ -79,8 +84,11 @@ enum Outgoing {
 /// dropped and counted.
 pub struct RawPublisher {
     runtime: Runtime,
+    participant: Participant,
+    /// Our ends of the topics.
+    own: Vec<Remote>,
     queue: mpsc::Sender<Outgoing>,
-    publishing: JoinHandle<(Participant, Vec<Writer>, Unsents)>,
+    publishing: JoinHandle<(Vec<Writer>, Unsents)>,
     patience: Duration,
     dropped: Unsents,
 }
@@ -148,55 +156,65 @@ impl RawPublisher {
         queue_len: usize,
         patience: Duration,
     ) -> anyhow::Result<Self> {
-        let runtime = runtime()?;
-        let (mut participant, warning) = {
-            let _inside = runtime.enter();
-            Participant::join(environment, names)?
-        };
-        participant.wait_for_room();
-        if let Some(warning) = warning {
-            tracing::warn!("{warning}");
+        let planned = planned(names, topics)?;
+        let (runtime, participant) = join(environment, names)?;
+        Self::speak(runtime, participant, planned, (queue_len, patience))
+    }
+
+    /// The same where nobody is met within `meeting` who publishes on the topics or moves axes by them, else who; nothing
+    /// is offered before that.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub fn where_alone(
+        environment: &Environment,
+        names: &NodeNames,
+        topics: &[TappedTopic],
+        (queue_len, patience): (usize, Duration),
+        meeting: Duration,
+    ) -> anyhow::Result<Result<Self, Vec<Rival>>> {
+        let planned = planned(names, topics)?;
+        let (runtime, participant) = join(environment, names)?;
+        let own: Vec<Remote> = planned.iter().map(|(end, _)| end.clone()).collect();
+        let until = Instant::now() + meeting;
+        loop {
+            let rivals = rivals::find(&own, &participant.writers(), &participant.readers());
+            if !rivals.is_empty() {
+                let _inside = runtime.enter();
+                let _ = participant.withdraw();
+                drop(participant);
+                return Ok(Err(rivals));
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                break;
+            }
+            std::thread::park_timeout(left.min(LOOK_PERIOD));
         }
-        let mut writers = Vec::with_capacity(topics.len());
-        for topic in topics {
-            let name = names.resolve(&topic.name)?;
-            let dds_type = names::dds_type(&topic.type_name);
-            writers.push(participant.writer(&name, &dds_type, topic.qos)?);
+        Self::speak(runtime, participant, planned, (queue_len, patience)).map(Ok)
+    }
+
+    fn speak(
+        runtime: Runtime,
+        participant: Participant,
+        planned: Vec<(Remote, Qos)>,
+        (queue_len, patience): (usize, Duration),
+    ) -> anyhow::Result<Self> {
+        let mut writers = Vec::with_capacity(planned.len());
+        let mut own = Vec::with_capacity(planned.len());
+        for (mut end, qos) in planned {
+            let writer = participant.writer(&end.name, &end.dds_type, qos)?;
+            end.guid = writer.guid();
+            own.push(end);
+            writers.push(writer);
         }
         participant.announce()?;
-        let (queue, mut outgoing) = mpsc::channel::<Outgoing>(queue_len.max(1));
-        let publishing = runtime.spawn(async move {
-            let mut refused = Unsents::new();
-            // A reader that stands still costs one patience, not one for each sample that waits behind.
-            let mut full = BTreeSet::new();
-            while let Some(next) = outgoing.recv().await {
-                match next {
-                    Outgoing::Sample(sample) => {
-                        let place = sample.place;
-                        let publish = || match writers.get(place) {
-                            Some(writer) => writer.publish(&sample.bytes, sample.source),
-                            None => Err(PublishError::Broken("no such topic".to_owned())),
-                        };
-                        let own = patience_for(&full, place, patience);
-                        let sent = once_there_is_room(publish, own).await;
-                        note_room(&mut full, place, &sent);
-                        if let Err(error) = sent {
-                            *refused.entry((place, error.kind())).or_default() += 1;
-                        }
-                    }
-                    Outgoing::Settle(patience, answer) => {
-                        let all =
-                            futures::future::join_all(writers.iter().map(Writer::acknowledged));
-                        let settled = tokio::time::timeout(patience, all).await.is_ok();
-                        // Who asked may have gone.
-                        let _ = answer.send(settled);
-                    }
-                }
-            }
-            (participant, writers, refused)
-        });
+        let (queue, outgoing) = mpsc::channel::<Outgoing>(queue_len.max(1));
+        let publishing = runtime.spawn(send(outgoing, writers, patience));
         Ok(Self {
             runtime,
+            participant,
+            own,
             queue,
             publishing,
             patience,
@@ -234,6 +252,13 @@ impl RawPublisher {
         asked.is_ok() && settled.blocking_recv().unwrap_or(false)
     }
 
+    /// Others who publish on these topics, and controllers whose axes move by them, as far as they have been met.
+    #[must_use]
+    pub fn rivals(&self) -> Vec<Rival> {
+        let (writers, readers) = (self.participant.writers(), self.participant.readers());
+        rivals::find(&self.own, &writers, &readers)
+    }
+
     /// How many samples find room in the queue now.
     #[must_use]
     pub fn room(&self) -> usize {
@@ -266,8 +291,9 @@ impl RawPublisher {
     /// When the publishing thread panicked.
     pub fn stop(self) -> anyhow::Result<PublishReport> {
         drop(self.queue);
-        self.runtime.block_on(async {
-            let (participant, writers, refused) = self.publishing.await.context("publisher")?;
+        let participant = self.participant;
+        self.runtime.block_on(async move {
+            let (writers, refused) = self.publishing.await.context("publisher")?;
             let all = futures::future::join_all(writers.iter().map(Writer::acknowledged));
             let _ = tokio::time::timeout(ACKNOWLEDGEMENT, all).await;
             let _ = participant.withdraw();
@@ -285,6 +311,73 @@ impl RawPublisher {
             })
         })
     }
+}
+
+/// Joins the network for a thread that speaks from now on.
+fn join(environment: &Environment, names: &NodeNames) -> anyhow::Result<(Runtime, Participant)> {
+    let runtime = runtime()?;
+    let (mut participant, warning) = {
+        let _inside = runtime.enter();
+        Participant::join(environment, names)?
+    };
+    participant.wait_for_room();
+    if let Some(warning) = warning {
+        tracing::warn!("{warning}");
+    }
+    Ok((runtime, participant))
+}
+
+/// Ends of topics that are not made yet.
+fn planned(names: &NodeNames, topics: &[TappedTopic]) -> anyhow::Result<Vec<(Remote, Qos)>> {
+    let end = |topic: &TappedTopic| -> anyhow::Result<(Remote, Qos)> {
+        let end = Remote {
+            guid: Guid::default(),
+            node: names.fully_qualified(),
+            role: Role::Message,
+            name: names.resolve(&topic.name)?,
+            dds_type: names::dds_type(&topic.type_name),
+            type_hash: None,
+            reliable: topic.qos.reliability == Reliability::Reliable,
+            latched: topic.qos.durability == Durability::TransientLocal,
+        };
+        Ok((end, topic.qos))
+    };
+    topics.iter().map(end).collect()
+}
+
+/// Sends what comes out of the queue until it is closed; with the writers what was refused.
+async fn send(
+    mut outgoing: mpsc::Receiver<Outgoing>,
+    writers: Vec<Writer>,
+    patience: Duration,
+) -> (Vec<Writer>, Unsents) {
+    let mut refused = Unsents::new();
+    // A reader that stands still costs one patience, not one for each sample that waits behind.
+    let mut full = BTreeSet::new();
+    while let Some(next) = outgoing.recv().await {
+        match next {
+            Outgoing::Sample(sample) => {
+                let place = sample.place;
+                let publish = || match writers.get(place) {
+                    Some(writer) => writer.publish(&sample.bytes, sample.source),
+                    None => Err(PublishError::Broken("no such topic".to_owned())),
+                };
+                let own = patience_for(&full, place, patience);
+                let sent = once_there_is_room(publish, own).await;
+                note_room(&mut full, place, &sent);
+                if let Err(error) = sent {
+                    *refused.entry((place, error.kind())).or_default() += 1;
+                }
+            }
+            Outgoing::Settle(patience, answer) => {
+                let all = futures::future::join_all(writers.iter().map(Writer::acknowledged));
+                let settled = tokio::time::timeout(patience, all).await.is_ok();
+                // Who asked may have gone.
+                let _ = answer.send(settled);
+            }
+        }
+    }
+    (writers, refused)
 }
 
 #[cfg(test)]

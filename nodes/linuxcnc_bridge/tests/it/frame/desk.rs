@@ -11,6 +11,8 @@ use metrology::{Axis, AxisSet, PerAxis, Stage};
 use crate::frame::control::{Control, State};
 
 const SECOND: i64 = 1_000_000_000;
+/// The mark of the bridge's machine file.
+pub const MARK: u64 = 0x0123_4567_89ab_cdef;
 
 pub fn at(seconds_s: f64) -> Stamp<Host> {
     Stamp::from_nanos(1000 * SECOND) + Span::from_secs_f64(seconds_s)
@@ -52,6 +54,8 @@ impl Desk {
             homing_timeout: Span::from_nanos(60 * SECOND),
             compensation_limit: PerAxis([0.2; 6]),
             compensation_stale_after: Span::from_nanos(SECOND),
+            pulse_mm: 1e-4,
+            mark: Some(MARK),
         };
         let mut desk = Self {
             stage: BridgeStage::new(&settings),

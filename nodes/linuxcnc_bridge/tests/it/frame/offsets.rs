@@ -23,7 +23,7 @@ fn offsets_of(axes: AxisSet, now_s: f64, mm: f64) -> Input {
         geometric: PerAxis::default(),
         positioning: PerAxis::default(),
         pulses: PerAxis::default(),
-        remainder: PerAxis::default(),
+        remainder: PerAxis([mm; 6]),
         state: PerAxis([CompensationState::Active; 6]),
     })
 }
@@ -171,6 +171,50 @@ fn an_axis_that_a_message_leaves_out_has_no_offset() {
         desk.tell(offsets_of(axes, now_s, 0.02));
         desk.later(0.05);
         assert_eq!(passed_mm(&mut desk), [0.0], "{axes:?}");
+    }
+}
+
+/// Spoils a set that comes at this time, s.
+type Spoil = fn(&mut AxisCompensation, f64);
+
+#[test]
+fn offsets_that_contradict_themselves_or_are_not_of_now_are_refused_and_become_stale() {
+    let bad: [(Spoil, &str); 6] = [
+        (
+            |sent, _| sent.state[Axis::X] = CompensationState::Off,
+            "STATE_OFF",
+        ),
+        (
+            |sent, _| sent.pulses[Axis::Y] = 4_900,
+            "pulses and remainder",
+        ),
+        (|sent, _| sent.remainder[Axis::Z] = 0.0, "axis Z"),
+        (|sent, now_s| sent.at = at(now_s - 3e7), "30000000 s ago"),
+        (|sent, now_s| sent.at = at(now_s - 1.2), "1.2 s ago"),
+        (|sent, now_s| sent.at = at(now_s + 3e8), "in the future"),
+    ];
+    for (spoil, word) in bad {
+        let mut desk = Desk::new(State::usual());
+        with_offsets(&mut desk, 0.5, 0.03);
+        assert_eq!(passed_mm(&mut desk).last(), Some(&0.03));
+        for _ in 0..40 {
+            let now_s = desk.now_s;
+            let Input::Compensation(mut sent) = offsets(now_s, 0.1) else {
+                unreachable!()
+            };
+            spoil(&mut sent, now_s);
+            desk.tell(Input::Compensation(sent));
+            desk.later(0.05);
+        }
+        assert!(passed_mm(&mut desk).is_empty(), "{word}");
+        let is_told = |condition: &&Condition| condition.to_string().contains(word);
+        let refused =
+            { desk.conditions.iter() }.filter(|told| told.name() == "compensation_refused");
+        assert_eq!(refused.filter(is_told).count(), 40, "{word}");
+        let is_stale = |told: &Condition| matches!(told, Condition::CompensationStale { .. });
+        assert!(desk.conditions.iter().any(is_stale), "{word}");
+        with_offsets(&mut desk, 0.5, 0.02);
+        assert_eq!(passed_mm(&mut desk).last(), Some(&0.02), "{word}");
     }
 }
 

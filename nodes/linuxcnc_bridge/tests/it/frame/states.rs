@@ -4,16 +4,40 @@ use linuxcnc_bridge::Input;
 use linuxcnc_bridge::run::Outcome;
 use linuxcnc_bridge::stage::IoEvent;
 use machine::program_frame::HEAD;
+use machine::program_machine::marked;
 use metrology::Severity;
 use rand::Rng as _;
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64Mcg;
 
 use crate::frame::control::{Control, State};
-use crate::frame::desk::Desk;
+use crate::frame::desk::{Desk, MARK};
 
 fn program() -> String {
     format!("{HEAD}G0 Z439\nG0 X-226 Y-174\nG1 Z14 F3600\nM2\n")
+}
+
+#[test]
+fn a_program_for_another_machine_file_is_refused_and_one_for_its_own_is_run() {
+    for (mark, is_own) in [
+        (MARK, true),
+        (MARK + 1, false),
+        (0, false),
+        (u64::MAX, false),
+    ] {
+        let mut desk = Desk::new(State::usual());
+        desk.begin(&marked(&program(), mark));
+        assert_eq!(desk.control.running, is_own, "{mark:x}");
+        assert_eq!(desk.stored.is_empty(), !is_own, "{:?}", desk.stored);
+        if is_own {
+            desk.run_out();
+            assert_eq!(desk.ending().0, Outcome::Done);
+            continue;
+        }
+        let (outcome, message) = desk.ending();
+        assert_eq!(outcome, Outcome::Refused);
+        assert!(message.contains("another machine file"), "{message}");
+    }
 }
 
 /// What the contract asks for.

@@ -21,7 +21,7 @@ fn offsets(x_mm: f64) -> LiveInput {
         geometric: PerAxis::default(),
         positioning: PerAxis::default(),
         pulses: PerAxis::default(),
-        remainder: PerAxis::default(),
+        remainder: total,
         state: PerAxis([CompensationState::Active; 6]),
     })
 }
@@ -64,7 +64,7 @@ fn offsets_reach_the_motor_without_a_step_and_fade_when_their_source_dies() {
     }
     assert!(matches!(
         rig.conditions.last(),
-        Some(Condition::CompensationRefused(_))
+        Some(Condition::CompensationRefused { .. })
     ));
     for _ in 0..40 {
         rig.tell(offsets(-0.020));
