@@ -188,6 +188,15 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
         let beyond = runs::check_travel(&runs, travel.as_ref(), (*axis, *overrun_mm));
         runs.remarks.extend(beyond.with_context(in_table)?);
     }
+    if let map::Test::Circle {
+        radius_mm,
+        radial_um,
+        ..
+    } = &map.test
+    {
+        let outliers = limits::outliers_of_circles(&runs, *radius_mm, radial_um);
+        runs.remarks.extend(outliers);
+    }
     let stated = map.resolution();
     let stated = stated.map(|(key, value)| format!("{key}: {value:?}\n"));
     let of_machine = (&machine, machine_text);
@@ -198,9 +207,15 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let folder = WholeFolder::begin(output)?;
     let mut writer = Writer::begin(folder.path(), of_machine, map.start_s, stated)?;
     let n_runs = motion::write(&map, &runs, &mut writer).with_context(in_table)?;
-    let n_messages = writer.finish()?;
+    let written = writer.finish()?;
     folder.finish()?;
     let mut notes = doubts(&map, &runs);
+    if written.repeated > 0 {
+        notes.push(format!(
+            "{} readings have time and value of one before them in their column: written once",
+            written.repeated
+        ));
+    }
     notes.extend(cells.note);
     notes.extend(table.left_out);
     let n_odd = table.odd.len();
@@ -208,7 +223,7 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     notes.extend(runs.remarks);
     Ok(Imported {
         n_runs,
-        n_messages,
+        n_messages: written.messages,
         n_rows,
         n_odd,
         notes,

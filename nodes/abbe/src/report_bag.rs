@@ -69,6 +69,9 @@ fn complain_of(tests: &Tests) {
     for run in &tests.broken_off {
         complain!("abbe: {run}");
     }
+    for run in reports::circular::refused(&tests.circles) {
+        complain!("abbe: not evaluated: {run}");
+    }
 }
 
 impl ReportBag {
@@ -105,7 +108,7 @@ impl ReportBag {
         let mut report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;
         if let Some(table) = &table {
             report.begin_with_table(&table.lines);
-            report.state_shortcomings(None, table.assumed());
+            report.state_shortcomings(None, table.warnings());
         }
         let machine = tests.machine.as_ref().map(|machine| machine.name.as_str());
         let mut made = Made::of(
@@ -137,7 +140,10 @@ impl ReportBag {
             &tests,
             table.as_ref().map(|table| table.bag.as_path()),
         )?;
-        Ok(loss::exit_code(tests.reading.is_whole() && n_odd == 0))
+        let is_sound = reports::circular::refused(&tests.circles).is_empty();
+        Ok(loss::exit_code(
+            tests.reading.is_whole() && n_odd == 0 && is_sound,
+        ))
     }
 
     /// Refuses outputs over inputs and over what is no page, before the work begins.

@@ -1,7 +1,10 @@
 //! Writes samples of a made-up motion into a bag.
 
+use std::collections::BTreeSet;
+use std::hash::{DefaultHasher, Hasher};
 use std::path::Path;
 
+use abbe_msgs::msg::AxisState as AxisStateMessage;
 use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Qos, Wire, to_cdr};
 use anyhow::{Context, Result, anyhow, bail};
@@ -21,6 +24,18 @@ pub struct Writer {
     at: Stamp<metrology::Host>,
     start: Stamp<metrology::Host>,
     messages: u64,
+    /// Of the instant at hand: channel, length and hash of each message.
+    written: BTreeSet<(usize, usize, u64)>,
+    repeated: u64,
+}
+
+/// What a finished bag has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// Messages of the bag.
+    pub messages: u64,
+    /// Readings that were not written, since the bag has an equal one of the same time.
+    pub repeated: u64,
 }
 
 impl Writer {
@@ -58,12 +73,21 @@ impl Writer {
             at,
             start: at,
             messages: 0,
+            written: BTreeSet::new(),
+            repeated: 0,
         })
     }
 
     /// Lets time pass.
     pub fn wait(&mut self, time_s: f64) {
-        self.at += Span::from_secs_f64(time_s);
+        self.go_to(self.at + Span::from_secs_f64(time_s));
+    }
+
+    fn go_to(&mut self, at: Stamp<metrology::Host>) {
+        if at != self.at {
+            self.at = at;
+            self.written.clear();
+        }
     }
 
     /// Goes to a time after the begin of the measurement.
@@ -78,7 +102,7 @@ impl Writer {
                 "{time_s} s after the first row: must not be before the row above, which is at {before_s} s"
             );
         }
-        self.at = at;
+        self.go_to(at);
         Ok(())
     }
 
@@ -173,9 +197,12 @@ impl Writer {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn finish(self) -> Result<u64> {
+    pub fn finish(self) -> Result<Written> {
         self.recording.finish()?;
-        Ok(self.messages)
+        Ok(Written {
+            messages: self.messages,
+            repeated: self.repeated,
+        })
     }
 
     fn write<M: Message + Wire>(
@@ -188,9 +215,16 @@ impl Writer {
     }
 
     fn put<M: Message>(&mut self, name: String, qos: Qos, message: &M) -> Result<()> {
-        let known = self.channels.iter().find(|(topic, _)| *topic == name);
+        let known = self.channels.iter().position(|(topic, _)| *topic == name);
+        let place = known.unwrap_or(self.channels.len());
+        let bytes = to_cdr(message);
+        if !self.is_new(place, &bytes) {
+            // Where the axes stand is no reading.
+            self.repeated += u64::from(M::TYPE_NAME != AxisStateMessage::TYPE_NAME);
+            return Ok(());
+        }
         let channel = match known {
-            Some((_, channel)) => *channel,
+            Some(place) => self.channels[place].1,
             None => {
                 let channel = self.recording.add_channel(&Channel {
                     topic: format!("/{name}"),
@@ -213,8 +247,16 @@ impl Writer {
             publish_time_nanos: nanos,
             sequence,
         };
-        self.recording.write(channel, stamp, &to_cdr(message))?;
+        self.recording.write(channel, stamp, &bytes)?;
         self.messages += 1;
         Ok(())
+    }
+
+    /// Whether the bag has no message with these bytes of this topic and instant: a reader would leave the second one out as
+    /// repeated.
+    fn is_new(&mut self, channel: usize, bytes: &[u8]) -> bool {
+        let mut hasher = DefaultHasher::new();
+        hasher.write(bytes);
+        self.written.insert((channel, bytes.len(), hasher.finish()))
     }
 }
