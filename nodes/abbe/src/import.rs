@@ -180,23 +180,8 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let table = Table::of(&cells.sheet, &map, &ranges).with_context(in_table)?;
     angles::check(&map, &table).with_context(in_table)?;
     let mut runs = runs::of(&map.test, &table).with_context(in_table)?;
-    if let map::Test::Positioning {
-        axis, overrun_mm, ..
-    } = &map.test
-    {
-        let travel = limits::targets(&machine, *axis);
-        let beyond = runs::check_travel(&runs, travel.as_ref(), (*axis, *overrun_mm));
-        runs.remarks.extend(beyond.with_context(in_table)?);
-    }
-    if let map::Test::Circle {
-        radius_mm,
-        radial_um,
-        ..
-    } = &map.test
-    {
-        let outliers = limits::outliers_of_circles(&runs, *radius_mm, radial_um);
-        runs.remarks.extend(outliers);
-    }
+    let remarks = plausible(&map.test, &machine, &runs).with_context(in_table)?;
+    runs.remarks.extend(remarks);
     let stated = map.resolution();
     let stated = stated.map(|(key, value)| format!("{key}: {value:?}\n"));
     let of_machine = (&machine, machine_text);
@@ -210,12 +195,7 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let written = writer.finish()?;
     folder.finish()?;
     let mut notes = doubts(&map, &runs);
-    if written.repeated > 0 {
-        notes.push(format!(
-            "{} readings have time and value of one before them in their column: written once",
-            written.repeated
-        ));
-    }
+    notes.extend(written.in_words());
     notes.extend(cells.note);
     notes.extend(table.left_out);
     let n_odd = table.odd.len();
@@ -228,6 +208,25 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
         n_odd,
         notes,
     })
+}
+
+/// Refuses targets beyond the travel; what is noted of readings that the test cannot have.
+fn plausible(test: &map::Test, machine: &MachineFile, runs: &Runs) -> Result<Vec<String>> {
+    match test {
+        map::Test::Positioning {
+            axis, overrun_mm, ..
+        } => {
+            let travel = limits::targets(machine, *axis);
+            let beyond = runs::check_travel(runs, travel.as_ref(), (*axis, *overrun_mm))?;
+            Ok(beyond.into_iter().collect())
+        }
+        map::Test::Circle {
+            radius_mm,
+            radial_um,
+            ..
+        } => Ok(limits::outliers_of_circles(runs, *radius_mm, radial_um)),
+        map::Test::Log { .. } => Ok(vec![]),
+    }
 }
 
 /// Asks about deviations that cannot be in the unit that they were read in, where the map does not state it.

@@ -74,8 +74,13 @@ fn complain_of(tests: &Tests) {
     }
 }
 
+/// Whether nothing was lost or left out, and every circle could be evaluated.
+fn is_whole(tests: &Tests) -> bool {
+    tests.reading.is_whole() && reports::circular::refused(&tests.circles).is_empty()
+}
+
 impl ReportBag {
-    /// Evaluates the bag; exit code 3 when a part of it was lost or left out.
+    /// Evaluates the bag; exit code 3 when a part of it was lost or left out, or a circle has an outlier.
     ///
     /// # Errors
     /// When bag or budget cannot be read, or the page not written.
@@ -140,10 +145,7 @@ impl ReportBag {
             &tests,
             table.as_ref().map(|table| table.bag.as_path()),
         )?;
-        let is_sound = reports::circular::refused(&tests.circles).is_empty();
-        Ok(loss::exit_code(
-            tests.reading.is_whole() && n_odd == 0 && is_sound,
-        ))
+        Ok(loss::exit_code(is_whole(&tests) && n_odd == 0))
     }
 
     /// Refuses outputs over inputs and over what is no page, before the work begins.

@@ -38,6 +38,18 @@ pub struct Written {
     pub repeated: u64,
 }
 
+impl Written {
+    /// A line about readings that were not written.
+    pub fn in_words(self) -> Option<String> {
+        let n = self.repeated;
+        (n > 0).then(|| {
+            format!(
+                "{n} readings have time and value of one before them in their column: written once"
+            )
+        })
+    }
+}
+
 impl Writer {
     /// Begins a bag with its machine file, and with what the map states beside the readings, as YAML.
     ///
@@ -53,7 +65,7 @@ impl Writer {
         let mut recording = Recording::begin(
             Directory::create(path)?,
             &name.to_string_lossy(),
-            RecorderConfig::default(),
+            RecorderConfig::read_when_finished(),
         )?;
         let at = epoch::whole_seconds(start_s, 0).map_err(|error| anyhow!("start_s = {error}"))?;
         recording.add_context(&RunContext {

@@ -285,7 +285,10 @@ mod tests {
     #[test]
     fn a_description_that_is_cut_or_no_yaml_is_named() {
         let unreadable = "is a folder".to_owned();
-        assert_eq!(faults(Err(&unreadable), None), [unreadable.clone()]);
+        assert_eq!(
+            faults(Err(&unreadable), None),
+            std::slice::from_ref(&unreadable)
+        );
         for text in [
             "",
             "{",

@@ -1,8 +1,4 @@
 //! The files of a bag's directory, and their order.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "opening a bag reads files; only recorder, replayer and the command line do"
-)]
 
 use std::collections::BTreeMap;
 use std::fs;

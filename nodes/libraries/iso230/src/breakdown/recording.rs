@@ -344,11 +344,6 @@ mod tests {
             Err(BreakdownError::TooFewSamples { n: 10, .. })
         ));
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
 
     #[test]
     fn single_slips_are_outliers_and_the_shape_of_a_circle_is_none() {
