@@ -272,3 +272,64 @@ impl Writer {
         self.written.insert((channel, bytes.len(), hasher.finish()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use recorder::{Bag, Order};
+    use replayer::reading;
+
+    use super::*;
+
+    const MACHINE: &str = include_str!("../../../../launch_configs/first_run/machine.yaml");
+
+    /// A bag of a log: time in s, displacement in µm and temperature of each row.
+    fn log(rows: &[(f64, f64, f64)]) -> Written {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("bag");
+        let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
+        let of_machine = (&machine, MACHINE.to_owned());
+        let mut writer = Writer::begin(&path, of_machine, 1_767_600_000, None).unwrap();
+        for (time_s, um, degc) in rows {
+            writer.wait_until(*time_s).unwrap();
+            writer.tick(&PerAxis::default()).unwrap();
+            writer.length(Axis::Z, um * 1e-3).unwrap();
+            writer.temperature("ambient", *degc).unwrap();
+        }
+        let written = writer.finish().unwrap();
+        let bag = Bag::open(&path).unwrap();
+        assert_eq!(bag.message_count(), written.messages);
+        let wanted = [
+            topics::AXES_STATE.name,
+            topics::LENGTH_POSITION.name,
+            topics::TEMPERATURE.base,
+        ];
+        let read = reading::read(&bag, Order::LogTime, &wanted, |_| {});
+        assert!(read.is_whole(), "{:?}", read.lines());
+        written
+    }
+
+    #[test]
+    fn rows_of_one_time_leave_no_repeated_message_and_are_counted() {
+        let usual = [(0.0, 1.0, 20.0), (60.0, 1.5, 20.0), (120.0, 2.0, 20.1)];
+        assert_eq!(log(&usual).repeated, 0);
+        assert_eq!(log(&usual).in_words(), None);
+        for (second, repeated) in [
+            ((60.0, 1.6, 20.0), 1),
+            ((60.0, 1.5, 20.3), 1),
+            ((60.0, 1.5, 20.0), 2),
+            ((60.0, 1.6, 20.3), 0),
+            // The next instant with the readings of the one before.
+            ((61.0, 1.5, 20.0), 0),
+        ] {
+            let [first, before, after] = usual;
+            let found = log(&[first, before, second, after]);
+            assert_eq!(found.repeated, repeated, "{second:?}");
+            let is_named = found.in_words().is_some_and(|line| {
+                line.starts_with(&format!("{repeated} readings have time and value"))
+            });
+            assert_eq!(is_named, repeated > 0);
+        }
+        let all_at_once = vec![(0.0, 1.0, 20.0); 50];
+        assert_eq!(log(&all_at_once).repeated, 98);
+    }
+}
