@@ -20,7 +20,7 @@ const LONGEST_TAG_BYTES: usize = 64 << 10;
 const LAST_ROW: u32 = 1_048_576;
 const LAST_COLUMN: u32 = 16_384;
 /// Most of each list that the reader keeps whole, by the tag of an entry: an entry of 5 bytes takes ten times as many in memory.
-const MOST_ENTRIES: [(&[u8], u64); 6] = [
+const MOST_OF_LIST: [(&[u8], u64); 6] = [
     (b"si", 2_000_000),
     (b"xf", 100_000),
     (b"numFmt", 100_000),
@@ -100,8 +100,8 @@ struct Tags {
     tag: Vec<u8>,
     /// Whether the part's name says that it is XML, and no image.
     is_xml: bool,
-    /// Tags of each kind of [`MOST_ENTRIES`] so far.
-    entries: [u64; MOST_ENTRIES.len()],
+    /// Tags of each kind of [`MOST_OF_LIST`] so far.
+    entries: [u64; MOST_OF_LIST.len()],
 }
 
 impl Tags {
@@ -158,12 +158,12 @@ impl Tags {
     /// Counts a tag of an entry that the reader keeps.
     fn count(&mut self) -> Result<()> {
         let (name, _) = named(&self.tag);
-        let known = MOST_ENTRIES.iter().position(|(entry, _)| *entry == name);
+        let known = MOST_OF_LIST.iter().position(|(entry, _)| *entry == name);
         let Some(place) = known else {
             return Ok(());
         };
         self.entries[place] += 1;
-        let most = MOST_ENTRIES[place].1;
+        let most = MOST_OF_LIST[place].1;
         if self.entries[place] > most {
             let name = String::from_utf8_lossy(name);
             bail!("more than {most} entries <{name}>, the most that is read: save it as CSV");
@@ -317,7 +317,7 @@ mod tests {
 
     #[test]
     fn more_entries_of_a_list_than_are_kept_are_refused_with_part_and_limit() {
-        for (name, most) in MOST_ENTRIES
+        for (name, most) in MOST_OF_LIST
             .into_iter()
             .filter(|(_, most)| *most <= 100_000)
         {

@@ -114,10 +114,14 @@ fn section(
     let is_empty = sound.is_empty();
     let group = if is_empty { all } else { &sound };
     let mut section = headed(group, reading);
-    for line in all.iter().filter_map(|circle| refused::outlier(circle)) {
+    let refused: Vec<String> = { all.iter() }
+        .filter_map(|circle| refused::outlier(circle))
+        .collect();
+    for line in &refused {
         section.not_evaluated(line);
     }
     if is_empty {
+        section.figures = serde_json::json!({ "test": section.title, "not_evaluated": refused });
         return Ok((section, None));
     }
     section.lines.extend(turn::lines(group));
@@ -126,6 +130,9 @@ fn section(
     match &evaluated {
         Ok(result) => state_figures(&mut section, (group, reading), &test, result)?,
         Err(error) => section.not_evaluated(error),
+    }
+    if !refused.is_empty() {
+        section.figures["not_evaluated"] = serde_json::json!(refused);
     }
     let result = evaluated.ok();
     let centre_mm = result.as_ref().map_or([0.0; 2], centre);

@@ -17,9 +17,9 @@ use metrology::stamp::{Machine, Span, Stamp};
 use super::once::Piece;
 
 /// A speed above this multiple of the others is far from them.
-const FAR: f64 = 1.5;
+const FAR_ABOVE_OTHERS: f64 = 1.5;
 /// Share of the other turning time that may be as fast.
-const SHARE: f64 = 0.01;
+const SHARE_OF_OTHERS: f64 = 0.01;
 /// Powers of two of nanoseconds.
 const N_LENGTHS: usize = 64;
 
@@ -87,14 +87,14 @@ impl Speeds {
         let reading = |(first, last, rpm): &(Stamp<Machine>, Stamp<Machine>, f64)| {
             let own = (*last - *first).nanos().unsigned_abs();
             let others = all - own;
-            let most = others as f64 * SHARE;
+            let most = others as f64 * SHARE_OF_OTHERS;
             // From the fastest down to where more than the share of the others is reached; the reading itself is none of them.
             let is_rare = |(at, sum): &(u64, u64)| {
                 let own = if *at as f64 <= rpm.round() { own } else { 0 };
                 (sum - own) as f64 <= most
             };
             let (others_rpm, _) = above.get(above.partition_point(is_rare))?;
-            let is_far = *rpm > FAR * *others_rpm as f64;
+            let is_far = *rpm > FAR_ABOVE_OTHERS * *others_rpm as f64;
             (is_far && *last - *first <= longest).then_some(DoubtfulSpeed {
                 during: (*first, *last),
                 rpm: *rpm,

@@ -320,6 +320,12 @@ fn an_outlier_refuses_its_run_by_name_in_figures_and_causes_and_the_others_are_e
             "{words}"
         );
         assert!(found[0].title.contains("run 1:"), "{}", found[0].title);
+        let lines = found[0].figures["not_evaluated"].as_array().unwrap();
+        assert!(
+            lines[0].as_str().is_some_and(|line| words.contains(line)),
+            "{lines:?}"
+        );
+        assert_eq!(found[1].figures, sound[1].figures);
         // The other sense has the figure that it has without it.
         let g = |section: &Section| cell(section, "counter-clockwise", "G").to_owned();
         assert_eq!(g(&found[0]), g(&sound[0]));
