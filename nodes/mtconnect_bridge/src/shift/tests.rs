@@ -250,7 +250,8 @@ fn a_false_speed_counts_by_its_time_and_is_named() {
         let of = |false_at| bins(log(every_s, false_at).as_bytes(), &mapping(), &order).unwrap();
         assert_eq!(of(None).doubtful, []);
         let found = of(Some(30 / every_s));
-        assert_eq!(found.bins[3].rpm(), wanted_rpm, "{every_s}");
+        let rpm = found.bins[3].rpm();
+        assert!((rpm - wanted_rpm).abs() <= 1, "{every_s}: {rpm}");
         let [named] = found.doubtful.as_slice() else {
             panic!("{every_s}: {:?}", found.doubtful)
         };
