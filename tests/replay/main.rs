@@ -16,6 +16,7 @@ mod lifecycle;
 mod old_bags;
 mod other_recorders;
 mod out_of_run;
+mod parts;
 mod positioning;
 mod recorded_output;
 mod rewrite;

@@ -194,7 +194,7 @@ impl Export {
         if selected.files.is_empty() {
             let bag = self.bag.display();
             complain!("abbe: {bag}: nothing to export; looked for");
-            for line in looked_for(&measured, topics, self.axes()) {
+            for line in looked_for(&measured, (topics, &reading), self.axes()) {
                 complain!("  {line}");
             }
             for loss in &losses {

@@ -180,14 +180,8 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let table = Table::of(&cells.sheet, &map, &ranges).with_context(in_table)?;
     angles::check(&map, &table).with_context(in_table)?;
     let mut runs = runs::of(&map.test, &table).with_context(in_table)?;
-    if let map::Test::Positioning {
-        axis, overrun_mm, ..
-    } = &map.test
-    {
-        let travel = limits::targets(&machine, *axis);
-        let beyond = runs::check_travel(&runs, travel.as_ref(), (*axis, *overrun_mm));
-        runs.remarks.extend(beyond.with_context(in_table)?);
-    }
+    let remarks = plausible(&map.test, &machine, &runs).with_context(in_table)?;
+    runs.remarks.extend(remarks);
     let stated = map.resolution();
     let stated = stated.map(|(key, value)| format!("{key}: {value:?}\n"));
     let of_machine = (&machine, machine_text);
@@ -198,9 +192,10 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let folder = WholeFolder::begin(output)?;
     let mut writer = Writer::begin(folder.path(), of_machine, map.start_s, stated)?;
     let n_runs = motion::write(&map, &runs, &mut writer).with_context(in_table)?;
-    let n_messages = writer.finish()?;
+    let written = writer.finish()?;
     folder.finish()?;
     let mut notes = doubts(&map, &runs);
+    notes.extend(written.in_words());
     notes.extend(cells.note);
     notes.extend(table.left_out);
     let n_odd = table.odd.len();
@@ -208,11 +203,30 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     notes.extend(runs.remarks);
     Ok(Imported {
         n_runs,
-        n_messages,
+        n_messages: written.messages,
         n_rows,
         n_odd,
         notes,
     })
+}
+
+/// Refuses targets beyond the travel; what is noted of readings that the test cannot have.
+fn plausible(test: &map::Test, machine: &MachineFile, runs: &Runs) -> Result<Vec<String>> {
+    match test {
+        map::Test::Positioning {
+            axis, overrun_mm, ..
+        } => {
+            let travel = limits::targets(machine, *axis);
+            let beyond = runs::check_travel(runs, travel.as_ref(), (*axis, *overrun_mm))?;
+            Ok(beyond.into_iter().collect())
+        }
+        map::Test::Circle {
+            radius_mm,
+            radial_um,
+            ..
+        } => Ok(limits::outliers_of_circles(runs, *radius_mm, radial_um)),
+        map::Test::Log { .. } => Ok(vec![]),
+    }
 }
 
 /// Asks about deviations that cannot be in the unit that they were read in, where the map does not state it.

@@ -213,7 +213,25 @@ impl ImportShift {
         write(&self.output, &programs)?;
         tell!("{}: {} programs", self.output.display(), programs.len());
         self.account(&shift, &order);
+        self.warn_of_speeds(&shift);
         Ok(loss::exit_code(shift.is_whole))
+    }
+
+    /// Readings of the spindle that the programs follow although they are far from the others.
+    fn warn_of_speeds(&self, shift: &Shift) {
+        let log = self.log.display();
+        for one in shift.doubtful.iter().take(SPEEDS_SHOWN) {
+            complain!(
+                "{log}: warning: spindle at {:.0} 1/min from {}; all but a hundredth of the other turning time is at most {:.0} 1/min: where the reading is false, take it out of the log",
+                one.rpm,
+                between(&one.during),
+                one.others_rpm
+            );
+        }
+        let more = shift.doubtful.len().saturating_sub(SPEEDS_SHOWN);
+        if more > 0 {
+            complain!("{log}: warning: and {more} more such readings");
+        }
     }
 
     /// What of the log is not in the programs, where there is something.
@@ -239,6 +257,9 @@ impl ImportShift {
         complain!("{log}: {}", shift.account);
     }
 }
+
+/// Speeds that are named at most.
+const SPEEDS_SHOWN: usize = 10;
 
 /// Writes all programs or none into a folder that has none of another shift: its parts would be run with those of this one.
 fn write(folder: &Path, programs: &[String]) -> Result<()> {

@@ -69,10 +69,18 @@ fn complain_of(tests: &Tests) {
     for run in &tests.broken_off {
         complain!("abbe: {run}");
     }
+    for run in reports::circular::refused(&tests.circles) {
+        complain!("abbe: not evaluated: {run}");
+    }
+}
+
+/// Whether nothing was lost or left out, and every circle could be evaluated.
+fn is_whole(tests: &Tests) -> bool {
+    tests.reading.is_whole() && reports::circular::refused(&tests.circles).is_empty()
 }
 
 impl ReportBag {
-    /// Evaluates the bag; exit code 3 when a part of it was lost or left out.
+    /// Evaluates the bag; exit code 3 when a part of it was lost or left out, or a circle has an outlier.
     ///
     /// # Errors
     /// When bag or budget cannot be read, or the page not written.
@@ -105,7 +113,7 @@ impl ReportBag {
         let mut report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;
         if let Some(table) = &table {
             report.begin_with_table(&table.lines);
-            report.state_shortcomings(None, table.assumed());
+            report.state_shortcomings(None, table.warnings());
         }
         let machine = tests.machine.as_ref().map(|machine| machine.name.as_str());
         let mut made = Made::of(
@@ -137,7 +145,7 @@ impl ReportBag {
             &tests,
             table.as_ref().map(|table| table.bag.as_path()),
         )?;
-        Ok(loss::exit_code(tests.reading.is_whole() && n_odd == 0))
+        Ok(loss::exit_code(is_whole(&tests) && n_odd == 0))
     }
 
     /// Refuses outputs over inputs and over what is no page, before the work begins.

@@ -1,5 +1,6 @@
 //! Parameters of the host clock; keys carry their units, limits are checked once.
 
+use metrology::bound::NAME_BYTES;
 use metrology::check_parameters;
 use metrology::stamp::Span;
 use schemars::JsonSchema;
@@ -106,6 +107,10 @@ impl HostClockConfig {
             if value.is_empty() {
                 return Err(HostClockError::Nameless { name });
             }
+            let bytes = value.len();
+            if bytes > NAME_BYTES {
+                return Err(HostClockError::NameTooLong { name, bytes });
+            }
         }
         check_parameters(self)?;
         let holds = self.exchanges();
@@ -162,6 +167,14 @@ mod tests {
         assert_eq!(
             refused(|config| config.host.clear()),
             "host is empty: must be the name of a host"
+        );
+        assert_eq!(
+            refused(|config| config.reference = "b".repeat(256)),
+            "reference: 256 bytes of text: at most 255"
+        );
+        assert_eq!(
+            refused(|config| config.host = "ü".repeat(200)),
+            "host: 400 bytes of text: at most 255"
         );
         assert_eq!(
             refused(|config| config.asymmetry_share = 1.5),

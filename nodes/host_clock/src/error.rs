@@ -1,6 +1,6 @@
 //! Parameters that cannot work and inputs that break the stage's contract.
 
-use metrology::bound::BoundError;
+use metrology::bound::{BoundError, NAME_BYTES};
 use metrology::number::number;
 
 /// Why a stage is not built, or an event not taken.
@@ -14,6 +14,14 @@ pub enum HostClockError {
     Nameless {
         /// Parameter.
         name: &'static str,
+    },
+    /// The name of a host that no message carries.
+    #[error("{name}: {bytes} bytes of text: at most {NAME_BYTES}")]
+    NameTooLong {
+        /// Parameter.
+        name: &'static str,
+        /// Its length.
+        bytes: usize,
     },
     /// The window cannot hold as many exchanges as an estimate needs.
     #[error(

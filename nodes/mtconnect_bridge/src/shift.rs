@@ -10,7 +10,7 @@
 //!
 //! A value holds until the next one. A time that a log has twice, since its clock goes back, counts as it came first, so
 //! that (1) is never above the greatest reading. A spindle that is absent is taken to stand, an axis that is absent not to
-//! move. Each axis goes its travel to and fro within a window of the other machine, so heat from nuts, guides and
+//! move. Short readings of the spindle far above the others are named ([`DoubtfulSpeed`]). Each axis goes its travel to and fro within a window of the other machine, so heat from nuts, guides and
 //! motors comes in as it did; where the axis stood is not followed. Nothing moves: a dwell.
 //!
 //! # Holds when
@@ -28,16 +28,21 @@ use crate::error::BridgeError;
 use crate::mapping::Use;
 use crate::observation::Told;
 
+mod doubtful;
 mod once;
 mod reading;
 #[cfg(test)]
 mod tests;
 
+pub use doubtful::DoubtfulSpeed;
+use doubtful::Speeds;
 use once::Once;
 pub use reading::{Shift, bins};
 
 /// A spindle that turns more slowly than this stands, 1/s.
 const STANDS_RAD_S: f64 = 1.0;
+/// One rad/s in 1/min.
+const RPM: f64 = 30.0 / std::f64::consts::PI;
 /// A travel below this is none, mm: dither at rest.
 const REST_MM: f64 = 0.01;
 /// Greatest travel of one line over the window's length.
@@ -104,7 +109,7 @@ impl Bin {
         if self.spindle_rad_s < STANDS_RAD_S {
             return 0;
         }
-        (self.spindle_rad_s * 30.0 / std::f64::consts::PI).round() as i64
+        (self.spindle_rad_s * RPM).round() as i64
     }
 }
 
@@ -128,6 +133,8 @@ struct Cutter {
     /// Times of which the log has the spindle, and each axis.
     turned: Once,
     travelled: PerAxis<Once>,
+    /// Readings of the spindle within the order.
+    speeds: Speeds,
 }
 
 impl Cutter {
@@ -143,6 +150,7 @@ impl Cutter {
             axis_told: PerAxis::default(),
             turned: Once::default(),
             travelled: PerAxis::from_fn(|_| Once::default()),
+            speeds: Speeds::default(),
         }
     }
 
@@ -154,6 +162,9 @@ impl Cutter {
     /// (1) of a speed that held from one instant to another.
     fn turn(&mut self, from: Stamp<Machine>, to: Stamp<Machine>, speed_rad_s: f64) {
         let first = self.place(from.max(self.from)).unwrap_or_default();
+        if first < self.bins.len() {
+            self.speeds.add((from, to), speed_rad_s * RPM, first);
+        }
         let last = self.place(to).map_or(0, |last| last.saturating_add(1));
         let bins = self.bins.iter_mut().enumerate().take(last);
         for (at, bin) in bins.skip(first) {

@@ -92,6 +92,19 @@ impl Default for RecorderConfig {
     }
 }
 
+impl RecorderConfig {
+    /// Of a bag that nobody reads before it is finished, as one made of a table: chunks by size alone, and hardly a
+    /// description before the last. The default writes both by log time, which a log of a week has plenty of.
+    #[must_use]
+    pub fn read_when_finished() -> Self {
+        Self {
+            flush_period_s: LONGEST_PERIOD_S,
+            metadata_period_s: LONGEST_PERIOD_S,
+            ..Self::default()
+        }
+    }
+}
+
 /// Parameters of the recorder as a node of its own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

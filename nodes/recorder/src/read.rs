@@ -13,6 +13,7 @@ mod file_order;
 mod foreign;
 mod framing;
 mod index;
+mod parts;
 mod regular;
 mod time_order;
 mod walk;
@@ -127,6 +128,20 @@ pub enum LossReason {
     /// A file that the description names is absent.
     #[error("the file is absent")]
     Absent,
+    /// A name of a file of the bag is a folder, a pipe, or a link that leads nowhere.
+    #[error(
+        "is {kind}, must be a regular file: nothing of it is read; move it out of the bag's folder"
+    )]
+    NotRegular {
+        /// What it is.
+        kind: &'static str,
+    },
+    /// A file that rosbag2 writes besides MCAP with compressed chunks, beside others.
+    #[error("{what}, which is not read: `ros2 bag convert` makes MCAP of it")]
+    NotRead {
+        /// What it is.
+        what: &'static str,
+    },
     /// The file ends inside a record.
     #[error(
         "the file was read up to its end at byte {end_byte}, which cuts a record of kind {opcode:#04x}: what followed is unknown"
@@ -151,6 +166,18 @@ pub enum LossReason {
         saved: u32,
         /// The CRC of what is there.
         calculated: u32,
+    },
+    /// A chunk's records are of another length than its header states.
+    #[error(
+        "chunk of {chunk_bytes} bytes: its records have {record_bytes} bytes, its header states {saved_bytes}"
+    )]
+    ChunkLength {
+        /// Its length in the file.
+        chunk_bytes: u64,
+        /// Length of the records by its header.
+        saved_bytes: u64,
+        /// Length of the records.
+        record_bytes: u64,
     },
     /// A chunk that cannot be decompressed.
     #[error("chunk of {chunk_bytes} bytes cannot be decompressed by {compression:?}")]

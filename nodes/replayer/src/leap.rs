@@ -94,10 +94,10 @@ impl Leaps {
 }
 
 /// Numbers, from 0, of the messages whose log time alone is wrong: it leaps forward and the next message is back before the
-/// leap, the bag ends there, it leaps back, or no clock of Abbe shows it.
+/// leap, the bag ends there, it leaps back, or no clock of Abbe shows it. Numbers count in `order`.
 #[must_use]
-pub fn strays(bag: &Bag, start: Stamp<Host>) -> BTreeSet<u64> {
-    let mut messages = bag.messages(Order::File);
+pub fn strays(bag: &Bag, order: Order, start: Stamp<Host>) -> BTreeSet<u64> {
+    let mut messages = bag.messages(order);
     let times = std::iter::from_fn(|| {
         loop {
             match messages.next_event()? {

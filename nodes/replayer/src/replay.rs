@@ -1,6 +1,6 @@
 //! Runs a bag's inputs through its nodes and holds what comes out against what was recorded.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use abbe_msgs::topics::Origin;
 use metrology::stamp::{Host, Stamp};
@@ -226,17 +226,42 @@ fn ears(harness: &Harness, roles: &[Role], computed: &[String]) -> Vec<Ear> {
     ears
 }
 
+/// The order in which a bag is replayed, and the messages whose log time alone is wrong.
+///
+/// A composed run is recorded in the order of its log times. Where a file is there twice, they put each message beside its
+/// copy, as in a report; a wrong log time would move its message, so the order of the files holds otherwise.
+fn order_of(bag: &Bag, start: Stamp<Host>) -> (Order, BTreeSet<u64>) {
+    let strays = leap::strays(bag, Order::File, start);
+    if bag.has_doubled_file() || (bag.has_overlapping_files() && strays.is_empty()) {
+        return (Order::LogTime, leap::strays(bag, Order::LogTime, start));
+    }
+    (Order::File, strays)
+}
+
+/// The service calls of a bag in their order; those of a file that is there twice are put in once.
+fn calls_of(bag: &Bag) -> VecDeque<RecordedCall> {
+    let mut calls = RecordedCall::all_of(bag);
+    if bag.has_doubled_file() {
+        calls.sort_by_key(|call| call.after_messages);
+        let mut seen = BTreeSet::new();
+        calls.retain(|call| {
+            seen.insert((call.after_messages, call.topic.clone(), call.event.clone()))
+        });
+    }
+    calls.into()
+}
+
 fn stamp(nanos: u64) -> Stamp<Host> {
     Stamp::from_nanos(i64::try_from(nanos).unwrap_or(i64::MAX))
 }
 
 impl Replay<'_> {
     fn run(&mut self) -> Result<(), ReplayError> {
-        let mut messages = self.bag.messages(Order::File);
+        let (order, strays) = order_of(self.bag, self.start);
+        let mut messages = self.bag.messages(order);
         let mut last = None;
-        let mut calls: VecDeque<_> = RecordedCall::all_of(self.bag).into();
+        let mut calls = calls_of(self.bag);
         let mut read = 0;
-        let strays = leap::strays(self.bag, self.start);
         while let Some(event) = messages.next_event() {
             let message = match event {
                 Event::Message(message) => message,
@@ -300,16 +325,19 @@ impl Replay<'_> {
             .map(|what| (Reason::OtherTime, what))
     }
 
-    /// Leaves out a message that the bag has already: nothing is lost by that.
+    /// Leaves out a message that the bag has already; which of the two is right is not known where what follows differs.
     fn is_repeated(&mut self, message: &MessageRef<'_>) -> bool {
-        let topic = message.topic.index();
-        let (Role::Input { row, .. } | Role::Result { row, .. }) = &self.roles[topic] else {
-            return false;
-        };
         if !self.passed.pass(message) {
             return false;
         }
         self.repeated += 1;
+        let topic = message.topic.index();
+        let (Role::Input { row, .. } | Role::Result { row, .. } | Role::LeftOut { row, .. }) =
+            &self.roles[topic]
+        else {
+            return true;
+        };
+        self.is_doubtful = true;
         let row = &mut self.outcome.reading.account.topics[*row];
         row.messages += 1;
         let what = repeats::WHAT.to_owned();

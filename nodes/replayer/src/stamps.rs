@@ -29,6 +29,8 @@ use crate::reading::stamp_of;
 
 mod clocks;
 
+use clocks::OtherClock;
+
 /// T of (2), ns: what a session of a diagnosis takes as the lateness of a sample, too.
 const TOLERANCE_NANOS: i64 = 2 * NANOS_PER_S;
 /// How far outside the bag's own times a stamp may lie where no message of its topic stands beside it, ns: messages of one
@@ -60,8 +62,8 @@ type Key = (usize, u64, i64);
 #[derive(Debug, Default)]
 pub(crate) struct WrongStamps {
     found: BTreeMap<Key, Limits>,
-    /// Offset of the stamps of each topic that is of another clock, ns.
-    other_clocks: BTreeMap<usize, i64>,
+    /// The topics that are of another clock.
+    other_clocks: BTreeMap<usize, OtherClock>,
 }
 
 /// Successive messages of a topic whose stamps go on with its log times (2).
@@ -253,12 +255,20 @@ impl WrongStamps {
 
     /// What is wrong with all stamps of a topic; `None`: they are of the same time as those of the others.
     pub(crate) fn other_clock(&self, topic: TopicId) -> Option<String> {
-        let offset_nanos = *self.other_clocks.get(&topic.index())?;
+        let OtherClock {
+            offset_nanos,
+            own: (first, last),
+            others: (from, to),
+        } = *self.other_clocks.get(&topic.index())?;
         let offset = Span::from_nanos(offset_nanos.saturating_abs());
         let way = if offset_nanos < 0 { "earlier" } else { "later" };
         Some(format!(
-            "its stamps are {:.0} s from those of the other topics, {way}: set the clock that stamped it",
-            offset.as_secs_f64()
+            "its stamps are {:.0} s from those of the other topics, {way}: {} to {} s, those {} to {} s; set the clock that stamped it",
+            offset.as_secs_f64(),
+            seconds(first),
+            seconds(last),
+            seconds(from),
+            seconds(to)
         ))
     }
 

@@ -5,7 +5,7 @@ use control_tables::selection::Measured;
 use metrology::sample::PositioningTable;
 use metrology::{Axis, AxisSet, PerAxis};
 use recorder::{Bag, Order};
-use replayer::{Reading, reading};
+use replayer::{Reading, TopicAccount, reading};
 use reports::evaluate::stops::Stops;
 
 use super::origin::{GEOMETRY, Origin, ROTARY, Said, THERMAL, Which};
@@ -111,10 +111,17 @@ pub(super) fn tables_of_stops(stops: &[Stops], measured: &mut Measured) -> AxisS
     of_stops
 }
 
+/// Whether a topic has messages and none of them could be used.
+fn is_left_out(topic: &str, reading: &Reading) -> bool {
+    let of_topic = |row: &&TopicAccount| is(&row.topic, topic);
+    let mut rows = reading.account.topics.iter().filter(of_topic).peekable();
+    rows.peek().is_some() && rows.all(|row| row.used == 0 && !row.left_out.is_empty())
+}
+
 /// Each source of tables with why it gave none.
 pub(super) fn looked_for(
     measured: &Measured,
-    topics: [Option<u64>; 4],
+    (topics, reading): ([Option<u64>; 4], &Reading),
     axes: AxisSet,
 ) -> Vec<String> {
     let of_axes = |known: AxisSet| {
@@ -138,6 +145,9 @@ pub(super) fn looked_for(
                     "the bag has no such topic: the node was not there or not recorded".to_owned()
                 }
                 Some(0) => "the bag has the topic, but nothing was published".to_owned(),
+                Some(n) if is_left_out(topic, reading) => {
+                    format!("each of its {n} messages was left out, as said below")
+                }
                 Some(_) if *topic == topics::POSITIONING_TABLE.name => of_axes(tables),
                 Some(n) => {
                     format!("{n} messages, none that gives a table for these axes in this format")

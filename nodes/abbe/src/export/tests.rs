@@ -320,13 +320,30 @@ fn nothing_to_export_names_each_source_and_why_it_gave_none() {
     let bag = bag(folder.path(), &[table(Axis::X, 1e-4)], false);
     let found = read(&Bag::open(&bag).unwrap(), Which::Last);
     assert_eq!(found.topics, [Some(1), None, None, None]);
-    let lines = looked_for(&found.measured, found.topics, AxisSet::EMPTY.with(Axis::Z));
+    let topics = (found.topics, &found.reading);
+    let lines = looked_for(&found.measured, topics, AxisSet::EMPTY.with(Axis::Z));
     assert!(lines[0].contains("positioning/table"), "{lines:?}");
     assert!(lines[0].contains("it is about X"), "{lines:?}");
     for line in &lines[1..4] {
         assert!(line.contains("the bag has no such topic"), "{lines:?}");
     }
     assert_eq!(lines[4], "for axes Z");
+}
+
+#[test]
+fn a_topic_of_which_every_message_was_left_out_is_named_so() {
+    for n in [1, 3] {
+        let mut bad = table(Axis::X, 1e-4);
+        bad.deviation_up[0] = f64::NAN;
+        let folder = tempfile::tempdir().unwrap();
+        let bag = bag(folder.path(), &vec![bad; n], false);
+        let found = read(&Bag::open(&bag).unwrap(), Which::Last);
+        let topics = (found.topics, &found.reading);
+        let lines = looked_for(&found.measured, topics, AxisSet::EMPTY.with(Axis::X));
+        let words = format!("each of its {n} messages was left out");
+        assert!(lines[0].contains(&words), "{lines:?}");
+        assert!(!lines[0].contains("it is about"), "{lines:?}");
+    }
 }
 
 #[test]

@@ -19,6 +19,15 @@ const LONGEST_TAG_BYTES: usize = 64 << 10;
 /// Last row and last column of a worksheet (ECMA-376).
 const LAST_ROW: u32 = 1_048_576;
 const LAST_COLUMN: u32 = 16_384;
+/// Most of each list that the reader keeps whole, by the tag of an entry: an entry of 5 bytes takes ten times as many in memory.
+const MOST_OF_LIST: [(&[u8], u64); 6] = [
+    (b"si", 2_000_000),
+    (b"xf", 100_000),
+    (b"numFmt", 100_000),
+    (b"definedName", 100_000),
+    (b"Relationship", 100_000),
+    (b"sheet", 1_000),
+];
 /// Bytes that are unpacked at a time.
 const PIECE_BYTES: usize = 64 << 10;
 
@@ -91,6 +100,8 @@ struct Tags {
     tag: Vec<u8>,
     /// Whether the part's name says that it is XML, and no image.
     is_xml: bool,
+    /// Tags of each kind of [`MOST_OF_LIST`] so far.
+    entries: [u64; MOST_OF_LIST.len()],
 }
 
 impl Tags {
@@ -120,6 +131,7 @@ impl Tags {
         match (quote, byte) {
             (None, b'>') => {
                 self.state = State::Text;
+                self.count()?;
                 return checked(&self.tag);
             }
             (None, b'"' | b'\'') => self.state = State::Tag(Some(byte)),
@@ -142,13 +154,37 @@ impl Tags {
         }
         Ok(())
     }
+
+    /// Counts a tag of an entry that the reader keeps.
+    fn count(&mut self) -> Result<()> {
+        let (name, _) = named(&self.tag);
+        let known = MOST_OF_LIST.iter().position(|(entry, _)| *entry == name);
+        let Some(place) = known else {
+            return Ok(());
+        };
+        self.entries[place] += 1;
+        let most = MOST_OF_LIST[place].1;
+        if self.entries[place] > most {
+            let name = String::from_utf8_lossy(name);
+            bail!("more than {most} entries <{name}>, the most that is read: save it as CSV");
+        }
+        Ok(())
+    }
+}
+
+/// The name of a tag without its prefix, and what follows it.
+fn named(tag: &[u8]) -> (&[u8], &[u8]) {
+    let is_blank = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'/';
+    let (name, rest) = tag.split_at(tag.iter().position(is_blank).unwrap_or(tag.len()));
+    (
+        name.rsplit(|byte| *byte == b':').next().unwrap_or(name),
+        rest,
+    )
 }
 
 /// The attribute with the reference of a tag, and what follows the tag's name: of a cell and a row `r`, of a dimension `ref`.
 fn attribute(tag: &[u8]) -> Option<(&'static [u8], &[u8])> {
-    let is_blank = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'/';
-    let (name, rest) = tag.split_at(tag.iter().position(is_blank).unwrap_or(tag.len()));
-    let local = name.rsplit(|byte| *byte == b':').next().unwrap_or(name);
+    let (local, rest) = named(tag);
     match local {
         b"c" | b"row" => Some((&b"r"[..], rest)),
         b"dimension" => Some((&b"ref"[..], rest)),
@@ -276,6 +312,24 @@ mod tests {
             "<c r=",
         ] {
             assert_eq!(refused(text), "", "{text}");
+        }
+    }
+
+    #[test]
+    fn more_entries_of_a_list_than_are_kept_are_refused_with_part_and_limit() {
+        for (name, most) in MOST_OF_LIST
+            .into_iter()
+            .filter(|(_, most)| *most <= 100_000)
+        {
+            let name = String::from_utf8_lossy(name);
+            for entry in [format!("<{name}/>"), format!("<x:{name} a='1'></x:{name}>")] {
+                assert_eq!(refused(&entry.repeat(usize::try_from(most).unwrap())), "");
+                let many = entry.repeat(usize::try_from(most).unwrap() + 1);
+                let words =
+                    format!("part xl/worksheets/sheet1.xml: more than {most} entries <{name}>");
+                let shown = refused(&many);
+                assert!(shown.contains(&words), "{shown}");
+            }
         }
     }
 

@@ -3,12 +3,14 @@
 use std::fmt;
 
 use anyhow::{Result, anyhow, bail};
+use iso230::breakdown::{GREATEST_DEVIATION, outliers};
 use machine::MachineFile;
 use metrology::leaves::{Row, check_number};
 use metrology::number::number;
 use metrology::{Axis, Host, epoch};
 
 use super::map::{Column, Map, Plane, Test, What, units};
+use super::runs::Runs;
 use super::times;
 
 /// Greatest deviation or displacement that an instrument reads, µm.
@@ -240,6 +242,28 @@ fn numbers(map: &Map) -> Result<()> {
     Ok(())
 }
 
+/// A line for each reading of a circle that lies far from the others of its run: no figure of that run is evaluated.
+pub fn outliers_of_circles(runs: &Runs, radius_mm: f64, column: &str) -> Vec<String> {
+    let limit_um = number(1e3 * GREATEST_DEVIATION * radius_mm);
+    let of_run = |rows: &Vec<super::table::Row>| -> Vec<String> {
+        let read: Vec<_> = rows.iter().filter(|row| row.cells[2].is_finite()).collect();
+        let deviations_mm: Vec<f64> = read.iter().map(|row| 1e-3 * row.cells[2]).collect();
+        let found = outliers(&deviations_mm, radius_mm)
+            .into_iter()
+            .map(|at| read[at]);
+        let in_words = |row: &super::table::Row| {
+            format!(
+                "warning, line {}, column \"{column}\": {} µm lies further than {limit_um} µm (5 % of radius_mm) from the others of run {}, which is not evaluated: mend the reading or repeat the run",
+                row.line,
+                number(row.cells[2]),
+                number(row.cells[0]),
+            )
+        };
+        found.map(in_words).collect()
+    };
+    runs.runs.iter().flat_map(of_run).collect()
+}
+
 /// A thermometer of the machine file.
 fn sensor(machine: &MachineFile, id: &str) -> Result<()> {
     let sensors = &machine.temperature_sensors;
@@ -380,6 +404,42 @@ mod tests {
             });
             let shown = refused(&test);
             assert!(shown.starts_with(words), "{words}: {shown}");
+        }
+    }
+
+    #[test]
+    fn a_reading_far_from_the_others_of_its_circle_is_named_by_its_line() {
+        let row = |k: u32, um: f64| super::super::table::Row {
+            line: u64::from(k) + 2,
+            cells: vec![3.0, f64::from(k), um],
+        };
+        for (at, um, radius_mm) in [
+            (7, 90_000.0, 100.0),
+            (0, -5_100.0, 100.0),
+            (89, 600.0, 10.0),
+        ] {
+            let rows = (0..90)
+                .map(|k| row(k, if k == at { um } else { 1.5 }))
+                .collect();
+            let runs = Runs {
+                runs: vec![rows, (0..90).map(|k| row(k, f64::NAN)).collect()],
+                remarks: vec![],
+            };
+            let found = outliers_of_circles(&runs, radius_mm, "radial_um");
+            assert_eq!(found.len(), 1, "{found:?}");
+            let words = format!(
+                "warning, line {}, column \"radial_um\": {} µm",
+                at + 2,
+                number(um)
+            );
+            assert!(
+                found[0].starts_with(&words) && found[0].contains("run 3"),
+                "{found:?}"
+            );
+            assert_eq!(
+                outliers_of_circles(&runs, 2_000.0, "r"),
+                Vec::<String>::new()
+            );
         }
     }
 

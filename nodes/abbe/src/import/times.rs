@@ -62,8 +62,26 @@ pub fn of_text(cell: &str) -> Result<Option<f64>> {
         return Ok(Some(seconds(day.nanos())));
     };
     let date = in_order(date)?.with_context(words)?;
-    let stamp = read_stamp(&format!("{date}T{clock}")).with_context(words)?;
+    let stamp = read_stamp(&format!("{date}T{clock}"));
+    let stamp = stamp.with_context(|| match is_beyond(&date, &clock) {
+        true => format!("\"{}\": {OF_NO_CLOCK}", shown(cell)),
+        false => words(),
+    })?;
     Ok(Some(seconds(stamp.nanos())))
+}
+
+/// What is said of an instant that no message carries.
+const OF_NO_CLOCK: &str = "must be a time from 1970-01-01T00:00:00Z to 2106-02-07T06:28:15Z: set the clock that wrote it, or write seconds since the first row";
+
+/// Whether a date with a clock is an instant outside the range of the wire: in a leap year within it both are one.
+fn is_beyond(date: &str, clock: &str) -> bool {
+    let Some((year, day)) = date.split_once('-') else {
+        return false;
+    };
+    let is_outside = year
+        .parse()
+        .is_ok_and(|year: u32| year <= 1970 || year >= 2106);
+    is_outside && read_stamp(&format!("2000-{day}T{clock}")).is_some()
 }
 
 fn seconds(nanos: i64) -> f64 {
@@ -227,11 +245,11 @@ pub fn named_unit(name: &str) -> Option<Unit> {
 }
 
 /// What is doubtful about a column of times that are plain numbers, in s as they were read. `is_stated`: the map names
-/// their unit.
+/// their unit, and is believed.
 ///
 /// # Errors
 /// With column and remedy, where all rows have one time, where the name of the column has another unit, or where rows lie
-/// closer together than anything is read.
+/// closer together than anything is read, as those of serial days under a name of seconds.
 pub fn of_column(name: &str, times_s: &[f64], is_stated: bool) -> Result<Option<String>> {
     let state = |unit: &str| format!("state `units: {{\"{name}\": {unit}}}` in the map");
     if let [first_s, _, ..] = times_s
@@ -248,7 +266,7 @@ pub fn of_column(name: &str, times_s: &[f64], is_stated: bool) -> Result<Option<
     let named = named_unit(name);
     match named {
         _ if is_stated => return Ok(None),
-        Some(Unit::Second) => return Ok(None),
+        Some(Unit::Second) => {}
         Some(unit) => bail!(
             "column \"{name}\": its name says {unit}, the map s: {}, or `s` where its name is wrong",
             state(unit.name()),
@@ -259,21 +277,32 @@ pub fn of_column(name: &str, times_s: &[f64], is_stated: bool) -> Result<Option<
     let usual = usual(times_s);
     let other = usual.iter().find(|unit| **unit != Unit::Second);
     let as_seconds = in_words(times_s, Unit::Second);
+    let reading = match named {
+        Some(unit) => format!("its name says {}", unit.name()),
+        None => "no unit in its name, read in s".to_owned(),
+    };
     let close = spacing(times_s).filter(|(step_s, _)| *step_s > 0.0 && *step_s < LEAST_SPACING_S);
     if let Some((step_s, _)) = close {
         let (likely, unit) = other.map_or((String::new(), "UNIT"), |unit| {
             (format!("; {}", in_words(times_s, *unit)), unit.name())
         });
         bail!(
-            "column \"{name}\": most rows lie {} s apart: must be at least {LEAST_SPACING_S} s{likely}: {}",
+            "column \"{name}\": {reading}: most rows lie {} s apart: must be at least {LEAST_SPACING_S} s{likely}: {}, or `s`",
             number(step_s),
             state(unit)
         );
     }
+    if named.is_some() {
+        return Ok(None);
+    }
     Ok(other.map(|unit| {
-        let word = if usual.contains(&Unit::Second) { "possible" } else { "likely" };
+        let word = if usual.contains(&Unit::Second) {
+            "possible"
+        } else {
+            "likely"
+        };
         format!(
-            "column \"{name}\": no unit in its name, read in s: {as_seconds}; {} is {word}: {}; {}, or `s`",
+            "column \"{name}\": {reading}: {as_seconds}; {} is {word}: {}; {}, or `s`",
             unit.name(),
             in_words(times_s, *unit),
             state(unit.name())
@@ -425,6 +454,49 @@ mod tests {
         let said = of_column("time", &seconds, false).unwrap().unwrap();
         assert!(said.contains("min is possible"), "{said}");
         assert_eq!(of_column("time_s", &seconds, false).unwrap(), None);
+    }
+
+    #[test]
+    fn rows_too_close_for_the_seconds_of_a_name_are_refused_until_the_map_states_a_unit() {
+        for (unit, begin) in [(Unit::Day, 46_000.0), (Unit::Day, 0.0), (Unit::Day, 1.5)] {
+            let times: Vec<f64> = minutes(unit).iter().map(|time| begin + time).collect();
+            for name in ["time_s", "time [s]", "seconds", "t"] {
+                let refused = of_column(name, &times, false).unwrap_err().to_string();
+                assert!(refused.contains("must be at least 0.005 s"), "{refused}");
+                let state = format!("state `units: {{\"{name}\": d}}` in the map, or `s`");
+                assert!(refused.ends_with(&state), "{refused}");
+                assert_eq!(of_column(name, &times, true).unwrap(), None);
+            }
+        }
+        let fast: Vec<f64> = (0..900).map(|k| f64::from(k) * 0.01).collect();
+        assert_eq!(of_column("time_s", &fast, false).unwrap(), None);
+    }
+
+    #[test]
+    fn an_instant_outside_the_range_of_the_wire_names_the_range() {
+        for cell in [
+            "1969-12-31T23:00:00Z",
+            "1970-01-01T00:30:00+01:00",
+            "1601-01-01 00:00:00",
+            "31.12.1899 08:15",
+            "2106-02-07T06:28:16Z",
+            "2107-01-01",
+            "9999-12-31 23:59:59",
+        ] {
+            let said = of_text(cell).unwrap_err().to_string();
+            assert!(
+                said.starts_with(&format!("\"{cell}\": {OF_NO_CLOCK}")),
+                "{said}"
+            );
+        }
+        for cell in [
+            "1969-13-31 23:00:00",
+            "1969-02-30 08:00:00",
+            "2026-02-29 08:00:00",
+        ] {
+            let said = of_text(cell).unwrap_err().to_string();
+            assert!(said.contains("must be a time: seconds"), "{said}");
+        }
     }
 
     #[test]

@@ -1,7 +1,10 @@
 //! Writes samples of a made-up motion into a bag.
 
+use std::collections::BTreeSet;
+use std::hash::{DefaultHasher, Hasher};
 use std::path::Path;
 
+use abbe_msgs::msg::AxisState as AxisStateMessage;
 use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Qos, Wire, to_cdr};
 use anyhow::{Context, Result, anyhow, bail};
@@ -21,6 +24,30 @@ pub struct Writer {
     at: Stamp<metrology::Host>,
     start: Stamp<metrology::Host>,
     messages: u64,
+    /// Of the instant at hand: channel, length and hash of each message.
+    written: BTreeSet<(usize, usize, u64)>,
+    repeated: u64,
+}
+
+/// What a finished bag has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// Messages of the bag.
+    pub messages: u64,
+    /// Readings that were not written, since the bag has an equal one of the same time.
+    pub repeated: u64,
+}
+
+impl Written {
+    /// A line about readings that were not written.
+    pub fn in_words(self) -> Option<String> {
+        let n = self.repeated;
+        (n > 0).then(|| {
+            format!(
+                "{n} readings have time and value of one before them in their column: written once"
+            )
+        })
+    }
 }
 
 impl Writer {
@@ -38,7 +65,7 @@ impl Writer {
         let mut recording = Recording::begin(
             Directory::create(path)?,
             &name.to_string_lossy(),
-            RecorderConfig::default(),
+            RecorderConfig::read_when_finished(),
         )?;
         let at = epoch::whole_seconds(start_s, 0).map_err(|error| anyhow!("start_s = {error}"))?;
         recording.add_context(&RunContext {
@@ -58,12 +85,21 @@ impl Writer {
             at,
             start: at,
             messages: 0,
+            written: BTreeSet::new(),
+            repeated: 0,
         })
     }
 
     /// Lets time pass.
     pub fn wait(&mut self, time_s: f64) {
-        self.at += Span::from_secs_f64(time_s);
+        self.go_to(self.at + Span::from_secs_f64(time_s));
+    }
+
+    fn go_to(&mut self, at: Stamp<metrology::Host>) {
+        if at != self.at {
+            self.at = at;
+            self.written.clear();
+        }
     }
 
     /// Goes to a time after the begin of the measurement.
@@ -78,7 +114,7 @@ impl Writer {
                 "{time_s} s after the first row: must not be before the row above, which is at {before_s} s"
             );
         }
-        self.at = at;
+        self.go_to(at);
         Ok(())
     }
 
@@ -173,9 +209,12 @@ impl Writer {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn finish(self) -> Result<u64> {
+    pub fn finish(self) -> Result<Written> {
         self.recording.finish()?;
-        Ok(self.messages)
+        Ok(Written {
+            messages: self.messages,
+            repeated: self.repeated,
+        })
     }
 
     fn write<M: Message + Wire>(
@@ -188,9 +227,16 @@ impl Writer {
     }
 
     fn put<M: Message>(&mut self, name: String, qos: Qos, message: &M) -> Result<()> {
-        let known = self.channels.iter().find(|(topic, _)| *topic == name);
+        let known = self.channels.iter().position(|(topic, _)| *topic == name);
+        let place = known.unwrap_or(self.channels.len());
+        let bytes = to_cdr(message);
+        if !self.is_new(place, &bytes) {
+            // Where the axes stand is no reading.
+            self.repeated += u64::from(M::TYPE_NAME != AxisStateMessage::TYPE_NAME);
+            return Ok(());
+        }
         let channel = match known {
-            Some((_, channel)) => *channel,
+            Some(place) => self.channels[place].1,
             None => {
                 let channel = self.recording.add_channel(&Channel {
                     topic: format!("/{name}"),
@@ -213,8 +259,77 @@ impl Writer {
             publish_time_nanos: nanos,
             sequence,
         };
-        self.recording.write(channel, stamp, &to_cdr(message))?;
+        self.recording.write(channel, stamp, &bytes)?;
         self.messages += 1;
         Ok(())
+    }
+
+    /// Whether the bag has no message with these bytes of this topic and instant: a reader would leave the second one out as
+    /// repeated.
+    fn is_new(&mut self, channel: usize, bytes: &[u8]) -> bool {
+        let mut hasher = DefaultHasher::new();
+        hasher.write(bytes);
+        self.written.insert((channel, bytes.len(), hasher.finish()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use recorder::{Bag, Order};
+    use replayer::reading;
+
+    use super::*;
+
+    const MACHINE: &str = include_str!("../../../../launch_configs/first_run/machine.yaml");
+
+    /// A bag of a log: time in s, displacement in µm and temperature of each row.
+    fn log(rows: &[(f64, f64, f64)]) -> Written {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("bag");
+        let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
+        let of_machine = (&machine, MACHINE.to_owned());
+        let mut writer = Writer::begin(&path, of_machine, 1_767_600_000, None).unwrap();
+        for (time_s, um, degc) in rows {
+            writer.wait_until(*time_s).unwrap();
+            writer.tick(&PerAxis::default()).unwrap();
+            writer.length(Axis::Z, um * 1e-3).unwrap();
+            writer.temperature("ambient", *degc).unwrap();
+        }
+        let written = writer.finish().unwrap();
+        let bag = Bag::open(&path).unwrap();
+        assert_eq!(bag.message_count(), written.messages);
+        let wanted = [
+            topics::AXES_STATE.name,
+            topics::LENGTH_POSITION.name,
+            topics::TEMPERATURE.base,
+        ];
+        let read = reading::read(&bag, Order::LogTime, &wanted, |_| {});
+        assert!(read.is_whole(), "{:?}", read.lines());
+        written
+    }
+
+    #[test]
+    fn rows_of_one_time_leave_no_repeated_message_and_are_counted() {
+        let usual = [(0.0, 1.0, 20.0), (60.0, 1.5, 20.0), (120.0, 2.0, 20.1)];
+        assert_eq!(log(&usual).repeated, 0);
+        assert_eq!(log(&usual).in_words(), None);
+        for (second, repeated) in [
+            ((60.0, 1.6, 20.0), 1),
+            ((60.0, 1.5, 20.3), 1),
+            ((60.0, 1.5, 20.0), 2),
+            ((60.0, 1.6, 20.3), 0),
+            // The next instant with the readings of the one before.
+            ((61.0, 1.5, 20.0), 0),
+        ] {
+            let [first, before, after] = usual;
+            let found = log(&[first, before, second, after]);
+            assert_eq!(found.repeated, repeated, "{second:?}");
+            let is_named = found.in_words().is_some_and(|line| {
+                line.starts_with(&format!("{repeated} readings have time and value"))
+            });
+            assert_eq!(is_named, repeated > 0);
+        }
+        let all_at_once = vec![(0.0, 1.0, 20.0); 50];
+        assert_eq!(log(&all_at_once).repeated, 98);
     }
 }

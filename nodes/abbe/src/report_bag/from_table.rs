@@ -12,6 +12,8 @@ use crate::import::{self, Named, propose};
 /// Ends of names of files that are tables.
 const ENDS: [&str; 6] = ["csv", "tsv", "txt", "dat", "xlsx", "xlsm"];
 
+/// Begin of a line that stands on the first screen.
+const WARNING: &str = "warning, ";
 /// Begin of a line with what was assumed of a column.
 const ASSUMED: &str = "warning, column ";
 
@@ -28,11 +30,11 @@ pub struct FromTable {
 }
 
 impl FromTable {
-    /// What was assumed of columns.
-    pub fn assumed(&self) -> Vec<String> {
+    /// What was assumed of columns, and readings that no machine has.
+    pub fn warnings(&self) -> Vec<String> {
         let lines = self.lines.iter();
-        let assumed = lines.filter(|line| line.starts_with(ASSUMED));
-        assumed.cloned().collect()
+        let warnings = lines.filter(|line| line.starts_with(WARNING));
+        warnings.cloned().collect()
     }
 }
 
@@ -76,6 +78,7 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
     let bag = home.path().join("bag");
     let imported = import::import(path, &named, machine, &bag)?;
     lines.extend(imported.notes);
+    lines.sort_by_key(|line| !line.starts_with(WARNING));
     Ok(Some(FromTable {
         _home: home,
         bag,
@@ -94,7 +97,6 @@ fn proposed(path: &Path) -> Result<(Named, Vec<String>)> {
         Some(rest) => format!("{ASSUMED}{rest}"),
         None => format!("not in the table: {line}"),
     }));
-    lines.sort_by_key(|line| !line.starts_with(ASSUMED));
     let named = Named {
         place: "proposed for the table (abbe import --propose prints it)".to_owned(),
         text: proposal.map,

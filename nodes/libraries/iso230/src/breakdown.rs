@@ -97,7 +97,8 @@ pub use cross_check::CrossCheck;
 pub use error::BreakdownError;
 pub use instrument::Instrument;
 pub use recording::{
-    CircularPlane, CircularRecording, CircularSample, CircularSense, ReferenceLength,
+    CircularPlane, CircularRecording, CircularSample, CircularSense, GREATEST_DEVIATION,
+    ReferenceLength, outliers,
 };
 pub use report::{
     Alias, Breakdown, Detail, Needed, Noise, NotFound, PlaneBreakdown, RecordingSummary, Row, Unit,

@@ -5,6 +5,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use metrology::bound::NAME_BYTES;
+
 /// A name that ROS forbids.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("name `{name}`: {reason}")]
@@ -86,6 +88,9 @@ fn check_token(token: &str) -> Result<(), NameError> {
             reason,
         })
     };
+    if token.len() > NAME_BYTES {
+        return error("must have at most 255 bytes: shorten it");
+    }
     if token.is_empty() {
         return error("is empty, or has two slashes together or one at its end");
     }
@@ -106,6 +111,12 @@ fn check_token(token: &str) -> Result<(), NameError> {
 /// # Errors
 /// Names the rule that it breaks.
 pub fn check(name: &str) -> Result<(), NameError> {
+    if name.len() > NAME_BYTES {
+        return Err(NameError {
+            name: name.to_owned(),
+            reason: "must have at most 255 bytes: shorten it",
+        });
+    }
     let rest = match name.strip_prefix('~') {
         Some("") => return Ok(()),
         Some(rest) => rest.strip_prefix('/').ok_or_else(|| NameError {
@@ -316,6 +327,20 @@ mod tests {
         for bad in ["", "a//b", "a/", "1a", "a__b", "a-b", "~a", "ü"] {
             assert!(check(bad).is_err(), "{bad} passed");
         }
+        for long in [
+            "b".repeat(256),
+            format!("/{}/b", "b".repeat(253)),
+            "b/".repeat(200),
+        ] {
+            let refused = check(&long).unwrap_err().to_string();
+            assert!(
+                refused.ends_with("at most 255 bytes: shorten it"),
+                "{refused}"
+            );
+        }
+        assert!(check(&"b".repeat(255)).is_ok());
+        let long = [RemapRule::parse(&format!("__node:={}", "b".repeat(255))).unwrap()];
+        assert!(NodeNames::new("a", &long).is_ok());
         assert!(RemapRule::parse("__ns:=cell").is_err());
         assert!(RemapRule::parse("__node:=a/b").is_err());
     }

@@ -5,6 +5,7 @@ use iso230::breakdown::{
     self, BreakdownConfig, CircularPlane, CircularRecording, CircularSample, CircularSense,
 };
 use iso230::circular::{CircularResult, CircularTest, CircularTrace, evaluate};
+use metrology::Axis;
 use metrology::sample::{Sense, TestPlane};
 
 use super::positioning::figure;
@@ -16,9 +17,11 @@ use crate::evaluate::circles::{CircleRecording, Instrument, plane_axes};
 use crate::evaluate::correction::Correction;
 use crate::evaluate::test_conditions::TestConditions;
 use causes::Read;
+pub use refused::refused;
 use scale::Expansion;
 
 mod causes;
+mod refused;
 mod scale;
 mod turn;
 
@@ -103,9 +106,54 @@ impl Evaluated {
 }
 
 fn section(
-    group: &[&CircleRecording],
+    all: &[&CircleRecording],
     reading: &CircleReading,
 ) -> Result<(Section, Option<CircularResult>)> {
+    // A slip of the instrument makes every figure of its run, and no figure leaves a reading out.
+    let sound: Vec<&CircleRecording> = all.iter().copied().filter(|one| is_sound(one)).collect();
+    let is_empty = sound.is_empty();
+    let group = if is_empty { all } else { &sound };
+    let mut section = headed(group, reading);
+    let refused: Vec<String> = { all.iter() }
+        .filter_map(|circle| refused::outlier(circle))
+        .collect();
+    for line in &refused {
+        section.not_evaluated(line);
+    }
+    if is_empty {
+        section.figures = serde_json::json!({ "test": section.title, "not_evaluated": refused });
+        return Ok((section, None));
+    }
+    section.lines.extend(turn::lines(group));
+    let test = at_20_degc(group, &reading.measured.correction);
+    let evaluated = evaluate(&test, &reading.measured.budget);
+    match &evaluated {
+        Ok(result) => state_figures(&mut section, (group, reading), &test, result)?,
+        Err(error) => section.not_evaluated(error),
+    }
+    if !refused.is_empty() {
+        section.figures["not_evaluated"] = serde_json::json!(refused);
+    }
+    let result = evaluated.ok();
+    let centre_mm = result.as_ref().map_or([0.0; 2], centre);
+    let drawn = trace::svg(&traces(group, &test, centre_mm), group[0].segment.plane)?;
+    section.drawings.push(Drawing {
+        svg: drawn.svg,
+        caption: format!(
+            "Deviations from the circle about its least-squares centre, {}",
+            drawn.scale
+        ),
+    });
+    Ok((section, result))
+}
+
+/// Whether a circle has no outlier.
+fn is_sound(circle: &CircleRecording) -> bool {
+    refused::outlier(circle).is_none()
+}
+
+/// The head of a circle's part.
+fn headed(group: &[&CircleRecording], reading: &CircleReading) -> Section {
     let segment = &group[0].segment;
     let state = if group[0].compensated {
         "compensated"
@@ -125,24 +173,7 @@ fn section(
     if reading.instrument == Instrument::Ballbar {
         section.lines.push(BY_BALLBAR.to_owned());
     }
-    section.lines.extend(turn::lines(group));
-    let test = at_20_degc(group, &reading.measured.correction);
-    let evaluated = evaluate(&test, &reading.measured.budget);
-    match &evaluated {
-        Ok(result) => state_figures(&mut section, (group, reading), &test, result)?,
-        Err(error) => section.not_evaluated(error),
-    }
-    let result = evaluated.ok();
-    let centre_mm = result.as_ref().map_or([0.0; 2], centre);
-    let drawn = trace::svg(&traces(group, &test, centre_mm), segment.plane)?;
-    section.drawings.push(Drawing {
-        svg: drawn.svg,
-        caption: format!(
-            "Deviations from the circle about its least-squares centre, {}",
-            drawn.scale
-        ),
-    });
-    Ok((section, result))
+    section
 }
 
 /// The figures of a circle: answer, table, what they lack, and for machines.
@@ -352,44 +383,68 @@ fn breakdowns(
 ) -> Vec<Section> {
     let mut sections = Vec::new();
     for compensated in [false, true] {
-        let own = circles.iter().filter(|one| one.compensated == compensated);
-        let recordings: Vec<CircularRecording> = own
-            .clone()
-            .filter_map(|circle| recording(circle, &reading_of(circle, budget, conditions)))
-            .collect();
-        if recordings.is_empty() {
-            continue;
-        }
-        let read = Read::of(own.filter(|circle| is_broken_down(circle)).map(|circle| {
-            let reading = reading_of(circle, budget, conditions);
-            (circle.segment.plane, reading)
-        }));
         let state = if compensated {
             "compensated"
         } else {
             "not compensated"
         };
+        let own = circles.iter().filter(|one| one.compensated == compensated);
+        let mut recordings = Vec::new();
+        let mut readings = Vec::new();
+        let mut left_out = Vec::new();
+        for circle in own {
+            let reading = reading_of(circle, budget, conditions);
+            let Some(recording) = recording(circle, &reading) else {
+                continue;
+            };
+            if let Some(why) = refused::of_causes(circle, &recording) {
+                left_out.push(why);
+                continue;
+            }
+            recordings.push(recording);
+            readings.push((circle.segment.plane, reading));
+        }
+        if recordings.is_empty() && left_out.is_empty() {
+            continue;
+        }
+        let read = Read::of(readings.into_iter());
         let config = BreakdownConfig::default();
-        match breakdown::evaluate_with(&recordings, read.errors(), &config) {
+        let found = if recordings.is_empty() {
+            Err("no circle can be broken down".to_owned())
+        } else {
+            breakdown::evaluate_with(&recordings, read.errors(), &config)
+                .map_err(|it| it.to_string())
+        };
+        let mut of_state = match found {
             Ok(found) => {
-                sections.extend(found.planes.iter().map(|plane| {
+                let of_plane = |plane| {
                     let own = (circles, compensated);
                     let expansion = Expansion::of(plane, own, budget, conditions);
-                    let evaluated = evaluated.iter().filter(|one| {
-                        one.compensated == compensated && plane_axes(one.plane) == Some(plane.axes)
-                    });
-                    let greatest_mm = evaluated.map(|one| one.error_mm).reduce(f64::max);
+                    let greatest_mm = greatest_mm(evaluated, plane.axes, compensated);
                     causes::section(plane, (state, greatest_mm), &expansion, &read)
-                }));
+                };
+                found.planes.iter().map(of_plane).collect()
             }
             Err(error) => {
                 let mut section = Section::new(format!("Causes, {state}"));
                 section.not_evaluated(error);
-                sections.push(section);
+                vec![section]
             }
+        };
+        if let Some(first) = of_state.first_mut() {
+            first.tell_left_out(&left_out);
         }
+        sections.extend(of_state);
     }
     sections
+}
+
+/// The greatest circular error of a sense among the circles of a plane, mm.
+fn greatest_mm(evaluated: &[Evaluated], axes: [Axis; 2], compensated: bool) -> Option<f64> {
+    let of_plane =
+        |one: &&Evaluated| one.compensated == compensated && plane_axes(one.plane) == Some(axes);
+    let own = evaluated.iter().filter(of_plane);
+    own.map(|one| one.error_mm).reduce(f64::max)
 }
 
 fn reading_of(
@@ -399,11 +454,6 @@ fn reading_of(
 ) -> CircleReading {
     let read = conditions.during(&[circle.segment.run]);
     CircleReading::of(budget, &read, circle.instrument)
-}
-
-/// Whether a recording has a plane and a sense.
-fn is_broken_down(circle: &CircleRecording) -> bool {
-    circle.segment.sense != Sense::None && circle.segment.plane != TestPlane::None
 }
 
 fn recording(circle: &CircleRecording, reading: &CircleReading) -> Option<CircularRecording> {

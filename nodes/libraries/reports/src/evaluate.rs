@@ -41,13 +41,15 @@ use stops::{StopRuns, Stops};
 use test_conditions::TestConditions;
 
 /// Topics that evaluations read.
-const WANTED: [&str; 14] = [
+const WANTED: [&str; 15] = [
     topics::AXES_STATE.name,
     topics::GRID_POSITION.name,
     topics::LENGTH_POSITION.name,
     topics::COMPENSATION.name,
     topics::TEST_SEGMENT.name,
     topics::PROBE_POINT.name,
+    // Touches are taken as the probe's node corrected them; of triggers of another clock it makes none.
+    topics::PROBE_TRIGGER.name,
     topics::PROBE_FEATURE.name,
     topics::BLOCKS_MEASUREMENT.name,
     topics::GEOMETRY_MODEL.name,

@@ -3,7 +3,7 @@
 use metrology::sample::Quantity;
 use metrology::stamp::{Host, Machine, Span, Stamp};
 
-use super::{Bin, Cutter, Event, ShiftOrder, event};
+use super::{Bin, Cutter, DoubtfulSpeed, Event, ShiftOrder, event};
 use crate::account::Account;
 use crate::condition::words;
 use crate::error::BridgeError;
@@ -30,6 +30,8 @@ pub struct Shift {
     pub covered: Vec<(Stamp<Machine>, Stamp<Machine>)>,
     /// Leaps of the machine's clock over an instant that was asked for.
     pub leaps: Vec<Leap>,
+    /// Readings of the spindle that are far above the others, and count.
+    pub doubtful: Vec<DoubtfulSpeed>,
     /// Whether nothing is missing that would change the programs.
     pub is_whole: bool,
 }
@@ -224,7 +226,9 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
     // What is shorter than one line of a program cannot be seen in it.
     let is_covered = (order.to - order.from).as_secs_f64() - covered_s < order.bin_s;
     let account = reader.account;
+    let bin = Span::from_secs_f64(order.bin_s);
     Ok(Shift {
+        doubtful: reader.cutter.speeds.doubtful(bin),
         bins: reader.cutter.bins,
         is_whole: is_covered && leaps.is_empty() && account.is_whole(),
         account,

@@ -227,3 +227,36 @@ fn lines_without_a_date_and_other_ends_of_lines_change_no_bin() {
         assert_eq!(found.bins, wanted, "{end:?}");
     }
 }
+
+#[test]
+fn a_false_speed_counts_by_its_time_and_is_named() {
+    let log = |every_s: usize, false_at: Option<usize>| {
+        let line = |k: usize| {
+            let at_s = k * every_s;
+            let rpm = if Some(k) == false_at { 9_999 } else { 3_000 };
+            format!(
+                "2016-11-29T10:{:02}:{:02}Z|Srpm|{rpm}\n",
+                at_s / 60,
+                at_s % 60
+            )
+        };
+        (0..1_200 / every_s).map(line).collect::<String>()
+    };
+    let order = ShiftOrder {
+        to: read_stamp("2016-11-29T10:20:00Z").unwrap(),
+        ..order()
+    };
+    for (every_s, wanted_rpm) in [(1, 3_700), (5, 6_500), (10, 9_999), (30, 9_999)] {
+        let of = |false_at| bins(log(every_s, false_at).as_bytes(), &mapping(), &order).unwrap();
+        assert_eq!(of(None).doubtful, []);
+        let found = of(Some(30 / every_s));
+        let rpm = found.bins[3].rpm();
+        assert!((rpm - wanted_rpm).abs() <= 1, "{every_s}: {rpm}");
+        let [named] = found.doubtful.as_slice() else {
+            panic!("{every_s}: {:?}", found.doubtful)
+        };
+        assert!((named.rpm - 9_999.0).abs() < 1e-6 && (named.others_rpm - 3_000.0).abs() < 1e-9);
+        assert!(words(named.during.0).contains("10:00:30"));
+        assert_eq!(found.is_whole, of(None).is_whole);
+    }
+}

@@ -5,7 +5,7 @@
 )]
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use mcap::records::{Record, op};
@@ -15,6 +15,7 @@ use super::description;
 use super::file_order::FileOrder;
 use super::foreign;
 use super::index::{FileIndex, parse};
+use super::parts::{self, Parts};
 use super::regular;
 use super::time_order::TimeOrder;
 use super::walk::Walker;
@@ -22,9 +23,9 @@ use super::{
     Attachment, Inner, LARGEST_READ_CHUNK_BYTES, Loss, LossReason, Messages, Order, TopicId,
     TopicInfo,
 };
-use crate::context::{self, MACHINE_FILE};
+use crate::context::{self, MACHINE_FILE, MessageOrder, RecordedRun};
 use crate::error::RecorderError;
-use crate::layout::{METADATA_FILE, TimeSpan, file_names_of};
+use crate::layout::{METADATA_FILE, TimeSpan};
 
 /// One file of a bag.
 #[derive(Debug)]
@@ -58,7 +59,7 @@ impl BagFile {
 fn recording_in(path: &Path) -> Option<PathBuf> {
     let entries = std::fs::read_dir(path).ok()?.flatten();
     let folders = entries.map(|entry| entry.path()).filter(|it| it.is_dir());
-    let is_one = |it: &PathBuf| files_of(it).is_ok_and(|(names, _)| !names.is_empty());
+    let is_one = |it: &PathBuf| parts::of(it).is_ok_and(|parts| !parts.files.is_empty());
     folders.filter(is_one).min()
 }
 
@@ -68,44 +69,49 @@ pub struct Bag {
     path: PathBuf,
     files: Vec<BagFile>,
     topics: Vec<TopicInfo>,
-    absent: Vec<PathBuf>,
+    /// Files of the bag of which nothing can be read.
+    unread: Vec<Loss>,
     description: Vec<Loss>,
 }
 
 impl Bag {
-    /// Opens a rosbag2 directory or one `.mcap` file. Damage is no error here: it is told by
-    /// [`Bag::messages`].
+    /// Opens a rosbag2 directory or one `.mcap` file. Damage is no error here: [`Bag::messages`] reports it, as each
+    /// file beside others of which nothing can be read. Files of a composed run are in the order of their log times.
     ///
     /// # Errors
-    /// The path cannot be opened, the directory holds no `.mcap` file, or rosbag2 has compressed what is there by itself.
+    /// The path cannot be opened, the directory holds no `.mcap` file that can be read, or rosbag2 has compressed it by
+    /// itself.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref();
         let failed = |path: &Path, source| RecorderError::Open {
             path: path.to_owned(),
             source,
         };
-        let (names, absent) = if path.is_dir() {
-            files_of(path).map_err(|source| failed(path, source))?
+        let parts = if path.is_dir() {
+            parts::of(path).map_err(|source| failed(path, source))?
         } else {
-            (vec![path.to_owned()], Vec::new())
+            Parts::one(path)
         };
-        if names.is_empty() && absent.is_empty() {
+        if parts.is_empty() {
             return Err(RecorderError::NoFiles {
                 path: path.to_owned(),
                 inside: recording_in(path),
             });
         }
-        foreign::refuse(path, &names)?;
+        let (names, unread) = foreign::readable(path, parts)?;
         let mut bag = Self {
             path: path.to_owned(),
             files: Vec::new(),
             topics: Vec::new(),
-            absent,
+            unread,
             description: Vec::new(),
         };
         for name in names {
             let mut file = regular::open(&name)?;
             bag.add_file(name, FileIndex::read(&mut file));
+        }
+        if RecordedRun::of(&bag).is_some_and(|run| run.order == MessageOrder::Total) {
+            parts::sort_by_time(&mut bag.files);
         }
         bag.description = bag.described_wrongly();
         let attached_wrongly = bag.attached_wrongly();
@@ -116,12 +122,12 @@ impl Bag {
     /// Faults of the description, where there is one.
     fn described_wrongly(&self) -> Vec<Loss> {
         let file = self.path.join(METADATA_FILE);
-        if !self.path.is_dir() || !file.is_file() {
+        if !self.path.is_dir() || file.symlink_metadata().is_err() {
             return Vec::new();
         }
         let is_whole = |file: &BagFile| file.index.end_loss.is_none() && !file.index.index_damaged;
-        let is_known = self.absent.is_empty() && self.files.iter().all(is_whole);
-        let text = regular::text(&file);
+        let is_known = self.unread.is_empty() && self.files.iter().all(is_whole);
+        let text = regular::description(&file);
         let faults = description::faults(text.as_deref(), is_known.then_some(&self.topics));
         let loss = |what| Loss {
             file: file.clone(),
@@ -225,6 +231,18 @@ impl Bag {
         self.files.iter().map(|file| file.path.as_path())
     }
 
+    /// Whether the log times of one file reach into those of another: the order of the files is not that of the messages.
+    #[must_use]
+    pub fn has_overlapping_files(&self) -> bool {
+        parts::overlap(&self.files)
+    }
+
+    /// Whether two files have equal first and last log times and equally many messages: one is a copy of the other.
+    #[must_use]
+    pub fn has_doubled_file(&self) -> bool {
+        parts::is_doubled(&self.files)
+    }
+
     /// Number of messages of all topics.
     #[must_use]
     pub fn message_count(&self) -> u64 {
@@ -244,15 +262,10 @@ impl Bag {
     /// Every message, in an order; may be called again and again.
     #[must_use]
     pub fn messages(&self, order: Order) -> Messages<'_> {
-        let absent = self.absent.iter().map(|path| Loss {
-            file: path.clone(),
-            at_byte: 0,
-            reason: LossReason::Absent,
-            messages_read: 0,
-        });
+        let unread = self.unread.iter().cloned().collect();
         let inner = match order {
-            Order::File => Inner::File(FileOrder::new(&self.files, absent.collect())),
-            Order::LogTime => Inner::LogTime(TimeOrder::new(&self.files, absent.collect())),
+            Order::File => Inner::File(FileOrder::new(&self.files, unread)),
+            Order::LogTime => Inner::LogTime(TimeOrder::new(&self.files, unread)),
         };
         Messages { inner }
     }
@@ -334,43 +347,4 @@ fn read_attachment(file: &BagFile, at: u64) -> Result<Attachment, LossReason> {
             opcode: frame.opcode,
         }),
     }
-}
-
-type Found = (Vec<PathBuf>, Vec<PathBuf>);
-
-/// Files of a directory as its description orders them, then those that it does not know yet.
-fn files_of(directory: &Path) -> std::io::Result<Found> {
-    let mut found = BTreeMap::new();
-    for entry in fs::read_dir(directory)? {
-        let path = entry?.path();
-        if path
-            .extension()
-            .is_some_and(|extension| extension == "mcap")
-        {
-            let stem = path
-                .file_stem()
-                .map(|stem| stem.to_string_lossy().into_owned());
-            let stem = stem.unwrap_or_default();
-            let number = stem
-                .rsplit('_')
-                .next()
-                .and_then(|digits| digits.parse::<u64>().ok());
-            found.insert((number, stem), path);
-        }
-    }
-    let text = regular::text(&directory.join(METADATA_FILE)).unwrap_or_default();
-    let listed = file_names_of(&text).unwrap_or_default();
-    let mut files = Vec::new();
-    let mut absent = Vec::new();
-    for name in listed {
-        let path = directory.join(name);
-        if path.is_file() {
-            files.push(path);
-        } else {
-            absent.push(path);
-        }
-    }
-    found.retain(|_, path| !files.contains(path));
-    files.extend(found.into_values());
-    Ok((files, absent))
 }

@@ -126,17 +126,26 @@ impl ChunkBuffer {
     fn check(&mut self, header: &ChunkHeader, frame: Frame) -> Result<(), LossReason> {
         let records = self.records();
         let calculated = crc32fast::hash(records);
-        let right_length = records.len() as u64 == header.plain_bytes;
-        // A CRC of 0 says that the writer made none.
-        if !right_length || (header.crc != 0 && header.crc != calculated) {
-            self.in_raw = Some(0..0);
-            return Err(LossReason::ChunkCrc {
-                chunk_bytes: frame.body_bytes,
+        let record_bytes = records.len() as u64;
+        let chunk_bytes = frame.body_bytes;
+        let wrong = if record_bytes != header.plain_bytes {
+            LossReason::ChunkLength {
+                chunk_bytes,
+                saved_bytes: header.plain_bytes,
+                record_bytes,
+            }
+        } else if header.crc != 0 && header.crc != calculated {
+            // A CRC of 0 says that the writer made none.
+            LossReason::ChunkCrc {
+                chunk_bytes,
                 saved: header.crc,
                 calculated,
-            });
-        }
-        Ok(())
+            }
+        } else {
+            return Ok(());
+        };
+        self.in_raw = Some(0..0);
+        Err(wrong)
     }
 
     /// The record at the cursor; steps behind it.

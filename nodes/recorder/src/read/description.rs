@@ -21,6 +21,9 @@ struct Root {
 #[derive(Deserialize)]
 struct Description {
     version: Option<u64>,
+    storage_identifier: Option<String>,
+    compression_format: Option<String>,
+    compression_mode: Option<String>,
     message_count: Option<u64>,
     topics_with_message_count: Option<Vec<TopicCount>>,
     relative_file_paths: Option<Vec<String>>,
@@ -40,11 +43,12 @@ struct TopicName {
     type_name: String,
 }
 
-/// What is wrong with a description: `text` is that of the file, `topics` what the files hold, `None` where they are
+/// What is wrong with a description: `text` is that of the file or why it cannot be read, `topics` what the files hold, `None` where they are
 /// damaged themselves, so that their counts are not known.
-pub(super) fn faults(text: Option<&str>, topics: Option<&[TopicInfo]>) -> Vec<String> {
-    let Some(text) = text else {
-        return vec!["the description cannot be read as UTF-8 text".to_owned()];
+pub(super) fn faults(text: Result<&str, &String>, topics: Option<&[TopicInfo]>) -> Vec<String> {
+    let text = match text {
+        Ok(text) => text,
+        Err(reason) => return vec![reason.clone()],
     };
     let description = match serde_saphyr::from_str::<Root>(text) {
         Ok(root) => root.rosbag2_bagfile_information,
@@ -59,6 +63,7 @@ pub(super) fn faults(text: Option<&str>, topics: Option<&[TopicInfo]>) -> Vec<St
         .iter()
         .map(|key| format!("the description is damaged: {key} is missing"))
         .collect();
+    faults.extend(other_storage(&description));
     if let Some(topics) = topics {
         faults.extend(contradictions(&description, topics));
     }
@@ -87,6 +92,35 @@ fn missing(description: &Description) -> Vec<&'static str> {
     ];
     let missing = keys.into_iter().filter(|(_, is_there)| !is_there);
     missing.map(|(key, _)| key).collect()
+}
+
+/// A storage or a compression that files that are read do not have: each is MCAP, compressed at most chunk by chunk.
+fn other_storage(description: &Description) -> Vec<String> {
+    let is_none = |said: &str| said.is_empty() || said.eq_ignore_ascii_case("none");
+    let said = |key: &'static str, value: &Option<String>, is_right: &dyn Fn(&str) -> bool| {
+        let value = value.as_deref().filter(|value| !is_right(value))?;
+        Some((key, value.to_owned()))
+    };
+    let storage = said(
+        "storage_identifier",
+        &description.storage_identifier,
+        &|it| it == "mcap",
+    );
+    let mode = said("compression_mode", &description.compression_mode, &is_none);
+    let format = said(
+        "compression_format",
+        &description.compression_format,
+        &is_none,
+    );
+    let fault = |(key, value): (&str, String)| match key {
+        "storage_identifier" => format!("{key} = {value}: the files are mcap"),
+        _ => format!("{key} = {value}: rosbag2 has compressed none of the files"),
+    };
+    [storage, mode, format]
+        .into_iter()
+        .flatten()
+        .map(fault)
+        .collect()
 }
 
 /// Counts and types of the description that are not those of the files.
@@ -171,7 +205,7 @@ mod tests {
 ";
 
     fn of(text: &str) -> Vec<String> {
-        faults(Some(text), Some(&[topic("/a", 3), topic("/b", 2)]))
+        faults(Ok(text), Some(&[topic("/a", 3), topic("/b", 2)]))
     }
 
     #[test]
@@ -181,8 +215,13 @@ mod tests {
             .replace("version: 9", "version: 4")
             .replace("  ros_distro: jazzy\n", "");
         assert_eq!(of(&old), Vec::<String>::new());
+        let plain = TEXT.replace(
+            "compression_format: \"\"",
+            "compression_format: none\n  compression_mode: NONE",
+        );
+        assert_eq!(of(&plain), Vec::<String>::new());
         // Where the files are damaged their counts are not known.
-        assert_eq!(faults(Some(TEXT), None), Vec::<String>::new());
+        assert_eq!(faults(Ok(TEXT), None), Vec::<String>::new());
     }
 
     #[test]
@@ -218,6 +257,21 @@ mod tests {
                 "type: x/msg/Y",
                 "/a: type = x/msg/Y: the files say std",
             ),
+            (
+                "identifier: mcap",
+                "identifier: sqlite3",
+                "storage_identifier = sqlite3: the files are mcap",
+            ),
+            (
+                "compression_format: \"\"",
+                "compression_format: zstd",
+                "compression_format = zstd: rosbag2 has compressed none",
+            ),
+            (
+                "compression_format: \"\"",
+                "compression_mode: FILE",
+                "compression_mode = FILE: rosbag2 has compressed none",
+            ),
         ] {
             let text = TEXT.replacen(from, to, 1);
             let faults = of(&text);
@@ -230,7 +284,11 @@ mod tests {
 
     #[test]
     fn a_description_that_is_cut_or_no_yaml_is_named() {
-        assert_eq!(faults(None, None).len(), 1);
+        let unreadable = "is a folder".to_owned();
+        assert_eq!(
+            faults(Err(&unreadable), None),
+            std::slice::from_ref(&unreadable)
+        );
         for text in [
             "",
             "{",

@@ -8,7 +8,9 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use super::parts::Parts;
 use super::regular;
+use super::{Loss, LossReason};
 use crate::error::RecorderError;
 use crate::layout::{METADATA_FILE, compression_of, file_names_of};
 
@@ -17,23 +19,77 @@ const ZSTD: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
 /// How an SQLite database begins.
 const SQLITE: &[u8] = b"SQLite format 3";
 
-/// Refuses files that rosbag2 has written and that are not read here.
+/// The files of a bag that may be MCAP, and losses: those beside them of which nothing can be read.
 ///
 /// # Errors
-/// Names the file and what it is. A file that cannot be opened is told by whoever reads it.
-pub(super) fn refuse(folder: &Path, files: &[PathBuf]) -> Result<(), RecorderError> {
-    let mut is_empty = !files.is_empty();
-    for path in files {
-        let length = regular::open(path)?
-            .metadata()
-            .map(|metadata| metadata.len());
-        is_empty &= length.is_ok_and(|bytes| bytes == 0);
-        if let Some(what) = kind_of(path) {
-            let path = path.clone();
-            return Err(RecorderError::NotRead { path, what });
+/// Names the file and what it is, where not one can be read, or where rosbag2 has compressed the messages one by one.
+pub(super) fn readable(
+    folder: &Path,
+    parts: Parts,
+) -> Result<(Vec<PathBuf>, Vec<Loss>), RecorderError> {
+    let mut files = Vec::new();
+    let mut unread: Vec<Loss> = parts
+        .absent
+        .into_iter()
+        .map(|path| lost(path, LossReason::Absent))
+        .collect();
+    let mut first = None;
+    for path in parts.files {
+        match may_be_mcap(&path) {
+            Ok(()) => files.push(path),
+            Err(error) => {
+                unread.push(lost(path, reason_of(&error)));
+                first.get_or_insert(error);
+            }
         }
     }
-    if is_empty {
+    if let (true, Some(error)) = (files.is_empty(), first) {
+        return Err(error);
+    }
+    refuse(folder, &files)?;
+    Ok((files, unread))
+}
+
+/// Refuses what is no regular file, cannot be opened, or is of another kind.
+fn may_be_mcap(path: &Path) -> Result<(), RecorderError> {
+    let kind = kind_of(regular::open(path)?).map_err(|source| RecorderError::Open {
+        path: path.to_owned(),
+        source,
+    })?;
+    match kind {
+        None => Ok(()),
+        Some(what) => Err(RecorderError::NotRead {
+            path: path.to_owned(),
+            what,
+        }),
+    }
+}
+
+/// Why nothing of a file can be read, as a loss of the bag.
+fn reason_of(error: &RecorderError) -> LossReason {
+    match error {
+        RecorderError::NotRegular { kind, .. } => LossReason::NotRegular { kind },
+        RecorderError::NotRead { what, .. } => LossReason::NotRead { what },
+        RecorderError::Open { source, .. } => LossReason::Io {
+            kind: source.kind(),
+        },
+        _ => LossReason::NotMcap,
+    }
+}
+
+fn lost(file: PathBuf, reason: LossReason) -> Loss {
+    Loss {
+        file,
+        at_byte: 0,
+        reason,
+        messages_read: 0,
+    }
+}
+
+/// Refuses a bag without a byte, a file alone that is no MCAP, and messages that rosbag2 has compressed one by one.
+fn refuse(folder: &Path, files: &[PathBuf]) -> Result<(), RecorderError> {
+    let is_empty = |path: &PathBuf| path.metadata().is_ok_and(|it| it.len() == 0);
+    if !files.is_empty() && files.iter().all(is_empty) {
         let path = match files {
             [only] => only.clone(),
             _ => folder.to_owned(),
@@ -85,19 +141,17 @@ fn is_no_mcap(path: &Path) -> Option<bool> {
     Some(!ends_as_one)
 }
 
-fn kind_of(path: &Path) -> Option<&'static str> {
+/// What a file is that rosbag2 writes besides MCAP.
+fn kind_of(file: File) -> std::io::Result<Option<&'static str>> {
     let mut start = Vec::new();
-    let file = File::open(path).ok()?;
-    file.take(SQLITE.len() as u64)
-        .read_to_end(&mut start)
-        .ok()?;
-    if start.starts_with(ZSTD) {
+    file.take(SQLITE.len() as u64).read_to_end(&mut start)?;
+    Ok(if start.starts_with(ZSTD) {
         Some("is a file that rosbag2 has compressed as a whole")
     } else if start.starts_with(SQLITE) {
         Some("is an SQLite database")
     } else {
         None
-    }
+    })
 }
 
 #[cfg(test)]
@@ -110,8 +164,11 @@ mod tests {
         for (name, bytes) in files {
             std::fs::write(path(name), bytes).unwrap();
         }
-        let files: Vec<PathBuf> = files.iter().map(|(name, _)| path(name)).collect();
-        refuse(folder.path(), &files).err().map(|e| e.to_string())
+        let parts = Parts {
+            files: files.iter().map(|(name, _)| path(name)).collect(),
+            absent: Vec::new(),
+        };
+        readable(folder.path(), parts).err().map(|e| e.to_string())
     }
 
     #[test]

@@ -17,7 +17,11 @@ const MOST_TEXT_BYTES: u64 = 256 << 20;
 
 /// The kind of a file that is not regular; `None` for a regular file.
 fn kind_of(path: &Path) -> std::io::Result<Option<&'static str>> {
-    let kind = fs::metadata(path)?.file_type();
+    let kind = match fs::metadata(path) {
+        Ok(metadata) => metadata.file_type(),
+        Err(_) if path.is_symlink() => return Ok(Some("a link that leads nowhere")),
+        Err(error) => return Err(error),
+    };
     Ok(if kind.is_file() {
         None
     } else if kind.is_dir() {
@@ -49,12 +53,28 @@ pub(super) fn open(path: &Path) -> Result<File, RecorderError> {
     File::open(path).map_err(failed)
 }
 
+/// The text of a bag's description.
+///
+/// # Errors
+/// Why it cannot be read.
+pub(super) fn description(path: &Path) -> Result<String, String> {
+    let file = match open(path) {
+        Ok(file) => file,
+        Err(RecorderError::NotRegular { kind, .. }) => {
+            return Err(format!("the description is {kind}, no regular file"));
+        }
+        Err(error) => return Err(format!("the description cannot be read: {error}")),
+    };
+    let mut text = String::new();
+    match file.take(MOST_TEXT_BYTES).read_to_string(&mut text) {
+        Ok(_) => Ok(text),
+        Err(_) => Err("the description cannot be read as UTF-8 text".to_owned()),
+    }
+}
+
 /// The text of a bag's description, as far as there is one.
 pub(super) fn text(path: &Path) -> Option<String> {
-    let mut text = String::new();
-    let file = open(path).ok()?;
-    file.take(MOST_TEXT_BYTES).read_to_string(&mut text).ok()?;
-    Some(text)
+    description(path).ok()
 }
 
 #[cfg(test)]
@@ -86,6 +106,13 @@ mod tests {
             let refused = text(path);
             assert!(refused.contains(kind), "{refused}");
         }
+        let link = folder.path().join("link.mcap");
+        std::os::unix::fs::symlink("nowhere", &link).unwrap();
+        let refused = text(&link);
+        assert!(
+            refused.contains("is a link that leads nowhere"),
+            "{refused}"
+        );
         // A pipe is not read as a description.
         let refused = text(&described);
         assert!(refused.contains("described"), "{refused}");

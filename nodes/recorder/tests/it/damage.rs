@@ -170,6 +170,44 @@ fn a_spoiled_chunk_is_left_out_and_the_next_one_is_read() {
     assert_eq!(losses.len(), 2);
 }
 
+/// The body of the second chunk of a file.
+fn second_chunk(bytes: &[u8]) -> usize {
+    let mut at = mcap::MAGIC.len();
+    let mut chunks = 0;
+    loop {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+        chunks += usize::from(bytes[at] == mcap::records::op::CHUNK);
+        if chunks == 2 {
+            return at + 9;
+        }
+        at += 9 + length;
+    }
+}
+
+#[test]
+fn a_chunk_whose_header_states_another_length_is_named_with_both_lengths() {
+    for compression in [ChunkCompression::None, ChunkCompression::Lz4] {
+        for more in [1_u64, 1_000] {
+            let home = tempfile::tempdir().unwrap();
+            let (mut bytes, path) = whole(home.path(), compression);
+            let at = second_chunk(&bytes) + 16;
+            let length = u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+            bytes[at..at + 8].copy_from_slice(&(length + more).to_le_bytes());
+            fs::write(&path, &bytes).unwrap();
+            let (found, losses) = read(&Bag::open(&path).unwrap(), Order::LogTime);
+            assert!(is_part_of(&found, &originals()));
+            let words = losses[0].to_string();
+            let stated = format!("{length} bytes, its header states {}", length + more);
+            assert!(
+                words.contains(&stated) || words.contains("decompressed"),
+                "{words}"
+            );
+            let is_plain = compression == ChunkCompression::None;
+            assert!(!is_plain || words.contains(&stated), "{words}");
+        }
+    }
+}
+
 #[test]
 fn a_recovered_bag_is_whole_and_holds_what_could_be_read() {
     let home = tempfile::tempdir().unwrap();

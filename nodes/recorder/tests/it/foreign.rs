@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use recorder::{Bag, ChunkCompression};
+use recorder::{Bag, ChunkCompression, MessageOrder, Order, RecorderConfig};
 
-use crate::sample::{record, small_chunks};
+use crate::sample::{expect_first, read, record, record_run, small_chunks};
 
 /// A small recording whose `metadata.yaml` says that rosbag2 has compressed it.
 fn compressed(home: &Path, mode: &str) -> std::path::PathBuf {
@@ -68,5 +68,154 @@ fn files_that_are_compressed_as_a_whole_and_databases_are_refused() {
         fs::write(folder.join("metadata.yaml"), listed).unwrap();
         let said = refusal(&folder);
         assert!(said.contains(what) && said.contains(name), "{said}");
+    }
+}
+
+/// Puts something of the name into a bag's folder.
+type Stray = fn(&Path);
+
+const STRAYS: [(&str, Stray, &str); 6] = [
+    (
+        "dead.mcap",
+        |path| std::os::unix::fs::symlink("nowhere", path).unwrap(),
+        "is a link that leads nowhere",
+    ),
+    (
+        "folder.mcap",
+        |path| fs::create_dir(path).unwrap(),
+        "is a folder",
+    ),
+    (
+        "pipe.mcap",
+        |path| {
+            let made = std::process::Command::new("mkfifo").arg(path).status();
+            assert!(made.unwrap().success());
+        },
+        "is a pipe (FIFO)",
+    ),
+    (
+        "device.mcap",
+        |path| std::os::unix::fs::symlink("/dev/zero", path).unwrap(),
+        "is a device",
+    ),
+    (
+        "database.mcap",
+        |path| fs::write(path, b"SQLite format 3\0 and more").unwrap(),
+        "is an SQLite database",
+    ),
+    (
+        "junk.mcap",
+        |path| fs::write(path, [0x5a; 64]).unwrap(),
+        "not an MCAP file",
+    ),
+];
+
+#[test]
+fn what_is_no_part_of_a_bag_is_a_loss_with_its_name_and_the_parts_are_read() {
+    for order in [Order::File, Order::LogTime] {
+        for (name, put, reason) in STRAYS {
+            let home = tempfile::tempdir().unwrap();
+            let (path, _) = record(home.path(), 60, small_chunks(ChunkCompression::None));
+            put(&path.join(name));
+            let (found, losses) = read(&Bag::open(&path).unwrap(), order);
+            expect_first(&found, 60);
+            assert_eq!(losses.len(), 1, "{losses:?}");
+            let words = losses[0].to_string();
+            assert!(words.contains(name) && words.contains(reason), "{words}");
+        }
+    }
+}
+
+#[test]
+fn a_part_that_the_description_names_and_that_is_no_file_is_one_loss() {
+    for (_, put, reason) in STRAYS {
+        let home = tempfile::tempdir().unwrap();
+        let config = RecorderConfig {
+            max_file_s: 0.2,
+            flush_period_s: 0.05,
+            ..RecorderConfig::default()
+        };
+        let (path, summary) = record(home.path(), 600, config);
+        assert!(summary.files.len() > 1, "{:?}", summary.files);
+        let part = path.join(&summary.files[0]);
+        fs::remove_file(&part).unwrap();
+        put(&part);
+        let bag = Bag::open(&path).unwrap();
+        assert_eq!(bag.description_losses(), []);
+        let (found, losses) = read(&bag, Order::LogTime);
+        assert!(!found.is_empty() && found.len() < 600);
+        assert_eq!(losses.len(), 1, "{losses:?}");
+        let words = losses[0].to_string();
+        assert!(words.contains(reason), "{words}");
+    }
+}
+
+#[test]
+fn a_description_that_contradicts_the_files_or_is_no_file_is_a_loss() {
+    let changes: [(&str, &str); 4] = [
+        ("storage_identifier: mcap", "storage_identifier: sqlite3"),
+        ("compression_mode: \"\"", "compression_mode: file"),
+        ("compression_mode: \"\"", "compression_mode: SOME"),
+        ("compression_format: \"\"", "compression_format: zstd"),
+    ];
+    for (from, to) in changes {
+        let home = tempfile::tempdir().unwrap();
+        let (path, _) = record(home.path(), 12, small_chunks(ChunkCompression::None));
+        let metadata = path.join("metadata.yaml");
+        let text = fs::read_to_string(&metadata).unwrap();
+        assert!(text.contains(from), "{text}");
+        fs::write(&metadata, text.replace(from, to)).unwrap();
+        let bag = Bag::open(&path).unwrap();
+        assert_eq!(bag.message_count(), 12);
+        let losses = bag.description_losses();
+        assert_eq!(losses.len(), 1, "{losses:?}");
+        let words = losses[0].to_string();
+        let (key, value) = to.split_once(": ").unwrap();
+        assert!(words.contains(&format!("{key} = {value}: ")), "{words}");
+    }
+    for (name, put, reason) in &STRAYS[..4] {
+        let home = tempfile::tempdir().unwrap();
+        let (path, _) = record(home.path(), 12, small_chunks(ChunkCompression::None));
+        let metadata = path.join("metadata.yaml");
+        fs::remove_file(&metadata).unwrap();
+        put(&metadata);
+        let losses = Bag::open(&path).unwrap().description_losses().to_vec();
+        assert_eq!(losses.len(), 1, "{name}: {losses:?}");
+        assert!(losses[0].to_string().contains(reason), "{losses:?}");
+    }
+}
+
+#[test]
+fn parts_whose_names_are_exchanged_are_read_in_the_order_of_a_composed_run_alone() {
+    for (order, is_composed) in [
+        (Some(MessageOrder::Total), true),
+        (Some(MessageOrder::Arrival), false),
+        (None, false),
+    ] {
+        let home = tempfile::tempdir().unwrap();
+        let config = RecorderConfig {
+            max_file_s: 0.2,
+            flush_period_s: 0.05,
+            ..RecorderConfig::default()
+        };
+        let (path, summary) = record_run(home.path(), 600, config, order);
+        let parts: Vec<_> = summary.files.iter().map(|name| path.join(name)).collect();
+        assert!(parts.len() > 2, "{parts:?}");
+        let aside = path.join("aside");
+        fs::rename(&parts[0], &aside).unwrap();
+        fs::rename(&parts[1], &parts[0]).unwrap();
+        fs::rename(&aside, &parts[1]).unwrap();
+        let bag = Bag::open(&path).unwrap();
+        assert_eq!(bag.has_overlapping_files(), !is_composed);
+        assert!(!bag.has_doubled_file());
+        let times: Vec<i64> = read(&bag, Order::File)
+            .0
+            .iter()
+            .map(|it| it.stamp.log_time_nanos)
+            .collect();
+        assert_eq!(times.len(), 600);
+        assert_eq!(times.is_sorted(), is_composed);
+        fs::copy(&parts[0], path.join("run_99.mcap")).unwrap();
+        assert!(Bag::open(&path).unwrap().has_doubled_file());
     }
 }

@@ -190,3 +190,29 @@ fn a_recording_that_cannot_be_described_from_its_begin_is_not_begun() {
     };
     assert!(error.to_string().contains("metadata.yaml"), "{error}");
 }
+
+/// A message every so many seconds, for a day; whether the description had to be written no more than 40 times.
+fn is_described_seldom(every_s: i64, config: RecorderConfig) -> bool {
+    let home = tempfile::tempdir().unwrap();
+    let inner = Directory::create(&home.path().join("run")).unwrap();
+    let mut recording = Recording::begin(Undescribed { inner, left: 40 }, "run", config).unwrap();
+    let ids = add_channels(&mut recording);
+    for n in 0..86_400 / every_s {
+        let mut m = message(n);
+        m.stamp.log_time_nanos += n * every_s * 1_000_000_000;
+        recording.write(ids[m.channel], m.stamp, &m.data).unwrap();
+    }
+    recording.finish().is_ok()
+}
+
+#[test]
+fn a_log_of_a_day_that_is_read_when_finished_is_described_a_few_times_however_dense_it_is() {
+    for every_s in [20, 60, 600] {
+        assert!(is_described_seldom(
+            every_s,
+            RecorderConfig::read_when_finished()
+        ));
+        // By default it grows with the log time.
+        assert!(!is_described_seldom(every_s, RecorderConfig::default()));
+    }
+}

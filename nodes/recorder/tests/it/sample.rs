@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use recorder::{
-    Bag, Channel, ChannelId, ChunkCompression, Directory, Durability, Event, Loss, MessageStamp,
-    Order, QosProfile, RecorderConfig, Recording, RecordingSummary, Reliability, Shelf,
-    qos_to_yaml,
+    Bag, Channel, ChannelId, ChunkCompression, Directory, Durability, Event, Loss, MessageOrder,
+    MessageStamp, Order, QosProfile, RecorderConfig, Recording, RecordingSummary, Reliability,
+    RunContext, Shelf, qos_to_yaml,
 };
 use serde::Serialize;
 
@@ -283,9 +283,29 @@ pub fn add_channels<S: Shelf>(recording: &mut Recording<S>) -> Vec<ChannelId> {
 
 /// Records the sample's first `count` messages into `directory/run`.
 pub fn record(directory: &Path, count: i64, config: RecorderConfig) -> (PathBuf, RecordingSummary) {
+    record_run(directory, count, config, None)
+}
+
+/// The same of a run, where `order` is given.
+pub fn record_run(
+    directory: &Path,
+    count: i64,
+    config: RecorderConfig,
+    order: Option<MessageOrder>,
+) -> (PathBuf, RecordingSummary) {
     let path = directory.join("run");
     let shelf = Directory::create(&path).unwrap();
     let mut recording = Recording::begin(shelf, "run", config).unwrap();
+    if let Some(order) = order {
+        let start_time_nanos = BEGIN_NANOS as u64;
+        recording
+            .add_context(&RunContext {
+                start_time_nanos,
+                order,
+                ..RunContext::default()
+            })
+            .unwrap();
+    }
     let ids = add_channels(&mut recording);
     for n in 0..count {
         let message = message(n);

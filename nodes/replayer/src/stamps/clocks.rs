@@ -18,22 +18,51 @@ use super::{Level, MARGIN_NANOS, TopicStamps, merged};
 /// Least and greatest offset, ns.
 type Offsets = (i64, i64);
 
-/// Offset of each such topic's stamps from the common one, ns, by topic.
-pub(super) fn others(topics: &[TopicStamps]) -> BTreeMap<usize, i64> {
+/// The stamps of a topic that is of another clock.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OtherClock {
+    /// Offset of its stamps from the common one, ns.
+    pub offset_nanos: i64,
+    /// Its first and last stamp, ns.
+    pub own: (i64, i64),
+    /// First and last stamp of the topics with the common offset, ns.
+    pub others: (i64, i64),
+}
+
+/// Such topics with their stamps.
+pub(super) fn others(topics: &[TopicStamps]) -> BTreeMap<usize, OtherClock> {
     let clocks = clocks(topics);
     let Some(common) = common(&clocks) else {
         return BTreeMap::new();
     };
-    let offset = |topic: &TopicStamps| {
+    let is_common = |topic: &&TopicStamps| steady(topic).is_some_and(|own| meets(common, own));
+    let of_common = topics.iter().filter(is_common);
+    let stamps_of_common = of_common.filter_map(stamps).reduce(joined);
+    let other = |topic: &TopicStamps| {
         let own = steady(topic)?;
         let mut others = clocks.iter().filter(|(name, _)| **name != topic.entry.name);
         let is_met = meets(common, own) || others.any(|(_, levels)| meets_any(levels, own));
-        (!is_met).then(|| own.0.saturating_sub(common.0))
+        let stamps = stamps(topic)?;
+        (!is_met).then(|| OtherClock {
+            offset_nanos: own.0.saturating_sub(common.0),
+            own: stamps,
+            others: stamps_of_common.unwrap_or(stamps),
+        })
     };
     let found = topics
         .iter()
-        .filter_map(|topic| Some((topic.topic, offset(topic)?)));
+        .filter_map(|topic| Some((topic.topic, other(topic)?)));
     found.collect()
+}
+
+/// First and last stamp of a topic, ns.
+fn stamps(topic: &TopicStamps) -> Option<(i64, i64)> {
+    let groups = topic.groups.iter().filter(|group| group.is_firm);
+    groups.map(|group| group.stamps).reduce(joined)
+}
+
+fn joined(a: (i64, i64), b: (i64, i64)) -> (i64, i64) {
+    (a.0.min(b.0), a.1.max(b.1))
 }
 
 /// Whether messages are stamped when they are made; the answers of another host's clock are not.

@@ -281,6 +281,15 @@ fn session(names: &[&str], by_s: f64) -> Vec<Of<'static>> {
     SESSION.into_iter().map(topic).collect()
 }
 
+/// First and last stamp of the topics of a session, in words.
+fn span(names: &[&str], by_s: f64, is_of: impl Fn(&str) -> bool) -> String {
+    let session = session(names, by_s);
+    let of = session.iter().filter(|(name, ..)| is_of(name));
+    let stamps = of.flat_map(|(.., times)| times.iter().map(|(_, stamp)| nanos(*stamp)));
+    let (first, last) = stamps.fold((i64::MAX, 0), |(a, b), at| (a.min(at), b.max(at)));
+    format!("{} to {} s", seconds(first), seconds(last))
+}
+
 #[test]
 fn a_topic_whose_stamps_are_all_of_another_time_than_those_of_the_others_is_named() {
     for (by_s, words) in [
@@ -314,6 +323,16 @@ fn a_topic_whose_stamps_are_all_of_another_time_than_those_of_the_others_is_name
             assert_eq!(topics, names, "{by_s}");
             for (topic, what) in &said {
                 assert!(what.starts_with(words), "{topic}: {what}");
+                let own = span(names, by_s, |name| name == topic);
+                let others = span(names, by_s, |name| !names.contains(&name));
+                let both = format!(
+                    "{way}: {own}, those {others}; set the clock",
+                    way = &words[words.len() - 5..]
+                );
+                assert!(
+                    what.contains(both.trim_start()),
+                    "{topic}: {what}, not {both}"
+                );
             }
         }
     }

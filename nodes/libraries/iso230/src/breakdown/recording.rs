@@ -12,12 +12,15 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::BreakdownError;
+use super::noise::median;
 use metrology::Axis;
 
 /// Fewer samples than this say nothing about two dozen causes.
 const MIN_SAMPLES_OF_CIRCLE: usize = 36;
 /// A deviation above this share of the radius is no deviation.
-const GREATEST_DEVIATION: f64 = 0.05;
+pub const GREATEST_DEVIATION: f64 = 0.05;
+/// One reading in so many may be an outlier; with more it is the shape of the circle.
+const OUTLIER_ONE_IN: usize = 10;
 
 /// Plane of a circle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -181,6 +184,14 @@ impl CircularRecording {
         Ok(())
     }
 
+    /// The first sample with a deviation that is none, from 0; `None` where all can be evaluated.
+    #[must_use]
+    pub fn beyond(&self) -> Option<usize> {
+        let limit_mm = GREATEST_DEVIATION * self.radius_mm;
+        let is_beyond = |sample: &CircularSample| sample.radial_deviation_mm.abs() > limit_mm;
+        self.samples.iter().position(is_beyond)
+    }
+
     fn check_samples(&self, recording: usize) -> Result<(), BreakdownError> {
         let limit_mm = GREATEST_DEVIATION * self.radius_mm;
         let mut previous_s = f64::NEG_INFINITY;
@@ -221,6 +232,24 @@ impl CircularRecording {
         });
         std::iter::once(first).chain(rest).collect()
     }
+}
+
+/// Places of radial deviations, mm, that lie further from their median than [`GREATEST_DEVIATION`] of the radius: single
+/// slips of an instrument or a table. Empty where more than a tenth lies there: then that is the circle.
+#[must_use]
+pub fn outliers(deviations_mm: &[f64], radius_mm: f64) -> Vec<usize> {
+    let middle_mm = median(deviations_mm.to_vec());
+    let limit_mm = GREATEST_DEVIATION * radius_mm;
+    let apart = deviations_mm.iter().map(|mm| (mm - middle_mm).abs());
+    let places: Vec<usize> = apart
+        .enumerate()
+        .filter(|(_, mm)| *mm > limit_mm)
+        .map(|(place, _)| place)
+        .collect();
+    if places.len() * OUTLIER_ONE_IN > deviations_mm.len() {
+        return Vec::new();
+    }
+    places
 }
 
 /// Steps of the angle from sample to sample, the short way round, rad.
@@ -314,5 +343,30 @@ mod tests {
             bad.check(0),
             Err(BreakdownError::TooFewSamples { n: 10, .. })
         ));
+    }
+
+    #[test]
+    fn single_slips_are_outliers_and_the_shape_of_a_circle_is_none() {
+        let circle = |slips: &[(usize, f64)], offset_mm: f64| {
+            let wave = |k: usize| offset_mm + 0.01 * (k as f64 / 20.0).sin();
+            let mut deviations: Vec<f64> = (0..200).map(wave).collect();
+            for (at, mm) in slips {
+                deviations[*at] = *mm;
+            }
+            deviations
+        };
+        for radius_mm in [10.0, 100.0, 300.0] {
+            let slip_mm = 0.06 * radius_mm;
+            for offset_mm in [0.0, -0.07 * radius_mm] {
+                assert!(outliers(&circle(&[], offset_mm), radius_mm).is_empty());
+                let slips = [(3, slip_mm), (77, -0.2 * radius_mm)];
+                assert_eq!(outliers(&circle(&slips, offset_mm), radius_mm), [3, 77]);
+                let small = [(3, offset_mm + 0.04 * radius_mm)];
+                assert!(outliers(&circle(&small, offset_mm), radius_mm).is_empty());
+            }
+            let many: Vec<(usize, f64)> = (0..30).map(|at| (at, slip_mm)).collect();
+            assert!(outliers(&circle(&many, 0.0), radius_mm).is_empty());
+        }
+        assert!(outliers(&[], 100.0).is_empty());
     }
 }

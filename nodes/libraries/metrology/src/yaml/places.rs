@@ -297,6 +297,12 @@ impl Places {
             .collect()
     }
 
+    /// Number of values, where a list stands at a node.
+    pub(super) fn list_length(&self, node: usize) -> Option<usize> {
+        let node = &self.nodes[node];
+        matches!(node.kind, Kind::List).then_some(node.n_children)
+    }
+
     /// What stands at a node.
     pub(super) fn value(&self, node: usize) -> String {
         let node = &self.nodes[node];

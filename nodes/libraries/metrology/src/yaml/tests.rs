@@ -106,6 +106,14 @@ fn every_error_names_place_key_value_and_what_belongs_there() {
             "3:38: axes.X.travel_mm[1] = far: must be a number, in mm",
         ),
         (
+            "name: m\naxes:\n  X: {lead_mm: 1.0, travel_mm: [-300,0, 300,0]}\n",
+            "axes.X.travel_mm = a list of 4: must be a list of 2, in mm; a comma separates values, decimals have a point",
+        ),
+        (
+            "name: m\naxes:\n  X: {lead_mm: 1.0, travel_mm: [0.0, 1.0, 2.0]}\n",
+            "axes.X.travel_mm = a list of 3: must be a list of 2, in mm",
+        ),
+        (
             "name: m\naxes:\n  X: {lead_mm: 1.0, channels: 300}\n",
             "3:31: axes.X.channels = 300: must be a whole number from 0 to 255",
         ),

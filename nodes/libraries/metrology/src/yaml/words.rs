@@ -62,6 +62,12 @@ pub(super) fn in_own_words(error: &Error, text: &str) -> YamlError {
             (key, value) = (String::new(), None);
             syntax(text, place)
         }
+        Error::SerdeInvalidLength { len, expected, .. } => {
+            // serde counts up to the first value that is too many.
+            let n_values = node.and_then(|node| places.list_length(node));
+            let remedy = decimal_commas(n_values.unwrap_or(*len), expected);
+            format!("must be {}{remedy}", wanted(expected, &key))
+        }
         other => {
             let among = node.map(|node| candidates(other, &places, node));
             let named: Vec<&str> = among
@@ -319,9 +325,6 @@ fn rule(error: &Error, key: &str) -> String {
         Error::SerdeInvalidType { expected, .. } | Error::SerdeInvalidValue { expected, .. } => {
             must(&wanted(expected, key))
         }
-        Error::SerdeInvalidLength { len, expected, .. } => {
-            format!("must be {}, and has {len}", wanted(expected, key))
-        }
         Error::InvalidScalar { ty, .. } => must(&wanted(ty, key)),
         Error::Unexpected { expected, .. } => must(&wanted(expected, key)),
         Error::SerdeUnknownVariant {
@@ -370,6 +373,24 @@ fn rule(error: &Error, key: &str) -> String {
         Error::UnexpectedValueForUnitEnumVariant { .. } => must("a name without values"),
         _ => "is not what belongs here: see the README for what does".to_owned(),
     }
+}
+
+/// How a list came to twice its values.
+fn decimal_commas(n_values: usize, expected: &str) -> &'static str {
+    if list_length(expected).is_some_and(|n| n_values == 2 * n) {
+        "; a comma separates values, decimals have a point"
+    } else {
+        ""
+    }
+}
+
+/// The length of a list that is expected, by serde's words.
+fn list_length(expected: &str) -> Option<usize> {
+    let beginnings = ["an array of length ", "a tuple of size "];
+    let mut lengths = beginnings
+        .iter()
+        .filter_map(|beginning| expected.strip_prefix(beginning));
+    lengths.next()?.trim().parse().ok()
 }
 
 /// A file that is larger or deeper than what is read, with what it has and the limit.
@@ -466,10 +487,8 @@ fn count(key: &str, of_type: &str) -> String {
 
 fn by_beginning(expected: &str, key: &str) -> String {
     let unit = unit_of(key).map(|unit| format!(", in {unit}"));
-    for beginning in ["an array of length ", "a tuple of size "] {
-        if let Some(n) = expected.strip_prefix(beginning) {
-            return format!("a list of {n}{}", unit.unwrap_or_default());
-        }
+    if let Some(n) = list_length(expected) {
+        return format!("a list of {n}{}", unit.unwrap_or_default());
     }
     let is_of = |word: &str| expected.starts_with(word);
     if is_of("struct ") || is_of("struct variant") {

@@ -278,3 +278,89 @@ fn conditions_name_the_ballbar_and_count_no_radius_without_its_length_as_correct
         "{words}"
     );
 }
+
+/// Two circles of both senses; the readings of each run are moved outwards by so many mm.
+fn moved(slips: &[(u32, usize, f64)]) -> Vec<Section> {
+    let mut circles: Vec<CircleRecording> = [(1, 1), (2, 1), (3, 2), (4, 2)]
+        .into_iter()
+        .map(|(run, zero_id)| {
+            let sense = if run % 2 == 1 {
+                Sense::CounterClockwise
+            } else {
+                Sense::Clockwise
+            };
+            let mut circle = circle(run, sense, Instrument::Ballbar);
+            circle.segment.zero_id = zero_id;
+            circle
+        })
+        .collect();
+    for (run, at, mm) in slips {
+        let circle = circles
+            .iter_mut()
+            .find(|one| one.segment.run == *run)
+            .unwrap();
+        let [u, v] = circle.points[*at].at_mm;
+        let longer = 1.0 + mm / u.hypot(v);
+        circle.points[*at].at_mm = [u * longer, v * longer];
+    }
+    sections(&circles, None, &TestConditions::default()).unwrap()
+}
+
+#[test]
+fn an_outlier_refuses_its_run_by_name_in_figures_and_causes_and_the_others_are_evaluated() {
+    let sound = moved(&[]);
+    for (at, mm) in [(0, 90.0), (283, -3.0), (719, 2.6)] {
+        let found = moved(&[(2, at, mm)]);
+        assert_eq!(found.len(), sound.len());
+        let words = all_words(&found[0]);
+        let named = format!("Not evaluated: run 2: reading {} of 720, ", at + 1);
+        assert!(words.contains(&named), "{words}");
+        assert!(
+            words.contains("at most 2.5 mm (5 % of the radius)"),
+            "{words}"
+        );
+        assert!(found[0].title.contains("run 1:"), "{}", found[0].title);
+        let lines = found[0].figures["not_evaluated"].as_array().unwrap();
+        assert!(
+            lines[0].as_str().is_some_and(|line| words.contains(line)),
+            "{lines:?}"
+        );
+        assert_eq!(found[1].figures, sound[1].figures);
+        // The other sense has the figure that it has without it.
+        let g = |section: &Section| cell(section, "counter-clockwise", "G").to_owned();
+        assert_eq!(g(&found[0]), g(&sound[0]));
+        assert_eq!(g(&found[1]), g(&sound[1]));
+        let causes = &found[2];
+        assert!(causes.title.starts_with("Causes in XY"), "{}", causes.title);
+        assert!(
+            causes.answers[0].starts_with("3 recordings"),
+            "{:?}",
+            causes.answers
+        );
+        assert!(
+            all_words(causes).contains("Left out: run 2: reading"),
+            "{}",
+            all_words(causes)
+        );
+    }
+}
+
+#[test]
+fn where_no_circle_is_sound_nothing_is_evaluated_and_each_reason_is_named() {
+    let slips: Vec<(u32, usize, f64)> = (1..=4).map(|run| (run, 7, 9.0)).collect();
+    let found = moved(&slips);
+    for section in &found[..2] {
+        assert!(section.tables.is_empty());
+        assert_eq!(all_words(section).matches("reading 8 of 720").count(), 2);
+    }
+    let words = all_words(&found[2]);
+    assert!(
+        words.contains("Not evaluated: no circle can be broken down"),
+        "{words}"
+    );
+    assert_eq!(words.matches("Left out: run").count(), 4, "{words}");
+}
+
+fn all_words(section: &Section) -> String {
+    section.terminal()
+}
