@@ -36,6 +36,7 @@ fn drift_test(displacement_mm: impl Fn(f64) -> f64, hours: f64) -> DriftTest {
 const CERTAIN_DRIFT: DriftBudget = DriftBudget {
     sensor: EXACT_DEVICE,
     reading_scatter_mm: 0.0,
+    sensor_error_period_mm: None,
     artefact_length_mm: 0.0,
     artefact_expansion_per_k: 0.0,
     artefact_temperature_range_k: 0.0,
@@ -116,6 +117,7 @@ fn eq5_of_a_drift_budget_by_hand() {
             ..EXACT_DEVICE
         },
         reading_scatter_mm: 0.0,
+        sensor_error_period_mm: None,
         artefact_length_mm: 200.0,
         artefact_expansion_per_k: 1e-6,
         artefact_temperature_range_k: 0.2 * 3.0_f64.sqrt(),
@@ -154,6 +156,7 @@ fn eq5_certificate_scatter_and_artefact_by_hand() {
             coverage_factor: 2.0,
         },
         reading_scatter_mm: 0.000_1,
+        sensor_error_period_mm: None,
         artefact_length_mm: 200.0,
         artefact_expansion_per_k: 1e-6,
         artefact_temperature_range_k: 0.2 * 3.0_f64.sqrt(),
