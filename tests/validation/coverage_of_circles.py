@@ -11,7 +11,8 @@ Printed with numpy 2.4.6 for 4000 machines, in % (two standard deviations are 0.
     circle     G 95.7  F max 96.9  F min 96.0  G(b) 93.9  D 97.0  H 95.9  G ccw 95.5  F max ccw 96.5
       with all of the certificate  G 95.0  F max 98.0  F min 97.4  G(b) 93.0  D 98.1  H 93.2  G ccw 94.8  F max ccw 98.0
     diagonals  E_d 97.5  B_d 97.4  spread 95.7
-    thermal    d 94.7  range 93.0  rate 99.1, with a stated artefact  d 98.6  range 95.0  rate 99.7
+    thermal    d 94.8  range 93.1  rate 98.8, with the period of the instrument's error  rate 95.3
+               with that and an artefact that grows  d 98.6  range 95.1  rate 99.7
 """
 
 from __future__ import annotations

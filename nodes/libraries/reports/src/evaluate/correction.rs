@@ -435,6 +435,8 @@ misalignment_mm: 0.1
 environmental_drift_um: 0.3
 ";
 
+    const MACHINE: &str = include_str!("../../../../../launch_configs/dual_loop/machine.yaml");
+
     fn measured(budget: Option<&str>, reference: Reference) -> Measured {
         let budget = budget.map(|text| Budget::read(text, Path::new("budget.yaml")).unwrap());
         let about = About {
@@ -499,8 +501,9 @@ environmental_drift_um: 0.3
             );
         }
         // With the scale in the loop.
+        const OF_SCALE: &str = "scale_expanded_uncertainty_um_per_m: 3.0";
         let file = |feedback: &str| {
-            let text = format!("{MACHINE}{feedback}}}\n");
+            let text = MACHINE.replacen(OF_SCALE, &format!("{OF_SCALE}{feedback}"), 1);
             Some(machine::MachineFile::parse(&text, "machine.yaml").unwrap())
         };
         for (feedback, expansion) in [("", 46.4e-6), (", position_feedback: scale", 8e-6)] {

@@ -9,7 +9,7 @@ use super::{LEAST_SHARE, LENGTHS, capital, figure, periods_mm, runs, side_of};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, unstate_named};
 use crate::evaluate::correction::{About, Measured};
-use crate::evaluate::linear::{LinearTest, Reference};
+use crate::evaluate::linear::LinearTest;
 use crate::section::{NOT_EVALUATED, Rows, Section, head, um};
 use crate::terminal::Rank;
 

@@ -8,7 +8,7 @@
 //! of the standard, written out here. `tests/validation/coverage_of_u.py` makes machines and figures of its own for axes,
 //! probing and periodic errors. The machine's scatter is part of it: ISO 230 states figures of the runs that were made.
 
-mod circle;
+pub mod circle;
 mod diagonals;
 mod linear;
 mod periodic;
@@ -88,8 +88,13 @@ pub fn hold(shares: &[(&'static str, f64)], wanted: &[(&str, f64, f64)]) {
 /// Least and greatest share of machines, %, that the clause on coverage allows: 93 to 97, each with two standard deviations of
 /// the share of [`MACHINES`] machines that are held so often.
 pub fn clause() -> [f64; 2] {
-    let deviation =
-        |percent: f64| 100.0 * (percent / 100.0 * (1.0 - percent / 100.0) / MACHINES as f64).sqrt();
+    clause_of(MACHINES)
+}
+
+/// The same of another number of machines.
+pub fn clause_of(machines: u64) -> [f64; 2] {
+    let variance = |percent: f64| percent * (100.0 - percent) / machines as f64;
+    let deviation = |percent: f64| variance(percent).sqrt();
     [93.0 - 2.0 * deviation(93.0), 97.0 + 2.0 * deviation(97.0)]
 }
 
