@@ -1,12 +1,11 @@
 //! The motion that a measurement was made with, from the order of its rows.
 
 use anyhow::{Context as _, Result, bail};
-use iso230::thermal::DriftCause;
+use iso230::thermal::{DriftCause, height_name};
 use metrology::number::number;
 use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
 use metrology::{Axis, PerAxis, Stamp};
 use nalgebra::Vector3;
-use reports::evaluate::drift::height_name;
 
 use super::limits::SETTLE_S;
 use super::map::{Map, Plane, Test, units};
@@ -378,7 +377,7 @@ fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
 }
 
 /// What a log is of: its axis, the cause of the drift and the heights of its sensors where they are stated, as
-/// [`reports::evaluate::drift`] reads them.
+/// `reports::evaluate::drift` reads them.
 fn named((axis, cause): (Axis, Option<DriftCause>), heights_mm: &[f64]) -> Vec<String> {
     let cause = match cause {
         None | Some(DriftCause::NotStated) => None,

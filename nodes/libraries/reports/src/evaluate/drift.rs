@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use iso230::thermal::DriftCause;
+use iso230::thermal::{DriftCause, height_of};
 use metrology::sample::{
     AxisState, LengthSample, MachineValue, Quantity, TemperatureSample, TestKind, TestSegment,
     Verdict,
@@ -101,22 +101,9 @@ struct Open {
     of: BTreeMap<(Axis, Option<u32>), (Series, u32, bool)>,
 }
 
-/// Before the zero of a sensor, in a name that states its height.
-const HEIGHT_OF: &str = "height_of_zero_";
-
-/// The name among the features of a log that states the height (mm) of the sensor whose readings have a zero.
-#[must_use]
-pub fn height_name(zero_id: u32, height_mm: f64) -> String {
-    format!("{HEIGHT_OF}{zero_id}_mm={height_mm}")
-}
-
 /// Heights by zeros that a log names, mm.
 fn heights_mm(begin: &TestSegment) -> BTreeMap<u32, f64> {
-    let read = |name: &String| {
-        let (zero, height) = name.strip_prefix(HEIGHT_OF)?.split_once("_mm=")?;
-        let height_mm: f64 = height.parse().ok()?;
-        Some((zero.parse().ok()?, height_mm)).filter(|_| height_mm.is_finite())
-    };
+    let read = |name: &String| height_of(name);
     begin.features.iter().filter_map(read).collect()
 }
 
@@ -223,6 +210,8 @@ fn cause(begin: &TestSegment) -> DriftCause {
 
 #[cfg(test)]
 mod tests {
+    use iso230::thermal::height_name;
+
     use super::*;
 
     fn at(ms: i64) -> Stamp<Host> {
