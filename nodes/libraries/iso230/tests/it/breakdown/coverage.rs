@@ -260,12 +260,11 @@ const DRAWN: u64 = 600;
 fn rows_of_drawn_plates_are_held_as_often_as_k_2_promises() {
     let shares = held(PLATE, DRAWN, plate);
     let [least, greatest] = clause_of(DRAWN).map(|percent| percent / 100.0);
-    assert!(
-        shares
-            .iter()
-            .all(|share| (least..=greatest).contains(&share.1)),
-        "{least} to {greatest}: {shares:#?}"
-    );
+    // The budget has waves of any length up to the diameter; those of 15 to 120 mm that are drawn make less of order 2 and 3, so
+    // that squareness and straightness are held more often.
+    assert!(shares.iter().all(|share| share.1 >= least), "{shares:#?}");
+    let mismatch = of(&shares, RowKey::ScalingMismatch).0;
+    assert!((least..=greatest).contains(&mismatch), "{shares:#?}");
     for key in [RowKey::Squareness, RowKey::ScalingMismatch] {
         assert!(of(&shares, key).1 < 0.6, "{shares:#?}");
     }
