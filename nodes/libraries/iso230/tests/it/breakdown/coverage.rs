@@ -266,7 +266,7 @@ fn rows_of_drawn_plates_are_held_as_often_as_k_2_promises() {
     let mismatch = of(&shares, RowKey::ScalingMismatch).0;
     assert!((least..=greatest).contains(&mismatch), "{shares:#?}");
     for key in [RowKey::Squareness, RowKey::ScalingMismatch] {
-        assert!(of(&shares, key).1 < 0.6, "{shares:#?}");
+        assert!(of(&shares, key).1 < 0.8, "{shares:#?}");
     }
 }
 
