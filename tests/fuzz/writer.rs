@@ -40,7 +40,11 @@ impl Writer {
         self.write()
     }
 
-    pub fn length(&mut self, _: Axis, _: f64) -> Result<()> {
+    pub fn length(&mut self, axis: Axis, displacement_mm: f64) -> Result<()> {
+        self.length_of((axis, 1), displacement_mm)
+    }
+
+    pub fn length_of(&mut self, _: (Axis, u32), _: f64) -> Result<()> {
         self.write()
     }
 

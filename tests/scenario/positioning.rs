@@ -66,14 +66,15 @@ impl Run {
             .collect()
     }
 
-    /// The positioning tests of the page, each checked to be the laser's and at 20 °C.
-    fn by_laser(&self) -> Vec<&Value> {
+    /// The positioning tests of the page, each checked to be the laser's and at 20 °C by the thermometers of `sources`.
+    fn by_laser(&self, sources: &[&str]) -> Vec<&Value> {
         let tests = self.report["tests"].as_array().unwrap();
         let found: Vec<&Value> = tests
             .iter()
             .filter(|test| test.get("iso230_2").is_some())
             .collect();
-        for test in &found {
+        assert_eq!(found.len(), sources.len());
+        for (test, source) in found.iter().zip(sources) {
             let title = test["test"].as_str().unwrap();
             assert!(title.ends_with("by the length reference"), "{title}");
             assert!(
@@ -82,7 +83,7 @@ impl Run {
             );
             let correction = &test["correction_to_20_degc"];
             assert_eq!(correction["done"], true, "{correction:#}");
-            assert_eq!(correction["machine"]["source"], "read by bed");
+            assert_eq!(correction["machine"]["source"], *source);
         }
         found
     }
@@ -119,15 +120,18 @@ fn a_learned_table_takes_the_screw_out_of_a_semi_closed_axis_and_follows_its_gro
     assert!(truths[1] < 0.75 * truths[0], "{truths:?}");
     assert!(truths[2] < 0.35 * truths[3], "{truths:?}");
     // What no part of the machine reads: the laser, without and with the table, and with it on the warm machine.
-    let by_laser = run.by_laser();
+    // The screw carries what the motor leads, the scale on the bed what its table compensates.
+    let by_laser = run.by_laser(&["read by nut_x", "read by bed", "read by bed"]);
     let accuracy_um: Vec<f64> =
         (by_laser.iter().map(|test| iso230_2_um(test, "accuracy"))).collect();
     eprintln!("dual_loop: A by the laser {accuracy_um:.2?} um");
     let [semi_cold, dual_cold, dual_warm] = accuracy_um[..] else {
         panic!("three tests by the laser: {accuracy_um:?}");
     };
-    assert!(dual_cold < 0.35 * semi_cold, "{accuracy_um:?}");
-    assert!(dual_warm < semi_cold, "{accuracy_um:?}");
+    // At 20 °C of the screw, the first has no growth of the screw but that of its ten runs; in the last, the screw cools behind
+    // a table that is not refreshed meanwhile.
+    assert!(dual_cold < 0.5 * semi_cold, "{accuracy_um:?}");
+    assert!(dual_warm < 1.3 * semi_cold, "{accuracy_um:?}");
     let conditions = &run.report["conditions"];
     assert_eq!(conditions["instruments"][0]["kind"], "length_reference");
     let thermometers = conditions["thermometers"].as_array().unwrap();
@@ -140,7 +144,7 @@ fn a_scale_in_the_loop_keeps_the_axis_where_it_is_warm_or_cold() {
     let p95_um = run.scale_p95_um(Axis::X);
     let truths = ["full-closed cold", "full-closed after 1 h"];
     let truths = truths.map(|label| run.true_p95_um(label));
-    let by_laser = run.by_laser();
+    let by_laser = run.by_laser(&["read by bed", "read by bed"]);
     let [cold, warm] = by_laser[..] else {
         panic!("two tests by the laser: {by_laser:#?}");
     };

@@ -335,7 +335,7 @@ fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> {
     sections.extend(reports::probing::sections(tests, budget));
     sections.extend(reports::drift::sections(
         &tests.blocks,
-        &tests.drift,
+        (&tests.drift, &tests.conditions),
         budget,
     )?);
     Ok(sections)

@@ -177,12 +177,15 @@ pub fn check(map: &Map, machine: &MachineFile) -> Result<()> {
         }
         Test::Log {
             axis,
+            second_displacement_um,
+            heights_mm,
             temperature_degc,
             ..
         } => {
             if !axis.is_linear() {
                 bail!("test.log.axis = {axis}: must be one of X, Y, Z: displacements are lengths");
             }
+            heights(*axis, second_displacement_um.is_some(), heights_mm)?;
             feed(machine, &[*axis], 0.0)?;
             temperature_degc
                 .keys()
@@ -262,6 +265,36 @@ pub fn outliers_of_circles(runs: &Runs, radius_mm: f64, column: &str) -> Vec<Str
         found.map(in_words).collect()
     };
     runs.runs.iter().flat_map(of_run).collect()
+}
+
+/// Farthest that a sensor of a drift test stands from the common level, mm.
+const FARTHEST_HEIGHT_MM: f64 = 10_000.0;
+
+/// Heights of the sensors of a log: two where there are two columns, one or none else.
+fn heights(axis: Axis, has_second: bool, heights_mm: &[f64]) -> Result<()> {
+    let key = "test.log.heights_mm";
+    for (k, height_mm) in heights_mm.iter().enumerate() {
+        if height_mm.is_nan() || height_mm.abs() > FARTHEST_HEIGHT_MM {
+            bail!(
+                "{key}[{k}] = {} mm: must be from -{FARTHEST_HEIGHT_MM} to {FARTHEST_HEIGHT_MM} mm",
+                number(*height_mm)
+            );
+        }
+    }
+    match (has_second, heights_mm) {
+        (false, [] | [_]) => Ok(()),
+        (false, _) => bail!(
+            "{key} has {} heights: must be one for one displacement, or two with second_displacement_um",
+            heights_mm.len()
+        ),
+        (true, _) if axis == Axis::Z => bail!(
+            "test.log.second_displacement_um: two heights of displacements along Z make no tilt: measure along X or Y, or import each as a log of its own"
+        ),
+        (true, [first, second]) if first.total_cmp(second).is_ne() => Ok(()),
+        (true, [..]) => bail!(
+            "{key} = {heights_mm:?}: must be two different heights, of displacement_um and of second_displacement_um"
+        ),
+    }
 }
 
 /// A thermometer of the machine file.

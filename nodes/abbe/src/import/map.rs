@@ -109,7 +109,7 @@ pub enum Test {
         /// Column of measured minus nominal radius, µm.
         radial_um: String,
     },
-    /// Temperatures and one displacement while the axes stand.
+    /// Temperatures and one displacement, or two at two heights, while the axes stand.
     Log {
         /// The axis along which the displacement is measured.
         axis: Axis,
@@ -121,8 +121,14 @@ pub enum Test {
         run: Option<String>,
         /// Column of the time, s.
         time_s: String,
-        /// Column of the displacement, µm.
+        /// Column of the displacement, µm; of two heights that of the first.
         displacement_um: String,
+        /// Column of the displacement at the second of two heights, µm, for the tilt of ISO 230-3.
+        #[serde(default)]
+        second_displacement_um: Option<String>,
+        /// Heights of the sensor, or of both, above any common level along Z, mm.
+        #[serde(default)]
+        heights_mm: Vec<f64>,
         /// Column of each temperature by the sensor's name in the machine file, degC.
         #[serde(default)]
         temperature_degc: BTreeMap<String, String>,
@@ -371,14 +377,17 @@ impl Test {
                 run,
                 time_s,
                 displacement_um,
+                second_displacement_um,
                 temperature_degc,
                 ..
             } => {
                 let run = run.iter().map(|name| column(name, What::Run));
-                let fixed = [
-                    column(time_s, What::Time),
-                    column(displacement_um, What::Deviation(Unit::Um)),
-                ];
+                let displacement = |name| column(name, What::Deviation(Unit::Um));
+                let fixed = [column(time_s, What::Time), displacement(displacement_um)];
+                let second = second_displacement_um.iter();
+                let fixed = fixed
+                    .into_iter()
+                    .chain(second.map(|name| displacement(name)));
                 let sensors = temperature_degc.values();
                 let sensors = sensors.map(|name| column(name, What::Temperature));
                 run.chain(fixed).chain(sensors).collect()

@@ -1,7 +1,7 @@
 //! The motion that a measurement was made with, from the order of its rows.
 
 use anyhow::{Context as _, Result, bail};
-use iso230::thermal::DriftCause;
+use iso230::thermal::{DriftCause, height_name};
 use metrology::number::number;
 use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
 use metrology::{Axis, PerAxis, Stamp};
@@ -60,6 +60,8 @@ pub fn write(map: &Map, runs: &Runs, writer: &mut Writer) -> Result<u32> {
                 axis,
                 cause,
                 run,
+                second_displacement_um,
+                heights_mm,
                 temperature_degc,
                 ..
             } => {
@@ -68,8 +70,10 @@ pub fn write(map: &Map, runs: &Runs, writer: &mut Writer) -> Result<u32> {
                 let begin_s = runs.runs[0][0].cells[first];
                 let rows = rows.iter().map(|row| (row.line, &row.cells[first..]));
                 let mut test = segment(TestKind::Dwell, n, 0.0);
-                test.features = named(*axis, *cause);
-                log((*axis, &test, begin_s), &sensors, rows, &position, writer)?;
+                test.features = named((*axis, *cause), heights_mm);
+                let displacements = 1 + usize::from(second_displacement_um.is_some());
+                let columns = (displacements, sensors.as_slice());
+                log((*axis, &test, begin_s), columns, rows, &position, writer)?;
             }
         }
     }
@@ -372,8 +376,9 @@ fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
     all
 }
 
-/// What a log is of: its axis and, where it was said, the cause of the drift, as [`reports::evaluate::drift`] reads them.
-fn named(axis: Axis, cause: Option<DriftCause>) -> Vec<String> {
+/// What a log is of: its axis, the cause of the drift and the heights of its sensors where they are stated, as
+/// `reports::evaluate::drift` reads them.
+fn named((axis, cause): (Axis, Option<DriftCause>), heights_mm: &[f64]) -> Vec<String> {
     let cause = match cause {
         None | Some(DriftCause::NotStated) => None,
         Some(DriftCause::Environment) => Some("environment"),
@@ -381,13 +386,18 @@ fn named(axis: Axis, cause: Option<DriftCause>) -> Vec<String> {
         Some(DriftCause::LinearAxis) => Some("linear_axis"),
         Some(DriftCause::RotaryAxis) => Some("rotary_axis"),
     };
-    let names = std::iter::once(axis.letter()).chain(cause);
-    names.map(str::to_owned).collect()
+    let names = std::iter::once(axis.letter())
+        .chain(cause)
+        .map(str::to_owned);
+    let heights = (1..).zip(heights_mm);
+    names
+        .chain(heights.map(|(zero_id, height_mm)| height_name(zero_id, *height_mm)))
+        .collect()
 }
 
 fn log<'a>(
     (axis, test, begin_s): (Axis, &TestSegment, f64),
-    sensors: &[&str],
+    (displacements, sensors): (usize, &[&str]),
     rows: impl Iterator<Item = (u64, &'a [f64])>,
     position: &PerAxis<f64>,
     writer: &mut Writer,
@@ -402,10 +412,11 @@ fn log<'a>(
             has_begun = true;
         }
         writer.tick(position)?;
-        if row[1].is_finite() {
-            writer.length(axis, position[axis] + row[1] * 1e-3)?;
+        let (of_lengths, of_sensors) = row[1..].split_at(displacements);
+        for (zero_id, um) in (1..).zip(of_lengths).filter(|(_, um)| um.is_finite()) {
+            writer.length_of((axis, zero_id), position[axis] + um * 1e-3)?;
         }
-        let read = sensors.iter().zip(&row[2..]);
+        let read = sensors.iter().zip(of_sensors);
         for (sensor, degc) in read.filter(|(_, degc)| degc.is_finite()) {
             writer.temperature(sensor, *degc)?;
         }

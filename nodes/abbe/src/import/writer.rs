@@ -143,6 +143,14 @@ impl Writer {
     /// # Errors
     /// When it cannot be written.
     pub fn length(&mut self, axis: Axis, displacement_mm: f64) -> Result<()> {
+        self.length_of((axis, 1), displacement_mm)
+    }
+
+    /// A reading of one of several sensors along an axis, each with a zero of its own.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn length_of(&mut self, (axis, zero_id): (Axis, u32), displacement_mm: f64) -> Result<()> {
         self.write(
             &topics::LENGTH_POSITION,
             topics::LENGTH_POSITION.name.to_owned(),
@@ -150,7 +158,7 @@ impl Writer {
                 at: self.at,
                 axis,
                 displacement_mm,
-                zero_id: 1,
+                zero_id,
             },
         )
     }

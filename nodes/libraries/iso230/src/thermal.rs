@@ -29,21 +29,32 @@
 //! ```text
 //!   d_t, range:  u² = [2 U₀² + (U₁ d)²]/k² + 2 s² + (α l Δθ)²/3                        (5)
 //!   an angle:    u² = 4 (U₀²/k² + s²)/(h₂ − h₁)²
-//!   rate:        u² = u_res² + [2 U₀² + (U₁ d)²]/(k τ)² + (α l Δθ)²/(3 T²)             (6)
+//!   rate v:      u² = s²/Σ(t − t̄)² + [g² U₀² + (U₁ v τ)²]/(k τ)² + (α l Δθ)²/(3 T²)    (6)
 //!   s² = mean of e_i²/(1 + w_i² + (1 − w_i)²),   e_i = x_i − [w_i x_{i−1} + (1 − w_i) x_{i+1}],
 //!        w_i = (t_{i+1} − t_i)/(t_{i+1} − t_{i−1})                                    (7)
 //! ```
 //!
-//! u_res is that of the slope by its residuals, which have the scatter. The second part of (6) is the certificate's of two
-//! readings τ apart, d that of the range: its errors bend as the drift does, and residuals do not show them. The third is the growth of the
+//! The first part of (6) is that of the slope of a line by the scatter of its readings; that the drift bends about the line is no
+//! error of its slope. The second is the certificate's: its constant part is the standard deviation √½ a of a curve over the
+//! displacement, a sin(2π x/λ + φ), which goes along with the drift and is in no residual. While x runs through v τ, the slope
+//! of the least-squares line takes of it
+//!
+//! ```text
+//!   τ × slope = a cos φ · 6 j₁(K),   K = π v τ/λ,   j₁(K) = (sin K − K cos K)/K²                 (8)
+//!   g = 6 j₁(K) up to its greatest, 2.617 at K = 2.082; beyond, at most that and 6 √(1 + 1/K²)/K
+//! ```
+//!
+//! so that its standard deviation over all φ is g U₀/(k τ). λ is that of the data sheet, `sensor_error_period_mm`. Where it is
+//! not stated, g² = 2: the first and the last reading of the window have errors of their own. That is too much by far where the
+//! window's travel is a small part of λ, and too little by up to 1.85 where it is 0.66 of λ. The third part is the growth of the
 //! artefact in the last τ of the test of length T: a body that follows the shop or warms up slows down towards the end,
 //! so that at most τ/T of its whole growth is left for the window. (7) takes each reading against the
 //! straight line between its neighbours, whose three variances add to the denominator: a drift that bends between
 //! neighbours makes s greater, never smaller.
 //!
 //! # Holds when
-//! What is sampled is slow beside the samples: between two of them (1) takes a straight line. u_res
-//! holds when residuals are independent; a bend of the curve makes them not so. The
+//! What is sampled is slow beside the samples: between two of them (1) takes a straight line. (8) takes the drift in the window
+//! as straight. The
 //! growth of the artefact is one for both heights and leaves the angle. An artefact that warms up in steps during the test
 //! can grow by more than τ/T in the last τ.
 //!
@@ -53,7 +64,7 @@
 //! hand.
 //!
 //! (5) by hand: `eq5_certificate_scatter_and_artefact_by_hand`; (7): `eq7_scatter_of_noise_on_a_line_by_hand`, and numpy on a
-//! table (`val_a_warm_up_logged_once_is_evaluated_by_iso_230_3`).
+//! table (`val_a_warm_up_logged_once_is_evaluated_by_iso_230_3`). (8): `eq8_the_slope_of_a_wave_is_that_of_sampled_lines`.
 //!
 //! # References
 //! \[1\] ISO 230-3:2020; from the literature, the text was not at hand. \[2\] JCGM 100:2008 (GUM), 4.2, 4.3 and 5.1.
@@ -73,6 +84,12 @@ use metrology::fit::fit_line;
 
 /// Samples without which a rate has no uncertainty.
 const MIN_SAMPLES_OF_RATE: usize = 3;
+/// Where g of (8) is greatest.
+const GREATEST_K: f64 = 2.081_576;
+/// g there.
+const GREATEST_G: f64 = 2.617_10;
+/// Below it, the first term of j₁ is exact to nine digits.
+const SMALL_K: f64 = 1e-4;
 
 /// What made the machine drift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -88,6 +105,25 @@ pub enum DriftCause {
     RotaryAxis,
     /// Several of these at once, or unknown.
     NotStated,
+}
+
+/// Before the zero of a sensor, in a name that states its height.
+const HEIGHT_OF: &str = "height_of_zero_";
+/// Between that zero and the height.
+const IS_MM: &str = "_mm=";
+
+/// A name by which a recording states the height (mm) of the sensor whose readings have a zero: `height_of_zero_1_mm=110`.
+#[must_use]
+pub fn height_name(zero_id: u32, height_mm: f64) -> String {
+    format!("{HEIGHT_OF}{zero_id}{IS_MM}{height_mm}")
+}
+
+/// Zero and height (mm) of such a name; none of another one.
+#[must_use]
+pub fn height_of(name: &str) -> Option<(u32, f64)> {
+    let (zero, height) = name.strip_prefix(HEIGHT_OF)?.split_once(IS_MM)?;
+    let height_mm: f64 = height.parse().ok()?;
+    Some((zero.parse().ok()?, height_mm)).filter(|_| height_mm.is_finite())
 }
 
 /// Displacements at one place.
@@ -128,6 +164,9 @@ pub struct DriftBudget {
     pub sensor: DeviceUncertainty,
     /// Standard deviation of one reading by scatter, which a certificate does not hold; [`scatter_mm`] finds it in a log, mm.
     pub reading_scatter_mm: f64,
+    /// Period over which the instrument's error repeats along the displacement, λ of (8), mm; none: it is not stated.
+    #[serde(default)]
+    pub sensor_error_period_mm: Option<f64>,
     /// Length of the artefact between its seat and the sensors, mm.
     pub artefact_length_mm: f64,
     /// Coefficient of expansion of the artefact, 1/K.
@@ -275,17 +314,19 @@ fn displacement(
     };
     let (drift_after, _) = of(test.drift(values_mm));
     let (range, contributions) = of(range(values_mm.iter().copied()));
+    let line = test.rate(values_mm)?;
     let share = test.rate_window_s / test.duration_s();
-    let of_window_mm = contributions
-        .certificate_mm
-        .hypot(share * contributions.artefact_mm);
-    let (rate_mm_s, u_rate_mm_s) = test.rate(values_mm, of_window_mm)?;
+    let u_rate_mm_s = combined(&[
+        line.slope_by_scatter(budget.reading_scatter_mm),
+        budget.rate_by_certificate(line.slope * test.rate_window_s) / test.rate_window_s,
+        share * contributions.artefact_mm / test.rate_window_s,
+    ]); // (6)
     Ok(DisplacementDrift {
         axis: channel.axis,
         height_mm: channel.height_mm,
         drift_after,
         range,
-        final_rate: ExpandedRate::new(rate_mm_s, u_rate_mm_s),
+        final_rate: ExpandedRate::new(line.slope, u_rate_mm_s),
         contributions,
     })
 }
@@ -366,8 +407,8 @@ impl DriftTest {
         values[after - 1] + share * (values[after] - values[after - 1]) - values[0]
     }
 
-    /// (3) and (6): slope and its standard uncertainty; `u_difference` is what the window is off by from one end to the other.
-    fn rate(&self, values: &[f64], u_difference: f64) -> Result<(f64, f64), Iso230Error> {
+    /// (3).
+    fn rate(&self, values: &[f64]) -> Result<RateLine, Iso230Error> {
         let end_s = self.times_s[self.times_s.len() - 1];
         let begin_s = end_s - self.rate_window_s;
         let first = self.times_s.partition_point(|t| *t < begin_s);
@@ -375,18 +416,55 @@ impl DriftTest {
         // About the end of the window, so that long clocks cost no digits.
         let times: Vec<f64> = self.times_s[first..].iter().map(|t| t - end_s).collect();
         let line = fit_line(&times, &values[first..], &vec![1.0; times.len()])?;
-        let scatter2 = line.chi_square / line.degrees_of_freedom as f64;
-        let by_residuals = (scatter2 * line.covariance[(1, 1)]).sqrt();
-        Ok((
-            line.slope,
-            by_residuals.hypot(u_difference / self.rate_window_s),
-        ))
+        Ok(RateLine {
+            slope: line.slope,
+            by_one_reading: line.covariance[(1, 1)].sqrt(),
+        })
     }
 }
 
+/// The line of (3).
+struct RateLine {
+    slope: f64,
+    /// 1/√Σ(t − t̄)², 1/s.
+    by_one_reading: f64,
+}
+
+impl RateLine {
+    /// First part of (6) by the standard deviation of a reading.
+    fn slope_by_scatter(&self, of_reading: f64) -> f64 {
+        self.by_one_reading * of_reading
+    }
+}
+
+/// g of (8) for a travel v τ over a period λ.
+fn wave_in_slope(travel_mm: f64, period_mm: f64) -> f64 {
+    let k = std::f64::consts::PI * travel_mm.abs() / period_mm;
+    if k < SMALL_K {
+        // j₁ = K/3 − K³/30 + …
+        return 2.0 * k;
+    }
+    if k <= GREATEST_K {
+        return 6.0 * (k.sin() - k * k.cos()) / (k * k);
+    }
+    GREATEST_G.min(6.0 * (1.0 + 1.0 / (k * k)).sqrt() / k)
+}
+
 impl DriftBudget {
+    /// Second part of (6) for a travel v τ of the window, mm.
+    fn rate_by_certificate(&self, travel_mm: f64) -> f64 {
+        let constant_mm = self.sensor.standard_mm(0.0);
+        let by_length_mm = self.sensor.standard_mm(travel_mm) - constant_mm;
+        let period = self.sensor_error_period_mm;
+        let g = period.map_or(2.0_f64.sqrt(), |mm| wave_in_slope(travel_mm, mm));
+        (g * constant_mm).hypot(by_length_mm)
+    }
+
     fn check(&self) -> Result<(), Iso230Error> {
         self.sensor.check()?;
+        if let Some(period_mm) = self.sensor_error_period_mm {
+            check_positive("sensor_error_period_mm", period_mm)?;
+        }
         check_not_negative("reading_scatter_mm", self.reading_scatter_mm)?;
         check_not_negative("artefact_length_mm", self.artefact_length_mm)?;
         check_not_negative("artefact_expansion_per_k", self.artefact_expansion_per_k)?;
@@ -418,12 +496,77 @@ fn angle(
     let certificate_rad = 2.0 * budget.sensor.standard_mm(0.0) / height_mm;
     let scatter_rad = 2.0 * budget.reading_scatter_mm / height_mm;
     let u_rad = certificate_rad.hypot(scatter_rad); // (5)
-    let (rate_rad_s, u_rate_rad_s) = test.rate(&angles, certificate_rad)?;
+    let line = test.rate(&angles)?;
+    let window_s = test.rate_window_s;
+    let low = test.rate(&lower.displacements_mm)?;
+    let high = test.rate(&upper.displacements_mm)?;
+    let of_both_mm = [low, high].map(|one| budget.rate_by_certificate(one.slope * window_s));
+    let u_rate_rad_s = combined(&[
+        2.0_f64.sqrt() * line.slope_by_scatter(budget.reading_scatter_mm) / height_mm,
+        combined(&of_both_mm) / (height_mm * window_s),
+    ]); // (6)
     Ok(Some(AngularDrift {
         axis: about,
         heights_mm: [lower.height_mm, upper.height_mm],
         drift_after: ExpandedAngle::new(test.drift(&angles), u_rad),
         range: ExpandedAngle::new(range(angles.iter().copied()), u_rad),
-        final_rate: ExpandedAngularRate::new(rate_rad_s, u_rate_rad_s),
+        final_rate: ExpandedAngularRate::new(line.slope, u_rate_rad_s),
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eq8_the_slope_of_a_wave_is_that_of_sampled_lines() {
+        // Least-squares slopes of sampled waves of 24 phases, by the two sums of a regression.
+        let n = 2001;
+        let sampled = |travel: f64| {
+            let mut squares = 0.0;
+            for phase in 0..24 {
+                let phi = std::f64::consts::TAU * f64::from(phase) / 24.0;
+                let (mut top, mut bottom) = (0.0, 0.0);
+                for i in 0..n {
+                    let t = f64::from(i) / f64::from(n - 1) - 0.5;
+                    let wave = (std::f64::consts::TAU * travel * t + phi).sin();
+                    top += t * wave;
+                    bottom += t * t;
+                }
+                squares += (top / bottom).powi(2) / 24.0;
+            }
+            // Of a wave with standard deviation 1.
+            (2.0 * squares).sqrt()
+        };
+        for travel in [1e-6, 0.01, 0.1, 0.3, 0.6, 0.66] {
+            let (found, wanted) = (wave_in_slope(travel, 1.0), sampled(travel));
+            assert!(
+                (found - wanted).abs() < 3e-3 * wanted + 1e-9,
+                "{travel}: {found} {wanted}"
+            );
+        }
+        for travel in [0.7, 0.9, 1.3, 2.0, 3.7, 12.2] {
+            assert!(
+                wave_in_slope(travel, 1.0) >= 0.999 * sampled(travel),
+                "{travel}"
+            );
+        }
+        assert!(wave_in_slope(0.0, 1.0).abs() < 1e-30);
+    }
+
+    #[test]
+    fn a_height_reads_back_and_other_names_have_none() {
+        for (zero_id, height_mm) in [(1, 110.0), (2, -0.125), (7, 260.5)] {
+            let found = height_of(&height_name(zero_id, height_mm));
+            assert_eq!(found, Some((zero_id, height_mm)));
+        }
+        for name in [
+            "spindle",
+            "height_of_zero_1",
+            "height_of_zero_x_mm=1",
+            "height_of_zero_1_mm=inf",
+        ] {
+            assert_eq!(height_of(name), None, "{name}");
+        }
+    }
 }

@@ -14,6 +14,31 @@ pub const END_NANOS: i64 = END_S * NANOS_PER_S;
 /// Begin of the years in which a time in another unit is looked for, s: 1990-01-01.
 const LIKELY_FROM_S: f64 = 631_152_000.0;
 
+/// An instant as a date and a time of the day in UTC, whole seconds: `2026-01-05 08:15:00 UTC`.
+///
+/// Days become dates by the eras of 400 years of the Gregorian calendar, counted from 1 March so that the leap day is the last.
+#[must_use]
+pub fn utc<C: Clock>(at: Stamp<C>) -> String {
+    let seconds = at.nanos().div_euclid(NANOS_PER_S);
+    let (days, of_day) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
+    // 719 468 days lie between 0000-03-01 and 1970-01-01; an era has 146 097.
+    let since = days + 719_468;
+    let (era, day) = (since.div_euclid(146_097), since.rem_euclid(146_097));
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let of_year = day - (365 * year + year / 4 - year / 100);
+    // Months from March on have 153 days in five.
+    let from_march = (5 * of_year + 2) / 153;
+    let date = of_year - (153 * from_march + 2) / 5 + 1;
+    let month = if from_march < 10 {
+        from_march + 3
+    } else {
+        from_march - 9
+    };
+    let year = year + 400 * era + i64::from(month <= 2);
+    let (hour, minute, second) = (of_day / 3600, of_day / 60 % 60, of_day % 60);
+    format!("{year:04}-{month:02}-{date:02} {hour:02}:{minute:02}:{second:02} UTC")
+}
+
 /// A number of seconds with every digit of a whole one, as it stands in the file.
 fn written(value: f64) -> String {
     if value.fract().abs() > 0.0 || value.abs() >= 1e19 {
@@ -93,6 +118,38 @@ mod tests {
 
     fn said(seconds_s: i64) -> String {
         whole_seconds::<Host>(seconds_s, 0).unwrap_err().to_string()
+    }
+
+    /// Dates by `date -u -d @951782400`.
+    #[test]
+    fn val_instants_are_dates_of_utc() {
+        for (seconds_s, wanted) in [
+            (0, "1970-01-01 00:00:00 UTC"),
+            (-1, "1969-12-31 23:59:59 UTC"),
+            (68_169_600, "1972-02-29 00:00:00 UTC"),
+            (951_782_400, "2000-02-29 00:00:00 UTC"),
+            (951_868_800, "2000-03-01 00:00:00 UTC"),
+            (1_767_600_000, "2026-01-05 08:00:00 UTC"),
+            (4_107_542_399, "2100-02-28 23:59:59 UTC"),
+            (4_107_542_400, "2100-03-01 00:00:00 UTC"),
+            (4_294_967_295, "2106-02-07 06:28:15 UTC"),
+        ] {
+            let at = Stamp::<Host>::from_nanos(seconds_s * NANOS_PER_S);
+            assert_eq!(utc(at), wanted);
+        }
+        // Parts of a second are left out, and no instant of 64 bits overflows.
+        assert_eq!(
+            utc(Stamp::<Host>::from_nanos(999_999_999)),
+            "1970-01-01 00:00:00 UTC"
+        );
+        assert_eq!(
+            utc(Stamp::<Host>::from_nanos(i64::MAX)),
+            "2262-04-11 23:47:16 UTC"
+        );
+        assert_eq!(
+            utc(Stamp::<Host>::from_nanos(i64::MIN)),
+            "1677-09-21 00:12:43 UTC"
+        );
     }
 
     /// Dates by `date -u -d @4294967295`.

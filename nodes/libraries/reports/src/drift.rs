@@ -9,28 +9,32 @@ use serde::Serialize;
 use super::section::{Rows, Section, head};
 use crate::evaluate::budget::Budget;
 use crate::evaluate::drift::{Drift, Series};
+use crate::evaluate::test_conditions::TestConditions;
 
 mod faces;
 mod figures;
 mod logs;
+mod tilt;
 
 /// Seconds of an hour.
 const HOUR_S: f64 = 3600.0;
 
-/// One part for the faces of blocks, one for each log.
+/// One part for the faces of blocks, one for each log, one for each axis with sensors at two heights.
 ///
 /// # Errors
 /// When a plot cannot be drawn.
 pub fn sections(
     blocks: &[BlockMeasurement],
-    drift: &Drift,
+    (drift, conditions): (&Drift, &TestConditions),
     budget: Option<&Budget>,
 ) -> Result<Vec<Section>> {
     let mut sections = Vec::new();
     sections.extend(faces::section(blocks, drift, budget)?);
     for log in &drift.logs {
-        sections.push(logs::section(log, drift, budget)?);
+        let during = conditions.during(&[log.run]);
+        sections.push(logs::section(log, drift, (budget, &during))?);
     }
+    sections.extend(tilt::sections(drift, budget)?);
     Ok(sections)
 }
 

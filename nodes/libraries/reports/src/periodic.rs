@@ -14,7 +14,7 @@ use super::positioning::figure;
 use super::section::{NOT_EVALUATED, Rows, Section, head, um};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, unstate};
-use crate::evaluate::correction::{BY_OWN_SCALE, Measured};
+use crate::evaluate::correction::{About, BY_OWN_SCALE, Measured};
 use crate::evaluate::linear::LinearTest;
 
 /// Share of a period by which targets may be apart.
@@ -107,8 +107,7 @@ fn evaluated(
     let period_mm = entry.lead_mm;
     let (first, last) = dense(&test.targets_mm, period_mm)?;
     let targets_mm = &test.targets_mm[first..=last];
-    let about: (&[u32], _, _) = (&test.runs, test.reference, test.axis);
-    let measured = Measured::of(tests, budget, about);
+    let measured = Measured::of(tests, budget, About::line(test));
     let greatest_step_mm =
         { targets_mm.windows(2) }.fold(0.0, |step: f64, two| step.max(two[1] - two[0]));
     let n_harmonics = harmonics(targets_mm.len(), greatest_step_mm / period_mm);

@@ -18,7 +18,7 @@ mod uncertainty;
 use super::section::{Rows, Section, head, um};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, unstate, unstate_named};
-use crate::evaluate::correction::{BY_OWN_SCALE, Measured};
+use crate::evaluate::correction::{About, BY_OWN_SCALE, Measured};
 use crate::evaluate::linear::{LinearTest, Reference, STOP_SETTLE, level};
 
 /// A figure and, where a budget was given, its expanded uncertainty.
@@ -42,8 +42,7 @@ pub fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> 
     // What all four diagonals say together comes before each of them.
     let mut sections = diagonals::sections(tests, budget);
     for test in &tests.linear {
-        let about: (&[u32], _, _) = (&test.runs, test.reference, test.axis);
-        let measured = Measured::of(tests, budget, about);
+        let measured = Measured::of(tests, budget, About::line(test));
         sections.push(section(tests, test, &measured)?);
     }
     Ok(sections)

@@ -55,6 +55,9 @@ fn pose(feature: &ProbedFeature) -> String {
     }
 }
 
+/// What the form of the probe's fit is, beside P_FTU.
+const FIT_OF_PROBE: &str = "The probe's own fit, from which centres and radii are: each touch counts by its uncertainty. Its range is greatest minus least distance from that shape, no figure of ISO 230-10: P_FTU, where all touches have one weight, stands under Probing errors.";
+
 fn shapes(features: &[ProbedFeature]) -> Option<Section> {
     let rows: Vec<Vec<String>> = features
         .iter()
@@ -88,9 +91,15 @@ fn shapes(features: &[ProbedFeature]) -> Option<Section> {
         let shapes: Vec<Value> = features.iter().map(shape).collect();
         section.figures = json!({ "test": section.title, "iso230_10_shapes": shapes });
         section.tables.push(Rows {
-            head: head(&["feature", "kind", "points", "form / µm", "radius / mm"]),
+            head: head(&[
+                "feature",
+                "kind",
+                "points",
+                "range of the weighted fit / µm",
+                "radius / mm",
+            ]),
             rows,
-            note: "Form: greatest minus least distance from the fitted shape; 25 points on a sphere are usual.".to_owned(),
+            note: FIT_OF_PROBE.to_owned(),
         });
         section
     })

@@ -10,7 +10,7 @@ use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, Instrument, NOT_STATED};
 use crate::evaluate::circle_reading::CircleReading;
 use crate::evaluate::circles::{self, CircleRecording};
-use crate::evaluate::correction::Measured;
+use crate::evaluate::correction::{About, Measured};
 use crate::evaluate::course::Course;
 use crate::evaluate::linear::LinearTest;
 use crate::evaluate::test_conditions::{Readings, TestConditions};
@@ -344,8 +344,9 @@ fn correction_of(tests: Option<&Tests>, budget: Option<&Budget>) -> String {
         return "not done: lengths, radii and locations are as measured".to_owned();
     };
     let of_line = |test: &LinearTest| {
-        let about: (&[u32], _, _) = (&test.runs, test.reference, test.axis);
-        Measured::of(tests, budget, about).correction.lacks()
+        Measured::of(tests, budget, About::line(test))
+            .correction
+            .lacks()
     };
     let of_circle = |circle: &CircleRecording| {
         let read = tests.conditions.during(&[circle.segment.run]);

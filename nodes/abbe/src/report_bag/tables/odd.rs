@@ -100,3 +100,74 @@ fn a_log_without_a_unit_of_its_time_is_read_in_the_likely_one_and_says_so() {
         "{refused}"
     );
 }
+
+/// A log along X of a mandrel at two heights: 1.5 µm/h at 110 mm, 3 µm/h at 260 mm, every 10 minutes for two hours.
+fn two_heights(map: &str) -> anyhow::Result<Report> {
+    let home = TempDir::new().unwrap();
+    let table = home.path().join("tilt.csv");
+    let row = |k: i32| {
+        format!(
+            "{},{},{}\n",
+            600 * k,
+            0.25 * f64::from(k),
+            0.5 * f64::from(k)
+        )
+    };
+    let rows: String = (0..=12).map(row).collect();
+    std::fs::write(&table, format!("t,x1,x2\n{rows}")).unwrap();
+    let (written, bag) = (home.path().join("map.yaml"), home.path().join("bag"));
+    let map =
+        format!("start_s: 1767600000\ntest:\n  log: {{time_s: t, displacement_um: x1, {map}}}\n");
+    std::fs::write(&written, map).unwrap();
+    let machine = root("launch_configs/first_run/machine.yaml");
+    Import::of(table, written, machine, bag.clone()).execute()?;
+    page("Tests", &Tests::of(&Bag::open(&bag).unwrap()), None)
+}
+
+#[test]
+fn a_log_at_two_heights_has_its_tilt_by_hand() {
+    for (axis, about, sign) in [("X", "B", 1.0), ("Y", "A", -1.0)] {
+        let map = format!(
+            "axis: {axis}, cause: spindle, second_displacement_um: x2, heights_mm: [110.0, 260.0]"
+        );
+        let report = two_heights(&map).unwrap();
+        let tilt = found(&report, "iso230_3_tilt");
+        assert_eq!(tilt["about"], about);
+        assert_eq!(tilt["readings"], 13);
+        // 1.5 µm over 150 mm in an hour: 10 µrad.
+        near(&tilt["figures"]["after_1_h"]["value_rad"], 1e6, sign * 10.0);
+        near(&tilt["figures"]["range"]["value_rad"], 1e6, 20.0);
+        let logs = report.figures["tests"].as_array().unwrap();
+        let heights: Vec<_> = { logs.iter() }
+            .filter_map(|test| test["iso230_3_log"]["height_mm"].as_f64())
+            .collect();
+        assert_eq!(heights, [110.0, 260.0]);
+    }
+}
+
+#[test]
+fn heights_that_make_no_tilt_are_refused_with_the_key() {
+    for (map, words) in [
+        (
+            "axis: X, second_displacement_um: x2",
+            "two different heights",
+        ),
+        (
+            "axis: X, second_displacement_um: x2, heights_mm: [110.0, 110.0]",
+            "two different heights",
+        ),
+        ("axis: X, heights_mm: [110.0, 260.0]", "has 2 heights"),
+        (
+            "axis: Z, second_displacement_um: x2, heights_mm: [110.0, 260.0]",
+            "make no tilt",
+        ),
+        (
+            "axis: X, second_displacement_um: x2, heights_mm: [110.0, 26000.0]",
+            "heights_mm[1] = 26000 mm",
+        ),
+    ] {
+        let error = two_heights(map).map(|_| ()).unwrap_err();
+        let error = format!("{error:#}");
+        assert!(error.contains(words), "{map}: {error}");
+    }
+}

@@ -1,5 +1,6 @@
 //! Rows of what is known beside the effects: single components and the thermal drift.
 
+use metrology::epoch::utc;
 use metrology::sample::{AxisDrift, CurveForm, ErrorCurve, GeometryModel, ThermalModel};
 use metrology::{Axis, ErrorComponent};
 use nalgebra::{DMatrix, DVector};
@@ -228,9 +229,9 @@ fn check_drift(axis: Axis, drift: &AxisDrift) -> Result<(), ExportError> {
 
 fn note(model: &ThermalModel, drift: &AxisDrift) -> String {
     let mut note = format!(
-        "fitted at {} ns and valid until {} ns of the host's clock",
-        model.at.nanos(),
-        model.valid_until.nanos()
+        "fitted at {} and valid until {} of the host's clock",
+        utc(model.at),
+        utc(model.valid_until)
     );
     if model.quarantined {
         note.push_str("; in quarantine until a second measurement confirms it");

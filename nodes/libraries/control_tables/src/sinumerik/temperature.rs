@@ -17,6 +17,7 @@ use super::super::number::fixed;
 use super::super::sign::{Sign, check, given};
 use super::check_name;
 use metrology::Axis;
+use metrology::epoch::utc;
 use metrology::sample::ThermalModel;
 
 const TEMPERATURE_TABLE: &str = "SINUMERIK temperature compensation";
@@ -162,9 +163,9 @@ fn program(
         check(TEMPERATURE_CHECK),
         format!("set MD32750[{name}] = 3 once; MD32760 limits how fast a change is travelled"),
         format!(
-            "fitted at {} ns, may be used until {} ns of the host's clock: a drift is of its hour",
-            model.at.nanos(),
-            model.valid_until.nanos()
+            "fitted at {}, may be used until {} of the host's clock: a drift is of its hour",
+            utc(model.at),
+            utc(model.valid_until)
         ),
     ];
     if !line.slope_identifiable {

@@ -13,6 +13,8 @@
 //! So what is fitted for a kept column is the bracket of (3), whatever the single β are: it is the
 //! estimable combination, and the only one to which the data give a number.
 
+use std::cell::RefCell;
+
 use nalgebra::DMatrix;
 
 use super::columns::Columns;
@@ -118,20 +120,13 @@ pub(super) fn reduce(gram: &DMatrix<f64>, least_sine: f64) -> Reduction {
     reduction
 }
 
+/// Which rows stay tied to others with some additions, judged once for all rows.
+#[derive(Debug, Default)]
+pub(super) struct Judged(RefCell<Vec<(Vec<Needed>, Vec<RowKey>)>>);
+
 /// Additions each of which, or which together, would tell a row apart from the others.
 pub(super) fn needed(input: &Input, key: RowKey) -> Vec<Vec<Needed>> {
-    let few: Vec<CircularRecording> = input
-        .recordings
-        .iter()
-        .map(|(_, recording)| few_samples(recording))
-        .collect();
-    let helps = |additions: &[Needed]| {
-        let mut recordings = few.clone();
-        for addition in additions {
-            add(&mut recordings, *addition);
-        }
-        is_kept(input, &recordings, key)
-    };
+    let helps = |additions: &[Needed]| !tied_with(input, additions).contains(&key);
     let singles: Vec<Vec<Needed>> = Needed::ALL
         .into_iter()
         .map(|one| vec![one])
@@ -149,18 +144,38 @@ pub(super) fn needed(input: &Input, key: RowKey) -> Vec<Vec<Needed>> {
     pairs.filter(|pair| helps(pair)).collect()
 }
 
-/// Whether a linear row is told apart from all others in some recordings.
-fn is_kept(input: &Input, recordings: &[CircularRecording], key: RowKey) -> bool {
+/// The linear rows that are not told apart with some additions.
+fn tied_with(input: &Input, additions: &[Needed]) -> Vec<RowKey> {
+    let known = |(judged, _): &&(Vec<Needed>, Vec<RowKey>)| judged == additions;
+    if let Some((_, rows)) = input.judged.0.borrow().iter().find(known) {
+        return rows.clone();
+    }
+    let few = input.recordings.iter();
+    let mut recordings: Vec<CircularRecording> =
+        few.map(|(_, recording)| few_samples(recording)).collect();
+    for addition in additions {
+        add(&mut recordings, *addition);
+    }
+    let rows = tied(input, &recordings);
+    let mut judged = input.judged.0.borrow_mut();
+    judged.push((additions.to_vec(), rows.clone()));
+    rows
+}
+
+/// The linear rows that are not told apart from all others in some recordings.
+fn tied(input: &Input, recordings: &[CircularRecording]) -> Vec<RowKey> {
     let listed: Vec<_> = recordings.iter().enumerate().collect();
     let scene = Scene::new(input.plane, &listed);
     let terms = Term::linear(&scene);
     let (_, gram) = Columns::new(&scene).gram(&terms);
     let reduction = reduce(&gram, input.config.least_sine);
-    let is_own = |column: usize| terms[column].row(&scene) == key;
-    let is_entangled =
-        |d: &Dependent| is_own(d.column) || d.aliases.iter().any(|(kept, _)| is_own(*kept));
-    !reduction.unseen.iter().any(|column| is_own(*column))
-        && !reduction.dependent.iter().any(is_entangled)
+    let with_aliases = |d: &Dependent| {
+        let aliases = d.aliases.iter().map(|(kept, _)| *kept);
+        std::iter::once(d.column).chain(aliases).collect::<Vec<_>>()
+    };
+    let dependent = reduction.dependent.iter().flat_map(with_aliases);
+    let columns = reduction.unseen.iter().copied().chain(dependent);
+    columns.map(|column| terms[column].row(&scene)).collect()
 }
 
 /// A recording with no more samples than the angles between columns need.

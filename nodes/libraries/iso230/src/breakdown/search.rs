@@ -29,6 +29,8 @@ use super::term::{Quadrature, RowKey, Term};
 use super::thin::{thinned, would_do};
 use super::{cause, cyclic};
 
+/// Effects without which none is searched again beside the others.
+const LEAST_TO_POLISH: usize = 2;
 /// Decay times that are tried, evenly in the logarithm.
 const DECAYS: usize = 25;
 /// Shapes of pulses that are tried.
@@ -89,7 +91,11 @@ pub(super) fn search(input: &Input, scene: &Scene) -> Result<Found, BreakdownErr
     } else {
         None
     };
-    let (mut chosen, mut last) = match &fewer {
+    let Effects {
+        mut chosen,
+        mut last,
+        fit: found,
+    } = match &fewer {
         Some(fewer) => effects(input, &Columns::new(fewer), &base)?,
         None => effects(input, &columns, &base)?,
     };
@@ -98,7 +104,11 @@ pub(super) fn search(input: &Input, scene: &Scene) -> Result<Found, BreakdownErr
         chosen.retain(|c| c.kind != Kind::Tone);
         last.retain(|c| c.kind != Kind::Tone);
     }
-    let mut fit = fit_with_play(input, &columns, &base, &chosen)?;
+    // A fit of all samples with what is chosen is not made twice.
+    let mut fit = match found.filter(|_| fewer.is_none()) {
+        Some(fit) => fit,
+        None => fit_with_play(input, &columns, &base, &chosen)?,
+    };
     if fewer.is_some() {
         fit = add_tones(input, &columns, &base, &mut chosen, &mut last, fit)?;
     }
@@ -114,21 +124,31 @@ pub(super) fn search(input: &Input, scene: &Scene) -> Result<Found, BreakdownErr
     })
 }
 
-/// The effects that are believed, and those that were tried last.
-fn effects(
-    input: &Input,
-    columns: &Columns,
-    base: &[Term],
-) -> Result<(Vec<Candidate>, Vec<Candidate>), BreakdownError> {
+/// The effects that are believed.
+struct Effects {
+    chosen: Vec<Candidate>,
+    /// Those that were tried last.
+    last: Vec<Candidate>,
+    /// With the chosen ones; none where they were polished after it.
+    fit: Option<Fit>,
+}
+
+/// The effects that are believed, each beside the others.
+fn effects(input: &Input, columns: &Columns, base: &[Term]) -> Result<Effects, BreakdownError> {
     let mut chosen: Vec<Candidate> = Vec::new();
-    let mut last = add_believed(input, columns, base, &mut chosen)?;
+    let (mut last, mut fit) = add_believed(input, columns, base, &mut chosen)?;
     // Tones that were found before the rest was known are found anew.
     let n_chosen = chosen.len();
     chosen.retain(|c| c.kind != Kind::Tone);
     if chosen.len() < n_chosen {
-        last = add_believed(input, columns, base, &mut chosen)?;
+        (last, fit) = add_believed(input, columns, base, &mut chosen)?;
     }
-    Ok((polished(input, columns, base, chosen)?, last))
+    let is_polished = chosen.len() >= LEAST_TO_POLISH;
+    Ok(Effects {
+        chosen: polished(input, columns, base, chosen)?,
+        last,
+        fit: (!is_polished).then_some(fit),
+    })
 }
 
 /// Adds believed tones beside what is chosen, until there is none.
@@ -160,13 +180,14 @@ fn n_tones(chosen: &[Candidate]) -> usize {
     chosen.iter().filter(|c| c.kind == Kind::Tone).count()
 }
 
-/// Adds the greatest believed candidate until there is none; gives the last ones that were tried.
+/// Adds the greatest believed candidate until there is none; gives the last ones that were tried, and the fit beside which they
+/// were.
 fn add_believed(
     input: &Input,
     columns: &Columns,
     base: &[Term],
     chosen: &mut Vec<Candidate>,
-) -> Result<Vec<Candidate>, BreakdownError> {
+) -> Result<(Vec<Candidate>, Fit), BreakdownError> {
     loop {
         let fit = fit_with_play(input, columns, base, chosen)?;
         let tried = candidates(
@@ -177,7 +198,7 @@ fn add_believed(
         let believed = tried.iter().filter(|c| c.chance < input.config.false_alarm);
         match believed.max_by(|a, b| a.gain_mm2.total_cmp(&b.gain_mm2)) {
             Some(best) => chosen.push(best.clone()),
-            None => return Ok(tried),
+            None => return Ok((tried, fit)),
         }
     }
 }
@@ -350,7 +371,7 @@ fn polished(
     base: &[Term],
     mut chosen: Vec<Candidate>,
 ) -> Result<Vec<Candidate>, BreakdownError> {
-    if chosen.len() < 2 {
+    if chosen.len() < LEAST_TO_POLISH {
         return Ok(chosen);
     }
     for at in 0..chosen.len() {

@@ -7,7 +7,7 @@ mod coverage;
 mod drift;
 mod exact;
 mod laws;
-mod machines;
+pub mod machines;
 mod published;
 mod reference_temperature;
 mod refusals;

@@ -107,7 +107,7 @@ pub fn section(
             with_unit(row.value, row.standard_uncertainty, row.unit),
             um(row.peak_to_peak_mm),
             format!("{:.1}", row.share_percent),
-            format!("{:.1}", row.variance_share_percent),
+            signed(row.variance_share_percent),
             um(row.worst_circularity_without_mm),
         ]
     });
@@ -122,12 +122,13 @@ pub fn section(
             of_value,
             "span / µm",
             "share / %",
-            "of variance / %",
+            "part of the mean square / %",
             "G without / µm",
         ]),
         rows: rows.collect(),
         note: format!(
-            "Span: greatest minus least deviation that the cause alone makes on one circle. G without: the greatest circular error that would be left, single outliers of the reader left out. {}{}",
+            "Span: greatest minus least deviation that the cause alone makes on one circle. G without: the greatest circular error that would be left, single outliers of the reader left out. {}{}{}",
+            parts(plane.rows.iter().map(|row| (row.name.as_str(), row.variance_share_percent))),
             squareness(plane),
             needed(plane)
         ),
@@ -140,6 +141,27 @@ pub fn section(
         "scale_at_20_degc": scale_at_20_degc,
     });
     section
+}
+
+/// A part with one decimal, and no minus before a zero.
+fn signed(percent: f64) -> String {
+    let rounded = (percent * 10.0).round() / 10.0;
+    format!("{:.1}", rounded + 0.0)
+}
+
+/// What the parts of the mean square (name, %) are; why one is below 0, where one is.
+fn parts<'a>(rows: impl Iterator<Item = (&'a str, f64)>) -> String {
+    const WORDS: &str = "Part of the mean square: the cause's own square and half of what it has in common with each other cause; with what no row explains they make 100 %.";
+    let below = rows.filter(|(_, percent)| signed(*percent).starts_with('-'));
+    let names: Vec<&str> = below.map(|(name, _)| name).collect();
+    if names.is_empty() {
+        format!("{WORDS} ")
+    } else {
+        format!(
+            "{WORDS} Below 0 ({}): it cancels more of the other causes than it adds; without it the mean square would be greater. ",
+            names.join(", ")
+        )
+    }
 }
 
 /// The sign of the squareness, where there is a row of it.
@@ -229,4 +251,28 @@ pub fn with_unit(value: f64, standard_uncertainty: f64, unit: Unit) -> String {
     };
     let (value, u) = rounded(value * factor, COVERAGE * standard_uncertainty * factor);
     format!("{value} ± {u} {name}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_below_0_has_its_reason_and_a_zero_no_minus() {
+        for (percent, cell) in [
+            (-0.04, "0.0"),
+            (-0.4, "-0.4"),
+            (12.34, "12.3"),
+            (0.0, "0.0"),
+        ] {
+            assert_eq!(signed(percent), cell);
+        }
+        let plain = parts([("squareness", 100.0), ("drift", -0.04)].into_iter());
+        assert!(plain.ends_with("make 100 %. "), "{plain}");
+        let below = parts([("squareness", 100.4), ("scaling mismatch", -0.4)].into_iter());
+        assert!(
+            below.contains("Below 0 (scaling mismatch): it cancels"),
+            "{below}"
+        );
+    }
 }

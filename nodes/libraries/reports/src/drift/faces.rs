@@ -11,7 +11,7 @@ use metrology::stamp::{Host, Stamp};
 use serde::Serialize;
 use serde_json::json;
 
-use super::figures::{self, FIGURE_NAMES, Figures};
+use super::figures::{self, FIGURE_NAMES, Figures, Reader};
 use super::{HOUR_S, in_words, show_temperatures, temperatures};
 use crate::evaluate::budget::Budget;
 use crate::evaluate::drift::{Drift, Work};
@@ -75,7 +75,7 @@ impl FaceDrift {
         let ends = (f64::INFINITY, f64::NEG_INFINITY);
         let (least, greatest) =
             { values.iter() }.fold(ends, |(l, g), (_, v)| (l.min(*v), g.max(*v)));
-        let found = figures::of(axis, cause, &values, sensor, 0.0);
+        let found = figures::of(axis, cause, &values, &Reader::certified(sensor));
         let why = found.as_ref().err().map(ToString::to_string);
         // The probe's uncertainty is one number for all its causes.
         let figures = found.ok().map(|found| Figures {

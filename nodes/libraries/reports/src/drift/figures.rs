@@ -7,6 +7,7 @@ use metrology::Axis;
 use serde::Serialize;
 
 use super::HOUR_S;
+use crate::evaluate::budget::MandrelGrowth;
 use crate::positioning::figure;
 use crate::section::um;
 
@@ -41,7 +42,57 @@ pub(super) fn scatter_mm(values: &[(f64, f64)]) -> f64 {
     thermal::scatter_mm(&times_s, &displacements_mm).unwrap_or(0.0)
 }
 
-/// Evaluates displacements (s since the first, mm) of an instrument with a certificate, whose readings scatter.
+/// What read displacements, and on what.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reader {
+    /// Certificate of the instrument.
+    pub sensor: DeviceUncertainty,
+    /// Standard deviation of one of its readings by scatter, mm.
+    pub reading_scatter_mm: f64,
+    /// Period of its error along the displacement, where it is stated, mm.
+    pub error_period_mm: Option<f64>,
+    /// The mandrel, as far as its growth is in the displacement.
+    pub mandrel: MandrelGrowth,
+}
+
+impl Reader {
+    /// One of which the certificate alone is known.
+    pub(super) const fn certified(sensor: DeviceUncertainty) -> Self {
+        Self {
+            sensor,
+            reading_scatter_mm: 0.0,
+            error_period_mm: None,
+            mandrel: MandrelGrowth::NONE,
+        }
+    }
+
+    /// For the evaluation of ISO 230-3.
+    pub(super) const fn budget(&self) -> DriftBudget {
+        DriftBudget {
+            sensor: self.sensor,
+            reading_scatter_mm: self.reading_scatter_mm,
+            sensor_error_period_mm: self.error_period_mm,
+            artefact_length_mm: self.mandrel.length_mm,
+            artefact_expansion_per_k: self.mandrel.expansion_per_k,
+            artefact_temperature_range_k: self.mandrel.temperature_range_k,
+        }
+    }
+}
+
+/// Length of the window of the last rate, s: an hour, or the whole where an hour has too few readings. Times are s since the
+/// first one.
+pub(super) fn rate_window_s(times_s: &[f64]) -> f64 {
+    let recorded_s = times_s.last().copied().unwrap_or(0.0);
+    let in_last_hour = times_s.iter().rev();
+    let in_last_hour = in_last_hour.take_while(|time_s| **time_s >= recorded_s - HOUR_S);
+    if recorded_s >= HOUR_S && in_last_hour.count() >= LEAST_OF_RATE {
+        HOUR_S
+    } else {
+        recorded_s
+    }
+}
+
+/// Evaluates displacements (s since the first, mm).
 ///
 /// # Errors
 /// As [`thermal::evaluate`].
@@ -49,21 +100,15 @@ pub(super) fn of(
     axis: Axis,
     cause: DriftCause,
     values: &[(f64, f64)],
-    sensor: DeviceUncertainty,
-    reading_scatter_mm: f64,
+    reader: &Reader,
 ) -> Result<Figures, Iso230Error> {
-    let recorded_s = values.last().map_or(0.0, |(time_s, _)| *time_s);
-    let in_last_hour = values.iter().rev();
-    let in_last_hour = in_last_hour.take_while(|(time_s, _)| *time_s >= recorded_s - HOUR_S);
-    let rate_window_s = if recorded_s >= HOUR_S && in_last_hour.count() >= LEAST_OF_RATE {
-        HOUR_S
-    } else {
-        recorded_s
-    };
+    let times_s: Vec<f64> = values.iter().map(|(time_s, _)| *time_s).collect();
+    let recorded_s = times_s.last().copied().unwrap_or(0.0);
+    let rate_window_s = rate_window_s(&times_s);
     let evaluated = |drift_after_s: f64| {
         let test = DriftTest {
             cause,
-            times_s: values.iter().map(|(time_s, _)| *time_s).collect(),
+            times_s: times_s.clone(),
             channels: vec![DriftChannel {
                 axis,
                 height_mm: 0.0,
@@ -73,14 +118,7 @@ pub(super) fn of(
             rate_window_s,
             longest_gap_s: LONGEST_PAUSE_S,
         };
-        let budget = DriftBudget {
-            sensor,
-            reading_scatter_mm,
-            artefact_length_mm: 0.0,
-            artefact_expansion_per_k: 0.0,
-            artefact_temperature_range_k: 0.0,
-        };
-        let result = thermal::evaluate(&test, &budget)?;
+        let result = thermal::evaluate(&test, &reader.budget())?;
         let one = result.displacements.first().copied();
         one.ok_or(Iso230Error::TooFewPoints {
             place: "displacements",
@@ -153,7 +191,12 @@ mod tests {
     };
 
     fn found(values: &[(f64, f64)]) -> Result<Figures, Iso230Error> {
-        of(Axis::Z, DriftCause::NotStated, values, EXACT, 0.0)
+        of(
+            Axis::Z,
+            DriftCause::NotStated,
+            values,
+            &Reader::certified(EXACT),
+        )
     }
 
     #[test]

@@ -2,24 +2,33 @@
 
 use anyhow::Result;
 use iso230::thermal::{DriftCause, DriftContributions};
+use metrology::Axis;
 use metrology::stamp::{Host, Stamp};
 use serde_json::json;
 
-use super::figures::{self, FIGURE_NAMES, Figures};
+use super::figures::{self, FIGURE_NAMES, Figures, Reader};
 use super::{HOUR_S, in_words, show_temperatures, temperatures};
-use crate::evaluate::budget::Budget;
+use crate::evaluate::budget::{Budget, MandrelGrowth};
 use crate::evaluate::drift::{Drift, DriftLog};
+use crate::evaluate::test_conditions::Thermometers;
 use crate::plot::{self, Plot, Trace};
 use crate::section::{Drawing, Rows, Section, head, um};
 
 /// The part of one log; a log that cannot be evaluated says why.
 ///
+/// `during` has the thermometers of the run.
+///
 /// # Errors
 /// When a plot cannot be drawn.
-pub(super) fn section(log: &DriftLog, drift: &Drift, budget: Option<&Budget>) -> Result<Section> {
+pub(super) fn section(
+    log: &DriftLog,
+    drift: &Drift,
+    (budget, during): (Option<&Budget>, &Thermometers),
+) -> Result<Section> {
     let mut section = Section::new(format!(
-        "Thermal drift of {}, run {}, ISO 230-3: {}",
+        "Thermal drift of {}{}, run {}, ISO 230-3: {}",
         log.axis,
+        at_height(log.height_mm),
         log.run,
         in_words(log.cause)
     ));
@@ -36,7 +45,8 @@ pub(super) fn section(log: &DriftLog, drift: &Drift, budget: Option<&Budget>) ->
     section
         .lines
         .push(extent(values.len(), recorded_s, log.cause));
-    let found = evaluated(log, &values, budget);
+    let mandrel = mandrel_of(log.axis, (budget, during), &mut section);
+    let found = evaluated(log, &values, (budget, mandrel));
     let beside = temperatures(drift, *from, *to);
     let figures = match found {
         Ok(found) => {
@@ -45,7 +55,7 @@ pub(super) fn section(log: &DriftLog, drift: &Drift, budget: Option<&Budget>) ->
             section.answers.push(format!(
                 "range {range} µm; {after_1_h} µm after an hour, {after_3_h} µm after three."
             ));
-            section.tables.push(table(log, &cells, budget.is_some()));
+            section.tables.push(table(log, &cells, (budget, mandrel)));
             section
                 .lines
                 .extend(found.contributions.as_ref().map(parts));
@@ -66,6 +76,7 @@ pub(super) fn section(log: &DriftLog, drift: &Drift, budget: Option<&Budget>) ->
         "iso230_3_log": {
             "run": log.run,
             "axis": log.axis.letter(),
+            "height_mm": log.height_mm,
             "cause": log.cause,
             "recorded_h": recorded_s / HOUR_S,
             "readings": values.len(),
@@ -105,15 +116,16 @@ fn too_short(recorded_s: f64) -> String {
 fn evaluated(
     log: &DriftLog,
     values: &[(f64, f64)],
-    budget: Option<&Budget>,
+    (budget, mandrel): (Option<&Budget>, MandrelGrowth),
 ) -> Result<Figures, String> {
     if log.zeroed_anew {
         return Err("the instrument was zeroed anew while it went on".to_owned());
     }
-    let nothing = Budget::nothing();
-    let certificate = budget.unwrap_or(&nothing).positioning(None, None).device;
-    let scatter_mm = figures::scatter_mm(values);
-    let found = figures::of(log.axis, log.cause, values, certificate, scatter_mm);
+    let reader = Reader {
+        mandrel,
+        ..reader(budget, figures::scatter_mm(values))
+    };
+    let found = figures::of(log.axis, log.cause, values, &reader);
     let found = found.map_err(|error| error.to_string())?;
     Ok(Figures {
         contributions: found.contributions.filter(|_| budget.is_some()),
@@ -121,32 +133,105 @@ fn evaluated(
     })
 }
 
+/// What read a log, with the scatter of its readings; the mandrel is not in it.
+pub(super) fn reader(budget: Option<&Budget>, reading_scatter_mm: f64) -> Reader {
+    let nothing = Budget::nothing();
+    let used = budget.unwrap_or(&nothing);
+    Reader {
+        reading_scatter_mm,
+        error_period_mm: used.length_error_period_mm(),
+        ..Reader::certified(used.positioning(None, None).device)
+    }
+}
+
+/// The mandrel as far as it is in displacements along an axis: with its length along Z, else not at all. A temperature that is
+/// not known is a warning, and its growth then counts as drift.
+fn mandrel_of(
+    axis: Axis,
+    (budget, during): (Option<&Budget>, &Thermometers),
+    section: &mut Section,
+) -> MandrelGrowth {
+    let found = budget
+        .filter(|_| axis == Axis::Z)
+        .map(|budget| budget.mandrel(during));
+    match found {
+        None | Some(Ok(None)) => MandrelGrowth::NONE,
+        Some(Ok(Some(mandrel))) => mandrel,
+        Some(Err(why)) => {
+            section.warn(
+                "Growth of the mandrel not in U",
+                format!("The budget file's {why}."),
+            );
+            MandrelGrowth::NONE
+        }
+    }
+}
+
+/// Where a sensor stands, behind the axis in a title.
+pub(super) fn at_height(height_mm: Option<f64>) -> String {
+    height_mm.map_or_else(String::new, |mm| format!(" at height {mm:.1} mm"))
+}
+
 /// The parts of the uncertainty of the range.
 fn parts(of: &DriftContributions) -> String {
+    let mandrel = if of.artefact_mm > 0.0 {
+        format!(", {} µm by the growth of the mandrel", um(of.artefact_mm))
+    } else {
+        String::new()
+    };
     format!(
-        "Standard uncertainty of the range: {} µm by the certificate of length_reference, {} µm by the scatter of two readings (each against the line between its neighbours); {} µm combined.",
+        "Standard uncertainty of the range: {} µm by the certificate of length_reference, {} µm by the scatter of two readings (each against the line between its neighbours){mandrel}; {} µm combined.",
         um(of.certificate_mm),
         um(of.scatter_mm),
         um(of.combined_mm())
     )
 }
 
-fn table(log: &DriftLog, cells: &[String; 4], stated: bool) -> Rows {
+/// What U of a table has in it, in words.
+pub(super) fn note_of(budget: Option<&Budget>) -> String {
+    let Some(budget) = budget else {
+        return "Without --budget no uncertainty is stated.".to_owned();
+    };
+    let rate = if budget.length_error_period_mm().is_some() {
+        ""
+    } else {
+        " U of the last rate takes the errors of the window's first and last reading as independent: length_error_period_um of the budget is not stated."
+    };
+    format!(
+        "± expanded uncertainty, k = 2: certificate of length_reference in the budget and scatter of the readings.{rate}"
+    )
+}
+
+fn table(
+    log: &DriftLog,
+    cells: &[String; 4],
+    (budget, mandrel): (Option<&Budget>, MandrelGrowth),
+) -> Rows {
     let names: Vec<&str> = std::iter::once("displacement along")
         .chain(FIGURE_NAMES)
         .collect();
-    let note = if stated {
-        "± expanded uncertainty, k = 2: certificate of length_reference in the budget and scatter of the readings; what the artefact and its holder grow is part of the drift."
-    } else {
-        "Without --budget no uncertainty is stated."
+    let grows = mandrel.length_mm > 0.0;
+    let note = match (budget.is_some(), grows, log.axis == Axis::Z) {
+        (true, true, _) => {
+            " The growth of the mandrel within the range of its temperature is in U."
+        }
+        (true, false, true) => " What the mandrel and its holder grow is part of the drift.",
+        (true, false, false) => " What the sensor's holder grows is part of the drift.",
+        (false, ..) => "",
     };
     let axis = std::iter::once(log.axis.letter().to_owned());
     Rows {
         head: head(&names),
         rows: vec![axis.chain(cells.iter().cloned()).collect()],
-        note: format!("Drift: reading then minus first reading. {note}"),
+        note: format!(
+            "Drift: reading then minus first reading. {}{note}",
+            note_of(budget)
+        ),
     }
 }
+
+/// Of the axis of time.
+pub(super) const TIME_LABEL: &str = "time since the first reading / h";
 
 fn drawings(
     log: &DriftLog,
@@ -154,7 +239,6 @@ fn drawings(
     values: &[(f64, f64)],
     (from, to): (Stamp<Host>, Stamp<Host>),
 ) -> Result<Vec<Drawing>> {
-    const TIME_LABEL: &str = "time since the first reading / h";
     let trace = |name: &str, points: Vec<(f64, f64)>| Trace {
         name: name.to_owned(),
         points,

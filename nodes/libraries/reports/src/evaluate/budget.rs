@@ -3,6 +3,7 @@
 //! Nothing uncertain in it has a default: a term that is left out would be an uncertainty of zero. Temperatures may be
 //! stated or read from thermometers of the bag; without them lengths are not corrected to 20 °C.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow};
@@ -10,6 +11,7 @@ use iso230::budget::{DeviceUncertainty, Expansion};
 use iso230::circular::CircularBudget;
 use iso230::positioning::budget::PositioningBudget;
 use iso230::positioning::rotary::RotaryBudget;
+use metrology::Axis;
 use metrology::number::{number, quantity};
 use metrology::yaml;
 use node_runtime::text_file;
@@ -18,13 +20,16 @@ use serde::Deserialize;
 use serde_json::Value;
 
 mod ballbar;
+mod mandrel;
+mod nothing;
+mod screw;
 mod statement;
 #[cfg(test)]
 mod tests;
 
-use super::circles;
 use super::test_conditions::{Readings, Thermometers};
 pub use ballbar::Ballbar;
+pub use mandrel::{Mandrel, MandrelGrowth};
 pub use statement::{Instrument, Instruments, NOT_STATED};
 
 /// Figures that had no budget to be computed from have no expanded uncertainty, not one of zero.
@@ -70,7 +75,8 @@ const REFERENCE_DEGC: f64 = 20.0;
 /// Farthest from it that a machine is measured, K.
 const FARTHEST_K: f64 = 100.0;
 /// The largest that can be stated, by the unit that a key ends with: the longest first. Beyond it the unit is mistaken.
-const GREATEST: [(&str, f64); 7] = [
+const GREATEST: [(&str, f64); 8] = [
+    (".length_mm", 1000.0),
     ("_um_per_m_k", 100.0),
     ("_um_per_m", 1e4),
     ("_um", 1e4),
@@ -140,6 +146,9 @@ pub struct Budget {
     ballbar: Option<Ballbar>,
     /// The machine, or the workpiece that lengths are corrected to.
     machine: Body,
+    /// Ball screws of axes: they carry the positions where the motor encoder leads alone, in place of the machine.
+    #[serde(default)]
+    screws: BTreeMap<Axis, Body>,
     /// The device's own body; coefficient 0 for an interferometer.
     device: Body,
     /// The plate of the grid encoder; where absent, radii of its circles are not corrected to 20 °C.
@@ -155,6 +164,13 @@ pub struct Budget {
     /// Standard deviation of such readings from one to the next; without it all drift counts as new at every reading.
     #[serde(default)]
     environmental_unrest_um: Option<f64>,
+    /// Period of the length reference's error over the displacement, for rates of ISO 230-3; without it the errors at both ends of
+    /// the window count as independent.
+    #[serde(default)]
+    length_error_period_um: Option<f64>,
+    /// Test mandrel of ISO 230-3; where absent, what it grows counts as drift of the machine.
+    #[serde(default)]
+    mandrel: Option<Mandrel>,
     /// For rotary axes; where absent, their figures have no uncertainty.
     #[serde(default)]
     angular_reference: Option<Angular>,
@@ -348,6 +364,8 @@ impl Budget {
             body.check()
                 .map_err(|(name, rule)| wrong(&format!("{key}.{name}{rule}")))?;
         }
+        budget.check_screws().map_err(|rule| wrong(&rule))?;
+        budget.check_drift_test().map_err(|rule| wrong(&rule))?;
         for (key, text) in budget.texts() {
             statement::check(&key, text).map_err(|message| wrong(&message))?;
         }
@@ -448,6 +466,7 @@ impl Budget {
         ];
         numbers.extend(self.numbers_of_parts());
         numbers.extend(self.ballbar.iter().flat_map(Ballbar::numbers));
+        numbers.extend(self.numbers_of_drift_test());
         let squareness = self.plate_squareness_urad;
         numbers.extend(squareness.map(|urad| ("plate_squareness_urad", urad)));
         numbers
@@ -523,16 +542,14 @@ impl Budget {
         self.plate.is_some()
     }
 
-    /// With the certificate and the body of what read a circle in place of the grid encoder's and the device's.
+    /// With the body of the plate, where it is stated, in place of the device's.
     #[must_use]
-    pub fn of_circles(&self, read_by: circles::Instrument) -> Self {
-        let mut budget = self.clone();
-        match (read_by, &self.plate) {
-            (circles::Instrument::Ballbar, _) => budget.grid_encoder = self.length_reference,
-            (circles::Instrument::GridEncoder, Some(plate)) => budget.device = plate.clone(),
-            (circles::Instrument::GridEncoder, None) => {}
+    pub fn of_plate(&self) -> Self {
+        let mut own = self.clone();
+        if let Some(plate) = &self.plate {
+            own.device = plate.clone();
         }
-        budget
+        own
     }
 
     /// For ISO 230-4: one device, plate and head, reads deviations and radius; with the temperatures of machine and device
@@ -557,39 +574,5 @@ impl Budget {
     #[must_use]
     pub fn radius_standard_mm(&self, radius_mm: f64) -> f64 {
         self.grid_encoder.inner().standard_mm(radius_mm)
-    }
-
-    /// A budget without any term, for figures whose uncertainty is not stated.
-    #[must_use]
-    pub const fn nothing() -> Self {
-        const DEVICE: Device = Device {
-            expanded_uncertainty_um: 0.0,
-            expanded_uncertainty_um_per_m: 0.0,
-            coverage_factor: 2.0,
-        };
-        const BODY: Body = Body {
-            temperature_deviation_k: None,
-            thermometers: Vec::new(),
-            temperature_half_width_k: 0.0,
-            expansion_um_per_m_k: 0.0,
-            expansion_half_width_um_per_m_k: 0.0,
-        };
-        Self {
-            grid_encoder: DEVICE,
-            length_reference: DEVICE,
-            machine: BODY,
-            device: BODY,
-            ballbar: None,
-            plate: None,
-            plate_squareness_urad: None,
-            misalignment_mm: 0.0,
-            environmental_drift_um: 0.0,
-            environmental_unrest_um: None,
-            angular_reference: None,
-            length_corrected_by_instrument: false,
-            instruments: Instruments::NONE,
-            operator: None,
-            warm_up: None,
-        }
     }
 }

@@ -36,7 +36,7 @@ impl CircleReading {
     pub fn of(budget: Option<&Budget>, read: &Thermometers, instrument: Instrument) -> Self {
         match instrument {
             Instrument::GridEncoder => Self {
-                measured: MeasuredCircle::of(budget, read, instrument),
+                measured: MeasuredCircle::by_plate(budget, read),
                 instrument,
                 unstated: budget.is_none().then_some(NO_BUDGET),
                 plate_squareness_rad: budget.and_then(Budget::plate_squareness_rad),
@@ -49,7 +49,7 @@ impl CircleReading {
     fn by_ballbar(budget: Option<&Budget>, read: &Thermometers) -> Self {
         let own = budget.and_then(Budget::of_ballbar);
         let length = budget.and_then(Budget::ballbar_length);
-        let mut measured = MeasuredCircle::of(own.as_ref(), read, Instrument::Ballbar);
+        let mut measured = MeasuredCircle::of(own.as_ref(), read);
         measured.budget.length = Some(length.unwrap_or(NO_LENGTH));
         let missing = |reason: &str| Correction::Missing {
             reason: reason.to_owned(),

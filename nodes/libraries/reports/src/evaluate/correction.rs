@@ -3,13 +3,13 @@
 use iso230::budget::{DeviceUncertainty, differential_expansion};
 use iso230::circular::CircularBudget;
 use iso230::positioning::budget::PositioningBudget;
+use machine::file::PositionFeedback;
 use metrology::Axis;
 use serde_json::{Value, json};
 
 use super::Tests;
 use super::budget::{BodyTemperature, Budget};
-use super::circles::Instrument;
-use super::linear::Reference;
+use super::linear::{LinearTest, Reference};
 use super::test_conditions::Thermometers;
 use crate::section::Section;
 
@@ -20,7 +20,9 @@ pub enum Correction {
     Here {
         /// ε of machine against device, mm/mm.
         differential_expansion: f64,
-        /// The machine: temperature, and coefficient in 1/K.
+        /// What carries the positions of the machine: the machine as a whole, or the ball screw of an axis.
+        carrier: Carrier,
+        /// That carrier: temperature, and coefficient in 1/K.
         machine: (BodyTemperature, f64),
         /// The device, alike.
         device: (BodyTemperature, f64),
@@ -32,6 +34,81 @@ pub enum Correction {
         /// Why not, and what to state.
         reason: String,
     },
+}
+
+/// What carries the positions that a test is of.
+///
+/// A motor encoder counts turns, so the ball screw carries the positions between its fixed bearing and the nut. With a scale in
+/// the position loop, or a table of the axis that acts on the command, it is the scale or whatever the table refers to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Carrier {
+    /// `machine` of the budget.
+    Machine,
+    /// `screws` of the budget.
+    Screw(Axis),
+}
+
+impl Carrier {
+    /// Key in the budget file.
+    fn key(self) -> String {
+        match self {
+            Self::Machine => "machine".to_owned(),
+            Self::Screw(axis) => format!("screws.{axis}"),
+        }
+    }
+
+    fn in_words(self) -> String {
+        match self {
+            Self::Machine => "machine".to_owned(),
+            Self::Screw(axis) => format!("ball screw of {axis}"),
+        }
+    }
+}
+
+/// Which lengths were measured.
+#[derive(Clone, Copy, Debug)]
+pub struct About<'a> {
+    /// Numbers of the runs.
+    pub runs: &'a [u32],
+    /// By what they were read.
+    pub reference: Reference,
+    /// Along which axis; none: along a line of several, or of a feature.
+    pub axis: Option<Axis>,
+    /// Whether a compensation acted.
+    pub is_compensated: bool,
+}
+
+impl<'a> About<'a> {
+    /// A test of stops on a line.
+    #[must_use]
+    pub fn line(test: &'a LinearTest) -> Self {
+        Self {
+            runs: &test.runs,
+            reference: test.reference,
+            axis: test.axis,
+            is_compensated: test.compensated,
+        }
+    }
+
+    /// Lengths along no single axis.
+    #[must_use]
+    pub const fn lengths(runs: &'a [u32]) -> Self {
+        Self {
+            runs,
+            reference: Reference::Length,
+            axis: None,
+            is_compensated: false,
+        }
+    }
+
+    /// The axis whose motor encoder alone led.
+    fn led_by_motor(&self, tests: &Tests) -> Option<Axis> {
+        let axis = self.axis.filter(|_| !self.is_compensated)?;
+        let machine = tests.machine.as_ref();
+        let feedback = machine.and_then(|file| file.linear(axis));
+        let by_scale = feedback.is_some_and(|one| one.position_feedback == PositionFeedback::Scale);
+        (!by_scale).then_some(axis)
+    }
 }
 
 /// How a test was measured, as far as it is stated.
@@ -56,17 +133,19 @@ const LEAST_GROWTH_UM: f64 = 0.1;
 pub const BY_OWN_SCALE: &str = "not ISO 230-2: read by the machine's scale";
 
 impl Measured {
-    /// How runs of these numbers were measured by `reference`; `axis` where they run along one.
+    /// How these lengths were measured.
     #[must_use]
-    pub fn of(
-        tests: &Tests,
-        budget: Option<&Budget>,
-        (runs, reference, axis): (&[u32], Reference, Option<Axis>),
-    ) -> Self {
+    pub fn of(tests: &Tests, budget: Option<&Budget>, about: About) -> Self {
+        let screw = about.led_by_motor(tests);
+        let on_screw = screw.and_then(|axis| Some((axis, budget?.of_screw(axis)?)));
+        let carrier = on_screw
+            .as_ref()
+            .map_or(Carrier::Machine, |(axis, _)| Carrier::Screw(*axis));
+        let budget = on_screw.as_ref().map(|(_, own)| own).or(budget);
         let nothing = Budget::nothing();
         let used = budget.unwrap_or(&nothing);
-        if reference == Reference::Scale {
-            let scale = axis.and_then(|axis| scale(tests, axis));
+        if about.reference == Reference::Scale {
+            let scale = about.axis.and_then(|axis| scale(tests, axis));
             return Self {
                 budget: used.of_scale(scale),
                 is_stated: budget.is_some() && scale.is_some(),
@@ -77,7 +156,7 @@ impl Measured {
                 },
             };
         }
-        let known = Known::of(budget, &tests.conditions.during(runs));
+        let known = Known::of(budget, &tests.conditions.during(about.runs), carrier);
         let corrects_itself = used.length_corrected_by_instrument;
         let uncertainties =
             used.positioning(known.machine.as_ref().ok(), known.device.as_ref().ok());
@@ -147,43 +226,47 @@ pub struct MeasuredCircle {
 }
 
 impl MeasuredCircle {
-    /// How circles were measured while `read` was the temperature; a plate corrects nothing itself, a ballbar is a length
-    /// reference that may.
+    /// How circles were measured while `read` was the temperature, by what has the places of `grid_encoder` and `device` in a
+    /// budget: it corrects nothing itself.
     #[must_use]
-    pub fn of(budget: Option<&Budget>, read: &Thermometers, instrument: Instrument) -> Self {
-        let is_plate = instrument == Instrument::GridEncoder;
-        let stated = budget.map(|budget| budget.of_circles(instrument));
-        let used = stated.clone().unwrap_or_else(Budget::nothing);
-        let known = Known::of(stated.as_ref(), read);
-        let circular = used.circular(known.machine.as_ref().ok(), known.device.as_ref().ok());
-        let correction = if is_plate && stated.is_some() && !used.has_plate() {
-            Correction::Missing {
-                reason: "the budget file states no plate (temperature and expansion of the grid encoder's plate)".to_owned(),
-            }
-        } else {
-            known.correction(
-                stated.as_ref(),
-                !is_plate && used.length_corrected_by_instrument,
-            )
-        };
+    pub fn of(budget: Option<&Budget>, read: &Thermometers) -> Self {
+        let nothing = Budget::nothing();
+        let used = budget.unwrap_or(&nothing);
+        let known = Known::of(budget, read, Carrier::Machine);
         Self {
-            budget: circular,
-            correction,
+            budget: used.circular(known.machine.as_ref().ok(), known.device.as_ref().ok()),
+            correction: known.correction(budget, false),
         }
+    }
+
+    /// By the plate of a grid encoder.
+    #[must_use]
+    pub fn by_plate(budget: Option<&Budget>, read: &Thermometers) -> Self {
+        let own = budget.map(Budget::of_plate);
+        let mut measured = Self::of(own.as_ref(), read);
+        if own.is_some_and(|budget| !budget.has_plate()) {
+            measured.correction = Correction::Missing {
+                reason: "the budget file states no plate (temperature and expansion of the grid encoder's plate)".to_owned(),
+            };
+        }
+        measured
     }
 }
 
 /// Temperatures of machine and device during a test, or why they are unknown.
 struct Known {
+    carrier: Carrier,
     machine: Result<BodyTemperature, String>,
     device: Result<BodyTemperature, String>,
 }
 
 impl Known {
-    fn of(budget: Option<&Budget>, read: &Thermometers) -> Self {
+    /// `carrier` stands as `machine` in the budget.
+    fn of(budget: Option<&Budget>, read: &Thermometers, carrier: Carrier) -> Self {
         let nothing = Budget::nothing();
         let (machine, device) = budget.unwrap_or(&nothing).bodies();
         Self {
+            carrier,
             machine: machine.temperature(read),
             device: device.temperature(read),
         }
@@ -197,8 +280,9 @@ impl Known {
         if corrects_itself {
             return Correction::ByInstrument;
         }
+        let key = self.carrier.key();
         let (of_machine, of_device) = match (self.machine, self.device) {
-            (Err(why), _) => return missing(format!("the budget file's `machine` {why}")),
+            (Err(why), _) => return missing(format!("the budget file's `{key}` {why}")),
             (_, Err(why)) => return missing(format!("the budget file's `device` {why}")),
             (Ok(of_machine), Ok(of_device)) => (of_machine, of_device),
         };
@@ -208,6 +292,7 @@ impl Known {
                 &machine.at(Some(&of_machine)),
                 &device.at(Some(&of_device)),
             ),
+            carrier: self.carrier,
             machine: (of_machine, machine.expansion_per_k()),
             device: (of_device, device.expansion_per_k()),
         }
@@ -252,11 +337,13 @@ impl Correction {
         match self {
             Self::Here {
                 differential_expansion,
+                carrier,
                 machine,
                 device,
             } => format!(
-                "Corrected to 20 °C: {:.2} µm taken out over {span_mm:.0} mm; machine {}, device {}.{}",
+                "Corrected to 20 °C: {:.2} µm taken out over {span_mm:.0} mm; {} {}, device {}.{}",
                 differential_expansion * span_mm * 1e3,
+                carrier.in_words(),
                 body_in_words(machine),
                 body_in_words(device),
                 change_in_words(machine, span_mm)
@@ -284,11 +371,13 @@ impl Correction {
         match self {
             Self::Here {
                 differential_expansion,
+                carrier,
                 machine,
                 device,
             } => json!({
                 "done": true,
                 "by": "nominal differential expansion",
+                "carrier": carrier.in_words(),
                 "differential_expansion": differential_expansion,
                 "machine": body(machine),
                 "device": body(device),
@@ -346,10 +435,100 @@ misalignment_mm: 0.1
 environmental_drift_um: 0.3
 ";
 
+    const MACHINE: &str = include_str!("../../../../../launch_configs/dual_loop/machine.yaml");
+
     fn measured(budget: Option<&str>, reference: Reference) -> Measured {
         let budget = budget.map(|text| Budget::read(text, Path::new("budget.yaml")).unwrap());
-        let about: (&[u32], _, _) = (&[1], reference, Some(Axis::X));
+        let about = About {
+            runs: &[1],
+            reference,
+            axis: Some(Axis::X),
+            is_compensated: false,
+        };
         Measured::of(&Tests::default(), budget.as_ref(), about)
+    }
+
+    #[test]
+    fn the_screw_carries_what_the_motor_leads_and_the_machine_what_a_scale_or_a_table_does_by_hand()
+    {
+        // Bed 21 °C with a scale of 8 µm/(m K), nut 24 °C on a screw of 11.6 µm/(m K): 46.4 against 8 µm/m, over 400 mm
+        // 18.56 against 3.2 µm.
+        let text = BUDGET
+            .replacen("temperature_deviation_k: 2.0", "thermometers: [bed]", 1)
+            .replacen("expansion_um_per_m_k: 11.0", "expansion_um_per_m_k: 8.0", 1)
+            .replacen("expansion_um_per_m_k: 5.0", "expansion_um_per_m_k: 0.0", 1);
+        let text = format!(
+            "{text}screws:\n  X: {{thermometers: [nut_x], temperature_half_width_k: 1.5, expansion_um_per_m_k: 11.6, expansion_half_width_um_per_m_k: 0.6}}\n"
+        );
+        let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
+        let read = Thermometers::from([
+            ("bed".to_owned(), Readings::new(21.0)),
+            ("nut_x".to_owned(), Readings::new(24.0)),
+        ]);
+        let mut tests = Tests::default();
+        tests.conditions.thermometers_of_run(1, read);
+        let about = |axis, is_compensated| About {
+            runs: &[1],
+            reference: Reference::Length,
+            axis,
+            is_compensated,
+        };
+        let of =
+            |axis, is_compensated| Measured::of(&tests, Some(&budget), about(axis, is_compensated));
+        let motor = of(Some(Axis::X), false);
+        assert!((motor.correction.differential_expansion() - 46.4e-6).abs() < 1e-15);
+        let words = motor.correction.in_words(400.0);
+        assert!(
+            words.starts_with("Corrected to 20 °C: 18.56 µm taken out over 400 mm; ball screw of X 24.00 °C (read by nut_x"),
+            "{words}"
+        );
+        assert_eq!(motor.correction.as_json()["carrier"], "ball screw of X");
+        // U has the limits of the screw: 11.6 µm/(m K) 1.5 K 0.4 m over √3.
+        let terms = motor.budget.over(400.0, 400.0);
+        assert!((terms.machine_temperature_mm - 6.96e-3 / 3.0_f64.sqrt()).abs() < 1e-12);
+        // By a table of the scale, along another axis, along several.
+        for other in [
+            of(Some(Axis::X), true),
+            of(Some(Axis::Y), false),
+            of(None, false),
+        ] {
+            assert!((other.correction.differential_expansion() - 8e-6).abs() < 1e-15);
+            assert!(
+                other
+                    .correction
+                    .in_words(400.0)
+                    .contains("400 mm; machine 21.00 °C")
+            );
+        }
+        // With the scale in the loop.
+        const OF_SCALE: &str = "scale_expanded_uncertainty_um_per_m: 3.0";
+        let file = |feedback: &str| {
+            let text = MACHINE.replacen(OF_SCALE, &format!("{OF_SCALE}{feedback}"), 1);
+            Some(machine::MachineFile::parse(&text, "machine.yaml").unwrap())
+        };
+        for (feedback, expansion) in [("", 46.4e-6), (", position_feedback: scale", 8e-6)] {
+            tests.machine = file(feedback);
+            let found = Measured::of(&tests, Some(&budget), about(Some(Axis::X), false));
+            assert!(
+                (found.correction.differential_expansion() - expansion).abs() < 1e-15,
+                "{feedback}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_screw_whose_thermometer_is_silent_is_named() {
+        let text = format!(
+            "{BUDGET}screws:\n  X: {{thermometers: [nut_x], temperature_half_width_k: 1.5, expansion_um_per_m_k: 11.6, expansion_half_width_um_per_m_k: 0.6}}\n"
+        );
+        let why = measured(Some(&text), Reference::Length)
+            .correction
+            .lacks()
+            .unwrap();
+        assert!(
+            why.contains("`screws.X` names the thermometer nut_x"),
+            "{why}"
+        );
     }
 
     #[test]
@@ -376,7 +555,8 @@ environmental_drift_um: 0.3
         bed.add(22.0);
         bed.add(22.6);
         let read = Thermometers::from([("bed".to_owned(), bed)]);
-        let found = Known::of(Some(&budget), &read).correction(Some(&budget), false);
+        let known = Known::of(Some(&budget), &read, Carrier::Machine);
+        let found = known.correction(Some(&budget), false);
         let words = found.in_words(400.0);
         let wanted = "machine 21.87 °C (read by bed: mean of the test for all its runs, range 1.60 K), 11.0 µm/(m K)";
         assert!(words.contains(wanted), "{words}");
@@ -408,30 +588,22 @@ environmental_drift_um: 0.3
     }
 
     #[test]
-    fn a_plate_does_not_correct_itself_and_a_ballbar_may() {
+    fn a_plate_does_not_correct_itself() {
         let text = format!("{BUDGET}length_corrected_by_instrument: true\n");
         let without = Budget::read(&text, Path::new("budget.yaml")).unwrap();
-        let unstated = MeasuredCircle::of(
-            Some(&without),
-            &Thermometers::new(),
-            Instrument::GridEncoder,
-        );
+        let by_plate = |budget| MeasuredCircle::by_plate(budget, &Thermometers::new());
+        let unstated = by_plate(Some(&without));
         assert!(unstated.correction.lacks().unwrap().contains("no plate"));
         // 11 µm/(m K) 2 K − 8 µm/(m K) 1.5 K = 10 µm/m.
         let text = format!(
             "{text}plate: {{temperature_deviation_k: 1.5, temperature_half_width_k: 0.1, expansion_um_per_m_k: 8.0, expansion_half_width_um_per_m_k: 0.0}}\n"
         );
         let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
-        let of = |instrument| MeasuredCircle::of(Some(&budget), &Thermometers::new(), instrument);
-        let plate = of(Instrument::GridEncoder);
+        let plate = by_plate(Some(&budget));
         assert!((plate.correction.differential_expansion() - 10e-6).abs() < 1e-15);
         assert!((plate.budget.differential_expansion() - 10e-6).abs() < 1e-15);
         assert!((plate.budget.displacement.expanded_uncertainty_mm - 0.4e-3).abs() < 1e-15);
-        let ballbar = of(Instrument::Ballbar);
-        assert_eq!(ballbar.correction, Correction::ByInstrument);
-        // The certificate of the length reference, not of the plate.
-        assert!((ballbar.budget.displacement.expanded_uncertainty_mm - 0.1e-3).abs() < 1e-15);
-        let unknown = MeasuredCircle::of(None, &Thermometers::new(), Instrument::GridEncoder);
+        let unknown = by_plate(None);
         assert!(unknown.correction.lacks().unwrap().contains("no budget"));
     }
 

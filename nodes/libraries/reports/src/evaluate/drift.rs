@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use iso230::thermal::DriftCause;
+use iso230::thermal::{DriftCause, height_of};
 use metrology::sample::{
     AxisState, LengthSample, MachineValue, Quantity, TemperatureSample, TestKind, TestSegment,
     Verdict,
@@ -61,6 +61,8 @@ pub struct DriftLog {
     pub axis: Axis,
     /// What made the machine drift, as the recording says it.
     pub cause: DriftCause,
+    /// Height of its sensor above any common level, along Z, where the recording states it, mm.
+    pub height_mm: Option<f64>,
     /// Displacements, mm.
     pub displacements: Series,
     /// Whether the reference was zeroed anew on the way.
@@ -89,11 +91,20 @@ pub struct Drift {
     pub work: Work,
 }
 
-/// A log that is being recorded: displacements with the zero of the reference, by axis.
+/// A log that is being recorded.
 #[derive(Debug)]
 struct Open {
     begin: TestSegment,
-    of: BTreeMap<Axis, (Series, u32, bool)>,
+    /// Heights of sensors by their zeros, mm; empty: not stated.
+    heights_mm: BTreeMap<u32, f64>,
+    /// Displacements with the zero of the reference, by axis and, where heights are stated, by the sensor's zero.
+    of: BTreeMap<(Axis, Option<u32>), (Series, u32, bool)>,
+}
+
+/// Heights by zeros that a log names, mm.
+fn heights_mm(begin: &TestSegment) -> BTreeMap<u32, f64> {
+    let read = |name: &String| height_of(name);
+    begin.features.iter().filter_map(read).collect()
 }
 
 /// Collects them while a bag is read.
@@ -111,6 +122,7 @@ impl Drifts {
         self.is_production = segment.begin && segment.kind == TestKind::Production;
         if segment.begin {
             self.open = (segment.kind == TestKind::Dwell).then(|| Open {
+                heights_mm: heights_mm(segment),
                 begin: segment.clone(),
                 of: BTreeMap::new(),
             });
@@ -120,15 +132,16 @@ impl Drifts {
         {
             let (run, cause) = (open.begin.run, cause(&open.begin));
             let logs = open.of.into_iter();
-            self.found.logs.extend(
-                logs.map(|(axis, (displacements, _, zeroed_anew))| DriftLog {
+            self.found.logs.extend(logs.map(
+                |((axis, sensor), (displacements, _, zeroed_anew))| DriftLog {
                     run,
                     axis,
                     cause,
+                    height_mm: sensor.and_then(|zero| open.heights_mm.get(&zero).copied()),
                     displacements,
                     zeroed_anew,
-                }),
-            );
+                },
+            ));
         }
     }
 
@@ -136,7 +149,16 @@ impl Drifts {
     pub fn length(&mut self, sample: &LengthSample) {
         if let Some(open) = &mut self.open {
             let fresh = || (Series::default(), sample.zero_id, false);
-            let (series, zero_id, zeroed_anew) = open.of.entry(sample.axis).or_insert_with(fresh);
+            let stated = open.heights_mm.contains_key(&sample.zero_id);
+            if !stated && !open.heights_mm.is_empty() {
+                // A zero without a height: one of the sensors was zeroed anew, and nobody knows which.
+                let all = open.of.iter_mut();
+                let same_axis = all.filter(|((axis, _), _)| *axis == sample.axis);
+                same_axis.for_each(|(_, (.., anew))| *anew = true);
+                return;
+            }
+            let key = (sample.axis, stated.then_some(sample.zero_id));
+            let (series, zero_id, zeroed_anew) = open.of.entry(key).or_insert_with(fresh);
             *zeroed_anew |= *zero_id != sample.zero_id;
             series.push(sample.at, sample.displacement_mm);
         }
@@ -188,10 +210,67 @@ fn cause(begin: &TestSegment) -> DriftCause {
 
 #[cfg(test)]
 mod tests {
+    use iso230::thermal::height_name;
+
     use super::*;
 
     fn at(ms: i64) -> Stamp<Host> {
         Stamp::from_nanos(ms * 1_000_000)
+    }
+
+    fn dwell(begin: bool, features: &[&str]) -> TestSegment {
+        TestSegment {
+            begin,
+            completed: !begin,
+            features: features.iter().map(|name| (*name).to_owned()).collect(),
+            ..TestSegment::of_kind(TestKind::Dwell, 1, at(0))
+        }
+    }
+
+    /// Logs of readings with a zero each.
+    fn logs(features: &[&str], readings: &[(i64, u32, f64)]) -> Vec<DriftLog> {
+        let mut drifts = Drifts::default();
+        drifts.segment(&dwell(true, features));
+        for (s, zero_id, displacement_mm) in readings {
+            drifts.length(&LengthSample {
+                at: at(1000 * s),
+                axis: Axis::X,
+                displacement_mm: *displacement_mm,
+                zero_id: *zero_id,
+            });
+        }
+        drifts.segment(&dwell(false, features));
+        drifts.drift().logs
+    }
+
+    #[test]
+    fn two_sensors_whose_heights_are_stated_are_two_logs() {
+        let [low, high] = [(1, 100.0), (2, 260.5)].map(|(zero, mm)| height_name(zero, mm));
+        let features = ["X", "spindle", low.as_str(), high.as_str()];
+        let readings = [(0, 1, 0.1), (0, 2, 0.2), (60, 1, 0.3), (60, 2, 0.4)];
+        let found = logs(&features, &readings);
+        let heights: Vec<_> = found.iter().map(|log| log.height_mm).collect();
+        assert_eq!(heights, [Some(100.0), Some(260.5)]);
+        for (log, values) in found.iter().zip([[0.1, 0.3], [0.2, 0.4]]) {
+            assert_eq!((log.cause, log.zeroed_anew), (DriftCause::Spindle, false));
+            let read: Vec<f64> = log.displacements.points.iter().map(|p| p.1).collect();
+            assert_eq!(read, values);
+        }
+        // A third zero is one of the two sensors zeroed anew.
+        let anew = logs(&features, &[(0, 1, 0.1), (0, 2, 0.2), (60, 3, 0.3)]);
+        assert!(
+            anew.len() == 2 && anew.iter().all(|log| log.zeroed_anew),
+            "{anew:?}"
+        );
+        // Without heights it is one sensor.
+        let one = logs(&["X"], &readings);
+        assert!(one.len() == 1 && one[0].zeroed_anew && one[0].height_mm.is_none());
+        // Without a cause the heights are no cause.
+        let bare = logs(&["X", &low], &[(0, 1, 0.1)]);
+        assert_eq!(
+            (bare[0].cause, bare[0].height_mm),
+            (DriftCause::NotStated, Some(100.0))
+        );
     }
 
     #[test]

@@ -244,6 +244,12 @@ impl TestConditions {
         }
         joined
     }
+
+    /// Takes what thermometers read during a run.
+    #[cfg(test)]
+    pub(super) fn thermometers_of_run(&mut self, run: u32, thermometers: Thermometers) {
+        self.tests.push(Test { run, thermometers });
+    }
 }
 
 fn add(thermometers: &mut Thermometers, name: &str, degc: f64) {

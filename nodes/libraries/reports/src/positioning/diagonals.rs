@@ -8,8 +8,8 @@ use metrology::sample::TestKind;
 use super::{LEAST_SHARE, LENGTHS, capital, figure, periods_mm, runs, side_of};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, unstate_named};
-use crate::evaluate::correction::Measured;
-use crate::evaluate::linear::{LinearTest, Reference};
+use crate::evaluate::correction::{About, Measured};
+use crate::evaluate::linear::LinearTest;
 use crate::section::{NOT_EVALUATED, Rows, Section, head, um};
 use crate::terminal::Rank;
 
@@ -115,7 +115,7 @@ fn diagonals_section(
     let mut section = Section::new(title).ranked(Rank::Answer);
     let all = first.iter().flat_map(|(.., test)| &test.runs);
     let all: Vec<u32> = all.copied().collect();
-    let measured = Measured::of(tests, budget, (&all, Reference::Length, None));
+    let measured = Measured::of(tests, budget, About::lengths(&all));
     let of = |(diagonal, is_upwards, test): &(SpaceDiagonal, bool, &LinearTest)| {
         let periods_mm = periods_mm(test, tests.machine.as_ref());
         let mut runs = upwards(runs(test, periods_mm, &measured), *is_upwards);

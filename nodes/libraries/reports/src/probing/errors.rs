@@ -14,8 +14,7 @@ use serde_json::json;
 use super::{drift_mm, kind, pose};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
-use crate::evaluate::correction::Measured;
-use crate::evaluate::linear::Reference;
+use crate::evaluate::correction::{About, Measured};
 use crate::positioning::figure;
 use crate::section::{NOT_EVALUATED, Rows, Section, head, um};
 
@@ -91,7 +90,7 @@ fn note(stated: bool) -> String {
         " Without --budget no uncertainty is stated."
     };
     format!(
-        "P_FTU,3D of a sphere, P_FTU,2D of a bore or boss: greatest minus least distance from the fitted centre. Size error: measured diameter minus that of the certificate, {SIZE_NOT_AT_20_DEGC}; no conformance of it is decided.{uncertainty}"
+        "P_FTU,3D of a sphere, P_FTU,2D of a bore or boss: greatest minus least distance from the centre that all touches have with one weight. Size error: measured diameter minus that of the certificate, {SIZE_NOT_AT_20_DEGC}; no conformance of it is decided.{uncertainty}"
     )
 }
 
@@ -159,8 +158,10 @@ fn artefact(
     certificate: Option<&CertificateEntry>,
     budget: Option<&Budget>,
 ) -> Artefact {
-    let about = (&[feature.run][..], Reference::Length, None);
-    let expansion = Measured::of(tests, budget, about).budget.machine;
+    let runs = [feature.run];
+    let expansion = Measured::of(tests, budget, About::lengths(&runs))
+        .budget
+        .machine;
     let device = |expanded_um: f64, coverage_factor: f64| DeviceUncertainty {
         expanded_uncertainty_mm: expanded_um * 1e-3,
         expanded_uncertainty_per_length: 0.0,
@@ -343,7 +344,9 @@ environmental_drift_um: 0.6
             rotary_axes: AxisSet::default(),
             rotary_rad: PerAxis::default(),
         };
-        let large = MACHINE.replacen("radius_mm: 12.5", "radius_mm: 15.0", 1);
+        // With certificates of the test alone.
+        let bare = MACHINE.split("certificates:").next().unwrap_or(MACHINE);
+        let large = bare.replacen("radius_mm: 12.5", "radius_mm: 15.0", 1);
         let machine = MachineFile::parse(&format!("{large}{certificate}"), "machine.yaml").unwrap();
         Tests {
             touches: touches.into_iter().map(|one| (segment(), one)).collect(),

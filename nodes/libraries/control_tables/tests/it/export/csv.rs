@@ -159,10 +159,10 @@ fn a_drift_has_the_uncertainty_at_its_place_by_hand() {
     let mut axes: PerAxis<Option<AxisDrift>> = PerAxis::default();
     axes[Axis::X] = Some(drift);
     let model = ThermalModel {
-        at: Stamp::from_nanos(0),
+        at: Stamp::from_nanos(1_767_600_000_000_000_000),
         axes,
         valid_from: Stamp::from_nanos(0),
-        valid_until: Stamp::from_nanos(1),
+        valid_until: Stamp::from_nanos(1_767_602_400_000_000_001),
         n_blocks: 2,
         lack_of_fit_p: f64::NAN,
         quarantined: false,
@@ -170,6 +170,10 @@ fn a_drift_has_the_uncertainty_at_its_place_by_hand() {
     };
     let mut known = Known::default();
     known.add_drift(&model, Axis::X).unwrap();
+    // By `date -u -d @1767600000`, and 40 minutes later.
+    let notes = table(&[], &[], &known).text;
+    let times = "fitted at 2026-01-05 08:00:00 UTC and valid until 2026-01-05 08:40:00 UTC of the host's clock";
+    assert!(notes.contains(times), "{notes}");
     // 2 µm at the reference; at 200 mm sqrt(4 + 200² 2.5e-4) = sqrt(14) µm.
     let found: Vec<f64> = uncertainties(&known)
         .iter()

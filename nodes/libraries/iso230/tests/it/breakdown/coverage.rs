@@ -13,6 +13,8 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
 use crate::breakdown::machine::{Axis, Machine, drive};
+use crate::iso230::machines::circle::PlateError;
+use crate::iso230::machines::clause_of;
 
 const RUNS: usize = 1000;
 const NOISE_MM: f64 = 0.0005;
@@ -170,21 +172,18 @@ const BALLBAR: Instrument = Instrument::Ballbar {
     drift_mm: 0.0,
 };
 
-/// Radial error of a plate by place, mm: its axes scaled each by itself and out of square, and on either a curve with knots of
-/// one distance.
-fn plate(rng: &mut Pcg64Mcg, has_curves: bool) -> impl Fn(f64) -> f64 + use<> {
+/// Radial error of a plate by angle, mm, as its certificate promises: its axes scaled each by itself and out of square, and on
+/// either waves over the plate and steps along the axis.
+fn plate(rng: &mut Pcg64Mcg) -> impl Fn(f64) -> f64 + use<> {
     let scales = [(); 2].map(|()| 1e-6 * normal(rng));
     let square = 1e-6 * normal(rng);
-    let knots_mm = [(); 2].map(|()| rng.random_range(10.0..100.0));
-    let size_mm = if has_curves { 2e-4 } else { 0.0 };
-    let curves =
-        knots_mm.map(|every_mm| Curve::draw(rng, every_mm, 40, |rng| size_mm * normal(rng)));
+    let errors = [(); 2].map(|()| PlateError::draw(rng, &CERTIFICATE, 100.0));
     move |angle: f64| {
         let (sin, cos) = angle.sin_cos();
         let at_mm = [100.0 * cos, 100.0 * sin];
         let along = |i: usize| {
             let across = 0.5 * square * at_mm[1 - i];
-            scales[i] * at_mm[i] + across + curves[i].at(at_mm[i] + 1000.0)
+            scales[i] * at_mm[i] + across + errors[i].at(at_mm, at_mm[i])
         };
         along(0) * cos + along(1) * sin
     }
@@ -204,6 +203,13 @@ fn ballbar(rng: &mut Pcg64Mcg) -> impl Fn(f64) -> f64 + use<> {
             curve.at(angle)
         }
     }
+}
+
+/// Radial error of a ballbar by angle, mm: two lobes on a turn, the same in every turn, normal with the standard deviation of its
+/// certificate. To this order the squareness responds most.
+fn ballbar_of_two_lobes(rng: &mut Pcg64Mcg) -> impl Fn(f64) -> f64 + use<> {
+    let size_mm = [(); 2].map(|()| 5e-4 * normal(rng));
+    move |angle: f64| size_mm[0] * (2.0 * angle).cos() + size_mm[1] * (2.0 * angle).sin()
 }
 
 /// Shares of the drawn measurements of which 2 u of each row holds the truth, with the instrument and by the fit alone.
@@ -247,37 +253,37 @@ fn of(shares: &[(RowKey, f64, f64)], key: RowKey) -> (f64, f64) {
     found.map(|(_, with, alone)| (*with, *alone)).unwrap()
 }
 
-#[test]
-fn squareness_and_scales_of_drawn_plates_are_held_as_often_as_k_2_promises() {
-    let certificate = DeviceUncertainty {
-        expanded_uncertainty_mm: 0.0,
-        ..CERTIFICATE
-    };
-    let instrument = Instrument::Plate {
-        certificate,
-        squareness_rad: 1e-6,
-        drift_mm: 0.0,
-    };
-    let shares = held(instrument, 600, |rng| plate(rng, false));
-    for key in [RowKey::Squareness, RowKey::ScalingMismatch] {
-        let (with, alone) = of(&shares, key);
-        assert!((0.93..=0.975).contains(&with), "{shares:#?}");
-        assert!(alone < 0.6, "{shares:#?}");
-    }
-}
+/// Measurements of each kind of instrument.
+const DRAWN: u64 = 600;
 
 #[test]
-fn rows_of_drawn_plates_with_curves_are_held() {
-    let shares = held(PLATE, 600, |rng| plate(rng, true));
-    assert!(shares.iter().all(|share| share.1 >= 0.93), "{shares:#?}");
+fn rows_of_drawn_plates_are_held_as_often_as_k_2_promises() {
+    let shares = held(PLATE, DRAWN, plate);
+    let [least, greatest] = clause_of(DRAWN).map(|percent| percent / 100.0);
+    // The budget has waves of any length up to the diameter; those of 15 to 120 mm that are drawn make less of order 2 and 3, so
+    // that squareness and straightness are held more often.
+    assert!(shares.iter().all(|share| share.1 >= least), "{shares:#?}");
+    let mismatch = of(&shares, RowKey::ScalingMismatch).0;
+    assert!((least..=greatest).contains(&mismatch), "{shares:#?}");
     for key in [RowKey::Squareness, RowKey::ScalingMismatch] {
-        assert!(of(&shares, key).1 < 0.6, "{shares:#?}");
+        assert!(of(&shares, key).1 < 0.8, "{shares:#?}");
     }
 }
 
 #[test]
 fn rows_of_drawn_ballbars_are_held() {
-    let shares = held(BALLBAR, 600, ballbar);
+    // A certificate of limits, that does not state how its error runs along the circle: each row has the order to which it
+    // responds most, so that every row is held more often than by a normal error.
+    let shares = held(BALLBAR, DRAWN, ballbar);
     assert!(shares.iter().all(|share| share.1 >= 0.95), "{shares:#?}");
     assert!(of(&shares, RowKey::Squareness).1 < 0.5, "{shares:#?}");
+}
+
+#[test]
+fn the_squareness_of_a_ballbar_whose_error_is_of_its_own_order_is_held_as_k_2_promises() {
+    let shares = held(BALLBAR, DRAWN, ballbar_of_two_lobes);
+    let [least, greatest] = clause_of(DRAWN).map(|percent| percent / 100.0);
+    let (with, alone) = of(&shares, RowKey::Squareness);
+    assert!((least..=greatest).contains(&with), "{shares:#?}");
+    assert!(alone < 0.3, "{shares:#?}");
 }

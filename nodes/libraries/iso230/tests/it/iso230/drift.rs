@@ -36,6 +36,7 @@ fn drift_test(displacement_mm: impl Fn(f64) -> f64, hours: f64) -> DriftTest {
 const CERTAIN_DRIFT: DriftBudget = DriftBudget {
     sensor: EXACT_DEVICE,
     reading_scatter_mm: 0.0,
+    sensor_error_period_mm: None,
     artefact_length_mm: 0.0,
     artefact_expansion_per_k: 0.0,
     artefact_temperature_range_k: 0.0,
@@ -116,6 +117,7 @@ fn eq5_of_a_drift_budget_by_hand() {
             ..EXACT_DEVICE
         },
         reading_scatter_mm: 0.0,
+        sensor_error_period_mm: None,
         artefact_length_mm: 200.0,
         artefact_expansion_per_k: 1e-6,
         artefact_temperature_range_k: 0.2 * 3.0_f64.sqrt(),
@@ -154,6 +156,7 @@ fn eq5_certificate_scatter_and_artefact_by_hand() {
             coverage_factor: 2.0,
         },
         reading_scatter_mm: 0.000_1,
+        sensor_error_period_mm: None,
         artefact_length_mm: 200.0,
         artefact_expansion_per_k: 1e-6,
         artefact_temperature_range_k: 0.2 * 3.0_f64.sqrt(),
@@ -188,10 +191,12 @@ fn eq5_certificate_scatter_and_artefact_by_hand() {
     );
     near("scatter", parts.scatter_mm, 1e-4 * 2.0_f64.sqrt(), 1e-15);
     near("artefact", parts.artefact_mm, 4e-5, 1e-15);
-    // Scatter is in the residuals of the rate, of which a line has none; the certificate remains, and of the artefact a quarter
-    // over the last of four hours: 0.01 µm.
+    // (6) of 3.6 µm in the last hour, in µm²: certificate 0.18 + (0.05 · 3.6/2)², artefact a quarter of 0.04 over the last of four
+    // hours; scatter 0.01 by 361 readings 10 s apart, whose squares of time are 100 n (n² - 1)/12 s² together.
+    let squares_s2: f64 = 100.0 * 361.0 * (361.0 * 361.0 - 1.0) / 12.0;
+    let by_hand_um2 = 0.18 + 0.0081 + 0.0001 + 0.01 * 3600.0_f64.powi(2) / squares_s2;
     let rate = x.final_rate.expanded_uncertainty_mm_s * 3600.0;
-    near("U(rate)", rate, 2e-3 * 0.3097_f64.sqrt(), 1e-9);
+    near("U(rate)", rate, 2e-3 * by_hand_um2.sqrt(), 1e-9);
 }
 
 #[test]

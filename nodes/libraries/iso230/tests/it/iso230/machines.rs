@@ -8,7 +8,7 @@
 //! of the standard, written out here. `tests/validation/coverage_of_u.py` makes machines and figures of its own for axes,
 //! probing and periodic errors. The machine's scatter is part of it: ISO 230 states figures of the runs that were made.
 
-mod circle;
+pub mod circle;
 mod diagonals;
 mod linear;
 mod periodic;
@@ -85,6 +85,32 @@ pub fn hold(shares: &[(&'static str, f64)], wanted: &[(&str, f64, f64)]) {
     }
 }
 
+/// Least and greatest share of machines, %, that the clause on coverage allows: 93 to 97, each with two standard deviations of
+/// the share of [`MACHINES`] machines that are held so often.
+pub fn clause() -> [f64; 2] {
+    clause_of(MACHINES)
+}
+
+/// The same of another number of machines.
+pub fn clause_of(machines: u64) -> [f64; 2] {
+    let variance = |percent: f64| percent * (100.0 - percent) / machines as f64;
+    let deviation = |percent: f64| variance(percent).sqrt();
+    [93.0 - 2.0 * deviation(93.0), 97.0 + 2.0 * deviation(97.0)]
+}
+
+/// Holds every share to the clause; those that are `wide` for a reason that their test states may be greater, and are.
+pub fn hold_clause(shares: &[(&'static str, f64)], wide: &[&str]) {
+    let [least, greatest] = clause();
+    for (name, share) in shares {
+        let percent = 100.0 * share;
+        let is_wide = wide.contains(name);
+        assert!(
+            percent >= least && (percent > greatest) == is_wide,
+            "{name}: {percent} %, clause {least:.1} to {greatest:.1} %, wide: {is_wide}"
+        );
+    }
+}
+
 /// Drift of a machine at rest over time in units of the test's length: a trend, three waves, and unrest of each reading.
 pub struct Drift {
     trend_mm: f64,
@@ -135,6 +161,16 @@ impl Drift {
     }
 }
 
+/// Anywhere within limits of ± 1.
+pub fn within_limits(rng: &mut Pcg64Mcg) -> f64 {
+    between(rng, -1.0, 1.0)
+}
+
+/// Normal, with the standard deviation of such limits.
+pub fn normal_as_limits(rng: &mut Pcg64Mcg) -> f64 {
+    normal(rng) / 3.0_f64.sqrt()
+}
+
 /// A body that expands: what is stated of it, and by how much it truly does, mm/mm.
 pub struct Body {
     pub stated: Expansion,
@@ -143,14 +179,24 @@ pub struct Body {
 
 impl Body {
     /// At a temperature within ± `spread_k` of `about_k` above 20 °C.
-    pub fn draw(rng: &mut Pcg64Mcg, (about_k, spread_k): (f64, f64), expansion_per_k: f64) -> Self {
+    pub fn draw(rng: &mut Pcg64Mcg, about: (f64, f64), expansion_per_k: f64) -> Self {
+        Self::draw_by(rng, about, expansion_per_k, within_limits)
+    }
+
+    /// The same with what is off from what is stated by `off`, in half widths.
+    pub fn draw_by(
+        rng: &mut Pcg64Mcg,
+        (about_k, spread_k): (f64, f64),
+        expansion_per_k: f64,
+        off: fn(&mut Pcg64Mcg) -> f64,
+    ) -> Self {
         let true_k = about_k + between(rng, -spread_k, spread_k);
         let half_width_k = between(rng, 0.1, 0.4);
         let half_width_per_k = 0.1 * expansion_per_k;
-        let true_per_k = expansion_per_k + half_width_per_k * between(rng, -1.0, 1.0);
+        let true_per_k = expansion_per_k + half_width_per_k * off(rng);
         Self {
             stated: Expansion {
-                temperature_deviation_k: true_k + half_width_k * between(rng, -1.0, 1.0),
+                temperature_deviation_k: true_k + half_width_k * off(rng),
                 temperature_half_width_k: half_width_k,
                 expansion_per_k,
                 expansion_half_width_per_k: half_width_per_k,

@@ -197,6 +197,7 @@ fn drift_tests_that_cannot_be_evaluated_are_refused() {
         let budget = DriftBudget {
             sensor: EXACT_DEVICE,
             reading_scatter_mm: 0.0,
+            sensor_error_period_mm: None,
             artefact_length_mm: 0.0,
             artefact_expansion_per_k: 0.0,
             artefact_temperature_range_k: 0.0,
@@ -373,6 +374,7 @@ proptest! {
         let budget = DriftBudget {
             sensor: EXACT_DEVICE,
             reading_scatter_mm: 0.0,
+            sensor_error_period_mm: None,
             artefact_length_mm: 0.0,
             artefact_expansion_per_k: 0.0,
             artefact_temperature_range_k: 0.0,

@@ -94,14 +94,13 @@ impl Ballbar {
 }
 
 impl Budget {
-    /// With the ballbar in the place of the length reference, its own body in that of the device's; none where the budget
-    /// states no ballbar. A ballbar corrects nothing to 20 °C itself.
+    /// With the ballbar in the place of the grid encoder, its own body in that of the device's; none where the budget states no
+    /// ballbar. No other instrument's entry counts for it, and it corrects nothing to 20 °C itself.
     #[must_use]
     pub fn of_ballbar(&self) -> Option<Self> {
         let ballbar = self.ballbar.as_ref()?;
         let mut own = self.clone();
-        own.length_reference = ballbar.reading();
-        own.length_corrected_by_instrument = false;
+        own.grid_encoder = ballbar.reading();
         if let Some(body) = &ballbar.body {
             own.device = body.clone();
         }

@@ -113,7 +113,7 @@ fn a_circular_budget_counts_the_plates_constant_once_and_its_expansion_too() {
 #[test]
 fn every_number_has_a_largest_value_and_one_beyond_it_is_refused_with_both() {
     let text = format!(
-        "{WHOLE}angular_reference: {{expanded_uncertainty_arcsec: 0.4, coverage_factor: 2.0, environmental_drift_arcsec: 0.2}}\nplate_squareness_urad: 2.0\n"
+        "{WHOLE}angular_reference: {{expanded_uncertainty_arcsec: 0.4, coverage_factor: 2.0, environmental_drift_arcsec: 0.2}}\nplate_squareness_urad: 2.0\nlength_error_period_um: 0.3\nmandrel: {{length_mm: 250.0, expansion_um_per_m_k: 1.5, temperature_range_k: 2.0}}\n"
     );
     let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
     for (key, value) in budget.numbers() {
