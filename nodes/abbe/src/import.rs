@@ -18,13 +18,16 @@ use recorder::RecorderError;
 use reports::loss;
 use reports::whole_file::WholeFolder;
 
+mod again;
 mod angles;
 mod beside;
 mod book;
+mod dates;
 mod file;
 pub(crate) mod limits;
 pub(crate) mod map;
 mod map_schema;
+mod measured;
 mod motion;
 mod odd;
 mod passes;
@@ -37,6 +40,7 @@ mod stated;
 mod table;
 mod times;
 mod units;
+mod vocabulary;
 mod writer;
 
 use file::Form;

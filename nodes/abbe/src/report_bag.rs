@@ -21,6 +21,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use maud::html;
 use recorder::Bag;
+use replayer::machines;
 
 use crate::SOFTWARE;
 use crate::history::keep::Keep;
@@ -83,10 +84,17 @@ impl ReportBag {
         complain!("Evaluating the tests of {}", self.bag.display());
         let table = from_table::of(&self.bag, self.map.as_deref())?;
         let bag = Bag::open(table.as_ref().map_or(&self.bag, |table| &table.bag))?;
+        machines::check(bag.topics()).with_context(|| self.bag.display().to_string())?;
         let mut tests = Tests::of(&bag);
         if table.is_some() {
             // Nothing is known of the machine.
             tests.machine = None;
+            if self.map.is_none() {
+                tests
+                    .linear
+                    .iter_mut()
+                    .for_each(|test| test.place_mm = None);
+            }
             tests.left_out.clear();
         }
         complain_of(&tests);

@@ -187,6 +187,11 @@ pub fn joined(hashes: &[String]) -> String {
     }
 }
 
+/// The hash of a diagnosis: of its bags, and of what it was made with.
+pub fn made_with(bags_sha256: &str, made_with: &str) -> String {
+    hash(format!("{bags_sha256}\n{made_with}").as_bytes())
+}
+
 /// Paths of bags in the length that a store takes.
 fn shortened(sources: Vec<String>) -> String {
     const MOST: usize = 20;

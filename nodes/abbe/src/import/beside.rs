@@ -63,11 +63,16 @@ pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<
 }
 
 /// The columns that no key of the map names.
-pub fn unnamed(head: &[String], places: &[usize]) -> Vec<String> {
+pub fn unnamed(head: &[String], places: &[usize], dates: Option<usize>) -> Vec<String> {
     let others = head.iter().enumerate();
     let others = others.filter(|(place, name)| !places.contains(place) && !name.is_empty());
     others
-        .map(|(_, name)| format!("column \"{name}\": the map does not name it"))
+        .map(|(place, name)| match dates {
+            Some(dates) if dates == place => {
+                format!("column \"{name}\": its dates stand before the times of their rows")
+            }
+            _ => format!("column \"{name}\": the map does not name it"),
+        })
         .collect()
 }
 
