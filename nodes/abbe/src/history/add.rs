@@ -117,7 +117,7 @@ impl Add {
         if value.get("schema").is_some() {
             return self.add_gap(&value, origin, store);
         }
-        self.add_report(&value, origin, store)
+        self.add_report(&value, origin.with_made(&value["made"]), store)
     }
 
     fn add_gap(&self, value: &Value, origin: Origin, store: &mut Store) -> Result<bool> {

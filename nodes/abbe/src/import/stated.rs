@@ -9,7 +9,7 @@ use anyhow::{Result, bail};
 use metrology::yaml::shown;
 
 use super::map::{Column, Direction, Map, What};
-use super::units::Unit;
+use super::units::{Kind, Unit};
 use super::vocabulary::{is_foreign, is_known, is_note_word, is_quantity, plain};
 
 /// Units that hold in the middle of a name too: no other word is written so.
@@ -277,7 +277,9 @@ fn in_words(text: &str, is_closed: bool) -> Stated {
     }
     let is_clear = |word: &str| {
         let word = plain(word);
-        CLEAR_UNITS.contains(&word.as_str()) || (word == "rad" && begins(ANGLES))
+        CLEAR_UNITS.contains(&word.as_str())
+            || (word == "rad" && begins(ANGLES))
+            || (is_closed && is_long_unit(&word))
     };
     // `100 mm bar` is no unit of the column.
     let is_numbered = |k: usize| k > 0 && is_digits(words[k - 1].1);
@@ -290,6 +292,13 @@ fn in_words(text: &str, is_closed: bool) -> Stated {
     in_place(&words, is_closed)
 }
 
+/// Whether a word is the full name of a unit of a length or an angle.
+fn is_long_unit(word: &str) -> bool {
+    let is_turn = word.starts_with("turn");
+    let unit = Unit::of_word(word).filter(|_| word.chars().count() > 3 && !is_turn);
+    unit.is_some_and(|unit| matches!(unit.kind(), Kind::Length | Kind::Angle))
+}
+
 /// What stands in the place of a unit, where no unit that is known does.
 fn in_place(words: &[(&str, &str)], is_closed: bool) -> Stated {
     let [.., (_, previous), (between, last)] = words else {
@@ -299,8 +308,15 @@ fn in_place(words: &[(&str, &str)], is_closed: bool) -> Stated {
     if is_slash && is_digits(last) && !is_digits(previous) && !is_known(previous) {
         return Stated::Unknown(format!("{previous}/{last}"));
     }
-    if is_digits(last) || is_known(last) || !is_closed {
+    if !is_closed {
         return Stated::Nothing;
+    }
+    if is_digits(last) || is_known(last) {
+        // `deviation mdeg run 1`; a step or a line may be counted there.
+        let is_counted = |word: &str| matches!(word.to_lowercase().as_str(), "line" | "step");
+        let mut inner = words[1..words.len() - 1].iter().map(|(_, word)| *word);
+        let foreign = inner.find(|word| is_foreign(word) && !is_counted(word));
+        return foreign.map_or(Stated::Nothing, |word| Stated::Unknown(word.to_owned()));
     }
     // `0.1um` is cut behind its point.
     if last.starts_with(|letter: char| letter.is_ascii_digit()) && is_digits(previous) {
@@ -428,6 +444,11 @@ mod tests {
             ("room [K]", Unit::Kelvin),
             ("room (degC)", Unit::Degc),
             ("phi_µrad", Unit::Urad),
+            ("deviation arc-sec", Unit::Arcsec),
+            ("error \"", Unit::Arcsec),
+            ("Abweichung Mikrometer Lauf 1", Unit::Um),
+            ("target millimeters", Unit::Mm),
+            ("Abweichung Bogensekunden", Unit::Arcsec),
             ("error [thou]", Unit::Thou),
         ] {
             assert_eq!(of(name).unit(), Some(unit), "{name}: {:?}", of(name));
@@ -463,6 +484,26 @@ mod tests {
             "error (µm) [mm]",
             "deviation [furlong]",
             "deviation_mgon",
+            "deviation (mdeg)",
+            "deviation_mdeg",
+            "deviation/µdeg",
+            "error m°",
+            "target (millideg)",
+            "error mas",
+            "deviation (steps)",
+            "deviation 0.1um",
+            "deviation V",
+            "deviation dmm",
+            "error/inc",
+            "deviation %",
+            "error lambda/4",
+            "error µ\"",
+            "deviation milli",
+            "deviation um per m",
+            "deviation furlongs",
+            "target foo",
+            "error (bar)foo",
+            "Abweichung mdeg Lauf 1",
         ] {
             assert!(
                 matches!(of(name), Stated::Unknown(_)),
@@ -492,6 +533,16 @@ mod tests {
             "grade",
             "radius angle",
             "deviation (abs)",
+            "deviation Laser",
+            "Soll-Ist-Abweichung",
+            "target position X",
+            "error mean value",
+            "deviation run1",
+            "spindle (Heidenhain)",
+            "bearing rear",
+            "deviation step 3",
+            "Deviation, forward",
+            "\"deviation\"",
             "",
         ] {
             assert_eq!(of(name), Stated::Nothing, "{name}");
