@@ -30,6 +30,7 @@ mod map_schema;
 mod measured;
 mod motion;
 mod odd;
+mod parted;
 mod passes;
 pub(crate) mod propose;
 mod recognise;

@@ -11,6 +11,7 @@ use metrology::Axis;
 use metrology::yaml::shown;
 
 use super::map::{Map, Plane, Test};
+use super::parted;
 use super::table::Row;
 
 /// Lines of cells with their numbers.
@@ -59,7 +60,8 @@ pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<
             let at = place(head, lines, SENSE_NAMES, sense_of).filter(open);
             at.map_or(Ok(()), |k| sense((head, lines), k, rows))
         }
-    }
+    }?;
+    parted::check(map, head, lines, rows)
 }
 
 /// The columns that no key of the map names.

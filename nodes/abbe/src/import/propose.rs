@@ -457,11 +457,19 @@ impl<'t> Text<'t> {
                 "nominal radius; lengths that follow from it (scale, squareness) depend on it",
             ),
         }
-        self.stated(
-            "feed_mm_min",
-            "1000.0",
-            "feed; what follows from speed depends on it",
-        );
+        match radial::feed(found) {
+            Some((column, feed_mm_min)) => {
+                let _ = writeln!(self.test, "    feed_mm_min: {feed_mm_min:?}");
+                self.recognised
+                    .push(format!("feed_mm_min: column \"{}\"", column.name));
+                self.used.push(column.name.clone());
+            }
+            None => self.stated(
+                "feed_mm_min",
+                "1000.0",
+                "feed; what follows from speed depends on it",
+            ),
+        }
         self.column("run", run);
         self.column("angle_deg", angle);
         self.unit(angle, Unit::Deg, None)?;

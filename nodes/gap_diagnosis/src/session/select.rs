@@ -375,9 +375,9 @@ mod tests {
         let backwards: Vec<Raw> = series.iter().rev().copied().collect();
         for stops in [
             vec![],
-            vec![0..1],
+            vec![0..1, 1..2],
             vec![3..5, 5..9, 12..13],
-            vec![0..20],
+            vec![0..20, 20..21],
             vec![2..2, 4..6, 30..40],
         ] {
             let within = |stop: &Range<usize>, series: &[Raw]| {
