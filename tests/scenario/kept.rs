@@ -307,3 +307,74 @@ fn scenario_a_pdf_that_is_called_off_leaves_no_folder_and_no_browser() {
         assert!(left.is_empty(), "{signal}: {left:?}");
     }
 }
+
+/// A table of one axis over `targets_mm`, three runs up and down.
+fn stops(targets_mm: &[f64]) -> String {
+    let mut text = "run,direction,target_mm,deviation_um\n".to_owned();
+    for run in 1..=3 {
+        for (way, sign) in [("up", 0.0), ("down", 3.0)] {
+            let mut targets = targets_mm.to_vec();
+            if way == "down" {
+                targets.reverse();
+            }
+            for target in targets {
+                let deviation = 0.02 * target + sign + 0.1 * f64::from(run);
+                text.push_str(&format!("{run},{way},{target},{deviation}\n"));
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn scenario_tests_of_another_travel_are_another_series_and_a_report_is_known_by_its_table() {
+    let home = tempfile::tempdir().unwrap();
+    let store = home.path().join("history.sqlite");
+    let table = |name: &str, targets_mm: &[f64]| {
+        let path = home.path().join(name);
+        std::fs::write(&path, stops(targets_mm)).unwrap();
+        path
+    };
+    let long = table("long.csv", &[0.0, 50.0, 100.0, 150.0, 200.0, 250.0]);
+    let short = table("short.csv", &[0.0, 10.0, 20.0, 30.0, 40.0, 50.0]);
+    for (path, date) in [(&long, "2026-01-05"), (&short, "2026-02-05")] {
+        let path = path.to_str().unwrap();
+        let keep = [
+            "report",
+            path,
+            "--keep",
+            "--kept-as",
+            "m1",
+            "--kept-at",
+            date,
+        ];
+        let kept = ran(&keep, &[("--store", store.as_path())]);
+        assert_eq!(kept.status.code(), Some(0), "{}", kept.said);
+    }
+    let shown = ran(
+        &["history", "m1", "--json"],
+        &[("--store", store.as_path())],
+    );
+    let figures = json(&shown);
+    let figures = figures["figures"].as_array().unwrap();
+    let of_accuracy = figures
+        .iter()
+        .filter(|it| it["figure"] == "iso230_2.accuracy");
+    let tests: Vec<&str> = of_accuracy.map(|it| it["test"].as_str().unwrap()).collect();
+    assert_eq!(tests.len(), 2, "{tests:?}");
+    for range in ["0 to 250 mm", "0 to 50 mm"] {
+        assert!(tests.iter().any(|test| test.contains(range)), "{tests:?}");
+    }
+    let report = ran(&["report", long.to_str().unwrap(), "--json"], &[]);
+    let path = home.path().join("long.json");
+    std::fs::write(&path, json(&report).to_string()).unwrap();
+    let add = ["history", "add", path.to_str().unwrap(), "--machine", "m1"];
+    let again = [&add[..], &["--at", "2026-01-05"]].concat();
+    let again = ran(&again, &[("--store", store.as_path())]);
+    assert_eq!(again.status.code(), Some(0), "{}", again.said);
+    assert!(
+        again.said.contains("already, nothing was added"),
+        "{}",
+        again.said
+    );
+}

@@ -319,6 +319,12 @@ fn beside(
         readings: recorded.readings,
         defaults,
         simulated,
+        without: config.left_out.clone(),
+        ablated: config
+            .ablated
+            .iter()
+            .map(|rule| rule.id().to_owned())
+            .collect(),
     })
 }
 

@@ -14,6 +14,7 @@ use control_tables::selection::{Selected, Wanted, select};
 use control_tables::{ExportFile, Travels, Unestimable};
 use metrology::{Axis, AxisSet, PerAxis};
 use recorder::Bag;
+use replayer::machines;
 
 use crate::tell::tell;
 use crate::usage::{USAGE, above_zero, refused};
@@ -146,6 +147,7 @@ impl Export {
         self.check(format)
             .map_err(|reason| refused("export", reason))?;
         let bag = Bag::open(&self.bag)?;
+        machines::check(bag.topics()).with_context(|| self.bag.display().to_string())?;
         let Found {
             mut measured,
             reading,

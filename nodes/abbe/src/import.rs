@@ -18,15 +18,19 @@ use recorder::RecorderError;
 use reports::loss;
 use reports::whole_file::WholeFolder;
 
+mod again;
 mod angles;
 mod beside;
 mod book;
+mod dates;
 mod file;
 pub(crate) mod limits;
 pub(crate) mod map;
 mod map_schema;
+mod measured;
 mod motion;
 mod odd;
+mod parted;
 mod passes;
 pub(crate) mod propose;
 mod recognise;
@@ -37,6 +41,7 @@ mod stated;
 mod table;
 mod times;
 mod units;
+mod vocabulary;
 mod writer;
 
 use file::Form;

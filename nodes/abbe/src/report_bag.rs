@@ -21,8 +21,10 @@ use anyhow::{Context, Result};
 use clap::Args;
 use maud::html;
 use recorder::Bag;
+use replayer::machines;
 
 use crate::SOFTWARE;
+use crate::diagnose::bags;
 use crate::history::keep::Keep;
 use crate::history::origin::Origin;
 use crate::pdf;
@@ -79,6 +81,16 @@ fn is_whole(tests: &Tests) -> bool {
     tests.reading.is_whole() && reports::circular::refused(&tests.circles).is_empty()
 }
 
+/// Nothing is known of the machine of a table; a map states where it was measured.
+fn forget_machine(tests: &mut Tests, has_map: bool) {
+    tests.machine = None;
+    if !has_map {
+        let linear = tests.linear.iter_mut();
+        linear.for_each(|test| test.place_mm = None);
+    }
+    tests.left_out.clear();
+}
+
 impl ReportBag {
     /// Evaluates the bag; exit code 3 when a part of it was lost or left out, or a circle has an outlier.
     ///
@@ -91,11 +103,10 @@ impl ReportBag {
         complain!("Evaluating the tests of {}", self.bag.display());
         let table = from_table::of(&self.bag, self.map.as_deref())?;
         let bag = Bag::open(table.as_ref().map_or(&self.bag, |table| &table.bag))?;
+        machines::check(bag.topics()).with_context(|| self.bag.display().to_string())?;
         let mut tests = Tests::of(&bag);
         if table.is_some() {
-            // Nothing is known of the machine.
-            tests.machine = None;
-            tests.left_out.clear();
+            forget_machine(&mut tests, self.map.is_some());
         }
         complain_of(&tests);
         let n_odd = table.as_ref().map_or(0, |table| table.n_odd);
@@ -128,6 +139,7 @@ impl ReportBag {
             made.machine = None;
         }
         report.made(made);
+        self.identify(&mut report, &bag, table.is_some())?;
         let page = self.out.as_ref().map(|out| out.join("report.html"));
         if self.json {
             tell!("{}", serde_json::to_string_pretty(&report.figures)?);
@@ -161,6 +173,19 @@ impl ReportBag {
         let files = files.into_iter().filter_map(|file| file.as_deref());
         let inputs = files.chain([self.bag.as_path()]).chain(self.keep.store());
         check_outputs(&outputs, inputs)
+    }
+
+    /// States by which SHA-256 a history recognises the bag or table, where the figures are written.
+    fn identify(&self, report: &mut Report, bag: &Bag, is_table: bool) -> Result<()> {
+        if self.json || self.out.is_some() {
+            let sha256 = if is_table {
+                Origin::of_text(&text_file::bytes(&self.bag)?, &self.bag).sha256
+            } else {
+                bags::hash(bag)?
+            };
+            report.figures["made"]["input_sha256"] = sha256.into();
+        }
+        Ok(())
     }
 
     /// The page as a PDF, and its figures in the history, where that is wanted; `of_table`: the bag that a table was made into.

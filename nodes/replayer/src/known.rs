@@ -13,18 +13,23 @@ use crate::account::Reason;
 /// The topic of ours that `name` is, in whatever namespace; the longest name where several fit.
 #[must_use]
 pub fn entry_in_any_namespace(name: &str) -> Option<&'static Entry> {
-    let fits = |entry: &&Entry| {
-        let known = entry.name.trim_start_matches('/');
-        let place = if entry.is_family {
-            name.rfind(known)
-                .filter(|at| is_member(&name[at + known.len()..]))
-        } else {
-            name.strip_suffix(known).map(str::len)
-        };
-        place.is_some_and(|at| at == 0 || name[..at].ends_with('/'))
-    };
+    let fits = |entry: &&Entry| namespace(name, entry).is_some();
     let entries = topics::all().iter().filter(fits);
     entries.max_by_key(|entry| entry.name.len())
+}
+
+/// What stands before a topic of ours in `name`, without the slash at its end; `None`: it is not this topic.
+#[must_use]
+pub(crate) fn namespace<'n>(name: &'n str, entry: &Entry) -> Option<&'n str> {
+    let known = entry.name.trim_start_matches('/');
+    let place = if entry.is_family {
+        name.rfind(known)
+            .filter(|at| is_member(&name[at + known.len()..]))
+    } else {
+        name.strip_suffix(known).map(str::len)
+    };
+    let before = &name[..place?];
+    (before.is_empty() || before.ends_with('/')).then(|| before.trim_end_matches('/'))
 }
 
 /// A name behind that of a family: the last one.

@@ -22,6 +22,7 @@ mod inputs;
 pub mod known;
 pub mod leap;
 mod listening;
+pub mod machines;
 pub mod pace;
 pub mod pause;
 pub mod playback;

@@ -10,7 +10,7 @@ use machine::MachineFile;
 use machine::file::AxisEntry;
 use metrology::text::{self, Comments};
 use recorder::{Bag, MACHINE_FILE, Order};
-use replayer::{Reading, Reason, Taken, reading};
+use replayer::{Reading, Reason, Taken, machines, reading};
 use reports::loss;
 use sha2::{Digest, Sha256};
 use twin::Session;
@@ -33,13 +33,26 @@ impl Recorded {
     /// # Errors
     /// When one cannot be opened, or is another machine's.
     pub fn read(paths: &[PathBuf], machine: &MachineFile) -> Result<Self> {
+        Self::of(paths, machine, true)
+    }
+
+    /// Reads the bags of a simulator, whose machine may have a name of its own.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn of_simulator(paths: &[PathBuf], machine: &MachineFile) -> Result<Self> {
+        Self::of(paths, machine, false)
+    }
+
+    fn of(paths: &[PathBuf], machine: &MachineFile, is_recording: bool) -> Result<Self> {
         let mut builder = SessionBuilder::new(machine, SessionConfig::default())?;
         let (mut readings, mut hashes, mut ends) = (vec![], vec![], vec![]);
         for path in paths {
             let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
+            machines::check(bag.topics()).with_context(|| format!("bag {}", path.display()))?;
             // A damaged one is among the losses of the bag.
             if let Ok(Some(attachment)) = bag.attachment(MACHINE_FILE) {
-                is_of(&attachment.data, machine)
+                is_of(&attachment.data, machine, is_recording)
                     .with_context(|| format!("bag {}", path.display()))?;
             }
             builder.next_bag();
@@ -97,11 +110,14 @@ const EQUAL_VALUES: f64 = 1e-9;
 
 /// Whether a machine file may be that of the machine which another one, of the recording, describes: what is built
 /// into a machine is the same in both. One that cannot be read, as of an older format, tells nothing.
-fn is_of(recorded: &[u8], machine: &MachineFile) -> Result<()> {
+fn is_of(recorded: &[u8], machine: &MachineFile, is_recording: bool) -> Result<()> {
     let parse = |text| MachineFile::parse(text, MACHINE_FILE).ok();
     let Some(recorded) = std::str::from_utf8(recorded).ok().and_then(parse) else {
         return Ok(());
     };
+    if is_recording {
+        same_name(&recorded.name, &machine.name)?;
+    }
     if recorded.chain != machine.chain {
         bail!(
             "chain: {} in the recording, {} in the machine file: it is another machine's",
@@ -122,6 +138,17 @@ fn is_of(recorded: &[u8], machine: &MachineFile) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Refuses a recording of a machine that has another name: machines of one model differ in nothing else.
+fn same_name(recorded: &str, machine: &str) -> Result<()> {
+    if recorded == machine {
+        return Ok(());
+    }
+    bail!(
+        "name: {recorded} in the recording, {machine} in the machine file: it is another machine's; where it is the same one, give \
+         the machine file its name ({recorded})"
+    );
 }
 
 /// What of an axis no adjustment changes.
@@ -230,6 +257,22 @@ mod tests {
     use std::io::Write;
 
     use super::*;
+
+    #[test]
+    fn a_recording_of_a_machine_with_another_name_is_refused_with_both() {
+        let text = include_str!("../../../../launch_configs/gap_first/machine.yaml");
+        let machine = MachineFile::parse(text, "m").unwrap();
+        let named = |name: &str| text.replace("name: vmc_3x", &format!("name: {name}"));
+        for name in ["vmc_17", "vmc_3x_b", "VMC_3X", "other"] {
+            let refused = is_of(named(name).as_bytes(), &machine, true).unwrap_err();
+            let refused = refused.to_string();
+            let words = format!("name: {name} in the recording, vmc_3x in the machine file");
+            assert!(refused.contains(&words), "{refused}");
+            assert!(is_of(named(name).as_bytes(), &machine, false).is_ok());
+        }
+        let changed = format!("{text}\n# mended\n");
+        assert!(is_of(changed.as_bytes(), &machine, true).is_ok());
+    }
 
     #[test]
     fn a_bag_that_was_cut_is_told_as_such_before_what_it_lacks() {

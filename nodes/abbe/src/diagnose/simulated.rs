@@ -33,7 +33,7 @@ pub fn beside(
     if paths.is_empty() {
         return Ok(None);
     }
-    let read = Recorded::read(paths, machine).context("--simulated")?;
+    let read = Recorded::of_simulator(paths, machine).context("--simulated")?;
     if let Some(lost) = loss::lines(&read.readings).first() {
         bail!(
             "--simulated: {lost}: a simulator's bag is used whole or not at all, let the simulator write it again"

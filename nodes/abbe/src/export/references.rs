@@ -127,6 +127,7 @@ mod tests {
             feed_mm_s: 100.0,
             reference,
             direction: Vector3::ith(axis.index(), 1.0),
+            place_mm: None,
             targets_mm: vec![0.0, 42.0, 83.0],
             up_mm: vec![vec![0.001, 0.002, 0.003], vec![0.003, 0.004, 0.005]],
             down_mm: vec![vec![-0.001, -0.002, -0.003], vec![-0.003, -0.002, -0.001]],

@@ -2,6 +2,7 @@
 
 use control_tables::Travels;
 use metrology::PerAxis;
+use node_runtime::complain;
 use recorder::Bag;
 use reports::machine_of_bag;
 
@@ -9,7 +10,12 @@ use reports::machine_of_bag;
 pub(super) fn of(bag: &Bag, losses: &mut Vec<String>) -> Travels {
     let machine = match machine_of_bag::of(bag) {
         Ok(Some((machine, _))) => machine,
-        Ok(None) => return PerAxis::default(),
+        Ok(None) => {
+            complain!(
+                "abbe: the bag has no machine file: points are not compared with the travel of the axes; record with --machine FILE"
+            );
+            return PerAxis::default();
+        }
         Err(why) => {
             losses.push(format!(
                 "points are not compared with the travel of the axes: {why}"

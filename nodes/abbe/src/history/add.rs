@@ -9,6 +9,7 @@ use gap_diagnosis::GapConfig;
 use history::{Kind, Store, gap_figures, report_figures};
 use node_runtime::{complain, complaint};
 use recorder::Bag;
+use replayer::machines;
 use reports::evaluate::Tests;
 use reports::evaluate::budget::Budget;
 use reports::loss;
@@ -16,7 +17,7 @@ use serde_json::Value;
 
 use super::dates::{Moment, moment};
 use super::keep::{add, complain_of_left_out, entry};
-use super::origin::{Origin, joined, json};
+use super::origin::{Origin, joined, json, made_with};
 use super::{open_to_write, unmake};
 use crate::diagnose::{self, bags};
 use crate::report_bag;
@@ -116,7 +117,7 @@ impl Add {
         if value.get("schema").is_some() {
             return self.add_gap(&value, origin, store);
         }
-        self.add_report(&value, origin, store)
+        self.add_report(&value, origin.with_made(&value["made"]), store)
     }
 
     fn add_gap(&self, value: &Value, origin: Origin, store: &mut Store) -> Result<bool> {
@@ -124,7 +125,7 @@ impl Add {
         let mut origin = self.stated(origin)?;
         // A diagnosis is recognised by its bags: its text has the time that it took.
         if !gap.bags.is_empty() {
-            origin.sha256 = joined(&gap.bags);
+            origin.sha256 = made_with(&joined(&gap.bags), &gap.made_with);
         }
         origin.machine_sha256 = gap.machine_sha256.or(origin.machine_sha256);
         let entry = entry(Kind::Diagnosis, gap.figures, origin)?;
@@ -134,6 +135,7 @@ impl Add {
 
     fn add_bag(&self, path: &Path, budget: Option<&Budget>, store: &mut Store) -> Result<bool> {
         let bag = Bag::open(path)?;
+        machines::check(bag.topics())?;
         let tests = Tests::of(&bag);
         loss::complain_of(&tests.reading);
         let page = report_bag::page("", &tests, budget)?;

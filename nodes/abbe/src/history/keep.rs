@@ -9,7 +9,7 @@ use node_runtime::complain;
 use serde_json::Value;
 
 use super::dates::{Moment, moment, time};
-use super::origin::Origin;
+use super::origin::{Origin, made_with};
 use super::{open_to_write, unmake};
 
 /// Arguments of verbs that can keep their figures.
@@ -60,6 +60,7 @@ impl Keep {
         let gap = gap_figures(gap)?;
         let mut origin = self.named(origin)?;
         origin.machine_sha256 = origin.machine_sha256.or(gap.machine_sha256);
+        origin.sha256 = made_with(&origin.sha256, &gap.made_with);
         let entry = entry(Kind::Diagnosis, gap.figures, origin)?;
         self.add(&entry)
     }
@@ -157,6 +158,9 @@ pub fn add(store: &mut Store, entry: &Entry) -> Result<String> {
     Ok(match store.add(entry)? {
         Added::New => format!("kept {n} figures of a {kind} of {machine}"),
         Added::Known => format!("has this {kind} of {machine} already, nothing was added"),
+        Added::KnownOtherwise => format!(
+            "has this {kind} of {machine} already, with other figures (as of another budget, map or version): nothing was added; keep these in another file with --store"
+        ),
         Added::Otherwise {
             machine: other,
             at_s,

@@ -109,12 +109,23 @@ impl Origin {
     }
 
     /// Of the text of a report.
-    pub fn of_text(text: &str, source: &Path) -> Self {
+    pub fn of_text(text: impl AsRef<[u8]>, source: &Path) -> Self {
         Self {
-            sha256: hash(text.as_bytes()),
+            sha256: hash(text.as_ref()),
             source: source.display().to_string(),
             ..Self::default()
         }
+    }
+
+    /// With machine and hash of the bag or table that a report's JSON was made of, where it has them: it is recognised as that
+    /// bag or table.
+    pub fn with_made(mut self, made: &Value) -> Self {
+        let text = |key: &str| made[key].as_str().map(str::to_owned);
+        self.machine = self.machine.or_else(|| text("machine"));
+        if let Some(sha256) = text("input_sha256") {
+            self.sha256 = sha256;
+        }
+        self
     }
 
     /// With machine and time as they were given; `option` is the name of the time's option.
@@ -187,6 +198,11 @@ pub fn joined(hashes: &[String]) -> String {
     }
 }
 
+/// The hash of a diagnosis: of its bags, and of what it was made with.
+pub fn made_with(bags_sha256: &str, made_with: &str) -> String {
+    hash(format!("{bags_sha256}\n{made_with}").as_bytes())
+}
+
 /// Paths of bags in the length that a store takes.
 fn shortened(sources: Vec<String>) -> String {
     const MOST: usize = 20;
@@ -240,6 +256,31 @@ mod tests {
         assert_eq!(Origin::default().with_conditions(&undated).at_s, None);
         let nothing = Origin::default().with_conditions(&Value::Null);
         assert_eq!(nothing, Origin::default());
+    }
+
+    #[test]
+    fn a_report_is_recognised_by_what_it_was_made_of() {
+        let path = Path::new("report.json");
+        let bag = "ab".repeat(32);
+        for (made, machine, sha256) in [
+            (
+                json!({"machine": "vmc_3x", "input_sha256": bag}),
+                Some("vmc_3x"),
+                Some(&bag),
+            ),
+            (
+                json!({"machine": null, "input_sha256": bag}),
+                None,
+                Some(&bag),
+            ),
+            (json!({"machine": "vmc_3x"}), Some("vmc_3x"), None),
+            (Value::Null, None, None),
+        ] {
+            let plain = Origin::of_text("{}", path);
+            let origin = plain.clone().with_made(&made);
+            assert_eq!(origin.machine.as_deref(), machine, "{made}");
+            assert_eq!(&origin.sha256, sha256.unwrap_or(&plain.sha256), "{made}");
+        }
     }
 
     #[test]

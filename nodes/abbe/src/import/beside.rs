@@ -11,6 +11,7 @@ use metrology::Axis;
 use metrology::yaml::shown;
 
 use super::map::{Map, Plane, Test};
+use super::parted;
 use super::table::Row;
 
 /// Lines of cells with their numbers.
@@ -59,15 +60,21 @@ pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<
             let at = place(head, lines, SENSE_NAMES, sense_of).filter(open);
             at.map_or(Ok(()), |k| sense((head, lines), k, rows))
         }
-    }
+    }?;
+    parted::check(map, head, lines, rows)
 }
 
 /// The columns that no key of the map names.
-pub fn unnamed(head: &[String], places: &[usize]) -> Vec<String> {
+pub fn unnamed(head: &[String], places: &[usize], dates: Option<usize>) -> Vec<String> {
     let others = head.iter().enumerate();
     let others = others.filter(|(place, name)| !places.contains(place) && !name.is_empty());
     others
-        .map(|(_, name)| format!("column \"{name}\": the map does not name it"))
+        .map(|(place, name)| match dates {
+            Some(dates) if dates == place => {
+                format!("column \"{name}\": its dates stand before the times of their rows")
+            }
+            _ => format!("column \"{name}\": the map does not name it"),
+        })
         .collect()
 }
 

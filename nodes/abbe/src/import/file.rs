@@ -8,6 +8,7 @@ use calamine::{DataRef, ExcelDateTime, Reader, SheetVisible, Xlsx};
 use node_runtime::text_file::{self, Comments};
 
 use super::book;
+use super::dates;
 use super::sheet::{MOST_CELLS, MOST_COLUMNS, Sheet};
 
 /// Begin of a ZIP archive, which an xlsx file is.
@@ -184,9 +185,11 @@ fn worksheet(book: &mut Xlsx<Cursor<Vec<u8>>>, name: &str, decimal: char) -> Res
     for (_, cells) in &mut lines {
         cells.resize(width, String::new());
     }
+    let dates = dates::join(&mut lines);
     Ok(Some(Sheet {
         lines,
         separator: None,
+        dates,
     }))
 }
 

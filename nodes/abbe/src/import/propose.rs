@@ -49,7 +49,8 @@ pub fn of(path: &Path) -> Result<Proposal> {
         Some(Of::Log) => text.log(axis)?,
         Some(Of::Circle) => text.circle()?,
         None => bail!(
-            "columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations: write a map (docs/reference/scenario.md#import-map)",
+            "{}columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations: write a map (docs/reference/scenario.md#import-map)",
+            sign::unsure(&found),
             names(&found).join(", ")
         ),
     };
@@ -284,6 +285,7 @@ impl<'t> Text<'t> {
         }
         match (found.first(Role::Deviation), found.first(Role::Measured)) {
             (Some(read), _) => {
+                sign::check(found, read)?;
                 self.column(key("deviation_um", "deviation_arcsec"), read);
                 self.unit(read, deviation, likely_deviation(&[read], deviation))?;
             }
@@ -342,6 +344,11 @@ impl<'t> Text<'t> {
         self.test.push_str("  log:\n");
         self.axis(axis, taken);
         self.column("time_s", time);
+        if let Some(dates) = &found.date_column {
+            self.used.push(dates.clone());
+            self.recognised
+                .push(format!("dates before its times: column \"{dates}\""));
+        }
         match times::of_text(&time.first)? {
             Some(first_s) => self.start_s = first_s,
             None => self.time_unit(time)?,
@@ -450,11 +457,19 @@ impl<'t> Text<'t> {
                 "nominal radius; lengths that follow from it (scale, squareness) depend on it",
             ),
         }
-        self.stated(
-            "feed_mm_min",
-            "1000.0",
-            "feed; what follows from speed depends on it",
-        );
+        match radial::feed(found) {
+            Some((column, feed_mm_min)) => {
+                let _ = writeln!(self.test, "    feed_mm_min: {feed_mm_min:?}");
+                self.recognised
+                    .push(format!("feed_mm_min: column \"{}\"", column.name));
+                self.used.push(column.name.clone());
+            }
+            None => self.stated(
+                "feed_mm_min",
+                "1000.0",
+                "feed; what follows from speed depends on it",
+            ),
+        }
         self.column("run", run);
         self.column("angle_deg", angle);
         self.unit(angle, Unit::Deg, None)?;
@@ -553,5 +568,6 @@ pub fn machine_for(map: &Map) -> String {
 
 mod likely;
 mod radial;
+mod sign;
 #[cfg(test)]
 mod tests;

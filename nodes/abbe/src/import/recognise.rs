@@ -10,6 +10,7 @@ use super::stated::{self, Stated};
 use super::table::number_of;
 use super::times;
 use super::units::{Kind, Unit};
+use super::vocabulary::{is_correction, is_reversed};
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +62,8 @@ pub struct Recognised {
     pub above: String,
     /// Words of the comments above the names.
     pub comments: String,
+    /// A column of dates, which stand before the times of their rows.
+    pub date_column: Option<String>,
     /// A column of axes, with the first of them.
     pub axis_column: Option<(String, Axis)>,
     /// A column of planes, with the first of them.
@@ -125,6 +128,7 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
         n_rows: lines.len() - at - 1,
         above: above.collect::<Vec<_>>().join(" "),
         comments: String::new(),
+        date_column: sheet.dates.and_then(|place| head.get(place).cloned()),
         axis_column: beside::axis(head, &lines[at + 1..]),
         plane_column: beside::plane(head, &lines[at + 1..]),
     })
@@ -301,7 +305,7 @@ fn role(
     if has_clock || kind == Some(Kind::Time) {
         return Some(Role::Time);
     }
-    if !is_numeric {
+    if !is_numeric || is_correction(name) || is_reversed(name) {
         return None;
     }
     if let Some(direction) = way_of(name, words) {
@@ -342,6 +346,12 @@ fn role(
         .into_iter()
         .find(|(_, is_it)| *is_it)
         .map(|(role, _)| role)
+}
+
+/// What a column of numbers holds by its name alone.
+pub fn role_of_name(name: &str) -> Option<Role> {
+    let (words, _) = parts(name);
+    role(name, &words, None, (&[], true))
 }
 
 /// The direction in the name of a pass: `1 up`, `Run 2 ↓`, `3-`.

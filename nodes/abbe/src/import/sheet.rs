@@ -2,6 +2,8 @@
 
 use anyhow::{Context, Result, bail};
 
+use super::dates;
+
 /// Most columns of a table that are read.
 pub const MOST_COLUMNS: u32 = 1_000;
 
@@ -15,6 +17,8 @@ pub struct Sheet {
     pub lines: Vec<(u64, Vec<String>)>,
     /// Separator of a text, which messages quote.
     pub separator: Option<char>,
+    /// Place of a column of dates that stand before the times of the day of their rows by now.
+    pub dates: Option<usize>,
 }
 
 impl Sheet {
@@ -55,9 +59,11 @@ impl Sheet {
                 "the file has no line with the names of columns: it is empty, or holds comments alone"
             );
         }
+        let dates = dates::join(&mut lines);
         Ok(Self {
             lines,
             separator: Some(separator),
+            dates,
         })
     }
 

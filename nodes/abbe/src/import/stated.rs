@@ -2,81 +2,20 @@
 //!
 //! A stated unit holds. One that is not known, or that is not the one of the map's key, is refused with what to state: only
 //! `units` of the map states that a name is wrong. In brackets stands a unit or a note; without them the last word may be a
-//! unit, or a clear one before it.
+//! unit, or a clear one before it. Where a name says deviation, target or another length or angle, what stands there is a
+//! unit, or a word that is known to be none.
 
 use anyhow::{Result, bail};
 use metrology::yaml::shown;
 
 use super::map::{Column, Direction, Map, What};
-use super::units::Unit;
+use super::units::{Kind, Unit};
+use super::vocabulary::{is_foreign, is_known, is_note_word, is_quantity, plain};
 
-/// Words of units that no map knows, lower case, and of parts of units (`hundredths mm`).
-const FOREIGN: &[&str] = &[
-    "mil",
-    "mils",
-    "tenth",
-    "tenths",
-    "hundredth",
-    "hundredths",
-    "thousandth",
-    "thousandths",
-    "zehntel",
-    "hundertstel",
-    "tausendstel",
-    "dm",
-    "km",
-    "ft",
-    "foot",
-    "feet",
-    "yd",
-    "yard",
-    "yards",
-    "angstrom",
-    "angstroms",
-    "å",
-    "pm",
-    "mv",
-    "uv",
-    "volt",
-    "volts",
-    "millivolt",
-    "millivolts",
-    "microvolt",
-    "microvolts",
-    "counts",
-    "cts",
-    "increments",
-    "inkremente",
-    "digits",
-    "ticks",
-    "pulses",
-    "lsb",
-    "divisions",
-    "ppm",
-    "ppb",
-    "percent",
-    "mgon",
-    "ohm",
-    "ohms",
-    "nrad",
-    "µµ",
-    "lines",
-    "fringes",
-    "wavelengths",
-    "furlong",
-    "line",
-    "fringe",
-];
 /// Units that hold in the middle of a name too: no other word is written so.
 const CLEAR_UNITS: &[&str] = &[
     "nm", "um", "mm", "uin", "inch", "inches", "micron", "microns", "arcsec", "arcmin", "urad",
     "mrad", "gon", "degc", "degf",
-];
-/// Short words in brackets that are no unit.
-const NOTE_WORDS: &[&str] = &[
-    "abs", "rel", "avg", "raw", "ist", "max", "act", "cmd", "dev", "opt", "cw", "ccw", "lh", "rh",
-    "1st", "2nd", "3rd", "mid", "top", "utc", "gmt", "cet", "mez", "sum", "ref", "iso", "low",
-    "uni", "bi", "old", "new", "all", "any", "c",
 ];
 /// Words with which a name of an angle begins.
 const ANGLES: &[&str] = &["angle", "winkel", "phi", "theta", "target", "pos", "soll"];
@@ -141,13 +80,15 @@ pub fn in_one_line(text: &str) -> String {
 /// What a column's name states of its unit.
 pub fn of(name: &str) -> Stated {
     let (plain, inner) = apart(name);
+    let is_closed = is_quantity(name);
+    let is_open = |open: char| open != '[' && !is_closed;
     let mut found: Vec<Stated> = inner
         .iter()
-        .map(|(open, text)| in_brackets(text, *open == '['))
+        .map(|(open, text)| in_brackets(text, *open == '[', is_open(*open)))
         .filter(|stated| *stated != Stated::Nothing)
         .collect();
     let Some(first) = found.pop() else {
-        return in_words(&plain);
+        return in_words(&plain, is_closed);
     };
     let is_other = |stated: &&Stated| stated.unit() != first.unit() || first.unit().is_none();
     match found.iter().find(is_other) {
@@ -182,15 +123,6 @@ fn apart(name: &str) -> (String, Vec<(char, String)>) {
     (plain, inner)
 }
 
-/// Lower case with `u` for a micro sign.
-fn plain(word: &str) -> String {
-    word.to_lowercase().replace(['µ', 'μ'], "u")
-}
-
-fn is_foreign(word: &str) -> bool {
-    FOREIGN.contains(&plain(word).as_str())
-}
-
 fn is_digits(word: &str) -> bool {
     !word.is_empty() && word.chars().all(|letter| letter.is_ascii_digit())
 }
@@ -199,7 +131,8 @@ fn is_letters(word: &str) -> bool {
     word.chars().all(char::is_alphabetic)
 }
 
-fn in_brackets(text: &str, is_square: bool) -> Stated {
+/// A unit in brackets; `is_open`: a single longer word may be any note.
+fn in_brackets(text: &str, is_square: bool, is_open: bool) -> Stated {
     let word = text.trim();
     let letter = match word {
         "F" | "f" => Some(Unit::Degf),
@@ -227,7 +160,8 @@ fn in_brackets(text: &str, is_square: bool) -> Stated {
         }
     }
     let is_long = |word: &&str| is_plain(word) && (word.chars().count() > 3 || is_note(word));
-    if !is_square && words.iter().all(is_long) {
+    let is_open = is_open || words.len() > 1 || is_known(word);
+    if !is_square && is_open && words.iter().all(is_long) {
         return Stated::Nothing;
     }
     Stated::Unknown(word.to_owned())
@@ -246,15 +180,36 @@ fn is_note(word: &str) -> bool {
         .unwrap_or(numbered);
     let is_sign = |letter: char| !letter.is_alphanumeric() && !"%°'\"′″‰".contains(letter);
     let is_axis = |letter: char| ('X'..='Z').contains(&letter) || ('A'..='C').contains(&letter);
-    NOTE_WORDS.contains(&lower.as_str())
+    is_note_word(&lower)
         || Direction::of_word(word).is_some()
         || is_digits(numbered.trim_matches([' ', '.', '#', '_']))
         || word.chars().all(is_sign)
         || (word.len() <= 3 && word.chars().all(is_axis))
 }
 
-/// A unit without brackets: the last word, or a clear one before it.
-fn in_words(text: &str) -> Stated {
+/// A sign of a unit behind the last word: `deviation %`, `error µ"`.
+fn sign_behind(text: &str, last: &str, rest: &str) -> Option<Stated> {
+    const SIGNS: &[char] = &['%', '‰', '"', '\''];
+    let sign = rest.trim();
+    let is_quoted = |sign: char| text.matches(sign).count() > 1;
+    let first = sign.chars().find(|letter| SIGNS.contains(letter))?;
+    if is_quoted(first) {
+        return None;
+    }
+    let is_apart = rest.starts_with(char::is_whitespace) || is_known(last);
+    let word = if is_apart {
+        sign.to_owned()
+    } else {
+        format!("{last}{sign}")
+    };
+    Some(match Unit::of_word(&word) {
+        Some(unit) => Stated::Unit(unit, word),
+        None => Stated::Unknown(word),
+    })
+}
+
+/// The words of a name, each with what stands before it; and what stands behind the last one.
+fn split(text: &str) -> (Vec<(&str, &str)>, &str) {
     let is_part = |letter: char| letter.is_alphanumeric() || matches!(letter, '°' | '′' | '″');
     let mut words: Vec<(&str, &str)> = vec![];
     let mut rest = text;
@@ -267,13 +222,31 @@ fn in_words(text: &str) -> Stated {
         words.push((between, &behind[..end]));
         rest = &behind[end..];
     }
+    (words, rest)
+}
+
+/// A unit without brackets: the last word, or a clear one before it.
+fn in_words(text: &str, is_closed: bool) -> Stated {
+    let (words, rest) = split(text);
     let [before @ .., (between, last)] = words.as_slice() else {
         return Stated::Nothing;
     };
+    if let Some(stated) = sign_behind(text, last, rest) {
+        return stated;
+    }
     let Some((apart, previous)) = before.last() else {
         return Stated::Nothing;
     };
+    if previous.eq_ignore_ascii_case("arc")
+        && let Some(unit) = Unit::of_word(&format!("arc{last}"))
+    {
+        return Stated::Unit(unit, format!("{previous} {last}"));
+    }
     let unit = Unit::of_word(last);
+    let is_share = matches!(previous.to_lowercase().as_str(), "per" | "pro" | "je");
+    if is_share && (unit.is_some() || is_foreign(last)) {
+        return Stated::Unknown(format!("{previous} {last}"));
+    }
     // `d/mm` is a quantity and its unit, `um/m` one unit.
     let is_quantity = before.len() == 1 && previous.chars().count() == 1 && !is_digits(previous);
     let is_ratio = *between == "/" && !is_quantity;
@@ -304,16 +277,52 @@ fn in_words(text: &str) -> Stated {
     }
     let is_clear = |word: &str| {
         let word = plain(word);
-        CLEAR_UNITS.contains(&word.as_str()) || (word == "rad" && begins(ANGLES))
+        CLEAR_UNITS.contains(&word.as_str())
+            || (word == "rad" && begins(ANGLES))
+            || (is_closed && is_long_unit(&word))
     };
     // `100 mm bar` is no unit of the column.
     let is_numbered = |k: usize| k > 0 && is_digits(words[k - 1].1);
     let mut clear = (0..before.len()).filter(|k| is_clear(words[*k].1) && !is_numbered(*k));
     let clear = clear.next_back().map(|k| words[k].1);
-    clear.map_or(Stated::Nothing, |word| match Unit::of_word(word) {
-        Some(unit) => Stated::Unit(unit, word.to_owned()),
-        None => Stated::Nothing,
-    })
+    let clear = clear.and_then(|word| Some((Unit::of_word(word)?, word)));
+    if let Some((unit, word)) = clear {
+        return Stated::Unit(unit, word.to_owned());
+    }
+    in_place(&words, is_closed)
+}
+
+/// Whether a word is the full name of a unit of a length or an angle.
+fn is_long_unit(word: &str) -> bool {
+    let is_turn = word.starts_with("turn");
+    let unit = Unit::of_word(word).filter(|_| word.chars().count() > 3 && !is_turn);
+    unit.is_some_and(|unit| matches!(unit.kind(), Kind::Length | Kind::Angle))
+}
+
+/// What stands in the place of a unit, where no unit that is known does.
+fn in_place(words: &[(&str, &str)], is_closed: bool) -> Stated {
+    let [.., (_, previous), (between, last)] = words else {
+        return Stated::Nothing;
+    };
+    let is_slash = between.trim() == "/";
+    if is_slash && is_digits(last) && !is_digits(previous) && !is_known(previous) {
+        return Stated::Unknown(format!("{previous}/{last}"));
+    }
+    if !is_closed {
+        return Stated::Nothing;
+    }
+    if is_digits(last) || is_known(last) {
+        // `deviation mdeg run 1`; a step or a line may be counted there.
+        let is_counted = |word: &str| matches!(word.to_lowercase().as_str(), "line" | "step");
+        let mut inner = words[1..words.len() - 1].iter().map(|(_, word)| *word);
+        let foreign = inner.find(|word| is_foreign(word) && !is_counted(word));
+        return foreign.map_or(Stated::Nothing, |word| Stated::Unknown(word.to_owned()));
+    }
+    // `0.1um` is cut behind its point.
+    if last.starts_with(|letter: char| letter.is_ascii_digit()) && is_digits(previous) {
+        return Stated::Unknown(format!("{previous}{between}{last}"));
+    }
+    Stated::Unknown((*last).to_owned())
 }
 
 /// A word without the brackets round it.
@@ -323,7 +332,7 @@ fn bare(word: &str) -> &str {
 
 /// What a cell of a line of units states.
 pub fn of_cell(word: &str) -> Stated {
-    in_brackets(bare(word), true)
+    in_brackets(bare(word), true, false)
 }
 
 /// Whether a line below the names has units: one at least, and no number.
@@ -435,6 +444,11 @@ mod tests {
             ("room [K]", Unit::Kelvin),
             ("room (degC)", Unit::Degc),
             ("phi_µrad", Unit::Urad),
+            ("deviation arc-sec", Unit::Arcsec),
+            ("error \"", Unit::Arcsec),
+            ("Abweichung Mikrometer Lauf 1", Unit::Um),
+            ("target millimeters", Unit::Mm),
+            ("Abweichung Bogensekunden", Unit::Arcsec),
             ("error [thou]", Unit::Thou),
         ] {
             assert_eq!(of(name).unit(), Some(unit), "{name}: {:?}", of(name));
@@ -499,9 +513,28 @@ mod tests {
             "grade",
             "radius angle",
             "deviation (abs)",
+            "deviation Laser",
+            "Soll-Ist-Abweichung",
+            "target position X",
+            "error mean value",
+            "deviation run1",
+            "spindle (Heidenhain)",
+            "bearing rear",
+            "deviation step 3",
+            "Deviation, forward",
+            "\"deviation\"",
             "",
         ] {
             assert_eq!(of(name), Stated::Nothing, "{name}");
+        }
+    }
+
+    #[test]
+    fn parts_of_units_and_words_that_a_name_does_not_know_are_unknown() {
+        let names = "deviation (mdeg);deviation_mdeg;deviation/µdeg;error m°;target (millideg);error mas;deviation (steps);deviation 0.1um;deviation V;deviation dmm;error/inc;deviation %;error lambda/4;error µ\";deviation milli;deviation um per m;deviation furlongs;target foo;Abweichung mdeg Lauf 1";
+        for name in names.split(';') {
+            let found = of(name);
+            assert!(matches!(found, Stated::Unknown(_)), "{name}: {found:?}");
         }
     }
 

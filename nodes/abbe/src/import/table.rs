@@ -4,9 +4,11 @@ use anyhow::{Context, Result, bail};
 
 use metrology::yaml::shown;
 
+use super::again;
 use super::beside;
 use super::limits::Range;
 use super::map::{Column, Direction, Map, Test, What, units};
+use super::measured;
 use super::odd::{Cost, Odd, Read, is_missing};
 use super::sheet::Sheet;
 use super::stated;
@@ -45,7 +47,7 @@ impl Table {
         let (head_line, head) = &sheet.lines[at];
         let place = |name: &&str| place_of(name, head, sheet.separator);
         let places: Vec<usize> = names.iter().map(place).collect::<Result<_>>()?;
-        let mut left_out = beside::unnamed(head, &places);
+        let mut left_out = beside::unnamed(head, &places, sheet.dates);
         left_out.extend((at > 0).then(|| {
             format!("{at} lines above line {head_line}, which has the names of the columns")
         }));
@@ -70,6 +72,7 @@ impl Table {
                 left_out.push(format!("line {line}: units alone"));
                 continue;
             }
+            again::check((head, cells), (&columns, &places), [*head_line, *line])?;
             check_length(cells, head.len(), *line)?;
             n_rows += 1;
             if let Some(cells) = reader.row(cells, *line)? {
@@ -83,6 +86,7 @@ impl Table {
             left_out.push(format!("{n_empty} rows: all their cells are empty"));
         }
         beside::check(map, head, &sheet.lines[at + 1..], &rows)?;
+        left_out.extend(measured::check(map, head, &sheet.lines[at + 1..], &rows)?);
         let rows = shaped(rows, map);
         Ok(Self {
             rows,

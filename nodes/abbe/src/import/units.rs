@@ -260,10 +260,12 @@ impl Unit {
         let word = word.to_lowercase();
         let own = Self::ALL.into_iter().find(|unit| unit.name() == word);
         own.or(match word.as_str() {
-            "micron" | "microns" | "micrometer" | "micrometre" | "mue" => Some(Self::Um),
-            "millimeter" | "millimetre" => Some(Self::Mm),
-            "meter" | "metre" => Some(Self::Metre),
-            "centimeter" | "centimetre" => Some(Self::Cm),
+            "micron" | "microns" | "micrometer" | "micrometre" | "mue" | "micrometers"
+            | "micrometres" | "mikrometer" | "mikron" | "mikrons" => Some(Self::Um),
+            "millimeter" | "millimetre" | "millimeters" | "millimetres" => Some(Self::Mm),
+            "meter" | "metre" | "meters" | "metres" => Some(Self::Metre),
+            "centimeter" | "centimetre" | "centimeters" | "centimetres" => Some(Self::Cm),
+            "nanometer" | "nanometre" | "nanometers" | "nanometres" => Some(Self::Nm),
             "in" | "inches" | "zoll" => Some(Self::Inch),
             "uinch" | "microinch" | "microinches" => Some(Self::Uin),
             "°c" | "ºc" | "degc" | "celsius" => Some(Self::Degc),
@@ -273,9 +275,15 @@ impl Unit {
             "gons" | "gradian" | "gradians" => Some(Self::Gon),
             "turns" | "rev" => Some(Self::Turn),
             "radian" | "radians" => Some(Self::Rad),
-            "'" | "′" => Some(Self::Arcmin),
-            "\"" | "″" | "arcseconds" | "arcs" | "as" => Some(Self::Arcsec),
-            "sec" | "secs" | "second" | "seconds" => Some(Self::Second),
+            "milliradian" | "milliradians" => Some(Self::Mrad),
+            "microradian" | "microradians" => Some(Self::Urad),
+            "'" | "′" | "arcminute" | "arcminutes" | "arc-min" | "arc min" | "bogenminute"
+            | "bogenminuten" => Some(Self::Arcmin),
+            "\"" | "″" | "arcsecond" | "arcseconds" | "arcs" | "as" | "asec" | "arc-sec"
+            | "arc sec" | "bogensekunde" | "bogensekunden" => Some(Self::Arcsec),
+            "sek" | "sekunde" | "sekunden" | "sec" | "secs" | "second" | "seconds" => {
+                Some(Self::Second)
+            }
             "msec" => Some(Self::Ms),
             "minutes" | "minute" => Some(Self::Min),
             "hour" | "hours" | "hr" | "hrs" | "std" | "stunden" => Some(Self::Hour),

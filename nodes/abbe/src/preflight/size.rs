@@ -1,6 +1,6 @@
 //! What a plan may hold for a preflight: its measurements are simulated once for every effect of the catalogue.
 //!
-//! A run in motion takes a tenth of a second and 4 MB, an hour of standing two seconds; touches of one cycle are compared
+//! A run in motion takes a tenth of a second and 4 MB, a stop a hundredth, an hour of standing two seconds; touches of one cycle are compared
 //! with each other, 2000 of them in four seconds, 8000 in two minutes. Within these bounds a preflight answers in about a
 //! minute.
 
@@ -10,14 +10,22 @@ use anyhow::{Context, Result, bail};
 use machine::MachineFile;
 use metrology::bound::Bound;
 use metrology::number::number;
+use node_runtime::complain;
 use sequencer::{Load, Plan};
 
 use super::dry_run::LIMIT_S;
 
 const REMEDY: &str = "; ask it of the same steps with fewer repeats, or of a part of the plan";
 const RUNS: Bound = Bound::at_most(500).with_remedy(REMEDY);
-const STOPS: Bound = Bound::at_most(50_000).with_remedy(REMEDY);
+const STOPS: Bound = Bound::at_most(5_000).with_remedy(REMEDY);
 const TOUCHES: Bound = Bound::at_most(4_000).with_remedy(REMEDY);
+
+/// Time of a run in motion, of a stop, and of two touches that are compared, s.
+const RUN_S: f64 = 0.1;
+const STOP_S: f64 = 0.0125;
+const TOUCHES_S: f64 = 1e-6;
+/// A preflight that takes longer is announced, s.
+const SAID_FROM_S: f64 = 15.0;
 
 /// Refuses a plan too large for a preflight, before anything is made of it.
 ///
@@ -28,7 +36,24 @@ pub fn check(
     programs: &BTreeMap<String, String>,
     machine: &MachineFile,
 ) -> Result<()> {
-    within(&sequencer::load(plan, machine, programs).context("plan")?)
+    let load = sequencer::load(plan, machine, programs).context("plan")?;
+    within(&load)?;
+    let expected_s = expected_s(&load);
+    if expected_s > SAID_FROM_S {
+        complain!(
+            "abbe: {} runs, {} stops and {} touches are simulated for every effect: about {expected_s:.0} s",
+            load.runs,
+            load.stops,
+            load.touches
+        );
+    }
+    Ok(())
+}
+
+/// How long a preflight of a plan takes on a computer of 2024, s.
+fn expected_s(load: &Load) -> f64 {
+    let touches = load.touches as f64;
+    RUN_S * load.runs as f64 + STOP_S * load.stops as f64 + TOUCHES_S * touches * touches
 }
 
 fn within(load: &Load) -> Result<()> {
@@ -72,8 +97,8 @@ mod tests {
                 "20000 runs of measuring steps: at most 500; ask it of",
             ),
             (
-                "{do: grid, placement: middle, trajectory: circle, radius_mm: 50.0, feed_mm_min: 1500.0, stations: 50001, dwell_s: 0.1}".to_owned(),
-                "50001 stops of measuring steps: at most 50000; ask",
+                "{do: grid, placement: middle, trajectory: circle, radius_mm: 50.0, feed_mm_min: 1500.0, stations: 5001, dwell_s: 0.1}".to_owned(),
+                "5001 stops of measuring steps: at most 5000; ask",
             ),
             (
                 "{do: wait, seconds: 90000.0}".to_owned(),
@@ -84,6 +109,26 @@ mod tests {
             assert!(said.contains(words), "{words}: {said}");
         }
         assert!(of(&circle(250)).is_ok());
+    }
+
+    #[test]
+    fn a_plan_at_every_limit_takes_two_minutes_at_most_and_shipped_ones_seconds() {
+        let load = |runs, stops, touches| Load {
+            runs,
+            stops,
+            touches,
+            ..Load::default()
+        };
+        for (load, within_s) in [
+            (load(500, 0, 0), 60.0),
+            (load(0, 5_000, 0), 70.0),
+            (load(0, 0, 4_000), 20.0),
+            (load(500, 5_000, 4_000), 130.0),
+            (load(27, 200, 50), SAID_FROM_S),
+        ] {
+            assert!(within(&load).is_ok());
+            assert!(expected_s(&load) < within_s, "{}", expected_s(&load));
+        }
     }
 
     #[test]

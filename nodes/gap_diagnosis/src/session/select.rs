@@ -83,13 +83,12 @@ impl Selection {
     /// Means of a channel; `block` neighbours of a run in motion make one.
     pub(super) fn apply(&self, series: &[Raw], block: usize) -> Vec<Raw> {
         match self {
-            Self::Stops(stops) => stops
-                .iter()
-                .filter_map(|stop| {
-                    let within = |raw: &&Raw| stop.contains(&index(raw.place));
-                    mean(series.iter().filter(within), 1)
-                })
-                .collect(),
+            Self::Stops(stops) => {
+                let at_stops = at_stops(series, stops).into_iter();
+                at_stops
+                    .filter_map(|raws| mean(raws.into_iter(), 1))
+                    .collect()
+            }
             Self::Motion(counts) => {
                 let selected: Vec<&Raw> = series
                     .iter()
@@ -108,6 +107,19 @@ impl Selection {
             }
         }
     }
+}
+
+/// The readings of each stop, in their order. Stops follow one another, so each reading is looked for once.
+fn at_stops<'r>(series: &'r [Raw], stops: &[Range<usize>]) -> Vec<Vec<&'r Raw>> {
+    let mut of_stops = vec![vec![]; stops.len()];
+    for raw in series {
+        let tick = index(raw.place);
+        let place = stops.partition_point(|stop| stop.end <= tick);
+        if stops.get(place).is_some_and(|stop| stop.contains(&tick)) {
+            of_stops[place].push(raw);
+        }
+    }
+    of_stops
 }
 
 /// Tick at or before a place.
@@ -350,6 +362,33 @@ mod tests {
         TestSegment {
             feed_mm_s,
             ..TestSegment::of_kind(kind, 1, Stamp::from_nanos(0))
+        }
+    }
+
+    #[test]
+    fn each_stop_has_the_mean_of_the_readings_within_it() {
+        let raw = |place: f64| Raw {
+            place,
+            deviation: 3.0 * place,
+        };
+        let series: Vec<Raw> = (0..40).map(|k| raw(0.5 * f64::from(k))).collect();
+        let backwards: Vec<Raw> = series.iter().rev().copied().collect();
+        for stops in [
+            vec![],
+            vec![0..1, 1..2],
+            vec![3..5, 5..9, 12..13],
+            vec![0..20, 20..21],
+            vec![2..2, 4..6, 30..40],
+        ] {
+            let within = |stop: &Range<usize>, series: &[Raw]| {
+                let own = series.iter().filter(|raw| stop.contains(&index(raw.place)));
+                mean(own, 1)
+            };
+            for series in [&series, &backwards] {
+                let wanted: Vec<Raw> = stops.iter().filter_map(|s| within(s, series)).collect();
+                let selection = Selection::Stops(stops.clone());
+                assert_eq!(selection.apply(series, 1), wanted, "{stops:?}");
+            }
         }
     }
 

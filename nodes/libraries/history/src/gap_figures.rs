@@ -22,6 +22,9 @@ pub struct Gap {
     pub bags: Vec<String>,
     /// SHA-256 of the machine file.
     pub machine_sha256: Option<String>,
+    /// What it was made with beside the bags, which tells diagnoses of the same bags apart: machine file, bags of a simulator,
+    /// effects and rules that were left out.
+    pub made_with: String,
     /// The figures.
     pub figures: Vec<Figure>,
 }
@@ -40,8 +43,54 @@ pub fn gap_figures(gap: &Value) -> Result<Gap, HistoryError> {
     Ok(Gap {
         bags: hashes.map(str::to_owned).collect(),
         machine_sha256: machine.filter(|hash| !hash.is_empty()).map(str::to_owned),
+        made_with: made_with(gap),
         figures: of(gap),
     })
+}
+
+/// The texts of a list.
+fn texts<'g>(list: &'g Value, key: Option<&str>) -> Vec<&'g str> {
+    let all = list.as_array().into_iter().flatten();
+    let text = |one: &'g Value| key.map_or(one, |key| &one[key]).as_str();
+    all.filter_map(text).collect()
+}
+
+fn made_with(gap: &Value) -> String {
+    let made = &gap["made_with"];
+    let machine = gap["inputs"]["machine_sha256"].as_str().unwrap_or_default();
+    let lists = [
+        (
+            "simulated",
+            texts(&gap["simulated"]["bags"], Some("sha256")),
+        ),
+        ("without", texts(&made["without"], None)),
+        ("ablated", texts(&made["ablated"], None)),
+    ];
+    let mut text = format!("machine {machine}");
+    for (key, mut all) in lists {
+        all.sort_unstable();
+        all.dedup();
+        text.push_str(&format!("; {key} {}", all.join(",")));
+    }
+    text
+}
+
+/// The title of a diagnosis: what it was made with tells its series apart. Bags of a simulator differ from test to test.
+fn title(gap: &Value) -> String {
+    let mut title = TEST.to_owned();
+    if gap["simulated"].is_object() {
+        title.push_str(", against the bags of a simulator");
+    }
+    let made = &gap["made_with"];
+    for (key, words) in [("without", "without"), ("ablated", "without the rule")] {
+        let mut all = texts(&made[key], None);
+        all.sort_unstable();
+        all.dedup();
+        if !all.is_empty() {
+            title.push_str(&format!(", {words} {}", all.join(" and ")));
+        }
+    }
+    title
 }
 
 /// The figures of a diagnosis.
@@ -66,6 +115,10 @@ pub(crate) fn of(gap: &Value) -> Vec<Figure> {
     all.extend(closed);
     for cause in gap["causes"].as_array().into_iter().flatten() {
         all.extend(cause_figures(cause));
+    }
+    let title = title(gap);
+    for figure in &mut all {
+        title.clone_into(&mut figure.test);
     }
     all
 }
@@ -189,6 +242,55 @@ mod tests {
             ("um", ""),
         ] {
             assert_eq!(unit_of(name), unit, "{name}");
+        }
+    }
+
+    #[test]
+    fn what_a_diagnosis_was_made_with_tells_it_and_its_series_apart() {
+        let gap = |more: Value| {
+            let mut gap = json!({
+                "schema": "abbe.gap/1", "gap": {"rms_um": 4.0},
+                "inputs": {"bags": [{"sha256": "ab"}], "machine_sha256": "cd"},
+            });
+            for (key, value) in more.as_object().unwrap() {
+                gap[key] = value.clone();
+            }
+            let read = gap_figures(&gap).unwrap();
+            (read.made_with, read.figures[0].test.clone())
+        };
+        let (plain, title) = gap(json!({}));
+        assert_eq!(title, "Diagnosis");
+        let mut keys = vec![plain];
+        for (more, wanted) in [
+            (
+                json!({"simulated": {"bags": [{"sha256": "01"}]}}),
+                "Diagnosis, against the bags of a simulator",
+            ),
+            (
+                json!({"simulated": {"bags": [{"sha256": "02"}]}}),
+                "Diagnosis, against the bags of a simulator",
+            ),
+            (
+                json!({"made_with": {"without": ["backlash"]}}),
+                "Diagnosis, without backlash",
+            ),
+            (
+                json!({"made_with": {"without": ["pitch", "backlash"], "ablated": ["constancy"]}}),
+                "Diagnosis, without backlash and pitch, without the rule constancy",
+            ),
+            (
+                json!({"made_with": {"ablated": ["constancy"]}}),
+                "Diagnosis, without the rule constancy",
+            ),
+            (
+                json!({"inputs": {"bags": [{"sha256": "ab"}], "machine_sha256": "ce"}}),
+                "Diagnosis",
+            ),
+        ] {
+            let (key, title) = gap(more);
+            assert_eq!(title, wanted);
+            assert!(!keys.contains(&key), "{key}");
+            keys.push(key);
         }
     }
 

@@ -7,6 +7,7 @@
 mod bound;
 mod change_points;
 mod comparison;
+mod conditions;
 mod due;
 mod entry;
 mod error;

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
+use crate::conditions::with_conditions;
 use crate::entry::Figure;
 use crate::error::HistoryError;
 use crate::gap_figures;
@@ -43,6 +44,7 @@ pub fn report_figures(report: &Value) -> Result<Vec<Figure>, HistoryError> {
         .flatten()
     {
         let title = steady_title(test["test"].as_str().unwrap_or_default());
+        let title = with_conditions(&title, test);
         below(test, &title, "", 0, &mut all);
         geometry(&test["geometry"], &title, &mut all);
     }

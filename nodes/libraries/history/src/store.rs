@@ -3,6 +3,7 @@
 //! An entry is written in one transaction: whole or not at all. Two programs that write at once wait for each other, up to
 //! [`Options::busy_ms`].
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -43,6 +44,8 @@ pub enum Added {
     New,
     /// The store has it already: the same kind and hash. Nothing was changed.
     Known,
+    /// The store has it already, and other figures of it. Nothing was changed.
+    KnownOtherwise,
     /// The store has it under another machine or time. Nothing was changed.
     Otherwise {
         /// The machine that it stands under.
@@ -168,14 +171,17 @@ impl Store {
         let add = |connection: &mut Connection| -> Result<Added, rusqlite::Error> {
             let transaction =
                 connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-            if let Some((machine, at_s)) = known(&transaction, entry)? {
+            if let Some((id, machine, at_s)) = known(&transaction, entry)? {
                 let is_date = at_s % DAY_S == 0 || entry.at_s % DAY_S == 0;
                 let is_day = is_date && at_s.div_euclid(DAY_S) == entry.at_s.div_euclid(DAY_S);
                 let is_same = machine == entry.machine && (at_s == entry.at_s || is_day);
-                return Ok(if is_same {
+                if !is_same {
+                    return Ok(Added::Otherwise { machine, at_s });
+                }
+                return Ok(if has_figures(&transaction, id, entry)? {
                     Added::Known
                 } else {
-                    Added::Otherwise { machine, at_s }
+                    Added::KnownOtherwise
                 });
             }
             insert(&transaction, entry)?;
@@ -190,15 +196,43 @@ impl Store {
     }
 }
 
-/// Machine and time of the entry of the same kind and hash, where there is one.
+/// Figures that differ by a smaller share are the same.
+const SAME_SHARE: f64 = 1e-9;
+
+/// Whether the entry `id` has the figures of another one.
+fn has_figures(
+    transaction: &Transaction<'_>,
+    id: i64,
+    entry: &Entry,
+) -> Result<bool, rusqlite::Error> {
+    let sql = "SELECT s.test, s.name, s.axis, f.value FROM figure f JOIN series s ON s.id = f.series WHERE f.entry = ?1";
+    let mut statement = transaction.prepare(sql)?;
+    let rows = statement.query_map([id], |row| {
+        let key: (String, String, String) = (row.get(0)?, row.get(1)?, row.get(2)?);
+        Ok((key, row.get::<_, f64>(3)?))
+    })?;
+    let kept: BTreeMap<(String, String, String), f64> = rows.collect::<Result<_, _>>()?;
+    let is_kept = |figure: &Figure| {
+        let key = (
+            figure.test.clone(),
+            figure.name.clone(),
+            figure.axis.clone(),
+        );
+        kept.get(&key)
+            .is_some_and(|value| (value - figure.value).abs() <= SAME_SHARE * value.abs())
+    };
+    Ok(kept.len() == entry.figures.len() && entry.figures.iter().all(is_kept))
+}
+
+/// Row, machine and time of the entry of the same kind and hash, where there is one.
 fn known(
     transaction: &Transaction<'_>,
     entry: &Entry,
-) -> Result<Option<(String, i64)>, rusqlite::Error> {
-    let sql = "SELECT machine, at_s FROM entry WHERE kind = ?1 AND sha256 = ?2";
+) -> Result<Option<(i64, String, i64)>, rusqlite::Error> {
+    let sql = "SELECT id, machine, at_s FROM entry WHERE kind = ?1 AND sha256 = ?2";
     let key = params![entry.kind.name(), entry.sha256];
     let mut statement = transaction.prepare(sql)?;
-    let mut rows = statement.query_map(key, |row| Ok((row.get(0)?, row.get(1)?)))?;
+    let mut rows = statement.query_map(key, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
     rows.next().transpose()
 }
 

@@ -270,6 +270,7 @@ mod tests {
                 feed_mm_s: 100.0,
                 reference,
                 direction: Vector3::x(),
+                place_mm: None,
                 targets_mm: targets_mm.clone(),
                 up_mm: vec![run.clone(); 5],
                 down_mm: vec![run.clone(); 5],

@@ -142,6 +142,13 @@ fn state_reference(section: &mut Section, test: &LinearTest, measured: &Measured
     section.figures["feed_mm_min"] = (test.feed_mm_s * 60.0).into();
     section.figures["dwell_s"] = test.longest_rest.map(|rest| rest.as_secs_f64()).into();
     section.figures["correction_to_20_degc"] = correction.as_json();
+    if let (Some(along), Some(place_mm)) = (test.axis, test.place_mm) {
+        let others = Axis::ALL
+            .into_iter()
+            .filter(|axis| axis.is_linear() && *axis != along);
+        let place = others.map(|axis| (axis.to_string(), place_mm[axis.index()].into()));
+        section.figures["place_mm"] = serde_json::Value::Object(place.collect());
+    }
     if test.reference == Reference::Scale {
         section.warn_first(OWN_SCALE, format!("{}.", capital(BY_OWN_SCALE)));
         if !measured.is_stated {

@@ -77,6 +77,18 @@ fn of_text(text: &str) -> Result<Vec<Likely>> {
                 ids.join(", ")
             );
         }
+        let is_same = |other: &Entry| other.effect == entry.effect && other.axis == entry.axis;
+        if let Some(first) = file.likely[..k].iter().position(is_same) {
+            bail!(
+                "likely[{k}]: {}{} is given twice, first as likely[{first}]: give it once",
+                entry.effect,
+                entry
+                    .axis
+                    .iter()
+                    .map(|axis| format!(" {axis}"))
+                    .collect::<String>()
+            );
+        }
         if !(0.0..=MOST_WEIGHT).contains(&entry.weight) {
             bail!(
                 "likely[{k}].weight = {}: must be from 0 to {}",
@@ -122,6 +134,14 @@ mod tests {
             ),
             ("{effect: backlash, weight: 200.0}", "from 0 to 100"),
             ("{effect: backlash, size: -1.0}", "likely[0].size"),
+            (
+                "{effect: backlash, axis: X, size: 3.0}\n  - {effect: backlash, axis: X}",
+                "likely[1]: backlash X is given twice, first as likely[0]",
+            ),
+            (
+                "{effect: backlash}\n  - {effect: backlash, weight: 1.0}",
+                "likely[1]: backlash is given twice",
+            ),
             ("{effect: backlash, width: 1.0}", "width"),
         ] {
             let error = format!("{:#}", of(entry).unwrap_err());

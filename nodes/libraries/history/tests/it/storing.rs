@@ -59,6 +59,27 @@ fn an_entry_is_added_once_by_kind_and_hash() {
 }
 
 #[test]
+fn an_entry_that_is_there_with_other_figures_is_told_apart() {
+    let home = tempfile::tempdir().unwrap();
+    let mut store = store(home.path());
+    let one = entry("m", 1, 100, 1.0);
+    assert_eq!(store.add(&one).unwrap(), Added::New);
+    let (mut value, mut test, mut more) = (one.clone(), one.clone(), one.clone());
+    value.figures[0].value += 1e-3;
+    test.figures[0].test = "another test".to_owned();
+    more.figures.push(figure("iso230_2.repeatability", 1.0));
+    for other in [&value, &test, &more] {
+        assert_eq!(store.add(other).unwrap(), Added::KnownOtherwise);
+    }
+    let mut uncertain = one.clone();
+    uncertain.figures[0].standard_uncertainty = Some(0.5);
+    for same in [&one, &uncertain] {
+        assert_eq!(store.add(same).unwrap(), Added::Known);
+    }
+    assert_eq!(store.machines().unwrap()[0].entries, 1);
+}
+
+#[test]
 fn an_entry_of_another_machine_or_time_is_named_and_not_added() {
     let home = tempfile::tempdir().unwrap();
     let mut store = store(home.path());

@@ -259,6 +259,9 @@ impl Body {
 
     /// Refuses a temperature out of range, or one from two sources: key and rule.
     fn check(&self) -> Result<(), (&'static str, String)> {
+        if let Some(reason) = statement::unit_slip(self.expansion_um_per_m_k) {
+            return Err(("expansion_um_per_m_k", reason));
+        }
         let Some(deviation_k) = self.temperature_deviation_k else {
             return Ok(());
         };

@@ -50,6 +50,8 @@ pub struct LinearTest {
     pub reference: Reference,
     /// Where the line leads, from its smaller positions to its greater ones; of length 1.
     pub direction: Vector3<f64>,
+    /// The point of the line nearest to the machine's zero, mm; none: nothing rested, or the place is not known.
+    pub place_mm: Option<Vector3<f64>>,
     /// Targets by ascending position along the line, mm.
     pub targets_mm: Vec<f64>,
     /// Deviations per run and target towards greater positions, mm.
@@ -259,6 +261,7 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
         let row = |run: &Visits| places.iter().map(|place| run[place][side][0]).collect();
         runs.iter().map(row).collect::<Vec<Vec<f64>>>()
     };
+    let first_stop = stops().next().map(|stop| stop.place_mm);
     let (mut up_mm, mut down_mm) = (of(0), of(1));
     level(&mut up_mm, &mut down_mm);
     Some(LinearTest {
@@ -270,6 +273,7 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
         feed_mm_s: first.feed_mm_s,
         reference,
         direction,
+        place_mm: first_stop.map(|at| at - direction * at.dot(&direction)),
         targets_mm: places.iter().map(|place| *place as f64 * SAME_MM).collect(),
         up_mm,
         down_mm,

@@ -19,6 +19,10 @@ pub struct Diagnosed {
     pub defaults: Vec<String>,
     /// The simulator that the machine was compared with, where it is not the machine file's own.
     pub simulated: Option<Simulated>,
+    /// Ids of effects that were not considered.
+    pub without: Vec<String>,
+    /// Ids of rules that were switched off.
+    pub ablated: Vec<String>,
 }
 
 impl Diagnosed {
@@ -41,6 +45,11 @@ impl Diagnosed {
         }
         if let Some(simulated) = &self.simulated {
             report["simulated"] = serde_json::to_value(simulated)?;
+        }
+        if !(self.without.is_empty() && self.ablated.is_empty()) {
+            report["made_with"] = serde_json::json!({
+                "without": self.without, "ablated": self.ablated,
+            });
         }
         Ok(report)
     }

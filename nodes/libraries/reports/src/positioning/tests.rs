@@ -15,6 +15,7 @@ pub(super) fn test(direction: [f64; 3]) -> LinearTest {
         feed_mm_s: 100.0,
         reference: Reference::Length,
         direction: Vector3::from(direction).normalize(),
+        place_mm: None,
         targets_mm: vec![0.0, 100.0, 300.0],
         up_mm: vec![vec![0.0, 0.001, 0.003]],
         down_mm: vec![vec![0.002, 0.003, 0.005]],

@@ -106,3 +106,17 @@ pub(super) fn check(key: &str, text: &str) -> Result<(), String> {
     }
     Ok(())
 }
+
+/// Least coefficient of expansion of a body but zero, µm/(m K): that of glass ceramics.
+const LEAST_EXPANSION_UM_PER_M_K: f64 = 0.02;
+
+/// What is wrong with a coefficient of expansion that no body has: one per K or in mm is a million or a thousand times less.
+pub(super) fn unit_slip(expansion_um_per_m_k: f64) -> Option<String> {
+    let is_slip = expansion_um_per_m_k > 0.0 && expansion_um_per_m_k < LEAST_EXPANSION_UM_PER_M_K;
+    is_slip.then(|| {
+        format!(
+            " = {}: must be 0, or from {LEAST_EXPANSION_UM_PER_M_K} um/(m K) on: 11e-6 per K are 11.0",
+            metrology::number::number(expansion_um_per_m_k)
+        )
+    })
+}

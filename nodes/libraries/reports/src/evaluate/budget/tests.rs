@@ -20,6 +20,25 @@ fn refusal(from: &str, to: &str) -> String {
 }
 
 #[test]
+fn an_expansion_in_another_unit_is_refused_with_the_right_one() {
+    for number in ["11.0e-6", "0.011", "1.0e-9", "0.0115"] {
+        let words = refusal(
+            "expansion_um_per_m_k: 11.0,",
+            &format!("expansion_um_per_m_k: {number},"),
+        );
+        assert!(words.contains("machine.expansion_um_per_m_k"), "{words}");
+        assert!(words.contains("11e-6 per K are 11.0"), "{words}");
+    }
+    for number in ["0.0", "0.05", "1.2", "23.8"] {
+        let text = WHOLE.replace("k: 11.0,", &format!("k: {number},"));
+        assert!(
+            Budget::read(&text, Path::new("budget.yaml")).is_ok(),
+            "{number}"
+        );
+    }
+}
+
+#[test]
 fn a_data_sheet_becomes_mm_and_ratios() {
     let budget = Budget::read(WHOLE, Path::new("budget.yaml")).unwrap();
     let device = budget.positioning(None, None).device;

@@ -1,0 +1,341 @@
+//! Positions that were measured, beside deviations: a deviation is the measured position less the target, and a table
+//! whose columns say otherwise has the sign, the unit or a row of one of them wrong.
+
+use anyhow::{Result, bail};
+use metrology::number::number;
+use metrology::yaml::shown;
+
+use super::map::{Map, Test, What, units};
+use super::recognise::{Role, role_of_name};
+use super::stated;
+use super::table::{Row, number_of};
+use super::vocabulary::{is_correction, is_reversed};
+
+/// Lines of cells with their numbers.
+type Lines = [(u64, Vec<String>)];
+
+/// Share of the span of the targets within which measured positions lie beside them; other numbers are no positions.
+const BESIDE: f64 = 0.05;
+/// Rounding of a table that was computed with 64 bits, in units of targets.
+const ROUNDING: f64 = 1e-9;
+
+/// What a column of numbers is compared with.
+struct Compared<'t> {
+    /// Its place among the cells, and its name.
+    place: usize,
+    name: &'t str,
+    /// Units of targets for one of its numbers.
+    size: f64,
+    /// Numbers differ by so much from rounding alone, in units of targets.
+    rounding: f64,
+}
+
+/// A row with all three.
+struct Triple {
+    line: u64,
+    target: f64,
+    measured: f64,
+    /// In units of targets.
+    deviation: f64,
+}
+
+/// Compares deviations with a column of measured positions that the map does not name; a remark where they differ by one
+/// number everywhere. `rows` are those that were read.
+///
+/// # Errors
+/// With line and both values of the first row where a deviation is not the measured position less the target.
+pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<Option<String>> {
+    let Test::Positioning { axis, .. } = &map.test else {
+        return Ok(None);
+    };
+    let columns = map.test.columns();
+    let at = |is: fn(What) -> bool| columns.iter().position(|column| is(column.what));
+    let target = at(|what| matches!(what, What::Place(_)));
+    let read = at(|what| matches!(what, What::Deviation(_)));
+    let (Some(target), Some(read)) = (target, read) else {
+        return Ok(None);
+    };
+    if !map.test.passes().is_empty() {
+        return Ok(None);
+    }
+    let [target_name, read_name] = [target, read].map(|k| columns[k].name);
+    let units = units(*axis);
+    let size = units.deviation_in_targets();
+    for (place, name) in head.iter().enumerate() {
+        let is_named = columns.iter().any(|column| column.name == name);
+        let is_other = is_named || is_correction(name) || is_reversed(name);
+        if is_other || role_of_name(name) != Some(Role::Measured) {
+            continue;
+        }
+        let Some(unit) = unit_of(map, name, target_name) else {
+            continue;
+        };
+        if unit.kind() != units.of_cells[0].kind() {
+            continue;
+        }
+        let step = |name: &str, size: f64| {
+            let k = head.iter().position(|other| other == name);
+            k.map_or(0.0, |k| least_step(lines, k, map.decimal) * size)
+        };
+        let of = |name: &str, own: super::units::Unit| {
+            let stated = map.units.get(name).copied().unwrap_or(own);
+            stated.size() / units.of_cells[0].size()
+        };
+        let [place_unit, deviation_unit] = units.of_cells;
+        let unit_size = unit.size() / units.of_cells[0].size();
+        let compared = Compared {
+            place,
+            name,
+            size: unit_size,
+            rounding: ROUNDING
+                + step(name, unit_size)
+                + step(target_name, of(target_name, place_unit))
+                + step(read_name, of(read_name, deviation_unit)),
+        };
+        let triples = triples(&compared, lines, rows, ([target, read], size, map.decimal));
+        if let Some(remark) = compare(&compared, &triples, (read_name, units.turn, units.target))? {
+            return Ok(Some(remark));
+        }
+    }
+    Ok(None)
+}
+
+/// The unit of a column of positions: stated in the map or its name; otherwise that of the targets.
+fn unit_of(map: &Map, name: &str, target: &str) -> Option<super::units::Unit> {
+    let Test::Positioning { axis, .. } = &map.test else {
+        return None;
+    };
+    let stated = |name: &str| map.units.get(name).copied();
+    let of_target = || stated(target).unwrap_or(units(*axis).of_cells[0]);
+    match stated::of(name) {
+        _ if stated(name).is_some() => stated(name),
+        stated::Stated::Unit(unit, _) => Some(unit),
+        stated::Stated::Nothing => Some(of_target()),
+        stated::Stated::Unknown(_) => None,
+    }
+}
+
+/// The step of the last decimal that any cell of a column has.
+fn least_step(lines: &Lines, place: usize, decimal: char) -> f64 {
+    let cells = lines.iter().filter_map(|(_, cells)| cells.get(place));
+    let numbers = cells.filter(|cell| number_of(cell, decimal).is_some());
+    let decimals = numbers.map(|cell| match cell.split_once(decimal) {
+        Some(_) if cell.contains(['e', 'E']) => i32::from(u8::MAX),
+        Some((_, decimals)) => decimals.chars().filter(char::is_ascii_digit).count() as i32,
+        None => 0,
+    });
+    decimals.max().map_or(0.0, |most| 10.0_f64.powi(-most))
+}
+
+fn triples(
+    compared: &Compared<'_>,
+    lines: &Lines,
+    rows: &[Row],
+    ([target, read], size, decimal): ([usize; 2], f64, char),
+) -> Vec<Triple> {
+    let mut own = rows.iter().peekable();
+    let mut all = vec![];
+    for (line, cells) in lines {
+        let Some(row) = own.next_if(|row| row.line == *line) else {
+            continue;
+        };
+        let cell = cells.get(compared.place);
+        let measured = cell.and_then(|cell| number_of(cell, decimal));
+        let deviation = row.cells[read] * size;
+        if let Some(measured) = measured.filter(|_| deviation.is_finite()) {
+            all.push(Triple {
+                line: *line,
+                target: row.cells[target],
+                measured: measured * compared.size,
+                deviation,
+            });
+        }
+    }
+    all
+}
+
+fn compare(
+    compared: &Compared<'_>,
+    triples: &[Triple],
+    (read_name, turn, unit): (&str, Option<f64>, &str),
+) -> Result<Option<String>> {
+    let difference = |row: &Triple| {
+        let difference = row.measured - row.target;
+        turn.map_or(difference, |turn| {
+            difference - turn * (difference / turn).round()
+        })
+    };
+    let targets = triples.iter().map(|row| row.target);
+    let [least, most] = [
+        targets.clone().fold(f64::INFINITY, f64::min),
+        targets.fold(f64::NEG_INFINITY, f64::max),
+    ];
+    let is_beside = |row: &&Triple| difference(row).abs() <= BESIDE * (most - least);
+    let n_beside = triples.iter().filter(is_beside).count();
+    if triples.is_empty() || most <= least || 2 * n_beside <= triples.len() {
+        return Ok(None);
+    }
+    let off = |row: &Triple| difference(row) - row.deviation;
+    let mut offs: Vec<f64> = triples.iter().map(off).collect();
+    offs.sort_by(f64::total_cmp);
+    let middle = offs[offs.len() / 2];
+    let tolerance = compared.rounding;
+    let is_one = offs.iter().all(|off| (off - middle).abs() <= tolerance);
+    let Some(row) = triples.iter().find(|row| off(row).abs() > tolerance) else {
+        return Ok(None);
+    };
+    let name = shown(compared.name);
+    if is_one && triples.len() > 1 {
+        return Ok(Some(format!(
+            "column \"{name}\": less the target it is {} {unit} more than \"{}\" in every row: its zero is another, and the deviations are taken",
+            number(middle),
+            shown(read_name)
+        )));
+    }
+    let is_turned = triples
+        .iter()
+        .all(|row| (difference(row) + row.deviation).abs() <= tolerance);
+    let turned = if is_turned {
+        ", the other sign in every row: a deviation is the measured position less the target"
+    } else {
+        ""
+    };
+    bail!(
+        "line {}, column \"{}\": the deviation is {} {unit}, and \"{name}\" less the target is {} {unit}{turned}: correct one of the \
+         columns (or its unit), or rename \"{name}\" where it holds something else",
+        row.line,
+        shown(read_name),
+        number(row.deviation),
+        number(difference(row))
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sheet::Sheet;
+    use super::super::table::Table;
+    use super::*;
+
+    const TARGETS: [f64; 5] = [0.0, 50.1, 100.2, 149.7, 200.4];
+    const DEVIATIONS_UM: [f64; 5] = [0.16, -0.74, -1.95, -3.08, -4.24];
+
+    /// What is remarked on a table of targets, deviations and another column, by keys of the map.
+    fn said(keys: &str, name: &str, cell: impl Fn(f64, f64) -> String) -> (bool, String) {
+        let test = "axis: X, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 1.0, target_mm: t, deviation_um: d";
+        let map = format!("start_s: 0\n{keys}test:\n  positioning: {{{test}}}\n");
+        let map: Map = serde_saphyr::from_str(&map).expect("a map");
+        let rows = TARGETS.iter().zip(DEVIATIONS_UM);
+        let rows = rows.map(|(t, d)| format!("{t},{d},{}\n", cell(*t, d)));
+        let text = format!("t,d,{name}\n{}", rows.collect::<String>());
+        let sheet = Sheet::of_text(&text, ',').expect("rows");
+        match Table::of(&sheet, &map, &[None, None]) {
+            Ok(table) => (true, table.left_out.join("\n")),
+            Err(error) => (false, format!("{error:#}")),
+        }
+    }
+
+    #[test]
+    fn positions_that_contradict_the_deviations_are_refused_with_line_and_both_values() {
+        let turned = |t: f64, d: f64| format!("{:.5}", t - 1e-3 * d);
+        for name in [
+            "measured_mm",
+            "actual",
+            "Istwert [mm]",
+            "Messwert",
+            "laser reading mm",
+        ] {
+            let (is_taken, said) = said("", name, turned);
+            assert!(!is_taken, "{name}");
+            for words in [
+                "line 2, column \"d\": the deviation is 0.00016 mm",
+                "less the target is -0.00016 mm, the other sign in every row",
+                "rename",
+            ] {
+                assert!(said.contains(words), "{name}: {words}: {said}");
+            }
+        }
+        for (keys, name, cell) in [
+            // A unit that is wrong, a row that is wrong, and an error that grows with the target.
+            (
+                "",
+                "measured_mm",
+                Box::new(|t: f64, d: f64| format!("{:.6}", t + d))
+                    as Box<dyn Fn(f64, f64) -> String>,
+            ),
+            (
+                "",
+                "measured_mm",
+                Box::new(|t, d| format!("{:.6}", t + 1e-3 * if t > 149.0 { 2.0 * d } else { d })),
+            ),
+            (
+                "",
+                "measured_mm",
+                Box::new(|t, d| format!("{:.6}", t + 1e-3 * d + 1e-4 * t)),
+            ),
+            (
+                "",
+                "measured_um",
+                Box::new(|t, d| format!("{:.3}", 1e3 * t - d)),
+            ),
+            (
+                "units: {measured: inch}\n",
+                "measured",
+                Box::new(|t, d| format!("{:.8}", (t - 1e-3 * d) / 25.4)),
+            ),
+        ] {
+            let (is_taken, said) = said(keys, name, cell);
+            assert!(!is_taken, "{name}: {said}");
+        }
+    }
+
+    #[test]
+    fn positions_that_agree_and_columns_of_other_numbers_do_no_harm() {
+        for (keys, name, cell) in [
+            (
+                "",
+                "measured_mm",
+                Box::new(|t: f64, d: f64| format!("{:.5}", t + 1e-3 * d))
+                    as Box<dyn Fn(f64, f64) -> String>,
+            ),
+            // A display of 1 µm, and another zero.
+            (
+                "",
+                "measured_mm",
+                Box::new(|t, d| format!("{:.3}", t + 1e-3 * d)),
+            ),
+            (
+                "",
+                "measured_mm",
+                Box::new(|t, d| format!("{:.6}", t + 1e-3 * d + 0.5)),
+            ),
+            (
+                "",
+                "actual um",
+                Box::new(|t, d| format!("{:.2}", 1e3 * t + d)),
+            ),
+            (
+                "units: {measured: inch}\n",
+                "measured",
+                Box::new(|t, d| format!("{:.9}", (t + 1e-3 * d) / 25.4)),
+            ),
+            // No positions: numbers of readings, powers, temperatures.
+            (
+                "",
+                "reading",
+                Box::new(|t, _| format!("{:.0}", t / 50.0 + 1.0)),
+            ),
+            ("", "laser power", Box::new(|_, _| "81.5".to_owned())),
+            (
+                "",
+                "measured temperature [degC]",
+                Box::new(|_, _| "20.5".to_owned()),
+            ),
+            ("", "measured_mm", Box::new(|_, _| String::new())),
+        ] {
+            let (is_taken, said) = said(keys, name, cell);
+            assert!(is_taken, "{name}: {said}");
+            let is_offset = said.contains("in every row: its zero is another");
+            assert!(!is_offset || said.contains("0.5 mm more"), "{said}");
+        }
+    }
+}

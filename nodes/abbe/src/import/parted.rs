@@ -1,0 +1,279 @@
+//! Columns that no key of a map names and that part a table into several tests, or mark rows as bad.
+//!
+//! What holds for whole runs and differs between them (a machine, a second axis, a line, a feed, a correction that was on)
+//! makes them different tests. They are known by their names and by cells that change with the runs, not within them.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Result, bail};
+use metrology::yaml::shown;
+
+use super::map::{Map, Test, What};
+use super::table::{Row, number_of};
+use super::times;
+
+/// Lines of cells with their numbers.
+type Lines = [(u64, Vec<String>)];
+
+/// Begins of names of what a whole test has.
+const OF_A_TEST: &[&str] = &[
+    "machine",
+    "maschine",
+    "axis",
+    "achse",
+    "serial",
+    "compensation",
+    "kompensation",
+    "correction",
+    "korrektur",
+    "feed",
+    "vorschub",
+    "radius",
+    "nominal",
+    "plane",
+    "ebene",
+    "line",
+    "linie",
+    "place",
+    "location",
+    "date",
+    "datum",
+    "instrument",
+    "placement",
+    "setup",
+    "height",
+];
+/// Names that are whole words.
+const WORDS_OF_A_TEST: &[&str] = &["x", "y", "z", "a", "b", "c", "comp", "day", "tag"];
+/// Names of columns that mark rows.
+const MARKS: &[&str] = &[
+    "valid",
+    "validity",
+    "invalid",
+    "status",
+    "ok",
+    "flag",
+    "flags",
+    "quality",
+    "bad",
+    "gültig",
+    "gueltig",
+    "ungültig",
+    "fehlercode",
+    "errorcode",
+    "warning",
+    "beam",
+    "signalstatus",
+    "reject",
+    "rejected",
+    "outlier",
+];
+/// Rows for one change at least, where no column numbers the runs.
+const ROWS_A_CHANGE: usize = 4;
+/// A test that runs over midnight has two dates, s.
+const DAY_S: f64 = 86_400.0;
+
+/// Refuses columns whose cells differ between runs where a test has one of them, and columns that mark some rows.
+///
+/// # Errors
+/// With line, column and both values.
+pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<()> {
+    let own = map.test.columns();
+    let run = own.iter().position(|column| column.what == What::Run);
+    let runs: BTreeMap<u64, f64> = rows
+        .iter()
+        .map(|row| (row.line, run.map_or(0.0, |k| row.cells[k])))
+        .collect();
+    // What changes during a log is part of it.
+    let is_log = matches!(map.test, Test::Log { .. });
+    for (k, name) in head.iter().enumerate() {
+        if name.is_empty() || own.iter().any(|column| column.name == name) {
+            continue;
+        }
+        let cells: Vec<Cell<'_>> = lines
+            .iter()
+            .filter_map(|(line, cells)| {
+                let run = *runs.get(line)?;
+                let text = cells.get(k).map_or("", String::as_str);
+                Some(Cell {
+                    line: *line,
+                    run,
+                    text,
+                })
+            })
+            .collect();
+        if is_named(name, &[], MARKS) {
+            marked(name, &cells)?;
+        } else if !is_log && is_named(name, OF_A_TEST, WORDS_OF_A_TEST) {
+            parted(name, &cells, (run.is_some(), map.decimal))?;
+        }
+    }
+    Ok(())
+}
+
+/// A cell with its line and the number of its run.
+struct Cell<'t> {
+    line: u64,
+    run: f64,
+    text: &'t str,
+}
+
+fn is_named(name: &str, begins: &[&str], whole: &[&str]) -> bool {
+    let lower = name.to_lowercase();
+    let words = lower.split(|letter: char| !letter.is_alphanumeric());
+    let mut words = words.filter(|word| !word.is_empty());
+    let is_first = words
+        .clone()
+        .next()
+        .is_some_and(|first| whole.contains(&first));
+    is_first || words.any(|word| begins.iter().any(|begin| word.starts_with(begin)))
+}
+
+fn marked(name: &str, cells: &[Cell<'_>]) -> Result<()> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for cell in cells {
+        *counts.entry(cell.text).or_default() += 1;
+    }
+    let usual = counts
+        .iter()
+        .max_by_key(|(_, n)| **n)
+        .map(|(text, _)| *text);
+    let Some(odd) = cells.iter().find(|cell| Some(cell.text) != usual) else {
+        return Ok(());
+    };
+    bail!(
+        "line {}, column \"{}\": \"{}\", and \"{}\" in most rows: the table marks rows itself: remove those that do not count, and \
+         the column with them",
+        odd.line,
+        shown(name),
+        shown(odd.text),
+        shown(usual.unwrap_or_default())
+    );
+}
+
+fn parted(name: &str, cells: &[Cell<'_>], (has_runs, decimal): (bool, char)) -> Result<()> {
+    let filled = cells.iter().filter(|cell| !cell.text.is_empty());
+    let filled: Vec<&Cell<'_>> = filled.collect();
+    let is_same = |a: &Cell<'_>, b: &Cell<'_>| {
+        let [first, second] = [a, b].map(|cell| number_of(cell.text, decimal));
+        let is_one_day = || {
+            let day = |cell: &Cell<'_>| times::of_text(cell.text).ok().flatten();
+            day(a)
+                .zip(day(b))
+                .is_some_and(|(a, b)| (a - b).abs() <= DAY_S)
+        };
+        let is_equal = first
+            .zip(second)
+            .is_some_and(|(a, b)| a.total_cmp(&b).is_eq());
+        a.text == b.text || is_equal || is_one_day()
+    };
+    let mut changes = filled.windows(2).filter(|two| !is_same(two[0], two[1]));
+    let n_changes = changes.clone().count();
+    let is_within = |two: &[&Cell<'_>]| two[0].run.total_cmp(&two[1].run).is_eq();
+    let is_of_runs = if has_runs {
+        !changes.clone().any(is_within)
+    } else {
+        n_changes * ROWS_A_CHANGE <= filled.len()
+    };
+    let Some(two) = changes.next().filter(|_| is_of_runs) else {
+        return Ok(());
+    };
+    bail!(
+        "line {}, column \"{}\": \"{}\", and \"{}\" in line {}: the rows are of different tests: write each into a table of its own, or \
+         rename the column where it says something else",
+        two[1].line,
+        shown(name),
+        shown(two[1].text),
+        shown(two[0].text),
+        two[0].line
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sheet::Sheet;
+    use super::super::table::Table;
+    use super::*;
+
+    /// The refusal of three runs over six targets with another column; `cell` by run and target.
+    fn refusal(keys: &str, name: &str, cell: impl Fn(u32, u32) -> String) -> String {
+        let test = format!(
+            "{{axis: X, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 1.0, {keys}target_mm: t, deviation_um: d}}"
+        );
+        let map = format!("start_s: 0\ntest:\n  positioning: {test}\n");
+        let map: Map = serde_saphyr::from_str(&map).expect("a map");
+        let mut text = format!("n,t,d,{name}\n");
+        for (run, target) in (1..=3).flat_map(|run| (0..6).map(move |target| (run, target))) {
+            let cell = cell(run, target);
+            text.push_str(&format!("{run},{},0.5,{cell}\n", 50 * target));
+        }
+        let sheet = Sheet::of_text(&text, ',').expect("rows");
+        let ranges = vec![None; map.test.columns().len()];
+        match Table::of(&sheet, &map, &ranges) {
+            Ok(_) => String::new(),
+            Err(error) => format!("{error:#}"),
+        }
+    }
+
+    #[test]
+    fn columns_that_change_with_the_runs_are_refused_with_both_values() {
+        for (name, values) in [
+            ("machine", ["mill_1", "mill_1", "mill_2"]),
+            ("axis", ["1", "1", "2"]),
+            ("Achse", ["X1", "Y1", "Y1"]),
+            ("y_mm", ["0", "400", "400"]),
+            ("compensation", ["off", "off", "on"]),
+            ("feed_mm_min", ["500", "5000", "5000"]),
+            ("nominal radius mm", ["100", "150", "150"]),
+            ("date", ["2026-01-05", "2026-01-05", "2026-03-05"]),
+            ("Datum", ["05.01.2026", "09.01.2026", "09.01.2026"]),
+            ("serial no", ["A1", "A2", "A2"]),
+        ] {
+            for keys in ["run: n, ", ""] {
+                let value = |run: u32, _| values[run as usize - 1].to_owned();
+                let refused = refusal(keys, name, value);
+                assert!(
+                    refused.contains("of different tests"),
+                    "{name} {keys}: {refused}"
+                );
+                assert!(refused.contains(&format!("column \"{name}\"")), "{refused}");
+            }
+        }
+        for (name, bad) in [
+            ("valid", "0"),
+            ("status", "ERR beam"),
+            ("OK", "n"),
+            ("flag", "x"),
+        ] {
+            let value = |run, target| if (run, target) == (2, 3) { bad } else { "1" }.to_owned();
+            let refused = refusal("run: n, ", name, value);
+            assert!(
+                refused.contains(&format!("line 11, column \"{name}\": \"{bad}\"")),
+                "{refused}"
+            );
+        }
+    }
+
+    #[test]
+    fn columns_that_hold_one_value_or_change_within_runs_are_no_tests() {
+        let taken = |name: &str, cell: &dyn Fn(u32, u32) -> String| {
+            assert_eq!(refusal("run: n, ", name, cell), "", "{name}");
+        };
+        taken("machine", &|_, _| "mill_1".to_owned());
+        taken("feed_mm_min", &|run, _| {
+            if run == 1 { "500" } else { "500.0" }.to_owned()
+        });
+        taken("x_mm", &|_, target| (50 * target).to_string());
+        taken("remark", &|run, _| format!("run {run}"));
+        taken("operator", &|run, _| format!("person {run}"));
+        taken("air temperature", &|run, _| format!("2{run}.5"));
+        taken("date", &|run, _| {
+            if run < 3 { "2026-01-05" } else { "2026-01-06" }.to_owned()
+        });
+        taken("compensation", &|run, _| {
+            if run < 3 { "" } else { "on" }.to_owned()
+        });
+        taken("valid", &|_, _| "1".to_owned());
+        taken("status", &|_, _| String::new());
+    }
+}

@@ -1,0 +1,109 @@
+//! Conditions of a test that make its figures another quantity: they belong to its title, which tells series apart.
+
+use serde_json::Value;
+
+/// rad to deg.
+const RAD_DEG: f64 = 180.0 / std::f64::consts::PI;
+/// Deepest level below a test that is looked at for its targets.
+const DEEPEST: usize = 3;
+
+/// A title with the range of the targets, the place of the line and the correction to 20 degC, as far as the test has them.
+/// Lengths are in whole mm, angles in whole deg: repetitions of one test do not differ by more.
+pub fn with_conditions(title: &str, test: &Value) -> String {
+    let mut text = title.to_owned();
+    let place = test["place_mm"].as_object().into_iter().flatten();
+    let place = place.filter_map(|(axis, at)| Some(format!("{axis} {:.0}", whole(at.as_f64()?))));
+    let place: Vec<String> = place.collect();
+    if let Some(range) = range(test, 0) {
+        text.push_str(&format!(", {range}"));
+    }
+    if !place.is_empty() {
+        text.push_str(&format!(", at {} mm", place.join(" ")));
+    }
+    if test["correction_to_20_degc"]["done"] == Value::Bool(true) {
+        text.push_str(", at 20 °C");
+    }
+    text
+}
+
+/// A number rounded to a whole one; no negative zero.
+fn whole(number: f64) -> f64 {
+    number.round() + 0.0
+}
+
+/// From the least to the greatest target.
+fn range(value: &Value, depth: usize) -> Option<String> {
+    let entries = value.as_object().filter(|_| depth <= DEEPEST)?;
+    let points = entries.get("points").and_then(Value::as_array);
+    for (key, size, unit) in [("target_mm", 1.0, "mm"), ("target_rad", RAD_DEG, "deg")] {
+        let targets = points.into_iter().flatten();
+        let targets: Vec<f64> = targets.filter_map(|point| point[key].as_f64()).collect();
+        if !targets.is_empty() {
+            let least = targets.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = targets.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let [least, most] = [least, most].map(|target| whole(size * target));
+            return Some(format!("{least:.0} to {most:.0} {unit}"));
+        }
+    }
+    let mut below = entries.values();
+    below.find_map(|value| range(value, depth + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn test(targets_mm: &[f64]) -> Value {
+        let points: Vec<Value> = targets_mm
+            .iter()
+            .map(|at| json!({"target_mm": at}))
+            .collect();
+        json!({"iso230_2": {"n_runs": 5, "points": points}})
+    }
+
+    #[test]
+    fn range_place_and_correction_tell_series_apart_and_repetitions_do_not() {
+        let base = test(&[0.0, 50.1, 249.9]);
+        let of = |test: &Value| with_conditions("Positioning X", test);
+        assert_eq!(of(&base), "Positioning X, 0 to 250 mm");
+        let with = |key: &str, value: Value| {
+            let mut other = base.clone();
+            other[key] = value;
+            of(&other)
+        };
+        for other in [
+            of(&test(&[0.0, 10.0, 49.98])),
+            of(&test(&[-250.0, 0.0])),
+            with("place_mm", json!({"Y": 0.0, "Z": 120.0})),
+            with("place_mm", json!({"Y": 300.0, "Z": 120.0})),
+            with("correction_to_20_degc", json!({"done": true})),
+        ] {
+            assert_ne!(other, of(&base), "{other}");
+        }
+        for same in [
+            of(&test(&[0.0002, 50.1, 249.9004])),
+            of(&test(&[-0.0002, 50.1, 249.8997])),
+            with("correction_to_20_degc", json!({"done": false})),
+            with("place_mm", Value::Null),
+        ] {
+            assert_eq!(same, of(&base));
+        }
+        let all = json!({
+            "place_mm": {"Y": -0.2, "Z": 119.9998},
+            "correction_to_20_degc": {"done": true},
+            "iso230_2": {"points": [{"target_mm": 0.0}, {"target_mm": 600.0}]},
+        });
+        assert_eq!(
+            of(&all),
+            "Positioning X, 0 to 600 mm, at Y 0 Z 120 mm, at 20 °C"
+        );
+        let turn = json!({"iso230_2_rotary": {"figures": {"points": [{"target_rad": 0.0}, {"target_rad": 3.141_6}]}}});
+        assert_eq!(with_conditions("C", &turn), "C, 0 to 180 deg");
+        assert_eq!(
+            with_conditions("Drift", &json!({"iso230_3_log": {}})),
+            "Drift"
+        );
+    }
+}
