@@ -25,6 +25,24 @@ pub struct ImportMap {
     device: Option<String>,
 }
 
+/// Refuses an address that is not read here; a password in it is not printed.
+fn check_address(source: &str) -> Result<()> {
+    let Some((scheme, rest)) = source.split_once("://") else {
+        return Ok(());
+    };
+    let host = rest.split('/').next().unwrap_or_default();
+    if host.contains('@') {
+        bail!("{scheme}://...@...: a user name in the address is not sent: {PROBE}");
+    }
+    if scheme != "http" {
+        bail!(
+            "{source}: {scheme}:// is not read, but http:// and opc.tcp:// are: save the answer to `probe` by another program, and \
+             name its file"
+        );
+    }
+    Ok(())
+}
+
 impl ImportMap {
     /// Prints the mapping.
     ///
@@ -34,6 +52,7 @@ impl ImportMap {
         if self.source.starts_with("opc.tcp://") {
             return self.of_server();
         }
+        check_address(&self.source)?;
         let text = if self.source.starts_with("http://") {
             io::http::fetch(&self.source)?
         } else {
@@ -86,5 +105,38 @@ impl ImportMap {
             proposal.left_out.len(),
         );
         Ok(ExitCode::SUCCESS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_that_are_not_read_are_refused_and_passwords_not_printed() {
+        for (source, words) in [
+            (
+                "https://host/probe",
+                "https:// is not read, but http:// and opc.tcp:// are",
+            ),
+            ("ftp://x", "ftp:// is not read"),
+            (
+                "http://user:secret@host:1/probe",
+                "a user name in the address",
+            ),
+            ("https://user:secret@host", "a user name in the address"),
+        ] {
+            let refused = check_address(source).unwrap_err().to_string();
+            assert!(refused.contains(words), "{refused}");
+            assert!(!refused.contains("secret"), "{refused}");
+        }
+        for source in [
+            "http://host:5000/probe",
+            "probe.xml",
+            "http://host/a@b",
+            "./a:b",
+        ] {
+            assert!(check_address(source).is_ok(), "{source}");
+        }
     }
 }

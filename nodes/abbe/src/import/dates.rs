@@ -103,6 +103,14 @@ mod tests {
     }
 
     #[test]
+    fn marks_of_an_end_of_file_are_no_row() {
+        for end in ["\u{1a}", "\0\0", "\r\n\u{1a}\r\n", "\n\u{1a}", ""] {
+            let (_, rows) = joined(&format!("t,z\n1,2\n3,4{end}"));
+            assert_eq!(rows, ["t,z", "1,2", "3,4"], "{end:?}");
+        }
+    }
+
+    #[test]
     fn other_tables_stay_as_they_are() {
         for text in [
             "time,z_um\n08:00:00,0.1\n08:01:00,0.2\n",

@@ -105,7 +105,7 @@ fn check_time(test: &Test, runs: &[Vec<Row>]) -> Result<()> {
     if time_s.is_nan() || time_s > LONGEST_MOTION_S {
         let units = units(*axis);
         bail!(
-            "{stops} stops, {} {} of way at {} = {feed_mm_min} {} of the map take {} s: at most {LONGEST_MOTION_S} s",
+            "{stops} stops, {} {} of way at {} = {feed_mm_min} {} of the map take {} s: at most {LONGEST_MOTION_S} s; state a shorter dwell_s (above 0.4) or a higher feed, or part the table",
             number(way_mm),
             units.target,
             units.keys[0],

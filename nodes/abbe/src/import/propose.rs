@@ -238,14 +238,15 @@ impl<'t> Text<'t> {
         self.test.push_str("  positioning:\n");
         self.axis(axis, taken);
         let [feed, overrun] = units.keys;
+        let [feed_per_min, dwell_s] = assumed_motion(found);
         self.stated(
             feed,
-            "1000.0",
+            feed_per_min,
             "feed between the targets; figures do not depend on it",
         );
         self.stated(
             "dwell_s",
-            "2.0",
+            dwell_s,
             "rest at each target; figures do not depend on it",
         );
         self.stated(
@@ -512,6 +513,19 @@ impl<'t> Text<'t> {
         map.push_str("test:\n");
         map.push_str(&self.test);
         map
+    }
+}
+
+/// Stops up to which each is taken to have lasted 2 s: half a day.
+const SLOW_STOPS: usize = 20_000;
+
+/// Feed per minute and dwell, s, that nobody stated: so that many stops fit into a day too.
+fn assumed_motion(found: &Recognised) -> [&'static str; 2] {
+    let n_stops = found.n_rows.saturating_mul(found.passes().len().max(1));
+    if n_stops > SLOW_STOPS {
+        ["10000.0", "0.5"]
+    } else {
+        ["1000.0", "2.0"]
     }
 }
 

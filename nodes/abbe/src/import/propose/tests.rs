@@ -4,6 +4,20 @@ use super::*;
 use machine::MachineFile;
 use metrology::yaml;
 
+#[test]
+fn the_motion_that_is_assumed_of_many_stops_fits_into_a_day() {
+    for (targets, runs, words) in [(5, 3, "dwell_s: 2.0"), (2_500, 10, "dwell_s: 0.5")] {
+        let mut text = "run,direction,target_mm,deviation_um\n".to_owned();
+        for run in 1..=runs {
+            for k in 0..targets {
+                text.push_str(&format!("{run},up,{},0.5\n", 0.2 * f64::from(k)));
+            }
+        }
+        let (proposal, _) = proposed("X.csv", &text);
+        assert!(proposal.map.contains(words), "{targets}: {}", proposal.map);
+    }
+}
+
 fn proposed(name: &str, text: &str) -> (Proposal, Map) {
     let home = tempfile::tempdir().unwrap();
     let path = home.path().join(name);
