@@ -2,10 +2,18 @@
 
 use std::time::{Duration, Instant};
 
+use anyhow::{Result, anyhow};
+use node_runtime::RawPublisher;
+use node_runtime::environment::Environment;
+use node_runtime::names::NodeNames;
 use node_runtime::tap::Rival;
+use replayer::PlaybackConfig;
+
+use crate::contents::Contents;
+use crate::player::{PATIENCE, QUEUE_LEN};
 
 /// Until everybody who was there before has been met.
-pub const MEETING: Duration = Duration::from_secs(1);
+const MEETING: Duration = Duration::from_secs(1);
 /// Between two looks at the graph.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 /// Rivals that a message names.
@@ -62,8 +70,27 @@ impl GraphWatch {
     }
 }
 
+/// Joins the network to speak on the topics of the bag, where it may.
+///
+/// # Errors
+/// When there is no network, or others use the topics.
+pub fn voice(
+    environment: &Environment,
+    names: &NodeNames,
+    contents: &Contents,
+    config: &PlaybackConfig,
+) -> Result<RawPublisher> {
+    let topics = &contents.offered;
+    if config.onto_a_running_graph {
+        return RawPublisher::of_found(environment, names, topics, QUEUE_LEN, PATIENCE);
+    }
+    let how = (QUEUE_LEN, PATIENCE);
+    RawPublisher::where_alone(environment, names, topics, how, MEETING)?
+        .map_err(|rivals| anyhow!("{}: {}", config.bag, refusal(&rivals, 0)))
+}
+
 /// Why a bag is not played among these, of which so many messages `sent` went out.
-pub fn refusal(rivals: &[Rival], sent: u64) -> String {
+fn refusal(rivals: &[Rival], sent: u64) -> String {
     let shown: Vec<String> = rivals.iter().take(SHOWN).map(Rival::to_string).collect();
     let more = match rivals.len().saturating_sub(SHOWN) {
         0 => String::new(),

@@ -19,13 +19,13 @@ use replayer::{Account, Place, Playback, PlaybackConfig, Reason, TopicAccount};
 
 use crate::contents::{Contents, Plan};
 use crate::desk::{Desk, Next};
-use crate::graph_watch::{GraphWatch, MEETING, refusal};
+use crate::graph_watch::{GraphWatch, voice};
 use crate::latched::Latched;
 
 /// Messages between the reader and the network.
-const QUEUE_LEN: usize = 4_096;
+pub const QUEUE_LEN: usize = 4_096;
 /// A network that takes nothing for so long loses messages, which are counted.
-const PATIENCE: Duration = Duration::from_secs(5);
+pub const PATIENCE: Duration = Duration::from_secs(5);
 /// Time between two `/clock`.
 const CLOCK_PERIOD: Duration = Duration::from_millis(25);
 /// The same in time of the bag, where nothing is waited for.
@@ -91,22 +91,6 @@ impl Player {
         let ended = self.thread.join();
         ended.map_err(|_| anyhow!("the thread that plays panicked"))
     }
-}
-
-/// Joins the network to speak on the topics of the bag, where it may.
-fn voice(
-    environment: &Environment,
-    names: &NodeNames,
-    contents: &Contents,
-    config: &PlaybackConfig,
-) -> Result<RawPublisher> {
-    let topics = &contents.offered;
-    if config.onto_a_running_graph {
-        return RawPublisher::of_found(environment, names, topics, QUEUE_LEN, PATIENCE);
-    }
-    let how = (QUEUE_LEN, PATIENCE);
-    RawPublisher::where_alone(environment, names, topics, how, MEETING)?
-        .map_err(|rivals| anyhow!("{}: {}", config.bag, refusal(&rivals, 0)))
 }
 
 /// What speaks on the topics of a bag.
