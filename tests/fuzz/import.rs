@@ -7,20 +7,30 @@
     )
 )]
 
+#[path = "../../nodes/abbe/src/import/again.rs"]
+pub mod again;
 #[path = "../../nodes/abbe/src/import/beside.rs"]
 pub mod beside;
+#[path = "../../nodes/abbe/src/import/dates.rs"]
+pub mod dates;
 #[path = "../../nodes/abbe/src/import/limits.rs"]
 pub mod limits;
 #[path = "../../nodes/abbe/src/import/map.rs"]
 pub mod map;
 #[path = "../../nodes/abbe/src/import/map_schema.rs"]
 pub mod map_schema;
+#[path = "../../nodes/abbe/src/import/measured.rs"]
+pub mod measured;
 #[path = "../../nodes/abbe/src/import/motion.rs"]
 pub mod motion;
 #[path = "../../nodes/abbe/src/import/odd.rs"]
 pub mod odd;
+#[path = "../../nodes/abbe/src/import/parted.rs"]
+pub mod parted;
 #[path = "../../nodes/abbe/src/import/passes.rs"]
 pub mod passes;
+#[path = "../../nodes/abbe/src/import/recognise.rs"]
+pub mod recognise;
 #[path = "../../nodes/abbe/src/import/runs.rs"]
 pub mod runs;
 #[path = "../../nodes/abbe/src/import/same.rs"]
@@ -35,5 +45,7 @@ pub mod table;
 pub mod times;
 #[path = "../../nodes/abbe/src/import/units.rs"]
 pub mod units;
+#[path = "../../nodes/abbe/src/import/vocabulary.rs"]
+pub mod vocabulary;
 #[path = "writer.rs"]
 pub mod writer;
