@@ -244,7 +244,8 @@ fn in_words(text: &str, is_closed: bool) -> Stated {
     }
     let unit = Unit::of_word(last);
     let is_share = matches!(previous.to_lowercase().as_str(), "per" | "pro" | "je");
-    if is_share && (unit.is_some() || is_foreign(last)) {
+    let is_part = unit.is_some() && is_foreign(previous);
+    if is_part || (is_share && (unit.is_some() || is_foreign(last))) {
         return Stated::Unknown(format!("{previous} {last}"));
     }
     // `d/mm` is a quantity and its unit, `um/m` one unit.
@@ -260,9 +261,6 @@ fn in_words(text: &str, is_closed: bool) -> Stated {
         if is_part {
             return Stated::Unknown(format!("{first}{apart}{previous} {last}"));
         }
-    }
-    if unit.is_some() && is_foreign(previous) {
-        return Stated::Unknown(format!("{previous} {last}"));
     }
     if let Some(unit) = unit {
         return Stated::Unit(unit, (*last).to_owned());
