@@ -2,7 +2,7 @@
 //!
 //! A stated unit holds. One that is not known, or that is not the one of the map's key, is refused with what to state: only
 //! `units` of the map states that a name is wrong. In brackets stands a unit or a note; without them the last word may be a
-//! unit, or a clear one before it. Where a name says deviation, target or another length or angle, what stands there is a
+//! unit, or a clear one before it. Where a name has deviation, target or another length or angle, what stands there is a
 //! unit, or a word that is known to be none.
 
 use anyhow::{Result, bail};
