@@ -2,7 +2,6 @@
 //! whose columns say otherwise has the sign, the unit or a row of one of them wrong.
 
 use anyhow::{Result, bail};
-use metrology::number::number;
 use metrology::yaml::shown;
 
 use super::map::{Map, Test, What, units};
@@ -28,6 +27,8 @@ struct Compared<'t> {
     size: f64,
     /// Numbers differ by so much from rounding alone, in units of targets.
     rounding: f64,
+    /// Step of the last decimal of the targets.
+    target_step: f64,
 }
 
 /// A row with all three.
@@ -89,8 +90,8 @@ pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<
             size: unit_size,
             rounding: ROUNDING
                 + step(name, unit_size)
-                + step(target_name, of(target_name, place_unit))
                 + step(read_name, of(read_name, deviation_unit)),
+            target_step: step(target_name, of(target_name, place_unit)),
         };
         let triples = triples(&compared, lines, rows, ([target, read], size, map.decimal));
         if let Some(remark) = compare(&compared, &triples, (read_name, units.turn, units.target))? {
@@ -154,6 +155,27 @@ fn triples(
     all
 }
 
+/// Whether all differences come from targets that are shown with fewer decimals than they have: at each target they are
+/// one, whatever the deviations are.
+fn is_of_targets(
+    off: &dyn Fn(&Triple) -> f64,
+    triples: &[Triple],
+    compared: &Compared<'_>,
+) -> bool {
+    let mut sorted: Vec<&Triple> = triples.iter().collect();
+    sorted.sort_by(|a, b| a.target.total_cmp(&b.target));
+    let repeats = || {
+        let twos = sorted.windows(2).map(|two| (two[0], two[1]));
+        twos.filter(|(a, b)| a.target.total_cmp(&b.target).is_eq())
+    };
+    let is_above = |a: f64, b: f64| (a - b).abs() > compared.rounding;
+    let half_step = 0.5 * compared.target_step + compared.rounding;
+    let has_other = repeats().any(|(a, b)| is_above(a.deviation, b.deviation));
+    has_other
+        && triples.iter().all(|row| off(row).abs() <= half_step)
+        && !repeats().any(|(a, b)| is_above(off(a), off(b)))
+}
+
 fn compare(
     compared: &Compared<'_>,
     triples: &[Triple],
@@ -184,11 +206,14 @@ fn compare(
     let Some(row) = triples.iter().find(|row| off(row).abs() > tolerance) else {
         return Ok(None);
     };
+    if is_of_targets(&off, triples, compared) {
+        return Ok(None);
+    }
     let name = shown(compared.name);
     if is_one && triples.len() > 1 {
         return Ok(Some(format!(
             "column \"{name}\": less the target it is {} {unit} more than \"{}\" in every row: its zero is another, and the deviations are taken",
-            number(middle),
+            rounded(middle),
             shown(read_name)
         )));
     }
@@ -205,9 +230,14 @@ fn compare(
          columns (or its unit), or rename \"{name}\" where it holds something else",
         row.line,
         shown(read_name),
-        number(row.deviation),
-        number(difference(row))
+        rounded(row.deviation),
+        rounded(difference(row))
     );
+}
+
+/// A length or an angle with its last decimal that matters.
+fn rounded(value: f64) -> String {
+    format!("{value:.6}")
 }
 
 #[cfg(test)]
@@ -247,8 +277,8 @@ mod tests {
             let (is_taken, said) = said("", name, turned);
             assert!(!is_taken, "{name}");
             for words in [
-                "line 2, column \"d\": the deviation is 0.00016 mm",
-                "less the target is -0.00016 mm, the other sign in every row",
+                "line 2, column \"d\": the deviation is 0.000160 mm",
+                "less the target is -0.000160 mm, the other sign in every row",
                 "rename",
             ] {
                 assert!(said.contains(words), "{name}: {words}: {said}");
@@ -335,7 +365,27 @@ mod tests {
             let (is_taken, said) = said(keys, name, cell);
             assert!(is_taken, "{name}: {said}");
             let is_offset = said.contains("in every row: its zero is another");
-            assert!(!is_offset || said.contains("0.5 mm more"), "{said}");
+            assert!(!is_offset || said.contains("0.500000 mm more"), "{said}");
+        }
+    }
+
+    #[test]
+    fn targets_that_are_shown_with_fewer_decimals_are_no_contradiction() {
+        let map: Map = serde_saphyr::from_str(
+            "start_s: 0\ntest:\n  positioning: {axis: X, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 1.0, run: n, target_mm: t, deviation_um: d}\n",
+        )
+        .expect("a map");
+        for (sign, is_taken) in [(1.0, true), (-1.0, false)] {
+            let mut text = "n,t,d,measured_mm\n".to_owned();
+            for (run, k) in (1..=3).flat_map(|run| (0..4).map(move |k| (run, k))) {
+                let target = 100.0 / 3.0 * f64::from(k);
+                let deviation = 0.5 * f64::from(run) + 0.3 * f64::from(k);
+                let measured = target + sign * 1e-3 * deviation;
+                text.push_str(&format!("{run},{target:.2},{deviation:.2},{measured:.5}\n"));
+            }
+            let sheet = Sheet::of_text(&text, ',').expect("rows");
+            let table = Table::of(&sheet, &map, &[None, None, None]);
+            assert_eq!(table.is_ok(), is_taken, "{sign}");
         }
     }
 }

@@ -180,7 +180,7 @@ fn parted(name: &str, cells: &[Cell<'_>], (has_runs, decimal): (bool, char)) -> 
     };
     bail!(
         "line {}, column \"{}\": \"{}\", and \"{}\" in line {}: the rows are of different tests: write each into a table of its own, or \
-         rename the column where it says something else",
+         rename the column where it holds something else",
         two[1].line,
         shown(name),
         shown(two[1].text),

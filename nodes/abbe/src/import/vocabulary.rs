@@ -383,7 +383,7 @@ pub fn is_correction(name: &str) -> bool {
     (0..words.len()).any(|k| is_one(&words[k]) && !is_under(k))
 }
 
-/// Whether a name says that the target comes first and the measured position is taken from it (`Soll-Ist`,
+/// Whether the target comes first in a name and the measured position is taken from it (`Soll-Ist`,
 /// `target - measured`): the negative of a deviation.
 pub fn is_reversed(name: &str) -> bool {
     let lower = name.to_lowercase().replace(['\u{2212}', '\u{2013}'], "-");

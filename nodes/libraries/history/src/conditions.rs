@@ -1,4 +1,4 @@
-//! Conditions of a test that make its figures another quantity: they belong to its title, which tells series apart.
+//! Conditions of a test that make its figures another quantity: they belong to its title, which distinguishes series.
 
 use serde_json::Value;
 

@@ -22,7 +22,7 @@ pub struct Gap {
     pub bags: Vec<String>,
     /// SHA-256 of the machine file.
     pub machine_sha256: Option<String>,
-    /// What it was made with beside the bags, which tells diagnoses of the same bags apart: machine file, bags of a simulator,
+    /// What it was made with beside the bags, which distinguishes diagnoses of the same bags: machine file, bags of a simulator,
     /// effects and rules that were left out.
     pub made_with: String,
     /// The figures.
@@ -75,7 +75,7 @@ fn made_with(gap: &Value) -> String {
     text
 }
 
-/// The title of a diagnosis: what it was made with tells its series apart. Bags of a simulator differ from test to test.
+/// The title of a diagnosis: what it was made with distinguishes its series. Bags of a simulator differ from test to test.
 fn title(gap: &Value) -> String {
     let mut title = TEST.to_owned();
     if gap["simulated"].is_object() {

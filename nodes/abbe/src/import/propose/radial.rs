@@ -19,10 +19,7 @@ pub fn feed(found: &Recognised) -> Option<(&Known, f64)> {
             ["feed" | "feedrate" | "vorschub", rest @ ..] => rest,
             _ => return None,
         };
-        let is_mm_min = matches!(
-            rest,
-            [] | ["rate"] | [.., "mm", "min"] | ["rate", "mm", "min"]
-        );
+        let is_mm_min = matches!(rest, [] | ["rate"] | [.., "mm", "min"]);
         let first = column.numbers.first().copied()?;
         let is_one = column
             .numbers

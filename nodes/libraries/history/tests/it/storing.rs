@@ -59,7 +59,7 @@ fn an_entry_is_added_once_by_kind_and_hash() {
 }
 
 #[test]
-fn an_entry_that_is_there_with_other_figures_is_told_apart() {
+fn an_entry_that_is_there_with_other_figures_is_reported() {
     let home = tempfile::tempdir().unwrap();
     let mut store = store(home.path());
     let one = entry("m", 1, 100, 1.0);
