@@ -412,10 +412,10 @@ pub fn is_reversed(name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
     #[test]
     fn a_correction_or_a_reversed_difference_is_no_deviation() {
+        use super::{is_correction, is_reversed};
+
         for name in [
             "error compensation um",
             "compensation",
@@ -459,6 +459,8 @@ mod tests {
 
     #[test]
     fn parts_of_units_are_foreign_and_words_of_the_trade_are_not() {
+        use super::{is_foreign, is_known};
+
         for word in [
             "mdeg",
             "µdeg",
