@@ -1,7 +1,7 @@
 //! What the bridge knows of a program's text: its frame and length, which feature each line touches, where it may
 //! stop, and which words would shift the machine's coordinates.
 
-use machine::program_frame::is_machine_frame;
+use machine::program_frame::{has_frame_behind_semicolon, is_machine_frame};
 use metrology::bound::NAME_BYTES;
 
 use crate::waiting::Stops;
@@ -14,6 +14,7 @@ pub struct ProgramText {
     features: Vec<(u32, String)>,
     stops: Stops,
     is_machine_frame: bool,
+    has_frame_behind_semicolon: bool,
     touches: bool,
     shifting: Option<(u32, ShiftingWord)>,
 }
@@ -48,6 +49,7 @@ impl ProgramText {
     pub fn new(text: &str) -> Self {
         let mut program = Self {
             is_machine_frame: is_machine_frame(text),
+            has_frame_behind_semicolon: has_frame_behind_semicolon(text),
             ..Self::default()
         };
         for line in text.lines() {
@@ -80,6 +82,12 @@ impl ProgramText {
     #[must_use]
     pub fn is_machine_frame(&self) -> bool {
         self.is_machine_frame
+    }
+
+    /// Whether a comment of the frame stands behind a semicolon, where it does not count.
+    #[must_use]
+    pub fn has_frame_behind_semicolon(&self) -> bool {
+        self.has_frame_behind_semicolon
     }
 
     /// The first feature whose name is longer than a message may have it: line and bytes.

@@ -89,11 +89,15 @@ const BOUNDS: [(&str, &str); 14] = [
     ),
     (
         "G4 P86401\nM2",
-        "line 1, column 4: word P = 86401: must be at most 86400 s, a day, of a dwell",
+        "line 1, column 4: word P = 86401: must be from 0 to 86400 s, a day, of a dwell",
     ),
     (
         "G4 P-1\nM2",
-        "line 1, column 4: word P = -1: must be from 0 to 1000000",
+        "line 1, column 4: word P = -1: must be from 0 to 86400 s, a day, of a dwell",
+    ),
+    (
+        "P2000000 G04\nM2",
+        "line 1, column 1: word P = 2000000: must be from 0 to 86400 s, a day, of a dwell",
     ),
     (
         "G0 X5000000\nM2",

@@ -305,6 +305,15 @@ fn refusals_name_the_offset_and_what_to_do() {
         ),
         ("(frame: work)\nM2", "line 1, column 1: frame comment"),
         ("; frame: machine\nM2", "line 1, column 1: frame comment"),
+        (";(frame: machine)\nM2", "line 1, column 1: frame comment"),
+        (
+            "G21 ; (Frame : machin)\nM2",
+            "line 1, column 5: frame comment",
+        ),
+        (
+            "G21\n;; part 7 (frame: machine)\nM2",
+            "line 2, column 1: frame comment",
+        ),
         (
             "(frame: machine) (frame: machine)\nM2",
             "line 1, column 18: frame comment",
