@@ -38,9 +38,11 @@ mod mirror;
 mod serve;
 mod shortcomings;
 mod table_trial;
+mod unwritten;
 
 use serve::ServeOptions;
 use table_trial::TableTrial;
+use unwritten::Unwritten;
 
 /// Arguments of `abbe run`.
 #[derive(Args)]

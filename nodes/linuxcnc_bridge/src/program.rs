@@ -171,6 +171,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_frame_behind_a_semicolon_is_found_and_refused_with_its_place() {
+        for (text, wanted) in [
+            (";(frame: machine)\nG0 X1\nM2\n", true),
+            ("; Frame: machine\nM2\n", true),
+            ("G21 ; part (frame: machin)\nM2\n", true),
+            ("(frame: machine) ; part\nM2\n", false),
+            ("; part 7\nM2\n", false),
+        ] {
+            let found = ProgramText::new(text).has_frame_behind_semicolon();
+            assert_eq!(found, wanted, "{text:?}");
+        }
+        let said = crate::run::Refusal::FrameBehindSemicolon.to_string();
+        assert!(
+            said.starts_with("line 1: ") && said.contains("in parentheses"),
+            "{said}"
+        );
+    }
+
+    #[test]
     fn the_last_comment_before_the_line_names_the_feature() {
         let text = "G21\n(feature: block_1/x)\nG38.2 X1 F60\nG0 X0 (Feature: block_1/y ) (done)\n";
         let program = ProgramText::new(text);
