@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use node_runtime::text_file::{self, Comments};
 
 /// Lines from the first on that are looked at for what parts their columns.
-const LOOKED_AT: usize = 100;
+const FIRST_LINES: usize = 100;
 
 /// Refuses a row of another length than the line with the names; separators at its end do no harm.
 pub(super) fn check_length(cells: &[String], wanted: usize, line: u64) -> Result<()> {
@@ -50,7 +50,9 @@ pub(super) fn no_names(path: &Path) -> String {
 /// How the columns of a text seem to be parted, where that is no separator that is read; `None`: nothing is seen.
 fn foreign(text: &str) -> Option<&'static str> {
     let lines = text.lines().filter(|line| !line.trim().is_empty());
-    let lines = lines.filter(|line| !line.starts_with('#')).take(LOOKED_AT);
+    let lines = lines
+        .filter(|line| !line.starts_with('#'))
+        .take(FIRST_LINES);
     let lines: Vec<&str> = lines.collect();
     if lines.iter().any(|line| line.contains([';', '\t'])) {
         return None;
