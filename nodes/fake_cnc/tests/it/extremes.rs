@@ -65,7 +65,7 @@ fn a_spindle_speed_beyond_the_machine_is_refused_with_its_place() {
 }
 
 /// Programs with a number beyond its bound, and the error; empty: the number is within.
-const BOUNDS: [(&str, &str); 14] = [
+const BOUNDS: [(&str, &str); 15] = [
     (
         "N1000000000 G0 X1\nM2",
         "line 1, column 1: word N = 1000000000: must be from 0 to 999999999",
