@@ -151,7 +151,7 @@ mod tests {
             of(&all),
             "Positioning X, 0 to 600 mm, at Y 0 Z 120 mm, at 20 °C"
         );
-        let turn = json!({"iso230_2_rotary": {"figures": {"points": [{"target_rad": 0.0}, {"target_rad": 3.141_6}]}}});
+        let turn = json!({"iso230_2_rotary": {"figures": {"points": [{"target_rad": 0.0}, {"target_rad": std::f64::consts::PI}]}}});
         assert_eq!(with_conditions("C", &turn), "C, 0 to 180 deg");
         assert_eq!(
             with_conditions("Drift", &json!({"iso230_3_log": {}})),

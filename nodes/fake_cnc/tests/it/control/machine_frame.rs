@@ -305,15 +305,6 @@ fn refusals_name_the_offset_and_what_to_do() {
         ),
         ("(frame: work)\nM2", "line 1, column 1: frame comment"),
         ("; frame: machine\nM2", "line 1, column 1: frame comment"),
-        (";(frame: machine)\nM2", "line 1, column 1: frame comment"),
-        (
-            "G21 ; (Frame : machin)\nM2",
-            "line 1, column 5: frame comment",
-        ),
-        (
-            "G21\n;; part 7 (frame: machine)\nM2",
-            "line 2, column 1: frame comment",
-        ),
         (
             "(frame: machine) (frame: machine)\nM2",
             "line 1, column 18: frame comment",
@@ -337,6 +328,20 @@ fn refusals_name_the_offset_and_what_to_do() {
             super::shop(clean.clone()).run(&format!("(frame: machine)\n{word}\nM2"));
         assert_eq!(outcome, Outcome::Refused, "{word}");
         assert!(message.contains("changes the coordinates"), "{message}");
+    }
+}
+
+#[test]
+fn a_frame_behind_a_semicolon_is_refused_with_its_place() {
+    for (text, place) in [
+        (";(frame: machine)\nM2", "line 1, column 1"),
+        ("; frame: machine\nM2", "line 1, column 1"),
+        ("G21 ; (Frame : machin)\nM2", "line 1, column 5"),
+        ("G21\n;; part 7 (frame: machine)\nM2", "line 2, column 1"),
+    ] {
+        let message = shop(Bench::open()).run(text).1;
+        let begin = format!("{place}: frame comment");
+        assert!(message.starts_with(&begin), "{message}");
     }
 }
 
