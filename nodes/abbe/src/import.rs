@@ -36,6 +36,7 @@ pub(crate) mod propose;
 mod recognise;
 mod runs;
 mod same;
+mod separators;
 mod sheet;
 mod stated;
 mod table;

@@ -38,9 +38,11 @@ mod mirror;
 mod serve;
 mod shortcomings;
 mod table_trial;
+mod unwritten;
 
 use serve::ServeOptions;
 use table_trial::TableTrial;
+use unwritten::Unwritten;
 
 /// Arguments of `abbe run`.
 #[derive(Args)]
@@ -248,19 +250,20 @@ impl Run {
             }
         }
         state_origin(&mut report, &outcome, &bag, between)?;
-        let page = match report.write(folder) {
-            Ok(()) => Some(folder.join("report.html")),
-            Err(error) => {
-                outcome.fail(format!(
-                    "no page was written, what it says is above: {error:#}"
-                ));
-                None
-            }
-        };
+        let written = report.write(folder);
+        // Each file is there whole or not at all, in a folder that is new.
+        let page = Some(folder.join("report.html")).filter(|page| page.is_file());
         self.tell(&report, &outcome, &bag, page.as_deref());
         let kept = self.keep_figures(&report, &outcome, scenario, &bag);
+        let has_bag = outcome.recorded > 0;
+        let unwritten = written.err().map(|error| Unwritten {
+            error,
+            is_plan_whole: outcome.failure.is_none(),
+            bag: Some(bag.as_path()).filter(|_| has_bag),
+            page: page.as_deref(),
+        });
         let ended = outcome.end();
-        kept.map(|()| ended)
+        kept.map(|()| unwritten.map_or(ended, |it| it.complain()))
     }
 
     /// The report on the terminal; without a page the whole of it, for then it stands nowhere else.

@@ -227,16 +227,7 @@ impl<H: Hardware> Control<H> {
     pub fn start(&mut self, goal: u64, text: &str) -> Result<(), ProgramError> {
         let start = &self.command.position;
         let program = rs274::read_in(text, &self.settings.envelope, start, &self.registers)?;
-        for (name, at) in &program.devices {
-            if !self.hardware.has_device(name) {
-                return Err(ProgramError::CommentValue {
-                    at: *at,
-                    what: "mount",
-                    text: name.clone(),
-                    rule: "followed by a placement or beam of the machine file",
-                });
-            }
-        }
+        program.check_devices(|name| self.hardware.has_device(name))?;
         if let (Some((one, other)), Some(line)) = (self.contested, program.first_touch()) {
             let why = Diagnostic::CompensationContested { one, other };
             let why = Box::new(why);

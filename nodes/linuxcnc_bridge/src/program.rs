@@ -1,7 +1,7 @@
 //! What the bridge knows of a program's text: its frame and length, which feature each line touches, where it may
 //! stop, and which words would shift the machine's coordinates.
 
-use machine::program_frame::is_machine_frame;
+use machine::program_frame::{has_frame_behind_semicolon, is_machine_frame};
 use metrology::bound::NAME_BYTES;
 
 use crate::waiting::Stops;
@@ -14,6 +14,7 @@ pub struct ProgramText {
     features: Vec<(u32, String)>,
     stops: Stops,
     is_machine_frame: bool,
+    has_frame_behind_semicolon: bool,
     touches: bool,
     shifting: Option<(u32, ShiftingWord)>,
 }
@@ -48,6 +49,7 @@ impl ProgramText {
     pub fn new(text: &str) -> Self {
         let mut program = Self {
             is_machine_frame: is_machine_frame(text),
+            has_frame_behind_semicolon: has_frame_behind_semicolon(text),
             ..Self::default()
         };
         for line in text.lines() {
@@ -80,6 +82,12 @@ impl ProgramText {
     #[must_use]
     pub fn is_machine_frame(&self) -> bool {
         self.is_machine_frame
+    }
+
+    /// Whether a comment of the frame stands behind a semicolon, where it does not count.
+    #[must_use]
+    pub fn has_frame_behind_semicolon(&self) -> bool {
+        self.has_frame_behind_semicolon
     }
 
     /// The first feature whose name is longer than a message may have it: line and bytes.
@@ -161,6 +169,25 @@ fn feature_comment(line: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_frame_behind_a_semicolon_is_found_and_refused_with_its_place() {
+        for (text, wanted) in [
+            (";(frame: machine)\nG0 X1\nM2\n", true),
+            ("; Frame: machine\nM2\n", true),
+            ("G21 ; part (frame: machin)\nM2\n", true),
+            ("(frame: machine) ; part\nM2\n", false),
+            ("; part 7\nM2\n", false),
+        ] {
+            let found = ProgramText::new(text).has_frame_behind_semicolon();
+            assert_eq!(found, wanted, "{text:?}");
+        }
+        let said = crate::run::Refusal::FrameBehindSemicolon.to_string();
+        assert!(
+            said.starts_with("line 1: ") && said.contains("in parentheses"),
+            "{said}"
+        );
+    }
 
     #[test]
     fn the_last_comment_before_the_line_names_the_feature() {

@@ -3,7 +3,7 @@
 //! A machine's topics stand in its namespace (`/mill_3/axes/state`). Instruments may have another one, as long as no
 //! topic of ours is in two: then nobody knows which messages belong together.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use recorder::TopicInfo;
@@ -38,24 +38,33 @@ impl fmt::Display for SeveralMachines {
 
 impl std::error::Error for SeveralMachines {}
 
+/// The namespaces of topics of ours that have messages, each once by name, without the root; instruments may have their own.
+#[must_use]
+pub fn namespaces(topics: &[TopicInfo]) -> Vec<&str> {
+    let all = topics.iter().filter_map(|info| Some(ours(info)?.0));
+    let all: BTreeSet<&str> = all.filter(|name| !name.is_empty()).collect();
+    all.into_iter().collect()
+}
+
+/// Namespace and name of a topic of ours that has messages; `None`: it is not ours.
+fn ours(info: &TopicInfo) -> Option<(&str, &str)> {
+    let entry = entry_in_any_namespace(&info.topic)?;
+    // A robot beside the machine has joint states and temperatures too.
+    let is_ours = info.message_count > 0
+        && entry.description.type_name.starts_with("abbe_msgs/")
+        && info.type_name == entry.description.type_name
+        && !entry.name.starts_with(OF_HOSTS);
+    let before = namespace(&info.topic, entry).filter(|_| is_ours)?;
+    Some((before, info.topic[before.len()..].trim_start_matches('/')))
+}
+
 /// Refuses topics of which one of ours has messages in several namespaces.
 ///
 /// # Errors
 /// With the first such topic and its namespaces.
 pub fn check(topics: &[TopicInfo]) -> Result<(), SeveralMachines> {
     let mut known: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for info in topics.iter().filter(|info| info.message_count > 0) {
-        let Some(entry) = entry_in_any_namespace(&info.topic) else {
-            continue;
-        };
-        // A robot beside the machine has joint states and temperatures too.
-        let is_ours = entry.description.type_name.starts_with("abbe_msgs/")
-            && info.type_name == entry.description.type_name
-            && !entry.name.starts_with(OF_HOSTS);
-        let Some(before) = namespace(&info.topic, entry).filter(|_| is_ours) else {
-            continue;
-        };
-        let rest = info.topic[before.len()..].trim_start_matches('/');
+    for (before, rest) in topics.iter().filter_map(ours) {
         known.entry(rest).or_default().push(before);
     }
     let Some((topic, namespaces)) = known.into_iter().find(|(_, all)| all.len() > 1) else {
@@ -75,8 +84,7 @@ pub fn check(topics: &[TopicInfo]) -> Result<(), SeveralMachines> {
 mod tests {
     use super::*;
 
-    /// Topics with their types and numbers of messages.
-    fn checked(topics: &[(&str, &str, u64)]) -> Result<(), SeveralMachines> {
+    fn infos(topics: &[(&str, &str, u64)]) -> Vec<TopicInfo> {
         let info = |(topic, name, n): &(&str, &str, u64)| TopicInfo {
             topic: (*topic).to_owned(),
             type_name: (*name).to_owned(),
@@ -87,7 +95,28 @@ mod tests {
             message_encoding: "cdr".to_owned(),
             qos_yaml: String::new(),
         };
-        check(&topics.iter().map(info).collect::<Vec<_>>())
+        topics.iter().map(info).collect()
+    }
+
+    /// Topics with their types and numbers of messages.
+    fn checked(topics: &[(&str, &str, u64)]) -> Result<(), SeveralMachines> {
+        check(&infos(topics))
+    }
+
+    #[test]
+    fn the_namespaces_of_our_topics_are_listed_without_the_root() {
+        for (topics, wanted) in [
+            (vec![("/axes/state", STATE, 9)], vec![]),
+            (vec![("/mill_3/axes/state", STATE, 9)], vec!["/mill_3"]),
+            (
+                vec![("/m/axes/state", STATE, 9), ("/k/grid/position", GRID, 1)],
+                vec!["/k", "/m"],
+            ),
+            (vec![("/mill_3/axes/state", STATE, 0)], vec![]),
+            (vec![("/robot/axes/state", "other/msg/State", 9)], vec![]),
+        ] {
+            assert_eq!(namespaces(&infos(&topics)), wanted, "{topics:?}");
+        }
     }
 
     const STATE: &str = "abbe_msgs/msg/AxisState";

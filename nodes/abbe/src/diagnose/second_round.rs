@@ -73,6 +73,7 @@ impl Round<'_> {
                 )),
             }
         }
+        lines.extend(self.plan_without_effect(&machine, &done, next));
         if tests.is_empty() {
             lines.push(format!(
                 "second round: no test of up to {} min decides what is left open: no folder is written",
@@ -101,6 +102,25 @@ impl Round<'_> {
             )
         ));
         Ok(lines)
+    }
+
+    /// The line of a plan of which no test of this round repeats a step.
+    fn plan_without_effect(
+        &self,
+        machine: &MachineFile,
+        done: &Plan,
+        next: &[NextExperiment],
+    ) -> Option<String> {
+        let path = self.plan?;
+        let is_used = second_round(next, self.minutes)
+            .into_iter()
+            .any(|place| repeats(machine, done, &next[place].run));
+        (!is_used).then(|| {
+            format!(
+                "second round: --plan {}: has no effect, no test of this round repeats a step of it: name the plan that was run, or leave it out",
+                path.display()
+            )
+        })
     }
 
     fn write_folder(
@@ -165,12 +185,71 @@ impl Round<'_> {
     /// The plan that was run; without steps where it is not given, as a bag does not hold it.
     fn done(&self) -> Result<Plan> {
         let Some(path) = self.plan else {
-            return Ok(Plan {
-                title: "not given".to_owned(),
-                steps: vec![],
-            });
+            return Ok(not_given());
         };
         let text = text_file::yaml(path).context("plan")?;
         Plan::from_yaml(&text).with_context(|| format!("plan {}", path.display()))
+    }
+}
+
+/// The plan of a round without `--plan`.
+fn not_given() -> Plan {
+    Plan {
+        title: "not given".to_owned(),
+        steps: vec![],
+    }
+}
+
+/// Whether a proposed test has steps of the plan that was run, which it would not have without that.
+fn repeats(machine: &MachineFile, done: &Plan, run: &str) -> bool {
+    let steps = |done: &Plan| extra_run(machine, done, run).map_or(vec![], |plan| plan.steps);
+    steps(done) != steps(&not_given())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FOLDER: &str = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../launch_configs/gap_first"
+    );
+
+    #[test]
+    fn a_plan_is_used_by_tests_that_repeat_its_steps_alone() {
+        let read = |name: &str| text_file::yaml(&Path::new(FOLDER).join(name)).unwrap();
+        let machine = MachineFile::parse(&read("machine.yaml"), "m").unwrap();
+        let done = Plan::from_yaml(&read("plan.yaml")).unwrap();
+        let reversed = "the session's own tests in reverse order";
+        assert!(repeats(&machine, &done, reversed));
+        assert!(!repeats(&machine, &not_given(), reversed));
+        for run in ["circle XY R100 F500, F1000", "line X F500", "nothing known"] {
+            assert!(!repeats(&machine, &done, run), "{run}");
+        }
+    }
+
+    #[test]
+    fn a_plan_that_no_test_repeats_gets_a_line_with_its_path() {
+        let read = |name: &str| text_file::yaml(&Path::new(FOLDER).join(name)).unwrap();
+        let text = read("machine.yaml");
+        let machine = MachineFile::parse(&text, "m").unwrap();
+        for plan in [
+            None,
+            Some(Path::new("a/plan.yaml")),
+            Some(Path::new("b.yaml")),
+        ] {
+            let round = Round {
+                bags: &[],
+                plan,
+                machine: ("m", &text),
+                minutes: 15.0,
+                out: Path::new("out"),
+            };
+            let said = round.plan_without_effect(&machine, &not_given(), &[]);
+            assert_eq!(said.is_some(), plan.is_some());
+            if let Some((said, plan)) = said.zip(plan) {
+                assert!(said.contains(&format!("--plan {}: has no effect", plan.display())));
+            }
+        }
     }
 }

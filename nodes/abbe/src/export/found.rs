@@ -5,7 +5,7 @@ use control_tables::selection::Measured;
 use metrology::sample::PositioningTable;
 use metrology::{Axis, AxisSet, PerAxis};
 use recorder::{Bag, Order};
-use replayer::{Reading, TopicAccount, reading};
+use replayer::{Reading, TopicAccount, machines, reading};
 use reports::evaluate::stops::Stops;
 
 use super::origin::{GEOMETRY, Origin, ROTARY, Said, THERMAL, Which};
@@ -59,6 +59,8 @@ pub(super) fn read(bag: &Bag, which: Which) -> Found {
         }
     }
     found.origin.began_nanos = bag.log_times_nanos().map(|(first, _)| first);
+    let namespaces = machines::namespaces(bag.topics()).into_iter();
+    found.origin.namespaces = namespaces.map(str::to_owned).collect();
     let (measured, origin) = (&mut found.measured, &mut found.origin);
     let wanted = TABLE_TOPICS.map(|(topic, _)| topic);
     found.reading = reading::read(bag, Order::LogTime, &wanted, |mut taken| {

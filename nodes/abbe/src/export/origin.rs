@@ -87,6 +87,8 @@ pub(super) const ROTARY: usize = 2;
 pub(super) struct Origin {
     /// Log time of the bag's first message, ns.
     pub began_nanos: Option<u64>,
+    /// Namespaces of the bag's topics, without the root.
+    pub namespaces: Vec<String>,
     /// By axis.
     pub tables: PerAxis<Option<Tables>>,
     /// Models of [`MODELS`]: how many, and the log time of the last, ns.
@@ -107,6 +109,10 @@ impl Origin {
     /// In words, a line each.
     pub fn lines(&self, bag: &Path, counting: &Counting) -> Vec<String> {
         let mut lines = vec![format!("made of the bag {}", bag.display())];
+        if !self.namespaces.is_empty() {
+            let namespaces = self.namespaces.join(", ");
+            lines.push(format!("namespace of the bag's topics: {namespaces}"));
+        }
         for (axis, span) in counting.written() {
             if let Some(said) = &self.of_references[axis] {
                 lines.push(said.clone());
@@ -219,6 +225,24 @@ mod tests {
         counting.spans = PerAxis::default();
         let lines = Origin::default().lines(Path::new("bag"), &counting);
         assert_eq!(lines, ["made of the bag bag"]);
+    }
+
+    #[test]
+    fn the_namespaces_of_the_topics_stand_below_the_bag() {
+        for (namespaces, line) in [
+            (vec!["/mill_3"], "namespace of the bag's topics: /mill_3"),
+            (
+                vec!["/laser", "/mill_4"],
+                "namespace of the bag's topics: /laser, /mill_4",
+            ),
+        ] {
+            let origin = Origin {
+                namespaces: namespaces.into_iter().map(str::to_owned).collect(),
+                ..Origin::default()
+            };
+            let lines = origin.lines(Path::new("bag"), &of_x());
+            assert_eq!(lines[1], line);
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ use node_runtime::text_file::{self, Comments};
 use super::file::{self, Form};
 use super::map::{Direction, Map, Plane, Test, units};
 use super::recognise::{self, Known, Recognised, Role};
+use super::separators;
 use super::sheet::Sheet;
 use super::stated::{in_one_line, quoted};
 use super::times;
@@ -34,9 +35,7 @@ pub struct Proposal {
 /// When the file cannot be read, or none of its columns is recognised.
 pub fn of(path: &Path) -> Result<Proposal> {
     let (found, sheet) = looked_at(path)?;
-    let found = found.with_context(|| {
-        "no line with the names of columns that has rows of numbers below it was found: write a map (docs/reference/scenario.md#import-map)"
-    })?;
+    let found = found.with_context(|| separators::no_names(path))?;
     let stem = path.file_stem().map(|stem| stem.to_string_lossy());
     let axis = found.axis(&stem.unwrap_or_default());
     let mut text = Text::new(&found, path);

@@ -10,6 +10,7 @@ use super::limits::Range;
 use super::map::{Column, Direction, Map, Test, What, units};
 use super::measured;
 use super::odd::{Cost, Odd, Read, is_missing};
+use super::separators;
 use super::sheet::Sheet;
 use super::stated;
 use super::times;
@@ -73,7 +74,7 @@ impl Table {
                 continue;
             }
             again::check((head, cells), (&columns, &places), [*head_line, *line])?;
-            check_length(cells, head.len(), *line)?;
+            separators::check_length(cells, head.len(), *line)?;
             n_rows += 1;
             if let Some(cells) = reader.row(cells, *line)? {
                 rows.push(Row { line: *line, cells });
@@ -94,19 +95,6 @@ impl Table {
             odd,
         })
     }
-}
-
-/// Refuses a row of another length than the line with the names; separators at its end do no harm.
-fn check_length(cells: &[String], wanted: usize, line: u64) -> Result<()> {
-    let used = cells.iter().rposition(|cell| !cell.is_empty());
-    let used = used.map_or(0, |last| last + 1);
-    if cells.len() < wanted || used > wanted {
-        bail!(
-            "line {line}: {} cells, the first line has {wanted}: check separators and quotes",
-            cells.len(),
-        );
-    }
-    Ok(())
 }
 
 /// Reads the cells of rows.

@@ -30,11 +30,11 @@ pub fn check(launched: &[LaunchNode], findings: &mut Findings) {
         let is_its =
             |node: &&LaunchNode| node.exec == "fake_cnc" && node.namespace == sequencer.namespace;
         for control in launched.iter().filter(is_its) {
-            let Ok(envelope) = envelope_of(control) else {
+            let Ok(control) = Control::of(control) else {
                 continue;
             };
             for (path, text) in &programs {
-                read(path, text, &envelope, findings);
+                read(path, text, &control, findings);
             }
         }
     }
@@ -61,21 +61,37 @@ fn programs_of(sequencer: &LaunchNode) -> Result<Vec<(PathBuf, String)>> {
 }
 
 /// What a control checks programs against.
-fn envelope_of(control: &LaunchNode) -> Result<Envelope> {
-    let setup = setup_of(control)?;
-    let config: fake_cnc::Config = setup.config()?;
-    let (path, text) = setup.file_text("machine_file")?;
-    let machine = MachineFile::parse(&text, &path.display().to_string())?;
-    Ok(Settings::new(&config, &machine)?.envelope().clone())
+struct Control {
+    envelope: Envelope,
+    machine: MachineFile,
 }
 
-fn read(path: &Path, text: &str, envelope: &Envelope, findings: &mut Findings) {
+impl Control {
+    fn of(control: &LaunchNode) -> Result<Self> {
+        let setup = setup_of(control)?;
+        let config: fake_cnc::Config = setup.config()?;
+        let (path, text) = setup.file_text("machine_file")?;
+        let machine = MachineFile::parse(&text, &path.display().to_string())?;
+        Self::new(&config, machine)
+    }
+
+    fn new(config: &fake_cnc::Config, machine: MachineFile) -> Result<Self> {
+        let envelope = Settings::new(config, &machine)?.envelope().clone();
+        Ok(Self { envelope, machine })
+    }
+}
+
+fn read(path: &Path, text: &str, control: &Control, findings: &mut Findings) {
+    let Control { envelope, machine } = control;
     let from = |share: f64| {
         let start = PerAxis::from_fn(|axis| {
             let [least, greatest] = envelope.travel[axis];
             least + share * (greatest - least)
         });
-        rs274::read(text, envelope, &start).err()
+        let program = rs274::read(text, envelope, &start);
+        let has_device =
+            |id: &str| machine.grid_placement(id).is_some() || machine.beam(id).is_some();
+        { program.and_then(|program| program.check_devices(has_device)) }.err()
     };
     let [Some(one), Some(other)] = PLACES.map(from) else {
         return;
@@ -98,10 +114,10 @@ mod tests {
 
     fn found(text: &str) -> Findings {
         let machine = MachineFile::parse(MACHINE, "m").unwrap();
-        let settings = Settings::new(&fake_cnc::Config::default(), &machine).unwrap();
+        let control = Control::new(&fake_cnc::Config::default(), machine).unwrap();
         let mut findings = Findings::default();
         let path = PathBuf::from("cell/part.ngc");
-        read(&path, text, settings.envelope(), &mut findings);
+        read(&path, text, &control, &mut findings);
         findings
     }
 
@@ -122,6 +138,31 @@ mod tests {
             );
             for word in words {
                 assert!(said.contains(word), "{text}: {said}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_placement_or_beam_that_the_machine_file_has_not_is_a_mistake_as_at_the_run() {
+        let machine = MachineFile::parse(MACHINE, "m").unwrap();
+        let grid = machine.grid_encoder.iter().flat_map(|it| &it.placements);
+        let length = machine.length_reference.iter().flat_map(|it| &it.beams);
+        let known = grid.map(|it| &it.id).chain(length.map(|it| &it.id));
+        let known: Vec<&String> = known.collect();
+        assert!(!known.is_empty());
+        for name in known {
+            let findings = found(&format!("(mount: {name})\nG4 P1\nM2\n"));
+            assert!(findings.mistakes.is_empty(), "{:?}", findings.mistakes);
+        }
+        for name in ["midle", "TABLE?", "x y", "1"] {
+            let said = found(&format!("G21\n(mount: {name})\nM2\n")).mistakes;
+            let said = said.join("\n");
+            for words in [
+                "line 2, column 1",
+                name,
+                "placement or beam of the machine file",
+            ] {
+                assert!(said.contains(words), "{name}: {said}");
             }
         }
     }

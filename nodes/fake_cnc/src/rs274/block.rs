@@ -161,9 +161,11 @@ impl Block {
             line: line.number,
             ..Self::default()
         };
+        let mut words = line.words.iter();
+        let is_dwell = words.any(|word| word.letter == 'G' && code(word) == Some(40));
         for (index, word) in line.words.iter().enumerate() {
             let at = line.place(word);
-            bounds::check(at, word)?;
+            bounds::check(at, word, is_dwell)?;
             match word.letter {
                 'G' => block.general(at, *word)?,
                 'M' => block.miscellaneous(at, *word)?,

@@ -29,12 +29,18 @@ const fn range(letter: char) -> (f64, f64, &'static str) {
     }
 }
 
-/// Refuses a number outside the range of its letter.
-pub fn check(at: Place, word: &Word) -> Result<(), ProgramError> {
+/// What P of a dwell may be, s.
+const DWELL: (f64, f64, &str) = (0.0, DWELL_S, "from 0 to 86400 s, a day, of a dwell");
+
+/// Refuses a number outside the range of its letter; `is_dwell`: in a block with G4.
+pub fn check(at: Place, word: &Word, is_dwell: bool) -> Result<(), ProgramError> {
     if matches!(word.letter, 'G' | 'M') {
         return Ok(());
     }
-    let (least, greatest, rule) = range(word.letter);
+    let (least, greatest, rule) = match word.letter {
+        'P' if is_dwell => DWELL,
+        letter => range(letter),
+    };
     let is_whole = !matches!(word.letter, 'H' | 'L') || word.value.fract() == 0.0;
     if (least..=greatest).contains(&word.value) && is_whole {
         return Ok(());

@@ -1,5 +1,6 @@
 //! Reads a program block by block: what each changes, does, and what it may not.
 
+use machine::program_frame::{FRAME_RULE, names_frame};
 use metrology::bound::NAME_BYTES;
 use metrology::{AxisSet, PerAxis};
 
@@ -180,6 +181,9 @@ impl Reader<'_> {
                 rule,
             })
         };
+        if comment.is_tail && names_frame(comment.text) {
+            return refuse("frame", FRAME_RULE);
+        }
         let Some((key, value)) = comment.text.split_once(':') else {
             return Ok(());
         };
@@ -212,7 +216,7 @@ impl Reader<'_> {
                     return refuse("frame", rule);
                 }
                 if !self.may_choose_frame(line, comment) {
-                    return refuse("frame", "once, in parentheses, on line 1, before any word");
+                    return refuse("frame", FRAME_RULE);
                 }
                 self.machine_frame(at)?;
             }
@@ -328,14 +332,6 @@ impl Reader<'_> {
                 needs: "P, its time in seconds",
             });
         };
-        if seconds.value > bounds::DWELL_S {
-            return Err(ProgramError::Value {
-                at: block.at(seconds),
-                word: 'P',
-                value: seconds.value,
-                rule: "at most 86400 s, a day, of a dwell",
-            });
-        }
         self.push(block.line, Action::Dwell(seconds.value))
     }
 

@@ -3,7 +3,7 @@
 use metrology::{Axis, PerAxis};
 
 use super::registers::{Change, Registers};
-use crate::error::Place;
+use crate::error::{Place, ProgramError};
 
 /// Where one axis goes; mm or rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -214,6 +214,23 @@ impl Program {
         let mut steps = self.steps.iter();
         let touch = steps.find(|step| matches!(step.action, Action::Touch(..)))?;
         Some(touch.line)
+    }
+
+    /// Refuses a `(mount: NAME)` of a name that `has_device` does not know, before anything moves.
+    ///
+    /// # Errors
+    /// With the first such name and its place.
+    pub fn check_devices(&self, has_device: impl Fn(&str) -> bool) -> Result<(), ProgramError> {
+        let mut devices = self.devices.iter();
+        match devices.find(|(name, _)| !has_device(name)) {
+            None => Ok(()),
+            Some((name, at)) => Err(ProgramError::CommentValue {
+                at: *at,
+                what: "mount",
+                text: name.clone(),
+                rule: "followed by a placement or beam of the machine file",
+            }),
+        }
     }
 
     /// Most motions that follow each other without a stop in between.

@@ -65,7 +65,7 @@ fn a_spindle_speed_beyond_the_machine_is_refused_with_its_place() {
 }
 
 /// Programs with a number beyond its bound, and the error; empty: the number is within.
-const BOUNDS: [(&str, &str); 14] = [
+const BOUNDS: [(&str, &str); 15] = [
     (
         "N1000000000 G0 X1\nM2",
         "line 1, column 1: word N = 1000000000: must be from 0 to 999999999",
@@ -89,11 +89,15 @@ const BOUNDS: [(&str, &str); 14] = [
     ),
     (
         "G4 P86401\nM2",
-        "line 1, column 4: word P = 86401: must be at most 86400 s, a day, of a dwell",
+        "line 1, column 4: word P = 86401: must be from 0 to 86400 s, a day, of a dwell",
     ),
     (
         "G4 P-1\nM2",
-        "line 1, column 4: word P = -1: must be from 0 to 1000000",
+        "line 1, column 4: word P = -1: must be from 0 to 86400 s, a day, of a dwell",
+    ),
+    (
+        "P2000000 G04\nM2",
+        "line 1, column 1: word P = 2000000: must be from 0 to 86400 s, a day, of a dwell",
     ),
     (
         "G0 X5000000\nM2",

@@ -26,6 +26,33 @@ pub fn with_conditions(title: &str, test: &Value) -> String {
     text
 }
 
+/// Whether `text` names a test of this title: from the begin of a word on, in either case; a single letter, as an axis, is a word
+/// of its own. Where a line stood (`, at Y 0 Z 100 mm`) counts for a text with the word "at" alone.
+pub fn has_words(title: &str, text: &str) -> bool {
+    let text = text.trim().to_ascii_lowercase();
+    let title = title.to_ascii_lowercase();
+    let is_of_place = text.split(' ').any(|word| word == "at");
+    let title = if is_of_place {
+        title
+    } else {
+        without_place(&title)
+    };
+    let is_letter = text.chars().count() == 1;
+    title.match_indices(text.as_str()).any(|(at, found)| {
+        let before = title[..at].chars().next_back();
+        let behind = title[at + found.len()..].chars().next();
+        let ends = |side: Option<char>| !side.is_some_and(char::is_alphanumeric);
+        ends(before) && (ends(behind) || !is_letter)
+    })
+}
+
+/// A title without the place of [`with_conditions`].
+fn without_place(title: &str) -> String {
+    let is_place = |part: &&str| part.starts_with("at ") && part.ends_with(" mm");
+    let parts: Vec<&str> = title.split(", ").filter(|part| !is_place(part)).collect();
+    parts.join(", ")
+}
+
 /// A number rounded to a whole one; no negative zero.
 fn whole(number: f64) -> f64 {
     number.round() + 0.0
@@ -54,6 +81,31 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+
+    #[test]
+    fn a_text_names_tests_by_their_words_and_a_place_by_at() {
+        let x = "Positioning X: not compensated, by the length reference, 0 to 250 mm, at Y 0 Z 100 mm, at 20 °C";
+        let y = "Positioning Y: not compensated, by the length reference, 0 to 250 mm, at X 30 mm";
+        let circle = "Circle XY, R 100.000 mm: compensated";
+        for (text, wanted) in [
+            ("Y", [false, true, false]),
+            ("x", [true, false, false]),
+            ("positioning", [true, true, false]),
+            ("Pos", [true, true, false]),
+            ("circle X", [false, false, true]),
+            ("xy", [false, false, true]),
+            ("at Y 0", [true, false, false]),
+            ("at X", [false, true, false]),
+            ("at 20 °C", [true, false, false]),
+            ("length reference", [true, true, false]),
+            ("ference", [false, false, false]),
+            (" Y ", [false, true, false]),
+            ("z", [false, false, false]),
+        ] {
+            let found = [x, y, circle].map(|title| has_words(title, text));
+            assert_eq!(found, wanted, "{text}");
+        }
+    }
 
     fn test(targets_mm: &[f64]) -> Value {
         let points: Vec<Value> = targets_mm

@@ -26,6 +26,31 @@ pub fn is_machine_frame(program: &str) -> bool {
     false
 }
 
+/// The remedy for a comment of the frame behind a semicolon.
+pub const FRAME_RULE: &str = "once, in parentheses, on line 1, before any word";
+
+/// Whether a comment behind a semicolon on the first line names a frame, which counts in parentheses alone:
+/// `;(frame: machine)` would run in the work system in use without a word.
+#[must_use]
+pub fn has_frame_behind_semicolon(program: &str) -> bool {
+    let line = program.lines().next().unwrap_or("");
+    let mut is_open = false;
+    let begin = line.char_indices().find(|(_, character)| {
+        is_open = (is_open || *character == '(') && *character != ')';
+        *character == ';' && !is_open
+    });
+    begin.is_some_and(|(at, _)| names_frame(&line[at..]))
+}
+
+/// Whether the text behind a semicolon names a frame, with or without parentheses around it.
+#[must_use]
+pub fn names_frame(tail: &str) -> bool {
+    tail.split([';', '(', ')']).any(|part| {
+        let key = part.split_once(':').map(|(key, _)| key.trim());
+        key.is_some_and(|key| key.eq_ignore_ascii_case("frame"))
+    })
+}
+
 fn is_frame_comment(comment: &str) -> bool {
     comment.split_once(':').is_some_and(|(key, frame)| {
         key.trim().eq_ignore_ascii_case("frame") && frame.trim().eq_ignore_ascii_case("machine")
@@ -58,6 +83,31 @@ mod tests {
             "frame: machine\n",
         ] {
             assert!(!is_machine_frame(other), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn a_frame_behind_a_semicolon_on_the_first_line_is_found() {
+        for behind in [
+            ";(frame: machine)\nM2\n",
+            "; frame: machine",
+            ";FRAME : machine\nM2",
+            " ; ( Frame : machin ) G21",
+            "G21 ;; (frame: machine)\r\nM2",
+            "(a part; of it) ; a part (frame: machine)",
+        ] {
+            assert!(has_frame_behind_semicolon(behind), "{behind:?}");
+        }
+        for other in [
+            "",
+            HEAD,
+            "(frame: machine) ; of a part",
+            "(a ; frame: machine)\nM2",
+            "; a frame of wood: oak",
+            "; part\n;(frame: machine)\n",
+            "G21 ; the frame (steel)",
+        ] {
+            assert!(!has_frame_behind_semicolon(other), "{other:?}");
         }
     }
 }

@@ -219,10 +219,10 @@ impl Report {
         page::page(&self.title, &body)
     }
 
-    /// Writes `report.html` and `report.json` into `folder`.
+    /// Writes `report.html` and `report.json` into `folder`, the page first.
     ///
     /// # Errors
-    /// When a file cannot be written.
+    /// When a file cannot be written, by its path; one that was written before it stays.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let html = self.html();
         let figures = serde_json::to_string_pretty(&self.figures)?;

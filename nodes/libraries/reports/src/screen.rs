@@ -6,6 +6,7 @@
 use chrono::DateTime;
 use maud::{Markup, html};
 use recorder::{Bag, RecordedRun};
+use replayer::machines;
 use serde_json::{Value, json};
 
 use crate::machine_of_bag;
@@ -113,6 +114,8 @@ pub struct Made {
     pub software: Software,
     /// Name of the machine.
     pub machine: Option<String>,
+    /// Namespaces of the bag's topics, without the root.
+    pub namespaces: Vec<String>,
     /// Begin of the first test, ns since 1970 by the clock of the bag.
     pub begin_nanos: Option<i64>,
     /// End of the last test, ns since 1970.
@@ -142,6 +145,9 @@ impl Made {
         Self {
             software,
             machine: machine.map(str::to_owned).or_else(|| machine_of(bag)),
+            namespaces: { machines::namespaces(bag.topics()).into_iter() }
+                .map(str::to_owned)
+                .collect(),
             begin_nanos: between.map(|(begin, _)| begin).or(began),
             end_nanos: between.map(|(_, end)| end),
             source: source.to_owned(),
@@ -185,6 +191,9 @@ impl Made {
         html! {
             dl.facts {
                 dt { "Machine" } dd { (or_missing(self.machine.clone())) }
+                @if !self.namespaces.is_empty() {
+                    dt { "Namespace" } dd { (self.namespaces.join(", ")) }
+                }
                 dt { "Measured" } dd { (or_missing(self.when())) }
                 dt { "Data" } dd { (self.source) }
                 dt { "Software" } dd { (self.software()) }
@@ -323,6 +332,7 @@ mod tests {
                 commit: "abcdef0123456789",
             },
             machine: Some("vmc <1>".to_owned()),
+            namespaces: vec!["/mill_3".to_owned()],
             begin_nanos: Some(1_767_600_000_000_000_000),
             end_nanos: Some(1_767_603_600_000_000_000),
             source: "runs/first/bag".to_owned(),
@@ -340,6 +350,7 @@ mod tests {
         for words in [
             "<h1>Tests</h1>",
             "vmc &lt;1&gt;",
+            "<dt>Namespace</dt><dd>/mill_3</dd>",
             "2026-01-05 08:00:00 UTC to 2026-01-05 09:00:00 UTC",
             "recorded with 0123456789",
             "Abbe 0.1.0 (abcdef0123)",
@@ -352,6 +363,7 @@ mod tests {
             ..Made::default()
         };
         assert!(undated.as_json()["begin"].is_null());
+        assert!(!undated.html().into_string().contains("Namespace"));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Programs that are not begun.
 
+use machine::program_frame::FRAME_RULE;
 use machine::program_machine::OtherMachine;
 use metrology::Author;
 use metrology::bound::NAME_BYTES;
@@ -47,6 +48,9 @@ pub enum Refusal {
     /// Its approaches are those of another machine file.
     #[error(transparent)]
     OtherMachine(#[from] OtherMachine),
+    /// Its comment of the frame would not count.
+    #[error("line 1: a frame comment behind a semicolon: must stand {FRAME_RULE}")]
+    FrameBehindSemicolon,
     /// Its coordinates are the machine's, and it would shift them.
     #[error(
         "line {line}: {word} shifts coordinates, and those of a program with (frame: machine) are the machine's: take one of both out"

@@ -332,6 +332,20 @@ fn refusals_name_the_offset_and_what_to_do() {
 }
 
 #[test]
+fn a_frame_behind_a_semicolon_is_refused_with_its_place() {
+    for (text, place) in [
+        (";(frame: machine)\nM2", "line 1, column 1"),
+        ("; frame: machine\nM2", "line 1, column 1"),
+        ("G21 ; (Frame : machin)\nM2", "line 1, column 5"),
+        ("G21\n;; part 7 (frame: machine)\nM2", "line 2, column 1"),
+    ] {
+        let message = shop(Bench::open()).run(text).1;
+        let begin = format!("{place}: frame comment");
+        assert!(message.starts_with(&begin), "{message}");
+    }
+}
+
+#[test]
 fn a_program_for_another_machine_file_is_refused_before_anything_moves() {
     let own = machine::program_machine::mark_of(&machine()).unwrap();
     let text = "(frame: machine)\nG0 X1\nM2";

@@ -5,6 +5,7 @@ use rusqlite::{Params, params};
 use super::Store;
 use super::cells::{Cells, Fault};
 use crate::bound;
+use crate::conditions::has_words;
 use crate::error::HistoryError;
 use crate::point::Point;
 
@@ -30,7 +31,7 @@ pub struct SeriesKey {
     pub name: Option<String>,
     /// The axis.
     pub axis: Option<String>,
-    /// A part of the test's title.
+    /// Words of the test's title, from the begin of one on; a letter alone is one.
     pub test: Option<String>,
 }
 
@@ -94,7 +95,7 @@ pub struct Last {
 const OF_KEY: &str = "(?1 IS NULL OR s.machine = ?1)
      AND (?2 IS NULL OR s.name = ?2 OR substr(s.name, 1, length(?2) + 1) = ?2 || '.')
      AND (?3 IS NULL OR s.axis = ?3)
-     AND (?4 IS NULL OR instr(lower(s.test), lower(?4)) > 0)";
+     AND (?4 IS NULL OR instr(lower(s.test), lower(trim(?4))) > 0)";
 const COLUMNS: &str = "s.id, s.machine, s.test, s.name, s.axis, s.unit";
 
 impl Store {
@@ -123,7 +124,9 @@ impl Store {
             "SELECT {COLUMNS} FROM series s WHERE {OF_KEY} ORDER BY s.machine, s.name, s.axis, s.test, s.unit"
         );
         let of = ("series", "series", bound::ROWS);
-        self.rows(&sql, of_key(key), of, read_series)
+        let mut found = self.rows(&sql, of_key(key), of, read_series)?;
+        found.retain(|series| is_of_test(key, series));
+        Ok(found)
     }
 
     /// The values of a series in order of time.
@@ -163,7 +166,7 @@ impl Store {
              ORDER BY s.machine, s.name, s.axis, s.test, s.unit"
         );
         let of = ("figure", "series", bound::ROWS);
-        self.rows(&sql, of_key(key), of, |cells| {
+        let mut found = self.rows(&sql, of_key(key), of, |cells| {
             let series = read_series(cells)?;
             let cells = cells.of(series.id, None);
             Ok(Last {
@@ -171,7 +174,9 @@ impl Store {
                 n: cells.whole(9, "values")?,
                 series,
             })
-        })
+        })?;
+        found.retain(|last| is_of_test(key, &last.series));
+        Ok(found)
     }
 
     /// Times at which a machine's tests were made: title and s since 1970, in order.
@@ -228,6 +233,12 @@ impl Store {
         }
         Ok(rows)
     }
+}
+
+/// Whether a series that [`OF_KEY`] holds for is of the test by its words.
+fn is_of_test(key: &SeriesKey, series: &Series) -> bool {
+    let text = key.test.as_deref();
+    text.is_none_or(|text| has_words(&series.test, text))
 }
 
 /// Parameters 1 to 4 of [`OF_KEY`].

@@ -14,6 +14,9 @@ const LARGEST_JSON: u64 = 256 << 20;
 /// Bytes at the begin of a page that show its kind.
 const HEAD: u64 = 1024;
 
+/// What stands for standard output where an option can print; those that reach [`check_outputs`] cannot.
+const STANDARD_OUTPUT: &str = "-";
+
 /// Kind of an output; where a file is, it must be of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
@@ -60,6 +63,12 @@ pub fn check_outputs<'p>(
     let to_files = outputs.iter().filter(|output| !is_own_output(&output.path));
     let mut places: Vec<(PathBuf, &Output)> = Vec::new();
     for output in to_files {
+        if output.path == Path::new(STANDARD_OUTPUT) {
+            bail!(
+                "{}: is no name of a file, and would write one named `-`: name a file, or /dev/stdout for standard output",
+                output.shown()
+            );
+        }
         must_be_regular(&output.path)?;
         let at = place(&output.path);
         if inputs.iter().any(|input| is_same(input, &at)) {
@@ -196,6 +205,26 @@ mod tests {
                 assert!(
                     said.starts_with("--x ") && said.contains("is no "),
                     "{said}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_dash_is_no_file() {
+        for (option, form) in [
+            ("--html", Form::Html),
+            ("--pdf", Form::Pdf),
+            ("--json", Form::Json),
+            ("--write-machine", Form::Any),
+        ] {
+            let said = refusal(&[Output::new(option, "-".into(), form)], &[]).unwrap();
+            assert!(said.starts_with(&format!("{option} -: ")), "{said}");
+            assert!(said.contains("name a file, or /dev/stdout"), "{said}");
+            for good in ["./-", "a-", "-.html"] {
+                assert_eq!(
+                    refusal(&[Output::new(option, good.into(), form)], &[]),
+                    None
                 );
             }
         }

@@ -13,6 +13,11 @@ use crate::section::um;
 /// A decision for a figure, in words.
 pub const CONFORMS: &str = "conforms";
 
+/// Figures that may be negative, by the last part of their names.
+const SIGNED: [&str; 3] = ["mean_reversal", "mean_radial_deviation", "size_error"];
+/// An end of a range of deviations, which one limit is enough for.
+const EXTREMES: [&str; 2] = ["greatest_radial_deviation", "least_radial_deviation"];
+
 /// A figure with its uncertainty.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Figure {
@@ -115,6 +120,21 @@ impl Judged {
         })
     }
 
+    /// Which limit is missing, where the figure may be negative and has an upper one alone: its key.
+    pub fn lacks_lower(&self, name: &str, limit: Limit) -> Option<&'static str> {
+        let (value, key, has_no_lower) = match self.figure.quantity {
+            Quantity::Length(length) => (length.value_mm, "lower_um", limit.lower_um.is_none()),
+            Quantity::Angle(angle) => (
+                angle.value_rad,
+                "lower_arcsec",
+                limit.lower_arcsec.is_none(),
+            ),
+        };
+        let last = name.rsplit('.').next().unwrap_or(name);
+        let is_signed = SIGNED.contains(&last) || (value < 0.0 && !EXTREMES.contains(&last));
+        (has_no_lower && is_signed).then_some(key)
+    }
+
     /// For the table of figures: name, test, value, limits, decision, probability.
     pub fn row(&self, (name, test): (&str, &str), limit: Limit, is_undecided: bool) -> Vec<String> {
         let ((value, expanded), unit) = match self.figure.quantity {
@@ -156,5 +176,53 @@ impl Judged {
             decision.to_owned(),
             probability,
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::evaluate::limits::Limits;
+
+    #[test]
+    fn a_figure_with_a_sign_and_an_upper_limit_alone_gives_a_remark() {
+        let length = |value_mm: f64| serde_json::json!({"value_mm": value_mm, "expanded_uncertainty_mm": 0.000_5});
+        let remarks = |figure: &str, value_mm: f64, limit: &str| {
+            let test = serde_json::json!({"test": "X", "iso": {figure: length(value_mm)}});
+            let text = format!("rule: simple\nlimits:\n  iso.{figure}: {limit}\n");
+            let section = Limits::read(&text, Path::new("limits.yaml"))
+                .unwrap()
+                .section(&[test])
+                .unwrap();
+            let kinds = section.warnings.iter().map(|warning| warning.line.clone());
+            kinds.collect::<Vec<_>>()
+        };
+        for (figure, value_mm) in [
+            ("mean_reversal", -0.050),
+            ("mean_reversal", 0.003),
+            ("mean_radial_deviation", 0.001),
+            ("size_error", -0.001),
+            ("another", -0.001),
+        ] {
+            let said = remarks(figure, value_mm, "{upper_um: 5.0}");
+            assert_eq!(said.len(), 1, "{figure} {value_mm}: {said:?}");
+            for words in [figure, "may be negative", "state lower_um too"] {
+                assert!(said[0].contains(words), "{said:?}");
+            }
+            let both = remarks(figure, value_mm, "{lower_um: -5.0, upper_um: 5.0}");
+            assert!(both.is_empty(), "{both:?}");
+            let lower = remarks(figure, value_mm, "{lower_um: -5.0}");
+            assert!(lower.is_empty(), "{lower:?}");
+        }
+        for (figure, value_mm) in [
+            ("accuracy", 0.004),
+            ("reversal", 0.0),
+            ("greatest_radial_deviation", -0.001),
+            ("another", 0.001),
+        ] {
+            let said = remarks(figure, value_mm, "{upper_um: 5.0}");
+            assert!(said.is_empty(), "{figure}: {said:?}");
+        }
     }
 }

@@ -1,0 +1,121 @@
+//! What is wrong with lines of a table that do not come apart as its names do.
+
+use std::path::Path;
+
+use anyhow::{Result, bail};
+use node_runtime::text_file::{self, Comments};
+
+/// Lines from the first on that are looked at for what parts their columns.
+const FIRST_LINES: usize = 100;
+
+/// Refuses a row of another length than the line with the names; separators at its end do no harm.
+pub(super) fn check_length(cells: &[String], wanted: usize, line: u64) -> Result<()> {
+    let used = cells.iter().rposition(|cell| !cell.is_empty());
+    let used = used.map_or(0, |last| last + 1);
+    if cells.len() < wanted || used > wanted {
+        bail!(
+            "line {line}: {} cells, the first line has {wanted}: check separators and quotes{}",
+            cells.len(),
+            of_block(cells),
+        );
+    }
+    Ok(())
+}
+
+/// The remedy for a line that begins with a word, as a block of statistics does below a table.
+fn of_block(cells: &[String]) -> String {
+    let first = cells.iter().find(|cell| !cell.is_empty());
+    let word = first.filter(|cell| !is_number(cell));
+    word.map_or_else(String::new, |word| {
+        format!(
+            "; where \"{word}\" begins something else below the table, such as statistics, take that away or begin its lines with #"
+        )
+    })
+}
+
+/// That no names of columns were found; a separator that is not read is named as the reason.
+pub(super) fn no_names(path: &Path) -> String {
+    let text = text_file::read(path, Comments::Csv).ok();
+    let remedy = match text.as_deref().and_then(foreign) {
+        Some(by) => format!(
+            "its columns seem to be apart by {by}, and comma, semicolon and tab are read: put one of those between them"
+        ),
+        None => "write a map (docs/reference/scenario.md#import-map)".to_owned(),
+    };
+    format!(
+        "no line with the names of columns that has rows of numbers below it was found: {remedy}"
+    )
+}
+
+/// How the columns of a text seem to be parted, where that is no separator that is read; `None`: nothing is seen.
+fn foreign(text: &str) -> Option<&'static str> {
+    let lines = text.lines().filter(|line| !line.trim().is_empty());
+    let lines = lines
+        .filter(|line| !line.starts_with('#'))
+        .take(FIRST_LINES);
+    let lines: Vec<&str> = lines.collect();
+    if lines.iter().any(|line| line.contains([';', '\t'])) {
+        return None;
+    }
+    // Two rows of two numbers or more are no text by chance.
+    let n_rows = |pieces: fn(&str) -> Vec<&str>| {
+        let rows = lines.iter().map(|line| pieces(line));
+        rows.filter(|row| row.iter().filter(|cell| is_number(cell)).count() > 1)
+            .count()
+    };
+    if n_rows(|line| line.split('|').map(str::trim).collect()) > 1 {
+        return Some("bars (|)");
+    }
+    (n_rows(|line| line.split_whitespace().collect()) > 1).then_some("spaces")
+}
+
+fn is_number(cell: &str) -> bool {
+    cell.replace(',', ".").parse::<f64>().is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cells(line: &str) -> Vec<String> {
+        line.split(',').map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn a_line_that_begins_with_a_word_may_be_of_another_block() {
+        for (line, is_block) in [
+            ("Statistics", true),
+            ("A,8.18", true),
+            ("Mean reversal,-5,0", true),
+            ("1,2", false),
+            ("1", false),
+            ("1,2,3,4,5", false),
+        ] {
+            let error = check_length(&cells(line), 4, 40).unwrap_err().to_string();
+            assert!(error.starts_with("line 40: "), "{error}");
+            assert!(error.contains("check separators and quotes"), "{error}");
+            assert_eq!(error.contains("such as statistics"), is_block, "{error}");
+        }
+        for good in ["1,2,3,4", "1,2,3,4,,"] {
+            check_length(&cells(good), 4, 1).unwrap();
+        }
+    }
+
+    #[test]
+    fn columns_apart_by_spaces_or_bars_are_seen() {
+        for (text, found) in [
+            ("run target dev\n1 0.0 -0.1\n1  50.1  0.7\n", Some("spaces")),
+            ("x y\n 0,0   1,5\n 10,0  1,7\n", Some("spaces")),
+            ("run | target\n1 | 0.0\n2 | 1.0\n", Some("bars (|)")),
+            ("|run|target|\n|1|0.0|\n|1|5.0|\n", Some("bars (|)")),
+            ("# 1 2\n# 3 4\nrun,target\n1,2\n", None),
+            ("a;b\n1 2;3 4\n5 6;7 8\n", None),
+            ("a\tb\n1\t2\n3\t4\n", None),
+            ("a letter of 3 lines\nand 4 words\n", None),
+            ("x y\n1 2\n", None),
+            ("", None),
+        ] {
+            assert_eq!(foreign(text), found, "{text:?}");
+        }
+    }
+}
