@@ -56,7 +56,7 @@ pub struct Config {
     #[schemars(range(min = 1e-3, max = 100.0))]
     pub following_error_limit_deg: f64,
     /// Silence after which a compensation is held no longer but fades; one that is stamped earlier or later than now by
-    /// more is refused.
+    /// more, and by more than 0.5 s, is refused.
     #[schemars(range(min = 1e-3, max = 3600.0))]
     pub compensation_hold_s: f64,
     /// Rate at which a stale compensation of a linear axis goes to zero.
@@ -387,7 +387,9 @@ impl Config {
             touch_margin: periods(self.touch_margin_s, period_s),
             settle: periods(self.settle_s, period_s),
             compensation_hold: periods(self.compensation_hold_s, period_s),
-            compensation_age: Span::from_secs_f64(self.compensation_hold_s),
+            compensation_age: OffsetRule::age_limit_of(Span::from_secs_f64(
+                self.compensation_hold_s,
+            )),
             pulse_mm: machine.control.pulse_equivalent_um * 1e-3,
             homing: periods(self.homing_s, period_s),
             optional_stop: self.optional_stop,

@@ -351,12 +351,15 @@ mod tests {
         (0..20).for_each(|_| assert_eq!(input.advance(), None));
         let before = (input.wanted, input.silent);
         let nan = input.receive(now(), &message(f64::NAN)).unwrap();
-        assert_eq!(nan.to_string(), "compensation of axis X is NaN: refused");
+        assert_eq!(
+            nan.to_string(),
+            "compensation of axis X is NaN: must be a number: refused; stop the node that publishes it"
+        );
         assert!(input.receive(now(), &message(f64::INFINITY)).is_some());
         let large = input.receive(now(), &message(0.7)).unwrap();
         assert_eq!(
             large.to_string(),
-            "compensation of axis X is 0.7 mm, limit 0.5 mm: refused"
+            "compensation of axis X is 0.7 mm, limit 0.5 mm: refused; compare the limits of its publisher with the controller's"
         );
         assert_eq!((input.wanted, input.silent), before);
     }

@@ -103,7 +103,7 @@ pub struct CompensationConfig {
     #[schemars(range(min = 0.1, max = 3600.0))]
     pub limit_arcsec: f64,
     /// Without news for this long the heartbeat stops and HAL fades the offsets out; a set that is stamped earlier or
-    /// later than now by more is refused.
+    /// later than now by more, and by more than 0.5 s, is refused.
     #[schemars(range(min = 1.0, max = 60_000.0))]
     pub stale_after_ms: f64,
 }
@@ -231,12 +231,12 @@ impl Settings {
 
     /// Which offsets are passed on.
     #[must_use]
-    pub const fn offset_rule(&self) -> OffsetRule {
+    pub fn offset_rule(&self) -> OffsetRule {
         OffsetRule {
             axes: self.axes,
             size_limit: self.compensation_limit,
             pulse_mm: self.pulse_mm,
-            age_limit: self.compensation_stale_after,
+            age_limit: OffsetRule::age_limit_of(self.compensation_stale_after),
         }
     }
 }

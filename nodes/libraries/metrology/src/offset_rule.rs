@@ -3,13 +3,14 @@
 //! For each axis with total o, N pulses of δ, remainder ρ and size limit S, a message stamped t that comes at t′:
 //!
 //! ```text
-//!   |o| ≤ S                       an axis of this controller                      (1)
+//!   |o| ≤ S                                                                       (1)
 //!   o = 0                         where the state is OFF                          (2)
 //!   |o − (N δ + ρ)| ≤ δ           a linear axis, which has a pulse equivalent     (3)
-//!   |t′ − t| ≤ T                  T: how long an offset is held without a new one (4)
+//!   |t′ − t| ≤ T                  T: an offset is held as long, and at least 0.5 s (4)
 //! ```
 //!
-//! A message that breaks one of them is refused whole. The controller then does as if none had come: it holds what it
+//! (1) to (3) are of the controller's own axes. (4) bounds delay and the difference of clocks, not silence: a busy network
+//! may be late by more than a short hold. A message that breaks one of them is refused whole. The controller then does as if none had come: it holds what it
 //! has, and lets it fade when none has come for T. Both stamps of (4) are by the reference's clock, where clocks of
 //! hosts are related to it, or by simulated time.
 
@@ -21,7 +22,7 @@ use crate::stamp::{Host, Span, Stamp};
 /// The limits of one controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OffsetRule {
-    /// Its axes; those of a message that it does not have are not followed.
+    /// Its axes; others of a message are neither checked nor followed.
     pub axes: AxisSet,
     /// S, mm or rad.
     pub size_limit: PerAxis<f64>,
@@ -35,7 +36,7 @@ pub struct OffsetRule {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum OffsetFault {
     /// Not a finite number.
-    #[error("compensation of axis {axis} is {value}: refused", value = number(*value))]
+    #[error("compensation of axis {axis} is {value}: must be a number: refused; stop the node that publishes it", value = number(*value))]
     NotFinite {
         /// Axis.
         axis: Axis,
@@ -44,7 +45,7 @@ pub enum OffsetFault {
     },
     /// Breaks (1).
     #[error(
-        "compensation of axis {axis} is {}, limit {}: refused",
+        "compensation of axis {axis} is {}, limit {}: refused; compare the limits of its publisher with the controller's",
         along(*axis, *value), along(*axis, *limit)
     )]
     TooLarge {
@@ -57,7 +58,7 @@ pub enum OffsetFault {
     },
     /// Breaks (2).
     #[error(
-        "compensation of axis {axis} is {} with STATE_OFF, which adds nothing: limit 0: refused; mend its publisher, or end it",
+        "compensation of axis {axis} is {} with STATE_OFF, which adds nothing: limit 0: refused; stop the node that publishes it",
         along(*axis, *value)
     )]
     Off {
@@ -68,7 +69,7 @@ pub enum OffsetFault {
     },
     /// Breaks (3).
     #[error(
-        "compensation of axis {axis} is {}, its pulses and remainder are {}, limit of the difference one pulse of {pulse_mm} mm: refused; compare control.pulse_equivalent_um of its publisher's machine file, or end it",
+        "compensation of axis {axis} is {}, its pulses and remainder are {}, limit of the difference one pulse of {pulse_mm} mm: refused; compare control.pulse_equivalent_um of its publisher's machine file, or stop that node",
         along(*axis, *value), along(*axis, *split), pulse_mm = number(*pulse_mm)
     )]
     Split {
@@ -83,7 +84,7 @@ pub enum OffsetFault {
     },
     /// Breaks (4), from the past.
     #[error(
-        "compensation is stamped {age_s} s ago, limit {limit_s} s: refused; end who publishes what was recorded, or relate the clocks of the hosts (clock_host)",
+        "compensation is stamped {age_s} s ago, limit {limit_s} s: refused; stop the node that publishes what was recorded, or relate the clocks of the hosts (clock_host)",
         age_s = number(*age_s), limit_s = number(*limit_s)
     )]
     Old {
@@ -94,7 +95,7 @@ pub enum OffsetFault {
     },
     /// Breaks (4), from the future.
     #[error(
-        "compensation is stamped {ahead_s} s in the future, limit {limit_s} s: refused; end who publishes it, or relate the clocks of the hosts (clock_host)",
+        "compensation is stamped {ahead_s} s in the future, limit {limit_s} s: refused; stop the node that publishes it, or relate the clocks of the hosts (clock_host)",
         ahead_s = number(*ahead_s), limit_s = number(*limit_s)
     )]
     Early {
@@ -153,7 +154,16 @@ impl OffsetsRefused {
     }
 }
 
+/// Delays and differences of clocks that are no fault, however short an offset is held.
+const LEAST_AGE_LIMIT: Span = Span::from_nanos(500_000_000);
+
 impl OffsetRule {
+    /// T of a controller that holds an offset so long without a new one.
+    #[must_use]
+    pub fn age_limit_of(hold: Span) -> Span {
+        hold.max(LEAST_AGE_LIMIT)
+    }
+
     /// Whether a message that comes `at` may be followed.
     ///
     /// # Errors
@@ -161,9 +171,10 @@ impl OffsetRule {
     pub fn check(&self, at: Stamp<Host>, message: &AxisCompensation) -> Result<(), OffsetFault> {
         for axis in message.axes.iter() {
             let value = message.total[axis];
-            if self.axes.contains(axis) {
-                self.check_size(axis, value)?;
+            if !self.axes.contains(axis) {
+                continue;
             }
+            self.check_size(axis, value)?;
             if message.state[axis] == CompensationState::Off && value != 0.0 {
                 return Err(OffsetFault::Off { axis, value });
             }
@@ -283,12 +294,13 @@ mod tests {
         let mut other = message(0.0);
         other.axes = other.axes.with(Axis::A);
         other.total[Axis::A] = 2.0;
+        other.state[Axis::A] = CompensationState::Off;
         assert_eq!(reason(now(), &other), None, "an axis of another machine");
     }
 
     #[test]
     fn eq2_an_axis_that_is_off_has_no_offset() {
-        for axis in Axis::ALL {
+        for axis in Axis::LINEAR {
             for offset in [0.4, -1e-9, 1e-3] {
                 let mut sent = message(0.0);
                 sent.axes = sent.axes.with(axis);
@@ -362,6 +374,20 @@ mod tests {
     }
 
     #[test]
+    fn a_short_hold_leaves_delays_of_half_a_second() {
+        for (hold_s, limit_s) in [
+            (0.001, 0.5),
+            (0.2, 0.5),
+            (0.5, 0.5),
+            (1.0, 1.0),
+            (60.0, 60.0),
+        ] {
+            let limit = OffsetRule::age_limit_of(Span::from_secs_f64(hold_s));
+            assert_eq!(limit, Span::from_secs_f64(limit_s), "{hold_s}");
+        }
+    }
+
+    #[test]
     fn a_refusal_names_axis_value_limit_and_remedy_and_is_counted_by_reason() {
         let mut off = message(0.4);
         off.state[Axis::X] = CompensationState::Off;
@@ -371,7 +397,11 @@ mod tests {
         let early = now() - Span::from_secs_f64(2.0);
         let mut counts = OffsetsRefused::default();
         for (at, sent, words) in [
-            (now(), &off, ["axis X is 0.4 mm", "limit 0", "end it"]),
+            (
+                now(),
+                &off,
+                ["axis X is 0.4 mm", "limit 0", "stop the node"],
+            ),
             (
                 now(),
                 &split,

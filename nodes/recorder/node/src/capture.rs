@@ -48,11 +48,11 @@ fn lock(words: &Mutex<Vec<String>>) -> MutexGuard<'_, Vec<String>> {
     words.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What is to be said of a pattern that picks or leaves out topics and fits none.
+/// The warning about a pattern that picks or leaves out topics and fits none.
 #[must_use]
 pub fn unmatched(pattern: &str) -> String {
     format!(
-        "warning: the pattern {pattern:?} of what to record or to exclude matched no topic: compare it with the names of the topics (`ros2 topic list`)"
+        "warning: the pattern {pattern:?} of `topics` or `exclude` matched no topic: compare it with the names of the topics (`ros2 topic list`)"
     )
 }
 

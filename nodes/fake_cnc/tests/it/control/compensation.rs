@@ -56,7 +56,12 @@ fn a_compensation_that_is_not_a_number_is_refused_and_told() {
     assert!((shop.cnc.offset()[Axis::X] - 0.001).abs() < 1e-15);
     let told = shop.diagnostics();
     let told: Vec<String> = told.iter().map(ToString::to_string).collect();
-    assert_eq!(told, ["compensation of axis X is NaN: refused"]);
+    assert_eq!(
+        told,
+        [
+            "compensation of axis X is NaN: must be a number: refused; stop the node that publishes it"
+        ]
+    );
 }
 
 /// Spoils a message that comes at this time.

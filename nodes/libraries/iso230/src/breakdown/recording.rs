@@ -234,18 +234,28 @@ impl CircularRecording {
     }
 }
 
-/// Places of radial deviations, mm, that lie further from their median than [`GREATEST_DEVIATION`] of the radius: single
-/// slips of an instrument or a table. Empty where more than a tenth lies there: then that is the circle.
+/// Places of radial deviations, mm, in time, that lie further from their median than [`GREATEST_DEVIATION`] of the radius and
+/// leap there: single slips of an instrument or a table. Where the deviation grows reading by reading the circle lies off its
+/// centre. Empty where more than a tenth lies there: then that is the circle.
 #[must_use]
 pub fn outliers(deviations_mm: &[f64], radius_mm: f64) -> Vec<usize> {
     let middle_mm = median(deviations_mm.to_vec());
     let limit_mm = GREATEST_DEVIATION * radius_mm;
-    let apart = deviations_mm.iter().map(|mm| (mm - middle_mm).abs());
-    let places: Vec<usize> = apart
-        .enumerate()
-        .filter(|(_, mm)| *mm > limit_mm)
-        .map(|(place, _)| place)
-        .collect();
+    let is_far = |mm: &f64| (mm - middle_mm).abs() > limit_mm;
+    let mut places = Vec::new();
+    let mut start = 0;
+    for group in deviations_mm.chunk_by(|one, next| is_far(one) == is_far(next)) {
+        let end = start + group.len();
+        let into = start.checked_sub(1).map(|before| [before, start]);
+        let out = (end < deviations_mm.len()).then_some([end - 1, end]);
+        let is_leap = |[one, next]: [usize; 2]| {
+            (deviations_mm[next] - deviations_mm[one]).abs() > 0.5 * limit_mm
+        };
+        if group.first().is_some_and(is_far) && into.into_iter().chain(out).any(is_leap) {
+            places.extend(start..end);
+        }
+        start = end;
+    }
     if places.len() * OUTLIER_ONE_IN > deviations_mm.len() {
         return Vec::new();
     }
@@ -368,5 +378,15 @@ mod tests {
             assert!(outliers(&circle(&many, 0.0), radius_mm).is_empty());
         }
         assert!(outliers(&[], 100.0).is_empty());
+        // Off its centre by little more than the limit: a few readings in a hundred lie beyond it, one beside the other.
+        for share in [1.001, 1.005, 1.012, 1.2, 3.0] {
+            let off_mm = share * GREATEST_DEVIATION * 10.0;
+            let around = (0..360).map(|k| off_mm * f64::from(k).to_radians().cos());
+            let mut deviations: Vec<f64> = around.collect();
+            assert!(outliers(&deviations, 10.0).is_empty(), "{share}");
+            deviations[90] = 5.0;
+            let slips = outliers(&deviations, 10.0);
+            assert!(slips.is_empty() || slips == [90], "{share}: {slips:?}");
+        }
     }
 }

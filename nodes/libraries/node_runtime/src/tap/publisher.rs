@@ -25,6 +25,8 @@ const RETRY: Duration = Duration::from_micros(200);
 
 /// Between looks at who is on the network.
 const LOOK_PERIOD: Duration = Duration::from_millis(50);
+/// What a node that was met is given to name itself.
+const NAMING: Duration = Duration::from_millis(300);
 
 /// Tries until there is room for a sample, for `patience` at most: on a busy computer the library's own thread may not have
 /// sent yet what came before.
@@ -121,6 +123,21 @@ pub struct PublishReport {
     pub unsent: Vec<Unsent>,
 }
 
+/// The rivals of a publisher; the names of nodes come a little later than their endpoints, and are waited for.
+fn named_rivals(participant: &Participant, own: &[Remote]) -> Vec<Rival> {
+    let until = Instant::now() + NAMING;
+    loop {
+        // Reads the news of the graph, which name the nodes.
+        let _ = participant.namesake();
+        let rivals = rivals::find(own, &participant.writers(), &participant.readers());
+        let has_names = rivals.iter().all(|rival| !rival.node.is_empty());
+        if has_names || Instant::now() >= until {
+            return rivals;
+        }
+        std::thread::park_timeout(LOOK_PERIOD);
+    }
+}
+
 impl RawPublisher {
     /// Joins the network as the node `names` with one writer for each of `topics`; `patience` is the
     /// longest that [`Self::publish`] waits.
@@ -178,7 +195,7 @@ impl RawPublisher {
         let own: Vec<Remote> = planned.iter().map(|(end, _)| end.clone()).collect();
         let until = Instant::now() + meeting;
         loop {
-            let rivals = rivals::find(&own, &participant.writers(), &participant.readers());
+            let rivals = named_rivals(&participant, &own);
             if !rivals.is_empty() {
                 let _inside = runtime.enter();
                 let _ = participant.withdraw();
@@ -255,8 +272,7 @@ impl RawPublisher {
     /// Others who publish on these topics, and controllers whose axes move by them, as far as they have been met.
     #[must_use]
     pub fn rivals(&self) -> Vec<Rival> {
-        let (writers, readers) = (self.participant.writers(), self.participant.readers());
-        rivals::find(&self.own, &writers, &readers)
+        named_rivals(&self.participant, &self.own)
     }
 
     /// How many samples find room in the queue now.
