@@ -35,6 +35,8 @@ pub mod recognise;
 pub mod runs;
 #[path = "../../nodes/abbe/src/import/same.rs"]
 pub mod same;
+#[path = "../../nodes/abbe/src/import/separators.rs"]
+pub mod separators;
 #[path = "../../nodes/abbe/src/import/sheet.rs"]
 pub mod sheet;
 #[path = "../../nodes/abbe/src/import/stated.rs"]
