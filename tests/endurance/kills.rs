@@ -233,7 +233,10 @@ fn no_offset_stepped(graph: &Graph, began: Instant, restarted: Instant, victim: 
         for (axis, total) in next.1.total.iter().enumerate() {
             let from_m = from.map_or(0.0, |(_, message)| message.total[axis]);
             let step_m = (total - from_m).abs();
-            let passed_s = from.map_or(0.0, |(at, _)| next.0.duration_since(*at).as_secs_f64());
+            // Where the first that is heard is not the first that was sent, the node has had the time since it started.
+            let start = if restarts(next.0) { restarted } else { began };
+            let since = from.map_or(start, |(at, _)| *at);
+            let passed_s = next.0.duration_since(since).as_secs_f64();
             let limit_m = OFFSET_RATE_M_S * (DELAY_S + 2.0 * passed_s);
             assert!(step_m <= limit_m, "axis {axis}: {step_m} m in {passed_s} s");
             assert!(total.abs() <= DRIFT_M * 1.01, "axis {axis}: {total} m");
