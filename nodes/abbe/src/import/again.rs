@@ -5,6 +5,7 @@ use metrology::yaml::shown;
 
 use super::map::{Column, What};
 use super::odd::is_missing;
+use super::recognise::{Role, role_of_name};
 use super::stated;
 
 /// Refuses a row that is no row of numbers but names columns, or units, again. `columns`: those of the map, with their
@@ -22,7 +23,8 @@ pub fn check(
     let read: Vec<&str> = numbers
         .filter_map(|(_, place)| cells.get(*place).map(String::as_str))
         .collect();
-    let what = if are_names(head, cells, &read) {
+    let is_timed = columns.iter().any(|column| column.what == What::Time);
+    let what = if are_names((head, cells), &read, is_timed) {
         "names of columns"
     } else if are_units(&read) {
         "units"
@@ -37,8 +39,9 @@ pub fn check(
     );
 }
 
-/// Whether most cells are those of the first line of names, or all that should be numbers are words.
-fn are_names(head: &[String], cells: &[String], read: &[&str]) -> bool {
+/// Whether most cells are those of the first line of names, or all that should be numbers are words and one is a name: one of
+/// the first line, or that of a target or an angle, of a log a time. Words of failed readings (`ERR`, `lost`) are none.
+fn are_names((head, cells): (&[String], &[String]), read: &[&str], is_timed: bool) -> bool {
     let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
     let lower = |cell: &String| cell.to_lowercase();
     let pairs = head.iter().zip(cells);
@@ -49,7 +52,13 @@ fn are_names(head: &[String], cells: &[String], read: &[&str]) -> bool {
         let is_number = cell.starts_with(|letter: char| letter.is_ascii_digit() || letter == '-');
         has(char::is_alphabetic) && !is_number && !is_missing(cell)
     };
-    (n_same >= 2 && 2 * n_same > filled) || (read.len() >= 2 && read.iter().all(is_word))
+    let is_name = |cell: &&str| match role_of_name(cell) {
+        Some(Role::Target | Role::Angle | Role::Radial) => true,
+        Some(Role::Time) => is_timed,
+        _ => false,
+    };
+    let are_words = read.len() >= 2 && read.iter().all(is_word);
+    (n_same >= 2 && 2 * n_same > filled) || (are_words && (n_same >= 1 || read.iter().any(is_name)))
 }
 
 fn are_units(read: &[&str]) -> bool {
@@ -114,6 +123,44 @@ mod tests {
             ("nan,up,nan,nan\n", 40),
         ] {
             assert_eq!(said(lines), Ok(rows), "{lines}");
+        }
+    }
+
+    #[test]
+    fn words_of_a_failed_reading_are_an_odd_row_where_no_column_numbers_the_runs() {
+        let rows_with = |line: &str| {
+            let map: Map = serde_saphyr::from_str(
+                "start_s: 0\ntest:\n  positioning: {axis: X, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 1.0, target_mm: t, deviation_um: d}\n",
+            )
+            .expect("a map");
+            let rows: String = (0..20).map(|k| format!("{k},0.5\n")).collect();
+            let sheet = Sheet::of_text(&format!("t,d\n{rows}{line}\n{rows}"), ',').expect("rows");
+            let table = Table::of(&sheet, &map, &[None; 2]);
+            table
+                .map(|table| (table.rows.len(), table.odd.len()))
+                .map_err(|error| format!("{error:#}"))
+        };
+        for line in [
+            "ERR,ERR",
+            "lost,beam",
+            "no signal,no signal",
+            "ERR,timeout",
+            "fault,overrange",
+        ] {
+            assert_eq!(rows_with(line), Ok((40, 1)), "{line}");
+        }
+        for line in [
+            "t,d",
+            "T,error",
+            "target,deviation",
+            "Soll,Abweichung",
+            "position,value",
+        ] {
+            let refused = rows_with(line).expect_err(line);
+            assert!(
+                refused.contains("line 22: names of columns again"),
+                "{refused}"
+            );
         }
     }
 }

@@ -15,11 +15,13 @@ type Lines = [(u64, Vec<String>)];
 
 /// Share of the span of the targets within which measured positions lie beside them; other numbers are no positions.
 const BESIDE: f64 = 0.05;
+/// Least number of targets whose even spacing is seen.
+const LEAST_EVEN: usize = 4;
 /// Rounding of a table that was computed with 64 bits, in units of targets.
 const ROUNDING: f64 = 1e-9;
 
-/// What a column of numbers is compared with.
-struct Compared<'t> {
+/// A column of numbers that is compared with the deviations.
+struct Comparison<'t> {
     /// Its place among the cells, and its name.
     place: usize,
     name: &'t str,
@@ -84,7 +86,7 @@ pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<
         };
         let [place_unit, deviation_unit] = units.of_cells;
         let unit_size = unit.size() / units.of_cells[0].size();
-        let compared = Compared {
+        let compared = Comparison {
             place,
             name,
             size: unit_size,
@@ -129,7 +131,7 @@ fn least_step(lines: &Lines, place: usize, decimal: char) -> f64 {
 }
 
 fn triples(
-    compared: &Compared<'_>,
+    compared: &Comparison<'_>,
     lines: &Lines,
     rows: &[Row],
     ([target, read], size, decimal): ([usize; 2], f64, char),
@@ -160,7 +162,7 @@ fn triples(
 fn is_of_targets(
     off: &dyn Fn(&Triple) -> f64,
     triples: &[Triple],
-    compared: &Compared<'_>,
+    compared: &Comparison<'_>,
 ) -> bool {
     let mut sorted: Vec<&Triple> = triples.iter().collect();
     sorted.sort_by(|a, b| a.target.total_cmp(&b.target));
@@ -176,8 +178,48 @@ fn is_of_targets(
         && !repeats().any(|(a, b)| is_above(off(a), off(b)))
 }
 
+/// A remark on targets of a single run that are shown with fewer decimals than they have. With no repeat the even spacing shows
+/// it: two at least agree with what was measured, the others within half of their last decimal, and measured less deviation
+/// is spaced evenly.
+fn of_even_targets(
+    off: &dyn Fn(&Triple) -> f64,
+    triples: &[Triple],
+    (compared, unit): (&Comparison<'_>, &str),
+) -> Option<String> {
+    let mut sorted: Vec<&Triple> = triples.iter().collect();
+    sorted.sort_by(|a, b| a.target.total_cmp(&b.target));
+    let mut twos = sorted.windows(2);
+    let has_repeat = twos.any(|two| two[0].target.total_cmp(&two[1].target).is_eq());
+    if has_repeat || sorted.len() < LEAST_EVEN {
+        return None;
+    }
+    let exact: Vec<f64> = sorted
+        .into_iter()
+        .map(|row| row.target + off(row))
+        .collect();
+    let (first, last) = (*exact.first()?, *exact.last()?);
+    let spacing = (last - first) / (exact.len() - 1) as f64;
+    let mut places = exact.iter().enumerate();
+    let is_even = places.all(|(k, place)| {
+        let wanted = first + spacing * k as f64;
+        (place - wanted).abs() <= 2.0 * compared.rounding
+    });
+    let offs: Vec<f64> = triples.iter().map(|row| off(row).abs()).collect();
+    let n_equal = offs.iter().filter(|off| **off <= compared.rounding).count();
+    let most = offs.iter().copied().fold(0.0, f64::max);
+    let is_within = most <= 0.5 * compared.target_step + compared.rounding;
+    (is_even && n_equal >= 2 && is_within).then(|| {
+        format!(
+            "column \"{}\": less the deviation it is spaced evenly and up to {} {unit} beside the targets: they have fewer decimals than the \
+             test had, and the deviations are taken",
+            shown(compared.name),
+            rounded(most)
+        )
+    })
+}
+
 fn compare(
-    compared: &Compared<'_>,
+    compared: &Comparison<'_>,
     triples: &[Triple],
     (read_name, turn, unit): (&str, Option<f64>, &str),
 ) -> Result<Option<String>> {
@@ -203,12 +245,10 @@ fn compare(
     let middle = offs[offs.len() / 2];
     let tolerance = compared.rounding;
     let is_one = offs.iter().all(|off| (off - middle).abs() <= tolerance);
-    let Some(row) = triples.iter().find(|row| off(row).abs() > tolerance) else {
+    let differing = triples.iter().find(|row| off(row).abs() > tolerance);
+    let Some(row) = differing.filter(|_| !is_of_targets(&off, triples, compared)) else {
         return Ok(None);
     };
-    if is_of_targets(&off, triples, compared) {
-        return Ok(None);
-    }
     let name = shown(compared.name);
     if is_one && triples.len() > 1 {
         return Ok(Some(format!(
@@ -216,6 +256,9 @@ fn compare(
             rounded(middle),
             shown(read_name)
         )));
+    }
+    if let Some(remark) = of_even_targets(&off, triples, (compared, unit)) {
+        return Ok(Some(remark));
     }
     let is_turned = triples
         .iter()
@@ -386,6 +429,43 @@ mod tests {
             let sheet = Sheet::of_text(&text, ',').expect("rows");
             let table = Table::of(&sheet, &map, &[None, None, None]);
             assert_eq!(table.is_ok(), is_taken, "{sign}");
+        }
+    }
+
+    #[test]
+    fn evenly_spaced_targets_of_a_single_run_may_be_rounded() {
+        let map: Map = serde_saphyr::from_str(
+            "start_s: 0\ntest:\n  positioning: {axis: X, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 1.0, target_mm: t, deviation_um: d}\n",
+        )
+        .expect("a map");
+        // Spacing of the targets, sign of the deviations in the measured positions, µm more in the third row.
+        for (spacing, sign, more_um, is_taken) in [
+            (100.0 / 3.0, 1.0, 0.0, true),
+            (100.0 / 7.0, 1.0, 0.0, true),
+            (100.0 / 3.0, -1.0, 0.0, false),
+            (100.0 / 3.0, 1.0, 2.0, false),
+            (50.0, 1.0, 2.0, false),
+            (50.0, -1.0, 0.0, false),
+        ] {
+            let mut text = "t,d,measured_mm\n".to_owned();
+            for k in 0..8 {
+                let target = spacing * f64::from(k);
+                let deviation = 0.5 + 0.3 * f64::from(k);
+                let more = if k == 2 { more_um } else { 0.0 };
+                let measured = target + 1e-3 * (sign * deviation + more);
+                text.push_str(&format!("{target:.2},{deviation:.2},{measured:.5}\n"));
+            }
+            let sheet = Sheet::of_text(&text, ',').expect("rows");
+            let table = Table::of(&sheet, &map, &[None, None]);
+            let case = format!("{spacing} {sign} {more_um}");
+            assert_eq!(table.is_ok(), is_taken, "{case}");
+            if let Ok(table) = table {
+                let mut lines = table.left_out.iter();
+                assert!(
+                    lines.any(|line| line.contains("is spaced evenly")),
+                    "{case}"
+                );
+            }
         }
     }
 }

@@ -9,8 +9,11 @@ use anyhow::{Result, bail};
 use metrology::yaml::shown;
 
 use super::map::{Map, Test, What};
+use super::stated;
 use super::table::{Row, number_of};
 use super::times;
+use super::units::Kind;
+use super::vocabulary::words;
 
 /// Lines of cells with their numbers.
 type Lines = [(u64, Vec<String>)];
@@ -32,20 +35,25 @@ const OF_A_TEST: &[&str] = &[
     "nominal",
     "plane",
     "ebene",
-    "line",
     "linie",
-    "place",
     "location",
     "date",
     "datum",
     "instrument",
     "placement",
     "setup",
-    "height",
 ];
-/// Names that are whole words.
+/// Other words of such names, whole but for digits at their ends.
+const WHOLE: &[&str] = &["line", "place", "height"];
+/// First words of such names.
 const WORDS_OF_A_TEST: &[&str] = &["x", "y", "z", "a", "b", "c", "comp", "day", "tag"];
-/// Names of columns that mark rows.
+/// Parts of names of temperatures, humidities and pressures, and units of them. One reading for each run parts no tests.
+const AMBIENT: &[&str] = &["temp", "therm", "humid", "feucht", "pressure", "druck"];
+const AMBIENT_UNITS: &[&str] = &["hpa", "kpa", "mbar", "rh", "rf"];
+/// Parts of names of what is set, whatever stands beside them (`temperature compensation`, `feed %`).
+const SETTINGS: &[&str] = &["compens", "kompens", "correct", "korrekt"];
+const FEED_WORDS: &[&str] = &["feed", "vorschub"];
+/// First words of columns that mark rows.
 const MARKS: &[&str] = &[
     "valid",
     "validity",
@@ -68,6 +76,18 @@ const MARKS: &[&str] = &[
     "rejected",
     "outlier",
 ];
+/// Those whose numbers are codes.
+const CODES: &[&str] = &[
+    "status",
+    "flag",
+    "flags",
+    "fehlercode",
+    "errorcode",
+    "warning",
+    "signalstatus",
+];
+/// Most values of a column that marks rows.
+const MOST_MARK_VALUES: usize = 3;
 /// Rows for one change at least, where no column numbers the runs.
 const ROWS_A_CHANGE: usize = 4;
 /// A test that runs over midnight has two dates, s.
@@ -102,9 +122,9 @@ pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<
                 })
             })
             .collect();
-        if is_named(name, &[], MARKS) {
-            marked(name, &cells)?;
-        } else if !is_log && is_named(name, OF_A_TEST, WORDS_OF_A_TEST) {
+        if is_first(name, MARKS) {
+            marked(name, &cells, map.decimal)?;
+        } else if !is_log && is_of_a_test(name) {
             parted(name, &cells, (run.is_some(), map.decimal))?;
         }
     }
@@ -118,21 +138,60 @@ struct Cell<'t> {
     text: &'t str,
 }
 
-fn is_named(name: &str, begins: &[&str], whole: &[&str]) -> bool {
-    let lower = name.to_lowercase();
-    let words = lower.split(|letter: char| !letter.is_alphanumeric());
-    let mut words = words.filter(|word| !word.is_empty());
-    let is_first = words
-        .clone()
-        .next()
-        .is_some_and(|first| whole.contains(&first));
-    is_first || words.any(|word| begins.iter().any(|begin| word.starts_with(begin)))
+/// Whether the first word of a name is one of these.
+fn is_first(name: &str, whole: &[&str]) -> bool {
+    let words = words(name);
+    let first = words.first();
+    first.is_some_and(|first| whole.contains(&first.as_str()))
 }
 
-fn marked(name: &str, cells: &[Cell<'_>]) -> Result<()> {
+/// Whether a name is that of what a whole test has.
+fn is_of_a_test(name: &str) -> bool {
+    let is_one = |word: &String| {
+        let bare = word.trim_end_matches(|letter: char| letter.is_ascii_digit());
+        WHOLE.contains(&bare) || OF_A_TEST.iter().any(|begin| word.starts_with(begin))
+    };
+    let is_named = is_first(name, WORDS_OF_A_TEST) || words(name).iter().any(is_one);
+    is_named && !is_ambient(name)
+}
+
+/// Whether a name or its unit is that of a temperature, a humidity or a pressure.
+fn is_ambient(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    let has = |parts: &[&str]| parts.iter().any(|part| lower.contains(*part));
+    let has_unit = || {
+        let is_unit = |word: &String| AMBIENT_UNITS.contains(&word.as_str());
+        words(name).iter().any(is_unit) || (lower.contains('%') && !has(FEED_WORDS))
+    };
+    let is_degree = || {
+        let unit = stated::of(name).unit();
+        unit.is_some_and(|unit| unit.kind() == Kind::Temperature)
+    };
+    !has(SETTINGS) && (has(AMBIENT) || has_unit() || is_degree())
+}
+
+/// Whether values mark rows: they are few, and where all are numbers, 0 and 1 alone, except for codes.
+fn are_marks(name: &str, values: &BTreeMap<&str, usize>, decimal: char) -> bool {
+    let filled = values.keys().filter(|text| !text.is_empty());
+    let numbers: Vec<Option<f64>> = filled
+        .map(|text| number_of(text.trim_end_matches([' ', '%']), decimal))
+        .collect();
+    let is_switch = |number: &Option<f64>| {
+        let is = |wanted: f64| number.is_some_and(|number| number.total_cmp(&wanted).is_eq());
+        is(0.0) || is(1.0)
+    };
+    let are_numbers = numbers.iter().all(Option::is_some);
+    let is_of_marks = !are_numbers || is_first(name, CODES) || numbers.iter().all(is_switch);
+    values.len() <= MOST_MARK_VALUES && is_of_marks
+}
+
+fn marked(name: &str, cells: &[Cell<'_>], decimal: char) -> Result<()> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for cell in cells {
         *counts.entry(cell.text).or_default() += 1;
+    }
+    if !are_marks(name, &counts, decimal) {
+        return Ok(());
     }
     let usual = counts
         .iter()
@@ -228,6 +287,10 @@ mod tests {
             ("date", ["2026-01-05", "2026-01-05", "2026-03-05"]),
             ("Datum", ["05.01.2026", "09.01.2026", "09.01.2026"]),
             ("serial no", ["A1", "A2", "A2"]),
+            ("line", ["1", "1", "2"]),
+            ("line2 height", ["0", "0", "100"]),
+            ("temperature compensation", ["off", "on", "on"]),
+            ("feed %", ["50", "100", "100"]),
         ] {
             for keys in ["run: n, ", ""] {
                 let value = |run: u32, _| values[run as usize - 1].to_owned();
@@ -244,6 +307,9 @@ mod tests {
             ("status", "ERR beam"),
             ("OK", "n"),
             ("flag", "x"),
+            ("fehlercode", "17"),
+            ("beam", "0"),
+            ("beam strength", "lost"),
         ] {
             let value = |run, target| if (run, target) == (2, 3) { bad } else { "1" }.to_owned();
             let refused = refusal("run: n, ", name, value);
@@ -275,5 +341,47 @@ mod tests {
         });
         taken("valid", &|_, _| "1".to_owned());
         taken("status", &|_, _| String::new());
+    }
+
+    #[test]
+    fn ambient_readings_of_each_run_part_no_tests() {
+        for name in [
+            "machine temperature",
+            "Maschinentemperatur [°C]",
+            "axis temperature X",
+            "Achse [K]",
+            "machine RH %",
+            "Luftdruck Maschine hPa",
+            "place mbar",
+            "x °C",
+            "Linearity",
+            "placeholder",
+        ] {
+            for keys in ["run: n, ", ""] {
+                let refused = refusal(keys, name, |run, _| format!("2{run}.5"));
+                assert_eq!(refused, "", "{name} {keys}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_of_each_reading_and_many_words_are_no_marks() {
+        let number = |numbers: [&'static str; 3]| {
+            move |run: u32, target: u32| numbers[((run + target) % 3) as usize].to_owned()
+        };
+        for (name, numbers) in [
+            ("Beam strength", ["96", "95", "96"]),
+            ("quality", ["96", "95", "94"]),
+            ("quality %", ["96 %", "95 %", "95 %"]),
+            ("beam", ["0.98", "1", ""]),
+            ("valid", ["20", "19", "20"]),
+        ] {
+            let refused = refusal("run: n, ", name, number(numbers));
+            assert_eq!(refused, "", "{name}");
+        }
+        let words = refusal("run: n, ", "quality", |_, target| format!("note {target}"));
+        assert_eq!(words, "");
+        let refused = refusal("run: n, ", "status", number(["0", "4", "0"]));
+        assert!(refused.contains("marks rows itself"), "{refused}");
     }
 }

@@ -3,7 +3,7 @@
 //! A stated unit holds. One that is not known, or that is not the one of the map's key, is refused with what to state: only
 //! `units` of the map states that a name is wrong. In brackets stands a unit or a note; without them the last word may be a
 //! unit, or a clear one before it. Where a name has deviation, target or another length or angle, what stands there is a
-//! unit, or a word that is known to be none.
+//! unit, a word that is known to be none, or one that is longer than what stands for units.
 
 use anyhow::{Result, bail};
 use metrology::yaml::shown;
@@ -519,12 +519,12 @@ mod tests {
 
     #[test]
     fn parts_of_units_and_words_that_a_name_does_not_know_are_unknown() {
-        let names = "deviation (mdeg);deviation_mdeg;deviation/µdeg;error m°;target (millideg);error mas;deviation (steps);deviation 0.1um;deviation V;deviation dmm;error/inc;deviation %;error lambda/4;error µ\";deviation milli;deviation um per m;deviation furlongs;target foo;Abweichung mdeg Lauf 1";
+        let names = "deviation (mdeg);deviation_mdeg;deviation/µdeg;error m°;target (millideg);error mas;deviation (steps);deviation 0.1um;deviation V;deviation dmm;error/inc;deviation %;error lambda/4;error µ\";deviation milli;deviation um per m;deviation furlongs;deviation foo;target foo;Abweichung mdeg Lauf 1;deviation thous;error uinches;drift pixels;error µstrain;deviation (abcd9);deviation [gesamt];deviation counts gesamt";
         for name in names.split(';') {
             let found = of(name);
             assert!(matches!(found, Stated::Unknown(_)), "{name}: {found:?}");
         }
-        let names = "deviation Laser;Soll-Ist-Abweichung;target position X;error mean value;deviation run1;spindle (Heidenhain);bearing rear;deviation step 3;Deviation, forward;\"deviation\"";
+        let names = "deviation Laser;Soll-Ist-Abweichung;target position X;error mean value;deviation run1;spindle (Heidenhain);bearing rear;deviation step 3;Deviation, forward;deviation warm;Abweichung kalt;Abweichung gesamt;deviation net;deviation (net);growth rate;Position error (Renishaw);error (API);deviation Zygo;error SIOS;Abweichung links;target drawing;deviation (cold state);\"deviation\"";
         for name in names.split(';') {
             assert_eq!(of(name), Stated::Nothing, "{name}");
         }

@@ -70,7 +70,7 @@ pub fn of_text(cell: &str) -> Result<Option<f64>> {
     Ok(Some(seconds(stamp.nanos())))
 }
 
-/// What is said of an instant that no message carries.
+/// Limits of the instants that a message can carry, and the remedy.
 const OF_NO_CLOCK: &str = "must be a time from 1970-01-01T00:00:00Z to 2106-02-07T06:28:15Z: set the clock that wrote it, or write seconds since the first row";
 
 /// Whether a date with a clock is an instant outside the range of the wire: in a leap year within it both are one.

@@ -95,6 +95,26 @@ const FOREIGN: &[&str] = &[
     "wavelength",
     "wavelengths",
     "furlong",
+    "furlongs",
+    "ångström",
+    "angström",
+    "ångstrom",
+    "percentage",
+    "pixel",
+    "pixels",
+    "radiant",
+    "teilstrich",
+    "teilstriche",
+    "skalenteil",
+    "skalenteile",
+    "wellenlänge",
+    "wellenlängen",
+    "pouce",
+    "pouces",
+    "pollice",
+    "pollici",
+    "pulgada",
+    "pulgadas",
     "milli",
     "micro",
     "mikro",
@@ -115,14 +135,15 @@ const SHORT_WHOLES: &[&str] = &[
 const NOTES: &[&str] = &[
     "abs", "rel", "avg", "raw", "ist", "max", "act", "cmd", "dev", "opt", "cw", "ccw", "lh", "rh",
     "1st", "2nd", "3rd", "mid", "top", "utc", "gmt", "cet", "mez", "sum", "ref", "iso", "low",
-    "uni", "bi", "old", "new", "all", "any", "c",
+    "uni", "bi", "old", "new", "all", "any", "c", "net", "api",
 ];
 /// Other words of names, whole.
 const WORDS: &[&str] = &[
     "x", "y", "z", "a", "b", "r", "n", "i", "xy", "yz", "zx", "xz", "nr", "no", "id", "of", "to",
     "at", "on", "off", "by", "from", "the", "and", "or", "val", "std", "rms", "pv", "ch", "set",
     "tcp", "cap", "ave", "ein", "aus", "mit", "von", "an", "bei", "pt", "bar", "hot", "cold",
-    "tip",
+    "tip", "warm", "kalt", "heiss", "heiß", "gesamt", "rate", "renishaw", "zygo", "agilent",
+    "keysight", "sios",
 ];
 /// Begins of other words of names.
 const BEGINS: &[&str] = &[
@@ -283,7 +304,14 @@ const BEGINS: &[&str] = &[
     "bidirect",
     "unidirect",
     "mirror",
+    "microscop",
+    "mikroskop",
+    "heidenhain",
 ];
+/// Most letters of a word that stands for a unit without being a known one; longer ones are words.
+const LONGEST_SHORT: usize = 4;
+/// Ends of plurals and of declined words.
+const PLURALS: &[&str] = &["s", "es", "n", "en"];
 /// Begins of the words of a quantity whose unit has to be known.
 const QUANTITIES: &[&str] = &[
     "dev", "err", "abweich", "fehler", "diff", "delta", "target", "soll", "nominal", "pos",
@@ -336,7 +364,20 @@ pub fn is_note_word(lower: &str) -> bool {
     NOTES.contains(&lower)
 }
 
-/// Whether a word of a name is known to be none of a unit; digits at its end only number it.
+/// Whether a word is too long for a short name of a unit, and no form or multiple of one.
+fn is_long(word: &str) -> bool {
+    let is_letter = |letter: char| letter.is_alphabetic() && !matches!(letter, 'µ' | 'μ');
+    let lower = plain(word);
+    let is_unit = |word: &str| Unit::of_word(word).is_some() || is_foreign(word);
+    let mut singles = PLURALS.iter().filter_map(|end| lower.strip_suffix(*end));
+    word.chars().count() > LONGEST_SHORT
+        && word.chars().all(is_letter)
+        && !is_unit(&lower)
+        && !singles.any(is_unit)
+        && !LONG_PARTS.iter().any(|part| lower.starts_with(part))
+}
+
+/// Whether a word of a name is known to be none of a unit, or too long for one; digits at its end only number it.
 pub fn is_known(word: &str) -> bool {
     let lower = plain(word);
     let bare = lower.trim_end_matches(|letter: char| letter.is_ascii_digit());
@@ -344,6 +385,7 @@ pub fn is_known(word: &str) -> bool {
         && (is_note_word(&lower)
             || WORDS.contains(&bare)
             || BEGINS.iter().any(|begin| bare.starts_with(begin))
+            || is_long(word)
             || Direction::of_word(word).is_some())
 }
 
@@ -358,7 +400,7 @@ pub fn is_quantity(name: &str) -> bool {
 }
 
 /// Words of a name in lower case.
-fn words(name: &str) -> Vec<String> {
+pub fn words(name: &str) -> Vec<String> {
     let words = name.split(|letter: char| !letter.is_alphanumeric());
     let words = words.filter(|word| !word.is_empty());
     words.map(str::to_lowercase).collect()
@@ -494,10 +536,12 @@ mod tests {
         ] {
             assert!(!is_foreign(word), "{word}");
         }
-        for word in ["laser", "run1", "x", "Mittelwert", "forward", "3rd"] {
+        let known = "laser run1 x Mittelwert forward 3rd warm kalt heiß gesamt net rate Renishaw API Zygo2 Heidenhain Lasertex SIOS links Gegenlauf Mikroskop turbine";
+        for word in known.split(' ') {
             assert!(is_known(word), "{word}");
         }
-        for word in ["mdeg", "furlongs", "foo", "1um", "u"] {
+        let unknown = "mdeg furlongs foo 1um u abcd mdegs thous arcsecs uinches mrads Millimetern millistrain µstrain pixel Ångström km/h foobar7";
+        for word in unknown.split(' ') {
             assert!(!is_known(word), "{word}");
         }
     }

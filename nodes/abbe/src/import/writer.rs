@@ -29,16 +29,16 @@ pub struct Writer {
     repeated: u64,
 }
 
-/// What a finished bag has.
+/// Counts of a finished bag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Written {
+pub struct BagCount {
     /// Messages of the bag.
     pub messages: u64,
     /// Readings that were not written, since the bag has an equal one of the same time.
     pub repeated: u64,
 }
 
-impl Written {
+impl BagCount {
     /// A line about readings that were not written.
     pub fn in_words(self) -> Option<String> {
         let n = self.repeated;
@@ -217,9 +217,9 @@ impl Writer {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn finish(self) -> Result<Written> {
+    pub fn finish(self) -> Result<BagCount> {
         self.recording.finish()?;
-        Ok(Written {
+        Ok(BagCount {
             messages: self.messages,
             repeated: self.repeated,
         })
@@ -291,7 +291,7 @@ mod tests {
     const MACHINE: &str = include_str!("../../../../launch_configs/first_run/machine.yaml");
 
     /// A bag of a log: time in s, displacement in µm and temperature of each row.
-    fn log(rows: &[(f64, f64, f64)]) -> Written {
+    fn log(rows: &[(f64, f64, f64)]) -> BagCount {
         let home = tempfile::tempdir().unwrap();
         let path = home.path().join("bag");
         let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();

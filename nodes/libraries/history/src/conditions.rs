@@ -8,11 +8,11 @@ const RAD_DEG: f64 = 180.0 / std::f64::consts::PI;
 const DEEPEST: usize = 3;
 
 /// A title with the range of the targets, the place of the line and the correction to 20 degC, as far as the test has them.
-/// Lengths are in whole mm, angles in whole deg: repetitions of one test do not differ by more.
+/// Lengths are in tenths of a mm, angles in tenths of a deg.
 pub fn with_conditions(title: &str, test: &Value) -> String {
     let mut text = title.to_owned();
     let place = test["place_mm"].as_object().into_iter().flatten();
-    let place = place.filter_map(|(axis, at)| Some(format!("{axis} {:.0}", whole(at.as_f64()?))));
+    let place = place.filter_map(|(axis, at)| Some(format!("{axis} {}", in_tenths(at.as_f64()?))));
     let place: Vec<String> = place.collect();
     if let Some(range) = range(test, 0) {
         text.push_str(&format!(", {range}"));
@@ -53,9 +53,11 @@ fn without_place(title: &str) -> String {
     parts.join(", ")
 }
 
-/// A number rounded to a whole one; no negative zero.
-fn whole(number: f64) -> f64 {
-    number.round() + 0.0
+/// A number rounded to tenths, half away from zero; no negative zero. It is rounded to hundredths first: targets such as 12.25
+/// that scatter by micrometres give one number.
+fn in_tenths(number: f64) -> f64 {
+    let hundredths = (number * 100.0).round();
+    (hundredths / 10.0).round() / 10.0 + 0.0
 }
 
 /// From the least to the greatest target.
@@ -68,8 +70,8 @@ fn range(value: &Value, depth: usize) -> Option<String> {
         if !targets.is_empty() {
             let least = targets.iter().copied().fold(f64::INFINITY, f64::min);
             let most = targets.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let [least, most] = [least, most].map(|target| whole(size * target));
-            return Some(format!("{least:.0} to {most:.0} {unit}"));
+            let [least, most] = [least, most].map(|target| in_tenths(size * target));
+            return Some(format!("{least} to {most} {unit}"));
         }
     }
     let mut below = entries.values();
@@ -119,7 +121,7 @@ mod tests {
     fn range_place_and_correction_tell_series_apart_and_repetitions_do_not() {
         let base = test(&[0.0, 50.1, 249.9]);
         let of = |test: &Value| with_conditions("Positioning X", test);
-        assert_eq!(of(&base), "Positioning X, 0 to 250 mm");
+        assert_eq!(of(&base), "Positioning X, 0 to 249.9 mm");
         let with = |key: &str, value: Value| {
             let mut other = base.clone();
             other[key] = value;
@@ -128,6 +130,7 @@ mod tests {
         for other in [
             of(&test(&[0.0, 10.0, 49.98])),
             of(&test(&[-250.0, 0.0])),
+            of(&test(&[0.0, 249.8])),
             with("place_mm", json!({"Y": 0.0, "Z": 120.0})),
             with("place_mm", json!({"Y": 300.0, "Z": 120.0})),
             with("correction_to_20_degc", json!({"done": true})),
@@ -149,7 +152,7 @@ mod tests {
         });
         assert_eq!(
             of(&all),
-            "Positioning X, 0 to 600 mm, at Y 0 Z 120 mm, at 20 °C"
+            "Positioning X, 0 to 600 mm, at Y -0.2 Z 120 mm, at 20 °C"
         );
         let turn = json!({"iso230_2_rotary": {"figures": {"points": [{"target_rad": 0.0}, {"target_rad": 1.221_7}]}}});
         assert_eq!(with_conditions("C", &turn), "C, 0 to 70 deg");
@@ -157,5 +160,34 @@ mod tests {
             with_conditions("Drift", &json!({"iso230_3_log": {}})),
             "Drift"
         );
+    }
+
+    #[test]
+    fn repetitions_about_usual_targets_and_places_have_one_title() {
+        let of = |at_mm: f64| {
+            let mut test = test(&[at_mm, at_mm + 100.0]);
+            test["place_mm"] = json!({"Y": at_mm});
+            with_conditions("X", &test)
+        };
+        for k in -4000_i32..4000 {
+            // Every 0.05 mm from -200 mm on, with a scatter of 1 µm and more.
+            let target_mm = f64::from(k) / 20.0;
+            for off_mm in [-0.004, -0.001, -0.0004, 0.0003, 0.001, 0.004] {
+                assert_eq!(
+                    of(target_mm + off_mm),
+                    of(target_mm),
+                    "{target_mm} {off_mm}"
+                );
+            }
+        }
+        for (at_mm, title) in [
+            (12.4996, "X, 12.5 to 112.5 mm, at Y 12.5 mm"),
+            (12.5003, "X, 12.5 to 112.5 mm, at Y 12.5 mm"),
+            (-0.0004, "X, 0 to 100 mm, at Y 0 mm"),
+            (-0.05, "X, -0.1 to 100 mm, at Y -0.1 mm"),
+            (33.333, "X, 33.3 to 133.3 mm, at Y 33.3 mm"),
+        ] {
+            assert_eq!(of(at_mm), title);
+        }
     }
 }
