@@ -69,9 +69,10 @@ fn ms(at: Stamp<Host>) -> i64 {
     at.nanos().div_euclid(1_000_000)
 }
 
-/// The same number but for the last digit of its decimal form.
+/// The same number but for the last digit of its decimal form; nothing where there is no number, as of a rejected touch.
 fn is_same(shown: &Value, recorded: f64) -> bool {
-    (shown.as_f64().unwrap() - recorded).abs() <= 1e-12 * recorded.abs()
+    let is_near = |shown: f64| (shown - recorded).abs() <= 1e-12 * recorded.abs();
+    shown.as_f64().map_or(recorded.is_nan(), is_near)
 }
 
 /// Position, touch and temperature of the page are those that the bag has at their times.
