@@ -75,14 +75,14 @@ fn is_number(cell: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
     fn cells(line: &str) -> Vec<String> {
         line.split(',').map(str::to_owned).collect()
     }
 
     #[test]
     fn a_line_that_begins_with_a_word_may_be_of_another_block() {
+        use super::check_length;
+
         for (line, is_block) in [
             ("Statistics", true),
             ("A,8.18", true),
@@ -103,6 +103,8 @@ mod tests {
 
     #[test]
     fn columns_apart_by_spaces_or_bars_are_seen() {
+        use super::foreign;
+
         for (text, found) in [
             ("run target dev\n1 0.0 -0.1\n1  50.1  0.7\n", Some("spaces")),
             ("x y\n 0,0   1,5\n 10,0  1,7\n", Some("spaces")),
