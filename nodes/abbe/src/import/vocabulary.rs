@@ -132,7 +132,7 @@ const SHORT_WHOLES: &[&str] = &[
     "inch",
 ];
 /// Short words beside a quantity that are no unit; in brackets too.
-const NOTES: &[&str] = &[
+const NOTE_WORDS: &[&str] = &[
     "abs", "rel", "avg", "raw", "ist", "max", "act", "cmd", "dev", "opt", "cw", "ccw", "lh", "rh",
     "1st", "2nd", "3rd", "mid", "top", "utc", "gmt", "cet", "mez", "sum", "ref", "iso", "low",
     "uni", "bi", "old", "new", "all", "any", "c", "net", "api",
@@ -361,7 +361,7 @@ fn is_whole(rest: &str) -> bool {
 
 /// Whether a short word is a note and no unit.
 pub fn is_note_word(lower: &str) -> bool {
-    NOTES.contains(&lower)
+    NOTE_WORDS.contains(&lower)
 }
 
 /// Whether a word is too long for a short name of a unit, and no form or multiple of one.

@@ -5,7 +5,7 @@ use serde_json::Value;
 /// rad to deg.
 const RAD_DEG: f64 = 180.0 / std::f64::consts::PI;
 /// Deepest level below a test that is looked at for its targets.
-const DEEPEST: usize = 3;
+const DEEPEST_CONDITION: usize = 3;
 
 /// A title with the range of the targets, the place of the line and the correction to 20 degC, as far as the test has them.
 /// Lengths are in tenths of a mm, angles in tenths of a deg.
@@ -62,7 +62,7 @@ fn in_tenths(number: f64) -> f64 {
 
 /// From the least to the greatest target.
 fn range(value: &Value, depth: usize) -> Option<String> {
-    let entries = value.as_object().filter(|_| depth <= DEEPEST)?;
+    let entries = value.as_object().filter(|_| depth <= DEEPEST_CONDITION)?;
     let points = entries.get("points").and_then(Value::as_array);
     for (key, size, unit) in [("target_mm", 1.0, "mm"), ("target_rad", RAD_DEG, "deg")] {
         let targets = points.into_iter().flatten();

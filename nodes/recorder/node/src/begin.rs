@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
-use node_runtime::HostTime;
+use anyhow::{Context, Result, bail};
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::Selection;
+use node_runtime::{HostTime, Setup};
 use recorder::{Directory, NodeConfig, Recorder, RecorderError, Recording, RunContext};
 
 use crate::capture::Capture;
@@ -14,6 +14,18 @@ use crate::capture::Capture;
 /// The topics that the parameters pick.
 pub(crate) fn selection(config: &NodeConfig) -> Selection {
     Selection::Matching(config.topics.clone()).without(config.exclude.clone())
+}
+
+/// Refuses parameters that leave nothing to record.
+pub(crate) fn check_selection(setup: &Setup, config: &NodeConfig) -> Result<()> {
+    if Selection::leaves_nothing(&config.topics, &config.exclude) {
+        let nothing = RecorderError::NothingToRecord {
+            topics: config.topics.clone(),
+            exclude: config.exclude.clone(),
+        };
+        bail!("{}", setup.placed(&nothing.to_string()));
+    }
+    Ok(())
 }
 
 /// What every bag holds beside messages.

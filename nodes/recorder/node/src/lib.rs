@@ -7,9 +7,8 @@ use abbe_msgs::topics;
 use anyhow::Result;
 use metrology::stamp::Span;
 use node_runtime::names::NodeNames;
-use node_runtime::tap::Selection;
 use node_runtime::{Node, Setup, Wiring};
-use recorder::{NodeConfig, RecorderError};
+use recorder::NodeConfig;
 
 mod begin;
 mod capture;
@@ -32,13 +31,7 @@ const TICK: Span = Span::from_nanos(500_000_000);
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: NodeConfig = setup.config()?;
     config.check_names()?;
-    if Selection::leaves_nothing(&config.topics, &config.exclude) {
-        let nothing = RecorderError::NothingToRecord {
-            topics: config.topics,
-            exclude: config.exclude,
-        };
-        anyhow::bail!("{}", setup.placed(&nothing.to_string()));
-    }
+    begin::check_selection(setup, &config)?;
     let machine = (!config.machine_file.is_empty()).then(|| setup.file_text("machine_file"));
     let machine = machine.transpose()?.map(|(_, text)| text);
     listen(setup, &config, machine)
