@@ -28,7 +28,9 @@ impl Sheet {
     /// When the separator is no byte, or the file holds no line.
     pub fn of_text(text: &str, separator: char) -> Result<Self> {
         // DOS programs end a file with ^Z, some loggers with NUL.
-        let text = text.trim_end_matches(['\u{1a}', '\0', '\r', '\n']);
+        let whole = text.trim_end_matches(['\u{1a}', '\0', '\r', '\n']);
+        // A comment on a last line without an end would be a row.
+        let text = &format!("{whole}\n");
         let byte = u8::try_from(separator).context("separator: must be one byte")?;
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(byte)

@@ -283,7 +283,7 @@ mod tests {
             two.node("sequencer", namespace, machine);
         }
         assert_eq!(two.said(), "");
-        two.node("probe", "/m2/", "machine.yaml");
+        two.node("probe", "/m2", "machine.yaml");
         assert!(two.said().contains("node probe"), "{}", two.said());
     }
 

@@ -423,7 +423,9 @@ mod tests {
             }],
             ..Tests::default()
         };
+        // What stands before its own instruments.
         let text = include_str!("../../../../launch_configs/diagonals/budget.yaml");
+        let text = text.split("instruments:").next().unwrap();
         let text = format!(
             "{text}\ninstruments: {{angular_reference: {{instrument: an encoder, certificate: K 9 of 2026-01-02}}}}\n"
         );
@@ -469,7 +471,9 @@ mod tests {
         assert!(cell(&silent, "operator").starts_with("not stated (operator in budget.yaml"));
         assert!(silent.terminal().contains("Temperatures not stated"));
         assert!(silent.terminal().contains("Correction to 20 °C: not done"));
+        // What stands before its own instruments.
         let text = include_str!("../../../../launch_configs/diagonals/budget.yaml");
+        let text = text.split("instruments:").next().unwrap();
         let budget = Budget::read(text, Path::new("budget.yaml")).unwrap();
         let stated = of(&seen, Some(&budget), None).terminal();
         assert!(
