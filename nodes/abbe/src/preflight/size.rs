@@ -22,7 +22,7 @@ const TOUCHES: Bound = Bound::at_most(4_000).with_remedy(REMEDY);
 
 /// Time of a run in motion, of a stop, and of two touches that are compared, s.
 const RUN_S: f64 = 0.1;
-const STOP_S: f64 = 0.0125;
+const STOP_S: f64 = 0.0015;
 const TOUCHES_S: f64 = 1e-6;
 /// A preflight that takes longer is announced, s.
 const SAID_FROM_S: f64 = 15.0;
