@@ -16,7 +16,7 @@ fn play(domain: u16, options: &[&str]) -> Process {
     Process::start(play)
 }
 
-/// Each of the words is in what was said, and nothing was played.
+/// The output has each of the words, and nothing was played.
 fn is_refused(ended: &Ended, words: &[&str]) {
     assert_eq!(ended.status.code(), Some(1), "{}", ended.said);
     for word in words {

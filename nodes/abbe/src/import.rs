@@ -216,7 +216,7 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     })
 }
 
-/// Refuses targets beyond the travel; what is noted of readings that the test cannot have.
+/// Refuses targets beyond the travel; gives remarks about readings that the test cannot have.
 fn plausible(test: &map::Test, machine: &MachineFile, runs: &Runs) -> Result<Vec<String>> {
     match test {
         map::Test::Positioning {

@@ -79,7 +79,7 @@ impl OffsetInput {
         &self.applied
     }
 
-    /// Takes a message that comes `at`, or refuses it as a whole; tells what became worse, or well again.
+    /// Takes a message that comes `at`, or refuses it as a whole; returns what became worse, or well again.
     pub fn receive(&mut self, at: Stamp<Host>, message: &AxisCompensation) -> Option<Diagnostic> {
         if let Err(fault) = self.rule.check(at, message) {
             self.complained = true;

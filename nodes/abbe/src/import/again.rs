@@ -40,7 +40,7 @@ pub fn check(
 }
 
 /// Whether most cells are those of the first line of names, or all that should be numbers are words and one is a name: one of
-/// the first line, or that of a target or an angle, of a log a time. Words of failed readings (`ERR`, `lost`) are none.
+/// the first line, or that of a target or an angle, of a log a time. Words of failed readings (`ERR`, `lost`) are not such roles.
 fn are_names((head, cells): (&[String], &[String]), read: &[&str], is_timed: bool) -> bool {
     let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
     let lower = |cell: &String| cell.to_lowercase();

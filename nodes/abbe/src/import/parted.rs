@@ -50,7 +50,7 @@ const WORDS_OF_A_TEST: &[&str] = &["x", "y", "z", "a", "b", "c", "comp", "day", 
 /// Parts of names of temperatures, humidities and pressures, and units of them. One reading for each run parts no tests.
 const AMBIENT: &[&str] = &["temp", "therm", "humid", "feucht", "pressure", "druck"];
 const AMBIENT_UNITS: &[&str] = &["hpa", "kpa", "mbar", "rh", "rf"];
-/// Parts of names of what is set, whatever stands beside them (`temperature compensation`, `feed %`).
+/// Parts of names of settings, whatever stands beside them (`temperature compensation`, `feed %`).
 const SETTINGS: &[&str] = &["compens", "kompens", "correct", "korrekt"];
 const FEED_WORDS: &[&str] = &["feed", "vorschub"];
 /// First words of columns that mark rows.

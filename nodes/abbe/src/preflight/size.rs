@@ -1,8 +1,8 @@
 //! What a plan may hold for a preflight: its measurements are simulated once for every effect of the catalogue.
 //!
-//! A run in motion takes a tenth of a second and 4 MB, a stop a hundredth, an hour of standing two seconds; touches of one cycle are compared
-//! with each other, 2000 of them in four seconds, 8000 in two minutes. Within these bounds a preflight answers in about a
-//! minute.
+//! A run in motion takes a tenth of a second and 4 MB, 3600 stops four seconds, an hour of standing two seconds; touches of one
+//! cycle are compared with each other, 2000 of them in four seconds, 8000 in two minutes. Within these bounds a preflight answers
+//! in about a minute.
 
 use std::collections::BTreeMap;
 
@@ -50,7 +50,7 @@ pub fn check(
     Ok(())
 }
 
-/// How long a preflight of a plan takes on a computer of 2024, s.
+/// How long a preflight of a plan takes, s; by the times above.
 fn expected_s(load: &Load) -> f64 {
     let touches = load.touches as f64;
     RUN_S * load.runs as f64 + STOP_S * load.stops as f64 + TOUCHES_S * touches * touches

@@ -1,4 +1,4 @@
-//! A run whose page or figures could not be written, as on a full disk: what failed, and what is there.
+//! A run whose page or figures could not be written, as on a full disk: the file that failed, and the files that are whole.
 
 use std::fmt;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use node_runtime::complain;
 
-/// What could not be written, and what is there.
+/// The file that could not be written, and the files that are whole.
 pub struct Unwritten<'r> {
     /// Why, with the path of the file.
     pub error: anyhow::Error,

@@ -21,7 +21,7 @@ const MACHINE_FILE: &str = "machine.yaml";
 /// Longest value that a message shows, characters.
 const SHOWN: usize = 60;
 
-/// Who reads a machine file, and what it says.
+/// A node that reads a machine file, and the file's content.
 struct Reader {
     who: String,
     path: PathBuf,

@@ -86,7 +86,7 @@ pub fn marked(program: &str, mark: u64) -> String {
     }
 }
 
-/// The mark on the first line of a program; a comment that names a machine in words is none.
+/// The mark on the first line of a program. A comment that names a machine in words is not a mark.
 #[must_use]
 pub fn mark_in(program: &str) -> Option<u64> {
     let mut rest = program.lines().next().unwrap_or("").trim_start();

@@ -198,7 +198,7 @@ impl OffsetRule {
         let pulse_mm = self.pulse_mm;
         let value = message.total[axis];
         let split = message.pulses[axis] as f64 * pulse_mm + message.remainder[axis];
-        // False for what is not a number.
+        // False for NaN.
         let is_whole = (value - split).abs() <= pulse_mm;
         if axis.is_linear() && !is_whole {
             return Err(OffsetFault::Split {

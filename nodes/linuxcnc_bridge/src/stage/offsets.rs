@@ -72,7 +72,7 @@ impl Offsets {
         self.authors.contested()
     }
 
-    /// Takes offsets, or says why they are refused.
+    /// Takes offsets, or returns why they are refused.
     pub(super) fn receive(
         &mut self,
         at: Stamp<Host>,

@@ -88,7 +88,7 @@ impl Speeds {
             let own = (*last - *first).nanos().unsigned_abs();
             let others = all - own;
             let most = others as f64 * SHARE_OF_OTHERS;
-            // From the fastest down to where more than the share of the others is reached; the reading itself is none of them.
+            // From the fastest down to where more than the share of the others is reached, without the reading itself.
             let is_rare = |(at, sum): &(u64, u64)| {
                 let own = if *at as f64 <= rpm.round() { own } else { 0 };
                 (sum - own) as f64 <= most

@@ -135,7 +135,7 @@ impl ChunkBuffer {
                 record_bytes,
             }
         } else if header.crc != 0 && header.crc != calculated {
-            // A CRC of 0 says that the writer made none.
+            // A CRC of 0 means that the writer computed no CRC.
             LossReason::ChunkCrc {
                 chunk_bytes,
                 saved: header.crc,

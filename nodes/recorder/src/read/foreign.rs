@@ -50,7 +50,7 @@ pub(super) fn readable(
     Ok((files, unread))
 }
 
-/// Refuses what is no regular file, cannot be opened, or is of another kind.
+/// Refuses a path that is no regular file, cannot be opened, or is of another kind.
 fn may_be_mcap(path: &Path) -> Result<(), RecorderError> {
     let kind = kind_of(regular::open(path)?).map_err(|source| RecorderError::Open {
         path: path.to_owned(),

@@ -101,7 +101,7 @@ trait Voice {
     /// Waits until what was said has been acknowledged; false when that took too long.
     fn settle(&self) -> bool;
 
-    /// Others on the graph among whom nothing may be said.
+    /// Other nodes on the graph, beside which nothing may be published.
     fn rivals(&self) -> Vec<Rival>;
 }
 
@@ -472,7 +472,7 @@ mod tests {
         Bag::open(&path).unwrap()
     }
 
-    /// A voice that nobody hears: what it said, and after how much of it somebody else speaks.
+    /// A publisher without readers: its messages, and after how many of them another node publishes.
     #[derive(Default)]
     struct Said(Vec<(usize, Bytes)>, Option<usize>);
 

@@ -144,7 +144,7 @@ pub(super) fn needed(input: &Input, key: RowKey) -> Vec<Vec<Needed>> {
     pairs.filter(|pair| helps(pair)).collect()
 }
 
-/// The linear rows that are not told apart with some additions.
+/// The linear rows that cannot be distinguished with some additions.
 fn tied_with(input: &Input, additions: &[Needed]) -> Vec<RowKey> {
     let known = |(judged, _): &&(Vec<Needed>, Vec<RowKey>)| judged == additions;
     if let Some((_, rows)) = input.judged.0.borrow().iter().find(known) {
@@ -162,7 +162,7 @@ fn tied_with(input: &Input, additions: &[Needed]) -> Vec<RowKey> {
     rows
 }
 
-/// The linear rows that are not told apart from all others in some recordings.
+/// The linear rows that cannot be distinguished from all others in some recordings.
 fn tied(input: &Input, recordings: &[CircularRecording]) -> Vec<RowKey> {
     let listed: Vec<_> = recordings.iter().enumerate().collect();
     let scene = Scene::new(input.plane, &listed);

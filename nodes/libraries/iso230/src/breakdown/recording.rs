@@ -184,7 +184,7 @@ impl CircularRecording {
         Ok(())
     }
 
-    /// The first sample with a deviation that is none, from 0; `None` where all can be evaluated.
+    /// The first sample whose deviation cannot be evaluated, from 0; `None` where all can be.
     #[must_use]
     pub fn beyond(&self) -> Option<usize> {
         let limit_mm = GREATEST_DEVIATION * self.radius_mm;

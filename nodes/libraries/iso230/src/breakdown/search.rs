@@ -104,7 +104,7 @@ pub(super) fn search(input: &Input, scene: &Scene) -> Result<Found, BreakdownErr
         chosen.retain(|c| c.kind != Kind::Tone);
         last.retain(|c| c.kind != Kind::Tone);
     }
-    // A fit of all samples with what is chosen is not made twice.
+    // A fit of all samples with the chosen columns is not made twice.
     let mut fit = match found.filter(|_| fewer.is_none()) {
         Some(fit) => fit,
         None => fit_with_play(input, &columns, &base, &chosen)?,
@@ -180,8 +180,8 @@ fn n_tones(chosen: &[Candidate]) -> usize {
     chosen.iter().filter(|c| c.kind == Kind::Tone).count()
 }
 
-/// Adds the greatest believed candidate until there is none; gives the last ones that were tried, and the fit beside which they
-/// were.
+/// Adds the greatest believed candidate until no candidate is believed; gives the last ones that were tried, and the fit beside
+/// which they were.
 fn add_believed(
     input: &Input,
     columns: &Columns,

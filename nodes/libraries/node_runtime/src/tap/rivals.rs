@@ -1,4 +1,4 @@
-//! Who else speaks on the topics of a publisher that replays, or moves axes by what it says.
+//! Nodes that publish on the topics of a replay, or move axes by its messages.
 //!
 //! Recorded messages among those of a running cell are taken for the cell's own: positions, tests and offsets of another
 //! day. So a replay looks at the graph before it speaks, and while it does.
@@ -181,7 +181,7 @@ mod tests {
             |of_participant, node| end(of_participant, 1, node, of("/compensation"), OFFSETS);
         let listener = hears(1, "/gap_diagnosis");
         assert!(said(&[], std::slice::from_ref(&listener)).is_empty());
-        // By participant, and by name where participants are not told apart.
+        // By participant, and by name where participants cannot be distinguished.
         for (server, controller) in [
             (end(2, 2, "", goals, goal), hears(2, "")),
             (end(2, 2, "/fake_cnc", goals, goal), hears(3, "/fake_cnc")),

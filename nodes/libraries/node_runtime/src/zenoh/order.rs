@@ -140,7 +140,7 @@ impl<T> Order<T> {
         }
     }
 
-    /// Patience with what is missing begins anew.
+    /// The waiting time for missing samples begins anew.
     fn has_patience(&mut self) {
         (self.again_at, self.unanswered_since, self.silent_since) = (None, None, None);
     }
@@ -217,7 +217,7 @@ impl<T> Order<T> {
         self.is_over(id, now, is_lost);
     }
 
-    /// A question is no longer waited for; where nothing of it came it is asked again, or what is missing is given up.
+    /// A question is no longer waited for; where nothing of it came it is asked again, or the missing samples are given up.
     fn is_over(&mut self, id: u64, now: Instant, is_lost: bool) {
         let Some(asked) = self.asked.take_if(|asked| asked.id == id) else {
             return;

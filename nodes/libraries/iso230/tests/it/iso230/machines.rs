@@ -183,7 +183,7 @@ impl Body {
         Self::draw_by(rng, about, expansion_per_k, within_limits)
     }
 
-    /// The same with what is off from what is stated by `off`, in half widths.
+    /// The same with stated values that are wrong by `off`, in half widths.
     pub fn draw_by(
         rng: &mut Pcg64Mcg,
         (about_k, spread_k): (f64, f64),

@@ -1,4 +1,4 @@
-//! Which body carries the positions, and what is taken out.
+//! Which body carries the positions, and which expansion is corrected.
 
 use super::*;
 use crate::evaluate::test_conditions::Readings;

@@ -33,7 +33,7 @@ impl Laser {
         Self::draw_by(rng, within_limits)
     }
 
-    /// The same with temperatures and coefficients that are `off` what is stated, in half widths.
+    /// The same with temperatures and coefficients that differ from the stated ones by `off`, in half widths.
     pub fn draw_by(rng: &mut Pcg64Mcg, off: fn(&mut Pcg64Mcg) -> f64) -> Self {
         let shop_k = between(rng, -3.0, 7.0);
         let alpha = [8e-6, 11e-6, 11.5e-6][rng.random_range(0..3)];
