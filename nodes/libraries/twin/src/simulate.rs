@@ -174,7 +174,7 @@ impl<'a> Reader<'a> {
                 .map(|(row, reading)| self.deviation(row, reading))
                 .sum(),
         };
-        total / count(rows.len())
+        total / rows.len() as f64
     }
 
     /// The series that a channel shows the sum of; none of one that reads along directions.
@@ -380,12 +380,6 @@ fn unit(axis: Axis) -> Vector3<f64> {
         direction[axis.index()] = 1.0;
     }
     direction
-}
-
-/// A count as a real number.
-#[expect(clippy::cast_precision_loss, reason = "counts are far below 2^52")]
-fn count(n: usize) -> f64 {
-    n as f64
 }
 
 fn interpolate(series: &[f64], reading: &Reading) -> f64 {

@@ -129,19 +129,11 @@ mod tests {
     use std::path::Path;
 
     use super::super::super::test_conditions::Readings;
+    use super::super::tests::WHOLE;
     use super::*;
 
-    const BUDGET: &str = "
-grid_encoder: {expanded_uncertainty_um: 0.6, expanded_uncertainty_um_per_m: 1.0, coverage_factor: 2.0}
-length_reference: {expanded_uncertainty_um: 0.1, expanded_uncertainty_um_per_m: 0.5, coverage_factor: 2.0}
-machine: {temperature_deviation_k: 0.5, temperature_half_width_k: 0.5, expansion_um_per_m_k: 11.0, expansion_half_width_um_per_m_k: 1.0}
-device: {temperature_deviation_k: 0.0, temperature_half_width_k: 0.1, expansion_um_per_m_k: 0.0, expansion_half_width_um_per_m_k: 0.0}
-misalignment_mm: 0.1
-environmental_drift_um: 0.6
-";
-
     fn read(more: &str) -> anyhow::Result<Budget> {
-        Budget::read(&format!("{BUDGET}{more}\n"), Path::new("budget.yaml"))
+        Budget::read(&format!("{WHOLE}{more}\n"), Path::new("budget.yaml"))
     }
 
     #[test]

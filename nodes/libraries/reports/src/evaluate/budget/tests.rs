@@ -3,7 +3,7 @@
 use super::*;
 use iso230::circular::{CircularTest, CircularTrace, evaluate};
 
-const WHOLE: &str = "
+pub(super) const WHOLE: &str = "
 grid_encoder: {expanded_uncertainty_um: 0.6, expanded_uncertainty_um_per_m: 1.0, coverage_factor: 2.0}
 length_reference: {expanded_uncertainty_um: 0.1, expanded_uncertainty_um_per_m: 0.5, coverage_factor: 2.0}
 machine: {temperature_deviation_k: 0.5, temperature_half_width_k: 0.5, expansion_um_per_m_k: 11.0, expansion_half_width_um_per_m_k: 1.0}
