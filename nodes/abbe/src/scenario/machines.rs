@@ -278,7 +278,7 @@ mod tests {
         cell.other("name: vmc_5x", "name: another");
         let mut two = Cell::new();
         two.other("name: vmc_5x", "name: another");
-        for (namespace, machine) in [("/m1", "machine.yaml"), ("m2", "m2.yaml")] {
+        for (namespace, machine) in [("/m1", "machine.yaml"), ("/m2", "m2.yaml")] {
             two.node("fake_cnc", namespace, machine);
             two.node("sequencer", namespace, machine);
         }
