@@ -1,7 +1,7 @@
 //! What the bridge knows of a program's text: its frame and length, which feature each line touches, where it may
 //! stop, and which words would shift the machine's coordinates.
 
-use machine::program_frame::{has_frame_behind_semicolon, is_machine_frame};
+use machine::program_frame::{is_machine_frame, misplaced_frame};
 use metrology::bound::NAME_BYTES;
 
 use crate::waiting::Stops;
@@ -14,7 +14,7 @@ pub struct ProgramText {
     features: Vec<(u32, String)>,
     stops: Stops,
     is_machine_frame: bool,
-    has_frame_behind_semicolon: bool,
+    misplaced_frame: Option<u32>,
     touches: bool,
     shifting: Option<(u32, ShiftingWord)>,
 }
@@ -49,7 +49,7 @@ impl ProgramText {
     pub fn new(text: &str) -> Self {
         let mut program = Self {
             is_machine_frame: is_machine_frame(text),
-            has_frame_behind_semicolon: has_frame_behind_semicolon(text),
+            misplaced_frame: misplaced_frame(text),
             ..Self::default()
         };
         for line in text.lines() {
@@ -84,10 +84,10 @@ impl ProgramText {
         self.is_machine_frame
     }
 
-    /// Whether a comment of the frame stands behind a semicolon, where it does not count.
+    /// Line of the first comment of the frame that does not count, by its place or its text.
     #[must_use]
-    pub fn has_frame_behind_semicolon(&self) -> bool {
-        self.has_frame_behind_semicolon
+    pub fn misplaced_frame(&self) -> Option<u32> {
+        self.misplaced_frame
     }
 
     /// The first feature whose name is longer than a message may have it: line and bytes.
@@ -171,21 +171,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_behind_a_semicolon_is_found_and_refused_with_its_place() {
+    fn a_frame_comment_that_does_not_count_is_refused_with_its_line() {
         for (text, wanted) in [
-            (";(frame: machine)\nG0 X1\nM2\n", true),
-            ("; Frame: machine\nM2\n", true),
-            ("G21 ; part (frame: machin)\nM2\n", true),
-            ("(frame: machine) ; part\nM2\n", false),
-            ("; part 7\nM2\n", false),
+            (";(frame: machine)\nG0 X1\nM2\n", Some(1)),
+            ("G21 ; part (frame: machin)\nM2\n", Some(1)),
+            ("(frame: machin)\nG0 X1\nM2\n", Some(1)),
+            ("G21\n(frame: machine)\nG0 X1\nM2\n", Some(2)),
+            ("(frame: machine) ; part\nM2\n", None),
+            ("; part 7\nM2\n", None),
         ] {
-            let found = ProgramText::new(text).has_frame_behind_semicolon();
+            let found = ProgramText::new(text).misplaced_frame();
             assert_eq!(found, wanted, "{text:?}");
         }
-        let said = crate::run::Refusal::FrameBehindSemicolon.to_string();
+        let words = crate::run::Refusal::FrameComment(2).to_string();
         assert!(
-            said.starts_with("line 1: ") && said.contains("in parentheses"),
-            "{said}"
+            words.starts_with("line 2: ") && words.contains("in parentheses, on line 1"),
+            "{words}"
         );
     }
 

@@ -254,8 +254,8 @@ impl BridgeStage {
             Some(Refusal::Empty)
         } else if let Err(other) = program_machine::check(program, self.settings.mark) {
             Some(Refusal::OtherMachine(other))
-        } else if ProgramText::new(program).has_frame_behind_semicolon() {
-            Some(Refusal::FrameBehindSemicolon)
+        } else if let Some(line) = ProgramText::new(program).misplaced_frame() {
+            Some(Refusal::FrameComment(line))
         } else if let Some((line, word)) = ProgramText::new(program).breaks_frame() {
             Some(Refusal::ShiftsFrame { line, word })
         } else if let Some((line, bytes)) = ProgramText::new(program).long_name() {

@@ -134,11 +134,14 @@ pub struct NodeConfig {
 }
 
 impl NodeConfig {
-    /// Refuses a name in `topics` or `exclude` that is no topic's: such names are absolute.
+    /// Refuses an empty list of topics, and a name in `topics` or `exclude` that is no topic's: such names are absolute.
     ///
     /// # Errors
     /// The parameter and the name.
     pub fn check_names(&self) -> Result<(), RecorderError> {
+        if self.topics.is_empty() {
+            return Err(RecorderError::NoTopics);
+        }
         for (key, names) in [("topics", &self.topics), ("exclude", &self.exclude)] {
             let relative = names.iter().position(|name| !name.starts_with(['/', '*']));
             if let Some(index) = relative {
@@ -268,6 +271,10 @@ mod tests {
         );
         let words = config("*", "c").check_names().unwrap_err().to_string();
         assert!(words.starts_with("exclude[0] = \"c\""), "{words}");
+        let mut none = config("*", "/c");
+        none.topics.clear();
+        let words = none.check_names().unwrap_err().to_string();
+        assert!(words.starts_with("topics = []: "), "{words}");
     }
 
     #[test]

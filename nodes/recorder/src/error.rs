@@ -278,6 +278,11 @@ pub enum RecorderError {
         /// The name.
         name: String,
     },
+    /// The list of topics is empty.
+    #[error(
+        "topics = []: nothing would be recorded: name topics, or leave the parameter out to record all"
+    )]
+    NoTopics,
     /// Every topic to record is left out.
     #[error(
         "exclude = {exclude:?}: leaves out every topic of {topics:?}, so that nothing would be recorded: exclude less"

@@ -55,8 +55,28 @@ fn tile(section: &Section) -> Tile {
     let answer = section.answers.first().map_or("", String::as_str);
     let answer = answer.trim_end_matches('.');
     let (value, more) = answer.split_once(&[',', ';'][..]).unwrap_or((answer, ""));
+    let more = more.trim_start();
     let title = section.title.split(':').next().unwrap_or_default();
-    Tile::new(title, value, more.trim_start())
+    match figure_of(value) {
+        Some((name, figure)) if more.is_empty() => Tile::new(title, figure, name),
+        Some((name, figure)) => Tile::new(title, figure, format!("{name}; {more}")),
+        None => Tile::new(title, value, more),
+    }
+}
+
+/// `accuracy A 8.50 ± 0.40 µm (k = 2)` as its words, `accuracy A (k = 2)`, and its number, `8.50 ± 0.40 µm`; `None` where the
+/// number is the first word, or where more words follow it.
+fn figure_of(value: &str) -> Option<(String, String)> {
+    let words: Vec<&str> = value.split(' ').collect();
+    let begin = words.iter().position(|word| word.parse::<f64>().is_ok())?;
+    let has_u = words.get(begin + 1) == Some(&"±");
+    let end = (begin + if has_u { 4 } else { 2 }).min(words.len());
+    let behind = &words[end..];
+    let is_whole = behind.first().is_none_or(|word| word.starts_with('('));
+    (begin > 0 && is_whole).then(|| {
+        let name = [&words[..begin], behind].concat().join(" ");
+        (name, words[begin..end].join(" "))
+    })
 }
 
 fn verdict(
@@ -142,8 +162,29 @@ mod tests {
         );
         assert_eq!(tone, Tone::Plain);
         assert_eq!(screen.tiles[1].name, "Positioning X, run 1 on");
-        assert_eq!(screen.tiles[1].value, "accuracy A 8.50 ± 0.40 µm");
+        assert_eq!(screen.tiles[1].value, "8.50 ± 0.40 µm");
+        assert!(screen.tiles[1].more.starts_with("accuracy A; systematic"));
         assert_eq!(screen.lacks, ["Circle XY: Not evaluated: one sense only."]);
+    }
+
+    #[test]
+    fn a_number_is_taken_out_of_its_words_where_they_stay_readable() {
+        for (value, name, figure) in [
+            ("accuracy A 8.50 ± 0.40 µm", "accuracy A", "8.50 ± 0.40 µm"),
+            (
+                "G of both senses 10.84 ± 0.60 µm (k = 2)",
+                "G of both senses (k = 2)",
+                "10.84 ± 0.60 µm",
+            ),
+            ("reversal -3.0 µm", "reversal", "-3.0 µm"),
+            ("accuracy A — µm", "", ""),
+            ("6 recordings", "", ""),
+            ("X: scale and motor are up to 39.71 µm apart", "", ""),
+            ("", "", ""),
+        ] {
+            let wanted = (!name.is_empty()).then(|| (name.to_owned(), figure.to_owned()));
+            assert_eq!(figure_of(value), wanted, "{value:?}");
+        }
     }
 
     #[test]

@@ -63,6 +63,12 @@ const WANTED: [&str; 15] = [
 /// Offsets below this are none, mm.
 const NOTHING_MM: f64 = 1e-7;
 
+/// Whether compensation moves an axis.
+pub(crate) fn acts(compensation: &AxisCompensation) -> bool {
+    let mut offsets = compensation.total.0.iter();
+    offsets.any(|offset| offset.abs() > NOTHING_MM)
+}
+
 /// The tests of a bag, and what was computed from them while it was recorded.
 #[derive(Debug, Default)]
 pub struct Tests {
@@ -253,14 +259,10 @@ impl Collected {
     }
 
     fn compensation(&mut self, compensation: &AxisCompensation) {
-        let acts = compensation
-            .total
-            .0
-            .iter()
-            .any(|offset| offset.abs() > NOTHING_MM);
-        self.circles.compensation(acts);
-        self.linear.compensation(acts);
-        self.stops.compensation(acts);
+        let is_acting = acts(compensation);
+        self.circles.compensation(is_acting);
+        self.linear.compensation(is_acting);
+        self.stops.compensation(is_acting);
     }
 
     fn result(&mut self, taken: &mut Taken<'_>) {

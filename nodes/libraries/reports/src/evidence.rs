@@ -14,6 +14,7 @@ use node_runtime::{Diagnostic, Level};
 
 mod start_up;
 
+use crate::evaluate::acts;
 use crate::evaluate::course::Course;
 use start_up::StartUp;
 
@@ -33,6 +34,8 @@ pub struct Verification {
     pub label: String,
     /// When it began.
     pub at: Stamp<Host>,
+    /// Whether an offset acted at one of its poses at least.
+    pub is_compensated: bool,
     /// Poses in the order of the program.
     pub poses: Vec<PoseError>,
 }
@@ -262,6 +265,7 @@ impl Evidence {
             self.verifications.push(Verification {
                 label,
                 at: segment.at,
+                is_compensated: false,
                 poses: Vec::new(),
             });
         }
@@ -277,7 +281,9 @@ impl Evidence {
 
     /// Adds a pose to the verification that is under way.
     pub fn pose(&mut self, pose: PoseError) {
+        let is_compensated = self.compensation.as_ref().is_some_and(acts);
         if let Some(verification) = self.verifications.last_mut() {
+            verification.is_compensated |= is_compensated;
             verification.poses.push(pose);
         }
     }

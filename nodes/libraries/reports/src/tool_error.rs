@@ -285,6 +285,7 @@ mod tests {
         Verification {
             label: label.to_owned(),
             at: metrology::Stamp::from_nanos(0),
+            is_compensated: false,
             poses,
         }
     }

@@ -124,17 +124,26 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
     Some(section)
 }
 
-/// The first screen of the last pair of verifications without and with compensation.
+/// The first screen of the last pair of verifications without and with compensation: of those that their labels name so, else
+/// of those without and with offsets.
 #[must_use]
 pub fn screen(verifications: &[Verification]) -> Screen {
     let seen = || verifications.iter().filter(|v| !v.poses.is_empty());
     let find = |word: &str| seen().rfind(|v| v.label.contains(word));
-    let (Some(without), Some(with)) = (find("without"), find("with compensation")) else {
-        return Screen::default();
-    };
+    let acted = |wanted: bool| seen().rfind(|v| v.is_compensated == wanted);
     let p95_mm = |verification| quantile_mm(&sizes_mm(verification, false), 0.95);
-    let what = format!("{} poses", with.poses.len());
-    compensated(p95_mm(without), p95_mm(with), &what)
+    let n = |verification: &Verification| verification.poses.len();
+    if let (Some(without), Some(with)) = (find("without"), find("with compensation")) {
+        return compensated(p95_mm(without), p95_mm(with), &format!("{} poses", n(with)));
+    }
+    match (acted(false), acted(true)) {
+        (Some(without), Some(with)) if n(without) == n(with) => {
+            let labels = format!("{}, {}", without.label, with.label);
+            let what = format!("{} poses: {labels}", n(with));
+            compensated(p95_mm(without), p95_mm(with), &what)
+        }
+        _ => Screen::default(),
+    }
 }
 
 fn figures(verification: &Verification) -> serde_json::Value {
@@ -166,6 +175,7 @@ mod tests {
         Verification {
             label: label.to_owned(),
             at: Stamp::from_nanos(0),
+            is_compensated: false,
             poses: (0..27).map(pose).collect(),
         }
     }
@@ -187,6 +197,23 @@ mod tests {
         let screen = super::screen(&[moved.clone(), stretched.clone()]);
         assert!(screen.verdict.is_some() && screen.tiles.len() == 1);
         assert!(super::screen(&[moved]).verdict.is_none());
+        let named = |label: &str, is_compensated| Verification {
+            label: label.to_owned(),
+            is_compensated,
+            ..stretched.clone()
+        };
+        let pair = [
+            named("semi-closed, warm", false),
+            named("dual loop, warm", true),
+        ];
+        let (verdict, _) = super::screen(&pair).verdict.unwrap();
+        assert!(
+            verdict.contains("semi-closed, warm, dual loop, warm"),
+            "{verdict}"
+        );
+        let (mut fewer, with) = pair.into();
+        fewer.poses.pop();
+        assert!(super::screen(&[fewer, with]).verdict.is_none());
         assert!(super::section(&[]).is_none());
     }
 

@@ -239,27 +239,18 @@ impl<'a> Reader<'a> {
         let r = self.response;
         let between = |series: &[f64]| interpolate(series, reading);
         let along = |direction: &Vector3<f64>| self.tip_at(reading, true).dot(direction);
-        let stands_on = match &reading.channel {
-            Channel::Motor(axis) => between(&r.servo[*axis]) + between(&r.motor_reading[*axis]),
-            Channel::Scale(axis) => {
-                between(&r.servo[*axis])
-                    + between(&r.drive[*axis])
-                    + between(&r.scale_reading[*axis])
+        let stands_on = match (self.series_of(&reading.channel), &reading.channel) {
+            (Some(series), _) => series.into_iter().map(between).sum(),
+            (None, Channel::Radial) => along(&radial(self.run, reading)),
+            (None, Channel::Length(axis)) => {
+                along(&self.beams[*axis]) + between(&r.length_reading_mm)
             }
-            Channel::GridU => self.on_plate(reading, 0) + between(&r.grid_reading_mm[0]),
-            Channel::GridV => self.on_plate(reading, 1) + between(&r.grid_reading_mm[1]),
-            Channel::Radial => along(&radial(self.run, reading)),
-            Channel::Length(axis) => along(&self.beams[*axis]) + between(&r.length_reading_mm),
-            Channel::Touch => self.touch(reading),
-            Channel::Thermometer(_) => 0.0,
+            (None, Channel::Touch) => self.touch(reading),
+            (None, Channel::GridU) => between(&r.grid_reading_mm[0]),
+            (None, Channel::GridV) => between(&r.grid_reading_mm[1]),
+            (None, _) => 0.0,
         };
         stands_on + r.reading.get(row).copied().unwrap_or(0.0)
-    }
-
-    /// Error of the tip along a coordinate of the plate.
-    fn on_plate(&self, reading: &Reading, coordinate: usize) -> f64 {
-        let axes = plate_axes(self.run.segment.plane);
-        axes.map_or(0.0, |axes| self.tip_along(reading, axes[coordinate], true))
     }
 
     /// Error of the tip with (or without) what the control loop leaves, machine frame.

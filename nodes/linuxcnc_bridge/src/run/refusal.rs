@@ -49,8 +49,8 @@ pub enum Refusal {
     #[error(transparent)]
     OtherMachine(#[from] OtherMachine),
     /// Its comment of the frame would not count.
-    #[error("line 1: a frame comment behind a semicolon: must stand {FRAME_RULE}")]
-    FrameBehindSemicolon,
+    #[error("line {0}: a comment of the frame must be (frame: machine) and stand {FRAME_RULE}")]
+    FrameComment(u32),
     /// Its coordinates are the machine's, and it would shift them.
     #[error(
         "line {line}: {word} shifts coordinates, and those of a program with (frame: machine) are the machine's: take one of both out"

@@ -120,9 +120,9 @@ pub(super) fn reduce(gram: &DMatrix<f64>, least_sine: f64) -> Reduction {
     reduction
 }
 
-/// Which rows stay tied to others with some additions, judged once for all rows.
+/// Which rows stay tied to others with some additions, found once for all rows.
 #[derive(Debug, Default)]
-pub(super) struct Judged(RefCell<Vec<(Vec<Needed>, Vec<RowKey>)>>);
+pub(super) struct TiedRows(RefCell<Vec<(Vec<Needed>, Vec<RowKey>)>>);
 
 /// Additions each of which, or which together, would tell a row apart from the others.
 pub(super) fn needed(input: &Input, key: RowKey) -> Vec<Vec<Needed>> {
@@ -146,8 +146,8 @@ pub(super) fn needed(input: &Input, key: RowKey) -> Vec<Vec<Needed>> {
 
 /// The linear rows that cannot be distinguished with some additions.
 fn tied_with(input: &Input, additions: &[Needed]) -> Vec<RowKey> {
-    let known = |(judged, _): &&(Vec<Needed>, Vec<RowKey>)| judged == additions;
-    if let Some((_, rows)) = input.judged.0.borrow().iter().find(known) {
+    let known = |(with, _): &&(Vec<Needed>, Vec<RowKey>)| with == additions;
+    if let Some((_, rows)) = input.tied.0.borrow().iter().find(known) {
         return rows.clone();
     }
     let few = input.recordings.iter();
@@ -157,8 +157,8 @@ fn tied_with(input: &Input, additions: &[Needed]) -> Vec<RowKey> {
         add(&mut recordings, *addition);
     }
     let rows = tied(input, &recordings);
-    let mut judged = input.judged.0.borrow_mut();
-    judged.push((additions.to_vec(), rows.clone()));
+    let mut known = input.tied.0.borrow_mut();
+    known.push((additions.to_vec(), rows.clone()));
     rows
 }
 

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::config::BreakdownConfig;
 use super::contribution::{self, Rows, circularity_mm};
 use super::cross_check::{cross_check, squareness_rad};
-use super::distinguish::Judged;
+use super::distinguish::TiedRows;
 use super::error::BreakdownError;
 use super::instrument::{self, Instrument};
 use super::noise;
@@ -22,7 +22,7 @@ pub(super) struct Input<'a> {
     /// Recordings of the plane with their places in the caller's list.
     pub recordings: &'a [(usize, &'a CircularRecording)],
     pub config: &'a BreakdownConfig,
-    pub judged: Judged,
+    pub tied: TiedRows,
 }
 
 /// `instruments` by the caller's list of recordings, or none.
@@ -36,7 +36,7 @@ pub(super) fn evaluate(
         plane,
         recordings,
         config,
-        judged: Judged::default(),
+        tied: TiedRows::default(),
     };
     let scene = Scene::new(plane, recordings);
     let found = search(&input, &scene)?;

@@ -1,5 +1,6 @@
 //! ISO 230-6: the four space diagonals of a bag.
 
+use anyhow::Result;
 use iso230::diagonal;
 use iso230::diagonal::{DiagonalResult, DiagonalRuns, DiagonalsResult, SpaceDiagonal};
 use iso230::positioning::{PointResult, PositioningRuns};
@@ -10,7 +11,8 @@ use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, unstate_named};
 use crate::evaluate::correction::{About, Measured};
 use crate::evaluate::linear::LinearTest;
-use crate::section::{NOT_EVALUATED, Rows, Section, head, um};
+use crate::plot::{self, Plot, Trace};
+use crate::section::{Drawing, NOT_EVALUATED, Rows, Section, head, um};
 use crate::terminal::Rank;
 
 /// The space diagonal along which a test ran, and whether it ran it upwards.
@@ -141,6 +143,10 @@ fn diagonals_section(
             )));
             measured.state_correction(&mut section, span_mm);
             section.tables.push(of_diagonals(&result, &measured));
+            match drawing(&result) {
+                Ok(drawing) => section.drawings.push(drawing),
+                Err(error) => section.lines.push(format!("Not drawn: {error:#}.")),
+            }
             section.figures = serde_json::json!({
                 "test": section.title,
                 "iso230_6": result,
@@ -155,6 +161,28 @@ fn diagonals_section(
         Err(error) => section.not_evaluated(error),
     }
     section
+}
+
+/// Mean deviation of both directions over the distance along each diagonal.
+fn drawing(result: &DiagonalsResult) -> Result<Drawing> {
+    let trace = |one: &DiagonalResult| {
+        let points = one.positioning.points.iter();
+        Trace {
+            name: one.diagonal.name().to_owned(),
+            points: points.map(|p| (p.target_mm, p.mean_mm * 1e3)).collect(),
+            marks: false,
+        }
+    };
+    let plot = Plot {
+        x: "distance along the diagonal / mm".to_owned(),
+        y: "mean deviation of both directions / µm".to_owned(),
+        traces: result.diagonals.iter().map(trace).collect(),
+    };
+    Ok(Drawing {
+        svg: plot::svg(&plot)?,
+        caption: "The four diagonals from the mean at their lower end: lines of one slope show a scale error, of several squareness."
+            .to_owned(),
+    })
 }
 
 /// By how much a diagonal is too long, mm: the mean of both directions at its end less that at its begin.
