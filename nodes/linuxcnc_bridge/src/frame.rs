@@ -98,6 +98,8 @@ pub struct Frame {
     modal: Option<Modal>,
     absolute: Vec<f64>,
     relative: Vec<f64>,
+    /// Work offset as it is after putting back, in the units of [`Found::work`].
+    work_left: Vec<f64>,
     found: Option<Found>,
     systems: Vec<WorkSystem>,
     /// The one that is used.
@@ -131,6 +133,7 @@ impl Frame {
             modal: None,
             absolute: Vec::new(),
             relative: Vec::new(),
+            work_left: Vec::new(),
             found: None,
             systems: Vec::new(),
             system: 0,
@@ -161,7 +164,7 @@ impl Frame {
             return None;
         }
         if at - since > STEP_LIMIT {
-            return Some(self.late());
+            return self.late(client);
         }
         if client.is_idle() {
             match self.step {
@@ -175,15 +178,28 @@ impl Frame {
                 Step::Asserting { .. } | Step::Looking | Step::PuttingBack => {
                     client.ask(Request::Get(Query::ProgramCodes));
                 }
+                Step::Confirming => client.ask(Request::Get(Query::PosOffset)),
+                Step::Comparing { .. } => {
+                    client.ask(Request::Get(Query::AbsCmdPos));
+                    client.ask(Request::Get(Query::RelCmdPos));
+                }
                 _ => {}
             }
         }
         None
     }
 
-    fn late(&mut self) -> FrameNews {
+    fn late(&mut self, client: &mut Client) -> Option<FrameNews> {
         let limit_s = STEP_LIMIT.as_secs_f64();
-        match (self.step, &self.found, &self.modal) {
+        if let (Step::Confirming, Some(found), false) =
+            (self.step, &self.found, self.work_left.is_empty())
+        {
+            let (was, is) = (Shift::of(&found.work, 0.0), Shift::of(&self.work_left, 0.0));
+            self.left = Some(format!("work offset {was} was found and {is} is left"));
+            self.leave(client);
+            return None;
+        }
+        Some(match (self.step, &self.found, &self.modal) {
             (Step::PuttingBack, Some(found), Some(now)) => {
                 let mut left = found.modal.differences(now);
                 if self.tool_unseen {
@@ -201,11 +217,19 @@ impl Frame {
                 "machine coordinates: {} did not become active within {limit_s} s (active: {now})",
                 now.missing(SYSTEMS[system]).join(" ")
             )),
+            (Step::Comparing { system }, ..) if !self.relative.is_empty() => {
+                FrameNews::Refused(format!(
+                    "machine coordinates: with {} and every offset off, LinuxCNC still shifts its axes by {}: find what does so \
+                     at the control",
+                    SYSTEMS[system],
+                    self.apart()
+                ))
+            }
             _ => FrameNews::Refused(format!(
                 "machine coordinates: LinuxCNC did not report its offsets within {limit_s} s: another user interface \
                  may take its messages; close it and run again"
             )),
-        }
+        })
     }
 
     /// Takes an answer.
@@ -219,7 +243,7 @@ impl Frame {
             (_, Reply::AbsCmdPos(position)) => self.absolute.clone_from(position),
             (Step::Comparing { system }, Reply::RelCmdPos(position)) => {
                 self.relative.clone_from(position);
-                return Some(self.compare(system, client));
+                return self.compare(system, client);
             }
             (_, Reply::RelCmdPos(position)) => self.relative.clone_from(position),
             (Step::Finding, Reply::PosOffset(offset)) => return self.all_found(offset, client),
@@ -380,6 +404,7 @@ impl Frame {
         let modal = self.modal.clone()?;
         match self.step {
             Step::Asserting { system } if modal.missing(SYSTEMS[system]).is_empty() => {
+                self.relative.clear();
                 client.ask(Request::Get(Query::AbsCmdPos));
                 client.ask(Request::Get(Query::RelCmdPos));
                 self.go(Step::Comparing { system });
@@ -388,6 +413,7 @@ impl Frame {
             Step::PuttingBack => {
                 let found = self.found.as_ref()?;
                 if found.modal.differences(&modal).is_empty() && !self.tool_unseen {
+                    self.work_left.clear();
                     client.ask(Request::Get(Query::PosOffset));
                     self.go(Step::Confirming);
                 }
@@ -397,16 +423,18 @@ impl Frame {
         None
     }
 
-    fn compare(&mut self, system: usize, client: &mut Client) -> FrameNews {
+    /// What still shifts the axes.
+    fn apart(&self) -> Shift {
         let apart = { self.absolute.iter().zip(&self.relative) }
             .map(|(absolute, relative)| absolute - relative);
-        let shift = Shift::of(&apart.collect::<Vec<_>>(), 0.0);
-        if self.absolute.len() != self.relative.len() || !shift.is_zero_to(EQUAL) {
-            return FrameNews::Refused(format!(
-                "machine coordinates: with {} and every offset off, LinuxCNC still shifts its axes by {shift}: find \
-                 what does so at the control",
-                SYSTEMS[system]
-            ));
+        Shift::of(&apart.collect::<Vec<_>>(), 0.0)
+    }
+
+    /// `None`: positions differ. LinuxCNC's line of active codes is ahead of its positions, since its interpreter reads ahead of
+    /// what is carried out, so they are asked for again until the step's limit.
+    fn compare(&mut self, system: usize, client: &mut Client) -> Option<FrameNews> {
+        if self.absolute.len() != self.relative.len() || !self.apart().is_zero_to(EQUAL) {
+            return None;
         }
         client.ask(Request::Set(Setting::Mode(Mode::Auto)));
         self.go(Step::Ready);
@@ -424,10 +452,10 @@ impl Frame {
                 )
             })
         });
-        FrameNews::Ready {
+        Some(FrameNews::Ready {
             system: SYSTEMS[system],
             changed,
-        }
+        })
     }
 
     /// The program is over, or never began: put back what was found. `was_reset`: an abort made LinuxCNC's
@@ -474,14 +502,20 @@ impl Frame {
     }
 
     /// The words are those that were found: what the axes are shifted by must be, too.
+    /// Positions follow the line of active codes here as in [`Self::compare`].
     fn confirm(&mut self, work: &[f64], client: &mut Client) {
-        let Some(found) = &self.found else { return };
-        if differ(&found.work, work) {
-            let (was, is) = (Shift::of(&found.work, 0.0), Shift::of(work, 0.0));
-            self.left = Some(format!("work offset {was} was found and {is} is left"));
+        let is_back = { self.found.as_ref() }.is_some_and(|found| !differ(&found.work, work));
+        self.work_left = work.to_vec();
+        if is_back {
+            self.leave(client);
         }
-        client.ask(Request::Set(Setting::Mode(found.mode)));
-        self.go(Step::Leaving);
+    }
+
+    fn leave(&mut self, client: &mut Client) {
+        if let Some(found) = &self.found {
+            client.ask(Request::Set(Setting::Mode(found.mode)));
+            self.go(Step::Leaving);
+        }
     }
 }
 

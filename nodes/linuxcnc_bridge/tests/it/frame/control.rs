@@ -124,6 +124,8 @@ pub struct Control {
     pub stubborn: Option<&'static str>,
     /// An offset that no number of LinuxCNC's tells, mm.
     pub hidden_mm: f64,
+    /// By how much reported work offsets are still behind, mm.
+    pub behind_mm: f64,
     /// Messages go to somebody else.
     pub robbed: bool,
     /// Messages come once this is over.
@@ -147,6 +149,7 @@ impl Control {
             began_in: Vec::new(),
             stubborn: None,
             hidden_mm: 0.0,
+            behind_mm: 0.0,
             robbed: false,
             withheld: false,
             spindle: false,
@@ -203,7 +206,10 @@ impl Control {
                 });
                 format!("REL_CMD_POS {}", list(relative))
             }
-            "get pos_offset" => format!("POS_OFFSET {}", list(self.state.shift_mm())),
+            "get pos_offset" => {
+                let shift = self.state.shift_mm().map(|mm| mm + self.behind_mm);
+                format!("POS_OFFSET {}", list(shift))
+            }
             "get joint_homed" => {
                 let homed = if self.homed { "YES" } else { "NO" };
                 format!("JOINT_HOMED {homed} {homed} {homed} NO NO NO")

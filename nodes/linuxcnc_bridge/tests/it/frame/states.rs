@@ -266,6 +266,28 @@ fn offsets_that_are_reported_late_are_waited_for() {
     assert!(desk.control.began_in[0].has("G90"));
 }
 
+/// LinuxCNC's positions follow its line of active codes: neither before nor after a program is the first answer the last word.
+#[test]
+fn positions_that_follow_the_active_codes_later_are_waited_for() {
+    let mut control = Control::new(State::usual().with("G55"));
+    control.state.systems[1][0] = -10.0;
+    control.hidden_mm = -10.0;
+    let mut desk = Desk::with(control, linuxcnc_bridge::config::Prepare::Observe);
+    desk.begin(&program());
+    desk.later(6.0);
+    assert!(desk.endings.is_empty() && desk.control.began_in.is_empty());
+    desk.control.hidden_mm = 0.0;
+    desk.later(4.0);
+    assert_eq!(desk.control.began_in.len(), 1);
+    desk.control.behind_mm = 10.0;
+    desk.run_out();
+    desk.later(2.0);
+    assert!(desk.endings.is_empty());
+    desk.control.behind_mm = 0.0;
+    desk.later(4.0);
+    assert_eq!(desk.ending(), (Outcome::Done, ""));
+}
+
 #[test]
 fn a_program_of_its_authors_own_runs_in_the_state_that_is_there() {
     let mut found = State::usual().with("G91").with("G18");
