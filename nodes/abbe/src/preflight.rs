@@ -25,8 +25,10 @@ mod floors;
 mod ideal;
 mod outcome;
 mod programme;
+mod requests;
 mod size;
 mod wanted;
+mod warming;
 
 use design::{Means, Mounting};
 use floors::FloorArgument;
@@ -160,10 +162,18 @@ impl Preflight {
             plan.programs.clone(),
             &plan.machine,
             &plan.control,
+            plan.beside(),
         )?;
+        size::check_touches(run.touches)?;
         let floors = floors::floors(&plan.machine, &self.floor);
         let forecast = preflight(&plan.machine, &run.session, &floors, &GapConfig::default())?;
-        let page = planned::page("What a diagnosis would find", &forecast, run.minutes);
+        let rehearsed = planned::Rehearsed {
+            minutes: run.minutes,
+            requested: run.requested,
+            is_unasked: plan.is_unasked(),
+            changes_k: &run.changes_k,
+        };
+        let page = planned::page("What a diagnosis would find", &forecast, &rehearsed);
         let title = format!("Preflight of: {}", plan.plan.title);
         if let Some(path) = &self.html {
             let sections = geometry.sections();
