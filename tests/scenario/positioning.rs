@@ -9,6 +9,7 @@ use metrology::sample::TestKind;
 use recorder::Bag;
 use serde_json::Value;
 
+use crate::foreseen::Foreseen;
 use crate::recorded::{all, quantile, stops, tests};
 
 /// Rest after which a stop counts, s.
@@ -22,12 +23,17 @@ struct Run {
 }
 
 fn run(name: &str) -> Run {
-    run_of(name, Scenario::copy_of(name))
+    let scenario = Scenario::copy_of(name);
+    let foreseen = Foreseen::begin(&scenario.folder());
+    run_of(name, scenario, Some(foreseen))
 }
 
-fn run_of(name: &str, scenario: Scenario) -> Run {
+fn run_of(name: &str, scenario: Scenario, foreseen: Option<Foreseen>) -> Run {
     let began = Instant::now();
     let run = scenario.run();
+    if let Some(foreseen) = foreseen {
+        foreseen.agrees(&scenario.folder(), &run);
+    }
     let text = std::fs::read_to_string(run.join("report.json")).unwrap();
     let found = Run {
         report: serde_json::from_str(&text).unwrap(),
@@ -221,7 +227,7 @@ fn in_a_shop_of(degc: &str, with_budget: bool) -> Run {
     if !with_budget {
         std::fs::remove_file(scenario.path("budget.yaml")).unwrap();
     }
-    run_of("full_closed", scenario)
+    run_of("full_closed", scenario, None)
 }
 
 #[test]

@@ -157,6 +157,23 @@ impl Preflight {
         let plan = Planned::read(what, self.machine.as_deref())?;
         size::check(&plan.plan, &plan.programs, &plan.machine)?;
         let geometry = self.geometry(&plan, u_um * 1e-3)?;
+        let page = self.foreseen(&plan)?;
+        let title = format!("Preflight of: {}", plan.plan.title);
+        if let Some(path) = &self.html {
+            let sections = geometry.sections();
+            let body = maud::html! {
+                h1 { (title) }
+                (page.body)
+                @for section in &sections { (section.html()) }
+            };
+            let html = reports::html(&title, &body);
+            whole_file::write(path, &html)?;
+        }
+        self.tell(&plan, &geometry, page)
+    }
+
+    /// What a diagnosis would find of what the plan, and what its nodes ask for, would record.
+    fn foreseen(&self, plan: &Planned) -> Result<Report> {
         let run = dry_run::dry_run(
             &plan.plan,
             plan.programs.clone(),
@@ -173,19 +190,11 @@ impl Preflight {
             is_unasked: plan.is_unasked(),
             changes_k: &run.changes_k,
         };
-        let page = planned::page("What a diagnosis would find", &forecast, &rehearsed);
-        let title = format!("Preflight of: {}", plan.plan.title);
-        if let Some(path) = &self.html {
-            let sections = geometry.sections();
-            let body = maud::html! {
-                h1 { (title) }
-                (page.body)
-                @for section in &sections { (section.html()) }
-            };
-            let html = reports::html(&title, &body);
-            whole_file::write(path, &html)?;
-        }
-        self.tell(&plan, &geometry, page)
+        Ok(planned::page(
+            "What a diagnosis would find",
+            &forecast,
+            &rehearsed,
+        ))
     }
 
     /// As [`design::Wanted::execute`].

@@ -72,11 +72,11 @@ impl Requests {
             self.look_at = now + LOOK;
             self.step(now, Input::Tick);
         }
-        let requests = self.out.drain(..).filter_map(|output| match output {
+        let mut requests = self.out.drain(..).filter_map(|output| match output {
             Output::UpdateRequest(request) => Some(request),
             _ => None,
         });
-        requests.last()
+        requests.next_back()
     }
 
     fn step(&mut self, now: Stamp<Host>, input: Input) {

@@ -19,7 +19,7 @@
 use std::f64::consts::TAU;
 
 use machine::MachineFile;
-use machine::file::{SensorPlace, TemperatureSensorEntry};
+use machine::file::{SensorEntry, SensorPlace};
 use metrology::stamp::Span;
 use metrology::{Axis, PerAxis};
 
@@ -84,7 +84,7 @@ struct Place {
 }
 
 impl Place {
-    fn new(sensor: &TemperatureSensorEntry) -> Self {
+    fn new(sensor: &SensorEntry) -> Self {
         let sources = SOURCES.iter().enumerate().filter_map(|(index, heat)| {
             let (rise_k, tau_min) = response(sensor.place, *heat)?;
             Some((index, rise_k, Lag::new(tau_min)))

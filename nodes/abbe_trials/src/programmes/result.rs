@@ -36,7 +36,7 @@ impl Line {
                 let verdict = &judged.verdict;
                 let large = verdict.truth.effects.iter();
                 let large = large.filter(move |effect| effect.d >= least_d);
-                large.map(|effect| verdict.has(effect))
+                large.map(move |effect| verdict.has(effect))
             });
             Proportion::of(each)
         };

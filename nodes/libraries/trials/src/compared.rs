@@ -143,7 +143,7 @@ impl Compared {
             }
             Self::Shop => {
                 let tests = of_shop(machine);
-                let often = |times| {
+                let often = |times: usize| -> Vec<String> {
                     let each = tests.iter();
                     each.flat_map(|test| vec![test.clone(); times]).collect()
                 };
