@@ -9,7 +9,6 @@ use metrology::sample::TestKind;
 use recorder::Bag;
 use serde_json::Value;
 
-use crate::foreseen::Foreseen;
 use crate::recorded::{all, quantile, stops, tests};
 
 /// Rest after which a stop counts, s.
@@ -23,17 +22,12 @@ struct Run {
 }
 
 fn run(name: &str) -> Run {
-    let scenario = Scenario::copy_of(name);
-    let foreseen = Foreseen::begin(&scenario.folder());
-    run_of(name, scenario, Some(foreseen))
+    run_of(name, Scenario::copy_of(name))
 }
 
-fn run_of(name: &str, scenario: Scenario, foreseen: Option<Foreseen>) -> Run {
+fn run_of(name: &str, scenario: Scenario) -> Run {
     let began = Instant::now();
     let run = scenario.run();
-    if let Some(foreseen) = foreseen {
-        foreseen.agrees(&scenario.folder(), &run);
-    }
     let text = std::fs::read_to_string(run.join("report.json")).unwrap();
     let found = Run {
         report: serde_json::from_str(&text).unwrap(),
@@ -227,7 +221,7 @@ fn in_a_shop_of(degc: &str, with_budget: bool) -> Run {
     if !with_budget {
         std::fs::remove_file(scenario.path("budget.yaml")).unwrap();
     }
-    run_of("full_closed", scenario, None)
+    run_of("full_closed", scenario)
 }
 
 #[test]

@@ -97,7 +97,7 @@ impl Table {
     }
 
     pub(super) fn markdown(&self) -> String {
-        let mut text = format!("# {TITLE}\n\n");
+        let mut text = format!("# {PROGRAMMES_TITLE}\n\n");
         for line in self.sentences() {
             let _ = writeln!(text, "{line}\n");
         }
@@ -145,7 +145,7 @@ impl Table {
     }
 
     fn section(&self) -> Section {
-        let mut section = Section::new(TITLE);
+        let mut section = Section::new(PROGRAMMES_TITLE);
         section.tables.push(Rows {
             head: head(&[
                 "programme",
@@ -164,7 +164,7 @@ impl Table {
     }
 }
 
-const TITLE: &str = "Programmes of the same minutes";
+const PROGRAMMES_TITLE: &str = "Programmes of the same minutes";
 
 /// One programme on one machine in a line.
 pub(super) fn sentence(judged: &Judged) -> String {
