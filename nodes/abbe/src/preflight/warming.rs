@@ -31,7 +31,7 @@ pub const COLD_DEGC: f64 = 20.0;
 /// S, K.
 const ROOM_SWING_K: f64 = 2.0;
 /// The period of (2), s.
-const DAY_S: f64 = 24.0 * 3600.0;
+const DAY_S: f64 = 86_400.0;
 /// Step of (1) and (2), s.
 const WARMING_STEP_S: f64 = 1.0;
 /// What warms a machine.
