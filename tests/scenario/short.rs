@@ -136,7 +136,10 @@ fn a_preflight_takes_forty_lines() {
         assert_eq!(short.contains(geometry), scenario != "first_run", "{short}");
         // Kinds that would show have a line for each axis, those that would not one together.
         assert!(whole.lines().count() >= lines, "{whole}");
-        assert!(whole.contains("\nTemperatures that are assumed\n"), "{whole}");
+        assert!(
+            whole.contains("\nTemperatures that are assumed\n"),
+            "{whole}"
+        );
     }
 }
 

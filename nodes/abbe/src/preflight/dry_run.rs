@@ -261,3 +261,63 @@ impl Rehearsal {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::super::programme::Planned;
+    use super::*;
+
+    /// The cold blocks and half an hour of production of `first_run`.
+    fn half_an_hour() -> Planned {
+        let folder = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../launch_configs/first_run"
+        );
+        let mut planned = Planned::read(Path::new(folder), None).unwrap();
+        planned.plan.steps = vec![
+            Step::Blocks {
+                blocks: Vec::new(),
+                cold: true,
+            },
+            Step::Produce {
+                program: "production.ngc".to_owned(),
+                minutes: 30.0,
+                serve_updates: true,
+            },
+        ];
+        planned
+    }
+
+    fn run(planned: &Planned, beside: Beside<'_>) -> DryRun {
+        let programs = planned.programs.clone();
+        dry_run(
+            &planned.plan,
+            programs,
+            &planned.machine,
+            &planned.control,
+            beside,
+        )
+        .unwrap()
+    }
+
+    /// It asks once the load has changed for the least period of 5 min, and 15 min after each cycle: 5 and 20 min.
+    #[test]
+    fn the_thermal_model_of_a_scenario_adds_its_cycles_and_production_warms_the_machine() {
+        let planned = half_an_hour();
+        let with = run(&planned, planned.beside());
+        assert!((1..=3).contains(&with.requested), "{}", with.requested);
+        let cycles = 1 + with.requested;
+        assert_eq!(with.session.runs.len(), cycles as usize);
+        assert_eq!(with.touches, 6 * u64::from(cycles));
+        let change_k = |run: &DryRun, id: &str| {
+            let found = run.changes_k.iter().find(|(sensor, _)| sensor == id);
+            found.map(|(_, change_k)| *change_k)
+        };
+        assert!(change_k(&with, "spindle_front").unwrap() > 5.0);
+        let still = run(&planned, Beside::default());
+        assert_eq!((still.requested, still.session.runs.len()), (0, 1));
+        assert_eq!(change_k(&still, "spindle_front"), None);
+    }
+}
