@@ -16,6 +16,7 @@ use nalgebra::Vector3;
 use recorder::Bag;
 use serde_json::Value;
 
+use crate::foreseen::Foreseen;
 use crate::recorded::{all, stops, tests};
 use crate::shadow::Shadow;
 
@@ -166,7 +167,9 @@ fn means_of(diagonal: &Value) -> Means {
 #[test]
 fn the_four_space_diagonals_are_what_the_plants_tool_did_along_them() {
     let scenario = Scenario::copy_of("diagonals");
+    let foreseen = Foreseen::begin(&scenario.folder());
     let run = scenario.run();
+    foreseen.agrees(&scenario.folder(), &run);
     let report = std::fs::read_to_string(run.join("report.json")).unwrap();
     let report: Value = serde_json::from_str(&report).unwrap();
     let tests = report["tests"].as_array().unwrap();

@@ -7,6 +7,7 @@ use abbe_tests::program::{Process, command};
 use abbe_tests::scenario::Scenario;
 use serde_json::Value;
 
+use crate::foreseen::Foreseen;
 use crate::{page, told};
 
 /// The plant's lost motion on X: its play, and what its screw gives way (165 and 155 N/µm from the bearings to the nut's
@@ -68,7 +69,9 @@ fn run_and_read(scenario: &Scenario) -> (PathBuf, [String; 2]) {
 #[test]
 fn scenario_gap_first_names_the_backlash_and_a_run_on_the_new_file_leaves_a_tenth_of_the_gap() {
     let scenario = Scenario::copy_of("gap_first");
+    let foreseen = Foreseen::begin(&scenario.folder());
     let (run, said) = run_and_read(&scenario);
+    foreseen.agrees(&scenario.folder(), &run);
     let better = scenario.path("better.yaml");
     let mut diagnose = command(0, &["diagnose"]);
     diagnose.arg(run.join("bag"));

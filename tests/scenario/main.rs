@@ -13,6 +13,7 @@ mod cell;
 mod design;
 mod diagonals;
 mod five_axis;
+mod foreseen;
 mod gap_bad_bags;
 mod gap_first;
 mod gap_import;

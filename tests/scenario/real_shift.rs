@@ -11,6 +11,8 @@ use metrology::sample::Verdict;
 use recorder::{Bag, Event, Order};
 use serde_json::Value;
 
+use crate::foreseen::Foreseen;
+
 const DATA: &str = "nodes/mtconnect_bridge/tests/data";
 
 /// What the programs add up to: turns of the spindle, travels of X, Y and Z in mm, time in s.
@@ -175,7 +177,9 @@ fn a_log_that_lacks_the_shift_or_a_part_of_it_is_no_standing_machine() {
 fn scenario_a_real_shift_is_compensated_and_its_log_stands_beside_it() {
     let began = Instant::now();
     let scenario = Scenario::copy_of("real_shift");
+    let foreseen = Foreseen::begin(&scenario.folder());
     let run = scenario.run();
+    foreseen.agrees(&scenario.folder(), &run);
     let report: Value = serde_json::from_str(&read(&run.join("report.json"))).unwrap();
     let span = &report["tool_error_in_blocks_span"];
     let p95_mm = |which: &str| span[which]["change_since_cold_p95_mm"].as_f64().unwrap();

@@ -6,6 +6,7 @@ use std::time::Instant;
 use abbe_tests::scenario::Scenario;
 use serde_json::Value;
 
+use crate::foreseen::Foreseen;
 use crate::{page, told};
 
 fn number(report: &Value, key: &str) -> f64 {
@@ -29,9 +30,11 @@ struct Ran {
 fn warm_up(name: &str, least_reduction: f64) -> Ran {
     let began = Instant::now();
     let scenario = Scenario::copy_of(name);
+    let foreseen = Foreseen::begin(&scenario.folder());
     let ended = scenario.run_to_end(&[]);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
     let run = scenario.new_run(&[]);
+    foreseen.agrees(&scenario.folder(), &run);
     let report = read(&run.join("report.json"));
     let took = began.elapsed();
     let error_s = number(&report, "latency_s") - number(&report, "true_latency_s");

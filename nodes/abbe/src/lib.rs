@@ -31,7 +31,7 @@ mod new_machine;
 mod node;
 mod pdf;
 mod play;
-mod preflight;
+pub mod preflight;
 mod progress;
 mod record;
 mod report_bag;

@@ -25,8 +25,10 @@ mod floors;
 mod ideal;
 mod outcome;
 mod programme;
+mod requests;
 mod size;
 mod wanted;
+mod warming;
 
 use design::{Means, Mounting};
 use floors::FloorArgument;
@@ -155,15 +157,7 @@ impl Preflight {
         let plan = Planned::read(what, self.machine.as_deref())?;
         size::check(&plan.plan, &plan.programs, &plan.machine)?;
         let geometry = self.geometry(&plan, u_um * 1e-3)?;
-        let run = dry_run::dry_run(
-            &plan.plan,
-            plan.programs.clone(),
-            &plan.machine,
-            &plan.control,
-        )?;
-        let floors = floors::floors(&plan.machine, &self.floor);
-        let forecast = preflight(&plan.machine, &run.session, &floors, &GapConfig::default())?;
-        let page = planned::page("What a diagnosis would find", &forecast, run.minutes);
+        let page = self.foreseen(&plan)?;
         let title = format!("Preflight of: {}", plan.plan.title);
         if let Some(path) = &self.html {
             let sections = geometry.sections();
@@ -176,6 +170,31 @@ impl Preflight {
             whole_file::write(path, &html)?;
         }
         self.tell(&plan, &geometry, page)
+    }
+
+    /// What a diagnosis would find of what the plan, and what its nodes ask for, would record.
+    fn foreseen(&self, plan: &Planned) -> Result<Report> {
+        let run = dry_run::dry_run(
+            &plan.plan,
+            plan.programs.clone(),
+            &plan.machine,
+            &plan.control,
+            plan.beside(),
+        )?;
+        size::check_touches(run.touches)?;
+        let floors = floors::floors(&plan.machine, &self.floor);
+        let forecast = preflight(&plan.machine, &run.session, &floors, &GapConfig::default())?;
+        let rehearsed = planned::Rehearsed {
+            minutes: run.minutes,
+            requested: run.requested,
+            is_unasked: plan.is_unasked(),
+            changes_k: &run.changes_k,
+        };
+        Ok(planned::page(
+            "What a diagnosis would find",
+            &forecast,
+            &rehearsed,
+        ))
     }
 
     /// As [`design::Wanted::execute`].

@@ -231,7 +231,8 @@ pub fn once(rules: &[Rule]) -> Vec<Rule> {
     rules.into_iter().collect()
 }
 
-fn input(sample: Sample) -> Input {
+/// A sample as a session takes it.
+pub fn input(sample: Sample) -> Input {
     match sample {
         Sample::State(state) => Input::State(state),
         Sample::Grid(sample) => Input::Grid(sample),

@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use abbe::diagnose::Diagnose;
+use abbe::preflight::Preflight;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
 use gap_diagnosis::Rule;
@@ -27,6 +28,7 @@ use trials::{Arm, Verdict};
 mod blind;
 mod journal;
 mod later;
+mod programmes;
 mod seal;
 mod series;
 mod session_bag;
@@ -35,6 +37,7 @@ mod tree;
 mod trial;
 
 use journal::Journal;
+use programmes::Programmes;
 use series::Series;
 use trial::How;
 
@@ -60,6 +63,11 @@ enum Verb {
     /// `abbe diagnose`: the process that this program starts for each trial.
     #[command(hide = true)]
     Diagnose(Diagnose),
+    /// `abbe preflight`: the process that designs a programme for a drawn machine file.
+    #[command(hide = true)]
+    Preflight(Preflight),
+    /// Compare the designed programme with others of the same minutes, on the same machines, before the same judge.
+    Programmes(Programmes),
 }
 
 /// Which trials are made, and where their files are.
@@ -125,6 +133,8 @@ fn main() -> ExitCode {
     let Arguments { trials, verb } = Arguments::parse();
     let outcome = match verb {
         Some(Verb::Diagnose(diagnose)) => diagnose.execute(),
+        Some(Verb::Preflight(preflight)) => preflight.execute(),
+        Some(Verb::Programmes(programmes)) => programmes.execute(),
         None => trials.execute(),
     };
     outcome.unwrap_or_else(|error| abbe::report_failure("abbe-trials", &error))

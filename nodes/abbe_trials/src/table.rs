@@ -223,7 +223,7 @@ fn computer() -> String {
     format!("{cores} cores of {name}")
 }
 
-fn markdown_table(rows: &Rows) -> String {
+pub(crate) fn markdown_table(rows: &Rows) -> String {
     let line = |cells: &[String]| {
         let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "/")).collect();
         format!("| {} |\n", cells.join(" | "))

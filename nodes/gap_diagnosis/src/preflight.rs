@@ -19,7 +19,7 @@
 //!
 //! # Holds when
 //! The machine moves as the control plans and the floor is what repeats will show. Temperatures are those that the
-//! session holds: an ideal machine's stand still, so effects that follow a thermometer show only by the time that passes.
+//! session holds: where they stand still, effects that follow a thermometer show only by the time that passes.
 //!
 //! # Agreement
 //! `eq1_a_backlash_of_the_foreseen_size_has_the_d_that_detects`: a play of the size foreseen, simulated, has D95 to 6 %

@@ -21,10 +21,10 @@ use twin::Instrument;
 pub mod folder;
 mod instruments;
 mod likely;
-mod menu;
+pub(super) mod menu;
 mod programs;
 pub mod stand_in;
-mod temperatures;
+pub(super) mod temperatures;
 
 pub use super::programme::control;
 pub use instruments::{Means, Mounting, means, mounting};
@@ -274,7 +274,13 @@ fn candidate(
         ballbar(machine, bar).context("a plane without axes")?
     } else {
         let plan = Plan::from_yaml(&plan_of(offer))?;
-        let run = dry_run::dry_run(&plan, offer.programs.clone(), machine, control)?;
+        let run = dry_run::dry_run(
+            &plan,
+            offer.programs.clone(),
+            machine,
+            control,
+            dry_run::Beside::default(),
+        )?;
         let mut session = run.session;
         if let Some(heat) = offer.heat {
             temperatures::foresee(&mut session, machine, heat);

@@ -1,7 +1,7 @@
 //! A machine without errors, for a programme to be run on before anything is measured.
 //!
 //! Motors do what the loops demand, axes stand where their motors do, readings are what the command says,
-//! temperatures stand still, and the ball meets the surfaces that the machine file describes:
+//! temperatures stand still or are those of [`super::warming`], and the ball meets the surfaces that the machine file describes:
 //!
 //! ```text
 //!   dv/dt = u,   dx/dt = v                                                (1)
@@ -17,8 +17,10 @@ use metrology::stamp::Span;
 use metrology::{Axis, AxisSet, PerAxis};
 use nalgebra::Vector3;
 
+use super::warming::{COLD_DEGC, Warming};
+
 /// Temperature of everything, degC.
-const IDEAL_TEMPERATURE_DEGC: f64 = 20.0;
+const IDEAL_TEMPERATURE_DEGC: f64 = COLD_DEGC;
 /// Half the thickness that a wall or plate is given, and half the height of a bore or boss, mm.
 const HALF_WALL_MM: f64 = 5.0;
 /// Distance from a surface within which every period is looked at, mm.
@@ -160,6 +162,7 @@ pub struct IdealMachine {
     mounted: Option<Device>,
     grid_zero: (u32, Vector3<f64>),
     length_zero: (u32, Vector3<f64>),
+    warming: Option<Warming>,
 }
 
 impl IdealMachine {
@@ -206,7 +209,20 @@ impl IdealMachine {
             mounted: None,
             grid_zero: (0, Vector3::zeros()),
             length_zero: (0, Vector3::zeros()),
+            warming: None,
         })
+    }
+
+    /// The same, but what moves warms it.
+    #[must_use]
+    pub fn warming(mut self, machine: &MachineFile) -> Self {
+        self.warming = Some(Warming::new(machine));
+        self
+    }
+
+    /// How far each thermometer has changed, K; none where temperatures stand still.
+    pub fn changes_k(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.warming.iter().flat_map(Warming::changes_k)
     }
 
     /// (2): distance of the ball from the nearest surface, mm.
@@ -250,7 +266,7 @@ impl IdealMachine {
 }
 
 impl Hardware for IdealMachine {
-    fn step(&mut self, demand: &PerAxis<f64>, _spindle_rpm: f64, period: Span) -> Feedback {
+    fn step(&mut self, demand: &PerAxis<f64>, spindle_rpm: f64, period: Span) -> Feedback {
         let period_s = period.as_secs_f64();
         let before = self.position;
         self.edge = None;
@@ -262,6 +278,9 @@ impl Hardware for IdealMachine {
         }
         if self.clear_mm <= 0.0 {
             self.look(&before, period);
+        }
+        if let Some(warming) = &mut self.warming {
+            warming.step(&self.velocity, spindle_rpm, period);
         }
         self.feedback()
     }
@@ -288,8 +307,11 @@ impl Hardware for IdealMachine {
         self.closed
     }
 
-    fn sensor_reading_degc(&mut self, _id: &str) -> Option<f64> {
-        Some(IDEAL_TEMPERATURE_DEGC)
+    fn sensor_reading_degc(&mut self, id: &str) -> Option<f64> {
+        match &self.warming {
+            Some(warming) => warming.reading_degc(id),
+            None => Some(IDEAL_TEMPERATURE_DEGC),
+        }
     }
 
     fn settle_at(&mut self, position: &PerAxis<f64>) {

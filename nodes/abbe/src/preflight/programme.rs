@@ -16,7 +16,9 @@ use node_runtime::arguments::Arguments;
 use node_runtime::text_file::{self, Comments};
 use sequencer::{Plan, Step, recordings};
 use sequencer_node::read_plan;
+use thermal_model::ThermalModelConfig;
 
+use super::dry_run::Beside;
 use crate::launch::LaunchNode;
 use crate::scenario::Scenario;
 
@@ -36,6 +38,8 @@ pub struct Planned {
     pub control: fake_cnc::Config,
     /// Parameters of the fit.
     pub fit: GridEncoderConfig,
+    /// Parameters of the thermal model, where the scenario has one: it asks for block cycles.
+    pub thermal_model: Option<ThermalModelConfig>,
     /// As the user gave it.
     what: String,
 }
@@ -60,11 +64,34 @@ impl Planned {
                 control: control(&machine),
                 machine,
                 fit: GridEncoderConfig::default(),
+                thermal_model: None,
                 what: String::new(),
             }
         };
         planned.what = what.display().to_string();
         Ok(planned)
+    }
+
+    /// What happens beside the plan.
+    pub const fn beside(&self) -> Beside<'_> {
+        Beside {
+            warms: true,
+            thermal_model: self.thermal_model.as_ref(),
+        }
+    }
+
+    /// Whether production serves block cycles that nobody is known to ask for.
+    pub fn is_unasked(&self) -> bool {
+        let serves = |step: &Step| {
+            matches!(
+                step,
+                Step::Produce {
+                    serve_updates: true,
+                    ..
+                }
+            )
+        };
+        self.thermal_model.is_none() && self.plan.steps.iter().any(serves)
     }
 
     /// Scenario or plan, as the user gave it.
@@ -149,6 +176,10 @@ fn of_scenario(folder: &Path, machine: Option<&Path>) -> Result<Planned> {
         fit: match find("grid_encoder") {
             Some(node) => self::setup(node)?.config()?,
             None => GridEncoderConfig::default(),
+        },
+        thermal_model: match find("thermal_model") {
+            Some(node) => Some(self::setup(node)?.config()?),
+            None => None,
         },
         what: String::new(),
     })

@@ -56,6 +56,15 @@ fn expected_s(load: &Load) -> f64 {
     RUN_S * load.runs as f64 + STOP_S * load.stops as f64 + TOUCHES_S * touches * touches
 }
 
+/// Refuses more touches than a preflight compares, those of cycles that nodes ask for counted.
+///
+/// # Errors
+/// With their number, the limit and the remedy.
+pub fn check_touches(touches: u64) -> Result<()> {
+    TOUCHES.check_amount(|| "run of a preflight".to_owned(), "touches", touches)?;
+    Ok(())
+}
+
 fn within(load: &Load) -> Result<()> {
     let place = || "plan for a preflight".to_owned();
     RUNS.check_amount(place, "runs of measuring steps", load.runs)?;

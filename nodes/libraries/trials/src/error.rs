@@ -5,6 +5,7 @@ use machine::MachineFileError;
 use sequencer::SequencerError;
 
 use crate::arm::Arm;
+use crate::compared::Compared;
 use metrology::number::number;
 
 /// A trial that cannot be made.
@@ -56,6 +57,16 @@ pub enum TrialError {
     ProgrammeText {
         /// Line, and what is wrong there.
         source: sequencer::PlanError,
+    },
+    /// A programme of the comparison does not fit into its minutes.
+    #[error("programme {programme}: {} min are too few, it needs {} min: give more with --minutes", number(*minutes), number(*needs_min))]
+    TooFewMinutes {
+        /// Which.
+        programme: Compared,
+        /// What there is.
+        minutes: f64,
+        /// What one pass of it takes, set-ups included.
+        needs_min: f64,
     },
     /// A program ended early on the plant.
     #[error("run {run} failed: {message}")]

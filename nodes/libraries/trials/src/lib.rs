@@ -7,7 +7,7 @@
 //! catalogue, whose ids it only writes down. The *diagnoser* is `abbe diagnose`, a process that is given the bag and
 //! the machine file. The *judge* is `verdict` for one trial, `tally`, `calibration`, `confusion` and `detection` for all of
 //! them, `covariate` knows what a leftover should go with, `target` says which figures are as good as they should be;
-//! `comparison` puts the methods of `baseline` and diagnoses without one of their rules before the same judge.
+//! `compared` has the programmes that a designed one is compared with; `comparison` puts the methods of `baseline` and diagnoses without one of their rules before the same judge.
 //!
 //! `size` says how large a hidden effect is for these measurements: D, the root of its chi-square against the
 //! trial's own scatter, of which the generator, unlike the diagnoser, knows the covariance.
@@ -16,6 +16,7 @@ pub mod arm;
 pub mod baseline;
 pub mod calibration;
 mod commissioning;
+pub mod compared;
 pub mod comparison;
 pub mod confusion;
 pub mod covariate;
@@ -39,6 +40,7 @@ pub mod verdict;
 
 pub use arm::Arm;
 pub use baseline::Method;
+pub use compared::Compared;
 pub use effect::Class;
 pub use error::TrialError;
 pub use measurement::{Sample, measure};

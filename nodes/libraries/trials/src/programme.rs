@@ -18,7 +18,7 @@ use crate::error::TrialError;
 /// Targets of a positioning run.
 const TARGETS: f64 = 9.0;
 /// Way from a beam's end to the first target, mm.
-const BEAM_MARGIN_MM: f64 = 20.0;
+pub(crate) const BEAM_MARGIN_MM: f64 = 20.0;
 
 /// Radii and feeds of the circles, the repeated ones first.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -22,7 +22,7 @@ const BEGIN_DEGC: f64 = 20.0;
 const LEAST_PAUSE_S: f64 = 400.0;
 
 /// Rise in the end, K, and time constant, min, of a place.
-const fn response(place: SensorPlace, heat: Heat) -> Option<(f64, f64)> {
+pub(in crate::preflight) const fn response(place: SensorPlace, heat: Heat) -> Option<(f64, f64)> {
     Some(match (place, heat) {
         (SensorPlace::NutX, Heat::Axis(Axis::X))
         | (SensorPlace::NutY, Heat::Axis(Axis::Y))

@@ -12,12 +12,27 @@ use crate::terminal::{self, Part, Rank};
 /// Names of other effects in one cell.
 const MOST_NAMES: usize = 3;
 
-/// The page of a programme of so many minutes.
-pub fn page(title: &str, forecast: &Preflight, minutes: f64) -> Report {
-    let lines = sentences(forecast, minutes);
+/// What a rehearsal of a programme has besides its forecast.
+#[derive(Clone, Copy, Debug)]
+pub struct Rehearsed<'r> {
+    /// How long it takes.
+    pub minutes: f64,
+    /// Block cycles that the thermal model asks for.
+    pub requested: u32,
+    /// Whether production serves block cycles, and nobody is known that asks for them.
+    pub is_unasked: bool,
+    /// How far each thermometer is assumed to change, K.
+    pub changes_k: &'r [(String, f64)],
+}
+
+/// The page of a programme.
+pub fn page(title: &str, forecast: &Preflight, rehearsed: &Rehearsed<'_>) -> Report {
+    let mut lines = sentences(forecast, rehearsed.minutes);
+    lines.extend(besides(rehearsed));
     let sections: Vec<Section> = [
         effects(forecast),
         hidden(forecast),
+        temperatures(rehearsed).ranked(Rank::Detail),
         floor(forecast).ranked(Rank::Detail),
     ]
     .into_iter()
@@ -34,7 +49,12 @@ pub fn page(title: &str, forecast: &Preflight, minutes: f64) -> Report {
             @for section in &sections { (section.html()) }
             (matrix::isolability(&forecast.isolability))
         },
-        figures: serde_json::json!({ "minutes": minutes, "forecast": forecast }),
+        figures: serde_json::json!({
+            "minutes": rehearsed.minutes,
+            "requested_block_cycles": rehearsed.requested,
+            "temperature_changes_k": rehearsed.changes_k.iter().cloned().collect::<std::collections::BTreeMap<_, _>>(),
+            "forecast": forecast,
+        }),
         lines,
     }
 }
@@ -79,6 +99,28 @@ fn sentences(forecast: &Preflight, minutes: f64) -> Vec<String> {
     }
     lines.push(imitated(forecast));
     lines
+}
+
+/// What is foreseen beside the plan.
+fn besides(rehearsed: &Rehearsed<'_>) -> Option<String> {
+    if rehearsed.is_unasked {
+        return Some("Production serves block cycles; who asks for them stands in a scenario: give its folder to count them.".to_owned());
+    }
+    let n = rehearsed.requested;
+    (n > 0).then(|| {
+        format!("The thermal model asks for {n} block cycles during production, which are counted; changes of the load and drift of the real machine can ask for more.")
+    })
+}
+
+fn temperatures(rehearsed: &Rehearsed<'_>) -> Section {
+    let changes = rehearsed.changes_k.iter();
+    let rows = changes.map(|(sensor, change_k)| vec![sensor.clone(), three(*change_k)]);
+    section(
+        "Temperatures that are assumed",
+        &["thermometer", "changes by K"],
+        rows.collect(),
+        "Of a machining centre of usual size that begins cold, by its axes and spindle as the plan moves them, in a room that swings by 2 K within a day. The machine itself does not grow in a forecast.",
+    )
 }
 
 fn held_out(forecast: &Preflight) -> String {
@@ -153,7 +195,7 @@ fn hidden(forecast: &Preflight) -> Section {
         "What would not show",
         &["effect", "needs"],
         rows.collect(),
-        "Temperatures stand still in a forecast: what follows a thermometer shows only in a recording.",
+        "What follows a thermometer is judged by the temperatures that are assumed; a recording shows what they were.",
     )
 }
 
