@@ -10,6 +10,7 @@ use twin::{Channel, Session, Twin, simulate};
 use crate::config::GapConfig;
 use crate::error::GapError;
 use crate::experiment::Experiment;
+use crate::judgement::along;
 use crate::judgement::cause::Found;
 use crate::judgement::guard;
 use crate::judgement::unknown::Leftover;
@@ -33,6 +34,7 @@ use crate::search::searched::{Base, Searched, less, told};
 use crate::session::changes::{self, Change};
 use crate::session::fewer::{MIN_STATIONS_KEPT, fewer};
 use crate::session::over_session;
+use crate::session::thermal_floats::{self, ThermalFloat};
 use crate::shrink::gap;
 use crate::shrink::share_interval;
 use crate::shrink::split::{self, Split};
@@ -159,7 +161,7 @@ fn prepared<R>(
     if noise.is_empty() {
         return Err(no_repeats(session, &rows));
     }
-    let base = Base {
+    let mut base = Base {
         machine,
         session,
         twin: &twin,
@@ -169,8 +171,12 @@ fn prepared<R>(
         listed: listed(machine)?,
         begins: changes::begins(session, &changes),
         changes,
+        floats: vec![],
     };
+    let fitted = split::split(session, config.hold_out).fit;
+    base.floats = thermal_floats::of(&base.stack(&fitted, &noise, &FormError::base(config)));
     let mut notes = notes(&rows, &noise);
+    notes.extend(base.floats.iter().map(ThermalFloat::note));
     if session.history.temperature_degc.is_empty() && !machine.temperature_sensors.is_empty() {
         notes.push(Note::NoTemperatures);
     }
@@ -425,6 +431,7 @@ fn remarks(stack: &Stack<'_>, split: &Split, found: &Found) -> Vec<Note> {
     }));
     notes.extend(found.not_written());
     notes.extend(found.only_together());
+    notes.extend(along::notes(stack, found));
     notes.extend(found.not_named());
     if !found.members.is_empty() && recalibration::PROVENANCE.is_none() {
         notes.push(Note::NotRecalibrated);

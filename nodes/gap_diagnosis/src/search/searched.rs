@@ -17,7 +17,9 @@ use crate::noise::stack::{Simulated, Stack};
 use crate::scatter::{self, Scattered};
 use crate::search::families::{self, Slot};
 use crate::search::signature::Begins;
+use crate::search::widening;
 use crate::session::changes::Change;
+use crate::session::thermal_floats::ThermalFloat;
 use crate::shrink::split::Split;
 
 /// What every stack is made of.
@@ -34,6 +36,8 @@ pub(crate) struct Base<'a> {
     pub(crate) begins: Vec<Begins>,
     /// What changed between repeats of the session.
     pub(crate) changes: Vec<Change>,
+    /// What is taken out of logs.
+    pub(crate) floats: Vec<ThermalFloat>,
 }
 
 impl<'a> Base<'a> {
@@ -43,7 +47,7 @@ impl<'a> Base<'a> {
         noise: &BTreeMap<Channel, Noise>,
         form: &FormError,
     ) -> Stack<'a> {
-        Stack::new(
+        let stack = Stack::new(
             self.session,
             self.twin,
             runs,
@@ -51,7 +55,8 @@ impl<'a> Base<'a> {
             noise,
             form,
             self.residual,
-        )
+        );
+        stack.floating(&self.floats)
     }
 
     /// Searches some runs twice: once with the form error that every simulator has, then with what the effects
@@ -93,7 +98,8 @@ impl<'a> Base<'a> {
         };
         let noise: BTreeMap<Channel, Noise> = self.noise.iter().map(scaled).collect();
         let listed = listed.unwrap_or_else(|| vec![0.0; told.len()]);
-        let form = FormError::beside(&first.stack, &listed, &told, config);
+        let formed = first.of_their_own_form();
+        let form = FormError::beside(&first.stack, &listed, &formed, config);
         let stack = self.stack(runs, &noise, &form).sharing(&simulated);
         let second = self.search(stack, &noise, kinds, config);
         Searched {
@@ -199,6 +205,23 @@ pub(crate) struct Searched<'a> {
     pub(crate) noise: BTreeMap<Channel, Noise>,
     pub(crate) inflation: BTreeMap<Channel, f64>,
 }
+
+impl Searched<'_> {
+    /// What the rows would show of the members whose form is the catalogue's. What is read at targets only has the form that the
+    /// targets show: a position error there, and a lost motion, are off in size but not in form.
+    fn of_their_own_form(&self) -> Vec<f64> {
+        let has_form = |member: &&Member| {
+            let instance = self.found.instance(member);
+            !OF_TARGETS.contains(&instance.kind.id)
+                || widening::coarse_axis(&self.stack, instance).is_none()
+        };
+        let members = self.found.members.iter().filter(has_form);
+        told(&self.stack, members, &self.found)
+    }
+}
+
+/// Effects that are a number at each target and side.
+const OF_TARGETS: [&str; 3] = ["backlash", "pitch_error", "scale_error"];
 
 /// What the rows would show of some members, mm.
 pub(crate) fn told<'m>(

@@ -148,7 +148,9 @@ fn both(
 ) -> SingleRunBoth {
     let pairs = || up.iter().zip(down);
     let reversals: Vec<f64> = pairs().map(|(up, down)| up - down).collect();
-    let means: Vec<f64> = pairs().map(|(up, down)| f64::midpoint(*up, *down)).collect();
+    let means: Vec<f64> = pairs()
+        .map(|(up, down)| f64::midpoint(*up, *down))
+        .collect();
     let of_means = range_of(targets_mm, &[&means]);
     let u_reversal_mm = u(0.0).reversal_mm();
     let greatest_mm = greatest(reversals.iter().map(|b| b.abs()));
@@ -175,7 +177,9 @@ fn systematic(
 
 /// Range of values at the targets, and the distance of the places of its ends, mm.
 fn range_of(targets_mm: &[f64], sides: &[&[f64]]) -> [f64; 2] {
-    let all = sides.iter().flat_map(|values| targets_mm.iter().zip(*values));
+    let all = sides
+        .iter()
+        .flat_map(|values| targets_mm.iter().zip(*values));
     let found = between(all.map(|(target_mm, value_mm)| [*target_mm, *value_mm, *value_mm, 0.0]));
     [found.range_mm, found.apart_mm]
 }
@@ -231,7 +235,10 @@ mod tests {
             (both.mean_systematic_error, 5.0),
         ] {
             let found_um = value.value_mm * 1e3;
-            assert!((found_um - wanted_um).abs() < 1e-12, "{found_um} {wanted_um}");
+            assert!(
+                (found_um - wanted_um).abs() < 1e-12,
+                "{found_um} {wanted_um}"
+            );
         }
         let few = PositioningRemark::FewRuns {
             n_runs: 1,
@@ -251,7 +258,10 @@ mod tests {
             (of_one.systematic_error, two.systematic_error),
             (of_one.mean_systematic_error, two.mean_systematic_error),
             (one.up.unwrap().systematic_error, two.up.systematic_error),
-            (one.down.unwrap().systematic_error, two.down.systematic_error),
+            (
+                one.down.unwrap().systematic_error,
+                two.down.systematic_error,
+            ),
         ] {
             assert!((one.value_mm - two.value_mm).abs() < 1e-15);
             assert!(one.expanded_uncertainty_mm > two.expanded_uncertainty_mm);

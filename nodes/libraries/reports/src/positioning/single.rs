@@ -57,9 +57,18 @@ fn answer(result: &SingleRunResult, measured: &Measured) -> String {
         .collect();
     if let Some(both) = &result.both {
         words = vec![
-            format!("systematic deviation E {} µm", length(&both.systematic_error)),
-            format!("range of means M {} µm", length(&both.mean_systematic_error)),
-            format!("reversal B {} µm", figure(&both.reversal, measured.is_stated)),
+            format!(
+                "systematic deviation E {} µm",
+                length(&both.systematic_error)
+            ),
+            format!(
+                "range of means M {} µm",
+                length(&both.mean_systematic_error)
+            ),
+            format!(
+                "reversal B {} µm",
+                figure(&both.reversal, measured.is_stated)
+            ),
         ];
     }
     format!(
@@ -77,7 +86,12 @@ fn table(result: &SingleRunResult, measured: &Measured) -> Rows {
     let both = result.both.as_ref();
     let side = |one: Option<_>| cell(one, measured.are_lengths_stated);
     let of_both = |name: &str, value: Option<&ExpandedLength>, stated: bool| {
-        vec![name.to_owned(), cell(None, stated), cell(None, stated), cell(value, stated)]
+        vec![
+            name.to_owned(),
+            cell(None, stated),
+            cell(None, stated),
+            cell(value, stated),
+        ]
     };
     Rows {
         head: head(&["ISO 230-2, one run / µm", "up", "down", "both"]),

@@ -268,10 +268,18 @@ fn a_test_of_one_run_has_the_figures_that_need_no_scatter() {
         ("/mean_reversal", -2.0),
         ("/mean_systematic_error", 3.0),
     ] {
-        assert!((um(place) - wanted_um).abs() < 1e-9, "{place} {}", um(place));
+        assert!(
+            (um(place) - wanted_um).abs() < 1e-9,
+            "{place} {}",
+            um(place)
+        );
     }
     assert!(found["accuracy"].is_null() && found["repeatability"].is_null());
-    assert!(both.lines.iter().any(|line| line.contains("R and accuracy A need at least 2 runs")));
+    assert!(
+        both.lines
+            .iter()
+            .any(|line| line.contains("R and accuracy A need at least 2 runs"))
+    );
     assert!(both.answers[0].contains("repeatability R and accuracy A need more runs"));
     for (up, side) in [(true, "up"), (false, "down")] {
         let mut one = one.clone();
