@@ -34,7 +34,7 @@ use crate::search::searched::{Base, Searched, less, told};
 use crate::session::changes::{self, Change};
 use crate::session::fewer::{MIN_STATIONS_KEPT, fewer};
 use crate::session::over_session;
-use crate::session::thermal_floats::{self, ThermalFloat};
+use crate::session::thermal_floats::ThermalFloat;
 use crate::shrink::gap;
 use crate::shrink::share_interval;
 use crate::shrink::split::{self, Split};
@@ -161,7 +161,7 @@ fn prepared<R>(
     if noise.is_empty() {
         return Err(no_repeats(session, &rows));
     }
-    let mut base = Base {
+    let base = Base {
         machine,
         session,
         twin: &twin,
@@ -172,19 +172,26 @@ fn prepared<R>(
         begins: changes::begins(session, &changes),
         changes,
         floats: vec![],
+        is_of_targets: false,
     };
-    let fitted = split::split(session, config.hold_out).fit;
-    base.floats = thermal_floats::of(&base.stack(&fitted, &noise, &FormError::base(config)));
-    let mut notes = notes(&rows, &noise);
+    let base = base.floating(config);
+    let notes = of_begin(&base, &rows, of);
+    Ok(then(&base, notes))
+}
+
+/// What a reader should know before anything is searched; `of` runs were recorded.
+fn of_begin(base: &Base<'_>, rows: &Rows, of: usize) -> Vec<Note> {
+    let session = base.session;
+    let mut notes = notes(rows, base.noise);
     notes.extend(base.floats.iter().map(ThermalFloat::note));
-    if session.history.temperature_degc.is_empty() && !machine.temperature_sensors.is_empty() {
+    if session.history.temperature_degc.is_empty() && !base.machine.temperature_sensors.is_empty() {
         notes.push(Note::NoTemperatures);
     }
     if session.runs.len() < of {
         let runs = session.runs.len();
         notes.push(Note::FewerRuns { runs, of });
     }
-    Ok(then(&base, notes))
+    notes
 }
 
 /// What changed between the repeats of a session.

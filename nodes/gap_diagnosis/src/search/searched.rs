@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use machine::MachineFile;
+use metrology::Axis;
 use nalgebra::DVector;
 use twin::effects::{Effect, Kind};
 use twin::{Channel, Session, Twin};
@@ -16,11 +17,12 @@ use crate::noise::form_error::FormError;
 use crate::noise::stack::{Simulated, Stack};
 use crate::scatter::{self, Scattered};
 use crate::search::families::{self, Slot};
+use crate::search::resolved;
 use crate::search::signature::Begins;
 use crate::search::widening;
 use crate::session::changes::Change;
-use crate::session::thermal_floats::ThermalFloat;
-use crate::shrink::split::Split;
+use crate::session::thermal_floats::{self, ThermalFloat};
+use crate::shrink::split::{self, Split};
 
 /// What every stack is made of.
 pub(crate) struct Base<'a> {
@@ -36,11 +38,23 @@ pub(crate) struct Base<'a> {
     pub(crate) begins: Vec<Begins>,
     /// What changed between repeats of the session.
     pub(crate) changes: Vec<Change>,
+    /// Whether all that was read are positions at targets.
+    pub(crate) is_of_targets: bool,
     /// What is taken out of logs.
     pub(crate) floats: Vec<ThermalFloat>,
 }
 
 impl<'a> Base<'a> {
+    /// The same with what floats in the logs of the runs that are fitted, and whether these are positions at targets.
+    pub(crate) fn floating(mut self, config: &GapConfig) -> Self {
+        let fitted = split::split(self.session, config.hold_out).fit;
+        let stack = self.stack(&fitted, self.noise, &FormError::base(config));
+        self.floats = thermal_floats::of(&stack);
+        let mut axes = Axis::LINEAR.into_iter();
+        self.is_of_targets = axes.any(|axis| resolved::is_coarse(&stack, axis));
+        self
+    }
+
     pub(crate) fn stack(
         &self,
         runs: &[usize],
@@ -53,7 +67,7 @@ impl<'a> Base<'a> {
             runs,
             self.stations,
             noise,
-            form,
+            &form.at_targets(self.is_of_targets),
             self.residual,
         );
         stack.floating(&self.floats)
