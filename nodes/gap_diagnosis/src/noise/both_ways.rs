@@ -27,7 +27,7 @@ const ONE_TARGET: f64 = 0.02;
 /// Targets are farther apart than this share of a lead.
 const LEAST_APART: f64 = 0.45;
 /// Fewest targets.
-const FEWEST: usize = 4;
+const FEWEST_PAIRS: usize = 4;
 /// Targets for each b of (1).
 const TARGETS_OF_A_MODE: usize = 3;
 /// Most b of (1).
@@ -74,7 +74,7 @@ fn pairs(rows: usize, place_mm: &dyn Fn(usize) -> f64, lead_mm: f64) -> Option<V
             _ => None,
         })
         .collect();
-    let is_enough = pairs.len() >= FEWEST && count(2 * pairs.len()) >= 0.8 * count(rows);
+    let is_enough = pairs.len() >= FEWEST_PAIRS && count(2 * pairs.len()) >= 0.8 * count(rows);
     (is_enough && 4 * close < targets.len()).then_some(pairs)
 }
 

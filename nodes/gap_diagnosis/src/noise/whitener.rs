@@ -37,7 +37,7 @@ use twin::{Channel, Run, Session};
 use crate::noise::form_error::{self, FormError};
 use crate::noise::repeats::Label;
 use crate::search::field::{self, Smooth};
-use crate::search::rows::{Block, Rows};
+use crate::search::rows::{Block, Rows, count};
 
 /// Autoregression of a channel: predictors of order 0 to p with the variance that each leaves.
 #[derive(Clone, Debug, PartialEq)]
@@ -243,7 +243,7 @@ impl Whitener {
             let mut mean = vec![0.0; group.differences.range.len()];
             for (sum, k) in mean.iter_mut().zip(0..) {
                 let sums: f64 = ranges().map(|range| stack[range.start + k]).sum();
-                *sum = sums / group.blocks.len() as f64;
+                *sum = sums / count(group.blocks.len());
             }
             for range in ranges() {
                 let part = &mut stack[range.clone()];

@@ -7,7 +7,6 @@
 use std::collections::BTreeSet;
 
 use machine::file::SensorPlace;
-use twin::Channel;
 
 use crate::noise::stack::Stack;
 use crate::report::figures::Note;
@@ -60,7 +59,7 @@ fn unowned(stack: &Stack<'_>) -> BTreeSet<String> {
     let read = |place: SensorPlace| {
         let own = sensors.iter().filter(move |sensor| sensor.place == place);
         own.map(|sensor| sensor.id.clone())
-            .filter(|id| history.temperature_degc.contains_key(id))
+            .filter(move |id| history.temperature_degc.contains_key(id))
     };
     if read(SensorPlace::Ambient).next().is_none() {
         return BTreeSet::new();
@@ -80,7 +79,7 @@ impl ThermalFloat {
         };
         let mut column = vec![0.0; stack.rows.len];
         for block in &stack.rows.blocks {
-            if Channel::to_string(&block.channel) != self.channel {
+            if block.channel.to_string() != self.channel {
                 continue;
             }
             let run = &stack.session.runs[block.run];
