@@ -403,18 +403,12 @@ impl fmt::Display for Note {
                 channel,
                 thermometer,
                 lag_min,
-            } => write!(
-                f,
-                "{channel}: what goes with {thermometer}, lagged by {lag_min:.1} min, was taken out before causes were searched; no effect of the catalogue goes with this thermometer"
-            ),
+            } => thermal_float(f, channel, thermometer, *lag_min),
             Self::Varies {
                 effect,
                 from_um,
                 to_um,
-            } => write!(
-                f,
-                "{effect} varies from {from_um:.1} to {to_um:.1} µm along the axis, at the places that were read"
-            ),
+            } => varies(f, effect, [*from_um, *to_um]),
             Self::NotWritten { effect, others } => write!(
                 f,
                 "{effect} is not written to a machine file: {} would do as well on this recording",
@@ -428,4 +422,23 @@ impl fmt::Display for Note {
             Self::Course(course) => course.fmt(f),
         }
     }
+}
+
+fn thermal_float(
+    f: &mut fmt::Formatter<'_>,
+    channel: &str,
+    thermometer: &str,
+    lag_min: f64,
+) -> fmt::Result {
+    write!(
+        f,
+        "{channel}: what goes with {thermometer}, lagged by {lag_min:.1} min, was taken out before causes were searched; no effect of the catalogue goes with this thermometer"
+    )
+}
+
+fn varies(f: &mut fmt::Formatter<'_>, effect: &str, [from_um, to_um]: [f64; 2]) -> fmt::Result {
+    write!(
+        f,
+        "{effect} varies from {from_um:.1} to {to_um:.1} µm along the axis, at the places that were read"
+    )
 }
