@@ -409,15 +409,8 @@ impl fmt::Display for Note {
                 from_um,
                 to_um,
             } => varies(f, effect, [*from_um, *to_um]),
-            Self::NotWritten { effect, others } => write!(
-                f,
-                "{effect} is not written to a machine file: {} would do as well on this recording",
-                others.join(", ")
-            ),
-            Self::OnlyLooksLike { effect, why } => {
-                let why: Vec<String> = why.iter().map(Veto::to_string).collect();
-                write!(f, "{effect} is not named: {}", why.join("; "))
-            }
+            Self::NotWritten { effect, others } => not_written(f, effect, others),
+            Self::OnlyLooksLike { effect, why } => only_looks_like(f, effect, why),
             Self::NoRun(none) => none.fmt(f),
             Self::Course(course) => course.fmt(f),
         }
@@ -441,4 +434,17 @@ fn varies(f: &mut fmt::Formatter<'_>, effect: &str, [from_um, to_um]: [f64; 2]) 
         f,
         "{effect} varies from {from_um:.1} to {to_um:.1} µm along the axis, at the places that were read"
     )
+}
+
+fn not_written(f: &mut fmt::Formatter<'_>, effect: &str, others: &[String]) -> fmt::Result {
+    write!(
+        f,
+        "{effect} is not written to a machine file: {} would do as well on this recording",
+        others.join(", ")
+    )
+}
+
+fn only_looks_like(f: &mut fmt::Formatter<'_>, effect: &str, why: &[Veto]) -> fmt::Result {
+    let why: Vec<String> = why.iter().map(Veto::to_string).collect();
+    write!(f, "{effect} is not named: {}", why.join("; "))
 }
