@@ -83,7 +83,6 @@ mod recent;
 mod record;
 mod select;
 mod standing;
-pub(crate) mod thermal_floats;
 mod thermometers;
 mod time;
 mod touching;
