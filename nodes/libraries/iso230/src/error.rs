@@ -131,6 +131,14 @@ pub enum Iso230Error {
         /// Runs down.
         n_down: usize,
     },
+    /// Several runs, where one is evaluated.
+    #[error("{place}: {n} runs were given, where a single run is evaluated")]
+    SeveralRuns {
+        /// Which list.
+        place: &'static str,
+        /// How many were given.
+        n: usize,
+    },
     /// A value is outside the range that has a meaning.
     #[error(
         "{place} = {value}: must be from {lower} to {upper}",

@@ -32,6 +32,7 @@
 //! Deviations are those at 20 °C: [`PositioningRuns::corrected_to_20_degc`] takes the nominal differential expansion out.
 //! Rotary axes are evaluated in [`rotary`]: their deviations are no lengths.
 //! A test that came to its targets from one side alone has the values of that side and no others ([`one_sided`]).
+//! A single run has no scatter: no s, R and A ([`single_run`]).
 //!
 //! # Agreement
 //! `val_iso230_2_report_of_a_slit_axis`: a measured axis with the figures of another program \[3\], all of them to the
@@ -52,6 +53,7 @@ pub mod one_sided;
 pub mod periodic;
 mod reference_temperature;
 pub mod rotary;
+pub mod single_run;
 mod spacing;
 
 use serde::{Deserialize, Serialize};

@@ -3,6 +3,7 @@
 use abbe_msgs::topics;
 use anyhow::Result;
 use iso230::positioning::one_sided::{self, OneSidedResult};
+use iso230::positioning::single_run;
 use iso230::positioning::{PositioningRemark, PositioningResult, PositioningRuns};
 use iso230::{Direction, ExpandedLength, positioning};
 use machine::MachineFile;
@@ -11,6 +12,7 @@ use metrology::sample::TestKind;
 
 mod curves;
 mod diagonals;
+mod single;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
@@ -107,6 +109,8 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
     ));
     let runs = runs(test, periods_mm(test, tests.machine.as_ref()), measured);
     let found = match side_of(test) {
+        _ if single_run::is_single(&runs) => single_run::evaluate(&runs, &measured.budget)
+            .map(|result| single::fill(&mut section, test, &result, measured)),
         None => positioning::evaluate(&runs, &measured.budget)
             .map(|result| fill(&mut section, test, &result, measured)),
         Some(direction) => one_sided::evaluate(&runs, direction, &measured.budget)

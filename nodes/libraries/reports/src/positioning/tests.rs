@@ -252,3 +252,42 @@ fn targets_on_whole_leads_of_the_machine_file_are_warned_of() {
     let remark = |line: &String| line.contains("the 51.550 mm period");
     assert!(section.lines.iter().any(remark), "{:?}", section.lines);
 }
+
+#[test]
+fn a_test_of_one_run_has_the_figures_that_need_no_scatter() {
+    let mut one = test([1.0, 0.0, 0.0]);
+    (one.kind, one.axis) = (TestKind::Positioning, Some(Axis::X));
+    let both = &sections(&tests_of(one.clone()), None).unwrap()[0];
+    let found = &both.figures["iso230_2"];
+    let um = |place: &str| 1e3 * found.pointer(place).unwrap()["value_mm"].as_f64().unwrap();
+    for (place, wanted_um) in [
+        ("/up/systematic_error", 3.0),
+        ("/down/systematic_error", 3.0),
+        ("/systematic_error", 5.0),
+        ("/reversal", 2.0),
+        ("/mean_reversal", -2.0),
+        ("/mean_systematic_error", 3.0),
+    ] {
+        assert!(
+            (um(place) - wanted_um).abs() < 1e-9,
+            "{place} {}",
+            um(place)
+        );
+    }
+    assert!(found["accuracy"].is_null() && found["repeatability"].is_null());
+    assert!(
+        both.lines
+            .iter()
+            .any(|line| line.contains("R and accuracy A need at least 2 runs"))
+    );
+    assert!(both.answers[0].contains("repeatability R and accuracy A need more runs"));
+    for (up, side) in [(true, "up"), (false, "down")] {
+        let mut one = one.clone();
+        if up { &mut one.down_mm } else { &mut one.up_mm }.clear();
+        let section = &sections(&tests_of(one), None).unwrap()[0];
+        let found = &section.figures["iso230_2"];
+        assert!(found[side]["systematic_error"].is_object(), "{found}");
+        assert!(found["reversal"].is_null(), "{found}");
+        assert!(section.lines.iter().any(|line| line.contains("one-way")));
+    }
+}
