@@ -398,3 +398,98 @@ fn expected(judged: &Judged, points: &[Point]) -> String {
     });
     dates.min_by(f64::total_cmp).map(date).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use history::{Entry, Kind, Options};
+
+    use super::*;
+
+    const LIMITS: &str = "rule: guard_band\nlimits:\n  effect.backlash.width_um: {upper_um: 10.0}\n  gap.rms: {upper_um: 9.0}\n";
+
+    fn limits() -> Limits {
+        Limits::read(LIMITS, Path::new("limits.yaml")).unwrap()
+    }
+
+    fn play(width_um: f64) -> Figure {
+        Figure {
+            test: "Diagnosis".to_owned(),
+            name: "effect.backlash.width_um".to_owned(),
+            axis: "X".to_owned(),
+            value: width_um,
+            unit: "um".to_owned(),
+            standard_uncertainty: Some(0.1),
+            interval: None,
+            status: "named".to_owned(),
+        }
+    }
+
+    fn measured(width_um: f64) -> Alarms {
+        let figures = [play(width_um)];
+        let measured = Measured {
+            machine: "m",
+            at_s: 86_400.0,
+            source: "bag",
+            figures: &figures,
+        };
+        Alarms::of_figures(limits(), &measured).unwrap()
+    }
+
+    #[test]
+    fn a_figure_beyond_its_limit_is_an_alarm_in_words_json_condition_and_exit_code() {
+        let other = ExitCode::from(3);
+        for (width_um, state, level, code) in [
+            (9.0, "within", DiagnosticStatus::OK, other),
+            (9.9, "undecided", DiagnosticStatus::WARN, other),
+            (10.1, "undecided", DiagnosticStatus::WARN, other),
+            (10.3, "alarm", DiagnosticStatus::ERROR, ExitCode::from(4)),
+        ] {
+            let alarms = measured(width_um);
+            assert_eq!(alarms.json()["state"], state, "{width_um}");
+            let condition = &alarms.conditions("abbe_run")[0];
+            assert_eq!(condition.level, level, "{width_um}");
+            let begin = "/abbe_run: limit/effect.backlash.width_um X";
+            assert!(condition.name.starts_with(begin), "{}", condition.name);
+            assert_eq!(alarms.code(other), code, "{width_um}");
+            let is_alarm = state == "alarm";
+            assert_eq!(alarms.lines().len(), usize::from(is_alarm));
+            let text = alarms.section().terminal();
+            assert_eq!(text.contains("ALARM: m: "), is_alarm, "{text}");
+            assert!(text.contains("≤ 10.00 µm"), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_last_value_of_a_series_counts_and_its_trend_gives_the_date_of_the_limit() {
+        let home = tempfile::tempdir().unwrap();
+        let mut store = Store::open(&home.path().join("s.sqlite"), Options::default()).unwrap();
+        for day in 0..10_i64 {
+            let entry = Entry {
+                machine: "m".to_owned(),
+                at_s: day * 86_400 + 1,
+                kind: Kind::Diagnosis,
+                sha256: format!("{day:064x}"),
+                machine_sha256: None,
+                source: format!("bag_{day}"),
+                instruments: String::new(),
+                operator: String::new(),
+                software: "abbe".to_owned(),
+                figures: vec![play(day as f64 * 0.5)],
+            };
+            store.add(&entry).unwrap();
+        }
+        let all = SeriesKey::default();
+        let alarms = Alarms::of_store(limits(), &store, &all, Window::ALL).unwrap();
+        assert_eq!(alarms.rows[0].point.value.to_bits(), 4.5_f64.to_bits());
+        // 10 µm at half a µm a day.
+        assert_eq!(alarms.rows[0].expected, "1970-01-21");
+        assert_eq!(alarms.unused, ["limits.gap.rms"]);
+        assert!(!alarms.is_whole());
+        let chosen = SeriesKey {
+            name: Some("effect".to_owned()),
+            ..SeriesKey::default()
+        };
+        let alarms = Alarms::of_store(limits(), &store, &chosen, Window::ALL).unwrap();
+        assert!(alarms.is_whole());
+    }
+}
