@@ -31,8 +31,7 @@ impl Server {
             eprintln!("NOT TESTED: {test}: {reason}");
             return None;
         };
-        let port = TcpListener::bind(("127.0.0.1", 0)).unwrap();
-        let port = port.local_addr().unwrap().port();
+        let port = free_port();
         let home = tempfile::tempdir().unwrap();
         if nix::unistd::Uid::effective().is_root() {
             chown(home.path(), Some(NOBODY), Some(NOBODY)).unwrap();
@@ -154,6 +153,12 @@ impl Drop for Server {
             let _ = process.wait();
         }
     }
+}
+
+/// A port that nobody has; it is given back before the server takes it.
+fn free_port() -> u16 {
+    let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+    listener.local_addr().unwrap().port()
 }
 
 fn is_running(process: &mut Child) -> bool {
