@@ -74,7 +74,7 @@ pub struct Store {
 enum Backend {
     Sqlite(Sqlite),
     #[cfg(feature = "postgres")]
-    Server(server::Server),
+    Server(Box<server::Server>),
 }
 
 impl Store {
@@ -168,7 +168,8 @@ impl Backend {
     #[cfg(feature = "postgres")]
     fn of_server(url: &str, options: Options, is_to_read: bool) -> Result<Self, HistoryError> {
         let shown = url::shown(Path::new(url));
-        server::Server::open(url, &shown, options, is_to_read).map(Self::Server)
+        let server = server::Server::open(url, &shown, options, is_to_read)?;
+        Ok(Self::Server(Box::new(server)))
     }
 
     #[cfg(not(feature = "postgres"))]
