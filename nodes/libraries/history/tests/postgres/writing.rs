@@ -194,6 +194,52 @@ fn a_user_who_may_only_read_reads_and_is_refused_to_write() {
     assert_eq!(n_kept(&path), 1);
 }
 
+/// Every answer of a store, as text.
+fn all_read(path: &Path) -> Vec<String> {
+    let store = Store::open_to_read(path, PATIENT).unwrap();
+    let keys = [
+        "effect.backlash",
+        "iso230_2.accuracy",
+        "effect",
+        "iso230_2.acc%",
+    ];
+    let named = keys.map(|name| SeriesKey {
+        name: Some(name.to_owned()),
+        ..SeriesKey::default()
+    });
+    let of_test = SeriesKey {
+        test: Some("diagnosis".to_owned()),
+        axis: Some("X".to_owned()),
+        ..SeriesKey::default()
+    };
+    let mut read = Vec::new();
+    for key in named.iter().chain([&SeriesKey::default(), &of_test]) {
+        for series in store.series(key).unwrap() {
+            let window = Window {
+                since_s: 86_400,
+                until_s: 86_400 * 4,
+            };
+            let kept = store.points(series.id, window).unwrap();
+            let name = (
+                series.machine,
+                series.test,
+                series.name,
+                series.axis,
+                series.unit,
+            );
+            read.push(format!("{name:?} {kept:?}"));
+        }
+        let last = store.last_values(key).unwrap();
+        let last = last
+            .iter()
+            .map(|it| format!("{} {:?} {}", it.series.machine, it.point, it.n));
+        read.extend(last);
+    }
+    read.push(format!("{:?}", store.machines().unwrap()));
+    read.push(format!("{:?}", store.test_times("a").unwrap()));
+    read
+}
+
 #[test]
 fn a_server_and_a_file_answer_the_same() {
     let Some(server) = Server::start("a_server_and_a_file_answer_the_same") else {
@@ -226,47 +272,7 @@ fn a_server_and_a_file_answer_the_same() {
         // A figure that stands there twice fails within the transaction: nothing of the entry stays.
         assert!(store.add(&twice).is_err());
         drop(store);
-        let store = Store::open_to_read(&path, PATIENT).unwrap();
-        let keys = [
-            "effect.backlash",
-            "iso230_2.accuracy",
-            "effect",
-            "iso230_2.acc%",
-        ];
-        let named = keys.map(|name| SeriesKey {
-            name: Some(name.to_owned()),
-            ..SeriesKey::default()
-        });
-        let of_test = SeriesKey {
-            test: Some("diagnosis".to_owned()),
-            axis: Some("X".to_owned()),
-            ..SeriesKey::default()
-        };
-        let mut read = Vec::new();
-        for key in named.iter().chain([&SeriesKey::default(), &of_test]) {
-            for series in store.series(key).unwrap() {
-                let window = Window {
-                    since_s: 86_400,
-                    until_s: 86_400 * 4,
-                };
-                let kept = store.points(series.id, window).unwrap();
-                let name = (
-                    series.machine,
-                    series.test,
-                    series.name,
-                    series.axis,
-                    series.unit,
-                );
-                read.push(format!("{name:?} {kept:?}"));
-            }
-            let last = store.last_values(key).unwrap();
-            let last = last
-                .iter()
-                .map(|it| format!("{} {:?} {}", it.series.machine, it.point, it.n));
-            read.extend(last);
-        }
-        read.push(format!("{:?}", store.machines().unwrap()));
-        read.push(format!("{:?}", store.test_times("a").unwrap()));
+        let read = all_read(&path);
         (added, read)
     });
     assert!(answers[0].1.len() > 20);
