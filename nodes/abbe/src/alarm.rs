@@ -25,6 +25,21 @@ const TIMES: u32 = 12;
 
 /// The message for `/diagnostics`: `node` cannot record any more.
 pub fn message(node: &str, reason: &str, at: Stamp<Host>) -> Vec<u8> {
+    array(vec![recording(node, reason)], at)
+}
+
+/// The condition of a node that cannot record any more.
+fn recording(node: &str, reason: &str) -> DiagnosticStatus {
+    DiagnosticStatus {
+        level: DiagnosticStatus::ERROR,
+        name: format!("/{node}: {CONDITION}"),
+        message: reason.to_owned(),
+        ..DiagnosticStatus::default()
+    }
+}
+
+/// Conditions as a message for `/diagnostics`.
+fn array(status: Vec<DiagnosticStatus>, at: Stamp<Host>) -> Vec<u8> {
     let sec = i32::try_from(at.nanos().div_euclid(NANOS_PER_S)).unwrap_or(0);
     let nanosec = u32::try_from(at.nanos().rem_euclid(NANOS_PER_S)).unwrap_or(0);
     to_cdr(&DiagnosticArray {
@@ -32,12 +47,7 @@ pub fn message(node: &str, reason: &str, at: Stamp<Host>) -> Vec<u8> {
             stamp: Time { sec, nanosec },
             frame_id: String::new(),
         },
-        status: vec![DiagnosticStatus {
-            level: DiagnosticStatus::ERROR,
-            name: format!("/{node}: {CONDITION}"),
-            message: reason.to_owned(),
-            ..DiagnosticStatus::default()
-        }],
+        status,
     })
 }
 
@@ -55,7 +65,8 @@ impl Alarm {
         let (environment, node, reason) = (environment.clone(), node.to_owned(), reason.to_owned());
         let until = Arc::clone(&over);
         let tell = move || {
-            if let Err(error) = tell(&environment, &node, &reason, &until) {
+            let conditions = [recording(&node, &reason)];
+            if let Err(error) = tell(&environment, &node, &conditions, &until) {
                 complain!("abbe: /diagnostics does not tell it: {error:#}");
             }
         };
@@ -77,11 +88,23 @@ impl Alarm {
     }
 }
 
-/// Publishes the alarm again and again, [`TIMES`] times at least and then until it is over.
+/// Publishes conditions of `node` on `/diagnostics` for [`TIMES`] times [`AGAIN`], so that whoever watches finds them.
+///
+/// # Errors
+/// When there is no network.
+pub fn publish(
+    environment: &Environment,
+    node: &str,
+    conditions: &[DiagnosticStatus],
+) -> anyhow::Result<()> {
+    tell(environment, node, conditions, &AtomicBool::new(true))
+}
+
+/// Publishes conditions again and again, [`TIMES`] times at least and then until the alarm is over.
 fn tell(
     environment: &Environment,
     node: &str,
-    reason: &str,
+    conditions: &[DiagnosticStatus],
     over: &AtomicBool,
 ) -> anyhow::Result<()> {
     let port = TopicPort {
@@ -95,7 +118,7 @@ fn tell(
     let mut publisher = RawPublisher::start(environment, &names, &[port], 16, AGAIN)?;
     let mut told = 0;
     while told < TIMES || !over.load(Ordering::Relaxed) {
-        let bytes = message(node, reason, RawPublisher::now());
+        let bytes = array(conditions.to_vec(), RawPublisher::now());
         publisher.publish(0, None, bytes.into());
         std::thread::sleep(AGAIN);
         told += 1;

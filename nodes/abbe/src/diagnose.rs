@@ -3,6 +3,7 @@
 use node_runtime::complain;
 use node_runtime::text_file;
 use reports::evaluate::budget::Budget;
+use reports::evaluate::limits::Limits;
 use reports::evaluate::test_conditions::TestConditions;
 use reports::gap::diagnosed::Diagnosed;
 use reports::loss;
@@ -25,6 +26,7 @@ use sha2::{Digest, Sha256};
 use twin::effects::CATALOGUE;
 
 use crate::SOFTWARE;
+use crate::history::alarms::{self, Alarms, LimitsOption};
 use crate::history::keep::Keep;
 use crate::history::origin::Origin;
 use crate::pdf;
@@ -99,6 +101,8 @@ pub struct Diagnose {
     budget: Option<PathBuf>,
     #[command(flatten)]
     keep: Keep,
+    #[command(flatten)]
+    limits: LimitsOption,
 }
 
 impl Diagnose {
@@ -122,6 +126,7 @@ impl Diagnose {
             ..GapConfig::default()
         };
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
+        let limits = self.limits.open()?;
         let diagnosed = beside(&self.bags, &self.simulated, &name, &text, &config)?;
         let title = format!("Simulator against machine: {}", listed(&self.bags));
         let mut page = gap::page(&title, &diagnosed, self.explain)?;
@@ -140,7 +145,7 @@ impl Diagnose {
             Some(&machine),
             between,
         ));
-        let json = serde_json::to_string_pretty(&diagnosed.json()?)?;
+        let (json, alarms) = self.judged(limits, &mut page, &diagnosed, (&machine, between))?;
         let on_terminal = self.json.as_deref() == Some(Path::new("-"));
         if on_terminal {
             tell!("{json}");
@@ -159,8 +164,28 @@ impl Diagnose {
         for remark in diagnosed.losses().iter().chain(&diagnosed.remarks) {
             complain!("abbe: {remark}");
         }
-        self.print_and_keep(&page, &diagnosed, machine)?;
-        Ok(loss::exit_code(diagnosed.losses().is_empty()))
+        let kept = self.print_and_keep(&page, &diagnosed, machine);
+        let code = loss::exit_code(diagnosed.losses().is_empty());
+        alarms::ended(alarms.as_ref(), kept, code)
+    }
+
+    /// The JSON, and the figures that are kept beside their limits, which are behind page and JSON.
+    fn judged(
+        &self,
+        limits: Option<Limits>,
+        page: &mut Report,
+        diagnosed: &Diagnosed,
+        (machine, between): (&str, Option<(i64, i64)>),
+    ) -> Result<(String, Option<Alarms>)> {
+        let mut json = diagnosed.json()?;
+        let of = (Some(machine), between, self.bags[0].as_path());
+        let judge = |limits: Limits| self.keep.judge_diagnosis(limits, &json, of);
+        let alarms = limits.map(judge).transpose()?;
+        if let Some(alarms) = &alarms {
+            page.add("alarms", &alarms.section());
+            json["alarms"] = alarms.json();
+        }
+        Ok((serde_json::to_string_pretty(&json)?, alarms))
     }
 
     /// Where the second round goes, where it is wanted.
@@ -234,6 +259,7 @@ impl Diagnose {
         let outputs: Vec<Output> = outputs.collect();
         let files = [&self.machine, &self.plan, &self.budget];
         let files = files.into_iter().filter_map(|file| file.as_deref());
+        let files = files.chain(self.limits.path());
         let bags = self.bags.iter().chain(&self.simulated);
         let inputs = bags.map(PathBuf::as_path).chain(files);
         check_outputs(&outputs, inputs.chain(self.keep.store()))?;

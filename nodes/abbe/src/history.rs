@@ -8,7 +8,9 @@ use clap::{Args, Subcommand};
 use reports::whole_file;
 
 mod add;
+pub mod alarms;
 mod dates;
+mod export;
 pub mod keep;
 mod machines;
 mod numbers;
@@ -16,6 +18,7 @@ pub mod origin;
 mod overview;
 mod single;
 mod view;
+mod webhook;
 
 /// Arguments of `abbe history`.
 #[derive(Args)]
@@ -31,6 +34,8 @@ pub struct History {
 enum Action {
     /// Keep the figures of bags, folders of runs, and JSON of reports and diagnoses; each once, however often it is added.
     Add(add::Add),
+    /// Write the values as a Parquet file, for data platforms; needs the feature `parquet`.
+    Export(export::Export),
 }
 
 impl History {
@@ -41,6 +46,7 @@ impl History {
     pub fn execute(self) -> Result<ExitCode> {
         match self.action {
             Some(Action::Add(add)) => add.execute(),
+            Some(Action::Export(export)) => export.execute(),
             None => self.view.execute(),
         }
     }
@@ -52,6 +58,9 @@ impl History {
 /// Where neither is known, or something is there that is no regular file.
 fn store_path(given: Option<&Path>) -> Result<PathBuf> {
     let path = path_of_store(given)?;
+    if history::is_server(&path) {
+        return Ok(path);
+    }
     whole_file::must_be_regular(&path).context("history")?;
     Ok(path)
 }
@@ -77,6 +86,10 @@ fn path_of_store(given: Option<&Path>) -> Result<PathBuf> {
 /// When folder or store cannot be made or opened.
 fn open_to_write(given: Option<&Path>) -> Result<(history::Store, PathBuf, bool)> {
     let path = store_path(given)?;
+    if history::is_server(&path) {
+        let store = history::Store::open(&path, history::Options::default())?;
+        return Ok((store, history::shown(&path), false));
+    }
     if let Some(folder) = path.parent().filter(|it| !it.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("folder of the history {}", folder.display()))?;

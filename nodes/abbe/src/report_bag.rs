@@ -25,6 +25,7 @@ use replayer::machines;
 
 use crate::SOFTWARE;
 use crate::diagnose::bags;
+use crate::history::alarms::{self, Alarms};
 use crate::history::keep::Keep;
 use crate::history::origin::Origin;
 use crate::pdf;
@@ -46,7 +47,7 @@ pub struct ReportBag {
     #[arg(long)]
     budget: Option<PathBuf>,
     /// Limits of figures, which are then judged by ISO 14253-1 with the uncertainties of --budget, which it needs; an example
-    /// is launch_configs/dual_loop/limits.yaml.
+    /// is launch_configs/dual_loop/limits.yaml. With --keep also exit code 4 and an alarm for each figure that exceeds its own.
     #[arg(long, requires = "budget")]
     limits: Option<PathBuf>,
     /// Folder to write `report.html` and `report.json` into; without it the terminal alone.
@@ -99,7 +100,7 @@ impl ReportBag {
     pub fn execute(self) -> Result<ExitCode> {
         self.check_outputs()?;
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
-        let limits = self.limits.as_deref().map(read_limits).transpose()?;
+        let limits = self.limits.as_deref().map(alarms::read).transpose()?;
         complain!("Evaluating the tests of {}", self.bag.display());
         let table = from_table::of(&self.bag, self.map.as_deref())?;
         let bag = Bag::open(table.as_ref().map_or(&self.bag, |table| &table.bag))?;
@@ -121,7 +122,7 @@ impl ReportBag {
             Some(_) => format!("Tests in the table {}", file_name(&self.bag)),
             None => format!("Tests in {}", self.bag.display()),
         };
-        let mut report = judged_page(&title, &tests, budget.as_ref(), limits.as_ref())?;
+        let (mut report, alarms) = self.judged(&title, &tests, budget.as_ref(), limits)?;
         if let Some(table) = &table {
             report.begin_with_table(&table.lines);
             report.state_shortcomings(None, table.warnings());
@@ -152,12 +153,34 @@ impl ReportBag {
             std::fs::create_dir_all(out).with_context(|| format!("folder {}", out.display()))?;
             report.write(out)?;
         }
-        self.print_and_keep(
+        let kept = self.print_and_keep(
             &report,
             &tests,
             table.as_ref().map(|table| table.bag.as_path()),
-        )?;
-        Ok(loss::exit_code(is_whole(&tests) && n_odd == 0))
+        );
+        let code = loss::exit_code(is_whole(&tests) && n_odd == 0);
+        alarms::ended(alarms.as_ref(), kept, code)
+    }
+
+    /// The page with the figures judged by their limits, and those that are kept as alarms.
+    fn judged(
+        &self,
+        title: &str,
+        tests: &Tests,
+        budget: Option<&Budget>,
+        limits: Option<Limits>,
+    ) -> Result<(Report, Option<Alarms>)> {
+        let machine = tests.machine.as_ref().map(|machine| machine.name.as_str());
+        let machine = self.keep.kept_as().or(machine);
+        let own = limits.clone().map(|limits| limits.of_machine(machine));
+        let mut report = judged_page(title, tests, budget, own.as_ref())?;
+        let Some(limits) = limits.filter(|_| self.keep.is_wanted()) else {
+            return Ok((report, None));
+        };
+        let of = (machine, tests.conditions.nanos(), self.bag.as_path());
+        let alarms = self.keep.judge_report(limits, &report.figures, of)?;
+        report.add("alarms", &alarms.section());
+        Ok((report, Some(alarms)))
     }
 
     /// Refuses outputs over inputs and over what is no page, before the work begins.
@@ -215,11 +238,6 @@ impl ReportBag {
 fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
-}
-
-fn read_limits(path: &Path) -> Result<Limits> {
-    let text = text_file::yaml(path).context("limits file")?;
-    Limits::read(&text, path)
 }
 
 /// More parts of detail than these stand behind one title.

@@ -9,6 +9,7 @@ use clap::Args;
 use live_view_node::View;
 use node_runtime::Interruption;
 use node_runtime::complain;
+use node_runtime::environment::Environment;
 use recorder::Bag;
 use reports::Report;
 use reports::ReportKind;
@@ -23,7 +24,9 @@ use reports::terminal::{MOST_LINES, Room};
 use reports::test_conditions;
 
 use crate::SOFTWARE;
+use crate::alarm;
 use crate::diagnose;
+use crate::history::alarms::{self, Alarms, LimitsOption};
 use crate::history::keep::Keep;
 use crate::history::origin::Origin;
 use crate::report_bag;
@@ -78,6 +81,8 @@ pub struct Run {
     served: ServeOptions,
     #[command(flatten)]
     keep: Keep,
+    #[command(flatten)]
+    limits: LimitsOption,
 }
 
 fn renamed(_: &str) -> Result<String, &'static str> {
@@ -86,6 +91,8 @@ fn renamed(_: &str) -> Result<String, &'static str> {
     )
 }
 
+/// Who states on `/diagnostics` how figures stand to their limits.
+const RUN_NAME: &str = "abbe_run";
 /// Why a plan that was called off did not run to its end.
 const INTERRUPTED: &str = "it was interrupted";
 /// How many times real time a run may be held to: slower than a thousandth nobody waits, and faster none is.
@@ -169,6 +176,8 @@ impl Run {
         }
         check_machines(&scenario.folder, &scenario.nodes)
             .with_context(|| format!("scenario {}", scenario.folder.display()))?;
+        // A mistake in the limits ends the run before it begins.
+        self.limits.open()?;
         let interruption = Interruption::listen("the bag is closed, no page is written")?;
         let view = self.served.open(&scenario)?;
         let folder = new_folder(&self.runs, &scenario.name)?;
@@ -249,6 +258,8 @@ impl Run {
                 Err(error) => outcome.fail(format!("{error:#}")),
             }
         }
+        // The page is written whatever is wrong with the limits.
+        let alarms = self.alarms(&mut report, &outcome, scenario, (&bag, between));
         state_origin(&mut report, &outcome, &bag, between)?;
         let written = report.write(folder);
         // Each file is there whole or not at all, in a folder that is new.
@@ -263,7 +274,13 @@ impl Run {
             page: page.as_deref(),
         });
         let ended = outcome.end();
-        kept.map(|()| unwritten.map_or(ended, |it| it.complain()))
+        let code = unwritten.map_or(ended, |it| it.complain());
+        let (alarms, kept) = match alarms {
+            Ok(alarms) => (alarms, kept),
+            Err(error) => (None, kept.and(Err(error))),
+        };
+        self.publish(alarms.as_ref());
+        alarms::ended(alarms.as_ref(), kept, code)
     }
 
     /// The report on the terminal; without a page the whole of it, for then it stands nowhere else.
@@ -283,6 +300,40 @@ impl Run {
             page: Some(page),
         };
         tell!("{}", report.short(&room));
+    }
+
+    /// The figures of a plan that ran to its end beside their limits, behind the report.
+    fn alarms(
+        &self,
+        report: &mut Report,
+        outcome: &Outcome,
+        scenario: &Scenario,
+        (bag, between): (&Path, Option<(i64, i64)>),
+    ) -> Result<Option<Alarms>> {
+        let is_whole = outcome.failure.is_none() && outcome.recorded > 0;
+        let Some(limits) = self.limits.open()?.filter(|_| is_whole) else {
+            return Ok(None);
+        };
+        let machine = Origin::of_run(bag, &scenario.folder.join("machine.yaml"))?.machine;
+        let of = (machine.as_deref(), between, bag);
+        let alarms = self.keep.judge_report(limits, &report.figures, of)?;
+        report.add("alarms", &alarms.section());
+        Ok(Some(alarms))
+    }
+
+    /// States on `/diagnostics` how the figures stand to their limits; the nodes have ended by then.
+    fn publish(&self, alarms: Option<&Alarms>) {
+        let Some(alarms) = alarms else { return };
+        if self.no_dds {
+            complain!("abbe: --no-dds: the alarms are not on /diagnostics");
+            return;
+        }
+        let conditions = alarms.conditions(RUN_NAME);
+        let environment = Environment::read().map_err(anyhow::Error::from);
+        let published = environment.and_then(|it| alarm::publish(&it, RUN_NAME, &conditions));
+        if let Err(error) = published {
+            complain!("abbe: the alarms are not on /diagnostics: {error:#}");
+        }
     }
 
     /// Keeps the figures of a plan that ran to its end, where that is wanted.

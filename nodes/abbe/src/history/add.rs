@@ -41,8 +41,8 @@ pub struct Add {
     /// Diagnose bags as well, as `abbe diagnose BAG` does.
     #[arg(long)]
     diagnose: bool,
-    /// File of the history; without it `~/.local/share/abbe/history.sqlite`.
-    #[arg(long, value_name = "FILE")]
+    /// The history: a file, or `postgres://USER@HOST/DATABASE`; without it `~/.local/share/abbe/history.sqlite`.
+    #[arg(long, value_name = "STORE")]
     store: Option<PathBuf>,
 }
 

@@ -5,9 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use history::{Added, Entry, Figure, Kind, LeftOut, Store, gap_figures, left_out, report_figures};
+use metrology::stamp::NANOS_PER_S;
 use node_runtime::complain;
+use reports::evaluate::limits::Limits;
 use serde_json::Value;
 
+use super::alarms::{Alarms, Measured};
 use super::dates::{Moment, moment, time};
 use super::origin::{Origin, made_with};
 use super::{open_to_write, unmake};
@@ -24,8 +27,8 @@ pub struct Keep {
     /// Time of the measurement, for a table without one: 2026-03-01 or 2026-03-01T12:00:00Z.
     #[arg(long, value_name = "DATE", requires = "keep", value_parser = moment)]
     kept_at: Option<Moment>,
-    /// File of the history; without it `~/.local/share/abbe/history.sqlite`.
-    #[arg(long, value_name = "FILE", requires = "keep")]
+    /// The history: a file, or `postgres://USER@HOST/DATABASE`; without it `~/.local/share/abbe/history.sqlite`.
+    #[arg(long, value_name = "STORE", requires = "keep")]
     store: Option<PathBuf>,
 }
 
@@ -38,6 +41,65 @@ impl Keep {
     /// The file of the history, where one is named.
     pub fn store(&self) -> Option<&Path> {
         self.store.as_deref()
+    }
+
+    /// Holds the figures of a report against limits, before they are kept; `machine` and `between` (ns since 1970) are its own.
+    ///
+    /// # Errors
+    /// When it is no report, or a limit is of another unit than its figure.
+    pub fn judge_report(
+        &self,
+        limits: Limits,
+        figures: &Value,
+        (machine, between, source): (Option<&str>, Option<(i64, i64)>, &Path),
+    ) -> Result<Alarms> {
+        self.judge(
+            limits,
+            &report_figures(figures)?,
+            (machine, between, source),
+        )
+    }
+
+    /// Holds the figures of a diagnosis against limits, as [`Self::judge_report`].
+    ///
+    /// # Errors
+    /// As [`Self::judge_report`].
+    pub fn judge_diagnosis(
+        &self,
+        limits: Limits,
+        gap: &Value,
+        (machine, between, source): (Option<&str>, Option<(i64, i64)>, &Path),
+    ) -> Result<Alarms> {
+        self.judge(
+            limits,
+            &gap_figures(gap)?.figures,
+            (machine, between, source),
+        )
+    }
+
+    fn judge(
+        &self,
+        limits: Limits,
+        figures: &[Figure],
+        (machine, between, source): (Option<&str>, Option<(i64, i64)>, &Path),
+    ) -> Result<Alarms> {
+        let own_s = between.map(|(begin, _)| begin.div_euclid(NANOS_PER_S));
+        let stated_s = self.kept_at.map(|at| at.begin_s);
+        let at_s = own_s
+            .or(stated_s)
+            .unwrap_or_else(|| chrono::Utc::now().timestamp());
+        let measured = Measured {
+            machine: self.kept_as.as_deref().or(machine).unwrap_or_default(),
+            at_s: at_s as f64,
+            source: &source.display().to_string(),
+            figures,
+        };
+        Alarms::of_figures(limits, &measured).context("--limits")
+    }
+
+    /// Name of the machine in the history, where one is stated.
+    pub fn kept_as(&self) -> Option<&str> {
+        self.kept_as.as_deref()
     }
 
     /// Keeps the figures of a report.

@@ -8,10 +8,12 @@ use clap::Args;
 use history::{Limit, Options, Series, SeriesKey, Side, Store, Window};
 use maud::html;
 use metrology::number::number;
+use reports::loss;
 use reports::section::Section;
 use reports::whole_file::{self, Form, Output, check_outputs};
 use serde_json::{Value, json};
 
+use super::alarms::{self, Alarms};
 use super::dates::{Moment, moment, time};
 use super::{machines, overview, single, store_path};
 use crate::tell::tell;
@@ -54,6 +56,9 @@ pub struct View {
     /// Limit that the figure must not fall below, in the unit that is shown.
     #[arg(long, allow_negative_numbers = true, value_parser = finite)]
     lower: Option<f64>,
+    /// Limits that the last values are held against (limits.yaml): exit code 4 and an alarm for each that exceeds its own.
+    #[arg(long, value_name = "FILE", conflicts_with = "between")]
+    limits: Option<PathBuf>,
     /// Days after which each test is due again; without it the machine's own usual interval.
     #[arg(long, value_name = "DAYS", value_parser = above_zero)]
     every_days: Option<f64>,
@@ -66,8 +71,8 @@ pub struct View {
     /// Write the page as one HTML file.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// File of the history; without it `~/.local/share/abbe/history.sqlite`.
-    #[arg(long, value_name = "FILE")]
+    /// The history: a file, or `postgres://USER@HOST/DATABASE`; without it `~/.local/share/abbe/history.sqlite`.
+    #[arg(long, value_name = "STORE")]
     store: Option<PathBuf>,
 }
 
@@ -115,12 +120,19 @@ impl View {
         let path = store_path(self.store.as_deref())?;
         let html = self.html.iter();
         let html = html.map(|page| Output::new("--html", page.clone(), Form::Html));
-        check_outputs(&html.collect::<Vec<_>>(), [path.as_path()])?;
+        let inputs = self.limits.iter().map(PathBuf::as_path);
+        let inputs = inputs.chain([path.as_path()]);
+        check_outputs(&html.collect::<Vec<_>>(), inputs)?;
         let store = Store::open_to_read(&path, Options::default())?;
         if let Some(machine) = &self.machine {
             is_there(&store, machine)?;
         }
-        let page = self.page(&store)?;
+        let mut page = self.page(&store)?;
+        let alarms = self.alarms(&store)?;
+        if let Some(alarms) = &alarms {
+            page.sections.insert(0, alarms.section());
+            page.json["alarms"] = alarms.json();
+        }
         if self.json {
             tell!("{}", serde_json::to_string_pretty(&page.json)?);
         } else if self.csv {
@@ -136,7 +148,20 @@ impl View {
             };
             whole_file::write(path, &reports::html(&page.title, &body))?;
         }
-        Ok(ExitCode::SUCCESS)
+        let Some(alarms) = alarms else {
+            return Ok(ExitCode::SUCCESS);
+        };
+        alarms.raise()?;
+        Ok(alarms.code(loss::exit_code(alarms.is_whole())))
+    }
+
+    /// The last values beside their limits, where there are limits.
+    fn alarms(&self, store: &Store) -> Result<Option<Alarms>> {
+        let Some(path) = &self.limits else {
+            return Ok(None);
+        };
+        let limits = alarms::read(path)?;
+        Alarms::of_store(limits, store, &self.key(), self.window()).map(Some)
     }
 
     /// Why an option would have no effect, or nothing could be shown; `None`: each has one.
@@ -153,9 +178,9 @@ impl View {
             "--every-days: it is for the overview of one machine: name the machine, without --figure, --effect and --between"
         } else if has_window && has_between {
             "--since and --until: --between has its own dates: leave out one of them"
-        } else if has_window && !has_machine && !has_name {
+        } else if has_window && !has_machine && !has_name && self.limits.is_none() {
             "--since and --until: the list of machines has no dates to choose: name a machine, --figure or --effect"
-        } else if self.test.is_some() && !has_machine && !has_name {
+        } else if self.test.is_some() && !has_machine && !has_name && self.limits.is_none() {
             "--test: the list of machines has no tests to choose: name a machine, --figure or --effect"
         } else {
             return self.reversed();

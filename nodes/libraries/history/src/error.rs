@@ -85,6 +85,38 @@ pub enum HistoryError {
         /// The file.
         path: PathBuf,
     },
+    /// A server is away, or does not answer in time.
+    #[error("history {path}: no answer within {waited_ms} ms ({reason}): start the server, check host, port and network, or name a file with --store; nothing was kept", path = path.display())]
+    Unreachable {
+        /// Its URL without the password.
+        path: PathBuf,
+        /// How long it was waited for.
+        waited_ms: u32,
+        /// What was seen last.
+        reason: String,
+    },
+    /// The user of a server may not read or write.
+    #[error("history {path}: the user may not do this: {reason}: grant it to the user (docs/history.md), or name another one in --store", path = path.display())]
+    Refused {
+        /// Its URL without the password.
+        path: PathBuf,
+        /// The server's words.
+        reason: String,
+    },
+    /// Anything else that a server reports.
+    #[error("history {path}: {reason}: nothing was kept", path = path.display())]
+    Server {
+        /// Its URL without the password.
+        path: PathBuf,
+        /// The server's words.
+        reason: String,
+    },
+    /// The program has no stores on servers.
+    #[error("history {path}: this program was built without the feature `postgres`: build it with `cargo build --release --features postgres`, or name a file with --store", path = path.display())]
+    NoFeature {
+        /// The URL without the password.
+        path: PathBuf,
+    },
     /// Anything else that SQLite reports.
     #[error("history {path}: {source}", path = path.display())]
     Database {

@@ -1,7 +1,7 @@
 //! The history of machines: figures of every report and diagnosis over time.
 //!
 //! An [`Entry`] holds the figures of one report or diagnosis with machine, time and hashes. The [`Store`] keeps entries in one
-//! SQLite file, each once. Statistics read no store: they take [`Point`]s and give trends, change points, dates at which a
+//! SQLite file or on a PostgreSQL server, each once. Statistics read no store: they take [`Point`]s and give trends, change points, dates at which a
 //! limit is reached, outliers of a fleet, changes between two dates and tests that are due.
 
 mod bound;
@@ -34,5 +34,7 @@ pub use limit_crossing::{Crossing, Limit, Side, crossing};
 pub use point::{Point, YEAR_S};
 pub use report_figures::report_figures;
 pub use schema::VERSION;
-pub use store::{Added, Kept, Last, MachineSummary, Options, Series, SeriesKey, Store, Window};
+pub use store::{
+    Added, Kept, Last, MachineSummary, Options, Series, SeriesKey, Store, Window, is_server, shown,
+};
 pub use trend::Trend;

@@ -45,6 +45,38 @@ CREATE TABLE figure (
 CREATE INDEX figure_of_entry ON figure (entry);
 "];
 
+/// The steps after a version, with their numbers.
+#[cfg(feature = "postgres")]
+pub fn steps_after(version: i64) -> impl Iterator<Item = (i64, &'static str)> {
+    let all = (1_i64..).zip(MIGRATIONS);
+    all.filter(move |(number, _)| *number > version)
+}
+
+/// A text of SQL, as SQLite takes it, in the words of PostgreSQL: the same tables, numbers and order of texts.
+#[cfg(feature = "postgres")]
+pub fn of_postgres(sql: &str) -> String {
+    const WORDS: [(&str, &str); 8] = [
+        (
+            "id INTEGER PRIMARY KEY",
+            "id BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY",
+        ),
+        (" INTEGER", " BIGINT"),
+        (" REAL", " DOUBLE PRECISION"),
+        // Bytes are compared, as SQLite does.
+        (" TEXT", " TEXT COLLATE \"C\""),
+        (" WITHOUT ROWID", ""),
+        ("instr(", "strpos("),
+        // Columns have one type there.
+        (" OR typeof(f.at_s) <> 'integer'", ""),
+        ("?", "$"),
+    ];
+    let mut text = sql.to_owned();
+    for (of_sqlite, of_postgres) in WORDS {
+        text = text.replace(of_sqlite, of_postgres);
+    }
+    text
+}
+
 /// The newest version.
 pub const VERSION: i64 = MIGRATIONS.len() as i64;
 

@@ -1,29 +1,33 @@
-//! The store: one SQLite file, with a write-ahead log so that reading and writing do not wait for each other.
+//! The store: one SQLite file, or a PostgreSQL server with the feature `postgres`. Both have the same tables.
 //!
-//! An entry is written in one transaction: whole or not at all. Two programs that write at once wait for each other, up to
-//! [`Options::busy_ms`].
+//! An entry is written in one transaction: whole or not at all.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
-
-use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior, params};
 
 use crate::entry::{Entry, Figure};
 use crate::error::HistoryError;
-use crate::schema;
 
 mod cells;
 mod reading;
+mod row;
+#[cfg(feature = "postgres")]
+mod server;
+mod sqlite;
+mod url;
 
+use cells::Fault;
 pub use reading::{Kept, Last, MachineSummary, Series, SeriesKey, Window};
+use row::{Key, TableRow};
+use sqlite::Sqlite;
+pub use url::{is_server, shown};
 
 /// How a store is opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// How long a lock of another program is waited for, ms.
+    /// How long a lock of another program, or a server, is waited for, ms.
     pub busy_ms: u32,
-    /// Most pages of 4,096 bytes that the file grows to.
+    /// Most pages of 4,096 bytes that a file grows to.
     pub most_pages: u32,
 }
 
@@ -61,157 +65,143 @@ const DAY_S: i64 = 86_400;
 /// A store of entries.
 #[derive(Debug)]
 pub struct Store {
-    connection: Connection,
+    backend: Backend,
+    /// The file, or the server's URL without its password.
     path: PathBuf,
-    options: Options,
+}
+
+#[derive(Debug)]
+enum Backend {
+    Sqlite(Sqlite),
+    #[cfg(feature = "postgres")]
+    Server(Box<server::Server>),
 }
 
 impl Store {
-    /// Opens a store for reading and writing; a file that is not there is made, an older one is brought up to date.
+    /// Opens a store for reading and writing: a file, or `postgres://USER@HOST/DATABASE`. One that is not there is made, an
+    /// older one is brought up to date.
     ///
     /// # Errors
-    /// When the file cannot be opened or written, is locked, no store, or a newer version's.
+    /// When it cannot be opened or written, is locked, no store, or a newer version's.
     pub fn open(path: &Path, options: Options) -> Result<Self, HistoryError> {
-        let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
-        let mut store = Self::connect(path, flags, options)?;
-        let version = store.known_version()?;
-        if version < schema::VERSION {
-            schema::migrate(&mut store.connection).map_err(|error| store.wrong(error))?;
-        }
-        let connection = &store.connection;
-        connection
-            .pragma_update(None, "foreign_keys", true)
-            .and_then(|()| {
-                // Gives the limit back as a row.
-                connection.pragma_update_and_check(
-                    None,
-                    "max_page_count",
-                    options.most_pages,
-                    |_| Ok(()),
-                )
-            })
-            .map_err(|error| store.wrong(error))?;
-        // The mode stays in the file. While another program holds it, its old mode does as well; whoever opens it next tries again.
-        let _ = connection.pragma_update_and_check(None, "journal_mode", "WAL", |_| Ok(()));
-        Ok(store)
+        Ok(Self {
+            backend: match url::of(path) {
+                Some(url) => Backend::of_server(url, options, false)?,
+                None => Backend::Sqlite(Sqlite::open(path, options)?),
+            },
+            path: url::shown(path),
+        })
     }
 
     /// Opens a store for reading alone; nothing is made or changed.
     ///
     /// # Errors
-    /// When the file is not there, cannot be opened, is no store, or another version's.
+    /// When it is not there, cannot be opened, is no store, or another version's.
     pub fn open_to_read(path: &Path, options: Options) -> Result<Self, HistoryError> {
-        if !path.exists() {
-            return Err(HistoryError::Absent {
-                path: path.to_owned(),
-            });
-        }
-        let store = Self::connect(path, OpenFlags::SQLITE_OPEN_READ_ONLY, options)?;
-        let found = store.known_version()?;
-        if found < schema::VERSION {
-            return Err(HistoryError::Older {
-                path: path.to_owned(),
-                found,
-                known: schema::VERSION,
-            });
-        }
-        Ok(store)
-    }
-
-    fn connect(path: &Path, flags: OpenFlags, options: Options) -> Result<Self, HistoryError> {
-        // Opening a pipe would wait, and a device has no end.
-        if path.exists() && !path.is_file() && !path.is_dir() {
-            return Err(HistoryError::NotRegular {
-                path: path.to_owned(),
-            });
-        }
-        let flags = flags | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let opened = Connection::open_with_flags(path, flags).and_then(|connection| {
-            let busy = Duration::from_millis(options.busy_ms.into());
-            connection.busy_timeout(busy)?;
-            Ok(connection)
-        });
-        let connection = opened.map_err(|error| wrong(path, options, error))?;
         Ok(Self {
-            connection,
-            path: path.to_owned(),
-            options,
+            backend: match url::of(path) {
+                Some(url) => Backend::of_server(url, options, true)?,
+                None => Backend::Sqlite(Sqlite::open_to_read(path, options)?),
+            },
+            path: url::shown(path),
         })
-    }
-
-    /// The version of a file that is ours, or empty.
-    fn known_version(&self) -> Result<i64, HistoryError> {
-        let version = schema::version(&self.connection).map_err(|error| self.wrong(error))?;
-        let Some(found) = version else {
-            let found = schema::application_id(&self.connection);
-            return Err(HistoryError::Foreign {
-                path: self.path.clone(),
-                found: found.map_err(|error| self.wrong(error))?,
-                wanted: schema::APPLICATION_ID,
-            });
-        };
-        if found > schema::VERSION {
-            return Err(HistoryError::Newer {
-                path: self.path.clone(),
-                found,
-                known: schema::VERSION,
-            });
-        }
-        Ok(found)
     }
 
     /// Adds an entry, unless one of its kind and hash is there. A time at midnight is that of a date alone: it agrees with
     /// every time of its day.
     ///
     /// # Errors
-    /// When the entry is out of bounds, or the file cannot be written; nothing of it is kept then.
+    /// When the entry is out of bounds, or the store cannot be written; nothing of it is kept then.
     pub fn add(&mut self, entry: &Entry) -> Result<Added, HistoryError> {
         entry.check()?;
-        let (path, options) = (self.path.clone(), self.options);
-        let add = |connection: &mut Connection| -> Result<Added, rusqlite::Error> {
-            let transaction =
-                connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-            if let Some((id, machine, at_s)) = known(&transaction, entry)? {
-                let is_date = at_s % DAY_S == 0 || entry.at_s % DAY_S == 0;
-                let is_day = is_date && at_s.div_euclid(DAY_S) == entry.at_s.div_euclid(DAY_S);
-                let is_same = machine == entry.machine && (at_s == entry.at_s || is_day);
-                if !is_same {
-                    return Ok(Added::Otherwise { machine, at_s });
-                }
-                return Ok(if has_figures(&transaction, id, entry)? {
-                    Added::Known
-                } else {
-                    Added::KnownOtherwise
-                });
-            }
-            insert(&transaction, entry)?;
-            transaction.commit()?;
-            Ok(Added::New)
-        };
-        add(&mut self.connection).map_err(|error| wrong(&path, options, error))
+        match &mut self.backend {
+            Backend::Sqlite(file) => file.add(entry),
+            #[cfg(feature = "postgres")]
+            Backend::Server(server) => server.add(entry),
+        }
     }
 
-    fn wrong(&self, error: rusqlite::Error) -> HistoryError {
-        wrong(&self.path, self.options, error)
+    /// Hands the rows of a question to `take` until it has enough; a server gives `most` and one.
+    fn each(
+        &self,
+        sql: &str,
+        keys: &[Key<'_>],
+        most: usize,
+        take: &mut dyn FnMut(&dyn TableRow) -> Result<bool, Fault>,
+    ) -> Result<(), HistoryError> {
+        let (path, of_file) = match &self.backend {
+            Backend::Sqlite(file) => (&self.path, file.each(sql, keys, take)),
+            #[cfg(feature = "postgres")]
+            Backend::Server(server) => (&self.path, server.each(sql, keys, most, take)),
+        };
+        // A file is read row by row.
+        let _ = most;
+        of_file.map_err(|fault| match fault {
+            Fault::Sqlite(error) => match &self.backend {
+                Backend::Sqlite(file) => file.wrong(error),
+                #[cfg(feature = "postgres")]
+                Backend::Server(_) => HistoryError::NoDatabase {
+                    path: path.clone(),
+                    reason: error.to_string(),
+                },
+            },
+            #[cfg(feature = "postgres")]
+            Fault::Store(error) => error,
+            #[cfg(feature = "postgres")]
+            Fault::Cell(reason) => HistoryError::NoDatabase {
+                path: path.clone(),
+                reason,
+            },
+            Fault::Row(bad) => HistoryError::BadRow {
+                path: path.clone(),
+                table: bad.table,
+                row: bad.row,
+                column: bad.column,
+                found: bad.found,
+                must: bad.must,
+            },
+        })
+    }
+}
+
+impl Backend {
+    #[cfg(feature = "postgres")]
+    fn of_server(url: &str, options: Options, is_to_read: bool) -> Result<Self, HistoryError> {
+        let shown = url::shown(Path::new(url));
+        let server = server::Server::open(url, &shown, options, is_to_read)?;
+        Ok(Self::Server(Box::new(server)))
+    }
+
+    #[cfg(not(feature = "postgres"))]
+    fn of_server(url: &str, _options: Options, _is_to_read: bool) -> Result<Self, HistoryError> {
+        Err(HistoryError::NoFeature {
+            path: url::shown(Path::new(url)),
+        })
+    }
+}
+
+/// Figures of an entry: test, name and axis, and the value.
+type KeptFigures = BTreeMap<(String, String, String), f64>;
+
+/// What an entry that is there, with its machine, time and figures, means for the one to add.
+fn of_known(entry: &Entry, (machine, at_s): (String, i64), kept: &KeptFigures) -> Added {
+    let is_date = at_s % DAY_S == 0 || entry.at_s % DAY_S == 0;
+    let is_day = is_date && at_s.div_euclid(DAY_S) == entry.at_s.div_euclid(DAY_S);
+    let is_same = machine == entry.machine && (at_s == entry.at_s || is_day);
+    if !is_same {
+        Added::Otherwise { machine, at_s }
+    } else if has_figures(entry, kept) {
+        Added::Known
+    } else {
+        Added::KnownOtherwise
     }
 }
 
 /// Figures that differ by a smaller share are the same.
 const SAME_SHARE: f64 = 1e-9;
 
-/// Whether the entry `id` has the figures of another one.
-fn has_figures(
-    transaction: &Transaction<'_>,
-    id: i64,
-    entry: &Entry,
-) -> Result<bool, rusqlite::Error> {
-    let sql = "SELECT s.test, s.name, s.axis, f.value FROM figure f JOIN series s ON s.id = f.series WHERE f.entry = ?1";
-    let mut statement = transaction.prepare(sql)?;
-    let rows = statement.query_map([id], |row| {
-        let key: (String, String, String) = (row.get(0)?, row.get(1)?, row.get(2)?);
-        Ok((key, row.get::<_, f64>(3)?))
-    })?;
-    let kept: BTreeMap<(String, String, String), f64> = rows.collect::<Result<_, _>>()?;
+/// Whether the figures of an entry are those that are kept.
+fn has_figures(entry: &Entry, kept: &KeptFigures) -> bool {
     let is_kept = |figure: &Figure| {
         let key = (
             figure.test.clone(),
@@ -221,107 +211,5 @@ fn has_figures(
         kept.get(&key)
             .is_some_and(|value| (value - figure.value).abs() <= SAME_SHARE * value.abs())
     };
-    Ok(kept.len() == entry.figures.len() && entry.figures.iter().all(is_kept))
-}
-
-/// Row, machine and time of the entry of the same kind and hash, where there is one.
-fn known(
-    transaction: &Transaction<'_>,
-    entry: &Entry,
-) -> Result<Option<(i64, String, i64)>, rusqlite::Error> {
-    let sql = "SELECT id, machine, at_s FROM entry WHERE kind = ?1 AND sha256 = ?2";
-    let key = params![entry.kind.name(), entry.sha256];
-    let mut statement = transaction.prepare(sql)?;
-    let mut rows = statement.query_map(key, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
-    rows.next().transpose()
-}
-
-fn insert(transaction: &Transaction<'_>, entry: &Entry) -> Result<(), rusqlite::Error> {
-    transaction.execute(
-        "INSERT INTO entry (machine, at_s, kind, sha256, machine_sha256, source, instruments, operator, software)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
-        params![
-            entry.machine,
-            entry.at_s,
-            entry.kind.name(),
-            entry.sha256,
-            entry.machine_sha256,
-            entry.source,
-            entry.instruments,
-            entry.operator,
-            entry.software,
-        ],
-    )?;
-    let id = transaction.last_insert_rowid();
-    let mut place = transaction.prepare(
-        "INSERT INTO series (machine, test, name, axis, unit) VALUES (?1, ?2, ?3, ?4, ?5)
-         ON CONFLICT (machine, name, axis, test, unit) DO UPDATE SET axis = axis RETURNING id",
-    )?;
-    let mut insert = transaction.prepare(
-        "INSERT INTO figure (series, at_s, entry, value, standard_uncertainty, low, high, status)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-    )?;
-    for Figure {
-        test,
-        name,
-        axis,
-        value,
-        unit,
-        standard_uncertainty,
-        interval,
-        status,
-    } in &entry.figures
-    {
-        let key = params![entry.machine, test, name, axis, unit];
-        let series: i64 = place.query_row(key, |row| row.get(0))?;
-        let [low, high] = interval.map_or([None, None], |ends| ends.map(Some));
-        insert.execute(params![
-            series,
-            entry.at_s,
-            id,
-            value,
-            standard_uncertainty,
-            low,
-            high,
-            status,
-        ])?;
-    }
-    Ok(())
-}
-
-/// What SQLite reports, in words that name the remedy.
-fn wrong(path: &Path, options: Options, error: rusqlite::Error) -> HistoryError {
-    let path = path.to_owned();
-    // Tables or columns that are gone, and values of another type than the schema's.
-    let is_schema = error.to_string().starts_with("no such ");
-    let is_value = matches!(
-        error,
-        rusqlite::Error::InvalidColumnType(..)
-            | rusqlite::Error::FromSqlConversionFailure(..)
-            | rusqlite::Error::IntegralValueOutOfRange(..)
-    );
-    if is_schema || is_value {
-        let reason = error.to_string();
-        return HistoryError::NoDatabase { path, reason };
-    }
-    match error.sqlite_error_code() {
-        Some(ErrorCode::CannotOpen | ErrorCode::PermissionDenied) => HistoryError::Unopened {
-            path,
-            reason: error.to_string(),
-        },
-        Some(ErrorCode::NotADatabase | ErrorCode::DatabaseCorrupt) => HistoryError::NoDatabase {
-            path,
-            reason: error.to_string(),
-        },
-        Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => HistoryError::Locked {
-            path,
-            waited_ms: options.busy_ms,
-        },
-        Some(ErrorCode::ReadOnly) => HistoryError::ReadOnly { path },
-        Some(ErrorCode::DiskFull) => HistoryError::Full { path },
-        _ => HistoryError::Database {
-            path,
-            source: error,
-        },
-    }
+    kept.len() == entry.figures.len() && entry.figures.iter().all(is_kept)
 }

@@ -1,9 +1,11 @@
 //! Cells of a row, each within the bounds of what is written: another program may have changed the file.
 
-use rusqlite::Row;
 use rusqlite::types::ValueRef;
 
+use super::row::TableRow;
 use crate::bound;
+#[cfg(feature = "postgres")]
+use crate::error::HistoryError;
 
 /// Bytes of a value that an error shows.
 const SHOWN_BYTES: usize = 40;
@@ -13,6 +15,12 @@ const SHOWN_BYTES: usize = 40;
 pub(super) enum Fault {
     /// As SQLite reports it.
     Sqlite(rusqlite::Error),
+    /// As the store reports it.
+    #[cfg(feature = "postgres")]
+    Store(HistoryError),
+    /// A cell of another type than its column's.
+    #[cfg(feature = "postgres")]
+    Cell(String),
     /// A cell is out of bounds.
     Row(Box<BadCell>),
 }
@@ -35,15 +43,15 @@ pub(super) struct BadCell {
 
 /// The cells of a row.
 #[derive(Clone, Copy)]
-pub(super) struct Cells<'r, 's> {
-    row: &'r Row<'s>,
+pub(super) struct Cells<'r> {
+    row: &'r dyn TableRow,
     table: &'static str,
     series: Option<i64>,
     entry: Option<i64>,
 }
 
-impl<'r, 's> Cells<'r, 's> {
-    pub const fn new(row: &'r Row<'s>, table: &'static str) -> Self {
+impl<'r> Cells<'r> {
+    pub const fn new(row: &'r dyn TableRow, table: &'static str) -> Self {
         Self {
             row,
             table,
@@ -68,7 +76,7 @@ impl<'r, 's> Cells<'r, 's> {
         column: &'static str,
         most_bytes: usize,
     ) -> Result<String, Fault> {
-        let value = self.row.get_ref(place)?;
+        let value = self.row.cell(place)?;
         if let ValueRef::Text(bytes) = value
             && bytes.len() <= most_bytes
             && let Ok(text) = std::str::from_utf8(bytes)
@@ -82,7 +90,7 @@ impl<'r, 's> Cells<'r, 's> {
 
     /// A whole number.
     pub fn whole(&self, place: usize, column: &'static str) -> Result<i64, Fault> {
-        match self.row.get_ref(place)? {
+        match self.row.cell(place)? {
             ValueRef::Integer(number) => Ok(number),
             value => Err(self.bad(column, value, "a whole number".to_owned())),
         }
@@ -90,7 +98,7 @@ impl<'r, 's> Cells<'r, 's> {
 
     /// A time of an entry, s since 1970.
     pub fn time(&self, place: usize, column: &'static str) -> Result<i64, Fault> {
-        match self.row.get_ref(place)? {
+        match self.row.cell(place)? {
             ValueRef::Integer(at_s) if bound::TIMES_S.contains(&at_s) => Ok(at_s),
             value => {
                 let (least, greatest) = (bound::TIMES_S.start(), bound::TIMES_S.end());
@@ -102,7 +110,7 @@ impl<'r, 's> Cells<'r, 's> {
 
     /// A number of a figure.
     pub fn number(&self, place: usize, column: &'static str) -> Result<f64, Fault> {
-        let value = self.row.get_ref(place)?;
+        let value = self.row.cell(place)?;
         let number = match value {
             ValueRef::Real(number) => number,
             ValueRef::Integer(number) => number as f64,
@@ -117,7 +125,7 @@ impl<'r, 's> Cells<'r, 's> {
 
     /// A standard uncertainty; `None`: not known.
     pub fn uncertainty(&self, place: usize, column: &'static str) -> Result<Option<f64>, Fault> {
-        let value = self.row.get_ref(place)?;
+        let value = self.row.cell(place)?;
         if matches!(value, ValueRef::Null) {
             return Ok(None);
         }

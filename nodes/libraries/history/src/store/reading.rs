@@ -1,9 +1,8 @@
 //! What a store gives back: machines, series, points, last values, times of tests.
 
-use rusqlite::{Params, params};
-
 use super::Store;
 use super::cells::{Cells, Fault};
+use super::row::Key;
 use crate::bound;
 use crate::conditions::has_words;
 use crate::error::HistoryError;
@@ -105,7 +104,7 @@ impl Store {
     /// When the store cannot be read, or has too many.
     pub fn machines(&self) -> Result<Vec<MachineSummary>, HistoryError> {
         let sql = "SELECT machine, count(*), min(at_s), max(at_s) FROM entry GROUP BY machine ORDER BY machine";
-        self.rows(sql, [], ("entry", "machines", bound::ROWS), |cells| {
+        self.rows(sql, &[], ("entry", "machines", bound::ROWS), |cells| {
             Ok(MachineSummary {
                 machine: cells.text(0, "machine", bound::NAME_BYTES)?,
                 entries: cells.whole(1, "entries")?,
@@ -124,7 +123,7 @@ impl Store {
             "SELECT {COLUMNS} FROM series s WHERE {OF_KEY} ORDER BY s.machine, s.name, s.axis, s.test, s.unit"
         );
         let of = ("series", "series", bound::ROWS);
-        let mut found = self.rows(&sql, of_key(key), of, read_series)?;
+        let mut found = self.rows(&sql, &of_key(key), of, read_series)?;
         found.retain(|series| is_of_test(key, series));
         Ok(found)
     }
@@ -139,9 +138,9 @@ impl Store {
              FROM figure f LEFT JOIN entry e ON e.id = f.entry
              WHERE f.series = ?1 AND (f.at_s BETWEEN ?2 AND ?3 OR typeof(f.at_s) <> 'integer')
              ORDER BY f.at_s, f.entry";
-        let key = params![series, window.since_s, window.until_s];
+        let key = [series, window.since_s, window.until_s].map(Key::Whole);
         let of = ("figure", "values of one figure", bound::POINTS);
-        self.rows(sql, key, of, |cells| {
+        self.rows(sql, &key, of, |cells| {
             let cells = cells.of(series, Some(cells.whole(5, "entry")?));
             Ok(Kept {
                 point: read_point(&cells, 0)?,
@@ -166,7 +165,7 @@ impl Store {
              ORDER BY s.machine, s.name, s.axis, s.test, s.unit"
         );
         let of = ("figure", "series", bound::ROWS);
-        let mut found = self.rows(&sql, of_key(key), of, |cells| {
+        let mut found = self.rows(&sql, &of_key(key), of, |cells| {
             let series = read_series(cells)?;
             let cells = cells.of(series.id, None);
             Ok(Last {
@@ -187,7 +186,7 @@ impl Store {
         let sql = "SELECT DISTINCT s.test, f.at_s FROM series s JOIN figure f ON f.series = s.id
              WHERE s.machine = ?1 AND s.test <> '' ORDER BY s.test, f.at_s";
         let of = ("figure", "times of tests", bound::POINTS);
-        self.rows(sql, [machine], of, |cells| {
+        self.rows(sql, &[Key::Text(Some(machine))], of, |cells| {
             let test = cells.text(0, "test", bound::NAME_BYTES)?;
             Ok((test, cells.time(1, "at_s")?))
         })
@@ -197,32 +196,14 @@ impl Store {
     fn rows<T>(
         &self,
         sql: &str,
-        key: impl Params,
+        keys: &[Key<'_>],
         (table, name, most): (&'static str, &'static str, usize),
-        read: impl Fn(&Cells<'_, '_>) -> Result<T, Fault>,
+        read: impl Fn(&Cells<'_>) -> Result<T, Fault>,
     ) -> Result<Vec<T>, HistoryError> {
-        let collect = || -> Result<Vec<T>, Fault> {
-            let mut statement = self.connection.prepare(sql)?;
-            let mut rows = statement.query(key)?;
-            let mut all = Vec::new();
-            while let Some(row) = rows.next()? {
-                all.push(read(&Cells::new(row, table))?);
-                if all.len() > most {
-                    break;
-                }
-            }
-            Ok(all)
-        };
-        let rows = collect().map_err(|fault| match fault {
-            Fault::Sqlite(error) => self.wrong(error),
-            Fault::Row(bad) => HistoryError::BadRow {
-                path: self.path.clone(),
-                table: bad.table,
-                row: bad.row,
-                column: bad.column,
-                found: bad.found,
-                must: bad.must,
-            },
+        let mut rows = Vec::new();
+        self.each(sql, keys, most, &mut |row| {
+            rows.push(read(&Cells::new(row, table))?);
+            Ok(rows.len() <= most)
         })?;
         if rows.len() > most {
             return Err(HistoryError::TooMany {
@@ -242,11 +223,11 @@ fn is_of_test(key: &SeriesKey, series: &Series) -> bool {
 }
 
 /// Parameters 1 to 4 of [`OF_KEY`].
-fn of_key(key: &SeriesKey) -> [Option<&str>; 4] {
-    [&key.machine, &key.name, &key.axis, &key.test].map(|text| text.as_deref())
+fn of_key(key: &SeriesKey) -> [Key<'_>; 4] {
+    [&key.machine, &key.name, &key.axis, &key.test].map(|text| Key::Text(text.as_deref()))
 }
 
-fn read_series(cells: &Cells<'_, '_>) -> Result<Series, Fault> {
+fn read_series(cells: &Cells<'_>) -> Result<Series, Fault> {
     let id = cells.whole(0, "id")?;
     let cells = cells.of(id, None);
     let text = |place, column| cells.text(place, column, bound::NAME_BYTES);
@@ -261,7 +242,7 @@ fn read_series(cells: &Cells<'_, '_>) -> Result<Series, Fault> {
 }
 
 /// Time, value and uncertainty in three columns from `first` on.
-fn read_point(cells: &Cells<'_, '_>, first: usize) -> Result<Point, Fault> {
+fn read_point(cells: &Cells<'_>, first: usize) -> Result<Point, Fault> {
     Ok(Point {
         at_s: cells.time(first, "at_s")? as f64,
         value: cells.number(first + 1, "value")?,

@@ -17,18 +17,23 @@ use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail};
 use iso230::conformance::Policy;
-use metrology::number::{number, quantity};
+use metrology::number::number;
 use metrology::yaml;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Value;
 
+pub mod alarms;
 mod judged;
+mod limit;
+pub mod webhook;
 
 use crate::section::{Rows, Section, head};
 use crate::terminal::Rank;
 pub use judged::CONFORMS;
 use judged::{Figure, Judged};
+use limit::Limit;
+use webhook::Webhook;
 
 /// `limits.yaml`.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -38,76 +43,25 @@ pub struct Limits {
     rule: Policy,
     /// Limits by the name of a figure, as `abbe report --json` has it below each test.
     limits: BTreeMap<String, Limit>,
+    /// Limits of single machines, by the machine's name and then as `limits`; they take the place of those of all.
+    #[serde(default)]
+    machines: BTreeMap<String, BTreeMap<String, Limit>>,
+    /// Where alarms of a history are sent as JSON (POST): http://HOST:PORT/PATH.
+    webhook: Option<String>,
 }
 
-/// Limits of one figure; at least one.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct Limit {
-    /// Least length that conforms.
-    lower_um: Option<f64>,
-    /// Greatest length that conforms.
-    upper_um: Option<f64>,
-    /// Least angle that conforms.
-    lower_arcsec: Option<f64>,
-    /// Greatest angle that conforms.
-    upper_arcsec: Option<f64>,
-}
+/// Begins of the names of figures that a history has and no test of a report: they are no mistake, and judged with the history.
+const OF_HISTORY: [&str; 6] = [
+    "effect.",
+    "gap.",
+    "geometry.",
+    "latency_s",
+    "location.",
+    "tool_error.",
+];
 
-/// Greatest magnitude of a limit of a length, µm: a metre.
-const GREATEST_UM: f64 = 1e6;
-/// Greatest magnitude of a limit of an angle, arcsec: a turn.
-const GREATEST_ARCSEC: f64 = 1_296_000.0;
 /// A probability of no more decides nothing.
 const LEAST_PROBABILITY: f64 = 0.5;
-
-impl Limit {
-    /// Refuses limits that are no numbers of a machine, or leave no zone; `place` is their key.
-    fn check(self, place: &str) -> Result<(), String> {
-        let of_lengths = (self.lower_um, self.upper_um, "um", GREATEST_UM);
-        let of_angles = (
-            self.lower_arcsec,
-            self.upper_arcsec,
-            "arcsec",
-            GREATEST_ARCSEC,
-        );
-        for (lower, upper, unit, greatest) in [of_lengths, of_angles] {
-            for (side, value) in [("lower", lower), ("upper", upper)] {
-                let Some(value) = value else { continue };
-                if !(-greatest..=greatest).contains(&value) {
-                    let key = format!("{place}.{side}_{unit}");
-                    let [value, least, greatest] =
-                        [value, -greatest, greatest].map(|one| quantity(&key, one));
-                    return Err(format!(
-                        "{key} = {value}: must be from {least} to {greatest}"
-                    ));
-                }
-            }
-            if let (Some(lower), Some(upper)) = (lower, upper)
-                && lower >= upper
-            {
-                let key = format!("{place}.lower_{unit}");
-                let [lower, upper] = [lower, upper].map(|one| quantity(&key, one));
-                return Err(format!(
-                    "{key} = {lower}: must be below upper_{unit} = {upper}: exchange them"
-                ));
-            }
-        }
-        let is_there = |lower: Option<f64>, upper: Option<f64>| lower.or(upper).is_some();
-        match (
-            is_there(self.lower_um, self.upper_um),
-            is_there(self.lower_arcsec, self.upper_arcsec),
-        ) {
-            (false, false) => Err(format!(
-                "{place}: has no limit: state lower_um or upper_um (µm), of an angle lower_arcsec or upper_arcsec"
-            )),
-            (true, true) => Err(format!(
-                "{place}: has limits in µm and in arcsec: a figure is a length or an angle, remove one"
-            )),
-            _ => Ok(()),
-        }
-    }
-}
 
 impl Limits {
     /// Reads the text of a file of limits; `place` names it in errors.
@@ -120,7 +74,7 @@ impl Limits {
             yaml::read(text).map_err(|error| anyhow!("limits file {place}:{error}"))?;
         let file = place.to_string();
         let wrong = |message: &str| anyhow!("limits file {}", yaml::placed(&file, text, message));
-        if limits.limits.is_empty() {
+        if limits.limits.is_empty() && limits.machines.values().all(BTreeMap::is_empty) {
             return Err(wrong("limits: must name one figure at least"));
         }
         limits.check().map_err(|message| wrong(&message))?;
@@ -138,7 +92,32 @@ impl Limits {
             ));
         }
         let mut limits = self.limits.iter();
-        limits.try_for_each(|(name, limit)| limit.check(&format!("limits.{name}")))
+        limits.try_for_each(|(name, limit)| limit.check(&format!("limits.{name}")))?;
+        let machines = self.machines.iter();
+        let mut own = machines.flat_map(|(machine, limits)| {
+            let place = move |name: &String| format!("machines.{machine}.{name}");
+            limits.iter().map(move |(name, limit)| (place(name), limit))
+        });
+        own.try_for_each(|(place, limit)| limit.check(&place))?;
+        self.webhook().map(|_| ())
+    }
+
+    /// Where alarms are sent, where that is wanted.
+    ///
+    /// # Errors
+    /// Why nothing can be sent there; never of limits that were read.
+    pub fn webhook(&self) -> Result<Option<Webhook>, String> {
+        self.webhook.as_deref().map(Webhook::read).transpose()
+    }
+
+    /// The limits of one machine: its own, and those of all that it has none for.
+    #[must_use]
+    pub fn of_machine(mut self, machine: Option<&str>) -> Self {
+        if let Some(own) = machine.and_then(|machine| self.machines.get(machine)) {
+            self.limits
+                .extend(own.iter().map(|(name, limit)| (name.clone(), *limit)));
+        }
+        self
     }
 
     /// Judges the figures of all tests.
@@ -157,7 +136,7 @@ impl Limits {
             ),
             ..Rows::default()
         };
-        for (name, limit) in &self.limits {
+        for (name, limit) in self.limits.iter().filter(|(name, _)| is_of_tests(name)) {
             let found: Vec<(&Value, Figure)> = tests
                 .iter()
                 .filter_map(|test| Some((test, Figure::of(test, name)?)))
@@ -198,11 +177,26 @@ impl Limits {
         for (name, key) in one_sided {
             section.warn("Limited on one side", one_sided_line(name, key));
         }
-        section.answers.push(in_short(&table.rows));
-        section.tables.push(table);
-        section.figures = verdicts.into();
+        conclude(&mut section, table, verdicts);
         Ok(section)
     }
+}
+
+/// Whether a name is that of a figure of a test; a name with an axis is not.
+fn is_of_tests(name: &str) -> bool {
+    !name.contains(' ') && !OF_HISTORY.iter().any(|begin| name.starts_with(begin))
+}
+
+/// Adds the decisions, or that there is none to make.
+fn conclude(section: &mut Section, table: Rows, verdicts: Vec<Value>) {
+    if table.rows.is_empty() {
+        let line = "Nothing is judged: the limits name no figure of a test, only those that a history has.";
+        section.warn("Nothing is judged", line.to_owned());
+        return;
+    }
+    section.answers.push(in_short(&table.rows));
+    section.tables.push(table);
+    section.figures = verdicts.into();
 }
 
 /// A figure with a sign that has no lower limit.

@@ -7,7 +7,7 @@ use iso230::conformance::{
 use iso230::{ExpandedAngle, ExpandedLength};
 use serde_json::Value;
 
-use super::Limit;
+use super::limit::Limit;
 use crate::section::um;
 
 /// A decision for a figure, in words.
@@ -85,6 +85,11 @@ impl Judged {
         let has_um = limit.lower_um.is_some() || limit.upper_um.is_some();
         let has_arcsec = limit.lower_arcsec.is_some() || limit.upper_arcsec.is_some();
         let (decision, probability, verdict) = match figure.quantity {
+            Quantity::Length(_) | Quantity::Angle(_) if limit.lower.or(limit.upper).is_some() => {
+                bail!(
+                    "has a unit: lower_um and upper_um limit a length, lower_arcsec and upper_arcsec an angle"
+                )
+            }
             Quantity::Length(_) if has_arcsec => {
                 bail!("is a length: lower_um and upper_um limit it, not seconds of arc")
             }
