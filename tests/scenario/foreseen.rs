@@ -61,11 +61,14 @@ pub fn differences(forecast: &Value, report: &Value) -> Vec<String> {
     let mut differ = Vec::new();
     let bags = report["inputs"]["bags"].as_array().unwrap().iter();
     let recorded: u64 = bags.map(|bag| bag["runs"].as_u64().unwrap()).sum();
-    if forecast["runs"] != recorded {
-        differ.push(format!(
-            "{} runs foreseen, {recorded} made",
-            forecast["runs"]
-        ));
+    let foreseen = forecast["runs"].as_u64().unwrap();
+    // Drift and the load of the real machine ask for cycles of their own, and move those of the period.
+    let of_heat = match forecast["requested_block_cycles"].as_u64().unwrap() {
+        0 => 0,
+        requested => 2.max(requested / 4),
+    };
+    if recorded + of_heat.min(1) < foreseen || recorded > foreseen + of_heat {
+        differ.push(format!("{foreseen} runs foreseen, {recorded} made"));
     }
     let channels = texts(&forecast["channels"], "channel");
     // Thermometers that are compared with each other have no floor to assume.
@@ -98,6 +101,7 @@ pub fn differences(forecast: &Value, report: &Value) -> Vec<String> {
 fn a_forecast_that_the_run_does_not_bear_out_is_noticed() {
     let forecast = serde_json::json!({
         "runs": 2,
+        "requested_block_cycles": 0,
         "channels": [{"channel": "touch", "repeats": 5}],
         "not_excited": [{"effect": "spindle_growth"}],
     });
@@ -110,6 +114,7 @@ fn a_forecast_that_the_run_does_not_bear_out_is_noticed() {
     };
     let of = |report: &Value| differences(&forecast, report).len();
     assert_eq!(of(&report(2, "probe_latency", "named", "touch")), 0);
+    assert_eq!(of(&report(1, "probe_latency", "named", "touch")), 1);
     assert_eq!(of(&report(17, "probe_latency", "named", "touch")), 1);
     assert_eq!(of(&report(2, "spindle_growth", "named", "touch")), 1);
     assert_eq!(of(&report(2, "spindle_growth", "surrogate", "touch")), 0);

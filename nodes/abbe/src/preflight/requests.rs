@@ -2,7 +2,8 @@
 //!
 //! The stage is that of the run, with its parameters; what it is given is foreseen: blocks that stand still, so that no
 //! drift is predicted and no jump has to be confirmed, and the temperatures of [`super::warming`]. Left are the requests
-//! of its period and of changes of the load.
+//! of its period and of pauses of production. Those of drift and of a thermometer's slope depend on the real machine's
+//! heat, which nobody knows before: a run can have more cycles than are foreseen.
 
 use anyhow::{Context, Result};
 use machine::MachineFile;
@@ -34,7 +35,10 @@ impl Requests {
     /// # Errors
     /// When the model cannot be made for this machine.
     pub fn new(config: &ThermalModelConfig, machine: &MachineFile) -> Result<Self> {
-        let stage = ThermalModelStage::new(config.clone(), machine).context("thermal_model")?;
+        let mut config = config.clone();
+        // The slopes of assumed temperatures say nothing of the real spindle's.
+        config.load.sensor.clear();
+        let stage = ThermalModelStage::new(config, machine).context("thermal_model")?;
         Ok(Self {
             stage,
             machine: machine.clone(),

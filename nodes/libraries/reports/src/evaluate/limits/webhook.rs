@@ -22,7 +22,9 @@ impl Webhook {
     /// # Errors
     /// Why no alarm can be sent there, with what to state instead.
     pub fn read(url: &str) -> Result<Self, String> {
-        let begin: String = url.chars().take(80).collect();
+        // A password is not repeated.
+        let shown = url.rsplit('@').next().unwrap_or(url);
+        let begin: String = shown.chars().take(80).collect();
         let wrong = |why: &str| Err(format!("webhook = {begin:?}: {why}"));
         if url.len() > MOST_BYTES {
             return wrong(&format!(
@@ -45,15 +47,16 @@ impl Webhook {
         };
         let begin = rest.find(['/', '?']).unwrap_or(rest.len());
         let (host, path) = rest.split_at(begin);
+        if host.contains('@') {
+            return wrong("must have no user and password: the receiver would get none");
+        }
         let (name, port) = match host.rsplit_once(':') {
             // Colons within brackets are those of an address of IPv6.
             Some((name, port)) if !port.ends_with(']') => (name, Some(port)),
             _ => (host, None),
         };
-        if name.is_empty() || name.contains('@') {
-            return wrong(
-                "must name a host without user and password, such as http://127.0.0.1:8080/alarm",
-            );
+        if name.is_empty() {
+            return wrong("must name a host, such as http://127.0.0.1:8080/alarm");
         }
         let port = match port.map(str::parse::<u16>) {
             None => USUAL_PORT,
@@ -99,7 +102,7 @@ mod tests {
             ("ftp://a", "must begin with http://"),
             ("http://", "must name a host"),
             ("http://:80/x", "must name a host"),
-            ("http://u:p@a/x", "without user and password"),
+            ("http://u:p@a/x", "no user and password"),
             ("http://a:0/", "from 1 to 65535"),
             ("http://a:x/", "from 1 to 65535"),
             ("http://a:65536/", "from 1 to 65535"),
@@ -110,6 +113,11 @@ mod tests {
             let said = Webhook::read(url).unwrap_err();
             assert!(said.contains(words), "{url}: {said}");
         }
+        assert!(
+            !Webhook::read("http://u:secret@a/x")
+                .unwrap_err()
+                .contains("secret")
+        );
         let long = format!("http://a/{}", "x".repeat(2_000));
         assert!(Webhook::read(&long).unwrap_err().contains("at most 2000"));
     }
