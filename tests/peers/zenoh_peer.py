@@ -242,7 +242,7 @@ def managed(desk: Desk, tokens: list[str]) -> list:
 
 def meet(endpoint: str, domain: int) -> None:
     desk = Desk(endpoint, domain)
-    tokens = desk.tokens("%fake_cnc%get_type_description")
+    tokens = desk.tokens("%run_program%_action%status")
     seen = {"tokens": tokens}
     state = "abbe_msgs/msg/AxisState"
     seen["hash"] = desk.types.hash_rihs01(state)
