@@ -22,20 +22,20 @@ impl Foreseen {
         Self(Process::start(preflight))
     }
 
-    /// Its forecast.
-    pub fn forecast(self) -> Value {
+    /// What it says of the scenario: its forecast, and the cycles that nodes ask for.
+    pub fn planned(self) -> Value {
         let ended = self.0.ended_within(Duration::from_secs(PATIENCE_S));
         assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
         let begin = ended.said.find('{').unwrap();
         // The expected time of a long one may stand behind it.
         let mut values = serde_json::Deserializer::from_str(&ended.said[begin..]).into_iter();
         let told: Value = values.next().unwrap().unwrap();
-        told["gap"]["forecast"].clone()
+        told["gap"].clone()
     }
 
     /// Compares with the report of the run, or with a diagnosis of its bag where the scenario makes none.
     pub fn agrees(self, folder: &Path, run: &Path) {
-        let forecast = self.forecast();
+        let planned = self.planned();
         let gap = run.join("gap.json");
         if !gap.is_file() {
             let mut diagnose = command(0, &["diagnose"]);
@@ -46,7 +46,7 @@ impl Foreseen {
             assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
         }
         let text = std::fs::read_to_string(&gap).unwrap();
-        let differ = differences(&forecast, &serde_json::from_str(&text).unwrap());
+        let differ = differences(&planned, &serde_json::from_str(&text).unwrap());
         assert!(differ.is_empty(), "{}: {differ:#?}", folder.display());
     }
 }
@@ -57,13 +57,14 @@ fn texts<'v>(list: &'v Value, key: &str) -> BTreeSet<&'v str> {
 }
 
 /// What of a forecast the report of the run does not bear out.
-pub fn differences(forecast: &Value, report: &Value) -> Vec<String> {
+pub fn differences(planned: &Value, report: &Value) -> Vec<String> {
     let mut differ = Vec::new();
+    let forecast = &planned["forecast"];
     let bags = report["inputs"]["bags"].as_array().unwrap().iter();
     let recorded: u64 = bags.map(|bag| bag["runs"].as_u64().unwrap()).sum();
     let foreseen = forecast["runs"].as_u64().unwrap();
     // Drift and the load of the real machine ask for cycles of their own, and move those of the period.
-    let of_heat = match forecast["requested_block_cycles"].as_u64().unwrap() {
+    let of_heat = match planned["requested_block_cycles"].as_u64().unwrap() {
         0 => 0,
         requested => 2.max(requested / 4),
     };
@@ -99,11 +100,13 @@ pub fn differences(forecast: &Value, report: &Value) -> Vec<String> {
 
 #[test]
 fn a_forecast_that_the_run_does_not_bear_out_is_noticed() {
-    let forecast = serde_json::json!({
-        "runs": 2,
+    let planned = serde_json::json!({
         "requested_block_cycles": 0,
-        "channels": [{"channel": "touch", "repeats": 5}],
-        "not_excited": [{"effect": "spindle_growth"}],
+        "forecast": {
+            "runs": 2,
+            "channels": [{"channel": "touch", "repeats": 5}],
+            "not_excited": [{"effect": "spindle_growth"}],
+        },
     });
     let report = |runs: u64, effect: &str, status: &str, channel: &str| {
         serde_json::json!({
@@ -112,7 +115,7 @@ fn a_forecast_that_the_run_does_not_bear_out_is_noticed() {
             "causes": [{"effect": effect, "status": status}],
         })
     };
-    let of = |report: &Value| differences(&forecast, report).len();
+    let of = |report: &Value| differences(&planned, report).len();
     assert_eq!(of(&report(2, "probe_latency", "named", "touch")), 0);
     assert_eq!(of(&report(1, "probe_latency", "named", "touch")), 1);
     assert_eq!(of(&report(17, "probe_latency", "named", "touch")), 1);
