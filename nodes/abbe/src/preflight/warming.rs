@@ -32,7 +32,7 @@ pub const COLD_DEGC: f64 = 20.0;
 const ROOM_SWING_K: f64 = 2.0;
 /// The period of (2), s.
 const DAY_S: f64 = 86_400.0;
-/// Step of (1) and (2), s.
+/// Least step of (1) and (2), s.
 const WARMING_STEP_S: f64 = 1.0;
 /// What warms a machine.
 const SOURCES: [Heat; 4] = [
@@ -56,20 +56,22 @@ const fn room_tau_min(place: SensorPlace) -> f64 {
 /// A first-order answer.
 #[derive(Clone, Copy, Debug)]
 struct Lag {
-    share: f64,
+    tau_s: f64,
     value_k: f64,
 }
 
 impl Lag {
     fn new(tau_min: f64) -> Self {
         Self {
-            share: 1.0 - (-WARMING_STEP_S / (60.0 * tau_min)).exp(),
+            tau_s: 60.0 * tau_min,
             value_k: 0.0,
         }
     }
 
-    fn follow(&mut self, target_k: f64) {
-        self.value_k += self.share * (target_k - self.value_k);
+    /// Exact while the target stands still over the time.
+    fn follow(&mut self, target_k: f64, passed_s: f64) {
+        let share = 1.0 - (-passed_s / self.tau_s).exp();
+        self.value_k += share * (target_k - self.value_k);
     }
 }
 
@@ -150,13 +152,15 @@ impl Warming {
     }
 
     fn warm(&mut self) {
-        self.at_s += self.passed_s;
+        let passed_s = self.passed_s;
+        self.at_s += passed_s;
         let room_k = ROOM_SWING_K * (TAU * self.at_s / DAY_S).sin();
         for place in &mut self.places {
             for (source, rise_k, lag) in &mut place.sources {
-                lag.follow(*rise_k * self.driven_s[*source] / self.passed_s); // (1)
+                let drive = self.driven_s[*source] / passed_s;
+                lag.follow(*rise_k * drive, passed_s); // (1)
             }
-            place.room.follow(room_k); // (2)
+            place.room.follow(room_k, passed_s); // (2)
             let reading = place.reading_degc();
             let [low, high] = place.span_degc;
             place.span_degc = [low.min(reading), high.max(reading)];
@@ -186,7 +190,7 @@ impl Warming {
 mod tests {
     use super::*;
 
-    const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
+    const MACHINE: &str = include_str!("../../../../launch_configs/first_run/machine.yaml");
 
     /// Readings after some minutes in which X moves at a speed and the spindle turns, or not.
     fn after(minutes: u32, speed_mm_s: f64, spindle_rpm: f64) -> Warming {
