@@ -32,7 +32,7 @@ pub const COLD_DEGC: f64 = 20.0;
 const ROOM_SWING_K: f64 = 2.0;
 /// The period of (2), s.
 const DAY_S: f64 = 86_400.0;
-/// Least step of (1) and (2), s.
+/// Step of (1) and (2), to the nearest period of motion, s.
 const WARMING_STEP_S: f64 = 1.0;
 /// What warms a machine.
 const SOURCES: [Heat; 4] = [
@@ -146,7 +146,8 @@ impl Warming {
             *driven_s += drive * period_s;
         }
         self.passed_s += period_s;
-        if self.passed_s >= WARMING_STEP_S {
+        // The nearest: ten tenths of a second add up to a little less than one.
+        if self.passed_s + 0.5 * period_s >= WARMING_STEP_S {
             self.warm();
         }
     }
