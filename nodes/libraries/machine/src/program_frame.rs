@@ -70,7 +70,7 @@ impl Comment<'_> {
     }
 }
 
-/// The comments of a line, in their order; one whose parenthesis is not closed is none.
+/// The comments of a line, in their order; one without its closing parenthesis does not count.
 fn comments(line: &str) -> impl Iterator<Item = Comment<'_>> {
     let (mut rest, mut place) = (line, Place::First);
     std::iter::from_fn(move || {

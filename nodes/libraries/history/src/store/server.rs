@@ -225,7 +225,7 @@ async fn connect(config: &Config) -> Result<Client, tokio_postgres::Error> {
     }
 }
 
-/// The version of the tables; 0 where there are none, `None` where another program has that schema.
+/// The version of the tables; 0 before they are made, `None` where another program has that schema.
 async fn version(client: &Client) -> Result<Option<i64>, tokio_postgres::Error> {
     let sql = "SELECT to_regclass('abbe.schema_version') IS NOT NULL,
                       EXISTS (SELECT 1 FROM pg_catalog.pg_tables WHERE schemaname = 'abbe')";

@@ -23,7 +23,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts a server. Where there is none the test's name and the reason are printed.
+    /// Starts a server. On a computer without PostgreSQL, the test's name and the reason are printed.
     pub fn start(test: &str) -> Option<Self> {
         let Some(programs) = programs() else {
             let reason = "no /usr/lib/postgresql/*/bin/initdb: apt-get install postgresql (tests/run installs it)";

@@ -187,7 +187,7 @@ fn is_of_tests(name: &str) -> bool {
     !name.contains(' ') && !OF_HISTORY.iter().any(|begin| name.starts_with(begin))
 }
 
-/// Adds the decisions, or that there is none to make.
+/// Adds the decisions, or the reason why none is made.
 fn conclude(section: &mut Section, table: Rows, verdicts: Vec<Value>) {
     if table.rows.is_empty() {
         let line = "Nothing is judged: the limits name no figure of a test, only those that a history has.";
