@@ -247,7 +247,7 @@ pub struct PositioningResult {
 ///
 /// # Errors
 /// A direction without runs, fewer than two runs or targets, targets that do not ascend, lists that
-/// do not fit together, a number that is none, a budget with a negative entry.
+/// do not fit together, a number that is not finite, a budget with a negative entry.
 pub fn evaluate(
     runs: &PositioningRuns,
     budget: &PositioningBudget,

@@ -83,7 +83,7 @@ pub fn evaluate(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::evaluate as evaluate_both;
     use super::*;
     use crate::budget::{DeviceUncertainty, Expansion};
@@ -103,7 +103,8 @@ mod tests {
         }
     }
 
-    fn budget() -> PositioningBudget {
+    /// A budget with a share of every kind.
+    pub(in super::super) fn budget() -> PositioningBudget {
         let body = Expansion {
             temperature_deviation_k: 0.5,
             temperature_half_width_k: 0.2,

@@ -77,7 +77,7 @@ pub fn is_single(runs: &PositioningRuns) -> bool {
 ///
 /// # Errors
 /// No run, more than one run of a side, fewer than two targets, targets that do not ascend, lists that do not fit together, a
-/// number that is none, a budget with a negative entry.
+/// number that is not finite, a budget with a negative entry.
 pub fn evaluate(
     runs: &PositioningRuns,
     budget: &PositioningBudget,
@@ -185,8 +185,8 @@ fn range_of(targets_mm: &[f64], sides: &[&[f64]]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::super::evaluate as evaluate_runs;
+    use super::super::one_sided::tests::budget;
     use super::*;
-    use crate::budget::{DeviceUncertainty, Expansion};
 
     fn runs(n: usize) -> PositioningRuns {
         PositioningRuns {
@@ -195,27 +195,6 @@ mod tests {
             down_mm: vec![vec![0.003, 0.005, 0.005, 0.0]; n],
             zero_mm: 0.0,
             periods_mm: vec![],
-        }
-    }
-
-    fn budget() -> PositioningBudget {
-        let body = Expansion {
-            temperature_deviation_k: 0.5,
-            temperature_half_width_k: 0.2,
-            expansion_per_k: 11e-6,
-            expansion_half_width_per_k: 1e-6,
-        };
-        PositioningBudget {
-            device: DeviceUncertainty {
-                expanded_uncertainty_mm: 1e-4,
-                expanded_uncertainty_per_length: 1e-6,
-                coverage_factor: 2.0,
-            },
-            misalignment_mm: 0.1,
-            machine: body,
-            device_expansion: body,
-            environmental_drift_mm: 1e-4,
-            environmental_unrest_mm: None,
         }
     }
 
