@@ -62,6 +62,17 @@ impl Run {
             .filter(move |touch| FeatureId::parse(&touch.point.feature_id).is_some_and(&mut wanted))
     }
 
+    /// Whether each of these features, blocks and artefacts was touched, by a touch that counts or by a rejected one.
+    pub(crate) fn has_touched(&self, names: &[String]) -> bool {
+        let mut touched = BTreeSet::new();
+        for touch in &self.touches {
+            let name = touch.point.feature_id.as_str();
+            touched.insert(name);
+            touched.extend(FeatureId::parse(name).map(|id| id.owner()));
+        }
+        names.iter().all(|name| touched.contains(name.as_str()))
+    }
+
     /// Blocks and artefacts that the segment names or that were touched, in this order.
     pub(crate) fn owners(&self) -> Vec<String> {
         let named = self.segment.features.iter().map(String::as_str);

@@ -3,7 +3,8 @@
 //!
 //! A trigger may overtake the position that it needs, since the two come on different topics: it
 //! waits for `hold_ms` at most. The end of a segment may overtake its last trigger and waits as long
-//! before the run is evaluated. Both are settled by whatever event comes next, a tick at the latest.
+//! before the run is evaluated; where a test ran to its end and a feature of it was not touched yet, the touches are
+//! still on their way and it waits for `MISSING_TOUCHES`. All are settled by whatever event comes next, a tick at the latest.
 
 use std::collections::VecDeque;
 
@@ -28,6 +29,8 @@ use crate::{block, shape};
 
 /// Touches and segments that may wait at once: a touch waits for `hold_ms`, and a machine makes a few in a second.
 const MOST_WAITING: usize = 10_000;
+/// How long the end of a test waits for touches that must have been made: as long as the sequencer does.
+const MISSING_TOUCHES: Span = Span::from_nanos(10_000_000_000);
 /// Rounding allowed in the length of an approach.
 const UNIT_ROUNDING: f64 = 1e-6;
 
@@ -267,7 +270,8 @@ impl ProbeStage {
     fn settle(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
         while let Some(mut waiting) = self.waiting.pop_front() {
             waiting.since = waiting.since.min(at); // host time went back: the wait begins anew
-            let may_wait = at - waiting.since < self.hold;
+            let waited = at - waiting.since;
+            let may_wait = waited < self.hold;
             match waiting.event {
                 WaitingEvent::Trigger {
                     ref trigger,
@@ -289,7 +293,9 @@ impl ProbeStage {
                     }
                 }
                 WaitingEvent::Begin(segment) => self.begin(segment, out),
-                WaitingEvent::End(_) if may_wait => {
+                WaitingEvent::End(ref segment)
+                    if may_wait || (waited < MISSING_TOUCHES && self.lacks_touches(segment)) =>
+                {
                     self.waiting.push_front(waiting);
                     return;
                 }
@@ -361,6 +367,12 @@ impl ProbeStage {
             .as_ref()
             .and_then(|run| run.ball_radius_mm)
             .unwrap_or_else(|| self.file.ball_radius_mm())
+    }
+
+    /// Whether a test ran to its end and the run has no touch yet of a feature that it names.
+    fn lacks_touches(&self, end: &TestSegment) -> bool {
+        let run = self.run.as_ref().filter(|run| run.number() == end.run);
+        end.completed && run.is_some_and(|run| !run.has_touched(&end.features))
     }
 
     fn begin(&mut self, segment: TestSegment, out: &mut Vec<Output>) {

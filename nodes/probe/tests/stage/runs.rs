@@ -1,8 +1,9 @@
 //! Runs: blocks, shapes, segments.
 
-use metrology::Axis;
 use metrology::sample::{FeatureKind, TestKind};
+use metrology::{Axis, Stage, Stamp};
 use nalgebra::Vector3;
+use probe::{Input, Output};
 
 use crate::rig::{Rig, known_latency};
 
@@ -116,6 +117,31 @@ fn a_touch_that_comes_after_the_end_of_its_segment_still_counts() {
     rig.settle();
     assert!(rig.blocks()[0].faces[Axis::Z].is_some());
     assert!(rig.diagnostics().is_empty());
+}
+
+#[test]
+fn a_completed_test_waits_for_a_face_whose_touch_is_seconds_late() {
+    let faces = ["block_1.x", "block_1.y", "block_1.z"];
+    let mut rig = Rig::new(&known_latency());
+    rig.segment(TestKind::Block, true, &faces);
+    let corner = Vector3::new(-220.0, -180.0, 20.0);
+    rig.touch(faces[0], corner, Vector3::x(), 2.0);
+    rig.touch(faces[1], corner, Vector3::y(), 2.0);
+    rig.segment(TestKind::Block, false, &faces);
+    rig.now_ns += 5_000_000_000;
+    rig.send(Input::Tick);
+    assert!(rig.blocks().is_empty(), "the computer stood still");
+    let mut without = rig.stage.clone();
+    rig.touch(faces[2], corner, -Vector3::z(), 2.0);
+    rig.settle();
+    let block = &rig.blocks()[0];
+    assert!(Axis::LINEAR.iter().all(|axis| block.faces[*axis].is_some()));
+
+    let at = Stamp::from_nanos(rig.now_ns + 10_000_000_000);
+    let mut out = Vec::new();
+    without.step(at, Input::Tick, &mut out).unwrap();
+    let blocks = { out.iter() }.filter(|output| matches!(output, Output::Block(_)));
+    assert_eq!(blocks.count(), 1, "it is evaluated without the touch");
 }
 
 #[test]

@@ -6,9 +6,9 @@ use metrology::stamp::Span;
 use super::{CANCELED, CycleOutcome, Output, ProgramEnd, Sequencer};
 use crate::job::Owner;
 
-/// How long touches are awaited after their program's end: on a live graph they come by another way
-/// than the end does, s.
-const STRAGGLERS_S: f64 = 1.0;
+/// How long touches are awaited after their program's end, s: on a live graph they come by another way than the end does,
+/// and on a computer that stood still for seconds they are sent again first.
+const STRAGGLERS_S: f64 = 10.0;
 
 impl Sequencer {
     /// The controller says that the program ended.
@@ -61,7 +61,8 @@ impl Sequencer {
             return;
         }
         let message = format!(
-            "{} of {} touches arrived, the others were lost",
+            "{} of {} touches arrived within {STRAGGLERS_S} s of the program's end, the others were lost; see whether \
+             the computer or the network was overloaded, then measure again",
             job.touches, job.task.planned
         );
         let lost = ProgramEnd {
