@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use abbe_msgs::topics;
+use abbe_tests::foreseen::Foreseen;
 use abbe_tests::scenario::Scenario;
 use fake_cnc::plant::{Plant, PlantFile};
 use machine::MachineFile;
@@ -16,7 +17,6 @@ use nalgebra::Vector3;
 use recorder::Bag;
 use serde_json::Value;
 
-use crate::foreseen::Foreseen;
 use crate::recorded::{all, stops, tests};
 use crate::shadow::Shadow;
 

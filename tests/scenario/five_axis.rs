@@ -2,10 +2,9 @@
 
 use std::time::Instant;
 
+use abbe_tests::foreseen::Foreseen;
 use abbe_tests::scenario::Scenario;
 use serde_json::Value;
-
-use crate::foreseen::Foreseen;
 
 /// Requirement of the tool error: this many times less.
 const LEAST_REDUCTION: f64 = 10.0;

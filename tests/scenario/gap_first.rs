@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use abbe_tests::foreseen::Foreseen;
 use abbe_tests::program::{Process, command};
 use abbe_tests::scenario::Scenario;
 use serde_json::Value;
 
-use crate::foreseen::Foreseen;
 use crate::{page, told};
 
 /// The plant's lost motion on X: its play, and what its screw gives way (165 and 155 N/µm from the bearings to the nut's

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use abbe_msgs::topics;
+use abbe_tests::foreseen::Foreseen;
 use abbe_tests::python::{interpreter, script, succeeded};
 use abbe_tests::scenario::Scenario;
 use metrology::sample::{GridSample, TestPlane, TestSegment};
@@ -140,8 +141,10 @@ fn check_published(parts: &[Value]) -> Vec<&Value> {
 fn every_reading_of_grid_xy_is_of_its_segment_and_its_page_marks_what_one_circle_cannot_tell() {
     let began = Instant::now();
     let scenario = Scenario::copy_of("grid_xy");
+    let foreseen = Foreseen::begin(&scenario.folder());
     let run = scenario.run();
     let took = began.elapsed();
+    foreseen.agrees(&scenario.folder(), &run);
     let bag = Bag::open(run.join("bag")).unwrap();
     let segments = all(&bag, &topics::TEST_SEGMENT);
     check_readings(&segments, &all(&bag, &topics::GRID_POSITION));

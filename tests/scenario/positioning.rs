@@ -1,8 +1,10 @@
 //! Positioning scenarios as a person runs them: a linear scale used by a table, and in the loop.
 
+use std::path::PathBuf;
 use std::time::Instant;
 
 use abbe_msgs::topics;
+use abbe_tests::foreseen::Foreseen;
 use abbe_tests::scenario::Scenario;
 use metrology::Axis;
 use metrology::sample::TestKind;
@@ -17,12 +19,18 @@ const REST_S: f64 = 0.4;
 struct Run {
     report: Value,
     bag: Bag,
+    folder: PathBuf,
     /// Keeps the folder that the bag is in.
-    _scenario: Scenario,
+    scenario: Scenario,
 }
 
+/// Runs a scenario as it is shipped, which its preflight must have foreseen.
 fn run(name: &str) -> Run {
-    run_of(name, Scenario::copy_of(name))
+    let scenario = Scenario::copy_of(name);
+    let foreseen = Foreseen::begin(&scenario.folder());
+    let run = run_of(name, scenario);
+    foreseen.agrees(&run.scenario.folder(), &run.folder);
+    run
 }
 
 fn run_of(name: &str, scenario: Scenario) -> Run {
@@ -32,7 +40,8 @@ fn run_of(name: &str, scenario: Scenario) -> Run {
     let found = Run {
         report: serde_json::from_str(&text).unwrap(),
         bag: Bag::open(run.join("bag")).unwrap(),
-        _scenario: scenario,
+        folder: run,
+        scenario,
     };
     let took = began.elapsed();
     eprintln!("{name}: {:.1} s", took.as_secs_f64());

@@ -5,13 +5,12 @@ use std::process::Command;
 use std::time::Instant;
 
 use abbe_msgs::{Wire, from_cdr, msg, sensor_msgs};
+use abbe_tests::foreseen::Foreseen;
 use abbe_tests::program::{command, root};
 use abbe_tests::scenario::Scenario;
 use metrology::sample::Verdict;
 use recorder::{Bag, Event, Order};
 use serde_json::Value;
-
-use crate::foreseen::Foreseen;
 
 const DATA: &str = "nodes/mtconnect_bridge/tests/data";
 

@@ -33,6 +33,7 @@ use sequencer::{GridStep, GridTrajectory, Plan, Step};
 use serde_json::Value;
 
 use crate::grid_truth::judge;
+use abbe_tests::foreseen::Foreseen;
 use abbe_tests::program::root;
 use abbe_tests::scenario::Scenario;
 
@@ -62,8 +63,10 @@ fn positions(p_mm: &Vector3<f64>) -> PerAxis<f64> {
 fn scenario_volumetric_error_is_reduced_tenfold() {
     let began = Instant::now();
     let scenario = Scenario::copy_of("volumetric");
+    let foreseen = Foreseen::begin(&scenario.folder());
     let run = scenario.run();
     let took = began.elapsed();
+    foreseen.agrees(&scenario.folder(), &run);
     let report = std::fs::read_to_string(run.join("report.json")).unwrap();
     let report: Value = serde_json::from_str(&report).unwrap();
     let verified = report["verification"]["verifications"].as_array().unwrap();

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use abbe_tests::foreseen::Foreseen;
 use abbe_tests::scenario::Scenario;
 use serde_json::Value;
 
-use crate::foreseen::Foreseen;
 use crate::{page, told};
 
 fn number(report: &Value, key: &str) -> f64 {

@@ -13,6 +13,7 @@ pub mod computer_clock;
 pub mod cyclone;
 pub mod drift;
 pub mod fast_dds;
+pub mod foreseen;
 pub mod graph;
 pub mod hosts;
 pub mod namespace;
