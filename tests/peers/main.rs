@@ -13,6 +13,7 @@ mod fast;
 mod foreign;
 mod frames;
 mod latched;
+mod opcua_cell;
 mod ring;
 mod served;
 mod slow;
