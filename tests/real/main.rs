@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Instant;
 
+use abbe_tests::program::abbe;
 use abbe_tests::python::{interpreter, succeeded};
 use expected::{Recording, recordings};
 use page::Verdict;
@@ -126,4 +127,19 @@ fn tables_and_figures_are_those_of_their_scripts() {
         };
         assert!(is_same, "{}", path.display());
     }
+}
+
+/// The first draws of the command that README.md names, of which it judges a thousand.
+#[test]
+fn random_lead_errors_get_no_false_name() {
+    let Some(python) = interpreter("random_lead_errors_get_no_false_name") else {
+        return;
+    };
+    let mut command = std::process::Command::new(&python);
+    command.arg(home().join("smooth_leads.py"));
+    command.arg("--program").arg(abbe());
+    command.args(["--count", "40"]);
+    let said = succeeded(&command.output().unwrap());
+    assert!(said.contains("40 diagnosed, 0 refused"), "{said}");
+    assert!(said.contains("with a false name: 0 of 40"), "{said}");
 }

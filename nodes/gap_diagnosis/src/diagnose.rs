@@ -10,6 +10,7 @@ use twin::{Channel, Session, Twin, simulate};
 use crate::config::GapConfig;
 use crate::error::GapError;
 use crate::experiment::Experiment;
+use crate::judgement::along;
 use crate::judgement::cause::Found;
 use crate::judgement::guard;
 use crate::judgement::unknown::Leftover;
@@ -33,6 +34,7 @@ use crate::search::searched::{Base, Searched, less, told};
 use crate::session::changes::{self, Change};
 use crate::session::fewer::{MIN_STATIONS_KEPT, fewer};
 use crate::session::over_session;
+use crate::session::thermal_floats::ThermalFloat;
 use crate::shrink::gap;
 use crate::shrink::share_interval;
 use crate::shrink::split::{self, Split};
@@ -169,16 +171,27 @@ fn prepared<R>(
         listed: listed(machine)?,
         begins: changes::begins(session, &changes),
         changes,
+        floats: vec![],
+        is_of_targets: false,
     };
-    let mut notes = notes(&rows, &noise);
-    if session.history.temperature_degc.is_empty() && !machine.temperature_sensors.is_empty() {
+    let base = base.floating(config);
+    let notes = of_begin(&base, &rows, of);
+    Ok(then(&base, notes))
+}
+
+/// What a reader should know before anything is searched; `of` runs were recorded.
+fn of_begin(base: &Base<'_>, rows: &Rows, of: usize) -> Vec<Note> {
+    let session = base.session;
+    let mut notes = notes(rows, base.noise);
+    notes.extend(base.floats.iter().map(ThermalFloat::note));
+    if session.history.temperature_degc.is_empty() && !base.machine.temperature_sensors.is_empty() {
         notes.push(Note::NoTemperatures);
     }
     if session.runs.len() < of {
         let runs = session.runs.len();
         notes.push(Note::FewerRuns { runs, of });
     }
-    Ok(then(&base, notes))
+    notes
 }
 
 /// What changed between the repeats of a session.
@@ -425,6 +438,7 @@ fn remarks(stack: &Stack<'_>, split: &Split, found: &Found) -> Vec<Note> {
     }));
     notes.extend(found.not_written());
     notes.extend(found.only_together());
+    notes.extend(along::notes(stack, found));
     notes.extend(found.not_named());
     if !found.members.is_empty() && recalibration::PROVENANCE.is_none() {
         notes.push(Note::NotRecalibrated);

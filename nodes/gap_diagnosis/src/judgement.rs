@@ -3,6 +3,7 @@
 //! Every rule that speaks for or against a cause yields a [`Check`]: its value, its limit and its verdict. [`status`] is
 //! the only place that decides from them whether a cause is named, one of a set, or a surrogate.
 
+pub(crate) mod along;
 pub(crate) mod aside;
 pub(crate) mod cause;
 pub(crate) mod confidence;

@@ -53,6 +53,7 @@ use crate::search::field::{self, Mode, Smooth};
 use crate::search::rows::{Block, Rows, count};
 use crate::session::log::LONG_S;
 
+mod both_ways;
 mod within_runs;
 
 /// Noise of one channel.

@@ -83,6 +83,7 @@ mod recent;
 mod record;
 mod select;
 mod standing;
+pub(crate) mod thermal_floats;
 mod thermometers;
 mod time;
 mod touching;

@@ -61,6 +61,8 @@ pub struct FormError {
     beyond_mm: BTreeMap<(usize, Channel), f64>,
     /// Rows of a block at which a signature jumps, with (3).
     edges_mm: BTreeMap<(usize, Channel), Vec<(usize, f64)>>,
+    /// Whether all that was read are positions at targets.
+    is_of_targets: bool,
 }
 
 /// Most jumps of one block; the greatest are kept.
@@ -73,6 +75,7 @@ impl FormError {
             base_mm: config.form_error_um * 1e-3,
             beyond_mm: BTreeMap::new(),
             edges_mm: BTreeMap::new(),
+            is_of_targets: false,
         }
     }
 
@@ -102,6 +105,20 @@ impl FormError {
             }
         }
         form
+    }
+
+    /// The same of a recording of which all, or not all, are positions at targets.
+    pub fn at_targets(&self, is_of_targets: bool) -> Self {
+        Self {
+            is_of_targets,
+            ..self.clone()
+        }
+    }
+
+    /// Whether all that was read are positions at targets: repeats then have the same rows, and what they differ by has no error
+    /// of form.
+    pub const fn is_of_targets(&self) -> bool {
+        self.is_of_targets
     }
 
     /// Rows of a block at which a signature jumps, with (3).
@@ -175,6 +192,17 @@ pub fn sharing(session: &Session, rows: &Rows) -> Vec<f64> {
         }
     }
     sharing
+}
+
+/// Groups of repeats with the same rows.
+pub fn alike(session: &Session, rows: &Rows) -> Vec<Vec<usize>> {
+    let stations = |block: usize| rows.blocks[block].rows.iter().map(|row| row.station);
+    let is_alike = |group: &Vec<usize>| {
+        let mut others = group.iter().skip(1);
+        group.len() > 1 && others.all(|other| stations(*other).eq(stations(group[0])))
+    };
+    let groups = repeats::groups(session, rows).into_iter();
+    groups.filter(is_alike).collect()
 }
 
 /// In how many blocks of a stack each touch is repeated.

@@ -22,6 +22,7 @@ use crate::noise::form_error::FormError;
 use crate::noise::whitener::Whitener;
 use crate::search::nuisance::Nuisance;
 use crate::search::rows::{Block, Rows, count, variances_within};
+use crate::session::thermal_floats::ThermalFloat;
 
 /// What the twin predicted for the rows of some runs, by effect and the bits of its values.
 pub type Simulated = Rc<RefCell<BTreeMap<(String, Vec<u64>), Rc<[f64]>>>>;
@@ -46,6 +47,8 @@ pub struct Stack<'a> {
     weight: Option<DVector<f64>>,
     nuisance: Nuisance,
     unweighted: Nuisance,
+    /// Columns that float beside what set-ups leave open.
+    floats: Vec<Vec<f64>>,
     /// Predictions that stacks of the same runs share; none are kept where they are not shared.
     simulated: Option<Simulated>,
 }
@@ -70,8 +73,8 @@ impl<'a> Stack<'a> {
             (within, &noise.between)
         };
         let whitener = Whitener::new(session, &rows, of, form);
-        let nuisance = Nuisance::new(twin, session, &rows, |column| whitener.apply(column));
-        let unweighted = Nuisance::new(twin, session, &rows, |_| {});
+        let nuisance = Nuisance::new(twin, session, &rows, &[], |column| whitener.apply(column));
+        let unweighted = Nuisance::new(twin, session, &rows, &[], |_| {});
         let mut raw = vec![0.0; rows.len];
         for &run in runs {
             rows.average(run, &residual[run], &mut raw);
@@ -90,6 +93,7 @@ impl<'a> Stack<'a> {
             weight: None,
             nuisance,
             unweighted,
+            floats: vec![],
             simulated: None,
         };
         stack.z = stack.whitened(raw.clone());
@@ -97,13 +101,28 @@ impl<'a> Stack<'a> {
         stack
     }
 
+    /// The same stack beside what floats in its logs.
+    pub(crate) fn floating(mut self, floats: &[ThermalFloat]) -> Self {
+        if floats.is_empty() {
+            return self;
+        }
+        self.floats = floats.iter().map(|float| float.column(&self)).collect();
+        let (twin, session) = (self.twin, self.session);
+        let whiten = |column: &mut [f64]| self.whitener.apply(column);
+        self.nuisance = Nuisance::new(twin, session, &self.rows, &self.floats, whiten);
+        self.unweighted = Nuisance::new(twin, session, &self.rows, &self.floats, |_| {});
+        self.z = self.whitened(self.raw.clone());
+        self
+    }
+
     /// The same stack where each row is known to scatter by this many times its noise.
     pub fn weighed(&self, spread: &DVector<f64>) -> Self {
         let weight = spread.map(|spread| 1.0 / spread);
-        let nuisance = Nuisance::new(self.twin, self.session, &self.rows, |column| {
+        let whiten = |column: &mut [f64]| {
             self.whitener.apply(column);
             scale(column, &weight);
-        });
+        };
+        let nuisance = Nuisance::new(self.twin, self.session, &self.rows, &self.floats, whiten);
         let mut weighed = Self {
             runs: self.runs.clone(),
             rows: self.rows.clone(),
@@ -114,6 +133,7 @@ impl<'a> Stack<'a> {
             weight: Some(weight),
             nuisance,
             unweighted: self.unweighted.clone(),
+            floats: self.floats.clone(),
             simulated: self.simulated.clone(),
             ..*self
         };

@@ -13,6 +13,14 @@
 //! with U S the singular vectors and values of the filtered B Lambda^(1/2). The first rows of a block are
 //! predicted with fewer terms (Levinson's recursion), so that (1) is exact from the first row.
 //!
+//! R repeats share one error of form F, which is in none of their differences. With F as though each had its own of R times the
+//! variance (`form_error`), W of (2) is right of their mean alone. At targets, whose rows are the same in every repeat, both have
+//! their own, and the repeats are white together, as Cov y = E (I - J/R) + (E + R F) J/R with J of ones:
+//!
+//! ```text
+//!   x_r = W_E (y_r - mean y) + W_(E + R F) mean y                         (3)
+//! ```
+//!
 //! # Holds when
 //! Rows of a block follow each other at one spacing in time.
 //!
@@ -20,12 +28,16 @@
 //! \[1\] G. E. P. Box, G. M. Jenkins, G. C. Reinsel, Time Series Analysis, 4th ed., Wiley 2008, 3.2
 //! (autoregression, recursion).
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use twin::{Channel, Session};
+use twin::{Channel, Run, Session};
 
 use crate::noise::form_error::{self, FormError};
+use crate::noise::repeats::Label;
 use crate::search::field::{self, Smooth};
-use crate::search::rows::{Block, Rows};
+use crate::search::rows::{Block, Rows, count};
 
 /// Autoregression of a channel: predictors of order 0 to p with the variance that each leaves.
 #[derive(Clone, Debug, PartialEq)]
@@ -136,18 +148,29 @@ impl Autoregression {
 /// Order of an autoregression with white noise beside it.
 const WHITE_ORDER: usize = 3;
 
-/// (2) of every block.
+/// (2) of every block, and (3) of groups of repeats.
 #[derive(Clone, Debug)]
 pub struct Whitener {
     blocks: Vec<BlockWhitener>,
+    /// Groups of repeats whose differences have no error of form.
+    apart: Vec<Apart>,
 }
 
 #[derive(Clone, Debug)]
 struct BlockWhitener {
-    range: std::ops::Range<usize>,
+    range: Range<usize>,
     filter: Autoregression,
     vectors: DMatrix<f64>,
     shrink: DVector<f64>,
+}
+
+/// Repeats of one test with the same rows.
+#[derive(Clone, Debug)]
+struct Apart {
+    /// Their blocks.
+    blocks: Vec<usize>,
+    /// W_E of (3).
+    differences: BlockWhitener,
 }
 
 impl Whitener {
@@ -162,70 +185,144 @@ impl Whitener {
         let touched = form_error::touched(session, rows);
         let of_block = |(block, sharing): (&Block, &f64)| {
             let run = &session.runs[block.run];
-            let (within, between) = noise(block);
-            let size = form.of(block) * sharing.sqrt();
-            let (kinds, mut columns) = field::modes(run, block);
-            let is_touch = block.channel == Channel::Touch;
-            let (filter, form_field) = if is_touch {
-                (within, Smooth::default())
-            } else {
-                (
-                    within.with_white(
-                        (form_error::ROUGH_STATION_SHARE * size).powi(2),
-                        WHITE_ORDER,
-                    ),
-                    form_error::smooth(size),
-                )
-            };
-            for (kind, mut column) in kinds.iter().zip(columns.column_iter_mut()) {
-                column *= form_error::joined(between, &form_field, *kind);
+            BlockWhitener::new(run, block, noise(block), (form, *sharing), &touched)
+        };
+        let of_group = |blocks: Vec<usize>| {
+            let first = &rows.blocks[blocks[0]];
+            let run = &session.runs[first.run];
+            let nothing = (&FormError::default(), 1.0);
+            let differences = BlockWhitener::new(run, first, noise(first), nothing, &touched);
+            Apart {
+                blocks,
+                differences,
             }
-            let of_touches = form_error::touch_columns(run, block, &touched)
-                .into_iter()
-                .map(|(column, repeats)| {
-                    let size = form.of(block) * repeats.sqrt();
-                    column.into_iter().map(|v| v * size).collect::<Vec<f64>>()
-                });
-            let of_edges = form.edges(block).iter().map(|(row, height)| {
-                let mut column = vec![0.0; block.rows.len()];
-                column[*row] = height * sharing.sqrt();
-                column
-            });
-            let more: Vec<Vec<f64>> = of_touches.into_iter().chain(of_edges).collect();
-            let mut columns = form_error::beside(columns, &more);
-            for mut column in columns.column_iter_mut() {
-                filter.filter(column.as_mut_slice());
-            }
-            let (vectors, singular) = singular(&columns);
-            BlockWhitener {
-                range: block.range(),
-                filter,
-                vectors,
-                shrink: singular.map(|s| 1.0 - 1.0 / (1.0 + s * s).sqrt()),
-            }
+        };
+        let alike = if form.is_of_targets() {
+            form_error::alike(session, rows)
+        } else {
+            vec![]
         };
         Self {
             blocks: rows.blocks.iter().zip(&sharing).map(of_block).collect(),
+            apart: alike.into_iter().map(of_group).collect(),
         }
     }
 
     /// Whitens a stack, in place.
     pub fn apply(&self, stack: &mut [f64]) {
+        let differences = self.differences(stack, |one, part| one.apply(part));
         for block in &self.blocks {
-            let part = &mut stack[block.range.clone()];
-            block.filter.filter(part);
-            let mut part = nalgebra::DVectorViewMut::from_slice(part, block.range.len());
-            let mut along = block.vectors.tr_mul(&part);
-            along.component_mul_assign(&block.shrink);
-            part.gemv(-1.0, &block.vectors, &along, 1.0);
+            block.apply(&mut stack[block.range.clone()]);
         }
+        add(stack, &differences);
     }
 
     /// A whitened stack in mm again, without what the smooth fields took, in place.
     pub fn unfilter(&self, stack: &mut [f64]) {
+        let differences = self.differences(stack, |one, part| one.filter.unfilter(part));
         for block in &self.blocks {
             block.filter.unfilter(&mut stack[block.range.clone()]);
         }
+        add(stack, &differences);
+    }
+
+    /// Leaves the mean of each group in its blocks, and gives what `of` makes of the differences from it.
+    fn differences(
+        &self,
+        stack: &mut [f64],
+        of: impl Fn(&BlockWhitener, &mut [f64]),
+    ) -> Vec<(Range<usize>, Vec<f64>)> {
+        let mut all = vec![];
+        for group in &self.apart {
+            let ranges = || {
+                group
+                    .blocks
+                    .iter()
+                    .map(|block| self.blocks[*block].range.clone())
+            };
+            let mut mean = vec![0.0; group.differences.range.len()];
+            for (sum, k) in mean.iter_mut().zip(0..) {
+                let sums: f64 = ranges().map(|range| stack[range.start + k]).sum();
+                *sum = sums / count(group.blocks.len());
+            }
+            for range in ranges() {
+                let part = &mut stack[range.clone()];
+                let rows = part.iter().zip(&mean);
+                let mut difference: Vec<f64> = rows.map(|(row, mean)| row - mean).collect();
+                of(&group.differences, &mut difference);
+                part.copy_from_slice(&mean);
+                all.push((range, difference));
+            }
+        }
+        all
+    }
+}
+
+fn add(stack: &mut [f64], differences: &[(Range<usize>, Vec<f64>)]) {
+    for (range, difference) in differences {
+        for (row, more) in stack[range.clone()].iter_mut().zip(difference) {
+            *row += more;
+        }
+    }
+}
+
+impl BlockWhitener {
+    /// (2) of a block with an error of form that so many repeats share.
+    fn new(
+        run: &Run,
+        block: &Block,
+        (within, between): (Autoregression, &Smooth),
+        (form, sharing): (&FormError, f64),
+        touched: &BTreeMap<Label, f64>,
+    ) -> Self {
+        let size = form.of(block) * sharing.sqrt();
+        let (kinds, mut columns) = field::modes(run, block);
+        let is_touch = block.channel == Channel::Touch;
+        let (filter, form_field) = if is_touch {
+            (within, Smooth::default())
+        } else {
+            let rough_mm2 = (form_error::ROUGH_STATION_SHARE * size).powi(2);
+            (
+                within.with_white(rough_mm2, WHITE_ORDER),
+                form_error::smooth(size),
+            )
+        };
+        for (kind, mut column) in kinds.iter().zip(columns.column_iter_mut()) {
+            column *= form_error::joined(between, &form_field, *kind);
+        }
+        let of_touches = form_error::touch_columns(run, block, touched)
+            .into_iter()
+            .map(|(column, repeats)| {
+                let size = form.of(block) * repeats.sqrt();
+                column.into_iter().map(|v| v * size).collect::<Vec<f64>>()
+            });
+        let of_edges = form.edges(block).iter().map(|(row, height)| {
+            let mut column = vec![0.0; block.rows.len()];
+            column[*row] = height * sharing.sqrt();
+            column
+        });
+        let more: Vec<Vec<f64>> = of_touches.into_iter().chain(of_edges).collect();
+        let mut columns = form_error::beside(columns, &more);
+        for mut column in columns.column_iter_mut() {
+            filter.filter(column.as_mut_slice());
+        }
+        let (vectors, singular) = singular(&columns);
+        Self {
+            range: block.range(),
+            filter,
+            vectors,
+            shrink: singular.map(|s| 1.0 - 1.0 / (1.0 + s * s).sqrt()),
+        }
+    }
+
+    /// Whitens the rows of the block, in place.
+    fn apply(&self, rows: &mut [f64]) {
+        self.filter.filter(rows);
+        let n = rows.len();
+        let mut part = nalgebra::DVectorViewMut::from_slice(rows, n);
+        let mut along = self.vectors.tr_mul(&part);
+        along.component_mul_assign(&self.shrink);
+        part.gemv(-1.0, &self.vectors, &along, 1.0);
     }
 }
 

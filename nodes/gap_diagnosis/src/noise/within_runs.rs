@@ -3,7 +3,8 @@
 //! # Model
 //!
 //! Within a run it is what its own smooth modes (`field`) leave, sharp places such as reversals among it: rather too great than
-//! too small. How a second run would differ was not measured; `unrepeated` states what is assumed, and lowers confidences.
+//! too small. At targets that were read from both sides it is what the two sides differ by beside a smooth lost motion
+//! (`both_ways`). How a second run would differ was not measured; `unrepeated` states what is assumed, and lowers confidences.
 //!
 //! # Holds when
 //! A run has three rows for each mode that is taken out of it; channels without such runs have no noise floor.
@@ -12,7 +13,9 @@ use std::collections::BTreeMap;
 
 use twin::Channel;
 
-use super::{Difference, Noise, Readings, autoregression, differences, doubt, resolution_mm};
+use super::{
+    Difference, Noise, Readings, autoregression, both_ways, differences, doubt, resolution_mm,
+};
 use crate::config::GapConfig;
 use crate::noise::pace::Pace;
 use crate::noise::repeats::{self, Contrasts};
@@ -47,7 +50,15 @@ pub(super) fn noise(
         let groups: Vec<Contrasts> = places.iter().map(single).collect();
         let all: Vec<Difference> = groups
             .iter()
-            .flat_map(|group| differences(readings, group))
+            .flat_map(|group| {
+                let block = &readings.rows.blocks[group.blocks[0]];
+                let is_along = both_ways::is_along(&channel);
+                let paired = is_along.then(|| both_ways::difference(readings, raw, block));
+                match paired.flatten() {
+                    Some(difference) => vec![difference],
+                    None => differences(readings, group),
+                }
+            })
             .filter(|one| one.values.len() >= LEAST_ROWS_OF_A_MODE * one.modes.ncols())
             .collect();
         let all: Vec<&Difference> = all.iter().collect();

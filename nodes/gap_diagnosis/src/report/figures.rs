@@ -189,6 +189,18 @@ pub enum Note {
         parameters: Vec<String>,
         d: f64,
     },
+    /// What goes with a thermometer that no effect goes with was taken out of a channel.
+    ThermalFloat {
+        channel: String,
+        thermometer: String,
+        lag_min: f64,
+    },
+    /// The lost motion of a named effect is another one at other places: its least and its greatest at the places that were read.
+    Varies {
+        effect: String,
+        from_um: f64,
+        to_um: f64,
+    },
     /// Something looks like an effect and is not named, for these reasons.
     OnlyLooksLike { effect: String, why: Vec<Veto> },
     /// What changed over the session, or is left beside a name.
@@ -387,17 +399,52 @@ impl fmt::Display for Note {
                 parameters,
                 d,
             } => only_together(f, effect, parameters, *d),
-            Self::NotWritten { effect, others } => write!(
-                f,
-                "{effect} is not written to a machine file: {} would do as well on this recording",
-                others.join(", ")
-            ),
-            Self::OnlyLooksLike { effect, why } => {
-                let why: Vec<String> = why.iter().map(Veto::to_string).collect();
-                write!(f, "{effect} is not named: {}", why.join("; "))
-            }
+            Self::ThermalFloat {
+                channel,
+                thermometer,
+                lag_min,
+            } => thermal_float(f, channel, thermometer, *lag_min),
+            Self::Varies {
+                effect,
+                from_um,
+                to_um,
+            } => varies(f, effect, [*from_um, *to_um]),
+            Self::NotWritten { effect, others } => not_written(f, effect, others),
+            Self::OnlyLooksLike { effect, why } => only_looks_like(f, effect, why),
             Self::NoRun(none) => none.fmt(f),
             Self::Course(course) => course.fmt(f),
         }
     }
+}
+
+fn thermal_float(
+    f: &mut fmt::Formatter<'_>,
+    channel: &str,
+    thermometer: &str,
+    lag_min: f64,
+) -> fmt::Result {
+    write!(
+        f,
+        "{channel}: what goes with {thermometer}, lagged by {lag_min:.1} min, was taken out before causes were searched; no effect of the catalogue goes with this thermometer"
+    )
+}
+
+fn varies(f: &mut fmt::Formatter<'_>, effect: &str, [from_um, to_um]: [f64; 2]) -> fmt::Result {
+    write!(
+        f,
+        "{effect} varies from {from_um:.1} to {to_um:.1} µm along the axis, at the places that were read"
+    )
+}
+
+fn not_written(f: &mut fmt::Formatter<'_>, effect: &str, others: &[String]) -> fmt::Result {
+    write!(
+        f,
+        "{effect} is not written to a machine file: {} would do as well on this recording",
+        others.join(", ")
+    )
+}
+
+fn only_looks_like(f: &mut fmt::Formatter<'_>, effect: &str, why: &[Veto]) -> fmt::Result {
+    let why: Vec<String> = why.iter().map(Veto::to_string).collect();
+    write!(f, "{effect} is not named: {}", why.join("; "))
 }

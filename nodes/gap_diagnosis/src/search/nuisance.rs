@@ -54,11 +54,13 @@ struct Group {
 }
 
 impl Nuisance {
-    /// Floats of a stack, each made white by `whiten`, orthonormal.
+    /// Floats of a stack and `more` columns that float beside them, each made white by `whiten`, orthonormal. All that share rows
+    /// with one of `more` are one group.
     pub fn new(
         twin: &Twin<'_>,
         session: &Session,
         rows: &Rows,
+        more: &[Vec<f64>],
         whiten: impl Fn(&mut [f64]),
     ) -> Self {
         let mut columns = BTreeMap::<Key, Vec<f64>>::new();
@@ -68,10 +70,28 @@ impl Nuisance {
                 column[block.range()].copy_from_slice(&values);
             }
         }
+        let is_shared = |column: &[f64]| {
+            let rows = |other: &Vec<f64>| {
+                other
+                    .iter()
+                    .zip(column)
+                    .any(|(a, b)| *a != 0.0 && *b != 0.0)
+            };
+            more.iter().any(rows)
+        };
         let mut by_group = BTreeMap::<String, Vec<Vec<f64>>>::new();
         for (key, mut column) in columns {
+            let group = if is_shared(&column) {
+                String::new()
+            } else {
+                key.group
+            };
             whiten(&mut column);
-            by_group.entry(key.group).or_default().push(column);
+            by_group.entry(group).or_default().push(column);
+        }
+        for mut column in more.iter().cloned() {
+            whiten(&mut column);
+            by_group.entry(String::new()).or_default().push(column);
         }
         let groups: Vec<Group> = by_group
             .into_values()

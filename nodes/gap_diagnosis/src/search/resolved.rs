@@ -80,6 +80,12 @@ pub fn is_coarse(stack: &Stack<'_>, axis: Axis) -> bool {
     is_read && !is_resolved && places.len() >= FEWEST_TARGETS
 }
 
+/// The least and the greatest place at which an axis was read, mm.
+pub fn extent_mm(stack: &Stack<'_>, axis: Axis) -> Option<[f64; 2]> {
+    let places = places_mm(stack, axis);
+    Some([*places.first()?, *places.last()?])
+}
+
 /// The period along an axis, mm; none of what has no period.
 fn period_mm(stack: &Stack<'_>, instance: &Instance, axis: Axis, values: &[f64]) -> Option<f64> {
     let parameters = instance.kind.parameters.iter().zip(values);

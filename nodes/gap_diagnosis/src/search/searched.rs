@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use machine::MachineFile;
+use metrology::Axis;
 use nalgebra::DVector;
 use twin::effects::{Effect, Kind};
 use twin::{Channel, Session, Twin};
@@ -16,9 +17,12 @@ use crate::noise::form_error::FormError;
 use crate::noise::stack::{Simulated, Stack};
 use crate::scatter::{self, Scattered};
 use crate::search::families::{self, Slot};
+use crate::search::resolved;
 use crate::search::signature::Begins;
+use crate::search::widening;
 use crate::session::changes::Change;
-use crate::shrink::split::Split;
+use crate::session::thermal_floats::{self, ThermalFloat};
+use crate::shrink::split::{self, Split};
 
 /// What every stack is made of.
 pub(crate) struct Base<'a> {
@@ -34,24 +38,39 @@ pub(crate) struct Base<'a> {
     pub(crate) begins: Vec<Begins>,
     /// What changed between repeats of the session.
     pub(crate) changes: Vec<Change>,
+    /// Whether all that was read are positions at targets.
+    pub(crate) is_of_targets: bool,
+    /// What is taken out of logs.
+    pub(crate) floats: Vec<ThermalFloat>,
 }
 
 impl<'a> Base<'a> {
+    /// The same with what floats in the logs of the runs that are fitted, and whether these are positions at targets.
+    pub(crate) fn floating(mut self, config: &GapConfig) -> Self {
+        let fitted = split::split(self.session, config.hold_out).fit;
+        let stack = self.stack(&fitted, self.noise, &FormError::base(config));
+        self.floats = thermal_floats::of(&stack);
+        let mut axes = Axis::LINEAR.into_iter();
+        self.is_of_targets = axes.any(|axis| resolved::is_coarse(&stack, axis));
+        self
+    }
+
     pub(crate) fn stack(
         &self,
         runs: &[usize],
         noise: &BTreeMap<Channel, Noise>,
         form: &FormError,
     ) -> Stack<'a> {
-        Stack::new(
+        let stack = Stack::new(
             self.session,
             self.twin,
             runs,
             self.stations,
             noise,
-            form,
+            &form.at_targets(self.is_of_targets),
             self.residual,
-        )
+        );
+        stack.floating(&self.floats)
     }
 
     /// Searches some runs twice: once with the form error that every simulator has, then with what the effects
@@ -93,7 +112,8 @@ impl<'a> Base<'a> {
         };
         let noise: BTreeMap<Channel, Noise> = self.noise.iter().map(scaled).collect();
         let listed = listed.unwrap_or_else(|| vec![0.0; told.len()]);
-        let form = FormError::beside(&first.stack, &listed, &told, config);
+        let formed = first.of_their_own_form();
+        let form = FormError::beside(&first.stack, &listed, &formed, config);
         let stack = self.stack(runs, &noise, &form).sharing(&simulated);
         let second = self.search(stack, &noise, kinds, config);
         Searched {
@@ -199,6 +219,23 @@ pub(crate) struct Searched<'a> {
     pub(crate) noise: BTreeMap<Channel, Noise>,
     pub(crate) inflation: BTreeMap<Channel, f64>,
 }
+
+impl Searched<'_> {
+    /// What the rows would show of the members whose form is the catalogue's. What is read at targets only has the form that the
+    /// targets show: a position error there, and a lost motion, are off in size but not in form.
+    fn of_their_own_form(&self) -> Vec<f64> {
+        let has_form = |member: &&Member| {
+            let instance = self.found.instance(member);
+            !OF_TARGETS.contains(&instance.kind.id)
+                || widening::coarse_axis(&self.stack, instance).is_none()
+        };
+        let members = self.found.members.iter().filter(has_form);
+        told(&self.stack, members, &self.found)
+    }
+}
+
+/// Effects that are a number at each target and side.
+const OF_TARGETS: [&str; 3] = ["backlash", "pitch_error", "scale_error"];
 
 /// What the rows would show of some members, mm.
 pub(crate) fn told<'m>(

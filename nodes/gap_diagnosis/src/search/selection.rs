@@ -18,7 +18,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use twin::effects::Moment;
+use twin::effects::{Moment, Targets};
 
 use crate::noise::normal::{Fit, Normal};
 use crate::search::rows::count;
@@ -186,6 +186,13 @@ impl<'l> Search<'l> {
         })
     }
 
+    /// Whether a set has one of two instances at most: they are the same, or the one growth of a spindle by one thermometer and by
+    /// another. Which thermometer it goes with is tried; together they would make up what no single lag of either meets.
+    fn excludes(&self, one: usize, other: usize) -> bool {
+        let [a, b] = [one, other].map(|place| self.signatures.instances[place].kind);
+        one == other || (a.id == b.id && a.targets == Targets::Spindle)
+    }
+
     /// The best form of each instance beside a set, the best first, with its set.
     fn beside(&mut self, set: &Set, most: usize) -> Vec<(f64, Set)> {
         let taken: BTreeSet<usize> = set
@@ -195,7 +202,8 @@ impl<'l> Search<'l> {
         let open: Vec<usize> = (0..self.signatures.forms.len())
             .filter(|form| {
                 let instance = self.signatures.forms[*form].instance;
-                !taken.contains(&instance) && !self.signatures.aside.contains_key(&instance)
+                let is_aside = self.signatures.aside.contains_key(&instance);
+                !is_aside && taken.iter().all(|own| !self.excludes(*own, instance))
             })
             .collect();
         let columns = self.columns(set);

@@ -15,6 +15,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use metrology::Axis;
 use twin::effects::Target;
 
 use crate::noise::normal::Normal;
@@ -29,8 +30,8 @@ const MOST_WIDENED: usize = 12;
 const CURVE: &str = "pitch_error";
 /// Most free amplitudes that are taken one after another.
 const MOST_PARTS: usize = 6;
-/// The same of a curve through targets.
-const MOST_OF_CURVE: usize = 14;
+/// The same of a curve through targets, which may need all of its heights.
+const MOST_OF_CURVE: usize = 17;
 /// Sets whose C is worse by this share of what the best one explains stand nearly as well.
 const NEAR_SHARE: f64 = 0.1;
 
@@ -52,6 +53,7 @@ pub fn widen(
         let has_free = !signatures.instances[instance].kind.free.is_empty();
         if has_free && added.len() < MOST_WIDENED && !added.contains_key(&instance) {
             let values = signatures.forms[form].values.clone();
+            let values = through_targets(stack, &signatures.instances[instance], values);
             let wide = signatures.add(stack, instance, values, true);
             added.insert(instance, wide);
         }
@@ -78,13 +80,42 @@ pub fn widen(
     }
 }
 
+/// Names of the ends of the part of a travel that a curve is over.
+const ENDS: [&str; 2] = ["free_from_mm", "free_to_mm"];
+
+/// Values of an instance whose curve along its axis is over the targets, where the axis was read at targets only: any form that
+/// they show is a curve over their own extent, however short a part of the travel that is.
+fn through_targets(stack: &Stack<'_>, instance: &Instance, mut values: Vec<f64>) -> Vec<f64> {
+    let Some(axis) = coarse_axis(stack, instance) else {
+        return values;
+    };
+    let Some([low_mm, high_mm]) = resolved::extent_mm(stack, axis) else {
+        return values;
+    };
+    let own = instance.kind.parameters.iter().chain(instance.kind.free);
+    for (parameter, value) in own.zip(&mut values) {
+        match ENDS.iter().position(|end| *end == parameter.name) {
+            Some(0) => *value = low_mm,
+            Some(_) => *value = high_mm,
+            None => {}
+        }
+    }
+    values
+}
+
+/// The axis that an instance acts on, where it was read at some targets only.
+pub fn coarse_axis(stack: &Stack<'_>, instance: &Instance) -> Option<Axis> {
+    let Target::Axis(axis) = instance.target else {
+        return None;
+    };
+    resolved::is_coarse(stack, axis).then_some(axis)
+}
+
 /// Adds the curve of any form to the pitch error of every axis that was read at some targets only. Its plain curve may be
 /// absent from the error that the targets show alike upwards and downwards.
 pub fn widen_curves(stack: &Stack<'_>, signatures: &mut Library) {
-    let is_curve = |instance: &Instance| match instance.target {
-        Target::Axis(axis) => instance.kind.id == CURVE && resolved::is_coarse(stack, axis),
-        _ => false,
-    };
+    let is_curve =
+        |instance: &Instance| instance.kind.id == CURVE && coarse_axis(stack, instance).is_some();
     let curves: Vec<usize> = (0..signatures.instances.len())
         .filter(|place| is_curve(&signatures.instances[*place]))
         .collect();
@@ -92,6 +123,7 @@ pub fn widen_curves(stack: &Stack<'_>, signatures: &mut Library) {
     for instance in curves {
         let kind = signatures.instances[instance].kind;
         let values = vec![0.0; kind.parameters.len() + kind.free.len()];
+        let values = through_targets(stack, &signatures.instances[instance], values);
         added.extend(signatures.add(stack, instance, values, true));
         signatures.curves.insert(instance);
     }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use gap_diagnosis::report::figures::Note;
 use gap_diagnosis::report::{Cause, Status};
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use gap_diagnosis::{Diagnosis, GapConfig, diagnose};
@@ -16,7 +17,6 @@ use rand_pcg::Pcg64Mcg;
 const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
 const FEED_MM_S: f64 = 100.0;
 const TICK_MS: i64 = 10;
-const RUNS: u32 = 5;
 /// Axes of which the tables are drawn; false names among them, at most one in a hundred.
 const TABLES: u64 = 100;
 
@@ -28,6 +28,10 @@ fn machine() -> MachineFile {
 struct Plant {
     waves: Vec<[f64; 3]>,
     lost_mm: f64,
+    /// What the lost motion has more in the middle than at both ends.
+    worn_mm: f64,
+    rate_mm_per_s: f64,
+    runs: u32,
     targets_mm: Vec<f64>,
     random: Pcg64Mcg,
 }
@@ -55,6 +59,9 @@ impl Plant {
         Self {
             waves,
             lost_mm: random.random_range(3e-3..20e-3),
+            worn_mm: 0.0,
+            rate_mm_per_s: 0.0,
+            runs: 5,
             targets_mm,
             random,
         }
@@ -65,9 +72,40 @@ impl Plant {
         self.waves.iter().map(wave).sum()
     }
 
-    fn reading_mm(&mut self, at_mm: f64, sense: f64) -> f64 {
+    /// Of a short part of the travel, 40 to 100 mm, with a lead error that is ten times as high and has shorter waves.
+    fn short(seed: u64) -> Self {
+        let mut short = Self::drawn(seed);
+        let [first, last] = [0, short.targets_mm.len() - 1].map(|k| short.targets_mm[k]);
+        let extent_mm = short.random.random_range(40.0..100.0);
+        for at_mm in &mut short.targets_mm {
+            *at_mm *= extent_mm / (last - first);
+        }
+        for [height_mm, per_mm, _] in &mut short.waves {
+            *height_mm *= 5.0;
+            *per_mm *= (last - first) / extent_mm;
+        }
+        short
+    }
+
+    /// Lost motion from the middle of the travel to the targets farthest from it: a wedge, which is no polynomial.
+    fn play_mm(&self, at_mm: f64) -> f64 {
+        let farthest_mm = self
+            .targets_mm
+            .iter()
+            .fold(1.0_f64, |most, at| most.max(at.abs()));
+        self.lost_mm + self.worn_mm * (1.0 - at_mm.abs() / farthest_mm)
+    }
+
+    fn mean_play_um(&self) -> f64 {
+        let all = self.targets_mm.iter().map(|at| 1e3 * self.play_mm(*at));
+        all.sum::<f64>() / self.targets_mm.len() as f64
+    }
+
+    fn reading_mm(&mut self, at_mm: f64, sense: f64, millis: i64) -> f64 {
         let noise: f64 = self.random.sample(StandardNormal);
-        at_mm + self.lead_mm(at_mm) - 0.5 * sense * self.lost_mm + 0.2e-3 * noise
+        let drifted_mm = self.rate_mm_per_s * 1e-3 * millis as f64;
+        let read_mm = at_mm + self.lead_mm(at_mm) - 0.5 * sense * self.play_mm(at_mm);
+        read_mm + drifted_mm + 0.2e-3 * noise
     }
 }
 
@@ -150,25 +188,25 @@ fn measured(plant: &mut Plant) -> Diagnosis {
         millis: 0,
         x_mm: targets_mm[0] - 5.0,
     };
-    for run in 1..=RUNS {
+    for run in 1..=plant.runs {
         table.rest(200);
         table.segment(run, true, 2 * targets_mm.len());
         table.go(targets_mm[0] - 5.0);
         for &target_mm in &targets_mm {
             table.go(target_mm);
-            let read_mm = plant.reading_mm(target_mm, 1.0);
+            let read_mm = plant.reading_mm(target_mm, 1.0, table.millis);
             table.stop(read_mm);
         }
         table.go(targets_mm[targets_mm.len() - 1] + 5.0);
         for &target_mm in targets_mm.iter().rev() {
             table.go(target_mm);
-            let read_mm = plant.reading_mm(target_mm, -1.0);
+            let read_mm = plant.reading_mm(target_mm, -1.0, table.millis);
             table.stop(read_mm);
         }
         table.segment(run, false, 2 * targets_mm.len());
     }
     let (session, account) = table.builder.finish().expect("a session");
-    assert_eq!(account.runs, 5, "{account:?}");
+    assert_eq!(account.runs, plant.runs as usize, "{account:?}");
     diagnose(&machine, &session, &GapConfig::default()).expect("a diagnosis")
 }
 
@@ -207,4 +245,85 @@ fn smooth_lead_errors_get_no_false_name_and_their_lost_motion_its_size() {
     assert!(100 * wrong.len() <= few, "{wrong:?}");
     assert!(10 * lost >= 9 * few, "{lost} of {few} lost motions");
     assert!(10 * curves >= 9 * few, "{curves} of {few} lead errors");
+}
+
+/// False names, and how many have their lead error and their lost motion within a limit, of some axes.
+fn named_of(plants: impl Iterator<Item = Plant>, within_um: f64) -> (Vec<String>, [usize; 2]) {
+    let (mut wrong, mut found) = (vec![], [0, 0]);
+    for (n, mut plant) in plants.enumerate() {
+        let diagnosis = measured(&mut plant);
+        let named = || diagnosis.report.causes.iter().filter(is_named);
+        wrong.extend({ named() }.filter(|cause| !is_true(cause)).map(|cause| {
+            let targets = plant.targets_mm.len();
+            format!("{n}: {} {}, {targets} targets", cause.effect, cause.axis)
+        }));
+        let of_lead = |cause: &Cause| ["pitch_error", "scale_error"].contains(&&*cause.effect);
+        found[0] += usize::from(named().any(of_lead));
+        let play = named().find(|cause| cause.effect == "backlash");
+        let width_um = play.and_then(|play| play.parameters.first());
+        let off_um = |width: f64| (width - plant.mean_play_um()).abs();
+        found[1] += usize::from(width_um.is_some_and(|width| off_um(width.value) < within_um));
+    }
+    (wrong, found)
+}
+
+#[test]
+fn a_lead_error_over_a_short_part_of_the_travel_has_the_shape_of_its_targets() {
+    let (wrong, [curves, lost]) = named_of((0..30).map(Plant::short), 0.8);
+    assert_eq!(wrong, Vec::<String>::new());
+    assert!(curves >= 27, "{curves} of 30 lead errors");
+    assert!(lost >= 27, "{lost} of 30 lost motions");
+}
+
+#[test]
+fn a_single_run_has_its_lead_error_and_its_lost_motion() {
+    let single = |seed| Plant {
+        runs: 1,
+        ..Plant::drawn(seed)
+    };
+    let (wrong, [curves, lost]) = named_of((0..30).map(single), 1.0);
+    assert_eq!(wrong, Vec::<String>::new());
+    // Few targets know their noise from few differences only.
+    assert!(curves >= 20, "{curves} of 30 lead errors");
+    assert!(lost >= 20, "{lost} of 30 lost motions");
+}
+
+#[test]
+fn a_drift_and_a_worn_screw_are_found_beside_a_large_lead_error() {
+    for seed in 0..8 {
+        let mut plant = Plant::drawn(seed);
+        (plant.lost_mm, plant.worn_mm) = (16e-3, 18e-3);
+        plant.rate_mm_per_s = -1e-3 / 60.0;
+        for wave in &mut plant.waves {
+            wave[0] *= 5.0;
+        }
+        let diagnosis = measured(&mut plant);
+        let causes = &diagnosis.report.causes;
+        let size = |effect: &str| {
+            let named = causes.iter().filter(is_named);
+            let found = named.filter(|cause| cause.effect == effect);
+            found
+                .flat_map(|cause| &cause.parameters)
+                .map(|p| p.value)
+                .next()
+        };
+        let near = |effect: &str, wanted: f64, within: f64| {
+            let found = size(effect);
+            let holds = found.is_some_and(|value| (value - wanted).abs() < within);
+            assert!(
+                holds,
+                "{seed}: {effect} {found:?}, not {wanted}: {causes:?}"
+            );
+        };
+        near("backlash", plant.mean_play_um(), 1.5);
+        near("ambient_drift", -60.0, 9.0);
+        assert!(size("pitch_error").is_some(), "{seed}: {causes:?}");
+        let varies = diagnosis.notes.iter().find_map(|note| match note {
+            Note::Varies { from_um, to_um, .. } => Some([*from_um, *to_um]),
+            _ => None,
+        });
+        let [from_um, to_um] = varies.expect("a note");
+        assert!((from_um - 16.0).abs() < 3.0, "{from_um}");
+        assert!((to_um - 34.0).abs() < 4.0, "{to_um}");
+    }
 }

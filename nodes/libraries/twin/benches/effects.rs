@@ -95,11 +95,7 @@ fn respond(bencher: Bencher<'_, '_>, id: &str) {
     let kind = twin::effects::kind(id).expect("in the catalogue");
     let target = kind.targets_on(&machine).remove(0);
     let typical = kind.parameters.iter().map(|p| p.typical);
-    let free = kind
-        .free
-        .iter()
-        .filter(|p| p.role == Role::Amplitude)
-        .map(|_| 0.0);
+    let free = kind.free.iter().map(|_| 0.0);
     let effect = (kind.build)(target, &typical.chain(free).collect::<Vec<_>>());
     bencher
         .counter(ItemsCount::new(TICKS))

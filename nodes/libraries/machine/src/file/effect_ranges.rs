@@ -65,6 +65,12 @@ pub const RANGES: &[(&str, &[Row])] = &[
             ("free_soft_100mm_s2_um", -300.0, 300.0),
             ("free_by_place_um", -300.0, 300.0),
             ("free_by_place2_um", -300.0, 300.0),
+            ("free_by_place3_um", -300.0, 300.0),
+            ("free_by_place4_um", -300.0, 300.0),
+            ("free_by_place5_um", -300.0, 300.0),
+            ("free_by_place6_um", -300.0, 300.0),
+            ("free_from_mm", -100_000.0, 100_000.0),
+            ("free_to_mm", -100_000.0, 100_000.0),
         ],
     ),
     (
@@ -216,6 +222,8 @@ pub const RANGES: &[(&str, &[Row])] = &[
             ("free_11_of_16_um", -500.0, 500.0),
             ("free_13_of_16_um", -500.0, 500.0),
             ("free_15_of_16_um", -500.0, 500.0),
+            ("free_from_mm", -100_000.0, 100_000.0),
+            ("free_to_mm", -100_000.0, 100_000.0),
         ],
     ),
     (

@@ -23,12 +23,12 @@
 //! The wider form adds steps that fade with the way since the reversal, hats in its logarithm of which the first
 //! reaches back to the reversal, and plays with soft corners, which the slide crosses the further the more force F over
 //! its mass carries it, half of the way at F_k, and a play that is another one along the axis, as a screw that is worn where
-//! it works most has it, x the place within the travel, -1 to 1:
+//! it works most has it, x the place within the travel, or within the part of it that is given, -1 to 1:
 //!
 //! ```text
 //!   q - m += -sgn(last motion) sum_k f_k h_k(log10 s)                     (5)
 //!   q - m += -sum_k (s_k / 2) F / (|F| + F_k),   F = a + c sgn(last motion) + k v    (6)
-//!   q - m += -sgn(last motion) (w_1 P_1(x) + w_2 P_2(x)) / 2              (7)
+//!   q - m += -sgn(last motion) (w_1 P_1(x) + .. + w_6 P_6(x)) / 2         (7)
 //! ```
 //!
 //! | symbol | here | unit |
@@ -38,7 +38,8 @@
 //! | f_k | `free_0p01mm_um` .. `free_3mm_um` | µm |
 //! | s | `since_reversal` | mm |
 //! | s_k | `free_soft_3mm_s2_um` .. `free_soft_100mm_s2_um`, where the file tells the friction | µm |
-//! | w_n | `free_by_place_um`, `free_by_place2_um`, of the width | µm |
+//! | w_n | `free_by_place_um`, `free_by_place2_um` .. `free_by_place6_um`, of the width | µm |
+//! | ends of the part | `free_from_mm`, `free_to_mm` | mm |
 //! | a, v | acceleration and velocity | mm/s², mm/s |
 //!
 //! # Holds when
@@ -59,7 +60,7 @@ use std::collections::BTreeSet;
 
 use metrology::Axis;
 
-use super::form::{Travel, WAY_HATS, legendre, way_hats};
+use super::form::{FROM_MM, TO_MM, Travel, WAY_HATS, legendre, way_hats};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
 use crate::Response;
 use crate::following::{Follower, within};
@@ -84,12 +85,23 @@ pub static KIND: Kind = Kind {
         Parameter::share("free_soft_100mm_s2_um", 300.0, 1.0),
         Parameter::amplitude("free_by_place_um", 300.0, 2.0),
         Parameter::amplitude("free_by_place2_um", 300.0, 2.0),
+        Parameter::amplitude("free_by_place3_um", 300.0, 2.0),
+        Parameter::amplitude("free_by_place4_um", 300.0, 2.0),
+        Parameter::amplitude("free_by_place5_um", 300.0, 2.0),
+        Parameter::amplitude("free_by_place6_um", 300.0, 2.0),
+        FROM_MM,
+        TO_MM,
     ],
     moment: Moment::Mean,
     wanders: 0.0,
     needs: "a reversal of the axis",
     build: |target, values| Box::new(Backlash::new(&target, values)),
 };
+
+/// Number of w_n of (7).
+const BY_PLACE: usize = 6;
+/// Place of w_1 among the values.
+const FIRST_BY_PLACE: usize = 1 + WAY_HATS + SOFT_MM_S2.len();
 
 /// Nearer to the reversal the wider form stays at its first hat's height, as presliding begins there.
 const FIRST_HAT_MM: f64 = 0.01;
@@ -109,7 +121,8 @@ struct Backlash {
     width_mm: f64,
     free_mm: [f64; WAY_HATS],
     soft_mm: [f64; SOFT_MM_S2.len()],
-    by_place_mm: [f64; 2],
+    by_place_mm: [f64; BY_PLACE],
+    part_mm: [f64; 2],
 }
 
 impl Backlash {
@@ -119,9 +132,8 @@ impl Backlash {
             width_mm: values[0] * 1e-3,
             free_mm: std::array::from_fn(|k| values[1 + k] * 1e-3),
             soft_mm: std::array::from_fn(|k| values[1 + WAY_HATS + k] * 1e-3),
-            by_place_mm: std::array::from_fn(|k| {
-                values[1 + WAY_HATS + SOFT_MM_S2.len() + k] * 1e-3
-            }),
+            by_place_mm: std::array::from_fn(|k| values[FIRST_BY_PLACE + k] * 1e-3),
+            part_mm: [0, 1].map(|k| values[FIRST_BY_PLACE + BY_PLACE + k]),
         }
     }
 
@@ -157,7 +169,8 @@ impl Backlash {
         if self.by_place_mm.iter().all(|width| *width == 0.0) {
             return;
         }
-        let (motion, travel) = (&scene.run.motion, Travel::of(scene, self.axis));
+        let travel = Travel::part(scene, self.axis, self.part_mm);
+        let motion = &scene.run.motion;
         let ticks = motion.sense[self.axis]
             .iter()
             .zip(&motion.position[self.axis]);

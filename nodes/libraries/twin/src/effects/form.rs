@@ -86,6 +86,14 @@ pub(super) const CURVE_UM: &[Parameter] = &[
     Parameter::ordinate("free_15_of_16_um", 500.0, 1.0),
 ];
 
+/// Lower end of the part of the travel over which a curve is defined, in the machine's coordinates. With [`TO_MM`] at the same
+/// value, as where neither is given, that is the whole travel.
+pub(super) const FROM_MM: Parameter = Parameter::shape("free_from_mm", PART_MM, 10.0, &[]);
+/// Upper end of that part.
+pub(super) const TO_MM: Parameter = Parameter::shape("free_to_mm", PART_MM, 100.0, &[]);
+/// Where a part of a travel can lie, mm.
+const PART_MM: [f64; 2] = [-100_000.0, 100_000.0];
+
 /// Sum of Legendre polynomials of the orders `first`, `first + 1`, ... at x.
 pub(super) fn legendre(first: usize, amplitudes: &[f64], x: f64) -> f64 {
     let (mut before, mut here) = (1.0, x);
@@ -127,6 +135,17 @@ impl Travel {
                 0.0
             },
             per_half: 2.0 / (high - low),
+        }
+    }
+
+    /// Of a part of an axis' travel, mm; of the whole travel where the part has no length.
+    pub(super) fn part(scene: &Scene<'_>, axis: Axis, [from, to]: [f64; 2]) -> Self {
+        if from >= to {
+            return Self::of(scene, axis);
+        }
+        Self {
+            middle: f64::midpoint(from, to),
+            per_half: 2.0 / (to - from),
         }
     }
 

@@ -21,7 +21,8 @@ pub struct Kind {
     pub targets: Targets,
     /// Parameters of its physics, amplitudes first. All are required in a machine file.
     pub parameters: &'static [Parameter],
-    /// Amplitudes of the wider form (GAP 1.4), all [`Role::Amplitude`], zero where a file does not give them.
+    /// Amplitudes of the wider form (GAP 1.4), zero where a file does not give them. Others than [`Role::Amplitude`] are off at
+    /// zero: what shapes a scatter, and the ends of the part of the travel that a curve is over.
     pub free: &'static [Parameter],
     /// Whether it moves the mean of readings or only their scatter.
     pub moment: Moment,

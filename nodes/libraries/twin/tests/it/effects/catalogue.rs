@@ -142,10 +142,11 @@ fn every_effect_is_described() {
         let id = kind.id;
         assert!(!kind.title.is_empty() && !kind.needs.is_empty(), "{id}");
         assert!(kind.amplitudes().count() > 0, "{id}");
-        // What widens a scatter may be a shape as well, which is off at 0.
+        // What widens a scatter may be a shape as well, which is off at 0, and so may the ends of a curve's part of the travel.
         let widens = |p: &Parameter| {
             let is_off = kind.moment == Moment::Variance && p.low.abs() < f64::EPSILON;
-            p.name.starts_with("free_") && (p.role == Role::Amplitude || is_off)
+            let is_end = ["free_from_mm", "free_to_mm"].contains(&p.name);
+            p.name.starts_with("free_") && (p.role == Role::Amplitude || is_off || is_end)
         };
         assert!(kind.free.iter().all(widens), "{id}");
         let mut names = vec![];

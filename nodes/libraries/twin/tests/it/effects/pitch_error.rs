@@ -70,3 +70,32 @@ fn eq1_a_parabola_has_two_thirds_of_its_sagitta_in_p2() {
         assert!((error * 1e3 - (3.0 * x * x - 1.0)).abs() < 1e-9);
     }
 }
+
+#[test]
+fn eq1_eq2_a_curve_over_a_part_of_the_travel_is_that_of_a_travel_as_long() {
+    let machine = three_axes("[w X' Y' b Z t]");
+    let run = run(6401, AxisSet::XYZ, |t| {
+        [-320.0 + 100.0 * t, 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+    let own = [("p2_um", 3.0), ("p3_um", 0.0), ("free_5_of_16_um", 2.0)];
+    let drive = |given: &[(&str, f64)]| {
+        response_of(&machine, &run, "pitch_error", "X", given).drive[Axis::X].clone()
+    };
+    let at = |x_mm: f64| {
+        let places = run.motion.position[Axis::X].iter();
+        places
+            .clone()
+            .position(|place| (place - x_mm).abs() < 1e-6)
+            .unwrap()
+    };
+    let whole = drive(&own);
+    for [from_mm, to_mm] in [[-40.0, 120.0], [0.0, 64.0], [-320.0, 320.0]] {
+        let ends = [("free_from_mm", from_mm), ("free_to_mm", to_mm)];
+        let part = drive(&[own.as_slice(), &ends].concat());
+        for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
+            let here_mm = part[at(from_mm + share * (to_mm - from_mm))];
+            let there_mm = whole[at(-320.0 + 640.0 * share)];
+            assert!((here_mm - there_mm).abs() < 1e-12, "{from_mm} {share}");
+        }
+    }
+}
