@@ -13,10 +13,14 @@
 //! or up to a ten-thousandth of its square. Even at its greatest size it could not be separated from them. It is set aside:
 //! the direct error is found, and the effect that was set aside is listed with it as a possible alternative. A sum of two
 //! errors would otherwise lose to an angle that has one name.
+//!
+//! A pitch error has any form. Where one channel was read along an axis, H is therefore every function of the target: a column for
+//! each, which is one at the readings of that target. What differs between lines, directions or times is in none of them.
 
 use std::collections::BTreeMap;
 
 use metrology::Axis;
+use nalgebra::{DMatrix, DVector};
 use twin::effects::{Parameter, Target};
 
 use crate::noise::normal::Normal;
@@ -31,6 +35,10 @@ const DIRECT: [&str; 2] = ["scale_error", "pitch_error"];
 const BY_AN_ARM: [&str; 2] = ["angular_error", "guide_bow"];
 /// Share of the square of a column that rounding and the second order leave.
 const ROUNDING_SHARE: f64 = 1e-4;
+/// Most targets of which each has a column.
+const MOST_TARGETS: usize = 200;
+/// A column of which less is left is a sum of those before.
+const LEAST_NORM_SHARE: f64 = 1e-6;
 /// Cosine from which an effect that was set aside is listed with a direct error.
 const MIN_COSINE_LISTED: f64 = 0.9;
 
@@ -46,6 +54,7 @@ pub fn set_aside(
     if direct.is_empty() {
         return BTreeMap::new();
     }
+    let any_form = any_form(stack);
     let columns: Vec<usize> = direct
         .iter()
         .flat_map(|form| signatures.forms[*form].columns.clone())
@@ -58,13 +67,19 @@ pub fn set_aside(
         let Some(&first) = forms.first().filter(|_| is_by_an_arm) else {
             continue;
         };
-        let is_explained = |form: &usize| is_explained(signatures, normal, &columns, *form);
+        let left = |column: usize| match &any_form {
+            Some(form) => left_of_any_form(form, &signatures.columns[column]),
+            None => left_of(normal, &columns, column),
+        };
+        let is_explained = |form: &usize| is_explained(signatures, normal, *form, left);
         // An effect that one direct error explains in its plain form competes with it as an equal.
         let needs_more = |form: &usize| {
             let mut plain = direct.iter().filter(|one| !signatures.forms[**one].wide);
             let tells = |one: &usize| {
                 let by = &signatures.forms[*one].columns;
-                self::is_explained(signatures, normal, by, *form)
+                self::is_explained(signatures, normal, *form, |column| {
+                    left_of(normal, by, column)
+                })
             };
             !plain.any(tells)
         };
@@ -89,8 +104,13 @@ fn is_direct(stack: &Stack<'_>, signatures: &Library, form: usize) -> bool {
     DIRECT.contains(&instance.kind.id) && matches!(own, Target::Axis(axis) if is_coarse(axis))
 }
 
-/// (1).
-fn is_explained(signatures: &Library, normal: &Normal, by: &[usize], form: usize) -> bool {
+/// (1), with what is left of the square of a column.
+fn is_explained(
+    signatures: &Library,
+    normal: &Normal,
+    form: usize,
+    left: impl Fn(usize) -> f64,
+) -> bool {
     let entry = &signatures.forms[form];
     let kind = signatures.instances[entry.instance].kind;
     let all: Vec<&Parameter> = kind.parameters.iter().chain(kind.free).collect();
@@ -100,8 +120,70 @@ fn is_explained(signatures: &Library, normal: &Normal, by: &[usize], form: usize
             return false;
         };
         let square = normal.gram[(*column, *column)];
-        let left = square - normal.explained_square(*column, by);
+        let left = left(*column);
         let most = parameter.low.abs().max(parameter.high.abs()) / parameter.typical;
         left < ROUNDING_SHARE * square || left.max(0.0).sqrt() * most < MIN_D_EXCITED
     })
+}
+
+/// What other columns leave of the square of a column.
+fn left_of(normal: &Normal, by: &[usize], column: usize) -> f64 {
+    normal.gram[(column, column)] - normal.explained_square(column, by)
+}
+
+/// What every function of the target leaves of the square of a column.
+fn left_of_any_form(form: &DMatrix<f64>, column: &DVector<f64>) -> f64 {
+    column.norm_squared() - form.tr_mul(column).norm_squared()
+}
+
+/// Unit columns that span every function of the target along the one axis that was read, whitened; none of a recording of several
+/// axes or channels.
+fn any_form(stack: &Stack<'_>) -> Option<DMatrix<f64>> {
+    let mut coarse = Axis::LINEAR.into_iter();
+    let axis = coarse.find(|axis| resolved::is_coarse(stack, *axis))?;
+    let channel = &stack.rows.blocks.first()?.channel;
+    if stack
+        .rows
+        .blocks
+        .iter()
+        .any(|block| block.channel != *channel)
+    {
+        return None;
+    }
+    let targets = resolved::targets(stack, axis)?;
+    if targets.len() > MOST_TARGETS {
+        return None;
+    }
+    let columns: Vec<DVector<f64>> = { targets.iter() }
+        .map(|rows| {
+            let mut column = vec![0.0; stack.rows.len];
+            for row in rows {
+                column[*row] = 1.0;
+            }
+            stack.whitened(column)
+        })
+        .collect();
+    Some(unit_span(&columns))
+}
+
+/// Unit columns of the span of some columns.
+fn unit_span(columns: &[DVector<f64>]) -> DMatrix<f64> {
+    let mut units: Vec<DVector<f64>> = vec![];
+    for column in columns {
+        let mut rest = column.clone();
+        // Twice, for the rounding of the first time.
+        for _ in 0..2 {
+            for unit in &units {
+                rest -= unit * unit.dot(&rest);
+            }
+        }
+        let norm = rest.norm();
+        if norm > LEAST_NORM_SHARE * column.norm() && norm > 0.0 {
+            units.push(rest / norm);
+        }
+    }
+    if units.is_empty() {
+        return DMatrix::zeros(columns.first().map_or(0, DVector::len), 0);
+    }
+    DMatrix::from_columns(&units)
 }

@@ -67,6 +67,8 @@ pub struct FormError {
 
 /// Most jumps of one block; the greatest are kept.
 const MOST_EDGES: usize = 48;
+/// Repeats that differ by less are the same reading, mm.
+const SAME_VALUE_MM: f64 = 1e-7;
 
 impl FormError {
     /// Before any effect was found.
@@ -203,6 +205,26 @@ pub fn alike(session: &Session, rows: &Rows) -> Vec<Vec<usize>> {
     };
     let groups = repeats::groups(session, rows).into_iter();
     groups.filter(is_alike).collect()
+}
+
+/// Whether an instrument rounds repeats to the same values in half of the rows or more: what it rounds off is then common to them,
+/// as an error of form is, and no noise of their mean.
+pub fn is_rounded_alike(stack: &Stack<'_>) -> bool {
+    let (mut same, mut all) = (0, 0);
+    for group in alike(stack.session, &stack.rows) {
+        let ranges: Vec<_> = { group.iter() }
+            .map(|block| stack.rows.blocks[*block].range())
+            .collect();
+        for k in 0..ranges[0].len() {
+            let values = ranges.iter().map(|range| stack.raw[range.start + k]);
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+                (low.min(v), high.max(v))
+            });
+            same += usize::from(high - low < SAME_VALUE_MM);
+            all += 1;
+        }
+    }
+    2 * same > all
 }
 
 /// In how many blocks of a stack each touch is repeated.

@@ -86,6 +86,22 @@ pub fn extent_mm(stack: &Stack<'_>, axis: Axis) -> Option<[f64; 2]> {
     Some([*places.first()?, *places.last()?])
 }
 
+/// Rows of each target along an axis, by its place: readings nearer than a share of a lead are of one target.
+pub fn targets(stack: &Stack<'_>, axis: Axis) -> Option<Vec<Vec<usize>>> {
+    let lead_mm = stack.twin.machine().linear(axis)?.lead_mm;
+    let mut placed: Vec<(f64, usize)> = vec![];
+    for block in &stack.rows.blocks {
+        let run = &stack.session.runs[block.run];
+        let rows = block.rows.iter().zip(block.range());
+        placed.extend(rows.map(|(row, place)| (position(run, row, axis), place)));
+    }
+    placed.retain(|(at_mm, _)| at_mm.is_finite());
+    placed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let is_one = |a: &(f64, usize), b: &(f64, usize)| b.0 - a.0 < ONE_PLACE * lead_mm;
+    let rows = |target: &[(f64, usize)]| target.iter().map(|(_, row)| *row).collect();
+    Some(placed.chunk_by(is_one).map(rows).collect())
+}
+
 /// The period along an axis, mm; none of what has no period.
 fn period_mm(stack: &Stack<'_>, instance: &Instance, axis: Axis, values: &[f64]) -> Option<f64> {
     let parameters = instance.kind.parameters.iter().zip(values);

@@ -13,7 +13,7 @@ use crate::judgement::cause::{self, Found, Member, Scope};
 use crate::judgement::guard;
 use crate::judgement::unknown::{self, Leftover};
 use crate::noise::Noise;
-use crate::noise::form_error::FormError;
+use crate::noise::form_error::{self, FormError};
 use crate::noise::stack::{Simulated, Stack};
 use crate::scatter::{self, Scattered};
 use crate::search::families::{self, Slot};
@@ -51,7 +51,8 @@ impl<'a> Base<'a> {
         let stack = self.stack(&fitted, self.noise, &FormError::base(config));
         self.floats = thermal_floats::of(&stack);
         let mut axes = Axis::LINEAR.into_iter();
-        self.is_of_targets = axes.any(|axis| resolved::is_coarse(&stack, axis));
+        let is_coarse = axes.any(|axis| resolved::is_coarse(&stack, axis));
+        self.is_of_targets = is_coarse && !form_error::is_rounded_alike(&stack);
         self
     }
 
