@@ -186,7 +186,8 @@ fn checks(
             MOST_CANCELLING * (before - after),
         );
         checks.push(Check::new(CheckId::NotCancelled, own <= most).with(own, most));
-        if !is_closed {
+        // A curve through targets is any shape itself.
+        if !is_closed && !signatures.curves.contains(&instance) {
             checks.push(beside_shapes(scope, signatures, best, place));
         }
         let is_shared = signatures.set_aside_for(instance).next().is_some();
