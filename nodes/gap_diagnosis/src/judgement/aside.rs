@@ -2,7 +2,7 @@
 //!
 //! # Model
 //!
-//! Where an axis was read at targets alone (`resolved::is_coarse`), positioning is the error at the point that is read. What
+//! Where nothing but positions along axes was read, positioning is the error at the point that is read. What
 //! an arm makes of an angle, or a bow of a guide, is a sum of such errors where all readings have one arm: its columns J_g lie
 //! in the span of those of scale and pitch, H, up to
 //!
@@ -48,8 +48,11 @@ pub fn set_aside(
     signatures: &Library,
     normal: &Normal,
 ) -> BTreeMap<usize, Vec<usize>> {
+    if !resolved::is_along_axes(stack) {
+        return BTreeMap::new();
+    }
     let direct: Vec<usize> = (0..signatures.forms.len())
-        .filter(|form| is_direct(stack, signatures, *form))
+        .filter(|form| is_direct(signatures, *form))
         .collect();
     if direct.is_empty() {
         return BTreeMap::new();
@@ -97,11 +100,9 @@ pub fn set_aside(
     aside
 }
 
-fn is_direct(stack: &Stack<'_>, signatures: &Library, form: usize) -> bool {
+fn is_direct(signatures: &Library, form: usize) -> bool {
     let instance = &signatures.instances[signatures.forms[form].instance];
-    let is_coarse = |axis: Axis| resolved::is_coarse(stack, axis);
-    let own = instance.target.clone();
-    DIRECT.contains(&instance.kind.id) && matches!(own, Target::Axis(axis) if is_coarse(axis))
+    DIRECT.contains(&instance.kind.id) && matches!(instance.target, Target::Axis(_))
 }
 
 /// (1), with what is left of the square of a column.

@@ -60,14 +60,7 @@ pub fn shows(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bool {
 /// Whether an axis was read at some targets only, which resolve no turn of its screw, and nothing but positions along axes was
 /// read: its errors between them are unknown, and a curve of any form goes through them.
 pub fn is_coarse(stack: &Stack<'_>, axis: Axis) -> bool {
-    let mut blocks = stack.rows.blocks.iter();
-    let is_along = |channel: &Channel| {
-        matches!(
-            channel,
-            Channel::Length(_) | Channel::Scale(_) | Channel::Motor(_)
-        )
-    };
-    if !blocks.all(|block| is_along(&block.channel)) {
+    if !is_along_axes(stack) {
         return false;
     }
     let Some(linear) = stack.twin.machine().linear(axis) else {
@@ -78,6 +71,18 @@ pub fn is_coarse(stack: &Stack<'_>, axis: Axis) -> bool {
     let is_resolved = resolves(&places, linear.lead_mm);
     places.dedup_by(|next, kept| *next - *kept < ONE_PLACE * linear.lead_mm);
     is_read && !is_resolved && places.len() >= FEWEST_TARGETS
+}
+
+/// Whether nothing but positions along axes was read.
+pub fn is_along_axes(stack: &Stack<'_>) -> bool {
+    let is_along = |channel: &Channel| {
+        matches!(
+            channel,
+            Channel::Length(_) | Channel::Scale(_) | Channel::Motor(_)
+        )
+    };
+    let mut blocks = stack.rows.blocks.iter();
+    blocks.all(|block| is_along(&block.channel))
 }
 
 /// The least and the greatest place at which an axis was read, mm.

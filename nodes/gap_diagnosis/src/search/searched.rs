@@ -113,7 +113,12 @@ impl<'a> Base<'a> {
         };
         let noise: BTreeMap<Channel, Noise> = self.noise.iter().map(scaled).collect();
         let listed = listed.unwrap_or_else(|| vec![0.0; told.len()]);
-        let formed = first.of_their_own_form();
+        // Rounded alike, repeats do not show the form.
+        let formed = if self.is_of_targets {
+            first.of_their_own_form()
+        } else {
+            told
+        };
         let form = FormError::beside(&first.stack, &listed, &formed, config);
         let stack = self.stack(runs, &noise, &form).sharing(&simulated);
         let second = self.search(stack, &noise, kinds, config);
