@@ -140,8 +140,8 @@ fn left_of_any_form(form: &DMatrix<f64>, column: &DVector<f64>) -> f64 {
 /// Unit columns that span every function of the target along the one axis that was read, whitened; none of a recording of several
 /// axes or channels.
 fn any_form(stack: &Stack<'_>) -> Option<DMatrix<f64>> {
-    let mut coarse = Axis::LINEAR.into_iter();
-    let axis = coarse.find(|axis| resolved::is_coarse(stack, *axis))?;
+    let mut axes = Axis::LINEAR.into_iter();
+    let axis = axes.find(|axis| resolved::is_at_targets(stack, *axis))?;
     let channel = &stack.rows.blocks.first()?.channel;
     if stack
         .rows

@@ -28,7 +28,7 @@ use twin::Channel;
 use twin::effects::{Role, Target};
 
 use crate::noise::stack::Stack;
-use crate::search::rows::{count, position};
+use crate::search::rows::{Block, count, position};
 use crate::search::signature::Instance;
 
 /// Places nearer than this share of a period are one.
@@ -37,8 +37,8 @@ const ONE_PLACE: f64 = 0.02;
 const CLOSE: f64 = 0.45;
 /// So many close neighbours resolve a period.
 const ENOUGH_CLOSE: usize = 16;
-/// With fewer places than this a curve of any form fits as well as a wave.
-const FEWEST_PLACES: usize = 24;
+/// With fewer places than this a curve of any form (17 heights) fits as well as a wave.
+const FEWEST_PLACES: usize = 40;
 /// A curve needs so many targets.
 const FEWEST_TARGETS: usize = 5;
 /// (1) from which two frequencies look alike at the places.
@@ -71,6 +71,19 @@ pub fn is_coarse(stack: &Stack<'_>, axis: Axis) -> bool {
     let is_resolved = resolves(&places, linear.lead_mm);
     places.dedup_by(|next, kept| *next - *kept < ONE_PLACE * linear.lead_mm);
     is_read && !is_resolved && places.len() >= FEWEST_TARGETS
+}
+
+/// Whether an axis was read at targets, and nothing but positions along axes: far apart (`is_coarse`), or where it stood still. A
+/// curve of any form goes through them.
+pub fn is_at_targets(stack: &Stack<'_>, axis: Axis) -> bool {
+    if is_coarse(stack, axis) {
+        return true;
+    }
+    let run = |block: &Block| &stack.session.runs[block.run];
+    let mut blocks = stack.rows.blocks.iter();
+    is_along_axes(stack)
+        && blocks.all(|block| run(block).segment.stations > 0)
+        && targets(stack, axis).is_some_and(|targets| targets.len() >= FEWEST_TARGETS)
 }
 
 /// Whether nothing but positions along axes was read.

@@ -51,8 +51,8 @@ impl<'a> Base<'a> {
         let stack = self.stack(&fitted, self.noise, &FormError::base(config));
         self.floats = thermal_floats::of(&stack);
         let mut axes = Axis::LINEAR.into_iter();
-        let is_coarse = axes.any(|axis| resolved::is_coarse(&stack, axis));
-        self.is_of_targets = is_coarse && !form_error::is_rounded_alike(&stack);
+        let is_of_targets = axes.any(|axis| resolved::is_at_targets(&stack, axis));
+        self.is_of_targets = is_of_targets && !form_error::is_rounded_alike(&stack);
         self
     }
 
@@ -233,7 +233,7 @@ impl Searched<'_> {
         let has_form = |member: &&Member| {
             let instance = self.found.instance(member);
             !OF_TARGETS.contains(&instance.kind.id)
-                || widening::coarse_axis(&self.stack, instance).is_none()
+                || widening::axis_at_targets(&self.stack, instance).is_none()
         };
         let members = self.found.members.iter().filter(has_form);
         told(&self.stack, members, &self.found)

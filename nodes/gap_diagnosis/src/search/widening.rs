@@ -86,7 +86,7 @@ const ENDS: [&str; 2] = ["free_from_mm", "free_to_mm"];
 /// Values of an instance whose curve along its axis is over the targets, where the axis was read at targets only: any form that
 /// they show is a curve over their own extent, however short a part of the travel that is.
 fn through_targets(stack: &Stack<'_>, instance: &Instance, mut values: Vec<f64>) -> Vec<f64> {
-    let Some(axis) = coarse_axis(stack, instance) else {
+    let Some(axis) = axis_at_targets(stack, instance) else {
         return values;
     };
     let Some([low_mm, high_mm]) = resolved::extent_mm(stack, axis) else {
@@ -103,19 +103,20 @@ fn through_targets(stack: &Stack<'_>, instance: &Instance, mut values: Vec<f64>)
     values
 }
 
-/// The axis that an instance acts on, where it was read at some targets only.
-pub fn coarse_axis(stack: &Stack<'_>, instance: &Instance) -> Option<Axis> {
+/// The axis that an instance acts on, where it was read at targets only.
+pub fn axis_at_targets(stack: &Stack<'_>, instance: &Instance) -> Option<Axis> {
     let Target::Axis(axis) = instance.target else {
         return None;
     };
-    resolved::is_coarse(stack, axis).then_some(axis)
+    resolved::is_at_targets(stack, axis).then_some(axis)
 }
 
-/// Adds the curve of any form to the pitch error of every axis that was read at some targets only. Its plain curve may be
+/// Adds the curve of any form to the pitch error of every axis that was read at targets only. Its plain curve may be
 /// absent from the error that the targets show alike upwards and downwards.
 pub fn widen_curves(stack: &Stack<'_>, signatures: &mut Library) {
-    let is_curve =
-        |instance: &Instance| instance.kind.id == CURVE && coarse_axis(stack, instance).is_some();
+    let is_curve = |instance: &Instance| {
+        instance.kind.id == CURVE && axis_at_targets(stack, instance).is_some()
+    };
     let curves: Vec<usize> = (0..signatures.instances.len())
         .filter(|place| is_curve(&signatures.instances[*place]))
         .collect();
