@@ -227,6 +227,7 @@ fn doubt_forms(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) 
         .map(|place| members[*place].estimate.clone())
         .collect();
     form_doubt::widen(stack, signatures, &forms, &mut estimates);
+    form_doubt::round(stack, signatures, &forms, &mut estimates);
     for (place, estimate) in places.into_iter().zip(estimates) {
         members[place].estimate = estimate;
     }

@@ -11,6 +11,13 @@
 //!
 //! with v and u value and standard uncertainty, n the catalogue's form and w the wide one.
 //!
+//! An instrument that rounds repeats to the same values, in steps of q, hides what it rounds off. It may be common to all that
+//! the effect moves, by c for each unit of its size (root mean square):
+//!
+//! ```text
+//!   u2 = u2 + (q / (sqrt 12 c))2                                          (2)
+//! ```
+//!
 //! # Holds when
 //! The wide form reaches the machine's own: what neither form shows stays out of the interval.
 //!
@@ -18,10 +25,12 @@
 //! \[1\] J. A. Hausman, Econometrica 46, 1978 (the variance of a difference of two estimates, one efficient).
 
 use nalgebra::DVector;
-use twin::effects::Role;
+use twin::effects::{Parameter, Role};
 
+use crate::noise::form_error;
 use crate::noise::stack::Stack;
 use crate::search::refit::{self, Estimate};
+use crate::search::rows::count;
 use crate::search::signature::{Form, Library};
 
 /// Coverage factor of the intervals.
@@ -46,6 +55,39 @@ pub fn widen(stack: &Stack<'_>, signatures: &Library, forms: &[&Form], estimates
             .collect();
         let refit = refit::joint(stack, signatures, &all, &sizes);
         doubt(&mut estimates[place], &refit.estimates[place]);
+    }
+}
+
+/// (2) for every amplitude.
+pub fn round(stack: &Stack<'_>, signatures: &Library, forms: &[&Form], estimates: &mut [Estimate]) {
+    let step_mm = form_error::rounding_step_mm(stack).unwrap_or(0.0);
+    if step_mm <= 0.0 {
+        return;
+    }
+    for (form, estimate) in forms.iter().zip(estimates) {
+        let instance = &signatures.instances[form.instance];
+        let all: Vec<&Parameter> = { instance.kind.parameters.iter() }
+            .chain(instance.kind.free)
+            .collect();
+        for place in estimate.active.clone() {
+            let Some(parameter) = all.get(place).filter(|p| p.role == Role::Amplitude) else {
+                continue;
+            };
+            let mut on = form.values.clone();
+            on[place] = parameter.typical;
+            let rows = stack.simulate(&[&*instance.effect(&on)]);
+            let moved: Vec<f64> = rows.into_iter().filter(|mm| *mm != 0.0).collect();
+            let squares_mm2: f64 = moved.iter().map(|mm| mm * mm).sum();
+            if squares_mm2 <= 0.0 {
+                continue;
+            }
+            let rms_mm = (squares_mm2 / count(moved.len())).sqrt();
+            let u = step_mm / 12_f64.sqrt() * parameter.typical / rms_mm;
+            let half = 0.5 * (estimate.high[place] - estimate.low[place]);
+            let by = half.hypot(COVERAGE * u);
+            estimate.low[place] = estimate.values[place] - by;
+            estimate.high[place] = estimate.values[place] + by;
+        }
     }
 }
 

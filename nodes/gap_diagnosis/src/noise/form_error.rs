@@ -207,10 +207,10 @@ pub fn alike(session: &Session, rows: &Rows) -> Vec<Vec<usize>> {
     groups.filter(is_alike).collect()
 }
 
-/// Whether an instrument rounds repeats to the same values in half of the rows or more: what it rounds off is then common to them,
-/// as an error of form is, and no noise of their mean.
-pub fn is_rounded_alike(stack: &Stack<'_>) -> bool {
-    let (mut same, mut all) = (0, 0);
+/// The step of an instrument that rounds repeats to the same values in more than half of the rows, mm; zero where all are the same.
+/// What it rounds off is then common to them, as an error of form is, and no noise of their mean.
+pub fn rounding_step_mm(stack: &Stack<'_>) -> Option<f64> {
+    let mut spreads_mm = vec![];
     for group in alike(stack.session, &stack.rows) {
         let ranges: Vec<_> = { group.iter() }
             .map(|block| stack.rows.blocks[*block].range())
@@ -220,11 +220,13 @@ pub fn is_rounded_alike(stack: &Stack<'_>) -> bool {
             let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
                 (low.min(v), high.max(v))
             });
-            same += usize::from(high - low < SAME_VALUE_MM);
-            all += 1;
+            spreads_mm.push(high - low);
         }
     }
-    2 * same > all
+    let apart = spreads_mm.iter().filter(|spread| **spread >= SAME_VALUE_MM);
+    let step_mm = apart.clone().copied().fold(f64::INFINITY, f64::min);
+    let is_rounded = 2 * apart.count() < spreads_mm.len();
+    is_rounded.then_some(if step_mm.is_finite() { step_mm } else { 0.0 })
 }
 
 /// In how many blocks of a stack each touch is repeated.

@@ -52,7 +52,7 @@ impl<'a> Base<'a> {
         self.floats = thermal_floats::of(&stack);
         let mut axes = Axis::LINEAR.into_iter();
         let is_of_targets = axes.any(|axis| resolved::is_at_targets(&stack, axis));
-        self.is_of_targets = is_of_targets && !form_error::is_rounded_alike(&stack);
+        self.is_of_targets = is_of_targets && form_error::rounding_step_mm(&stack).is_none();
         self
     }
 
